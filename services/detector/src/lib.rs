@@ -1,0 +1,1 @@
+//! Detects any deviation from nominal behaviour.

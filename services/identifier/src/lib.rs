@@ -1,0 +1,1 @@
+//! Identifies the fault.

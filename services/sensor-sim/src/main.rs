@@ -1,0 +1,2 @@
+//! The simulated rover, and playback of recorded frames.
+fn main() {}

@@ -1,0 +1,2 @@
+//! Decides what to do about a fault.
+fn main() {}

@@ -1,0 +1,112 @@
+//! The supervisor's decision: what to do.
+
+use crate::block::block;
+use crate::{Cause, Header};
+
+/// Capacity of the decision model's states.
+pub const DECISION_STATES: usize = 64;
+/// Capacity of the decision model's actions.
+pub const DECISION_ACTIONS: usize = 32;
+
+block! {
+    /// Written by the supervisor every cycle; valid until `valid_until_ns`.
+    pub struct Action, size 984 {
+        /// Common header.
+        pub header: Header,
+        /// The journal entry behind this decision.
+        pub cause: Cause,
+        /// Run of the frame.
+        pub run_id: u64,
+        /// Counts decisions: rises when `action` or its parameters change. From 1.
+        pub decision_seq: u64,
+        /// `CLOCK_MONOTONIC` ns after which the robot must no longer obey this block, but stop.
+        pub valid_until_ns: u64,
+        /// Hash of the decision model that gives states and actions their meaning.
+        pub model_hash: u64,
+        /// Belief over the decision model's states.
+        pub belief: [f64; DECISION_STATES],
+        /// Value (or votes) of each action under the policy.
+        pub value: [f64; DECISION_ACTIONS],
+        /// Entropy of the belief, normalised to 0..1.
+        pub entropy: f64,
+        /// Value of the chosen action minus the runner-up's.
+        pub margin: f64,
+        /// Natural logarithm of the probability of the last evidence under the belief.
+        pub log_evidence: f64,
+        /// Speed factor to apply, 0..1.
+        pub speed_scale: f64,
+        /// Curvature to command: `curvature_gain * curvature + curvature_offset`.
+        pub curvature_gain: f64,
+        /// See `curvature_gain`; 1/m.
+        pub curvature_offset: f64,
+        /// Index of the chosen action in the decision model.
+        pub action: u32,
+        /// What the robot is to do: a [`RecoveryKind`].
+        pub kind: u32,
+        /// Wheel that the action is about; `u32::MAX` for none.
+        pub wheel: u32,
+        /// How the action was chosen: a [`ControlMode`].
+        pub control_mode: u32,
+        /// States in use.
+        pub state_count: u32,
+        /// Actions in use.
+        pub action_count: u32,
+        /// Observations that were impossible under the belief so far.
+        pub impossible_count: u32,
+        /// Bit 0: identifier lost; bit 1: detector lost.
+        pub lost_stages: u32,
+        /// Reserved, zero.
+        pub reserved: [u64; 4],
+    }
+}
+
+/// What the robot is to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum RecoveryKind {
+    /// Nothing decided: the robot stops.
+    None = 0,
+    /// Drive as planned.
+    GoOn = 1,
+    /// Drive as planned, slower.
+    SlowDown = 2,
+    /// Stop.
+    Stop = 3,
+    /// Counter-steer against a dragging wheel.
+    Compensate = 4,
+    /// Drive on without trusting one wheel's encoder.
+    IgnoreEncoder = 5,
+    /// Stop and call for help.
+    CallForHelp = 6,
+}
+
+impl RecoveryKind {
+    /// The kind behind a block's `kind`, if this version knows it.
+    #[must_use]
+    pub const fn from_wire(value: u32) -> Option<Self> {
+        Some(match value {
+            0 => Self::None,
+            1 => Self::GoOn,
+            2 => Self::SlowDown,
+            3 => Self::Stop,
+            4 => Self::Compensate,
+            5 => Self::IgnoreEncoder,
+            6 => Self::CallForHelp,
+            _ => return None,
+        })
+    }
+}
+
+/// How an action was chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum ControlMode {
+    /// By the policy, from a belief with fresh evidence.
+    Policy = 1,
+    /// To gather information (dual control).
+    Dual = 2,
+    /// From the detector's belief alone, because the identifier is lost.
+    Fallback = 3,
+    /// By rule, because no usable belief is left: stop.
+    Safe = 4,
+}

@@ -1,0 +1,34 @@
+//! Commands from the operator.
+
+use crate::Header;
+use crate::block::block;
+
+block! {
+    /// Written by the operator's tool; refused unless the configuration permits it.
+    pub struct Control, size 96 {
+        /// Common header.
+        pub header: Header,
+        /// A [`ControlCommand`].
+        pub command: u32,
+        /// Fault to inject or clear: a kind code of the robot's faults.
+        pub fault: u32,
+        /// Wheel, by index in the robot's description; `u32::MAX` for all.
+        pub wheel: u32,
+        /// Reserved, zero.
+        pub reserved: u32,
+        /// Parameters of the fault.
+        pub parameter: [f64; 4],
+    }
+}
+
+/// What a [`Control`] block asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum ControlCommand {
+    /// Inject a fault.
+    Inject = 1,
+    /// Remove a fault.
+    Clear = 2,
+    /// Reset the filters.
+    Reset = 3,
+}

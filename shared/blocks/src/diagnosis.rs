@@ -1,0 +1,71 @@
+//! The identifier's belief: what is wrong?
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::block::block;
+use crate::{Cause, Header};
+
+/// Capacity of nodes of the fault tree.
+pub const FAULT_NODES: usize = 64;
+/// Capacity of reported fault sets.
+pub const FAULT_SETS: usize = 8;
+/// [`FaultBelief::mode`] when no known fault explains the data.
+pub const MODE_UNKNOWN: u32 = 1000;
+/// [`FaultBelief::mode`] when two or more faults are present.
+pub const MODE_MULTIPLE: u32 = 1001;
+
+/// A set of leaves of the fault tree and its probability.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct FaultSet {
+    /// Bit i: node i of the tree (always a leaf) is in the set; 0 is the nominal mode.
+    pub leaves: u64,
+    /// Probability that exactly this set is present.
+    pub p: f64,
+}
+
+block! {
+    /// Written by the identifier every cycle. Before an alarm it reports nominal with
+    /// probability 1 - p_fault and the rest as unknown.
+    pub struct FaultBelief, size 1312 {
+        /// Common header.
+        pub header: Header,
+        /// The journal entry behind this belief.
+        pub cause: Cause,
+        /// Run of the frame.
+        pub run_id: u64,
+        /// Hash of the fault tree that gives the nodes their meaning.
+        pub tree_hash: u64,
+        /// Probability of each node: a leaf's own, an abstract node's sum of its children.
+        /// Node 0 is nominal.
+        pub p: [f64; FAULT_NODES],
+        /// The same before this cycle's data: prediction from the last cycle.
+        pub p_predicted: [f64; FAULT_NODES],
+        /// Probability that no modelled fault explains the data.
+        pub p_unknown: f64,
+        /// The same before this cycle's data.
+        pub p_unknown_predicted: f64,
+        /// Most probable sets of leaves, in falling order.
+        pub sets: [FaultSet; FAULT_SETS],
+        /// Entropy of the distribution over leaves and unknown, nats.
+        pub entropy: f64,
+        /// Probability of `mode`.
+        pub p_mode: f64,
+        /// Capture time of the frame that raised the alarm, ns; 0 before an alarm.
+        pub alarm_t_capture_ns: u64,
+        /// Most probable onset of the most probable fault, capture time ns; 0 if none.
+        pub onset_t_capture_ns: u64,
+        /// Reported mode: a node's index, [`MODE_UNKNOWN`] or [`MODE_MULTIPLE`].
+        pub mode: u32,
+        /// Changes of `mode` so far.
+        pub mode_change_count: u32,
+        /// Nodes in use.
+        pub node_count: u32,
+        /// Sets in use.
+        pub set_count: u32,
+        /// 1 while identifying (an alarm stands or a fault is believed), 0 while watching.
+        pub identifying: u32,
+        /// Steps that met impossible or non-finite evidence and kept the prediction.
+        pub degenerate_count: u32,
+    }
+}

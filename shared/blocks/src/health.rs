@@ -1,0 +1,163 @@
+//! What each service says about itself.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::Header;
+use crate::block::block;
+
+/// Capacity of the ring of recent events in a [`Health`] block.
+pub const EVENTS: usize = 32;
+
+/// Something worth telling a person. `what` is an index whose meaning depends on `kind`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct Event {
+    /// When, `CLOCK_MONOTONIC` ns.
+    pub t_ns: u64,
+    /// An [`EventKind`].
+    pub kind: u32,
+    /// See [`EventKind`].
+    pub what: u32,
+    /// Probability, where the event has one; else 0.
+    pub p: f64,
+    /// See [`EventKind`].
+    pub value: u64,
+}
+
+/// Kind of an [`Event`], and the meaning of its `what` and `value`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum EventKind {
+    /// The drive begins: every stage answers. `value`: the sensor's sequence number.
+    Ready = 1,
+    /// A fault was injected. `what`: index of the injection among those asked for.
+    Injected = 2,
+    /// A fault was removed by injection. `what`: as above.
+    Restored = 3,
+    /// The detector's alarm rose.
+    Alarm = 4,
+    /// The detector's alarm fell, or the identifier is back at nominal.
+    Cleared = 5,
+    /// A diagnosis. `what`: node of the fault tree, or one of the `MODE_*`; `value`: leaves of
+    /// the most probable fault set as bits.
+    Diagnosis = 6,
+    /// A decision. `what`: action of the decision model; `value`: the action's wheel.
+    Action = 7,
+    /// Deadlines missed. `value`: how many in a row.
+    Miss = 8,
+    /// An input is lost. `what`: 0 sensor, 1 detection, 2 diagnosis, 3 action.
+    InputLost = 9,
+    /// The input is back. `what`: as above.
+    InputBack = 10,
+    /// The robot stops itself: no valid action.
+    SafeStop = 11,
+    /// The robot obeys actions again.
+    SafeStopEnds = 12,
+    /// A control command was refused. `what`: a reason of the service.
+    Refused = 13,
+    /// A new run began. `value`: its id.
+    Run = 14,
+    /// Recorded frames are at their end.
+    EndOfRecording = 15,
+}
+
+impl EventKind {
+    /// The kind behind an event's `kind`, if this version knows it.
+    #[must_use]
+    pub const fn from_wire(value: u32) -> Option<Self> {
+        Some(match value {
+            1 => Self::Ready,
+            2 => Self::Injected,
+            3 => Self::Restored,
+            4 => Self::Alarm,
+            5 => Self::Cleared,
+            6 => Self::Diagnosis,
+            7 => Self::Action,
+            8 => Self::Miss,
+            9 => Self::InputLost,
+            10 => Self::InputBack,
+            11 => Self::SafeStop,
+            12 => Self::SafeStopEnds,
+            13 => Self::Refused,
+            14 => Self::Run,
+            15 => Self::EndOfRecording,
+            _ => return None,
+        })
+    }
+}
+
+block! {
+    /// Written by each service, at about 20 Hz and at once when something happens.
+    pub struct Health, size 1248 {
+        /// Common header.
+        pub header: Header,
+        /// Cycles done: blocks published, or frames for the source.
+        pub cycles: u64,
+        /// Scheduled cycles whose deadline passed before the block was out.
+        pub missed: u64,
+        /// Schedule instants that the source slept through.
+        pub slips: u64,
+        /// Input blocks that never arrived, by gaps of their sequence numbers.
+        pub lost: u64,
+        /// Input blocks that arrived after their deadline.
+        pub late: u64,
+        /// Input blocks that arrived twice.
+        pub duplicate: u64,
+        /// Input blocks refused: wrong schema, impossible time stamps, non-finite data.
+        pub invalid: u64,
+        /// Longest time from wake-up to publication, ns.
+        pub worst_cycle_ns: u64,
+        /// Sequence number of that cycle.
+        pub worst_cycle_seq: u64,
+        /// Last time from wake-up to publication, ns.
+        pub last_cycle_ns: u64,
+        /// Period of the schedule, ns.
+        pub period_ns: u64,
+        /// Deadline after the schedule, ns.
+        pub deadline_ns: u64,
+        /// Schedule instant of the service's first and last accounted cycle, ns.
+        pub accounted_ns: [u64; 2],
+        /// A [`ServiceState`].
+        pub state: u32,
+        /// Core that was asked for.
+        pub core_wanted: u32,
+        /// Core that the kernel reported in the last check.
+        pub core: u32,
+        /// Scheduling policy read back (`SCHED_FIFO` is 1, `SCHED_OTHER` 0).
+        pub policy: u32,
+        /// Priority read back.
+        pub priority: u32,
+        /// 1 if all memory is locked.
+        pub memory_locked: u32,
+        /// Process id.
+        pub pid: u32,
+        /// 1 if in degraded mode: an input is lost or a budget was cut.
+        pub degraded: u32,
+        /// Sequence number of the last control command handled, and the writer's epoch.
+        pub control_seq: u64,
+        /// Epoch of the writer of that command.
+        pub control_epoch: u64,
+        /// 1 done, 2 refused, 0 none yet.
+        pub control_result: u32,
+        /// Last checkpoint passed in the cycle: 1 woken, 2 input taken, 3 stepped, 4 published.
+        pub checkpoint: u32,
+        /// Events so far; event number n is at `events[n % EVENTS]`.
+        pub event_count: u64,
+        /// Recent events.
+        pub events: [Event; EVENTS],
+    }
+}
+
+/// Life of a service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum ServiceState {
+    /// Opening ports, warming up.
+    Starting = 1,
+    /// Ports are open; no input yet.
+    Ready = 2,
+    /// Cycling.
+    Running = 3,
+    /// Told to stop, and stopping.
+    Stopping = 4,
+}

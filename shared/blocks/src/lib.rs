@@ -1,0 +1,40 @@
+//! Wire blocks of the Vigil graph.
+//!
+//! Every block is a fixed-size `#[repr(C)]` struct of plain integers and floats, natural alignment
+//! (at most 8 bytes), no padding: it is written in place in shared memory and read in place by
+//! any process, in Rust, C or Python. Nothing here has behaviour beyond reading a field.
+//!
+//! Units are SI, angles radians, times `CLOCK_MONOTONIC` nanoseconds; frames follow REP-103 and
+//! REP-105 (x forward, y left, yaw counter-clockwise; poses in a continuous frame such as `odom`).
+//!
+//! | block | written by | says |
+//! |---|---|---|
+//! | [`SensorFrame`] | sensor-sim or an external publisher | what the robot measured and did |
+//! | [`DetectionBelief`] | detector | is something wrong? |
+//! | [`ParticleBlock`] | detector, identifier | the filter's particles |
+//! | [`FaultBelief`] | identifier | what is wrong? |
+//! | [`Action`] | supervisor | what to do about it |
+//! | [`Health`] | each service | cycle, deadline and input accounting, recent events |
+//! | [`Control`] | operator's tool | inject, clear, reset |
+
+mod action;
+mod block;
+mod control;
+mod detection;
+mod diagnosis;
+mod header;
+mod health;
+mod journal;
+mod particles;
+mod sensor;
+
+pub use action::{Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind};
+pub use block::{Block, fnv1a};
+pub use control::{Control, ControlCommand};
+pub use detection::{CHANNELS, Channel, DetectionBelief};
+pub use diagnosis::{FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_MULTIPLE, MODE_UNKNOWN};
+pub use header::{Cause, CauseKind, Header};
+pub use health::{EVENTS, Event, EventKind, Health, ServiceState};
+pub use journal::Entry;
+pub use particles::{PARTICLE_CAPACITY, ParticleBlock};
+pub use sensor::{ActionOutcome, COMMANDS, SensorFrame, Symptoms, Valid, WHEELS};

@@ -1,0 +1,1 @@
+//! Real-time cycle: clock, placement, deadlines, histograms, ports.

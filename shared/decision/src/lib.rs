@@ -1,0 +1,1 @@
+//! POMDP models, solvers, policies and belief tracking.

@@ -1,0 +1,1 @@
+//! Data sets, learning of models, scoring.

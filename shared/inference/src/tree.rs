@@ -1,0 +1,108 @@
+//! The fault tree: nominal mode, abstract nodes, leaves.
+
+use vigil_blocks::{FAULT_NODES, fnv1a};
+
+/// One node of a [`FaultTree`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Node {
+    /// Name, as reported (`RM_STUCK`, `RSS`).
+    pub name: String,
+    /// Index of the parent; `None` for the nominal mode and for children of the root.
+    pub parent: Option<usize>,
+    /// For a leaf: the fault that it stands for, in the words of the robot's model
+    /// (`stuck:RM`, `encoder:RM`). `None` for nominal and abstract nodes.
+    pub fault: Option<String>,
+}
+
+/// A fault tree. Node 0 is the nominal mode; every other node is an abstract node or a leaf;
+/// parents come before their children.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FaultTree {
+    nodes: Vec<Node>,
+    hash: u64,
+}
+
+/// Why a fault tree was refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TreeError {
+    /// More nodes than a block can carry, or none.
+    #[error("a fault tree has 1 to {FAULT_NODES} nodes, not {0}")]
+    Size(usize),
+    /// Two nodes have one name.
+    #[error("node '{0}' appears twice")]
+    Duplicate(String),
+    /// The first node must be the nominal mode: no parent, no fault.
+    #[error("the first node must be the nominal mode, without parent and fault")]
+    Nominal,
+    /// A parent does not come before its child, or is a leaf or the nominal mode.
+    #[error("the parent of '{0}' must be an abstract node listed before it")]
+    Parent(String),
+    /// A node has neither a fault nor children.
+    #[error("node '{0}' has neither a fault nor children")]
+    Empty(String),
+}
+
+impl FaultTree {
+    /// Checks and builds a tree.
+    ///
+    /// # Errors
+    /// [`TreeError`] naming the node.
+    pub fn new(nodes: Vec<Node>) -> Result<Self, TreeError> {
+        if nodes.is_empty() || nodes.len() > FAULT_NODES {
+            return Err(TreeError::Size(nodes.len()));
+        }
+        if nodes[0].parent.is_some() || nodes[0].fault.is_some() {
+            return Err(TreeError::Nominal);
+        }
+        for (i, node) in nodes.iter().enumerate() {
+            if nodes[..i].iter().any(|other| other.name == node.name) {
+                return Err(TreeError::Duplicate(node.name.clone()));
+            }
+            if let Some(parent) = node.parent
+                && (parent == 0 || parent >= i || nodes[parent].fault.is_some())
+            {
+                return Err(TreeError::Parent(node.name.clone()));
+            }
+            let childless = !nodes.iter().any(|other| other.parent == Some(i));
+            if i > 0 && node.fault.is_none() && childless {
+                return Err(TreeError::Empty(node.name.clone()));
+            }
+        }
+        let mut hash = fnv1a::BASIS;
+        for node in &nodes {
+            hash = fnv1a::hash(hash, node.name.as_bytes());
+            hash = fnv1a::hash_u64(hash, node.parent.map_or(u64::MAX, |p| p as u64));
+            hash = fnv1a::hash(hash, node.fault.as_deref().unwrap_or("").as_bytes());
+        }
+        Ok(Self { nodes, hash })
+    }
+
+    /// All nodes; index 0 is nominal.
+    #[must_use]
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// Hash over names, parents and faults.
+    #[must_use]
+    pub const fn hash(&self) -> u64 {
+        self.hash
+    }
+
+    /// Indices of the leaves, in order.
+    pub fn leaves(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.nodes.len()).filter(|&i| self.nodes[i].fault.is_some())
+    }
+
+    /// Index of the node called `name`.
+    #[must_use]
+    pub fn index(&self, name: &str) -> Option<usize> {
+        self.nodes.iter().position(|node| node.name == name)
+    }
+
+    /// Number of ancestors of node `i`.
+    #[must_use]
+    pub fn depth(&self, i: usize) -> usize {
+        std::iter::successors(self.nodes[i].parent, |&p| self.nodes[p].parent).count()
+    }
+}

@@ -1,0 +1,111 @@
+//! Faults that can be injected or modelled, and their text form.
+
+use std::fmt;
+
+use crate::Description;
+
+/// Kind of a wheel fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum FaultKind {
+    /// The motor is stuck: the wheel is locked and dragged.
+    Stuck = 1,
+    /// The encoder reports exactly 0.
+    EncoderZero = 2,
+    /// The encoder repeats its last value.
+    EncoderFrozen = 3,
+    /// The encoder reports noise.
+    EncoderNoise = 4,
+}
+
+impl FaultKind {
+    /// The kind behind a wire code ([`vigil_blocks::Control`]), if this version knows it.
+    #[must_use]
+    pub const fn from_wire(code: u32) -> Option<Self> {
+        Some(match code {
+            1 => Self::Stuck,
+            2 => Self::EncoderZero,
+            3 => Self::EncoderFrozen,
+            4 => Self::EncoderNoise,
+            _ => return None,
+        })
+    }
+}
+
+/// A fault of one wheel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Fault {
+    /// What is broken.
+    pub kind: FaultKind,
+    /// Which wheel, by index in the robot's description.
+    pub wheel: usize,
+}
+
+/// Why a fault's text was refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum FaultError {
+    /// The form is wrong.
+    #[error("'{0}' is not a fault: expected stuck:WHEEL or encoder:WHEEL:zero|frozen|noise")]
+    Form(String),
+    /// The wheel does not exist.
+    #[error("'{wheel}' is not a wheel of {robot}: expected one of {allowed}")]
+    Wheel {
+        /// What was given.
+        wheel: String,
+        /// Name of the robot.
+        robot: String,
+        /// Names of its wheels.
+        allowed: String,
+    },
+}
+
+impl Fault {
+    /// Parses `stuck:WHEEL` or `encoder:WHEEL:zero|frozen|noise`.
+    ///
+    /// # Errors
+    /// [`FaultError`] naming what was given and what is allowed.
+    pub fn parse(text: &str, robot: &Description) -> Result<Self, FaultError> {
+        let parts: Vec<&str> = text.split(':').collect();
+        let (kind, wheel) = match parts.as_slice() {
+            ["stuck", wheel] => (FaultKind::Stuck, *wheel),
+            ["encoder", wheel, "zero"] => (FaultKind::EncoderZero, *wheel),
+            ["encoder", wheel, "frozen"] => (FaultKind::EncoderFrozen, *wheel),
+            ["encoder", wheel, "noise"] => (FaultKind::EncoderNoise, *wheel),
+            _ => return Err(FaultError::Form(text.to_owned())),
+        };
+        Self::wheel_of(wheel, robot).map(|wheel| Self { kind, wheel })
+    }
+
+    /// Index of a wheel by name, or the error that names the wheels there are.
+    ///
+    /// # Errors
+    /// [`FaultError::Wheel`].
+    pub fn wheel_of(name: &str, robot: &Description) -> Result<usize, FaultError> {
+        robot.wheel_index(name).ok_or_else(|| FaultError::Wheel {
+            wheel: name.to_owned(),
+            robot: robot.name.clone(),
+            allowed: robot.wheels.iter().map(|w| w.name.as_str()).collect::<Vec<_>>().join(" "),
+        })
+    }
+
+    /// Text form, as [`Self::parse`] takes it.
+    #[must_use]
+    pub fn text(&self, robot: &Description) -> String {
+        let wheel = robot.wheels.get(self.wheel).map_or("?", |w| w.name.as_str());
+        match self.kind {
+            FaultKind::Stuck => format!("stuck:{wheel}"),
+            kind => format!("encoder:{wheel}:{kind}"),
+        }
+    }
+}
+
+impl fmt::Display for FaultKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Stuck => "stuck",
+            Self::EncoderZero => "zero",
+            Self::EncoderFrozen => "frozen",
+            Self::EncoderNoise => "noise",
+        })
+    }
+}

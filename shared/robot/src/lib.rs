@@ -1,0 +1,10 @@
+//! Robots as models: description, kinematics, slip physics, faults, learned transitions.
+//!
+//! No I/O, no clock, no transport. A robot is described by a [`Description`] (from the
+//! configuration); its behaviour is either simulated ([`slip`]) or learned ([`learned`]).
+
+pub mod description;
+pub mod fault;
+
+pub use description::Description;
+pub use fault::{Fault, FaultKind};

@@ -1,0 +1,3 @@
+//! Configuration schema, validation and defaults.
+
+pub mod schema;

@@ -1,0 +1,365 @@
+//! The configuration's schema: every key, its unit, range and default.
+//!
+//! A graph file (`config/rover.toml`) holds one [`GraphFile`]; it names the robot, the fault
+//! tree, the learned model and the decision model, each a file of its own. Paths are relative to
+//! the graph file. Keys end in their unit. Unknown keys are errors.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+/// A whole graph file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GraphFile {
+    /// Identity of the graph and its schedule.
+    pub graph: Graph,
+    /// The models that the graph runs on.
+    pub files: Files,
+    /// Placement and deadlines, one table per service.
+    pub services: Services,
+    /// Sizes of the shared-memory queues.
+    #[serde(default)]
+    pub transport: Transport,
+    /// Where sensor frames come from.
+    #[serde(default)]
+    pub sensor: Sensor,
+    /// What the simulated rover drives: segments, repeated for ever.
+    #[serde(default)]
+    pub drive: Vec<DriveSegment>,
+    /// The simulated world.
+    #[serde(default)]
+    pub simulator: Simulator,
+    /// The detection filter.
+    #[serde(default)]
+    pub detector: Detector,
+    /// The identification filter.
+    #[serde(default)]
+    pub identifier: Identifier,
+    /// The decision system.
+    #[serde(default)]
+    pub supervisor: Supervisor,
+    /// Control commands at run time.
+    #[serde(default)]
+    pub control: Control,
+    /// What the launcher does when a service dies.
+    #[serde(default)]
+    pub restart: Restart,
+}
+
+/// Identity of the graph and its schedule.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Graph {
+    /// Name; two graphs with one name cannot run on one machine. Letters, digits, `-`, at most 24.
+    pub name: String,
+    /// Rate of the sensor's schedule, Hz, 1 to 10000.
+    pub rate_hz: f64,
+    /// Seed from which every generator starts.
+    #[serde(default = "one")]
+    pub seed: u64,
+}
+
+/// The models that the graph runs on; paths relative to the graph file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Files {
+    /// Description of the robot (TOML).
+    pub robot: String,
+    /// Fault tree (TOML).
+    pub tree: String,
+    /// Learned transition models (TOML, written by `vigil learn`).
+    pub model: String,
+    /// Decision model (`.pomdp`).
+    pub decision: String,
+}
+
+/// Placement and deadlines, one table per service.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Services {
+    /// The sensor source.
+    #[serde(rename = "sensor-sim")]
+    pub sensor_sim: Service,
+    /// The detector.
+    pub detector: Service,
+    /// The identifier.
+    pub identifier: Service,
+    /// The supervisor.
+    pub supervisor: Service,
+}
+
+/// Placement and deadline of one service.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Service {
+    /// Core to pin to. Several services may name one core; every report says so.
+    pub core: usize,
+    /// `SCHED_FIFO` priority, 1 to 90; used where permitted.
+    #[serde(default = "fifty")]
+    pub priority: u8,
+    /// Deadline after the scheduled instant, as a percentage of the period, 1 to 100. Stagger
+    /// consecutive stages: each must leave time to the next.
+    pub deadline_percent: f64,
+    /// Compute budget of one cycle, as a percentage of the period, 1 to 100.
+    #[serde(default = "eighty")]
+    pub budget_percent: f64,
+}
+
+/// Sizes of the shared-memory queues; the same for every peer.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Transport {
+    /// Blocks a reader may fall behind before the oldest is overwritten, 2 to 256.
+    pub buffer: usize,
+    /// Blocks kept for a reader that connects late, 0 to 8.
+    pub history: usize,
+    /// Readers of one topic, observers included, 4 to 32.
+    pub max_subscribers: usize,
+}
+
+impl Default for Transport {
+    fn default() -> Self {
+        Self { buffer: 16, history: 1, max_subscribers: 8 }
+    }
+}
+
+/// Where sensor frames come from.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Sensor {
+    /// `simulator`, `playback` or `external`.
+    pub source: Source,
+    /// Frames to play back (CSV or CSV.gz), relative to the graph file; for `playback`.
+    pub frames: Option<String>,
+    /// Runs to play back: `all`, or run ids separated by commas; for `playback`.
+    pub runs: Option<String>,
+    /// Speed of the playback relative to the recording, 0.01 to 100; default 1.
+    pub speed: Option<f64>,
+}
+
+/// Kind of the sensor source.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Source {
+    /// The simulated rover.
+    #[default]
+    Simulator,
+    /// Recorded frames.
+    Playback,
+    /// A publisher outside the graph.
+    External,
+}
+
+/// One piece of the simulated drive.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriveSegment {
+    /// Duration, s, above 0.
+    pub duration_s: f64,
+    /// Signed curvature, 1/m (left positive), within the robot's limits.
+    pub curvature_1_m: f64,
+    /// Speed, m/s, within the robot's limits.
+    pub speed_m_s: f64,
+}
+
+/// The simulated world.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Simulator {
+    /// Friction coefficient of the soil, 0.1 to 2.
+    pub friction: f64,
+    /// Janosi shear modulus of the soil (relative slip), 0.02 to 2.
+    pub shear_modulus: f64,
+    /// Relative standard deviation of friction along the path, 0 to 0.5.
+    pub friction_scatter: f64,
+    /// Correlation length of that scatter, m, 0.01 to 10.
+    pub scatter_length_m: f64,
+    /// Time constant of the body's velocity, s, 0 to 1.
+    pub lag_s: f64,
+    /// Factor on the sensor noise of the robot's description, 0 to 10.
+    pub noise_scale: f64,
+}
+
+impl Default for Simulator {
+    fn default() -> Self {
+        Self {
+            friction: 0.65,
+            shear_modulus: 0.20,
+            friction_scatter: 0.08,
+            scatter_length_m: 0.2,
+            lag_s: 0.1,
+            noise_scale: 1.0,
+        }
+    }
+}
+
+/// The detection filter.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Detector {
+    /// Particles of the nominal pose track, 32 to 4096.
+    pub particles: usize,
+    /// Mean time between false alarms to which the alarm threshold is set, h, 0.01 to 10000. The
+    /// model holds the calibration from nominal runs.
+    pub false_alarm_interval_h: f64,
+    /// Prior rate of faults, 1/h, above 0.
+    pub fault_rate_1_h: f64,
+    /// Channels used: `pose` or `pose+encoders`.
+    pub sensors: Sensors,
+}
+
+impl Default for Detector {
+    fn default() -> Self {
+        Self {
+            particles: 256,
+            false_alarm_interval_h: 24.0,
+            fault_rate_1_h: 1.0,
+            sensors: Sensors::PoseEncoders,
+        }
+    }
+}
+
+/// Channels that the filters may use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+pub enum Sensors {
+    /// Pose and command.
+    #[serde(rename = "pose")]
+    Pose,
+    /// Pose, command, wheel rates and steering angles.
+    #[default]
+    #[serde(rename = "pose+encoders")]
+    PoseEncoders,
+}
+
+/// The identification filter.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Identifier {
+    /// Filter: `exact` is the only one so far.
+    pub filter: String,
+    /// Particles published, drawn from the belief, 32 to 4096.
+    pub particles: usize,
+    /// Kept frames from which an identification starts, s, 0.5 to 30.
+    pub ring_s: f64,
+    /// Prior probability that a fault is one that no model describes, 0 to 0.5.
+    pub p_unknown: f64,
+}
+
+impl Default for Identifier {
+    fn default() -> Self {
+        Self { filter: "exact".into(), particles: 256, ring_s: 3.0, p_unknown: 0.01 }
+    }
+}
+
+/// The decision system.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Supervisor {
+    /// Policy: `qmdp` is the only one so far.
+    pub policy: String,
+    /// Interval between decision epochs, ms, 1 to 10000. A change of the diagnosed mode or the
+    /// loss of a stage opens an epoch at once.
+    pub epoch_ms: f64,
+    /// Validity of a published action, as a multiple of the period, 1 to 1000 (at least 20 ms).
+    pub validity_periods: f64,
+    /// What each action of the decision model makes the robot do, by the action's name.
+    pub actions: BTreeMap<String, RecoveryAction>,
+}
+
+impl Default for Supervisor {
+    fn default() -> Self {
+        Self {
+            policy: "qmdp".into(),
+            epoch_ms: 100.0,
+            validity_periods: 10.0,
+            actions: BTreeMap::new(),
+        }
+    }
+}
+
+/// What an action makes the robot do.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecoveryAction {
+    /// Kind of the recovery.
+    pub kind: Recovery,
+    /// Factor on the commanded speed, 0 to 1; default 1 (0 for `stop`, `call_for_help`).
+    pub speed_scale: Option<f64>,
+}
+
+/// Kind of a recovery action; see `vigil_blocks::RecoveryKind`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Recovery {
+    /// Drive as planned.
+    GoOn,
+    /// Drive as planned, slower.
+    SlowDown,
+    /// Stop.
+    Stop,
+    /// Counter-steer by the learned yaw offset of the stuck wheel.
+    Compensate,
+    /// Drive on without trusting one wheel's encoder.
+    IgnoreEncoder,
+    /// Stop and call for help.
+    CallForHelp,
+}
+
+/// Control commands at run time.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Control {
+    /// True to let `vigil inject` and `--inject` break the simulated rover. Default false.
+    pub allow_injection: bool,
+}
+
+/// What the launcher does when a service dies.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Restart {
+    /// Restarts of one service within `window_s` before it is given up, 0 to 100.
+    pub max_restarts: u32,
+    /// See `max_restarts`; s, 1 to 3600.
+    pub window_s: f64,
+    /// Delay before the first restart, ms, doubled at each further one, 0 to 10000.
+    pub delay_ms: f64,
+}
+
+impl Default for Restart {
+    fn default() -> Self {
+        Self { max_restarts: 3, window_s: 60.0, delay_ms: 20.0 }
+    }
+}
+
+/// A fault tree file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TreeFile {
+    /// Nodes; the first is the nominal mode, parents come before their children.
+    pub node: Vec<TreeNode>,
+}
+
+/// One node of a fault tree file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TreeNode {
+    /// Name, as reported.
+    pub name: String,
+    /// Name of the parent; none for children of the root.
+    pub parent: Option<String>,
+    /// For a leaf: `stuck:WHEEL` or `encoder:WHEEL`.
+    pub fault: Option<String>,
+}
+
+const fn one() -> u64 {
+    1
+}
+
+const fn fifty() -> u8 {
+    50
+}
+
+const fn eighty() -> f64 {
+    80.0
+}

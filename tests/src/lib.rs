@@ -1,0 +1,1 @@
+//! Tests that span processes, and tidy checks.
