@@ -7,7 +7,7 @@ use crate::Header;
 /// A fixed-size wire block. Implement it with the `block!` macro of this crate only: the macro
 /// derives the schema hash from the names, types and offsets of the fields, so that two sides
 /// whose layouts differ never connect.
-pub trait Block: Pod {
+pub trait Block: Pod + PartialEq + core::fmt::Debug {
     /// FNV-1a hash over the block's name and, per field, name, type text and offset, then size
     /// and alignment. Also stored in [`Header::schema`] of each block.
     const SCHEMA: u64;

@@ -1,1 +1,38 @@
-//! Real-time cycle: clock, placement, deadlines, histograms, ports.
+//! The real-time cycle: absolute clock, placement, deadline monitoring, histograms, ports.
+//!
+//! Knows no robot and no filter. A service implements [`Stage`] (it is woken by input) or
+//! [`Source`] (it is woken by its schedule); [`StageCycle`] and [`SourceCycle`] do one turn at a
+//! time and know no thread, so that the same code runs on the robot (over shared memory, under the
+//! monotonic clock) and in tests (in process, under a virtual clock).
+//!
+//! One turn: wake, count deadlines that have passed, take input, check it, step, publish, account.
+
+pub mod clock;
+pub mod deadline;
+pub mod domain;
+pub mod health;
+pub mod input;
+pub mod latency;
+pub mod live;
+pub mod placement;
+pub mod port;
+pub mod report;
+pub mod serve;
+pub mod signal;
+pub mod source;
+pub mod stage;
+pub mod topic;
+pub mod wake;
+
+pub use clock::{Clock, Monotonic, VirtualClock};
+pub use deadline::DeadlineMonitor;
+pub use domain::Domain;
+pub use health::HealthBoard;
+pub use input::InputAccount;
+pub use latency::Latency;
+pub use placement::Placement;
+pub use port::{Graph, PortError, Receiver, Sender, Stamp};
+pub use report::RunReport;
+pub use source::{Produced, Source, SourceCycle};
+pub use stage::{Intake, Stage, StageCycle, Timing};
+pub use topic::Topic;

@@ -1,3 +1,15 @@
-//! Configuration schema, validation and defaults.
+//! Configuration: schema, reading, validation with precise messages, defaults.
+//!
+//! [`GraphArgs`] are the command-line options that every program of the graph shares;
+//! [`GraphArgs::load`] reads the graph file and the files it names, applies the options, and checks
+//! everything before anything starts. All problems are reported at once, each with file, line,
+//! key and what is allowed.
 
+mod args;
+mod check;
+mod load;
+mod locate;
 pub mod schema;
+
+pub use args::GraphArgs;
+pub use load::{Problem, Setup, SetupError, load_graph, load_robot, load_tree};

@@ -1,0 +1,98 @@
+//! The detector at its ports.
+
+use vigil_blocks::{
+    Cause, Control, ControlCommand, DetectionBelief, Entry, EventKind, ParticleBlock, SensorFrame,
+};
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{Clock, Graph, HealthBoard, Intake, PortError, Receiver, Sender, Stage, Stamp};
+use vigil_cycle::Topic;
+
+use crate::Detector;
+
+/// The detector as a stage of the graph: sensor frames in, belief and particles out.
+pub struct DetectorStage {
+    detector: Detector,
+    frames: Box<dyn Receiver<SensorFrame>>,
+    control: Box<dyn Receiver<Control>>,
+    belief: Box<dyn Sender<DetectionBelief>>,
+    particles: Box<dyn Sender<ParticleBlock>>,
+    alarm: bool,
+    alarm_told: bool,
+    p_fault: f64,
+}
+
+impl DetectorStage {
+    /// Opens the detector's ports on `graph`.
+    ///
+    /// # Errors
+    /// The transport's.
+    pub fn new(detector: Detector, graph: &Graph) -> Result<Self, PortError> {
+        Ok(Self {
+            detector,
+            frames: graph.receiver(Topic::Sensor)?,
+            control: graph.receiver(Topic::Control(ServiceName::Detector))?,
+            belief: graph.sender(Topic::Detection)?,
+            particles: graph.sender(Topic::DetectionParticles)?,
+            alarm: false,
+            alarm_told: false,
+            p_fault: 0.0,
+        })
+    }
+
+    fn step(&mut self, entry: Entry<&SensorFrame>) {
+        let (belief, particles) = (self.belief.block(), self.particles.block());
+        self.detector.step(entry, belief, particles);
+        (self.alarm, self.p_fault) = (belief.alarm != 0, belief.p_fault);
+    }
+}
+
+impl Stage for DetectorStage {
+    fn take(&mut self, intake: &mut Intake<'_>) {
+        for _ in 0..self.frames.buffer() {
+            if !self.frames.advance() {
+                break;
+            }
+            let Some(frame) = self.frames.held() else { break };
+            let identity = (frame.header.epoch, frame.header.seq);
+            if intake.accept::<SensorFrame>(&frame.header, Some(identity)) {
+                let (belief, particles) = (self.belief.block(), self.particles.block());
+                self.detector.step(Entry::Frame(frame), belief, particles);
+                (self.alarm, self.p_fault) = (belief.alarm != 0, belief.p_fault);
+            }
+        }
+    }
+
+    fn miss(&mut self, count: u32) {
+        self.step(Entry::Missed(count));
+    }
+
+    fn publish(
+        &mut self,
+        cause: Cause,
+        stamp: Stamp,
+        clock: &dyn Clock,
+    ) -> Result<u64, PortError> {
+        self.belief.block().cause = cause;
+        self.particles.block().cause = cause;
+        // Particles first: they are there when the belief wakes the identifier.
+        self.particles.send(stamp, clock)?;
+        self.belief.send(stamp, clock)
+    }
+
+    fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        if self.alarm != self.alarm_told {
+            let kind = if self.alarm { EventKind::Alarm } else { EventKind::Cleared };
+            health.event(now_ns, kind, 0, self.p_fault, 0);
+            self.alarm_told = self.alarm;
+        }
+        while self.control.advance() {
+            let Some(command) = self.control.held() else { break };
+            let (epoch, seq) = (command.header.epoch, command.header.seq);
+            let reset = command.command == ControlCommand::Reset as u32;
+            health.answer_control(epoch, seq, reset);
+            if reset {
+                self.step(Entry::Reset);
+            }
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The supervisor at its ports.
+
+use vigil_blocks::{Action, Cause, CauseKind, DetectionBelief, Entry, EventKind, FaultBelief};
+use vigil_cycle::{
+    Clock, Graph, HealthBoard, InputAccount, Intake, PortError, Receiver, Sender, Stage, Stamp,
+    Topic,
+};
+
+use crate::{Inputs, Supervisor};
+
+/// The supervisor as a stage of the graph: diagnoses and detections in, actions out.
+pub struct SupervisorStage {
+    supervisor: Supervisor,
+    diagnoses: Box<dyn Receiver<FaultBelief>>,
+    detections: Box<dyn Receiver<DetectionBelief>>,
+    detection_account: InputAccount,
+    detection: Box<DetectionBelief>,
+    detection_is_new: bool,
+    period_ns: u64,
+    validity_ns: u64,
+    action: Box<dyn Sender<Action>>,
+    stepped: bool,
+    decided: Decided,
+    told: u64,
+}
+
+/// What the last block decided, for the timeline.
+#[derive(Debug, Clone, Copy, Default)]
+struct Decided {
+    seq: u64,
+    action: u32,
+    wheel: u32,
+    p: f64,
+}
+
+impl SupervisorStage {
+    /// Opens the supervisor's ports on `graph`. Each action is valid for `validity_ns` after its
+    /// publication.
+    ///
+    /// # Errors
+    /// The transport's.
+    pub fn new(
+        supervisor: Supervisor,
+        graph: &Graph,
+        period_ns: u64,
+        validity_ns: u64,
+    ) -> Result<Self, PortError> {
+        Ok(Self {
+            supervisor,
+            diagnoses: graph.receiver(Topic::Diagnosis)?,
+            detections: graph.receiver(Topic::Detection)?,
+            detection_account: InputAccount::default(),
+            detection: Box::default(),
+            detection_is_new: false,
+            period_ns,
+            validity_ns,
+            action: graph.sender(Topic::Action)?,
+            stepped: false,
+            decided: Decided::default(),
+            told: 0,
+        })
+    }
+
+    fn take_detections(&mut self, now_ns: u64) {
+        for _ in 0..self.detections.buffer() {
+            if !self.detections.advance() {
+                break;
+            }
+            let Some(block) = self.detections.held() else { break };
+            let account = &mut self.detection_account;
+            let arrival = account.arrive::<DetectionBelief>(&block.header, now_ns, self.period_ns);
+            if arrival.is_taken() && block.cause.kind() == Some(CauseKind::Frame) {
+                *self.detection = *block;
+                self.detection_is_new = true;
+            }
+        }
+    }
+}
+
+impl Stage for SupervisorStage {
+    fn take(&mut self, intake: &mut Intake<'_>) {
+        self.stepped = false;
+        self.take_detections(intake.now_ns());
+        for _ in 0..self.diagnoses.buffer() {
+            if !self.diagnoses.advance() {
+                break;
+            }
+            let Some(diagnosis) = self.diagnoses.held() else { break };
+            let cause = diagnosis.cause;
+            let is_frame = cause.kind() == Some(CauseKind::Frame);
+            let identity = is_frame.then_some((cause.frame_epoch, cause.frame_seq));
+            if intake.accept::<FaultBelief>(&diagnosis.header, identity) && is_frame {
+                let detection = self.detection_is_new.then_some(&*self.detection);
+                let inputs = Inputs { diagnosis: Some(diagnosis), detection };
+                self.supervisor.step(Entry::Frame(inputs), self.action.block());
+                self.stepped = true;
+                self.detection_is_new = false;
+            }
+        }
+    }
+
+    fn miss(&mut self, count: u32) {
+        self.supervisor.step(Entry::Missed(count), self.action.block());
+        if self.detection_is_new {
+            let inputs = Inputs { diagnosis: None, detection: Some(&*self.detection) };
+            self.supervisor.step(Entry::Frame(inputs), self.action.block());
+            self.detection_is_new = false;
+        }
+        self.stepped = true;
+    }
+
+    fn publish(
+        &mut self,
+        cause: Cause,
+        stamp: Stamp,
+        clock: &dyn Clock,
+    ) -> Result<u64, PortError> {
+        if !self.stepped {
+            self.supervisor.step(Entry::Missed(0), self.action.block());
+        }
+        let action = self.action.block();
+        action.cause = cause;
+        action.valid_until_ns = clock.now_ns() + self.validity_ns;
+        let states = (action.state_count as usize).min(action.belief.len());
+        self.decided = Decided {
+            seq: action.decision_seq,
+            action: action.action,
+            wheel: action.wheel,
+            p: action.belief[..states].iter().copied().fold(0.0, f64::max),
+        };
+        self.action.send(stamp, clock)
+    }
+
+    fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        let Decided { seq, action, wheel, p } = self.decided;
+        if seq != self.told {
+            health.event(now_ns, EventKind::Action, action, p, u64::from(wheel));
+            self.told = seq;
+        }
+    }
+}

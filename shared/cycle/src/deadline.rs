@@ -1,0 +1,192 @@
+//! Exact deadline accounting from the schedule.
+//!
+//! The sensor's schedule is a grid of instants, one period apart. Every instant owes one block,
+//! published no later than `deadline` after it. The monitor decides each instant once: by the
+//! publication that answers it, or by the clock when its deadline has passed. It counts by the
+//! clock, not by time-outs, so a late input cannot mask a miss; and latencies are recorded for
+//! every instant, also those that only a later block answered (no coordinated omission).
+
+use crate::latency::Latency;
+
+/// Most schedule instants that one gap may account for; a larger gap re-anchors the grid.
+const GAP_INSTANTS_MAX: u64 = 100_000;
+
+/// Accounts scheduled instants of one service.
+#[derive(Debug, Clone)]
+pub struct DeadlineMonitor {
+    period_ns: u64,
+    deadline_ns: u64,
+    /// First instant that is neither answered in time nor counted as missed.
+    undecided_ns: Option<u64>,
+    /// First instant that no publication has answered.
+    unanswered_ns: u64,
+    accounted_ns: [u64; 2],
+    missed: u64,
+}
+
+impl DeadlineMonitor {
+    /// A monitor for a schedule of `period_ns`, with deadlines `deadline_ns` after each instant.
+    #[must_use]
+    pub const fn new(period_ns: u64, deadline_ns: u64) -> Self {
+        Self {
+            period_ns: if period_ns == 0 { 1 } else { period_ns },
+            deadline_ns,
+            undecided_ns: None,
+            unanswered_ns: 0,
+            accounted_ns: [0; 2],
+            missed: 0,
+        }
+    }
+
+    /// Counts the instants whose deadline passed before `now_ns`; returns how many are new.
+    pub fn overdue(&mut self, now_ns: u64) -> u64 {
+        let Some(undecided) = self.undecided_ns else { return 0 };
+        let Some(late_ns) = now_ns.checked_sub(undecided + self.deadline_ns + 1) else { return 0 };
+        let count = late_ns / self.period_ns + 1;
+        self.missed += count;
+        self.undecided_ns = Some(undecided + count * self.period_ns);
+        self.accounted_ns[1] = undecided + (count - 1) * self.period_ns;
+        count
+    }
+
+    /// Accounts a block for the instant `schedule_ns`, published at `publish_ns`; returns how many
+    /// instants it reveals as missed. Records the latency of every instant that it answers.
+    pub fn published(&mut self, schedule_ns: u64, publish_ns: u64, latency: &mut Latency) -> u64 {
+        let first = match self.undecided_ns {
+            None => {
+                self.unanswered_ns = schedule_ns;
+                self.accounted_ns[0] = schedule_ns;
+                schedule_ns
+            }
+            Some(undecided) => undecided,
+        };
+        self.answer(schedule_ns, publish_ns, latency);
+        let missed_before = self.missed;
+        if schedule_ns + self.period_ns / 2 >= first {
+            let skipped = (schedule_ns + self.period_ns / 2 - first) / self.period_ns;
+            if skipped <= GAP_INSTANTS_MAX {
+                for instant in (0..skipped).map(|i| first + i * self.period_ns) {
+                    self.missed += u64::from(publish_ns > instant + self.deadline_ns);
+                }
+            }
+            self.missed += u64::from(publish_ns > schedule_ns + self.deadline_ns);
+            self.undecided_ns = Some(schedule_ns + self.period_ns);
+            self.accounted_ns[1] = schedule_ns;
+        }
+        self.missed - missed_before
+    }
+
+    /// Records the latencies of the instants up to `schedule_ns` that nothing answered before.
+    fn answer(&mut self, schedule_ns: u64, publish_ns: u64, latency: &mut Latency) {
+        if schedule_ns + self.period_ns / 2 < self.unanswered_ns {
+            return;
+        }
+        let skipped = (schedule_ns + self.period_ns / 2 - self.unanswered_ns) / self.period_ns;
+        if skipped <= GAP_INSTANTS_MAX {
+            for instant in (0..skipped).map(|i| self.unanswered_ns + i * self.period_ns) {
+                latency.record(publish_ns.saturating_sub(instant));
+            }
+        }
+        latency.record(publish_ns.saturating_sub(schedule_ns));
+        self.unanswered_ns = schedule_ns + self.period_ns;
+    }
+
+    /// The next deadline, ns; `None` before the first block.
+    #[must_use]
+    pub fn next_deadline_ns(&self) -> Option<u64> {
+        self.undecided_ns.map(|instant| instant + self.deadline_ns)
+    }
+
+    /// Schedule instant of the last miss or publication that was accounted.
+    #[must_use]
+    pub const fn last_accounted_ns(&self) -> u64 {
+        self.accounted_ns[1]
+    }
+
+    /// First and last instant accounted so far.
+    #[must_use]
+    pub const fn accounted_ns(&self) -> [u64; 2] {
+        self.accounted_ns
+    }
+
+    /// Instants missed so far.
+    #[must_use]
+    pub const fn missed(&self) -> u64 {
+        self.missed
+    }
+
+    /// Period of the schedule, ns.
+    #[must_use]
+    pub const fn period_ns(&self) -> u64 {
+        self.period_ns
+    }
+
+    /// Deadline after each instant, ns.
+    #[must_use]
+    pub const fn deadline_ns(&self) -> u64 {
+        self.deadline_ns
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    const P: u64 = 1000;
+    const D: u64 = 400;
+
+    fn monitor() -> (DeadlineMonitor, Latency) {
+        (DeadlineMonitor::new(P, D), Latency::new().unwrap())
+    }
+
+    #[test]
+    fn a_block_exactly_on_its_deadline_is_in_time_and_one_ns_later_is_not() {
+        let (mut m, mut l) = monitor();
+        assert_eq!(m.published(10 * P, 10 * P + D, &mut l), 0);
+        assert_eq!(m.overdue(11 * P + D), 0);
+        assert_eq!(m.published(11 * P, 11 * P + D + 1, &mut l), 1);
+        assert_eq!(m.missed(), 1);
+    }
+
+    #[test]
+    fn silence_is_counted_once_per_instant_however_often_one_asks() {
+        let (mut m, mut l) = monitor();
+        assert_eq!(m.overdue(1_000_000), 0, "no deadline before the first block");
+        m.published(0, 10, &mut l);
+        assert_eq!(m.overdue(P + D), 0);
+        assert_eq!(m.overdue(P + D + 1), 1);
+        assert_eq!(m.overdue(P + D + 2), 0);
+        assert_eq!(m.overdue(5 * P + D + 1), 4);
+        assert_eq!(m.missed(), 5);
+    }
+
+    #[test]
+    fn a_late_block_does_not_count_twice_and_does_not_move_the_grid_back() {
+        let (mut m, mut l) = monitor();
+        m.published(0, 10, &mut l);
+        assert_eq!(m.overdue(2 * P + D + 1), 2);
+        assert_eq!(m.published(P, 2 * P + 500, &mut l), 0, "instant P was counted by the clock");
+        assert_eq!(m.next_deadline_ns(), Some(3 * P + D));
+    }
+
+    #[test]
+    fn an_instant_that_only_a_later_block_answers_has_the_whole_latency() {
+        let (mut m, mut l) = monitor();
+        m.published(0, 10, &mut l);
+        // The source slept through instants 1000 and 2000.
+        assert_eq!(m.published(3 * P, 3 * P + 10, &mut l), 2);
+        let p = l.percentiles();
+        assert_eq!((p.n, p.max_ns), (4, 2 * P + 10));
+    }
+
+    #[test]
+    fn a_schedule_with_another_phase_after_a_restart_is_followed() {
+        let (mut m, mut l) = monitor();
+        m.published(0, 10, &mut l);
+        assert_eq!(m.overdue(3 * P + D + 1), 3);
+        // The restarted source is due at 3700: nearer to instant 4000 than to 3000.
+        assert_eq!(m.published(3 * P + 700, 3 * P + 710, &mut l), 0);
+        assert_eq!(m.next_deadline_ns(), Some(4 * P + 700 + D));
+    }
+}

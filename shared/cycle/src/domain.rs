@@ -1,0 +1,168 @@
+//! Where a graph lives on a machine: runtime folder, shared-memory prefix, and its lock.
+
+use std::fs::{self, File, OpenOptions};
+use std::io;
+use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+
+use iceoryx2::prelude::{Config, FileName, SemanticString};
+
+use crate::port::PortError;
+
+/// Sizes of the shared-memory queues; the same for every peer of a graph.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Queues {
+    /// Blocks a reader may fall behind before the oldest is overwritten.
+    pub buffer: usize,
+    /// Blocks kept for a reader that connects late.
+    pub history: usize,
+    /// Readers of one topic.
+    pub max_subscribers: usize,
+}
+
+/// A graph's place on this machine. Graphs with different names share nothing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Domain {
+    graph: String,
+    folder: PathBuf,
+    queues: Queues,
+}
+
+/// Holds the right to run a graph; released when dropped or when the process dies.
+#[derive(Debug)]
+pub struct GraphLock {
+    _file: File,
+}
+
+impl Domain {
+    /// The place of `graph`; creates its runtime folder (mode 0700).
+    ///
+    /// # Errors
+    /// [`PortError::Setup`] when no runtime folder can be made.
+    pub fn new(graph: &str, queues: Queues) -> Result<Self, PortError> {
+        let folder = runtime_folder().join(graph);
+        fs::DirBuilder::new()
+            .recursive(true)
+            .mode(0o700)
+            .create(&folder)
+            .map_err(|e| PortError::setup("runtime folder", &format!("{}: {e}", folder.display())))?;
+        Ok(Self { graph: graph.to_owned(), folder, queues })
+    }
+
+    /// Name of the graph.
+    #[must_use]
+    pub fn graph(&self) -> &str {
+        &self.graph
+    }
+
+    /// Folder for the graph's lock, reports and the transport's files.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Sizes of the queues.
+    #[must_use]
+    pub const fn queues(&self) -> Queues {
+        self.queues
+    }
+
+    /// Beginning of the names of the graph's files in /dev/shm.
+    #[must_use]
+    pub fn prefix(&self) -> String {
+        format!("vigil_{}_", self.graph)
+    }
+
+    /// The transport's configuration, built here and handed to every node: a file found through
+    /// the current directory would put services that start in different folders into different
+    /// worlds.
+    ///
+    /// # Errors
+    /// [`PortError::Setup`] when a name is too long for the transport.
+    pub fn transport_config(&self) -> Result<Config, PortError> {
+        let mut config = Config::default();
+        config.global.prefix = FileName::new(self.prefix().as_bytes())
+            .map_err(|e| PortError::setup("shared-memory prefix", &e))?;
+        let root = self.folder.join("t");
+        let root = iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes())
+            .map_err(|e| PortError::setup("transport folder", &e))?;
+        config.global.set_root_path(&root);
+        Ok(config)
+    }
+
+    /// Takes the right to run this graph; `None` if another launcher holds it.
+    ///
+    /// # Errors
+    /// The file system's.
+    pub fn lock(&self) -> io::Result<Option<GraphLock>> {
+        let file = OpenOptions::new()
+            .create(true)
+            .truncate(false)
+            .write(true)
+            .mode(0o600)
+            .open(self.folder.join("lock"))?;
+        match file.try_lock() {
+            Ok(()) => Ok(Some(GraphLock { _file: file })),
+            Err(fs::TryLockError::WouldBlock) => Ok(None),
+            Err(fs::TryLockError::Error(error)) => Err(error),
+        }
+    }
+
+    /// Files of this graph in /dev/shm and in the transport's folder.
+    #[must_use]
+    pub fn residue(&self) -> Vec<PathBuf> {
+        let prefix = self.prefix();
+        let mut found = Vec::new();
+        for entry in fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+            if entry.file_name().to_string_lossy().starts_with(&prefix) {
+                found.push(entry.path());
+            }
+        }
+        collect_files(&self.folder.join("t"), &mut found);
+        found
+    }
+
+    /// Removes every file of this graph. Only for the holder of the lock, with no service alive.
+    pub fn remove_residue(&self) {
+        for path in self.residue() {
+            let _ = fs::remove_file(path);
+        }
+        let _ = fs::remove_dir_all(self.folder.join("t"));
+    }
+}
+
+fn collect_files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            collect_files(&path, found);
+        } else {
+            found.push(path);
+        }
+    }
+}
+
+/// `/run/vigil` where the user may write there, else the user's own runtime folder. Short, since
+/// socket paths are limited to 108 bytes.
+fn runtime_folder() -> PathBuf {
+    let system = PathBuf::from("/run/vigil");
+    if fs::DirBuilder::new().recursive(true).mode(0o700).create(&system).is_ok()
+        && tempfile_works(&system)
+    {
+        return system;
+    }
+    if let Some(user) = std::env::var_os("XDG_RUNTIME_DIR") {
+        return PathBuf::from(user).join("vigil");
+    }
+    // SAFETY: no arguments, no effects, cannot fail.
+    #[allow(unsafe_code)]
+    let uid = unsafe { libc::getuid() };
+    std::env::temp_dir().join(format!("vigil-{uid}"))
+}
+
+fn tempfile_works(folder: &Path) -> bool {
+    let probe = folder.join(format!(".probe-{}", std::process::id()));
+    let works = File::create(&probe).is_ok();
+    let _ = fs::remove_file(probe);
+    works
+}

@@ -1,0 +1,124 @@
+//! A service's account of itself, and when to publish it.
+
+use vigil_blocks::{Block, EVENTS, Event, EventKind, Health, ServiceState};
+
+use crate::clock::Clock;
+use crate::placement::{self, Placement, Wanted};
+use crate::port::{PortError, Sender, Stamp};
+
+/// Health goes out at least this often, ns; at once when something happens.
+pub const HEALTH_PERIOD_NS: u64 = 50_000_000;
+
+/// Collects counters and events, and publishes them.
+pub struct HealthBoard {
+    block: Health,
+    sender: Box<dyn Sender<Health>>,
+    published_ns: u64,
+    changed: bool,
+}
+
+impl HealthBoard {
+    /// A board for a service with this schedule and placement.
+    #[must_use]
+    pub fn new(
+        sender: Box<dyn Sender<Health>>,
+        period_ns: u64,
+        deadline_ns: u64,
+        wanted: Wanted,
+        got: Placement,
+    ) -> Self {
+        let block = Health {
+            period_ns,
+            deadline_ns,
+            state: ServiceState::Starting as u32,
+            core_wanted: u32::try_from(wanted.core).unwrap_or(u32::MAX),
+            core: u32::try_from(got.core).unwrap_or(u32::MAX),
+            policy: got.policy,
+            priority: got.priority,
+            memory_locked: u32::from(got.memory_locked),
+            pid: std::process::id(),
+            ..Health::default()
+        };
+        Self { block, sender, published_ns: 0, changed: true }
+    }
+
+    /// The counters, to be kept up to date by the cycle.
+    pub const fn block(&mut self) -> &mut Health {
+        &mut self.block
+    }
+
+    /// A read-only view of the counters.
+    #[must_use]
+    pub const fn view(&self) -> &Health {
+        &self.block
+    }
+
+    /// Enters a state; told at once.
+    pub fn enter(&mut self, state: ServiceState) {
+        if self.block.state != state as u32 {
+            self.block.state = state as u32;
+            self.changed = true;
+        }
+    }
+
+    /// Sets or clears degraded mode; told at once.
+    pub fn set_degraded(&mut self, degraded: bool) {
+        if self.block.degraded != u32::from(degraded) {
+            self.block.degraded = u32::from(degraded);
+            self.changed = true;
+        }
+    }
+
+    /// Records the answer to a control command; told at once.
+    pub fn answer_control(&mut self, epoch: u64, seq: u64, done: bool) {
+        self.block.control_epoch = epoch;
+        self.block.control_seq = seq;
+        self.block.control_result = if done { 1 } else { 2 };
+        self.changed = true;
+    }
+
+    /// Records an event; told at once.
+    pub fn event(&mut self, t_ns: u64, kind: EventKind, what: u32, p: f64, value: u64) {
+        let slot = (self.block.event_count % EVENTS as u64) as usize;
+        self.block.events[slot] = Event { t_ns, kind: kind as u32, what, p, value };
+        self.block.event_count += 1;
+        self.changed = true;
+    }
+
+    /// When the block has to go out next, ns.
+    #[must_use]
+    pub const fn due_ns(&self) -> u64 {
+        self.published_ns + HEALTH_PERIOD_NS
+    }
+
+    /// Publishes if something changed or the time has come.
+    ///
+    /// # Errors
+    /// The transport's.
+    pub fn publish(&mut self, clock: &impl Clock) -> Result<(), PortError> {
+        let now_ns = clock.now_ns();
+        if !self.changed && now_ns < self.due_ns() {
+            return Ok(());
+        }
+        self.block.core = u32::try_from(placement::current_core()).unwrap_or(u32::MAX);
+        *self.sender.block() = self.block;
+        self.sender.send(Stamp { t_schedule_ns: now_ns, t_capture_ns: now_ns }, clock)?;
+        self.published_ns = now_ns;
+        self.changed = false;
+        Ok(())
+    }
+}
+
+/// Reads the events of `health` that are new since event number `seen`; updates `seen`. Returns
+/// how many were overwritten before they could be read.
+pub fn new_events(health: &Health, seen: &mut u64, mut take: impl FnMut(&Event)) -> u64 {
+    let oldest = health.event_count.saturating_sub(EVENTS as u64);
+    let overwritten = oldest.saturating_sub(*seen);
+    for n in (*seen).max(oldest)..health.event_count {
+        take(&health.events[(n % EVENTS as u64) as usize]);
+    }
+    *seen = health.event_count;
+    overwritten
+}
+
+const _: () = assert!(Health::SCHEMA != 0);

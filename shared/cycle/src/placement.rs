@@ -1,0 +1,82 @@
+//! Core, scheduling policy and memory lock of the calling thread: asked for, then read back.
+
+/// What a service asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wanted {
+    /// Core to run on.
+    pub core: usize,
+    /// `SCHED_FIFO` priority.
+    pub priority: u8,
+}
+
+/// What the kernel says after [`apply`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Placement {
+    /// Core on which the thread runs now.
+    pub core: usize,
+    /// True if that core is the only one it may run on.
+    pub pinned: bool,
+    /// Scheduling policy (`SCHED_FIFO` is 1, `SCHED_OTHER` 0).
+    pub policy: u32,
+    /// Real-time priority; 0 under `SCHED_OTHER`.
+    pub priority: u32,
+    /// True if all present and future memory is locked.
+    pub memory_locked: bool,
+}
+
+impl Placement {
+    /// `fifo:<priority>` or `other`, as reports print it.
+    #[must_use]
+    pub fn scheduling(policy: u32, priority: u32) -> String {
+        if policy == libc::SCHED_FIFO as u32 { format!("fifo:{priority}") } else { "other".into() }
+    }
+}
+
+/// Pins the calling thread, asks for `SCHED_FIFO`, locked memory and 1 ns of timer slack, and reads
+/// back what came of it. What is not permitted is left as it is: the caller reports it.
+#[must_use]
+pub fn apply(wanted: Wanted) -> Placement {
+    core_affinity::set_for_current(core_affinity::CoreId { id: wanted.core });
+    let param = libc::sched_param { sched_priority: i32::from(wanted.priority) };
+    // SAFETY: plain system calls on the calling thread; `param` outlives the call. Failure leaves
+    // the thread as it was and shows in `read_back`.
+    #[allow(unsafe_code)]
+    let locked = unsafe {
+        libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const param);
+        libc::prctl(libc::PR_SET_TIMERSLACK, 1_u64, 0_u64, 0_u64, 0_u64);
+        libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0
+    };
+    Placement { memory_locked: locked, ..read_back() }
+}
+
+/// Core on which the calling thread runs at this moment.
+#[must_use]
+pub fn current_core() -> usize {
+    // SAFETY: no arguments, no effects.
+    #[allow(unsafe_code)]
+    let core = unsafe { libc::sched_getcpu() };
+    usize::try_from(core).unwrap_or(usize::MAX)
+}
+
+/// Reads the placement of the calling thread from the kernel (`memory_locked` is not known here
+/// and false).
+#[must_use]
+pub fn read_back() -> Placement {
+    let mut param = libc::sched_param { sched_priority: 0 };
+    // SAFETY: both calls only write into the locals that they are given; the cpu set is plain bits.
+    #[allow(unsafe_code)]
+    let (policy, allowed) = unsafe {
+        let policy = libc::sched_getscheduler(0);
+        libc::sched_getparam(0, &raw mut param);
+        let mut set: libc::cpu_set_t = std::mem::zeroed();
+        libc::sched_getaffinity(0, size_of::<libc::cpu_set_t>(), &raw mut set);
+        (policy, libc::CPU_COUNT(&set))
+    };
+    Placement {
+        core: current_core(),
+        pinned: allowed == 1,
+        policy: u32::try_from(policy).unwrap_or(u32::MAX),
+        priority: u32::try_from(param.sched_priority).unwrap_or(0),
+        memory_locked: false,
+    }
+}

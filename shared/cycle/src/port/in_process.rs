@@ -1,0 +1,106 @@
+//! Queues inside one thread: the ports of tests under the virtual clock.
+
+use std::any::Any;
+use std::cell::RefCell;
+use std::collections::{HashMap, VecDeque};
+use std::rc::Rc;
+
+use vigil_blocks::Block;
+
+use super::{PortError, Receiver, Sender, Stamp, stamp_header};
+use crate::clock::Clock;
+use crate::topic::Topic;
+
+/// Blocks that a queue holds before the oldest is overwritten.
+const BUFFER: usize = 16;
+
+type Queue<T> = Rc<RefCell<VecDeque<Box<T>>>>;
+type Readers<T> = Rc<RefCell<Vec<Queue<T>>>>;
+
+/// All topics of one in-process graph. Clones share them.
+#[derive(Clone, Default)]
+pub struct Bus {
+    topics: Rc<RefCell<HashMap<Topic, Box<dyn Any>>>>,
+    epochs: Rc<RefCell<u64>>,
+}
+
+impl Bus {
+    fn readers<T: Block>(&self, topic: Topic) -> Readers<T> {
+        let mut topics = self.topics.borrow_mut();
+        let entry = topics.entry(topic).or_insert_with(|| Box::new(Readers::<T>::default()));
+        // A topic has one type by construction of `Topic`; another type gets a topic of its own
+        // that nobody reads.
+        entry.downcast_ref::<Readers<T>>().cloned().unwrap_or_default()
+    }
+
+    pub(super) fn sender<T: Block>(&self, topic: Topic) -> LocalSender<T> {
+        *self.epochs.borrow_mut() += 1;
+        LocalSender {
+            readers: self.readers(topic),
+            loaned: Box::new(T::zeroed()),
+            epoch: *self.epochs.borrow(),
+            seq: 0,
+        }
+    }
+
+    pub(super) fn receiver<T: Block>(&self, topic: Topic) -> LocalReceiver<T> {
+        let queue = Queue::<T>::default();
+        self.readers::<T>(topic).borrow_mut().push(Rc::clone(&queue));
+        LocalReceiver { queue, held: None }
+    }
+}
+
+pub(super) struct LocalSender<T> {
+    readers: Readers<T>,
+    loaned: Box<T>,
+    epoch: u64,
+    seq: u64,
+}
+
+impl<T: Block> Sender<T> for LocalSender<T> {
+    fn block(&mut self) -> &mut T {
+        &mut self.loaned
+    }
+
+    fn send(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
+        let published_ns = stamp_header(&mut *self.loaned, self.epoch, self.seq, stamp, clock);
+        self.seq += 1;
+        for queue in self.readers.borrow().iter() {
+            let mut queue = queue.borrow_mut();
+            if queue.len() == BUFFER {
+                queue.pop_front();
+            }
+            queue.push_back(self.loaned.clone());
+        }
+        *self.loaned = T::zeroed();
+        Ok(published_ns)
+    }
+
+    fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    fn next_seq(&self) -> u64 {
+        self.seq
+    }
+}
+
+pub(super) struct LocalReceiver<T> {
+    queue: Queue<T>,
+    held: Option<Box<T>>,
+}
+
+impl<T: Block> Receiver<T> for LocalReceiver<T> {
+    fn advance(&mut self) -> bool {
+        self.held = self.queue.borrow_mut().pop_front();
+        self.held.is_some()
+    }
+
+    fn held(&self) -> Option<&T> {
+        self.held.as_deref()
+    }
+
+    fn buffer(&self) -> usize {
+        BUFFER
+    }
+}

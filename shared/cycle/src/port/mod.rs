@@ -1,0 +1,155 @@
+//! Ports: typed senders and receivers of blocks, over shared memory or in process.
+
+mod in_process;
+mod shared_memory;
+
+use vigil_blocks::{Block, Header};
+
+use crate::clock::Clock;
+use crate::topic::Topic;
+
+pub use in_process::Bus;
+pub use shared_memory::{EventListener, Link, Wire};
+
+/// Sends blocks on one topic; the only writer of that topic.
+pub trait Sender<T: Block> {
+    /// The next block, all zero when it was loaned, written in place.
+    fn block(&mut self) -> &mut T;
+
+    /// Stamps the header (schema, epoch, next sequence number, times), sends the block, wakes the
+    /// listeners, loans the next one. Returns the publication instant that it wrote, ns.
+    ///
+    /// # Errors
+    /// [`PortError`] when the transport refuses.
+    fn send(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError>;
+
+    /// Epoch under which this sender writes.
+    fn epoch(&self) -> u64;
+
+    /// Sequence number of the next block.
+    fn next_seq(&self) -> u64;
+}
+
+/// Receives the blocks of one topic.
+pub trait Receiver<T: Block> {
+    /// Drops the held block and takes the next waiting one; false if none waits. Call it at most
+    /// [`Self::buffer`] times a turn, so that a flood cannot hold the cycle.
+    fn advance(&mut self) -> bool;
+
+    /// The held block, read in place.
+    fn held(&self) -> Option<&T>;
+
+    /// Blocks that can wait at once.
+    fn buffer(&self) -> usize;
+}
+
+/// The times that a block carries on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Stamp {
+    /// See [`Header::t_schedule_ns`].
+    pub t_schedule_ns: u64,
+    /// See [`Header::t_capture_ns`].
+    pub t_capture_ns: u64,
+}
+
+impl Stamp {
+    /// The times of an input block.
+    #[must_use]
+    pub const fn of(header: &Header) -> Self {
+        Self { t_schedule_ns: header.t_schedule_ns, t_capture_ns: header.t_capture_ns }
+    }
+}
+
+/// Why a port could not be opened or used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PortError {
+    /// The topic could not be opened.
+    #[error("topic {topic} (type {type_name}, {size} bytes) cannot be opened: {cause}")]
+    Open {
+        /// Full name of the topic.
+        topic: String,
+        /// Type name that this side expects.
+        type_name: &'static str,
+        /// Size of the block.
+        size: usize,
+        /// What the transport said.
+        cause: String,
+    },
+    /// A block could not be loaned, sent or received.
+    #[error("topic {topic}: {operation} failed: {cause}")]
+    Transfer {
+        /// Full name of the topic.
+        topic: String,
+        /// `loan`, `send`, `notify` or `receive`.
+        operation: &'static str,
+        /// What the transport said.
+        cause: String,
+    },
+    /// Something that the ports need could not be set up.
+    #[error("{what} cannot be set up: {cause}")]
+    Setup {
+        /// What it is.
+        what: &'static str,
+        /// What the system said.
+        cause: String,
+    },
+}
+
+impl PortError {
+    /// A [`PortError::Setup`] from any error.
+    pub fn setup(what: &'static str, cause: &impl std::fmt::Debug) -> Self {
+        Self::Setup { what, cause: format!("{cause:?}") }
+    }
+}
+
+/// The transport of a graph.
+pub enum Graph {
+    /// Shared memory between processes.
+    SharedMemory(Link),
+    /// Queues inside one thread, for tests under the virtual clock.
+    InProcess(Bus),
+}
+
+impl Graph {
+    /// Opens the writing side of a topic.
+    ///
+    /// # Errors
+    /// [`PortError::Open`], among others when the topic already has a living writer.
+    pub fn sender<T: Block>(&self, topic: Topic) -> Result<Box<dyn Sender<T>>, PortError> {
+        Ok(match self {
+            Self::SharedMemory(link) => Box::new(link.sender::<T>(topic)?),
+            Self::InProcess(bus) => Box::new(bus.sender::<T>(topic)),
+        })
+    }
+
+    /// Opens a reading side of a topic.
+    ///
+    /// # Errors
+    /// [`PortError::Open`].
+    pub fn receiver<T: Block>(&self, topic: Topic) -> Result<Box<dyn Receiver<T>>, PortError> {
+        Ok(match self {
+            Self::SharedMemory(link) => Box::new(link.receiver::<T>(topic)?),
+            Self::InProcess(bus) => Box::new(bus.receiver::<T>(topic)),
+        })
+    }
+}
+
+/// Fills the header of a block that is about to go out; returns the publication instant, ns.
+fn stamp_header<T: Block>(
+    block: &mut T,
+    epoch: u64,
+    seq: u64,
+    stamp: Stamp,
+    clock: &dyn Clock,
+) -> u64 {
+    let t_publish_ns = clock.now_ns();
+    *block.header_mut() = Header {
+        schema: T::SCHEMA,
+        epoch,
+        seq,
+        t_schedule_ns: stamp.t_schedule_ns,
+        t_capture_ns: stamp.t_capture_ns,
+        t_publish_ns,
+    };
+    t_publish_ns
+}

@@ -1,0 +1,270 @@
+//! Ports over iceoryx2: blocks loaned, written and read in place in shared memory.
+
+use std::os::fd::RawFd;
+
+use iceoryx2::port::listener::Listener;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::*;
+use iceoryx2::sample::Sample;
+use iceoryx2::sample_mut::SampleMut;
+use vigil_blocks::Block;
+
+use super::{PortError, Receiver, Sender, Stamp, stamp_header};
+use crate::clock::{Clock, Monotonic};
+use crate::domain::{Domain, Queues};
+use crate::topic::Topic;
+
+/// A block as the transport sees it: the same bytes, named by the block's schema.
+#[repr(transparent)]
+#[derive(Debug, Clone, Copy)]
+pub struct Wire<T>(pub T);
+
+// SAFETY: `Block` requires plain old data (`Pod`): self-contained, `repr(C)`, no pointers, valid for
+// any bytes. The type name holds the hash of the whole layout.
+#[allow(unsafe_code)]
+unsafe impl<T: Block> ZeroCopySend for Wire<T> {
+    unsafe fn type_name() -> &'static str {
+        T::TYPE_NAME
+    }
+}
+
+/// A process's link to the graph: one node, and the settings that every topic shares.
+pub struct Link {
+    node: Node<ipc::Service>,
+    graph: String,
+    queues: Queues,
+}
+
+type TopicFactory<T> =
+    iceoryx2::service::port_factory::publish_subscribe::PortFactory<ipc::Service, Wire<T>, ()>;
+type EventFactory = iceoryx2::service::port_factory::event::PortFactory<ipc::Service>;
+
+impl Link {
+    /// Joins the graph of `domain` under `name`; removes what dead processes left behind.
+    ///
+    /// # Errors
+    /// [`PortError::Setup`].
+    pub fn join(domain: &Domain, name: &str) -> Result<Self, PortError> {
+        let config = domain.transport_config()?;
+        let node_name = NodeName::new(name).map_err(|e| PortError::setup("node name", &e))?;
+        let node = NodeBuilder::new()
+            .config(&config)
+            .name(&node_name)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .map_err(|e| PortError::setup("node", &e))?;
+        Ok(Self { node, graph: domain.graph().to_owned(), queues: domain.queues() })
+    }
+
+    /// The one place where topics are opened: the same settings for every peer, whoever is first.
+    fn topic<T: Block>(&self, topic: Topic) -> Result<TopicFactory<T>, PortError> {
+        let name = self.name::<T>(topic)?;
+        self.node
+            .service_builder(&name)
+            .publish_subscribe::<Wire<T>>()
+            .max_publishers(1)
+            .max_subscribers(self.queues.max_subscribers)
+            .max_nodes(self.queues.max_subscribers + 4)
+            .subscriber_max_buffer_size(self.queues.buffer)
+            .subscriber_max_borrowed_samples(2)
+            .history_size(self.queues.history)
+            .enable_safe_overflow(true)
+            .open_or_create()
+            .map_err(|e| self.open_error::<T>(topic, &e))
+    }
+
+    fn event<T: Block>(&self, topic: Topic) -> Result<EventFactory, PortError> {
+        let name = self.name::<T>(topic)?;
+        self.node
+            .service_builder(&name)
+            .event()
+            .max_notifiers(4)
+            .max_listeners(self.queues.max_subscribers)
+            .max_nodes(self.queues.max_subscribers + 4)
+            .event_id_max_value(15)
+            .open_or_create()
+            .map_err(|e| self.open_error::<T>(topic, &e))
+    }
+
+    fn name<T: Block>(&self, topic: Topic) -> Result<ServiceName, PortError> {
+        let path = topic.path(&self.graph);
+        ServiceName::new(&path).map_err(|e| self.open_error::<T>(topic, &e))
+    }
+
+    fn open_error<T: Block>(&self, topic: Topic, cause: &impl std::fmt::Debug) -> PortError {
+        PortError::Open {
+            topic: topic.path(&self.graph),
+            type_name: T::TYPE_NAME,
+            size: size_of::<T>(),
+            cause: format!("{cause:?}"),
+        }
+    }
+
+    /// Opens the writing side; warm: one block is loaned, and every slot was touched by the
+    /// transport's own initialisation.
+    pub(super) fn sender<T: Block>(&self, topic: Topic) -> Result<SharedSender<T>, PortError> {
+        let publisher = self
+            .topic::<T>(topic)?
+            .publisher_builder()
+            .max_loaned_samples(2)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(|e| self.open_error::<T>(topic, &e))?;
+        let notifier = self
+            .event::<T>(topic)?
+            .notifier_builder()
+            .create()
+            .map_err(|e| self.open_error::<T>(topic, &e))?;
+        let path = topic.path(&self.graph);
+        let loaned = loan(&publisher, &path)?;
+        // The start instant identifies the start: no two starts of one writer share it, as the
+        // transport admits one living writer only.
+        let epoch = Monotonic.now_ns().max(1);
+        let spare = bytemuck::allocation::zeroed_box();
+        Ok(SharedSender { loaned: Some(loaned), spare, publisher, notifier, path, epoch, seq: 0 })
+    }
+
+    /// Opens a reading side.
+    pub(super) fn receiver<T: Block>(&self, topic: Topic) -> Result<SharedReceiver<T>, PortError> {
+        let subscriber = self
+            .topic::<T>(topic)?
+            .subscriber_builder()
+            .buffer_size(self.queues.buffer)
+            .create()
+            .map_err(|e| self.open_error::<T>(topic, &e))?;
+        Ok(SharedReceiver { subscriber, held: None, buffer: self.queues.buffer, failed: 0 })
+    }
+
+    /// Opens the wake-up side of a topic.
+    ///
+    /// # Errors
+    /// [`PortError::Open`].
+    pub fn listener<T: Block>(&self, topic: Topic) -> Result<EventListener, PortError> {
+        let listener = self
+            .event::<T>(topic)?
+            .listener_builder()
+            .create()
+            .map_err(|e| self.open_error::<T>(topic, &e))?;
+        Ok(EventListener { listener })
+    }
+
+    /// Removes what dead processes of this graph left behind. File-system work: never on a
+    /// real-time thread.
+    pub fn remove_dead_peers(&self) {
+        let _ = self.node.try_cleanup_dead_nodes();
+    }
+}
+
+/// Wakes a service when a block arrives on a topic.
+pub struct EventListener {
+    listener: Listener<ipc::Service>,
+}
+
+impl EventListener {
+    /// Descriptor that becomes readable when a block arrives.
+    #[must_use]
+    pub fn descriptor(&self) -> RawFd {
+        // SAFETY: the descriptor is only polled, and only while the listener lives.
+        #[allow(unsafe_code)]
+        unsafe {
+            self.listener.file_descriptor().native_handle()
+        }
+    }
+
+    /// Consumes the pending wake-ups; else the descriptor stays readable.
+    pub fn drain(&self) {
+        let _ = self.listener.try_wait(|_| {});
+    }
+}
+
+type Loaned<T> = SampleMut<ipc::Service, Wire<T>, ()>;
+
+fn loan<T: Block>(
+    publisher: &Publisher<ipc::Service, Wire<T>, ()>,
+    path: &str,
+) -> Result<Loaned<T>, PortError> {
+    let mut sample = publisher.loan_uninit().map_err(|e| transfer(path, "loan", &e))?;
+    // Zeroed in place: a block of 80 KiB must not travel over the stack.
+    // SAFETY: the slot is writable memory of exactly one `Wire<T>`; all-zero bytes are a valid `T`.
+    #[allow(unsafe_code)]
+    unsafe {
+        sample.payload_mut().as_mut_ptr().write_bytes(0, 1);
+        Ok(sample.assume_init())
+    }
+}
+
+fn transfer(path: &str, operation: &'static str, cause: &impl std::fmt::Debug) -> PortError {
+    PortError::Transfer { topic: path.to_owned(), operation, cause: format!("{cause:?}") }
+}
+
+pub(super) struct SharedSender<T: Block> {
+    // Fields drop in this order: the loaned block returns before its publisher goes.
+    loaned: Option<Loaned<T>>,
+    spare: Box<T>,
+    publisher: Publisher<ipc::Service, Wire<T>, ()>,
+    notifier: Notifier<ipc::Service>,
+    path: String,
+    epoch: u64,
+    seq: u64,
+}
+
+impl<T: Block> Sender<T> for SharedSender<T> {
+    fn block(&mut self) -> &mut T {
+        match &mut self.loaned {
+            Some(sample) => &mut sample.payload_mut().0,
+            // Only after a failed loan, and then `send` says so.
+            None => &mut self.spare,
+        }
+    }
+
+    fn send(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
+        let (epoch, seq) = (self.epoch, self.seq);
+        let Some(mut sample) = self.loaned.take() else {
+            self.loaned = Some(loan(&self.publisher, &self.path)?);
+            return Err(transfer(&self.path, "send", &"the last loan had failed"));
+        };
+        let published_ns = stamp_header(&mut sample.payload_mut().0, epoch, seq, stamp, clock);
+        self.seq += 1;
+        sample.send().map_err(|e| transfer(&self.path, "send", &e))?;
+        self.notifier.notify().map_err(|e| transfer(&self.path, "notify", &e))?;
+        self.loaned = Some(loan(&self.publisher, &self.path)?);
+        Ok(published_ns)
+    }
+
+    fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    fn next_seq(&self) -> u64 {
+        self.seq
+    }
+}
+
+pub(super) struct SharedReceiver<T: Block> {
+    held: Option<Sample<ipc::Service, Wire<T>, ()>>,
+    subscriber: Subscriber<ipc::Service, Wire<T>, ()>,
+    buffer: usize,
+    failed: u64,
+}
+
+impl<T: Block> Receiver<T> for SharedReceiver<T> {
+    fn advance(&mut self) -> bool {
+        // Dropped before the next is taken, so that one borrowed block is the most ever held.
+        self.held = None;
+        match self.subscriber.receive() {
+            Ok(sample) => self.held = sample,
+            Err(_) => self.failed += 1,
+        }
+        self.held.is_some()
+    }
+
+    fn held(&self) -> Option<&T> {
+        self.held.as_ref().map(|sample| &sample.payload().0)
+    }
+
+    fn buffer(&self) -> usize {
+        self.buffer
+    }
+}

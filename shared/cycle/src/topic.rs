@@ -1,0 +1,80 @@
+//! Names of the graph's topics.
+
+/// A topic of the graph, under `vigil/<graph>/`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Topic {
+    /// Sensor frames.
+    Sensor,
+    /// The detector's belief.
+    Detection,
+    /// The detector's particles.
+    DetectionParticles,
+    /// The identifier's belief.
+    Diagnosis,
+    /// The identifier's particles.
+    DiagnosisParticles,
+    /// The supervisor's action.
+    Action,
+    /// Health of a service.
+    Health(ServiceName),
+    /// Commands to a service.
+    Control(ServiceName),
+}
+
+/// The services of the graph, in the order of the data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ServiceName {
+    /// The sensor source.
+    SensorSim,
+    /// The detector.
+    Detector,
+    /// The identifier.
+    Identifier,
+    /// The supervisor.
+    Supervisor,
+}
+
+impl ServiceName {
+    /// All services.
+    pub const ALL: [Self; 4] =
+        [Self::SensorSim, Self::Detector, Self::Identifier, Self::Supervisor];
+
+    /// Name, as in topics, configuration and reports.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::SensorSim => "sensor-sim",
+            Self::Detector => "detector",
+            Self::Identifier => "identifier",
+            Self::Supervisor => "supervisor",
+        }
+    }
+
+    /// Position in [`Self::ALL`].
+    #[must_use]
+    pub const fn index(self) -> usize {
+        match self {
+            Self::SensorSim => 0,
+            Self::Detector => 1,
+            Self::Identifier => 2,
+            Self::Supervisor => 3,
+        }
+    }
+}
+
+impl Topic {
+    /// Full name of the topic in `graph`.
+    #[must_use]
+    pub fn path(self, graph: &str) -> String {
+        match self {
+            Self::Sensor => format!("vigil/{graph}/sensor"),
+            Self::Detection => format!("vigil/{graph}/detection"),
+            Self::DetectionParticles => format!("vigil/{graph}/detection/particles"),
+            Self::Diagnosis => format!("vigil/{graph}/diagnosis"),
+            Self::DiagnosisParticles => format!("vigil/{graph}/diagnosis/particles"),
+            Self::Action => format!("vigil/{graph}/action"),
+            Self::Health(service) => format!("vigil/{graph}/health/{}", service.as_str()),
+            Self::Control(service) => format!("vigil/{graph}/control/{}", service.as_str()),
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Command-line options that every program of the graph shares.
+
+use std::path::PathBuf;
+
+use crate::load::{Setup, SetupError, load_graph};
+use crate::schema::Source;
+
+/// Which graph, and what to change in it for this start.
+#[derive(Debug, Clone, Default, PartialEq, clap::Args)]
+pub struct GraphArgs {
+    /// Graph file (TOML).
+    #[arg(long, env = "VIGIL_CONFIG", default_value = "config/rover.toml", value_name = "F")]
+    pub config: PathBuf,
+    /// Rate of the schedule, Hz; replaces `graph.rate_hz`.
+    #[arg(long, value_name = "HZ")]
+    pub rate: Option<f64>,
+    /// Name of the graph; replaces `graph.name`, so that one file can run twice.
+    #[arg(long, value_name = "NAME")]
+    pub graph: Option<String>,
+    /// Seed; replaces `graph.seed`.
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// Play these recorded frames (CSV or CSV.gz) instead of the simulator.
+    #[arg(long, value_name = "F")]
+    pub replay: Option<PathBuf>,
+    /// Runs to play: `all`, `heldout` (those that the model was not learned from), or ids
+    /// separated by commas.
+    #[arg(long, value_name = "LIST", requires = "replay")]
+    pub runs: Option<String>,
+    /// Speed of the playback relative to the recording.
+    #[arg(long, value_name = "X", requires = "replay")]
+    pub speed: Option<f64>,
+}
+
+impl GraphArgs {
+    /// Reads the graph file and the files that it names, applies these options, checks all.
+    ///
+    /// # Errors
+    /// Every problem found, at once; see [`SetupError`].
+    pub fn load(&self) -> Result<Setup, SetupError> {
+        load_graph(&self.config, |file| {
+            if let Some(rate_hz) = self.rate {
+                file.graph.rate_hz = rate_hz;
+            }
+            if let Some(name) = &self.graph {
+                file.graph.name.clone_from(name);
+            }
+            if let Some(seed) = self.seed {
+                file.graph.seed = seed;
+            }
+            if let Some(frames) = &self.replay {
+                file.sensor.source = Source::Playback;
+                let absolute = std::path::absolute(frames).unwrap_or_else(|_| frames.clone());
+                file.sensor.frames = Some(absolute.display().to_string());
+                file.sensor.runs.clone_from(&self.runs);
+                file.sensor.speed = self.speed;
+            }
+        })
+    }
+
+    /// The options as a command line, to hand them on to another program of the graph.
+    #[must_use]
+    pub fn to_command_line(&self) -> Vec<String> {
+        let mut line = vec!["--config".to_owned(), self.config.display().to_string()];
+        let mut option = |name: &str, value: Option<String>| {
+            if let Some(value) = value {
+                line.push(name.to_owned());
+                line.push(value);
+            }
+        };
+        option("--rate", self.rate.map(|v| v.to_string()));
+        option("--graph", self.graph.clone());
+        option("--seed", self.seed.map(|v| v.to_string()));
+        option("--replay", self.replay.as_ref().map(|p| p.display().to_string()));
+        option("--runs", self.runs.clone());
+        option("--speed", self.speed.map(|v| v.to_string()));
+        line
+    }
+}

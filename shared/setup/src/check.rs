@@ -1,0 +1,224 @@
+//! Range and cross-field rules, beyond what the schema's types can say.
+
+use std::path::Path;
+
+use vigil_blocks::WHEELS;
+use vigil_robot::Description;
+
+use crate::schema::{GraphFile, Service, Source};
+
+/// Largest length of a graph's name: it is part of shared-memory and socket names.
+const NAME_LENGTH_MAX: usize = 24;
+/// Filters that the identifier offers.
+const IDENTIFIERS: [&str; 1] = ["exact"];
+/// Policies that the supervisor offers.
+const POLICIES: [&str; 3] = ["qmdp", "mls", "av"];
+
+/// Checks a graph file; `report` gets the key and a message for each problem.
+pub(crate) fn graph(
+    file: &GraphFile,
+    robot: Option<&Description>,
+    path: &Path,
+    mut report: impl FnMut(&str, String),
+) {
+    let name = &file.graph.name;
+    let legal = |c: char| c.is_ascii_alphanumeric() || c == '-';
+    if name.is_empty() || name.len() > NAME_LENGTH_MAX || !name.chars().all(legal) {
+        let allowed = format!("1 to {NAME_LENGTH_MAX} letters, digits or '-'");
+        report("graph.name", format!("'{name}' is not a name: allowed are {allowed}"));
+    }
+    let mut range = |key: &str, value: f64, low: f64, high: f64| {
+        if !(low..=high).contains(&value) {
+            report(key, format!("{value} is out of range: allowed is {low} to {high}"));
+        }
+    };
+    range("graph.rate_hz", file.graph.rate_hz, 1.0, 10_000.0);
+    range("transport.buffer", file.transport.buffer as f64, 2.0, 256.0);
+    range("transport.history", file.transport.history as f64, 0.0, 8.0);
+    range("transport.max_subscribers", file.transport.max_subscribers as f64, 4.0, 32.0);
+    simulator_ranges(file, &mut range);
+    filter_ranges(file, &mut range);
+    range("restart.max_restarts", f64::from(file.restart.max_restarts), 0.0, 100.0);
+    range("restart.window_s", file.restart.window_s, 1.0, 3600.0);
+    range("restart.delay_ms", file.restart.delay_ms, 0.0, 10_000.0);
+    services(file, &mut report);
+    sensor(file, path, &mut report);
+    drive(file, robot, &mut report);
+    choice("identifier.filter", &file.identifier.filter, &IDENTIFIERS, &mut report);
+    choice("supervisor.policy", &file.supervisor.policy, &POLICIES, &mut report);
+}
+
+fn simulator_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
+    let simulator = &file.simulator;
+    range("simulator.friction", simulator.friction, 0.1, 2.0);
+    range("simulator.shear_modulus", simulator.shear_modulus, 0.02, 2.0);
+    range("simulator.friction_scatter", simulator.friction_scatter, 0.0, 0.5);
+    range("simulator.scatter_length_m", simulator.scatter_length_m, 0.01, 10.0);
+    range("simulator.lag_s", simulator.lag_s, 0.0, 1.0);
+    range("simulator.noise_scale", simulator.noise_scale, 0.0, 10.0);
+}
+
+fn filter_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
+    range("detector.particles", file.detector.particles as f64, 32.0, 4096.0);
+    range("detector.false_alarm_interval_h", file.detector.false_alarm_interval_h, 0.01, 1e4);
+    range("detector.fault_rate_1_h", file.detector.fault_rate_1_h, 1e-9, 3600.0);
+    range("identifier.particles", file.identifier.particles as f64, 32.0, 4096.0);
+    range("identifier.ring_s", file.identifier.ring_s, 0.5, 30.0);
+    range("identifier.p_unknown", file.identifier.p_unknown, 0.0, 0.5);
+    range("supervisor.epoch_ms", file.supervisor.epoch_ms, 1.0, 10_000.0);
+    range("supervisor.validity_periods", file.supervisor.validity_periods, 1.0, 1000.0);
+    for (name, action) in &file.supervisor.actions {
+        let key = format!("supervisor.actions.{name}.speed_scale");
+        range(&key, action.speed_scale.unwrap_or(1.0), 0.0, 1.0);
+    }
+}
+
+fn services(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
+    let stages = [
+        ("sensor-sim", &file.services.sensor_sim),
+        ("detector", &file.services.detector),
+        ("identifier", &file.services.identifier),
+        ("supervisor", &file.services.supervisor),
+    ];
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let online = online_cores().unwrap_or_else(|| (0..cores).collect());
+    for (name, service) in stages {
+        service_ranges(name, service, &online, report);
+    }
+    for pair in stages.windows(2) {
+        let ((before, first), (after, second)) = (pair[0], pair[1]);
+        if second.deadline_percent <= first.deadline_percent {
+            let key = format!("services.{after}.deadline_percent");
+            let message = format!(
+                "{} must be above {before}'s {}: a stage cannot be due before its input",
+                second.deadline_percent, first.deadline_percent
+            );
+            report(&key, message);
+        }
+    }
+}
+
+fn service_ranges(
+    name: &str,
+    service: &Service,
+    online: &[usize],
+    report: &mut impl FnMut(&str, String),
+) {
+    if !online.contains(&service.core) {
+        let message =
+            format!("core {} does not exist: this machine has {online:?}", service.core);
+        report(&format!("services.{name}.core"), message);
+    }
+    let mut range = |key: &str, value: f64, low: f64, high: f64| {
+        if !(low..=high).contains(&value) {
+            let message = format!("{value} is out of range: allowed is {low} to {high}");
+            report(&format!("services.{name}.{key}"), message);
+        }
+    };
+    range("priority", f64::from(service.priority), 1.0, 90.0);
+    range("deadline_percent", service.deadline_percent, 1.0, 100.0);
+    range("budget_percent", service.budget_percent, 1.0, 100.0);
+}
+
+fn sensor(file: &GraphFile, path: &Path, report: &mut impl FnMut(&str, String)) {
+    let sensor = &file.sensor;
+    if sensor.source == Source::Playback {
+        match &sensor.frames {
+            None => report("sensor.frames", "is required for source = \"playback\"".into()),
+            Some(frames) => {
+                let full = path.parent().unwrap_or_else(|| Path::new(".")).join(frames);
+                if let Err(error) = std::fs::File::open(&full) {
+                    report("sensor.frames", format!("{}: {error}", full.display()));
+                }
+            }
+        }
+        if let Some(runs) = &sensor.runs
+            && !matches!(runs.as_str(), "all" | "heldout")
+            && runs.split(',').any(|id| id.trim().parse::<u32>().is_err())
+        {
+            let allowed = "'all', 'heldout', or run ids separated by commas";
+            report("sensor.runs", format!("'{runs}' is not understood: allowed are {allowed}"));
+        }
+        if let Some(speed) = sensor.speed
+            && !(0.01..=100.0).contains(&speed)
+        {
+            report("sensor.speed", format!("{speed} is out of range: allowed is 0.01 to 100"));
+        }
+    }
+}
+
+fn drive(
+    file: &GraphFile,
+    robot: Option<&Description>,
+    report: &mut impl FnMut(&str, String),
+) {
+    if file.sensor.source == Source::Simulator && file.drive.is_empty() {
+        report("drive", "at least one [[drive]] segment is required by the simulator".into());
+    }
+    let Some(robot) = robot else { return };
+    let (curvature, speed) = (robot.limits.curvature_1_m, robot.limits.speed_m_s);
+    for (i, segment) in file.drive.iter().enumerate() {
+        let mut range = |key: &str, value: f64, low: f64, high: f64| {
+            if !(low..=high).contains(&value) {
+                let message = format!("{value} is out of range: allowed is {low} to {high}");
+                report(&format!("drive.{i}.{key}"), message);
+            }
+        };
+        range("duration_s", segment.duration_s, 0.01, 1e6);
+        range("curvature_1_m", segment.curvature_1_m, -curvature, curvature);
+        range("speed_m_s", segment.speed_m_s, 0.0, speed);
+    }
+}
+
+fn choice(key: &str, value: &str, allowed: &[&str], report: &mut impl FnMut(&str, String)) {
+    if !allowed.contains(&value) {
+        report(key, format!("'{value}' is not known: allowed are {}", allowed.join(", ")));
+    }
+}
+
+/// Checks a robot's description; `report` gets the key and a message for each problem.
+pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
+    if robot.wheels.is_empty() || robot.wheels.len() > WHEELS {
+        report("wheels", format!("{} wheels: allowed are 1 to {WHEELS}", robot.wheels.len()));
+    }
+    for (i, wheel) in robot.wheels.iter().enumerate() {
+        if robot.wheels[..i].iter().any(|other| other.name == wheel.name) {
+            report(&format!("wheels.{i}.name"), format!("wheel '{}' appears twice", wheel.name));
+        }
+        if !wheel.x.is_finite() || !wheel.y.is_finite() {
+            report(&format!("wheels.{i}"), "x and y must be finite".into());
+        }
+    }
+    let (noise, limits) = (&robot.noise, &robot.limits);
+    let positive = [
+        ("wheel_radius_m", robot.wheel_radius_m),
+        ("mass_kg", robot.mass_kg),
+        ("noise.reference_rate_hz", noise.reference_rate_hz),
+        ("noise.position_m", noise.position_m),
+        ("noise.yaw_rad", noise.yaw_rad),
+        ("noise.yaw_rate_rad_s", noise.yaw_rate_rad_s),
+        ("noise.wheel_rate_rad_s", noise.wheel_rate_rad_s),
+        ("noise.steer_rad", noise.steer_rad),
+        ("noise.current_a", noise.current_a),
+        ("limits.curvature_1_m", limits.curvature_1_m),
+        ("limits.speed_m_s", limits.speed_m_s),
+        ("limits.yaw_rate_rad_s", limits.yaw_rate_rad_s),
+        ("limits.wheel_rate_rad_s", limits.wheel_rate_rad_s),
+    ];
+    for (key, value) in positive {
+        if !(value.is_finite() && value > 0.0) {
+            report(key, format!("{value} is out of range: allowed is any finite value above 0"));
+        }
+    }
+}
+
+/// Online cores by number, from the kernel (`0-3,6`).
+fn online_cores() -> Option<Vec<usize>> {
+    let text = std::fs::read_to_string("/sys/devices/system/cpu/online").ok()?;
+    let mut cores = Vec::new();
+    for part in text.trim().split(',') {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        cores.extend(first.parse::<usize>().ok()?..=last.parse::<usize>().ok()?);
+    }
+    Some(cores)
+}
