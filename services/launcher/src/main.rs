@@ -1,2 +1,140 @@
-//! Starts, watches, restarts, stops and summarises the graph.
-fn main() {}
+//! `vigil-launcher`: starts the four services of a graph, watches them, restarts what dies within
+//! a bound, stops them without residue, and says what happened.
+//!
+//! It is not in the data path: it only reads Health. Exit codes: 0 done, 1 the run had a failure,
+//! 2 usage or configuration (nothing was started).
+
+mod children;
+mod observer;
+mod plan;
+mod summary;
+mod timeline;
+
+use std::io::Write;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use vigil_blocks::EventKind;
+use vigil_cycle::port::Link;
+use vigil_cycle::signal;
+
+use crate::children::Children;
+use crate::observer::Observer;
+use crate::plan::{LauncherArgs, Plan};
+use crate::summary::Summary;
+
+/// Interval at which Health is read and children are looked after.
+const POLL: Duration = Duration::from_millis(4);
+/// Time that all services may take until the first action comes back.
+const STARTUP_LIMIT: Duration = Duration::from_secs(20);
+/// Time that the last events may take to arrive after the end of a recording.
+const DRAIN: Duration = Duration::from_millis(300);
+
+fn main() -> ExitCode {
+    let args = LauncherArgs::parse();
+    let plan = match Plan::new(&args) {
+        Ok(plan) => plan,
+        Err(error) => {
+            eprintln!("{error}");
+            return ExitCode::from(2);
+        }
+    };
+    match run(&args, &plan) {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::Failed) => ExitCode::from(1),
+        Ok(Outcome::Refused) => ExitCode::from(2),
+        Err(error) => {
+            eprintln!("vigil: {error}");
+            ExitCode::from(1)
+        }
+    }
+}
+
+enum Outcome {
+    Done,
+    Failed,
+    Refused,
+}
+
+fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, Box<dyn std::error::Error>> {
+    let domain = plan.setup.domain()?;
+    let Some(lock) = domain.lock()? else {
+        let name = domain.graph();
+        eprintln!(
+            "vigil: a graph named '{name}' is running on this machine; stop it, or give this one \
+             another name with --graph"
+        );
+        return Ok(Outcome::Refused);
+    };
+    lock.share_with_children();
+    domain.remove_residue();
+    signal::install();
+    let link = Link::join(&domain, "launcher")?;
+    let mut observer = Observer::new(link, plan)?;
+    let mut children = Children::start(plan, &domain)?;
+    let ended = watch(args, plan, &mut observer, &mut children);
+    children.stop();
+    observer.poll(!args.json);
+    let reports = children.reports();
+    let summary = Summary::new(plan, &observer, &children, &reports, ended);
+    drop(observer);
+    domain.remove_residue();
+    let mut out = std::io::stdout().lock();
+    // A closed pipe is the reader's choice, not a failure.
+    let _ = if args.json {
+        writeln!(out, "{}", serde_json::to_string(&summary)?)
+    } else {
+        write!(out, "{summary}")
+    };
+    Ok(if summary.failed() {
+        Outcome::Failed
+    } else {
+        Outcome::Done
+    })
+}
+
+/// Watches until the end; returns why it ended.
+fn watch(
+    args: &LauncherArgs,
+    plan: &Plan,
+    observer: &mut Observer,
+    children: &mut Children,
+) -> summary::Ended {
+    use summary::Ended;
+    let started = Instant::now();
+    let mut recording_ended: Option<Instant> = None;
+    loop {
+        std::thread::sleep(POLL);
+        observer.poll(!args.json);
+        if children.look_after(plan, observer) {
+            return Ended::GaveUp;
+        }
+        if signal::stop_requested() {
+            return Ended::Stopped;
+        }
+        if observer.ready_ns().is_none() && plan.waits_for_ready() {
+            if started.elapsed() > STARTUP_LIMIT {
+                eprintln!(
+                    "vigil: no action came back within {} s",
+                    STARTUP_LIMIT.as_secs()
+                );
+                return Ended::NeverReady;
+            }
+            continue;
+        }
+        let lasted = observer.since_ready_s();
+        if args
+            .duration
+            .is_some_and(|limit_s| lasted.is_some_and(|s| s >= limit_s))
+        {
+            return Ended::Duration;
+        }
+        if observer.timeline().has(EventKind::EndOfRecording) {
+            let since = *recording_ended.get_or_insert_with(Instant::now);
+            if since.elapsed() > DRAIN {
+                return Ended::EndOfRecording;
+            }
+        }
+    }
+}

@@ -56,7 +56,11 @@ pub(crate) const fn name_with_hash<const N: usize>(prefix: &str, hash: u64) -> [
     let mut digit = 0;
     while digit < 16 {
         let nibble = ((hash >> (60 - 4 * digit)) & 0xf) as u8;
-        out[bytes.len() + digit] = if nibble < 10 { b'0' + nibble } else { b'a' + nibble - 10 };
+        out[bytes.len() + digit] = if nibble < 10 {
+            b'0' + nibble
+        } else {
+            b'a' + nibble - 10
+        };
         digit += 1;
     }
     out
@@ -136,11 +140,11 @@ mod tests {
         use crate::block::block;
         mod a {
             block! { pub struct Swap, size 64 {
-                pub header: crate::Header, pub first: u64, pub second: u64, } }
+            pub header: crate::Header, pub first: u64, pub second: u64, } }
         }
         mod b {
             block! { pub struct Swap, size 64 {
-                pub header: crate::Header, pub second: u64, pub first: u64, } }
+            pub header: crate::Header, pub second: u64, pub first: u64, } }
         }
         assert_ne!(a::Swap::SCHEMA, b::Swap::SCHEMA);
         assert_ne!(a::Swap::TYPE_NAME, b::Swap::TYPE_NAME);

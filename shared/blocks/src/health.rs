@@ -30,9 +30,9 @@ pub struct Event {
 pub enum EventKind {
     /// The drive begins: every stage answers. `value`: the sensor's sequence number.
     Ready = 1,
-    /// A fault was injected. `what`: index of the injection among those asked for.
+    /// A fault was injected. `what`: wheel + 256 x kind code of the fault.
     Injected = 2,
-    /// A fault was removed by injection. `what`: as above.
+    /// The faults of a wheel were removed. `what`: the wheel.
     Restored = 3,
     /// The detector's alarm rose.
     Alarm = 4,

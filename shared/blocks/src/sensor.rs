@@ -1,7 +1,7 @@
 //! What the robot measured, independent of its kind.
 
-use crate::block::block;
 use crate::Header;
+use crate::block::block;
 
 /// Capacity of per-wheel arrays.
 pub const WHEELS: usize = 8;

@@ -15,7 +15,10 @@ pub struct Monotonic;
 
 impl Clock for Monotonic {
     fn now_ns(&self) -> u64 {
-        let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+        let mut time = libc::timespec {
+            tv_sec: 0,
+            tv_nsec: 0,
+        };
         // SAFETY: `time` is a valid, writable timespec; CLOCK_MONOTONIC always exists on Linux.
         #[allow(unsafe_code)]
         unsafe {
@@ -25,7 +28,8 @@ impl Clock for Monotonic {
     }
 }
 
-/// A clock that moves only when told to. Clones share the time.
+/// A clock that moves only when told to: the present of the process that is being simulated.
+/// Clones share the time.
 #[derive(Debug, Clone, Default)]
 pub struct VirtualClock {
     now_ns: Rc<Cell<u64>>,
@@ -37,9 +41,10 @@ impl VirtualClock {
         self.now_ns.set(self.now_ns.get() + ns);
     }
 
-    /// Moves to `ns`, never back.
-    pub fn advance_to(&self, ns: u64) {
-        self.now_ns.set(self.now_ns.get().max(ns));
+    /// Moves to `ns`. Back is allowed: processes that are simulated one after the other run at
+    /// the same time.
+    pub fn set(&self, ns: u64) {
+        self.now_ns.set(ns);
     }
 }
 
@@ -51,7 +56,10 @@ impl Clock for VirtualClock {
 
 /// Converts ns to the kernel's form.
 pub(crate) const fn timespec(ns: u64) -> libc::timespec {
-    libc::timespec { tv_sec: (ns / 1_000_000_000) as i64, tv_nsec: (ns % 1_000_000_000) as i64 }
+    libc::timespec {
+        tv_sec: (ns / 1_000_000_000) as i64,
+        tv_nsec: (ns % 1_000_000_000) as i64,
+    }
 }
 
 /// Sleeps until the absolute instant `at_ns` of `CLOCK_MONOTONIC`; returns early on a signal.

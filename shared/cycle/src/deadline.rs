@@ -40,8 +40,12 @@ impl DeadlineMonitor {
 
     /// Counts the instants whose deadline passed before `now_ns`; returns how many are new.
     pub fn overdue(&mut self, now_ns: u64) -> u64 {
-        let Some(undecided) = self.undecided_ns else { return 0 };
-        let Some(late_ns) = now_ns.checked_sub(undecided + self.deadline_ns + 1) else { return 0 };
+        let Some(undecided) = self.undecided_ns else {
+            return 0;
+        };
+        let Some(late_ns) = now_ns.checked_sub(undecided + self.deadline_ns + 1) else {
+            return 0;
+        };
         let count = late_ns / self.period_ns + 1;
         self.missed += count;
         self.undecided_ns = Some(undecided + count * self.period_ns);
@@ -152,7 +156,11 @@ mod tests {
     #[test]
     fn silence_is_counted_once_per_instant_however_often_one_asks() {
         let (mut m, mut l) = monitor();
-        assert_eq!(m.overdue(1_000_000), 0, "no deadline before the first block");
+        assert_eq!(
+            m.overdue(1_000_000),
+            0,
+            "no deadline before the first block"
+        );
         m.published(0, 10, &mut l);
         assert_eq!(m.overdue(P + D), 0);
         assert_eq!(m.overdue(P + D + 1), 1);
@@ -166,7 +174,11 @@ mod tests {
         let (mut m, mut l) = monitor();
         m.published(0, 10, &mut l);
         assert_eq!(m.overdue(2 * P + D + 1), 2);
-        assert_eq!(m.published(P, 2 * P + 500, &mut l), 0, "instant P was counted by the clock");
+        assert_eq!(
+            m.published(P, 2 * P + 500, &mut l),
+            0,
+            "instant P was counted by the clock"
+        );
         assert_eq!(m.next_deadline_ns(), Some(3 * P + D));
     }
 

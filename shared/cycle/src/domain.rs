@@ -2,6 +2,7 @@
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
+use std::os::fd::AsRawFd;
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
@@ -28,10 +29,23 @@ pub struct Domain {
     queues: Queues,
 }
 
-/// Holds the right to run a graph; released when dropped or when the process dies.
+/// Holds the right to run a graph; released when dropped or when the process dies, and the
+/// processes that inherited it as well.
 #[derive(Debug)]
 pub struct GraphLock {
-    _file: File,
+    file: File,
+}
+
+impl GraphLock {
+    /// Lets the children that are started from now on hold the lock too: should the launcher die,
+    /// its services drive on, and nobody can start a second graph over them.
+    pub fn share_with_children(&self) {
+        // SAFETY: the descriptor is open as long as self lives; only its close-on-exec flag changes.
+        #[allow(unsafe_code)]
+        unsafe {
+            libc::fcntl(self.file.as_raw_fd(), libc::F_SETFD, 0);
+        }
+    }
 }
 
 impl Domain {
@@ -45,8 +59,14 @@ impl Domain {
             .recursive(true)
             .mode(0o700)
             .create(&folder)
-            .map_err(|e| PortError::setup("runtime folder", &format!("{}: {e}", folder.display())))?;
-        Ok(Self { graph: graph.to_owned(), folder, queues })
+            .map_err(|e| {
+                PortError::setup("runtime folder", &format!("{}: {e}", folder.display()))
+            })?;
+        Ok(Self {
+            graph: graph.to_owned(),
+            folder,
+            queues,
+        })
     }
 
     /// Name of the graph.
@@ -102,7 +122,7 @@ impl Domain {
             .mode(0o600)
             .open(self.folder.join("lock"))?;
         match file.try_lock() {
-            Ok(()) => Ok(Some(GraphLock { _file: file })),
+            Ok(()) => Ok(Some(GraphLock { file })),
             Err(fs::TryLockError::WouldBlock) => Ok(None),
             Err(fs::TryLockError::Error(error)) => Err(error),
         }
@@ -146,7 +166,11 @@ fn collect_files(folder: &Path, found: &mut Vec<PathBuf>) {
 /// socket paths are limited to 108 bytes.
 fn runtime_folder() -> PathBuf {
     let system = PathBuf::from("/run/vigil");
-    if fs::DirBuilder::new().recursive(true).mode(0o700).create(&system).is_ok()
+    if fs::DirBuilder::new()
+        .recursive(true)
+        .mode(0o700)
+        .create(&system)
+        .is_ok()
         && tempfile_works(&system)
     {
         return system;

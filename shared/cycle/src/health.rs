@@ -39,7 +39,12 @@ impl HealthBoard {
             pid: std::process::id(),
             ..Health::default()
         };
-        Self { block, sender, published_ns: 0, changed: true }
+        Self {
+            block,
+            sender,
+            published_ns: 0,
+            changed: true,
+        }
     }
 
     /// The counters, to be kept up to date by the cycle.
@@ -80,7 +85,13 @@ impl HealthBoard {
     /// Records an event; told at once.
     pub fn event(&mut self, t_ns: u64, kind: EventKind, what: u32, p: f64, value: u64) {
         let slot = (self.block.event_count % EVENTS as u64) as usize;
-        self.block.events[slot] = Event { t_ns, kind: kind as u32, what, p, value };
+        self.block.events[slot] = Event {
+            t_ns,
+            kind: kind as u32,
+            what,
+            p,
+            value,
+        };
         self.block.event_count += 1;
         self.changed = true;
     }
@@ -102,7 +113,13 @@ impl HealthBoard {
         }
         self.block.core = u32::try_from(placement::current_core()).unwrap_or(u32::MAX);
         *self.sender.block() = self.block;
-        self.sender.send(Stamp { t_schedule_ns: now_ns, t_capture_ns: now_ns }, clock)?;
+        self.sender.send(
+            Stamp {
+                t_schedule_ns: now_ns,
+                t_capture_ns: now_ns,
+            },
+            clock,
+        )?;
         self.published_ns = now_ns;
         self.changed = false;
         Ok(())

@@ -73,7 +73,12 @@ mod tests {
     use vigil_blocks::SensorFrame;
 
     fn arrive(account: &mut InputAccount, epoch: u64, seq: u64) -> Arrival {
-        let header = Header { schema: SensorFrame::SCHEMA, epoch, seq, ..Header::default() };
+        let header = Header {
+            schema: SensorFrame::SCHEMA,
+            epoch,
+            seq,
+            ..Header::default()
+        };
         account.arrive::<SensorFrame>(&header, 1_000_000, 1000)
     }
 
@@ -93,15 +98,28 @@ mod tests {
     #[test]
     fn impossible_headers_are_refused() {
         let mut a = InputAccount::default();
-        let good = Header { schema: SensorFrame::SCHEMA, epoch: 1, ..Header::default() };
+        let good = Header {
+            schema: SensorFrame::SCHEMA,
+            epoch: 1,
+            ..Header::default()
+        };
         let now_ns = 1_000_000;
         for bad in [
             Header { schema: 1, ..good },
             Header { epoch: 0, ..good },
-            Header { t_schedule_ns: now_ns + 2001, ..good },
-            Header { t_schedule_ns: u64::MAX, ..good },
+            Header {
+                t_schedule_ns: now_ns + 2001,
+                ..good
+            },
+            Header {
+                t_schedule_ns: u64::MAX,
+                ..good
+            },
         ] {
-            assert_eq!(a.arrive::<SensorFrame>(&bad, now_ns, 1000), Arrival::Invalid);
+            assert_eq!(
+                a.arrive::<SensorFrame>(&bad, now_ns, 1000),
+                Arrival::Invalid
+            );
         }
         assert_eq!(a.arrive::<SensorFrame>(&good, now_ns, 1000), Arrival::Next);
         assert_eq!(a.invalid, 4);

@@ -40,7 +40,11 @@ impl Latency {
     /// None in practice: the bounds are constants that the library accepts.
     pub fn new() -> Result<Self, CreationError> {
         let histogram = Histogram::new_with_bounds(1, LATENCY_NS_MAX, 3)?;
-        Ok(Self { histogram, over_range: 0, max_ns: 0 })
+        Ok(Self {
+            histogram,
+            over_range: 0,
+            max_ns: 0,
+        })
     }
 
     /// Records one latency. Allocates nothing.
@@ -49,7 +53,8 @@ impl Latency {
         if ns > LATENCY_NS_MAX {
             self.over_range += 1;
         }
-        self.histogram.saturating_record(ns.clamp(1, LATENCY_NS_MAX));
+        self.histogram
+            .saturating_record(ns.clamp(1, LATENCY_NS_MAX));
     }
 
     /// Forgets everything recorded so far (the end of the warm-up).
@@ -95,9 +100,16 @@ mod tests {
         (1..=10_000).for_each(|us| latency.record(us * 1000));
         let p = latency.percentiles();
         assert_eq!((p.n, p.max_ns, p.over_range), (10_000, 10_000_000, 0));
-        for (got, exact) in [(p.p50_ns, 5e6), (p.p90_ns, 9e6), (p.p99_ns, 9.9e6), (p.p999_ns, 9.99e6)]
-        {
-            assert!((got as f64 / exact - 1.0).abs() < 2e-3, "{got} against {exact}");
+        for (got, exact) in [
+            (p.p50_ns, 5e6),
+            (p.p90_ns, 9e6),
+            (p.p99_ns, 9.9e6),
+            (p.p999_ns, 9.99e6),
+        ] {
+            assert!(
+                (got as f64 / exact - 1.0).abs() < 2e-3,
+                "{got} against {exact}"
+            );
         }
     }
 

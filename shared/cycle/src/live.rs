@@ -2,8 +2,8 @@
 
 use crate::clock::{self, Clock, Monotonic};
 use crate::placement::{self, Placement, Wanted};
-use crate::port::PortError;
 use crate::port::EventListener;
+use crate::port::PortError;
 use crate::signal;
 use crate::source::{Source, SourceCycle};
 use crate::stage::{Stage, StageCycle};
@@ -25,8 +25,11 @@ pub fn run_stage(
     cycle.ready(&Monotonic)?;
     while !signal::stop_requested() {
         let latest_ns = Monotonic.now_ns() + WAIT_NS_MAX;
-        if wake::wait(&timer, listener.descriptor(), cycle.next_wake_ns().min(latest_ns))
-            == Wake::Input
+        if wake::wait(
+            &timer,
+            listener.descriptor(),
+            cycle.next_wake_ns().min(latest_ns),
+        ) == Wake::Input
         {
             listener.drain();
         }

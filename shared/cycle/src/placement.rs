@@ -28,7 +28,11 @@ impl Placement {
     /// `fifo:<priority>` or `other`, as reports print it.
     #[must_use]
     pub fn scheduling(policy: u32, priority: u32) -> String {
-        if policy == libc::SCHED_FIFO as u32 { format!("fifo:{priority}") } else { "other".into() }
+        if policy == libc::SCHED_FIFO as u32 {
+            format!("fifo:{priority}")
+        } else {
+            "other".into()
+        }
     }
 }
 
@@ -37,7 +41,9 @@ impl Placement {
 #[must_use]
 pub fn apply(wanted: Wanted) -> Placement {
     core_affinity::set_for_current(core_affinity::CoreId { id: wanted.core });
-    let param = libc::sched_param { sched_priority: i32::from(wanted.priority) };
+    let param = libc::sched_param {
+        sched_priority: i32::from(wanted.priority),
+    };
     // SAFETY: plain system calls on the calling thread; `param` outlives the call. Failure leaves
     // the thread as it was and shows in `read_back`.
     #[allow(unsafe_code)]
@@ -46,7 +52,10 @@ pub fn apply(wanted: Wanted) -> Placement {
         libc::prctl(libc::PR_SET_TIMERSLACK, 1_u64, 0_u64, 0_u64, 0_u64);
         libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0
     };
-    Placement { memory_locked: locked, ..read_back() }
+    Placement {
+        memory_locked: locked,
+        ..read_back()
+    }
 }
 
 /// Core on which the calling thread runs at this moment.

@@ -6,8 +6,8 @@
 use std::io;
 use std::path::Path;
 
-use hdrhistogram::serialization::{Deserializer, Serializer, V2Serializer};
 use hdrhistogram::Histogram;
+use hdrhistogram::serialization::{Deserializer, Serializer, V2Serializer};
 use serde::{Deserialize, Serialize};
 
 use crate::latency::{Latency, Percentiles};
@@ -63,7 +63,10 @@ impl Stored {
         V2Serializer::new()
             .serialize(latency.histogram(), &mut histogram_v2)
             .map_err(|e| ReportError::Format(e.to_string()))?;
-        Ok(Self { percentiles: latency.percentiles(), histogram_v2 })
+        Ok(Self {
+            percentiles: latency.percentiles(),
+            histogram_v2,
+        })
     }
 
     /// The whole histogram.
@@ -114,13 +117,19 @@ impl RunReport {
     pub fn decode(bytes: &[u8]) -> Result<Self, ReportError> {
         let wrong = |what: String| Err(ReportError::Format(what));
         let word = |at: usize| {
-            bytes.get(at..at + 4).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes)
+            bytes
+                .get(at..at + 4)
+                .and_then(|b| b.try_into().ok())
+                .map(u32::from_le_bytes)
         };
         if bytes.get(..4) != Some(MAGIC.as_slice()) {
             return wrong("not a run report".into());
         }
         if word(4) != Some(VERSION) {
-            return wrong(format!("version {:?}, this program reads {VERSION}", word(4)));
+            return wrong(format!(
+                "version {:?}, this program reads {VERSION}",
+                word(4)
+            ));
         }
         let payload = bytes.get(12..).unwrap_or_default();
         if word(8) != Some(crc32fast::hash(payload)) {

@@ -61,9 +61,14 @@ pub fn stage<T: vigil_blocks::Block, S: Stage>(
 ) -> Result<(), ServeError> {
     let (graph, health) = open(plan)?;
     let mut stage = build(&graph)?;
-    let Graph::SharedMemory(link) = &graph else { return Ok(()) };
+    let Graph::SharedMemory(link) = &graph else {
+        return Ok(());
+    };
     let listener = link.listener::<T>(input)?;
-    let mut cycle = StageCycle::new(DeadlineMonitor::new(plan.period_ns, plan.deadline_ns), health)?;
+    let mut cycle = StageCycle::new(
+        DeadlineMonitor::new(plan.period_ns, plan.deadline_ns),
+        health,
+    )?;
     let faults = live::page_faults();
     live::run_stage(&mut cycle, &mut stage, &listener)?;
     report(plan, cycle.timing(), faults)
@@ -92,13 +97,20 @@ fn open(plan: &Plan) -> Result<(Graph, HealthBoard), PortError> {
     let domain = Domain::new(&plan.graph, plan.queues)?;
     let graph = Graph::SharedMemory(Link::join(&domain, plan.service.as_str())?);
     let sender = graph.sender(Topic::Health(plan.service))?;
-    let health =
-        HealthBoard::new(sender, plan.period_ns, plan.deadline_ns, plan.wanted, placement);
+    let health = HealthBoard::new(
+        sender,
+        plan.period_ns,
+        plan.deadline_ns,
+        plan.wanted,
+        placement,
+    );
     Ok((graph, health))
 }
 
 fn report(plan: &Plan, timing: &Timing, before: [u64; 2]) -> Result<(), ServeError> {
-    let Some(path) = &plan.report else { return Ok(()) };
+    let Some(path) = &plan.report else {
+        return Ok(());
+    };
     let after = live::page_faults();
     let page_faults = [after[0] - before[0], after[1] - before[1]];
     Ok(RunReport::new(plan.service.as_str(), timing, page_faults)?.write(path)?)

@@ -48,13 +48,23 @@ impl SourceCycle {
         health: HealthBoard,
         first_ns: u64,
     ) -> Result<Self, PortError> {
-        Ok(Self { monitor, health, timing: Timing::new()?, next_ns: first_ns, ended: false })
+        Ok(Self {
+            monitor,
+            health,
+            timing: Timing::new()?,
+            next_ns: first_ns,
+            ended: false,
+        })
     }
 
     /// When the next turn is due, ns.
     #[must_use]
     pub fn next_wake_ns(&self) -> u64 {
-        if self.ended { self.health.due_ns() } else { self.next_ns }
+        if self.ended {
+            self.health.due_ns()
+        } else {
+            self.next_ns
+        }
     }
 
     /// Announces that the ports are open.
@@ -90,7 +100,8 @@ impl SourceCycle {
 
     fn account(&mut self, schedule_ns: u64, woken_ns: u64, published_ns: u64, slips: u64) {
         let missed =
-            self.monitor.published(schedule_ns, published_ns, &mut self.timing.from_schedule);
+            self.monitor
+                .published(schedule_ns, published_ns, &mut self.timing.from_schedule);
         let cycle_ns = published_ns.saturating_sub(woken_ns);
         self.timing.step.record(cycle_ns);
         self.health.enter(ServiceState::Running);

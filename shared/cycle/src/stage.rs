@@ -28,8 +28,7 @@ pub trait Stage {
     ///
     /// # Errors
     /// The transport's.
-    fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock)
-    -> Result<u64, PortError>;
+    fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError>;
 
     /// Reports events of the last step, and handles control commands. Off the critical path.
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64);
@@ -50,7 +49,9 @@ impl Intake<'_> {
     /// Accounts an input block; true if it is to be taken. `frame` is the sensor frame's identity
     /// behind the block: (epoch, seq), or `None` if the block is only a prediction.
     pub fn accept<T: Block>(&mut self, header: &Header, frame: Option<(u64, u64)>) -> bool {
-        let arrival = self.account.arrive::<T>(header, self.now_ns, self.period_ns);
+        let arrival = self
+            .account
+            .arrive::<T>(header, self.now_ns, self.period_ns);
         if !arrival.is_taken() {
             return false;
         }
@@ -63,8 +64,12 @@ impl Intake<'_> {
                 self.newest = *header;
             }
             self.frames += 1;
-            self.cause =
-                Cause { kind: CauseKind::Frame as u32, count: self.frames, frame_epoch, frame_seq };
+            self.cause = Cause {
+                kind: CauseKind::Frame as u32,
+                count: self.frames,
+                frame_epoch,
+                frame_seq,
+            };
         }
         true
     }
@@ -95,7 +100,11 @@ impl Timing {
     /// None in practice; see [`Latency::new`].
     pub fn new() -> Result<Self, PortError> {
         let new = || Latency::new().map_err(|error| PortError::setup("histogram", &error));
-        Ok(Self { wake_up: new()?, step: new()?, from_schedule: new()? })
+        Ok(Self {
+            wake_up: new()?,
+            step: new()?,
+            from_schedule: new()?,
+        })
     }
 }
 
@@ -134,7 +143,10 @@ impl StageCycle {
     /// When the next turn is due at the latest, ns.
     #[must_use]
     pub fn next_wake_ns(&self) -> u64 {
-        let deadline_ns = self.monitor.next_deadline_ns().map_or(u64::MAX, |ns| ns + 1);
+        let deadline_ns = self
+            .monitor
+            .next_deadline_ns()
+            .map_or(u64::MAX, |ns| ns + 1);
         deadline_ns.min(self.health.due_ns())
     }
 
@@ -172,7 +184,9 @@ impl StageCycle {
             self.health.block().checkpoint = 4;
             self.health.block().late +=
                 u64::from(woken_ns > newest.t_schedule_ns + self.monitor.deadline_ns());
-            self.timing.wake_up.record(woken_ns.saturating_sub(newest.t_publish_ns));
+            self.timing
+                .wake_up
+                .record(woken_ns.saturating_sub(newest.t_publish_ns));
             self.account_cycle(woken_ns, published_ns, newest.seq);
             overdue += self.monitor.published(
                 stamp.t_schedule_ns,
@@ -183,9 +197,20 @@ impl StageCycle {
         } else if overdue > 0 {
             let count = u32::try_from(overdue).unwrap_or(u32::MAX);
             stage.miss(count);
-            let cause = Cause { kind: CauseKind::Missed as u32, count, ..self.last_cause };
+            let cause = Cause {
+                kind: CauseKind::Missed as u32,
+                count,
+                ..self.last_cause
+            };
             let t_schedule_ns = self.monitor.last_accounted_ns();
-            stage.publish(cause, Stamp { t_schedule_ns, ..self.last_stamp }, clock)?;
+            stage.publish(
+                cause,
+                Stamp {
+                    t_schedule_ns,
+                    ..self.last_stamp
+                },
+                clock,
+            )?;
         }
         self.report(stage, frames, overdue, clock)
     }
@@ -218,19 +243,27 @@ impl StageCycle {
             self.next_miss_event_ns = now_ns + MISS_EVENT_INTERVAL_NS;
         }
         let was_lost = self.misses_in_a_row >= LOST_AFTER_MISSES;
-        self.misses_in_a_row = if frames > 0 { 0 } else { self.misses_in_a_row + overdue };
+        self.misses_in_a_row = if frames > 0 {
+            0
+        } else {
+            self.misses_in_a_row + overdue
+        };
         let is_lost = self.misses_in_a_row >= LOST_AFTER_MISSES;
         if is_lost != was_lost {
             let kind = if is_lost { InputLost } else { InputBack };
-            self.health.event(now_ns, kind, 0, 0.0, self.misses_in_a_row);
+            self.health
+                .event(now_ns, kind, 0, 0.0, self.misses_in_a_row);
             self.health.set_degraded(is_lost);
         }
         if frames > 0 {
             self.health.enter(ServiceState::Running);
         }
         let (missed, accounted_ns) = (self.monitor.missed(), self.monitor.accounted_ns());
-        let (lost, duplicate, invalid) =
-            (self.account.lost, self.account.duplicate, self.account.invalid);
+        let (lost, duplicate, invalid) = (
+            self.account.lost,
+            self.account.duplicate,
+            self.account.invalid,
+        );
         let health = self.health.block();
         (health.missed, health.accounted_ns) = (missed, accounted_ns);
         (health.lost, health.duplicate, health.invalid) = (lost, duplicate, invalid);

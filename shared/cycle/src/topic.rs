@@ -36,8 +36,12 @@ pub enum ServiceName {
 
 impl ServiceName {
     /// All services.
-    pub const ALL: [Self; 4] =
-        [Self::SensorSim, Self::Detector, Self::Identifier, Self::Supervisor];
+    pub const ALL: [Self; 4] = [
+        Self::SensorSim,
+        Self::Detector,
+        Self::Identifier,
+        Self::Supervisor,
+    ];
 
     /// Name, as in topics, configuration and reports.
     #[must_use]

@@ -39,14 +39,18 @@ impl Timer {
             if fd < 0 {
                 return Err(io::Error::last_os_error());
             }
-            Ok(Self { fd: OwnedFd::from_raw_fd(fd) })
+            Ok(Self {
+                fd: OwnedFd::from_raw_fd(fd),
+            })
         }
     }
 
     /// Expires once at `at_ns`; clears an expiry that is pending.
     pub fn arm(&self, at_ns: u64) {
-        let spec =
-            libc::itimerspec { it_value: timespec(at_ns.max(1)), it_interval: timespec(0) };
+        let spec = libc::itimerspec {
+            it_value: timespec(at_ns.max(1)),
+            it_interval: timespec(0),
+        };
         // SAFETY: the descriptor is a timerfd for as long as self lives; `spec` outlives the call.
         #[allow(unsafe_code)]
         unsafe {
@@ -63,12 +67,21 @@ impl Timer {
 /// Blocks until `input` is readable or `deadline_ns` has come.
 pub fn wait(timer: &Timer, input: RawFd, deadline_ns: u64) -> Wake {
     timer.arm(deadline_ns);
-    let poll = |fd| libc::pollfd { fd, events: libc::POLLIN, revents: 0 };
+    let poll = |fd| libc::pollfd {
+        fd,
+        events: libc::POLLIN,
+        revents: 0,
+    };
     let mut fds = [poll(input), poll(timer.fd.as_raw_fd())];
     // SAFETY: `fds` holds two valid entries; null time-out and mask mean "no limit, no change".
     #[allow(unsafe_code)]
     let ready = unsafe {
-        libc::ppoll(fds.as_mut_ptr(), fds.len() as u64, std::ptr::null(), std::ptr::null())
+        libc::ppoll(
+            fds.as_mut_ptr(),
+            fds.len() as u64,
+            std::ptr::null(),
+            std::ptr::null(),
+        )
     };
     if ready < 0 {
         Wake::Signal

@@ -9,7 +9,12 @@ use crate::schema::Source;
 #[derive(Debug, Clone, Default, PartialEq, clap::Args)]
 pub struct GraphArgs {
     /// Graph file (TOML).
-    #[arg(long, env = "VIGIL_CONFIG", default_value = "config/rover.toml", value_name = "F")]
+    #[arg(
+        long,
+        env = "VIGIL_CONFIG",
+        default_value = "config/rover.toml",
+        value_name = "F"
+    )]
     pub config: PathBuf,
     /// Rate of the schedule, Hz; replaces `graph.rate_hz`.
     #[arg(long, value_name = "HZ")]
@@ -71,7 +76,10 @@ impl GraphArgs {
         option("--rate", self.rate.map(|v| v.to_string()));
         option("--graph", self.graph.clone());
         option("--seed", self.seed.map(|v| v.to_string()));
-        option("--replay", self.replay.as_ref().map(|p| p.display().to_string()));
+        option(
+            "--replay",
+            self.replay.as_ref().map(|p| p.display().to_string()),
+        );
         option("--runs", self.runs.clone());
         option("--speed", self.speed.map(|v| v.to_string()));
         line

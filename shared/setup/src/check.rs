@@ -25,48 +25,119 @@ pub(crate) fn graph(
     let legal = |c: char| c.is_ascii_alphanumeric() || c == '-';
     if name.is_empty() || name.len() > NAME_LENGTH_MAX || !name.chars().all(legal) {
         let allowed = format!("1 to {NAME_LENGTH_MAX} letters, digits or '-'");
-        report("graph.name", format!("'{name}' is not a name: allowed are {allowed}"));
+        report(
+            "graph.name",
+            format!("'{name}' is not a name: allowed are {allowed}"),
+        );
     }
     let mut range = |key: &str, value: f64, low: f64, high: f64| {
         if !(low..=high).contains(&value) {
-            report(key, format!("{value} is out of range: allowed is {low} to {high}"));
+            report(
+                key,
+                format!("{value} is out of range: allowed is {low} to {high}"),
+            );
         }
     };
     range("graph.rate_hz", file.graph.rate_hz, 1.0, 10_000.0);
     range("transport.buffer", file.transport.buffer as f64, 2.0, 256.0);
     range("transport.history", file.transport.history as f64, 0.0, 8.0);
-    range("transport.max_subscribers", file.transport.max_subscribers as f64, 4.0, 32.0);
+    range(
+        "transport.max_subscribers",
+        file.transport.max_subscribers as f64,
+        4.0,
+        32.0,
+    );
     simulator_ranges(file, &mut range);
     filter_ranges(file, &mut range);
-    range("restart.max_restarts", f64::from(file.restart.max_restarts), 0.0, 100.0);
+    range(
+        "restart.max_restarts",
+        f64::from(file.restart.max_restarts),
+        0.0,
+        100.0,
+    );
     range("restart.window_s", file.restart.window_s, 1.0, 3600.0);
     range("restart.delay_ms", file.restart.delay_ms, 0.0, 10_000.0);
     services(file, &mut report);
     sensor(file, path, &mut report);
     drive(file, robot, &mut report);
-    choice("identifier.filter", &file.identifier.filter, &IDENTIFIERS, &mut report);
-    choice("supervisor.policy", &file.supervisor.policy, &POLICIES, &mut report);
+    choice(
+        "identifier.filter",
+        &file.identifier.filter,
+        &IDENTIFIERS,
+        &mut report,
+    );
+    choice(
+        "supervisor.policy",
+        &file.supervisor.policy,
+        &POLICIES,
+        &mut report,
+    );
 }
 
 fn simulator_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
     let simulator = &file.simulator;
     range("simulator.friction", simulator.friction, 0.1, 2.0);
-    range("simulator.shear_modulus", simulator.shear_modulus, 0.02, 2.0);
-    range("simulator.friction_scatter", simulator.friction_scatter, 0.0, 0.5);
-    range("simulator.scatter_length_m", simulator.scatter_length_m, 0.01, 10.0);
+    range(
+        "simulator.shear_modulus",
+        simulator.shear_modulus,
+        0.02,
+        2.0,
+    );
+    range(
+        "simulator.friction_scatter",
+        simulator.friction_scatter,
+        0.0,
+        0.5,
+    );
+    range(
+        "simulator.scatter_length_m",
+        simulator.scatter_length_m,
+        0.01,
+        10.0,
+    );
     range("simulator.lag_s", simulator.lag_s, 0.0, 1.0);
     range("simulator.noise_scale", simulator.noise_scale, 0.0, 10.0);
 }
 
 fn filter_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
-    range("detector.particles", file.detector.particles as f64, 32.0, 4096.0);
-    range("detector.false_alarm_interval_h", file.detector.false_alarm_interval_h, 0.01, 1e4);
-    range("detector.fault_rate_1_h", file.detector.fault_rate_1_h, 1e-9, 3600.0);
-    range("identifier.particles", file.identifier.particles as f64, 32.0, 4096.0);
+    range(
+        "detector.particles",
+        file.detector.particles as f64,
+        32.0,
+        4096.0,
+    );
+    range(
+        "detector.false_alarm_interval_h",
+        file.detector.false_alarm_interval_h,
+        0.01,
+        1e4,
+    );
+    range(
+        "detector.fault_rate_1_h",
+        file.detector.fault_rate_1_h,
+        1e-9,
+        3600.0,
+    );
+    range(
+        "identifier.particles",
+        file.identifier.particles as f64,
+        32.0,
+        4096.0,
+    );
     range("identifier.ring_s", file.identifier.ring_s, 0.5, 30.0);
     range("identifier.p_unknown", file.identifier.p_unknown, 0.0, 0.5);
-    range("supervisor.epoch_ms", file.supervisor.epoch_ms, 1.0, 10_000.0);
-    range("supervisor.validity_periods", file.supervisor.validity_periods, 1.0, 1000.0);
+    range(
+        "supervisor.epoch_ms",
+        file.supervisor.epoch_ms,
+        1.0,
+        10_000.0,
+    );
+    range(
+        "supervisor.validity_periods",
+        file.supervisor.validity_periods,
+        1.0,
+        1000.0,
+    );
     for (name, action) in &file.supervisor.actions {
         let key = format!("supervisor.actions.{name}.speed_scale");
         range(&key, action.speed_scale.unwrap_or(1.0), 0.0, 1.0);
@@ -105,8 +176,10 @@ fn service_ranges(
     report: &mut impl FnMut(&str, String),
 ) {
     if !online.contains(&service.core) {
-        let message =
-            format!("core {} does not exist: this machine has {online:?}", service.core);
+        let message = format!(
+            "core {} does not exist: this machine has {online:?}",
+            service.core
+        );
         report(&format!("services.{name}.core"), message);
     }
     let mut range = |key: &str, value: f64, low: f64, high: f64| {
@@ -124,7 +197,10 @@ fn sensor(file: &GraphFile, path: &Path, report: &mut impl FnMut(&str, String)) 
     let sensor = &file.sensor;
     if sensor.source == Source::Playback {
         match &sensor.frames {
-            None => report("sensor.frames", "is required for source = \"playback\"".into()),
+            None => report(
+                "sensor.frames",
+                "is required for source = \"playback\"".into(),
+            ),
             Some(frames) => {
                 let full = path.parent().unwrap_or_else(|| Path::new(".")).join(frames);
                 if let Err(error) = std::fs::File::open(&full) {
@@ -137,23 +213,28 @@ fn sensor(file: &GraphFile, path: &Path, report: &mut impl FnMut(&str, String)) 
             && runs.split(',').any(|id| id.trim().parse::<u32>().is_err())
         {
             let allowed = "'all', 'heldout', or run ids separated by commas";
-            report("sensor.runs", format!("'{runs}' is not understood: allowed are {allowed}"));
+            report(
+                "sensor.runs",
+                format!("'{runs}' is not understood: allowed are {allowed}"),
+            );
         }
         if let Some(speed) = sensor.speed
             && !(0.01..=100.0).contains(&speed)
         {
-            report("sensor.speed", format!("{speed} is out of range: allowed is 0.01 to 100"));
+            report(
+                "sensor.speed",
+                format!("{speed} is out of range: allowed is 0.01 to 100"),
+            );
         }
     }
 }
 
-fn drive(
-    file: &GraphFile,
-    robot: Option<&Description>,
-    report: &mut impl FnMut(&str, String),
-) {
+fn drive(file: &GraphFile, robot: Option<&Description>, report: &mut impl FnMut(&str, String)) {
     if file.sensor.source == Source::Simulator && file.drive.is_empty() {
-        report("drive", "at least one [[drive]] segment is required by the simulator".into());
+        report(
+            "drive",
+            "at least one [[drive]] segment is required by the simulator".into(),
+        );
     }
     let Some(robot) = robot else { return };
     let (curvature, speed) = (robot.limits.curvature_1_m, robot.limits.speed_m_s);
@@ -165,25 +246,42 @@ fn drive(
             }
         };
         range("duration_s", segment.duration_s, 0.01, 1e6);
-        range("curvature_1_m", segment.curvature_1_m, -curvature, curvature);
+        range(
+            "curvature_1_m",
+            segment.curvature_1_m,
+            -curvature,
+            curvature,
+        );
         range("speed_m_s", segment.speed_m_s, 0.0, speed);
     }
 }
 
 fn choice(key: &str, value: &str, allowed: &[&str], report: &mut impl FnMut(&str, String)) {
     if !allowed.contains(&value) {
-        report(key, format!("'{value}' is not known: allowed are {}", allowed.join(", ")));
+        report(
+            key,
+            format!("'{value}' is not known: allowed are {}", allowed.join(", ")),
+        );
     }
 }
 
 /// Checks a robot's description; `report` gets the key and a message for each problem.
 pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
     if robot.wheels.is_empty() || robot.wheels.len() > WHEELS {
-        report("wheels", format!("{} wheels: allowed are 1 to {WHEELS}", robot.wheels.len()));
+        report(
+            "wheels",
+            format!("{} wheels: allowed are 1 to {WHEELS}", robot.wheels.len()),
+        );
     }
     for (i, wheel) in robot.wheels.iter().enumerate() {
-        if robot.wheels[..i].iter().any(|other| other.name == wheel.name) {
-            report(&format!("wheels.{i}.name"), format!("wheel '{}' appears twice", wheel.name));
+        if robot.wheels[..i]
+            .iter()
+            .any(|other| other.name == wheel.name)
+        {
+            report(
+                &format!("wheels.{i}.name"),
+                format!("wheel '{}' appears twice", wheel.name),
+            );
         }
         if !wheel.x.is_finite() || !wheel.y.is_finite() {
             report(&format!("wheels.{i}"), "x and y must be finite".into());
@@ -207,7 +305,10 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
     ];
     for (key, value) in positive {
         if !(value.is_finite() && value > 0.0) {
-            report(key, format!("{value} is out of range: allowed is any finite value above 0"));
+            report(
+                key,
+                format!("{value} is out of range: allowed is any finite value above 0"),
+            );
         }
     }
 }

@@ -9,6 +9,7 @@ mod args;
 mod check;
 mod load;
 mod locate;
+mod place;
 pub mod schema;
 
 pub use args::GraphArgs;

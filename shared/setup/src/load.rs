@@ -22,6 +22,8 @@ pub struct Setup {
     pub path: PathBuf,
     /// The robot.
     pub robot: Description,
+    /// Where it was read from.
+    pub robot_path: PathBuf,
     /// The fault tree.
     pub tree: FaultTree,
     /// Text of the learned model (TOML).
@@ -37,12 +39,6 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Period of the schedule, ns.
-    #[must_use]
-    pub fn period_ns(&self) -> u64 {
-        (1e9 / self.file.graph.rate_hz).round() as u64
-    }
-
     /// Resolves a path that the graph file names.
     #[must_use]
     pub fn resolve(&self, path: &str) -> PathBuf {
@@ -86,7 +82,9 @@ pub struct SetupError {
 
 impl From<Problem> for SetupError {
     fn from(problem: Problem) -> Self {
-        Self { problems: vec![problem] }
+        Self {
+            problems: vec![problem],
+        }
     }
 }
 
@@ -94,10 +92,7 @@ impl From<Problem> for SetupError {
 ///
 /// # Errors
 /// Every problem found, at once.
-pub fn load_graph(
-    path: &Path,
-    change: impl FnOnce(&mut GraphFile),
-) -> Result<Setup, SetupError> {
+pub fn load_graph(path: &Path, change: impl FnOnce(&mut GraphFile)) -> Result<Setup, SetupError> {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let (mut file, text) = parse::<GraphFile>(&path)?;
     change(&mut file);
@@ -117,8 +112,20 @@ pub fn load_graph(
     let decision_text = read(&decision_path);
     keep(robot.as_ref().map(|_| ()).map_err(Clone::clone));
     keep(tree.as_ref().map(|_| ()).map_err(Clone::clone));
-    keep(model_text.as_ref().map(|_| ()).map_err(Clone::clone).map_err(SetupError::from));
-    keep(decision_text.as_ref().map(|_| ()).map_err(Clone::clone).map_err(SetupError::from));
+    keep(
+        model_text
+            .as_ref()
+            .map(|_| ())
+            .map_err(Clone::clone)
+            .map_err(SetupError::from),
+    );
+    keep(
+        decision_text
+            .as_ref()
+            .map(|_| ())
+            .map_err(Clone::clone)
+            .map_err(SetupError::from),
+    );
     check::graph(&file, robot.as_ref().ok(), &path, |key, message| {
         problems.push(Problem {
             file: path.clone(),
@@ -132,10 +139,27 @@ pub fn load_graph(
     else {
         return Err(SetupError { problems });
     };
-    let hash = [format!("{file:?}{robot:?}"), model_text.clone(), decision_text.clone()]
-        .iter()
-        .fold(fnv1a::hash_u64(fnv1a::BASIS, tree.hash()), |h, t| fnv1a::hash(h, t.as_bytes()));
-    Ok(Setup { file, path, robot, tree, model_text, model_path, decision_text, decision_path, hash })
+    let hash = [
+        format!("{file:?}{robot:?}"),
+        model_text.clone(),
+        decision_text.clone(),
+    ]
+    .iter()
+    .fold(fnv1a::hash_u64(fnv1a::BASIS, tree.hash()), |h, t| {
+        fnv1a::hash(h, t.as_bytes())
+    });
+    Ok(Setup {
+        file,
+        path,
+        robot,
+        robot_path,
+        tree,
+        model_text,
+        model_path,
+        decision_text,
+        decision_path,
+        hash,
+    })
 }
 
 /// Reads and checks a robot's description.
@@ -153,7 +177,11 @@ pub fn load_robot(path: &Path) -> Result<Description, SetupError> {
             message,
         });
     });
-    if problems.is_empty() { Ok(robot) } else { Err(SetupError { problems }) }
+    if problems.is_empty() {
+        Ok(robot)
+    } else {
+        Err(SetupError { problems })
+    }
 }
 
 /// Reads and checks a fault tree.
@@ -172,17 +200,29 @@ pub fn load_tree(path: &Path) -> Result<FaultTree, SetupError> {
     for (i, node) in file.node.iter().enumerate() {
         let parent = match &node.parent {
             None => None,
-            Some(name) => Some(file.node.iter().position(|n| n.name == *name).ok_or_else(|| {
-                problem(&format!("node.{i}.parent"), format!("there is no node '{name}'"))
-            })?),
+            Some(name) => Some(file.node.iter().position(|n| n.name == *name).ok_or_else(
+                || {
+                    problem(
+                        &format!("node.{i}.parent"),
+                        format!("there is no node '{name}'"),
+                    )
+                },
+            )?),
         };
-        nodes.push(Node { name: node.name.clone(), parent, fault: node.fault.clone() });
+        nodes.push(Node {
+            name: node.name.clone(),
+            parent,
+            fault: node.fault.clone(),
+        });
     }
     FaultTree::new(nodes).map_err(|error| problem("node", error.to_string()).into())
 }
 
 fn resolve(graph_file: &Path, path: &str) -> PathBuf {
-    graph_file.parent().unwrap_or_else(|| Path::new(".")).join(path)
+    graph_file
+        .parent()
+        .unwrap_or_else(|| Path::new("."))
+        .join(path)
 }
 
 fn read(path: &Path) -> Result<String, Problem> {
@@ -198,7 +238,9 @@ fn parse<T: DeserializeOwned>(path: &Path) -> Result<(T, String), SetupError> {
     let text = read(path)?;
     let value = toml::from_str(&text).map_err(|error| Problem {
         file: path.to_path_buf(),
-        line: error.span().map_or(0, |span| line_of_byte(&text, span.start)),
+        line: error
+            .span()
+            .map_or(0, |span| line_of_byte(&text, span.start)),
         key: String::new(),
         message: error.message().replace('\n', " "),
     })?;

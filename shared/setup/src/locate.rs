@@ -5,19 +5,26 @@ use toml::de::{DeTable, DeValue};
 /// Line (from 1) of `byte` in `text`.
 pub(crate) fn line_of_byte(text: &str, byte: usize) -> usize {
     let end = byte.min(text.len());
-    1 + text.as_bytes()[..end].iter().filter(|&&b| b == b'\n').count()
+    1 + text.as_bytes()[..end]
+        .iter()
+        .filter(|&&b| b == b'\n')
+        .count()
 }
 
 /// Line (from 1) of the key at `path` (`services.detector.core`, `drive.2.speed_m_s`), or of the
 /// deepest part of the path that exists; 1 if nothing of it does.
 pub(crate) fn line_of_key(text: &str, path: &str) -> usize {
-    let Ok(root) = DeTable::parse(text) else { return 1 };
+    let Ok(root) = DeTable::parse(text) else {
+        return 1;
+    };
     let mut byte = 0;
     let mut table = Some(root.get_ref());
     let mut array: Option<&[toml::Spanned<DeValue<'_>>]> = None;
     for part in path.split('.') {
         let value = if let Some(items) = array.take() {
-            let Some(item) = part.parse().ok().and_then(|i: usize| items.get(i)) else { break };
+            let Some(item) = part.parse().ok().and_then(|i: usize| items.get(i)) else {
+                break;
+            };
             byte = item.span().start;
             item
         } else if let Some(entries) = table.take() {

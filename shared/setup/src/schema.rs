@@ -120,7 +120,11 @@ pub struct Transport {
 
 impl Default for Transport {
     fn default() -> Self {
-        Self { buffer: 16, history: 1, max_subscribers: 8 }
+        Self {
+            buffer: 16,
+            history: 1,
+            max_subscribers: 8,
+        }
     }
 }
 
@@ -248,7 +252,12 @@ pub struct Identifier {
 
 impl Default for Identifier {
     fn default() -> Self {
-        Self { filter: "exact".into(), particles: 256, ring_s: 3.0, p_unknown: 0.01 }
+        Self {
+            filter: "exact".into(),
+            particles: 256,
+            ring_s: 3.0,
+            p_unknown: 0.01,
+        }
     }
 }
 
@@ -328,7 +337,11 @@ pub struct Restart {
 
 impl Default for Restart {
     fn default() -> Self {
-        Self { max_restarts: 3, window_s: 60.0, delay_ms: 20.0 }
+        Self {
+            max_restarts: 3,
+            window_s: 60.0,
+            delay_ms: 20.0,
+        }
     }
 }
 

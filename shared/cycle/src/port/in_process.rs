@@ -8,7 +8,7 @@ use std::rc::Rc;
 use vigil_blocks::Block;
 
 use super::{PortError, Receiver, Sender, Stamp, stamp_header};
-use crate::clock::Clock;
+use crate::clock::{Clock, VirtualClock};
 use crate::topic::Topic;
 
 /// Blocks that a queue holds before the oldest is overwritten.
@@ -17,20 +17,37 @@ const BUFFER: usize = 16;
 type Queue<T> = Rc<RefCell<VecDeque<Box<T>>>>;
 type Readers<T> = Rc<RefCell<Vec<Queue<T>>>>;
 
-/// All topics of one in-process graph. Clones share them.
-#[derive(Clone, Default)]
+/// All topics of one in-process graph. Clones share them. A block is visible from the instant of
+/// its publication on, by the virtual clock.
+#[derive(Clone)]
 pub struct Bus {
+    clock: VirtualClock,
     topics: Rc<RefCell<HashMap<Topic, Box<dyn Any>>>>,
     epochs: Rc<RefCell<u64>>,
 }
 
 impl Bus {
+    /// An empty bus under `clock`.
+    #[must_use]
+    pub fn new(clock: VirtualClock) -> Self {
+        Self {
+            clock,
+            topics: Rc::default(),
+            epochs: Rc::default(),
+        }
+    }
+
     fn readers<T: Block>(&self, topic: Topic) -> Readers<T> {
         let mut topics = self.topics.borrow_mut();
-        let entry = topics.entry(topic).or_insert_with(|| Box::new(Readers::<T>::default()));
+        let entry = topics
+            .entry(topic)
+            .or_insert_with(|| Box::new(Readers::<T>::default()));
         // A topic has one type by construction of `Topic`; another type gets a topic of its own
         // that nobody reads.
-        entry.downcast_ref::<Readers<T>>().cloned().unwrap_or_default()
+        entry
+            .downcast_ref::<Readers<T>>()
+            .cloned()
+            .unwrap_or_default()
     }
 
     pub(super) fn sender<T: Block>(&self, topic: Topic) -> LocalSender<T> {
@@ -45,8 +62,14 @@ impl Bus {
 
     pub(super) fn receiver<T: Block>(&self, topic: Topic) -> LocalReceiver<T> {
         let queue = Queue::<T>::default();
-        self.readers::<T>(topic).borrow_mut().push(Rc::clone(&queue));
-        LocalReceiver { queue, held: None }
+        self.readers::<T>(topic)
+            .borrow_mut()
+            .push(Rc::clone(&queue));
+        LocalReceiver {
+            clock: self.clock.clone(),
+            queue,
+            held: None,
+        }
     }
 }
 
@@ -86,14 +109,19 @@ impl<T: Block> Sender<T> for LocalSender<T> {
 }
 
 pub(super) struct LocalReceiver<T> {
+    clock: VirtualClock,
     queue: Queue<T>,
     held: Option<Box<T>>,
 }
 
 impl<T: Block> Receiver<T> for LocalReceiver<T> {
     fn advance(&mut self) -> bool {
-        self.held = self.queue.borrow_mut().pop_front();
-        self.held.is_some()
+        let mut queue = self.queue.borrow_mut();
+        let now_ns = self.clock.now_ns();
+        let is_out = |block: &T| block.header().t_publish_ns <= now_ns;
+        let visible = queue.front().is_some_and(|block| is_out(block));
+        self.held = if visible { queue.pop_front() } else { None };
+        visible
     }
 
     fn held(&self) -> Option<&T> {

@@ -56,7 +56,10 @@ impl Stamp {
     /// The times of an input block.
     #[must_use]
     pub const fn of(header: &Header) -> Self {
-        Self { t_schedule_ns: header.t_schedule_ns, t_capture_ns: header.t_capture_ns }
+        Self {
+            t_schedule_ns: header.t_schedule_ns,
+            t_capture_ns: header.t_capture_ns,
+        }
     }
 }
 
@@ -98,7 +101,10 @@ pub enum PortError {
 impl PortError {
     /// A [`PortError::Setup`] from any error.
     pub fn setup(what: &'static str, cause: &impl std::fmt::Debug) -> Self {
-        Self::Setup { what, cause: format!("{cause:?}") }
+        Self::Setup {
+            what,
+            cause: format!("{cause:?}"),
+        }
     }
 }
 

@@ -55,7 +55,11 @@ impl Link {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|e| PortError::setup("node", &e))?;
-        Ok(Self { node, graph: domain.graph().to_owned(), queues: domain.queues() })
+        Ok(Self {
+            node,
+            graph: domain.graph().to_owned(),
+            queues: domain.queues(),
+        })
     }
 
     /// The one place where topics are opened: the same settings for every peer, whoever is first.
@@ -123,7 +127,15 @@ impl Link {
         // transport admits one living writer only.
         let epoch = Monotonic.now_ns().max(1);
         let spare = bytemuck::allocation::zeroed_box();
-        Ok(SharedSender { loaned: Some(loaned), spare, publisher, notifier, path, epoch, seq: 0 })
+        Ok(SharedSender {
+            loaned: Some(loaned),
+            spare,
+            publisher,
+            notifier,
+            path,
+            epoch,
+            seq: 0,
+        })
     }
 
     /// Opens a reading side.
@@ -134,7 +146,12 @@ impl Link {
             .buffer_size(self.queues.buffer)
             .create()
             .map_err(|e| self.open_error::<T>(topic, &e))?;
-        Ok(SharedReceiver { subscriber, held: None, buffer: self.queues.buffer, failed: 0 })
+        Ok(SharedReceiver {
+            subscriber,
+            held: None,
+            buffer: self.queues.buffer,
+            failed: 0,
+        })
     }
 
     /// Opens the wake-up side of a topic.
@@ -185,7 +202,9 @@ fn loan<T: Block>(
     publisher: &Publisher<ipc::Service, Wire<T>, ()>,
     path: &str,
 ) -> Result<Loaned<T>, PortError> {
-    let mut sample = publisher.loan_uninit().map_err(|e| transfer(path, "loan", &e))?;
+    let mut sample = publisher
+        .loan_uninit()
+        .map_err(|e| transfer(path, "loan", &e))?;
     // Zeroed in place: a block of 80 KiB must not travel over the stack.
     // SAFETY: the slot is writable memory of exactly one `Wire<T>`; all-zero bytes are a valid `T`.
     #[allow(unsafe_code)]
@@ -196,7 +215,11 @@ fn loan<T: Block>(
 }
 
 fn transfer(path: &str, operation: &'static str, cause: &impl std::fmt::Debug) -> PortError {
-    PortError::Transfer { topic: path.to_owned(), operation, cause: format!("{cause:?}") }
+    PortError::Transfer {
+        topic: path.to_owned(),
+        operation,
+        cause: format!("{cause:?}"),
+    }
 }
 
 pub(super) struct SharedSender<T: Block> {
@@ -227,8 +250,12 @@ impl<T: Block> Sender<T> for SharedSender<T> {
         };
         let published_ns = stamp_header(&mut sample.payload_mut().0, epoch, seq, stamp, clock);
         self.seq += 1;
-        sample.send().map_err(|e| transfer(&self.path, "send", &e))?;
-        self.notifier.notify().map_err(|e| transfer(&self.path, "notify", &e))?;
+        sample
+            .send()
+            .map_err(|e| transfer(&self.path, "send", &e))?;
+        self.notifier
+            .notify()
+            .map_err(|e| transfer(&self.path, "notify", &e))?;
         self.loaned = Some(loan(&self.publisher, &self.path)?);
         Ok(published_ns)
     }

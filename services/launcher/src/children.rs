@@ -1,0 +1,164 @@
+//! The service processes: start, restart within a bound, stop.
+
+use std::io;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{Domain, RunReport, signal};
+
+use crate::observer::Observer;
+use crate::plan::Plan;
+
+/// Time that a service may take to stop before it is killed.
+const STOP_LIMIT: Duration = Duration::from_secs(3);
+const POLL: Duration = Duration::from_millis(5);
+
+/// One service process.
+struct Supervised {
+    name: ServiceName,
+    child: Child,
+    report: PathBuf,
+    restarts: Vec<Instant>,
+    restart_at: Option<Instant>,
+    last_exit: String,
+}
+
+/// All service processes of a graph.
+pub struct Children {
+    services: Vec<Supervised>,
+    gave_up: Option<ServiceName>,
+}
+
+impl Children {
+    /// Starts every service of the plan; on a failure stops those already started.
+    pub fn start(plan: &Plan, domain: &Domain) -> io::Result<Self> {
+        let mut children = Self {
+            services: Vec::new(),
+            gave_up: None,
+        };
+        for name in plan.services() {
+            let report = domain.folder().join(format!("{}.report", name.as_str()));
+            let _ = std::fs::remove_file(&report);
+            match spawn(plan, name, &report) {
+                Ok(child) => children.services.push(Supervised {
+                    name,
+                    child,
+                    report,
+                    restarts: Vec::new(),
+                    restart_at: None,
+                    last_exit: String::new(),
+                }),
+                Err(error) => {
+                    children.stop();
+                    return Err(error);
+                }
+            }
+        }
+        Ok(children)
+    }
+
+    /// Restarts what has died; true if a service had to be given up.
+    pub fn look_after(&mut self, plan: &Plan, observer: &Observer) -> bool {
+        let policy = &plan.setup.file.restart;
+        let window = Duration::from_secs_f64(policy.window_s);
+        for service in &mut self.services {
+            let now = Instant::now();
+            if let (None, Ok(Some(status))) = (service.restart_at, service.child.try_wait()) {
+                service.last_exit = status.to_string();
+                service
+                    .restarts
+                    .retain(|at| now.duration_since(*at) < window);
+                let count = service.restarts.len() as u32;
+                let name = service.name.as_str();
+                if count >= policy.max_restarts {
+                    eprintln!("vigil: {name} ended ({status}); given up after {count} restarts");
+                    self.gave_up = Some(service.name);
+                    return true;
+                }
+                eprintln!("vigil: {name} ended ({status}); restarting");
+                let delay_ms = policy.delay_ms * f64::from(2_u32.saturating_pow(count));
+                service.restart_at = Some(now + Duration::from_secs_f64(delay_ms * 1e-3));
+                observer.remove_dead_peers();
+            }
+            // A stop always wins over a restart.
+            if service.restart_at.is_some_and(|at| now >= at) && !signal::stop_requested() {
+                service.restart_at = None;
+                service.restarts.push(now);
+                match spawn(plan, service.name, &service.report) {
+                    Ok(child) => service.child = child,
+                    Err(error) => {
+                        eprintln!(
+                            "vigil: {} cannot be started: {error}",
+                            service.name.as_str()
+                        );
+                        self.gave_up = Some(service.name);
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// Stops every service, the source first; kills those that do not stop in time.
+    pub fn stop(&mut self) {
+        for service in &mut self.services {
+            if matches!(service.child.try_wait(), Ok(None)) {
+                signal::terminate(service.child.id());
+            }
+        }
+        let deadline = Instant::now() + STOP_LIMIT;
+        for service in &mut self.services {
+            while matches!(service.child.try_wait(), Ok(None)) && Instant::now() < deadline {
+                std::thread::sleep(POLL);
+            }
+            if matches!(service.child.try_wait(), Ok(None)) {
+                eprintln!("vigil: {} did not stop: killed", service.name.as_str());
+                let _ = service.child.kill();
+            }
+            let _ = service.child.wait();
+        }
+    }
+
+    /// The run reports that the services have left.
+    pub fn reports(&self) -> Vec<(ServiceName, Option<RunReport>)> {
+        let read = |service: &Supervised| match RunReport::read(&service.report) {
+            Ok(report) => Some(report),
+            Err(error) => {
+                eprintln!("vigil: no report of {}: {error}", service.name.as_str());
+                None
+            }
+        };
+        self.services
+            .iter()
+            .map(|service| (service.name, read(service)))
+            .collect()
+    }
+
+    /// Restarts of a service.
+    pub fn restarts(&self, name: ServiceName) -> usize {
+        self.services
+            .iter()
+            .find(|s| s.name == name)
+            .map_or(0, |s| s.restarts.len())
+    }
+
+    /// The service that was given up, and how it last ended.
+    pub fn gave_up(&self) -> Option<(ServiceName, &str)> {
+        let name = self.gave_up?;
+        let service = self.services.iter().find(|s| s.name == name)?;
+        Some((name, service.last_exit.as_str()))
+    }
+}
+
+fn spawn(plan: &Plan, name: ServiceName, report: &std::path::Path) -> io::Result<Child> {
+    let (program, line) = plan.command(name, report.to_path_buf());
+    Command::new(&program)
+        .args(line)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .spawn()
+        .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", program.display())))
+}

@@ -1,0 +1,148 @@
+//! Reads the Health of every service.
+
+use vigil_blocks::{Block, EventKind, Health};
+use vigil_cycle::port::Link;
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{Clock, Graph, Monotonic, PortError, Receiver, Topic, health};
+
+use crate::plan::Plan;
+use crate::timeline::{Namer, Timeline};
+
+/// What the launcher knows of one service.
+pub struct Watched {
+    /// Which service.
+    pub name: ServiceName,
+    receiver: Box<dyn Receiver<Health>>,
+    seen_events: u64,
+    /// The newest Health of the present process.
+    pub latest: Option<Box<Health>>,
+    /// Counters of processes that have died.
+    pub before: Counters,
+}
+
+/// Counters that add up over restarts.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Counters {
+    pub cycles: u64,
+    pub missed: u64,
+    pub slips: u64,
+    pub lost: u64,
+    pub late: u64,
+    pub duplicate: u64,
+    pub invalid: u64,
+}
+
+impl Counters {
+    fn add(&mut self, health: &Health) {
+        self.cycles += health.cycles;
+        self.missed += health.missed;
+        self.slips += health.slips;
+        self.lost += health.lost;
+        self.late += health.late;
+        self.duplicate += health.duplicate;
+        self.invalid += health.invalid;
+    }
+}
+
+impl Watched {
+    /// Counters over all processes of the service.
+    pub fn counters(&self) -> Counters {
+        let mut counters = self.before;
+        if let Some(health) = &self.latest {
+            counters.add(health);
+        }
+        counters
+    }
+}
+
+/// Reads Health and keeps the timeline.
+pub struct Observer {
+    graph: Graph,
+    watched: Vec<Watched>,
+    timeline: Timeline,
+}
+
+impl Observer {
+    /// Opens the Health topics, before any service has written there.
+    pub fn new(link: Link, plan: &Plan) -> Result<Self, PortError> {
+        let graph = Graph::SharedMemory(link);
+        let watch = |name| {
+            let receiver = graph.receiver(Topic::Health(name))?;
+            let before = Counters::default();
+            Ok(Watched {
+                name,
+                receiver,
+                seen_events: 0,
+                latest: None,
+                before,
+            })
+        };
+        let watched = plan
+            .services()
+            .map(watch)
+            .collect::<Result<_, PortError>>()?;
+        Ok(Self {
+            watched,
+            graph,
+            timeline: Timeline::new(Namer::new(plan)),
+        })
+    }
+
+    /// Takes what is new; prints events to standard error as they come if `show`.
+    pub fn poll(&mut self, show: bool) {
+        for service in &mut self.watched {
+            for _ in 0..service.receiver.buffer() {
+                if !service.receiver.advance() {
+                    break;
+                }
+                let Some(block) = service.receiver.held() else {
+                    break;
+                };
+                if block.header.schema != Health::SCHEMA {
+                    continue;
+                }
+                if let Some(old) = &service.latest
+                    && old.header.epoch != block.header.epoch
+                {
+                    service.before.add(old);
+                    service.seen_events = 0;
+                }
+                let timeline = &mut self.timeline;
+                let overwritten = health::new_events(block, &mut service.seen_events, |event| {
+                    timeline.add(service.name, event);
+                });
+                timeline.add_overwritten(overwritten);
+                service.latest = Some(Box::new(*block));
+            }
+        }
+        self.timeline.settle(show);
+    }
+
+    /// Instant of the first cycle in which every service answered, ns.
+    pub fn ready_ns(&self) -> Option<u64> {
+        self.timeline.first(EventKind::Ready)
+    }
+
+    /// Seconds since then.
+    pub fn since_ready_s(&self) -> Option<f64> {
+        self.ready_ns()
+            .map(|ready_ns| Monotonic.now_ns().saturating_sub(ready_ns) as f64 * 1e-9)
+    }
+
+    /// Every service watched.
+    pub fn watched(&self) -> &[Watched] {
+        &self.watched
+    }
+
+    /// What has happened.
+    pub const fn timeline(&self) -> &Timeline {
+        &self.timeline
+    }
+
+    /// Removes what dead processes left behind.
+    pub fn remove_dead_peers(&self) {
+        if let Graph::SharedMemory(link) = &self.graph {
+            link.remove_dead_peers();
+        }
+    }
+}

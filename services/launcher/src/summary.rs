@@ -1,0 +1,259 @@
+//! The readable end of a run, and the same for programs.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::Serialize;
+use vigil_cycle::latency::Percentiles;
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{Placement, RunReport};
+
+use crate::children::Children;
+use crate::observer::{Observer, Watched};
+use crate::plan::Plan;
+use crate::timeline::Told;
+
+/// Why a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ended {
+    /// The duration is over.
+    Duration,
+    /// The recording is over.
+    EndOfRecording,
+    /// Ctrl-C or SIGTERM.
+    Stopped,
+    /// A service died too often.
+    GaveUp,
+    /// The graph never came up.
+    NeverReady,
+}
+
+/// A latency distribution, us.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Microseconds {
+    n: u64,
+    p50: f64,
+    p90: f64,
+    p99: f64,
+    p999: f64,
+    max: f64,
+}
+
+impl From<Percentiles> for Microseconds {
+    fn from(p: Percentiles) -> Self {
+        let us = |ns: u64| ns as f64 * 1e-3;
+        Self {
+            n: p.n,
+            p50: us(p.p50_ns),
+            p90: us(p.p90_ns),
+            p99: us(p.p99_ns),
+            p999: us(p.p999_ns),
+            max: us(p.max_ns),
+        }
+    }
+}
+
+/// What one service did.
+#[derive(Debug, Clone, Serialize)]
+pub struct ServiceSummary {
+    cycles: u64,
+    missed: u64,
+    slips: u64,
+    lost: u64,
+    late: u64,
+    duplicate: u64,
+    invalid: u64,
+    restarts: usize,
+    pid: u32,
+    core: u32,
+    core_wanted: u32,
+    scheduling: String,
+    memory_locked: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    wake_up_us: Option<Microseconds>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    step_us: Option<Microseconds>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    from_schedule_us: Option<Microseconds>,
+}
+
+/// What happened in a run.
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    schema_version: u32,
+    graph: String,
+    rate_hz: f64,
+    duration_s: f64,
+    ended: Ended,
+    release_build: bool,
+    config_hash: String,
+    services: BTreeMap<&'static str, ServiceSummary>,
+    end_to_end_us: Microseconds,
+    events: Vec<Told>,
+    events_overwritten: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gave_up: Option<String>,
+}
+
+impl Summary {
+    /// Collects what the observer, the children and their reports know.
+    pub fn new(
+        plan: &Plan,
+        observer: &Observer,
+        children: &Children,
+        reports: &[(ServiceName, Option<RunReport>)],
+        ended: Ended,
+    ) -> Self {
+        let report = |name| {
+            reports
+                .iter()
+                .find(|(n, _)| *n == name)
+                .and_then(|(_, r)| r.as_ref())
+        };
+        let services = observer
+            .watched()
+            .iter()
+            .map(|w| {
+                (
+                    w.name.as_str(),
+                    service(w, children.restarts(w.name), report(w.name)),
+                )
+            })
+            .collect();
+        let end_to_end = report(ServiceName::Supervisor).map(|r| r.from_schedule.percentiles);
+        Self {
+            schema_version: 1,
+            graph: plan.setup.file.graph.name.clone(),
+            rate_hz: plan.setup.file.graph.rate_hz,
+            duration_s: observer.since_ready_s().unwrap_or(0.0),
+            ended,
+            release_build: !cfg!(debug_assertions),
+            config_hash: format!("{:016x}", plan.setup.hash),
+            services,
+            end_to_end_us: end_to_end.unwrap_or_default().into(),
+            events: observer.timeline().told(),
+            events_overwritten: observer.timeline().overwritten(),
+            gave_up: children
+                .gave_up()
+                .map(|(name, exit)| format!("{}: {exit}", name.as_str())),
+        }
+    }
+
+    /// True if the run itself failed.
+    pub const fn failed(&self) -> bool {
+        matches!(self.ended, Ended::GaveUp | Ended::NeverReady)
+    }
+}
+
+fn service(w: &Watched, restarts: usize, report: Option<&RunReport>) -> ServiceSummary {
+    let (counters, health) = (w.counters(), w.latest.as_deref());
+    let of = |get: fn(&RunReport) -> Percentiles| report.map(|r| get(r).into());
+    ServiceSummary {
+        cycles: counters.cycles,
+        missed: counters.missed,
+        slips: counters.slips,
+        lost: counters.lost,
+        late: counters.late,
+        duplicate: counters.duplicate,
+        invalid: counters.invalid,
+        restarts,
+        pid: health.map_or(0, |h| h.pid),
+        core: health.map_or(u32::MAX, |h| h.core),
+        core_wanted: health.map_or(u32::MAX, |h| h.core_wanted),
+        scheduling: health.map_or_else(
+            || "unknown".into(),
+            |h| Placement::scheduling(h.policy, h.priority),
+        ),
+        memory_locked: health.is_some_and(|h| h.memory_locked != 0),
+        wake_up_us: of(|r| r.wake_up.percentiles),
+        step_us: of(|r| r.step.percentiles),
+        from_schedule_us: of(|r| r.from_schedule.percentiles),
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            graph,
+            rate_hz,
+            duration_s,
+            ..
+        } = self;
+        writeln!(f, "\ngraph {graph}: {duration_s:.1} s at {rate_hz} Hz")?;
+        if !self.release_build {
+            writeln!(f, "DEBUG BUILD: the times below mean nothing")?;
+        }
+        self.placement(f)?;
+        writeln!(
+            f,
+            "  service      core  scheduling   cycles  missed  slips  lost  late  restarts  step p99"
+        )?;
+        for (name, s) in self.in_order() {
+            let step = s
+                .step_us
+                .map_or_else(|| "-".into(), |l| format!("{:.0} us", l.p99));
+            writeln!(
+                f,
+                "  {name:<11} {:>5}  {:<10} {:>8} {:>7} {:>6} {:>5} {:>5} {:>9}  {step}",
+                s.core, s.scheduling, s.cycles, s.missed, s.slips, s.lost, s.late, s.restarts
+            )?;
+        }
+        let e = &self.end_to_end_us;
+        writeln!(
+            f,
+            "  end to end, from the schedule to the action: p50 {:.0}, p90 {:.0}, p99 {:.0}, \
+             p99.9 {:.0}, max {:.0} us (n = {})",
+            e.p50, e.p90, e.p99, e.p999, e.max, e.n
+        )?;
+        writeln!(f, "  timeline:")?;
+        for event in &self.events {
+            let p = event.p.map_or_else(String::new, |p| format!("  p={p:.3}"));
+            let Told {
+                t_s,
+                service,
+                event,
+                what,
+                ..
+            } = event;
+            writeln!(f, "  {t_s:9.3} s  {service:<10}  {event:<10}  {what}{p}")?;
+        }
+        if let Some(gave_up) = &self.gave_up {
+            writeln!(f, "  given up: {gave_up}")?;
+        }
+        Ok(())
+    }
+}
+
+impl Summary {
+    fn in_order(&self) -> impl Iterator<Item = (&'static str, &ServiceSummary)> {
+        ServiceName::ALL
+            .iter()
+            .filter_map(|name| self.services.get(name.as_str()).map(|s| (name.as_str(), s)))
+    }
+
+    /// Says openly which services share a core, and what was not permitted.
+    fn placement(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut cores: BTreeMap<u32, Vec<&str>> = BTreeMap::new();
+        for (name, service) in self.in_order() {
+            cores.entry(service.core).or_default().push(name);
+            if service.core != service.core_wanted {
+                let (core, wanted) = (service.core, service.core_wanted);
+                writeln!(f, "  {name} runs on core {core}, not on {wanted} as asked")?;
+            }
+            if service.scheduling == "other" {
+                writeln!(
+                    f,
+                    "  {name} runs under SCHED_OTHER: real-time priority not permitted"
+                )?;
+            }
+            if !service.memory_locked {
+                writeln!(f, "  {name}: memory is not locked: not permitted")?;
+            }
+        }
+        for (core, names) in cores.iter().filter(|(_, names)| names.len() > 1) {
+            writeln!(f, "  core {core} is shared by {}", names.join(", "))?;
+        }
+        Ok(())
+    }
+}

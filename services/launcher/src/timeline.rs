@@ -1,0 +1,207 @@
+//! What happened, in order, in words.
+
+use serde::Serialize;
+use vigil_blocks::{Event, EventKind, MODE_MULTIPLE, MODE_UNKNOWN};
+use vigil_cycle::topic::ServiceName;
+use vigil_robot::{Fault, FaultKind};
+
+use crate::plan::Plan;
+
+/// An event in words.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Told {
+    /// Seconds since every service answered for the first time.
+    pub t_s: f64,
+    /// The service that says so.
+    pub service: &'static str,
+    /// Kind of the event.
+    pub event: &'static str,
+    /// What it is about.
+    pub what: String,
+    /// Probability, where the event has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub p: Option<f64>,
+}
+
+/// All events of a run.
+pub struct Timeline {
+    namer: Namer,
+    raw: Vec<(ServiceName, Event)>,
+    shown: usize,
+    overwritten: u64,
+}
+
+impl Timeline {
+    /// An empty timeline.
+    pub const fn new(namer: Namer) -> Self {
+        Self {
+            namer,
+            raw: Vec::new(),
+            shown: 0,
+            overwritten: 0,
+        }
+    }
+
+    /// Adds an event.
+    pub fn add(&mut self, service: ServiceName, event: &Event) {
+        self.raw.push((service, *event));
+    }
+
+    /// Counts events that were overwritten before they could be read.
+    pub const fn add_overwritten(&mut self, count: u64) {
+        self.overwritten += count;
+    }
+
+    /// Events that were overwritten before they could be read.
+    pub const fn overwritten(&self) -> u64 {
+        self.overwritten
+    }
+
+    /// Puts the newly added events in order; prints them to standard error if `show`.
+    pub fn settle(&mut self, show: bool) {
+        let origin_ns = self.first(EventKind::Ready);
+        self.raw[self.shown..].sort_by_key(|(_, event)| event.t_ns);
+        if show && origin_ns.is_some() {
+            for (service, event) in &self.raw[self.shown..] {
+                let told = self.namer.tell(*service, event, origin_ns);
+                let p = told.p.map_or_else(String::new, |p| format!("  p={p:.3}"));
+                let Told {
+                    t_s,
+                    service,
+                    event,
+                    what,
+                    ..
+                } = told;
+                eprintln!("{t_s:9.3} s  {service:<10}  {event:<10}  {what}{p}");
+            }
+        }
+        if origin_ns.is_some() || !show {
+            self.shown = self.raw.len();
+        }
+    }
+
+    /// Instant of the first event of a kind, ns.
+    pub fn first(&self, kind: EventKind) -> Option<u64> {
+        self.raw
+            .iter()
+            .find(|(_, e)| e.kind == kind as u32)
+            .map(|(_, e)| e.t_ns)
+    }
+
+    /// True if an event of this kind is there.
+    pub fn has(&self, kind: EventKind) -> bool {
+        self.first(kind).is_some()
+    }
+
+    /// Every event in words, in order.
+    pub fn told(&self) -> Vec<Told> {
+        let origin_ns = self.first(EventKind::Ready);
+        let mut sorted = self.raw.clone();
+        sorted.sort_by_key(|(_, event)| event.t_ns);
+        sorted
+            .iter()
+            .map(|(service, event)| self.namer.tell(*service, event, origin_ns))
+            .collect()
+    }
+}
+
+/// Gives names to what events are about.
+pub struct Namer {
+    nodes: Vec<String>,
+    actions: Vec<String>,
+    robot: vigil_robot::Description,
+}
+
+impl Namer {
+    /// Names from the plan's models.
+    pub fn new(plan: &Plan) -> Self {
+        Self {
+            nodes: plan
+                .setup
+                .tree
+                .nodes()
+                .iter()
+                .map(|node| node.name.clone())
+                .collect(),
+            actions: plan.action_names.clone(),
+            robot: plan.setup.robot.clone(),
+        }
+    }
+
+    fn tell(&self, service: ServiceName, event: &Event, origin_ns: Option<u64>) -> Told {
+        let kind = EventKind::from_wire(event.kind);
+        let t_s = origin_ns.map_or(0.0, |origin| (event.t_ns as f64 - origin as f64) * 1e-9);
+        let has_p = matches!(
+            kind,
+            Some(EventKind::Alarm | EventKind::Cleared | EventKind::Diagnosis | EventKind::Action)
+        );
+        Told {
+            t_s: (t_s * 1e6).round() * 1e-6,
+            service: service.as_str(),
+            event: kind.map_or("unknown", kind_name),
+            what: kind.map_or_else(String::new, |kind| self.what(kind, event)),
+            p: has_p.then_some(event.p),
+        }
+    }
+
+    fn what(&self, kind: EventKind, event: &Event) -> String {
+        match kind {
+            EventKind::Diagnosis | EventKind::Cleared => self.mode(event.what),
+            EventKind::Action => {
+                let action = self.actions.get(event.what as usize);
+                let wheel = usize::try_from(event.value)
+                    .ok()
+                    .and_then(|i| self.robot.wheels.get(i));
+                let action = action.map_or("?", String::as_str);
+                wheel.map_or_else(|| action.to_owned(), |w| format!("{action}:{}", w.name))
+            }
+            EventKind::Injected => match FaultKind::from_wire(event.what >> 8) {
+                Some(kind) => Fault {
+                    kind,
+                    wheel: (event.what & 255) as usize,
+                }
+                .text(&self.robot),
+                None => "?".into(),
+            },
+            EventKind::Restored => {
+                let wheel = self.robot.wheels.get(event.what as usize);
+                format!("clear:{}", wheel.map_or("all", |w| w.name.as_str()))
+            }
+            EventKind::Miss => format!("{} cycles", event.value),
+            EventKind::Run => event.value.to_string(),
+            _ => String::new(),
+        }
+    }
+
+    fn mode(&self, node: u32) -> String {
+        match node {
+            MODE_UNKNOWN => "UNKNOWN".into(),
+            MODE_MULTIPLE => "MULTIPLE".into(),
+            node => self
+                .nodes
+                .get(node as usize)
+                .cloned()
+                .unwrap_or_else(|| "?".into()),
+        }
+    }
+}
+
+const fn kind_name(kind: EventKind) -> &'static str {
+    match kind {
+        EventKind::Ready => "ready",
+        EventKind::Injected => "injected",
+        EventKind::Restored => "restored",
+        EventKind::Alarm => "alarm",
+        EventKind::Cleared => "cleared",
+        EventKind::Diagnosis => "diagnosis",
+        EventKind::Action => "action",
+        EventKind::Miss => "miss",
+        EventKind::InputLost => "input-lost",
+        EventKind::InputBack => "input-back",
+        EventKind::SafeStop => "safe-stop",
+        EventKind::SafeStopEnds => "safe-stop-ends",
+        EventKind::Refused => "refused",
+        EventKind::Run => "run",
+        EventKind::EndOfRecording => "end-of-recording",
+    }
+}
