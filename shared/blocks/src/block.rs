@@ -137,7 +137,6 @@ mod tests {
 
     #[test]
     fn swapping_two_fields_of_equal_type_changes_the_schema() {
-        use crate::block::block;
         mod a {
             block! { pub struct Swap, size 64 {
             pub header: crate::Header, pub first: u64, pub second: u64, } }

@@ -151,6 +151,30 @@ impl Domain {
     }
 }
 
+/// Free bytes of /dev/shm; `None` if it cannot be asked. A full one kills its users with SIGBUS.
+#[must_use]
+pub fn shared_memory_free_bytes() -> Option<u64> {
+    // SAFETY: the path is a constant C string; statvfs only writes into the zeroed struct.
+    #[allow(unsafe_code)]
+    unsafe {
+        let mut stat: libc::statvfs = std::mem::zeroed();
+        (libc::statvfs(c"/dev/shm".as_ptr(), &raw mut stat) == 0)
+            .then(|| stat.f_bavail * stat.f_frsize)
+    }
+}
+
+impl Queues {
+    /// Bytes of shared memory that one writer of blocks of `size` bytes reserves: a slot for
+    /// every block that may wait or be held, and one of history and loan.
+    #[must_use]
+    pub const fn reserved_bytes(&self, size: usize) -> u64 {
+        const BORROWED: usize = 2;
+        const LOANED: usize = 2;
+        let slots = self.max_subscribers * (self.buffer + BORROWED) + self.history + LOANED;
+        (slots * size) as u64
+    }
+}
+
 fn collect_files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();

@@ -7,6 +7,7 @@
 //!
 //! One turn: wake, count deadlines that have passed, take input, check it, step, publish, account.
 
+pub mod allocation;
 pub mod clock;
 pub mod deadline;
 pub mod domain;

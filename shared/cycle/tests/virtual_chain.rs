@@ -355,9 +355,9 @@ fn without_delays_nothing_is_missed() {
 
 #[test]
 fn injected_delays_are_reported_exactly_in_every_stage() {
-    for delayed in 0..4 {
+    for (delayed, deadline_ns) in DEADLINES_NS.into_iter().enumerate() {
         for tenths in [5, 9, 10, 11, 15, 20, 25, 30] {
-            let delay_ns = DEADLINES_NS[delayed] * tenths / 10;
+            let delay_ns = deadline_ns * tenths / 10;
             let mut world = World::new();
             world.delays[delayed].set(Some((DELAYED * PERIOD_NS, delay_ns)));
             world.run();

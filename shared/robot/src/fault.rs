@@ -45,7 +45,9 @@ pub struct Fault {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum FaultError {
     /// The form is wrong.
-    #[error("'{0}' is not a fault: expected stuck:WHEEL or encoder:WHEEL:zero|frozen|noise")]
+    #[error(
+        "'{0}' is not a fault: expected stuck:WHEEL, encoder:WHEEL:zero|frozen|noise or clear:WHEEL"
+    )]
     Form(String),
     /// The wheel does not exist.
     #[error("'{wheel}' is not a wheel of {robot}: expected one of {allowed}")]
@@ -84,14 +86,22 @@ impl Fault {
         robot.wheel_index(name).ok_or_else(|| FaultError::Wheel {
             wheel: name.to_owned(),
             robot: robot.name.clone(),
-            allowed: robot.wheels.iter().map(|w| w.name.as_str()).collect::<Vec<_>>().join(" "),
+            allowed: robot
+                .wheels
+                .iter()
+                .map(|w| w.name.as_str())
+                .collect::<Vec<_>>()
+                .join(" "),
         })
     }
 
     /// Text form, as [`Self::parse`] takes it.
     #[must_use]
     pub fn text(&self, robot: &Description) -> String {
-        let wheel = robot.wheels.get(self.wheel).map_or("?", |w| w.name.as_str());
+        let wheel = robot
+            .wheels
+            .get(self.wheel)
+            .map_or("?", |w| w.name.as_str());
         match self.kind {
             FaultKind::Stuck => format!("stuck:{wheel}"),
             kind => format!("encoder:{wheel}:{kind}"),

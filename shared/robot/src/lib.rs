@@ -5,6 +5,8 @@
 
 pub mod description;
 pub mod fault;
+pub mod injection;
 
 pub use description::Description;
 pub use fault::{Fault, FaultKind};
+pub use injection::Injection;

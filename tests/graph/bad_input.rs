@@ -1,0 +1,109 @@
+//! Bad input is refused with one precise message and exit code 2, before anything starts.
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use crate::harness::{Running, binary, eventually, machine, root, unique};
+
+/// A copy of `config/` in which one text is replaced.
+fn changed(folder: &Path, file: &str, from: &str, to: &str) {
+    let copy = |name: &str| {
+        let target = folder.join(name);
+        fs::create_dir_all(target.parent().unwrap()).unwrap();
+        let text = fs::read_to_string(root().join("config").join(name)).unwrap();
+        let text = if name == file {
+            assert!(text.contains(from), "{file} does not contain '{from}'");
+            text.replacen(from, to, 1)
+        } else {
+            text
+        };
+        fs::write(target, text).unwrap();
+    };
+    ["rover.toml", "rover.pomdp", "robots/rover.toml", "trees/rover.toml", "models/rover.toml"]
+        .map(copy);
+}
+
+fn launch(config: &Path, name: &str, options: &[&str]) -> Output {
+    binary("vigil-launcher")
+        .args(["--json", "--duration", "1", "--graph", &unique(name), "--config"])
+        .arg(config)
+        .args(options)
+        .output()
+        .unwrap()
+}
+
+fn assert_refused(output: &Output, expected: &[&str]) {
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(output.stdout.is_empty(), "nothing on standard output");
+    for part in expected {
+        assert!(message.contains(part), "'{part}' is not in: {message}");
+    }
+}
+
+#[test]
+fn every_bad_configuration_names_file_line_key_and_what_is_allowed() {
+    let cases: [(&str, &str, &str, &[&str]); 8] = [
+        ("rover.toml", "rate_hz = 100.0", "rate_hz = 0.0", &["rover.toml:5", "rate_hz", "1 to"]),
+        ("rover.toml", "seed = 1", "seeds = 1", &["rover.toml:6", "unknown field `seeds`"]),
+        ("rover.toml", "core = 0,", "core = 99,", &["services.sensor-sim.core", "99 does not"]),
+        ("rover.toml", "priority = 55", "priority = 99", &["priority", "1 to 90"]),
+        ("rover.toml", "models/rover.toml", "models/no.toml", &["models/no.toml", "cannot be"]),
+        ("rover.toml", "filter = \"exact\"", "filter = \"x\"", &["'x' is not known", "exact"]),
+        ("robots/rover.toml", "mass_kg = 14.2", "mass_kg = nan", &["robots/rover.toml", "mass_kg"]),
+        ("trees/rover.toml", "\"LSS\"", "\"RSS\"", &["trees/rover.toml", "RSS"]),
+    ];
+    for (i, (file, from, to, expected)) in cases.into_iter().enumerate() {
+        let folder = std::env::temp_dir().join(unique(&format!("bad{i}")));
+        changed(&folder, file, from, to);
+        let output = launch(&folder.join("rover.toml"), "bad", &[]);
+        fs::remove_dir_all(&folder).unwrap();
+        assert_refused(&output, expected);
+    }
+}
+
+#[test]
+fn all_problems_are_reported_at_once() {
+    let folder = std::env::temp_dir().join(unique("many"));
+    changed(&folder, "rover.toml", "rate_hz = 100.0\nseed = 1", "rate_hz = 1e9\nseed = 1");
+    let path = folder.join("rover.toml");
+    let text = fs::read_to_string(&path).unwrap().replace("ring_s = 3.0", "ring_s = 300.0");
+    fs::write(&path, text).unwrap();
+    let output = launch(&path, "many", &[]);
+    fs::remove_dir_all(&folder).unwrap();
+    assert_refused(&output, &["graph.rate_hz", "identifier.ring_s"]);
+}
+
+#[test]
+fn bad_options_and_recordings_are_refused() {
+    let config = root().join("config/rover.toml");
+    let frames = std::env::temp_dir().join(unique("frames.csv"));
+    let frames_text = frames.display().to_string();
+    assert_refused(&launch(&config, "o1", &["--inject", "stuck:XX@1"]), &["XX", "LF LM LR"]);
+    assert_refused(&launch(&config, "o2", &["--inject", "stuck:RM"]), &["stuck:RM"]);
+    assert_refused(&launch(&config, "o3", &["--replay", &frames_text]), &["frames.csv"]);
+    fs::write(&frames, "run,t,x\n0,0.05,1\n").unwrap();
+    let missing = ["frames.csv", "yaw", "cmd_curv"];
+    assert_refused(&launch(&config, "o4", &["--replay", &frames_text]), &missing);
+    fs::remove_file(&frames).unwrap();
+}
+
+#[test]
+fn a_second_graph_of_the_same_name_is_refused_and_the_first_goes_on() {
+    let _machine = machine();
+    let mut first = Running::start("twice", &["--duration", "30"]);
+    let observed = first.observe();
+    let mut health = crate::harness::HealthWatch::new(&observed);
+    eventually("all services run", || health.all_running().then_some(()));
+    let second = launch(&root().join("config/rover.toml"), "twice", &[]);
+    assert_refused(&second, &[&first.setup.file.graph.name, "running"]);
+    let cycles = health.poll()["supervisor"].cycles;
+    eventually("the first goes on", || (health.poll()["supervisor"].cycles > cycles).then_some(()));
+    assert!(first.is_alive());
+    first.interrupt();
+    let summary = first.finish();
+    for name in ["sensor-sim", "detector", "identifier", "supervisor"] {
+        assert_eq!(summary.service(name, "restarts"), 0);
+    }
+}

@@ -1,0 +1,206 @@
+//! Starts and ends graphs.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use vigil_blocks::{Block, Health};
+use vigil_cycle::port::Link;
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{Graph, Receiver, Topic};
+use vigil_setup::{GraphArgs, Setup};
+
+/// A test that hangs is ended after this long; no test passes or fails by its duration.
+const WATCHDOG: Duration = Duration::from_secs(120);
+
+static MACHINE: Mutex<()> = Mutex::new(());
+
+/// Takes the machine for one test.
+pub fn machine() -> MutexGuard<'static, ()> {
+    MACHINE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+pub fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
+}
+
+/// A binary of the workspace, built into the same target folder as this test.
+pub fn binary(name: &str) -> Command {
+    let deps = std::env::current_exe().unwrap();
+    let path = deps.parent().unwrap().with_file_name(name);
+    assert!(path.exists(), "{} is not built: run `cargo build --workspace`", path.display());
+    let mut command = Command::new(path);
+    command.current_dir(root()).env_remove("VIGIL_CONFIG");
+    command
+}
+
+/// Name for a graph that no other test and no other run of the tests has.
+pub fn unique(name: &str) -> String {
+    format!("t{}-{name}", std::process::id())
+}
+
+/// A running graph; stopped, with all its services, when dropped.
+pub struct Running {
+    launcher: Option<Child>,
+    pub setup: Setup,
+}
+
+impl Running {
+    /// Starts the launcher with `--json` and these options.
+    pub fn start(name: &str, options: &[&str]) -> Self {
+        Self::start_with("config/rover.toml".into(), name, options)
+    }
+
+    pub fn start_with(config: PathBuf, name: &str, options: &[&str]) -> Self {
+        let graph = unique(name);
+        let args = GraphArgs { config, graph: Some(graph.clone()), ..GraphArgs::default() };
+        let launcher = binary("vigil-launcher")
+            .args(["--json", "--graph", &graph, "--config"])
+            .arg(&args.config)
+            .args(options)
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let setup = GraphArgs { config: root().join(&args.config), ..args }.load().unwrap();
+        Self { launcher: Some(launcher), setup }
+    }
+
+    /// An observer's link to the graph.
+    pub fn observe(&self) -> Graph {
+        let domain = self.setup.domain().unwrap();
+        Graph::SharedMemory(Link::join(&domain, "test").unwrap())
+    }
+
+    /// True while the launcher runs.
+    pub fn is_alive(&mut self) -> bool {
+        matches!(self.launcher.as_mut().unwrap().try_wait(), Ok(None))
+    }
+
+    /// Asks the launcher to stop.
+    pub fn interrupt(&self) {
+        vigil_cycle::signal::terminate(self.launcher.as_ref().unwrap().id());
+    }
+
+    /// Waits for the end and reads the summary.
+    pub fn finish(mut self) -> Summary {
+        let output = wait(self.launcher.take().unwrap());
+        assert!(output.status.success(), "launcher: {}", output.status);
+        let text = String::from_utf8(output.stdout).unwrap();
+        let residue = self.setup.domain().unwrap().residue();
+        assert_eq!(residue, Vec::<PathBuf>::new(), "shared memory is left behind");
+        Summary { json: serde_json::from_str(&text).unwrap() }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if let Some(launcher) = self.launcher.take() {
+            vigil_cycle::signal::terminate(launcher.id());
+            let _ = wait(launcher);
+        }
+    }
+}
+
+/// Waits for a child; a hanging one is killed and fails the test.
+fn wait(mut child: Child) -> Output {
+    let started = Instant::now();
+    while matches!(child.try_wait(), Ok(None)) {
+        if started.elapsed() > WATCHDOG {
+            let _ = child.kill();
+            panic!("a process hung");
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.wait_with_output().unwrap()
+}
+
+/// Polls until `condition` gives a value; panics when it never does.
+pub fn eventually<T>(what: &str, mut condition: impl FnMut() -> Option<T>) -> T {
+    let started = Instant::now();
+    loop {
+        if let Some(value) = condition() {
+            return value;
+        }
+        assert!(started.elapsed() < WATCHDOG, "never happened: {what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Takes every waiting block.
+pub fn drain<T: Block>(receiver: &mut dyn Receiver<T>, mut take: impl FnMut(&T)) {
+    while receiver.advance() {
+        take(receiver.held().unwrap());
+    }
+}
+
+/// Newest Health of each service.
+pub struct HealthWatch {
+    receivers: Vec<(ServiceName, Box<dyn Receiver<Health>>)>,
+    pub latest: BTreeMap<&'static str, Health>,
+}
+
+impl HealthWatch {
+    pub fn new(graph: &Graph) -> Self {
+        let open = |name| (name, graph.receiver(Topic::Health(name)).unwrap());
+        Self { receivers: ServiceName::ALL.into_iter().map(open).collect(), latest: BTreeMap::new() }
+    }
+
+    pub fn poll(&mut self) -> &BTreeMap<&'static str, Health> {
+        for (name, receiver) in &mut self.receivers {
+            drain(receiver.as_mut(), |health| {
+                self.latest.insert(name.as_str(), *health);
+            });
+        }
+        &self.latest
+    }
+
+    /// True once every service cycles.
+    pub fn all_running(&mut self) -> bool {
+        let running = vigil_blocks::ServiceState::Running as u32;
+        self.poll().values().filter(|h| h.state == running).count() == ServiceName::ALL.len()
+    }
+}
+
+/// The launcher's JSON document.
+pub struct Summary {
+    pub json: Value,
+}
+
+impl Summary {
+    pub fn service(&self, name: &str, key: &str) -> u64 {
+        self.json["services"][name][key].as_u64().unwrap()
+    }
+
+    /// Events of a kind: (time, what), in order.
+    pub fn events(&self, kind: &str) -> Vec<(f64, String)> {
+        let events = self.json["events"].as_array().unwrap();
+        events
+            .iter()
+            .filter(|e| e["event"] == kind)
+            .map(|e| (e["t_s"].as_f64().unwrap(), e["what"].as_str().unwrap().to_owned()))
+            .collect()
+    }
+}
+
+/// The mode that the identifier reports, by name.
+pub struct ModeWatch {
+    receiver: Box<dyn Receiver<vigil_blocks::FaultBelief>>,
+    names: Vec<String>,
+    mode: Option<u32>,
+}
+
+impl ModeWatch {
+    pub fn new(graph: &Graph, setup: &Setup) -> Self {
+        let names = setup.tree.nodes().iter().map(|node| node.name.clone()).collect();
+        Self { receiver: graph.receiver(Topic::Diagnosis).unwrap(), names, mode: None }
+    }
+
+    pub fn poll(&mut self) -> Option<String> {
+        drain(self.receiver.as_mut(), |belief| self.mode = Some(belief.mode));
+        let mode = self.mode? as usize;
+        Some(self.names.get(mode).cloned().unwrap_or_else(|| format!("mode {mode}")))
+    }
+}

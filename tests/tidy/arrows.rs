@@ -1,0 +1,200 @@
+//! Dependencies between crates point one way.
+
+use crate::manifest::Manifest;
+use crate::source::{Source, workspace};
+
+const SHARED: &[&str] = &[
+    "vigil-setup",
+    "vigil-cycle",
+    "vigil-evaluation",
+    "vigil-robot",
+    "vigil-inference",
+    "vigil-decision",
+    "vigil-blocks",
+];
+
+/// The services whose `step` others may run offline.
+const SERVICES: &[&str] = &[
+    "vigil-sensor-sim",
+    "vigil-detector",
+    "vigil-identifier",
+    "vigil-supervisor",
+];
+
+/// For each shared crate, the crates of the workspace that it may see.
+const ALLOWED: &[(&str, &[&str])] = &[
+    ("vigil-blocks", &[]),
+    ("vigil-inference", &["vigil-blocks"]),
+    ("vigil-decision", &["vigil-blocks"]),
+    ("vigil-cycle", &["vigil-blocks"]),
+    ("vigil-robot", &["vigil-inference", "vigil-blocks"]),
+    // Setup turns the configuration into what the cycle needs: placement, deadlines, queues.
+    (
+        "vigil-setup",
+        &[
+            "vigil-cycle",
+            "vigil-robot",
+            "vigil-inference",
+            "vigil-blocks",
+        ],
+    ),
+    (
+        "vigil-evaluation",
+        &["vigil-robot", "vigil-inference", "vigil-blocks"],
+    ),
+];
+
+/// Crates that compute only: no transport, no clock, no system call.
+const PURE: &[&str] = &[
+    "vigil-blocks",
+    "vigil-inference",
+    "vigil-decision",
+    "vigil-robot",
+];
+
+/// What a pure crate never sees.
+const SYSTEM: &[&str] = &[
+    "iceoryx2",
+    "libc",
+    "rustix",
+    "nix",
+    "core_affinity",
+    "signal-hook",
+];
+
+fn allowed(manifest: &Manifest) -> Option<Vec<&'static str>> {
+    let package = manifest.package.as_str();
+    if let Some((_, shared)) = ALLOWED.iter().find(|(name, _)| *name == package) {
+        return Some(shared.to_vec());
+    }
+    if package == "vigil" || package == "vigil-tests" {
+        return Some([SHARED, SERVICES].concat());
+    }
+    manifest
+        .path
+        .starts_with("services/")
+        .then(|| SHARED.to_vec())
+}
+
+fn arrow_violations(manifests: &[Manifest]) -> Vec<String> {
+    let ours = |name: &str| manifests.iter().any(|manifest| manifest.package == name);
+    let mut found = Vec::new();
+    for manifest in manifests {
+        let (path, package) = (&manifest.path, &manifest.package);
+        let Some(allowed) = allowed(manifest) else {
+            found.push(format!(
+                "{path}: '{package}' has no place in the table of arrows"
+            ));
+            continue;
+        };
+        let pure = PURE.contains(&package.as_str());
+        for dependency in &manifest.dependencies {
+            // Tests of a crate may name the crate itself.
+            if ours(dependency) && dependency != package && !allowed.contains(&dependency.as_str())
+            {
+                let list = allowed.join(", ");
+                found.push(format!("{path}: depends on {dependency}; allowed: {list}"));
+            }
+            if pure && SYSTEM.iter().any(|system| dependency.starts_with(system)) {
+                found.push(format!(
+                    "{path}: {package} only computes; it cannot use {dependency}"
+                ));
+            }
+        }
+    }
+    found
+}
+
+fn lint_violations(manifests: &[Manifest]) -> Vec<String> {
+    let lax = manifests
+        .iter()
+        .filter(|manifest| !manifest.has_workspace_lints);
+    lax.map(|manifest| format!("{}: no `[lints] workspace = true`", manifest.path))
+        .collect()
+}
+
+fn manifests(sources: &[Source]) -> Vec<Manifest> {
+    sources
+        .iter()
+        .filter(|source| source.path.ends_with("/Cargo.toml"))
+        .map(|source| Manifest::read(&source.path, &source.text))
+        .collect()
+}
+
+#[test]
+fn arrows_between_crates_point_one_way() {
+    let manifests = manifests(workspace());
+    assert!(manifests.len() >= SHARED.len() + SERVICES.len());
+    crate::demand_none(
+        "Move what you need to the room that may hold it, or pass it in as data: services -> \
+         {setup, cycle, evaluation} -> robot -> inference -> blocks, setup -> cycle, decision -> blocks.",
+        &arrow_violations(&manifests),
+    );
+}
+
+#[test]
+fn every_crate_takes_the_lints_of_the_workspace() {
+    crate::demand_none(
+        "Add `[lints] workspace = true` to the crate's manifest.",
+        &lint_violations(&manifests(workspace())),
+    );
+}
+
+#[test]
+fn wrong_arrows_are_refused() {
+    let read = |path: &str, name: &str, dependencies: &[&str]| {
+        let lines: String = dependencies
+            .iter()
+            .map(|d| format!("{d}.workspace = true\n"))
+            .collect();
+        let text = format!("[package]\nname = \"{name}\"\n[dependencies]\n{lines}");
+        Manifest::read(path, &text)
+    };
+    let blocks = read("shared/blocks/Cargo.toml", "vigil-blocks", &["bytemuck"]);
+    let cycle = read(
+        "shared/cycle/Cargo.toml",
+        "vigil-cycle",
+        &["vigil-blocks", "libc"],
+    );
+    let good = [blocks, cycle];
+    assert_eq!(arrow_violations(&good), Vec::<String>::new());
+    assert_eq!(lint_violations(&good).len(), 2);
+
+    let [blocks, cycle] = good;
+    let bad = [
+        blocks,
+        cycle,
+        read(
+            "shared/inference/Cargo.toml",
+            "vigil-inference",
+            &["vigil-cycle"],
+        ),
+        read(
+            "shared/robot/Cargo.toml",
+            "vigil-robot",
+            &["iceoryx2-bb-posix", "vigil-blocks"],
+        ),
+        read("shared/misc/Cargo.toml", "vigil-misc", &[]),
+        read(
+            "services/detector/Cargo.toml",
+            "vigil-detector",
+            &["vigil-cycle"],
+        ),
+        read(
+            "services/supervisor/Cargo.toml",
+            "vigil-supervisor",
+            &["vigil-detector"],
+        ),
+        read("services/vigil/Cargo.toml", "vigil", &["vigil-detector"]),
+    ];
+    let found = arrow_violations(&bad);
+    let at: Vec<&str> = found
+        .iter()
+        .map(|line| line.split('/').nth(1).unwrap())
+        .collect();
+    assert_eq!(
+        at,
+        ["inference", "robot", "misc", "supervisor"],
+        "{found:?}"
+    );
+}
