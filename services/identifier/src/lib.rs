@@ -1,1 +1,14 @@
 //! Identifies the fault.
+//!
+//! [`Identifier`] is a pure function of journal entries; [`wiring`] connects it to its ports.
+
+mod draw;
+mod exact;
+mod identifier;
+mod modes;
+mod posterior;
+pub mod wiring;
+
+pub use identifier::{Identifier, Input};
+pub use modes::IdentifierError;
+pub use wiring::IdentifierStage;

@@ -1,1 +1,27 @@
 //! The simulated rover, and playback of recorded frames.
+//!
+//! - [`World`]: the rover on its soil, its sensors, and the faults injected into both;
+//! - [`Obedience`]: what the rover makes of the supervisor's actions;
+//! - [`Playback`]: recorded frames, one run after the other;
+//! - [`Schedule`]: injections that are due at given times.
+//!
+//! Nothing here knows a clock or a port: times are parameters, and equal input and seed give equal
+//! bits. The binary wires this to the graph.
+
+mod drive;
+mod encoders;
+mod noise;
+mod obedience;
+mod playback;
+mod schedule;
+mod soil;
+mod wiring;
+mod world;
+
+pub use drive::{ACCELERATION_MAX_M_S2, CURVATURE_RATE_MAX_1_M_S, DriveCommand};
+pub use encoders::{NOISE_MAX_RAD_S, NOISE_MIN_RAD_S};
+pub use obedience::{EffectiveCommand, Obedience, Refusal, Refusals};
+pub use playback::{Playback, PlaybackError};
+pub use schedule::Schedule;
+pub use wiring::{PlaybackSource, SimulatorSource};
+pub use world::{CURRENT_PER_TORQUE_A_N_M, Truth, World, WorldError};

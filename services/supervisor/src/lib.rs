@@ -1,1 +1,14 @@
-//! Decides what to do about a fault.
+//! The supervisor: tracks the belief of a recovery POMDP and decides what to do.
+//!
+//! [`Supervisor::step`] is a pure function of state and journal entry; [`SupervisorStage`] puts it
+//! at its ports.
+
+mod evidence;
+mod mapping;
+mod restraint;
+mod supervisor;
+mod wiring;
+
+pub use mapping::{Compensation, SupervisorError};
+pub use supervisor::{Inputs, Supervisor};
+pub use wiring::SupervisorStage;

@@ -56,14 +56,17 @@ fn prepare(args: &Args) -> Result<(Setup, Supervisor), Box<dyn std::error::Error
     let decision = Pomdp::parse(&setup.decision_text)
         .map_err(|e| format!("{}: {e}", setup.decision_path.display()))?;
     let compensation = (0..setup.robot.wheels.len())
-        .filter_map(|wheel| {
-            let (curvature_gain, curvature_offset_1_m) = model.compensation(wheel)?;
-            Some(Compensation { wheel, curvature_gain, curvature_offset_1_m })
+        .map(|wheel| {
+            let (curvature_gain, curvature_offset_1_m) = model.compensation(wheel);
+            Compensation {
+                wheel,
+                curvature_gain,
+                curvature_offset_1_m,
+            }
         })
         .collect();
     let settings = &setup.file.supervisor;
-    let supervisor =
-        Supervisor::new(decision, &setup.tree, &setup.robot, settings, compensation)?;
+    let supervisor = Supervisor::new(decision, &setup.tree, &setup.robot, settings, compensation)?;
     Ok((setup, supervisor))
 }
 

@@ -66,7 +66,9 @@ impl SupervisorStage {
             if !self.detections.advance() {
                 break;
             }
-            let Some(block) = self.detections.held() else { break };
+            let Some(block) = self.detections.held() else {
+                break;
+            };
             let account = &mut self.detection_account;
             let arrival = account.arrive::<DetectionBelief>(&block.header, now_ns, self.period_ns);
             if arrival.is_taken() && block.cause.kind() == Some(CauseKind::Frame) {
@@ -85,14 +87,20 @@ impl Stage for SupervisorStage {
             if !self.diagnoses.advance() {
                 break;
             }
-            let Some(diagnosis) = self.diagnoses.held() else { break };
+            let Some(diagnosis) = self.diagnoses.held() else {
+                break;
+            };
             let cause = diagnosis.cause;
             let is_frame = cause.kind() == Some(CauseKind::Frame);
             let identity = is_frame.then_some((cause.frame_epoch, cause.frame_seq));
             if intake.accept::<FaultBelief>(&diagnosis.header, identity) && is_frame {
                 let detection = self.detection_is_new.then_some(&*self.detection);
-                let inputs = Inputs { diagnosis: Some(diagnosis), detection };
-                self.supervisor.step(Entry::Frame(inputs), self.action.block());
+                let inputs = Inputs {
+                    diagnosis: Some(diagnosis),
+                    detection,
+                };
+                self.supervisor
+                    .step(Entry::Frame(inputs), self.action.block());
                 self.stepped = true;
                 self.detection_is_new = false;
             }
@@ -100,21 +108,21 @@ impl Stage for SupervisorStage {
     }
 
     fn miss(&mut self, count: u32) {
-        self.supervisor.step(Entry::Missed(count), self.action.block());
+        self.supervisor
+            .step(Entry::Missed(count), self.action.block());
         if self.detection_is_new {
-            let inputs = Inputs { diagnosis: None, detection: Some(&*self.detection) };
-            self.supervisor.step(Entry::Frame(inputs), self.action.block());
+            let inputs = Inputs {
+                diagnosis: None,
+                detection: Some(&*self.detection),
+            };
+            self.supervisor
+                .step(Entry::Frame(inputs), self.action.block());
             self.detection_is_new = false;
         }
         self.stepped = true;
     }
 
-    fn publish(
-        &mut self,
-        cause: Cause,
-        stamp: Stamp,
-        clock: &dyn Clock,
-    ) -> Result<u64, PortError> {
+    fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
         if !self.stepped {
             self.supervisor.step(Entry::Missed(0), self.action.block());
         }
@@ -132,7 +140,12 @@ impl Stage for SupervisorStage {
     }
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
-        let Decided { seq, action, wheel, p } = self.decided;
+        let Decided {
+            seq,
+            action,
+            wheel,
+            p,
+        } = self.decided;
         if seq != self.told {
             health.event(now_ns, EventKind::Action, action, p, u64::from(wheel));
             self.told = seq;

@@ -1,2 +1,48 @@
-//! The operator's tool.
-fn main() {}
+//! `vigil`: the operator's tool. Never in the data path of a running graph.
+
+mod commands;
+mod output;
+mod pipeline;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use commands::{Outcome, check, diagnose, evaluate, inject, learn};
+
+/// Fault detection, diagnosis and recovery for mobile robots.
+///
+/// Exit codes: 0 done, 1 the run found or had a failure, 2 usage or configuration error.
+#[derive(Debug, Parser)]
+#[command(version, about)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Learn(learn::Args),
+    Diagnose(diagnose::Args),
+    Evaluate(evaluate::Args),
+    Inject(inject::Args),
+    Check(check::Args),
+}
+
+fn main() -> ExitCode {
+    let result = match Args::parse().command {
+        Command::Learn(args) => learn::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
+        Command::Inject(args) => inject::run(&args),
+        Command::Check(args) => check::run(&args),
+    };
+    match result {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::Failed) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}

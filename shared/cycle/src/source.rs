@@ -13,6 +13,8 @@ use crate::stage::Timing;
 pub enum Produced {
     /// A frame was published at this instant, ns.
     Frame(u64),
+    /// Nothing is to be published at this instant.
+    Nothing,
     /// There is nothing more to publish.
     End,
 }
@@ -87,6 +89,7 @@ impl SourceCycle {
             let schedule_ns = self.next_ns + slips * self.monitor.period_ns();
             self.timing.wake_up.record(woken_ns - schedule_ns);
             match source.produce(schedule_ns, clock)? {
+                Produced::Nothing => {}
                 Produced::End => self.ended = true,
                 Produced::Frame(published_ns) => {
                     self.account(schedule_ns, woken_ns, published_ns, slips);

@@ -1,1 +1,19 @@
-//! POMDP models, solvers, policies and belief tracking.
+//! Decisions under uncertainty: POMDP models, their solution, policies, belief tracking.
+//!
+//! A [`Pomdp`] is read from Cassandra's `.pomdp` format; its fully observable relaxation is solved
+//! by [`mdp::solve`]; a [`Policy`] turns a belief into an action; a [`Tracker`] keeps the belief.
+//! Deciding and tracking allocate nothing. No transport, no clock, no files.
+//!
+//! Notation of Verma, Fernandez and Simmons (2002): states S, actions A, observations Z,
+//! T(s,a,s') = p(s'|s,a), Z(a,s',z) = p(z|a,s'), R(s,a), discount gamma.
+
+pub mod belief;
+pub mod mdp;
+pub mod model;
+pub mod policy;
+mod reader;
+
+pub use belief::{Evidence, Tracker};
+pub use model::{Pomdp, Warning};
+pub use policy::{ActionVoting, Choice, MostLikelyState, Policy, QMdp};
+pub use reader::{ParseError, Position};

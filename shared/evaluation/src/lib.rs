@@ -1,1 +1,8 @@
-//! Data sets, learning of models, scoring.
+//! Data sets, learning of models, scoring. Reads files; knows no transport and no clock.
+
+pub mod frames;
+pub mod labels;
+pub mod learning;
+pub mod scoring;
+pub mod split;
+mod table;

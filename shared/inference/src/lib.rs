@@ -1,6 +1,29 @@
 //! Bayes filters over hybrid models: detection of any deviation from nominal, identification of
 //! the fault. No robot, no transport, no clock, no files.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`logspace`] | sums and odds of probabilities kept as logarithms |
+//! | [`resample`] | systematic resampling |
+//! | [`particles`] | planar pose particles, structure of arrays |
+//! | [`gaussian`] | the Kalman filter |
+//! | [`track`] | a pose track with run offsets and coloured deviations |
+//! | [`forward`] | the exact forward filter of a small hidden Markov model |
+//! | [`ages`] | detection: nominal against nominal plus an unknown constant bias |
+//! | [`constant`] | detection: nominal against a constant likelihood |
+//! | [`bank`] | exact single faults: one hypothesis per (mode, onset) |
+//! | [`tree`] | the fault tree |
 
+pub mod ages;
+pub mod angle;
+pub mod bank;
+pub mod constant;
+pub mod forward;
+pub mod gaussian;
+pub mod logspace;
+pub mod particles;
+pub mod resample;
+pub mod track;
 pub mod tree;
 
 pub use tree::FaultTree;

@@ -6,6 +6,9 @@
 pub mod description;
 pub mod fault;
 pub mod injection;
+pub mod kinematics;
+pub mod learned;
+pub mod slip;
 
 pub use description::Description;
 pub use fault::{Fault, FaultKind};

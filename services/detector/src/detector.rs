@@ -1,0 +1,242 @@
+//! The detector's `step`: guard, observe, monitor, alarm, report.
+
+use vigil_blocks::{Channel, DetectionBelief, Entry, PARTICLE_CAPACITY, ParticleBlock, SensorFrame, Symptoms};
+use vigil_inference::logspace::probability;
+use vigil_robot::Description;
+use vigil_robot::learned::monitor::Channels;
+use vigil_robot::learned::{Model, ModelError, Monitor, Observer};
+use vigil_setup::schema;
+
+/// Time from the start of a run at which alarms begin, s: the noise scale must be known first.
+const ARM_S: f64 = 1.0;
+/// An alarm falls when the log-odds have stayed this far below those that raise it ..
+const CLEAR_BELOW: f64 = 8.0;
+/// .. and below these odds, whatever the threshold ..
+const CLEAR_LOG_ODDS: f64 = -4.0;
+/// .. for this long, moving, s.
+const CLEAR_S: f64 = 1.0;
+/// Pose log-odds beyond which the detector reports an error in position.
+const SYMPTOM_LOG_ODDS: f64 = 0.0;
+
+/// Why a detector was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DetectorError {
+    /// The model does not fit.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// Too few or too many particles.
+    #[error("detector.particles: {0} is not allowed: 1 to {PARTICLE_CAPACITY}")]
+    Particles(usize),
+    /// A rate or an interval is not positive and finite.
+    #[error("detector.{key}: {value} is not allowed: a positive finite number")]
+    Value {
+        /// The key.
+        key: &'static str,
+        /// What was found.
+        value: f64,
+    },
+}
+
+/// The detection filter at frame rate.
+///
+/// A step that completes an observation (about every learned interval, 50 ms) updates the belief;
+/// the steps between repeat it. Equal entries and seeds give bit-identical beliefs.
+#[derive(Debug, Clone)]
+pub struct Detector {
+    observer: Observer,
+    monitor: Monitor,
+    fault_rate_1_s: f64,
+    alarm_log_odds: f64,
+    particles: usize,
+    run_s: f64,
+    armed: bool,
+    period_s: f64,
+    t_last_ns: u64,
+    run_id: u64,
+    alarm_t_ns: u64,
+    alarm_count: u32,
+    quiet_s: f64,
+    invalid_count: u32,
+    symptoms: u32,
+    external: u32,
+}
+
+impl Detector {
+    /// A detector for `model` and its robot. The alarm threshold follows from the model's
+    /// calibration and `settings.false_alarm_interval_h`.
+    ///
+    /// # Errors
+    /// [`DetectorError`] if the model is of another robot, has no calibration for the channels, or
+    /// a setting is out of range.
+    pub fn new(
+        model: &Model,
+        robot: &Description,
+        settings: &schema::Detector,
+        seed: u64,
+    ) -> Result<Self, DetectorError> {
+        model.check_robot(robot)?;
+        if !(1..=PARTICLE_CAPACITY).contains(&settings.particles) {
+            return Err(DetectorError::Particles(settings.particles));
+        }
+        let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
+        let interval = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
+        let channels = match settings.sensors {
+            schema::Sensors::Pose => Channels::Pose,
+            schema::Sensors::PoseEncoders => Channels::PoseEncoders,
+        };
+        let calibration = model.calibration(channels.name())?;
+        Ok(Self {
+            observer: Observer::new(model, robot),
+            monitor: Monitor::new(model, robot, channels, settings.particles, rate, seed),
+            fault_rate_1_s: rate / 3600.0,
+            alarm_log_odds: calibration.alarm_log_odds(interval, rate),
+            particles: settings.particles,
+            run_s: 0.0,
+            armed: false,
+            period_s: model.interval_s,
+            t_last_ns: 0,
+            run_id: 0,
+            alarm_t_ns: 0,
+            alarm_count: 0,
+            quiet_s: 0.0,
+            invalid_count: 0,
+            symptoms: 0,
+            external: 0,
+        })
+    }
+
+    /// Log-odds at which the alarm rises.
+    #[must_use]
+    pub const fn alarm_log_odds(&self) -> f64 {
+        self.alarm_log_odds
+    }
+
+    /// Takes one entry of the journal and fills the belief and the particles (headers and causes
+    /// are the caller's).
+    pub fn step(
+        &mut self,
+        entry: Entry<&SensorFrame>,
+        belief: &mut DetectionBelief,
+        particles: &mut ParticleBlock,
+    ) {
+        let mut missed = 0;
+        match entry {
+            Entry::Frame(frame) => self.take(frame),
+            Entry::Missed(count) => missed = count,
+            Entry::Budget(count) => {
+                let count = (count as usize).clamp(1, self.particles);
+                self.monitor.resize(count);
+            }
+            Entry::Reset => {
+                self.observer.reset();
+                self.begin_run();
+            }
+        }
+        self.report(missed, belief);
+        self.publish(particles);
+    }
+
+    fn begin_run(&mut self) {
+        self.monitor.reset();
+        (self.run_s, self.armed, self.quiet_s) = (0.0, false, 0.0);
+        (self.alarm_t_ns, self.symptoms) = (0, 0);
+    }
+
+    fn take(&mut self, frame: &SensorFrame) {
+        let intake = self.observer.push(frame);
+        self.external = frame.symptoms & Symptoms::ALL;
+        self.invalid_count = self.invalid_count.saturating_add(u32::from(intake.invalid));
+        if intake.new_run {
+            self.begin_run();
+        }
+        if frame.header.t_capture_ns > self.t_last_ns && !intake.new_run {
+            let period_s = (frame.header.t_capture_ns - self.t_last_ns) as f64 * 1e-9;
+            self.period_s = period_s.min(1.0);
+        }
+        self.t_last_ns = frame.header.t_capture_ns;
+        self.run_id = frame.run_id;
+        if intake.complete {
+            self.observe();
+        }
+    }
+
+    fn observe(&mut self) {
+        let observation = self.observer.observation();
+        let moving = observation.moving;
+        self.monitor.step(observation, self.alarm_t_ns != 0);
+        self.run_s += observation.dt_s;
+        if !self.armed {
+            // Evidence from before the noise scale is known is no evidence.
+            self.armed = self.run_s >= ARM_S;
+            self.monitor.forget_evidence();
+        }
+        let log_odds = self.monitor.report().log_odds;
+        if self.alarm_t_ns == 0 {
+            if self.armed && log_odds > self.alarm_log_odds {
+                self.alarm_t_ns = observation.t_ns.max(1);
+                self.alarm_count = self.alarm_count.saturating_add(1);
+                self.quiet_s = 0.0;
+            }
+        } else if moving {
+            // Clearing needs evidence: time at rest does not count.
+            let clear = (self.alarm_log_odds - CLEAR_BELOW).min(CLEAR_LOG_ODDS);
+            let quiet = log_odds < clear;
+            self.quiet_s = if quiet { self.quiet_s + observation.dt_s } else { 0.0 };
+            if self.quiet_s >= CLEAR_S {
+                self.alarm_t_ns = 0;
+            }
+        }
+        let off_course = self.monitor.report().channels[Channel::POSE] > SYMPTOM_LOG_ODDS;
+        self.symptoms = if !off_course {
+            0
+        } else if moving {
+            Symptoms::EPM
+        } else {
+            Symptoms::EPS
+        };
+    }
+
+    fn report(&self, missed: u32, belief: &mut DetectionBelief) {
+        let report = self.monitor.report();
+        let p_now = probability(report.log_odds);
+        // The state stays at the last frame; what is told is its prediction.
+        let appears = self.fault_rate_1_s * self.period_s * f64::from(missed);
+        let p_fault = p_now + (1.0 - p_now) * (1.0 - (-appears).exp());
+        let odds = (p_fault / (1.0 - p_fault)).ln();
+        belief.run_id = self.run_id;
+        belief.p_fault = p_fault;
+        belief.log_odds = if missed > 0 && odds.is_finite() { odds } else { report.log_odds };
+        belief.alarm_log_odds = self.alarm_log_odds;
+        belief.evidence = if report.evidence.is_finite() { report.evidence } else { 0.0 };
+        belief.effective_sample_size = report.effective_sample_size;
+        belief.noise_scale = self.monitor.noise_scale();
+        belief.channel_log_odds = report.channels;
+        belief.alarm_t_capture_ns = self.alarm_t_ns;
+        belief.alarm = u32::from(self.alarm_t_ns != 0);
+        belief.alarm_count = self.alarm_count;
+        belief.symptoms = self.symptoms | self.external;
+        belief.invalid_count = self.invalid_count;
+        belief.degenerate_count = report.degenerate_count;
+        belief.particle_count = self.monitor.particles().len() as u32;
+    }
+
+    fn publish(&self, block: &mut ParticleBlock) {
+        let cloud = self.monitor.particles();
+        let count = cloud.len().min(PARTICLE_CAPACITY);
+        block.count = count as u32;
+        block.mode[..count].fill(0);
+        for i in 0..count {
+            block.x[i] = cloud.x[i] as f32;
+            block.y[i] = cloud.y[i] as f32;
+            block.yaw[i] = cloud.yaw[i] as f32;
+            block.log_weight[i] = cloud.log_weight[i] as f32;
+        }
+    }
+}
+
+fn positive(key: &'static str, value: f64) -> Result<f64, DetectorError> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(value);
+    }
+    Err(DetectorError::Value { key, value })
+}

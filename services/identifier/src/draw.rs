@@ -1,0 +1,94 @@
+//! Particles: moments of a block, and a block drawn from the belief.
+
+use nalgebra::{Cholesky, Matrix3, Vector3};
+use rand::RngExt;
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+use vigil_blocks::{MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock, WHEELS};
+use vigil_inference::angle::wrap;
+
+use crate::exact::{Exact, NOMINAL, UNKNOWN};
+use crate::modes::Leaves;
+
+/// Variance added to a cloud's covariance: particles are carried in single precision.
+const PRECISION: f64 = 1e-10;
+
+/// Weighted mean and covariance of a block (x, y, yaw); None if it is empty or not finite.
+#[must_use]
+pub fn moments(block: &ParticleBlock) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+    let count = (block.count as usize).min(PARTICLE_CAPACITY);
+    if count == 0 {
+        return None;
+    }
+    let at = |i: usize| Vector3::new(block.x[i].into(), block.y[i].into(), block.yaw[i].into());
+    let origin: Vector3<f64> = at(0);
+    let (mut total, mut mean, mut square) = (0.0, Vector3::zeros(), Matrix3::zeros());
+    for i in 0..count {
+        let weight = f64::from(block.log_weight[i]).exp();
+        let mut apart: Vector3<f64> = at(i) - origin;
+        apart[2] = wrap(apart[2]);
+        total += weight;
+        mean += apart * weight;
+        square += apart * apart.transpose() * weight;
+    }
+    let mean = mean / total;
+    let covariance = square / total - mean * mean.transpose() + Matrix3::identity() * PRECISION;
+    let finite = total > 0.0 && mean.iter().chain(covariance.iter()).all(|value| value.is_finite());
+    finite.then(|| (mean + origin, covariance))
+}
+
+/// Draws `count` particles of equal weight from the belief: hypotheses by systematic sampling,
+/// the pose from its Gaussian.
+pub fn draw(
+    exact: &Exact,
+    leaves: &Leaves,
+    count: usize,
+    rng: &mut Pcg64Mcg,
+    out: &mut ParticleBlock,
+) {
+    let count = count.min(PARTICLE_CAPACITY);
+    let offset: f64 = rng.random();
+    let (mut filled, mut sum) = (0, 0.0);
+    let hypotheses = exact.hypotheses();
+    for (i, hypothesis) in hypotheses.iter().enumerate() {
+        sum += hypothesis.log_weight.exp();
+        let last = i + 1 == hypotheses.len();
+        let share = (sum * count as f64 - offset).ceil().max(0.0) as usize;
+        let until = if last { count } else { share.min(count) };
+        if until <= filled {
+            continue;
+        }
+        let mean = hypothesis.track.pose();
+        let spread = hypothesis.track.pose_covariance() + Matrix3::identity() * PRECISION;
+        let factor = Cholesky::new(spread).map_or(Matrix3::zeros(), |factor| factor.l());
+        for slot in filled..until {
+            let normal = Vector3::from_fn(|_, _| rng.sample(StandardNormal));
+            let pose = mean + factor * normal;
+            out.x[slot] = pose[0] as f32;
+            out.y[slot] = pose[1] as f32;
+            out.yaw[slot] = wrap(pose[2]) as f32;
+            out.mode[slot] = node(exact, leaves, hypothesis.mode, rng.random());
+        }
+        filled = until;
+    }
+    out.count = filled as u32;
+    out.log_weight[..filled].fill(-(filled.max(1) as f32).ln());
+}
+
+/// Node of a particle in a motion mode; nominal motion is divided among the encoders' states.
+fn node(exact: &Exact, leaves: &Leaves, mode: usize, u: f64) -> u32 {
+    match mode {
+        UNKNOWN => MODE_UNKNOWN,
+        NOMINAL => {
+            let mut sum = 0.0;
+            for wheel in 0..WHEELS {
+                sum += exact.encoder_log_p(wheel).exp();
+                if let Some(leaf) = leaves.encoder[wheel].filter(|_| u < sum) {
+                    return leaf as u32;
+                }
+            }
+            0
+        }
+        stuck => leaves.stuck[stuck - 1].map_or(0, |leaf| leaf as u32),
+    }
+}

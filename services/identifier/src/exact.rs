@@ -1,0 +1,403 @@
+//! Exact Bayes over nominal, single faults and the unknown.
+//!
+//! The motion tells stuck wheels apart: one track per (mode, onset). Broken encoders do not move
+//! the robot: under nominal motion a small hidden Markov model says which encoder does what. A
+//! stuck wheel's encoder reads zero with the sensor's noise. The unknown is nominal motion with a
+//! large constant deviation, and wheels that may do anything.
+
+use nalgebra::{Matrix3, Vector3};
+use vigil_blocks::WHEELS;
+use vigil_inference::bank::{Bank, Hypothesis};
+use vigil_inference::forward::Forward;
+use vigil_inference::logspace::{log_add, log_normal};
+use vigil_inference::track::{Displacement, MotionNoise, Track};
+use vigil_robot::Description;
+use vigil_robot::learned::wheels::{rolling_rate, steering_angle};
+use vigil_robot::learned::{EncoderState, Model, MotionModel, Observation};
+
+use crate::modes::Leaves;
+use crate::posterior::Posterior;
+
+/// Motion modes: nominal, each wheel stuck, unknown.
+pub const MOTIONS: usize = WHEELS + 2;
+/// Index of the nominal motion.
+pub const NOMINAL: usize = 0;
+/// Index of the unknown motion.
+pub const UNKNOWN: usize = WHEELS + 1;
+/// States of the encoders: healthy, or one wheel's encoder broken in one of four ways.
+const ENCODER_STATES: usize = 1 + KINDS * WHEELS;
+const KINDS: usize = 4;
+/// Prior shares of the ways: zero, frozen, noise, dead (zero plus the sensor's noise).
+const KIND_SHARES: [f64; KINDS] = [0.32, 0.32, 0.32, 0.04];
+
+/// Onset hypotheses kept per mode.
+const PER_MODE: usize = 32;
+/// Hypotheses less probable than this are dropped (natural logarithm).
+const FLOOR: f64 = -30.0;
+/// A new onset is supposed every so many observations in motion.
+const ONSET_STRIDE: u32 = 2;
+/// Prior rate of faults while something is suspected, 1/s of motion. An alarm has been raised:
+/// the rate over a robot's life would make the filter slow without making it more often right.
+pub const BIRTH_1_S: f64 = 0.01;
+/// Rate at which faults vanish, 1/s of motion.
+pub const DEATH_1_S: f64 = 1.0 / 60.0;
+/// The unknown: standard deviation of its constant deviation per metre (yaw, forward, lateral).
+const UNKNOWN_SD: [f64; 3] = [0.25, 0.2, 0.12];
+/// Soil other than that learned from: deviation of a stuck wheel's effect, relative to the effect.
+const TERRAIN: f64 = 0.1;
+/// Share of healthy wheels' rates in the tail: while all is well, and while another wheel drags.
+const TAIL: f64 = 0.02;
+const TAIL_DRAGGED: f64 = 0.1;
+/// Share of wheels that do anything, in the unknown.
+const ANYTHING: f64 = 0.2;
+/// Standard deviation of a steering angle that does anything, rad.
+const STEER_ANY_RAD: f64 = 0.3;
+
+/// One way to move.
+#[derive(Debug, Clone)]
+struct Mode {
+    motion: MotionModel,
+    noise: MotionNoise,
+    /// Prior share among faults; 0 for a mode that the tree lacks.
+    share: f64,
+}
+
+/// The filter.
+#[derive(Debug, Clone)]
+pub struct Exact {
+    model: Model,
+    robot: Description,
+    leaves: Leaves,
+    use_wheels: bool,
+    modes: Vec<Mode>,
+    bank: Bank<Track>,
+    encoders: Forward<ENCODER_STATES>,
+    encoder_onset: [u64; ENCODER_STATES],
+    encoder_birth: [f64; ENCODER_STATES],
+    since_spawn: u32,
+    spawn_s: f64,
+    degenerate_count: u32,
+}
+
+impl Exact {
+    /// A filter over the leaves of a tree. `p_unknown` is the prior share of the unknown.
+    #[must_use]
+    pub fn new(
+        model: &Model,
+        robot: &Description,
+        leaves: &Leaves,
+        use_wheels: bool,
+        p_unknown: f64,
+    ) -> Self {
+        let each = (1.0 - p_unknown) / leaves.count.max(1) as f64;
+        let nominal = &model.nominal.motion;
+        let modes = (0..MOTIONS)
+            .map(|mode| match mode {
+                NOMINAL => Mode { motion: *nominal, noise: nominal.noise(), share: 0.0 },
+                UNKNOWN => Mode { motion: *nominal, noise: unknown_noise(model), share: p_unknown },
+                _ => stuck_mode(model, mode - 1, leaves.stuck[mode - 1].map_or(0.0, |_| each)),
+            })
+            .collect();
+        let mut encoder_birth = [0.0; ENCODER_STATES];
+        for (wheel, _) in leaves.encoder.iter().enumerate().filter(|(_, leaf)| leaf.is_some()) {
+            for (kind, share) in KIND_SHARES.iter().enumerate() {
+                encoder_birth[1 + KINDS * wheel + kind] = share * each;
+            }
+        }
+        Self {
+            model: model.clone(),
+            robot: robot.clone(),
+            leaves: leaves.clone(),
+            use_wheels,
+            modes,
+            bank: Bank::new(MOTIONS, PER_MODE),
+            encoders: Forward::at(0),
+            encoder_onset: [0; ENCODER_STATES],
+            encoder_birth,
+            since_spawn: 0,
+            spawn_s: 0.0,
+            degenerate_count: 0,
+        }
+    }
+
+    /// Starts from the nominal mode, its pose known to `moments` at `t_ns`.
+    pub fn restart(&mut self, mean: Vector3<f64>, covariance: Matrix3<f64>, t_ns: u64) {
+        let track = Track::new(mean, covariance, &self.modes[NOMINAL].noise);
+        self.bank.restart(NOMINAL, t_ns, track);
+        self.encoders = Forward::at(0);
+        self.encoder_onset = [t_ns; ENCODER_STATES];
+        (self.since_spawn, self.spawn_s) = (0, 0.0);
+    }
+
+    /// Observations that were impossible under every hypothesis, and were passed over.
+    #[must_use]
+    pub const fn degenerate_count(&self) -> u32 {
+        self.degenerate_count
+    }
+
+    /// The hypotheses; `mode` is 0 nominal, 1 + wheel stuck, [`UNKNOWN`].
+    #[must_use]
+    pub fn hypotheses(&self) -> &[Hypothesis<Track>] {
+        self.bank.hypotheses()
+    }
+
+    /// Logarithm of the probability, given nominal motion, that this wheel's encoder is broken.
+    #[must_use]
+    pub fn encoder_log_p(&self, wheel: usize) -> f64 {
+        let states = &self.encoders.log_p()[1 + KINDS * wheel..1 + KINDS * (wheel + 1)];
+        states.iter().copied().fold(f64::NEG_INFINITY, log_add)
+    }
+
+    /// Takes one observation; the pose's noise is `noise_scale` times the learned one.
+    pub fn step(&mut self, observation: &Observation, noise_scale: f64) {
+        let variance = self.pose_variance(observation, noise_scale);
+        if observation.anchor {
+            if observation.pose_frames > 0 {
+                for hypothesis in self.bank.hypotheses_mut() {
+                    hypothesis.track.anchor(observation.pose, variance);
+                }
+            }
+            return;
+        }
+        if observation.moving {
+            self.spawn_s += observation.dt_s;
+            self.since_spawn += 1;
+            if self.since_spawn >= ONSET_STRIDE {
+                self.spawn(observation.t_first_ns);
+            }
+        }
+        self.predict(observation);
+        // A robot at rest tells nothing: no fault appears, fades or is named.
+        if !observation.moving {
+            return;
+        }
+        let mut wheels = [0.0; MOTIONS];
+        if self.use_wheels {
+            self.weigh_wheels(observation, &mut wheels);
+        }
+        let mut failed = false;
+        for hypothesis in self.bank.hypotheses_mut() {
+            let mut gained = wheels[hypothesis.mode];
+            if observation.pose_frames > 0 {
+                match hypothesis.track.update(observation.pose, variance) {
+                    Some(log_likelihood) => gained += log_likelihood,
+                    None => failed = true,
+                }
+            }
+            hypothesis.log_weight += gained;
+        }
+        if failed || self.bank.normalise(FLOOR).is_none() {
+            self.degenerate_count = self.degenerate_count.saturating_add(1);
+        }
+    }
+
+    fn pose_variance(&self, observation: &Observation, noise_scale: f64) -> [f64; 3] {
+        let noise = &self.model.noise;
+        let ratio = noise_scale * noise_scale;
+        [noise.position_m, noise.position_m, noise.yaw_rad].map(|sd| {
+            let sample = self.model.sample_variance(sd, observation.frame_s) * ratio;
+            observation.mean_variance(sample, observation.pose_frames)
+        })
+    }
+
+    fn predict(&mut self, observation: &Observation) {
+        let limit = self.model.command.curvature_max_1_m;
+        let extra = observation.lag_variance(&self.model);
+        let mut steps = [Displacement { per_metre: [0.0; 3], travel_m: 0.0, extra }; MOTIONS];
+        for (step, mode) in steps.iter_mut().zip(&self.modes) {
+            step.travel_m = observation.travel_m;
+            step.per_metre =
+                mode.motion.per_metre(observation.curvature, observation.speed, limit);
+        }
+        for hypothesis in self.bank.hypotheses_mut() {
+            hypothesis.track.predict(&steps[hypothesis.mode], &self.modes[hypothesis.mode].noise);
+        }
+    }
+
+    /// New hypotheses: from nominal to each fault; from the most probable fault to nominal and to
+    /// each other fault.
+    fn spawn(&mut self, t_ns: u64) {
+        let (birth, death) = (BIRTH_1_S * self.spawn_s, DEATH_1_S * self.spawn_s);
+        (self.since_spawn, self.spawn_s) = (0, 0.0);
+        let nominal = self.bank.best(|mode| mode == NOMINAL).copied();
+        let fault = self.bank.best(|mode| mode != NOMINAL).copied();
+        for from in [nominal, fault].into_iter().flatten() {
+            for mode in 0..MOTIONS {
+                let share = if mode == NOMINAL { death } else { birth * self.modes[mode].share };
+                let log_weight = from.log_weight + share.ln();
+                if mode == from.mode || log_weight <= FLOOR {
+                    continue;
+                }
+                let track = from.track.fork(&self.modes[mode].noise);
+                self.bank.add(Hypothesis { mode, onset: t_ns, log_weight, track });
+            }
+        }
+    }
+
+    /// Log-likelihood of the wheels' readings under each motion mode.
+    fn weigh_wheels(&mut self, observation: &Observation, out: &mut [f64; MOTIONS]) {
+        let count = self.robot.wheels.len();
+        let encoder = self.model.encoder;
+        let sd = self.model.noise.wheel_rate_rad_s;
+        let sample_sd = self.model.sample_variance(sd, observation.frame_s).sqrt();
+        let command = observation.command;
+        let mut rolling = [(0.0, 0.0); WHEELS];
+        let mut healthy = [0.0; WHEELS];
+        for i in 0..count {
+            let rate = rolling_rate(&self.robot, i, command[0], command[1]);
+            let lagged =
+                rolling_rate(&self.robot, i, observation.curvature, observation.speed);
+            rolling[i] = (rate, (rate - lagged) * (rate - lagged));
+            let (mean, variance) = self.model.nominal.rates[i].rate(rate, command[0]);
+            let turning = EncoderState::Turning(mean, variance + rolling[i].1, TAIL);
+            healthy[i] =
+                encoder.log_likelihood(turning, &observation.wheels[i], sample_sd);
+        }
+        let all: f64 = healthy[..count].iter().sum();
+        out[NOMINAL] = self.update_encoders(observation, sample_sd, &healthy, all);
+        for wheel in 0..count {
+            if self.modes[1 + wheel].share <= 0.0 {
+                continue;
+            }
+            let Some(stuck) = self.model.stuck(wheel) else { continue };
+            out[1 + wheel] = (0..count)
+                .map(|i| {
+                    let turning = if i == wheel {
+                        EncoderState::Turning(0.0, 4e-4, TAIL)
+                    } else {
+                        let (mean, variance) = stuck.rates[i].rate(rolling[i].0, command[0]);
+                        EncoderState::Turning(mean, variance + rolling[i].1, TAIL_DRAGGED)
+                    };
+                    encoder.log_likelihood(turning, &observation.wheels[i], sample_sd)
+                })
+                .sum();
+        }
+        out[UNKNOWN] = self.steering(observation);
+        for i in 0..count {
+            let any =
+                encoder.log_likelihood(EncoderState::Any, &observation.wheels[i], sample_sd);
+            out[UNKNOWN] += log_add((1.0 - ANYTHING).ln() + healthy[i], ANYTHING.ln() + any);
+        }
+    }
+
+    /// Steps the hidden Markov model of the encoders; returns its evidence.
+    fn update_encoders(
+        &mut self,
+        observation: &Observation,
+        sample_sd: f64,
+        healthy: &[f64; WHEELS],
+        all: f64,
+    ) -> f64 {
+        let states =
+            [EncoderState::Zero, EncoderState::Frozen, EncoderState::Noise, EncoderState::Dead];
+        let dt = observation.dt_s;
+        let birth = self.encoder_birth.map(|share| share * BIRTH_1_S * dt);
+        let nominal = self.encoders.log_p()[0];
+        let mut log_l = [f64::NEG_INFINITY; ENCODER_STATES];
+        log_l[0] = all;
+        for (wheel, reading) in observation.wheels.iter().enumerate().take(self.robot.wheels.len()) {
+            for (kind, state) in states.into_iter().enumerate() {
+                let i = 1 + KINDS * wheel + kind;
+                let seen = self.model.encoder.log_likelihood(state, reading, sample_sd);
+                log_l[i] = all - healthy[wheel] + seen;
+                // The onset is that of the mass that came last in quantity.
+                if nominal + birth[i].ln() > self.encoders.log_p()[i] {
+                    self.encoder_onset[i] = observation.t_first_ns;
+                }
+            }
+        }
+        self.encoders.predict_star(0, &birth, DEATH_1_S * dt);
+        self.encoders.update(&log_l).unwrap_or_else(|| {
+            self.degenerate_count = self.degenerate_count.saturating_add(1);
+            all
+        })
+    }
+
+    /// What the steering angles say for the unknown: relative to angles as commanded, which every
+    /// named mode has.
+    fn steering(&self, observation: &Observation) -> f64 {
+        let sample = self.model.sample_variance(self.model.noise.steer_rad, observation.frame_s);
+        let extra = self.model.nominal.steer_sd_rad;
+        let mut sum = 0.0;
+        for i in (0..self.robot.wheels.len()).filter(|&i| self.robot.wheels[i].steered) {
+            let reading = &observation.steer[i];
+            if reading.plain == 0 {
+                continue;
+            }
+            let angle = steering_angle(&self.robot, i, observation.command[0]);
+            let behind = angle - steering_angle(&self.robot, i, observation.curvature);
+            let noise = observation.mean_variance(sample, reading.plain);
+            let variance = noise + extra * extra + behind * behind;
+            let apart = reading.mean - angle;
+            let wide = variance + STEER_ANY_RAD * STEER_ANY_RAD;
+            let ratio = log_normal(apart, wide) - log_normal(apart, variance);
+            sum += log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + ratio.min(30.0));
+        }
+        sum
+    }
+
+    /// Probabilities of nominal, leaves and unknown.
+    #[must_use]
+    pub fn posterior(&self) -> Posterior {
+        let mut log_p = [f64::NEG_INFINITY; MOTIONS];
+        self.bank.modes(&mut log_p);
+        let mut out = Posterior::nominal();
+        out.nodes[0] = (log_p[NOMINAL] + self.encoders.log_p()[0]).exp();
+        for wheel in 0..WHEELS {
+            if let Some(node) = self.leaves.stuck[wheel] {
+                out.nodes[node] = log_p[1 + wheel].exp();
+            }
+            if let Some(node) = self.leaves.encoder[wheel] {
+                out.nodes[node] = (log_p[NOMINAL] + self.encoder_log_p(wheel)).exp();
+            }
+        }
+        out.unknown = log_p[UNKNOWN].exp();
+        out.normalise(&self.leaves);
+        out
+    }
+
+    /// Most probable onset of a node's fault, capture time ns; 0 if it is no leaf.
+    #[must_use]
+    pub fn onset(&self, node: usize) -> u64 {
+        if let Some(wheel) = self.leaves.stuck.iter().position(|&leaf| leaf == Some(node)) {
+            return self.bank.best(|mode| mode == 1 + wheel).map_or(0, |best| best.onset);
+        }
+        if let Some(wheel) = self.leaves.encoder.iter().position(|&leaf| leaf == Some(node)) {
+            let log_p = self.encoders.log_p();
+            let states = 1 + KINDS * wheel..1 + KINDS * (wheel + 1);
+            let best = states.max_by(|&a, &b| log_p[a].total_cmp(&log_p[b]));
+            return best.map_or(0, |state| self.encoder_onset[state]);
+        }
+        0
+    }
+}
+
+fn unknown_noise(model: &Model) -> MotionNoise {
+    let nominal = model.nominal.motion.noise();
+    // As coloured as the stuck modes: an unknown fault meets the same soil.
+    let coloured = model.stuck.iter().map(|stuck| stuck.motion.noise().deviation);
+    let count = model.stuck.len().max(1) as f64;
+    let deviation = coloured.fold(Matrix3::zeros(), |sum, next| sum + next) / count;
+    let square = |sd: f64| sd * sd;
+    MotionNoise {
+        offset: Matrix3::from_diagonal(&Vector3::from(UNKNOWN_SD.map(square))),
+        deviation: Matrix3::from_diagonal(&deviation.diagonal()) + nominal.deviation,
+        length_m: 0.2,
+        white: nominal.white * 4.0,
+    }
+}
+
+/// A wheel stuck. Another soil changes the size of the effect, not its sign: the run's offset may
+/// also lie along the effect itself.
+fn stuck_mode(model: &Model, wheel: usize, share: f64) -> Mode {
+    let motion = model.stuck(wheel).map_or(model.nominal.motion, |stuck| stuck.motion);
+    let nominal = &model.nominal.motion;
+    let effect = Vector3::new(
+        motion.yaw.curvature[0] - nominal.yaw.curvature[0],
+        motion.forward.curvature[0] - nominal.forward.curvature[0],
+        0.0,
+    );
+    let mut noise = motion.noise();
+    noise.offset += effect * effect.transpose() * (TERRAIN * TERRAIN);
+    Mode { motion, noise, share }
+}

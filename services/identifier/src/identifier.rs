@@ -1,0 +1,337 @@
+//! The identifier's `step`: watch, keep a ring, identify from it after an alarm, report.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Matrix3, Vector3};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+use vigil_blocks::{
+    DetectionBelief, Entry, FaultBelief, PARTICLE_CAPACITY, ParticleBlock, SensorFrame,
+};
+use vigil_inference::FaultTree;
+use vigil_robot::Description;
+use vigil_robot::learned::{Model, Observation, Observer};
+use vigil_setup::schema;
+
+use crate::draw::{draw, moments};
+use crate::exact::{BIRTH_1_S, DEATH_1_S, Exact};
+use crate::modes::{IdentifierError, Leaves};
+use crate::posterior::Posterior;
+
+/// A ring is worked off in about this time after an alarm, s.
+const CATCH_UP_S: f64 = 0.1;
+/// Observations worked off per cycle at least while catching up: more than arrive.
+const CATCH_UP_MIN: usize = 2;
+/// Probability of the nominal mode at which an identification ends, once the alarm has fallen.
+const RECOVERED: f64 = 0.95;
+
+/// What the identifier takes each cycle.
+#[derive(Debug, Clone, Copy)]
+pub struct Input<'a> {
+    /// The sensor frame.
+    pub frame: &'a SensorFrame,
+    /// The detector's belief and particles of the same frame, if they are known.
+    pub detection: Option<(&'a DetectionBelief, &'a ParticleBlock)>,
+}
+
+/// An observation kept for an identification, and the pose as the detector knew it after it.
+#[derive(Debug, Clone, Copy)]
+struct Kept {
+    observation: Observation,
+    noise_scale: f64,
+    pose: Option<(Vector3<f64>, Matrix3<f64>)>,
+}
+
+/// What the identifier is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// No alarm, no fault believed.
+    Watching,
+    /// The next observation of the ring to take has this index.
+    Identifying(usize),
+}
+
+/// The identification filter at frame rate.
+///
+/// Before an alarm it reports nominal with 1 - p(fault) and keeps a ring of observations, each
+/// with the moments of the detector's particles. An alarm starts the exact filter from the pose
+/// that the detector's particles had at the beginning of the ring: the fault had not happened yet,
+/// and the particles of later cycles follow a nominal model that no longer holds. The ring is
+/// worked off within about 0.1 s, a bounded number of observations per cycle; until then the
+/// report stays what it was. Then every observation is one update; cycles between observations
+/// repeat the belief, with predicted and present probability equal.
+#[derive(Debug, Clone)]
+pub struct Identifier {
+    leaves: Leaves,
+    exact: Exact,
+    observer: Observer,
+    p_unknown: f64,
+    particles: usize,
+    budget: usize,
+    seed: u64,
+    rng: Pcg64Mcg,
+    ring: VecDeque<Kept>,
+    capacity: usize,
+    phase: Phase,
+    detection: Detection,
+    posterior: Posterior,
+    predicted: Posterior,
+    mode: u32,
+    mode_changes: u32,
+    run_id: u64,
+}
+
+/// The last detection.
+#[derive(Debug, Clone, Copy, Default)]
+struct Detection {
+    alarm: bool,
+    t_ns: u64,
+    p_fault: f64,
+    noise_scale: f64,
+}
+
+impl Identifier {
+    /// An identifier over the leaves of `tree`.
+    ///
+    /// # Errors
+    /// [`IdentifierError`] if the model is of another robot or lacks a leaf's fault, or a setting
+    /// is out of range.
+    pub fn new(
+        model: &Model,
+        robot: &Description,
+        tree: &FaultTree,
+        settings: &schema::Identifier,
+        sensors: schema::Sensors,
+        seed: u64,
+    ) -> Result<Self, IdentifierError> {
+        model.check_robot(robot)?;
+        check(settings)?;
+        let leaves = Leaves::new(tree, model, robot)?;
+        let use_wheels = sensors == schema::Sensors::PoseEncoders;
+        let capacity = (settings.ring_s / model.interval_s).ceil().max(2.0) as usize;
+        Ok(Self {
+            exact: Exact::new(model, robot, &leaves, use_wheels, settings.p_unknown),
+            leaves,
+            observer: Observer::new(model, robot),
+            p_unknown: settings.p_unknown,
+            particles: settings.particles,
+            budget: settings.particles,
+            seed,
+            rng: Pcg64Mcg::seed_from_u64(seed),
+            ring: VecDeque::with_capacity(capacity),
+            capacity,
+            phase: Phase::Watching,
+            detection: Detection { noise_scale: 1.0, ..Detection::default() },
+            posterior: Posterior::nominal(),
+            predicted: Posterior::nominal(),
+            mode: 0,
+            mode_changes: 0,
+            run_id: 0,
+        })
+    }
+
+    /// Takes one entry of the journal and fills the belief and the particles (headers and causes
+    /// are the caller's).
+    pub fn step(
+        &mut self,
+        entry: Entry<Input<'_>>,
+        belief: &mut FaultBelief,
+        particles: &mut ParticleBlock,
+    ) {
+        self.predicted = self.posterior;
+        match entry {
+            Entry::Frame(input) => {
+                self.take(&input);
+                self.report(belief);
+                self.publish(input.detection.map(|(_, block)| block), particles);
+            }
+            // The state stays at the last frame: what is told is its prediction.
+            Entry::Missed(_) => self.report(belief),
+            Entry::Budget(count) => {
+                self.budget = (count as usize).clamp(1, self.particles);
+                self.report(belief);
+            }
+            Entry::Reset => {
+                self.observer.reset();
+                self.begin_run();
+                self.report(belief);
+                particles.count = 0;
+            }
+        }
+    }
+
+    fn begin_run(&mut self) {
+        self.rng = Pcg64Mcg::seed_from_u64(self.seed);
+        self.ring.clear();
+        self.phase = Phase::Watching;
+        self.detection = Detection { noise_scale: 1.0, ..Detection::default() };
+        self.posterior = Posterior::nominal();
+        self.predicted = self.posterior;
+    }
+
+    fn take(&mut self, input: &Input<'_>) {
+        let intake = self.observer.push(input.frame);
+        if intake.new_run {
+            self.begin_run();
+        }
+        self.run_id = input.frame.run_id;
+        if let Some((belief, _)) = input.detection {
+            let scale = belief.noise_scale;
+            self.detection = Detection {
+                alarm: belief.alarm != 0,
+                t_ns: belief.alarm_t_capture_ns,
+                p_fault: belief.p_fault,
+                noise_scale: if scale > 0.1 && scale < 100.0 { scale } else { 1.0 },
+            };
+        }
+        if intake.complete {
+            self.keep(input);
+        }
+        match self.phase {
+            Phase::Watching if self.detection.alarm => self.begin(),
+            Phase::Watching => self.posterior = Posterior::watching(self.detection.p_fault),
+            Phase::Identifying(_) => {}
+        }
+        if let Phase::Identifying(next) = self.phase {
+            self.identify(next, intake.complete);
+        }
+    }
+
+    /// Adds the last observation to the ring; the oldest gives way.
+    fn keep(&mut self, input: &Input<'_>) {
+        if self.ring.len() == self.capacity {
+            self.ring.pop_front();
+            if let Phase::Identifying(next) = self.phase {
+                // An observation that nobody has taken is taken before it goes; see CATCH_UP_MIN.
+                self.phase = Phase::Identifying(next.saturating_sub(1));
+            }
+        }
+        self.ring.push_back(Kept {
+            observation: *self.observer.observation(),
+            noise_scale: self.detection.noise_scale,
+            pose: input.detection.and_then(|(_, block)| moments(block)),
+        });
+    }
+
+    /// Starts from the oldest kept observation whose pose is known.
+    fn begin(&mut self) {
+        let known = self.ring.iter().position(|kept| {
+            kept.pose.is_some() || kept.observation.pose_frames > 0
+        });
+        let start = known.unwrap_or(0);
+        let Some(kept) = self.ring.get(start) else { return };
+        let measured = Vector3::from(kept.observation.pose);
+        let (mean, covariance) = kept.pose.unwrap_or((measured, Matrix3::identity() * 1e-4));
+        self.exact.restart(mean, covariance, kept.observation.t_ns);
+        self.phase = Phase::Identifying(start + 1);
+        // What was unknown so far is now any of the faults, by their priors.
+        self.predicted = self.predicted.divided(&self.leaves, self.p_unknown);
+    }
+
+    fn identify(&mut self, next: usize, complete: bool) {
+        let behind = self.ring.len().saturating_sub(next);
+        let was_behind = behind > usize::from(complete);
+        let allowed = if was_behind { self.catch_up() } else { 1 };
+        let taken = behind.min(allowed);
+        let mut moved_s = 0.0;
+        for i in next..next + taken {
+            let Some(kept) = self.ring.get(i) else { break };
+            self.exact.step(&kept.observation, kept.noise_scale);
+            moved_s += if kept.observation.moving { kept.observation.dt_s } else { 0.0 };
+        }
+        self.phase = Phase::Identifying(next + taken);
+        if taken < behind {
+            // The report stays what it was until the ring is worked off.
+            self.posterior = self.predicted;
+            return;
+        }
+        if taken == 0 {
+            return;
+        }
+        let (birth, death) = (BIRTH_1_S * moved_s, DEATH_1_S * moved_s);
+        self.predicted = self.predicted.predicted(&self.leaves, self.p_unknown, birth, death);
+        self.posterior = self.exact.posterior();
+        let recovered = self.posterior.nodes[0] > RECOVERED;
+        if recovered && !self.detection.alarm {
+            self.phase = Phase::Watching;
+        }
+    }
+
+    /// Observations to work off in one cycle while behind.
+    fn catch_up(&self) -> usize {
+        let frame_s = self.observer.observation().frame_s;
+        ((self.capacity as f64 * frame_s / CATCH_UP_S).ceil() as usize)
+            .clamp(CATCH_UP_MIN, self.capacity)
+    }
+
+    fn is_catching_up(&self) -> bool {
+        matches!(self.phase, Phase::Identifying(next) if next < self.ring.len())
+    }
+
+    fn report(&mut self, belief: &mut FaultBelief) {
+        self.posterior.write(&self.leaves, belief);
+        belief.p_predicted = self.predicted.tree(&self.leaves);
+        belief.p_unknown_predicted = self.predicted.unknown;
+        belief.run_id = self.run_id;
+        let (mode, p_mode) = match self.phase {
+            Phase::Watching => (0, self.posterior.nodes[0]),
+            Phase::Identifying(_) if self.is_catching_up() => (self.mode, belief.p[0]),
+            Phase::Identifying(_) => self.posterior.mode(&self.leaves),
+        };
+        if mode != self.mode {
+            self.mode = mode;
+            self.mode_changes = self.mode_changes.saturating_add(1);
+        }
+        belief.mode = mode;
+        belief.p_mode = p_mode;
+        belief.mode_change_count = self.mode_changes;
+        belief.alarm_t_capture_ns = if self.detection.alarm { self.detection.t_ns } else { 0 };
+        belief.onset_t_capture_ns = self.onset();
+        belief.identifying = u32::from(self.phase != Phase::Watching);
+        belief.degenerate_count = self.exact.degenerate_count();
+    }
+
+    fn onset(&self) -> u64 {
+        if self.phase == Phase::Watching || self.is_catching_up() {
+            return 0;
+        }
+        let leaves = self.leaves.stuck.iter().chain(&self.leaves.encoder).flatten();
+        let p = &self.posterior.nodes;
+        leaves.max_by(|&&a, &&b| p[a].total_cmp(&p[b])).map_or(0, |&node| self.exact.onset(node))
+    }
+
+    fn publish(&mut self, detected: Option<&ParticleBlock>, out: &mut ParticleBlock) {
+        if self.phase != Phase::Watching && !self.is_catching_up() {
+            draw(&self.exact, &self.leaves, self.budget, &mut self.rng, out);
+            return;
+        }
+        let Some(block) = detected else {
+            out.count = 0;
+            return;
+        };
+        let count = (block.count as usize).min(self.budget).min(PARTICLE_CAPACITY);
+        out.count = count as u32;
+        out.mode[..count].copy_from_slice(&block.mode[..count]);
+        out.x[..count].copy_from_slice(&block.x[..count]);
+        out.y[..count].copy_from_slice(&block.y[..count]);
+        out.yaw[..count].copy_from_slice(&block.yaw[..count]);
+        out.log_weight[..count].copy_from_slice(&block.log_weight[..count]);
+    }
+}
+
+fn check(settings: &schema::Identifier) -> Result<(), IdentifierError> {
+    if settings.filter != "exact" {
+        return Err(IdentifierError::Filter(settings.filter.clone()));
+    }
+    let refuse = |key, value, allowed| Err(IdentifierError::Value { key, value, allowed });
+    if !(1..=PARTICLE_CAPACITY).contains(&settings.particles) {
+        return refuse("particles", settings.particles as f64, "1 to 4096");
+    }
+    if !(settings.ring_s >= 0.1 && settings.ring_s <= 60.0) {
+        return refuse("ring_s", settings.ring_s, "0.1 to 60");
+    }
+    if !(settings.p_unknown >= 0.0 && settings.p_unknown <= 0.9) {
+        return refuse("p_unknown", settings.p_unknown, "0 to 0.9");
+    }
+    Ok(())
+}

@@ -1,0 +1,127 @@
+//! Which leaf of the fault tree stands for which fault of the model.
+
+use vigil_blocks::{FAULT_NODES, WHEELS};
+use vigil_inference::FaultTree;
+use vigil_robot::learned::{Model, ModelError};
+use vigil_robot::{Description, Fault};
+
+/// Why an identifier was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum IdentifierError {
+    /// The model does not fit.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A leaf's fault is none that the model knows.
+    #[error("leaf '{leaf}': fault '{fault}' is not in the model: expected stuck:WHEEL or \
+             encoder:WHEEL, WHEEL one of {wheels}")]
+    Leaf {
+        /// Name of the leaf.
+        leaf: String,
+        /// Its fault.
+        fault: String,
+        /// Wheels whose faults the model knows.
+        wheels: String,
+    },
+    /// Two leaves stand for one fault.
+    #[error("leaves '{0}' and '{1}' stand for the same fault")]
+    Twice(String, String),
+    /// A filter that does not exist.
+    #[error("identifier.filter: '{0}' is not a filter: expected exact")]
+    Filter(String),
+    /// A setting is out of range.
+    #[error("identifier.{key}: {value} is not allowed: {allowed}")]
+    Value {
+        /// The key.
+        key: &'static str,
+        /// What was found.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+}
+
+/// What a leaf stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LeafFault {
+    /// This wheel is stuck.
+    Stuck(usize),
+    /// This wheel's encoder is broken.
+    Encoder(usize),
+}
+
+/// The leaves of a tree, by fault.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Leaves {
+    /// Node of each stuck wheel.
+    pub stuck: [Option<usize>; WHEELS],
+    /// Node of each broken encoder.
+    pub encoder: [Option<usize>; WHEELS],
+    /// Number of leaves.
+    pub count: usize,
+    /// Parent of each node.
+    pub parents: [Option<usize>; FAULT_NODES],
+    /// Depth of each node.
+    pub depths: [usize; FAULT_NODES],
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Hash of the tree.
+    pub hash: u64,
+}
+
+impl Leaves {
+    /// Reads the faults of the leaves.
+    ///
+    /// # Errors
+    /// [`IdentifierError::Leaf`] for a fault that the model does not know,
+    /// [`IdentifierError::Twice`] for one that appears twice.
+    pub fn new(
+        tree: &FaultTree,
+        model: &Model,
+        robot: &Description,
+    ) -> Result<Self, IdentifierError> {
+        let mut leaves = Self {
+            stuck: [None; WHEELS],
+            encoder: [None; WHEELS],
+            count: 0,
+            parents: [None; FAULT_NODES],
+            depths: [0; FAULT_NODES],
+            nodes: tree.nodes().len(),
+            hash: tree.hash(),
+        };
+        for (i, node) in tree.nodes().iter().enumerate() {
+            leaves.parents[i] = node.parent;
+            leaves.depths[i] = tree.depth(i);
+        }
+        for i in tree.leaves() {
+            let node = &tree.nodes()[i];
+            let fault = node.fault.as_deref().unwrap_or_default();
+            let place = match leaf_fault(fault, model, robot) {
+                Some(LeafFault::Stuck(wheel)) => &mut leaves.stuck[wheel],
+                Some(LeafFault::Encoder(wheel)) => &mut leaves.encoder[wheel],
+                None => {
+                    return Err(IdentifierError::Leaf {
+                        leaf: node.name.clone(),
+                        fault: fault.to_owned(),
+                        wheels: model.wheels.join(" "),
+                    });
+                }
+            };
+            if let Some(other) = place.replace(i) {
+                let other = tree.nodes()[other].name.clone();
+                return Err(IdentifierError::Twice(other, node.name.clone()));
+            }
+            leaves.count += 1;
+        }
+        Ok(leaves)
+    }
+}
+
+fn leaf_fault(text: &str, model: &Model, robot: &Description) -> Option<LeafFault> {
+    let (kind, wheel) = text.split_once(':')?;
+    let wheel = Fault::wheel_of(wheel, robot).ok()?;
+    match kind {
+        "stuck" => model.stuck(wheel).map(|_| LeafFault::Stuck(wheel)),
+        "encoder" => Some(LeafFault::Encoder(wheel)),
+        _ => None,
+    }
+}

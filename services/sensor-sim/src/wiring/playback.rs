@@ -1,0 +1,78 @@
+//! Recorded frames as the source of the graph.
+
+use vigil_blocks::{EventKind, SensorFrame};
+use vigil_cycle::{Clock, Graph, HealthBoard, PortError, Produced, Sender, Source, Stamp, Topic};
+
+use super::actions::Actions;
+use super::peers::Peers;
+use crate::Playback;
+
+/// Plays recorded frames, one per period of the schedule; capture times stay the recording's own.
+/// A recording cannot obey actions.
+pub struct PlaybackSource {
+    playback: Playback,
+    peers: Peers,
+    actions: Actions,
+    frames: Box<dyn Sender<SensorFrame>>,
+    run_id: u64,
+    run_told: u64,
+    ready_told: bool,
+    ended: bool,
+    end_told: bool,
+}
+
+impl PlaybackSource {
+    /// Opens the playback's ports on `graph`.
+    ///
+    /// # Errors
+    /// The transport's.
+    pub fn new(playback: Playback, graph: &Graph) -> Result<Self, PortError> {
+        Ok(Self {
+            playback,
+            peers: Peers::new(graph)?,
+            actions: Actions::new(graph)?,
+            frames: graph.sender(Topic::Sensor)?,
+            run_id: 0,
+            run_told: 0,
+            ready_told: false,
+            ended: false,
+            end_told: false,
+        })
+    }
+}
+
+impl Source for PlaybackSource {
+    fn produce(&mut self, t_schedule_ns: u64, clock: &dyn Clock) -> Result<Produced, PortError> {
+        if !self.peers.are_up() {
+            return Ok(Produced::Nothing);
+        }
+        self.actions.take(t_schedule_ns, self.frames.epoch());
+        let Some((frame, _)) = self.playback.next() else {
+            self.ended = true;
+            return Ok(Produced::End);
+        };
+        *self.frames.block() = *frame;
+        self.run_id = frame.run_id;
+        let stamp = Stamp {
+            t_schedule_ns,
+            t_capture_ns: frame.header.t_capture_ns,
+        };
+        self.frames.send(stamp, clock).map(Produced::Frame)
+    }
+
+    fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        if let (Some(ready_ns), false) = (self.actions.ready_ns(), self.ready_told) {
+            health.event(ready_ns, EventKind::Ready, 0, 0.0, self.frames.next_seq());
+            self.ready_told = true;
+        }
+        if self.run_id != self.run_told {
+            // Recorded runs count from 0, run ids from 1.
+            health.event(now_ns, EventKind::Run, 0, 0.0, self.run_id - 1);
+            self.run_told = self.run_id;
+        }
+        if self.ended && !self.end_told {
+            health.event(now_ns, EventKind::EndOfRecording, 0, 0.0, 0);
+            self.end_told = true;
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! The simulated rover as the source of the graph.
+
+use vigil_blocks::{Block, Control, ControlCommand, EventKind, SensorFrame};
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{
+    Clock, Graph, HealthBoard, PortError, Produced, Receiver, Sender, Source, Stamp, Topic,
+};
+use vigil_robot::injection::Change;
+use vigil_robot::{Fault, FaultKind};
+
+use super::actions::Actions;
+use super::peers::Peers;
+use crate::{Obedience, Schedule, World};
+
+/// Changes that may wait to be told in one cycle.
+const CHANGES_MAX: usize = 16;
+
+/// Simulates, measures, obeys.
+pub struct SimulatorSource {
+    world: World,
+    obedience: Obedience,
+    schedule: Schedule,
+    allow_injection: bool,
+    peers: Peers,
+    actions: Actions,
+    control: Box<dyn Receiver<Control>>,
+    frames: Box<dyn Sender<SensorFrame>>,
+    last_ns: Option<u64>,
+    period_ns: u64,
+    changes: Vec<(u64, Change)>,
+    ready_told: bool,
+    safe_stop: bool,
+    safe_stop_told: bool,
+}
+
+impl SimulatorSource {
+    /// Opens the simulator's ports on `graph`. Each start of a simulator is a run of its own.
+    ///
+    /// # Errors
+    /// The transport's.
+    pub fn new(
+        mut world: World,
+        obedience: Obedience,
+        schedule: Schedule,
+        allow_injection: bool,
+        period_ns: u64,
+        graph: &Graph,
+    ) -> Result<Self, PortError> {
+        let frames = graph.sender(Topic::Sensor)?;
+        world.set_run_id(frames.epoch());
+        Ok(Self {
+            world,
+            obedience,
+            schedule,
+            allow_injection,
+            peers: Peers::new(graph)?,
+            actions: Actions::new(graph)?,
+            control: graph.receiver(Topic::Control(ServiceName::SensorSim))?,
+            frames,
+            last_ns: None,
+            period_ns,
+            changes: Vec::with_capacity(CHANGES_MAX),
+            ready_told: false,
+            safe_stop: false,
+            safe_stop_told: false,
+        })
+    }
+
+    /// Makes a change; true if the simulated rover can be changed so.
+    fn change(&mut self, change: Change, at_ns: u64) -> bool {
+        let done = self.world.change(change).is_ok();
+        if done && self.changes.len() < CHANGES_MAX {
+            self.changes.push((at_ns, change));
+        }
+        done
+    }
+
+    fn take_due_injections(&mut self, t_schedule_ns: u64) {
+        let Some(ready_ns) = self.actions.ready_ns() else {
+            return;
+        };
+        let elapsed_ns = t_schedule_ns.saturating_sub(ready_ns);
+        while let Some(change) = self.schedule.due(elapsed_ns) {
+            self.change(change, t_schedule_ns);
+        }
+    }
+
+    fn take_control(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        for _ in 0..self.control.buffer() {
+            if !self.control.advance() {
+                break;
+            }
+            let Some(command) = self.control.held().copied() else {
+                break;
+            };
+            let wanted = change_of(&command);
+            let permitted = self.allow_injection && command.header.schema == Control::SCHEMA;
+            let done = permitted && wanted.is_some_and(|change| self.change(change, now_ns));
+            health.answer_control(command.header.epoch, command.header.seq, done);
+            if !done {
+                health.event(now_ns, EventKind::Refused, command.command, 0.0, 0);
+            }
+        }
+    }
+}
+
+/// The change that a command asks for, if it is one.
+fn change_of(command: &Control) -> Option<Change> {
+    let wheel = command.wheel as usize;
+    if command.command == ControlCommand::Inject as u32 {
+        let kind = FaultKind::from_wire(command.fault)?;
+        return Some(Change::Inject(Fault { kind, wheel }));
+    }
+    (command.command == ControlCommand::Clear as u32).then_some(Change::Clear(wheel))
+}
+
+impl Source for SimulatorSource {
+    fn produce(&mut self, t_schedule_ns: u64, clock: &dyn Clock) -> Result<Produced, PortError> {
+        if !self.peers.are_up() {
+            return Ok(Produced::Nothing);
+        }
+        self.actions.take(t_schedule_ns, self.frames.epoch());
+        self.take_due_injections(t_schedule_ns);
+        let planned = self.world.planned();
+        let command = self
+            .obedience
+            .apply(planned, self.actions.newest(), clock.now_ns());
+        self.safe_stop = command.safe_stop;
+        let last_ns = self.last_ns.replace(t_schedule_ns);
+        let passed_ns = last_ns.map_or(self.period_ns, |last_ns| t_schedule_ns - last_ns);
+        self.world.step(passed_ns as f64 * 1e-9, command);
+        self.world.measure(self.frames.block());
+        let stamp = Stamp {
+            t_schedule_ns,
+            t_capture_ns: t_schedule_ns,
+        };
+        self.frames.send(stamp, clock).map(Produced::Frame)
+    }
+
+    fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        if let (Some(ready_ns), false) = (self.actions.ready_ns(), self.ready_told) {
+            health.event(ready_ns, EventKind::Ready, 0, 0.0, self.frames.next_seq());
+            self.ready_told = true;
+            self.safe_stop_told = false;
+        }
+        self.take_control(health, now_ns);
+        for (at_ns, change) in self.changes.drain(..) {
+            match change {
+                Change::Inject(Fault { kind, wheel }) => {
+                    let what = wheel as u32 | ((kind as u32) << 8);
+                    health.event(at_ns, EventKind::Injected, what, 0.0, 0);
+                }
+                Change::Clear(wheel) => {
+                    health.event(at_ns, EventKind::Restored, wheel as u32, 0.0, 0);
+                }
+            }
+        }
+        // Standing still before the first action is no event.
+        if self.ready_told && self.safe_stop != self.safe_stop_told {
+            let kind = if self.safe_stop {
+                EventKind::SafeStop
+            } else {
+                EventKind::SafeStopEnds
+            };
+            health.event(now_ns, kind, 0, 0.0, 0);
+            self.safe_stop_told = self.safe_stop;
+        }
+    }
+}

@@ -1,0 +1,460 @@
+//! The simulated rover: drive, soil, slip, sensors, faults.
+
+use vigil_blocks::{ActionOutcome, SensorFrame, Valid};
+use vigil_robot::injection::Change;
+use vigil_robot::kinematics::{GeometryError, ROVER_WHEELS, advance, wrap_angle};
+use vigil_robot::slip::{Situation, SlipModel, Solution};
+use vigil_robot::{Description, Fault, FaultKind};
+use vigil_setup::schema::{DriveSegment, Simulator};
+
+use crate::drive::{Drive, Servo};
+use crate::encoders::Encoders;
+use crate::noise::Noise;
+use crate::soil::SoilPath;
+use crate::{DriveCommand, EffectiveCommand};
+
+/// Motor current per torque, A/(N m): the constant of the simulated motors with their gear.
+pub const CURRENT_PER_TORQUE_A_N_M: f64 = 2.0;
+/// Longest step of the physics, s; longer cycles are divided. Also the interval at which the slip
+/// equilibrium follows soil and command: well below the body's lag and the soil's scatter length.
+const STEP_MAX_S: f64 = 0.01;
+/// Longest cycle, s: beyond it simulated time falls behind instead of keeping the cycle busy.
+const CYCLE_MAX_S: f64 = 1.0;
+/// Velocity, m/s and rad/s, below which a stopped body stands still.
+const STILL: f64 = 1e-5;
+
+/// Why a world cannot be made, or a fault not be injected.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum WorldError {
+    /// The robot is not one that the simulator knows.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+    /// A number is out of range.
+    #[error("{quantity} is {found}: allowed is {allowed}")]
+    Quantity {
+        /// Which number.
+        quantity: &'static str,
+        /// Its value.
+        found: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// There is no such wheel.
+    #[error("wheel {found} does not exist: allowed is 0 to 5")]
+    Wheel {
+        /// Its index.
+        found: usize,
+    },
+}
+
+/// The true state of the rover, for tests and displays; no filter may see it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Truth {
+    /// x m, y m, yaw rad (not wrapped).
+    pub pose: [f64; 3],
+    /// Body velocity: forward m/s, left m/s, yaw rate rad/s.
+    pub velocity: [f64; 3],
+    /// Wheel rates, rad/s.
+    pub wheel_rate_rad_s: [f64; ROVER_WHEELS],
+    /// Motor torques, N m.
+    pub torque_n_m: [f64; ROVER_WHEELS],
+    /// Which wheels are stuck.
+    pub stuck: [bool; ROVER_WHEELS],
+}
+
+/// The simulated rover in its world.
+#[derive(Debug, Clone)]
+pub struct World {
+    model: SlipModel,
+    drive: Drive,
+    executed: Servo,
+    planned: Servo,
+    planned_pose: [f64; 3],
+    pose: [f64; 3],
+    velocity: [f64; 3],
+    lag_s: f64,
+    soil: SoilPath,
+    /// The last equilibrium, and how long ago it was found.
+    motion: Solution,
+    motion_age_s: f64,
+    stuck: [bool; ROVER_WHEELS],
+    encoders: Encoders,
+    noise: Noise,
+    run_id: u64,
+    safe_stop: bool,
+    action_seq: u64,
+    outcome: ActionOutcome,
+    unsolved: u64,
+    invalid: u64,
+}
+
+impl World {
+    /// A rover at rest at the origin, about to drive `drive` (standing still if it is empty), with
+    /// sensors read `rate_hz` times a second. Equal arguments give equal worlds.
+    ///
+    /// # Errors
+    /// [`WorldError`] naming what is out of range.
+    pub fn new(
+        robot: &Description,
+        settings: &Simulator,
+        drive: &[DriveSegment],
+        rate_hz: f64,
+        seed: u64,
+    ) -> Result<Self, WorldError> {
+        check_settings(settings, rate_hz)?;
+        check_drive(drive)?;
+        check_noise(robot)?;
+        let model = SlipModel::new(robot)?;
+        let rest = Situation {
+            curvature_1_m: 0.0,
+            speed_m_s: 0.0,
+            stuck: [false; ROVER_WHEELS],
+            soil: vigil_robot::slip::Soil::default(),
+        };
+        let Ok(motion) = model.solve(&rest, None) else {
+            return Err(quantity("speed at rest", 0.0, "always solvable"));
+        };
+        // One stream each, so that a fault changes no healthy channel's noise.
+        let stream = |n: u64| seed.wrapping_mul(4).wrapping_add(n);
+        Ok(Self {
+            model,
+            drive: Drive::new(drive),
+            executed: Servo::default(),
+            planned: Servo::default(),
+            planned_pose: [0.0; 3],
+            pose: [0.0; 3],
+            velocity: [0.0; 3],
+            lag_s: settings.lag_s,
+            soil: SoilPath::new(settings, stream(0)),
+            motion,
+            motion_age_s: f64::INFINITY,
+            stuck: [false; ROVER_WHEELS],
+            encoders: Encoders::new(stream(1)),
+            noise: Noise::new(&robot.noise, rate_hz, settings.noise_scale, stream(2)),
+            run_id: 1,
+            safe_stop: false,
+            action_seq: 0,
+            outcome: ActionOutcome::None,
+            unsolved: 0,
+            invalid: 0,
+        })
+    }
+
+    /// What the drive wants now: input of [`crate::Obedience::apply`].
+    #[must_use]
+    pub fn planned(&self) -> DriveCommand {
+        self.drive.command()
+    }
+
+    /// Moves the world on by `dt_s` under `command`. Steering and speed follow it at limited
+    /// rates; the drive's clock runs at the command's `progress`, so that a slowed rover drives
+    /// the same path. A step that is not a positive number of seconds, or a command that is not
+    /// finite, is counted and not executed: the rover then stops.
+    pub fn step(&mut self, dt_s: f64, command: EffectiveCommand) {
+        if !(dt_s.is_finite() && dt_s > 0.0) {
+            self.invalid += 1;
+            return;
+        }
+        let command = self.checked(command);
+        let cycle_s = dt_s.min(CYCLE_MAX_S);
+        let parts = (cycle_s / STEP_MAX_S).ceil().max(1.0);
+        let part_s = cycle_s / parts;
+        for _ in 0..parts as u32 {
+            self.move_on(part_s, &command);
+        }
+        self.safe_stop = command.safe_stop;
+        self.action_seq = command.action_seq;
+        let reached = self.executed.at == command.target;
+        self.outcome = match (command.action_seq, command.safe_stop) {
+            (0, _) => ActionOutcome::None,
+            (_, true) => ActionOutcome::Failed,
+            (_, false) if reached => ActionOutcome::Succeeded,
+            (_, false) => ActionOutcome::Running,
+        };
+    }
+
+    /// Reads the sensors into `frame`; its header is left to the caller. Bits of `valid` are set
+    /// for exactly what this rover measures.
+    pub fn measure(&mut self, frame: &mut SensorFrame) {
+        *frame = SensorFrame {
+            header: frame.header,
+            run_id: self.run_id,
+            action_seq: self.action_seq,
+            action_outcome: self.outcome as u32,
+            safe_stop: u32::from(self.safe_stop),
+            ..SensorFrame::default()
+        };
+        let DriveCommand {
+            curvature_1_m,
+            speed_m_s,
+        } = self.executed.at;
+        (frame.command[0], frame.command[1]) = (curvature_1_m, speed_m_s);
+        frame.valid = Valid::command(0) | Valid::command(1);
+
+        let noise = &mut self.noise;
+        frame.pose[0] = self.pose[0] + noise.draw(noise.position_m);
+        frame.pose[1] = self.pose[1] + noise.draw(noise.position_m);
+        frame.pose[2] = wrap_angle(self.pose[2] + noise.draw(noise.yaw_rad));
+        frame.yaw_rate = self.velocity[2] + noise.draw(noise.yaw_rate_rad_s);
+        let [x, y, yaw] = self.planned_pose;
+        frame.planned_pose = [x, y, wrap_angle(yaw)];
+        frame.valid |= Valid::POSE | Valid::PLANNED_POSE | Valid::YAW_RATE;
+
+        let kinematics = self.model.kinematics();
+        let steer_rad = kinematics.targets(curvature_1_m, speed_m_s).steer_rad;
+        for (i, &steer) in steer_rad.iter().enumerate() {
+            let rate = self.motion.wheel_rate_rad_s[i] + noise.draw(noise.wheel_rate_rad_s);
+            frame.wheel_rate[i] = self.encoders.report(i, rate);
+            let current = CURRENT_PER_TORQUE_A_N_M * self.motion.torque_n_m[i];
+            frame.current[i] = current + noise.draw(noise.current_a);
+            frame.valid |= Valid::wheel_rate(i) | Valid::current(i);
+            if kinematics.steered[i] {
+                frame.steer[i] = steer + noise.draw(noise.steer_rad);
+                frame.valid |= Valid::steer(i);
+            }
+        }
+    }
+
+    /// Breaks something. A wheel may be stuck and have a broken encoder at once; a new fault of an
+    /// encoder takes the place of its old one.
+    ///
+    /// # Errors
+    /// [`WorldError::Wheel`].
+    pub fn inject(&mut self, fault: Fault) -> Result<(), WorldError> {
+        check_wheel(fault.wheel)?;
+        match fault.kind {
+            FaultKind::Stuck => self.set_stuck(fault.wheel, true),
+            kind => self.encoders.set(fault.wheel, Some(kind)),
+        }
+        Ok(())
+    }
+
+    /// Mends everything of one wheel.
+    ///
+    /// # Errors
+    /// [`WorldError::Wheel`].
+    pub fn clear(&mut self, wheel: usize) -> Result<(), WorldError> {
+        check_wheel(wheel)?;
+        self.set_stuck(wheel, false);
+        self.encoders.set(wheel, None);
+        Ok(())
+    }
+
+    /// Does what an injection asks for.
+    ///
+    /// # Errors
+    /// [`WorldError::Wheel`].
+    pub fn change(&mut self, change: Change) -> Result<(), WorldError> {
+        match change {
+            Change::Inject(fault) => self.inject(fault),
+            Change::Clear(wheel) => self.clear(wheel),
+        }
+    }
+
+    /// The true state.
+    #[must_use]
+    pub fn truth(&self) -> Truth {
+        Truth {
+            pose: self.pose,
+            velocity: self.velocity,
+            wheel_rate_rad_s: self.motion.wheel_rate_rad_s,
+            torque_n_m: self.motion.torque_n_m,
+            stuck: self.stuck,
+        }
+    }
+
+    /// Sets the run's id as it appears in the frames; 1 at first. A new id resets every filter.
+    pub fn set_run_id(&mut self, run_id: u64) {
+        self.run_id = run_id;
+    }
+
+    /// Equilibria that were not found; the last one was kept.
+    #[must_use]
+    pub const fn unsolved(&self) -> u64 {
+        self.unsolved
+    }
+
+    /// Steps and commands that were not finite.
+    #[must_use]
+    pub const fn invalid(&self) -> u64 {
+        self.invalid
+    }
+
+    fn set_stuck(&mut self, wheel: usize, stuck: bool) {
+        self.stuck[wheel] = stuck;
+        self.motion_age_s = f64::INFINITY;
+    }
+
+    /// A command that cannot be executed becomes a stop.
+    fn checked(&mut self, command: EffectiveCommand) -> EffectiveCommand {
+        let target = command.target;
+        let finite = target.curvature_1_m.is_finite() && target.speed_m_s.is_finite();
+        if finite && (0.0..=1.0).contains(&command.progress) {
+            return command;
+        }
+        self.invalid += 1;
+        EffectiveCommand {
+            target: DriveCommand {
+                curvature_1_m: self.executed.at.curvature_1_m,
+                speed_m_s: 0.0,
+            },
+            progress: 0.0,
+            safe_stop: true,
+            action_seq: command.action_seq,
+        }
+    }
+
+    fn move_on(&mut self, dt_s: f64, command: &EffectiveCommand) {
+        let mut planned = self.drive.command();
+        planned.speed_m_s *= command.progress;
+        self.drive.advance(dt_s * command.progress);
+        self.planned.follow(planned, dt_s);
+        let ideal = self.planned.at;
+        let ideal_yaw_rate = ideal.curvature_1_m * ideal.speed_m_s;
+        let ideal = [ideal.speed_m_s, 0.0, ideal_yaw_rate];
+        self.planned_pose = advance(self.planned_pose, ideal, dt_s);
+
+        self.executed.follow(command.target, dt_s);
+        self.find_motion(dt_s);
+        // First-order lag toward the equilibrium; the mean over the step moves the pose.
+        let decay = if self.lag_s > 0.0 {
+            (-dt_s / self.lag_s).exp()
+        } else {
+            0.0
+        };
+        let mean_share = (1.0 - decay) * self.lag_s / dt_s;
+        let mut mean = [0.0; 3];
+        for (axis, mean) in mean.iter_mut().enumerate() {
+            let target = self.motion.velocity[axis];
+            let off = self.velocity[axis] - target;
+            *mean = target + off * mean_share;
+            self.velocity[axis] = target + off * decay;
+        }
+        let stopped = self.executed.at.speed_m_s == 0.0;
+        if stopped && self.velocity.iter().all(|value| value.abs() < STILL) {
+            self.velocity = [0.0; 3];
+            return;
+        }
+        self.pose = advance(self.pose, mean, dt_s);
+        self.soil.advance(mean[0].hypot(mean[1]) * dt_s);
+    }
+
+    /// Brings the slip equilibrium up to date: at once when the rover starts, stops, or a wheel
+    /// sticks or comes free, else every [`STEP_MAX_S`].
+    fn find_motion(&mut self, dt_s: f64) {
+        let at = self.executed.at;
+        self.motion_age_s += dt_s;
+        // Half a step of tolerance: rounding must not stretch the interval by a whole cycle.
+        if at.speed_m_s != 0.0 && self.motion_age_s + 0.5 * dt_s < STEP_MAX_S {
+            return;
+        }
+        let situation = Situation {
+            curvature_1_m: at.curvature_1_m,
+            speed_m_s: at.speed_m_s,
+            stuck: self.stuck,
+            soil: self.soil.here(),
+        };
+        // From rest the ideal motion is the better start.
+        let moves = self.motion.velocity != [0.0; 3];
+        let start = moves.then(|| self.motion.unknowns());
+        match self.model.solve(&situation, start.as_ref()) {
+            Ok(motion) => self.motion = motion,
+            Err(_) => self.unsolved += 1,
+        }
+        let rests = at.speed_m_s == 0.0;
+        self.motion_age_s = if rests { f64::INFINITY } else { 0.0 };
+    }
+}
+
+fn quantity(quantity: &'static str, found: f64, allowed: &'static str) -> WorldError {
+    WorldError::Quantity {
+        quantity,
+        found,
+        allowed,
+    }
+}
+
+fn check_wheel(found: usize) -> Result<(), WorldError> {
+    if found < ROVER_WHEELS {
+        Ok(())
+    } else {
+        Err(WorldError::Wheel { found })
+    }
+}
+
+fn check_settings(settings: &Simulator, rate_hz: f64) -> Result<(), WorldError> {
+    let ranges = [
+        ("rate_hz", rate_hz, 1.0, 1e4, "1 to 10000"),
+        ("friction", settings.friction, 0.1, 2.0, "0.1 to 2"),
+        (
+            "shear_modulus",
+            settings.shear_modulus,
+            0.02,
+            2.0,
+            "0.02 to 2",
+        ),
+        (
+            "friction_scatter",
+            settings.friction_scatter,
+            0.0,
+            0.5,
+            "0 to 0.5",
+        ),
+        (
+            "scatter_length_m",
+            settings.scatter_length_m,
+            0.01,
+            10.0,
+            "0.01 to 10",
+        ),
+        ("lag_s", settings.lag_s, 0.0, 1.0, "0 to 1"),
+        ("noise_scale", settings.noise_scale, 0.0, 10.0, "0 to 10"),
+    ];
+    for (name, found, low, high, allowed) in ranges {
+        if !(low..=high).contains(&found) {
+            return Err(quantity(name, found, allowed));
+        }
+    }
+    Ok(())
+}
+
+fn check_drive(drive: &[DriveSegment]) -> Result<(), WorldError> {
+    for segment in drive {
+        let duration_s = segment.duration_s;
+        if !(duration_s.is_finite() && duration_s > 0.0) {
+            let allowed = "any finite number above 0";
+            return Err(quantity("duration_s", duration_s, allowed));
+        }
+        for (name, found) in [
+            ("curvature_1_m", segment.curvature_1_m),
+            ("speed_m_s", segment.speed_m_s),
+        ] {
+            if !found.is_finite() {
+                return Err(quantity(name, found, "any finite number"));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_noise(robot: &Description) -> Result<(), WorldError> {
+    let noise = &robot.noise;
+    let rate_hz = noise.reference_rate_hz;
+    if !(rate_hz.is_finite() && rate_hz > 0.0) {
+        let allowed = "any finite number above 0";
+        return Err(quantity("noise.reference_rate_hz", rate_hz, allowed));
+    }
+    for (name, found) in [
+        ("noise.position_m", noise.position_m),
+        ("noise.yaw_rad", noise.yaw_rad),
+        ("noise.yaw_rate_rad_s", noise.yaw_rate_rad_s),
+        ("noise.wheel_rate_rad_s", noise.wheel_rate_rad_s),
+        ("noise.steer_rad", noise.steer_rad),
+        ("noise.current_a", noise.current_a),
+    ] {
+        if !(found.is_finite() && found >= 0.0) {
+            return Err(quantity(name, found, "any finite number from 0"));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,64 @@
+//! A steady cycle of the simulator allocates nothing.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use vigil_blocks::{Action, RecoveryKind, SensorFrame};
+use vigil_cycle::allocation::{CountingAllocator, allocations};
+use vigil_robot::injection::Change;
+use vigil_robot::{Fault, FaultKind};
+use vigil_sensor_sim::{Obedience, Schedule, World};
+use vigil_setup::schema::{DriveSegment, Simulator};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+#[test]
+fn steady_cycles_with_faults_and_actions_allocate_nothing() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/robots/rover.toml");
+    let robot = vigil_setup::load_robot(&path).unwrap();
+    let segment = |curvature_1_m| DriveSegment {
+        duration_s: 1.0,
+        curvature_1_m,
+        speed_m_s: 0.2,
+    };
+    let drive = [segment(0.5), segment(0.0), segment(-0.5)];
+    let mut world = World::new(&robot, &Simulator::default(), &drive, 1000.0, 1).unwrap();
+    let mut obedience = Obedience::new(&robot.limits);
+    let injection = |kind, wheel, at_s| vigil_robot::Injection {
+        change: Change::Inject(Fault { kind, wheel }),
+        at_s,
+    };
+    let mut schedule = Schedule::new(vec![
+        injection(FaultKind::Stuck, 4, 1.0),
+        injection(FaultKind::EncoderFrozen, 0, 1.5),
+        injection(FaultKind::EncoderNoise, 2, 2.0),
+        injection(FaultKind::Stuck, 1, 2.5),
+    ]);
+    let mut action = Action {
+        kind: RecoveryKind::GoOn as u32,
+        valid_until_ns: 4_000_000_000,
+        speed_scale: 1.0,
+        curvature_gain: 1.0,
+        ..Action::default()
+    };
+    let mut frame = SensorFrame::default();
+    let before = allocations();
+    for cycle in 0..5000_u64 {
+        let now_ns = cycle * 1_000_000;
+        action.decision_seq = cycle;
+        while let Some(change) = schedule.due(now_ns) {
+            world.change(change).unwrap();
+        }
+        let command = obedience.apply(world.planned(), Some(&action), now_ns);
+        world.step(0.001, command);
+        world.measure(&mut frame);
+    }
+    assert_eq!(allocations() - before, 0);
+    // It did drive, break and stop.
+    assert!(world.truth().stuck[4] && frame.safe_stop == 1 && schedule.is_empty());
+    assert!(world.truth().pose[0] > 0.3);
+    // The counter counts.
+    drop(vec![1_u8]);
+    assert!(allocations() > before);
+}

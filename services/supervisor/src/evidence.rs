@@ -1,0 +1,114 @@
+//! Soft evidence from the identifier, each piece used once.
+//!
+//! The likelihood of a node is its probability divided by its predicted probability: what this
+//! cycle's data said, without what the identifier believed before. The identifier speaks every
+//! cycle and decisions are slower, so the logarithms are summed over the cycles of an epoch. This
+//! is the more robust of the two known forms: tracking anew from a flat prior each epoch would
+//! throw away what the decision model itself knows (which faults mend, and how fast).
+//!
+//! When the identifier changes what it reports about (it begins to identify, or returns to
+//! watching), quotients across the change mean nothing: then its belief is taken over as it is.
+
+use vigil_blocks::{DECISION_STATES, FaultBelief};
+
+use crate::mapping::StateMeaning;
+
+/// One cycle can change the odds of a state by this factor at most, as a logarithm.
+const LOG_RATIO_MAX: f64 = 20.0;
+/// An epoch can change them by this factor at most: below it, a double still holds both sides.
+const LOG_EPOCH_MAX: f64 = 300.0;
+
+/// Evidence gathered since the last epoch.
+#[derive(Debug, Clone)]
+pub(crate) struct Gathered {
+    log_likelihood: [f64; DECISION_STATES],
+    identifying: Option<u32>,
+    mode_changes: u32,
+}
+
+/// What a diagnosis asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Effect {
+    /// Wait for the end of the epoch.
+    Wait,
+    /// The reported mode has changed: decide now.
+    Decide,
+    /// The reporting has changed: take the belief over and decide now.
+    Anchor,
+}
+
+impl Gathered {
+    pub(crate) const fn new() -> Self {
+        Self {
+            log_likelihood: [0.0; DECISION_STATES],
+            identifying: None,
+            mode_changes: 0,
+        }
+    }
+
+    /// Takes a diagnosis.
+    pub(crate) fn add(&mut self, diagnosis: &FaultBelief, states: &[StateMeaning]) -> Effect {
+        let before = self.identifying.replace(diagnosis.identifying);
+        let changes = std::mem::replace(&mut self.mode_changes, diagnosis.mode_change_count);
+        if before != Some(diagnosis.identifying) {
+            self.clear();
+            return Effect::Anchor;
+        }
+        for (sum, meaning) in self.log_likelihood.iter_mut().zip(states) {
+            let (p, predicted) = probabilities(diagnosis, *meaning);
+            *sum = (*sum + log_ratio(p, predicted)).clamp(-LOG_EPOCH_MAX, LOG_EPOCH_MAX);
+        }
+        if changes == diagnosis.mode_change_count {
+            Effect::Wait
+        } else {
+            Effect::Decide
+        }
+    }
+
+    /// Writes the likelihoods, the largest being 1, and begins anew.
+    pub(crate) fn take(&mut self, likelihood: &mut [f64]) {
+        let used = &self.log_likelihood[..likelihood.len()];
+        let max = used.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        for (out, log) in likelihood.iter_mut().zip(used) {
+            *out = (log - max).exp();
+        }
+        self.clear();
+    }
+
+    /// The next diagnosis is taken over as it is.
+    pub(crate) fn forget(&mut self) {
+        self.identifying = None;
+        self.clear();
+    }
+
+    fn clear(&mut self) {
+        self.log_likelihood.fill(0.0);
+    }
+}
+
+/// Probability and predicted probability of a state.
+fn probabilities(diagnosis: &FaultBelief, meaning: StateMeaning) -> (f64, f64) {
+    match meaning.node {
+        None => (diagnosis.p_unknown, diagnosis.p_unknown_predicted),
+        Some(node) => (
+            diagnosis.p.get(node).copied().unwrap_or(0.0),
+            diagnosis.p_predicted.get(node).copied().unwrap_or(0.0),
+        ),
+    }
+}
+
+/// ln(p / predicted), bounded; no evidence where it has no meaning.
+fn log_ratio(p: f64, predicted: f64) -> f64 {
+    let ratio = p / predicted;
+    if !(p >= 0.0 && predicted > 0.0 && ratio.is_finite()) {
+        return 0.0;
+    }
+    ratio.ln().clamp(-LOG_RATIO_MAX, LOG_RATIO_MAX)
+}
+
+/// Writes the identifier's belief over the decision model's states into `weights`.
+pub(crate) fn weights(diagnosis: &FaultBelief, states: &[StateMeaning], weights: &mut [f64]) {
+    for (weight, meaning) in weights.iter_mut().zip(states) {
+        *weight = probabilities(diagnosis, *meaning).0;
+    }
+}

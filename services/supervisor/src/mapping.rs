@@ -1,0 +1,161 @@
+//! From the fault tree's nodes to the decision model's states, and from its actions to the robot.
+
+use std::collections::BTreeMap;
+
+use vigil_blocks::{DECISION_ACTIONS, DECISION_STATES, RecoveryKind};
+use vigil_decision::Pomdp;
+use vigil_decision::mdp::SolveError;
+use vigil_inference::FaultTree;
+use vigil_robot::Description;
+use vigil_setup::schema::{Recovery, RecoveryAction};
+
+/// Name of the decision model's state for deviations that no fault model explains.
+const UNKNOWN: &str = "UNKNOWN";
+
+/// Counter-steering that lets a robot with a stuck wheel drive the commanded curvature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Compensation {
+    /// Index of the stuck wheel.
+    pub wheel: usize,
+    /// The curvature to command is `curvature_gain * curvature + curvature_offset_1_m`.
+    pub curvature_gain: f64,
+    /// See `curvature_gain`; 1/m.
+    pub curvature_offset_1_m: f64,
+}
+
+/// Why a supervisor could not be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SupervisorError {
+    /// The decision model is larger than a block can carry.
+    #[error(
+        "the decision model has {states} states and {actions} actions; allowed are \
+         {DECISION_STATES} and {DECISION_ACTIONS}"
+    )]
+    Size {
+        /// States of the model.
+        states: usize,
+        /// Actions of the model.
+        actions: usize,
+    },
+    /// A leaf of the fault tree, nominal or unknown has no state.
+    #[error("the decision model has no state '{0}'; it needs one for every leaf, ND and UNKNOWN")]
+    NoState(String),
+    /// A state means nothing in the fault tree.
+    #[error("state '{0}' of the decision model is no leaf of the fault tree, ND or UNKNOWN")]
+    NoLeaf(String),
+    /// An action of the model is not mapped.
+    #[error("action '{0}' of the decision model is missing in [supervisor.actions]")]
+    NoAction(String),
+    /// A mapped action is not in the model.
+    #[error("[supervisor.actions] names '{0}', which the decision model does not have")]
+    ForeignAction(String),
+    /// The policy is not known.
+    #[error("policy '{0}' is not known: allowed are qmdp, mls, av")]
+    Policy(String),
+    /// The model has no solution.
+    #[error("decision model: {0}")]
+    Solve(#[from] SolveError),
+}
+
+/// Which node of the fault tree, and which wheel, a state of the decision model stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct StateMeaning {
+    /// Node of the fault tree; `None` for UNKNOWN.
+    pub node: Option<usize>,
+    /// Wheel of the fault.
+    pub wheel: Option<usize>,
+    /// True if the fault is a stuck wheel.
+    pub stuck: bool,
+}
+
+/// Meaning of every state, in the model's order.
+pub(crate) fn states(
+    model: &Pomdp,
+    tree: &FaultTree,
+    robot: &Description,
+) -> Result<Vec<StateMeaning>, SupervisorError> {
+    let (states, actions) = (model.states().len(), model.actions().len());
+    if states > DECISION_STATES || actions > DECISION_ACTIONS {
+        return Err(SupervisorError::Size { states, actions });
+    }
+    let names = std::iter::once(0)
+        .chain(tree.leaves())
+        .map(|i| tree.nodes()[i].name.as_str());
+    for name in names.chain([UNKNOWN]) {
+        if !model.states().iter().any(|state| state == name) {
+            return Err(SupervisorError::NoState(name.to_owned()));
+        }
+    }
+    model
+        .states()
+        .iter()
+        .map(|name| meaning(name, tree, robot))
+        .collect()
+}
+
+fn meaning(
+    name: &str,
+    tree: &FaultTree,
+    robot: &Description,
+) -> Result<StateMeaning, SupervisorError> {
+    if name == UNKNOWN {
+        return Ok(StateMeaning {
+            node: None,
+            wheel: None,
+            stuck: false,
+        });
+    }
+    let node = tree
+        .index(name)
+        .ok_or_else(|| SupervisorError::NoLeaf(name.to_owned()))?;
+    let fault = tree.nodes()[node].fault.as_deref();
+    if node != 0 && fault.is_none() {
+        return Err(SupervisorError::NoLeaf(name.to_owned()));
+    }
+    let wheel = fault
+        .and_then(|f| f.split(':').nth(1))
+        .and_then(|w| robot.wheel_index(w));
+    let stuck = fault.is_some_and(|f| f.starts_with("stuck:"));
+    Ok(StateMeaning {
+        node: Some(node),
+        wheel,
+        stuck,
+    })
+}
+
+/// What an action of the decision model makes the robot do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ActionMeaning {
+    pub kind: RecoveryKind,
+    pub speed_scale: f64,
+}
+
+/// Meaning of every action, in the model's order.
+pub(crate) fn actions(
+    model: &Pomdp,
+    settings: &BTreeMap<String, RecoveryAction>,
+) -> Result<Vec<ActionMeaning>, SupervisorError> {
+    if let Some(foreign) = settings.keys().find(|name| !model.actions().contains(name)) {
+        return Err(SupervisorError::ForeignAction(foreign.clone()));
+    }
+    model
+        .actions()
+        .iter()
+        .map(|name| {
+            let action = settings
+                .get(name)
+                .ok_or_else(|| SupervisorError::NoAction(name.clone()))?;
+            let kind = match action.kind {
+                Recovery::GoOn => RecoveryKind::GoOn,
+                Recovery::SlowDown => RecoveryKind::SlowDown,
+                Recovery::Stop => RecoveryKind::Stop,
+                Recovery::Compensate => RecoveryKind::Compensate,
+                Recovery::IgnoreEncoder => RecoveryKind::IgnoreEncoder,
+                Recovery::CallForHelp => RecoveryKind::CallForHelp,
+            };
+            let stands = matches!(kind, RecoveryKind::Stop | RecoveryKind::CallForHelp);
+            let speed_scale = action.speed_scale.unwrap_or(if stands { 0.0 } else { 1.0 });
+            Ok(ActionMeaning { kind, speed_scale })
+        })
+        .collect()
+}

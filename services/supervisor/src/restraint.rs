@@ -1,0 +1,96 @@
+//! Keeps decisions from chattering and from crying wolf.
+//!
+//! - An action that lets the robot move faster than the present one must be best for
+//!   [`HOLD_EPOCHS`] epochs in a row. A more cautious one is taken at once.
+//! - Help is called for only when that has been best for [`HELP_EPOCHS`] epochs in a row; until
+//!   then the best of the other actions is taken.
+
+use vigil_blocks::RecoveryKind;
+use vigil_decision::Choice;
+use vigil_decision::policy::choose;
+
+use crate::mapping::ActionMeaning;
+
+/// Epochs for which a less cautious action must be best before it is taken.
+pub(crate) const HOLD_EPOCHS: u32 = 3;
+/// Epochs for which a call for help must be best before it is made.
+pub(crate) const HELP_EPOCHS: u32 = 10;
+
+/// What has been best, and for how long.
+#[derive(Debug, Clone)]
+pub(crate) struct Restraint {
+    candidate: usize,
+    epochs: u32,
+    help_epochs: u32,
+}
+
+impl Restraint {
+    pub(crate) const fn new() -> Self {
+        Self {
+            candidate: usize::MAX,
+            epochs: 0,
+            help_epochs: 0,
+        }
+    }
+
+    /// The action to take. `current` is the present action, `values` every action's value (the
+    /// values of actions that are not yet allowed are lowered below all others), `timed` is true
+    /// once per epoch.
+    pub(crate) fn decide(
+        &mut self,
+        current: Option<usize>,
+        best: Choice,
+        values: &mut [f64],
+        meanings: &[ActionMeaning],
+        timed: bool,
+    ) -> Choice {
+        let is_help = |action: usize| {
+            meanings
+                .get(action)
+                .is_some_and(|m| m.kind == RecoveryKind::CallForHelp)
+        };
+        let mut choice = best;
+        if is_help(best.action) {
+            self.help_epochs = self.help_epochs.saturating_add(u32::from(timed));
+            let calling = current.is_some_and(is_help);
+            let others = (0..values.len()).any(|action| !is_help(action));
+            if self.help_epochs < HELP_EPOCHS && !calling && others {
+                for (action, value) in values.iter_mut().enumerate() {
+                    if is_help(action) {
+                        *value = f64::MIN;
+                    }
+                }
+                choice = choose(values);
+            }
+        } else {
+            self.help_epochs = 0;
+        }
+        self.hold(current, choice, meanings, timed)
+    }
+
+    fn hold(
+        &mut self,
+        current: Option<usize>,
+        choice: Choice,
+        meanings: &[ActionMeaning],
+        timed: bool,
+    ) -> Choice {
+        let Some(current) = current else {
+            return choice;
+        };
+        if choice.action != self.candidate {
+            self.candidate = choice.action;
+            self.epochs = 0;
+        }
+        self.epochs = self.epochs.saturating_add(u32::from(timed));
+        let speed = |action: usize| meanings.get(action).map_or(0.0, |m| m.speed_scale);
+        let faster = speed(choice.action) > speed(current);
+        if faster && self.epochs < HOLD_EPOCHS {
+            return Choice {
+                action: current,
+                margin: 0.0,
+            };
+        }
+        choice
+    }
+}

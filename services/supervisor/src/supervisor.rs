@@ -1,0 +1,335 @@
+//! One decision cycle.
+
+use vigil_blocks::{
+    Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, DetectionBelief, Entry, FaultBelief,
+    RecoveryKind,
+};
+use vigil_decision::{
+    ActionVoting, Choice, Evidence, MostLikelyState, Policy, Pomdp, QMdp, Tracker, mdp,
+};
+use vigil_inference::FaultTree;
+use vigil_robot::Description;
+use vigil_setup::schema;
+
+use crate::evidence::{self, Effect, Gathered};
+use crate::mapping::{self, ActionMeaning, Compensation, StateMeaning, SupervisorError};
+use crate::restraint::Restraint;
+
+/// Diagnoses missed in a row after which the identifier counts as lost.
+const LOST_AFTER_MISSES: u32 = 3;
+/// Misses in a row without any detection after which no belief is usable: the robot stops.
+const BLIND_AFTER_MISSES: u32 = 10;
+/// Bit of [`Action::lost_stages`]: the identifier is lost.
+const IDENTIFIER_LOST: u32 = 1;
+/// Bit of [`Action::lost_stages`]: the detector is lost.
+const DETECTOR_LOST: u32 = 2;
+
+/// What a cycle of the supervisor is told; at least one of the two is there.
+#[derive(Debug, Clone, Copy)]
+pub struct Inputs<'a> {
+    /// The identifier's belief, if it came.
+    pub diagnosis: Option<&'a FaultBelief>,
+    /// The newest belief of the detector, if it is new.
+    pub detection: Option<&'a DetectionBelief>,
+}
+
+/// Tracks the belief of the recovery POMDP and chooses actions.
+pub struct Supervisor {
+    model: Pomdp,
+    policy: Box<dyn Policy>,
+    tracker: Tracker,
+    states: Vec<StateMeaning>,
+    actions: Vec<ActionMeaning>,
+    compensation: Vec<Compensation>,
+    epoch_ns: u64,
+    gathered: Gathered,
+    restraint: Restraint,
+    values: Vec<f64>,
+    scratch: Vec<f64>,
+    epoch_t_capture_ns: Option<u64>,
+    choice: Choice,
+    decided: Option<Decided>,
+    decision_seq: u64,
+    log_evidence: f64,
+    impossible_count: u32,
+    misses: u32,
+    misses_without_detection: u32,
+    control_mode: ControlMode,
+    run_id: u64,
+}
+
+/// What the robot is told; a change of it is a new decision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Decided {
+    action: usize,
+    kind: RecoveryKind,
+    wheel: Option<usize>,
+}
+
+impl Supervisor {
+    /// Builds a supervisor for a decision model whose states are the leaves of `tree`.
+    ///
+    /// # Errors
+    /// [`SupervisorError`] naming what does not fit.
+    pub fn new(
+        model: Pomdp,
+        tree: &FaultTree,
+        robot: &Description,
+        settings: &schema::Supervisor,
+        compensation: Vec<Compensation>,
+    ) -> Result<Self, SupervisorError> {
+        let states = mapping::states(&model, tree, robot)?;
+        let actions = mapping::actions(&model, &settings.actions)?;
+        let solution = mdp::solve(&model)?;
+        let policy: Box<dyn Policy> = match settings.policy.as_str() {
+            "qmdp" => Box::new(QMdp::new(solution)),
+            "mls" => Box::new(MostLikelyState::new(solution)),
+            "av" => Box::new(ActionVoting::new(solution)),
+            other => return Err(SupervisorError::Policy(other.to_owned())),
+        };
+        Ok(Self {
+            policy,
+            tracker: Tracker::new(&model),
+            epoch_ns: (settings.epoch_ms * 1e6) as u64,
+            gathered: Gathered::new(),
+            restraint: Restraint::new(),
+            values: vec![0.0; actions.len()],
+            scratch: vec![0.0; states.len()],
+            epoch_t_capture_ns: None,
+            choice: Choice {
+                action: 0,
+                margin: 0.0,
+            },
+            decided: None,
+            decision_seq: 0,
+            log_evidence: 0.0,
+            impossible_count: 0,
+            misses: 0,
+            misses_without_detection: 0,
+            control_mode: ControlMode::Policy,
+            run_id: 0,
+            model,
+            states,
+            actions,
+            compensation,
+        })
+    }
+
+    /// Takes one journal entry and writes the decision. Every field of `action` is written but the
+    /// header's epoch, sequence number and times, the cause and `valid_until_ns`: those belong to
+    /// the ports. Allocates nothing, never panics; no field is ever NaN.
+    pub fn step(&mut self, entry: Entry<Inputs<'_>>, action: &mut Action) {
+        match entry {
+            Entry::Frame(inputs) => self.take(inputs),
+            Entry::Missed(count) => self.miss(count),
+            Entry::Reset => self.reset(),
+            Entry::Budget(_) => {}
+        }
+        self.write(action);
+    }
+
+    fn take(&mut self, inputs: Inputs<'_>) {
+        if inputs.detection.is_some() {
+            self.misses_without_detection = 0;
+        }
+        match (inputs.diagnosis, inputs.detection) {
+            (Some(diagnosis), _) => {
+                let was_lost = self.misses >= LOST_AFTER_MISSES;
+                (self.misses, self.misses_without_detection) = (0, 0);
+                if was_lost {
+                    self.gathered.forget();
+                }
+                self.take_diagnosis(diagnosis);
+            }
+            (None, Some(detection)) if self.misses >= LOST_AFTER_MISSES => {
+                self.fall_back(detection);
+            }
+            _ => {}
+        }
+    }
+
+    fn take_diagnosis(&mut self, diagnosis: &FaultBelief) {
+        if diagnosis.run_id != self.run_id {
+            self.reset();
+            self.run_id = diagnosis.run_id;
+        }
+        let effect = self.gathered.add(diagnosis, &self.states);
+        let timed = self.epoch_is_over(diagnosis.header.t_capture_ns);
+        self.control_mode = ControlMode::Policy;
+        if effect == Effect::Anchor {
+            evidence::weights(diagnosis, &self.states, &mut self.scratch);
+            if !self.tracker.anchor(&self.scratch) {
+                self.impossible_count = self.impossible_count.saturating_add(1);
+            }
+            self.log_evidence = 0.0;
+            self.decide(timed);
+        } else if timed || effect == Effect::Decide {
+            if timed {
+                self.tracker.predict(&self.model, self.choice.action);
+            }
+            self.gathered.take(&mut self.scratch);
+            match self.tracker.weigh(&self.scratch) {
+                Evidence::Taken(p) => self.log_evidence = p.max(f64::MIN_POSITIVE).ln(),
+                Evidence::Impossible => {
+                    self.impossible_count = self.impossible_count.saturating_add(1);
+                }
+            }
+            self.decide(timed);
+        }
+    }
+
+    /// True once per epoch, by differences of the capture time; a jump back begins a new epoch.
+    fn epoch_is_over(&mut self, t_capture_ns: u64) -> bool {
+        let over = self.epoch_t_capture_ns.is_none_or(|last_ns| {
+            t_capture_ns
+                .checked_sub(last_ns)
+                .is_none_or(|passed| passed >= self.epoch_ns)
+        });
+        if over {
+            self.epoch_t_capture_ns = Some(t_capture_ns);
+        }
+        over
+    }
+
+    /// The identifier is lost: the detector says how probable a fault is, the belief before the
+    /// loss says which.
+    fn fall_back(&mut self, detection: &DetectionBelief) {
+        if !detection.p_fault.is_finite() {
+            return;
+        }
+        let p_fault = detection.p_fault.clamp(0.0, 1.0);
+        let belief = self.tracker.belief();
+        let is_nominal = |meaning: &StateMeaning| meaning.node == Some(0);
+        let faulty: f64 = belief
+            .iter()
+            .zip(&self.states)
+            .filter(|(_, m)| !is_nominal(m))
+            .map(|(b, _)| b)
+            .sum();
+        let others = self.states.iter().filter(|m| !is_nominal(m)).count() as f64;
+        for ((weight, b), meaning) in self.scratch.iter_mut().zip(belief).zip(&self.states) {
+            *weight = if is_nominal(meaning) {
+                1.0 - p_fault
+            } else if faulty > 0.0 {
+                p_fault * b / faulty
+            } else {
+                p_fault / others
+            };
+        }
+        self.tracker.anchor(&self.scratch);
+        self.control_mode = ControlMode::Fallback;
+        let timed = self.epoch_is_over(detection.header.t_capture_ns);
+        self.decide(timed);
+    }
+
+    fn miss(&mut self, count: u32) {
+        self.misses = self.misses.saturating_add(count);
+        self.misses_without_detection = self.misses_without_detection.saturating_add(count);
+        if self.misses_without_detection >= BLIND_AFTER_MISSES {
+            self.control_mode = ControlMode::Safe;
+            self.gathered.forget();
+        }
+    }
+
+    fn reset(&mut self) {
+        self.tracker.reset();
+        self.gathered.forget();
+        self.restraint = Restraint::new();
+        self.epoch_t_capture_ns = None;
+        self.log_evidence = 0.0;
+        self.control_mode = ControlMode::Policy;
+        self.decide(false);
+    }
+
+    fn decide(&mut self, timed: bool) {
+        let best = self
+            .policy
+            .evaluate(self.tracker.belief(), &mut self.values);
+        let current = self.decided.map(|decided| decided.action);
+        self.choice = self
+            .restraint
+            .decide(current, best, &mut self.values, &self.actions, timed);
+    }
+
+    /// What the robot is told now.
+    fn decided(&self) -> Decided {
+        if self.control_mode == ControlMode::Safe {
+            let is_stop = |m: &ActionMeaning| m.kind == RecoveryKind::Stop;
+            let action = self.actions.iter().position(is_stop);
+            let action = action.unwrap_or(self.choice.action);
+            return Decided {
+                action,
+                kind: RecoveryKind::Stop,
+                wheel: None,
+            };
+        }
+        let action = self.choice.action;
+        let kind = self
+            .actions
+            .get(action)
+            .map_or(RecoveryKind::Stop, |m| m.kind);
+        let wheel = match kind {
+            RecoveryKind::Compensate => self.most_probable_wheel(true),
+            RecoveryKind::IgnoreEncoder => self.most_probable_wheel(false),
+            _ => None,
+        };
+        Decided {
+            action,
+            kind,
+            wheel,
+        }
+    }
+
+    fn most_probable_wheel(&self, stuck: bool) -> Option<usize> {
+        let mut best = (None, 0.0);
+        for (meaning, b) in self.states.iter().zip(self.tracker.belief()) {
+            if meaning.wheel.is_some() && meaning.stuck == stuck && *b > best.1 {
+                best = (meaning.wheel, *b);
+            }
+        }
+        best.0
+    }
+
+    fn write(&mut self, action: &mut Action) {
+        let decided = self.decided();
+        if self.decided != Some(decided) {
+            self.decided = Some(decided);
+            self.decision_seq += 1;
+        }
+        let meaning = self.actions.get(decided.action).copied();
+        let stops = decided.kind == RecoveryKind::Stop;
+        let counter = decided
+            .wheel
+            .filter(|_| decided.kind == RecoveryKind::Compensate)
+            .and_then(|wheel| self.compensation.iter().find(|c| c.wheel == wheel));
+        action.run_id = self.run_id;
+        action.decision_seq = self.decision_seq;
+        action.model_hash = self.model.hash();
+        action.belief = [0.0; DECISION_STATES];
+        action.value = [0.0; DECISION_ACTIONS];
+        let belief = self.tracker.belief();
+        action.belief[..belief.len()].copy_from_slice(belief);
+        action.value[..self.values.len()].copy_from_slice(&self.values);
+        action.entropy = self.tracker.entropy();
+        action.margin = self.choice.margin;
+        action.log_evidence = self.log_evidence;
+        action.speed_scale = meaning.map_or(0.0, |m| if stops { 0.0 } else { m.speed_scale });
+        action.curvature_gain = counter.map_or(1.0, |c| c.curvature_gain);
+        action.curvature_offset = counter.map_or(0.0, |c| c.curvature_offset_1_m);
+        action.action = decided.action as u32;
+        action.kind = decided.kind as u32;
+        action.wheel = decided.wheel.map_or(u32::MAX, |wheel| wheel as u32);
+        action.control_mode = self.control_mode as u32;
+        action.state_count = belief.len() as u32;
+        action.action_count = self.values.len() as u32;
+        action.impossible_count = self.impossible_count;
+        action.lost_stages = self.lost_stages();
+        action.reserved = [0; 4];
+    }
+
+    fn lost_stages(&self) -> u32 {
+        let identifier = self.misses >= LOST_AFTER_MISSES;
+        let detector = self.misses_without_detection >= LOST_AFTER_MISSES;
+        u32::from(identifier) * IDENTIFIER_LOST + u32::from(detector) * DETECTOR_LOST
+    }
+}

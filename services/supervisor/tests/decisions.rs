@@ -1,0 +1,288 @@
+//! The shipped decision model behind the supervisor: what it does in which situation.
+
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use std::path::PathBuf;
+
+use proptest::prelude::*;
+use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
+use vigil_cycle::allocation::{CountingAllocator, allocations};
+use vigil_decision::{Policy, Pomdp, QMdp, mdp};
+use vigil_inference::FaultTree;
+use vigil_robot::Description;
+use vigil_setup::schema::GraphFile;
+use vigil_supervisor::{Compensation, Inputs, Supervisor};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+const CYCLE_NS: u64 = 10_000_000;
+
+fn config() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config")
+}
+
+fn model() -> Pomdp {
+    Pomdp::parse(&std::fs::read_to_string(config().join("rover.pomdp")).unwrap()).unwrap()
+}
+
+struct World {
+    supervisor: Supervisor,
+    tree: FaultTree,
+    robot: Description,
+    t_ns: u64,
+    action: Action,
+}
+
+impl World {
+    fn new() -> Self {
+        let tree = vigil_setup::load_tree(&config().join("trees/rover.toml")).unwrap();
+        let robot = vigil_setup::load_robot(&config().join("robots/rover.toml")).unwrap();
+        let text = std::fs::read_to_string(config().join("rover.toml")).unwrap();
+        let file: GraphFile = toml::from_str(&text).unwrap();
+        let compensation = (0..6)
+            .map(|wheel| Compensation {
+                wheel,
+                curvature_gain: 1.1,
+                curvature_offset_1_m: wheel as f64,
+            })
+            .collect();
+        let supervisor =
+            Supervisor::new(model(), &tree, &robot, &file.supervisor, compensation).unwrap();
+        Self {
+            supervisor,
+            tree,
+            robot,
+            t_ns: 0,
+            action: Action::default(),
+        }
+    }
+
+    /// One cycle in which the identifier believes `p` (by name), having predicted `predicted`.
+    fn cycle(&mut self, identifying: bool, p: &[(&str, f64)], predicted: &[(&str, f64)]) {
+        self.t_ns += CYCLE_NS;
+        let mut belief = FaultBelief {
+            identifying: u32::from(identifying),
+            ..Default::default()
+        };
+        belief.header.t_capture_ns = self.t_ns;
+        for (of, list) in [(false, p), (true, predicted)] {
+            for (name, value) in list {
+                let node = self.tree.index(name);
+                match (node, of) {
+                    (Some(i), false) => belief.p[i] = *value,
+                    (Some(i), true) => belief.p_predicted[i] = *value,
+                    (None, false) => belief.p_unknown = *value,
+                    (None, true) => belief.p_unknown_predicted = *value,
+                }
+            }
+        }
+        let inputs = Inputs {
+            diagnosis: Some(&belief),
+            detection: None,
+        };
+        self.supervisor.step(Entry::Frame(inputs), &mut self.action);
+    }
+
+    /// Cycles with a belief that no data changes.
+    fn rest(&mut self, cycles: usize, identifying: bool, p: &[(&str, f64)]) {
+        (0..cycles).for_each(|_| self.cycle(identifying, p, p));
+    }
+
+    fn kind(&self) -> RecoveryKind {
+        RecoveryKind::from_wire(self.action.kind).unwrap()
+    }
+
+    fn belief(&self, name: &str) -> f64 {
+        let states = model().states().to_vec();
+        self.action.belief[states.iter().position(|s| s == name).unwrap()]
+    }
+}
+
+#[test]
+fn every_certain_state_has_the_action_that_a_driver_would_expect() {
+    let model = model();
+    let policy = QMdp::new(mdp::solve(&model).unwrap());
+    let mut values = vec![0.0; model.actions().len()];
+    for (i, state) in model.states().iter().enumerate() {
+        let mut belief = vec![0.0; model.states().len()];
+        belief[i] = 1.0;
+        let action = &model.actions()[policy.evaluate(&belief, &mut values).action];
+        let expected = match state
+            .split_once('_')
+            .map_or(state.as_str(), |(_, kind)| kind)
+        {
+            "ND" => "go_on",
+            "STUCK" => "compensate",
+            "ENC" => "ignore_encoder",
+            _ => "call_for_help",
+        };
+        assert_eq!(action, expected, "in {state}: {values:?}");
+    }
+    let mut doubtful = vec![0.0; model.states().len()];
+    (doubtful[0], doubtful[13]) = (0.6, 0.4);
+    assert_eq!(
+        model.actions()[policy.evaluate(&doubtful, &mut values).action],
+        "slow_down"
+    );
+}
+
+#[test]
+fn a_nominal_rover_goes_on() {
+    let mut world = World::new();
+    world.rest(500, false, &[("ND", 0.9999), ("UNKNOWN", 0.0001)]);
+    assert_eq!(
+        (world.kind(), world.action.decision_seq),
+        (RecoveryKind::GoOn, 1)
+    );
+}
+
+#[test]
+fn a_named_stuck_wheel_is_compensated_in_the_cycle_that_names_it() {
+    let mut world = World::new();
+    world.rest(100, false, &[("ND", 0.9999), ("UNKNOWN", 0.0001)]);
+    let named = [("RM_STUCK", 0.97), ("RF_STUCK", 0.02), ("ND", 0.01)];
+    world.cycle(true, &named, &named);
+    assert_eq!(world.kind(), RecoveryKind::Compensate);
+    let wheel = world.robot.wheel_index("RM").unwrap();
+    assert_eq!(world.action.wheel as usize, wheel);
+    assert_eq!(
+        (world.action.curvature_gain, world.action.curvature_offset),
+        (1.1, wheel as f64)
+    );
+    assert!((world.belief("RM_STUCK") - 0.97).abs() < 0.01);
+}
+
+#[test]
+fn evidence_of_one_epoch_counts_once_however_many_cycles_carry_it() {
+    let mut world = World::new();
+    let even = [("RM_STUCK", 0.5), ("RF_STUCK", 0.5)];
+    world.cycle(true, &even, &even);
+    // Data in favour of RM by 3 to 1, in one cycle; then a posterior that no data changes.
+    let after = [("RM_STUCK", 0.75), ("RF_STUCK", 0.25)];
+    world.cycle(true, &after, &even);
+    world.rest(200, true, &after);
+    assert!(
+        (world.belief("RM_STUCK") - 0.75).abs() < 0.01,
+        "{}",
+        world.belief("RM_STUCK")
+    );
+}
+
+#[test]
+fn a_cleared_fault_lets_the_rover_go_on_after_a_while() {
+    let mut world = World::new();
+    world.rest(50, true, &[("RM_STUCK", 1.0)]);
+    assert_eq!(world.kind(), RecoveryKind::Compensate);
+    let nominal = [("ND", 0.999), ("UNKNOWN", 0.001)];
+    world.cycle(false, &nominal, &nominal);
+    assert_eq!(world.kind(), RecoveryKind::Compensate, "not at once");
+    world.rest(50, false, &nominal);
+    assert_eq!(world.kind(), RecoveryKind::GoOn);
+}
+
+#[test]
+fn help_is_called_only_when_the_unknown_lasts() {
+    let mut world = World::new();
+    let unknown = [("UNKNOWN", 0.99), ("ND", 0.01)];
+    world.cycle(true, &unknown, &unknown);
+    assert_eq!(world.kind(), RecoveryKind::SlowDown);
+    world.rest(20, true, &unknown);
+    assert_ne!(world.kind(), RecoveryKind::CallForHelp);
+    world.rest(200, true, &unknown);
+    assert_eq!(world.kind(), RecoveryKind::CallForHelp);
+    assert_eq!(world.action.speed_scale, 0.0);
+}
+
+#[test]
+fn a_lost_identifier_leaves_the_detector_and_two_lost_stages_stop_the_robot() {
+    let mut world = World::new();
+    world.rest(100, false, &[("ND", 0.9999), ("UNKNOWN", 0.0001)]);
+    world.supervisor.step(Entry::Missed(3), &mut world.action);
+    assert_eq!(world.action.lost_stages, 3);
+    let mut detection = DetectionBelief {
+        p_fault: 0.5,
+        ..Default::default()
+    };
+    detection.header.t_capture_ns = world.t_ns + CYCLE_NS;
+    let inputs = Inputs {
+        diagnosis: None,
+        detection: Some(&detection),
+    };
+    world
+        .supervisor
+        .step(Entry::Frame(inputs), &mut world.action);
+    assert_eq!(world.action.control_mode, ControlMode::Fallback as u32);
+    assert_eq!(world.action.lost_stages, 1);
+    assert_eq!(world.kind(), RecoveryKind::SlowDown);
+    world.supervisor.step(Entry::Missed(10), &mut world.action);
+    assert_eq!(world.kind(), RecoveryKind::Stop);
+    assert_eq!(world.action.control_mode, ControlMode::Safe as u32);
+    world.rest(50, false, &[("ND", 0.9999), ("UNKNOWN", 0.0001)]);
+    assert_eq!(
+        (world.kind(), world.action.lost_stages),
+        (RecoveryKind::GoOn, 0)
+    );
+}
+
+#[test]
+fn a_steady_cycle_allocates_nothing() {
+    let mut world = World::new();
+    let belief = FaultBelief {
+        p: [0.1; 64],
+        p_predicted: [0.2; 64],
+        ..Default::default()
+    };
+    let before = allocations();
+    for i in 0..10_000_u64 {
+        let mut belief = belief;
+        belief.header.t_capture_ns = i * CYCLE_NS;
+        belief.mode_change_count = (i / 100) as u32;
+        belief.identifying = (i / 1000 % 2) as u32;
+        let inputs = Inputs {
+            diagnosis: Some(&belief),
+            detection: None,
+        };
+        world
+            .supervisor
+            .step(Entry::Frame(inputs), &mut world.action);
+        world
+            .supervisor
+            .step(Entry::Missed((i % 5) as u32), &mut world.action);
+    }
+    assert_eq!(allocations() - before, 0);
+}
+
+proptest! {
+    #[test]
+    fn no_input_makes_a_decision_bad(
+        cycles in prop::collection::vec(
+            (any::<[f64; 4]>(), any::<u64>(), any::<u8>(), 0_u32..5), 1..40
+        )
+    ) {
+        let mut world = World::new();
+        for (values, t_ns, bits, missed) in cycles {
+            let mut belief = FaultBelief { p_unknown: values[2], ..Default::default() };
+            belief.p_unknown_predicted = values[3];
+            belief.p = std::array::from_fn(|i| values[i % 4]);
+            belief.p_predicted = std::array::from_fn(|i| values[(i + 1) % 4]);
+            belief.header.t_capture_ns = t_ns;
+            (belief.identifying, belief.mode_change_count) = (u32::from(bits & 1), missed);
+            let detection = DetectionBelief { p_fault: values[0], ..Default::default() };
+            let inputs = Inputs {
+                diagnosis: (bits & 2 != 0).then_some(&belief),
+                detection: Some(&detection),
+            };
+            world.supervisor.step(Entry::Missed(missed), &mut world.action);
+            world.supervisor.step(Entry::Frame(inputs), &mut world.action);
+            let action = &world.action;
+            let sum: f64 = action.belief.iter().sum();
+            prop_assert!((sum - 1.0).abs() < 1e-6, "belief sums to {sum}");
+            prop_assert!(action.belief.iter().all(|b| b.is_finite() && *b >= 0.0));
+            prop_assert!(action.value.iter().all(|v| v.is_finite()));
+            prop_assert!(action.entropy.is_finite() && action.margin.is_finite());
+            prop_assert!((0.0..=1.0).contains(&action.speed_scale));
+            prop_assert!(RecoveryKind::from_wire(action.kind).is_some());
+        }
+    }
+}

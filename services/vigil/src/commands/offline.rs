@@ -1,0 +1,155 @@
+//! Options and files that the offline commands share.
+
+use std::path::{Path, PathBuf};
+
+use clap::builder::PossibleValuesParser;
+use serde::Serialize;
+use vigil_evaluation::frames::{self, Run};
+use vigil_inference::FaultTree;
+use vigil_robot::Description;
+use vigil_robot::learned::Model;
+use vigil_setup::schema::{self, Sensors};
+use vigil_setup::{load_robot, load_tree};
+
+use super::CommandError;
+use crate::pipeline::Pipeline;
+
+/// Which robot.
+#[derive(Debug, clap::Args)]
+pub struct RobotArgs {
+    /// Description of the robot (TOML).
+    #[arg(long, value_name = "F", default_value = "config/robots/rover.toml")]
+    robot: PathBuf,
+}
+
+impl RobotArgs {
+    /// Reads the description.
+    pub fn load(&self) -> Result<Description, CommandError> {
+        load_robot(&self.robot).map_err(CommandError::usage)
+    }
+}
+
+/// Which frames, model and filters.
+#[derive(Debug, clap::Args)]
+pub struct FilterArgs {
+    /// Learned model (TOML, written by `vigil learn`).
+    #[arg(long, value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Recorded frames (CSV, plain or gzip), any number of runs.
+    #[arg(long, value_name = "F")]
+    pub frames: PathBuf,
+    /// Channels that the filters may use: pose and command, or wheel rates and steering angles
+    /// too.
+    #[arg(
+        long,
+        default_value = "pose+encoders",
+        value_parser = PossibleValuesParser::new(["pose", "pose+encoders"])
+    )]
+    sensors: String,
+    /// Identification filter.
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "exact",
+        value_parser = PossibleValuesParser::new(["exact"])
+    )]
+    identifier: String,
+    /// Particles of detector and identifier, 32 to 4096.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 256,
+        value_parser = clap::value_parser!(u16).range(32..=4096)
+    )]
+    particles: u16,
+    /// Seed of the filters.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    robot: RobotArgs,
+    /// Fault tree (TOML).
+    #[arg(long, value_name = "F", default_value = "config/trees/rover.toml")]
+    tree: PathBuf,
+}
+
+/// What was used, for the record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Used {
+    /// Hash of the learned model.
+    pub model_hash: String,
+    /// Hash of the fault tree.
+    pub tree_hash: String,
+    /// Channels.
+    pub sensors: String,
+    /// Identification filter.
+    pub identifier: String,
+    /// Particles.
+    pub particles: u16,
+    /// Seed.
+    pub seed: u64,
+}
+
+/// Everything that a run of the filters needs, read and checked.
+pub struct Prepared {
+    /// The robot.
+    pub robot: Description,
+    /// The learned model.
+    pub model: Model,
+    /// Detector and identifier.
+    pub pipeline: Pipeline,
+    /// All runs of the frames file.
+    pub runs: Vec<Run>,
+    /// What was used.
+    pub used: Used,
+}
+
+impl FilterArgs {
+    /// Reads and checks all files and settings.
+    pub fn prepare(&self) -> Result<Prepared, CommandError> {
+        let robot = self.robot.load()?;
+        let tree = load_tree(&self.tree).map_err(CommandError::usage)?;
+        let model = load_model(&self.model)?;
+        let pipeline = self.pipeline(&model, &robot, &tree)?;
+        let runs = frames::read(&self.frames, &robot).map_err(CommandError::usage)?;
+        let used = Used {
+            model_hash: format!("{:016x}", model.hash()),
+            tree_hash: format!("{:016x}", tree.hash()),
+            sensors: self.sensors.clone(),
+            identifier: self.identifier.clone(),
+            particles: self.particles,
+            seed: self.seed,
+        };
+        Ok(Prepared { robot, model, pipeline, runs, used })
+    }
+
+    fn pipeline(
+        &self,
+        model: &Model,
+        robot: &Description,
+        tree: &FaultTree,
+    ) -> Result<Pipeline, CommandError> {
+        let detector = schema::Detector {
+            particles: self.particles.into(),
+            sensors: match self.sensors.as_str() {
+                "pose" => Sensors::Pose,
+                _ => Sensors::PoseEncoders,
+            },
+            ..schema::Detector::default()
+        };
+        let identifier = schema::Identifier {
+            filter: self.identifier.clone(),
+            particles: self.particles.into(),
+            ..schema::Identifier::default()
+        };
+        Pipeline::new(model, robot, tree, &detector, &identifier, self.seed)
+            .map_err(|error| CommandError::usage(format!("{}: {error}", self.model.display())))
+    }
+}
+
+fn load_model(path: &Path) -> Result<Model, CommandError> {
+    let refuse = |error: &dyn std::fmt::Display| {
+        CommandError::usage(format!("{}: {error}", path.display()))
+    };
+    let text = std::fs::read_to_string(path).map_err(|error| refuse(&error))?;
+    Model::from_toml(&text).map_err(|error| refuse(&error))
+}

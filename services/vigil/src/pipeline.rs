@@ -1,0 +1,115 @@
+//! Detector and identifier over recorded runs, as they run live.
+
+use vigil_blocks::{
+    DetectionBelief, Entry, FaultBelief, MODE_MULTIPLE, MODE_UNKNOWN, ParticleBlock,
+};
+use vigil_detector::{Detector, DetectorError};
+use vigil_evaluation::frames::Run;
+use vigil_evaluation::scoring::{MULTIPLE, Side, Taxonomy, UNKNOWN, Verdict};
+use vigil_identifier::{Identifier, IdentifierError, Input};
+use vigil_inference::FaultTree;
+use vigil_robot::Description;
+use vigil_robot::learned::Model;
+use vigil_setup::schema;
+
+/// Why a pipeline was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum PipelineError {
+    /// The detector's reason.
+    #[error(transparent)]
+    Detector(#[from] DetectorError),
+    /// The identifier's reason.
+    #[error(transparent)]
+    Identifier(#[from] IdentifierError),
+}
+
+/// Detector and identifier in one process.
+pub struct Pipeline {
+    detector: Detector,
+    identifier: Identifier,
+    taxonomy: Taxonomy,
+    detection: Box<DetectionBelief>,
+    detection_particles: Box<ParticleBlock>,
+    diagnosis: Box<FaultBelief>,
+    diagnosis_particles: Box<ParticleBlock>,
+}
+
+impl Pipeline {
+    /// A pipeline with the settings of a graph; `seed` is the graph's.
+    ///
+    /// # Errors
+    /// [`PipelineError`] if model, robot, tree and settings do not fit together.
+    pub fn new(
+        model: &Model,
+        robot: &Description,
+        tree: &FaultTree,
+        detector: &schema::Detector,
+        identifier: &schema::Identifier,
+        seed: u64,
+    ) -> Result<Self, PipelineError> {
+        let sensors = detector.sensors;
+        Ok(Self {
+            detector: Detector::new(model, robot, detector, seed)?,
+            identifier: Identifier::new(model, robot, tree, identifier, sensors, seed)?,
+            taxonomy: Taxonomy::new(tree, robot),
+            detection: Box::default(),
+            detection_particles: Box::default(),
+            diagnosis: Box::default(),
+            diagnosis_particles: Box::default(),
+        })
+    }
+
+    /// Sides and types of the faults that the verdicts name.
+    pub const fn taxonomy(&self) -> &Taxonomy {
+        &self.taxonomy
+    }
+
+    /// Gives one verdict per frame, each from the frames up to it. Every run starts from the same
+    /// state, so that its verdicts do not depend on the runs before it.
+    pub fn run(&mut self, run: &Run, mut take: impl FnMut(Verdict)) {
+        let mut detector = self.detector.clone();
+        let mut identifier = self.identifier.clone();
+        for frame in &run.frames {
+            let (detection, particles) = (&mut *self.detection, &mut *self.detection_particles);
+            detector.step(Entry::Frame(frame), detection, particles);
+            let input = Input {
+                frame,
+                detection: Some((detection, particles)),
+            };
+            let (diagnosis, particles) = (&mut *self.diagnosis, &mut *self.diagnosis_particles);
+            identifier.step(Entry::Frame(input), diagnosis, particles);
+            take(self.verdict(frame.header.t_capture_ns));
+        }
+    }
+
+    fn verdict(&self, t_ns: u64) -> Verdict {
+        let belief = &self.diagnosis;
+        let name = |i: usize| self.taxonomy.name(i).unwrap_or(UNKNOWN).to_owned();
+        let mode = match belief.mode {
+            MODE_UNKNOWN => UNKNOWN.to_owned(),
+            MODE_MULTIPLE => MULTIPLE.to_owned(),
+            node => name(node as usize),
+        };
+        let leaves = belief.sets[0].leaves;
+        let members: Vec<String> = (1..u64::BITS as usize)
+            .filter(|i| leaves >> i & 1 == 1)
+            .map(name)
+            .collect();
+        let stuck = |side| {
+            let leaves = self.taxonomy.leaves("stuck", side);
+            leaves.map(|i| belief.p[i]).sum::<f64>().min(1.0)
+        };
+        Verdict {
+            t_s: t_ns as f64 / 1e9,
+            p_fault: self.detection.p_fault,
+            alarm: self.detection.alarm != 0,
+            mode,
+            p_mode: belief.p_mode,
+            p_unknown: belief.p_unknown,
+            fault_set: if members.is_empty() { name(0) } else { members.join("+") },
+            p_left_stuck: stuck(Side::Left),
+            p_right_stuck: stuck(Side::Right),
+            p_nodes: belief.p[..(belief.node_count as usize).min(belief.p.len())].to_vec(),
+        }
+    }
+}

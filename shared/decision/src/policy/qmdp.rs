@@ -1,0 +1,32 @@
+//! Q-MDP: the action with the largest expected value if all became observable after it.
+
+use super::{Choice, Policy, choose};
+use crate::mdp::Solution;
+
+/// argmax_a sum_s b(s) Q_CO(s,a). Never gathers information for its own sake; see
+/// [`super::ActionVoting`] for a policy that is robust to unequal scales of the values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct QMdp {
+    solution: Solution,
+}
+
+impl QMdp {
+    /// The policy that follows from a solved model.
+    #[must_use]
+    pub const fn new(solution: Solution) -> Self {
+        Self { solution }
+    }
+}
+
+impl Policy for QMdp {
+    fn evaluate(&self, belief: &[f64], values: &mut [f64]) -> Choice {
+        for (action, value) in values.iter_mut().enumerate() {
+            *value = belief
+                .iter()
+                .zip(self.solution.q_of(action))
+                .map(|(b, q)| b * q)
+                .sum();
+        }
+        choose(values)
+    }
+}

@@ -1,0 +1,30 @@
+//! Action voting: every state votes for its best action, with its probability.
+
+use super::{Choice, Policy, choose};
+use crate::mdp::Solution;
+
+/// argmax_a w(a), w(a) = sum_s b(s) [pi_CO(s) = a].
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActionVoting {
+    solution: Solution,
+}
+
+impl ActionVoting {
+    /// The policy that follows from a solved model.
+    #[must_use]
+    pub const fn new(solution: Solution) -> Self {
+        Self { solution }
+    }
+}
+
+impl Policy for ActionVoting {
+    fn evaluate(&self, belief: &[f64], values: &mut [f64]) -> Choice {
+        values.fill(0.0);
+        for (state, b) in belief.iter().enumerate() {
+            if let Some(vote) = values.get_mut(self.solution.best(state)) {
+                *vote += b;
+            }
+        }
+        choose(values)
+    }
+}

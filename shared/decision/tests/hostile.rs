@@ -1,0 +1,39 @@
+//! Untrusted text and beliefs: no panic, no NaN.
+
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use proptest::prelude::*;
+use vigil_decision::{Pomdp, Tracker};
+
+const MODEL: &str = "discount: 0.9\nstates: a b\nactions: go stay\nobservations: x y\n\
+    start: 0.5 0.5\nT: go identity\nT: stay uniform\nO: * uniform\nR: * : * : * : * -1.5\n";
+
+proptest! {
+    #[test]
+    fn any_text_is_read_or_refused(text in ".{0,400}") {
+        let _ = Pomdp::parse(&text);
+    }
+
+    #[test]
+    fn a_damaged_model_is_read_or_refused(
+        at in 0..MODEL.len(), length in 0_usize..8, with in "[-0-9a-zTOR:*.# \n]{0,8}"
+    ) {
+        let end = (at + length).min(MODEL.len());
+        let text = format!("{}{with}{}", &MODEL[..at], &MODEL[end..]);
+        if let Ok(model) = Pomdp::parse(&text) {
+            prop_assert!(model.discount() >= 0.0 && model.discount() <= 1.0);
+        }
+    }
+
+    #[test]
+    fn no_likelihood_makes_a_belief_bad(values in prop::collection::vec(any::<f64>(), 2)) {
+        let model = Pomdp::parse(MODEL).unwrap();
+        let mut tracker = Tracker::new(&model);
+        tracker.weigh(&values);
+        tracker.anchor(&values);
+        tracker.update(&model, 1, 0);
+        let sum: f64 = tracker.belief().iter().sum();
+        prop_assert!((sum - 1.0).abs() < 1e-9);
+        prop_assert!(tracker.belief().iter().all(|b| b.is_finite() && *b >= 0.0));
+    }
+}

@@ -1,0 +1,198 @@
+//! Recorded sensor frames.
+//!
+//! CSV, plain or gzip: `run, t` (s), `x, y` (m), `yaw` (rad, wrapped), `enc_<WHEEL>` (rad/s) for
+//! every wheel, `steer_<WHEEL>` (rad) for every steered wheel, `cmd_curv` (1/m, left positive),
+//! `cmd_speed` (m/s). Columns are found by name, in any order; others are ignored. The rows of a
+//! run are contiguous and in order of time. Several runs may follow each other.
+
+use std::collections::BTreeSet;
+use std::f64::consts::PI;
+use std::path::Path;
+
+use vigil_blocks::{SensorFrame, Valid};
+use vigil_robot::Description;
+
+use crate::table::Table;
+pub use crate::table::TableError as FramesError;
+
+/// A gap in time longer than this many usual intervals is refused.
+const GAP_INTERVALS_MAX: f64 = 10.0;
+/// Distance between two frames that no robot of this kind can drive, m.
+const JUMP_M_MAX: f64 = 2.0;
+
+/// One recorded run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Its id in the file.
+    pub id: u32,
+    /// Its frames, in order of time. `header.t_capture_ns` is the recording's own time, `run_id`
+    /// is `id + 1` (0 means none), `header.seq` counts from 0; the other header fields are 0.
+    pub frames: Vec<SensorFrame>,
+}
+
+/// Positions of the columns.
+struct Columns {
+    fixed: Vec<usize>,
+    encoders: Vec<(usize, usize)>,
+    steers: Vec<(usize, usize)>,
+}
+
+const FIXED: [&str; 7] = ["run", "t", "x", "y", "yaw", "cmd_curv", "cmd_speed"];
+
+impl Columns {
+    fn find(table: &Table, robot: &Description) -> Result<Self, FramesError> {
+        let wheels = || robot.wheels.iter().enumerate();
+        let encoders: Vec<(usize, String)> = wheels()
+            .map(|(i, w)| (i, format!("enc_{}", w.name)))
+            .collect();
+        let steers: Vec<(usize, String)> = wheels()
+            .filter(|(_, w)| w.steered)
+            .map(|(i, w)| (i, format!("steer_{}", w.name)))
+            .collect();
+        let mut names: Vec<String> = FIXED.iter().map(|&name| name.to_owned()).collect();
+        names.extend(encoders.iter().chain(&steers).map(|(_, name)| name.clone()));
+        let at = table.require(&names)?;
+        let (fixed, rest) = at.split_at(FIXED.len());
+        let (enc, steer) = rest.split_at(encoders.len());
+        let pair = |wheels: &[(usize, String)], at: &[usize]| {
+            wheels
+                .iter()
+                .map(|(i, _)| *i)
+                .zip(at.iter().copied())
+                .collect()
+        };
+        Ok(Self {
+            fixed: fixed.to_vec(),
+            encoders: pair(&encoders, enc),
+            steers: pair(&steers, steer),
+        })
+    }
+
+    fn frame(&self, table: &Table, robot: &Description) -> Result<(u32, SensorFrame), FramesError> {
+        let [run, t, x, y, yaw, curvature, speed] = self.fixed[..] else {
+            return Err(table.wrong("columns are missing".into()));
+        };
+        let mut frame = SensorFrame::default();
+        let id = table.whole(run)?;
+        frame.run_id = u64::from(id) + 1;
+        let t_s = table.number(t)?;
+        if !(0.0..=1e9).contains(&t_s) {
+            return Err(table.wrong(format!("t is {t_s}, allowed is 0 to 1e9 s")));
+        }
+        frame.header.t_capture_ns = (t_s * 1e9).round() as u64;
+        frame.pose = [table.number(x)?, table.number(y)?, table.number(yaw)?];
+        angle(table, "yaw", frame.pose[2])?;
+        frame.command[0] = table.number(curvature)?;
+        frame.command[1] = table.number(speed)?;
+        frame.valid = Valid::POSE | Valid::command(0) | Valid::command(1);
+        for &(wheel, column) in &self.encoders {
+            frame.wheel_rate[wheel] = table.number(column)?;
+            frame.valid |= Valid::wheel_rate(wheel);
+        }
+        for &(wheel, column) in &self.steers {
+            frame.steer[wheel] = table.number(column)?;
+            angle(
+                table,
+                &format!("steer_{}", robot.wheels[wheel].name),
+                frame.steer[wheel],
+            )?;
+            frame.valid |= Valid::steer(wheel);
+        }
+        Ok((id, frame))
+    }
+}
+
+fn angle(table: &Table, name: &str, value: f64) -> Result<(), FramesError> {
+    // Rounding may put a wrapped angle a little beyond pi.
+    if value.abs() <= PI + 1e-3 {
+        return Ok(());
+    }
+    let message = format!("{name} is {value}, allowed is -pi to pi rad; are these degrees?");
+    Err(table.wrong(message))
+}
+
+/// Reads all runs of a file.
+///
+/// # Errors
+/// [`FramesError`] naming file, row, column, what was found and what is allowed.
+pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
+    read_table(Table::open(path)?, robot, usize::MAX)
+}
+
+/// Interval between the first frames of a file, s.
+///
+/// # Errors
+/// As [`read`]; also when the file holds fewer than two frames of one run.
+pub fn interval_s(path: &Path, robot: &Description) -> Result<f64, FramesError> {
+    let table = Table::open(path)?;
+    let runs = read_table(table, robot, 2)?;
+    match runs.first().map(|run| run.frames.as_slice()) {
+        Some([a, b, ..]) => Ok((b.header.t_capture_ns - a.header.t_capture_ns) as f64 * 1e-9),
+        _ => Err(FramesError::Row {
+            path: path.to_path_buf(),
+            row: 1,
+            message: "fewer than two frames in the first run".into(),
+        }),
+    }
+}
+
+fn read_table(
+    mut table: Table,
+    robot: &Description,
+    rows_max: usize,
+) -> Result<Vec<Run>, FramesError> {
+    let columns = Columns::find(&table, robot)?;
+    let (mut runs, mut seen, mut rows) = (Vec::<Run>::new(), BTreeSet::new(), 0);
+    while rows < rows_max && table.advance()? {
+        rows += 1;
+        let (id, mut frame) = columns.frame(&table, robot)?;
+        if runs.last().is_none_or(|run| run.id != id) {
+            if !seen.insert(id) {
+                let message = format!("run {id} appears again: the rows of a run are contiguous");
+                return Err(table.wrong(message));
+            }
+            runs.push(Run {
+                id,
+                frames: Vec::new(),
+            });
+        }
+        let Some(run) = runs.last_mut() else { continue };
+        follows(&table, run, &frame)?;
+        frame.header.seq = run.frames.len() as u64;
+        run.frames.push(frame);
+    }
+    if runs.is_empty() {
+        return Err(table.wrong("there are no frames".into()));
+    }
+    Ok(runs)
+}
+
+/// Checks a frame against the ones before it in its run.
+fn follows(table: &Table, run: &Run, frame: &SensorFrame) -> Result<(), FramesError> {
+    let Some(before) = run.frames.last() else {
+        return Ok(());
+    };
+    let t_ns = |f: &SensorFrame| f.header.t_capture_ns;
+    let (last_ns, now_ns) = (t_ns(before), t_ns(frame));
+    if now_ns <= last_ns {
+        let (now, last) = (now_ns as f64 * 1e-9, last_ns as f64 * 1e-9);
+        return Err(table.wrong(format!(
+            "t is {now} after {last}: time must rise within a run"
+        )));
+    }
+    if let [first, second, ..] = run.frames.as_slice() {
+        let usual_ns = (t_ns(second) - t_ns(first)) as f64;
+        let gap_ns = (now_ns - last_ns) as f64;
+        if gap_ns > GAP_INTERVALS_MAX * usual_ns {
+            let (gap, usual) = (gap_ns * 1e-9, usual_ns * 1e-9);
+            let message = format!("a gap of {gap:.3} s, usual are {usual:.3} s: start a new run");
+            return Err(table.wrong(message));
+        }
+    }
+    let moved = (frame.pose[0] - before.pose[0]).hypot(frame.pose[1] - before.pose[1]);
+    if moved > JUMP_M_MAX {
+        let message = format!("the pose jumps by {moved:.2} m; allowed are {JUMP_M_MAX} m");
+        return Err(table.wrong(message));
+    }
+    Ok(())
+}

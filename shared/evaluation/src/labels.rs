@@ -1,0 +1,104 @@
+//! What was wrong in each recorded run.
+//!
+//! CSV: `run`, `mode` (`ND`, `<WHEEL>_STUCK`, `<WHEEL>_ENC`), `kind` (`stuck`, `zero`, `frozen`,
+//! `noise`, or empty), `wheel` (or empty), `onset_s` (-1 for none), `cmd_curv`, `cmd_speed`,
+//! `dur_s`. Other columns are ignored.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use vigil_robot::Description;
+
+use crate::table::Table;
+pub use crate::table::TableError as LabelsError;
+
+/// Label of one run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Label {
+    /// Id of the run.
+    pub run: u32,
+    /// Mode: `ND` or a leaf of the fault tree.
+    pub mode: String,
+    /// Kind of the fault; empty for none.
+    pub kind: String,
+    /// Index of the wheel, if the fault is a wheel's.
+    pub wheel: Option<usize>,
+    /// Onset of the fault, s; `None` for a nominal run.
+    pub onset_s: Option<f64>,
+    /// Commanded curvature, 1/m.
+    pub command_curvature_1_m: f64,
+    /// Commanded speed, m/s.
+    pub command_speed_m_s: f64,
+    /// Duration, s.
+    pub duration_s: f64,
+}
+
+impl Label {
+    /// True if nothing is wrong in the run.
+    #[must_use]
+    pub const fn is_nominal(&self) -> bool {
+        self.onset_s.is_none()
+    }
+}
+
+const COLUMNS: [&str; 8] = [
+    "run",
+    "mode",
+    "kind",
+    "wheel",
+    "onset_s",
+    "cmd_curv",
+    "cmd_speed",
+    "dur_s",
+];
+
+/// Reads the labels of a file.
+///
+/// # Errors
+/// [`LabelsError`] naming file, row, column, what was found and what is allowed.
+pub fn read(path: &Path, robot: &Description) -> Result<Vec<Label>, LabelsError> {
+    let mut table = Table::open(path)?;
+    let names: Vec<String> = COLUMNS.iter().map(|&name| name.to_owned()).collect();
+    let at = table.require(&names)?;
+    let (mut labels, mut seen) = (Vec::new(), BTreeSet::new());
+    while table.advance()? {
+        let label = label(&table, &at, robot)?;
+        if !seen.insert(label.run) {
+            return Err(table.wrong(format!("run {} appears twice", label.run)));
+        }
+        labels.push(label);
+    }
+    Ok(labels)
+}
+
+fn label(table: &Table, at: &[usize], robot: &Description) -> Result<Label, LabelsError> {
+    let [run, mode, kind, wheel, onset, curvature, speed, duration] = at[..] else {
+        return Err(table.wrong("columns are missing".into()));
+    };
+    let name = table.text(wheel);
+    let index = robot.wheel_index(name);
+    if !name.is_empty() && index.is_none() {
+        let allowed: Vec<&str> = robot.wheels.iter().map(|w| w.name.as_str()).collect();
+        let message = format!(
+            "wheel is '{name}', allowed are {} or empty",
+            allowed.join(" ")
+        );
+        return Err(table.wrong(message));
+    }
+    let onset_s = Some(table.number(onset)?).filter(|s| *s >= 0.0);
+    let mode = table.text(mode).to_owned();
+    if (mode == "ND") != onset_s.is_none() {
+        let message = format!("mode is '{mode}' but onset_s is {}", table.text(onset));
+        return Err(table.wrong(format!("{message}: only ND has none (-1)")));
+    }
+    Ok(Label {
+        run: table.whole(run)?,
+        mode,
+        kind: table.text(kind).to_owned(),
+        wheel: index,
+        onset_s,
+        command_curvature_1_m: table.number(curvature)?,
+        command_speed_m_s: table.number(speed)?,
+        duration_s: table.number(duration)?,
+    })
+}

@@ -1,0 +1,228 @@
+//! Displacement per commanded metre: polynomials by least squares, noise by maximum likelihood.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{Matrix3, Vector3};
+use vigil_inference::angle::wrap;
+use vigil_inference::track::{Displacement, Track};
+use vigil_robot::learned::{Curve, Model, MotionModel, Observation};
+
+use super::segments::Segment;
+use super::simplex::minimise;
+use super::{LearnError, Options};
+use super::least_squares::LeastSquares;
+
+/// Length of the window over which a displacement is measured, s.
+const WINDOW_S: f64 = 2.0;
+/// Observations averaged at either end of a window.
+const END: usize = 5;
+/// Different curvatures that a 4th-order polynomial needs.
+const CURVATURES_MIN: usize = 5;
+/// Soil scatter per metre assumed for weighting windows against sensor noise.
+const SCATTER: f64 = 0.02;
+/// Noise of the lateral motion, which no stuck wheel changes much, as a fraction of the forward's.
+const LATERAL: f64 = 0.15;
+/// Segments to which the noise is fitted at most: more add time, not precision.
+const SEGMENTS_MAX: usize = 120;
+
+/// Fits the motion of one mode to its pieces of runs.
+///
+/// # Errors
+/// [`LearnError`] if the pieces do not determine the polynomials.
+pub fn fit(
+    model: &Model,
+    segments: &[Segment],
+    mode: &str,
+    options: &Options,
+) -> Result<MotionModel, LearnError> {
+    let steps = windows(segments);
+    if steps.is_empty() {
+        return Err(LearnError::Missing { mode: mode.to_owned(), missing: "pose in motion" });
+    }
+    let curvatures: BTreeSet<i64> =
+        steps.iter().map(|step| (step.curvature * 100.0).round() as i64).collect();
+    if curvatures.len() < CURVATURES_MIN {
+        let (found, needed) = (curvatures.len(), CURVATURES_MIN);
+        return Err(LearnError::Curvatures { mode: mode.to_owned(), found, needed });
+    }
+    let singular = || LearnError::Singular { mode: mode.to_owned(), what: "polynomial" };
+    let noise = &model.noise;
+    let mut curves = [Curve::default(); 3];
+    for (axis, curve) in curves.iter_mut().enumerate() {
+        let sd = if axis == 0 { noise.yaw_rad } else { noise.position_m };
+        let mut fit = LeastSquares::<{ Curve::TERMS }>::default();
+        for step in &steps {
+            let sensor = 2.0 * sd * sd / END as f64 / (step.travel * step.travel);
+            let weight = 1.0 / (sensor + SCATTER * SCATTER);
+            fit.push(Curve::basis(step.curvature, step.speed), step.per_metre[axis], weight);
+        }
+        *curve = Curve::from_terms(fit.solve().ok_or_else(singular)?);
+    }
+    let motion = MotionModel {
+        yaw: curves[0],
+        forward: curves[1],
+        lateral: curves[2],
+        ..model.nominal.motion
+    };
+    Ok(fit_noise(model, &motion, segments, options))
+}
+
+/// One measured displacement.
+struct Window {
+    curvature: f64,
+    speed: f64,
+    travel: f64,
+    per_metre: [f64; 3],
+}
+
+fn windows(segments: &[Segment]) -> Vec<Window> {
+    let mut out = Vec::new();
+    for segment in segments {
+        let mut from = 0;
+        while from + END <= segment.len() {
+            let mut to = from + END;
+            let mut elapsed = 0.0;
+            while to < segment.len() && elapsed < WINDOW_S {
+                elapsed += segment[to].dt_s;
+                to += 1;
+            }
+            if to - from < 3 * END {
+                break;
+            }
+            out.extend(window(&segment[from..to]));
+            from = to - END;
+        }
+    }
+    out
+}
+
+/// Displacement between the mean poses of both ends. A chord is shorter than its arc by the
+/// factor sin(h)/h, h half the turn: the polynomials describe short steps, so it is undone.
+fn window(piece: &[Observation]) -> Option<Window> {
+    if piece.iter().any(|o| !o.moving || o.anchor || o.pose_frames == 0) {
+        return None;
+    }
+    let (head, tail) = (&piece[..END], &piece[piece.len() - END..]);
+    let (start, end) = (mean_pose(head), mean_pose(tail));
+    let middle = END / 2;
+    let inner = &piece[middle + 1..piece.len() - middle];
+    let travel: f64 = inner.iter().map(|o| o.travel_m).sum();
+    if travel.abs() < 0.02 {
+        return None;
+    }
+    let heading: f64 = inner.iter().map(|o| o.travel_m * o.curvature).sum();
+    let speed = inner.iter().map(|o| o.speed).sum::<f64>() / inner.len() as f64;
+    // The turn may exceed half a circle only if the steps in between say so.
+    let turn: f64 = piece.windows(2).map(|two| wrap(two[1].pose[2] - two[0].pose[2])).sum();
+    let coarse = wrap(end[2] - start[2]);
+    let turn = coarse + (turn - coarse).signum() * whole_turns(turn - coarse);
+    let half = 0.5 * turn;
+    let arc = if half.abs() > 1e-6 { half / half.sin() } else { 1.0 };
+    let (dx, dy) = ((end[0] - start[0]) * arc, (end[1] - start[1]) * arc);
+    let (sin, cos) = (start[2] + half).sin_cos();
+    let forward = dx * cos + dy * sin;
+    let lateral = -dx * sin + dy * cos;
+    let per_metre = [turn / travel, forward / travel, lateral / travel];
+    Some(Window { curvature: heading / travel, speed, travel, per_metre })
+}
+
+fn whole_turns(angle: f64) -> f64 {
+    (angle.abs() / std::f64::consts::TAU).round() * std::f64::consts::TAU
+}
+
+fn mean_pose(piece: &[Observation]) -> [f64; 3] {
+    let first = piece[0].pose;
+    let count = piece.len() as f64;
+    let mean = |axis: usize| -> f64 {
+        let apart = |o: &Observation| o.pose[axis] - first[axis];
+        let sum: f64 = match axis {
+            2 => piece.iter().map(|o| wrap(apart(o))).sum(),
+            _ => piece.iter().map(apart).sum(),
+        };
+        first[axis] + sum / count
+    };
+    [mean(0), mean(1), mean(2)]
+}
+
+/// Maximum likelihood of the tracking filter over offset and coloured deviation of yaw and
+/// forward motion, their correlation, the correlation length and white noise.
+fn fit_noise(
+    model: &Model,
+    motion: &MotionModel,
+    segments: &[Segment],
+    options: &Options,
+) -> MotionModel {
+    let stride = segments.len().div_ceil(SEGMENTS_MAX).max(1);
+    let used: Vec<&Segment> = segments.iter().step_by(stride).collect();
+    let start = [-5.0, -5.5, -4.0, -4.5, -1.6, 0.0, -6.0];
+    let best = minimise(start, 0.7, options.evaluations, |x| {
+        let noise = with_noise(motion, x);
+        let fit: f64 = used.iter().map(|segment| log_likelihood(model, &noise, segment)).sum();
+        // A weak pull towards the start keeps directions without data where they are.
+        let pull: f64 = x.iter().zip(start).map(|(a, b)| (a - b) * (a - b)).sum();
+        0.05 * pull - fit
+    });
+    with_noise(motion, &best)
+}
+
+fn with_noise(motion: &MotionModel, x: &[f64; 7]) -> MotionModel {
+    let bounded = |value: f64, low: f64, high: f64| value.exp().clamp(low, high);
+    let (offset_yaw, offset_forward) = (bounded(x[0], 2e-4, 1.0), bounded(x[1], 2e-4, 1.0));
+    let (yaw, forward) = (bounded(x[2], 2e-4, 2.0), bounded(x[3], 2e-4, 2.0));
+    let white = bounded(x[6], 1e-4, 0.1);
+    MotionModel {
+        offset_sd: [offset_yaw, offset_forward, (LATERAL * offset_forward).max(3e-4)],
+        deviation_sd: [yaw, forward, (LATERAL * forward).max(3e-4)],
+        deviation_length_m: bounded(x[4], 0.03, 3.0),
+        correlation: 0.98 * x[5].tanh(),
+        white_sd: [white, white, white],
+        ..*motion
+    }
+}
+
+/// Log-likelihood of a piece's poses under a motion model.
+#[must_use]
+pub fn log_likelihood(model: &Model, motion: &MotionModel, segment: &Segment) -> f64 {
+    let mut sum = 0.0;
+    follow(model, motion, segment, |_, log_likelihood| sum += log_likelihood);
+    sum
+}
+
+/// Tracks a piece from its first pose; tells for each pose after it the innovation (x, y, yaw) and
+/// its log-density.
+pub fn follow(
+    model: &Model,
+    motion: &MotionModel,
+    segment: &Segment,
+    mut tell: impl FnMut(Vector3<f64>, f64),
+) {
+    let noise = motion.noise();
+    let limit = model.command.curvature_max_1_m;
+    let mut track: Option<Track> = None;
+    for observation in segment {
+        let sensor = &model.noise;
+        let variance = [sensor.position_m, sensor.position_m, sensor.yaw_rad].map(|sd| {
+            let sample = model.sample_variance(sd, observation.frame_s);
+            observation.mean_variance(sample, observation.pose_frames)
+        });
+        let Some(track) = track.as_mut().filter(|_| !observation.anchor) else {
+            if observation.pose_frames > 0 {
+                let spread = Matrix3::from_diagonal(&Vector3::from(variance));
+                track = Some(Track::new(Vector3::from(observation.pose), spread, &noise));
+            }
+            continue;
+        };
+        let step = Displacement {
+            per_metre: motion.per_metre(observation.curvature, observation.speed, limit),
+            travel_m: observation.travel_m,
+            extra: observation.lag_variance(model),
+        };
+        track.predict(&step, &noise);
+        if observation.pose_frames > 0 {
+            let (innovation, _) = track.innovation(observation.pose, variance);
+            if let Some(log_likelihood) = track.update(observation.pose, variance) {
+                tell(innovation, log_likelihood);
+            }
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Side and type of every node of a fault tree.
+
+use vigil_inference::FaultTree;
+use vigil_robot::Description;
+
+use super::UNKNOWN;
+
+/// Side of a robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Wheels with y > 0.
+    Left,
+    /// Wheels with y < 0.
+    Right,
+}
+
+/// What the nodes of a fault tree say about a fault.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Taxonomy {
+    nodes: Vec<Node>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Node {
+    name: String,
+    parent: Option<usize>,
+    /// Common side of all leaves below.
+    side: Option<Side>,
+    /// Common type of all leaves below: the first word of the fault, `stuck` or `encoder`.
+    class: Option<String>,
+    is_leaf: bool,
+}
+
+impl Taxonomy {
+    /// Taxonomy of the faults of `tree` in the words of `robot`.
+    #[must_use]
+    pub fn new(tree: &FaultTree, robot: &Description) -> Self {
+        let mut nodes: Vec<Node> = tree
+            .nodes()
+            .iter()
+            .map(|node| {
+                let mut words = node.fault.as_deref().unwrap_or("").split(':');
+                let class = words.next().filter(|word| !word.is_empty());
+                let wheel = words.next().and_then(|name| robot.wheel_index(name));
+                Node {
+                    name: node.name.clone(),
+                    parent: node.parent,
+                    side: wheel.and_then(|wheel| side_of(robot.wheels[wheel].y)),
+                    class: class.map(str::to_owned),
+                    is_leaf: node.fault.is_some(),
+                }
+            })
+            .collect();
+        // Parents come before their children: from the last node on, children are complete.
+        for i in (1..nodes.len()).rev().filter(|&i| !tree.nodes()[i].fault.is_some()) {
+            let mut children = nodes.iter().filter(|node| node.parent == Some(i));
+            let Some(first) = children.next() else { continue };
+            let (mut side, mut class) = (first.side, first.class.clone());
+            for child in children {
+                side = side.filter(|side| child.side == Some(*side));
+                class = class.filter(|class| child.class.as_ref() == Some(class));
+            }
+            (nodes[i].side, nodes[i].class) = (side, class);
+        }
+        Self { nodes }
+    }
+
+    fn node(&self, name: &str) -> Option<&Node> {
+        self.nodes.iter().find(|node| node.name == name)
+    }
+
+    /// Name of node `i`.
+    #[must_use]
+    pub fn name(&self, i: usize) -> Option<&str> {
+        self.nodes.get(i).map(|node| node.name.as_str())
+    }
+
+    /// Index of a leaf or of the nominal mode.
+    #[must_use]
+    pub fn index(&self, mode: &str) -> Option<usize> {
+        let position = self.nodes.iter().position(|node| node.name == mode)?;
+        (position == 0 || self.nodes[position].is_leaf).then_some(position)
+    }
+
+    /// Side on which a node's leaves lie, if it is one.
+    #[must_use]
+    pub fn side(&self, mode: &str) -> Option<Side> {
+        self.node(mode)?.side
+    }
+
+    /// Type of a node's faults (`stuck`, `encoder`), if it is one.
+    #[must_use]
+    pub fn class(&self, mode: &str) -> Option<&str> {
+        self.node(mode)?.class.as_deref()
+    }
+
+    /// Indices of the leaves of a type on a side.
+    pub fn leaves(&self, class: &str, side: Side) -> impl Iterator<Item = usize> {
+        let has = move |node: &Node| {
+            node.is_leaf && node.side == Some(side) && node.class.as_deref() == Some(class)
+        };
+        (0..self.nodes.len()).filter(move |&i| has(&self.nodes[i]))
+    }
+
+    /// The leaf that should be named when `truth` is true.
+    #[must_use]
+    pub fn expected<'a>(&self, truth: &'a str) -> &'a str {
+        self.index(truth).map_or(UNKNOWN, |_| truth)
+    }
+
+    /// True if naming `mode` is no lie when `truth` is true: it is the expected leaf, or an
+    /// abstract node above it.
+    #[must_use]
+    pub fn covers(&self, mode: &str, truth: &str) -> bool {
+        let mut at = self.nodes.iter().position(|node| node.name == truth);
+        if at.is_none() {
+            return mode == UNKNOWN;
+        }
+        while let Some(i) = at {
+            if self.nodes[i].name == mode {
+                return true;
+            }
+            at = self.nodes[i].parent;
+        }
+        false
+    }
+}
+
+fn side_of(y: f64) -> Option<Side> {
+    match y {
+        y if y > 0.0 => Some(Side::Left),
+        y if y < 0.0 => Some(Side::Right),
+        _ => None,
+    }
+}

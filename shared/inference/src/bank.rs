@@ -1,0 +1,171 @@
+//! Exact single faults: one hypothesis per (mode, onset), each with its own track.
+//!
+//! While no measurement is ambiguous about which hypothesis it belongs to, the posterior over modes
+//! is the sum of the hypotheses' weights: no sampling, no mixing. The number of hypotheses is
+//! bounded: unlikely ones are dropped, and when the bank is full the least likely gives way.
+
+use crate::logspace::log_sum_exp;
+
+/// One hypothesis: since `onset` the system is in `mode`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hypothesis<T> {
+    /// Mode, a caller's index.
+    pub mode: usize,
+    /// Onset, a caller's time.
+    pub onset: u64,
+    /// Logarithm of the normalised weight.
+    pub log_weight: f64,
+    /// Continuous state under this hypothesis.
+    pub track: T,
+}
+
+/// A bounded set of hypotheses.
+#[derive(Debug, Clone)]
+pub struct Bank<T> {
+    hypotheses: Vec<Hypothesis<T>>,
+    scratch: Vec<f64>,
+    capacity: usize,
+    per_mode: usize,
+}
+
+impl<T: Copy> Bank<T> {
+    /// An empty bank of at most `per_mode` hypotheses for each of `modes` modes. Allocates once.
+    #[must_use]
+    pub fn new(modes: usize, per_mode: usize) -> Self {
+        let capacity = modes * per_mode;
+        Self {
+            hypotheses: Vec::with_capacity(capacity),
+            scratch: Vec::with_capacity(capacity),
+            capacity,
+            per_mode,
+        }
+    }
+
+    /// Forgets everything and starts from one hypothesis.
+    pub fn restart(&mut self, mode: usize, onset: u64, track: T) {
+        self.hypotheses.clear();
+        self.hypotheses.push(Hypothesis { mode, onset, log_weight: 0.0, track });
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.hypotheses.clear();
+    }
+
+    /// The hypotheses.
+    #[must_use]
+    pub fn hypotheses(&self) -> &[Hypothesis<T>] {
+        &self.hypotheses
+    }
+
+    /// The hypotheses, for the caller's prediction and update.
+    pub fn hypotheses_mut(&mut self) -> &mut [Hypothesis<T>] {
+        &mut self.hypotheses
+    }
+
+    /// The most probable hypothesis among those of `wanted` modes.
+    #[must_use]
+    pub fn best(&self, wanted: impl Fn(usize) -> bool) -> Option<&Hypothesis<T>> {
+        self.hypotheses
+            .iter()
+            .filter(|hypothesis| wanted(hypothesis.mode))
+            .max_by(|a, b| a.log_weight.total_cmp(&b.log_weight))
+    }
+
+    /// Adds a hypothesis. A mode that has its share of places gives up its least likely one, if
+    /// the new one is more likely or as young as to have no evidence yet.
+    pub fn add(&mut self, hypothesis: Hypothesis<T>) {
+        let same = self.hypotheses.iter().filter(|other| other.mode == hypothesis.mode).count();
+        if same >= self.per_mode || self.hypotheses.len() >= self.capacity {
+            let least = (0..self.hypotheses.len())
+                .filter(|&i| self.hypotheses[i].mode == hypothesis.mode)
+                .min_by(|&a, &b| {
+                    let (a, b) = (&self.hypotheses[a], &self.hypotheses[b]);
+                    a.log_weight.total_cmp(&b.log_weight)
+                });
+            match least {
+                Some(i) => self.hypotheses[i] = hypothesis,
+                None => return,
+            }
+            return;
+        }
+        self.hypotheses.push(hypothesis);
+    }
+
+    /// Drops hypotheses whose log-weight is below `floor`, or not a number, and normalises the
+    /// others. Returns the logarithm of the sum before, or None, unchanged, if nothing is possible.
+    pub fn normalise(&mut self, floor: f64) -> Option<f64> {
+        self.scratch.clear();
+        for hypothesis in &mut self.hypotheses {
+            if hypothesis.log_weight.is_nan() {
+                hypothesis.log_weight = f64::NEG_INFINITY;
+            }
+            self.scratch.push(hypothesis.log_weight);
+        }
+        let evidence = log_sum_exp(&self.scratch);
+        if !evidence.is_finite() {
+            return None;
+        }
+        self.hypotheses.retain_mut(|hypothesis| {
+            hypothesis.log_weight -= evidence;
+            hypothesis.log_weight >= floor
+        });
+        Some(evidence)
+    }
+
+    /// Adds to `log_p[mode]` (logarithms, minus infinity where there is nothing) the weights of each
+    /// mode.
+    pub fn modes(&self, log_p: &mut [f64]) {
+        log_p.fill(f64::NEG_INFINITY);
+        for hypothesis in &self.hypotheses {
+            let p = &mut log_p[hypothesis.mode];
+            *p = crate::logspace::log_add(*p, hypothesis.log_weight);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn hypothesis(mode: usize, onset: u64, p: f64) -> Hypothesis<()> {
+        Hypothesis { mode, onset, log_weight: p.ln(), track: () }
+    }
+
+    #[test]
+    fn weights_add_up_per_mode() {
+        let mut bank = Bank::new(3, 4);
+        bank.restart(0, 0, ());
+        bank.add(hypothesis(1, 1, 0.5));
+        bank.add(hypothesis(1, 2, 0.5));
+        let evidence = bank.normalise(-30.0).unwrap();
+        assert!((evidence - 2.0_f64.ln()).abs() < 1e-12);
+        let mut log_p = [0.0; 3];
+        bank.modes(&mut log_p);
+        assert!((log_p[0].exp() - 0.5).abs() < 1e-12 && (log_p[1].exp() - 0.5).abs() < 1e-12);
+        assert_eq!(log_p[2], f64::NEG_INFINITY);
+        assert_eq!(bank.best(|mode| mode == 1).map(|best| best.mode), Some(1));
+    }
+
+    #[test]
+    fn the_unlikely_are_dropped_and_the_bank_stays_bounded() {
+        let mut bank = Bank::new(2, 3);
+        bank.restart(0, 0, ());
+        for onset in 0..50 {
+            bank.add(hypothesis(1, onset, 1e-3));
+        }
+        assert_eq!(bank.hypotheses().len(), 4);
+        bank.add(hypothesis(1, 99, 1e-30));
+        bank.normalise(-30.0).unwrap();
+        assert!(bank.hypotheses().iter().all(|other| other.onset != 99));
+    }
+
+    #[test]
+    fn impossible_weights_are_told() {
+        let mut bank = Bank::new(1, 2);
+        bank.restart(0, 0, ());
+        bank.hypotheses_mut()[0].log_weight = f64::NAN;
+        assert_eq!(bank.normalise(-30.0), None);
+    }
+}

@@ -1,0 +1,259 @@
+//! A Gaussian track of a planar pose whose motion per metre deviates from its model.
+//!
+//! State: x, y, yaw; three offsets that are constant within a run; three deviations that follow an
+//! Ornstein-Uhlenbeck process along the path. Offsets and deviations are per commanded metre, in
+//! the order yaw, forward, lateral. The extended Kalman filter linearises about the heading at half
+//! the turn.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use crate::angle::wrap;
+use crate::gaussian::log_density;
+
+/// Dimension of the state.
+const N: usize = 9;
+
+/// How far the motion per metre deviates from its model; order yaw, forward, lateral.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionNoise {
+    /// Covariance of the offsets, per metre.
+    pub offset: Matrix3<f64>,
+    /// Stationary covariance of the coloured deviations, per metre.
+    pub deviation: Matrix3<f64>,
+    /// Correlation length of the deviations, m.
+    pub length_m: f64,
+    /// Variance of white noise per metre travelled.
+    pub white: Vector3<f64>,
+}
+
+/// One displacement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Displacement {
+    /// Expected yaw, forward, lateral displacement per commanded metre.
+    pub per_metre: [f64; 3],
+    /// Commanded travel, m.
+    pub travel_m: f64,
+    /// Additional variance of yaw (rad²), forward and lateral displacement (m²).
+    pub extra: [f64; 3],
+}
+
+/// The track.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Track {
+    mean: SVector<f64, N>,
+    covariance: SMatrix<f64, N, N>,
+}
+
+impl Track {
+    /// A track at `pose` (x, y, yaw) with its covariance and the noise's stationary deviations.
+    #[must_use]
+    pub fn new(pose: Vector3<f64>, covariance: Matrix3<f64>, noise: &MotionNoise) -> Self {
+        let mut track = Self { mean: SVector::zeros(), covariance: SMatrix::zeros() };
+        track.mean.fixed_rows_mut::<3>(0).copy_from(&pose);
+        track.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&covariance);
+        track.forget(noise);
+        track
+    }
+
+    /// Pose x m, y m, yaw rad (not wrapped).
+    #[must_use]
+    pub fn pose(&self) -> Vector3<f64> {
+        self.mean.fixed_rows::<3>(0).into()
+    }
+
+    /// Covariance of the pose.
+    #[must_use]
+    pub fn pose_covariance(&self) -> Matrix3<f64> {
+        self.covariance.fixed_view::<3, 3>(0, 0).into()
+    }
+
+    /// Estimated deviation per metre from the model: offset plus coloured part.
+    #[must_use]
+    pub fn deviation(&self) -> Vector3<f64> {
+        self.mean.fixed_rows::<3>(3) + self.mean.fixed_rows::<3>(6)
+    }
+
+    /// The same pose under another mode: offsets and deviations start anew from `noise`.
+    #[must_use]
+    pub fn fork(&self, noise: &MotionNoise) -> Self {
+        let mut track = *self;
+        track.forget(noise);
+        track
+    }
+
+    fn forget(&mut self, noise: &MotionNoise) {
+        let pose = self.pose_covariance();
+        self.mean.fixed_rows_mut::<6>(3).fill(0.0);
+        self.covariance.fill(0.0);
+        self.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&pose);
+        self.covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&noise.offset);
+        self.covariance.fixed_view_mut::<3, 3>(6, 6).copy_from(&noise.deviation);
+    }
+
+    /// Puts the pose at `pose` with `variance`, keeping what is known of the deviations: the frame
+    /// of the measurement has jumped.
+    pub fn anchor(&mut self, pose: [f64; 3], variance: [f64; 3]) {
+        self.mean.fixed_rows_mut::<3>(0).copy_from(&Vector3::from(pose));
+        self.covariance.fixed_view_mut::<3, 6>(0, 3).fill(0.0);
+        self.covariance.fixed_view_mut::<6, 3>(3, 0).fill(0.0);
+        let block = Matrix3::from_diagonal(&Vector3::from(variance));
+        self.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&block);
+    }
+
+    /// Moves by one displacement.
+    pub fn predict(&mut self, step: &Displacement, noise: &MotionNoise) {
+        let travel = step.travel_m;
+        let moved = (Vector3::from(step.per_metre) + self.deviation()) * travel;
+        let (turn, forward, lateral) = (moved[0], moved[1], moved[2]);
+        let (sin, cos) = (self.mean[2] + 0.5 * turn).sin_cos();
+        let (dx, dy) = (forward * cos - lateral * sin, forward * sin + lateral * cos);
+        self.mean[0] += dx;
+        self.mean[1] += dy;
+        self.mean[2] += turn;
+        let fading = (-travel.abs() / noise.length_m).exp();
+        let old = self.mean.fixed_rows::<3>(6).into_owned();
+        self.mean.fixed_rows_mut::<3>(6).copy_from(&(old * fading));
+
+        let heading = Matrix3::new(1.0, 0.0, -dy, 0.0, 1.0, dx, 0.0, 0.0, 1.0);
+        let body = Matrix3::new(-0.5 * dy, cos, -sin, 0.5 * dx, sin, cos, 1.0, 0.0, 0.0);
+        let by = body * travel;
+        let view = |r: usize, c: usize| -> Matrix3<f64> {
+            self.covariance.fixed_view::<3, 3>(r, c).into()
+        };
+        let (pp, po, pd) = (view(0, 0), view(0, 3), view(0, 6));
+        let (oo, od, dd) = (view(3, 3), view(3, 6), view(6, 6));
+        // Rows of the new pose against the old offsets and deviations.
+        let pose_offset = heading * po + by * (oo + od.transpose());
+        let pose_deviation = heading * pd + by * (od + dd);
+        let mixed = heading * (po + pd) * by.transpose();
+        let drift = by * (oo + od + od.transpose() + dd) * by.transpose();
+        let white = noise.white * travel.abs() + Vector3::from(step.extra);
+        let white = body * Matrix3::from_diagonal(&white) * body.transpose();
+        let pose = heading * pp * heading.transpose() + mixed + mixed.transpose() + drift + white;
+        let fresh = noise.deviation * (1.0 - fading * fading);
+        self.set(0, 0, &pose);
+        self.set(0, 3, &pose_offset);
+        self.set(0, 6, &(pose_deviation * fading));
+        self.set(3, 6, &(od * fading));
+        self.set(6, 6, &(dd * (fading * fading) + fresh));
+    }
+
+    fn set(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
+        self.covariance.fixed_view_mut::<3, 3>(row, column).copy_from(block);
+        if row != column {
+            self.covariance.fixed_view_mut::<3, 3>(column, row).copy_from(&block.transpose());
+        }
+    }
+
+    /// Innovation of a measured pose (x, y, yaw) and its covariance, in the frame of the pose.
+    #[must_use]
+    pub fn innovation(&self, pose: [f64; 3], variance: [f64; 3]) -> (Vector3<f64>, Matrix3<f64>) {
+        let apart = Vector3::new(
+            pose[0] - self.mean[0],
+            pose[1] - self.mean[1],
+            wrap(pose[2] - self.mean[2]),
+        );
+        (apart, self.pose_covariance() + Matrix3::from_diagonal(&Vector3::from(variance)))
+    }
+
+    /// Conditions on a measured pose (x, y, yaw) with independent noise of `variance`; returns
+    /// its log-density. None, unchanged, if a value is not finite or the covariance degenerated.
+    pub fn update(&mut self, pose: [f64; 3], variance: [f64; 3]) -> Option<f64> {
+        let (apart, spread) = self.innovation(pose, variance);
+        let (log_likelihood, factor) = log_density(&apart, spread)?;
+        let rows: SMatrix<f64, 3, N> = self.covariance.fixed_view::<3, N>(0, 0).into();
+        let gain = factor.solve(&rows).transpose();
+        let mean = self.mean + gain * apart;
+        let covariance = self.covariance - gain * rows;
+        if !mean.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        self.mean = mean;
+        self.covariance = 0.5 * (covariance + covariance.transpose());
+        Some(log_likelihood)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::gaussian::Gaussian;
+
+    fn noise() -> MotionNoise {
+        MotionNoise {
+            offset: Matrix3::new(4e-4, -1e-4, 0.0, -1e-4, 1e-4, 0.0, 0.0, 0.0, 1e-6),
+            deviation: Matrix3::new(2e-3, -9e-4, 0.0, -9e-4, 6e-4, 0.0, 0.0, 0.0, 3e-6),
+            length_m: 0.2,
+            white: Vector3::new(1e-5, 2e-5, 1e-6),
+        }
+    }
+
+    fn motion(state: &SVector<f64, N>, step: &Displacement) -> SVector<f64, N> {
+        let (travel, f) = (step.travel_m, step.per_metre);
+        let turn = (f[0] + state[3] + state[6]) * travel;
+        let forward = (f[1] + state[4] + state[7]) * travel;
+        let lateral = (f[2] + state[5] + state[8]) * travel;
+        let (sin, cos) = (state[2] + 0.5 * turn).sin_cos();
+        let mut out = *state;
+        out[0] += forward * cos - lateral * sin;
+        out[1] += forward * sin + lateral * cos;
+        out[2] += turn;
+        for i in 6..N {
+            out[i] *= (-travel / noise().length_m).exp();
+        }
+        out
+    }
+
+    #[test]
+    fn the_track_equals_a_plain_extended_kalman_filter() {
+        let noise = noise();
+        let start = Matrix3::from_diagonal(&Vector3::new(1e-4, 2e-4, 3e-4));
+        let mut track = Track::new(Vector3::new(1.0, 2.0, 0.5), start, &noise);
+        let mut plain = Gaussian { mean: track.mean, covariance: track.covariance };
+        let step =
+            Displacement { per_metre: [0.5, 0.9, 0.02], travel_m: 0.05, extra: [1e-6, 0.0, 0.0] };
+        for k in 0..40 {
+            let jacobian = SMatrix::<f64, N, N>::from_fn(|i, j| {
+                let (mut up, mut down) = (plain.mean, plain.mean);
+                up[j] += 1e-6;
+                down[j] -= 1e-6;
+                (motion(&up, &step)[i] - motion(&down, &step)[i]) / 2e-6
+            });
+            let turn = (0.5 + plain.mean[3] + plain.mean[6]) * 0.05;
+            let (sin, cos) = (plain.mean[2] + 0.5 * turn).sin_cos();
+            let shift = motion(&plain.mean, &step) - jacobian * plain.mean;
+            let moved = motion(&plain.mean, &step) - plain.mean;
+            let body = Matrix3::new(
+                -0.5 * moved[1], cos, -sin, 0.5 * moved[0], sin, cos, 1.0, 0.0, 0.0,
+            );
+            let white = Matrix3::from_diagonal(&(noise.white * 0.05 + Vector3::from(step.extra)));
+            let mut q = SMatrix::<f64, N, N>::zeros();
+            q.fixed_view_mut::<3, 3>(0, 0).copy_from(&(body * white * body.transpose()));
+            let fading = (-0.05_f64 / 0.2).exp();
+            let fresh = noise.deviation * (1.0 - fading * fading);
+            q.fixed_view_mut::<3, 3>(6, 6).copy_from(&fresh);
+            plain.predict(&jacobian, &shift, &q);
+            track.predict(&step, &noise);
+            let z = [1.0 + 0.04 * f64::from(k), 2.0, 0.5 + 0.03 * f64::from(k)];
+            let (apart, _) = track.innovation(z, [2.5e-5; 3]);
+            let observe = SMatrix::<f64, 3, N>::identity();
+            let r = Matrix3::identity() * 2.5e-5;
+            let expected = plain.update(&apart, &observe, &r).unwrap();
+            let found = track.update(z, [2.5e-5; 3]).unwrap();
+            assert!((expected - found).abs() < 1e-5 * (1.0 + expected.abs()), "{k}");
+        }
+        assert!((plain.mean - track.mean).abs().max() < 1e-6);
+        assert!((plain.covariance - track.covariance).abs().max() < 1e-8);
+    }
+
+    #[test]
+    fn impossible_measurements_change_nothing() {
+        let before = Track::new(Vector3::zeros(), Matrix3::identity(), &noise());
+        for bad in [f64::NAN, f64::INFINITY, 1e308] {
+            let mut track = before;
+            assert!(track.update([bad, 0.0, 0.0], [1e-4; 3]).is_none());
+            assert_eq!(track, before);
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! Learned behaviour: what `vigil learn` fits and the detector and identifier read.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`model`] | the model file |
+//! | [`motion`] | displacement per commanded metre, and its noise |
+//! | [`wheels`] | wheel rates and steering angles, and what an encoder says about its wheel |
+//! | [`observation`] | frames averaged into observations of about the learned interval |
+//! | [`noise_scale`] | how much noisier the sensors are than the learned ones |
+//! | [`calibration`] | alarm thresholds for a stated mean time between false alarms |
+//! | [`monitor`] | the detection filter over observations |
+
+pub mod calibration;
+pub mod model;
+pub mod monitor;
+pub mod motion;
+pub mod noise_scale;
+pub mod observation;
+mod reading;
+pub mod wheels;
+
+pub use calibration::Calibration;
+pub use model::{Model, ModelError};
+pub use monitor::Monitor;
+pub use motion::{Curve, MotionModel};
+pub use observation::{Intake, Observation, Observer};
+pub use reading::Reading;
+pub use wheels::{EncoderModel, EncoderState, RateModel};

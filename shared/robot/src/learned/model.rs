@@ -1,0 +1,332 @@
+//! The model file: written by `vigil learn`, read by detector and identifier.
+
+use serde::{Deserialize, Serialize};
+use vigil_blocks::{WHEELS, fnv1a};
+
+use super::calibration::Calibration;
+use super::motion::{Curve, MotionModel};
+use super::wheels::{EncoderModel, RateModel};
+
+/// Version of the file's layout.
+pub const VERSION: u32 = 1;
+
+/// Everything learned about one robot on one kind of ground.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Model {
+    /// Layout of the file.
+    pub version: u32,
+    /// Name of the robot.
+    pub robot: String,
+    /// Names of its wheels, in the order of every per-wheel array.
+    pub wheels: Vec<String>,
+    /// Interval over which frames are averaged into one observation, s.
+    pub interval_s: f64,
+    /// Where the model comes from.
+    pub provenance: Provenance,
+    /// Sensor noise per sample at its reference rate.
+    pub noise: Noise,
+    /// What is known of the command.
+    pub command: CommandModel,
+    /// Encoders, healthy and broken.
+    pub encoder: EncoderModel,
+    /// The nominal mode.
+    pub nominal: NominalModel,
+    /// One model per wheel that may be stuck.
+    pub stuck: Vec<StuckModel>,
+    /// Alarm thresholds, one per set of channels.
+    pub calibration: Vec<Calibration>,
+}
+
+/// Where a model comes from.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// Hash over the frames that were learned from.
+    pub data_hash: String,
+    /// Runs learned from.
+    pub runs_learned: Vec<u32>,
+    /// Runs left out, for the test.
+    pub runs_held_out: Vec<u32>,
+}
+
+/// Standard deviations of the sensors' white noise per sample at the reference rate; at another
+/// rate they scale so that the information per second is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Noise {
+    /// Rate for which the deviations hold, Hz.
+    pub reference_rate_hz: f64,
+    /// Position, m.
+    pub position_m: f64,
+    /// Yaw, rad.
+    pub yaw_rad: f64,
+    /// Wheel rate, rad/s.
+    pub wheel_rate_rad_s: f64,
+    /// Steering angle, rad.
+    pub steer_rad: f64,
+}
+
+/// What is known of the command.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CommandModel {
+    /// Time constant with which the body follows a change of the command, s. Assumed, not learned:
+    /// the runs learned from drive one command each.
+    pub lag_s: f64,
+    /// Uncertainty of the effect of that lag, relative.
+    pub lag_uncertainty: f64,
+    /// Largest curvature learned from, 1/m.
+    pub curvature_max_1_m: f64,
+    /// Smallest and largest speed learned from, m/s.
+    pub speed_range_m_s: [f64; 2],
+    /// Speed below which the robot counts as standing, m/s.
+    pub standing_m_s: f64,
+}
+
+/// The nominal mode.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NominalModel {
+    /// Standard deviation of steering angles about Ackermann's, sensor noise excluded, rad.
+    pub steer_sd_rad: f64,
+    /// Motion.
+    pub motion: MotionModel,
+    /// Wheel rates.
+    pub rates: Vec<RateModel>,
+}
+
+/// A stuck wheel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StuckModel {
+    /// Name of the wheel.
+    pub wheel: String,
+    /// Motion.
+    pub motion: MotionModel,
+    /// Rates of all wheels; the stuck wheel's own entry is not used.
+    pub rates: Vec<RateModel>,
+}
+
+/// Why a model was refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ModelError {
+    /// Not TOML, or not a model.
+    #[error("not a learned model: {0}")]
+    Parse(String),
+    /// Another layout.
+    #[error("the model has layout version {0}; this program reads version {VERSION}")]
+    Version(u32),
+    /// A value is not finite or out of range.
+    #[error("{key}: {value} is not allowed: {allowed}")]
+    Value {
+        /// Where.
+        key: String,
+        /// What was found.
+        value: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// The model is of another robot.
+    #[error("the model is of robot '{model}' ({model_wheels}), not of '{robot}' ({robot_wheels})")]
+    Robot {
+        /// Robot of the model.
+        model: String,
+        /// Its wheels.
+        model_wheels: String,
+        /// Robot asked for.
+        robot: String,
+        /// Its wheels.
+        robot_wheels: String,
+    },
+    /// The model has no calibration for the channels.
+    #[error("the model has no calibration for '{0}'; learn it again")]
+    Calibration(String),
+}
+
+impl Model {
+    /// Reads and checks a model.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming the key, what was found and what is allowed.
+    pub fn from_toml(text: &str) -> Result<Self, ModelError> {
+        let model: Self =
+            toml::from_str(text).map_err(|error| ModelError::Parse(error.to_string()))?;
+        model.check()?;
+        Ok(model)
+    }
+
+    /// The file's text.
+    ///
+    /// # Errors
+    /// [`ModelError::Parse`] if the model cannot be written.
+    pub fn to_toml(&self) -> Result<String, ModelError> {
+        toml::to_string(self).map_err(|error| ModelError::Parse(error.to_string()))
+    }
+
+    /// Hash over the file's text; equal for equal models.
+    #[must_use]
+    pub fn hash(&self) -> u64 {
+        let text = self.to_toml().unwrap_or_default();
+        fnv1a::hash(fnv1a::BASIS, text.as_bytes())
+    }
+
+    /// Checks that the model is of this robot.
+    ///
+    /// # Errors
+    /// [`ModelError::Robot`].
+    pub fn check_robot(&self, robot: &crate::Description) -> Result<(), ModelError> {
+        let names: Vec<&str> = robot.wheels.iter().map(|wheel| wheel.name.as_str()).collect();
+        if self.robot == robot.name && self.wheels == names {
+            return Ok(());
+        }
+        Err(ModelError::Robot {
+            model: self.robot.clone(),
+            model_wheels: self.wheels.join(" "),
+            robot: robot.name.clone(),
+            robot_wheels: names.join(" "),
+        })
+    }
+
+    /// The calibration for a set of channels.
+    ///
+    /// # Errors
+    /// [`ModelError::Calibration`].
+    pub fn calibration(&self, sensors: &str) -> Result<&Calibration, ModelError> {
+        self.calibration
+            .iter()
+            .find(|calibration| calibration.sensors == sensors)
+            .ok_or_else(|| ModelError::Calibration(sensors.to_owned()))
+    }
+
+    /// The model of `wheel` stuck.
+    #[must_use]
+    pub fn stuck(&self, wheel: usize) -> Option<&StuckModel> {
+        let name = self.wheels.get(wheel)?;
+        self.stuck.iter().find(|stuck| stuck.wheel == *name)
+    }
+
+    /// Gain and offset (1/m) such that a robot with `wheel` stuck, commanded the curvature
+    /// `gain·κ + offset`, drives the curvature κ. The driven curvature `yaw(κ')/forward(κ')` is
+    /// linearised about κ' = 0. (1, 0) if the model does not know the wheel.
+    #[must_use]
+    pub fn compensation(&self, wheel: usize) -> (f64, f64) {
+        let Some(stuck) = self.stuck(wheel) else { return (1.0, 0.0) };
+        let (yaw, forward) = (stuck.motion.yaw.curvature, stuck.motion.forward.curvature);
+        let at_zero = yaw[0] / forward[0];
+        let slope = (yaw[1] - at_zero * forward[1]) / forward[0];
+        let (gain, offset) = (1.0 / slope, -at_zero / slope);
+        if gain.is_finite() && offset.is_finite() { (gain, offset) } else { (1.0, 0.0) }
+    }
+
+    /// Variance of one sample of a channel with standard deviation `sd` at the reference rate,
+    /// when samples come every `dt_s`.
+    #[must_use]
+    pub fn sample_variance(&self, sd: f64, dt_s: f64) -> f64 {
+        sd * sd / (self.noise.reference_rate_hz * dt_s.max(1e-6))
+    }
+
+    fn check(&self) -> Result<(), ModelError> {
+        if self.version != VERSION {
+            return Err(ModelError::Version(self.version));
+        }
+        let count = self.wheels.len();
+        if count == 0 || count > WHEELS {
+            return refuse("wheels", count, "1 to 8 names");
+        }
+        check_range("interval_s", self.interval_s, 1e-3, 1.0)?;
+        self.noise.check()?;
+        self.command.check()?;
+        let encoder = &self.encoder;
+        check_range("encoder.repeat_rate", encoder.repeat_rate, 1e-9, 0.9)?;
+        check_range("encoder.resolution_rad_s", encoder.resolution_rad_s, 1e-9, 1.0)?;
+        check_range("encoder.broken_mean_rad_s", encoder.broken_mean_rad_s, -1e3, 1e3)?;
+        check_range("encoder.broken_sd_rad_s", encoder.broken_sd_rad_s, 1e-3, 1e3)?;
+        check_range("nominal.steer_sd_rad", self.nominal.steer_sd_rad, 0.0, 1.0)?;
+        check_motion("nominal.motion", &self.nominal.motion)?;
+        check_rates("nominal.rates", &self.nominal.rates, count)?;
+        for stuck in &self.stuck {
+            let key = format!("stuck.{}", stuck.wheel);
+            if !self.wheels.contains(&stuck.wheel) {
+                return refuse(&key, &stuck.wheel, "a name listed in wheels");
+            }
+            check_motion(&key, &stuck.motion)?;
+            check_rates(&key, &stuck.rates, count)?;
+        }
+        self.calibration.iter().try_for_each(check_calibration)
+    }
+}
+
+impl Noise {
+    fn check(&self) -> Result<(), ModelError> {
+        check_range("noise.reference_rate_hz", self.reference_rate_hz, 1e-2, 1e5)?;
+        check_range("noise.position_m", self.position_m, 1e-6, 10.0)?;
+        check_range("noise.yaw_rad", self.yaw_rad, 1e-6, 1.0)?;
+        check_range("noise.wheel_rate_rad_s", self.wheel_rate_rad_s, 1e-6, 10.0)?;
+        check_range("noise.steer_rad", self.steer_rad, 1e-6, 1.0)
+    }
+}
+
+impl CommandModel {
+    fn check(&self) -> Result<(), ModelError> {
+        check_range("command.lag_s", self.lag_s, 0.0, 5.0)?;
+        check_range("command.lag_uncertainty", self.lag_uncertainty, 0.0, 10.0)?;
+        check_range("command.curvature_max_1_m", self.curvature_max_1_m, 1e-3, 1e3)?;
+        check_range("command.speed_range_m_s", self.speed_range_m_s[0], 0.0, 100.0)?;
+        check_range("command.speed_range_m_s", self.speed_range_m_s[1], 0.0, 100.0)?;
+        check_range("command.standing_m_s", self.standing_m_s, 1e-4, 10.0)
+    }
+}
+
+fn refuse<T>(key: &str, value: impl ToString, allowed: &'static str) -> Result<T, ModelError> {
+    Err(ModelError::Value { key: key.to_owned(), value: value.to_string(), allowed })
+}
+
+fn check_range(key: &str, value: f64, low: f64, high: f64) -> Result<(), ModelError> {
+    if value >= low && value <= high {
+        return Ok(());
+    }
+    let allowed = if value.is_finite() { "outside its physical range" } else { "a finite number" };
+    refuse(key, value, allowed)
+}
+
+fn check_motion(key: &str, motion: &MotionModel) -> Result<(), ModelError> {
+    for (name, curve) in [("yaw", &motion.yaw), ("forward", &motion.forward)] {
+        check_curve(&format!("{key}.{name}"), curve)?;
+    }
+    check_curve(&format!("{key}.lateral"), &motion.lateral)?;
+    let floors = [("offset_sd", motion.offset_sd), ("deviation_sd", motion.deviation_sd)];
+    for (name, values) in floors.into_iter().chain([("white_sd", motion.white_sd)]) {
+        for value in values {
+            check_range(&format!("{key}.{name}"), value, 0.0, 10.0)?;
+        }
+    }
+    check_range(&format!("{key}.correlation"), motion.correlation, -0.99, 0.99)?;
+    check_range(&format!("{key}.deviation_length_m"), motion.deviation_length_m, 1e-3, 1e3)
+}
+
+fn check_curve(key: &str, curve: &Curve) -> Result<(), ModelError> {
+    curve.terms().into_iter().try_for_each(|value| check_range(key, value, -1e3, 1e3))
+}
+
+fn check_rates(key: &str, rates: &[RateModel], count: usize) -> Result<(), ModelError> {
+    if rates.len() != count {
+        return refuse(&format!("{key}.rates"), rates.len(), "one entry per wheel");
+    }
+    for rate in rates {
+        for value in rate.ratio {
+            check_range(&format!("{key}.ratio"), value, -10.0, 10.0)?;
+        }
+        check_range(&format!("{key}.ratio_sd"), rate.ratio_sd, 0.0, 10.0)?;
+    }
+    Ok(())
+}
+
+fn check_calibration(calibration: &Calibration) -> Result<(), ModelError> {
+    let key = |name: &str| format!("calibration.{}.{name}", calibration.sensors);
+    check_range(&key("fault_rate_1_h"), calibration.fault_rate_1_h, 1e-12, 1e6)?;
+    check_range(&key("level_log_odds"), calibration.level_log_odds, -700.0, 700.0)?;
+    check_range(&key("interval_at_level_h"), calibration.interval_at_level_h, 1e-9, 1e9)?;
+    check_range(&key("tail_slope"), calibration.tail_slope, 1e-3, 10.0)?;
+    check_range(&key("exposure_h"), calibration.exposure_h, 0.0, 1e9)
+}

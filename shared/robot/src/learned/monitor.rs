@@ -1,0 +1,416 @@
+//! The detection filter over observations: only the nominal mode is modelled.
+//!
+//! Particles of the nominal mode track the pose; the fault flag is integrated exactly (a fault
+//! state has no dynamics, so its probability follows from the nominal predictive density alone).
+//! Residuals are whitened by that density, per group of channels: pose (3), each wheel rate, each
+//! steering angle. Per group the fault state learns an unknown constant bias ([`Ages`]); an encoder
+//! that repeats itself exactly has a flag of its own; over all groups together stands the paper's
+//! constant likelihood ([`Constant`]). The groups' odds add up: a fault enters by one of them.
+
+use nalgebra::{Matrix3, SVector, Vector3};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+use vigil_blocks::{CHANNELS, Channel, WHEELS};
+use vigil_inference::ages::Ages;
+use vigil_inference::angle::wrap;
+use vigil_inference::constant::Constant;
+use vigil_inference::gaussian::log_density;
+use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
+use vigil_inference::particles::PoseParticles;
+
+use super::noise_scale::NoiseScale;
+use super::wheels::{rolling_rate, steering_angle};
+use super::{Model, Observation};
+use crate::Description;
+
+/// Shares of the prior: how a fault first shows.
+const SHARE_POSE: f64 = 0.5;
+const SHARE_WHEELS: f64 = 0.3;
+const SHARE_REPEATS: f64 = 0.1;
+const SHARE_STEER: f64 = 0.05;
+const SHARE_ANY: f64 = 0.05;
+/// Standard deviation of a fault's bias in units of the whitened residual.
+const BIAS_POSE: f64 = 1.0;
+const BIAS_CHANNEL: f64 = 3.0;
+/// Constant of the paper's form per dimension: above 1, or nominal residuals are evidence.
+const TAU_SQUARED_PER_DIMENSION: f64 = 1.6;
+/// Probability that a frozen encoder does not repeat itself.
+const REPEAT_FAILS: f64 = 0.01;
+/// Bound of the flag of exact repeats.
+const REPEATS_LOG_ODDS_MAX: f64 = 40.0;
+/// Diffusion of the pose per observation while following, in units of the measurement's deviation.
+const FOLLOWING: f64 = 0.1;
+/// Residuals beyond this many deviations mean a lost track.
+const LOST: f64 = 10.0;
+/// Observations in a row without usable weights after which the pose starts anew.
+const COAST_MAX: u32 = 10;
+
+/// Which channels a monitor uses besides the pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Channels {
+    /// Pose and command.
+    Pose,
+    /// Wheel rates and steering angles too.
+    PoseEncoders,
+}
+
+impl Channels {
+    /// Name, as calibrations carry it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pose => "pose",
+            Self::PoseEncoders => "pose+encoders",
+        }
+    }
+}
+
+/// The detection filter.
+#[derive(Debug, Clone)]
+pub struct Monitor {
+    model: Model,
+    robot: Description,
+    channels: Channels,
+    fault_rate_1_s: f64,
+    seed: u64,
+    rng: Pcg64Mcg,
+    particles: PoseParticles,
+    tracking: bool,
+    coasted: u32,
+    anchor_variance: f64,
+    pose: Ages<3>,
+    wheels: [Ages<1>; WHEELS],
+    steer: [Ages<1>; WHEELS],
+    repeats: [f64; WHEELS],
+    any: Constant,
+    scale_pose: NoiseScale,
+    scale_wheels: NoiseScale,
+    history: [Option<Observation>; 2],
+    report: Report,
+}
+
+/// What the last observation did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Report {
+    /// Natural log-odds that the robot is not in its nominal mode.
+    pub log_odds: f64,
+    /// The same by each channel alone; see [`Channel`].
+    pub channels: [f64; CHANNELS],
+    /// Log-likelihood of the observation under the nominal mode.
+    pub evidence: f64,
+    /// Effective sample size before resampling.
+    pub effective_sample_size: f64,
+    /// Observations whose weights degenerated, or after which the pose started anew.
+    pub degenerate_count: u32,
+}
+
+impl Monitor {
+    /// A monitor with `particles` particles and a prior fault rate.
+    #[must_use]
+    pub fn new(
+        model: &Model,
+        robot: &Description,
+        channels: Channels,
+        particles: usize,
+        fault_rate_1_h: f64,
+        seed: u64,
+    ) -> Self {
+        let mut monitor = Self {
+            model: model.clone(),
+            robot: robot.clone(),
+            channels,
+            fault_rate_1_s: fault_rate_1_h / 3600.0,
+            seed,
+            rng: Pcg64Mcg::seed_from_u64(seed),
+            particles: PoseParticles::new(particles),
+            tracking: false,
+            coasted: 0,
+            anchor_variance: 0.0,
+            pose: Ages::new(BIAS_POSE),
+            wheels: [Ages::new(BIAS_CHANNEL); WHEELS],
+            steer: [Ages::new(BIAS_CHANNEL); WHEELS],
+            repeats: [0.0; WHEELS],
+            any: Constant::default(),
+            scale_pose: NoiseScale::default(),
+            scale_wheels: NoiseScale::default(),
+            history: [None; 2],
+            report: Report {
+                log_odds: f64::NEG_INFINITY,
+                channels: [f64::NEG_INFINITY; CHANNELS],
+                evidence: 0.0,
+                effective_sample_size: particles as f64,
+                degenerate_count: 0,
+            },
+        };
+        monitor.reset();
+        monitor
+    }
+
+    /// Forgets everything; the generator starts from its seed again, so that equal runs have equal
+    /// beliefs whatever came before.
+    pub fn reset(&mut self) {
+        self.rng = Pcg64Mcg::seed_from_u64(self.seed);
+        self.tracking = false;
+        self.coasted = 0;
+        self.anchor_variance = 0.0;
+        self.scale_pose = NoiseScale::default();
+        self.scale_wheels = NoiseScale::default();
+        self.history = [None; 2];
+        self.forget_evidence();
+    }
+
+    /// Forgets what speaks for a fault, and keeps the track.
+    pub fn forget_evidence(&mut self) {
+        self.pose = Ages::new(BIAS_POSE);
+        self.wheels = [Ages::new(BIAS_CHANNEL); WHEELS];
+        self.steer = [Ages::new(BIAS_CHANNEL); WHEELS];
+        self.repeats = [self.birth(self.model.interval_s, SHARE_REPEATS).ln(); WHEELS];
+        self.any = Constant::default();
+        self.sum_up();
+    }
+
+    /// What the last observation did.
+    #[must_use]
+    pub const fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// The pose particles.
+    #[must_use]
+    pub const fn particles(&self) -> &PoseParticles {
+        &self.particles
+    }
+
+    /// Changes the number of particles, at most to the number at the start.
+    pub fn resize(&mut self, particles: usize) {
+        self.particles.resize(particles, &mut self.rng);
+    }
+
+    /// Ratio of the pose sensor's noise to the learned one, as standard deviations.
+    #[must_use]
+    pub fn noise_scale(&self) -> f64 {
+        self.scale_pose.variance_ratio().sqrt()
+    }
+
+    /// The same for the wheel rates.
+    #[must_use]
+    pub fn noise_scale_wheels(&self) -> f64 {
+        self.scale_wheels.variance_ratio().sqrt()
+    }
+
+    /// Probability that a fault appears in `dt_s`, in one of the groups with this share.
+    fn birth(&self, dt_s: f64, share: f64) -> f64 {
+        (self.fault_rate_1_s * dt_s * share).clamp(1e-300, 0.1)
+    }
+
+    /// Takes one observation. While `following`, the pose track gives way to the measurement, so
+    /// that the return of a robot to its nominal mode is seen after a fault has led it away.
+    pub fn step(&mut self, observation: &Observation, following: bool) {
+        self.report.evidence = 0.0;
+        self.update_noise_scale(observation);
+        self.step_pose(observation, following);
+        if observation.moving && self.channels == Channels::PoseEncoders {
+            self.step_wheels(observation);
+            self.step_steer(observation);
+        }
+        self.sum_up();
+    }
+
+    fn pose_variance(&self, observation: &Observation) -> [f64; 3] {
+        let noise = &self.model.noise;
+        let ratio = self.scale_pose.variance_ratio();
+        [noise.position_m, noise.position_m, noise.yaw_rad].map(|sd| {
+            let sample = self.model.sample_variance(sd, observation.frame_s) * ratio;
+            observation.mean_variance(sample, observation.pose_frames)
+        })
+    }
+
+    fn step_pose(&mut self, observation: &Observation, following: bool) {
+        let variance = self.pose_variance(observation);
+        let lost = self.coasted >= COAST_MAX;
+        // A cloud much wider than the measurement has too few particles where it matters.
+        let coarse = observation.pose_frames > 0 && self.anchor_variance > 4.0 * variance[0];
+        if !self.tracking || observation.anchor || lost || coarse {
+            if observation.pose_frames > 0 {
+                self.anchor_variance = variance[0];
+                let sd = variance.map(f64::sqrt);
+                self.particles.scatter(observation.pose, sd, &mut self.rng);
+                self.tracking = true;
+                self.coasted = 0;
+            }
+            return;
+        }
+        self.anchor_variance = 0.0;
+        self.advance(observation, following, variance);
+        if observation.pose_frames == 0 {
+            return;
+        }
+        let usable = self.weigh_pose(observation, variance);
+        // A standing robot tells nothing about its motion, but its pose stays known.
+        match self.particles.weigh(observation.pose, variance).filter(|_| usable || !following) {
+            Some(size) => {
+                self.report.effective_sample_size = size;
+                if size < 0.5 * self.particles.len() as f64 {
+                    self.particles.resample(&mut self.rng);
+                }
+                self.coasted = if usable { 0 } else { self.coasted + 1 };
+            }
+            None => self.coasted += 1,
+        }
+        if self.coasted > 0 {
+            self.report.degenerate_count += 1;
+        }
+    }
+
+    fn advance(&mut self, observation: &Observation, following: bool, variance: [f64; 3]) {
+        let motion = &self.model.nominal.motion;
+        let limit = self.model.command.curvature_max_1_m;
+        let per_metre = motion.per_metre(observation.curvature, observation.speed, limit);
+        let travel = observation.travel_m;
+        let lag = observation.lag_variance(&self.model);
+        let white = motion.whitened();
+        let follow = if following { FOLLOWING * FOLLOWING } else { 0.0 };
+        let measured = [variance[2], variance[0], variance[1]];
+        let sd: [f64; 3] = std::array::from_fn(|i| {
+            (white[i] * travel.abs() + lag[i] + follow * measured[i]).sqrt()
+        });
+        self.particles.advance(per_metre.map(|value| value * travel), sd, &mut self.rng);
+    }
+
+    /// Evidence of the pose's residual; false if the track is lost.
+    fn weigh_pose(&mut self, observation: &Observation, variance: [f64; 3]) -> bool {
+        let moments = self.particles.moments();
+        let pose = observation.pose;
+        let apart = Vector3::new(
+            pose[0] - moments.mean[0],
+            pose[1] - moments.mean[1],
+            wrap(pose[2] - moments.mean[2]),
+        );
+        let (sin, cos) = moments.mean[2].sin_cos();
+        let turn = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
+        let spread = moments.covariance + Matrix3::from_diagonal(&Vector3::from(variance));
+        let spread = turn * spread * turn.transpose();
+        let apart = turn * apart;
+        let Some((evidence, factor)) = log_density(&apart, spread) else { return false };
+        let Some(whitened) = factor.l_dirty().solve_lower_triangular(&apart) else { return false };
+        if observation.moving {
+            let share = self.birth(observation.dt_s, SHARE_POSE);
+            self.pose.step(&whitened, share);
+            let birth = self.birth(observation.dt_s, SHARE_ANY);
+            let norm = whitened.norm_squared();
+            self.any.step(norm, 3.0 * TAU_SQUARED_PER_DIMENSION, birth, birth);
+            self.report.evidence += evidence;
+        }
+        whitened.norm_squared() < LOST * LOST
+    }
+
+    fn step_wheels(&mut self, observation: &Observation) {
+        let ratio = self.scale_wheels.variance_ratio();
+        let sd = self.model.noise.wheel_rate_rad_s;
+        let sample = self.model.sample_variance(sd, observation.frame_s) * ratio;
+        let share = 1.0 / self.robot.wheels.len() as f64;
+        let birth = self.birth(observation.dt_s, SHARE_WHEELS * share);
+        let birth_repeats = self.birth(observation.dt_s, SHARE_REPEATS * share);
+        let (command, lagged) = (observation.command, [observation.curvature, observation.speed]);
+        for i in 0..self.robot.wheels.len() {
+            let reading = &observation.wheels[i];
+            self.update_repeats(i, reading.plain, reading.repeats, birth_repeats);
+            if reading.plain == 0 {
+                continue;
+            }
+            let rolling = rolling_rate(&self.robot, i, command[0], command[1]);
+            let behind = rolling - rolling_rate(&self.robot, i, lagged[0], lagged[1]);
+            let (rate, variance) = self.model.nominal.rates[i].rate(rolling, command[0]);
+            let noise = observation.mean_variance(sample, reading.plain);
+            let variance = variance + behind * behind + noise;
+            let apart = reading.mean - rate;
+            self.wheels[i].step(&SVector::from([apart / variance.sqrt()]), birth);
+            self.report.evidence += log_normal(apart, variance);
+        }
+    }
+
+    /// A frozen encoder repeats itself; a healthy one hardly ever does.
+    fn update_repeats(&mut self, wheel: usize, plain: u32, repeats: u32, birth: f64) {
+        let healthy = self.model.encoder.repeat_rate;
+        let seen = f64::from(repeats) * ((1.0 - REPEAT_FAILS) / healthy).ln()
+            + f64::from(plain) * (REPEAT_FAILS / (1.0 - healthy)).ln();
+        let log_odds = log_add(self.repeats[wheel], birth.ln()) + seen;
+        self.repeats[wheel] = log_odds.clamp(birth.ln(), REPEATS_LOG_ODDS_MAX);
+    }
+
+    fn step_steer(&mut self, observation: &Observation) {
+        let sample = self.model.sample_variance(self.model.noise.steer_rad, observation.frame_s);
+        let extra = self.model.nominal.steer_sd_rad;
+        let steered = self.robot.wheels.iter().filter(|wheel| wheel.steered).count().max(1);
+        let birth = self.birth(observation.dt_s, SHARE_STEER / steered as f64);
+        for i in 0..self.robot.wheels.len() {
+            let reading = &observation.steer[i];
+            if !self.robot.wheels[i].steered || reading.plain == 0 {
+                continue;
+            }
+            let angle = steering_angle(&self.robot, i, observation.command[0]);
+            let behind = angle - steering_angle(&self.robot, i, observation.curvature);
+            let noise = observation.mean_variance(sample, reading.plain);
+            let variance = noise + extra * extra + behind * behind;
+            let apart = reading.mean - angle;
+            self.steer[i].step(&SVector::from([apart / variance.sqrt()]), birth);
+            self.report.evidence += log_normal(apart, variance);
+        }
+    }
+
+    /// Second differences of the pose and first differences of the wheel rates, at constant
+    /// command: neither a curve nor a fault that persists shows in them.
+    fn update_noise_scale(&mut self, now: &Observation) {
+        let [before, last] = self.history;
+        self.history = [last, Some(*now)];
+        let (Some(before), Some(last)) = (before, last) else { return };
+        let all = [&before, &last, now];
+        let steady = all.iter().all(|o| {
+            o.moving && (o.command[0] - o.curvature).abs() < 0.02 && o.dt_s > 0.0
+        });
+        let even = all.iter().all(|o| (o.dt_s - now.dt_s).abs() < 0.2 * now.dt_s);
+        if !steady || !even || now.anchor || last.anchor {
+            return;
+        }
+        let noise = &self.model.noise;
+        if all.iter().all(|o| o.pose_frames == now.pose_frames && o.pose_frames > 0) {
+            for (i, sd) in [noise.position_m, noise.position_m, noise.yaw_rad].into_iter().enumerate() {
+                let sample = self.model.sample_variance(sd, now.frame_s);
+                let variance = 6.0 * now.mean_variance(sample, now.pose_frames);
+                let (up, down) = (now.pose[i] - last.pose[i], last.pose[i] - before.pose[i]);
+                let bend = if i == 2 { wrap(wrap(up) - wrap(down)) } else { up - down };
+                self.scale_pose.push(bend * bend / variance);
+            }
+        }
+        let surge = (now.command[1] - last.command[1]).abs();
+        for i in 0..self.robot.wheels.len() {
+            let (a, b) = (&last.wheels[i], &now.wheels[i]);
+            if surge < 1e-3 && a.plain == b.plain && a.plain > 0 {
+                let sample = self.model.sample_variance(noise.wheel_rate_rad_s, now.frame_s);
+                let step = b.mean - a.mean;
+                self.scale_wheels.push(step * step / (2.0 * now.mean_variance(sample, b.plain)));
+            }
+        }
+    }
+
+    fn sum_up(&mut self) {
+        let mut channels = [f64::NEG_INFINITY; CHANNELS];
+        channels[Channel::POSE] = self.pose.log_odds();
+        channels[Channel::ANY] = self.any.log_odds();
+        if self.channels == Channels::PoseEncoders {
+            for i in 0..self.robot.wheels.len() {
+                let wheel = log_add(self.wheels[i].log_odds(), self.repeats[i]);
+                channels[Channel::wheel_rate(i)] = wheel;
+                if self.robot.wheels[i].steered {
+                    channels[Channel::steer(i)] = self.steer[i].log_odds();
+                }
+            }
+        }
+        let finite = |value: f64| value.max(LOG_ODDS_MIN);
+        self.report.log_odds = finite(log_sum_exp(&channels));
+        self.report.channels = channels.map(finite);
+    }
+}
+
+/// Log-odds below this are reported as this: no evidence for a fault at all.
+const LOG_ODDS_MIN: f64 = -700.0;

@@ -1,0 +1,326 @@
+//! Frames averaged into observations of about the learned interval.
+//!
+//! The filters step once per observation, not once per frame. Averaging n samples of white noise
+//! keeps their information (the mean's variance is the sample's over n), so residuals, ages and
+//! thresholds mean the same at 20 Hz, 100 Hz and 1 kHz; between observations a belief is its own
+//! prediction. Exact repeats of an encoder are counted frame by frame, before averaging.
+
+use vigil_blocks::{SensorFrame, Valid, WHEELS};
+use vigil_inference::angle::wrap;
+
+use super::{Model, Reading};
+use crate::Description;
+
+/// A gap in the frames beyond which the pose starts anew, s.
+const GAP_S: f64 = 1.0;
+/// Period assumed of a run's first frame, s: as noisy as at the highest rate.
+const FRAME_UNKNOWN_S: f64 = 1e-3;
+/// Positions beyond this are no measurement, m.
+const POSITION_MAX_M: f64 = 1e7;
+/// Fraction of the interval that completes an observation: frames are never exactly periodic.
+const COMPLETE: f64 = 0.98;
+
+/// Frames averaged over about the learned interval.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Observation {
+    /// Capture time of the last frame, ns.
+    pub t_ns: u64,
+    /// Capture time of the first frame, ns.
+    pub t_first_ns: u64,
+    /// Time since the observation before, s.
+    pub dt_s: f64,
+    /// Time covered by one frame, s.
+    pub frame_s: f64,
+    /// Frames averaged.
+    pub frames: u32,
+    /// Commanded travel since the observation before, from middle to middle, m.
+    pub travel_m: f64,
+    /// Curvature over that travel, lag included, 1/m.
+    pub curvature: f64,
+    /// Speed, lag included, m/s.
+    pub speed: f64,
+    /// Command itself, averaged: curvature 1/m, speed m/s.
+    pub command: [f64; 2],
+    /// Whether the robot was commanded to move: otherwise nothing is evidence.
+    pub moving: bool,
+    /// Whether the pose has no relation to the one before: start or jump of its frame, or a gap.
+    pub anchor: bool,
+    /// Frames with a pose; 0: `pose` means nothing.
+    pub pose_frames: u32,
+    /// Mean pose x, y, yaw.
+    pub pose: [f64; 3],
+    /// Wheel rates, rad/s.
+    pub wheels: [Reading; WHEELS],
+    /// Steering angles, rad.
+    pub steer: [Reading; WHEELS],
+}
+
+impl Observation {
+    /// Variance of a mean whose samples came in `valid` of the frames, from the variance of one
+    /// sample at this frame rate.
+    #[must_use]
+    pub fn mean_variance(&self, sample_variance: f64, valid: u32) -> f64 {
+        sample_variance / f64::from(valid.max(1))
+    }
+
+    /// Variance of the yaw, forward and lateral displacement beyond the motion model: the body's
+    /// lag behind a changing command is known only roughly, and the error is coherent.
+    #[must_use]
+    pub fn lag_variance(&self, model: &Model) -> [f64; 3] {
+        let command = &model.command;
+        let scale = command.lag_uncertainty * command.lag_uncertainty * command.lag_s;
+        let turn = (self.command[0] - self.curvature).abs() * model.command.curvature_max_1_m;
+        let surge = (self.command[1] - self.speed).abs() * command.speed_range_m_s[1];
+        let yaw = scale * self.dt_s * turn * self.speed * self.speed;
+        [yaw, scale * self.dt_s * surge, 0.0]
+    }
+}
+
+/// What became of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Intake {
+    /// The frame completed an observation.
+    pub complete: bool,
+    /// The frame, or one of its channels, was refused: not finite, out of range, out of order.
+    pub invalid: bool,
+    /// The frame begins a new run: forget everything before.
+    pub new_run: bool,
+}
+
+/// Builds observations from frames.
+#[derive(Debug, Clone)]
+pub struct Observer {
+    wheel_count: usize,
+    wheel_rate_max: f64,
+    curvature_max: f64,
+    speed_max: f64,
+    interval_s: f64,
+    lag_s: f64,
+    standing_m_s: f64,
+    state: State,
+    observation: Observation,
+}
+
+/// What carries over from frame to frame.
+#[derive(Debug, Clone, Copy, Default)]
+struct State {
+    run_id: u64,
+    t_ns: u64,
+    started: bool,
+    command: [f64; 2],
+    lagged: [f64; 2],
+    reset_count: u32,
+    anchor: bool,
+    travel: f64,
+    heading: f64,
+    travel_before: f64,
+    heading_before: f64,
+    wheels: [Option<f64>; WHEELS],
+    steer: [Option<f64>; WHEELS],
+    sums: Sums,
+}
+
+/// Sums over the frames of the observation under way.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    frames: u32,
+    elapsed_s: f64,
+    t_first_ns: u64,
+    travel: f64,
+    heading: f64,
+    command: [f64; 2],
+    first_pose: [f64; 3],
+    pose: [f64; 3],
+    pose_frames: u32,
+    wheels: [Reading; WHEELS],
+    steer: [Reading; WHEELS],
+}
+
+impl Observer {
+    /// An observer for a model and its robot.
+    #[must_use]
+    pub fn new(model: &Model, robot: &Description) -> Self {
+        Self {
+            wheel_count: robot.wheels.len().min(WHEELS),
+            wheel_rate_max: robot.limits.wheel_rate_rad_s,
+            // Generous: a command beyond the limits is the robot's affair, garbage is not.
+            curvature_max: 10.0 * robot.limits.curvature_1_m,
+            speed_max: 10.0 * robot.limits.speed_m_s,
+            interval_s: model.interval_s,
+            lag_s: model.command.lag_s,
+            standing_m_s: model.command.standing_m_s,
+            state: State::default(),
+            observation: Observation::default(),
+        }
+    }
+
+    /// The last completed observation.
+    #[must_use]
+    pub const fn observation(&self) -> &Observation {
+        &self.observation
+    }
+
+    /// Forgets everything: the next frame begins a new run.
+    pub fn reset(&mut self) {
+        self.state = State::default();
+    }
+
+    /// Takes a frame.
+    pub fn push(&mut self, frame: &SensorFrame) -> Intake {
+        let new_run = !self.state.started || frame.run_id != self.state.run_id;
+        let t_ns = frame.header.t_capture_ns;
+        if !new_run && t_ns <= self.state.t_ns {
+            return Intake { invalid: true, ..Intake::default() };
+        }
+        let mut invalid = false;
+        if new_run {
+            self.state = State { run_id: frame.run_id, started: true, ..State::default() };
+            self.state.reset_count = frame.pose_reset_count;
+            self.state.anchor = true;
+        }
+        let dt_s = if new_run { 0.0 } else { (t_ns - self.state.t_ns) as f64 * 1e-9 };
+        self.state.t_ns = t_ns;
+        let jumped = dt_s > GAP_S || frame.pose_reset_count != self.state.reset_count;
+        if jumped {
+            // Poses before and after must not be averaged: drop what was collected.
+            self.state.reset_count = frame.pose_reset_count;
+            self.state.anchor = true;
+            self.state.sums.pose_frames = 0;
+            self.state.sums.pose = [0.0; 3];
+        }
+        invalid |= self.take_command(frame, dt_s.min(GAP_S), new_run);
+        if self.state.sums.frames == 0 {
+            self.state.sums.t_first_ns = t_ns;
+        }
+        self.state.sums.frames += 1;
+        self.state.sums.elapsed_s += dt_s;
+        invalid |= self.take_pose(frame);
+        invalid |= self.take_wheels(frame);
+        let enough = self.state.sums.elapsed_s >= COMPLETE * self.interval_s;
+        let complete = new_run || enough || jumped;
+        if complete {
+            self.complete(dt_s);
+        }
+        Intake { complete, invalid, new_run }
+    }
+
+    /// The body follows the command with a first-order lag.
+    fn take_command(&mut self, frame: &SensorFrame, dt_s: f64, new_run: bool) -> bool {
+        let [curvature, speed, ..] = frame.command;
+        let valid = frame.has(Valid::command(0) | Valid::command(1));
+        let sane = curvature.abs() <= self.curvature_max && speed.abs() <= self.speed_max;
+        let state = &mut self.state;
+        if valid && sane {
+            state.command = [curvature, speed];
+        }
+        if new_run {
+            state.lagged = state.command;
+        }
+        let follows = if self.lag_s > 0.0 { 1.0 - (-dt_s / self.lag_s).exp() } else { 1.0 };
+        let before = state.lagged;
+        for i in 0..2 {
+            state.lagged[i] += follows * (state.command[i] - state.lagged[i]);
+        }
+        let travel = 0.5 * (before[1] + state.lagged[1]) * dt_s;
+        state.travel += travel;
+        state.heading += 0.5 * (before[0] + state.lagged[0]) * travel;
+        state.sums.travel += state.travel;
+        state.sums.heading += state.heading;
+        for i in 0..2 {
+            state.sums.command[i] += state.command[i];
+        }
+        !(valid && sane)
+    }
+
+    fn take_pose(&mut self, frame: &SensorFrame) -> bool {
+        if !frame.has(Valid::POSE) {
+            return false;
+        }
+        let [x, y, yaw] = frame.pose;
+        let sane = x.abs() <= POSITION_MAX_M && y.abs() <= POSITION_MAX_M && yaw.abs() <= 1e3;
+        if !sane {
+            return true;
+        }
+        let sums = &mut self.state.sums;
+        if sums.pose_frames == 0 {
+            sums.first_pose = frame.pose;
+        }
+        sums.pose_frames += 1;
+        sums.pose[0] += x - sums.first_pose[0];
+        sums.pose[1] += y - sums.first_pose[1];
+        sums.pose[2] += wrap(yaw - sums.first_pose[2]);
+        false
+    }
+
+    fn take_wheels(&mut self, frame: &SensorFrame) -> bool {
+        let mut invalid = false;
+        let state = &mut self.state;
+        for i in 0..self.wheel_count {
+            if frame.has(Valid::wheel_rate(i)) {
+                let rate = frame.wheel_rate[i];
+                if rate.abs() <= self.wheel_rate_max {
+                    state.sums.wheels[i].push(rate, state.wheels[i].replace(rate));
+                } else {
+                    invalid = true;
+                }
+            }
+            if frame.has(Valid::steer(i)) {
+                let angle = frame.steer[i];
+                if angle.abs() <= std::f64::consts::PI {
+                    state.sums.steer[i].push(angle, state.steer[i].replace(angle));
+                } else {
+                    invalid = true;
+                }
+            }
+        }
+        invalid
+    }
+
+    fn complete(&mut self, dt_s: f64) {
+        let state = &mut self.state;
+        let sums = state.sums;
+        let count = f64::from(sums.frames.max(1));
+        let (travel, heading) = (sums.travel / count, sums.heading / count);
+        let moved = travel - state.travel_before;
+        let turned = heading - state.heading_before;
+        let mut pose = sums.first_pose;
+        if sums.pose_frames > 0 {
+            for (value, sum) in pose.iter_mut().zip(sums.pose) {
+                *value += sum / f64::from(sums.pose_frames);
+            }
+            pose[2] = wrap(pose[2]);
+        }
+        let command = sums.command.map(|sum| sum / count);
+        let elapsed = sums.elapsed_s.min(GAP_S);
+        // Dividing by a small travel would amplify rounding: a standing robot has its command's.
+        let curvature = if moved.abs() > 1e-6 { turned / moved } else { command[0] };
+        self.observation = Observation {
+            t_ns: state.t_ns,
+            t_first_ns: sums.t_first_ns,
+            dt_s: elapsed,
+            frame_s: if dt_s > 0.0 { elapsed / count } else { FRAME_UNKNOWN_S },
+            frames: sums.frames,
+            travel_m: moved,
+            curvature: curvature.clamp(-self.curvature_max, self.curvature_max),
+            speed: state.lagged[1],
+            command,
+            moving: command[1].abs() >= self.standing_m_s
+                && state.lagged[1].abs() >= self.standing_m_s,
+            anchor: state.anchor,
+            pose_frames: sums.pose_frames,
+            pose,
+            wheels: sums.wheels,
+            steer: sums.steer,
+        };
+        (state.travel_before, state.heading_before) = (travel, heading);
+        // An anchor without a pose is still to come.
+        state.anchor = state.anchor && sums.pose_frames == 0;
+        state.sums = Sums::default();
+        // Cumulative sums stay small however long the run.
+        if travel.abs() > 1e3 {
+            state.travel -= travel;
+            state.heading -= heading;
+            (state.travel_before, state.heading_before) = (0.0, 0.0);
+        }
+    }
+}

@@ -1,0 +1,300 @@
+//! Quasi-static slip of a six-wheel rocker-bogie rover: how the body moves when the wheels are
+//! driven, steered and, some of them, stuck.
+//!
+//! The body is in equilibrium of the wheels' shear forces (Janosi-type law, [`shear`]); the load
+//! on each wheel follows from these forces through the rocker-bogie linkage ([`loads`]); each
+//! free wheel's motor balances traction and bearing friction; a stuck wheel stands still and is
+//! dragged. Nine unknowns (forward, lateral and yaw velocity, six wheel rates) are solved by a
+//! damped Newton method with a pseudo-transient fallback ([`solver`]).
+//!
+//! Without the load transfer the front and rear wheel of one side would turn the rover equally,
+//! and no pose sensor could tell which of them is stuck.
+//!
+//! Left out: lateral load transfer, slopes, an off-centre mass, transients.
+
+mod balance;
+pub mod loads;
+pub mod shear;
+mod solver;
+
+pub use loads::RockerBogie;
+pub use solver::Unknowns;
+
+use crate::Description;
+use crate::kinematics::{Ackermann6, GeometryError, ROVER_WHEELS, WheelTargets};
+
+/// Standard gravity as the weight of the reference rover assumes it, m/s².
+pub const GRAVITY_M_S2: f64 = 9.81;
+/// From this many stuck wheels on the rover cannot move: the free wheels spin in place.
+pub const IMMOBILE_STUCK: usize = 4;
+
+/// Drive motors: torque = `gain` (commanded rate - rate), limited; bearing friction against it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motor {
+    /// Gain of the rate controller, N m s/rad.
+    pub gain_n_m_s: f64,
+    /// Largest torque, N m. Traction alone cannot reach it on soils up to a friction of about 1.
+    pub torque_max_n_m: f64,
+    /// Dry friction of the bearing, N m.
+    pub dry_friction_n_m: f64,
+    /// Viscous friction of the bearing, N m s/rad.
+    pub viscous_friction_n_m_s: f64,
+}
+
+impl Default for Motor {
+    /// The reference rover's motors.
+    fn default() -> Self {
+        Self {
+            gain_n_m_s: 6.0,
+            torque_max_n_m: 6.0,
+            dry_friction_n_m: 0.02,
+            viscous_friction_n_m_s: 0.02,
+        }
+    }
+}
+
+/// The soil under the wheels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Soil {
+    /// Friction coefficient under each wheel.
+    pub friction: [f64; ROVER_WHEELS],
+    /// Shear modulus: relative slip at which 63 % of the friction is reached.
+    pub shear_modulus: f64,
+}
+
+impl Soil {
+    /// The same soil under every wheel.
+    #[must_use]
+    pub const fn uniform(friction: f64, shear_modulus: f64) -> Self {
+        Self {
+            friction: [friction; ROVER_WHEELS],
+            shear_modulus,
+        }
+    }
+}
+
+impl Default for Soil {
+    /// The reference soil.
+    fn default() -> Self {
+        Self::uniform(0.65, 0.20)
+    }
+}
+
+/// What to solve for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Situation {
+    /// Commanded signed curvature, 1/m.
+    pub curvature_1_m: f64,
+    /// Commanded speed, m/s.
+    pub speed_m_s: f64,
+    /// Which wheels are stuck.
+    pub stuck: [bool; ROVER_WHEELS],
+    /// The soil.
+    pub soil: Soil,
+}
+
+/// Steady motion of the rover.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solution {
+    /// Body velocity at the centre: forward m/s, left m/s, yaw rate rad/s.
+    pub velocity: [f64; 3],
+    /// Wheel rates, rad/s; exactly 0 for stuck wheels.
+    pub wheel_rate_rad_s: [f64; ROVER_WHEELS],
+    /// Loads on the wheels, N.
+    pub load_n: [f64; ROVER_WHEELS],
+    /// Motor torques, N m, within the motors' limit.
+    pub torque_n_m: [f64; ROVER_WHEELS],
+    /// Iterations that it took, both methods together.
+    pub iterations: u32,
+}
+
+impl Solution {
+    /// The unknowns behind this solution, to start the next solve from.
+    #[must_use]
+    pub fn unknowns(&self) -> Unknowns {
+        let ([vx, vy, omega], rate) = (self.velocity, self.wheel_rate_rad_s);
+        Unknowns::from([
+            vx, vy, omega, rate[0], rate[1], rate[2], rate[3], rate[4], rate[5],
+        ])
+    }
+}
+
+/// Why a situation has no solution here.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SlipError {
+    /// A number of the situation is not finite, or the soil is impossible.
+    #[error("{0} is impossible: it must be finite, and friction and shear modulus above 0")]
+    Input(&'static str),
+    /// Neither method converged.
+    #[error(
+        "no equilibrium found in {iterations} iterations: the residual is {residual} N, allowed \
+         is {allowed} N"
+    )]
+    NotConverged {
+        /// Iterations done.
+        iterations: u32,
+        /// Largest residual left, N.
+        residual: f64,
+        /// Largest residual allowed, N.
+        allowed: f64,
+    },
+}
+
+/// The slip model of one robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SlipModel {
+    kinematics: Ackermann6,
+    linkage: RockerBogie,
+    /// Wheels of the left and of the right side: front, middle, rear.
+    sides: [[usize; 3]; 2],
+    motor: Motor,
+    weight_n: f64,
+}
+
+impl SlipModel {
+    /// The model of `robot` on the reference linkage and motors.
+    ///
+    /// # Errors
+    /// [`GeometryError`] if the robot is not a six-wheel rocker-bogie rover.
+    pub fn new(robot: &Description) -> Result<Self, GeometryError> {
+        Self::with_parts(robot, RockerBogie::default(), Motor::default())
+    }
+
+    /// The model of `robot` on a linkage and motors of its own.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_parts(
+        robot: &Description,
+        linkage: RockerBogie,
+        motor: Motor,
+    ) -> Result<Self, GeometryError> {
+        let kinematics = Ackermann6::new(robot)?;
+        if !(robot.mass_kg.is_finite() && robot.mass_kg > 0.0) {
+            return Err(GeometryError::Quantity {
+                robot: robot.name.clone(),
+                quantity: "mass_kg",
+                found: robot.mass_kg,
+                allowed: " above 0",
+            });
+        }
+        let sides = linkage.sides(&robot.name, &kinematics)?;
+        Ok(Self {
+            kinematics,
+            linkage,
+            sides,
+            motor,
+            weight_n: robot.mass_kg * GRAVITY_M_S2,
+        })
+    }
+
+    /// The ideal kinematics behind the model.
+    #[must_use]
+    pub const fn kinematics(&self) -> &Ackermann6 {
+        &self.kinematics
+    }
+
+    /// The steady motion in `situation`, starting the search from the ideal motion or from `start`
+    /// (the solution of a similar situation).
+    ///
+    /// With [`IMMOBILE_STUCK`] or more stuck wheels the body stands still and the free wheels
+    /// spin. At speed 0 everything stands still, exactly.
+    ///
+    /// # Errors
+    /// [`SlipError`] for impossible input, and if neither method converges.
+    pub fn solve(
+        &self,
+        situation: &Situation,
+        start: Option<&Unknowns>,
+    ) -> Result<Solution, SlipError> {
+        check(situation)?;
+        let targets = self
+            .kinematics
+            .targets(situation.curvature_1_m, situation.speed_m_s);
+        if situation.speed_m_s == 0.0 {
+            return Ok(self.at_rest([0.0; ROVER_WHEELS], &targets));
+        }
+        if situation.stuck.iter().filter(|&&stuck| stuck).count() >= IMMOBILE_STUCK {
+            return Ok(self.at_rest(self.spinning(situation, &targets), &targets));
+        }
+        let balance = balance::Balance::new(self, situation, &targets);
+        let ideal = balance.ideal(situation.speed_m_s, situation.curvature_1_m);
+        let (unknowns, iterations) = solver::solve(&balance, start, &ideal)?;
+        Ok(Solution {
+            velocity: [unknowns[0], unknowns[1], unknowns[2]],
+            wheel_rate_rad_s: std::array::from_fn(|i| unknowns[3 + i]),
+            load_n: balance.loads(&unknowns),
+            torque_n_m: std::array::from_fn(|i| {
+                self.torque(targets.rate_rad_s[i], unknowns[3 + i])
+            }),
+            iterations,
+        })
+    }
+
+    fn torque(&self, commanded_rad_s: f64, rate_rad_s: f64) -> f64 {
+        let limit = self.motor.torque_max_n_m;
+        (self.motor.gain_n_m_s * (commanded_rad_s - rate_rad_s)).clamp(-limit, limit)
+    }
+
+    /// Standing still on the static loads.
+    fn at_rest(&self, wheel_rate_rad_s: [f64; ROVER_WHEELS], targets: &WheelTargets) -> Solution {
+        let load_n = self.static_loads();
+        Solution {
+            velocity: [0.0; 3],
+            wheel_rate_rad_s,
+            load_n,
+            torque_n_m: std::array::from_fn(|i| {
+                self.torque(targets.rate_rad_s[i], wheel_rate_rad_s[i])
+            }),
+            iterations: 0,
+        }
+    }
+
+    fn static_loads(&self) -> [f64; ROVER_WHEELS] {
+        let mut load_n = [0.0; ROVER_WHEELS];
+        for side in &self.sides {
+            let side_loads =
+                self.linkage
+                    .loads(&self.kinematics, side, 0.5 * self.weight_n, [0.0; 3]);
+            for (&wheel, load) in side.iter().zip(side_loads) {
+                load_n[wheel] = load;
+            }
+        }
+        load_n
+    }
+
+    /// Rates of free wheels that spin under a body that does not move: the motor against the
+    /// shear at full slip and the bearing.
+    fn spinning(&self, situation: &Situation, targets: &WheelTargets) -> [f64; ROVER_WHEELS] {
+        let load_n = self.static_loads();
+        let shear = 1.0 - (-1.0 / situation.soil.shear_modulus).exp();
+        let motor = &self.motor;
+        std::array::from_fn(|i| {
+            if situation.stuck[i] {
+                return 0.0;
+            }
+            let commanded = targets.rate_rad_s[i];
+            let traction = situation.soil.friction[i] * shear * load_n[i];
+            let resistance = traction * self.kinematics.wheel_radius_m + motor.dry_friction_n_m;
+            let drive = (motor.gain_n_m_s * commanded.abs() - resistance).max(0.0);
+            (drive / (motor.gain_n_m_s + motor.viscous_friction_n_m_s)).copysign(commanded)
+        })
+    }
+}
+
+fn check(situation: &Situation) -> Result<(), SlipError> {
+    let positive = |value: f64| value.is_finite() && value > 0.0;
+    if !situation.curvature_1_m.is_finite() {
+        return Err(SlipError::Input("curvature_1_m"));
+    }
+    if !situation.speed_m_s.is_finite() {
+        return Err(SlipError::Input("speed_m_s"));
+    }
+    if !situation.soil.friction.iter().all(|&f| positive(f)) {
+        return Err(SlipError::Input("friction"));
+    }
+    if !positive(situation.soil.shear_modulus) {
+        return Err(SlipError::Input("shear_modulus"));
+    }
+    Ok(())
+}

@@ -1,0 +1,216 @@
+//! The nine equations: forces and moment on the body, torque on each wheel.
+
+use nalgebra::SMatrix;
+
+use super::shear::{Contact, Shear};
+use super::solver::{UNKNOWNS, Unknowns};
+use super::{Situation, SlipModel};
+use crate::kinematics::{ROVER_WHEELS, WheelTargets};
+
+/// Weight of the motors' rows (N m) against the forces' (N), for conditioning.
+pub(super) const MOTOR_SCALE: f64 = 5.0;
+/// Wheel rate within which dry bearing friction turns round smoothly, rad/s.
+const DRY_SMOOTHING_RAD_S: f64 = 0.01;
+/// Step of the forward differences.
+const DIFFERENCE: f64 = 1e-7;
+
+/// Derivatives by the unknowns.
+pub(super) type Jacobian = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
+
+/// The equations of one situation.
+pub(super) struct Balance<'a> {
+    model: &'a SlipModel,
+    contacts: [Contact; ROVER_WHEELS],
+    commanded_rad_s: [f64; ROVER_WHEELS],
+    stuck: [bool; ROVER_WHEELS],
+}
+
+impl<'a> Balance<'a> {
+    pub(super) fn new(model: &'a SlipModel, situation: &Situation, targets: &WheelTargets) -> Self {
+        let contacts = std::array::from_fn(|i| {
+            let (sin, cos) = targets.steer_rad[i].sin_cos();
+            Contact {
+                heading: (cos, sin),
+                radius_m: model.kinematics.wheel_radius_m,
+                friction: situation.soil.friction[i],
+                shear_modulus: situation.soil.shear_modulus,
+            }
+        });
+        Self {
+            model,
+            contacts,
+            commanded_rad_s: targets.rate_rad_s,
+            stuck: situation.stuck,
+        }
+    }
+
+    /// The motion without any slip, stuck wheels at rest: where the search starts.
+    pub(super) fn ideal(&self, speed_m_s: f64, curvature_1_m: f64) -> Unknowns {
+        let mut unknowns = Unknowns::zeros();
+        unknowns[0] = speed_m_s;
+        unknowns[2] = speed_m_s * curvature_1_m;
+        for i in 0..ROVER_WHEELS {
+            unknowns[3 + i] = self.commanded_rad_s[i];
+        }
+        self.hold_stuck(&unknowns)
+    }
+
+    /// `unknowns` with the stuck wheels at rest.
+    pub(super) fn hold_stuck(&self, unknowns: &Unknowns) -> Unknowns {
+        let mut held = *unknowns;
+        for i in 0..ROVER_WHEELS {
+            if self.stuck[i] {
+                held[3 + i] = 0.0;
+            }
+        }
+        held
+    }
+
+    /// Loads on the wheels, N.
+    pub(super) fn loads(&self, unknowns: &Unknowns) -> [f64; ROVER_WHEELS] {
+        self.loads_of(&std::array::from_fn(|i| self.shear(i, unknowns)))
+    }
+
+    /// Residuals: body forces N, moment N m, and the motors' torques times [`MOTOR_SCALE`].
+    pub(super) fn residual(&self, unknowns: &Unknowns) -> Unknowns {
+        let shears = std::array::from_fn(|i| self.shear(i, unknowns));
+        let loads = self.loads_of(&shears);
+        let (x, y) = (&self.model.kinematics.x_m, &self.model.kinematics.y_m);
+        let mut residual = Unknowns::zeros();
+        for i in 0..ROVER_WHEELS {
+            let (fx, fy) = (loads[i] * shears[i].x, loads[i] * shears[i].y);
+            residual[0] += fx;
+            residual[1] += fy;
+            residual[2] += x[i] * fy - y[i] * fx;
+            let rate = unknowns[3 + i];
+            residual[3 + i] = if self.stuck[i] {
+                -rate
+            } else {
+                MOTOR_SCALE * (self.drive(i, rate) - loads[i] * shears[i].along * self.radius())
+            };
+        }
+        residual
+    }
+
+    /// Derivatives of [`Self::residual`]. Each wheel's force depends on three numbers only (hub
+    /// velocity and rate) and each load on three forces, so differences are taken there and
+    /// chained: a quarter of the work of differencing all nine equations nine times.
+    pub(super) fn jacobian(&self, unknowns: &Unknowns) -> Jacobian {
+        let (x, y) = (&self.model.kinematics.x_m, &self.model.kinematics.y_m);
+        let shears: [Shear; ROVER_WHEELS] = std::array::from_fn(|i| self.shear(i, unknowns));
+        let loads = self.loads_of(&shears);
+        // Gradient of each wheel's forward, lateral and in-plane force by all unknowns.
+        let gradients: [[Unknowns; 3]; ROVER_WHEELS] =
+            std::array::from_fn(|i| self.shear_gradient(i, unknowns, &shears[i]));
+        let mut jacobian = Jacobian::zeros();
+        for side in &self.model.sides {
+            let sensitivity = self.load_sensitivity(side, &shears);
+            for (k, &i) in side.iter().enumerate() {
+                let [by_x, by_y, by_along] = &gradients[i];
+                let mut load = Unknowns::zeros();
+                for (j, &other) in side.iter().enumerate() {
+                    load += gradients[other][0] * sensitivity[k][j];
+                }
+                let fx = by_x * loads[i] + load * shears[i].x;
+                let fy = by_y * loads[i] + load * shears[i].y;
+                let along = by_along * loads[i] + load * shears[i].along;
+                for column in 0..UNKNOWNS {
+                    jacobian[(0, column)] += fx[column];
+                    jacobian[(1, column)] += fy[column];
+                    jacobian[(2, column)] += x[i] * fy[column] - y[i] * fx[column];
+                }
+                let row = 3 + i;
+                if self.stuck[i] {
+                    jacobian[(row, row)] = -1.0;
+                    continue;
+                }
+                let rate = unknowns[row];
+                let drive = (self.drive(i, rate + DIFFERENCE) - self.drive(i, rate)) / DIFFERENCE;
+                for column in 0..UNKNOWNS {
+                    jacobian[(row, column)] = -MOTOR_SCALE * self.radius() * along[column];
+                }
+                jacobian[(row, row)] += MOTOR_SCALE * drive;
+            }
+        }
+        jacobian
+    }
+
+    fn radius(&self) -> f64 {
+        self.model.kinematics.wheel_radius_m
+    }
+
+    /// Torque of motor and bearing on wheel `i`, N m.
+    fn drive(&self, i: usize, rate: f64) -> f64 {
+        let motor = &self.model.motor;
+        motor.gain_n_m_s * (self.commanded_rad_s[i] - rate)
+            - motor.viscous_friction_n_m_s * rate
+            - motor.dry_friction_n_m * (rate / DRY_SMOOTHING_RAD_S).tanh()
+    }
+
+    fn shear(&self, i: usize, unknowns: &Unknowns) -> Shear {
+        self.contacts[i].shear(self.hub(i, unknowns), unknowns[3 + i])
+    }
+
+    fn hub(&self, i: usize, unknowns: &Unknowns) -> (f64, f64) {
+        let kinematics = &self.model.kinematics;
+        (
+            unknowns[0] - unknowns[2] * kinematics.y_m[i],
+            unknowns[1] + unknowns[2] * kinematics.x_m[i],
+        )
+    }
+
+    fn loads_of(&self, shears: &[Shear; ROVER_WHEELS]) -> [f64; ROVER_WHEELS] {
+        let mut loads = [0.0; ROVER_WHEELS];
+        for side in &self.model.sides {
+            let side_loads = self.side_loads(side, side.map(|i| shears[i].x));
+            for (&i, load) in side.iter().zip(side_loads) {
+                loads[i] = load;
+            }
+        }
+        loads
+    }
+
+    fn side_loads(&self, side: &[usize; 3], traction: [f64; 3]) -> [f64; 3] {
+        let model = self.model;
+        model
+            .linkage
+            .loads(&model.kinematics, side, 0.5 * model.weight_n, traction)
+    }
+
+    /// d(load k)/d(forward force j per unit of load) on one side, N.
+    fn load_sensitivity(&self, side: &[usize; 3], shears: &[Shear; ROVER_WHEELS]) -> [[f64; 3]; 3] {
+        let traction = side.map(|i| shears[i].x);
+        let loads = self.side_loads(side, traction);
+        let mut sensitivity = [[0.0; 3]; 3];
+        for j in 0..3 {
+            let mut moved = traction;
+            moved[j] += DIFFERENCE;
+            let moved = self.side_loads(side, moved);
+            for k in 0..3 {
+                sensitivity[k][j] = (moved[k] - loads[k]) / DIFFERENCE;
+            }
+        }
+        sensitivity
+    }
+
+    /// Gradients of wheel `i`'s (x, y, along) by all unknowns.
+    fn shear_gradient(&self, i: usize, unknowns: &Unknowns, at: &Shear) -> [Unknowns; 3] {
+        let (hub, rate) = (self.hub(i, unknowns), unknowns[3 + i]);
+        let contact = &self.contacts[i];
+        let by = |moved: Shear| {
+            [moved.x - at.x, moved.y - at.y, moved.along - at.along].map(|d| d / DIFFERENCE)
+        };
+        let by_forward = by(contact.shear((hub.0 + DIFFERENCE, hub.1), rate));
+        let by_left = by(contact.shear((hub.0, hub.1 + DIFFERENCE), rate));
+        let by_rate = by(contact.shear(hub, rate + DIFFERENCE));
+        let kinematics = &self.model.kinematics;
+        std::array::from_fn(|q| {
+            let mut gradient = Unknowns::zeros();
+            gradient[0] = by_forward[q];
+            gradient[1] = by_left[q];
+            gradient[2] = kinematics.x_m[i] * by_left[q] - kinematics.y_m[i] * by_forward[q];
+            gradient[3 + i] = by_rate[q];
+            gradient
+        })
+    }
+}
