@@ -8,6 +8,7 @@
 //! Nothing here knows a clock or a port: times are parameters, and equal input and seed give equal
 //! bits. The binary wires this to the graph.
 
+mod check;
 mod drive;
 mod encoders;
 mod noise;
@@ -18,10 +19,11 @@ mod soil;
 mod wiring;
 mod world;
 
+pub use check::WorldError;
 pub use drive::{ACCELERATION_MAX_M_S2, CURVATURE_RATE_MAX_1_M_S, DriveCommand};
 pub use encoders::{NOISE_MAX_RAD_S, NOISE_MIN_RAD_S};
 pub use obedience::{EffectiveCommand, Obedience, Refusal, Refusals};
 pub use playback::{Playback, PlaybackError};
 pub use schedule::Schedule;
 pub use wiring::{PlaybackSource, SimulatorSource};
-pub use world::{CURRENT_PER_TORQUE_A_N_M, Truth, World, WorldError};
+pub use world::{CURRENT_PER_TORQUE_A_N_M, Truth, World};

@@ -2,11 +2,12 @@
 
 use vigil_blocks::{ActionOutcome, SensorFrame, Valid};
 use vigil_robot::injection::Change;
-use vigil_robot::kinematics::{GeometryError, ROVER_WHEELS, advance, wrap_angle};
+use vigil_robot::kinematics::{ROVER_WHEELS, advance, wrap_angle};
 use vigil_robot::slip::{Situation, SlipModel, Solution};
 use vigil_robot::{Description, Fault, FaultKind};
 use vigil_setup::schema::{DriveSegment, Simulator};
 
+use crate::check::{self, WorldError};
 use crate::drive::{Drive, Servo};
 use crate::encoders::Encoders;
 use crate::noise::Noise;
@@ -22,30 +23,6 @@ const STEP_MAX_S: f64 = 0.01;
 const CYCLE_MAX_S: f64 = 1.0;
 /// Velocity, m/s and rad/s, below which a stopped body stands still.
 const STILL: f64 = 1e-5;
-
-/// Why a world cannot be made, or a fault not be injected.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum WorldError {
-    /// The robot is not one that the simulator knows.
-    #[error(transparent)]
-    Geometry(#[from] GeometryError),
-    /// A number is out of range.
-    #[error("{quantity} is {found}: allowed is {allowed}")]
-    Quantity {
-        /// Which number.
-        quantity: &'static str,
-        /// Its value.
-        found: f64,
-        /// What is allowed.
-        allowed: &'static str,
-    },
-    /// There is no such wheel.
-    #[error("wheel {found} does not exist: allowed is 0 to 5")]
-    Wheel {
-        /// Its index.
-        found: usize,
-    },
-}
 
 /// The true state of the rover, for tests and displays; no filter may see it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,9 +78,9 @@ impl World {
         rate_hz: f64,
         seed: u64,
     ) -> Result<Self, WorldError> {
-        check_settings(settings, rate_hz)?;
-        check_drive(drive)?;
-        check_noise(robot)?;
+        check::settings(settings, rate_hz)?;
+        check::drive(drive)?;
+        check::noise(robot)?;
         let model = SlipModel::new(robot)?;
         let rest = Situation {
             curvature_1_m: 0.0,
@@ -112,7 +89,7 @@ impl World {
             soil: vigil_robot::slip::Soil::default(),
         };
         let Ok(motion) = model.solve(&rest, None) else {
-            return Err(quantity("speed at rest", 0.0, "always solvable"));
+            return Err(check::quantity("speed at rest", 0.0, "always solvable"));
         };
         // One stream each, so that a fault changes no healthy channel's noise.
         let stream = |n: u64| seed.wrapping_mul(4).wrapping_add(n);
@@ -221,7 +198,7 @@ impl World {
     /// # Errors
     /// [`WorldError::Wheel`].
     pub fn inject(&mut self, fault: Fault) -> Result<(), WorldError> {
-        check_wheel(fault.wheel)?;
+        check::wheel(fault.wheel)?;
         match fault.kind {
             FaultKind::Stuck => self.set_stuck(fault.wheel, true),
             kind => self.encoders.set(fault.wheel, Some(kind)),
@@ -234,7 +211,7 @@ impl World {
     /// # Errors
     /// [`WorldError::Wheel`].
     pub fn clear(&mut self, wheel: usize) -> Result<(), WorldError> {
-        check_wheel(wheel)?;
+        check::wheel(wheel)?;
         self.set_stuck(wheel, false);
         self.encoders.set(wheel, None);
         Ok(())
@@ -364,97 +341,4 @@ impl World {
         let rests = at.speed_m_s == 0.0;
         self.motion_age_s = if rests { f64::INFINITY } else { 0.0 };
     }
-}
-
-fn quantity(quantity: &'static str, found: f64, allowed: &'static str) -> WorldError {
-    WorldError::Quantity {
-        quantity,
-        found,
-        allowed,
-    }
-}
-
-fn check_wheel(found: usize) -> Result<(), WorldError> {
-    if found < ROVER_WHEELS {
-        Ok(())
-    } else {
-        Err(WorldError::Wheel { found })
-    }
-}
-
-fn check_settings(settings: &Simulator, rate_hz: f64) -> Result<(), WorldError> {
-    let ranges = [
-        ("rate_hz", rate_hz, 1.0, 1e4, "1 to 10000"),
-        ("friction", settings.friction, 0.1, 2.0, "0.1 to 2"),
-        (
-            "shear_modulus",
-            settings.shear_modulus,
-            0.02,
-            2.0,
-            "0.02 to 2",
-        ),
-        (
-            "friction_scatter",
-            settings.friction_scatter,
-            0.0,
-            0.5,
-            "0 to 0.5",
-        ),
-        (
-            "scatter_length_m",
-            settings.scatter_length_m,
-            0.01,
-            10.0,
-            "0.01 to 10",
-        ),
-        ("lag_s", settings.lag_s, 0.0, 1.0, "0 to 1"),
-        ("noise_scale", settings.noise_scale, 0.0, 10.0, "0 to 10"),
-    ];
-    for (name, found, low, high, allowed) in ranges {
-        if !(low..=high).contains(&found) {
-            return Err(quantity(name, found, allowed));
-        }
-    }
-    Ok(())
-}
-
-fn check_drive(drive: &[DriveSegment]) -> Result<(), WorldError> {
-    for segment in drive {
-        let duration_s = segment.duration_s;
-        if !(duration_s.is_finite() && duration_s > 0.0) {
-            let allowed = "any finite number above 0";
-            return Err(quantity("duration_s", duration_s, allowed));
-        }
-        for (name, found) in [
-            ("curvature_1_m", segment.curvature_1_m),
-            ("speed_m_s", segment.speed_m_s),
-        ] {
-            if !found.is_finite() {
-                return Err(quantity(name, found, "any finite number"));
-            }
-        }
-    }
-    Ok(())
-}
-
-fn check_noise(robot: &Description) -> Result<(), WorldError> {
-    let noise = &robot.noise;
-    let rate_hz = noise.reference_rate_hz;
-    if !(rate_hz.is_finite() && rate_hz > 0.0) {
-        let allowed = "any finite number above 0";
-        return Err(quantity("noise.reference_rate_hz", rate_hz, allowed));
-    }
-    for (name, found) in [
-        ("noise.position_m", noise.position_m),
-        ("noise.yaw_rad", noise.yaw_rad),
-        ("noise.yaw_rate_rad_s", noise.yaw_rate_rad_s),
-        ("noise.wheel_rate_rad_s", noise.wheel_rate_rad_s),
-        ("noise.steer_rad", noise.steer_rad),
-        ("noise.current_a", noise.current_a),
-    ] {
-        if !(found.is_finite() && found >= 0.0) {
-            return Err(quantity(name, found, "any finite number from 0"));
-        }
-    }
-    Ok(())
 }

@@ -11,7 +11,7 @@ use crate::rover::{NAMES, drive, even_soil, fault, measure, robot, segment, stea
 fn a_stuck_wheel_turns_the_rover_toward_its_side() {
     // Left turn, straight, right turn: a stuck left wheel always adds yaw to the left.
     for curvature in [0.5, 0.0, -0.5] {
-        for wheel in 0..6 {
+        for (wheel, name) in NAMES.into_iter().enumerate() {
             let turned = |stuck: bool| {
                 let mut world = steady(curvature, 100.0);
                 drive(&mut world, 100.0, 300);
@@ -23,7 +23,7 @@ fn a_stuck_wheel_turns_the_rover_toward_its_side() {
             };
             let added = turned(true) - turned(false);
             let side = if wheel < 3 { 1.0 } else { -1.0 };
-            assert!(added * side > 0.02, "{curvature} {}: {added}", NAMES[wheel]);
+            assert!(added * side > 0.02, "{curvature} {name}: {added}");
         }
     }
 }

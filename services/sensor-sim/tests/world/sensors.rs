@@ -7,8 +7,11 @@ use vigil_setup::schema::Simulator;
 
 use crate::rover::{drive, fault, measure, robot, segment};
 
+/// Picks one number of a frame.
+type Channel = fn(&SensorFrame) -> f64;
+
 /// Samples of one channel of a rover at rest, where the truth is 0 in every channel.
-fn at_rest(rate_hz: f64, noise_scale: f64, channel: fn(&SensorFrame) -> f64) -> Vec<f64> {
+fn at_rest(rate_hz: f64, noise_scale: f64, channel: Channel) -> Vec<f64> {
     let settings = Simulator {
         noise_scale,
         ..Simulator::default()
@@ -28,7 +31,7 @@ fn moments(samples: &[f64]) -> (f64, f64, f64) {
 #[test]
 fn noise_carries_equal_information_per_second_at_any_rate() {
     let noise = robot().noise;
-    let channels: [(&str, f64, fn(&SensorFrame) -> f64); 7] = [
+    let channels: [(&str, f64, Channel); 7] = [
         ("x", noise.position_m, |f| f.pose[0]),
         ("y", noise.position_m, |f| f.pose[1]),
         ("yaw", noise.yaw_rad, |f| f.pose[2]),

@@ -1,0 +1,122 @@
+//! What a world may be made of.
+
+use vigil_robot::Description;
+use vigil_robot::kinematics::{GeometryError, ROVER_WHEELS};
+use vigil_setup::schema::{DriveSegment, Simulator};
+
+/// Why a world cannot be made, or a fault not be injected.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum WorldError {
+    /// The robot is not one that the simulator knows.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+    /// A number is out of range.
+    #[error("{quantity} is {found}: allowed is {allowed}")]
+    Quantity {
+        /// Which number.
+        quantity: &'static str,
+        /// Its value.
+        found: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// There is no such wheel.
+    #[error("wheel {found} does not exist: allowed is 0 to 5")]
+    Wheel {
+        /// Its index.
+        found: usize,
+    },
+}
+
+pub(crate) fn quantity(quantity: &'static str, found: f64, allowed: &'static str) -> WorldError {
+    WorldError::Quantity {
+        quantity,
+        found,
+        allowed,
+    }
+}
+
+pub(crate) fn wheel(found: usize) -> Result<(), WorldError> {
+    if found < ROVER_WHEELS {
+        Ok(())
+    } else {
+        Err(WorldError::Wheel { found })
+    }
+}
+
+pub(crate) fn settings(settings: &Simulator, rate_hz: f64) -> Result<(), WorldError> {
+    let ranges = [
+        ("rate_hz", rate_hz, 1.0, 1e4, "1 to 10000"),
+        ("friction", settings.friction, 0.1, 2.0, "0.1 to 2"),
+        (
+            "shear_modulus",
+            settings.shear_modulus,
+            0.02,
+            2.0,
+            "0.02 to 2",
+        ),
+        (
+            "friction_scatter",
+            settings.friction_scatter,
+            0.0,
+            0.5,
+            "0 to 0.5",
+        ),
+        (
+            "scatter_length_m",
+            settings.scatter_length_m,
+            0.01,
+            10.0,
+            "0.01 to 10",
+        ),
+        ("lag_s", settings.lag_s, 0.0, 1.0, "0 to 1"),
+        ("noise_scale", settings.noise_scale, 0.0, 10.0, "0 to 10"),
+    ];
+    for (name, found, low, high, allowed) in ranges {
+        if !(low..=high).contains(&found) {
+            return Err(quantity(name, found, allowed));
+        }
+    }
+    Ok(())
+}
+
+pub(crate) fn drive(drive: &[DriveSegment]) -> Result<(), WorldError> {
+    for segment in drive {
+        let duration_s = segment.duration_s;
+        if !(duration_s.is_finite() && duration_s > 0.0) {
+            let allowed = "any finite number above 0";
+            return Err(quantity("duration_s", duration_s, allowed));
+        }
+        for (name, found) in [
+            ("curvature_1_m", segment.curvature_1_m),
+            ("speed_m_s", segment.speed_m_s),
+        ] {
+            if !found.is_finite() {
+                return Err(quantity(name, found, "any finite number"));
+            }
+        }
+    }
+    Ok(())
+}
+
+pub(crate) fn noise(robot: &Description) -> Result<(), WorldError> {
+    let noise = &robot.noise;
+    let rate_hz = noise.reference_rate_hz;
+    if !(rate_hz.is_finite() && rate_hz > 0.0) {
+        let allowed = "any finite number above 0";
+        return Err(quantity("noise.reference_rate_hz", rate_hz, allowed));
+    }
+    for (name, found) in [
+        ("noise.position_m", noise.position_m),
+        ("noise.yaw_rad", noise.yaw_rad),
+        ("noise.yaw_rate_rad_s", noise.yaw_rate_rad_s),
+        ("noise.wheel_rate_rad_s", noise.wheel_rate_rad_s),
+        ("noise.steer_rad", noise.steer_rad),
+        ("noise.current_a", noise.current_a),
+    ] {
+        if !(found.is_finite() && found >= 0.0) {
+            return Err(quantity(name, found, "any finite number from 0"));
+        }
+    }
+    Ok(())
+}
