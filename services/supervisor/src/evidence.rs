@@ -6,8 +6,9 @@
 //! is the more robust of the two known forms: tracking anew from a flat prior each epoch would
 //! throw away what the decision model itself knows (which faults mend, and how fast).
 //!
-//! When the identifier changes what it reports about (it begins to identify, or returns to
-//! watching), quotients across the change mean nothing: then its belief is taken over as it is.
+//! When the identifier changes what it reports about (it begins to identify, returns to watching,
+//! names another mode), its belief is taken over as it is: quotients across such a change mean
+//! little, and rounding in long products must not make the two beliefs drift apart.
 
 use vigil_blocks::{DECISION_STATES, FaultBelief};
 
@@ -31,9 +32,7 @@ pub(crate) struct Gathered {
 pub(crate) enum Effect {
     /// Wait for the end of the epoch.
     Wait,
-    /// The reported mode has changed: decide now.
-    Decide,
-    /// The reporting has changed: take the belief over and decide now.
+    /// The reporting or the reported mode has changed: take the belief over and decide now.
     Anchor,
 }
 
@@ -50,7 +49,7 @@ impl Gathered {
     pub(crate) fn add(&mut self, diagnosis: &FaultBelief, states: &[StateMeaning]) -> Effect {
         let before = self.identifying.replace(diagnosis.identifying);
         let changes = std::mem::replace(&mut self.mode_changes, diagnosis.mode_change_count);
-        if before != Some(diagnosis.identifying) {
+        if before != Some(diagnosis.identifying) || changes != diagnosis.mode_change_count {
             self.clear();
             return Effect::Anchor;
         }
@@ -58,11 +57,7 @@ impl Gathered {
             let (p, predicted) = probabilities(diagnosis, *meaning);
             *sum = (*sum + log_ratio(p, predicted)).clamp(-LOG_EPOCH_MAX, LOG_EPOCH_MAX);
         }
-        if changes == diagnosis.mode_change_count {
-            Effect::Wait
-        } else {
-            Effect::Decide
-        }
+        Effect::Wait
     }
 
     /// Writes the likelihoods, the largest being 1, and begins anew.

@@ -163,10 +163,8 @@ impl Supervisor {
             }
             self.log_evidence = 0.0;
             self.decide(timed);
-        } else if timed || effect == Effect::Decide {
-            if timed {
-                self.tracker.predict(&self.model, self.choice.action);
-            }
+        } else if timed {
+            self.tracker.predict(&self.model, self.choice.action);
             self.gathered.take(&mut self.scratch);
             match self.tracker.weigh(&self.scratch) {
                 Evidence::Taken(p) => self.log_evidence = p.max(f64::MIN_POSITIVE).ln(),
