@@ -20,13 +20,27 @@ fn changed(folder: &Path, file: &str, from: &str, to: &str) {
         };
         fs::write(target, text).unwrap();
     };
-    ["rover.toml", "rover.pomdp", "robots/rover.toml", "trees/rover.toml", "models/rover.toml"]
-        .map(copy);
+    for name in [
+        "rover.toml",
+        "rover.pomdp",
+        "robots/rover.toml",
+        "trees/rover.toml",
+        "models/rover.toml",
+    ] {
+        copy(name);
+    }
 }
 
 fn launch(config: &Path, name: &str, options: &[&str]) -> Output {
     binary("vigil-launcher")
-        .args(["--json", "--duration", "1", "--graph", &unique(name), "--config"])
+        .args([
+            "--json",
+            "--duration",
+            "1",
+            "--graph",
+            &unique(name),
+            "--config",
+        ])
         .arg(config)
         .args(options)
         .output()
@@ -45,14 +59,54 @@ fn assert_refused(output: &Output, expected: &[&str]) {
 #[test]
 fn every_bad_configuration_names_file_line_key_and_what_is_allowed() {
     let cases: [(&str, &str, &str, &[&str]); 8] = [
-        ("rover.toml", "rate_hz = 100.0", "rate_hz = 0.0", &["rover.toml:5", "rate_hz", "1 to"]),
-        ("rover.toml", "seed = 1", "seeds = 1", &["rover.toml:6", "unknown field `seeds`"]),
-        ("rover.toml", "core = 0,", "core = 99,", &["services.sensor-sim.core", "99 does not"]),
-        ("rover.toml", "priority = 55", "priority = 99", &["priority", "1 to 90"]),
-        ("rover.toml", "models/rover.toml", "models/no.toml", &["models/no.toml", "cannot be"]),
-        ("rover.toml", "filter = \"exact\"", "filter = \"x\"", &["'x' is not known", "exact"]),
-        ("robots/rover.toml", "mass_kg = 14.2", "mass_kg = nan", &["robots/rover.toml", "mass_kg"]),
-        ("trees/rover.toml", "\"LSS\"", "\"RSS\"", &["trees/rover.toml", "RSS"]),
+        (
+            "rover.toml",
+            "rate_hz = 100.0",
+            "rate_hz = 0.0",
+            &["rover.toml:5", "rate_hz", "1 to"],
+        ),
+        (
+            "rover.toml",
+            "seed = 1",
+            "seeds = 1",
+            &["rover.toml:6", "unknown field `seeds`"],
+        ),
+        (
+            "rover.toml",
+            "core = 0,",
+            "core = 99,",
+            &["services.sensor-sim.core", "99 does not"],
+        ),
+        (
+            "rover.toml",
+            "priority = 55",
+            "priority = 99",
+            &["priority", "1 to 90"],
+        ),
+        (
+            "rover.toml",
+            "models/rover.toml",
+            "models/no.toml",
+            &["models/no.toml", "cannot be"],
+        ),
+        (
+            "rover.toml",
+            "filter = \"exact\"",
+            "filter = \"x\"",
+            &["'x' is not known", "exact"],
+        ),
+        (
+            "robots/rover.toml",
+            "mass_kg = 14.2",
+            "mass_kg = nan",
+            &["robots/rover.toml", "mass_kg"],
+        ),
+        (
+            "trees/rover.toml",
+            "\"LSS\"",
+            "\"RSS\"",
+            &["trees/rover.toml:8", "no node 'LSS'"],
+        ),
     ];
     for (i, (file, from, to, expected)) in cases.into_iter().enumerate() {
         let folder = std::env::temp_dir().join(unique(&format!("bad{i}")));
@@ -66,9 +120,16 @@ fn every_bad_configuration_names_file_line_key_and_what_is_allowed() {
 #[test]
 fn all_problems_are_reported_at_once() {
     let folder = std::env::temp_dir().join(unique("many"));
-    changed(&folder, "rover.toml", "rate_hz = 100.0\nseed = 1", "rate_hz = 1e9\nseed = 1");
+    changed(
+        &folder,
+        "rover.toml",
+        "rate_hz = 100.0\nseed = 1",
+        "rate_hz = 1e9\nseed = 1",
+    );
     let path = folder.join("rover.toml");
-    let text = fs::read_to_string(&path).unwrap().replace("ring_s = 3.0", "ring_s = 300.0");
+    let text = fs::read_to_string(&path)
+        .unwrap()
+        .replace("ring_s = 3.0", "ring_s = 300.0");
     fs::write(&path, text).unwrap();
     let output = launch(&path, "many", &[]);
     fs::remove_dir_all(&folder).unwrap();
@@ -80,12 +141,24 @@ fn bad_options_and_recordings_are_refused() {
     let config = root().join("config/rover.toml");
     let frames = std::env::temp_dir().join(unique("frames.csv"));
     let frames_text = frames.display().to_string();
-    assert_refused(&launch(&config, "o1", &["--inject", "stuck:XX@1"]), &["XX", "LF LM LR"]);
-    assert_refused(&launch(&config, "o2", &["--inject", "stuck:RM"]), &["stuck:RM"]);
-    assert_refused(&launch(&config, "o3", &["--replay", &frames_text]), &["frames.csv"]);
+    assert_refused(
+        &launch(&config, "o1", &["--inject", "stuck:XX@1"]),
+        &["XX", "LF LM LR"],
+    );
+    assert_refused(
+        &launch(&config, "o2", &["--inject", "stuck:RM"]),
+        &["stuck:RM"],
+    );
+    assert_refused(
+        &launch(&config, "o3", &["--replay", &frames_text]),
+        &["frames.csv"],
+    );
     fs::write(&frames, "run,t,x\n0,0.05,1\n").unwrap();
     let missing = ["frames.csv", "yaw", "cmd_curv"];
-    assert_refused(&launch(&config, "o4", &["--replay", &frames_text]), &missing);
+    assert_refused(
+        &launch(&config, "o4", &["--replay", &frames_text]),
+        &missing,
+    );
     fs::remove_file(&frames).unwrap();
 }
 
@@ -99,7 +172,9 @@ fn a_second_graph_of_the_same_name_is_refused_and_the_first_goes_on() {
     let second = launch(&root().join("config/rover.toml"), "twice", &[]);
     assert_refused(&second, &[&first.setup.file.graph.name, "running"]);
     let cycles = health.poll()["supervisor"].cycles;
-    eventually("the first goes on", || (health.poll()["supervisor"].cycles > cycles).then_some(()));
+    eventually("the first goes on", || {
+        (health.poll()["supervisor"].cycles > cycles).then_some(())
+    });
     assert!(first.is_alive());
     first.interrupt();
     let summary = first.finish();

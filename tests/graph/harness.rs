@@ -24,14 +24,21 @@ pub fn machine() -> MutexGuard<'static, ()> {
 }
 
 pub fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap()
+        .to_path_buf()
 }
 
 /// A binary of the workspace, built into the same target folder as this test.
 pub fn binary(name: &str) -> Command {
     let deps = std::env::current_exe().unwrap();
     let path = deps.parent().unwrap().with_file_name(name);
-    assert!(path.exists(), "{} is not built: run `cargo build --workspace`", path.display());
+    assert!(
+        path.exists(),
+        "{} is not built: run `cargo build --workspace`",
+        path.display()
+    );
     let mut command = Command::new(path);
     command.current_dir(root()).env_remove("VIGIL_CONFIG");
     command
@@ -56,7 +63,11 @@ impl Running {
 
     pub fn start_with(config: PathBuf, name: &str, options: &[&str]) -> Self {
         let graph = unique(name);
-        let args = GraphArgs { config, graph: Some(graph.clone()), ..GraphArgs::default() };
+        let args = GraphArgs {
+            config,
+            graph: Some(graph.clone()),
+            ..GraphArgs::default()
+        };
         let launcher = binary("vigil-launcher")
             .args(["--json", "--graph", &graph, "--config"])
             .arg(&args.config)
@@ -64,8 +75,16 @@ impl Running {
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
-        let setup = GraphArgs { config: root().join(&args.config), ..args }.load().unwrap();
-        Self { launcher: Some(launcher), setup }
+        let setup = GraphArgs {
+            config: root().join(&args.config),
+            ..args
+        }
+        .load()
+        .unwrap();
+        Self {
+            launcher: Some(launcher),
+            setup,
+        }
     }
 
     /// An observer's link to the graph.
@@ -90,8 +109,14 @@ impl Running {
         assert!(output.status.success(), "launcher: {}", output.status);
         let text = String::from_utf8(output.stdout).unwrap();
         let residue = self.setup.domain().unwrap().residue();
-        assert_eq!(residue, Vec::<PathBuf>::new(), "shared memory is left behind");
-        Summary { json: serde_json::from_str(&text).unwrap() }
+        assert_eq!(
+            residue,
+            Vec::<PathBuf>::new(),
+            "shared memory is left behind"
+        );
+        Summary {
+            json: serde_json::from_str(&text).unwrap(),
+        }
     }
 }
 
@@ -145,7 +170,10 @@ pub struct HealthWatch {
 impl HealthWatch {
     pub fn new(graph: &Graph) -> Self {
         let open = |name| (name, graph.receiver(Topic::Health(name)).unwrap());
-        Self { receivers: ServiceName::ALL.into_iter().map(open).collect(), latest: BTreeMap::new() }
+        Self {
+            receivers: ServiceName::ALL.into_iter().map(open).collect(),
+            latest: BTreeMap::new(),
+        }
     }
 
     pub fn poll(&mut self) -> &BTreeMap<&'static str, Health> {
@@ -180,7 +208,12 @@ impl Summary {
         events
             .iter()
             .filter(|e| e["event"] == kind)
-            .map(|e| (e["t_s"].as_f64().unwrap(), e["what"].as_str().unwrap().to_owned()))
+            .map(|e| {
+                (
+                    e["t_s"].as_f64().unwrap(),
+                    e["what"].as_str().unwrap().to_owned(),
+                )
+            })
             .collect()
     }
 }
@@ -194,13 +227,29 @@ pub struct ModeWatch {
 
 impl ModeWatch {
     pub fn new(graph: &Graph, setup: &Setup) -> Self {
-        let names = setup.tree.nodes().iter().map(|node| node.name.clone()).collect();
-        Self { receiver: graph.receiver(Topic::Diagnosis).unwrap(), names, mode: None }
+        let names = setup
+            .tree
+            .nodes()
+            .iter()
+            .map(|node| node.name.clone())
+            .collect();
+        Self {
+            receiver: graph.receiver(Topic::Diagnosis).unwrap(),
+            names,
+            mode: None,
+        }
     }
 
     pub fn poll(&mut self) -> Option<String> {
-        drain(self.receiver.as_mut(), |belief| self.mode = Some(belief.mode));
+        drain(self.receiver.as_mut(), |belief| {
+            self.mode = Some(belief.mode)
+        });
         let mode = self.mode? as usize;
-        Some(self.names.get(mode).cloned().unwrap_or_else(|| format!("mode {mode}")))
+        Some(
+            self.names
+                .get(mode)
+                .cloned()
+                .unwrap_or_else(|| format!("mode {mode}")),
+        )
     }
 }

@@ -25,7 +25,9 @@ struct Recorded {
 fn record(graph: &mut Running) -> Recorded {
     let observed = graph.observe();
     let mut sensor = observed.receiver::<SensorFrame>(Topic::Sensor).unwrap();
-    let mut detection = observed.receiver::<DetectionBelief>(Topic::Detection).unwrap();
+    let mut detection = observed
+        .receiver::<DetectionBelief>(Topic::Detection)
+        .unwrap();
     let mut diagnosis = observed.receiver::<FaultBelief>(Topic::Diagnosis).unwrap();
     let mut recorded = Recorded::default();
     while graph.is_alive() {
@@ -58,9 +60,17 @@ fn beliefs_live_and_offline_are_bit_identical() {
     let recorded = record(&mut graph);
     let setup = graph.setup.clone();
     graph.finish();
-    assert_eq!(recorded.first_detection_seq, Some(0), "the observer was there from the start");
+    assert_eq!(
+        recorded.first_detection_seq,
+        Some(0),
+        "the observer was there from the start"
+    );
     let last = *recorded.frames.keys().last().unwrap();
-    assert_eq!(recorded.frames.len() as u64, last + 1, "every frame was recorded");
+    assert_eq!(
+        recorded.frames.len() as u64,
+        last + 1,
+        "every frame was recorded"
+    );
 
     let file = &setup.file;
     let model = Model::from_toml(&setup.model_text).unwrap();
@@ -75,9 +85,16 @@ fn beliefs_live_and_offline_are_bit_identical() {
         detector.step(Entry::Frame(frame), &mut belief, &mut particles);
         let live = recorded.detections.get(seq);
         if let Some(live) = live {
-            let offline =
-                DetectionBelief { header: live.header, cause: live.cause, ..belief };
-            assert_eq!(bytemuck::bytes_of(&offline), bytemuck::bytes_of(live), "frame {seq}");
+            let offline = DetectionBelief {
+                header: live.header,
+                cause: live.cause,
+                ..belief
+            };
+            assert_eq!(
+                bytemuck::bytes_of(&offline),
+                bytemuck::bytes_of(live),
+                "frame {seq}"
+            );
         }
         // A frame whose detection was folded into a later one had none live either.
         let detection = live.map(|_| (&belief, &*particles));
@@ -86,12 +103,24 @@ fn beliefs_live_and_offline_are_bit_identical() {
         identifier.step(Entry::Frame(input), &mut diagnosis, &mut drawn);
         if let Some(live) = recorded.diagnoses.get(seq) {
             let header: Header = live.header;
-            let offline = FaultBelief { header, cause: live.cause, ..diagnosis };
-            assert_eq!(bytemuck::bytes_of(&offline), bytemuck::bytes_of(live), "frame {seq}");
+            let offline = FaultBelief {
+                header,
+                cause: live.cause,
+                ..diagnosis
+            };
+            assert_eq!(
+                bytemuck::bytes_of(&offline),
+                bytemuck::bytes_of(live),
+                "frame {seq}"
+            );
             compared += 1;
         }
     }
-    assert!(compared > 600, "{compared} beliefs compared, {} predictions", recorded.missed);
+    assert!(
+        compared > 600,
+        "{compared} beliefs compared, {} predictions",
+        recorded.missed
+    );
     let named = recorded.diagnoses.values().last().unwrap().mode;
     assert_eq!(setup.tree.nodes()[named as usize].name, "LM_STUCK");
 }

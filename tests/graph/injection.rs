@@ -8,15 +8,28 @@ fn assert_told_and_obeyed(summary: &Summary) {
     assert_eq!(injected.len(), 1);
     assert_eq!(injected[0].1, "stuck:RM");
     let alarms = summary.events("alarm");
-    assert!(!alarms.is_empty() && alarms[0].0 > injected[0].0, "alarms: {alarms:?}");
+    assert!(
+        !alarms.is_empty() && alarms[0].0 > injected[0].0,
+        "alarms: {alarms:?}"
+    );
     let diagnoses = summary.events("diagnosis");
     let (_, last) = diagnoses.last().unwrap();
     assert_eq!(last, "RM_STUCK", "diagnoses: {diagnoses:?}");
-    assert!(diagnoses.iter().all(|(t, _)| *t > injected[0].0), "diagnoses: {diagnoses:?}");
-    let named = diagnoses.iter().find(|(_, what)| what == "RM_STUCK").unwrap().0;
+    assert!(
+        diagnoses.iter().all(|(t, _)| *t > injected[0].0),
+        "diagnoses: {diagnoses:?}"
+    );
+    let named = diagnoses
+        .iter()
+        .find(|(_, what)| what == "RM_STUCK")
+        .unwrap()
+        .0;
     let acted = |(t, what): &(f64, String)| *t >= injected[0].0 && !what.starts_with("go_on");
     let actions = summary.events("action");
-    assert!(actions.iter().any(acted), "named at {named}, actions: {actions:?}");
+    assert!(
+        actions.iter().any(acted),
+        "named at {named}, actions: {actions:?}"
+    );
     let (_, action) = actions.last().unwrap();
     assert!(!action.starts_with("go_on"), "last action: {action}");
 }
@@ -28,11 +41,16 @@ fn a_stuck_wheel_is_detected_named_and_acted_upon() {
     let summary = graph.finish();
     assert_told_and_obeyed(&summary);
     let services = summary.json["services"].as_object().unwrap();
-    let pids: std::collections::BTreeSet<u64> =
-        services.values().map(|s| s["pid"].as_u64().unwrap()).collect();
+    let pids: std::collections::BTreeSet<u64> = services
+        .values()
+        .map(|s| s["pid"].as_u64().unwrap())
+        .collect();
     assert_eq!(pids.len(), 4, "four processes");
     for (name, service) in services {
-        assert_eq!(service["core"], service["core_wanted"], "{name} is where it was put");
+        assert_eq!(
+            service["core"], service["core_wanted"],
+            "{name} is where it was put"
+        );
     }
     assert!(summary.json["end_to_end_us"]["n"].as_u64().unwrap() > 800);
 }
@@ -40,7 +58,14 @@ fn a_stuck_wheel_is_detected_named_and_acted_upon() {
 #[test]
 fn a_stuck_wheel_is_named_at_1_khz_too() {
     let _machine = machine();
-    let options = ["--rate", "1000", "--duration", "8", "--inject", "stuck:RM@3"];
+    let options = [
+        "--rate",
+        "1000",
+        "--duration",
+        "8",
+        "--inject",
+        "stuck:RM@3",
+    ];
     assert_told_and_obeyed(&Running::start("khz", &options).finish());
 }
 
@@ -62,14 +87,26 @@ fn a_fault_injected_at_run_time_is_named_and_its_end_is_seen() {
     let mut health = crate::harness::HealthWatch::new(&observed);
     eventually("all services run", || health.all_running().then_some(()));
     let inject = |spec: &str| {
-        binary("vigil").args(["inject", "--graph", &name, spec]).status().unwrap().code()
+        binary("vigil")
+            .args(["inject", "--graph", &name, spec])
+            .status()
+            .unwrap()
+            .code()
     };
     assert_eq!(inject("encoder:LF:zero"), Some(0));
-    assert_eq!(inject("encoder:XX:zero"), Some(2), "a wheel that does not exist");
+    assert_eq!(
+        inject("encoder:XX:zero"),
+        Some(2),
+        "a wheel that does not exist"
+    );
     let mut seen = crate::harness::ModeWatch::new(&observed, &graph.setup);
-    eventually("LF_ENC is named", || seen.poll().filter(|mode| mode == "LF_ENC"));
+    eventually("LF_ENC is named", || {
+        seen.poll().filter(|mode| mode == "LF_ENC")
+    });
     assert_eq!(inject("clear:LF"), Some(0));
-    eventually("the rover is nominal again", || seen.poll().filter(|mode| mode == "ND"));
+    eventually("the rover is nominal again", || {
+        seen.poll().filter(|mode| mode == "ND")
+    });
     assert!(graph.is_alive());
     graph.interrupt();
     let summary = graph.finish();

@@ -14,7 +14,10 @@ fn each_service_killed_once_comes_back_and_nothing_is_left() {
     for service in services {
         eventually("all services run", || health.all_running().then_some(()));
         let before = health.poll()[service];
-        let status = Command::new("kill").args(["-9", &before.pid.to_string()]).status().unwrap();
+        let status = Command::new("kill")
+            .args(["-9", &before.pid.to_string()])
+            .status()
+            .unwrap();
         assert!(status.success());
         let back = eventually("it is restarted", || {
             let now = health.poll()[service];
@@ -32,5 +35,9 @@ fn each_service_killed_once_comes_back_and_nothing_is_left() {
     for service in services {
         assert_eq!(summary.service(service, "restarts"), 1, "{service}");
     }
-    assert_eq!(summary.events("diagnosis"), [], "a restart is no fault of the rover");
+    assert_eq!(
+        summary.events("diagnosis"),
+        [],
+        "a restart is no fault of the rover"
+    );
 }

@@ -25,10 +25,20 @@ fn stuck_wheels_of_recorded_runs_are_named_live() {
     // One run of each stuck wheel, and a nominal one between them.
     let mut runs: Vec<u32> = ["LF", "LM", "LR", "RF", "RM", "RR"]
         .iter()
-        .map(|w| *labels.iter().find(|(_, m)| **m == format!("{w}_STUCK")).unwrap().0)
+        .map(|w| {
+            *labels
+                .iter()
+                .find(|(_, m)| **m == format!("{w}_STUCK"))
+                .unwrap()
+                .0
+        })
         .collect();
     runs.insert(3, *labels.iter().find(|(_, mode)| *mode == "ND").unwrap().0);
-    let list = runs.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+    let list = runs
+        .iter()
+        .map(ToString::to_string)
+        .collect::<Vec<_>>()
+        .join(",");
     let frames = "tests/data/rover/learn_frames.csv.gz";
     let options = ["--replay", frames, "--runs", &list, "--speed", "20"];
     let summary = Running::start("playback", &options).finish();

@@ -20,11 +20,23 @@ struct Tap<T> {
 impl<T: Block> Tap<T> {
     fn new(graph: &Graph, topic: Topic, cause: fn(&T) -> Option<Cause>) -> Self {
         let receiver = graph.receiver(topic).unwrap();
-        Self { receiver, cause, published_ns: BTreeMap::new(), next: None, lost: 0 }
+        Self {
+            receiver,
+            cause,
+            published_ns: BTreeMap::new(),
+            next: None,
+            lost: 0,
+        }
     }
 
     fn poll(&mut self) {
-        let Self { receiver, cause, published_ns, next, lost } = self;
+        let Self {
+            receiver,
+            cause,
+            published_ns,
+            next,
+            lost,
+        } = self;
         drain(receiver.as_mut(), |block: &T| {
             let header = *block.header();
             if let Some((epoch, seq)) = *next
@@ -34,7 +46,9 @@ impl<T: Block> Tap<T> {
             }
             *next = Some((header.epoch, header.seq + 1));
             if cause(block).is_none_or(|c| c.kind() == Some(CauseKind::Frame)) {
-                published_ns.entry(header.t_schedule_ns).or_insert(header.t_publish_ns);
+                published_ns
+                    .entry(header.t_schedule_ns)
+                    .or_insert(header.t_publish_ns);
             }
         });
     }
@@ -45,7 +59,10 @@ impl<T: Block> Tap<T> {
             .map(|k| first_ns + k * period_ns)
             .filter(|at_ns| {
                 let due_ns = at_ns + deadline_ns;
-                !self.published_ns.get(at_ns).is_some_and(|&out_ns| out_ns <= due_ns)
+                !self
+                    .published_ns
+                    .get(at_ns)
+                    .is_some_and(|&out_ns| out_ns <= due_ns)
             })
             .count() as u64
     }
@@ -63,30 +80,42 @@ fn the_monitors_count_what_the_stamps_say() {
         let path = config.join(name).display().to_string();
         text.replacen(&format!("\"{name}\""), &format!("\"{path}\""), 1)
     };
-    let text = ["robots/rover.toml", "trees/rover.toml", "models/rover.toml", "rover.pomdp"]
-        .into_iter()
-        .fold(text, absolute);
+    let text = [
+        "robots/rover.toml",
+        "trees/rover.toml",
+        "models/rover.toml",
+        "rover.pomdp",
+    ]
+    .into_iter()
+    .fold(text, absolute);
     let path = folder.join("rover.toml");
-    fs::write(&path, format!("{text}\n[transport]\nbuffer = 256\nmax_subscribers = 4\n")).unwrap();
+    fs::write(
+        &path,
+        format!("{text}\n[transport]\nbuffer = 256\nmax_subscribers = 4\n"),
+    )
+    .unwrap();
 
     let mut graph = Running::start_with(path, "recount", &["--rate", "1000", "--duration", "8"]);
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
     let mut sensor = Tap::<SensorFrame>::new(&observed, Topic::Sensor, |_| None);
-    let mut detection =
-        Tap::<DetectionBelief>::new(&observed, Topic::Detection, |b| Some(b.cause));
+    let mut detection = Tap::<DetectionBelief>::new(&observed, Topic::Detection, |b| Some(b.cause));
     let mut diagnosis = Tap::<FaultBelief>::new(&observed, Topic::Diagnosis, |b| Some(b.cause));
     let mut action = Tap::<Action>::new(&observed, Topic::Action, |b| Some(b.cause));
     while graph.is_alive() {
+        // Health first: the taps then hold every block that it accounts for.
+        health.poll();
         sensor.poll();
         detection.poll();
         diagnosis.poll();
         action.poll();
-        health.poll();
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     fs::remove_dir_all(&folder).unwrap();
-    assert_eq!([sensor.lost, detection.lost, diagnosis.lost, action.lost], [0; 4]);
+    assert_eq!(
+        [sensor.lost, detection.lost, diagnosis.lost, action.lost],
+        [0; 4]
+    );
     let check = |name: &str, recount: &dyn Fn([u64; 2], u64, u64) -> u64| {
         let h = health.latest[name];
         let counted = recount(h.accounted_ns, h.period_ns, h.deadline_ns);
@@ -95,6 +124,8 @@ fn the_monitors_count_what_the_stamps_say() {
     };
     check("sensor-sim", &|window, p, d| sensor.recount(window, p, d));
     check("detector", &|window, p, d| detection.recount(window, p, d));
-    check("identifier", &|window, p, d| diagnosis.recount(window, p, d));
+    check("identifier", &|window, p, d| {
+        diagnosis.recount(window, p, d)
+    });
     check("supervisor", &|window, p, d| action.recount(window, p, d));
 }

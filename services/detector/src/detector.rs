@@ -1,6 +1,8 @@
 //! The detector's `step`: guard, observe, monitor, alarm, report.
 
-use vigil_blocks::{Channel, DetectionBelief, Entry, PARTICLE_CAPACITY, ParticleBlock, SensorFrame, Symptoms};
+use vigil_blocks::{
+    Channel, DetectionBelief, Entry, PARTICLE_CAPACITY, ParticleBlock, SensorFrame, Symptoms,
+};
 use vigil_inference::logspace::probability;
 use vigil_robot::Description;
 use vigil_robot::learned::monitor::Channels;
@@ -181,7 +183,11 @@ impl Detector {
             // Clearing needs evidence: time at rest does not count.
             let clear = (self.alarm_log_odds - CLEAR_BELOW).min(CLEAR_LOG_ODDS);
             let quiet = log_odds < clear;
-            self.quiet_s = if quiet { self.quiet_s + observation.dt_s } else { 0.0 };
+            self.quiet_s = if quiet {
+                self.quiet_s + observation.dt_s
+            } else {
+                0.0
+            };
             if self.quiet_s >= CLEAR_S {
                 self.alarm_t_ns = 0;
             }
@@ -205,9 +211,17 @@ impl Detector {
         let odds = (p_fault / (1.0 - p_fault)).ln();
         belief.run_id = self.run_id;
         belief.p_fault = p_fault;
-        belief.log_odds = if missed > 0 && odds.is_finite() { odds } else { report.log_odds };
+        belief.log_odds = if missed > 0 && odds.is_finite() {
+            odds
+        } else {
+            report.log_odds
+        };
         belief.alarm_log_odds = self.alarm_log_odds;
-        belief.evidence = if report.evidence.is_finite() { report.evidence } else { 0.0 };
+        belief.evidence = if report.evidence.is_finite() {
+            report.evidence
+        } else {
+            0.0
+        };
         belief.effective_sample_size = report.effective_sample_size;
         belief.noise_scale = self.monitor.noise_scale();
         belief.channel_log_odds = report.channels;

@@ -3,9 +3,9 @@
 use vigil_blocks::{
     Cause, Control, ControlCommand, DetectionBelief, Entry, EventKind, ParticleBlock, SensorFrame,
 };
+use vigil_cycle::Topic;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Graph, HealthBoard, Intake, PortError, Receiver, Sender, Stage, Stamp};
-use vigil_cycle::Topic;
 
 use crate::Detector;
 
@@ -52,7 +52,9 @@ impl Stage for DetectorStage {
             if !self.frames.advance() {
                 break;
             }
-            let Some(frame) = self.frames.held() else { break };
+            let Some(frame) = self.frames.held() else {
+                break;
+            };
             let identity = (frame.header.epoch, frame.header.seq);
             if intake.accept::<SensorFrame>(&frame.header, Some(identity)) {
                 let (belief, particles) = (self.belief.block(), self.particles.block());
@@ -66,12 +68,7 @@ impl Stage for DetectorStage {
         self.step(Entry::Missed(count));
     }
 
-    fn publish(
-        &mut self,
-        cause: Cause,
-        stamp: Stamp,
-        clock: &dyn Clock,
-    ) -> Result<u64, PortError> {
+    fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
         self.belief.block().cause = cause;
         self.particles.block().cause = cause;
         // Particles first: they are there when the belief wakes the identifier.
@@ -81,12 +78,18 @@ impl Stage for DetectorStage {
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         if self.alarm != self.alarm_told {
-            let kind = if self.alarm { EventKind::Alarm } else { EventKind::Cleared };
+            let kind = if self.alarm {
+                EventKind::Alarm
+            } else {
+                EventKind::Cleared
+            };
             health.event(now_ns, kind, 0, self.p_fault, 0);
             self.alarm_told = self.alarm;
         }
         while self.control.advance() {
-            let Some(command) = self.control.held() else { break };
+            let Some(command) = self.control.held() else {
+                break;
+            };
             let (epoch, seq) = (command.header.epoch, command.header.seq);
             let reset = command.command == ControlCommand::Reset as u32;
             health.answer_control(epoch, seq, reset);

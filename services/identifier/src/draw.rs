@@ -33,7 +33,11 @@ pub fn moments(block: &ParticleBlock) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     }
     let mean = mean / total;
     let covariance = square / total - mean * mean.transpose() + Matrix3::identity() * PRECISION;
-    let finite = total > 0.0 && mean.iter().chain(covariance.iter()).all(|value| value.is_finite());
+    let finite = total > 0.0
+        && mean
+            .iter()
+            .chain(covariance.iter())
+            .all(|value| value.is_finite());
     finite.then(|| (mean + origin, covariance))
 }
 
@@ -58,16 +62,21 @@ pub fn draw(
         if until <= filled {
             continue;
         }
-        let mean = hypothesis.track.pose();
-        let spread = hypothesis.track.pose_covariance() + Matrix3::identity() * PRECISION;
+        let mean = hypothesis.state.track.pose();
+        let spread = hypothesis.state.track.pose_covariance() + Matrix3::identity() * PRECISION;
         let factor = Cholesky::new(spread).map_or(Matrix3::zeros(), |factor| factor.l());
+        let broken: [f64; WHEELS] =
+            std::array::from_fn(|wheel| match (hypothesis.mode, leaves.encoder[wheel]) {
+                (NOMINAL, Some(_)) => hypothesis.state.encoders.p_broken(wheel),
+                _ => 0.0,
+            });
         for slot in filled..until {
             let normal = Vector3::from_fn(|_, _| rng.sample(StandardNormal));
             let pose = mean + factor * normal;
             out.x[slot] = pose[0] as f32;
             out.y[slot] = pose[1] as f32;
             out.yaw[slot] = wrap(pose[2]) as f32;
-            out.mode[slot] = node(exact, leaves, hypothesis.mode, rng.random());
+            out.mode[slot] = node(leaves, hypothesis.mode, &broken, rng.random());
         }
         filled = until;
     }
@@ -76,14 +85,14 @@ pub fn draw(
 }
 
 /// Node of a particle in a motion mode; nominal motion is divided among the encoders' states.
-fn node(exact: &Exact, leaves: &Leaves, mode: usize, u: f64) -> u32 {
+fn node(leaves: &Leaves, mode: usize, broken: &[f64; WHEELS], u: f64) -> u32 {
     match mode {
-        UNKNOWN => MODE_UNKNOWN,
+        UNKNOWN.. => MODE_UNKNOWN,
         NOMINAL => {
             let mut sum = 0.0;
-            for wheel in 0..WHEELS {
-                sum += exact.encoder_log_p(wheel).exp();
-                if let Some(leaf) = leaves.encoder[wheel].filter(|_| u < sum) {
+            for (leaf, p) in leaves.encoder.iter().zip(broken) {
+                sum += p;
+                if let Some(leaf) = leaf.filter(|_| u < sum) {
                     return leaf as u32;
                 }
             }
@@ -91,4 +100,20 @@ fn node(exact: &Exact, leaves: &Leaves, mode: usize, u: f64) -> u32 {
         }
         stuck => leaves.stuck[stuck - 1].map_or(0, |leaf| leaf as u32),
     }
+}
+
+/// Copies the particles of a block (not its header), at most `limit`; none if one is not finite.
+pub fn copy(from: &ParticleBlock, limit: usize, to: &mut ParticleBlock) {
+    let count = (from.count as usize).min(limit).min(PARTICLE_CAPACITY);
+    let finite = |values: &[f32]| values[..count].iter().all(|value| value.is_finite());
+    if !(finite(&from.x) && finite(&from.y) && finite(&from.yaw) && finite(&from.log_weight)) {
+        to.count = 0;
+        return;
+    }
+    to.count = count as u32;
+    to.mode[..count].copy_from_slice(&from.mode[..count]);
+    to.x[..count].copy_from_slice(&from.x[..count]);
+    to.y[..count].copy_from_slice(&from.y[..count]);
+    to.yaw[..count].copy_from_slice(&from.yaw[..count]);
+    to.log_weight[..count].copy_from_slice(&from.log_weight[..count]);
 }

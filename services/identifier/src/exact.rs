@@ -8,28 +8,24 @@
 use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::WHEELS;
 use vigil_inference::bank::{Bank, Hypothesis};
-use vigil_inference::forward::Forward;
 use vigil_inference::logspace::{log_add, log_normal};
 use vigil_inference::track::{Displacement, MotionNoise, Track};
 use vigil_robot::Description;
 use vigil_robot::learned::wheels::{rolling_rate, steering_angle};
 use vigil_robot::learned::{EncoderState, Model, MotionModel, Observation};
 
+use crate::encoders::{Births, Encoders};
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
 
-/// Motion modes: nominal, each wheel stuck, unknown.
-pub const MOTIONS: usize = WHEELS + 2;
+/// Motion modes: nominal, each wheel stuck, two kinds of unknown.
+pub const MOTIONS: usize = WHEELS + 3;
 /// Index of the nominal motion.
 pub const NOMINAL: usize = 0;
-/// Index of the unknown motion.
+/// Index of the unknown motion whose wheels turn as commanded.
 pub const UNKNOWN: usize = WHEELS + 1;
-/// States of the encoders: healthy, or one wheel's encoder broken in one of four ways.
-const ENCODER_STATES: usize = 1 + KINDS * WHEELS;
-const KINDS: usize = 4;
-/// Prior shares of the ways: zero, frozen, noise, dead (zero plus the sensor's noise).
-const KIND_SHARES: [f64; KINDS] = [0.32, 0.32, 0.32, 0.04];
-
+/// Index of the unknown motion whose wheels and steering may do anything.
+const UNKNOWN_ANY: usize = WHEELS + 2;
 /// Onset hypotheses kept per mode.
 const PER_MODE: usize = 32;
 /// Hypotheses less probable than this are dropped (natural logarithm).
@@ -62,6 +58,16 @@ struct Mode {
     share: f64,
 }
 
+/// Continuous state of a hypothesis, and what its encoders do. Each nominal hypothesis has its own
+/// encoders: a robot that has recovered from a stuck wheel has healthy ones.
+#[derive(Debug, Clone, Copy)]
+pub struct State {
+    /// Pose and deviations.
+    pub track: Track,
+    /// Encoders under nominal motion; not used by other modes.
+    pub encoders: Encoders,
+}
+
 /// The filter.
 #[derive(Debug, Clone)]
 pub struct Exact {
@@ -70,10 +76,8 @@ pub struct Exact {
     leaves: Leaves,
     use_wheels: bool,
     modes: Vec<Mode>,
-    bank: Bank<Track>,
-    encoders: Forward<ENCODER_STATES>,
-    encoder_onset: [u64; ENCODER_STATES],
-    encoder_birth: [f64; ENCODER_STATES],
+    bank: Bank<State>,
+    births: Births,
     since_spawn: u32,
     spawn_s: f64,
     degenerate_count: u32,
@@ -93,17 +97,23 @@ impl Exact {
         let nominal = &model.nominal.motion;
         let modes = (0..MOTIONS)
             .map(|mode| match mode {
-                NOMINAL => Mode { motion: *nominal, noise: nominal.noise(), share: 0.0 },
-                UNKNOWN => Mode { motion: *nominal, noise: unknown_noise(model), share: p_unknown },
-                _ => stuck_mode(model, mode - 1, leaves.stuck[mode - 1].map_or(0.0, |_| each)),
+                NOMINAL => Mode {
+                    motion: *nominal,
+                    noise: nominal.noise(),
+                    share: 0.0,
+                },
+                UNKNOWN.. => Mode {
+                    motion: *nominal,
+                    noise: unknown_noise(model),
+                    share: 0.5 * p_unknown,
+                },
+                _ => stuck_mode(
+                    model,
+                    mode - 1,
+                    leaves.stuck[mode - 1].map_or(0.0, |_| each),
+                ),
             })
             .collect();
-        let mut encoder_birth = [0.0; ENCODER_STATES];
-        for (wheel, _) in leaves.encoder.iter().enumerate().filter(|(_, leaf)| leaf.is_some()) {
-            for (kind, share) in KIND_SHARES.iter().enumerate() {
-                encoder_birth[1 + KINDS * wheel + kind] = share * each;
-            }
-        }
         Self {
             model: model.clone(),
             robot: robot.clone(),
@@ -111,9 +121,7 @@ impl Exact {
             use_wheels,
             modes,
             bank: Bank::new(MOTIONS, PER_MODE),
-            encoders: Forward::at(0),
-            encoder_onset: [0; ENCODER_STATES],
-            encoder_birth,
+            births: Births::new(leaves, if use_wheels { each } else { 0.0 }),
             since_spawn: 0,
             spawn_s: 0.0,
             degenerate_count: 0,
@@ -123,9 +131,14 @@ impl Exact {
     /// Starts from the nominal mode, its pose known to `moments` at `t_ns`.
     pub fn restart(&mut self, mean: Vector3<f64>, covariance: Matrix3<f64>, t_ns: u64) {
         let track = Track::new(mean, covariance, &self.modes[NOMINAL].noise);
-        self.bank.restart(NOMINAL, t_ns, track);
-        self.encoders = Forward::at(0);
-        self.encoder_onset = [t_ns; ENCODER_STATES];
+        self.bank.restart(
+            NOMINAL,
+            t_ns,
+            State {
+                track,
+                encoders: Encoders::healthy(t_ns),
+            },
+        );
         (self.since_spawn, self.spawn_s) = (0, 0.0);
     }
 
@@ -137,15 +150,8 @@ impl Exact {
 
     /// The hypotheses; `mode` is 0 nominal, 1 + wheel stuck, [`UNKNOWN`].
     #[must_use]
-    pub fn hypotheses(&self) -> &[Hypothesis<Track>] {
+    pub fn hypotheses(&self) -> &[Hypothesis<State>] {
         self.bank.hypotheses()
-    }
-
-    /// Logarithm of the probability, given nominal motion, that this wheel's encoder is broken.
-    #[must_use]
-    pub fn encoder_log_p(&self, wheel: usize) -> f64 {
-        let states = &self.encoders.log_p()[1 + KINDS * wheel..1 + KINDS * (wheel + 1)];
-        states.iter().copied().fold(f64::NEG_INFINITY, log_add)
     }
 
     /// Takes one observation; the pose's noise is `noise_scale` times the learned one.
@@ -154,7 +160,7 @@ impl Exact {
         if observation.anchor {
             if observation.pose_frames > 0 {
                 for hypothesis in self.bank.hypotheses_mut() {
-                    hypothesis.track.anchor(observation.pose, variance);
+                    hypothesis.state.track.anchor(observation.pose, variance);
                 }
             }
             return;
@@ -179,7 +185,7 @@ impl Exact {
         for hypothesis in self.bank.hypotheses_mut() {
             let mut gained = wheels[hypothesis.mode];
             if observation.pose_frames > 0 {
-                match hypothesis.track.update(observation.pose, variance) {
+                match hypothesis.state.track.update(observation.pose, variance) {
                     Some(log_likelihood) => gained += log_likelihood,
                     None => failed = true,
                 }
@@ -203,14 +209,23 @@ impl Exact {
     fn predict(&mut self, observation: &Observation) {
         let limit = self.model.command.curvature_max_1_m;
         let extra = observation.lag_variance(&self.model);
-        let mut steps = [Displacement { per_metre: [0.0; 3], travel_m: 0.0, extra }; MOTIONS];
+        let mut steps = [Displacement {
+            per_metre: [0.0; 3],
+            travel_m: 0.0,
+            extra,
+        }; MOTIONS];
         for (step, mode) in steps.iter_mut().zip(&self.modes) {
             step.travel_m = observation.travel_m;
-            step.per_metre =
-                mode.motion.per_metre(observation.curvature, observation.speed, limit);
+            step.per_metre = mode
+                .motion
+                .per_metre(observation.curvature, observation.speed, limit);
         }
         for hypothesis in self.bank.hypotheses_mut() {
-            hypothesis.track.predict(&steps[hypothesis.mode], &self.modes[hypothesis.mode].noise);
+            let noise = &self.modes[hypothesis.mode].noise;
+            hypothesis
+                .state
+                .track
+                .predict(&steps[hypothesis.mode], noise);
         }
     }
 
@@ -223,13 +238,25 @@ impl Exact {
         let fault = self.bank.best(|mode| mode != NOMINAL).copied();
         for from in [nominal, fault].into_iter().flatten() {
             for mode in 0..MOTIONS {
-                let share = if mode == NOMINAL { death } else { birth * self.modes[mode].share };
+                let share = if mode == NOMINAL {
+                    death
+                } else {
+                    birth * self.modes[mode].share
+                };
                 let log_weight = from.log_weight + share.ln();
                 if mode == from.mode || log_weight <= FLOOR {
                     continue;
                 }
-                let track = from.track.fork(&self.modes[mode].noise);
-                self.bank.add(Hypothesis { mode, onset: t_ns, log_weight, track });
+                let state = State {
+                    track: from.state.track.fork(&self.modes[mode].noise),
+                    encoders: Encoders::healthy(t_ns),
+                };
+                self.bank.add(Hypothesis {
+                    mode,
+                    onset: t_ns,
+                    log_weight,
+                    state,
+                });
             }
         }
     }
@@ -245,21 +272,38 @@ impl Exact {
         let mut healthy = [0.0; WHEELS];
         for i in 0..count {
             let rate = rolling_rate(&self.robot, i, command[0], command[1]);
-            let lagged =
-                rolling_rate(&self.robot, i, observation.curvature, observation.speed);
+            let lagged = rolling_rate(&self.robot, i, observation.curvature, observation.speed);
             rolling[i] = (rate, (rate - lagged) * (rate - lagged));
             let (mean, variance) = self.model.nominal.rates[i].rate(rate, command[0]);
             let turning = EncoderState::Turning(mean, variance + rolling[i].1, TAIL);
-            healthy[i] =
-                encoder.log_likelihood(turning, &observation.wheels[i], sample_sd);
+            healthy[i] = encoder.log_likelihood(turning, &observation.wheels[i], sample_sd);
         }
-        let all: f64 = healthy[..count].iter().sum();
-        out[NOMINAL] = self.update_encoders(observation, sample_sd, &healthy, all);
+        let patterns = self
+            .births
+            .patterns(&encoder, observation, sample_sd, &healthy[..count]);
+        let (birth, death) = (BIRTH_1_S * observation.dt_s, DEATH_1_S * observation.dt_s);
+        for hypothesis in self
+            .bank
+            .hypotheses_mut()
+            .iter_mut()
+            .filter(|h| h.mode == NOMINAL)
+        {
+            let encoders = &mut hypothesis.state.encoders;
+            hypothesis.log_weight += encoders.step(
+                &self.births,
+                birth,
+                death,
+                &patterns,
+                observation.t_first_ns,
+            );
+        }
         for wheel in 0..count {
             if self.modes[1 + wheel].share <= 0.0 {
                 continue;
             }
-            let Some(stuck) = self.model.stuck(wheel) else { continue };
+            let Some(stuck) = self.model.stuck(wheel) else {
+                continue;
+            };
             out[1 + wheel] = (0..count)
                 .map(|i| {
                     let turning = if i == wheel {
@@ -272,51 +316,20 @@ impl Exact {
                 })
                 .sum();
         }
-        out[UNKNOWN] = self.steering(observation);
-        for i in 0..count {
-            let any =
-                encoder.log_likelihood(EncoderState::Any, &observation.wheels[i], sample_sd);
-            out[UNKNOWN] += log_add((1.0 - ANYTHING).ln() + healthy[i], ANYTHING.ln() + any);
+        out[UNKNOWN] = healthy[..count].iter().sum();
+        out[UNKNOWN_ANY] = self.steering(observation);
+        for (reading, health) in observation.wheels.iter().zip(&healthy[..count]) {
+            let any = encoder.log_likelihood(EncoderState::Any, reading, sample_sd);
+            out[UNKNOWN_ANY] += log_add((1.0 - ANYTHING).ln() + health, ANYTHING.ln() + any);
         }
-    }
-
-    /// Steps the hidden Markov model of the encoders; returns its evidence.
-    fn update_encoders(
-        &mut self,
-        observation: &Observation,
-        sample_sd: f64,
-        healthy: &[f64; WHEELS],
-        all: f64,
-    ) -> f64 {
-        let states =
-            [EncoderState::Zero, EncoderState::Frozen, EncoderState::Noise, EncoderState::Dead];
-        let dt = observation.dt_s;
-        let birth = self.encoder_birth.map(|share| share * BIRTH_1_S * dt);
-        let nominal = self.encoders.log_p()[0];
-        let mut log_l = [f64::NEG_INFINITY; ENCODER_STATES];
-        log_l[0] = all;
-        for (wheel, reading) in observation.wheels.iter().enumerate().take(self.robot.wheels.len()) {
-            for (kind, state) in states.into_iter().enumerate() {
-                let i = 1 + KINDS * wheel + kind;
-                let seen = self.model.encoder.log_likelihood(state, reading, sample_sd);
-                log_l[i] = all - healthy[wheel] + seen;
-                // The onset is that of the mass that came last in quantity.
-                if nominal + birth[i].ln() > self.encoders.log_p()[i] {
-                    self.encoder_onset[i] = observation.t_first_ns;
-                }
-            }
-        }
-        self.encoders.predict_star(0, &birth, DEATH_1_S * dt);
-        self.encoders.update(&log_l).unwrap_or_else(|| {
-            self.degenerate_count = self.degenerate_count.saturating_add(1);
-            all
-        })
     }
 
     /// What the steering angles say for the unknown: relative to angles as commanded, which every
     /// named mode has.
     fn steering(&self, observation: &Observation) -> f64 {
-        let sample = self.model.sample_variance(self.model.noise.steer_rad, observation.frame_s);
+        let sample = self
+            .model
+            .sample_variance(self.model.noise.steer_rad, observation.frame_s);
         let extra = self.model.nominal.steer_sd_rad;
         let mut sum = 0.0;
         for i in (0..self.robot.wheels.len()).filter(|&i| self.robot.wheels[i].steered) {
@@ -339,19 +352,28 @@ impl Exact {
     /// Probabilities of nominal, leaves and unknown.
     #[must_use]
     pub fn posterior(&self) -> Posterior {
-        let mut log_p = [f64::NEG_INFINITY; MOTIONS];
-        self.bank.modes(&mut log_p);
         let mut out = Posterior::nominal();
-        out.nodes[0] = (log_p[NOMINAL] + self.encoders.log_p()[0]).exp();
-        for wheel in 0..WHEELS {
-            if let Some(node) = self.leaves.stuck[wheel] {
-                out.nodes[node] = log_p[1 + wheel].exp();
-            }
-            if let Some(node) = self.leaves.encoder[wheel] {
-                out.nodes[node] = (log_p[NOMINAL] + self.encoder_log_p(wheel)).exp();
+        out.nodes[0] = 0.0;
+        for hypothesis in self.bank.hypotheses() {
+            let p = hypothesis.log_weight.exp();
+            match hypothesis.mode {
+                NOMINAL => {
+                    let encoders = &hypothesis.state.encoders;
+                    out.nodes[0] += p * encoders.p_healthy();
+                    for (wheel, leaf) in self.leaves.encoder.iter().enumerate() {
+                        if let Some(node) = leaf {
+                            out.nodes[*node] += p * encoders.p_broken(wheel);
+                        }
+                    }
+                }
+                UNKNOWN.. => out.unknown += p,
+                stuck => {
+                    if let Some(node) = self.leaves.stuck[stuck - 1] {
+                        out.nodes[node] += p;
+                    }
+                }
             }
         }
-        out.unknown = log_p[UNKNOWN].exp();
         out.normalise(&self.leaves);
         out
     }
@@ -359,14 +381,25 @@ impl Exact {
     /// Most probable onset of a node's fault, capture time ns; 0 if it is no leaf.
     #[must_use]
     pub fn onset(&self, node: usize) -> u64 {
-        if let Some(wheel) = self.leaves.stuck.iter().position(|&leaf| leaf == Some(node)) {
-            return self.bank.best(|mode| mode == 1 + wheel).map_or(0, |best| best.onset);
+        if let Some(wheel) = self
+            .leaves
+            .stuck
+            .iter()
+            .position(|&leaf| leaf == Some(node))
+        {
+            return self
+                .bank
+                .best(|mode| mode == 1 + wheel)
+                .map_or(0, |best| best.onset);
         }
-        if let Some(wheel) = self.leaves.encoder.iter().position(|&leaf| leaf == Some(node)) {
-            let log_p = self.encoders.log_p();
-            let states = 1 + KINDS * wheel..1 + KINDS * (wheel + 1);
-            let best = states.max_by(|&a, &b| log_p[a].total_cmp(&log_p[b]));
-            return best.map_or(0, |state| self.encoder_onset[state]);
+        if let Some(wheel) = self
+            .leaves
+            .encoder
+            .iter()
+            .position(|&leaf| leaf == Some(node))
+        {
+            let best = self.bank.best(|mode| mode == NOMINAL);
+            return best.map_or(0, |best| best.state.encoders.onset(wheel));
         }
         0
     }
@@ -375,7 +408,10 @@ impl Exact {
 fn unknown_noise(model: &Model) -> MotionNoise {
     let nominal = model.nominal.motion.noise();
     // As coloured as the stuck modes: an unknown fault meets the same soil.
-    let coloured = model.stuck.iter().map(|stuck| stuck.motion.noise().deviation);
+    let coloured = model
+        .stuck
+        .iter()
+        .map(|stuck| stuck.motion.noise().deviation);
     let count = model.stuck.len().max(1) as f64;
     let deviation = coloured.fold(Matrix3::zeros(), |sum, next| sum + next) / count;
     let square = |sd: f64| sd * sd;
@@ -390,7 +426,9 @@ fn unknown_noise(model: &Model) -> MotionNoise {
 /// A wheel stuck. Another soil changes the size of the effect, not its sign: the run's offset may
 /// also lie along the effect itself.
 fn stuck_mode(model: &Model, wheel: usize, share: f64) -> Mode {
-    let motion = model.stuck(wheel).map_or(model.nominal.motion, |stuck| stuck.motion);
+    let motion = model
+        .stuck(wheel)
+        .map_or(model.nominal.motion, |stuck| stuck.motion);
     let nominal = &model.nominal.motion;
     let effect = Vector3::new(
         motion.yaw.curvature[0] - nominal.yaw.curvature[0],
@@ -399,5 +437,9 @@ fn stuck_mode(model: &Model, wheel: usize, share: f64) -> Mode {
     );
     let mut noise = motion.noise();
     noise.offset += effect * effect.transpose() * (TERRAIN * TERRAIN);
-    Mode { motion, noise, share }
+    Mode {
+        motion,
+        noise,
+        share,
+    }
 }

@@ -13,7 +13,7 @@ use vigil_robot::Description;
 use vigil_robot::learned::{Model, Observation, Observer};
 use vigil_setup::schema;
 
-use crate::draw::{draw, moments};
+use crate::draw::{copy, draw, moments};
 use crate::exact::{BIRTH_1_S, DEATH_1_S, Exact};
 use crate::modes::{IdentifierError, Leaves};
 use crate::posterior::Posterior;
@@ -68,6 +68,8 @@ pub struct Identifier {
     p_unknown: f64,
     particles: usize,
     budget: usize,
+    drawn: Box<ParticleBlock>,
+    updated: bool,
     seed: u64,
     rng: Pcg64Mcg,
     ring: VecDeque<Kept>,
@@ -116,12 +118,17 @@ impl Identifier {
             p_unknown: settings.p_unknown,
             particles: settings.particles,
             budget: settings.particles,
+            drawn: Box::default(),
+            updated: false,
             seed,
             rng: Pcg64Mcg::seed_from_u64(seed),
             ring: VecDeque::with_capacity(capacity),
             capacity,
             phase: Phase::Watching,
-            detection: Detection { noise_scale: 1.0, ..Detection::default() },
+            detection: Detection {
+                noise_scale: 1.0,
+                ..Detection::default()
+            },
             posterior: Posterior::nominal(),
             predicted: Posterior::nominal(),
             mode: 0,
@@ -139,32 +146,34 @@ impl Identifier {
         particles: &mut ParticleBlock,
     ) {
         self.predicted = self.posterior;
+        self.updated = false;
+        let mut detected = None;
         match entry {
             Entry::Frame(input) => {
+                detected = input.detection.map(|(_, block)| block);
                 self.take(&input);
-                self.report(belief);
-                self.publish(input.detection.map(|(_, block)| block), particles);
             }
             // The state stays at the last frame: what is told is its prediction.
-            Entry::Missed(_) => self.report(belief),
-            Entry::Budget(count) => {
-                self.budget = (count as usize).clamp(1, self.particles);
-                self.report(belief);
-            }
+            Entry::Missed(_) => {}
+            Entry::Budget(count) => self.budget = (count as usize).clamp(1, self.particles),
             Entry::Reset => {
                 self.observer.reset();
                 self.begin_run();
-                self.report(belief);
-                particles.count = 0;
             }
         }
+        self.report(belief);
+        self.publish(detected, particles);
     }
 
     fn begin_run(&mut self) {
         self.rng = Pcg64Mcg::seed_from_u64(self.seed);
         self.ring.clear();
+        self.drawn.count = 0;
         self.phase = Phase::Watching;
-        self.detection = Detection { noise_scale: 1.0, ..Detection::default() };
+        self.detection = Detection {
+            noise_scale: 1.0,
+            ..Detection::default()
+        };
         self.posterior = Posterior::nominal();
         self.predicted = self.posterior;
     }
@@ -181,7 +190,11 @@ impl Identifier {
                 alarm: belief.alarm != 0,
                 t_ns: belief.alarm_t_capture_ns,
                 p_fault: belief.p_fault,
-                noise_scale: if scale > 0.1 && scale < 100.0 { scale } else { 1.0 },
+                noise_scale: if scale > 0.1 && scale < 100.0 {
+                    scale
+                } else {
+                    1.0
+                },
             };
         }
         if intake.complete {
@@ -215,11 +228,14 @@ impl Identifier {
 
     /// Starts from the oldest kept observation whose pose is known.
     fn begin(&mut self) {
-        let known = self.ring.iter().position(|kept| {
-            kept.pose.is_some() || kept.observation.pose_frames > 0
-        });
+        let known = self
+            .ring
+            .iter()
+            .position(|kept| kept.pose.is_some() || kept.observation.pose_frames > 0);
         let start = known.unwrap_or(0);
-        let Some(kept) = self.ring.get(start) else { return };
+        let Some(kept) = self.ring.get(start) else {
+            return;
+        };
         let measured = Vector3::from(kept.observation.pose);
         let (mean, covariance) = kept.pose.unwrap_or((measured, Matrix3::identity() * 1e-4));
         self.exact.restart(mean, covariance, kept.observation.t_ns);
@@ -237,7 +253,11 @@ impl Identifier {
         for i in next..next + taken {
             let Some(kept) = self.ring.get(i) else { break };
             self.exact.step(&kept.observation, kept.noise_scale);
-            moved_s += if kept.observation.moving { kept.observation.dt_s } else { 0.0 };
+            moved_s += if kept.observation.moving {
+                kept.observation.dt_s
+            } else {
+                0.0
+            };
         }
         self.phase = Phase::Identifying(next + taken);
         if taken < behind {
@@ -249,8 +269,11 @@ impl Identifier {
             return;
         }
         let (birth, death) = (BIRTH_1_S * moved_s, DEATH_1_S * moved_s);
-        self.predicted = self.predicted.predicted(&self.leaves, self.p_unknown, birth, death);
+        self.predicted = self
+            .predicted
+            .predicted(&self.leaves, self.p_unknown, birth, death);
         self.posterior = self.exact.posterior();
+        self.updated = true;
         let recovered = self.posterior.nodes[0] > RECOVERED;
         if recovered && !self.detection.alarm {
             self.phase = Phase::Watching;
@@ -285,7 +308,11 @@ impl Identifier {
         belief.mode = mode;
         belief.p_mode = p_mode;
         belief.mode_change_count = self.mode_changes;
-        belief.alarm_t_capture_ns = if self.detection.alarm { self.detection.t_ns } else { 0 };
+        belief.alarm_t_capture_ns = if self.detection.alarm {
+            self.detection.t_ns
+        } else {
+            0
+        };
         belief.onset_t_capture_ns = self.onset();
         belief.identifying = u32::from(self.phase != Phase::Watching);
         belief.degenerate_count = self.exact.degenerate_count();
@@ -295,27 +322,38 @@ impl Identifier {
         if self.phase == Phase::Watching || self.is_catching_up() {
             return 0;
         }
-        let leaves = self.leaves.stuck.iter().chain(&self.leaves.encoder).flatten();
+        let leaves = self
+            .leaves
+            .stuck
+            .iter()
+            .chain(&self.leaves.encoder)
+            .flatten();
         let p = &self.posterior.nodes;
-        leaves.max_by(|&&a, &&b| p[a].total_cmp(&p[b])).map_or(0, |&node| self.exact.onset(node))
+        leaves
+            .max_by(|&&a, &&b| p[a].total_cmp(&p[b]))
+            .map_or(0, |&node| self.exact.onset(node))
     }
 
+    /// Particles of the identification are drawn once per observation; before one, the detector's
+    /// are passed on.
     fn publish(&mut self, detected: Option<&ParticleBlock>, out: &mut ParticleBlock) {
         if self.phase != Phase::Watching && !self.is_catching_up() {
-            draw(&self.exact, &self.leaves, self.budget, &mut self.rng, out);
+            if self.updated {
+                draw(
+                    &self.exact,
+                    &self.leaves,
+                    self.budget,
+                    &mut self.rng,
+                    &mut self.drawn,
+                );
+            }
+            copy(&self.drawn, self.budget, out);
             return;
         }
-        let Some(block) = detected else {
-            out.count = 0;
-            return;
-        };
-        let count = (block.count as usize).min(self.budget).min(PARTICLE_CAPACITY);
-        out.count = count as u32;
-        out.mode[..count].copy_from_slice(&block.mode[..count]);
-        out.x[..count].copy_from_slice(&block.x[..count]);
-        out.y[..count].copy_from_slice(&block.y[..count]);
-        out.yaw[..count].copy_from_slice(&block.yaw[..count]);
-        out.log_weight[..count].copy_from_slice(&block.log_weight[..count]);
+        if let Some(block) = detected {
+            copy(block, self.budget, &mut self.drawn);
+        }
+        copy(&self.drawn, self.budget, out);
     }
 }
 
@@ -323,7 +361,13 @@ fn check(settings: &schema::Identifier) -> Result<(), IdentifierError> {
     if settings.filter != "exact" {
         return Err(IdentifierError::Filter(settings.filter.clone()));
     }
-    let refuse = |key, value, allowed| Err(IdentifierError::Value { key, value, allowed });
+    let refuse = |key, value, allowed| {
+        Err(IdentifierError::Value {
+            key,
+            value,
+            allowed,
+        })
+    };
     if !(1..=PARTICLE_CAPACITY).contains(&settings.particles) {
         return refuse("particles", settings.particles as f64, "1 to 4096");
     }

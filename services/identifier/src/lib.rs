@@ -3,6 +3,7 @@
 //! [`Identifier`] is a pure function of journal entries; [`wiring`] connects it to its ports.
 
 mod draw;
+mod encoders;
 mod exact;
 mod identifier;
 mod modes;

@@ -53,7 +53,6 @@ fn prepare(args: &Args) -> Result<(Setup, Identifier), Box<dyn std::error::Error
     let file = &setup.file;
     let (settings, sensors) = (&file.identifier, file.detector.sensors);
     let seed = file.graph.seed;
-    let identifier =
-        Identifier::new(&model, &setup.robot, &setup.tree, settings, sensors, seed)?;
+    let identifier = Identifier::new(&model, &setup.robot, &setup.tree, settings, sensors, seed)?;
     Ok((setup, identifier))
 }

@@ -12,8 +12,10 @@ pub enum IdentifierError {
     #[error(transparent)]
     Model(#[from] ModelError),
     /// A leaf's fault is none that the model knows.
-    #[error("leaf '{leaf}': fault '{fault}' is not in the model: expected stuck:WHEEL or \
-             encoder:WHEEL, WHEEL one of {wheels}")]
+    #[error(
+        "leaf '{leaf}': fault '{fault}' is not in the model: expected stuck:WHEEL or \
+             encoder:WHEEL, WHEEL one of {wheels}"
+    )]
     Leaf {
         /// Name of the leaf.
         leaf: String,

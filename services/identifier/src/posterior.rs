@@ -22,13 +22,20 @@ impl Posterior {
     pub const fn nominal() -> Self {
         let mut nodes = [0.0; FAULT_NODES];
         nodes[0] = 1.0;
-        Self { nodes, unknown: 0.0 }
+        Self {
+            nodes,
+            unknown: 0.0,
+        }
     }
 
     /// Before an identification: what is not nominal is unknown.
     #[must_use]
     pub fn watching(p_fault: f64) -> Self {
-        let p_fault = if p_fault.is_nan() { 0.0 } else { p_fault.clamp(0.0, 1.0) };
+        let p_fault = if p_fault.is_nan() {
+            0.0
+        } else {
+            p_fault.clamp(0.0, 1.0)
+        };
         let mut out = Self::nominal();
         out.nodes[0] = 1.0 - p_fault;
         out.unknown = p_fault;
@@ -71,7 +78,11 @@ impl Posterior {
             *p = if p.is_finite() { p.max(FLOOR) } else { FLOOR };
             sum += *p;
         }
-        self.unknown = if self.unknown.is_finite() { self.unknown.max(FLOOR) } else { FLOOR };
+        self.unknown = if self.unknown.is_finite() {
+            self.unknown.max(FLOOR)
+        } else {
+            FLOOR
+        };
         sum += self.unknown;
         self.unknown /= sum;
         self.nodes = self.nodes.map(|p| p / sum);
@@ -97,17 +108,30 @@ impl Posterior {
         belief.node_count = leaves.nodes as u32;
         belief.tree_hash = leaves.hash;
         let term = |p: f64| if p > 0.0 { -p * p.ln() } else { 0.0 };
-        belief.entropy = self.nodes[..leaves.nodes].iter().map(|&p| term(p)).sum::<f64>()
+        belief.entropy = self.nodes[..leaves.nodes]
+            .iter()
+            .map(|&p| term(p))
+            .sum::<f64>()
             + term(self.unknown);
         belief.sets = [FaultSet::default(); FAULT_SETS];
         let mut count = 0;
         for node in 0..leaves.nodes {
-            let is_set = node == 0 || leaves.stuck.iter().chain(&leaves.encoder).any(|&n| n == Some(node));
+            let is_set = node == 0
+                || leaves
+                    .stuck
+                    .iter()
+                    .chain(&leaves.encoder)
+                    .any(|&n| n == Some(node));
             if !is_set {
                 continue;
             }
-            let set = FaultSet { leaves: if node == 0 { 0 } else { 1 << node }, p: self.nodes[node] };
-            let place = belief.sets[..count].iter().position(|other| other.p < set.p);
+            let set = FaultSet {
+                leaves: if node == 0 { 0 } else { 1 << node },
+                p: self.nodes[node],
+            };
+            let place = belief.sets[..count]
+                .iter()
+                .position(|other| other.p < set.p);
             let place = place.unwrap_or(count);
             if place < FAULT_SETS {
                 let end = (count + 1).min(FAULT_SETS);
@@ -129,9 +153,8 @@ impl Posterior {
         let p = self.tree(leaves);
         let mut best = None;
         for node in (0..leaves.nodes).filter(|&node| p[node] >= 0.5) {
-            let better = |&other: &usize| {
-                (leaves.depths[node], p[node]) > (leaves.depths[other], p[other])
-            };
+            let better =
+                |&other: &usize| (leaves.depths[node], p[node]) > (leaves.depths[other], p[other]);
             if best.as_ref().is_none_or(better) {
                 best = Some(node);
             }

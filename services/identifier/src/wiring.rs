@@ -70,9 +70,14 @@ impl IdentifierStage {
             if !self.frames.advance() {
                 break;
             }
-            let Some(frame) = self.frames.held() else { break };
+            let Some(frame) = self.frames.held() else {
+                break;
+            };
             let account = &mut self.frame_account;
-            if account.arrive::<SensorFrame>(&frame.header, now_ns, self.period_ns).is_taken() {
+            if account
+                .arrive::<SensorFrame>(&frame.header, now_ns, self.period_ns)
+                .is_taken()
+            {
                 if self.pending.len() == PENDING_MAX {
                     self.pending.pop_front();
                 }
@@ -83,11 +88,19 @@ impl IdentifierStage {
 
     /// Steps the frames up to the one behind the held detection.
     fn step_held(&mut self) {
-        let Some(detection) = self.detections.held() else { return };
+        let Some(detection) = self.detections.held() else {
+            return;
+        };
         let wanted = (detection.cause.frame_epoch, detection.cause.frame_seq);
         let is_wanted = |f: &SensorFrame| (f.header.epoch, f.header.seq) == wanted;
-        let Some(last) = self.pending.iter().position(is_wanted) else { return };
-        while self.detected.held().is_none_or(|p| precedes(&p.cause, &detection.cause)) {
+        let Some(last) = self.pending.iter().position(is_wanted) else {
+            return;
+        };
+        while self
+            .detected
+            .held()
+            .is_none_or(|p| precedes(&p.cause, &detection.cause))
+        {
             if !self.detected.advance() {
                 break;
             }
@@ -95,7 +108,10 @@ impl IdentifierStage {
         let particles = self.detected.held().filter(|p| p.cause == detection.cause);
         for (i, frame) in self.pending.drain(..=last).enumerate() {
             let detection = particles.filter(|_| i == last).map(|p| (detection, p));
-            let input = Input { frame: &frame, detection };
+            let input = Input {
+                frame: &frame,
+                detection,
+            };
             let (belief, out) = (self.belief.block(), self.particles.block());
             self.identifier.step(Entry::Frame(input), belief, out);
         }
@@ -104,7 +120,8 @@ impl IdentifierStage {
 
     fn step_without_frame(&mut self, count: u32) {
         let (belief, particles) = (self.belief.block(), self.particles.block());
-        self.identifier.step(Entry::Missed(count), belief, particles);
+        self.identifier
+            .step(Entry::Missed(count), belief, particles);
         self.stepped = true;
     }
 }
@@ -112,7 +129,8 @@ impl IdentifierStage {
 /// True if the block behind `a` came before the one behind `b`. A block of another epoch belongs to
 /// a source that is gone.
 const fn precedes(a: &Cause, b: &Cause) -> bool {
-    a.frame_epoch != b.frame_epoch || a.frame_seq < b.frame_seq
+    a.frame_epoch != b.frame_epoch
+        || a.frame_seq < b.frame_seq
         || (a.frame_seq == b.frame_seq && a.kind != b.kind)
 }
 
@@ -124,7 +142,9 @@ impl Stage for IdentifierStage {
             if !self.detections.advance() {
                 break;
             }
-            let Some(detection) = self.detections.held() else { break };
+            let Some(detection) = self.detections.held() else {
+                break;
+            };
             let cause = detection.cause;
             let is_frame = cause.kind() == Some(CauseKind::Frame);
             let identity = is_frame.then_some((cause.frame_epoch, cause.frame_seq));
@@ -138,12 +158,7 @@ impl Stage for IdentifierStage {
         self.step_without_frame(count);
     }
 
-    fn publish(
-        &mut self,
-        cause: Cause,
-        stamp: Stamp,
-        clock: &dyn Clock,
-    ) -> Result<u64, PortError> {
+    fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
         if !self.stepped {
             // The frame behind the detection was lost on its way here.
             self.step_without_frame(0);
@@ -164,9 +179,18 @@ impl Stage for IdentifierStage {
     }
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
-        let Reported { mode, p_mode, leaves, changes } = self.reported;
+        let Reported {
+            mode,
+            p_mode,
+            leaves,
+            changes,
+        } = self.reported;
         if changes != self.told {
-            let kind = if mode == 0 { EventKind::Cleared } else { EventKind::Diagnosis };
+            let kind = if mode == 0 {
+                EventKind::Cleared
+            } else {
+                EventKind::Diagnosis
+            };
             health.event(now_ns, kind, mode, p_mode, leaves);
             self.told = changes;
         }

@@ -21,7 +21,11 @@ pub fn line(text: &str) -> io::Result<()> {
     let result = writeln!(out, "{text}").and_then(|()| out.flush());
     match result {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-        result => result,
+        Err(error) => Err(io::Error::new(
+            error.kind(),
+            format!("standard output: {error}"),
+        )),
+        Ok(()) => Ok(()),
     }
 }
 

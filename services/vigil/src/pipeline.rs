@@ -106,7 +106,11 @@ impl Pipeline {
             mode,
             p_mode: belief.p_mode,
             p_unknown: belief.p_unknown,
-            fault_set: if members.is_empty() { name(0) } else { members.join("+") },
+            fault_set: if members.is_empty() {
+                name(0)
+            } else {
+                members.join("+")
+            },
             p_left_stuck: stuck(Side::Left),
             p_right_stuck: stuck(Side::Right),
             p_nodes: belief.p[..(belief.node_count as usize).min(belief.p.len())].to_vec(),

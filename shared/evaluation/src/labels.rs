@@ -9,8 +9,8 @@ use std::path::Path;
 
 use vigil_robot::Description;
 
-use crate::table::Table;
 pub use crate::table::TableError as LabelsError;
+use crate::table::{Table, quoted};
 
 /// Label of one run.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,7 +80,8 @@ fn label(table: &Table, at: &[usize], robot: &Description) -> Result<Label, Labe
     if !name.is_empty() && index.is_none() {
         let allowed: Vec<&str> = robot.wheels.iter().map(|w| w.name.as_str()).collect();
         let message = format!(
-            "wheel is '{name}', allowed are {} or empty",
+            "wheel is '{}', allowed are {} or empty",
+            quoted(name),
             allowed.join(" ")
         );
         return Err(table.wrong(message));
@@ -88,7 +89,8 @@ fn label(table: &Table, at: &[usize], robot: &Description) -> Result<Label, Labe
     let onset_s = Some(table.number(onset)?).filter(|s| *s >= 0.0);
     let mode = table.text(mode).to_owned();
     if (mode == "ND") != onset_s.is_none() {
-        let message = format!("mode is '{mode}' but onset_s is {}", table.text(onset));
+        let (mode, onset) = (quoted(&mode), quoted(table.text(onset)));
+        let message = format!("mode is '{mode}' but onset_s is {onset}");
         return Err(table.wrong(format!("{message}: only ND has none (-1)")));
     }
     Ok(Label {

@@ -8,6 +8,8 @@ use flate2::bufread::MultiGzDecoder;
 
 /// Largest size of a decompressed table, bytes: a compressed file must not exhaust the memory.
 const TABLE_BYTES_MAX: u64 = 4 << 30;
+/// Longest text of a field that a message repeats, characters.
+const QUOTED_CHARS_MAX: usize = 40;
 
 /// Why a table was refused. Rows count from 1, the header not included.
 #[derive(Debug, thiserror::Error)]
@@ -30,6 +32,14 @@ pub enum TableError {
         /// All columns that are needed.
         expected: String,
     },
+    /// A column that is needed stands twice in the header: which one counts is not known.
+    #[error("{path}: column {name} appears twice")]
+    Repeated {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        name: String,
+    },
     /// A row is malformed.
     #[error("{path}: row {row}: {message}")]
     Row {
@@ -40,6 +50,24 @@ pub enum TableError {
         /// What is wrong and what is allowed.
         message: String,
     },
+}
+
+/// Refuses content longer than a limit, where `Read::take` would pass off its first part as whole.
+struct Limited<R> {
+    content: R,
+    /// Bytes that may still come.
+    left: u64,
+}
+
+impl<R: Read> Read for Limited<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.content.read(buffer)?;
+        self.left = self.left.checked_sub(count as u64).ok_or_else(|| {
+            let message = format!("larger than {TABLE_BYTES_MAX} bytes, which are allowed");
+            io::Error::new(io::ErrorKind::FileTooLarge, message)
+        })?;
+        Ok(count)
+    }
 }
 
 /// An open table: its header is read.
@@ -61,11 +89,12 @@ impl Table {
         let mut plain = BufReader::new(File::open(path).map_err(io)?);
         let compressed = plain.fill_buf().map_err(io)?.starts_with(&[0x1f, 0x8b]);
         let content: Box<dyn Read> = if compressed {
-            Box::new(MultiGzDecoder::new(plain).take(TABLE_BYTES_MAX))
+            Box::new(MultiGzDecoder::new(plain))
         } else {
-            Box::new(plain.take(TABLE_BYTES_MAX))
+            Box::new(plain)
         };
-        Self::new(path, content)
+        let left = TABLE_BYTES_MAX;
+        Self::new(path, Box::new(Limited { content, left }))
     }
 
     /// Reads the header of `content`; `path` only names it.
@@ -87,7 +116,7 @@ impl Table {
         })
     }
 
-    /// Positions of the columns, all of which must exist.
+    /// Positions of the columns, each of which must exist, and once.
     pub(crate) fn require(&self, names: &[String]) -> Result<Vec<usize>, TableError> {
         let missing: Vec<&str> = names
             .iter()
@@ -100,6 +129,11 @@ impl Table {
                 missing: missing.join(", "),
                 expected: names.join(", "),
             });
+        }
+        let times = |name: &String| self.columns.iter().filter(|c| *c == name).count();
+        if let Some(name) = names.iter().find(|name| times(name) > 1) {
+            let (path, name) = (self.path.clone(), name.clone());
+            return Err(TableError::Repeated { path, name });
         }
         Ok(names.iter().filter_map(|n| self.position(n)).collect())
     }
@@ -128,7 +162,7 @@ impl Table {
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
             _ => {
-                let name = &self.columns[column];
+                let (name, text) = (&self.columns[column], quoted(text));
                 Err(self.wrong(format!("{name} is '{text}', allowed is a finite number")))
             }
         }
@@ -138,7 +172,7 @@ impl Table {
     pub(crate) fn whole(&self, column: usize) -> Result<u32, TableError> {
         let text = self.text(column);
         text.parse().map_err(|_| {
-            let name = &self.columns[column];
+            let (name, text) = (&self.columns[column], quoted(text));
             self.wrong(format!(
                 "{name} is '{text}', allowed is a whole number from 0"
             ))
@@ -151,10 +185,62 @@ impl Table {
     }
 }
 
+/// Text from a file as a message may show it on a terminal: short, without control characters.
+pub(crate) fn quoted(text: &str) -> String {
+    let mut shown: String = text.chars().take(QUOTED_CHARS_MAX).collect();
+    if shown.len() < text.len() {
+        shown.push_str("...");
+    }
+    shown.replace(char::is_control, "?")
+}
+
 fn wrong_row(path: &Path, row: u64, message: String) -> TableError {
     TableError::Row {
         path: path.to_path_buf(),
         row,
         message,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    fn table(text: &'static str) -> Table {
+        Table::new(Path::new("a.csv"), Box::new(text.as_bytes())).unwrap()
+    }
+
+    #[test]
+    fn content_at_the_limit_is_read_and_beyond_it_refused() {
+        let read = |left: u64| {
+            let mut text = String::new();
+            let content = &b"0123456789"[..];
+            Limited { content, left }
+                .read_to_string(&mut text)
+                .map(|_| text)
+        };
+        assert_eq!(read(10).unwrap(), "0123456789");
+        assert_eq!(read(9).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+    }
+
+    #[test]
+    fn a_needed_column_that_appears_twice_is_refused() {
+        let table = table("t,x,t,x,y\n");
+        assert_eq!(table.require(&["y".to_owned()]).unwrap(), [4]);
+        let error = table.require(&["y".to_owned(), "x".to_owned()]);
+        assert_eq!(
+            error.unwrap_err().to_string(),
+            "a.csv: column x appears twice"
+        );
+    }
+
+    #[test]
+    fn messages_repeat_no_long_text_and_no_control_characters() {
+        assert_eq!(quoted("12,5"), "12,5");
+        assert_eq!(quoted("\x1b[2J"), "?[2J");
+        assert_eq!(quoted(&"x".repeat(40)), "x".repeat(40));
+        assert_eq!(quoted(&"y".repeat(41)), format!("{}...", "y".repeat(40)));
     }
 }

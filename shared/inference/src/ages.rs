@@ -81,8 +81,11 @@ impl<const D: usize> Ages<D> {
         let fraction = 0.5_f64.powi(j as i32);
         let moved = self.log_weight[j] + fraction.ln();
         self.merge(j + 1, moved, self.bias[j], self.variance[j]);
-        self.log_weight[j] =
-            if j == 0 { f64::NEG_INFINITY } else { self.log_weight[j] + (1.0 - fraction).ln() };
+        self.log_weight[j] = if j == 0 {
+            f64::NEG_INFINITY
+        } else {
+            self.log_weight[j] + (1.0 - fraction).ln()
+        };
     }
 
     /// Adds a component's weight to component j, matching the first two moments.
@@ -91,7 +94,10 @@ impl<const D: usize> Ages<D> {
         if total == f64::NEG_INFINITY {
             return;
         }
-        let (old, new) = ((self.log_weight[j] - total).exp(), (log_weight - total).exp());
+        let (old, new) = (
+            (self.log_weight[j] - total).exp(),
+            (log_weight - total).exp(),
+        );
         let apart = (self.bias[j] - bias).norm_squared() / D as f64;
         self.variance[j] = old * self.variance[j] + new * variance + old * new * apart;
         self.bias[j] = self.bias[j] * old + bias * new;
@@ -113,13 +119,14 @@ mod tests {
             let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
             let mut filter = Ages::<3>::new(1.0);
             let bias = SVector::from([lambda.sqrt(), 0.0, 0.0]);
-            total += 1 + (0..steps_max)
-                .position(|_| {
-                    let noise = SVector::<f64, 3>::from_fn(|_, _| rng.sample(StandardNormal));
-                    filter.step(&(noise + bias), 1e-3);
-                    filter.log_odds() > alarm
-                })
-                .unwrap_or(steps_max);
+            total += 1
+                + (0..steps_max)
+                    .position(|_| {
+                        let noise = SVector::<f64, 3>::from_fn(|_, _| rng.sample(StandardNormal));
+                        filter.step(&(noise + bias), 1e-3);
+                        filter.log_odds() > alarm
+                    })
+                    .unwrap_or(steps_max);
         }
         total as f64 / runs as f64
     }
@@ -133,7 +140,10 @@ mod tests {
         for (lambda, expected) in [(0.25, 78.0), (1.0, 19.0), (5.0, 5.0), (20.0, 2.0)] {
             let mean = delay(lambda, alarm, 300, 2000);
             let allowed = 0.3 * expected + 0.7;
-            assert!((mean - expected).abs() < allowed, "{lambda}: {mean} steps, not {expected}");
+            assert!(
+                (mean - expected).abs() < allowed,
+                "{lambda}: {mean} steps, not {expected}"
+            );
         }
     }
 

@@ -1,4 +1,5 @@
-//! Exact single faults: one hypothesis per (mode, onset), each with its own track.
+//! Exact single faults: one hypothesis per (mode, onset), each with its own continuous
+//! state.
 //!
 //! While no measurement is ambiguous about which hypothesis it belongs to, the posterior over modes
 //! is the sum of the hypotheses' weights: no sampling, no mixing. The number of hypotheses is
@@ -16,7 +17,7 @@ pub struct Hypothesis<T> {
     /// Logarithm of the normalised weight.
     pub log_weight: f64,
     /// Continuous state under this hypothesis.
-    pub track: T,
+    pub state: T,
 }
 
 /// A bounded set of hypotheses.
@@ -42,9 +43,14 @@ impl<T: Copy> Bank<T> {
     }
 
     /// Forgets everything and starts from one hypothesis.
-    pub fn restart(&mut self, mode: usize, onset: u64, track: T) {
+    pub fn restart(&mut self, mode: usize, onset: u64, state: T) {
         self.hypotheses.clear();
-        self.hypotheses.push(Hypothesis { mode, onset, log_weight: 0.0, track });
+        self.hypotheses.push(Hypothesis {
+            mode,
+            onset,
+            log_weight: 0.0,
+            state,
+        });
     }
 
     /// Forgets everything.
@@ -75,7 +81,11 @@ impl<T: Copy> Bank<T> {
     /// Adds a hypothesis. A mode that has its share of places gives up its least likely one, if
     /// the new one is more likely or as young as to have no evidence yet.
     pub fn add(&mut self, hypothesis: Hypothesis<T>) {
-        let same = self.hypotheses.iter().filter(|other| other.mode == hypothesis.mode).count();
+        let same = self
+            .hypotheses
+            .iter()
+            .filter(|other| other.mode == hypothesis.mode)
+            .count();
         if same >= self.per_mode || self.hypotheses.len() >= self.capacity {
             let least = (0..self.hypotheses.len())
                 .filter(|&i| self.hypotheses[i].mode == hypothesis.mode)
@@ -113,8 +123,8 @@ impl<T: Copy> Bank<T> {
         Some(evidence)
     }
 
-    /// Adds to `log_p[mode]` (logarithms, minus infinity where there is nothing) the weights of each
-    /// mode.
+    /// Fills `log_p[mode]` with the logarithm of each mode's weight, minus infinity where there is
+    /// none.
     pub fn modes(&self, log_p: &mut [f64]) {
         log_p.fill(f64::NEG_INFINITY);
         for hypothesis in &self.hypotheses {
@@ -130,7 +140,12 @@ mod tests {
     use super::*;
 
     fn hypothesis(mode: usize, onset: u64, p: f64) -> Hypothesis<()> {
-        Hypothesis { mode, onset, log_weight: p.ln(), track: () }
+        Hypothesis {
+            mode,
+            onset,
+            log_weight: p.ln(),
+            state: (),
+        }
     }
 
     #[test]

@@ -15,7 +15,9 @@ pub struct Constant {
 
 impl Default for Constant {
     fn default() -> Self {
-        Self { log_odds: f64::NEG_INFINITY }
+        Self {
+            log_odds: f64::NEG_INFINITY,
+        }
     }
 }
 

@@ -27,7 +27,10 @@ impl<const N: usize> Forward<N> {
     pub fn predict(&mut self, transition: &[[f64; N]; N]) {
         let before = self.log_p.map(f64::exp);
         for (j, log_p) in self.log_p.iter_mut().enumerate() {
-            *log_p = (0..N).map(|i| before[i] * transition[i][j]).sum::<f64>().ln();
+            *log_p = (0..N)
+                .map(|i| before[i] * transition[i][j])
+                .sum::<f64>()
+                .ln();
         }
     }
 

@@ -64,12 +64,17 @@ mod tests {
 
     #[test]
     fn one_dimension_matches_the_textbook() {
-        let mut state = Gaussian { mean: SVector::from([1.0]), covariance: SMatrix::from([[4.0]]) };
+        let mut state = Gaussian {
+            mean: SVector::from([1.0]),
+            covariance: SMatrix::from([[4.0]]),
+        };
         let identity = SMatrix::from([[1.0]]);
         state.predict(&SMatrix::from([[2.0]]), &SVector::from([0.5]), &identity);
         assert_eq!((state.mean[0], state.covariance[0]), (2.5, 17.0));
         let innovation = SVector::from([4.0 - 2.5]);
-        let log_likelihood = state.update(&innovation, &identity, &SMatrix::from([[3.0]])).unwrap();
+        let log_likelihood = state
+            .update(&innovation, &identity, &SMatrix::from([[3.0]]))
+            .unwrap();
         assert!((log_likelihood - crate::logspace::log_normal(1.5, 20.0)).abs() < 1e-14);
         assert!((state.mean[0] - (2.5 + 17.0 / 20.0 * 1.5)).abs() < 1e-14);
         assert!((state.covariance[0] - 17.0 * 3.0 / 20.0).abs() < 1e-14);
@@ -77,12 +82,19 @@ mod tests {
 
     #[test]
     fn impossible_input_changes_nothing() {
-        let before = Gaussian { mean: SVector::from([1.0]), covariance: SMatrix::from([[4.0]]) };
+        let before = Gaussian {
+            mean: SVector::from([1.0]),
+            covariance: SMatrix::from([[4.0]]),
+        };
         let identity = SMatrix::from([[1.0]]);
         for (innovation, noise) in [(f64::NAN, 1.0), (0.0, -9.0), (f64::INFINITY, 1.0)] {
             let mut state = before;
             let noise = SMatrix::from([[noise]]);
-            assert!(state.update(&SVector::from([innovation]), &identity, &noise).is_none());
+            assert!(
+                state
+                    .update(&SVector::from([innovation]), &identity, &noise)
+                    .is_none()
+            );
             assert_eq!(state, before);
         }
     }

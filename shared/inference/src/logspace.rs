@@ -7,14 +7,22 @@ pub fn log_sum_exp(values: &[f64]) -> f64 {
     if !max.is_finite() {
         return max;
     }
-    max + values.iter().map(|value| (value - max).exp()).sum::<f64>().ln()
+    max + values
+        .iter()
+        .map(|value| (value - max).exp())
+        .sum::<f64>()
+        .ln()
 }
 
 /// `ln(exp(a) + exp(b))`.
 #[must_use]
 pub fn log_add(a: f64, b: f64) -> f64 {
     let (high, low) = if a >= b { (a, b) } else { (b, a) };
-    if high.is_finite() { high + (low - high).exp().ln_1p() } else { high }
+    if high.is_finite() {
+        high + (low - high).exp().ln_1p()
+    } else {
+        high
+    }
 }
 
 /// Probability behind natural log-odds.

@@ -100,7 +100,10 @@ impl PoseParticles {
             mean += at * self.weight[i];
             square += at * at.transpose() * self.weight[i];
         }
-        Moments { mean: mean + origin, covariance: square - mean * mean.transpose() }
+        Moments {
+            mean: mean + origin,
+            covariance: square - mean * mean.transpose(),
+        }
     }
 
     /// Weighs by independent normal densities of `pose` with `variance` (x, y, yaw); returns the
@@ -118,7 +121,11 @@ impl PoseParticles {
         if !highest.is_finite() {
             return None;
         }
-        let sum: f64 = self.scratch.iter().map(|log_weight| (log_weight - highest).exp()).sum();
+        let sum: f64 = self
+            .scratch
+            .iter()
+            .map(|log_weight| (log_weight - highest).exp())
+            .sum();
         let norm = highest + sum.ln();
         let mut squares = 0.0;
         for i in 0..self.len() {
@@ -174,7 +181,9 @@ impl PoseParticles {
 
     fn smooth(&mut self, rng: &mut Pcg64Mcg) {
         let Moments { mean, covariance } = self.moments();
-        let Some(factor) = Cholesky::new(covariance) else { return };
+        let Some(factor) = Cholesky::new(covariance) else {
+            return;
+        };
         let (spread, shrink) = (factor.l() * KERNEL, (1.0 - KERNEL * KERNEL).sqrt());
         for i in 0..self.len() {
             let apart = Vector3::new(self.x[i], self.y[i], self.yaw[i]) - mean;
@@ -197,7 +206,9 @@ mod tests {
         let mut rng = Pcg64Mcg::seed_from_u64(7);
         let mut cloud = PoseParticles::new(40_000);
         cloud.scatter([0.0, 0.0, 3.0], [0.2, 0.2, 0.2], &mut rng);
-        cloud.weigh([0.3, -0.3, 3.3 - std::f64::consts::TAU], [0.01; 3]).unwrap();
+        cloud
+            .weigh([0.3, -0.3, 3.3 - std::f64::consts::TAU], [0.01; 3])
+            .unwrap();
         for resampled in [false, true] {
             if resampled {
                 cloud.resample(&mut rng);
@@ -205,7 +216,12 @@ mod tests {
             let moments = cloud.moments();
             let expected = Vector3::new(0.24, -0.24, 3.24);
             assert!((moments.mean - expected).abs().max() < 3e-3, "{moments:?}");
-            assert!((moments.covariance.diagonal().add_scalar(-0.008)).abs().max() < 5e-4);
+            assert!(
+                (moments.covariance.diagonal().add_scalar(-0.008))
+                    .abs()
+                    .max()
+                    < 5e-4
+            );
         }
     }
 
@@ -227,7 +243,9 @@ mod tests {
             assert_eq!(cloud.len(), count.min(4000));
             let sum: f64 = cloud.log_weight.iter().map(|w| w.exp()).sum();
             assert!((sum - 1.0).abs() < 1e-9);
-            let off = (cloud.moments().mean - Vector3::new(1.0, 2.0, 3.0)).abs().max();
+            let off = (cloud.moments().mean - Vector3::new(1.0, 2.0, 3.0))
+                .abs()
+                .max();
             assert!(off < if count == 500 { 0.02 } else { 0.5 });
         }
     }

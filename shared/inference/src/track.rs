@@ -48,9 +48,15 @@ impl Track {
     /// A track at `pose` (x, y, yaw) with its covariance and the noise's stationary deviations.
     #[must_use]
     pub fn new(pose: Vector3<f64>, covariance: Matrix3<f64>, noise: &MotionNoise) -> Self {
-        let mut track = Self { mean: SVector::zeros(), covariance: SMatrix::zeros() };
+        let mut track = Self {
+            mean: SVector::zeros(),
+            covariance: SMatrix::zeros(),
+        };
         track.mean.fixed_rows_mut::<3>(0).copy_from(&pose);
-        track.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&covariance);
+        track
+            .covariance
+            .fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&covariance);
         track.forget(noise);
         track
     }
@@ -85,19 +91,29 @@ impl Track {
         let pose = self.pose_covariance();
         self.mean.fixed_rows_mut::<6>(3).fill(0.0);
         self.covariance.fill(0.0);
-        self.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&pose);
-        self.covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&noise.offset);
-        self.covariance.fixed_view_mut::<3, 3>(6, 6).copy_from(&noise.deviation);
+        self.covariance
+            .fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&pose);
+        self.covariance
+            .fixed_view_mut::<3, 3>(3, 3)
+            .copy_from(&noise.offset);
+        self.covariance
+            .fixed_view_mut::<3, 3>(6, 6)
+            .copy_from(&noise.deviation);
     }
 
     /// Puts the pose at `pose` with `variance`, keeping what is known of the deviations: the frame
     /// of the measurement has jumped.
     pub fn anchor(&mut self, pose: [f64; 3], variance: [f64; 3]) {
-        self.mean.fixed_rows_mut::<3>(0).copy_from(&Vector3::from(pose));
+        self.mean
+            .fixed_rows_mut::<3>(0)
+            .copy_from(&Vector3::from(pose));
         self.covariance.fixed_view_mut::<3, 6>(0, 3).fill(0.0);
         self.covariance.fixed_view_mut::<6, 3>(3, 0).fill(0.0);
         let block = Matrix3::from_diagonal(&Vector3::from(variance));
-        self.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&block);
+        self.covariance
+            .fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&block);
     }
 
     /// Moves by one displacement.
@@ -139,9 +155,13 @@ impl Track {
     }
 
     fn set(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
-        self.covariance.fixed_view_mut::<3, 3>(row, column).copy_from(block);
+        self.covariance
+            .fixed_view_mut::<3, 3>(row, column)
+            .copy_from(block);
         if row != column {
-            self.covariance.fixed_view_mut::<3, 3>(column, row).copy_from(&block.transpose());
+            self.covariance
+                .fixed_view_mut::<3, 3>(column, row)
+                .copy_from(&block.transpose());
         }
     }
 
@@ -153,7 +173,10 @@ impl Track {
             pose[1] - self.mean[1],
             wrap(pose[2] - self.mean[2]),
         );
-        (apart, self.pose_covariance() + Matrix3::from_diagonal(&Vector3::from(variance)))
+        (
+            apart,
+            self.pose_covariance() + Matrix3::from_diagonal(&Vector3::from(variance)),
+        )
     }
 
     /// Conditions on a measured pose (x, y, yaw) with independent noise of `variance`; returns
@@ -162,14 +185,16 @@ impl Track {
         let (apart, spread) = self.innovation(pose, variance);
         let (log_likelihood, factor) = log_density(&apart, spread)?;
         let rows: SMatrix<f64, 3, N> = self.covariance.fixed_view::<3, N>(0, 0).into();
-        let gain = factor.solve(&rows).transpose();
-        let mean = self.mean + gain * apart;
-        let covariance = self.covariance - gain * rows;
+        // With spread = L Lᵀ the gain is Wᵀ L⁻¹ for W = L⁻¹ rows: the covariance stays symmetric.
+        let root = factor.l_dirty();
+        let whitened = root.solve_lower_triangular(&apart)?;
+        let rows = root.solve_lower_triangular(&rows)?;
+        let mean = self.mean + rows.tr_mul(&whitened);
         if !mean.iter().all(|value| value.is_finite()) {
             return None;
         }
         self.mean = mean;
-        self.covariance = 0.5 * (covariance + covariance.transpose());
+        self.covariance -= rows.tr_mul(&rows);
         Some(log_likelihood)
     }
 }
@@ -210,9 +235,15 @@ mod tests {
         let noise = noise();
         let start = Matrix3::from_diagonal(&Vector3::new(1e-4, 2e-4, 3e-4));
         let mut track = Track::new(Vector3::new(1.0, 2.0, 0.5), start, &noise);
-        let mut plain = Gaussian { mean: track.mean, covariance: track.covariance };
-        let step =
-            Displacement { per_metre: [0.5, 0.9, 0.02], travel_m: 0.05, extra: [1e-6, 0.0, 0.0] };
+        let mut plain = Gaussian {
+            mean: track.mean,
+            covariance: track.covariance,
+        };
+        let step = Displacement {
+            per_metre: [0.5, 0.9, 0.02],
+            travel_m: 0.05,
+            extra: [1e-6, 0.0, 0.0],
+        };
         for k in 0..40 {
             let jacobian = SMatrix::<f64, N, N>::from_fn(|i, j| {
                 let (mut up, mut down) = (plain.mean, plain.mean);
@@ -225,11 +256,20 @@ mod tests {
             let shift = motion(&plain.mean, &step) - jacobian * plain.mean;
             let moved = motion(&plain.mean, &step) - plain.mean;
             let body = Matrix3::new(
-                -0.5 * moved[1], cos, -sin, 0.5 * moved[0], sin, cos, 1.0, 0.0, 0.0,
+                -0.5 * moved[1],
+                cos,
+                -sin,
+                0.5 * moved[0],
+                sin,
+                cos,
+                1.0,
+                0.0,
+                0.0,
             );
             let white = Matrix3::from_diagonal(&(noise.white * 0.05 + Vector3::from(step.extra)));
             let mut q = SMatrix::<f64, N, N>::zeros();
-            q.fixed_view_mut::<3, 3>(0, 0).copy_from(&(body * white * body.transpose()));
+            q.fixed_view_mut::<3, 3>(0, 0)
+                .copy_from(&(body * white * body.transpose()));
             let fading = (-0.05_f64 / 0.2).exp();
             let fresh = noise.deviation * (1.0 - fading * fading);
             q.fixed_view_mut::<3, 3>(6, 6).copy_from(&fresh);
@@ -241,7 +281,10 @@ mod tests {
             let r = Matrix3::identity() * 2.5e-5;
             let expected = plain.update(&apart, &observe, &r).unwrap();
             let found = track.update(z, [2.5e-5; 3]).unwrap();
-            assert!((expected - found).abs() < 1e-5 * (1.0 + expected.abs()), "{k}");
+            assert!(
+                (expected - found).abs() < 1e-5 * (1.0 + expected.abs()),
+                "{k}"
+            );
         }
         assert!((plain.mean - track.mean).abs().max() < 1e-6);
         assert!((plain.covariance - track.covariance).abs().max() < 1e-8);

@@ -210,8 +210,8 @@ mod tests {
         let targets = rover().targets(0.5, 0.2);
         let (inner, outer) = (f64::atan2(0.35, 1.7), f64::atan2(0.35, 2.3));
         let steer = [inner, 0.0, -inner, outer, 0.0, -outer];
-        for i in 0..6 {
-            assert!((targets.steer_rad[i] - steer[i]).abs() < 1e-12);
+        for (i, steer) in steer.into_iter().enumerate() {
+            assert!((targets.steer_rad[i] - steer).abs() < 1e-12);
             let side = if i < 3 { 1.7 } else { 2.3 };
             let from_centre = if i % 3 == 1 {
                 side

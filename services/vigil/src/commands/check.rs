@@ -58,15 +58,29 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut findings = vec![configuration(&setup), model(&setup), decision(&setup)];
     findings.extend(cores(&setup));
     findings.push(scheduling(&setup));
-    findings.extend([memory_lock(), throttling(), preemption(), shared_memory(&setup)]);
+    findings.extend([
+        memory_lock(),
+        throttling(),
+        preemption(),
+        shared_memory(&setup),
+    ]);
     findings.push(residue(&setup));
     findings.push(build());
     let ok = findings.iter().all(|f| f.status != Status::Failure);
     if args.json {
-        let document = Document { schema_version: 1, ok, findings: &findings };
+        let document = Document {
+            schema_version: 1,
+            ok,
+            findings: &findings,
+        };
         output::json(&document).map_err(CommandError::failure)?;
     } else {
-        for Finding { check, status, detail } in &findings {
+        for Finding {
+            check,
+            status,
+            detail,
+        } in &findings
+        {
             let mark = match status {
                 Status::Ok => "ok      ",
                 Status::Warning => "warning ",
@@ -79,20 +93,30 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 }
 
 fn finding(check: &'static str, status: Status, detail: impl Into<String>) -> Finding {
-    Finding { check, status, detail: detail.into() }
+    Finding {
+        check,
+        status,
+        detail: detail.into(),
+    }
 }
 
 fn configuration(setup: &Setup) -> Finding {
     let (path, hash) = (setup.path.display(), setup.hash);
-    finding("configuration", Status::Ok, format!("{path}, hash {hash:016x}"))
+    finding(
+        "configuration",
+        Status::Ok,
+        format!("{path}, hash {hash:016x}"),
+    )
 }
 
 fn model(setup: &Setup) -> Finding {
     let path = setup.model_path.display();
     match Model::from_toml(&setup.model_text) {
-        Ok(model) => {
-            finding("learned model", Status::Ok, format!("{path}, hash {:016x}", model.hash()))
-        }
+        Ok(model) => finding(
+            "learned model",
+            Status::Ok,
+            format!("{path}, hash {:016x}", model.hash()),
+        ),
         Err(error) => finding("learned model", Status::Failure, format!("{path}: {error}")),
     }
 }
@@ -101,15 +125,21 @@ fn decision(setup: &Setup) -> Finding {
     let path = setup.decision_path.display();
     match Pomdp::parse(&setup.decision_text) {
         Ok(_) => finding("decision model", Status::Ok, path.to_string()),
-        Err(error) => finding("decision model", Status::Failure, format!("{path}: {error}")),
+        Err(error) => finding(
+            "decision model",
+            Status::Failure,
+            format!("{path}: {error}"),
+        ),
     }
 }
 
 /// Which service is to run where. That the cores exist was checked with the configuration.
 fn cores(setup: &Setup) -> Vec<Finding> {
     let isolated = fs::read_to_string("/sys/devices/system/cpu/isolated").unwrap_or_default();
-    let mut used: Vec<usize> =
-        ServiceName::ALL.iter().map(|&name| setup.service(name).core).collect();
+    let mut used: Vec<usize> = ServiceName::ALL
+        .iter()
+        .map(|&name| setup.service(name).core)
+        .collect();
     used.sort_unstable();
     used.dedup();
     used.iter()
@@ -126,14 +156,20 @@ fn cores(setup: &Setup) -> Vec<Finding> {
             };
             let detail = format!("core {core}: {}{shared}{isolated}", names.join(", "));
             let alone = names.len() == 1;
-            finding("core", if alone { Status::Ok } else { Status::Warning }, detail)
+            finding(
+                "core",
+                if alone { Status::Ok } else { Status::Warning },
+                detail,
+            )
         })
         .collect()
 }
 
 /// Tries the placement on a thread of its own, which ends with it.
 fn trial(core: usize, priority: u8) -> Option<Placement> {
-    std::thread::spawn(move || placement::apply(Wanted { core, priority })).join().ok()
+    std::thread::spawn(move || placement::apply(Wanted { core, priority }))
+        .join()
+        .ok()
 }
 
 fn scheduling(setup: &Setup) -> Finding {
@@ -180,7 +216,11 @@ fn throttling() -> Finding {
 
 fn preemption() -> Finding {
     let version = fs::read_to_string("/proc/version").unwrap_or_default();
-    let kernel = version.split_whitespace().nth(2).unwrap_or("unknown").to_owned();
+    let kernel = version
+        .split_whitespace()
+        .nth(2)
+        .unwrap_or("unknown")
+        .to_owned();
     if version.contains("PREEMPT_RT") {
         return finding("kernel", Status::Ok, format!("{kernel}, PREEMPT_RT"));
     }
@@ -236,7 +276,11 @@ fn residue(setup: &Setup) -> Finding {
 
 fn build() -> Finding {
     if cfg!(debug_assertions) {
-        finding("build", Status::Warning, "debug build: latencies mean nothing")
+        finding(
+            "build",
+            Status::Warning,
+            "debug build: latencies mean nothing",
+        )
     } else {
         finding("build", Status::Ok, "release")
     }

@@ -38,7 +38,9 @@ const COLUMNS: [&str; 10] = [
 /// # Errors
 /// An input that is refused; an output that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let Prepared { mut pipeline, runs, .. } = args.filter.prepare()?;
+    let Prepared {
+        mut pipeline, runs, ..
+    } = args.filter.prepare()?;
     let at_out = |error: &dyn std::fmt::Display| format!("{}: {error}", args.out.display());
     let file = File::create(&args.out).map_err(|e| CommandError::usage(at_out(&e)))?;
     let mut writer = csv::Writer::from_writer(file);

@@ -53,7 +53,13 @@ struct Document<'a> {
 /// # Errors
 /// An input that is refused.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let Prepared { robot, model, mut pipeline, mut runs, used } = args.filter.prepare()?;
+    let Prepared {
+        robot,
+        model,
+        mut pipeline,
+        mut runs,
+        used,
+    } = args.filter.prepare()?;
     let labels = labels::read(&args.runs, &robot).map_err(CommandError::usage)?;
     let mut labels: BTreeMap<u32, Label> =
         labels.into_iter().map(|label| (label.run, label)).collect();
@@ -71,14 +77,20 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         }
     }
     if let Some(run) = runs.iter().find(|run| !labels.contains_key(&run.id)) {
-        let message = format!("{}: there is no label of run {}", args.runs.display(), run.id);
+        let message = format!(
+            "{}: there is no label of run {}",
+            args.runs.display(),
+            run.id
+        );
         return Err(CommandError::usage(message));
     }
     let mut cases = Vec::with_capacity(runs.len());
     let progress = Progress::new("runs", runs.len());
     for (done, run) in runs.iter().enumerate() {
         progress.show(done);
-        let Some(label) = labels.remove(&run.id) else { continue };
+        let Some(label) = labels.remove(&run.id) else {
+            continue;
+        };
         let mut verdicts = Vec::with_capacity(run.frames.len());
         pipeline.run(run, |verdict| verdicts.push(verdict));
         cases.push(Case { label, verdicts });
@@ -87,7 +99,12 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let score = scoring::score(&cases, pipeline.taxonomy());
     let (part, used) = (args.part, &used);
     let printed = if args.json {
-        output::json(&Document { schema_version: 1, part, used, score: &score })
+        output::json(&Document {
+            schema_version: 1,
+            part,
+            used,
+            score: &score,
+        })
     } else {
         output::line(&score.to_string())
     };

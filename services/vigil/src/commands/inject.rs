@@ -40,14 +40,19 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let domain = setup.domain().map_err(CommandError::failure)?;
     if domain.lock().map_err(CommandError::failure)?.is_some() {
         let name = domain.graph();
-        return Err(CommandError::failure(format!("no graph named '{name}' is running")));
+        return Err(CommandError::failure(format!(
+            "no graph named '{name}' is running"
+        )));
     }
     let link = Link::join(&domain, "vigil-inject").map_err(CommandError::failure)?;
     let graph = Graph::SharedMemory(link);
     let simulator = ServiceName::SensorSim;
-    let mut health = graph.receiver(Topic::Health(simulator)).map_err(CommandError::failure)?;
-    let mut sender =
-        graph.sender::<Control>(Topic::Control(simulator)).map_err(CommandError::failure)?;
+    let mut health = graph
+        .receiver(Topic::Health(simulator))
+        .map_err(CommandError::failure)?;
+    let mut sender = graph
+        .sender::<Control>(Topic::Control(simulator))
+        .map_err(CommandError::failure)?;
     let block = sender.block();
     match change {
         Change::Inject(fault) => {
@@ -61,7 +66,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         }
     }
     let (epoch, seq) = (sender.epoch(), sender.next_seq());
-    sender.send(Stamp::default(), &Monotonic).map_err(CommandError::failure)?;
+    sender
+        .send(Stamp::default(), &Monotonic)
+        .map_err(CommandError::failure)?;
     match answer(health.as_mut(), epoch, seq) {
         Some(true) => {
             eprintln!("injected {}", args.spec);

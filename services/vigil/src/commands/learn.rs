@@ -74,7 +74,10 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         .cloned()
         .collect();
     let held_out = split(&with_frames, args.test_fraction, args.seed);
-    let options = Options { seed: args.seed, ..Options::default() };
+    let options = Options {
+        seed: args.seed,
+        ..Options::default()
+    };
     let (model, report) = learning::learn(&runs, &labels, &held_out, &robot, &options)
         .map_err(|error| CommandError::usage(format!("{}: {error}", args.frames.display())))?;
     let text = model.to_toml().map_err(CommandError::failure)?;
@@ -114,7 +117,8 @@ fn write_whole(path: &Path, text: &str) -> io::Result<()> {
 }
 
 fn table(report: &Report, out: &Path) -> String {
-    let mut lines = vec![
+    let mut lines =
+        vec![
         format!("model        {}", out.display()),
         format!("learned from {} runs, {} left out", report.runs_learned, report.runs_held_out),
         format!("alarms       calibrated on {:.2} h without a fault", report.exposure_h),

@@ -119,7 +119,13 @@ impl FilterArgs {
             particles: self.particles,
             seed: self.seed,
         };
-        Ok(Prepared { robot, model, pipeline, runs, used })
+        Ok(Prepared {
+            robot,
+            model,
+            pipeline,
+            runs,
+            used,
+        })
     }
 
     fn pipeline(
@@ -147,9 +153,8 @@ impl FilterArgs {
 }
 
 fn load_model(path: &Path) -> Result<Model, CommandError> {
-    let refuse = |error: &dyn std::fmt::Display| {
-        CommandError::usage(format!("{}: {error}", path.display()))
-    };
+    let refuse =
+        |error: &dyn std::fmt::Display| CommandError::usage(format!("{}: {error}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| refuse(&error))?;
     Model::from_toml(&text).map_err(|error| refuse(&error))
 }

@@ -47,6 +47,8 @@ impl Link {
     /// # Errors
     /// [`PortError::Setup`].
     pub fn join(domain: &Domain, name: &str) -> Result<Self, PortError> {
+        // Its warnings are about files that another process has just cleaned up.
+        set_log_level(LogLevel::Error);
         let config = domain.transport_config()?;
         let node_name = NodeName::new(name).map_err(|e| PortError::setup("node name", &e))?;
         let node = NodeBuilder::new()

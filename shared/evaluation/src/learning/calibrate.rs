@@ -33,8 +33,14 @@ pub fn fit(
     let labels = by_run(labels);
     for channels in [Channels::Pose, Channels::PoseEncoders] {
         let mut maxima = Vec::new();
-        let mut monitor =
-            Monitor::new(model, robot, channels, options.particles, FAULT_RATE_1_H, options.seed);
+        let mut monitor = Monitor::new(
+            model,
+            robot,
+            channels,
+            options.particles,
+            FAULT_RATE_1_H,
+            options.seed,
+        );
         for run in runs {
             let label = labels.get(&run.id).ok_or(LearnError::Label(run.id))?;
             let onset = label.onset_s.unwrap_or(f64::INFINITY);
@@ -61,7 +67,9 @@ pub fn fit(
         let found_s = maxima.len() as f64 * WINDOW_S;
         let fit = Calibration::fit(channels.name(), FAULT_RATE_1_H, &mut maxima, WINDOW_S);
         let needed_s = WINDOWS_MIN as f64 * WINDOW_S;
-        model.calibration.push(fit.ok_or(LearnError::Exposure { found_s, needed_s })?);
+        model
+            .calibration
+            .push(fit.ok_or(LearnError::Exposure { found_s, needed_s })?);
     }
     Ok(())
 }

@@ -15,7 +15,11 @@ pub struct LeastSquares<const N: usize> {
 
 impl<const N: usize> Default for LeastSquares<N> {
     fn default() -> Self {
-        Self { matrix: SMatrix::zeros(), right: SVector::zeros(), count: 0 }
+        Self {
+            matrix: SMatrix::zeros(),
+            right: SVector::zeros(),
+            count: 0,
+        }
     }
 }
 
@@ -37,7 +41,10 @@ impl<const N: usize> LeastSquares<N> {
         let ridge = self.matrix.trace() * RIDGE;
         let matrix = self.matrix + SMatrix::identity() * ridge;
         let solution = Cholesky::new(matrix)?.solve(&self.right);
-        solution.iter().all(|value| value.is_finite()).then(|| solution.into())
+        solution
+            .iter()
+            .all(|value| value.is_finite())
+            .then(|| solution.into())
     }
 }
 

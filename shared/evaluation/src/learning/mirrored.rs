@@ -9,7 +9,10 @@ use vigil_robot::learned::{Curve, MotionModel, RateModel};
 pub fn stuck(known: &StuckModel, name: &str, mirror: &[usize]) -> StuckModel {
     let rate = |&opposite: &usize| {
         let RateModel { ratio, ratio_sd } = known.rates[opposite];
-        RateModel { ratio: [ratio[0], -ratio[1], ratio[2]], ratio_sd }
+        RateModel {
+            ratio: [ratio[0], -ratio[1], ratio[2]],
+            ratio_sd,
+        }
     };
     StuckModel {
         wheel: name.to_owned(),
@@ -39,7 +42,10 @@ mod tests {
 
     #[test]
     fn a_mirrored_curve_has_the_other_sign_at_the_other_curvature() {
-        let known = Curve { curvature: [0.2, 0.9, -0.1, 0.03, 0.05], inverse_speed: 0.01 };
+        let known = Curve {
+            curvature: [0.2, 0.9, -0.1, 0.03, 0.05],
+            inverse_speed: 0.01,
+        };
         for (sign, k) in [(-1.0, 0.7), (1.0, -0.4)] {
             let found = curve(&known, sign).value(k, 0.1);
             assert!((found - sign * known.value(-k, 0.1)).abs() < 1e-12);

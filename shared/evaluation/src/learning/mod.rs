@@ -20,7 +20,7 @@ use std::collections::BTreeSet;
 use vigil_blocks::fnv1a;
 use vigil_robot::Description;
 use vigil_robot::learned::model::{
-    CommandModel, Model, NominalModel, Noise, Provenance, StuckModel, VERSION,
+    CommandModel, Model, Noise, NominalModel, Provenance, StuckModel, VERSION,
 };
 use vigil_robot::learned::{Curve, EncoderModel, MotionModel, RateModel};
 
@@ -44,7 +44,12 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { interval_s: 0.05, seed: 1, particles: 256, evaluations: 400 }
+        Self {
+            interval_s: 0.05,
+            seed: 1,
+            particles: 256,
+            evaluations: 400,
+        }
     }
 }
 
@@ -115,12 +120,19 @@ pub fn learn(
     options: &Options,
 ) -> Result<(Model, Report), LearnError> {
     let left_out: BTreeSet<u32> = held_out.iter().copied().collect();
-    let learned: Vec<&Run> = runs.iter().filter(|run| !left_out.contains(&run.id)).collect();
+    let learned: Vec<&Run> = runs
+        .iter()
+        .filter(|run| !left_out.contains(&run.id))
+        .collect();
     let mut model = blank(robot, options);
     model.provenance = Provenance {
         data_hash: data_hash(&learned),
         runs_learned: learned.iter().map(|run| run.id).collect(),
-        runs_held_out: runs.iter().map(|run| run.id).filter(|id| left_out.contains(id)).collect(),
+        runs_held_out: runs
+            .iter()
+            .map(|run| run.id)
+            .filter(|id| left_out.contains(id))
+            .collect(),
     };
     let mut segments = Segments::collect(&learned, labels, robot, &model)?;
     check_runs(&segments, robot)?;
@@ -148,7 +160,10 @@ pub fn learn(
         });
     }
     calibrate::fit(&mut model, &learned, labels, robot, options)?;
-    let tested: Vec<&Run> = runs.iter().filter(|run| left_out.contains(&run.id)).collect();
+    let tested: Vec<&Run> = runs
+        .iter()
+        .filter(|run| left_out.contains(&run.id))
+        .collect();
     let report = report::report(&model, &tested, labels, robot)?;
     Ok((model, report))
 }
@@ -160,7 +175,11 @@ fn check_runs(segments: &Segments, robot: &Description) -> Result<(), LearnError
         found.push((format!("{}_STUCK", wheel.name), stuck.len()));
     }
     match found.into_iter().find(|(_, found)| *found < RUNS_MIN) {
-        Some((mode, found)) => Err(LearnError::Runs { mode, found, needed: RUNS_MIN }),
+        Some((mode, found)) => Err(LearnError::Runs {
+            mode,
+            found,
+            needed: RUNS_MIN,
+        }),
         None => Ok(()),
     }
 }
@@ -173,16 +192,32 @@ fn blank(robot: &Description, options: &Options) -> Model {
         deviation_length_m: 0.2,
         correlation: 0.0,
         white_sd: [0.0; 3],
-        yaw: Curve { curvature: [0.0, 1.0, 0.0, 0.0, 0.0], inverse_speed: 0.0 },
-        forward: Curve { curvature: [1.0, 0.0, 0.0, 0.0, 0.0], inverse_speed: 0.0 },
+        yaw: Curve {
+            curvature: [0.0, 1.0, 0.0, 0.0, 0.0],
+            inverse_speed: 0.0,
+        },
+        forward: Curve {
+            curvature: [1.0, 0.0, 0.0, 0.0, 0.0],
+            inverse_speed: 0.0,
+        },
         lateral: Curve::default(),
     };
-    let rates = vec![RateModel { ratio: [1.0, 0.0, 0.0], ratio_sd: 0.01 }; robot.wheels.len()];
+    let rates = vec![
+        RateModel {
+            ratio: [1.0, 0.0, 0.0],
+            ratio_sd: 0.01
+        };
+        robot.wheels.len()
+    ];
     let noise = &robot.noise;
     Model {
         version: VERSION,
         robot: robot.name.clone(),
-        wheels: robot.wheels.iter().map(|wheel| wheel.name.clone()).collect(),
+        wheels: robot
+            .wheels
+            .iter()
+            .map(|wheel| wheel.name.clone())
+            .collect(),
         interval_s: options.interval_s,
         provenance: Provenance::default(),
         noise: Noise {
@@ -205,7 +240,11 @@ fn blank(robot: &Description, options: &Options) -> Model {
             broken_mean_rad_s: 0.0,
             broken_sd_rad_s: 0.25 * robot.limits.wheel_rate_rad_s,
         },
-        nominal: NominalModel { steer_sd_rad: 0.001, motion, rates },
+        nominal: NominalModel {
+            steer_sd_rad: 0.001,
+            motion,
+            rates,
+        },
         stuck: Vec::new(),
         calibration: Vec::new(),
     }
@@ -217,7 +256,11 @@ fn data_hash(runs: &[&Run]) -> String {
         hash = fnv1a::hash_u64(hash, u64::from(run.id));
         for frame in &run.frames {
             hash = fnv1a::hash_u64(hash, frame.header.t_capture_ns);
-            let values = frame.pose.iter().chain(&frame.command).chain(&frame.wheel_rate);
+            let values = frame
+                .pose
+                .iter()
+                .chain(&frame.command)
+                .chain(&frame.wheel_rate);
             for value in values {
                 hash = fnv1a::hash_u64(hash, value.to_bits());
             }

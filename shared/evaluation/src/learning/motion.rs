@@ -7,10 +7,10 @@ use vigil_inference::angle::wrap;
 use vigil_inference::track::{Displacement, Track};
 use vigil_robot::learned::{Curve, Model, MotionModel, Observation};
 
+use super::least_squares::LeastSquares;
 use super::segments::Segment;
 use super::simplex::minimise;
 use super::{LearnError, Options};
-use super::least_squares::LeastSquares;
 
 /// Length of the window over which a displacement is measured, s.
 const WINDOW_S: f64 = 2.0;
@@ -37,24 +37,44 @@ pub fn fit(
 ) -> Result<MotionModel, LearnError> {
     let steps = windows(segments);
     if steps.is_empty() {
-        return Err(LearnError::Missing { mode: mode.to_owned(), missing: "pose in motion" });
+        return Err(LearnError::Missing {
+            mode: mode.to_owned(),
+            missing: "pose in motion",
+        });
     }
-    let curvatures: BTreeSet<i64> =
-        steps.iter().map(|step| (step.curvature * 100.0).round() as i64).collect();
+    let curvatures: BTreeSet<i64> = steps
+        .iter()
+        .map(|step| (step.curvature * 100.0).round() as i64)
+        .collect();
     if curvatures.len() < CURVATURES_MIN {
         let (found, needed) = (curvatures.len(), CURVATURES_MIN);
-        return Err(LearnError::Curvatures { mode: mode.to_owned(), found, needed });
+        return Err(LearnError::Curvatures {
+            mode: mode.to_owned(),
+            found,
+            needed,
+        });
     }
-    let singular = || LearnError::Singular { mode: mode.to_owned(), what: "polynomial" };
+    let singular = || LearnError::Singular {
+        mode: mode.to_owned(),
+        what: "polynomial",
+    };
     let noise = &model.noise;
     let mut curves = [Curve::default(); 3];
     for (axis, curve) in curves.iter_mut().enumerate() {
-        let sd = if axis == 0 { noise.yaw_rad } else { noise.position_m };
+        let sd = if axis == 0 {
+            noise.yaw_rad
+        } else {
+            noise.position_m
+        };
         let mut fit = LeastSquares::<{ Curve::TERMS }>::default();
         for step in &steps {
             let sensor = 2.0 * sd * sd / END as f64 / (step.travel * step.travel);
             let weight = 1.0 / (sensor + SCATTER * SCATTER);
-            fit.push(Curve::basis(step.curvature, step.speed), step.per_metre[axis], weight);
+            fit.push(
+                Curve::basis(step.curvature, step.speed),
+                step.per_metre[axis],
+                weight,
+            );
         }
         *curve = Curve::from_terms(fit.solve().ok_or_else(singular)?);
     }
@@ -99,7 +119,10 @@ fn windows(segments: &[Segment]) -> Vec<Window> {
 /// Displacement between the mean poses of both ends. A chord is shorter than its arc by the
 /// factor sin(h)/h, h half the turn: the polynomials describe short steps, so it is undone.
 fn window(piece: &[Observation]) -> Option<Window> {
-    if piece.iter().any(|o| !o.moving || o.anchor || o.pose_frames == 0) {
+    if piece
+        .iter()
+        .any(|o| !o.moving || o.anchor || o.pose_frames == 0)
+    {
         return None;
     }
     let (head, tail) = (&piece[..END], &piece[piece.len() - END..]);
@@ -113,17 +136,29 @@ fn window(piece: &[Observation]) -> Option<Window> {
     let heading: f64 = inner.iter().map(|o| o.travel_m * o.curvature).sum();
     let speed = inner.iter().map(|o| o.speed).sum::<f64>() / inner.len() as f64;
     // The turn may exceed half a circle only if the steps in between say so.
-    let turn: f64 = piece.windows(2).map(|two| wrap(two[1].pose[2] - two[0].pose[2])).sum();
+    let turn: f64 = piece
+        .windows(2)
+        .map(|two| wrap(two[1].pose[2] - two[0].pose[2]))
+        .sum();
     let coarse = wrap(end[2] - start[2]);
     let turn = coarse + (turn - coarse).signum() * whole_turns(turn - coarse);
     let half = 0.5 * turn;
-    let arc = if half.abs() > 1e-6 { half / half.sin() } else { 1.0 };
+    let arc = if half.abs() > 1e-6 {
+        half / half.sin()
+    } else {
+        1.0
+    };
     let (dx, dy) = ((end[0] - start[0]) * arc, (end[1] - start[1]) * arc);
     let (sin, cos) = (start[2] + half).sin_cos();
     let forward = dx * cos + dy * sin;
     let lateral = -dx * sin + dy * cos;
     let per_metre = [turn / travel, forward / travel, lateral / travel];
-    Some(Window { curvature: heading / travel, speed, travel, per_metre })
+    Some(Window {
+        curvature: heading / travel,
+        speed,
+        travel,
+        per_metre,
+    })
 }
 
 fn whole_turns(angle: f64) -> f64 {
@@ -157,7 +192,10 @@ fn fit_noise(
     let start = [-5.0, -5.5, -4.0, -4.5, -1.6, 0.0, -6.0];
     let best = minimise(start, 0.7, options.evaluations, |x| {
         let noise = with_noise(motion, x);
-        let fit: f64 = used.iter().map(|segment| log_likelihood(model, &noise, segment)).sum();
+        let fit: f64 = used
+            .iter()
+            .map(|segment| log_likelihood(model, &noise, segment))
+            .sum();
         // A weak pull towards the start keeps directions without data where they are.
         let pull: f64 = x.iter().zip(start).map(|(a, b)| (a - b) * (a - b)).sum();
         0.05 * pull - fit
@@ -171,7 +209,11 @@ fn with_noise(motion: &MotionModel, x: &[f64; 7]) -> MotionModel {
     let (yaw, forward) = (bounded(x[2], 2e-4, 2.0), bounded(x[3], 2e-4, 2.0));
     let white = bounded(x[6], 1e-4, 0.1);
     MotionModel {
-        offset_sd: [offset_yaw, offset_forward, (LATERAL * offset_forward).max(3e-4)],
+        offset_sd: [
+            offset_yaw,
+            offset_forward,
+            (LATERAL * offset_forward).max(3e-4),
+        ],
         deviation_sd: [yaw, forward, (LATERAL * forward).max(3e-4)],
         deviation_length_m: bounded(x[4], 0.03, 3.0),
         correlation: 0.98 * x[5].tanh(),
@@ -184,7 +226,9 @@ fn with_noise(motion: &MotionModel, x: &[f64; 7]) -> MotionModel {
 #[must_use]
 pub fn log_likelihood(model: &Model, motion: &MotionModel, segment: &Segment) -> f64 {
     let mut sum = 0.0;
-    follow(model, motion, segment, |_, log_likelihood| sum += log_likelihood);
+    follow(model, motion, segment, |_, log_likelihood| {
+        sum += log_likelihood
+    });
     sum
 }
 

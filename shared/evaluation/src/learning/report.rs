@@ -54,13 +54,23 @@ pub fn report(
     let mut segments = Segments::collect(tested, labels, robot, model)?;
     segments.drop_unmoved();
     let mut modes = Vec::new();
-    modes.extend(mode_error(model, "ND".into(), &model.nominal.motion, &segments.nominal));
+    modes.extend(mode_error(
+        model,
+        "ND".into(),
+        &model.nominal.motion,
+        &segments.nominal,
+    ));
     for (wheel, stuck) in segments.stuck.iter().enumerate() {
-        let Some(learned) = model.stuck(wheel) else { continue };
+        let Some(learned) = model.stuck(wheel) else {
+            continue;
+        };
         let mode = format!("{}_STUCK", learned.wheel);
         modes.extend(mode_error(model, mode, &learned.motion, stuck));
     }
-    let exposure = model.calibration.iter().map(|calibration| calibration.exposure_h);
+    let exposure = model
+        .calibration
+        .iter()
+        .map(|calibration| calibration.exposure_h);
     Ok(Report {
         runs_learned: model.provenance.runs_learned.len(),
         runs_held_out: tested.len(),

@@ -32,10 +32,13 @@ pub struct Segments {
 #[must_use]
 pub fn observations(run: &Run, robot: &Description, model: &Model) -> Segment {
     let mut observer = Observer::new(model, robot);
-    run.frames
-        .iter()
-        .filter_map(|frame| observer.push(frame).complete.then(|| *observer.observation()))
-        .collect()
+    let mut out = Segment::new();
+    for frame in &run.frames {
+        if observer.push(frame).complete {
+            out.push(*observer.observation());
+        }
+    }
+    out
 }
 
 /// The labels by run.
@@ -74,7 +77,9 @@ impl Segments {
             let onset = label.onset_s.unwrap_or(f64::INFINITY);
             out.nominal.push(between(SETTLE_S, onset));
             out.nominal_runs += usize::from(label.is_nominal());
-            let Some(wheel) = label.wheel.filter(|_| !label.is_nominal()) else { continue };
+            let Some(wheel) = label.wheel.filter(|_| !label.is_nominal()) else {
+                continue;
+            };
             let after = between(onset + SETTLE_S, f64::INFINITY);
             match label.kind.as_str() {
                 "stuck" => out.stuck[wheel].push(after),
@@ -94,11 +99,13 @@ impl Segments {
         }
     }
 
-    /// Pieces with `wheel` stuck, and mirrored those with the wheel opposite stuck, if there is one.
+    /// Pieces with `wheel` stuck, and mirrored those with the wheel opposite stuck, if any.
     #[must_use]
     pub fn stuck_pooled(&self, wheel: usize, robot: &Description) -> Vec<Segment> {
         let mut pooled = self.stuck[wheel].clone();
-        let Some(mirror) = mirror(robot) else { return pooled };
+        let Some(mirror) = mirror(robot) else {
+            return pooled;
+        };
         if mirror[wheel] != wheel {
             let opposite = self.stuck[mirror[wheel]].iter();
             pooled.extend(opposite.map(|segment| mirrored(segment, &mirror)));

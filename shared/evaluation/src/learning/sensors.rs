@@ -16,12 +16,11 @@ const REPEAT_RATE_MIN: f64 = 1e-4;
 ///
 /// # Errors
 /// [`LearnError::Missing`] if nominal runs hold no pose.
-pub fn fit(
-    model: &mut Model,
-    segments: &Segments,
-    robot: &Description,
-) -> Result<(), LearnError> {
-    let missing = |missing| LearnError::Missing { mode: "ND".into(), missing };
+pub fn fit(model: &mut Model, segments: &Segments, robot: &Description) -> Result<(), LearnError> {
+    let missing = |missing| LearnError::Missing {
+        mode: "ND".into(),
+        missing,
+    };
     let described = model.noise;
     let rate = described.reference_rate_hz;
     let position = pose_sd(segments, 0, described.position_m, rate);
@@ -32,13 +31,20 @@ pub fn fit(
     };
     model.noise.position_m = (0.5 * (x * x + y * y)).sqrt();
     model.noise.yaw_rad = yaw;
-    if let Some(sd) = wheel_sd(segments, described.wheel_rate_rad_s, rate, robot.wheels.len()) {
+    if let Some(sd) = wheel_sd(
+        segments,
+        described.wheel_rate_rad_s,
+        rate,
+        robot.wheels.len(),
+    ) {
         model.noise.wheel_rate_rad_s = sd;
     }
     let moving = || segments.nominal.iter().flatten().filter(|o| o.moving);
     let largest = |value: fn(&Observation) -> f64| moving().map(value).fold(0.0, f64::max);
     model.command.curvature_max_1_m = largest(|o| o.command[0].abs());
-    let slowest = moving().map(|o| o.command[1].abs()).fold(f64::INFINITY, f64::min);
+    let slowest = moving()
+        .map(|o| o.command[1].abs())
+        .fold(f64::INFINITY, f64::min);
     model.command.speed_range_m_s = [slowest, largest(|o| o.command[1].abs())];
     fit_encoder(model, segments, robot);
     Ok(())
@@ -47,14 +53,25 @@ pub fn fit(
 /// Root mean square second difference over √6, scaled to the reference rate.
 fn pose_sd(segments: &Segments, axis: usize, described: f64, rate: f64) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0.0);
-    for three in segments.nominal.iter().flat_map(|segment| segment.windows(3)) {
-        if three.iter().any(|o| !o.moving || o.anchor || o.pose_frames == 0) {
+    for three in segments
+        .nominal
+        .iter()
+        .flat_map(|segment| segment.windows(3))
+    {
+        if three
+            .iter()
+            .any(|o| !o.moving || o.anchor || o.pose_frames == 0)
+        {
             continue;
         }
         let scale = f64::from(three[1].pose_frames) * three[1].frame_s * rate;
         let up = three[2].pose[axis] - three[1].pose[axis];
         let down = three[1].pose[axis] - three[0].pose[axis];
-        let bend = if axis == 2 { wrap(wrap(up) - wrap(down)) } else { up - down };
+        let bend = if axis == 2 {
+            wrap(wrap(up) - wrap(down))
+        } else {
+            up - down
+        };
         let variance = bend * bend * scale / 6.0;
         if variance < CLIP * CLIP * described * described {
             sum += variance;
@@ -66,7 +83,11 @@ fn pose_sd(segments: &Segments, axis: usize, described: f64, rate: f64) -> Optio
 
 fn wheel_sd(segments: &Segments, described: f64, rate: f64, wheels: usize) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0.0);
-    for two in segments.nominal.iter().flat_map(|segment| segment.windows(2)) {
+    for two in segments
+        .nominal
+        .iter()
+        .flat_map(|segment| segment.windows(2))
+    {
         for i in 0..wheels {
             let (a, b) = (&two[0].wheels[i], &two[1].wheels[i]);
             if a.plain == 0 || b.plain == 0 || !two.iter().all(|o| o.moving) {
@@ -96,7 +117,11 @@ fn fit_encoder(model: &mut Model, segments: &Segments, robot: &Description) {
     }
     let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
     for (wheel, segment) in &segments.noisy {
-        for reading in segment.iter().map(|o| &o.wheels[*wheel]).filter(|r| r.plain > 0) {
+        for reading in segment
+            .iter()
+            .map(|o| &o.wheels[*wheel])
+            .filter(|r| r.plain > 0)
+        {
             let plain = f64::from(reading.plain);
             count += plain;
             sum += reading.mean * plain;

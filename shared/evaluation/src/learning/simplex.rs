@@ -25,9 +25,8 @@ pub fn minimise<const N: usize>(
         if worst.1 - best < 1e-3 {
             break;
         }
-        let centre: [f64; N] = std::array::from_fn(|i| {
-            corners[..N].iter().map(|(x, _)| x[i]).sum::<f64>() / N as f64
-        });
+        let centre: [f64; N] =
+            std::array::from_fn(|i| corners[..N].iter().map(|(x, _)| x[i]).sum::<f64>() / N as f64);
         let along = |t: f64| -> [f64; N] {
             std::array::from_fn(|i| centre[i] + t * (worst.0[i] - centre[i]))
         };

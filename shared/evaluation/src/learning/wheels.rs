@@ -23,7 +23,9 @@ pub fn fit(
     segments: &[Segment],
     mode: &str,
 ) -> Result<Vec<RateModel>, LearnError> {
-    (0..robot.wheels.len()).map(|wheel| fit_wheel(robot, segments, mode, wheel)).collect()
+    (0..robot.wheels.len())
+        .map(|wheel| fit_wheel(robot, segments, mode, wheel))
+        .collect()
 }
 
 fn fit_wheel(
@@ -39,12 +41,22 @@ fn fit_wheel(
         .filter_map(|chunk| ratio(robot, chunk, wheel))
         .collect();
     if windows.is_empty() {
-        return Ok(RateModel { ratio: [1.0, 0.0, 0.0], ratio_sd: 0.05 });
+        return Ok(RateModel {
+            ratio: [1.0, 0.0, 0.0],
+            ratio_sd: 0.05,
+        });
     }
     for (curvature, ratio, variance) in &windows {
-        fit.push([1.0, *curvature, curvature * curvature], *ratio, 1.0 / (variance + 1e-6));
+        fit.push(
+            [1.0, *curvature, curvature * curvature],
+            *ratio,
+            1.0 / (variance + 1e-6),
+        );
     }
-    let singular = || LearnError::Singular { mode: mode.to_owned(), what: "wheel rates" };
+    let singular = || LearnError::Singular {
+        mode: mode.to_owned(),
+        what: "wheel rates",
+    };
     let terms = fit.solve().ok_or_else(singular)?;
     let (mut sum, mut noise) = (0.0, 0.0);
     for (curvature, ratio, variance) in &windows {
@@ -53,7 +65,10 @@ fn fit_wheel(
         noise += variance;
     }
     let variance = (sum - noise) / windows.len() as f64;
-    Ok(RateModel { ratio: terms, ratio_sd: variance.max(0.0).sqrt().max(RATIO_SD_MIN) })
+    Ok(RateModel {
+        ratio: terms,
+        ratio_sd: variance.max(0.0).sqrt().max(RATIO_SD_MIN),
+    })
 }
 
 /// Curvature, ratio of the rates, and the ratio's variance by sensor noise, over one window. The
@@ -63,20 +78,31 @@ fn ratio(
     chunk: &[vigil_robot::learned::Observation],
     wheel: usize,
 ) -> Option<(f64, f64, f64)> {
-    let used: Vec<_> = chunk.iter().filter(|o| o.moving && o.wheels[wheel].plain > 0).collect();
+    let used: Vec<_> = chunk
+        .iter()
+        .filter(|o| o.moving && o.wheels[wheel].plain > 0)
+        .collect();
     if used.len() < WINDOW / 2 {
         return None;
     }
     let count = used.len() as f64;
     let curvature = used.iter().map(|o| o.command[0]).sum::<f64>() / count;
-    let rolling =
-        used.iter().map(|o| rolling_rate(robot, wheel, o.command[0], o.command[1])).sum::<f64>();
+    let rolling = used
+        .iter()
+        .map(|o| rolling_rate(robot, wheel, o.command[0], o.command[1]))
+        .sum::<f64>();
     let rate = used.iter().map(|o| o.wheels[wheel].mean).sum::<f64>();
-    let steps = used.windows(2).map(|two| two[1].wheels[wheel].mean - two[0].wheels[wheel].mean);
+    let steps = used
+        .windows(2)
+        .map(|two| two[1].wheels[wheel].mean - two[0].wheels[wheel].mean);
     let noise = steps.map(|step| step * step).sum::<f64>() / (2.0 * (count - 1.0));
     let rolling = rolling / count;
     if rolling.abs() < 0.05 {
         return None;
     }
-    Some((curvature, rate / count / rolling, noise / count / (rolling * rolling)))
+    Some((
+        curvature,
+        rate / count / rolling,
+        noise / count / (rolling * rolling),
+    ))
 }

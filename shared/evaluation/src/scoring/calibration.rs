@@ -43,7 +43,7 @@ impl Claims {
     }
 }
 
-/// Calibration of the reported modes 2 s after the onset, over all runs with a fault.
+/// Calibration of the reported modes 2 s after the onset of the faults of one class.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Calibration {
     /// Runs.
@@ -58,11 +58,13 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    pub(super) fn of(cases: &[Case], taxonomy: &Taxonomy) -> Self {
+    pub(super) fn of(cases: &[&Case], taxonomy: &Taxonomy) -> Self {
         let (mut claims, mut log_score) = (Claims::default(), 0.0);
         let mut confident_wrong = Ratio::default();
         for case in cases {
-            let Some(verdict) = case.at(JUDGED_S) else { continue };
+            let Some(verdict) = case.at(JUDGED_S) else {
+                continue;
+            };
             let truth = &case.label.mode;
             let is_true = taxonomy.covers(&verdict.mode, truth);
             claims.add(verdict.p_mode, is_true);

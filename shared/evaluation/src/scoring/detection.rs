@@ -101,5 +101,7 @@ impl Detection {
 fn delay_s(case: &Case) -> Option<f64> {
     let onset_s = case.label.onset_s?;
     let mut after = rises(case.verdicts.iter()).map(|verdict| verdict.t_s - onset_s);
-    after.find(|delay_s| *delay_s >= -TIME_SLACK_S).map(|delay_s| delay_s.max(0.0))
+    after
+        .find(|delay_s| *delay_s >= -TIME_SLACK_S)
+        .map(|delay_s| delay_s.max(0.0))
 }

@@ -55,9 +55,8 @@ pub struct Identification {
 
 impl Identification {
     pub(super) fn of(cases: &[&Case], taxonomy: &Taxonomy) -> Self {
-        let leaf = |case: &Case, verdict: &Verdict| {
-            verdict.mode == taxonomy.expected(&case.label.mode)
-        };
+        let leaf =
+            |case: &Case, verdict: &Verdict| verdict.mode == taxonomy.expected(&case.label.mode);
         let side = |case: &Case, verdict: &Verdict| match taxonomy.side(&case.label.mode) {
             Some(side) => taxonomy.side(&verdict.mode) == Some(side),
             None => leaf(case, verdict),
@@ -68,7 +67,11 @@ impl Identification {
         };
         let isolated_s = |case: &&Case| {
             let onset_s = case.label.onset_s?;
-            let right = case.verdicts.iter().rev().take_while(|verdict| leaf(case, verdict));
+            let right = case
+                .verdicts
+                .iter()
+                .rev()
+                .take_while(|verdict| leaf(case, verdict));
             right.last().map(|since| (since.t_s - onset_s).max(0.0))
         };
         let wrong = |case: &&&Case| case.at(2.0).is_some_and(|verdict| !leaf(case, verdict));

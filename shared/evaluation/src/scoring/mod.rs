@@ -80,7 +80,10 @@ impl Case {
         if self.verdicts.last()?.t_s + 2.0 * TIME_SLACK_S < t_s {
             return None;
         }
-        self.verdicts.iter().rev().find(|verdict| verdict.t_s <= t_s)
+        self.verdicts
+            .iter()
+            .rev()
+            .find(|verdict| verdict.t_s <= t_s)
     }
 
     /// Classes under which a faulty run is counted: all, its type, its kind.
@@ -155,8 +158,9 @@ pub struct Score {
     pub identification: BTreeMap<String, Identification>,
     /// True mode, reported mode, runs: 2 s after the onset, and at the end of nominal runs.
     pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
-    /// Whether the probabilities can be believed, 2 s after the onset.
-    pub calibration: Calibration,
+    /// Whether the probabilities can be believed, 2 s after the onset, by class of fault; `all` is
+    /// every one.
+    pub calibration: BTreeMap<String, Calibration>,
 }
 
 /// Scores runs.
@@ -177,17 +181,22 @@ pub fn score(cases: &[Case], taxonomy: &Taxonomy) -> Score {
             }
         }
     }
-    let detection = classes.iter().map(|(class, of)| (class.clone(), Detection::of(of)));
+    let detection = classes
+        .iter()
+        .map(|(class, of)| (class.clone(), Detection::of(of)));
     let identification = classes
         .iter()
         .map(|(class, of)| (class.clone(), Identification::of(of, taxonomy)));
+    let calibration = classes
+        .iter()
+        .map(|(class, of)| (class.clone(), Calibration::of(of, taxonomy)));
     Score {
         runs,
         false_alarms: FalseAlarms::of(cases),
         detection: detection.collect(),
         identification: identification.collect(),
         confusion: confusion(cases),
-        calibration: Calibration::of(cases, taxonomy),
+        calibration: calibration.collect(),
     }
 }
 

@@ -2,11 +2,13 @@
 
 use std::fmt;
 
-use super::{Instants, Ratio, Score, Spread};
+use super::{Ratio, Score, Spread};
 
 impl fmt::Display for Ratio {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let percent = self.fraction.map_or("-".to_owned(), |p| format!("{:.1} %", 100.0 * p));
+        let percent = self
+            .fraction
+            .map_or("-".to_owned(), |p| format!("{:.1} %", 100.0 * p));
         let text = format!("{percent} ({}/{})", self.right, self.n);
         f.pad(&text)
     }
@@ -23,62 +25,115 @@ impl fmt::Display for Spread {
 impl fmt::Display for Score {
     /// Tables for reading; the serialised form is the complete one.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let runs: Vec<String> = self.runs.iter().map(|(kind, n)| format!("{n} {kind}")).collect();
-        writeln!(f, "runs            {}", runs.join(", "))?;
-        let alarms = &self.false_alarms;
+        let runs = self.runs.iter().map(|(kind, n)| format!("{n} {kind}"));
+        writeln!(f, "runs            {}", runs.collect::<Vec<_>>().join(", "))?;
+        self.detection_table(f)?;
+        for what in ["leaf", "side", "type", "unknown"] {
+            self.identification_table(f, what)?;
+        }
+        self.isolation_table(f)?;
+        self.confusion_table(f)?;
+        self.calibration_table(f)
+    }
+}
+
+impl Score {
+    fn detection_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let found = &self.false_alarms;
+        let (alarms, exposure_h) = (found.alarms, found.exposure_h);
+        let nominal = format!("{} of {}", found.nominal_runs_alarmed, found.nominal_runs);
+        let before = found.faulty_runs_alarmed_before_onset;
+        let faulty = format!("{before} of {}", found.faulty_runs);
+        write!(
+            f,
+            "false alarms    {alarms} in {exposure_h:.2} h without a fault: "
+        )?;
         writeln!(
             f,
-            "false alarms    {} in {:.2} h without a fault: {} of {} nominal runs, {} of {} runs \
-             before the onset",
-            alarms.alarms,
-            alarms.exposure_h,
-            alarms.nominal_runs_alarmed,
-            alarms.nominal_runs,
-            alarms.faulty_runs_alarmed_before_onset,
-            alarms.faulty_runs,
+            "{nominal} nominal runs, {faulty} runs before the onset\n"
         )?;
-        writeln!(f, "\n{:<12} {:>9} {:>7} {:>23}", "detection", "detected", "missed", "delay, s")?;
-        writeln!(f, "{:<12} {:>9} {:>7} {:>7} {:>7} {:>7}", "", "", "", "p50", "p90", "max")?;
+        let heads = ["detection", "detected", "missed", "delay, s"];
+        writeln!(
+            f,
+            "{:<12} {:>9} {:>7} {:>23}",
+            heads[0], heads[1], heads[2], heads[3]
+        )?;
+        writeln!(f, "{:<30} {:>7} {:>7} {:>7}", "", "p50", "p90", "max")?;
         for (class, found) in &self.detection {
             let detected = format!("{}/{}", found.detected, found.n);
-            writeln!(f, "{class:<12} {detected:>9} {:>7} {}", found.missed, found.delay)?;
+            writeln!(
+                f,
+                "{class:<12} {detected:>9} {:>7} {}",
+                found.missed, found.delay
+            )?;
         }
-        for what in ["leaf", "side", "type", "unknown"] {
-            let heads = ["after 2 s", "after 5 s", "after 10 s", "at the end"];
-            write!(f, "\n{what:<12}")?;
-            for head in heads {
-                write!(f, " {head:>18}")?;
+        Ok(())
+    }
+
+    fn identification_table(&self, f: &mut fmt::Formatter<'_>, what: &str) -> fmt::Result {
+        write!(f, "\n{what:<12}")?;
+        for head in ["after 2 s", "after 5 s", "after 10 s", "at the end"] {
+            write!(f, " {head:>18}")?;
+        }
+        writeln!(f)?;
+        for (class, found) in &self.identification {
+            let of = match what {
+                "leaf" => &found.leaf,
+                "side" => &found.side,
+                "type" => &found.class,
+                _ => &found.unknown,
+            };
+            write!(f, "{class:<12}")?;
+            for ratio in [of.after_2_s, of.after_5_s, of.after_10_s, of.at_end] {
+                write!(f, " {ratio:>18}")?;
             }
             writeln!(f)?;
-            for (class, found) in &self.identification {
-                let Instants { after_2_s, after_5_s, after_10_s, at_end } = match what {
-                    "leaf" => found.leaf,
-                    "side" => found.side,
-                    "type" => found.class,
-                    _ => found.unknown,
-                };
-                writeln!(f, "{class:<12} {after_2_s:>18} {after_5_s:>18} {after_10_s:>18} {at_end:>18}")?;
-            }
         }
-        writeln!(f, "\n{:<12} {:>7} {:>7} {:>7}", "isolation, s", "p50", "p90", "max")?;
+        Ok(())
+    }
+
+    fn isolation_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "\n{:<12} {:>7} {:>7} {:>7}",
+            "isolation, s", "p50", "p90", "max"
+        )?;
         for (class, found) in &self.identification {
             writeln!(f, "{class:<12} {}", found.isolation)?;
         }
+        Ok(())
+    }
+
+    fn confusion_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "\nconfusion after 2 s (true: reported, runs)")?;
         for (truth, row) in &self.confusion {
-            let row: Vec<String> = row.iter().map(|(mode, n)| format!("{mode} {n}")).collect();
-            writeln!(f, "{truth:<12} {}", row.join(", "))?;
+            let row = row.iter().map(|(mode, n)| format!("{mode} {n}"));
+            writeln!(f, "{truth:<12} {}", row.collect::<Vec<_>>().join(", "))?;
         }
-        let number = |value: Option<f64>| value.map_or("-".to_owned(), |x| format!("{x:.4}"));
-        let calibration = &self.calibration;
+        Ok(())
+    }
+
+    fn calibration_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "\ncalibration after 2 s, {} runs: expected calibration error {}, log score {} nats, \
-             confident and wrong {}",
-            calibration.n,
-            number(calibration.expected_calibration_error),
-            number(calibration.log_score_nats),
-            calibration.confident_wrong,
-        )
+            "\n{:<12} {:>5} {:>18}",
+            "calibration", "runs", "calibration error"
+        )?;
+        write!(
+            f,
+            " {:>16} {:>20}",
+            "log score, nats", "confident and wrong"
+        )?;
+        let number = |value: Option<f64>| value.map_or("-".to_owned(), |x| format!("{x:.4}"));
+        for (class, found) in &self.calibration {
+            let error = number(found.expected_calibration_error);
+            let (n, log_score) = (found.n, number(found.log_score_nats));
+            let wrong = found.confident_wrong;
+            write!(
+                f,
+                "\n{class:<12} {n:>5} {error:>18} {log_score:>16} {wrong:>20}"
+            )?;
+        }
+        Ok(())
     }
 }

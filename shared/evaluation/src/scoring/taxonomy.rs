@@ -52,9 +52,14 @@ impl Taxonomy {
             })
             .collect();
         // Parents come before their children: from the last node on, children are complete.
-        for i in (1..nodes.len()).rev().filter(|&i| !tree.nodes()[i].fault.is_some()) {
+        for i in (1..nodes.len())
+            .rev()
+            .filter(|&i| tree.nodes()[i].fault.is_none())
+        {
             let mut children = nodes.iter().filter(|node| node.parent == Some(i));
-            let Some(first) = children.next() else { continue };
+            let Some(first) = children.next() else {
+                continue;
+            };
             let (mut side, mut class) = (first.side, first.class.clone());
             for child in children {
                 side = side.filter(|side| child.side == Some(*side));

@@ -52,7 +52,11 @@ impl Calibration {
         }
         maxima.sort_by(f64::total_cmp);
         let level = maxima[maxima.len() / 2];
-        let above: Vec<f64> = maxima.iter().map(|value| value - level).filter(|&x| x > 0.0).collect();
+        let above: Vec<f64> = maxima
+            .iter()
+            .map(|value| value - level)
+            .filter(|&x| x > 0.0)
+            .collect();
         let count = above.len().max(1) as f64;
         let mean = above.iter().sum::<f64>() / count;
         let lower = 1.0 - 1.645 / count.sqrt();
@@ -76,12 +80,17 @@ mod tests {
     fn an_exponential_tail_is_recovered_and_extrapolated() {
         // Quantiles of an exponential with slope .8: the median is ln 2 / .8.
         let n = 4000;
-        let mut maxima: Vec<f64> =
-            (0..n).map(|i| -(1.0 - (f64::from(i) + 0.5) / f64::from(n)).ln() / 0.8).collect();
+        let mut maxima: Vec<f64> = (0..n)
+            .map(|i| -(1.0 - (f64::from(i) + 0.5) / f64::from(n)).ln() / 0.8)
+            .collect();
         let fit = Calibration::fit("pose", 1.0, &mut maxima, 3.6).unwrap();
         assert!((fit.level_log_odds - 2.0_f64.ln() / 0.8).abs() < 2e-3);
         let expected = 0.8 * (1.0 - 1.645 / 2000.0_f64.sqrt());
-        assert!((fit.tail_slope - expected).abs() < 5e-3, "{}", fit.tail_slope);
+        assert!(
+            (fit.tail_slope - expected).abs() < 5e-3,
+            "{}",
+            fit.tail_slope
+        );
         assert!((fit.exposure_h - 4.0).abs() < 1e-9);
         let threshold = fit.alarm_log_odds(24.0, 1.0);
         let by_hand = fit.level_log_odds + (24.0 / 0.002_f64).ln() / fit.tail_slope;

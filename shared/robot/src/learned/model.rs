@@ -176,7 +176,11 @@ impl Model {
     /// # Errors
     /// [`ModelError::Robot`].
     pub fn check_robot(&self, robot: &crate::Description) -> Result<(), ModelError> {
-        let names: Vec<&str> = robot.wheels.iter().map(|wheel| wheel.name.as_str()).collect();
+        let names: Vec<&str> = robot
+            .wheels
+            .iter()
+            .map(|wheel| wheel.name.as_str())
+            .collect();
         if self.robot == robot.name && self.wheels == names {
             return Ok(());
         }
@@ -211,12 +215,18 @@ impl Model {
     /// linearised about κ' = 0. (1, 0) if the model does not know the wheel.
     #[must_use]
     pub fn compensation(&self, wheel: usize) -> (f64, f64) {
-        let Some(stuck) = self.stuck(wheel) else { return (1.0, 0.0) };
+        let Some(stuck) = self.stuck(wheel) else {
+            return (1.0, 0.0);
+        };
         let (yaw, forward) = (stuck.motion.yaw.curvature, stuck.motion.forward.curvature);
         let at_zero = yaw[0] / forward[0];
         let slope = (yaw[1] - at_zero * forward[1]) / forward[0];
         let (gain, offset) = (1.0 / slope, -at_zero / slope);
-        if gain.is_finite() && offset.is_finite() { (gain, offset) } else { (1.0, 0.0) }
+        if gain.is_finite() && offset.is_finite() {
+            (gain, offset)
+        } else {
+            (1.0, 0.0)
+        }
     }
 
     /// Variance of one sample of a channel with standard deviation `sd` at the reference rate,
@@ -239,9 +249,24 @@ impl Model {
         self.command.check()?;
         let encoder = &self.encoder;
         check_range("encoder.repeat_rate", encoder.repeat_rate, 1e-9, 0.9)?;
-        check_range("encoder.resolution_rad_s", encoder.resolution_rad_s, 1e-9, 1.0)?;
-        check_range("encoder.broken_mean_rad_s", encoder.broken_mean_rad_s, -1e3, 1e3)?;
-        check_range("encoder.broken_sd_rad_s", encoder.broken_sd_rad_s, 1e-3, 1e3)?;
+        check_range(
+            "encoder.resolution_rad_s",
+            encoder.resolution_rad_s,
+            1e-9,
+            1.0,
+        )?;
+        check_range(
+            "encoder.broken_mean_rad_s",
+            encoder.broken_mean_rad_s,
+            -1e3,
+            1e3,
+        )?;
+        check_range(
+            "encoder.broken_sd_rad_s",
+            encoder.broken_sd_rad_s,
+            1e-3,
+            1e3,
+        )?;
         check_range("nominal.steer_sd_rad", self.nominal.steer_sd_rad, 0.0, 1.0)?;
         check_motion("nominal.motion", &self.nominal.motion)?;
         check_rates("nominal.rates", &self.nominal.rates, count)?;
@@ -271,22 +296,45 @@ impl CommandModel {
     fn check(&self) -> Result<(), ModelError> {
         check_range("command.lag_s", self.lag_s, 0.0, 5.0)?;
         check_range("command.lag_uncertainty", self.lag_uncertainty, 0.0, 10.0)?;
-        check_range("command.curvature_max_1_m", self.curvature_max_1_m, 1e-3, 1e3)?;
-        check_range("command.speed_range_m_s", self.speed_range_m_s[0], 0.0, 100.0)?;
-        check_range("command.speed_range_m_s", self.speed_range_m_s[1], 0.0, 100.0)?;
+        check_range(
+            "command.curvature_max_1_m",
+            self.curvature_max_1_m,
+            1e-3,
+            1e3,
+        )?;
+        check_range(
+            "command.speed_range_m_s",
+            self.speed_range_m_s[0],
+            0.0,
+            100.0,
+        )?;
+        check_range(
+            "command.speed_range_m_s",
+            self.speed_range_m_s[1],
+            0.0,
+            100.0,
+        )?;
         check_range("command.standing_m_s", self.standing_m_s, 1e-4, 10.0)
     }
 }
 
 fn refuse<T>(key: &str, value: impl ToString, allowed: &'static str) -> Result<T, ModelError> {
-    Err(ModelError::Value { key: key.to_owned(), value: value.to_string(), allowed })
+    Err(ModelError::Value {
+        key: key.to_owned(),
+        value: value.to_string(),
+        allowed,
+    })
 }
 
 fn check_range(key: &str, value: f64, low: f64, high: f64) -> Result<(), ModelError> {
     if value >= low && value <= high {
         return Ok(());
     }
-    let allowed = if value.is_finite() { "outside its physical range" } else { "a finite number" };
+    let allowed = if value.is_finite() {
+        "outside its physical range"
+    } else {
+        "a finite number"
+    };
     refuse(key, value, allowed)
 }
 
@@ -295,18 +343,34 @@ fn check_motion(key: &str, motion: &MotionModel) -> Result<(), ModelError> {
         check_curve(&format!("{key}.{name}"), curve)?;
     }
     check_curve(&format!("{key}.lateral"), &motion.lateral)?;
-    let floors = [("offset_sd", motion.offset_sd), ("deviation_sd", motion.deviation_sd)];
+    let floors = [
+        ("offset_sd", motion.offset_sd),
+        ("deviation_sd", motion.deviation_sd),
+    ];
     for (name, values) in floors.into_iter().chain([("white_sd", motion.white_sd)]) {
         for value in values {
             check_range(&format!("{key}.{name}"), value, 0.0, 10.0)?;
         }
     }
-    check_range(&format!("{key}.correlation"), motion.correlation, -0.99, 0.99)?;
-    check_range(&format!("{key}.deviation_length_m"), motion.deviation_length_m, 1e-3, 1e3)
+    check_range(
+        &format!("{key}.correlation"),
+        motion.correlation,
+        -0.99,
+        0.99,
+    )?;
+    check_range(
+        &format!("{key}.deviation_length_m"),
+        motion.deviation_length_m,
+        1e-3,
+        1e3,
+    )
 }
 
 fn check_curve(key: &str, curve: &Curve) -> Result<(), ModelError> {
-    curve.terms().into_iter().try_for_each(|value| check_range(key, value, -1e3, 1e3))
+    curve
+        .terms()
+        .into_iter()
+        .try_for_each(|value| check_range(key, value, -1e3, 1e3))
 }
 
 fn check_rates(key: &str, rates: &[RateModel], count: usize) -> Result<(), ModelError> {
@@ -324,9 +388,24 @@ fn check_rates(key: &str, rates: &[RateModel], count: usize) -> Result<(), Model
 
 fn check_calibration(calibration: &Calibration) -> Result<(), ModelError> {
     let key = |name: &str| format!("calibration.{}.{name}", calibration.sensors);
-    check_range(&key("fault_rate_1_h"), calibration.fault_rate_1_h, 1e-12, 1e6)?;
-    check_range(&key("level_log_odds"), calibration.level_log_odds, -700.0, 700.0)?;
-    check_range(&key("interval_at_level_h"), calibration.interval_at_level_h, 1e-9, 1e9)?;
+    check_range(
+        &key("fault_rate_1_h"),
+        calibration.fault_rate_1_h,
+        1e-12,
+        1e6,
+    )?;
+    check_range(
+        &key("level_log_odds"),
+        calibration.level_log_odds,
+        -700.0,
+        700.0,
+    )?;
+    check_range(
+        &key("interval_at_level_h"),
+        calibration.interval_at_level_h,
+        1e-9,
+        1e9,
+    )?;
     check_range(&key("tail_slope"), calibration.tail_slope, 1e-3, 10.0)?;
     check_range(&key("exposure_h"), calibration.exposure_h, 0.0, 1e9)
 }

@@ -156,6 +156,8 @@ impl Monitor {
         self.scale_pose = NoiseScale::default();
         self.scale_wheels = NoiseScale::default();
         self.history = [None; 2];
+        self.report.evidence = 0.0;
+        self.report.effective_sample_size = self.particles.len() as f64;
         self.forget_evidence();
     }
 
@@ -247,7 +249,11 @@ impl Monitor {
         }
         let usable = self.weigh_pose(observation, variance);
         // A standing robot tells nothing about its motion, but its pose stays known.
-        match self.particles.weigh(observation.pose, variance).filter(|_| usable || !following) {
+        match self
+            .particles
+            .weigh(observation.pose, variance)
+            .filter(|_| usable || !following)
+        {
             Some(size) => {
                 self.report.effective_sample_size = size;
                 if size < 0.5 * self.particles.len() as f64 {
@@ -269,12 +275,17 @@ impl Monitor {
         let travel = observation.travel_m;
         let lag = observation.lag_variance(&self.model);
         let white = motion.whitened();
-        let follow = if following { FOLLOWING * FOLLOWING } else { 0.0 };
+        let follow = if following {
+            FOLLOWING * FOLLOWING
+        } else {
+            0.0
+        };
         let measured = [variance[2], variance[0], variance[1]];
         let sd: [f64; 3] = std::array::from_fn(|i| {
             (white[i] * travel.abs() + lag[i] + follow * measured[i]).sqrt()
         });
-        self.particles.advance(per_metre.map(|value| value * travel), sd, &mut self.rng);
+        self.particles
+            .advance(per_metre.map(|value| value * travel), sd, &mut self.rng);
     }
 
     /// Evidence of the pose's residual; false if the track is lost.
@@ -291,14 +302,19 @@ impl Monitor {
         let spread = moments.covariance + Matrix3::from_diagonal(&Vector3::from(variance));
         let spread = turn * spread * turn.transpose();
         let apart = turn * apart;
-        let Some((evidence, factor)) = log_density(&apart, spread) else { return false };
-        let Some(whitened) = factor.l_dirty().solve_lower_triangular(&apart) else { return false };
+        let Some((evidence, factor)) = log_density(&apart, spread) else {
+            return false;
+        };
+        let Some(whitened) = factor.l_dirty().solve_lower_triangular(&apart) else {
+            return false;
+        };
         if observation.moving {
             let share = self.birth(observation.dt_s, SHARE_POSE);
             self.pose.step(&whitened, share);
             let birth = self.birth(observation.dt_s, SHARE_ANY);
             let norm = whitened.norm_squared();
-            self.any.step(norm, 3.0 * TAU_SQUARED_PER_DIMENSION, birth, birth);
+            self.any
+                .step(norm, 3.0 * TAU_SQUARED_PER_DIMENSION, birth, birth);
             self.report.evidence += evidence;
         }
         whitened.norm_squared() < LOST * LOST
@@ -311,7 +327,10 @@ impl Monitor {
         let share = 1.0 / self.robot.wheels.len() as f64;
         let birth = self.birth(observation.dt_s, SHARE_WHEELS * share);
         let birth_repeats = self.birth(observation.dt_s, SHARE_REPEATS * share);
-        let (command, lagged) = (observation.command, [observation.curvature, observation.speed]);
+        let (command, lagged) = (
+            observation.command,
+            [observation.curvature, observation.speed],
+        );
         for i in 0..self.robot.wheels.len() {
             let reading = &observation.wheels[i];
             self.update_repeats(i, reading.plain, reading.repeats, birth_repeats);
@@ -339,9 +358,17 @@ impl Monitor {
     }
 
     fn step_steer(&mut self, observation: &Observation) {
-        let sample = self.model.sample_variance(self.model.noise.steer_rad, observation.frame_s);
+        let sample = self
+            .model
+            .sample_variance(self.model.noise.steer_rad, observation.frame_s);
         let extra = self.model.nominal.steer_sd_rad;
-        let steered = self.robot.wheels.iter().filter(|wheel| wheel.steered).count().max(1);
+        let steered = self
+            .robot
+            .wheels
+            .iter()
+            .filter(|wheel| wheel.steered)
+            .count()
+            .max(1);
         let birth = self.birth(observation.dt_s, SHARE_STEER / steered as f64);
         for i in 0..self.robot.wheels.len() {
             let reading = &observation.steer[i];
@@ -363,22 +390,36 @@ impl Monitor {
     fn update_noise_scale(&mut self, now: &Observation) {
         let [before, last] = self.history;
         self.history = [last, Some(*now)];
-        let (Some(before), Some(last)) = (before, last) else { return };
+        let (Some(before), Some(last)) = (before, last) else {
+            return;
+        };
         let all = [&before, &last, now];
-        let steady = all.iter().all(|o| {
-            o.moving && (o.command[0] - o.curvature).abs() < 0.02 && o.dt_s > 0.0
-        });
-        let even = all.iter().all(|o| (o.dt_s - now.dt_s).abs() < 0.2 * now.dt_s);
+        let steady = all
+            .iter()
+            .all(|o| o.moving && (o.command[0] - o.curvature).abs() < 0.02 && o.dt_s > 0.0);
+        let even = all
+            .iter()
+            .all(|o| (o.dt_s - now.dt_s).abs() < 0.2 * now.dt_s);
         if !steady || !even || now.anchor || last.anchor {
             return;
         }
         let noise = &self.model.noise;
-        if all.iter().all(|o| o.pose_frames == now.pose_frames && o.pose_frames > 0) {
-            for (i, sd) in [noise.position_m, noise.position_m, noise.yaw_rad].into_iter().enumerate() {
+        if all
+            .iter()
+            .all(|o| o.pose_frames == now.pose_frames && o.pose_frames > 0)
+        {
+            for (i, sd) in [noise.position_m, noise.position_m, noise.yaw_rad]
+                .into_iter()
+                .enumerate()
+            {
                 let sample = self.model.sample_variance(sd, now.frame_s);
                 let variance = 6.0 * now.mean_variance(sample, now.pose_frames);
                 let (up, down) = (now.pose[i] - last.pose[i], last.pose[i] - before.pose[i]);
-                let bend = if i == 2 { wrap(wrap(up) - wrap(down)) } else { up - down };
+                let bend = if i == 2 {
+                    wrap(wrap(up) - wrap(down))
+                } else {
+                    up - down
+                };
                 self.scale_pose.push(bend * bend / variance);
             }
         }
@@ -386,9 +427,12 @@ impl Monitor {
         for i in 0..self.robot.wheels.len() {
             let (a, b) = (&last.wheels[i], &now.wheels[i]);
             if surge < 1e-3 && a.plain == b.plain && a.plain > 0 {
-                let sample = self.model.sample_variance(noise.wheel_rate_rad_s, now.frame_s);
+                let sample = self
+                    .model
+                    .sample_variance(noise.wheel_rate_rad_s, now.frame_s);
                 let step = b.mean - a.mean;
-                self.scale_wheels.push(step * step / (2.0 * now.mean_variance(sample, b.plain)));
+                self.scale_wheels
+                    .push(step * step / (2.0 * now.mean_variance(sample, b.plain)));
             }
         }
     }
@@ -406,9 +450,8 @@ impl Monitor {
                 }
             }
         }
-        let finite = |value: f64| value.max(LOG_ODDS_MIN);
-        self.report.log_odds = finite(log_sum_exp(&channels));
-        self.report.channels = channels.map(finite);
+        self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);
+        self.report.channels = channels.map(|value| value.max(LOG_ODDS_MIN));
     }
 }
 

@@ -35,7 +35,10 @@ impl Curve {
     /// The curve with these coefficients of [`Self::basis`].
     #[must_use]
     pub const fn from_terms(c: [f64; Self::TERMS]) -> Self {
-        Self { curvature: [c[0], c[1], c[2], c[3], c[4]], inverse_speed: c[5] }
+        Self {
+            curvature: [c[0], c[1], c[2], c[3], c[4]],
+            inverse_speed: c[5],
+        }
     }
 
     /// Coefficients in the order of [`Self::basis`].
@@ -49,7 +52,11 @@ impl Curve {
     #[must_use]
     pub fn value(&self, curvature: f64, speed: f64) -> f64 {
         let terms = self.terms();
-        Self::basis(curvature, speed).iter().zip(terms).map(|(basis, c)| basis * c).sum()
+        Self::basis(curvature, speed)
+            .iter()
+            .zip(terms)
+            .map(|(basis, c)| basis * c)
+            .sum()
     }
 }
 
@@ -122,7 +129,10 @@ mod tests {
 
     #[test]
     fn the_curve_is_the_polynomial() {
-        let curve = Curve { curvature: [1.0, 2.0, 3.0, 4.0, 5.0], inverse_speed: 0.1 };
+        let curve = Curve {
+            curvature: [1.0, 2.0, 3.0, 4.0, 5.0],
+            inverse_speed: 0.1,
+        };
         assert!((curve.value(0.5, 0.2) - (1.0 + 1.0 + 0.75 + 0.5 + 0.3125)).abs() < 1e-12);
         assert!((curve.value(0.0, 0.1) - 1.5).abs() < 1e-12);
         assert!(curve.value(0.0, 0.0).is_finite());

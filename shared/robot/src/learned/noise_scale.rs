@@ -19,7 +19,10 @@ pub struct NoiseScale {
 
 impl Default for NoiseScale {
     fn default() -> Self {
-        Self { sum: PRIOR, count: PRIOR }
+        Self {
+            sum: PRIOR,
+            count: PRIOR,
+        }
     }
 }
 
@@ -56,10 +59,17 @@ mod tests {
             let mut scale = NoiseScale::default();
             for i in 0..3000 {
                 let x: f64 = rng.sample(StandardNormal);
-                scale.push(if i % 100 == 0 { f64::INFINITY } else { x * x * ratio });
+                scale.push(if i % 100 == 0 {
+                    f64::INFINITY
+                } else {
+                    x * x * ratio
+                });
             }
             let found = scale.variance_ratio();
-            assert!(found > 0.95 * ratio && found < 1.3 * ratio, "{ratio}: {found}");
+            assert!(
+                found > 0.95 * ratio && found < 1.3 * ratio,
+                "{ratio}: {found}"
+            );
         }
     }
 }

@@ -17,8 +17,8 @@ const GAP_S: f64 = 1.0;
 const FRAME_UNKNOWN_S: f64 = 1e-3;
 /// Positions beyond this are no measurement, m.
 const POSITION_MAX_M: f64 = 1e7;
-/// Fraction of the interval that completes an observation: frames are never exactly periodic.
-const COMPLETE: f64 = 0.98;
+/// Part of a frame that may lack to an interval: frames are never exactly periodic.
+const NEARLY: f64 = 0.4;
 
 /// Frames averaged over about the learned interval.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -170,15 +170,26 @@ impl Observer {
         let new_run = !self.state.started || frame.run_id != self.state.run_id;
         let t_ns = frame.header.t_capture_ns;
         if !new_run && t_ns <= self.state.t_ns {
-            return Intake { invalid: true, ..Intake::default() };
+            return Intake {
+                invalid: true,
+                ..Intake::default()
+            };
         }
         let mut invalid = false;
         if new_run {
-            self.state = State { run_id: frame.run_id, started: true, ..State::default() };
+            self.state = State {
+                run_id: frame.run_id,
+                started: true,
+                ..State::default()
+            };
             self.state.reset_count = frame.pose_reset_count;
             self.state.anchor = true;
         }
-        let dt_s = if new_run { 0.0 } else { (t_ns - self.state.t_ns) as f64 * 1e-9 };
+        let dt_s = if new_run {
+            0.0
+        } else {
+            (t_ns - self.state.t_ns) as f64 * 1e-9
+        };
         self.state.t_ns = t_ns;
         let jumped = dt_s > GAP_S || frame.pose_reset_count != self.state.reset_count;
         if jumped {
@@ -196,12 +207,16 @@ impl Observer {
         self.state.sums.elapsed_s += dt_s;
         invalid |= self.take_pose(frame);
         invalid |= self.take_wheels(frame);
-        let enough = self.state.sums.elapsed_s >= COMPLETE * self.interval_s;
+        let enough = self.state.sums.elapsed_s + NEARLY * dt_s >= self.interval_s;
         let complete = new_run || enough || jumped;
         if complete {
             self.complete(dt_s);
         }
-        Intake { complete, invalid, new_run }
+        Intake {
+            complete,
+            invalid,
+            new_run,
+        }
     }
 
     /// The body follows the command with a first-order lag.
@@ -216,7 +231,11 @@ impl Observer {
         if new_run {
             state.lagged = state.command;
         }
-        let follows = if self.lag_s > 0.0 { 1.0 - (-dt_s / self.lag_s).exp() } else { 1.0 };
+        let follows = if self.lag_s > 0.0 {
+            1.0 - (-dt_s / self.lag_s).exp()
+        } else {
+            1.0
+        };
         let before = state.lagged;
         for i in 0..2 {
             state.lagged[i] += follows * (state.command[i] - state.lagged[i]);
@@ -293,12 +312,20 @@ impl Observer {
         let command = sums.command.map(|sum| sum / count);
         let elapsed = sums.elapsed_s.min(GAP_S);
         // Dividing by a small travel would amplify rounding: a standing robot has its command's.
-        let curvature = if moved.abs() > 1e-6 { turned / moved } else { command[0] };
+        let curvature = if moved.abs() > 1e-6 {
+            turned / moved
+        } else {
+            command[0]
+        };
         self.observation = Observation {
             t_ns: state.t_ns,
             t_first_ns: sums.t_first_ns,
             dt_s: elapsed,
-            frame_s: if dt_s > 0.0 { elapsed / count } else { FRAME_UNKNOWN_S },
+            frame_s: if dt_s > 0.0 {
+                elapsed / count
+            } else {
+                FRAME_UNKNOWN_S
+            },
             frames: sums.frames,
             travel_m: moved,
             curvature: curvature.clamp(-self.curvature_max, self.curvature_max),

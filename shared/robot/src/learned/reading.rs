@@ -50,7 +50,13 @@ mod tests {
             reading.push(value, before);
             before = Some(value);
         }
-        let Reading { plain, mean, squares, repeats, zeros } = reading;
+        let Reading {
+            plain,
+            mean,
+            squares,
+            repeats,
+            zeros,
+        } = reading;
         assert_eq!((plain, repeats, zeros, reading.count()), (3, 2, 2, 5));
         assert!((mean - 4.0 / 3.0).abs() < 1e-12);
         assert!((squares - 42.0 / 9.0).abs() < 1e-12);

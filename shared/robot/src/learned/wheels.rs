@@ -18,7 +18,11 @@ pub fn rolling_rate(robot: &Description, wheel: usize, curvature: f64, speed: f6
 #[must_use]
 pub fn steering_angle(robot: &Description, wheel: usize, curvature: f64) -> f64 {
     let at = &robot.wheels[wheel];
-    if at.steered { (curvature * at.x).atan2(1.0 - curvature * at.y) } else { 0.0 }
+    if at.steered {
+        (curvature * at.x).atan2(1.0 - curvature * at.y)
+    } else {
+        0.0
+    }
 }
 
 /// Rate of one wheel relative to rolling without slip.
@@ -37,7 +41,10 @@ impl RateModel {
     pub fn rate(&self, rolling: f64, curvature: f64) -> (f64, f64) {
         let ratio = self.ratio[0] + curvature * (self.ratio[1] + curvature * self.ratio[2]);
         let sd = self.ratio_sd * rolling;
-        (ratio * rolling, sd * sd + RATE_FLOOR_RAD_S * RATE_FLOOR_RAD_S)
+        (
+            ratio * rolling,
+            sd * sd + RATE_FLOOR_RAD_S * RATE_FLOOR_RAD_S,
+        )
     }
 }
 
@@ -173,8 +180,13 @@ mod tests {
     fn each_pattern_is_explained_best_by_its_own_state() {
         let turning = EncoderState::Turning(2.0, 4e-4, 0.02);
         let standing = EncoderState::Turning(0.0, 4e-4, 0.02);
-        let states =
-            [turning, standing, EncoderState::Zero, EncoderState::Frozen, EncoderState::Noise];
+        let states = [
+            turning,
+            standing,
+            EncoderState::Zero,
+            EncoderState::Frozen,
+            EncoderState::Noise,
+        ];
         let patterns: [&[f64]; 5] = [
             &[2.03, 1.94, 2.01, 1.99, 2.06],
             &[0.03, -0.04, 0.01, -0.02, 0.05],
@@ -202,7 +214,11 @@ mod tests {
     #[test]
     fn no_samples_say_nothing() {
         let nothing = Reading::default();
-        for state in [EncoderState::Zero, EncoderState::Frozen, EncoderState::Noise] {
+        for state in [
+            EncoderState::Zero,
+            EncoderState::Frozen,
+            EncoderState::Noise,
+        ] {
             assert_eq!(model().log_likelihood(state, &nothing, 0.05), 0.0);
         }
         assert!(model().common(&nothing, 2.0, 0.1, 0.05).abs() < 1e-12);

@@ -21,7 +21,7 @@ const BODY_STEP_MAX: f64 = 0.1;
 /// Largest Newton step of a wheel rate, rad/s.
 const RATE_STEP_MAX_RAD_S: f64 = 1.0;
 /// Pseudo-transient steps before giving up.
-const TRANSIENT_MAX: u32 = 200;
+const TRANSIENT_MAX: u32 = 40;
 /// First pseudo-time step, s.
 const TRANSIENT_STEP_S: f64 = 0.02;
 /// Pseudo-time step below which there is no hope, s.
@@ -30,8 +30,8 @@ const TRANSIENT_STEP_MIN_S: f64 = 1e-9;
 /// pseudo-time. They shape the way, not the solution.
 const PSEUDO_INERTIA: [f64; 4] = [14.2, 14.2, 1.2, 0.15];
 
-/// Newton from `start`, then from `ideal`, then pseudo-transient continuation from `ideal`.
-/// Returns the unknowns and the iterations of all attempts.
+/// Newton from `start`, then from `ideal`, then pseudo-transient continuation from standing and
+/// from `ideal`. Returns the unknowns and the iterations of all attempts.
 pub(super) fn solve(
     balance: &Balance<'_>,
     start: Option<&Unknowns>,
@@ -47,14 +47,21 @@ pub(super) fn solve(
     if let Some(found) = newton(balance, *ideal, &mut total) {
         return Ok((found, total));
     }
-    match transient(balance, *ideal, &mut total) {
-        Ok(found) => Ok((found, total)),
-        Err(residual) => Err(SlipError::NotConverged {
-            iterations: total,
-            residual,
-            allowed: TOLERANCE_N,
-        }),
+    // Where the free wheels can hardly pull the stuck ones the rover all but stands: begin there.
+    let mut standing = *ideal;
+    standing.fixed_rows_mut::<3>(0).fill(0.0);
+    let mut least = f64::INFINITY;
+    for start in [standing, *ideal] {
+        match transient(balance, start, &mut total) {
+            Ok(found) => return Ok((found, total)),
+            Err(residual) => least = least.min(residual),
+        }
     }
+    Err(SlipError::NotConverged {
+        iterations: total,
+        residual: least,
+        allowed: TOLERANCE_N,
+    })
 }
 
 fn newton(balance: &Balance<'_>, start: Unknowns, total: &mut u32) -> Option<Unknowns> {

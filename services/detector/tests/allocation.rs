@@ -1,0 +1,34 @@
+//! A steady cycle of the detector allocates nothing.
+#![allow(clippy::unwrap_used)]
+
+mod recorded;
+
+use vigil_blocks::{DetectionBelief, Entry, ParticleBlock};
+use vigil_cycle::allocation::{CountingAllocator, allocations};
+use vigil_detector::Detector;
+use vigil_setup::schema;
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+#[test]
+fn steady_cycles_allocate_nothing() {
+    let (frames, _) = recorded::unseen("RM_STUCK", "stuck");
+    let (model, robot) = (recorded::model(), recorded::robot());
+    let mut detector = Detector::new(&model, &robot, &schema::Detector::default(), 1).unwrap();
+    let mut belief = DetectionBelief::default();
+    let mut particles: Box<ParticleBlock> = Box::default();
+    let before = allocations();
+    for (i, frame) in frames.iter().enumerate() {
+        detector.step(Entry::Frame(frame), &mut belief, &mut particles);
+        detector.step(Entry::Missed(1), &mut belief, &mut particles);
+        if i % 40 == 0 {
+            let budget = if i % 80 == 0 { 64 } else { 256 };
+            detector.step(Entry::Budget(budget), &mut belief, &mut particles);
+        }
+    }
+    detector.step(Entry::Reset, &mut belief, &mut particles);
+    assert_eq!(allocations() - before, 0);
+    // It did detect.
+    assert_eq!(belief.alarm_count, 1);
+}

@@ -1,0 +1,43 @@
+//! Recorded runs, the robot and the shipped model, for tests.
+
+use std::path::PathBuf;
+
+use vigil_blocks::SensorFrame;
+use vigil_evaluation::frames::{self, Run};
+use vigil_evaluation::labels::{self, Label};
+use vigil_robot::Description;
+use vigil_robot::learned::Model;
+
+/// A file of the project.
+pub fn path(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("../..")
+        .join(name)
+}
+
+/// The rover.
+pub fn robot() -> Description {
+    vigil_setup::load_robot(&path("config/robots/rover.toml")).unwrap()
+}
+
+/// The shipped model.
+pub fn model() -> Model {
+    Model::from_toml(&std::fs::read_to_string(path("config/models/rover.toml")).unwrap()).unwrap()
+}
+
+/// All runs and their labels.
+pub fn runs(robot: &Description) -> (Vec<Run>, Vec<Label>) {
+    let runs = frames::read(&path("tests/data/rover/learn_frames.csv.gz"), robot).unwrap();
+    let labels = labels::read(&path("tests/data/rover/learn_runs.csv"), robot).unwrap();
+    (runs, labels)
+}
+
+/// The first run of a mode and kind among those that the model has not seen.
+pub fn unseen(mode: &str, kind: &str) -> (Vec<SensorFrame>, Label) {
+    let (runs, labels) = runs(&robot());
+    let held_out = model().provenance.runs_held_out;
+    let is_wanted = |l: &&Label| l.mode == mode && l.kind == kind && held_out.contains(&l.run);
+    let label = labels.iter().find(is_wanted).unwrap().clone();
+    let run = runs.into_iter().find(|run| run.id == label.run).unwrap();
+    (run.frames, label)
+}

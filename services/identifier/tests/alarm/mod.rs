@@ -1,0 +1,43 @@
+//! A detection made by hand: an alarm between two instants, and particles around the pose.
+
+use vigil_blocks::{DetectionBelief, ParticleBlock, SensorFrame};
+
+/// Detections for frames of a run: an alarm stands from `from_s` to `to_s`.
+pub struct Alarm {
+    pub from_s: f64,
+    pub to_s: f64,
+    pub belief: DetectionBelief,
+    pub particles: Box<ParticleBlock>,
+}
+
+impl Alarm {
+    pub fn between(from_s: f64, to_s: f64) -> Self {
+        let belief = DetectionBelief {
+            noise_scale: 1.0,
+            ..DetectionBelief::default()
+        };
+        Self {
+            from_s,
+            to_s,
+            belief,
+            particles: Box::default(),
+        }
+    }
+
+    /// Sets belief and particles for a frame: eight corners a noise away from its pose.
+    pub fn set(&mut self, frame: &SensorFrame) {
+        let t_s = frame.header.t_capture_ns as f64 * 1e-9;
+        let alarm = (self.from_s..self.to_s).contains(&t_s);
+        self.belief.alarm = u32::from(alarm);
+        self.belief.alarm_t_capture_ns = if alarm { (self.from_s * 1e9) as u64 } else { 0 };
+        self.belief.p_fault = if alarm { 0.999 } else { 1e-6 };
+        self.particles.count = 8;
+        for i in 0..8 {
+            let side = |bit: usize| if i & bit == 0 { -0.005_f32 } else { 0.005 };
+            self.particles.x[i] = frame.pose[0] as f32 + side(1);
+            self.particles.y[i] = frame.pose[1] as f32 + side(2);
+            self.particles.yaw[i] = frame.pose[2] as f32 + side(4);
+            self.particles.log_weight[i] = -(8.0_f32).ln();
+        }
+    }
+}

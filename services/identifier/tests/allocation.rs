@@ -1,0 +1,38 @@
+//! A steady cycle of the identifier allocates nothing.
+#![allow(clippy::unwrap_used)]
+
+mod alarm;
+mod recorded;
+
+use vigil_blocks::{Entry, FaultBelief, ParticleBlock};
+use vigil_cycle::allocation::{CountingAllocator, allocations};
+use vigil_identifier::{Identifier, Input};
+use vigil_setup::schema;
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+#[test]
+fn steady_cycles_allocate_nothing() {
+    let (frames, label) = recorded::unseen("RM_STUCK", "stuck");
+    let tree = vigil_setup::load_tree(&recorded::path("config/trees/rover.toml")).unwrap();
+    let (model, robot) = (recorded::model(), recorded::robot());
+    let settings = schema::Identifier::default();
+    let sensors = schema::Sensors::Pose;
+    let mut identifier = Identifier::new(&model, &robot, &tree, &settings, sensors, 1).unwrap();
+    let mut belief = FaultBelief::default();
+    let mut particles: Box<ParticleBlock> = Box::default();
+    let mut alarm = alarm::Alarm::between(label.onset_s.unwrap() + 0.5, 10.0);
+    let before = allocations();
+    for frame in &frames {
+        alarm.set(frame);
+        let detection = Some((&alarm.belief, &*alarm.particles));
+        let entry = Entry::Frame(Input { frame, detection });
+        identifier.step(entry, &mut belief, &mut particles);
+        identifier.step(Entry::Missed(1), &mut belief, &mut particles);
+    }
+    identifier.step(Entry::Budget(64), &mut belief, &mut particles);
+    assert_eq!(allocations() - before, 0);
+    // It did identify.
+    assert_eq!(belief.mode as usize, tree.index("RM_STUCK").unwrap());
+}

@@ -1,0 +1,242 @@
+//! The offline commands as a user runs them: `learn`, `evaluate`, `diagnose`.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use flate2::read::GzDecoder;
+use serde_json::Value;
+use tempfile::TempDir;
+
+const FRAMES: &str = "tests/data/rover/learn_frames.csv.gz";
+const RUNS: &str = "tests/data/rover/learn_runs.csv";
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn vigil(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_vigil"));
+    command.args(arguments).current_dir(root());
+    command
+}
+
+fn run(arguments: &[&str]) -> Output {
+    vigil(arguments).output().unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = run(arguments);
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{errors}");
+    assert_eq!(errors, "", "nothing but the document is printed");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// A model learned from the shipped runs, its file and the folder that holds it.
+fn learned() -> (TempDir, String, Value) {
+    let folder = TempDir::new().unwrap();
+    let model = folder.path().join("rover.toml").display().to_string();
+    let report = json(&[
+        "learn", "--frames", FRAMES, "--runs", RUNS, "--out", &model, "--json",
+    ]);
+    (folder, model, report)
+}
+
+/// Rows of the frames file that `keep` wants, by run and time, as a plain table.
+fn cut(to: &Path, keep: impl Fn(u32, f64) -> bool) {
+    let mut text = String::new();
+    let file = File::open(root().join(FRAMES)).unwrap();
+    GzDecoder::new(file).read_to_string(&mut text).unwrap();
+    let mut lines = text.lines();
+    let mut kept = vec![lines.next().unwrap()];
+    kept.extend(lines.filter(|line| {
+        let mut fields = line.split(',');
+        let run = fields.next().unwrap().parse().unwrap();
+        keep(run, fields.next().unwrap().parse().unwrap())
+    }));
+    fs::write(to, kept.join("\n")).unwrap();
+}
+
+fn check_report(report: &Value) {
+    let modes = report["modes"].as_array().unwrap();
+    assert_eq!(modes.len(), 7);
+    for mode in modes {
+        // No better than the sensor's noise, and not much worse.
+        for key in ["position_to_floor", "yaw_to_floor"] {
+            let ratio = mode[key].as_f64().unwrap();
+            assert!((0.95..1.3).contains(&ratio), "{mode}");
+        }
+    }
+    let held_out = report["held_out_run_ids"].as_array().unwrap().len();
+    assert_eq!(report["runs_held_out"], held_out);
+    assert_eq!(report["runs_learned"], 492 - held_out);
+    assert!((150..175).contains(&held_out));
+}
+
+fn check_score(score: &Value, held_out: &Value) {
+    let runs: u64 = score["runs"]
+        .as_object()
+        .unwrap()
+        .values()
+        .map(|n| n.as_u64().unwrap())
+        .sum();
+    assert_eq!(
+        runs, *held_out,
+        "every run left out, and no other, is scored"
+    );
+    assert_eq!(score["false_alarms"]["alarms"], 0);
+    for class in ["stuck", "zero", "frozen", "noise"] {
+        assert_eq!(score["detection"][class]["missed"], 0, "{class}");
+    }
+    let leaf = &score["identification"]["all"]["leaf"];
+    for instant in ["after_2_s", "after_5_s", "after_10_s", "at_end"] {
+        assert!(
+            leaf[instant]["fraction"].as_f64().unwrap() >= 0.97,
+            "{instant}: {leaf}"
+        );
+    }
+}
+
+#[test]
+fn a_learned_model_names_the_faults_of_runs_left_out() {
+    let (folder, model, report) = learned();
+    check_report(&report);
+    let entries = fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(entries, 1, "only the model is left behind");
+    let evaluate = [
+        "evaluate", "--model", &model, "--frames", FRAMES, "--runs", RUNS, "--json",
+    ];
+    let score = json(&evaluate);
+    check_score(&score, &report["runs_held_out"]);
+    assert_eq!(
+        json(&evaluate),
+        score,
+        "the same seed gives the same figures"
+    );
+
+    let pose = json(&[&evaluate[..], &["--sensors", "pose"]].concat());
+    assert_eq!(pose["false_alarms"]["alarms"], 0);
+    let detected = pose["detection"]["stuck"]["detected"].as_f64().unwrap();
+    assert!(detected >= 0.97 * pose["detection"]["stuck"]["n"].as_f64().unwrap());
+
+    // Not one run of this file was left out: a clear refusal, not an empty score.
+    let frames = folder.path().join("few.csv");
+    let held_out = report["held_out_run_ids"].as_array().unwrap().clone();
+    cut(&frames, |run, _| {
+        run < 9 && !held_out.contains(&Value::from(run))
+    });
+    let few = frames.display().to_string();
+    let refused = run(&[
+        "evaluate", "--model", &model, "--frames", &few, "--runs", RUNS,
+    ]);
+    assert_eq!(refused.status.code(), Some(2));
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(
+        message.ends_with("score every run with --part all\n"),
+        "{message}"
+    );
+
+    verdicts_are_causal(&folder, &model);
+    a_closed_pipe_is_success(&model, &few);
+}
+
+/// Rows of a run cut short, alone in its file, equal the first rows of the whole run among others.
+fn verdicts_are_causal(folder: &TempDir, model: &str) {
+    let diagnose = |name: &str, keep: &dyn Fn(u32, f64) -> bool| {
+        let (frames, out) = (folder.path().join("in.csv"), folder.path().join(name));
+        cut(&frames, keep);
+        let paths = [frames, out.clone()].map(|path| path.display().to_string());
+        let output = run(&[
+            "diagnose", "--model", model, "--frames", &paths[0], "--out", &paths[1],
+        ]);
+        assert!(output.status.success() && output.stdout.is_empty());
+        fs::read_to_string(out).unwrap()
+    };
+    let whole = diagnose("whole.csv", &|run, _| [60, 100, 300].contains(&run));
+    assert_eq!(whole.lines().count(), 1 + 3 * 300);
+    let header = "run,t,p_fault,alarm,mode,p_mode,p_unknown,fault_set,p_left_stuck,p_right_stuck";
+    assert_eq!(whole.lines().next(), Some(header));
+    for id in [100, 300] {
+        // Runs of this data are not longer than 15 s; their faults begin before 5 s.
+        let short = diagnose("short.csv", &|run, t_s| run == id && t_s < 7.0);
+        let wanted: Vec<&str> = whole
+            .lines()
+            .filter(|line| {
+                let fields: Vec<&str> = line.split(',').collect();
+                fields[0] == id.to_string() && fields[1].parse::<f64>().unwrap() < 7.0
+            })
+            .collect();
+        assert!(wanted.len() > 100);
+        assert_eq!(short.lines().skip(1).collect::<Vec<_>>(), wanted);
+    }
+}
+
+fn a_closed_pipe_is_success(model: &str, frames: &str) {
+    let mut child = vigil(&[
+        "evaluate", "--model", model, "--frames", frames, "--runs", RUNS,
+    ])
+    .args(["--part", "all"])
+    .stdout(Stdio::piped())
+    .stderr(Stdio::piped())
+    .spawn()
+    .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+}
+
+#[test]
+fn wrong_input_is_refused_with_its_name_and_exit_code_2() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (no_pose, model, out) = (path("frames.csv"), path("model.toml"), path("out"));
+    fs::write(&no_pose, "run,t\n").unwrap();
+    fs::write(&model, "version = 1\n").unwrap();
+    let learn = ["learn", "--runs", RUNS, "--out", &out];
+    let diagnose = ["diagnose", "--frames", FRAMES, "--out", &out];
+    let cases: [(Vec<&str>, &str); 8] = [
+        (
+            [&learn[..], &["--frames", "no.csv"]].concat(),
+            "no.csv: No such file",
+        ),
+        (
+            [&learn[..], &["--frames", &no_pose]].concat(),
+            "frames.csv: missing columns x, y, yaw",
+        ),
+        (
+            [&learn[..], &["--frames", FRAMES, "--test-fraction", "1"]].concat(),
+            "allowed is 0 to 0.9",
+        ),
+        (
+            [&learn[..], &["--frames", FRAMES, "--robot", "no.toml"]].concat(),
+            "no.toml: cannot be read",
+        ),
+        (
+            [&diagnose[..], &["--model", "no.toml"]].concat(),
+            "no.toml: No such file",
+        ),
+        (
+            [&diagnose[..], &["--model", &model]].concat(),
+            "model.toml: not a learned model",
+        ),
+        (
+            [&diagnose[..], &["--model", &model, "--sensors", "lidar"]].concat(),
+            "pose+encoders",
+        ),
+        (
+            [&diagnose[..], &["--model", &model, "--particles", "31"]].concat(),
+            "32..=4096",
+        ),
+    ];
+    for (arguments, wanted) in cases {
+        let output = run(&arguments);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        assert!(message.contains(wanted), "{arguments:?}: {message}");
+        assert!(output.stdout.is_empty() && !Path::new(&out).exists());
+    }
+}
