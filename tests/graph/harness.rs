@@ -87,9 +87,13 @@ impl Running {
         }
     }
 
-    /// An observer's link to the graph.
-    pub fn observe(&self) -> Graph {
+    /// An observer's link to the graph, once its services have been started.
+    pub fn observe(&mut self) -> Graph {
         let domain = self.setup.domain().unwrap();
+        eventually("the services are started", || {
+            assert!(self.is_alive(), "the launcher ended");
+            domain.processes_file().exists().then_some(())
+        });
         Graph::SharedMemory(Link::join(&domain, "test").unwrap())
     }
 

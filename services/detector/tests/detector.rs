@@ -251,7 +251,11 @@ fn frame() -> impl Strategy<Value = SensorFrame> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 200,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
     #[test]
     fn no_input_breaks_the_belief(frames in prop::collection::vec(frame(), 1..60)) {
         let mut bench = Bench::new(schema::Sensors::PoseEncoders);

@@ -56,7 +56,15 @@ impl Children {
                 }
             }
         }
+        children.list(domain)?;
         Ok(children)
+    }
+
+    /// Leaves the process ids where whoever finds the graph running can read them.
+    fn list(&self, domain: &Domain) -> io::Result<()> {
+        let line = |s: &Supervised| format!("{} {}\n", s.name.as_str(), s.child.id());
+        let text: String = self.services.iter().map(line).collect();
+        std::fs::write(domain.processes_file(), text)
     }
 
     /// Restarts what has died; true if a service had to be given up.

@@ -61,9 +61,11 @@ fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, Box<dyn std::error::
     let domain = plan.setup.domain()?;
     let Some(lock) = domain.lock()? else {
         let name = domain.graph();
+        let processes = std::fs::read_to_string(domain.processes_file()).unwrap_or_default();
         eprintln!(
-            "vigil: a graph named '{name}' is running on this machine; stop it, or give this one \
-             another name with --graph"
+            "vigil: a graph named '{name}' is running on this machine ({}); stop it, or give this \
+             one another name with --graph",
+            processes.trim().replace('\n', ", ")
         );
         return Ok(Outcome::Refused);
     };

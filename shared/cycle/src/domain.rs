@@ -81,6 +81,12 @@ impl Domain {
         &self.folder
     }
 
+    /// File that lists the services' first processes, `name pid` a line, while the graph runs.
+    #[must_use]
+    pub fn processes_file(&self) -> PathBuf {
+        self.folder.join("processes")
+    }
+
     /// Sizes of the queues.
     #[must_use]
     pub const fn queues(&self) -> Queues {
@@ -148,6 +154,7 @@ impl Domain {
             let _ = fs::remove_file(path);
         }
         let _ = fs::remove_dir_all(self.folder.join("t"));
+        let _ = fs::remove_file(self.processes_file());
     }
 }
 
