@@ -7,6 +7,8 @@ use serde_json::{Value, json};
 
 use crate::archive::output;
 
+const CLOCKSOURCE: &str = "/sys/devices/system/clocksource/clocksource0/current_clocksource";
+
 /// What a reader of a figure must know: processor, cores, kernel, preemption, clock, load,
 /// virtualisation, compiler, commit.
 #[must_use]
@@ -24,7 +26,7 @@ pub fn facts() -> Value {
         "hypervisor": field("flags").split(' ').any(|flag| flag == "hypervisor"),
         "cores": cores,
         "kernel": output(Command::new("uname").args(["-srv"])),
-        "clocksource": read("/sys/devices/system/clocksource/clocksource0/current_clocksource").trim(),
+        "clocksource": read(CLOCKSOURCE).trim(),
         "cores_isolated": read("/sys/devices/system/cpu/isolated").trim(),
         "rt_runtime_us": read("/proc/sys/kernel/sched_rt_runtime_us").trim(),
         "load_average": read("/proc/loadavg").trim(),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use vigil_blocks::{
-    CauseKind, DetectionBelief, Entry, FaultBelief, Header, ParticleBlock, SensorFrame,
+    Block, CauseKind, DetectionBelief, Entry, FaultBelief, Header, ParticleBlock, SensorFrame,
 };
 use vigil_cycle::Topic;
 use vigil_detector::Detector;
@@ -90,11 +90,7 @@ fn beliefs_live_and_offline_are_bit_identical() {
                 cause: live.cause,
                 ..belief
             };
-            assert_eq!(
-                bytemuck::bytes_of(&offline),
-                bytemuck::bytes_of(live),
-                "frame {seq}"
-            );
+            assert_same(&offline, live, *seq);
         }
         // A frame whose detection was folded into a later one had none live either.
         let detection = live.map(|_| (&belief, &*particles));
@@ -108,11 +104,7 @@ fn beliefs_live_and_offline_are_bit_identical() {
                 cause: live.cause,
                 ..diagnosis
             };
-            assert_eq!(
-                bytemuck::bytes_of(&offline),
-                bytemuck::bytes_of(live),
-                "frame {seq}"
-            );
+            assert_same(&offline, live, *seq);
             compared += 1;
         }
     }
@@ -123,6 +115,11 @@ fn beliefs_live_and_offline_are_bit_identical() {
     );
     let named = recorded.diagnoses.values().last().unwrap().mode;
     assert_eq!(setup.tree.nodes()[named as usize].name, "LM_STUCK");
+}
+
+fn assert_same<T: Block>(offline: &T, live: &T, seq: u64) {
+    let (offline, live) = (bytemuck::bytes_of(offline), bytemuck::bytes_of(live));
+    assert_eq!(offline, live, "frame {seq}");
 }
 
 fn zeroed_particles() -> Box<ParticleBlock> {

@@ -187,7 +187,8 @@ impl fmt::Display for Summary {
         self.placement(f)?;
         writeln!(
             f,
-            "  service      core  scheduling   cycles  missed  slips  lost  late  restarts  step p99"
+            "  service      core  scheduling   cycles  missed  slips  lost  late  restarts  \
+             step p99"
         )?;
         for (name, s) in self.in_order() {
             let step = s

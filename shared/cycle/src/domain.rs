@@ -40,7 +40,8 @@ impl GraphLock {
     /// Lets the children that are started from now on hold the lock too: should the launcher die,
     /// its services drive on, and nobody can start a second graph over them.
     pub fn share_with_children(&self) {
-        // SAFETY: the descriptor is open as long as self lives; only its close-on-exec flag changes.
+        // SAFETY: the descriptor is open as long as self lives; only its close-on-exec flag
+        // changes.
         #[allow(unsafe_code)]
         unsafe {
             libc::fcntl(self.file.as_raw_fd(), libc::F_SETFD, 0);

@@ -21,8 +21,8 @@ use crate::topic::Topic;
 #[derive(Debug, Clone, Copy)]
 pub struct Wire<T>(pub T);
 
-// SAFETY: `Block` requires plain old data (`Pod`): self-contained, `repr(C)`, no pointers, valid for
-// any bytes. The type name holds the hash of the whole layout.
+// SAFETY: `Block` requires plain old data (`Pod`): self-contained, `repr(C)`, no pointers, valid
+// for any bytes. The type name holds the hash of the whole layout.
 #[allow(unsafe_code)]
 unsafe impl<T: Block> ZeroCopySend for Wire<T> {
     unsafe fn type_name() -> &'static str {
