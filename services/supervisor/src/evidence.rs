@@ -8,7 +8,10 @@
 //!
 //! When the identifier changes what it reports about (it begins to identify, returns to watching,
 //! names another mode), its belief is taken over as it is: quotients across such a change mean
-//! little, and rounding in long products must not make the two beliefs drift apart.
+//! little, and rounding in long products must not make the two beliefs drift apart. For the same
+//! reason it is taken over when the tracked belief has drifted from it: products lose what lost
+//! diagnoses carried, and a fault that the decision model expects to mend must not fade while the
+//! robot stands still and shows nothing. Clearing needs evidence, and the identifier has it.
 
 use vigil_blocks::{DECISION_STATES, FaultBelief};
 
@@ -18,6 +21,11 @@ use crate::mapping::StateMeaning;
 const LOG_RATIO_MAX: f64 = 20.0;
 /// An epoch can change them by this factor at most: below it, a double still holds both sides.
 const LOG_EPOCH_MAX: f64 = 300.0;
+/// The tracked belief may differ from the identifier's by this much (half the sum of absolute
+/// differences); beyond it, it is taken over.
+const DRIFT_MAX: f64 = 0.05;
+/// A probability may exceed 1 by this much, for rounding.
+const P_TOLERANCE: f64 = 1e-6;
 
 /// Evidence gathered since the last epoch.
 #[derive(Debug, Clone)]
@@ -25,6 +33,7 @@ pub(crate) struct Gathered {
     log_likelihood: [f64; DECISION_STATES],
     identifying: Option<u32>,
     mode_changes: u32,
+    writer_epoch: u64,
 }
 
 /// What a diagnosis asks for.
@@ -42,14 +51,20 @@ impl Gathered {
             log_likelihood: [0.0; DECISION_STATES],
             identifying: None,
             mode_changes: 0,
+            writer_epoch: 0,
         }
     }
 
-    /// Takes a diagnosis.
+    /// Takes a diagnosis. One from another start of the identifier is taken over: what it
+    /// predicted has nothing to do with what was said before.
     pub(crate) fn add(&mut self, diagnosis: &FaultBelief, states: &[StateMeaning]) -> Effect {
         let before = self.identifying.replace(diagnosis.identifying);
         let changes = std::mem::replace(&mut self.mode_changes, diagnosis.mode_change_count);
-        if before != Some(diagnosis.identifying) || changes != diagnosis.mode_change_count {
+        let writer = std::mem::replace(&mut self.writer_epoch, diagnosis.header.epoch);
+        if before != Some(diagnosis.identifying)
+            || changes != diagnosis.mode_change_count
+            || writer != diagnosis.header.epoch
+        {
             self.clear();
             return Effect::Anchor;
         }
@@ -106,4 +121,29 @@ pub(crate) fn weights(diagnosis: &FaultBelief, states: &[StateMeaning], weights:
     for (weight, meaning) in weights.iter_mut().zip(states) {
         *weight = probabilities(diagnosis, *meaning).0;
     }
+}
+
+/// True if a diagnosis speaks of the tree with `tree_hash` and gives every state a probability,
+/// and some state more than 0.
+pub(crate) fn is_sound(diagnosis: &FaultBelief, states: &[StateMeaning], tree_hash: u64) -> bool {
+    let mut sum = 0.0;
+    for meaning in states {
+        let (p, predicted) = probabilities(diagnosis, *meaning);
+        if ![p, predicted]
+            .iter()
+            .all(|p| (0.0..=1.0 + P_TOLERANCE).contains(p))
+        {
+            return false;
+        }
+        sum += p;
+    }
+    sum > 0.0 && diagnosis.tree_hash == tree_hash
+}
+
+/// True if `belief` is too far from the identifier's, given as `weights` that need not sum to 1.
+pub(crate) fn has_drifted(belief: &[f64], weights: &[f64]) -> bool {
+    let sum: f64 = weights.iter().sum();
+    let apart = |(b, w): (&f64, &f64)| (b - w / sum).abs();
+    let distance: f64 = belief.iter().zip(weights).map(apart).sum();
+    distance > 2.0 * DRIFT_MAX
 }

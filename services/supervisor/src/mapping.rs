@@ -49,6 +49,12 @@ pub enum SupervisorError {
     /// A mapped action is not in the model.
     #[error("[supervisor.actions] names '{0}', which the decision model does not have")]
     ForeignAction(String),
+    /// A wheel that may be stuck has no usable compensation, though the model compensates.
+    #[error(
+        "wheel {0} may be stuck and action '{1}' compensates, but it has no compensation; each \
+         such wheel needs a finite curvature gain and offset"
+    )]
+    NoCompensation(usize, String),
     /// The policy is not known.
     #[error("policy '{0}' is not known: allowed are qmdp, mls, av")]
     Policy(String),
@@ -158,4 +164,30 @@ pub(crate) fn actions(
             Ok(ActionMeaning { kind, speed_scale })
         })
         .collect()
+}
+
+/// Checks that every wheel whose stuck motor is a state can be compensated, if an action does so.
+pub(crate) fn check_compensation(
+    model: &Pomdp,
+    states: &[StateMeaning],
+    actions: &[ActionMeaning],
+    compensation: &[Compensation],
+) -> Result<(), SupervisorError> {
+    let compensates = |meaning: &ActionMeaning| meaning.kind == RecoveryKind::Compensate;
+    let Some(action) = actions.iter().position(compensates) else {
+        return Ok(());
+    };
+    let is_usable = |wheel: usize| {
+        compensation.iter().any(|c| {
+            c.wheel == wheel && c.curvature_gain.is_finite() && c.curvature_offset_1_m.is_finite()
+        })
+    };
+    let stuck = states.iter().filter(|state| state.stuck);
+    match stuck.filter_map(|s| s.wheel).find(|&w| !is_usable(w)) {
+        Some(wheel) => Err(SupervisorError::NoCompensation(
+            wheel,
+            model.actions()[action].clone(),
+        )),
+        None => Ok(()),
+    }
 }

@@ -7,14 +7,15 @@
 
 use vigil_blocks::RecoveryKind;
 use vigil_decision::Choice;
-use vigil_decision::policy::choose;
+use vigil_decision::policy::choose_among;
 
 use crate::mapping::ActionMeaning;
 
 /// Epochs for which a less cautious action must be best before it is taken.
 pub(crate) const HOLD_EPOCHS: u32 = 3;
-/// Epochs for which a call for help must be best before it is made.
-pub(crate) const HELP_EPOCHS: u32 = 10;
+/// Epochs for which a call for help must be best before it is made: an identifier that has just
+/// begun may not know yet, and a robot that stands still for help shows it nothing more.
+pub(crate) const HELP_EPOCHS: u32 = 20;
 
 /// What has been best, and for how long.
 #[derive(Debug, Clone)]
@@ -33,14 +34,14 @@ impl Restraint {
         }
     }
 
-    /// The action to take. `current` is the present action, `values` every action's value (the
-    /// values of actions that are not yet allowed are lowered below all others), `timed` is true
-    /// once per epoch.
+    /// The action to take. `current` is the present action, `best` the policy's choice, `values`
+    /// every action's value, `timed` is true once per epoch. The margin is to the best of the
+    /// other actions that are allowed; 0 where the present action is held against a better one.
     pub(crate) fn decide(
         &mut self,
         current: Option<usize>,
         best: Choice,
-        values: &mut [f64],
+        values: &[f64],
         meanings: &[ActionMeaning],
         timed: bool,
     ) -> Choice {
@@ -55,12 +56,7 @@ impl Restraint {
             let calling = current.is_some_and(is_help);
             let others = (0..values.len()).any(|action| !is_help(action));
             if self.help_epochs < HELP_EPOCHS && !calling && others {
-                for (action, value) in values.iter_mut().enumerate() {
-                    if is_help(action) {
-                        *value = f64::MIN;
-                    }
-                }
-                choice = choose(values);
+                choice = choose_among(values, |action| !is_help(action));
             }
         } else {
             self.help_epochs = 0;

@@ -37,6 +37,7 @@ pub struct Inputs<'a> {
 pub struct Supervisor {
     model: Pomdp,
     policy: Box<dyn Policy>,
+    tree_hash: u64,
     tracker: Tracker,
     states: Vec<StateMeaning>,
     actions: Vec<ActionMeaning>,
@@ -80,6 +81,7 @@ impl Supervisor {
     ) -> Result<Self, SupervisorError> {
         let states = mapping::states(&model, tree, robot)?;
         let actions = mapping::actions(&model, &settings.actions)?;
+        mapping::check_compensation(&model, &states, &actions, &compensation)?;
         let solution = mdp::solve(&model)?;
         let policy: Box<dyn Policy> = match settings.policy.as_str() {
             "qmdp" => Box::new(QMdp::new(solution)),
@@ -87,8 +89,9 @@ impl Supervisor {
             "av" => Box::new(ActionVoting::new(solution)),
             other => return Err(SupervisorError::Policy(other.to_owned())),
         };
-        Ok(Self {
+        let mut supervisor = Self {
             policy,
+            tree_hash: tree.hash(),
             tracker: Tracker::new(&model),
             epoch_ns: (settings.epoch_ms * 1e6) as u64,
             gathered: Gathered::new(),
@@ -112,10 +115,15 @@ impl Supervisor {
             states,
             actions,
             compensation,
-        })
+        };
+        supervisor.decide(false);
+        Ok(supervisor)
     }
 
-    /// Takes one journal entry and writes the decision. Every field of `action` is written but the
+    /// Takes one journal entry and writes the decision. On misses belief and decision stand (what
+    /// a late diagnosis says is folded in when it comes), until no stage is heard any more. Input
+    /// that is not a probability, or of another fault tree, is counted in `impossible_count` and
+    /// refused; a refused diagnosis counts as missed. Every field of `action` is written but the
     /// header's epoch, sequence number and times, the cause and `valid_until_ns`: those belong to
     /// the ports. Allocates nothing, never panics; no field is ever NaN.
     pub fn step(&mut self, entry: Entry<Inputs<'_>>, action: &mut Action) {
@@ -129,10 +137,21 @@ impl Supervisor {
     }
 
     fn take(&mut self, inputs: Inputs<'_>) {
-        if inputs.detection.is_some() {
+        let is_sound =
+            |diagnosis: &FaultBelief| evidence::is_sound(diagnosis, &self.states, self.tree_hash);
+        let diagnosis = inputs.diagnosis.filter(|diagnosis| is_sound(diagnosis));
+        let detection = inputs.detection.filter(|d| d.p_fault.is_finite());
+        let refused = u32::from(diagnosis.is_some() != inputs.diagnosis.is_some())
+            + u32::from(detection.is_some() != inputs.detection.is_some());
+        self.impossible_count = self.impossible_count.saturating_add(refused);
+        if inputs.diagnosis.is_some() && diagnosis.is_none() {
+            // An identifier that talks nonsense is as good as one that is silent.
+            self.miss(1);
+        }
+        if detection.is_some() {
             self.misses_without_detection = 0;
         }
-        match (inputs.diagnosis, inputs.detection) {
+        match (diagnosis, detection) {
             (Some(diagnosis), _) => {
                 let was_lost = self.misses >= LOST_AFTER_MISSES;
                 (self.misses, self.misses_without_detection) = (0, 0);
@@ -158,9 +177,7 @@ impl Supervisor {
         self.control_mode = ControlMode::Policy;
         if effect == Effect::Anchor {
             evidence::weights(diagnosis, &self.states, &mut self.scratch);
-            if !self.tracker.anchor(&self.scratch) {
-                self.impossible_count = self.impossible_count.saturating_add(1);
-            }
+            self.tracker.anchor(&self.scratch);
             self.log_evidence = 0.0;
             self.decide(timed);
         } else if timed {
@@ -171,6 +188,10 @@ impl Supervisor {
                 Evidence::Impossible => {
                     self.impossible_count = self.impossible_count.saturating_add(1);
                 }
+            }
+            evidence::weights(diagnosis, &self.states, &mut self.scratch);
+            if evidence::has_drifted(self.tracker.belief(), &self.scratch) {
+                self.tracker.anchor(&self.scratch);
             }
             self.decide(timed);
         }
@@ -192,9 +213,6 @@ impl Supervisor {
     /// The identifier is lost: the detector says how probable a fault is, the belief before the
     /// loss says which.
     fn fall_back(&mut self, detection: &DetectionBelief) {
-        if !detection.p_fault.is_finite() {
-            return;
-        }
         let p_fault = detection.p_fault.clamp(0.0, 1.0);
         let belief = self.tracker.belief();
         let is_nominal = |meaning: &StateMeaning| meaning.node == Some(0);
@@ -246,7 +264,7 @@ impl Supervisor {
         let current = self.decided.map(|decided| decided.action);
         self.choice = self
             .restraint
-            .decide(current, best, &mut self.values, &self.actions, timed);
+            .decide(current, best, &self.values, &self.actions, timed);
     }
 
     /// What the robot is told now.

@@ -17,8 +17,12 @@ const IMPROVEMENT_MIN: f64 = 1e-12;
 /// Why a model could not be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SolveError {
-    /// The values are unbounded, or the equations singular: a discount of 1 without an end.
-    #[error("the values are not bounded: with discount {0} every policy must come to an end")]
+    /// The values are unbounded, or the equations singular: a discount of 1 without an end, or
+    /// rewards too large for a double.
+    #[error(
+        "the values are not bounded with discount {0}: allowed is a discount below 1, or policies \
+         that come to an end, and rewards whose sums are finite"
+    )]
     Unbounded(f64),
     /// Too many states for the dense solve.
     #[error("{0} states, allowed are {STATES_MAX}")]
@@ -98,6 +102,10 @@ pub fn solve(model: &Pomdp) -> Result<Solution, SolveError> {
         .flat_map(|a| (0..n).map(move |s| (a, s)))
         .map(|(a, s)| backup(model, &value, s, a))
         .collect();
+    // An action that no policy takes may still have a reward beyond all bounds.
+    if q.iter().any(|q| !q.is_finite()) {
+        return Err(SolveError::Unbounded(model.discount()));
+    }
     let policy = (0..n).map(|s| lowest_best(&q, n, s)).collect();
     Ok(Solution {
         states: n,
