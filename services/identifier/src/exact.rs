@@ -31,7 +31,11 @@ const PER_MODE: usize = 32;
 /// Hypotheses less probable than this are dropped (natural logarithm).
 const FLOOR: f64 = -30.0;
 /// A new onset is supposed every so many observations in motion.
-const ONSET_STRIDE: u32 = 2;
+const ONSET_STRIDE: u32 = 1;
+/// So long after a supposed onset, ns, a stuck wheel's encoder may read anything (an observation
+/// may hold the very moment), and the other wheels may still turn as before: the robot slows down
+/// within a few tenths of a second.
+const ONSET_BLUR_NS: u64 = 150_000_000;
 /// Prior rate of faults while something is suspected, 1/s of motion. An alarm has been raised:
 /// the rate over a robot's life would make the filter slow without making it more often right.
 pub const BIRTH_1_S: f64 = 0.01;
@@ -177,13 +181,15 @@ impl Exact {
         if !observation.moving {
             return;
         }
-        let mut wheels = [0.0; MOTIONS];
+        let (mut wheels, mut at_onset) = ([0.0; MOTIONS], [0.0; MOTIONS]);
         if self.use_wheels {
-            self.weigh_wheels(observation, &mut wheels);
+            self.weigh_wheels(observation, &mut wheels, &mut at_onset);
         }
+        let t_ns = observation.t_ns;
         let mut failed = false;
         for hypothesis in self.bank.hypotheses_mut() {
-            let mut gained = wheels[hypothesis.mode];
+            let is_new = t_ns.saturating_sub(hypothesis.onset) < ONSET_BLUR_NS;
+            let mut gained = if is_new { at_onset } else { wheels }[hypothesis.mode];
             if observation.pose_frames > 0 {
                 match hypothesis.state.track.update(observation.pose, variance) {
                     Some(log_likelihood) => gained += log_likelihood,
@@ -261,8 +267,14 @@ impl Exact {
         }
     }
 
-    /// Log-likelihood of the wheels' readings under each motion mode.
-    fn weigh_wheels(&mut self, observation: &Observation, out: &mut [f64; MOTIONS]) {
+    /// Log-likelihood of the wheels' readings under each motion mode: in general, and for a mode
+    /// that has just begun.
+    fn weigh_wheels(
+        &mut self,
+        observation: &Observation,
+        out: &mut [f64; MOTIONS],
+        at_onset: &mut [f64; MOTIONS],
+    ) {
         let count = self.robot.wheels.len();
         let encoder = self.model.encoder;
         let sd = self.model.noise.wheel_rate_rad_s;
@@ -297,31 +309,49 @@ impl Exact {
                 observation.t_first_ns,
             );
         }
-        for wheel in 0..count {
-            if self.modes[1 + wheel].share <= 0.0 {
-                continue;
-            }
-            let Some(stuck) = self.model.stuck(wheel) else {
-                continue;
-            };
-            out[1 + wheel] = (0..count)
-                .map(|i| {
-                    let turning = if i == wheel {
-                        EncoderState::Turning(0.0, 4e-4, TAIL)
-                    } else {
-                        let (mean, variance) = stuck.rates[i].rate(rolling[i].0, command[0]);
-                        EncoderState::Turning(mean, variance + rolling[i].1, TAIL_DRAGGED)
-                    };
-                    encoder.log_likelihood(turning, &observation.wheels[i], sample_sd)
-                })
-                .sum();
-        }
         out[UNKNOWN] = healthy[..count].iter().sum();
         out[UNKNOWN_ANY] = self.steering(observation);
         for (reading, health) in observation.wheels.iter().zip(&healthy[..count]) {
             let any = encoder.log_likelihood(EncoderState::Any, reading, sample_sd);
             out[UNKNOWN_ANY] += log_add((1.0 - ANYTHING).ln() + health, ANYTHING.ln() + any);
         }
+        *at_onset = *out;
+        for wheel in 0..count {
+            let dragging = self.weigh_dragging(observation, wheel, &rolling, &healthy, sample_sd);
+            if let Some(dragging) = dragging {
+                (out[1 + wheel], at_onset[1 + wheel]) = dragging;
+            }
+        }
+    }
+
+    /// Log-likelihood of the wheels' readings while `wheel` drags: in general, and at its onset.
+    fn weigh_dragging(
+        &self,
+        observation: &Observation,
+        wheel: usize,
+        rolling: &[(f64, f64); WHEELS],
+        healthy: &[f64; WHEELS],
+        sample_sd: f64,
+    ) -> Option<(f64, f64)> {
+        if self.modes[1 + wheel].share <= 0.0 {
+            return None;
+        }
+        let stuck = self.model.stuck(wheel)?;
+        let encoder = self.model.encoder;
+        let read =
+            |i: usize, state| encoder.log_likelihood(state, &observation.wheels[i], sample_sd);
+        let even = |a: f64, b: f64| log_add(a, b) - std::f64::consts::LN_2;
+        let (mut dragged, mut at_onset) = (0.0, 0.0);
+        for i in (0..self.robot.wheels.len()).filter(|&i| i != wheel) {
+            let (mean, variance) = stuck.rates[i].rate(rolling[i].0, observation.command[0]);
+            let turning = EncoderState::Turning(mean, variance + rolling[i].1, TAIL_DRAGGED);
+            let log_likelihood = read(i, turning);
+            dragged += log_likelihood;
+            at_onset += even(log_likelihood, healthy[i]);
+        }
+        let standing = read(wheel, EncoderState::Turning(0.0, 4e-4, TAIL));
+        let anything = read(wheel, EncoderState::Any);
+        Some((dragged + standing, at_onset + even(standing, anything)))
     }
 
     /// What the steering angles say for the unknown: relative to angles as commanded, which every

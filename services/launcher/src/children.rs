@@ -110,15 +110,14 @@ impl Children {
         false
     }
 
-    /// Stops every service, the source first; kills those that do not stop in time.
+    /// Stops every service, the last of the chain first, so that none waits for input in vain;
+    /// kills those that do not stop in time.
     pub fn stop(&mut self) {
-        for service in &mut self.services {
+        for service in self.services.iter_mut().rev() {
             if matches!(service.child.try_wait(), Ok(None)) {
                 signal::terminate(service.child.id());
             }
-        }
-        let deadline = Instant::now() + STOP_LIMIT;
-        for service in &mut self.services {
+            let deadline = Instant::now() + STOP_LIMIT;
             while matches!(service.child.try_wait(), Ok(None)) && Instant::now() < deadline {
                 std::thread::sleep(POLL);
             }

@@ -76,6 +76,7 @@ fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, Box<dyn std::error::
     let mut observer = Observer::new(link, plan)?;
     let mut children = Children::start(plan, &domain)?;
     let ended = watch(args, plan, &mut observer, &mut children);
+    observer.close();
     children.stop();
     observer.poll(!args.json);
     let reports = children.reports();

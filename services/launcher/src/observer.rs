@@ -139,6 +139,11 @@ impl Observer {
         &self.timeline
     }
 
+    /// The services are about to be stopped: what they say of that is no event.
+    pub fn close(&mut self) {
+        self.timeline.close(Monotonic.now_ns());
+    }
+
     /// Removes what dead processes left behind.
     pub fn remove_dead_peers(&self) {
         if let Graph::SharedMemory(link) = &self.graph {

@@ -29,6 +29,7 @@ pub struct Timeline {
     raw: Vec<(ServiceName, Event)>,
     shown: usize,
     overwritten: u64,
+    closed_ns: Option<u64>,
 }
 
 impl Timeline {
@@ -39,12 +40,23 @@ impl Timeline {
             raw: Vec::new(),
             shown: 0,
             overwritten: 0,
+            closed_ns: None,
         }
     }
 
-    /// Adds an event.
+    /// Adds an event, unless it lies in the stopping of the graph.
     pub fn add(&mut self, service: ServiceName, event: &Event) {
-        self.raw.push((service, *event));
+        if self
+            .closed_ns
+            .is_none_or(|closed_ns| event.t_ns <= closed_ns)
+        {
+            self.raw.push((service, *event));
+        }
+    }
+
+    /// Events after `t_ns` are of no interest: the services are being stopped.
+    pub const fn close(&mut self, t_ns: u64) {
+        self.closed_ns = Some(t_ns);
     }
 
     /// Counts events that were overwritten before they could be read.

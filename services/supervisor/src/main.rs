@@ -66,9 +66,21 @@ fn prepare(args: &Args) -> Result<(Setup, Supervisor), Box<dyn std::error::Error
         })
         .collect();
     let settings = &setup.file.supervisor;
-    let supervisor = Supervisor::new(decision, &setup.tree, &setup.robot, settings, compensation)?;
+    let blind = (BLIND_NS / setup.period_ns()).max(BLIND_MISSES_MIN) as u32;
+    let supervisor = Supervisor::new(
+        decision,
+        &setup.tree,
+        &setup.robot,
+        settings,
+        compensation,
+        blind,
+    )?;
     Ok((setup, supervisor))
 }
+
+/// Without any belief the robot stops after this long, ns, and not before so many misses.
+const BLIND_NS: u64 = 100_000_000;
+const BLIND_MISSES_MIN: u64 = 5;
 
 /// How long an action stays valid: long enough to survive a few lost cycles, short enough to stop
 /// a robot whose supervisor is gone.

@@ -17,8 +17,6 @@ use crate::restraint::Restraint;
 
 /// Diagnoses missed in a row after which the identifier counts as lost.
 const LOST_AFTER_MISSES: u32 = 3;
-/// Misses in a row without any detection after which no belief is usable: the robot stops.
-const BLIND_AFTER_MISSES: u32 = 10;
 /// Bit of [`Action::lost_stages`]: the identifier is lost.
 const IDENTIFIER_LOST: u32 = 1;
 /// Bit of [`Action::lost_stages`]: the detector is lost.
@@ -42,6 +40,7 @@ pub struct Supervisor {
     states: Vec<StateMeaning>,
     actions: Vec<ActionMeaning>,
     compensation: Vec<Compensation>,
+    blind_after_misses: u32,
     epoch_ns: u64,
     gathered: Gathered,
     restraint: Restraint,
@@ -68,7 +67,9 @@ struct Decided {
 }
 
 impl Supervisor {
-    /// Builds a supervisor for a decision model whose states are the leaves of `tree`.
+    /// Builds a supervisor for a decision model whose states are the leaves of `tree`. After
+    /// `blind_after_misses` misses in a row without any detection no belief is usable, and the
+    /// robot stops.
     ///
     /// # Errors
     /// [`SupervisorError`] naming what does not fit.
@@ -78,6 +79,7 @@ impl Supervisor {
         robot: &Description,
         settings: &schema::Supervisor,
         compensation: Vec<Compensation>,
+        blind_after_misses: u32,
     ) -> Result<Self, SupervisorError> {
         let states = mapping::states(&model, tree, robot)?;
         let actions = mapping::actions(&model, &settings.actions)?;
@@ -115,6 +117,7 @@ impl Supervisor {
             states,
             actions,
             compensation,
+            blind_after_misses,
         };
         supervisor.decide(false);
         Ok(supervisor)
@@ -241,7 +244,7 @@ impl Supervisor {
     fn miss(&mut self, count: u32) {
         self.misses = self.misses.saturating_add(count);
         self.misses_without_detection = self.misses_without_detection.saturating_add(count);
-        if self.misses_without_detection >= BLIND_AFTER_MISSES {
+        if self.misses_without_detection >= self.blind_after_misses {
             self.control_mode = ControlMode::Safe;
             self.gathered.forget();
         }

@@ -48,7 +48,7 @@ impl World {
             })
             .collect();
         let supervisor =
-            Supervisor::new(model(), &tree, &robot, &file.supervisor, compensation).unwrap();
+            Supervisor::new(model(), &tree, &robot, &file.supervisor, compensation, 10).unwrap();
         Self {
             supervisor,
             tree,
@@ -63,6 +63,7 @@ impl World {
         self.t_ns += CYCLE_NS;
         let mut belief = FaultBelief {
             identifying: u32::from(identifying),
+            tree_hash: self.tree.hash(),
             ..Default::default()
         };
         belief.header.t_capture_ns = self.t_ns;
@@ -87,6 +88,15 @@ impl World {
     /// Cycles with a belief that no data changes.
     fn rest(&mut self, cycles: usize, identifying: bool, p: &[(&str, f64)]) {
         (0..cycles).for_each(|_| self.cycle(identifying, p, p));
+    }
+
+    /// One cycle with an arbitrary diagnosis and no detection.
+    fn told(&mut self, diagnosis: &FaultBelief) {
+        let inputs = Inputs {
+            diagnosis: Some(diagnosis),
+            detection: None,
+        };
+        self.supervisor.step(Entry::Frame(inputs), &mut self.action);
     }
 
     fn kind(&self) -> RecoveryKind {
@@ -192,6 +202,99 @@ fn help_is_called_only_when_the_unknown_lasts() {
     world.rest(200, true, &unknown);
     assert_eq!(world.kind(), RecoveryKind::CallForHelp);
     assert_eq!(world.action.speed_scale, 0.0);
+    // Now the robot stands still and shows nothing. The model lets an unknown fault mend with
+    // 0.001 per epoch: 1,000 epochs without evidence must not make it drive again.
+    world.rest(10_000, true, &unknown);
+    assert_eq!(world.kind(), RecoveryKind::CallForHelp);
+    assert!(world.belief("UNKNOWN") > 0.9);
+}
+
+#[test]
+fn evidence_that_was_lost_on_the_way_is_made_good_within_an_epoch() {
+    let mut world = World::new();
+    let before = [("RM_STUCK", 0.6), ("RF_STUCK", 0.4)];
+    world.cycle(true, &before, &before);
+    // Only diagnoses whose predicted belief has already moved come through.
+    world.rest(11, true, &[("RM_STUCK", 0.99), ("RF_STUCK", 0.01)]);
+    assert!((world.belief("RM_STUCK") - 0.99).abs() < 0.001);
+}
+
+#[test]
+fn a_diagnosis_that_is_none_is_refused_counted_and_as_good_as_missed() {
+    let nominal = [("ND", 0.9999), ("UNKNOWN", 0.0001)];
+    let hash = World::new().tree.hash();
+    let sound = FaultBelief {
+        tree_hash: hash,
+        p_unknown: 1.0,
+        ..Default::default()
+    };
+    let mut bad = [sound; 4];
+    bad[0].p[0] = f64::NAN;
+    bad[1].p_predicted[4] = -0.1;
+    bad[2].p_unknown = 0.0;
+    bad[3].tree_hash = hash ^ 1;
+    for diagnosis in bad {
+        let mut world = World::new();
+        world.rest(50, false, &nominal);
+        let believed = world.action.belief;
+        (0..3).for_each(|_| world.told(&diagnosis));
+        assert_eq!(world.action.belief, believed);
+        let action = &world.action;
+        assert_eq!((action.impossible_count, action.lost_stages), (3, 3));
+        (0..7).for_each(|_| world.told(&diagnosis));
+        assert_eq!(world.kind(), RecoveryKind::Stop);
+        world.rest(50, false, &nominal);
+        assert_eq!(world.kind(), RecoveryKind::GoOn);
+    }
+}
+
+#[test]
+fn before_the_first_diagnosis_the_start_belief_decides() {
+    let mut world = World::new();
+    world.supervisor.step(Entry::Missed(0), &mut world.action);
+    assert_eq!(world.kind(), RecoveryKind::GoOn);
+    // go_on is worth more than nothing in a robot that is almost certainly healthy.
+    assert!(world.action.value[0] > 0.0 && world.action.margin > 0.0);
+}
+
+#[test]
+fn what_does_not_fit_is_named() {
+    let World { tree, robot, .. } = World::new();
+    let text = std::fs::read_to_string(config().join("rover.toml")).unwrap();
+    let settings = toml::from_str::<GraphFile>(&text).unwrap().supervisor;
+    let source = std::fs::read_to_string(config().join("rover.pomdp")).unwrap();
+    let all: Vec<Compensation> = (0..6)
+        .map(|wheel| Compensation {
+            wheel,
+            curvature_gain: 1.0,
+            curvature_offset_1_m: 0.0,
+        })
+        .collect();
+    let message = |source: &str, settings: &_, compensation: &[Compensation]| {
+        let model = Pomdp::parse(source).unwrap();
+        Supervisor::new(model, &tree, &robot, settings, compensation.to_vec())
+            .err()
+            .unwrap()
+            .to_string()
+    };
+    let missing = message(&source.replace("LR_ENC", "XX_ENC"), &settings, &all);
+    assert!(missing.contains("no state 'LR_ENC'"), "{missing}");
+    let mut fewer = settings.clone();
+    fewer.actions.remove("stop");
+    assert!(message(&source, &fewer, &all).contains("action 'stop'"));
+    let mut more = settings.clone();
+    more.actions
+        .insert("fly".into(), settings.actions["stop"].clone());
+    assert!(message(&source, &more, &all).contains("'fly'"));
+    let mut other = settings.clone();
+    other.policy = "luck".into();
+    assert!(message(&source, &other, &all).contains("'luck'"));
+    let mut spoilt = all.clone();
+    spoilt[4].curvature_gain = f64::NAN;
+    assert!(message(&source, &settings, &spoilt).contains("wheel 4"));
+    let large = "discount: 0.9\nstates: 65\nactions: 2\nobservations: 1\nT: * identity\n\
+                 O: * uniform\n";
+    assert!(message(large, &settings, &all).contains("65 states"));
 }
 
 #[test]
@@ -229,6 +332,7 @@ fn a_lost_identifier_leaves_the_detector_and_two_lost_stages_stop_the_robot() {
 fn a_steady_cycle_allocates_nothing() {
     let mut world = World::new();
     let belief = FaultBelief {
+        tree_hash: world.tree.hash(),
         p: [0.1; 64],
         p_predicted: [0.2; 64],
         ..Default::default()
@@ -253,17 +357,23 @@ fn a_steady_cycle_allocates_nothing() {
     assert_eq!(allocations() - before, 0);
 }
 
+/// Probabilities, at times none.
+fn value() -> impl Strategy<Value = f64> {
+    prop_oneof![6 => 0.0..=1.0, 1 => Just(0.0), 1 => Just(1.0), 1 => any::<f64>()]
+}
+
 proptest! {
     #[test]
     fn no_input_makes_a_decision_bad(
         cycles in prop::collection::vec(
-            (any::<[f64; 4]>(), any::<u64>(), any::<u8>(), 0_u32..5), 1..40
+            ([value(), value(), value(), value()], any::<u64>(), any::<u8>(), 0_u32..5), 1..40
         )
     ) {
         let mut world = World::new();
         for (values, t_ns, bits, missed) in cycles {
             let mut belief = FaultBelief { p_unknown: values[2], ..Default::default() };
             belief.p_unknown_predicted = values[3];
+            belief.tree_hash = world.tree.hash() ^ u64::from(bits >> 7);
             belief.p = std::array::from_fn(|i| values[i % 4]);
             belief.p_predicted = std::array::from_fn(|i| values[(i + 1) % 4]);
             belief.header.t_capture_ns = t_ns;

@@ -86,11 +86,11 @@ pub fn solve(model: &Pomdp) -> Result<Solution, SolveError> {
         value = evaluate(model, &policy).ok_or(SolveError::Unbounded(model.discount()))?;
         let scale = value.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
         let mut changed = false;
-        for s in 0..n {
+        for (s, action) in policy.iter_mut().enumerate() {
             let candidate = best(model, &value, s);
-            let gain = backup(model, &value, s, candidate) - backup(model, &value, s, policy[s]);
+            let gain = backup(model, &value, s, candidate) - backup(model, &value, s, *action);
             if gain > IMPROVEMENT_MIN * scale {
-                policy[s] = candidate;
+                *action = candidate;
                 changed = true;
             }
         }

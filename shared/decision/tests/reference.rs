@@ -4,7 +4,8 @@
 
 use std::path::PathBuf;
 
-use vigil_decision::{Evidence, Policy, Pomdp, QMdp, Tracker, mdp};
+use vigil_decision::policy::{choose, choose_among};
+use vigil_decision::{ActionVoting, Evidence, MostLikelyState, Policy, Pomdp, QMdp, Tracker, mdp};
 
 /// The tiger behind one of two doors, written from its published description.
 const TIGER: &str = "
@@ -53,6 +54,45 @@ fn tiger_values_are_exact() {
     let choice = QMdp::new(solution).evaluate(&[0.5, 0.5], &mut values);
     assert_eq!(choice.action, 0);
     assert!((values[0] - 189.0).abs() < 1e-9 && (values[1] - 145.0).abs() < 1e-9);
+}
+
+#[test]
+fn the_other_policies_follow_their_definitions() {
+    let solution = mdp::solve(&Pomdp::parse(TIGER).unwrap()).unwrap();
+    let mut values = [0.0; 3];
+    // A tiger on the left: open the right door.
+    let mls = MostLikelyState::new(solution.clone()).evaluate(&[0.6, 0.4], &mut values);
+    assert_eq!((mls.action, values), (2, [0.0, 0.0, 0.6]));
+    let av = ActionVoting::new(solution.clone()).evaluate(&[0.3, 0.7], &mut values);
+    assert_eq!((av.action, values), (1, [0.0, 0.7, 0.3]));
+    assert!((av.margin - 0.4).abs() < 1e-15);
+    // An exact tie: the first state, hence its door.
+    let tie = MostLikelyState::new(solution).evaluate(&[0.5, 0.5], &mut values);
+    assert_eq!(tie.action, 2);
+}
+
+#[test]
+fn ties_go_to_the_lowest_index_and_rounding_does_not_break_them() {
+    assert_eq!(choose(&[1.0, 3.0, 2.0]).action, 1);
+    assert_eq!(choose(&[1.0, 3.0, 2.0]).margin, 1.0);
+    let tie = choose(&[0.0, 0.3, 0.1 + 0.2]);
+    assert_eq!(tie.action, 1);
+    assert!(tie.margin >= 0.0 && tie.margin < 1e-15);
+    assert_eq!(choose(&[1e6, 1e6 + 1e-4]).action, 0);
+    assert_eq!(choose(&[1e6, 1e6 + 1e-2]).action, 1);
+    assert_eq!(choose(&[f64::NAN, -1.0]).action, 1);
+    assert_eq!(choose_among(&[1.0, 3.0, 2.0], |a| a != 1).action, 2);
+    assert_eq!(choose(&[]).margin, 0.0);
+}
+
+#[test]
+fn values_without_bound_are_refused() {
+    let endless = TIGER.replace("discount: 0.95", "discount: 1");
+    assert!(mdp::solve(&Pomdp::parse(&endless).unwrap()).is_err());
+    // Staying is worth -1e308, a double still; going costs more than any double holds.
+    let dear = "discount: 0.95 states: 1 actions: stay go observations: 1 T: * identity\n\
+                O: * uniform\nR: stay : * : * : * -5e306\nR: go : * : * : * -1.7e308\n";
+    assert!(mdp::solve(&Pomdp::parse(dear).unwrap()).is_err());
 }
 
 #[test]
