@@ -59,10 +59,9 @@ impl<T: Block> Tap<T> {
             .map(|k| first_ns + k * period_ns)
             .filter(|at_ns| {
                 let due_ns = at_ns + deadline_ns;
-                !self
-                    .published_ns
+                self.published_ns
                     .get(at_ns)
-                    .is_some_and(|&out_ns| out_ns <= due_ns)
+                    .is_none_or(|&out_ns| out_ns > due_ns)
             })
             .count() as u64
     }

@@ -48,6 +48,8 @@ pub struct Supervisor {
     scratch: Vec<f64>,
     epoch_t_capture_ns: Option<u64>,
     choice: Choice,
+    /// True while the present action stands although another is better.
+    is_held: bool,
     decided: Option<Decided>,
     decision_seq: u64,
     log_evidence: f64,
@@ -105,6 +107,7 @@ impl Supervisor {
                 action: 0,
                 margin: 0.0,
             },
+            is_held: false,
             decided: None,
             decision_seq: 0,
             log_evidence: 0.0,
@@ -268,6 +271,7 @@ impl Supervisor {
         self.choice = self
             .restraint
             .decide(current, best, &self.values, &self.actions, timed);
+        self.is_held = current == Some(self.choice.action) && self.choice.action != best.action;
     }
 
     /// What the robot is told now.
@@ -287,6 +291,11 @@ impl Supervisor {
             .actions
             .get(action)
             .map_or(RecoveryKind::Stop, |m| m.kind);
+        // The belief no longer speaks for a held action: it stands as it was.
+        let held = self.decided.filter(|d| self.is_held && d.action == action);
+        if let Some(held) = held {
+            return held;
+        }
         let wheel = match kind {
             RecoveryKind::Compensate => self.most_probable_wheel(true),
             RecoveryKind::IgnoreEncoder => self.most_probable_wheel(false),
