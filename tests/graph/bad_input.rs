@@ -1,8 +1,11 @@
 //! Bad input is refused with one precise message and exit code 2, before anything starts.
 
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::Output;
+
+use flate2::bufread::GzDecoder;
 
 use crate::harness::{Running, binary, eventually, machine, root, unique};
 
@@ -56,59 +59,85 @@ fn assert_refused(output: &Output, expected: &[&str]) {
     }
 }
 
+/// File, text in it, what replaces it, and what the message names.
+const BAD: [(&str, &str, &str, &[&str]); 12] = [
+    (
+        "rover.toml",
+        "rate_hz = 100.0",
+        "rate_hz = 0.0",
+        &["rover.toml:5", "rate_hz", "1 to"],
+    ),
+    (
+        "rover.toml",
+        "seed = 1",
+        "seeds = 1",
+        &["rover.toml:6", "unknown field `seeds`"],
+    ),
+    (
+        "rover.toml",
+        "core = 0,",
+        "core = 99,",
+        &["services.sensor-sim.core", "99 does not"],
+    ),
+    (
+        "rover.toml",
+        "priority = 55",
+        "priority = 99",
+        &["priority", "1 to 90"],
+    ),
+    (
+        "rover.toml",
+        "models/rover.toml",
+        "models/no.toml",
+        &["models/no.toml", "cannot be"],
+    ),
+    (
+        "rover.toml",
+        "filter = \"exact\"",
+        "filter = \"x\"",
+        &["'x' is not known", "exact"],
+    ),
+    (
+        "robots/rover.toml",
+        "mass_kg = 14.2",
+        "mass_kg = nan",
+        &["robots/rover.toml", "mass_kg"],
+    ),
+    (
+        "trees/rover.toml",
+        "\"LSS\"",
+        "\"RSS\"",
+        &["trees/rover.toml:8", "no node 'LSS'"],
+    ),
+    (
+        "models/rover.toml",
+        "robot = \"",
+        "robot = \"no-",
+        &["models/rover.toml", "is of robot 'no-"],
+    ),
+    (
+        "models/rover.toml",
+        "interval_s = ",
+        "interval_s = x",
+        &["models/rover.toml", "line "],
+    ),
+    (
+        "rover.pomdp",
+        "states: ND ",
+        "states: FINE ",
+        &["rover.pomdp:", "found 'ND'"],
+    ),
+    (
+        "rover.toml",
+        "stop = { kind",
+        "halt = { kind",
+        &["[supervisor.actions]", "'halt'"],
+    ),
+];
+
 #[test]
 fn every_bad_configuration_names_file_line_key_and_what_is_allowed() {
-    let cases: [(&str, &str, &str, &[&str]); 8] = [
-        (
-            "rover.toml",
-            "rate_hz = 100.0",
-            "rate_hz = 0.0",
-            &["rover.toml:5", "rate_hz", "1 to"],
-        ),
-        (
-            "rover.toml",
-            "seed = 1",
-            "seeds = 1",
-            &["rover.toml:6", "unknown field `seeds`"],
-        ),
-        (
-            "rover.toml",
-            "core = 0,",
-            "core = 99,",
-            &["services.sensor-sim.core", "99 does not"],
-        ),
-        (
-            "rover.toml",
-            "priority = 55",
-            "priority = 99",
-            &["priority", "1 to 90"],
-        ),
-        (
-            "rover.toml",
-            "models/rover.toml",
-            "models/no.toml",
-            &["models/no.toml", "cannot be"],
-        ),
-        (
-            "rover.toml",
-            "filter = \"exact\"",
-            "filter = \"x\"",
-            &["'x' is not known", "exact"],
-        ),
-        (
-            "robots/rover.toml",
-            "mass_kg = 14.2",
-            "mass_kg = nan",
-            &["robots/rover.toml", "mass_kg"],
-        ),
-        (
-            "trees/rover.toml",
-            "\"LSS\"",
-            "\"RSS\"",
-            &["trees/rover.toml:8", "no node 'LSS'"],
-        ),
-    ];
-    for (i, (file, from, to, expected)) in cases.into_iter().enumerate() {
+    for (i, (file, from, to, expected)) in BAD.into_iter().enumerate() {
         let folder = std::env::temp_dir().join(unique(&format!("bad{i}")));
         changed(&folder, file, from, to);
         let output = launch(&folder.join("rover.toml"), "bad", &[]);
@@ -158,6 +187,28 @@ fn bad_options_and_recordings_are_refused() {
     assert_refused(
         &launch(&config, "o4", &["--replay", &frames_text]),
         &missing,
+    );
+    let rover = "tests/data/rover/learn_frames.csv.gz";
+    let replay =
+        |options: &[&str]| launch(&config, "o5", &[&["--replay", rover], options].concat());
+    assert_refused(&replay(&["--runs", "0,99999"]), &[rover, "no run 99999"]);
+    assert_refused(&replay(&["--rate", "100"]), &["--rate", "--speed"]);
+    assert_refused(
+        &replay(&["--inject", "stuck:RM@1"]),
+        &["--inject", "simulator"],
+    );
+    // The header and two rows of that recording, the second row broken.
+    let file = fs::File::open(root().join(rover)).unwrap();
+    let lines = BufReader::new(GzDecoder::new(BufReader::new(file)))
+        .lines()
+        .map(Result::unwrap);
+    let mut lines: Vec<String> = lines.take(3).collect();
+    let (before, _) = lines[2].rsplit_once(',').unwrap();
+    lines[2] = format!("{before},NaN");
+    fs::write(&frames, lines.join("\n")).unwrap();
+    assert_refused(
+        &launch(&config, "o6", &["--replay", &frames_text]),
+        &["frames.csv", "row 2", "NaN"],
     );
     fs::remove_file(&frames).unwrap();
 }

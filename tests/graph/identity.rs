@@ -6,9 +6,7 @@ use vigil_blocks::{
     Block, CauseKind, DetectionBelief, Entry, FaultBelief, Header, ParticleBlock, SensorFrame,
 };
 use vigil_cycle::Topic;
-use vigil_detector::Detector;
-use vigil_identifier::{Identifier, Input};
-use vigil_robot::learned::Model;
+use vigil_identifier::Input;
 
 use crate::harness::{Running, drain, machine};
 
@@ -72,13 +70,8 @@ fn beliefs_live_and_offline_are_bit_identical() {
         "every frame was recorded"
     );
 
-    let file = &setup.file;
-    let model = Model::from_toml(&setup.model_text).unwrap();
-    let (robot, seed) = (&setup.robot, file.graph.seed);
-    let mut detector = Detector::new(&model, robot, &file.detector, seed).unwrap();
-    let (settings, sensors) = (&file.identifier, file.detector.sensors);
-    let mut identifier =
-        Identifier::new(&model, robot, &setup.tree, settings, sensors, seed).unwrap();
+    let mut detector = vigil_detector::assemble(&setup).unwrap();
+    let mut identifier = vigil_identifier::assemble(&setup).unwrap();
     let mut compared = 0;
     for (seq, frame) in &recorded.frames {
         let (mut belief, mut particles) = (DetectionBelief::default(), zeroed_particles());

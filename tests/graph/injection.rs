@@ -47,10 +47,8 @@ fn a_stuck_wheel_is_detected_named_and_acted_upon() {
         .collect();
     assert_eq!(pids.len(), 4, "four processes");
     for (name, service) in services {
-        assert_eq!(
-            service["core"], service["core_wanted"],
-            "{name} is where it was put"
-        );
+        assert_eq!(service["core"], service["core_wanted"], "{name}");
+        assert_eq!(service["pinned"], true, "{name} is where it was put");
     }
     assert!(summary.json["end_to_end_us"]["n"].as_u64().unwrap() > 800);
 }

@@ -2,7 +2,61 @@
 
 use std::process::Command;
 
-use crate::harness::{HealthWatch, Running, eventually, machine};
+use vigil_blocks::FaultBelief;
+use vigil_cycle::Topic;
+
+use crate::harness::{HealthWatch, ModeWatch, Running, drain, eventually, machine};
+
+#[test]
+fn a_restarted_simulator_goes_on_with_its_broken_rover() {
+    let _machine = machine();
+    let options = ["--duration", "60", "--inject", "encoder:LF:zero@1"];
+    let mut graph = Running::start("resume", &options);
+    let observed = graph.observe();
+    let mut health = HealthWatch::new(&observed);
+    let mut seen = ModeWatch::new(&observed, &graph.setup);
+    let mut is_named = || {
+        eventually("LF_ENC is named", || {
+            seen.poll().filter(|mode| mode == "LF_ENC")
+        })
+    };
+    is_named();
+    eventually("all services run", || health.all_running().then_some(()));
+    let before = health.poll()["sensor-sim"];
+    kill(before.pid);
+    let epoch = eventually("it is restarted", || {
+        let epoch = health.poll()["sensor-sim"].header.epoch;
+        (epoch != before.header.epoch).then_some(epoch)
+    });
+    let mut frames = observed.receiver::<FaultBelief>(Topic::Diagnosis).unwrap();
+    eventually("the fault is named from the new simulator's frames", || {
+        let mut named = None;
+        drain(frames.as_mut(), |belief| {
+            let name = graph.setup.tree.nodes().get(belief.mode as usize);
+            if name.is_some_and(|n| n.name == "LF_ENC") && belief.cause.frame_epoch >= epoch {
+                named = Some(());
+            }
+        });
+        named
+    });
+    assert!(graph.is_alive());
+    graph.interrupt();
+    let injected: Vec<String> = graph
+        .finish()
+        .events("injected")
+        .into_iter()
+        .map(|e| e.1)
+        .collect();
+    assert_eq!(injected, ["encoder:LF:zero", "encoder:LF:zero"]);
+}
+
+fn kill(pid: u32) {
+    let status = Command::new("kill")
+        .args(["-9", &pid.to_string()])
+        .status()
+        .unwrap();
+    assert!(status.success());
+}
 
 #[test]
 fn each_service_killed_once_comes_back_and_nothing_is_left() {
@@ -14,11 +68,7 @@ fn each_service_killed_once_comes_back_and_nothing_is_left() {
     for service in services {
         eventually("all services run", || health.all_running().then_some(()));
         let before = health.poll()[service];
-        let status = Command::new("kill")
-            .args(["-9", &before.pid.to_string()])
-            .status()
-            .unwrap();
-        assert!(status.success());
+        kill(before.pid);
         let back = eventually("it is restarted", || {
             let now = health.poll()[service];
             (now.header.epoch != before.header.epoch && now.cycles > 10).then_some(now)

@@ -28,11 +28,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vigil-decision", &["vigil-blocks"]),
     ("vigil-cycle", &["vigil-blocks"]),
     ("vigil-robot", &["vigil-inference", "vigil-blocks"]),
-    // Setup turns the configuration into what the cycle needs: placement, deadlines, queues.
+    // Setup reads every model that a graph names, and turns the configuration into what the cycle
+    // needs: placement, deadlines, queues.
     (
         "vigil-setup",
         &[
             "vigil-cycle",
+            "vigil-decision",
             "vigil-robot",
             "vigil-inference",
             "vigil-blocks",

@@ -55,7 +55,9 @@ const ALLOCATIONS: [&str; 13] = [
 ];
 
 /// First words in the names of functions that run every cycle.
-const STEADY: &[&str] = &["step", "update", "predict", "decide"];
+const STEADY: &[&str] = &[
+    "step", "update", "predict", "decide", "take", "observe", "report",
+];
 
 /// The same for decision, where solvers update their bounds offline.
 const STEADY_DECISION: &[&str] = &["step", "decide"];

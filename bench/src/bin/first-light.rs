@@ -203,6 +203,15 @@ fn evaluate(archive: &mut Archive, sensors: &str) -> Result<(), Box<dyn Error>> 
             .args(["--sensors", sensors]),
     )?;
     archive.store(&format!("evaluate-{sensors}.json"), &score)?;
-    archive.say(&format!("```json\n{score:#}\n```"));
+    let alarms = &score["false_alarms"];
+    archive.say(&format!("- false alarms: {alarms}"));
+    for class in ["stuck", "encoder"] {
+        let detection = &score["detection"][class];
+        archive.say(&format!("- {class}, detection: {detection}"));
+        for at in ["after_2_s", "after_5_s", "after_10_s"] {
+            let leaf = &score["identification"][class]["leaf"][at];
+            archive.say(&format!("- {class}, leaf {at}: {leaf}"));
+        }
+    }
     Ok(())
 }

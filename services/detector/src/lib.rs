@@ -2,8 +2,10 @@
 //!
 //! [`Detector`] is a pure function of journal entries; [`wiring`] connects it to its ports.
 
+mod assemble;
 mod detector;
 pub mod wiring;
 
+pub use assemble::assemble;
 pub use detector::{Detector, DetectorError};
 pub use wiring::DetectorStage;

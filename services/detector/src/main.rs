@@ -1,7 +1,6 @@
 //! `vigil-detector`: the detector as a process of the graph. Exit codes: 0 stopped, 1 failed,
 //! 2 configuration.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -9,23 +8,19 @@ use vigil_blocks::SensorFrame;
 use vigil_cycle::Topic;
 use vigil_cycle::serve::{self, ServeError};
 use vigil_cycle::topic::ServiceName;
-use vigil_detector::{Detector, DetectorStage};
-use vigil_robot::learned::Model;
-use vigil_setup::{GraphArgs, Setup};
+use vigil_detector::{Detector, DetectorStage, assemble};
+use vigil_setup::{ServiceArgs, Setup};
 
 /// Detects any deviation from nominal behaviour.
 #[derive(Debug, Parser)]
 #[command(version, about)]
 struct Args {
     #[command(flatten)]
-    graph: GraphArgs,
-    /// Where to leave the run report.
-    #[arg(long, value_name = "F")]
-    report: Option<PathBuf>,
+    service: ServiceArgs,
 }
 
 fn main() -> ExitCode {
-    let args = Args::parse();
+    let args = Args::parse().service;
     let (setup, detector) = match prepare(&args) {
         Ok(prepared) => prepared,
         Err(error) => {
@@ -33,6 +28,9 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+    if args.check {
+        return ExitCode::SUCCESS;
+    }
     let plan = setup.plan(ServiceName::Detector, args.report);
     let build = |graph: &_| DetectorStage::new(detector, graph).map_err(ServeError::from);
     match serve::stage::<SensorFrame, _>(&plan, Topic::Sensor, build) {
@@ -44,11 +42,8 @@ fn main() -> ExitCode {
     }
 }
 
-fn prepare(args: &Args) -> Result<(Setup, Detector), Box<dyn std::error::Error>> {
+fn prepare(args: &ServiceArgs) -> Result<(Setup, Detector), Box<dyn std::error::Error>> {
     let setup = args.graph.load()?;
-    let model = Model::from_toml(&setup.model_text)
-        .map_err(|e| format!("{}: {e}", setup.model_path.display()))?;
-    let seed = setup.file.graph.seed;
-    let detector = Detector::new(&model, &setup.robot, &setup.file.detector, seed)?;
+    let detector = assemble(&setup).map_err(|e| format!("{}: {e}", setup.path.display()))?;
     Ok((setup, detector))
 }

@@ -1,11 +1,9 @@
 //! The detector at its ports.
 
-use vigil_blocks::{
-    Cause, Control, ControlCommand, DetectionBelief, Entry, EventKind, ParticleBlock, SensorFrame,
+use vigil_blocks::{Cause, DetectionBelief, Entry, EventKind, ParticleBlock, SensorFrame};
+use vigil_cycle::{
+    Clock, Graph, HealthBoard, Intake, PortError, Receiver, Sender, Stage, Stamp, Topic,
 };
-use vigil_cycle::Topic;
-use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{Clock, Graph, HealthBoard, Intake, PortError, Receiver, Sender, Stage, Stamp};
 
 use crate::Detector;
 
@@ -13,7 +11,6 @@ use crate::Detector;
 pub struct DetectorStage {
     detector: Detector,
     frames: Box<dyn Receiver<SensorFrame>>,
-    control: Box<dyn Receiver<Control>>,
     belief: Box<dyn Sender<DetectionBelief>>,
     particles: Box<dyn Sender<ParticleBlock>>,
     alarm: bool,
@@ -30,19 +27,12 @@ impl DetectorStage {
         Ok(Self {
             detector,
             frames: graph.receiver(Topic::Sensor)?,
-            control: graph.receiver(Topic::Control(ServiceName::Detector))?,
             belief: graph.sender(Topic::Detection)?,
             particles: graph.sender(Topic::DetectionParticles)?,
             alarm: false,
             alarm_told: false,
             p_fault: 0.0,
         })
-    }
-
-    fn step(&mut self, entry: Entry<&SensorFrame>) {
-        let (belief, particles) = (self.belief.block(), self.particles.block());
-        self.detector.step(entry, belief, particles);
-        (self.alarm, self.p_fault) = (belief.alarm != 0, belief.p_fault);
     }
 }
 
@@ -55,21 +45,23 @@ impl Stage for DetectorStage {
             let Some(frame) = self.frames.held() else {
                 break;
             };
-            let identity = (frame.header.epoch, frame.header.seq);
-            if intake.accept::<SensorFrame>(&frame.header, Some(identity)) {
+            if intake.accept::<SensorFrame>(&frame.header) {
                 let (belief, particles) = (self.belief.block(), self.particles.block());
                 self.detector.step(Entry::Frame(frame), belief, particles);
-                (self.alarm, self.p_fault) = (belief.alarm != 0, belief.p_fault);
+                intake.stepped(&frame.header, (frame.header.epoch, frame.header.seq));
             }
         }
     }
 
     fn miss(&mut self, count: u32) {
-        self.step(Entry::Missed(count));
+        let (belief, particles) = (self.belief.block(), self.particles.block());
+        self.detector.step(Entry::Missed(count), belief, particles);
     }
 
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
-        self.belief.block().cause = cause;
+        let belief = self.belief.block();
+        belief.cause = cause;
+        (self.alarm, self.p_fault) = (belief.alarm != 0, belief.p_fault);
         self.particles.block().cause = cause;
         // Particles first: they are there when the belief wakes the identifier.
         self.particles.send(stamp, clock)?;
@@ -85,17 +77,6 @@ impl Stage for DetectorStage {
             };
             health.event(now_ns, kind, 0, self.p_fault, 0);
             self.alarm_told = self.alarm;
-        }
-        while self.control.advance() {
-            let Some(command) = self.control.held() else {
-                break;
-            };
-            let (epoch, seq) = (command.header.epoch, command.header.seq);
-            let reset = command.command == ControlCommand::Reset as u32;
-            health.answer_control(epoch, seq, reset);
-            if reset {
-                self.step(Entry::Reset);
-            }
         }
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! [`Identifier`] is a pure function of journal entries; [`wiring`] connects it to its ports.
 
+mod assemble;
 mod draw;
 mod encoders;
 mod exact;
@@ -10,6 +11,7 @@ mod modes;
 mod posterior;
 pub mod wiring;
 
+pub use assemble::assemble;
 pub use identifier::{Identifier, Input};
 pub use modes::IdentifierError;
 pub use wiring::IdentifierStage;

@@ -1,7 +1,6 @@
 //! `vigil-identifier`: the identifier as a process of the graph. Exit codes: 0 stopped, 1 failed,
 //! 2 configuration.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -9,23 +8,19 @@ use vigil_blocks::DetectionBelief;
 use vigil_cycle::Topic;
 use vigil_cycle::serve::{self, ServeError};
 use vigil_cycle::topic::ServiceName;
-use vigil_identifier::{Identifier, IdentifierStage};
-use vigil_robot::learned::Model;
-use vigil_setup::{GraphArgs, Setup};
+use vigil_identifier::{Identifier, IdentifierStage, assemble};
+use vigil_setup::{ServiceArgs, Setup};
 
 /// Identifies the fault.
 #[derive(Debug, Parser)]
 #[command(version, about)]
 struct Args {
     #[command(flatten)]
-    graph: GraphArgs,
-    /// Where to leave the run report.
-    #[arg(long, value_name = "F")]
-    report: Option<PathBuf>,
+    service: ServiceArgs,
 }
 
 fn main() -> ExitCode {
-    let args = Args::parse();
+    let args = Args::parse().service;
     let (setup, identifier) = match prepare(&args) {
         Ok(prepared) => prepared,
         Err(error) => {
@@ -33,8 +28,11 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+    if args.check {
+        return ExitCode::SUCCESS;
+    }
     let plan = setup.plan(ServiceName::Identifier, args.report);
-    let period_ns = plan.period_ns;
+    let period_ns = setup.period_ns();
     let build =
         |graph: &_| IdentifierStage::new(identifier, graph, period_ns).map_err(ServeError::from);
     match serve::stage::<DetectionBelief, _>(&plan, Topic::Detection, build) {
@@ -46,13 +44,8 @@ fn main() -> ExitCode {
     }
 }
 
-fn prepare(args: &Args) -> Result<(Setup, Identifier), Box<dyn std::error::Error>> {
+fn prepare(args: &ServiceArgs) -> Result<(Setup, Identifier), Box<dyn std::error::Error>> {
     let setup = args.graph.load()?;
-    let model = Model::from_toml(&setup.model_text)
-        .map_err(|e| format!("{}: {e}", setup.model_path.display()))?;
-    let file = &setup.file;
-    let (settings, sensors) = (&file.identifier, file.detector.sensors);
-    let seed = file.graph.seed;
-    let identifier = Identifier::new(&model, &setup.robot, &setup.tree, settings, sensors, seed)?;
+    let identifier = assemble(&setup).map_err(|e| format!("{}: {e}", setup.path.display()))?;
     Ok((setup, identifier))
 }

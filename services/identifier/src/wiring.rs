@@ -29,7 +29,6 @@ pub struct IdentifierStage {
     period_ns: u64,
     belief: Box<dyn Sender<FaultBelief>>,
     particles: Box<dyn Sender<ParticleBlock>>,
-    stepped: bool,
     reported: Reported,
     told: u32,
 }
@@ -59,7 +58,6 @@ impl IdentifierStage {
             period_ns,
             belief: graph.sender(Topic::Diagnosis)?,
             particles: graph.sender(Topic::DiagnosisParticles)?,
-            stepped: false,
             reported: Reported::default(),
             told: 0,
         })
@@ -86,15 +84,21 @@ impl IdentifierStage {
         }
     }
 
-    /// Steps the frames up to the one behind the held detection.
-    fn step_held(&mut self) {
-        let Some(detection) = self.detections.held() else {
-            return;
-        };
-        let wanted = (detection.cause.frame_epoch, detection.cause.frame_seq);
-        let is_wanted = |f: &SensorFrame| (f.header.epoch, f.header.seq) == wanted;
-        let Some(last) = self.pending.iter().position(is_wanted) else {
-            return;
+    fn position(&self, (epoch, seq): (u64, u64)) -> Option<usize> {
+        self.pending
+            .iter()
+            .position(|frame| (frame.header.epoch, frame.header.seq) == (epoch, seq))
+    }
+
+    /// Steps the frames up to `wanted`, the one behind the held detection; false if it was lost on
+    /// its way here.
+    fn step_held(&mut self, wanted: (u64, u64), now_ns: u64) -> bool {
+        if self.position(wanted).is_none() {
+            // It was published before its detection, but perhaps after the frames were taken.
+            self.take_frames(now_ns);
+        }
+        let (Some(last), Some(detection)) = (self.position(wanted), self.detections.held()) else {
+            return false;
         };
         while self
             .detected
@@ -115,14 +119,7 @@ impl IdentifierStage {
             let (belief, out) = (self.belief.block(), self.particles.block());
             self.identifier.step(Entry::Frame(input), belief, out);
         }
-        self.stepped = true;
-    }
-
-    fn step_without_frame(&mut self, count: u32) {
-        let (belief, particles) = (self.belief.block(), self.particles.block());
-        self.identifier
-            .step(Entry::Missed(count), belief, particles);
-        self.stepped = true;
+        true
     }
 }
 
@@ -136,7 +133,6 @@ const fn precedes(a: &Cause, b: &Cause) -> bool {
 
 impl Stage for IdentifierStage {
     fn take(&mut self, intake: &mut Intake<'_>) {
-        self.stepped = false;
         self.take_frames(intake.now_ns());
         for _ in 0..self.detections.buffer() {
             if !self.detections.advance() {
@@ -145,24 +141,24 @@ impl Stage for IdentifierStage {
             let Some(detection) = self.detections.held() else {
                 break;
             };
-            let cause = detection.cause;
-            let is_frame = cause.kind() == Some(CauseKind::Frame);
-            let identity = is_frame.then_some((cause.frame_epoch, cause.frame_seq));
-            if intake.accept::<DetectionBelief>(&detection.header, identity) && is_frame {
-                self.step_held();
+            let (header, cause) = (detection.header, detection.cause);
+            let identity = (cause.frame_epoch, cause.frame_seq);
+            if intake.accept::<DetectionBelief>(&header)
+                && cause.kind() == Some(CauseKind::Frame)
+                && self.step_held(identity, intake.now_ns())
+            {
+                intake.stepped(&header, identity);
             }
         }
     }
 
     fn miss(&mut self, count: u32) {
-        self.step_without_frame(count);
+        let (belief, particles) = (self.belief.block(), self.particles.block());
+        self.identifier
+            .step(Entry::Missed(count), belief, particles);
     }
 
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
-        if !self.stepped {
-            // The frame behind the detection was lost on its way here.
-            self.step_without_frame(0);
-        }
         let belief = self.belief.block();
         belief.cause = cause;
         self.reported = Reported {

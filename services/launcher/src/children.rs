@@ -1,7 +1,8 @@
 //! The service processes: start, restart within a bound, stop.
 
 use std::io;
-use std::path::PathBuf;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -41,7 +42,7 @@ impl Children {
         for name in plan.services() {
             let report = domain.folder().join(format!("{}.report", name.as_str()));
             let _ = std::fs::remove_file(&report);
-            match spawn(plan, name, &report) {
+            match spawn(plan, name, &report, None) {
                 Ok(child) => children.services.push(Supervised {
                     name,
                     child,
@@ -80,7 +81,8 @@ impl Children {
                     .retain(|at| now.duration_since(*at) < window);
                 let count = service.restarts.len() as u32;
                 let name = service.name.as_str();
-                if count >= policy.max_restarts {
+                // What was refused at a restart is refused at the next.
+                if count >= policy.max_restarts || status.code() == Some(2) {
                     eprintln!("vigil: {name} ended ({status}); given up after {count} restarts");
                     self.gave_up = Some(service.name);
                     return true;
@@ -94,7 +96,7 @@ impl Children {
             if service.restart_at.is_some_and(|at| now >= at) && !signal::stop_requested() {
                 service.restart_at = None;
                 service.restarts.push(now);
-                match spawn(plan, service.name, &service.report) {
+                match spawn(plan, service.name, &service.report, observer.ready_ns()) {
                     Ok(child) => service.child = child,
                     Err(error) => {
                         eprintln!(
@@ -160,10 +162,22 @@ impl Children {
     }
 }
 
-fn spawn(plan: &Plan, name: ServiceName, report: &std::path::Path) -> io::Result<Child> {
-    let (program, line) = plan.command(name, report.to_path_buf());
-    Command::new(&program)
-        .args(line)
+/// Starts a service; a simulator goes on with the drive that began at `began_ns`.
+fn spawn(
+    plan: &Plan,
+    name: ServiceName,
+    report: &Path,
+    began_ns: Option<u64>,
+) -> io::Result<Child> {
+    let (program, line) = plan.command(name);
+    let mut command = Command::new(&program);
+    command.args(line).arg("--report").arg(report);
+    if let (ServiceName::SensorSim, Some(began_ns)) = (name, began_ns) {
+        command.args(["--began-ns", &began_ns.to_string()]);
+    }
+    // A group of its own: Ctrl-C reaches the launcher alone, which stops the services in order.
+    command
+        .process_group(0)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .spawn()

@@ -110,11 +110,11 @@ fn watch(
     loop {
         std::thread::sleep(POLL);
         observer.poll(!args.json);
-        if children.look_after(plan, observer) {
-            return Ended::GaveUp;
-        }
         if signal::stop_requested() {
             return Ended::Stopped;
+        }
+        if children.look_after(plan, observer) {
+            return Ended::GaveUp;
         }
         if observer.ready_ns().is_none() && plan.waits_for_ready() {
             if started.elapsed() > STARTUP_LIMIT {

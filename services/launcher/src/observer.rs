@@ -6,7 +6,7 @@ use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Graph, Monotonic, PortError, Receiver, Topic, health};
 
 use crate::plan::Plan;
-use crate::timeline::{Namer, Timeline};
+use crate::timeline::Timeline;
 
 /// What the launcher knows of one service.
 pub struct Watched {
@@ -17,7 +17,7 @@ pub struct Watched {
     /// The newest Health of the present process.
     pub latest: Option<Box<Health>>,
     /// Counters of processes that have died.
-    pub before: Counters,
+    before: Counters,
 }
 
 /// Counters that add up over restarts.
@@ -25,6 +25,7 @@ pub struct Watched {
 pub struct Counters {
     pub cycles: u64,
     pub missed: u64,
+    pub over_budget: u64,
     pub slips: u64,
     pub lost: u64,
     pub late: u64,
@@ -36,6 +37,7 @@ impl Counters {
     fn add(&mut self, health: &Health) {
         self.cycles += health.cycles;
         self.missed += health.missed;
+        self.over_budget += health.over_budget;
         self.slips += health.slips;
         self.lost += health.lost;
         self.late += health.late;
@@ -44,15 +46,13 @@ impl Counters {
     }
 }
 
-impl Watched {
-    /// Counters over all processes of the service.
-    pub fn counters(&self) -> Counters {
-        let mut counters = self.before;
-        if let Some(health) = &self.latest {
-            counters.add(health);
-        }
-        counters
-    }
+/// Instants that `health` accounts from `end_ns` on: nothing was published for them, so all of them
+/// are among its misses.
+fn accounted_from(health: &Health, end_ns: u64) -> u64 {
+    let period_ns = health.period_ns.max(1);
+    (health.accounted_ns[1] + period_ns / 2)
+        .checked_sub(end_ns)
+        .map_or(0, |ns| ns / period_ns + 1)
 }
 
 /// Reads Health and keeps the timeline.
@@ -84,7 +84,7 @@ impl Observer {
         Ok(Self {
             watched,
             graph,
-            timeline: Timeline::new(Namer::new(plan)),
+            timeline: Timeline::new(plan),
         })
     }
 
@@ -127,6 +127,20 @@ impl Observer {
     pub fn since_ready_s(&self) -> Option<f64> {
         self.ready_ns()
             .map(|ready_ns| Monotonic.now_ns().saturating_sub(ready_ns) as f64 * 1e-9)
+    }
+
+    /// Counters of a service over all its processes. What it missed because a recording was at its
+    /// end is no miss.
+    pub fn counters(&self, service: &Watched) -> Counters {
+        let mut counters = service.before;
+        if let Some(health) = &service.latest {
+            counters.add(health);
+            if let Some(end_ns) = self.timeline.recording_end_ns() {
+                let unowed = accounted_from(health, end_ns);
+                counters.missed = counters.missed.saturating_sub(unowed);
+            }
+        }
+        counters
     }
 
     /// Every service watched.

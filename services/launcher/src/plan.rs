@@ -1,12 +1,11 @@
 //! What is to be started: options, configuration and every model, checked before anything starts.
 
+use std::error::Error;
 use std::path::PathBuf;
+use std::process::{Command, Stdio};
 
 use vigil_cycle::topic::ServiceName;
-use vigil_decision::Pomdp;
 use vigil_evaluation::frames;
-use vigil_robot::Injection;
-use vigil_robot::learned::Model;
 use vigil_setup::schema::Source;
 use vigil_setup::{GraphArgs, Setup};
 
@@ -31,41 +30,59 @@ pub struct LauncherArgs {
 pub struct Plan {
     /// The configuration, options applied.
     pub setup: Setup,
-    /// Names of the decision model's actions.
-    pub action_names: Vec<String>,
     /// Options for every service.
     options: Vec<String>,
     inject: Vec<String>,
 }
 
 impl Plan {
-    /// Reads and checks everything that the services will read.
-    pub fn new(args: &LauncherArgs) -> Result<Self, Box<dyn std::error::Error>> {
-        let mut graph = args.graph.clone();
-        if let (Some(recording), None) = (&graph.replay, graph.rate) {
-            // A recording has its own rate; the deadlines follow it.
-            let robot = vigil_setup::load_robot(&graph.load()?.robot_path)?;
-            let interval_s = frames::interval_s(recording, &robot)?;
-            graph.rate = Some(graph.speed.unwrap_or(1.0) / interval_s);
-        }
-        let setup = graph.load()?;
+    /// Reads and checks everything that the services will read; each of them checks its part.
+    pub fn new(args: &LauncherArgs) -> Result<Self, Box<dyn Error>> {
         if args.duration.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
             return Err("--duration: allowed is any number of seconds above 0".into());
         }
-        Model::from_toml(&setup.model_text)
-            .map_err(|e| format!("{}: {e}", setup.model_path.display()))?;
-        let decision = Pomdp::parse(&setup.decision_text)
-            .map_err(|e| format!("{}: {e}", setup.decision_path.display()))?;
-        let action_names = decision.actions().to_vec();
-        if !args.inject.is_empty() {
-            check_injections(&args.inject, &setup)?;
+        let mut graph = args.graph.clone();
+        let mut setup = graph.load()?;
+        if setup.file.sensor.source == Source::Playback {
+            if graph.rate.is_some() {
+                return Err(
+                    "--rate: recorded frames have their own rate; change it with --speed".into(),
+                );
+            }
+            graph.rate = Some(playback_rate_hz(&setup)?);
+            setup = graph.load()?;
         }
-        Ok(Self {
+        let plan = Self {
             options: graph.to_command_line(),
             setup,
-            action_names,
             inject: args.inject.clone(),
-        })
+        };
+        plan.check_services()?;
+        Ok(plan)
+    }
+
+    /// Lets each service check what it needs, models included, without starting it.
+    fn check_services(&self) -> Result<(), Box<dyn Error>> {
+        let mut problems: Vec<String> = Vec::new();
+        for name in self.services() {
+            let (program, mut line) = self.command(name);
+            line.push("--check".into());
+            let output = Command::new(&program)
+                .args(line)
+                .stdin(Stdio::null())
+                .output()
+                .map_err(|error| format!("{}: {error}", program.display()))?;
+            if !output.status.success() {
+                let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+                if !problems.contains(&said) {
+                    problems.push(said);
+                }
+            }
+        }
+        if problems.is_empty() {
+            return Ok(());
+        }
+        Err(problems.join("\n").into())
     }
 
     /// True if a first action must come back within the start-up limit; an external sensor may
@@ -82,14 +99,13 @@ impl Plan {
             .filter(move |&service| !(external && service == ServiceName::SensorSim))
     }
 
-    /// Program and arguments of a service.
-    pub fn command(&self, name: ServiceName, report: PathBuf) -> (PathBuf, Vec<String>) {
+    /// Program of a service, and the options that say what it is to do.
+    pub fn command(&self, name: ServiceName) -> (PathBuf, Vec<String>) {
         let program = format!("vigil-{}", name.as_str());
         let beside = std::env::current_exe()
             .unwrap_or_default()
             .with_file_name(program);
         let mut line = self.options.clone();
-        line.extend(["--report".to_owned(), report.display().to_string()]);
         if name == ServiceName::SensorSim {
             for spec in &self.inject {
                 line.extend(["--inject".to_owned(), spec.clone()]);
@@ -99,18 +115,12 @@ impl Plan {
     }
 }
 
-fn check_injections(specs: &[String], setup: &Setup) -> Result<(), Box<dyn std::error::Error>> {
-    if setup.file.sensor.source != Source::Simulator {
-        return Err("--inject: only the simulator can be broken; the source is another".into());
-    }
-    if !setup.file.control.allow_injection {
-        let path = setup.path.display();
-        return Err(
-            format!("{path}: control.allow_injection is false: --inject is refused").into(),
-        );
-    }
-    for spec in specs {
-        Injection::parse(spec, &setup.robot).map_err(|e| format!("--inject {spec}: {e}"))?;
-    }
-    Ok(())
+/// Rate at which recorded frames are played: their own, times the speed.
+fn playback_rate_hz(setup: &Setup) -> Result<f64, Box<dyn Error>> {
+    let sensor = &setup.file.sensor;
+    let path = setup.resolve(sensor.frames.as_deref().unwrap_or_default());
+    let runs = frames::read(&path, &setup.robot)?;
+    let interval_s = frames::interval_s(&runs)
+        .ok_or_else(|| format!("{}: no run has two frames", path.display()))?;
+    Ok(sensor.speed.unwrap_or(1.0) / interval_s)
 }

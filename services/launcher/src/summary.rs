@@ -9,7 +9,7 @@ use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Placement, RunReport};
 
 use crate::children::Children;
-use crate::observer::{Observer, Watched};
+use crate::observer::{Counters, Observer, Watched};
 use crate::plan::Plan;
 use crate::timeline::Told;
 
@@ -59,6 +59,7 @@ impl From<Percentiles> for Microseconds {
 pub struct ServiceSummary {
     cycles: u64,
     missed: u64,
+    over_budget: u64,
     slips: u64,
     lost: u64,
     late: u64,
@@ -68,6 +69,7 @@ pub struct ServiceSummary {
     pid: u32,
     core: u32,
     core_wanted: u32,
+    pinned: bool,
     scheduling: String,
     memory_locked: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -117,7 +119,12 @@ impl Summary {
             .map(|w| {
                 (
                     w.name.as_str(),
-                    service(w, children.restarts(w.name), report(w.name)),
+                    service(
+                        w,
+                        observer.counters(w),
+                        children.restarts(w.name),
+                        report(w.name),
+                    ),
                 )
             })
             .collect();
@@ -146,12 +153,18 @@ impl Summary {
     }
 }
 
-fn service(w: &Watched, restarts: usize, report: Option<&RunReport>) -> ServiceSummary {
-    let (counters, health) = (w.counters(), w.latest.as_deref());
+fn service(
+    w: &Watched,
+    counters: Counters,
+    restarts: usize,
+    report: Option<&RunReport>,
+) -> ServiceSummary {
+    let health = w.latest.as_deref();
     let of = |get: fn(&RunReport) -> Percentiles| report.map(|r| get(r).into());
     ServiceSummary {
         cycles: counters.cycles,
         missed: counters.missed,
+        over_budget: counters.over_budget,
         slips: counters.slips,
         lost: counters.lost,
         late: counters.late,
@@ -161,6 +174,7 @@ fn service(w: &Watched, restarts: usize, report: Option<&RunReport>) -> ServiceS
         pid: health.map_or(0, |h| h.pid),
         core: health.map_or(u32::MAX, |h| h.core),
         core_wanted: health.map_or(u32::MAX, |h| h.core_wanted),
+        pinned: health.is_some_and(|h| h.pinned != 0),
         scheduling: health.map_or_else(
             || "unknown".into(),
             |h| Placement::scheduling(h.policy, h.priority),
@@ -187,8 +201,8 @@ impl fmt::Display for Summary {
         self.placement(f)?;
         writeln!(
             f,
-            "  service      core  scheduling   cycles  missed  slips  lost  late  restarts  \
-             step p99"
+            "  service      core  scheduling   cycles  missed  over budget  slips  lost  late  \
+             restarts  step p99"
         )?;
         for (name, s) in self.in_order() {
             let step = s
@@ -196,8 +210,16 @@ impl fmt::Display for Summary {
                 .map_or_else(|| "-".into(), |l| format!("{:.0} us", l.p99));
             writeln!(
                 f,
-                "  {name:<11} {:>5}  {:<10} {:>8} {:>7} {:>6} {:>5} {:>5} {:>9}  {step}",
-                s.core, s.scheduling, s.cycles, s.missed, s.slips, s.lost, s.late, s.restarts
+                "  {name:<11} {:>5}  {:<10} {:>8} {:>7} {:>12} {:>6} {:>5} {:>5} {:>9}  {step}",
+                s.core,
+                s.scheduling,
+                s.cycles,
+                s.missed,
+                s.over_budget,
+                s.slips,
+                s.lost,
+                s.late,
+                s.restarts
             )?;
         }
         let e = &self.end_to_end_us;
@@ -207,6 +229,12 @@ impl fmt::Display for Summary {
              p99.9 {:.0}, max {:.0} us (n = {})",
             e.p50, e.p90, e.p99, e.p999, e.max, e.n
         )?;
+        if self.services.values().any(|s| s.restarts > 0) {
+            writeln!(
+                f,
+                "  latencies of a restarted service are those since its last start"
+            )?;
+        }
         writeln!(f, "  timeline:")?;
         for event in &self.events {
             let p = event.p.map_or_else(String::new, |p| format!("  p={p:.3}"));
@@ -238,9 +266,12 @@ impl Summary {
         let mut cores: BTreeMap<u32, Vec<&str>> = BTreeMap::new();
         for (name, service) in self.in_order() {
             cores.entry(service.core).or_default().push(name);
-            if service.core != service.core_wanted {
+            if !service.pinned {
                 let (core, wanted) = (service.core, service.core_wanted);
-                writeln!(f, "  {name} runs on core {core}, not on {wanted} as asked")?;
+                writeln!(
+                    f,
+                    "  {name} runs on core {core} and is not pinned to {wanted} as asked"
+                )?;
             }
             if service.scheduling == "other" {
                 writeln!(

@@ -1,7 +1,7 @@
 //! What happened, in order, in words.
 
 use serde::Serialize;
-use vigil_blocks::{Event, EventKind, MODE_MULTIPLE, MODE_UNKNOWN};
+use vigil_blocks::{Event, EventKind, MODE_MULTIPLE, MODE_UNKNOWN, Refusal};
 use vigil_cycle::topic::ServiceName;
 use vigil_robot::{Fault, FaultKind};
 
@@ -29,14 +29,17 @@ pub struct Timeline {
     raw: Vec<(ServiceName, Event)>,
     shown: usize,
     overwritten: u64,
+    deadlines_ns: [u64; ServiceName::ALL.len()],
     closed_ns: Option<u64>,
 }
 
 impl Timeline {
-    /// An empty timeline.
-    pub const fn new(namer: Namer) -> Self {
+    /// An empty timeline for the services of a plan.
+    pub fn new(plan: &Plan) -> Self {
+        let deadline_ns = |name| plan.setup.plan(name, None).schedule.deadline_ns;
         Self {
-            namer,
+            namer: Namer::new(plan),
+            deadlines_ns: ServiceName::ALL.map(deadline_ns),
             raw: Vec::new(),
             shown: 0,
             overwritten: 0,
@@ -69,12 +72,27 @@ impl Timeline {
         self.overwritten
     }
 
+    /// First instant of the schedule that no recorded frame answers any more, ns.
+    pub fn recording_end_ns(&self) -> Option<u64> {
+        let end = |(_, e): &&(_, Event)| e.kind == EventKind::EndOfRecording as u32;
+        self.raw.iter().find(end).map(|(_, event)| event.value)
+    }
+
+    /// False for what a service says because the recording is at its end: that it misses input.
+    fn is_told(&self, service: ServiceName, event: &Event) -> bool {
+        let deadline_ns = self.deadlines_ns[service.index()];
+        self.recording_end_ns()
+            .is_none_or(|end_ns| event.t_ns <= end_ns + deadline_ns)
+            || event.kind == EventKind::EndOfRecording as u32
+    }
+
     /// Puts the newly added events in order; prints them to standard error if `show`.
     pub fn settle(&mut self, show: bool) {
         let origin_ns = self.first(EventKind::Ready);
         self.raw[self.shown..].sort_by_key(|(_, event)| event.t_ns);
         if show && origin_ns.is_some() {
-            for (service, event) in &self.raw[self.shown..] {
+            let new = self.raw[self.shown..].iter();
+            for (service, event) in new.filter(|(service, e)| self.is_told(*service, e)) {
                 let told = self.namer.tell(*service, event, origin_ns);
                 let p = told.p.map_or_else(String::new, |p| format!("  p={p:.3}"));
                 let Told {
@@ -112,6 +130,7 @@ impl Timeline {
         sorted.sort_by_key(|(_, event)| event.t_ns);
         sorted
             .iter()
+            .filter(|(service, event)| self.is_told(*service, event))
             .map(|(service, event)| self.namer.tell(*service, event, origin_ns))
             .collect()
     }
@@ -135,7 +154,7 @@ impl Namer {
                 .iter()
                 .map(|node| node.name.clone())
                 .collect(),
-            actions: plan.action_names.clone(),
+            actions: plan.setup.decision.actions().to_vec(),
             robot: plan.setup.robot.clone(),
         }
     }
@@ -180,6 +199,14 @@ impl Namer {
                 format!("clear:{}", wheel.map_or("all", |w| w.name.as_str()))
             }
             EventKind::Miss => format!("{} cycles", event.value),
+            EventKind::SafeStop => match Refusal::from_wire(event.what) {
+                Some(Refusal::Nothing) => "no action".into(),
+                Some(Refusal::Expired) => "the action has expired".into(),
+                Some(Refusal::UnknownKind) => "the action's kind is unknown".into(),
+                Some(Refusal::NotFinite) => "a parameter is not finite".into(),
+                Some(Refusal::OutOfRange) => "the speed factor is out of range".into(),
+                None => "?".into(),
+            },
             EventKind::Run => event.value.to_string(),
             _ => String::new(),
         }

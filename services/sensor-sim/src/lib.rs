@@ -8,6 +8,7 @@
 //! Nothing here knows a clock or a port: times are parameters, and equal input and seed give equal
 //! bits. The binary wires this to the graph.
 
+mod assemble;
 mod check;
 mod drive;
 mod encoders;
@@ -19,10 +20,11 @@ mod soil;
 mod wiring;
 mod world;
 
+pub use assemble::{Assembled, assemble};
 pub use check::WorldError;
 pub use drive::{ACCELERATION_MAX_M_S2, CURVATURE_RATE_MAX_1_M_S, DriveCommand};
 pub use encoders::{NOISE_MAX_RAD_S, NOISE_MIN_RAD_S};
-pub use obedience::{EffectiveCommand, Obedience, Refusal, Refusals};
+pub use obedience::{EffectiveCommand, Obedience};
 pub use playback::{Playback, PlaybackError};
 pub use schedule::Schedule;
 pub use wiring::{PlaybackSource, SimulatorSource};

@@ -1,6 +1,6 @@
 //! What the rover makes of the supervisor's actions.
 
-use vigil_blocks::{Action, RecoveryKind};
+use vigil_blocks::{Action, RecoveryKind, Refusal};
 use vigil_robot::description::Limits;
 
 use crate::DriveCommand;
@@ -12,8 +12,8 @@ pub struct EffectiveCommand {
     pub target: DriveCommand,
     /// Share of the planned speed, 0..1: how fast the drive's own clock runs. 0 when stopping.
     pub progress: f64,
-    /// True while the rover stops itself because it holds no valid action.
-    pub safe_stop: bool,
+    /// Why the rover stops itself: it holds no valid action.
+    pub refusal: Option<Refusal>,
     /// `decision_seq` of the last action obeyed; 0 for none.
     pub action_seq: u64,
 }
@@ -25,40 +25,10 @@ impl EffectiveCommand {
         Self {
             target: planned,
             progress: 1.0,
-            safe_stop: false,
+            refusal: None,
             action_seq: 0,
         }
     }
-}
-
-/// Why the rover does not obey.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refusal {
-    /// There is no action, or it says that nothing is decided.
-    None,
-    /// Its validity has passed.
-    Expired,
-    /// Its kind is not one that this version knows.
-    UnknownKind,
-    /// A parameter is not finite.
-    NotFinite,
-    /// The speed factor is not within 0..1.
-    OutOfRange,
-}
-
-/// Cycles in which the rover did not obey, by reason.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Refusals {
-    /// [`Refusal::None`].
-    pub none: u64,
-    /// [`Refusal::Expired`].
-    pub expired: u64,
-    /// [`Refusal::UnknownKind`].
-    pub unknown_kind: u64,
-    /// [`Refusal::NotFinite`].
-    pub not_finite: u64,
-    /// [`Refusal::OutOfRange`].
-    pub out_of_range: u64,
 }
 
 /// Turns actions into commands. Equal calls give equal results; the time is a parameter.
@@ -67,7 +37,6 @@ pub struct Obedience {
     curvature_max_1_m: f64,
     speed_max_m_s: f64,
     action_seq: u64,
-    refusals: Refusals,
 }
 
 impl Obedience {
@@ -79,7 +48,6 @@ impl Obedience {
             curvature_max_1_m: limits.curvature_1_m.max(0.0),
             speed_max_m_s: limits.speed_m_s.max(0.0),
             action_seq: 0,
-            refusals: Refusals::default(),
         }
     }
 
@@ -95,31 +63,22 @@ impl Obedience {
             speed_m_s: 0.0,
             ..planned
         };
-        let (target, progress, safe_stop) = match obey(planned, action, now_ns) {
+        let (target, progress, refusal) = match obey(planned, action, now_ns) {
             Ok((decision_seq, driving)) => {
                 self.action_seq = decision_seq;
                 match driving {
-                    Some((target, progress)) => (target, progress, false),
-                    None => (stop, 0.0, false),
+                    Some((target, progress)) => (target, progress, None),
+                    None => (stop, 0.0, None),
                 }
             }
-            Err(refusal) => {
-                self.count(refusal);
-                (stop, 0.0, true)
-            }
+            Err(refusal) => (stop, 0.0, Some(refusal)),
         };
         EffectiveCommand {
             target: self.within_limits(target),
             progress,
-            safe_stop,
+            refusal,
             action_seq: self.action_seq,
         }
-    }
-
-    /// Cycles in which the rover did not obey, by reason.
-    #[must_use]
-    pub const fn refusals(&self) -> Refusals {
-        self.refusals
     }
 
     fn within_limits(&self, target: DriveCommand) -> DriveCommand {
@@ -129,24 +88,13 @@ impl Obedience {
             speed_m_s: target.speed_m_s.clamp(-speed, speed),
         }
     }
-
-    fn count(&mut self, refusal: Refusal) {
-        let counter = match refusal {
-            Refusal::None => &mut self.refusals.none,
-            Refusal::Expired => &mut self.refusals.expired,
-            Refusal::UnknownKind => &mut self.refusals.unknown_kind,
-            Refusal::NotFinite => &mut self.refusals.not_finite,
-            Refusal::OutOfRange => &mut self.refusals.out_of_range,
-        };
-        *counter += 1;
-    }
 }
 
 /// Decision and, unless it says stop, the command and its share of the planned speed.
 type Obeyed = (u64, Option<(DriveCommand, f64)>);
 
 fn obey(planned: DriveCommand, action: Option<&Action>, now_ns: u64) -> Result<Obeyed, Refusal> {
-    let action = action.ok_or(Refusal::None)?;
+    let action = action.ok_or(Refusal::Nothing)?;
     if now_ns > action.valid_until_ns {
         return Err(Refusal::Expired);
     }
@@ -160,7 +108,7 @@ fn obey(planned: DriveCommand, action: Option<&Action>, now_ns: u64) -> Result<O
         return Err(Refusal::OutOfRange);
     }
     match kind {
-        RecoveryKind::None => Err(Refusal::None),
+        RecoveryKind::None => Err(Refusal::Nothing),
         RecoveryKind::Stop | RecoveryKind::CallForHelp => Ok((action.decision_seq, None)),
         RecoveryKind::GoOn
         | RecoveryKind::SlowDown
@@ -220,10 +168,9 @@ mod tests {
             );
             assert!((found.target.speed_m_s - 0.1).abs() < 1e-12);
             assert_eq!(
-                (found.progress, found.safe_stop, found.action_seq),
-                (0.5, false, 7)
+                (found.progress, found.refusal, found.action_seq),
+                (0.5, None, 7)
             );
-            assert_eq!(obedience.refusals(), Refusals::default());
         }
     }
 
@@ -233,7 +180,7 @@ mod tests {
             let mut obedience = Obedience::new(&limits());
             let found = obedience.apply(PLANNED, Some(&action(kind)), 0);
             assert_eq!((found.target.speed_m_s, found.progress), (0.0, 0.0));
-            assert_eq!((found.safe_stop, found.action_seq), (false, 7));
+            assert_eq!((found.refusal, found.action_seq), (None, 7));
         }
     }
 
@@ -241,12 +188,13 @@ mod tests {
     fn without_a_valid_action_the_rover_stops_itself_and_says_why() {
         let mut obedience = Obedience::new(&limits());
         let good = action(RecoveryKind::GoOn);
-        let refused: [(Option<Action>, u64); 7] = [
-            (None, 0),
-            (Some(Action { kind: 0, ..good }), 0),
-            (Some(good), 1001),
-            (Some(Action { kind: 77, ..good }), 0),
+        let refused: [(Refusal, Option<Action>, u64); 7] = [
+            (Refusal::Nothing, None, 0),
+            (Refusal::Nothing, Some(Action { kind: 0, ..good }), 0),
+            (Refusal::Expired, Some(good), 1001),
+            (Refusal::UnknownKind, Some(Action { kind: 77, ..good }), 0),
             (
+                Refusal::NotFinite,
                 Some(Action {
                     curvature_offset: f64::NAN,
                     ..good
@@ -254,6 +202,7 @@ mod tests {
                 0,
             ),
             (
+                Refusal::OutOfRange,
                 Some(Action {
                     speed_scale: 1.01,
                     ..good
@@ -261,6 +210,7 @@ mod tests {
                 0,
             ),
             (
+                Refusal::OutOfRange,
                 Some(Action {
                     speed_scale: -0.1,
                     ..good
@@ -269,21 +219,13 @@ mod tests {
             ),
         ];
         let obeyed = obedience.apply(PLANNED, Some(&good), 1000);
-        assert!(!obeyed.safe_stop);
-        for (action, now_ns) in refused {
+        assert_eq!(obeyed.refusal, None);
+        for (reason, action, now_ns) in refused {
             let found = obedience.apply(PLANNED, action.as_ref(), now_ns);
-            assert!(found.safe_stop, "{action:?}");
+            assert_eq!(found.refusal, Some(reason), "{action:?}");
             assert_eq!((found.target.speed_m_s, found.progress), (0.0, 0.0));
             assert_eq!(found.action_seq, 7, "the last action obeyed stays reported");
         }
-        let expected = Refusals {
-            none: 2,
-            expired: 1,
-            unknown_kind: 1,
-            not_finite: 1,
-            out_of_range: 2,
-        };
-        assert_eq!(obedience.refusals(), expected);
     }
 
     #[test]

@@ -31,12 +31,6 @@ impl Schedule {
         }
         self.pending.pop().map(|injection| injection.change)
     }
-
-    /// True if nothing is left.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.pending.is_empty()
-    }
 }
 
 #[cfg(test)]
@@ -65,7 +59,6 @@ mod tests {
         assert_eq!(schedule.due(100_000_000), None);
         assert_eq!(schedule.due(9_000_000_000), Some(stuck(4, 3.5).change));
         assert_eq!(schedule.due(9_000_000_000), Some(Change::Clear(4)));
-        assert!(schedule.is_empty());
         assert_eq!(schedule.due(u64::MAX), None);
     }
 }

@@ -139,10 +139,10 @@ impl World {
         for _ in 0..parts as u32 {
             self.move_on(part_s, &command);
         }
-        self.safe_stop = command.safe_stop;
+        self.safe_stop = command.refusal.is_some();
         self.action_seq = command.action_seq;
         let reached = self.executed.at == command.target;
-        self.outcome = match (command.action_seq, command.safe_stop) {
+        self.outcome = match (command.action_seq, command.refusal.is_some()) {
             (0, _) => ActionOutcome::None,
             (_, true) => ActionOutcome::Failed,
             (_, false) if reached => ActionOutcome::Succeeded,
@@ -276,7 +276,7 @@ impl World {
                 speed_m_s: 0.0,
             },
             progress: 0.0,
-            safe_stop: true,
+            refusal: Some(vigil_blocks::Refusal::Nothing),
             action_seq: command.action_seq,
         }
     }

@@ -3,12 +3,14 @@
 //! [`Supervisor::step`] is a pure function of state and journal entry; [`SupervisorStage`] puts it
 //! at its ports.
 
+mod assemble;
 mod evidence;
 mod mapping;
 mod restraint;
 mod supervisor;
 mod wiring;
 
+pub use assemble::{assemble, validity_ns};
 pub use mapping::{Compensation, SupervisorError};
 pub use supervisor::{Inputs, Supervisor};
 pub use wiring::SupervisorStage;

@@ -1,7 +1,6 @@
 //! `vigil-supervisor`: the supervisor as a process of the graph. Exit codes: 0 stopped, 1 failed,
 //! 2 configuration.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -9,24 +8,19 @@ use vigil_blocks::FaultBelief;
 use vigil_cycle::Topic;
 use vigil_cycle::serve::{self, ServeError};
 use vigil_cycle::topic::ServiceName;
-use vigil_decision::Pomdp;
-use vigil_robot::learned::Model;
-use vigil_setup::{GraphArgs, Setup};
-use vigil_supervisor::{Compensation, Supervisor, SupervisorStage};
+use vigil_setup::{ServiceArgs, Setup};
+use vigil_supervisor::{Supervisor, SupervisorStage, assemble, validity_ns};
 
 /// Decides what to do about a fault.
 #[derive(Debug, Parser)]
 #[command(version, about)]
 struct Args {
     #[command(flatten)]
-    graph: GraphArgs,
-    /// Where to leave the run report.
-    #[arg(long, value_name = "F")]
-    report: Option<PathBuf>,
+    service: ServiceArgs,
 }
 
 fn main() -> ExitCode {
-    let args = Args::parse();
+    let args = Args::parse().service;
     let (setup, supervisor) = match prepare(&args) {
         Ok(prepared) => prepared,
         Err(error) => {
@@ -34,9 +28,11 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+    if args.check {
+        return ExitCode::SUCCESS;
+    }
     let plan = setup.plan(ServiceName::Supervisor, args.report);
-    let period_ns = plan.period_ns;
-    let validity_ns = validity_ns(&setup);
+    let (period_ns, validity_ns) = (setup.period_ns(), validity_ns(&setup));
     let build = |graph: &_| {
         SupervisorStage::new(supervisor, graph, period_ns, validity_ns).map_err(ServeError::from)
     };
@@ -49,43 +45,8 @@ fn main() -> ExitCode {
     }
 }
 
-fn prepare(args: &Args) -> Result<(Setup, Supervisor), Box<dyn std::error::Error>> {
+fn prepare(args: &ServiceArgs) -> Result<(Setup, Supervisor), Box<dyn std::error::Error>> {
     let setup = args.graph.load()?;
-    let model = Model::from_toml(&setup.model_text)
-        .map_err(|e| format!("{}: {e}", setup.model_path.display()))?;
-    let decision = Pomdp::parse(&setup.decision_text)
-        .map_err(|e| format!("{}: {e}", setup.decision_path.display()))?;
-    let compensation = (0..setup.robot.wheels.len())
-        .map(|wheel| {
-            let (curvature_gain, curvature_offset_1_m) = model.compensation(wheel);
-            Compensation {
-                wheel,
-                curvature_gain,
-                curvature_offset_1_m,
-            }
-        })
-        .collect();
-    let settings = &setup.file.supervisor;
-    let blind = (BLIND_NS / setup.period_ns()).max(BLIND_MISSES_MIN) as u32;
-    let supervisor = Supervisor::new(
-        decision,
-        &setup.tree,
-        &setup.robot,
-        settings,
-        compensation,
-        blind,
-    )?;
+    let supervisor = assemble(&setup).map_err(|e| format!("{}: {e}", setup.path.display()))?;
     Ok((setup, supervisor))
-}
-
-/// Without any belief the robot stops after this long, ns, and not before so many misses.
-const BLIND_NS: u64 = 100_000_000;
-const BLIND_MISSES_MIN: u64 = 5;
-
-/// How long an action stays valid: long enough to survive a few lost cycles, short enough to stop
-/// a robot whose supervisor is gone.
-fn validity_ns(setup: &Setup) -> u64 {
-    const VALIDITY_NS_MIN: f64 = 20e6;
-    let periods = setup.file.supervisor.validity_periods;
-    (periods * setup.period_ns() as f64).max(VALIDITY_NS_MIN) as u64
 }

@@ -19,7 +19,6 @@ pub struct SupervisorStage {
     period_ns: u64,
     validity_ns: u64,
     action: Box<dyn Sender<Action>>,
-    stepped: bool,
     decided: Decided,
     told: u64,
 }
@@ -55,7 +54,6 @@ impl SupervisorStage {
             period_ns,
             validity_ns,
             action: graph.sender(Topic::Action)?,
-            stepped: false,
             decided: Decided::default(),
             told: 0,
         })
@@ -81,7 +79,6 @@ impl SupervisorStage {
 
 impl Stage for SupervisorStage {
     fn take(&mut self, intake: &mut Intake<'_>) {
-        self.stepped = false;
         self.take_detections(intake.now_ns());
         for _ in 0..self.diagnoses.buffer() {
             if !self.diagnoses.advance() {
@@ -90,10 +87,8 @@ impl Stage for SupervisorStage {
             let Some(diagnosis) = self.diagnoses.held() else {
                 break;
             };
-            let cause = diagnosis.cause;
-            let is_frame = cause.kind() == Some(CauseKind::Frame);
-            let identity = is_frame.then_some((cause.frame_epoch, cause.frame_seq));
-            if intake.accept::<FaultBelief>(&diagnosis.header, identity) && is_frame {
+            let (header, cause) = (&diagnosis.header, &diagnosis.cause);
+            if intake.accept::<FaultBelief>(header) && cause.kind() == Some(CauseKind::Frame) {
                 let detection = self.detection_is_new.then_some(&*self.detection);
                 let inputs = Inputs {
                     diagnosis: Some(diagnosis),
@@ -101,8 +96,8 @@ impl Stage for SupervisorStage {
                 };
                 self.supervisor
                     .step(Entry::Frame(inputs), self.action.block());
-                self.stepped = true;
                 self.detection_is_new = false;
+                intake.stepped(header, (cause.frame_epoch, cause.frame_seq));
             }
         }
     }
@@ -119,13 +114,9 @@ impl Stage for SupervisorStage {
                 .step(Entry::Frame(inputs), self.action.block());
             self.detection_is_new = false;
         }
-        self.stepped = true;
     }
 
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
-        if !self.stepped {
-            self.supervisor.step(Entry::Missed(0), self.action.block());
-        }
         let action = self.action.block();
         action.cause = cause;
         action.valid_until_ns = clock.now_ns() + self.validity_ns;

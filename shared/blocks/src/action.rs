@@ -97,6 +97,37 @@ impl RecoveryKind {
     }
 }
 
+/// Why a robot does not obey an action, and stops itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Refusal {
+    /// There is no action, or it says that nothing is decided.
+    Nothing = 1,
+    /// Its validity has passed.
+    Expired = 2,
+    /// Its kind is not one that this version knows.
+    UnknownKind = 3,
+    /// A parameter is not finite.
+    NotFinite = 4,
+    /// The speed factor is not within 0..1.
+    OutOfRange = 5,
+}
+
+impl Refusal {
+    /// The refusal behind an event's code, if this version knows it.
+    #[must_use]
+    pub const fn from_wire(value: u32) -> Option<Self> {
+        Some(match value {
+            1 => Self::Nothing,
+            2 => Self::Expired,
+            3 => Self::UnknownKind,
+            4 => Self::NotFinite,
+            5 => Self::OutOfRange,
+            _ => return None,
+        })
+    }
+}
+
 /// How an action was chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]

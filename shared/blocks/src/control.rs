@@ -29,6 +29,4 @@ pub enum ControlCommand {
     Inject = 1,
     /// Remove a fault.
     Clear = 2,
-    /// Reset the filters.
-    Reset = 3,
 }

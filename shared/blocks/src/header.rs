@@ -25,8 +25,7 @@ pub struct Header {
     pub t_publish_ns: u64,
 }
 
-/// Which journal entry a service had taken when it wrote a block: enough to rebuild the journal
-/// from the published blocks alone.
+/// Which journal entry a service had taken last when it wrote a block.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 pub struct Cause {
@@ -48,8 +47,6 @@ pub enum CauseKind {
     Frame = 1,
     /// The deadline passed without input; the belief is a prediction.
     Missed = 2,
-    /// The filters were reset.
-    Reset = 3,
 }
 
 impl Cause {
@@ -59,7 +56,6 @@ impl Cause {
         match self.kind {
             1 => Some(CauseKind::Frame),
             2 => Some(CauseKind::Missed),
-            3 => Some(CauseKind::Reset),
             _ => None,
         }
     }

@@ -49,7 +49,7 @@ pub enum EventKind {
     InputLost = 9,
     /// The input is back. `what`: as above.
     InputBack = 10,
-    /// The robot stops itself: no valid action.
+    /// The robot stops itself: no valid action. `what`: a [`crate::Refusal`].
     SafeStop = 11,
     /// The robot obeys actions again.
     SafeStopEnds = 12,
@@ -57,7 +57,8 @@ pub enum EventKind {
     Refused = 13,
     /// A new run began. `value`: its id.
     Run = 14,
-    /// Recorded frames are at their end.
+    /// Recorded frames are at their end. `value`: the first instant of the schedule that no frame
+    /// answers any more, ns.
     EndOfRecording = 15,
 }
 
@@ -88,13 +89,15 @@ impl EventKind {
 
 block! {
     /// Written by each service, at about 20 Hz and at once when something happens.
-    pub struct Health, size 1248 {
+    pub struct Health, size 1264 {
         /// Common header.
         pub header: Header,
         /// Cycles done: blocks published, or frames for the source.
         pub cycles: u64,
         /// Scheduled cycles whose deadline passed before the block was out.
         pub missed: u64,
+        /// Cycles whose time from wake-up to publication exceeded the budget.
+        pub over_budget: u64,
         /// Schedule instants that the source slept through.
         pub slips: u64,
         /// Input blocks that never arrived, by gaps of their sequence numbers.
@@ -115,6 +118,8 @@ block! {
         pub period_ns: u64,
         /// Deadline after the schedule, ns.
         pub deadline_ns: u64,
+        /// Budget of one cycle, from wake-up to publication, ns.
+        pub budget_ns: u64,
         /// Schedule instant of the service's first and last accounted cycle, ns.
         pub accounted_ns: [u64; 2],
         /// A [`ServiceState`].
@@ -123,6 +128,8 @@ block! {
         pub core_wanted: u32,
         /// Core that the kernel reported in the last check.
         pub core: u32,
+        /// 1 if the kernel lets the service run on no other core than `core_wanted`.
+        pub pinned: u32,
         /// Scheduling policy read back (`SCHED_FIFO` is 1, `SCHED_OTHER` 0).
         pub policy: u32,
         /// Priority read back.
@@ -131,16 +138,14 @@ block! {
         pub memory_locked: u32,
         /// Process id.
         pub pid: u32,
-        /// 1 if in degraded mode: an input is lost or a budget was cut.
+        /// 1 if in degraded mode: an input is lost.
         pub degraded: u32,
-        /// Sequence number of the last control command handled, and the writer's epoch.
+        /// Result of the last control command: 1 done, 2 refused, 0 none yet.
+        pub control_result: u32,
+        /// Sequence number of the last control command handled.
         pub control_seq: u64,
         /// Epoch of the writer of that command.
         pub control_epoch: u64,
-        /// 1 done, 2 refused, 0 none yet.
-        pub control_result: u32,
-        /// Last checkpoint passed in the cycle: 1 woken, 2 input taken, 3 stepped, 4 published.
-        pub checkpoint: u32,
         /// Events so far; event number n is at `events[n % EVENTS]`.
         pub event_count: u64,
         /// Recent events.

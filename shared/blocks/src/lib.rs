@@ -28,7 +28,7 @@ mod journal;
 mod particles;
 mod sensor;
 
-pub use action::{Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind};
+pub use action::{Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, Refusal};
 pub use block::{Block, fnv1a};
 pub use control::{Control, ControlCommand};
 pub use detection::{CHANNELS, Channel, DetectionBelief};

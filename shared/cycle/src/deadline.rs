@@ -11,6 +11,17 @@ use crate::latency::Latency;
 /// Most schedule instants that one gap may account for; a larger gap re-anchors the grid.
 const GAP_INSTANTS_MAX: u64 = 100_000;
 
+/// When a service's cycles are due, and how long they may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Schedule {
+    /// Period, ns.
+    pub period_ns: u64,
+    /// Deadline of a publication after its scheduled instant, ns.
+    pub deadline_ns: u64,
+    /// Budget of one cycle, from wake-up to publication, ns.
+    pub budget_ns: u64,
+}
+
 /// Accounts scheduled instants of one service.
 #[derive(Debug, Clone)]
 pub struct DeadlineMonitor {
@@ -25,12 +36,13 @@ pub struct DeadlineMonitor {
 }
 
 impl DeadlineMonitor {
-    /// A monitor for a schedule of `period_ns`, with deadlines `deadline_ns` after each instant.
+    /// A monitor for this schedule.
     #[must_use]
-    pub const fn new(period_ns: u64, deadline_ns: u64) -> Self {
+    pub const fn new(schedule: Schedule) -> Self {
+        let period_ns = schedule.period_ns;
         Self {
             period_ns: if period_ns == 0 { 1 } else { period_ns },
-            deadline_ns,
+            deadline_ns: schedule.deadline_ns,
             undecided_ns: None,
             unanswered_ns: 0,
             accounted_ns: [0; 2],
@@ -141,7 +153,12 @@ mod tests {
     const D: u64 = 400;
 
     fn monitor() -> (DeadlineMonitor, Latency) {
-        (DeadlineMonitor::new(P, D), Latency::new().unwrap())
+        let schedule = Schedule {
+            period_ns: P,
+            deadline_ns: D,
+            budget_ns: P,
+        };
+        (DeadlineMonitor::new(schedule), Latency::new().unwrap())
     }
 
     #[test]

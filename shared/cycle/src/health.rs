@@ -1,8 +1,9 @@
 //! A service's account of itself, and when to publish it.
 
-use vigil_blocks::{Block, EVENTS, Event, EventKind, Health, ServiceState};
+use vigil_blocks::{EVENTS, Event, EventKind, Health, ServiceState};
 
 use crate::clock::Clock;
+use crate::deadline::Schedule;
 use crate::placement::{self, Placement, Wanted};
 use crate::port::{PortError, Sender, Stamp};
 
@@ -22,17 +23,18 @@ impl HealthBoard {
     #[must_use]
     pub fn new(
         sender: Box<dyn Sender<Health>>,
-        period_ns: u64,
-        deadline_ns: u64,
+        schedule: Schedule,
         wanted: Wanted,
         got: Placement,
     ) -> Self {
         let block = Health {
-            period_ns,
-            deadline_ns,
+            period_ns: schedule.period_ns,
+            deadline_ns: schedule.deadline_ns,
+            budget_ns: schedule.budget_ns,
             state: ServiceState::Starting as u32,
             core_wanted: u32::try_from(wanted.core).unwrap_or(u32::MAX),
             core: u32::try_from(got.core).unwrap_or(u32::MAX),
+            pinned: u32::from(got.pinned),
             policy: got.policy,
             priority: got.priority,
             memory_locked: u32::from(got.memory_locked),
@@ -56,6 +58,17 @@ impl HealthBoard {
     #[must_use]
     pub const fn view(&self) -> &Health {
         &self.block
+    }
+
+    /// Counts a cycle that took `cycle_ns` from wake-up to publication, for the block `seq`.
+    pub const fn count_cycle(&mut self, cycle_ns: u64, seq: u64) {
+        let health = &mut self.block;
+        health.cycles += 1;
+        health.over_budget += (cycle_ns > health.budget_ns) as u64;
+        health.last_cycle_ns = cycle_ns;
+        if cycle_ns > health.worst_cycle_ns {
+            (health.worst_cycle_ns, health.worst_cycle_seq) = (cycle_ns, seq);
+        }
     }
 
     /// Enters a state; told at once.
@@ -137,5 +150,3 @@ pub fn new_events(health: &Health, seen: &mut u64, mut take: impl FnMut(&Event))
     *seen = health.event_count;
     overwritten
 }
-
-const _: () = assert!(Health::SCHEMA != 0);

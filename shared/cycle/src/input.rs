@@ -2,8 +2,11 @@
 
 use vigil_blocks::{Block, Header};
 
-/// A header may be ahead of the reader's clock by this much at most, in periods.
+/// A scheduled instant may be ahead of the reader's clock by this much at most, in periods.
 const AHEAD_PERIODS_MAX: u64 = 2;
+/// A scheduled instant may lie this far in the past, ns: older blocks are not of this drive, or of
+/// another clock.
+const BEHIND_NS_MAX: u64 = 10_000_000_000;
 
 /// What an input block is, by its header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,7 +19,7 @@ pub enum Arrival {
     AfterGap(u64),
     /// Seen before, or older than one seen before: not to be taken.
     Duplicate,
-    /// Impossible: wrong schema, or a time stamp from the future. Not to be taken.
+    /// Impossible: wrong schema, or scheduled in the future or long ago. Not to be taken.
     Invalid,
 }
 
@@ -43,8 +46,10 @@ pub struct InputAccount {
 impl InputAccount {
     /// Accounts a block by its header, at `now_ns`, for a schedule of `period_ns`.
     pub fn arrive<T: Block>(&mut self, header: &Header, now_ns: u64, period_ns: u64) -> Arrival {
-        let latest_ns = now_ns.saturating_add(AHEAD_PERIODS_MAX * period_ns);
-        if header.schema != T::SCHEMA || header.epoch == 0 || header.t_schedule_ns > latest_ns {
+        let due_ns = header.t_schedule_ns;
+        let is_live = due_ns <= now_ns.saturating_add(AHEAD_PERIODS_MAX * period_ns)
+            && due_ns >= now_ns.saturating_sub(BEHIND_NS_MAX);
+        if header.schema != T::SCHEMA || header.epoch == 0 || !is_live {
             self.invalid += 1;
             return Arrival::Invalid;
         }
@@ -101,9 +106,10 @@ mod tests {
         let good = Header {
             schema: SensorFrame::SCHEMA,
             epoch: 1,
+            t_schedule_ns: 60_000_000_000,
             ..Header::default()
         };
-        let now_ns = 1_000_000;
+        let now_ns = good.t_schedule_ns;
         for bad in [
             Header { schema: 1, ..good },
             Header { epoch: 0, ..good },
@@ -115,6 +121,10 @@ mod tests {
                 t_schedule_ns: u64::MAX,
                 ..good
             },
+            Header {
+                t_schedule_ns: now_ns - BEHIND_NS_MAX - 1,
+                ..good
+            },
         ] {
             assert_eq!(
                 a.arrive::<SensorFrame>(&bad, now_ns, 1000),
@@ -122,6 +132,6 @@ mod tests {
             );
         }
         assert_eq!(a.arrive::<SensorFrame>(&good, now_ns, 1000), Arrival::Next);
-        assert_eq!(a.invalid, 4);
+        assert_eq!(a.invalid, 5);
     }
 }

@@ -26,7 +26,7 @@ pub mod topic;
 pub mod wake;
 
 pub use clock::{Clock, Monotonic, VirtualClock};
-pub use deadline::DeadlineMonitor;
+pub use deadline::{DeadlineMonitor, Schedule};
 pub use domain::Domain;
 pub use health::HealthBoard;
 pub use input::InputAccount;

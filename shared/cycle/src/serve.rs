@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::clock::{Clock, Monotonic};
-use crate::deadline::DeadlineMonitor;
+use crate::deadline::{DeadlineMonitor, Schedule};
 use crate::domain::{Domain, Queues};
 use crate::health::HealthBoard;
 use crate::live;
@@ -28,10 +28,8 @@ pub struct Plan {
     pub queues: Queues,
     /// Core and priority.
     pub wanted: Wanted,
-    /// Period of the schedule, ns.
-    pub period_ns: u64,
-    /// Deadline after each scheduled instant, ns.
-    pub deadline_ns: u64,
+    /// Period, deadline and budget.
+    pub schedule: Schedule,
     /// Where to leave the run report when the service stops.
     pub report: Option<PathBuf>,
 }
@@ -65,10 +63,7 @@ pub fn stage<T: vigil_blocks::Block, S: Stage>(
         return Ok(());
     };
     let listener = link.listener::<T>(input)?;
-    let mut cycle = StageCycle::new(
-        DeadlineMonitor::new(plan.period_ns, plan.deadline_ns),
-        health,
-    )?;
+    let mut cycle = StageCycle::new(DeadlineMonitor::new(plan.schedule), health)?;
     let faults = live::page_faults();
     live::run_stage(&mut cycle, &mut stage, &listener)?;
     report(plan, cycle.timing(), faults)
@@ -85,8 +80,7 @@ pub fn source<S: Source>(
     let (graph, health) = open(plan)?;
     let mut source = build(&graph)?;
     let first_ns = Monotonic.now_ns() + START_DELAY_NS;
-    let monitor = DeadlineMonitor::new(plan.period_ns, plan.deadline_ns);
-    let mut cycle = SourceCycle::new(monitor, health, first_ns)?;
+    let mut cycle = SourceCycle::new(DeadlineMonitor::new(plan.schedule), health, first_ns)?;
     let faults = live::page_faults();
     live::run_source(&mut cycle, &mut source)?;
     report(plan, cycle.timing(), faults)
@@ -97,13 +91,7 @@ fn open(plan: &Plan) -> Result<(Graph, HealthBoard), PortError> {
     let domain = Domain::new(&plan.graph, plan.queues)?;
     let graph = Graph::SharedMemory(Link::join(&domain, plan.service.as_str())?);
     let sender = graph.sender(Topic::Health(plan.service))?;
-    let health = HealthBoard::new(
-        sender,
-        plan.period_ns,
-        plan.deadline_ns,
-        plan.wanted,
-        placement,
-    );
+    let health = HealthBoard::new(sender, plan.schedule, plan.wanted, placement);
     Ok((graph, health))
 }
 

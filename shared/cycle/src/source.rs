@@ -107,16 +107,13 @@ impl SourceCycle {
                 .published(schedule_ns, published_ns, &mut self.timing.from_schedule);
         let cycle_ns = published_ns.saturating_sub(woken_ns);
         self.timing.step.record(cycle_ns);
+        let seq = self.health.view().cycles;
+        self.health.count_cycle(cycle_ns, seq);
         self.health.enter(ServiceState::Running);
         let (total, accounted_ns) = (self.monitor.missed(), self.monitor.accounted_ns());
         let health = self.health.block();
-        health.cycles += 1;
         health.slips += slips;
         (health.missed, health.accounted_ns) = (total, accounted_ns);
-        health.last_cycle_ns = cycle_ns;
-        if cycle_ns > health.worst_cycle_ns {
-            (health.worst_cycle_ns, health.worst_cycle_seq) = (cycle_ns, health.cycles - 1);
-        }
         if missed > 0 {
             let kind = vigil_blocks::EventKind::Miss;
             self.health.event(published_ns, kind, 0, 0.0, missed);

@@ -34,44 +34,43 @@ pub trait Stage {
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64);
 }
 
-/// What the stage took in one turn.
+/// What the stage takes in one turn.
 pub struct Intake<'a> {
     account: &'a mut InputAccount,
     now_ns: u64,
     period_ns: u64,
-    /// Frames taken in this turn.
+    /// Frames stepped in this turn.
     frames: u32,
     newest: Header,
+    new_epoch: bool,
     cause: Cause,
 }
 
 impl Intake<'_> {
-    /// Accounts an input block; true if it is to be taken. `frame` is the sensor frame's identity
-    /// behind the block: (epoch, seq), or `None` if the block is only a prediction.
-    pub fn accept<T: Block>(&mut self, header: &Header, frame: Option<(u64, u64)>) -> bool {
+    /// Accounts an input block; true if it is to be taken.
+    pub fn accept<T: Block>(&mut self, header: &Header) -> bool {
         let arrival = self
             .account
             .arrive::<T>(header, self.now_ns, self.period_ns);
-        if !arrival.is_taken() {
-            return false;
+        self.new_epoch |= arrival == Arrival::NewEpoch;
+        arrival.is_taken()
+    }
+
+    /// The filter has stepped the sensor frame (epoch, seq) behind the accepted block with this
+    /// header: the output answers its instant of the schedule.
+    pub fn stepped(&mut self, header: &Header, (frame_epoch, frame_seq): (u64, u64)) {
+        // An old frame never moves the schedule back.
+        if self.frames == 0 || header.t_schedule_ns >= self.newest.t_schedule_ns || self.new_epoch {
+            self.newest = *header;
+            self.new_epoch = false;
         }
-        if let Some((frame_epoch, frame_seq)) = frame {
-            // An old frame never moves the schedule back.
-            if self.frames == 0
-                || header.t_schedule_ns >= self.newest.t_schedule_ns
-                || arrival == Arrival::NewEpoch
-            {
-                self.newest = *header;
-            }
-            self.frames += 1;
-            self.cause = Cause {
-                kind: CauseKind::Frame as u32,
-                count: self.frames,
-                frame_epoch,
-                frame_seq,
-            };
-        }
-        true
+        self.frames += 1;
+        self.cause = Cause {
+            kind: CauseKind::Frame as u32,
+            count: self.frames,
+            frame_epoch,
+            frame_seq,
+        };
     }
 
     /// The instant at which this turn began, ns.
@@ -165,7 +164,6 @@ impl StageCycle {
     /// The transport's.
     pub fn turn(&mut self, stage: &mut impl Stage, clock: &impl Clock) -> Result<(), PortError> {
         let woken_ns = clock.now_ns();
-        self.health.block().checkpoint = 1;
         let mut overdue = self.monitor.overdue(woken_ns);
         let mut intake = Intake {
             account: &mut self.account,
@@ -173,21 +171,22 @@ impl StageCycle {
             period_ns: self.monitor.period_ns(),
             frames: 0,
             newest: Header::default(),
+            new_epoch: false,
             cause: self.last_cause,
         };
         stage.take(&mut intake);
         let (frames, newest, cause) = (intake.frames, intake.newest, intake.cause);
-        self.health.block().checkpoint = 3;
         if frames > 0 {
             let stamp = Stamp::of(&newest);
             let published_ns = stage.publish(cause, stamp, clock)?;
-            self.health.block().checkpoint = 4;
             self.health.block().late +=
                 u64::from(woken_ns > newest.t_schedule_ns + self.monitor.deadline_ns());
             self.timing
                 .wake_up
                 .record(woken_ns.saturating_sub(newest.t_publish_ns));
-            self.account_cycle(woken_ns, published_ns, newest.seq);
+            let cycle_ns = published_ns.saturating_sub(woken_ns);
+            self.timing.step.record(cycle_ns);
+            self.health.count_cycle(cycle_ns, newest.seq);
             overdue += self.monitor.published(
                 stamp.t_schedule_ns,
                 published_ns,
@@ -213,18 +212,6 @@ impl StageCycle {
             )?;
         }
         self.report(stage, frames, overdue, clock)
-    }
-
-    fn account_cycle(&mut self, woken_ns: u64, published_ns: u64, seq: u64) {
-        let cycle_ns = published_ns.saturating_sub(woken_ns);
-        self.timing.step.record(cycle_ns);
-        let health = self.health.block();
-        health.cycles += 1;
-        health.last_cycle_ns = cycle_ns;
-        if cycle_ns > health.worst_cycle_ns {
-            health.worst_cycle_ns = cycle_ns;
-            health.worst_cycle_seq = seq;
-        }
     }
 
     fn report(

@@ -7,17 +7,18 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use vigil_blocks::{
-    Action, Block, Cause, CauseKind, DetectionBelief, FaultBelief, Header, SensorFrame,
+    Action, Block, Cause, CauseKind, DetectionBelief, FaultBelief, Header, Health, SensorFrame,
 };
 use vigil_cycle::placement::{Placement, Wanted};
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    Clock, DeadlineMonitor, Graph, HealthBoard, Intake, PortError, Produced, Receiver, Sender,
-    Source, SourceCycle, Stage, StageCycle, Stamp, Topic, VirtualClock,
+    Clock, DeadlineMonitor, Graph, HealthBoard, Intake, PortError, Produced, Receiver, Schedule,
+    Sender, Source, SourceCycle, Stage, StageCycle, Stamp, Topic, VirtualClock,
 };
 
 const PERIOD_NS: u64 = 1_000_000;
+const BUDGET_NS: u64 = 300_000;
 const DEADLINES_NS: [u64; 4] = [200_000, 500_000, 750_000, 950_000];
 /// The cycle into which a delay is injected.
 const DELAYED: u64 = 20;
@@ -63,9 +64,10 @@ impl<I: Block, O: Caused> Stage for Relay<I, O> {
             }
             let block = self.input.held().unwrap();
             let identity = (self.identity)(block);
-            if intake.accept::<I>(block.header(), identity) && identity.is_some() {
+            if let (true, Some(identity)) = (intake.accept::<I>(block.header()), identity) {
                 self.clock
                     .advance(compute_ns(&self.delay, block.header().t_schedule_ns));
+                intake.stepped(block.header(), identity);
             }
         }
     }
@@ -177,17 +179,19 @@ fn board(graph: &Graph, service: ServiceName) -> HealthBoard {
         priority: 1,
     };
     let sender = graph.sender(Topic::Health(service)).unwrap();
-    HealthBoard::new(
-        sender,
-        PERIOD_NS,
-        DEADLINES_NS[service.index()],
-        wanted,
-        placement,
-    )
+    HealthBoard::new(sender, schedule(service), wanted, placement)
+}
+
+fn schedule(service: ServiceName) -> Schedule {
+    Schedule {
+        period_ns: PERIOD_NS,
+        deadline_ns: DEADLINES_NS[service.index()],
+        budget_ns: BUDGET_NS,
+    }
 }
 
 fn monitor(service: ServiceName) -> DeadlineMonitor {
-    DeadlineMonitor::new(PERIOD_NS, DEADLINES_NS[service.index()])
+    DeadlineMonitor::new(schedule(service))
 }
 
 fn stage<I: Block, O: Caused>(
@@ -310,13 +314,17 @@ impl World {
         ]
     }
 
-    fn missed(&self) -> [u64; 4] {
+    fn health(&self) -> [&Health; 4] {
         [
-            self.source.health().view().missed,
-            self.detector.0.health().view().missed,
-            self.identifier.0.health().view().missed,
-            self.supervisor.0.health().view().missed,
+            self.source.health().view(),
+            self.detector.0.health().view(),
+            self.identifier.0.health().view(),
+            self.supervisor.0.health().view(),
         ]
+    }
+
+    fn missed(&self) -> [u64; 4] {
+        self.health().map(|health| health.missed)
     }
 
     fn drain_taps(&mut self) {
@@ -386,6 +394,20 @@ fn a_stall_shows_in_the_latencies_of_every_cycle_that_it_delayed() {
     let late = world.supervisor.0.timing().from_schedule.histogram();
     // Six cycles waited: 5.5, 4.5, ... 0.5 periods.
     assert_eq!(late.count_between(PERIOD_NS / 4, u64::MAX / 2), 6);
+}
+
+#[test]
+fn a_cycle_over_its_budget_is_counted_once_and_only_in_its_stage() {
+    for (delayed, over) in [(BUDGET_NS, 0), (BUDGET_NS + 1, 1)] {
+        for stage in 0..4 {
+            let mut world = World::new();
+            world.delays[stage].set(Some((DELAYED * PERIOD_NS, delayed)));
+            world.run();
+            let counted = world.health().map(|health| health.over_budget);
+            let expected: [u64; 4] = std::array::from_fn(|i| u64::from(i == stage) * over);
+            assert_eq!(counted, expected, "stage {stage}, {delayed} ns");
+        }
+    }
 }
 
 #[test]

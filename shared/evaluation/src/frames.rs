@@ -116,35 +116,10 @@ fn angle(table: &Table, name: &str, value: f64) -> Result<(), FramesError> {
 /// # Errors
 /// [`FramesError`] naming file, row, column, what was found and what is allowed.
 pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
-    read_table(Table::open(path)?, robot, usize::MAX)
-}
-
-/// Interval between the first frames of a file, s.
-///
-/// # Errors
-/// As [`read`]; also when the file holds fewer than two frames of one run.
-pub fn interval_s(path: &Path, robot: &Description) -> Result<f64, FramesError> {
-    let table = Table::open(path)?;
-    let runs = read_table(table, robot, 2)?;
-    match runs.first().map(|run| run.frames.as_slice()) {
-        Some([a, b, ..]) => Ok((b.header.t_capture_ns - a.header.t_capture_ns) as f64 * 1e-9),
-        _ => Err(FramesError::Row {
-            path: path.to_path_buf(),
-            row: 1,
-            message: "fewer than two frames in the first run".into(),
-        }),
-    }
-}
-
-fn read_table(
-    mut table: Table,
-    robot: &Description,
-    rows_max: usize,
-) -> Result<Vec<Run>, FramesError> {
+    let mut table = Table::open(path)?;
     let columns = Columns::find(&table, robot)?;
-    let (mut runs, mut seen, mut rows) = (Vec::<Run>::new(), BTreeSet::new(), 0);
-    while rows < rows_max && table.advance()? {
-        rows += 1;
+    let (mut runs, mut seen) = (Vec::<Run>::new(), BTreeSet::new());
+    while table.advance()? {
         let (id, mut frame) = columns.frame(&table, robot)?;
         if runs.last().is_none_or(|run| run.id != id) {
             if !seen.insert(id) {
@@ -165,6 +140,21 @@ fn read_table(
         return Err(table.wrong("there are no frames".into()));
     }
     Ok(runs)
+}
+
+/// Median interval between consecutive frames of a run, s; `None` if no run has two frames.
+#[must_use]
+pub fn interval_s(runs: &[Run]) -> Option<f64> {
+    let pairs = runs.iter().flat_map(|run| run.frames.windows(2));
+    let mut intervals_ns: Vec<u64> = pairs
+        .map(|pair| pair[1].header.t_capture_ns - pair[0].header.t_capture_ns)
+        .collect();
+    let middle = intervals_ns.len() / 2;
+    if intervals_ns.is_empty() {
+        return None;
+    }
+    let (_, median_ns, _) = intervals_ns.select_nth_unstable(middle);
+    Some(*median_ns as f64 * 1e-9)
 }
 
 /// Checks a frame against the ones before it in its run.

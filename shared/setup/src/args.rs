@@ -37,6 +37,20 @@ pub struct GraphArgs {
     pub speed: Option<f64>,
 }
 
+/// Options of every service process.
+#[derive(Debug, Clone, PartialEq, clap::Args)]
+pub struct ServiceArgs {
+    #[command(flatten)]
+    #[allow(missing_docs)] // Would replace the options' own texts.
+    pub graph: GraphArgs,
+    /// Where to leave the run report.
+    #[arg(long, value_name = "F")]
+    pub report: Option<PathBuf>,
+    /// Only read and check everything that the service needs; exit code 0 or 2.
+    #[arg(long)]
+    pub check: bool,
+}
+
 impl GraphArgs {
     /// Reads the graph file and the files that it names, applies these options, checks all.
     ///

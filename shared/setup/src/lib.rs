@@ -12,5 +12,5 @@ mod locate;
 mod place;
 pub mod schema;
 
-pub use args::GraphArgs;
-pub use load::{Problem, Setup, SetupError, load_graph, load_robot, load_tree};
+pub use args::{GraphArgs, ServiceArgs};
+pub use load::{Problem, Setup, SetupError, load_graph, load_model, load_robot, load_tree};

@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use vigil_blocks::fnv1a;
+use vigil_decision::Pomdp;
 use vigil_inference::FaultTree;
 use vigil_inference::tree::Node;
 use vigil_robot::Description;
+use vigil_robot::learned::{Model, ModelError};
 
 use crate::check;
 use crate::locate::{line_of_byte, line_of_key};
@@ -26,12 +28,12 @@ pub struct Setup {
     pub robot_path: PathBuf,
     /// The fault tree.
     pub tree: FaultTree,
-    /// Text of the learned model (TOML).
-    pub model_text: String,
+    /// The learned model.
+    pub model: Model,
     /// Where it was read from.
     pub model_path: PathBuf,
-    /// Text of the decision model (`.pomdp`).
-    pub decision_text: String,
+    /// The decision model.
+    pub decision: Pomdp,
     /// Where it was read from.
     pub decision_path: PathBuf,
     /// Hash of the effective configuration and every file it names.
@@ -101,32 +103,11 @@ pub fn load_graph(path: &Path, change: impl FnOnce(&mut GraphFile)) -> Result<Se
     let tree_path = resolve(&path, &file.files.tree);
     let model_path = resolve(&path, &file.files.model);
     let decision_path = resolve(&path, &file.files.decision);
-    let mut keep = |result: Result<(), SetupError>| {
-        if let Err(error) = result {
-            problems.extend(error.problems);
-        }
-    };
-    let robot = load_robot(&robot_path);
-    let tree = load_tree(&tree_path);
-    let model_text = read(&model_path);
-    let decision_text = read(&decision_path);
-    keep(robot.as_ref().map(|_| ()).map_err(Clone::clone));
-    keep(tree.as_ref().map(|_| ()).map_err(Clone::clone));
-    keep(
-        model_text
-            .as_ref()
-            .map(|_| ())
-            .map_err(Clone::clone)
-            .map_err(SetupError::from),
-    );
-    keep(
-        decision_text
-            .as_ref()
-            .map(|_| ())
-            .map_err(Clone::clone)
-            .map_err(SetupError::from),
-    );
-    check::graph(&file, robot.as_ref().ok(), &path, |key, message| {
+    let robot = keep(load_robot(&robot_path), &mut problems);
+    let tree = keep(load_tree(&tree_path), &mut problems);
+    let model = keep(load_model(&model_path, robot.as_ref()), &mut problems);
+    let decision = keep(load_decision(&decision_path), &mut problems);
+    check::graph(&file, robot.as_ref(), &path, |key, message| {
         problems.push(Problem {
             file: path.clone(),
             line: line_of_key(&text, key),
@@ -134,32 +115,32 @@ pub fn load_graph(path: &Path, change: impl FnOnce(&mut GraphFile)) -> Result<Se
             message,
         });
     });
-    let (Ok(robot), Ok(tree), Ok(model_text), Ok(decision_text), true) =
-        (robot, tree, model_text, decision_text, problems.is_empty())
+    let (Some(robot), Some(tree), Some(model), Some(decision), true) =
+        (robot, tree, model, decision, problems.is_empty())
     else {
         return Err(SetupError { problems });
     };
-    let hash = [
-        format!("{file:?}{robot:?}"),
-        model_text.clone(),
-        decision_text.clone(),
-    ]
-    .iter()
-    .fold(fnv1a::hash_u64(fnv1a::BASIS, tree.hash()), |h, t| {
-        fnv1a::hash(h, t.as_bytes())
-    });
+    let text = format!("{file:?}{robot:?}");
+    let hash = [tree.hash(), model.hash(), decision.hash()]
+        .into_iter()
+        .fold(fnv1a::hash(fnv1a::BASIS, text.as_bytes()), fnv1a::hash_u64);
     Ok(Setup {
         file,
         path,
         robot,
         robot_path,
         tree,
-        model_text,
+        model,
         model_path,
-        decision_text,
+        decision,
         decision_path,
         hash,
     })
+}
+
+/// The value, or its problems among `problems`.
+fn keep<T>(result: Result<T, SetupError>, problems: &mut Vec<Problem>) -> Option<T> {
+    result.map_err(|e| problems.extend(e.problems)).ok()
 }
 
 /// Reads and checks a robot's description.
@@ -218,6 +199,39 @@ pub fn load_tree(path: &Path) -> Result<FaultTree, SetupError> {
     FaultTree::new(nodes).map_err(|error| problem("node", error.to_string()).into())
 }
 
+/// Reads a learned model; checks that it is one of `robot`.
+///
+/// # Errors
+/// The first problem found.
+pub fn load_model(path: &Path, robot: Option<&Description>) -> Result<Model, SetupError> {
+    let problem = |error: ModelError| whole_file(path, error.to_string());
+    let model = Model::from_toml(&read(path)?).map_err(problem)?;
+    robot.map_or(Ok(()), |robot| model.check_robot(robot).map_err(problem))?;
+    Ok(model)
+}
+
+fn load_decision(path: &Path) -> Result<Pomdp, SetupError> {
+    let text = read(path)?;
+    Pomdp::parse(&text).map_err(|error| {
+        Problem {
+            file: path.to_path_buf(),
+            line: error.at.line,
+            key: String::new(),
+            message: error.message,
+        }
+        .into()
+    })
+}
+
+fn whole_file(path: &Path, message: String) -> Problem {
+    Problem {
+        file: path.to_path_buf(),
+        line: 0,
+        key: String::new(),
+        message,
+    }
+}
+
 fn resolve(graph_file: &Path, path: &str) -> PathBuf {
     graph_file
         .parent()
@@ -226,12 +240,8 @@ fn resolve(graph_file: &Path, path: &str) -> PathBuf {
 }
 
 fn read(path: &Path) -> Result<String, Problem> {
-    std::fs::read_to_string(path).map_err(|error| Problem {
-        file: path.to_path_buf(),
-        line: 0,
-        key: String::new(),
-        message: format!("cannot be read: {error}"),
-    })
+    std::fs::read_to_string(path)
+        .map_err(|error| whole_file(path, format!("cannot be read: {error}")))
 }
 
 fn parse<T: DeserializeOwned>(path: &Path) -> Result<(T, String), SetupError> {

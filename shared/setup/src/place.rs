@@ -6,7 +6,7 @@ use vigil_cycle::domain::Queues;
 use vigil_cycle::placement::Wanted;
 use vigil_cycle::serve::Plan;
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{Domain, PortError};
+use vigil_cycle::{Domain, PortError, Schedule};
 
 use crate::load::Setup;
 use crate::schema::Service;
@@ -53,6 +53,7 @@ impl Setup {
     #[must_use]
     pub fn plan(&self, name: ServiceName, report: Option<PathBuf>) -> Plan {
         let (service, period_ns) = (self.service(name), self.period_ns());
+        let share_ns = |percent: f64| (period_ns as f64 * percent * 1e-2).round() as u64;
         Plan {
             service: name,
             graph: self.file.graph.name.clone(),
@@ -61,8 +62,11 @@ impl Setup {
                 core: service.core,
                 priority: service.priority,
             },
-            period_ns,
-            deadline_ns: (period_ns as f64 * service.deadline_percent * 1e-2).round() as u64,
+            schedule: Schedule {
+                period_ns,
+                deadline_ns: share_ns(service.deadline_percent),
+                budget_ns: share_ns(service.budget_percent),
+            },
             report,
         }
     }

@@ -53,7 +53,7 @@ pub struct GraphFile {
 pub struct Graph {
     /// Name; two graphs with one name cannot run on one machine. Letters, digits, `-`, at most 24.
     pub name: String,
-    /// Rate of the sensor's schedule, Hz, 1 to 10000.
+    /// Rate of the sensor's schedule, Hz, 1 to 10000. A playback has the recording's own instead.
     pub rate_hz: f64,
     /// Seed from which every generator starts.
     #[serde(default = "one")]
@@ -136,7 +136,8 @@ pub struct Sensor {
     pub source: Source,
     /// Frames to play back (CSV or CSV.gz), relative to the graph file; for `playback`.
     pub frames: Option<String>,
-    /// Runs to play back: `all`, or run ids separated by commas; for `playback`.
+    /// Runs to play back: `all`, `heldout` (those that the model was not learned from), or run ids
+    /// separated by commas; for `playback`.
     pub runs: Option<String>,
     /// Speed of the playback relative to the recording, 0.01 to 100; default 1.
     pub speed: Option<f64>,
@@ -265,10 +266,10 @@ impl Default for Identifier {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Supervisor {
-    /// Policy: `qmdp` is the only one so far.
+    /// Policy: `qmdp`, `mls` (the best action of the most likely state) or `av` (action voting).
     pub policy: String,
-    /// Interval between decision epochs, ms, 1 to 10000. A change of the diagnosed mode or the
-    /// loss of a stage opens an epoch at once.
+    /// Interval between decision epochs, ms, 1 to 10000. A change of the diagnosed mode opens an
+    /// epoch at once.
     pub epoch_ms: f64,
     /// Validity of a published action, as a multiple of the period, 1 to 1000 (at least 20 ms).
     pub validity_periods: f64,

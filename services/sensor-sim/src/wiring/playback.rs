@@ -17,7 +17,7 @@ pub struct PlaybackSource {
     run_id: u64,
     run_told: u64,
     ready_told: bool,
-    ended: bool,
+    ended_ns: Option<u64>,
     end_told: bool,
 }
 
@@ -35,7 +35,7 @@ impl PlaybackSource {
             run_id: 0,
             run_told: 0,
             ready_told: false,
-            ended: false,
+            ended_ns: None,
             end_told: false,
         })
     }
@@ -47,8 +47,8 @@ impl Source for PlaybackSource {
             return Ok(Produced::Nothing);
         }
         self.actions.take(t_schedule_ns, self.frames.epoch());
-        let Some((frame, _)) = self.playback.next() else {
-            self.ended = true;
+        let Some(frame) = self.playback.next() else {
+            self.ended_ns = Some(t_schedule_ns);
             return Ok(Produced::End);
         };
         *self.frames.block() = *frame;
@@ -70,8 +70,8 @@ impl Source for PlaybackSource {
             health.event(now_ns, EventKind::Run, 0, 0.0, self.run_id - 1);
             self.run_told = self.run_id;
         }
-        if self.ended && !self.end_told {
-            health.event(now_ns, EventKind::EndOfRecording, 0, 0.0, 0);
+        if let Some(ended_ns) = self.ended_ns.filter(|_| !self.end_told) {
+            health.event(now_ns, EventKind::EndOfRecording, 0, 0.0, ended_ns);
             self.end_told = true;
         }
     }

@@ -1,6 +1,6 @@
 //! The simulated rover as the source of the graph.
 
-use vigil_blocks::{Block, Control, ControlCommand, EventKind, SensorFrame};
+use vigil_blocks::{Block, Control, ControlCommand, EventKind, Refusal, SensorFrame};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
     Clock, Graph, HealthBoard, PortError, Produced, Receiver, Sender, Source, Stamp, Topic,
@@ -26,11 +26,12 @@ pub struct SimulatorSource {
     control: Box<dyn Receiver<Control>>,
     frames: Box<dyn Sender<SensorFrame>>,
     last_ns: Option<u64>,
+    began_ns: Option<u64>,
     period_ns: u64,
     changes: Vec<(u64, Change)>,
     ready_told: bool,
-    safe_stop: bool,
-    safe_stop_told: bool,
+    refusal: Option<Refusal>,
+    refusal_told: Option<Refusal>,
 }
 
 impl SimulatorSource {
@@ -59,11 +60,21 @@ impl SimulatorSource {
             frames,
             last_ns: None,
             period_ns,
+            began_ns: None,
             changes: Vec::with_capacity(CHANGES_MAX),
             ready_told: false,
-            safe_stop: false,
-            safe_stop_told: false,
+            refusal: None,
+            refusal_told: None,
         })
+    }
+
+    /// Goes on with a drive that began at `began_ns`, if it is given: what was injected until now
+    /// is injected at once.
+    #[must_use]
+    pub fn resuming(mut self, began_ns: Option<u64>) -> Self {
+        self.ready_told = began_ns.is_some();
+        self.began_ns = began_ns;
+        self
     }
 
     /// Makes a change; true if the simulated rover can be changed so.
@@ -76,10 +87,10 @@ impl SimulatorSource {
     }
 
     fn take_due_injections(&mut self, t_schedule_ns: u64) {
-        let Some(ready_ns) = self.actions.ready_ns() else {
+        let Some(began_ns) = self.began_ns.or(self.actions.ready_ns()) else {
             return;
         };
-        let elapsed_ns = t_schedule_ns.saturating_sub(ready_ns);
+        let elapsed_ns = t_schedule_ns.saturating_sub(began_ns);
         while let Some(change) = self.schedule.due(elapsed_ns) {
             self.change(change, t_schedule_ns);
         }
@@ -125,7 +136,7 @@ impl Source for SimulatorSource {
         let command = self
             .obedience
             .apply(planned, self.actions.newest(), clock.now_ns());
-        self.safe_stop = command.safe_stop;
+        self.refusal = command.refusal;
         let last_ns = self.last_ns.replace(t_schedule_ns);
         let passed_ns = last_ns.map_or(self.period_ns, |last_ns| t_schedule_ns - last_ns);
         self.world.step(passed_ns as f64 * 1e-9, command);
@@ -141,7 +152,7 @@ impl Source for SimulatorSource {
         if let (Some(ready_ns), false) = (self.actions.ready_ns(), self.ready_told) {
             health.event(ready_ns, EventKind::Ready, 0, 0.0, self.frames.next_seq());
             self.ready_told = true;
-            self.safe_stop_told = false;
+            self.refusal_told = None;
         }
         self.take_control(health, now_ns);
         for (at_ns, change) in self.changes.drain(..) {
@@ -156,14 +167,12 @@ impl Source for SimulatorSource {
             }
         }
         // Standing still before the first action is no event.
-        if self.ready_told && self.safe_stop != self.safe_stop_told {
-            let kind = if self.safe_stop {
-                EventKind::SafeStop
-            } else {
-                EventKind::SafeStopEnds
-            };
-            health.event(now_ns, kind, 0, 0.0, 0);
-            self.safe_stop_told = self.safe_stop;
+        if self.ready_told && self.refusal != self.refusal_told {
+            match self.refusal {
+                Some(reason) => health.event(now_ns, EventKind::SafeStop, reason as u32, 0.0, 0),
+                None => health.event(now_ns, EventKind::SafeStopEnds, 0, 0.0, 0),
+            }
+            self.refusal_told = self.refusal;
         }
     }
 }

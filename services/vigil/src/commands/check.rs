@@ -1,5 +1,6 @@
 //! `vigil check`: says before a start what will not work, and why.
 
+use std::error::Error;
 use std::fs;
 
 use serde::Serialize;
@@ -9,8 +10,7 @@ use vigil_blocks::{
 use vigil_cycle::domain::shared_memory_free_bytes;
 use vigil_cycle::placement::{self, Placement, Wanted};
 use vigil_cycle::topic::ServiceName;
-use vigil_decision::Pomdp;
-use vigil_robot::learned::Model;
+use vigil_setup::schema::Source;
 use vigil_setup::{GraphArgs, Setup};
 
 use super::{CommandError, Outcome};
@@ -55,7 +55,7 @@ struct Document<'a> {
 /// A configuration that is refused.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let setup = args.graph.load().map_err(CommandError::usage)?;
-    let mut findings = vec![configuration(&setup), model(&setup), decision(&setup)];
+    let mut findings = vec![configuration(&setup), models(&setup)];
     findings.extend(cores(&setup));
     findings.push(scheduling(&setup));
     findings.extend([
@@ -109,27 +109,23 @@ fn configuration(setup: &Setup) -> Finding {
     )
 }
 
-fn model(setup: &Setup) -> Finding {
-    let path = setup.model_path.display();
-    match Model::from_toml(&setup.model_text) {
-        Ok(model) => finding(
-            "learned model",
-            Status::Ok,
-            format!("{path}, hash {:016x}", model.hash()),
-        ),
-        Err(error) => finding("learned model", Status::Failure, format!("{path}: {error}")),
-    }
-}
-
-fn decision(setup: &Setup) -> Finding {
-    let path = setup.decision_path.display();
-    match Pomdp::parse(&setup.decision_text) {
-        Ok(_) => finding("decision model", Status::Ok, path.to_string()),
-        Err(error) => finding(
-            "decision model",
-            Status::Failure,
-            format!("{path}: {error}"),
-        ),
+/// Lets each service assemble what it runs on.
+fn models(setup: &Setup) -> Finding {
+    let assembled = || -> Result<(), Box<dyn Error>> {
+        if setup.file.sensor.source != Source::External {
+            vigil_sensor_sim::assemble(setup, &[])?;
+        }
+        vigil_detector::assemble(setup)?;
+        vigil_identifier::assemble(setup)?;
+        vigil_supervisor::assemble(setup)?;
+        Ok(())
+    };
+    match assembled() {
+        Ok(()) => {
+            let (model, decision) = (setup.model_path.display(), setup.decision_path.display());
+            finding("models", Status::Ok, format!("{model}, {decision}"))
+        }
+        Err(error) => finding("models", Status::Failure, error.to_string()),
     }
 }
 

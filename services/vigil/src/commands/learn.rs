@@ -65,6 +65,11 @@ fn test_fraction(text: &str) -> Result<f64, String> {
 /// # Errors
 /// An input that is refused; an output that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let folder = args.out.parent().filter(|f| !f.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        let refused = format!("--out: there is no folder {}", folder.display());
+        return Err(CommandError::usage(refused));
+    }
     let robot = args.robot.load()?;
     let labels = labels::read(&args.runs, &robot).map_err(CommandError::usage)?;
     let runs = frames::read(&args.frames, &robot).map_err(CommandError::usage)?;

@@ -14,7 +14,38 @@ use crate::topic::Topic;
 /// Blocks that a queue holds before the oldest is overwritten.
 const BUFFER: usize = 16;
 
-type Queue<T> = Rc<RefCell<VecDeque<Box<T>>>>;
+/// What waits for one reader. Blocks that were read go round, so that a steady cycle in process
+/// allocates as little as one over shared memory.
+struct Waiting<T> {
+    blocks: VecDeque<Box<T>>,
+    spare: Vec<Box<T>>,
+}
+
+impl<T: Block> Waiting<T> {
+    fn new() -> Self {
+        Self {
+            blocks: VecDeque::with_capacity(BUFFER),
+            // One more than can wait: the held one.
+            spare: (0..=BUFFER)
+                .map(|_| bytemuck::allocation::zeroed_box())
+                .collect(),
+        }
+    }
+
+    fn push(&mut self, block: &T) {
+        let overwritten = if self.blocks.len() == BUFFER {
+            self.blocks.pop_front()
+        } else {
+            None
+        };
+        let slot = overwritten.or_else(|| self.spare.pop());
+        let mut slot = slot.unwrap_or_else(bytemuck::allocation::zeroed_box);
+        *slot = *block;
+        self.blocks.push_back(slot);
+    }
+}
+
+type Queue<T> = Rc<RefCell<Waiting<T>>>;
 type Readers<T> = Rc<RefCell<Vec<Queue<T>>>>;
 
 /// All topics of one in-process graph. Clones share them. A block is visible from the instant of
@@ -54,14 +85,14 @@ impl Bus {
         *self.epochs.borrow_mut() += 1;
         LocalSender {
             readers: self.readers(topic),
-            loaned: Box::new(T::zeroed()),
+            loaned: bytemuck::allocation::zeroed_box(),
             epoch: *self.epochs.borrow(),
             seq: 0,
         }
     }
 
     pub(super) fn receiver<T: Block>(&self, topic: Topic) -> LocalReceiver<T> {
-        let queue = Queue::<T>::default();
+        let queue = Rc::new(RefCell::new(Waiting::new()));
         self.readers::<T>(topic)
             .borrow_mut()
             .push(Rc::clone(&queue));
@@ -89,11 +120,7 @@ impl<T: Block> Sender<T> for LocalSender<T> {
         let published_ns = stamp_header(&mut *self.loaned, self.epoch, self.seq, stamp, clock);
         self.seq += 1;
         for queue in self.readers.borrow().iter() {
-            let mut queue = queue.borrow_mut();
-            if queue.len() == BUFFER {
-                queue.pop_front();
-            }
-            queue.push_back(self.loaned.clone());
+            queue.borrow_mut().push(&self.loaned);
         }
         *self.loaned = T::zeroed();
         Ok(published_ns)
@@ -119,8 +146,13 @@ impl<T: Block> Receiver<T> for LocalReceiver<T> {
         let mut queue = self.queue.borrow_mut();
         let now_ns = self.clock.now_ns();
         let is_out = |block: &T| block.header().t_publish_ns <= now_ns;
-        let visible = queue.front().is_some_and(|block| is_out(block));
-        self.held = if visible { queue.pop_front() } else { None };
+        queue.spare.extend(self.held.take());
+        let visible = queue.blocks.front().is_some_and(|block| is_out(block));
+        self.held = if visible {
+            queue.blocks.pop_front()
+        } else {
+            None
+        };
         visible
     }
 

@@ -150,8 +150,15 @@ impl Model {
     /// # Errors
     /// [`ModelError`] naming the key, what was found and what is allowed.
     pub fn from_toml(text: &str) -> Result<Self, ModelError> {
-        let model: Self =
-            toml::from_str(text).map_err(|error| ModelError::Parse(error.to_string()))?;
+        let model: Self = toml::from_str(text).map_err(|error| {
+            let until = text
+                .as_bytes()
+                .iter()
+                .take(error.span().map_or(0, |s| s.start));
+            let line = 1 + until.filter(|&&byte| byte == b'\n').count();
+            let message = error.message().replace('\n', " ");
+            ModelError::Parse(format!("line {line}: {message}"))
+        })?;
         model.check()?;
         Ok(model)
     }

@@ -1,0 +1,14 @@
+//! From the configuration to a detector.
+
+use vigil_setup::Setup;
+
+use crate::{Detector, DetectorError};
+
+/// The detector that a configuration describes.
+///
+/// # Errors
+/// [`DetectorError`] if model, robot and settings do not fit together.
+pub fn assemble(setup: &Setup) -> Result<Detector, DetectorError> {
+    let file = &setup.file;
+    Detector::new(&setup.model, &setup.robot, &file.detector, file.graph.seed)
+}

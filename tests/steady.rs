@@ -1,0 +1,127 @@
+//! A steady cycle of every service, ports and accounting included, allocates nothing.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use std::path::PathBuf;
+
+use vigil_cycle::allocation::{CountingAllocator, allocations};
+use vigil_cycle::placement::{Wanted, read_back};
+use vigil_cycle::port::Bus;
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{
+    DeadlineMonitor, Graph, HealthBoard, SourceCycle, Stage, StageCycle, Topic, VirtualClock,
+};
+use vigil_detector::DetectorStage;
+use vigil_identifier::IdentifierStage;
+use vigil_sensor_sim::{Assembled, SimulatorSource};
+use vigil_setup::{GraphArgs, Setup};
+use vigil_supervisor::SupervisorStage;
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+/// Cycles until the first action has come back.
+const WARM_UP: u64 = 5;
+const CYCLES: u64 = 1200;
+/// A sensor frame is held back in this cycle: the deadlines pass.
+const SILENT: u64 = 900;
+
+fn setup() -> Setup {
+    let config = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../config/rover.toml");
+    let args = GraphArgs {
+        config,
+        ..GraphArgs::default()
+    };
+    args.load().unwrap()
+}
+
+fn cycle_parts(setup: &Setup, graph: &Graph, name: ServiceName) -> (DeadlineMonitor, HealthBoard) {
+    let schedule = setup.plan(name, None).schedule;
+    let wanted = Wanted {
+        core: 0,
+        priority: 1,
+    };
+    let sender = graph.sender(Topic::Health(name)).unwrap();
+    let board = HealthBoard::new(sender, schedule, wanted, read_back());
+    (DeadlineMonitor::new(schedule), board)
+}
+
+/// The simulated rover, one of whose wheels will stick.
+fn simulator(setup: &Setup, graph: &Graph) -> SimulatorSource {
+    let inject = ["stuck:RM@3".to_owned()];
+    match vigil_sensor_sim::assemble(setup, &inject).unwrap() {
+        Assembled::Simulator(world, obedience, schedule) => {
+            let period_ns = setup.period_ns();
+            SimulatorSource::new(*world, obedience, schedule, true, period_ns, graph).unwrap()
+        }
+        Assembled::Playback(_) => unreachable!("the default graph simulates"),
+    }
+}
+
+/// Allocations of one turn.
+fn turn(cycle: &mut StageCycle, stage: &mut impl Stage, clock: &VirtualClock) -> u64 {
+    let before = allocations();
+    cycle.turn(stage, clock).unwrap();
+    allocations() - before
+}
+
+#[test]
+fn steady_cycles_of_every_service_allocate_nothing() {
+    use ServiceName::{Detector, Identifier, SensorSim, Supervisor};
+    let setup = setup();
+    let period_ns = setup.period_ns();
+    let clock = VirtualClock::default();
+    let graph = Graph::InProcess(Bus::new(clock.clone()));
+    let parts = |name| cycle_parts(&setup, &graph, name);
+    let stage = |name| {
+        let (monitor, board) = parts(name);
+        StageCycle::new(monitor, board).unwrap()
+    };
+    let mut sensor = simulator(&setup, &graph);
+    let (monitor, board) = parts(SensorSim);
+    let mut source = SourceCycle::new(monitor, board, period_ns).unwrap();
+    let detector = vigil_detector::assemble(&setup).unwrap();
+    let mut detector = (
+        stage(Detector),
+        DetectorStage::new(detector, &graph).unwrap(),
+    );
+    let identifier = vigil_identifier::assemble(&setup).unwrap();
+    let identifier = IdentifierStage::new(identifier, &graph, period_ns).unwrap();
+    let mut identifier = (stage(Identifier), identifier);
+    let supervisor = vigil_supervisor::assemble(&setup).unwrap();
+    let validity_ns = vigil_supervisor::validity_ns(&setup);
+    let supervisor = SupervisorStage::new(supervisor, &graph, period_ns, validity_ns).unwrap();
+    let mut supervisor = (stage(Supervisor), supervisor);
+    clock.set(period_ns);
+    detector.0.ready(&clock).unwrap();
+    identifier.0.ready(&clock).unwrap();
+    supervisor.0.ready(&clock).unwrap();
+
+    for k in 1..=CYCLES {
+        clock.set(k * period_ns);
+        let before = allocations();
+        if k != SILENT {
+            source.turn(&mut sensor, &clock).unwrap();
+        } else {
+            // Later than every deadline of this period.
+            clock.advance(period_ns - 1);
+        }
+        let counts = [
+            allocations() - before,
+            turn(&mut detector.0, &mut detector.1, &clock),
+            turn(&mut identifier.0, &mut identifier.1, &clock),
+            turn(&mut supervisor.0, &mut supervisor.1, &clock),
+        ];
+        assert!(k <= WARM_UP || counts == [0; 4], "cycle {k}: {counts:?}");
+    }
+    // It did cycle, miss, and see the wheel stick.
+    assert_eq!(source.health().view().slips, 1);
+    for cycle in [&detector.0, &identifier.0, &supervisor.0] {
+        let health = cycle.health().view();
+        assert!(health.cycles > CYCLES - 5 && health.missed >= 1);
+    }
+    assert!(identifier.0.health().view().event_count > 0);
+    // The counter counts.
+    let before = allocations();
+    drop(vec![1_u8]);
+    assert_eq!(allocations() - before, 1);
+}
