@@ -32,6 +32,7 @@ fn assert_told_and_obeyed(summary: &Summary) {
     );
     let (_, action) = actions.last().unwrap();
     assert!(!action.starts_with("go_on"), "last action: {action}");
+    assert_eq!(summary.events("obeys").last().unwrap().1, *action);
 }
 
 #[test]

@@ -178,7 +178,7 @@ impl Namer {
     fn what(&self, kind: EventKind, event: &Event) -> String {
         match kind {
             EventKind::Diagnosis | EventKind::Cleared => self.mode(event.what),
-            EventKind::Action => {
+            EventKind::Action | EventKind::Obeys => {
                 let action = self.actions.get(event.what as usize);
                 let wheel = usize::try_from(event.value)
                     .ok()
@@ -242,5 +242,6 @@ const fn kind_name(kind: EventKind) -> &'static str {
         EventKind::Refused => "refused",
         EventKind::Run => "run",
         EventKind::EndOfRecording => "end-of-recording",
+        EventKind::Obeys => "obeys",
     }
 }

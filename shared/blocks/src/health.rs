@@ -60,6 +60,8 @@ pub enum EventKind {
     /// Recorded frames are at their end. `value`: the first instant of the schedule that no frame
     /// answers any more, ns.
     EndOfRecording = 15,
+    /// The robot begins to obey another decision. `what` and `value` as for `Action`.
+    Obeys = 16,
 }
 
 impl EventKind {
@@ -82,6 +84,7 @@ impl EventKind {
             13 => Self::Refused,
             14 => Self::Run,
             15 => Self::EndOfRecording,
+            16 => Self::Obeys,
             _ => return None,
         })
     }
