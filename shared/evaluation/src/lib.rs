@@ -1,5 +1,6 @@
 //! Data sets, learning of models, scoring. Reads files; knows no transport and no clock.
 
+pub mod cases;
 pub mod frames;
 pub mod labels;
 pub mod learning;

@@ -14,16 +14,25 @@
 //! | [`bank`] | exact single faults: one hypothesis per (mode, onset) |
 //! | [`tree`] | the fault tree |
 
+pub mod adaptive;
 pub mod ages;
 pub mod angle;
 pub mod bank;
+pub mod bootstrap;
 pub mod constant;
+pub mod filter;
 pub mod forward;
 pub mod gaussian;
+pub mod hybrid;
 pub mod logspace;
+pub mod look_ahead;
+pub mod merged;
 pub mod particles;
+pub mod proposal;
 pub mod resample;
+pub mod sequences;
 pub mod track;
 pub mod tree;
+pub mod weights;
 
 pub use tree::FaultTree;

@@ -1,0 +1,304 @@
+//! Every filter against the cases with exact answers (tests/data/filters).
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+use std::path::PathBuf;
+
+use nalgebra::{Matrix3, Vector3};
+use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Linear};
+use vigil_inference::bootstrap::ParticleFilter;
+use vigil_inference::filter::Filter;
+use vigil_inference::forward::Forward;
+use vigil_inference::hybrid::Conditional;
+use vigil_inference::look_ahead::LookAhead;
+use vigil_inference::merged::Merged;
+use vigil_inference::proposal::Proposal;
+use vigil_inference::resample::{Resampling, Scheme};
+use vigil_inference::sequences::Sequences;
+
+fn path(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/data/filters")
+        .join(name)
+}
+
+fn hidden_markov() -> HiddenMarkov {
+    HiddenMarkov::read(&path("case1_hmm13.json")).unwrap()
+}
+
+fn linear() -> Linear {
+    Linear::read(&path("case2_lgss3.json")).unwrap()
+}
+
+fn jump_linear() -> JumpLinear {
+    JumpLinear::read(&path("case3_jmls3_full.json")).unwrap()
+}
+
+/// `Σ |p - q|`.
+fn distance(p: &[f64], q: &[f64]) -> f64 {
+    assert_eq!(p.len(), q.len());
+    p.iter().zip(q).map(|(p, q)| (p - q).abs()).sum()
+}
+
+/// Mean distance of a filter's beliefs from the exact ones, and its log-evidence.
+fn run<F: Filter>(
+    filter: &mut F,
+    observations: impl Iterator<Item: std::borrow::Borrow<F::Observation>>,
+    exact: &[impl AsRef<[f64]>],
+) -> (f64, f64) {
+    use std::borrow::Borrow;
+    let (mut sum, mut log_evidence) = (0.0, 0.0);
+    for (z, exact) in observations.zip(exact) {
+        log_evidence += filter.step(z.borrow()).log_evidence;
+        sum += distance(filter.posterior(), exact.as_ref());
+    }
+    (sum / exact.len() as f64, log_evidence)
+}
+
+/// Mean over seeds of the distance and of the error of the log-evidence.
+fn mean_of(seeds: u64, exact: f64, mut run: impl FnMut(u64) -> (f64, f64)) -> (f64, f64) {
+    let (mut distance, mut bias) = (0.0, 0.0);
+    for seed in 0..seeds {
+        let (d, log_evidence) = run(seed);
+        (distance, bias) = (distance + d, bias + log_evidence - exact);
+    }
+    (distance / seeds as f64, bias / seeds as f64)
+}
+
+#[test]
+fn thirteen_modes_are_filtered_exactly() {
+    let case = hidden_markov();
+    let (mut filter, mut sum) = (Forward::<13>::at(0), 0.0);
+    for (t, z) in case.observations.iter().enumerate() {
+        filter.predict(case.transitions());
+        let log_l = std::array::from_fn(|mode| case.log_density(mode, z));
+        sum += filter.update(&log_l).unwrap();
+        let found = filter.log_p().map(f64::exp);
+        assert!(distance(&found, &case.filter[t]) < 1e-9, "step {t}");
+        assert!(
+            (sum - case.log_evidence[t]).abs() < 1e-9 * (1.0 + sum.abs()),
+            "step {t}"
+        );
+    }
+    // Without a continuous state nothing is merged: this filter is exact too.
+    let (found, log_evidence) = run(
+        &mut Merged::<_, 0>::new(case.clone()),
+        case.observations.iter(),
+        &case.filter,
+    );
+    assert!(found < 1e-9 && (log_evidence - sum).abs() < 1e-9 * sum.abs());
+}
+
+#[test]
+fn a_linear_gaussian_state_is_filtered_exactly() {
+    let case = linear();
+    let (mut state, mut sum) = (case.prior(0), 0.0);
+    for (t, z) in case.observations.iter().enumerate() {
+        case.predict(0, &mut state);
+        sum += case.update(0, &mut state, z).unwrap();
+        let covariance = Matrix3::from_fn(|i, j| case.covariance[t][i][j]);
+        assert!(
+            (state.mean - Vector3::from(case.mean[t])).abs().max() < 1e-9,
+            "step {t}"
+        );
+        assert!(
+            (state.covariance - covariance).abs().max() < 1e-9,
+            "step {t}"
+        );
+        assert!(
+            (sum - case.log_evidence[t]).abs() < 1e-9 * (1.0 + sum.abs()),
+            "step {t}"
+        );
+    }
+}
+
+#[test]
+fn all_sequences_of_modes_are_filtered_exactly() {
+    let case = jump_linear();
+    let mut filter = Sequences::<_, 3>::new(case.clone(), 177_147);
+    let mut sum = 0.0;
+    for (t, z) in case.observations().enumerate() {
+        sum += filter.step(&z).log_evidence;
+        assert!(
+            distance(filter.posterior(), &case.filter[t]) < 1e-9,
+            "step {t}"
+        );
+        let (mean, variance) = filter.state();
+        assert!(
+            (mean - Vector3::from(case.mean[t])).abs().max() < 1e-9,
+            "step {t}"
+        );
+        assert!(
+            (variance - Vector3::from(case.variance[t])).abs().max() < 1e-9,
+            "step {t}"
+        );
+        assert!(
+            (sum - case.log_evidence[t]).abs() < 1e-9 * (1.0 + sum.abs()),
+            "step {t}"
+        );
+    }
+    assert_eq!(filter.log_dropped(), f64::NEG_INFINITY);
+}
+
+#[test]
+fn dropping_the_least_likely_sequences_costs_little_and_is_told() {
+    let case = jump_linear();
+    let mut filter = Sequences::<_, 3>::new(case.clone(), 100);
+    let (found, _) = run(&mut filter, case.observations(), &case.filter);
+    assert!(found < 5e-3, "{found}");
+    assert!(filter.log_dropped() > -20.0 && filter.log_dropped() < -3.0);
+}
+
+#[test]
+fn three_merged_filters_are_close_to_all_sequences() {
+    let case = jump_linear();
+    let mut filter = Merged::<_, 3>::new(case.clone());
+    let (found, log_evidence) = run(&mut filter, case.observations(), &case.filter);
+    let exact = *case.log_evidence.last().unwrap();
+    let error = (log_evidence - exact).abs();
+    assert!(
+        found < 0.0103 && error < 0.2,
+        "{found}, evidence off by {error}"
+    );
+}
+
+fn bootstrap<M: vigil_inference::hybrid::Sampled + Clone>(
+    model: &M,
+    resampling: Resampling,
+    count: usize,
+    seed: u64,
+) -> ParticleFilter<M> {
+    ParticleFilter::new(
+        model.clone(),
+        Proposal::prior(model),
+        resampling,
+        count,
+        seed,
+    )
+}
+
+#[test]
+fn the_bootstrap_filter_approaches_the_exact_belief_of_thirteen_modes() {
+    let case = hidden_markov();
+    let exact = *case.log_evidence.last().unwrap();
+    for (count, bound) in [(1_000, 0.035), (10_000, 0.010)] {
+        let (found, bias) = mean_of(20, exact, |seed| {
+            let mut filter = bootstrap(&case, Resampling::EVERY_STEP, count, seed);
+            run(&mut filter, case.observations.iter(), &case.filter)
+        });
+        assert!(found < bound, "{count}: {found}");
+        assert!(count < 10_000 || bias.abs() < 0.6, "{count}: bias {bias}");
+    }
+}
+
+#[test]
+fn the_bootstrap_filter_approaches_the_kalman_filter() {
+    let case = linear();
+    let exact = *case.log_evidence.last().unwrap();
+    let (mut square, mut bias, runs) = (0.0, 0.0, 20);
+    for seed in 0..runs {
+        let mut filter = bootstrap(&case, Resampling::EVERY_STEP, 10_000, seed);
+        for (t, z) in case.observations.iter().enumerate() {
+            bias += filter.step(z).log_evidence;
+            // After resampling the weights are equal.
+            let sum: Vector3<f64> = filter.particles().map(|(_, state, w)| state * w).sum();
+            for i in 0..3 {
+                square += (sum[i] - case.mean[t][i]).powi(2) / case.covariance[t][i][i];
+            }
+        }
+        bias -= exact;
+    }
+    let rmse = (square / (runs as f64 * 3.0 * case.mean.len() as f64)).sqrt();
+    assert!(rmse < 0.05, "{rmse}");
+    assert!((bias / runs as f64).abs() < 0.6, "{bias}");
+}
+
+#[test]
+fn look_ahead_with_a_thousand_particles_beats_ten_thousand_of_the_bootstrap_filter() {
+    let case = jump_linear();
+    let exact = *case.log_evidence.last().unwrap();
+    let (plain, plain_bias) = mean_of(20, exact, |seed| {
+        let mut filter = bootstrap(&case, Resampling::EVERY_STEP, 10_000, seed);
+        run(&mut filter, case.observations(), &case.filter)
+    });
+    assert!(
+        plain < 0.035 && plain_bias.abs() < 0.6,
+        "{plain}, {plain_bias}"
+    );
+    let (ahead, bias) = mean_of(20, exact, |seed| {
+        let mut filter = LookAhead::<_, 3>::new(case.clone(), 1_000, seed);
+        run(&mut filter, case.observations(), &case.filter)
+    });
+    assert!(ahead * 1.5 < plain, "{ahead} against {plain}");
+    assert!(bias.abs() < 0.1, "{bias}");
+}
+
+#[test]
+fn the_evidence_is_right_whether_or_not_the_particles_are_resampled() {
+    let case = jump_linear();
+    let exact = *case.log_evidence.last().unwrap();
+    let schemes = [
+        (Scheme::Systematic, 0.5),
+        (Scheme::Stratified, 1.0),
+        (Scheme::Residual, 1.0),
+        (Scheme::Multinomial, 1.0),
+        (Scheme::Systematic, 0.2),
+    ];
+    for (scheme, threshold) in schemes {
+        let resampling = Resampling { scheme, threshold };
+        let (found, bias) = mean_of(20, exact, |seed| {
+            let mut filter = bootstrap(&case, resampling, 10_000, seed);
+            run(&mut filter, case.observations(), &case.filter)
+        });
+        assert!(
+            found < 0.04 && bias.abs() < 0.3,
+            "{resampling:?}: {found}, bias {bias}"
+        );
+    }
+}
+
+#[test]
+fn better_proposals_keep_belief_and_evidence_and_need_fewer_particles() {
+    let case = hidden_markov();
+    let exact = *case.log_evidence.last().unwrap();
+    let mut risk = [8.0; 13];
+    risk[0] = 1.0;
+    let proposals = [
+        Proposal::prior(&case),
+        Proposal::raised(&case, 0.5).unwrap(),
+        Proposal::risk_sensitive(&case, &risk).unwrap(),
+    ];
+    let at = |proposal: &Proposal, count| {
+        mean_of(20, exact, |seed| {
+            let resampling = Resampling::default();
+            let mut filter =
+                ParticleFilter::new(case.clone(), proposal.clone(), resampling, count, seed);
+            run(&mut filter, case.observations.iter(), &case.filter)
+        })
+    };
+    let [prior, raised, tilted] = proposals.each_ref().map(|proposal| at(proposal, 300));
+    assert!(
+        raised.0 < 0.7 * prior.0,
+        "raised {raised:?}, prior {prior:?}"
+    );
+    assert!(tilted.0 < 0.7 * prior.0, "risk {tilted:?}, prior {prior:?}");
+    for proposal in &proposals {
+        let (found, bias) = at(proposal, 10_000);
+        assert!(found < 0.015 && bias.abs() < 0.3, "{found}, bias {bias}");
+    }
+}
+
+#[test]
+fn equal_seeds_give_equal_bits_and_other_seeds_others() {
+    let case = jump_linear();
+    let beliefs = |seed| {
+        let mut filter = bootstrap(&case, Resampling::default(), 500, seed);
+        case.observations()
+            .map(|z| {
+                filter.step(&z);
+                filter.posterior().to_vec()
+            })
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(beliefs(7), beliefs(7));
+    assert_ne!(beliefs(7), beliefs(8));
+}

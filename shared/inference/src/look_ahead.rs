@@ -1,0 +1,193 @@
+//! Look-ahead Rao-Blackwellised particle filter.
+//!
+//! A particle is a mode and a Gaussian over the continuous state. Before anything is drawn, every
+//! mode is tried: `l_k = ln P(k | d) + ln p(z | k, Gaussian)` by one Kalman step each. Parents are
+//! resampled by `Σ_k exp(l_k)` first, then the mode is drawn by `exp(l_k)`: both drawings know the
+//! observation (Morales-Menéndez, de Freitas and Poole, *Real-Time Monitoring of Complex Industrial
+//! Processes with Particle Filters*, 2002). The belief over modes sums the `exp(l_k)` themselves, so
+//! it has no sampling noise of this step.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use crate::filter::{Event, Filter, Step, normalise_into};
+use crate::gaussian::Gaussian;
+use crate::hybrid::Conditional;
+use crate::logspace::{log_add, log_sum_exp};
+use crate::resample::systematic;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Particle<const N: usize> {
+    mode: usize,
+    state: Gaussian<N>,
+}
+
+/// The look-ahead filter of N continuous dimensions. Particles have equal weights after each step.
+#[derive(Debug, Clone)]
+pub struct LookAhead<M, const N: usize> {
+    model: M,
+    rng: Pcg64Mcg,
+    particles: Vec<Particle<N>>,
+    children: Vec<Particle<N>>,
+    /// Row i: `l_k` of particle i.
+    log_joint: Vec<f64>,
+    log_parent: Vec<f64>,
+    parent: Vec<f64>,
+    ancestors: Vec<u32>,
+    log_p: Vec<f64>,
+    posterior: Vec<f64>,
+}
+
+impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
+    /// A filter of `count` particles, at least 1.
+    pub fn new(model: M, count: usize, seed: u64) -> Self {
+        let (count, modes) = (count.max(1), model.modes());
+        let particle = Particle {
+            mode: 0,
+            state: model.prior(0),
+        };
+        let mut filter = Self {
+            rng: Pcg64Mcg::seed_from_u64(seed),
+            particles: vec![particle; count],
+            children: vec![particle; count],
+            log_joint: vec![0.0; count * modes],
+            log_parent: vec![0.0; count],
+            parent: vec![0.0; count],
+            ancestors: vec![0; count],
+            log_p: vec![0.0; modes],
+            posterior: vec![0.0; modes],
+            model,
+        };
+        filter.reset();
+        filter
+    }
+
+    /// Mode and Gaussian of each particle; their weights are equal.
+    pub fn particles(&self) -> impl Iterator<Item = (usize, &Gaussian<N>)> {
+        self.particles
+            .iter()
+            .map(|particle| (particle.mode, &particle.state))
+    }
+
+    /// Tries every mode on every particle; false if nothing explains the observation.
+    fn look_ahead(&mut self, z: &M::Observation) -> bool {
+        let modes = self.model.modes();
+        self.log_p.fill(f64::NEG_INFINITY);
+        for (i, particle) in self.particles.iter().enumerate() {
+            let row = &mut self.log_joint[i * modes..(i + 1) * modes];
+            for (mode, log_joint) in row.iter_mut().enumerate() {
+                let p = self.model.transition(particle.mode, mode);
+                let mut state = particle.state;
+                *log_joint = f64::NEG_INFINITY;
+                if p > 0.0 {
+                    self.model.predict(mode, &mut state);
+                    if let Some(log_likelihood) = self.model.update(mode, &mut state, z) {
+                        *log_joint = p.ln() + log_likelihood;
+                    }
+                }
+                self.log_p[mode] = log_add(self.log_p[mode], *log_joint);
+            }
+            self.log_parent[i] = log_sum_exp(row);
+        }
+        normalise_into(&self.log_parent, &mut self.parent)
+    }
+
+    /// Draws parents, then their modes, by what the look-ahead has found.
+    fn draw(&mut self, z: &M::Observation) {
+        let modes = self.model.modes();
+        systematic(&self.parent, self.rng.random(), &mut self.ancestors);
+        self.children.clear();
+        for &ancestor in &self.ancestors {
+            let i = ancestor as usize;
+            let row = &self.log_joint[i * modes..(i + 1) * modes];
+            let mode = draw_index(row, self.log_parent[i], self.rng.random());
+            let mut child = Particle {
+                mode,
+                ..self.particles[i]
+            };
+            self.model.predict(mode, &mut child.state);
+            // It was possible a moment ago, in the look-ahead.
+            let _ = self.model.update(mode, &mut child.state, z);
+            self.children.push(child);
+        }
+        std::mem::swap(&mut self.particles, &mut self.children);
+    }
+
+    /// Moves on without an observation: each particle draws its mode from the model.
+    fn coast(&mut self) {
+        let share = 1.0 / self.particles.len() as f64;
+        self.posterior.fill(0.0);
+        for particle in &mut self.particles {
+            let mut left = self.rng.random::<f64>();
+            let from = particle.mode;
+            let drawn = (0..self.model.modes()).find(|&to| {
+                left -= self.model.transition(from, to);
+                left < 0.0
+            });
+            particle.mode = drawn.unwrap_or(from);
+            self.model.predict(particle.mode, &mut particle.state);
+            self.posterior[particle.mode] += share;
+        }
+    }
+}
+
+/// Index drawn with the probabilities `exp(log_p - log_sum)` by a uniform `u` in [0, 1).
+fn draw_index(log_p: &[f64], log_sum: f64, u: f64) -> usize {
+    let (mut sum, mut last) = (0.0, 0);
+    for (i, log_p) in log_p.iter().enumerate() {
+        let p = (log_p - log_sum).exp();
+        if p > 0.0 {
+            sum += p;
+            last = i;
+            if u < sum {
+                break;
+            }
+        }
+    }
+    last
+}
+
+impl<M: Conditional<N>, const N: usize> Filter for LookAhead<M, N> {
+    type Observation = M::Observation;
+
+    fn step(&mut self, z: &M::Observation) -> Step {
+        let count = self.particles.len() as f64;
+        if !self.look_ahead(z) {
+            self.coast();
+            return Step {
+                log_evidence: 0.0,
+                effective_sample_size: count,
+                event: Some(Event::Coasted),
+            };
+        }
+        let log_evidence = log_sum_exp(&self.log_parent) - count.ln();
+        normalise_into(&self.log_p, &mut self.posterior);
+        let squares: f64 = self.parent.iter().map(|weight| weight * weight).sum();
+        self.draw(z);
+        Step {
+            log_evidence,
+            effective_sample_size: 1.0 / squares,
+            event: None,
+        }
+    }
+
+    fn posterior(&self) -> &[f64] {
+        &self.posterior
+    }
+
+    fn reset(&mut self) {
+        self.posterior.fill(0.0);
+        let count = self.particles.len();
+        for (i, particle) in self.particles.iter_mut().enumerate() {
+            // Evenly over the prior's cumulative probabilities.
+            let mut left = (i as f64 + 0.5) / count as f64;
+            let drawn = (0..self.model.modes()).find(|&mode| {
+                left -= self.model.initial(mode);
+                left < 0.0
+            });
+            particle.mode = drawn.unwrap_or(0);
+            particle.state = self.model.prior(particle.mode);
+            self.posterior[particle.mode] += 1.0 / count as f64;
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! One Kalman filter per mode: the interacting multiple model filter.
+//!
+//! Exact mode sequences grow without bound; here the Gaussians that lead into one mode are merged
+//! into one of the same mean and covariance before each prediction (Blom and Bar-Shalom, *The
+//! Interacting Multiple Model Algorithm*, 1988): `μ_ij = b_i P_ij / Σ_i`, mean `m̄_j = Σ_i μ_ij m_i`,
+//! covariance `Σ_i μ_ij (V_i + (m_i - m̄_j)(m_i - m̄_j)ᵀ)`.
+
+use crate::filter::{Event, Filter, Step, normalise_into};
+use crate::gaussian::Gaussian;
+use crate::hybrid::Conditional;
+
+/// The interacting multiple model filter of N continuous dimensions.
+#[derive(Debug, Clone)]
+pub struct Merged<M, const N: usize> {
+    model: M,
+    states: Vec<Gaussian<N>>,
+    mixed: Vec<Gaussian<N>>,
+    log_p: Vec<f64>,
+    posterior: Vec<f64>,
+    predicted: Vec<f64>,
+}
+
+impl<M: Conditional<N>, const N: usize> Merged<M, N> {
+    /// A filter at the model's prior.
+    pub fn new(model: M) -> Self {
+        let modes = model.modes();
+        let states: Vec<_> = (0..modes).map(|mode| model.prior(mode)).collect();
+        let mut filter = Self {
+            mixed: states.clone(),
+            states,
+            log_p: vec![0.0; modes],
+            posterior: vec![0.0; modes],
+            predicted: vec![0.0; modes],
+            model,
+        };
+        filter.reset();
+        filter
+    }
+
+    /// The continuous state given each mode.
+    #[must_use]
+    pub fn states(&self) -> &[Gaussian<N>] {
+        &self.states
+    }
+
+    /// Mean and covariance of the continuous state over all modes.
+    #[must_use]
+    pub fn state(&self) -> Gaussian<N> {
+        merge(self.posterior.iter().copied().zip(&self.states))
+    }
+
+    fn predict(&mut self) {
+        for to in 0..self.states.len() {
+            let share = |from: usize| self.posterior[from] * self.model.transition(from, to);
+            let total: f64 = (0..self.states.len()).map(share).sum();
+            self.predicted[to] = total;
+            self.mixed[to] = if total > 0.0 {
+                let shares = (0..self.states.len()).map(|from| share(from) / total);
+                merge(shares.zip(&self.states))
+            } else {
+                // Nothing leads here: what this mode would have made of its own state.
+                self.states[to]
+            };
+            self.model.predict(to, &mut self.mixed[to]);
+        }
+        std::mem::swap(&mut self.states, &mut self.mixed);
+    }
+}
+
+/// The Gaussian with the mean and covariance of a mixture; weights sum to 1.
+fn merge<'a, const N: usize>(
+    parts: impl Iterator<Item = (f64, &'a Gaussian<N>)> + Clone,
+) -> Gaussian<N> {
+    let mut merged = Gaussian {
+        mean: nalgebra::SVector::zeros(),
+        covariance: nalgebra::SMatrix::zeros(),
+    };
+    for (weight, part) in parts.clone() {
+        merged.mean += part.mean * weight;
+    }
+    for (weight, part) in parts {
+        let apart = part.mean - merged.mean;
+        merged.covariance += (part.covariance + apart * apart.transpose()) * weight;
+    }
+    merged
+}
+
+impl<M: Conditional<N>, const N: usize> Filter for Merged<M, N> {
+    type Observation = M::Observation;
+
+    fn step(&mut self, z: &M::Observation) -> Step {
+        self.predict();
+        for mode in 0..self.states.len() {
+            let log_likelihood = self.model.update(mode, &mut self.states[mode], z);
+            self.log_p[mode] =
+                log_likelihood.unwrap_or(f64::NEG_INFINITY) + self.predicted[mode].ln();
+        }
+        let highest = crate::logspace::log_sum_exp(&self.log_p);
+        let updated = normalise_into(&self.log_p, &mut self.posterior);
+        if !updated {
+            self.posterior.copy_from_slice(&self.predicted);
+        }
+        Step {
+            log_evidence: if updated { highest } else { 0.0 },
+            effective_sample_size: 1.0 / self.posterior.iter().map(|p| p * p).sum::<f64>(),
+            event: (!updated).then_some(Event::Coasted),
+        }
+    }
+
+    fn posterior(&self) -> &[f64] {
+        &self.posterior
+    }
+
+    fn reset(&mut self) {
+        for (mode, (state, p)) in self.states.iter_mut().zip(&mut self.posterior).enumerate() {
+            (*state, *p) = (self.model.prior(mode), self.model.initial(mode));
+        }
+    }
+}
