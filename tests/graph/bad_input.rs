@@ -7,7 +7,7 @@ use std::process::Output;
 
 use flate2::bufread::GzDecoder;
 
-use crate::harness::{Running, binary, eventually, machine, root, unique};
+use crate::harness::{Running, eventually, launch, machine, root, unique};
 
 /// A copy of `config/` in which one text is replaced.
 fn changed(folder: &Path, file: &str, from: &str, to: &str) {
@@ -32,22 +32,6 @@ fn changed(folder: &Path, file: &str, from: &str, to: &str) {
     ] {
         copy(name);
     }
-}
-
-fn launch(config: &Path, name: &str, options: &[&str]) -> Output {
-    binary("vigil-launcher")
-        .args([
-            "--json",
-            "--duration",
-            "1",
-            "--graph",
-            &unique(name),
-            "--config",
-        ])
-        .arg(config)
-        .args(options)
-        .output()
-        .unwrap()
 }
 
 fn assert_refused(output: &Output, expected: &[&str]) {

@@ -1,7 +1,7 @@
 //! Starts and ends graphs.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -47,6 +47,37 @@ pub fn binary(name: &str) -> Command {
 /// Name for a graph that no other test and no other run of the tests has.
 pub fn unique(name: &str) -> String {
     format!("t{}-{name}", std::process::id())
+}
+
+/// The default graph file in `folder`, changed; the models stay where they are.
+pub fn config_with(folder: &Path, change: impl FnOnce(String) -> String) -> PathBuf {
+    std::fs::create_dir_all(folder).unwrap();
+    let config = root().join("config");
+    let absolute = |text: String, name: &str| {
+        let path = config.join(name).display().to_string();
+        text.replacen(&format!("\"{name}\""), &format!("\"{path}\""), 1)
+    };
+    let text = std::fs::read_to_string(config.join("rover.toml")).unwrap();
+    let models = [
+        "robots/rover.toml",
+        "trees/rover.toml",
+        "models/rover.toml",
+        "rover.pomdp",
+    ];
+    let path = folder.join("rover.toml");
+    std::fs::write(&path, change(models.into_iter().fold(text, absolute))).unwrap();
+    path
+}
+
+/// Starts the launcher for a second at most, and waits for its end.
+pub fn launch(config: &Path, name: &str, options: &[&str]) -> Output {
+    binary("vigil-launcher")
+        .args(["--json", "--duration", "1", "--graph", &unique(name)])
+        .arg("--config")
+        .arg(config)
+        .args(options)
+        .output()
+        .unwrap()
 }
 
 /// A running graph; stopped, with all its services, when dropped.

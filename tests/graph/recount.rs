@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 use std::fs;
 
-use vigil_blocks::{Action, Block, Cause, CauseKind, DetectionBelief, FaultBelief, SensorFrame};
+use vigil_blocks::{
+    Action, Block, Cause, CauseKind, DetectionBelief, FaultBelief, Health, SensorFrame,
+};
 use vigil_cycle::{Graph, Receiver, Topic};
 
-use crate::harness::{HealthWatch, Running, drain, machine, root, unique};
+use crate::harness::{HealthWatch, Running, config_with, drain, machine, unique};
 
 /// Publication instants of the frame-caused blocks of a topic, by their scheduled instant.
 struct Tap<T> {
@@ -15,6 +17,7 @@ struct Tap<T> {
     published_ns: BTreeMap<u64, u64>,
     next: Option<(u64, u64)>,
     lost: u64,
+    anchor: Option<Health>,
 }
 
 impl<T: Block> Tap<T> {
@@ -26,6 +29,7 @@ impl<T: Block> Tap<T> {
             published_ns: BTreeMap::new(),
             next: None,
             lost: 0,
+            anchor: None,
         }
     }
 
@@ -36,6 +40,7 @@ impl<T: Block> Tap<T> {
             published_ns,
             next,
             lost,
+            ..
         } = self;
         drain(receiver.as_mut(), |block: &T| {
             let header = *block.header();
@@ -53,17 +58,33 @@ impl<T: Block> Tap<T> {
         });
     }
 
-    /// Instants from `first_ns` to `last_ns` without a block in time.
-    fn recount(&self, [first_ns, last_ns]: [u64; 2], period_ns: u64, deadline_ns: u64) -> u64 {
-        (0..=(last_ns - first_ns + period_ns / 2) / period_ns)
+    /// Keeps the first account of the service whose last instant this tap has seen: every later
+    /// block is seen too.
+    fn anchor(&mut self, health: Option<&Health>) {
+        let (Some(health), Some((first_ns, _))) = (health, self.published_ns.first_key_value())
+        else {
+            return;
+        };
+        if self.anchor.is_none() && health.accounted_ns[1] >= *first_ns {
+            self.anchor = Some(*health);
+        }
+    }
+
+    /// Instants without a block in time, of those accounted after the anchor and up to `end`;
+    /// and what the monitor says of them.
+    fn recount(&self, end: &Health) -> (u64, u64) {
+        let (anchor, period_ns) = (self.anchor.unwrap(), end.period_ns);
+        let [first_ns, last_ns] = [anchor, *end].map(|health| health.accounted_ns[1]);
+        let missed = (1..=(last_ns - first_ns + period_ns / 2) / period_ns)
             .map(|k| first_ns + k * period_ns)
             .filter(|at_ns| {
-                let due_ns = at_ns + deadline_ns;
+                let due_ns = at_ns + end.deadline_ns;
                 self.published_ns
                     .get(at_ns)
                     .is_none_or(|&out_ns| out_ns > due_ns)
             })
-            .count() as u64
+            .count() as u64;
+        (missed, end.missed - anchor.missed)
     }
 }
 
@@ -72,27 +93,9 @@ fn the_monitors_count_what_the_stamps_say() {
     let _machine = machine();
     // Long queues: this observer is an ordinary process and must not lose a block.
     let folder = std::env::temp_dir().join(unique("recount"));
-    fs::create_dir_all(&folder).unwrap();
-    let config = root().join("config");
-    let text = fs::read_to_string(config.join("rover.toml")).unwrap();
-    let absolute = |text: String, name: &str| {
-        let path = config.join(name).display().to_string();
-        text.replacen(&format!("\"{name}\""), &format!("\"{path}\""), 1)
-    };
-    let text = [
-        "robots/rover.toml",
-        "trees/rover.toml",
-        "models/rover.toml",
-        "rover.pomdp",
-    ]
-    .into_iter()
-    .fold(text, absolute);
-    let path = folder.join("rover.toml");
-    fs::write(
-        &path,
-        format!("{text}\n[transport]\nbuffer = 256\nmax_subscribers = 4\n"),
-    )
-    .unwrap();
+    let path = config_with(&folder, |text| {
+        format!("{text}\n[transport]\nbuffer = 256\nmax_subscribers = 4\n")
+    });
 
     let mut graph = Running::start_with(path, "recount", &["--rate", "1000", "--duration", "8"]);
     let observed = graph.observe();
@@ -103,11 +106,15 @@ fn the_monitors_count_what_the_stamps_say() {
     let mut action = Tap::<Action>::new(&observed, Topic::Action, |b| Some(b.cause));
     while graph.is_alive() {
         // Health first: the taps then hold every block that it accounts for.
-        health.poll();
+        let latest = health.poll();
         sensor.poll();
+        sensor.anchor(latest.get("sensor-sim"));
         detection.poll();
+        detection.anchor(latest.get("detector"));
         diagnosis.poll();
+        diagnosis.anchor(latest.get("identifier"));
         action.poll();
+        action.anchor(latest.get("supervisor"));
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     fs::remove_dir_all(&folder).unwrap();
@@ -115,16 +122,14 @@ fn the_monitors_count_what_the_stamps_say() {
         [sensor.lost, detection.lost, diagnosis.lost, action.lost],
         [0; 4]
     );
-    let check = |name: &str, recount: &dyn Fn([u64; 2], u64, u64) -> u64| {
-        let h = health.latest[name];
-        let counted = recount(h.accounted_ns, h.period_ns, h.deadline_ns);
-        assert_eq!(h.missed, counted, "{name}: monitor against recount");
-        assert!(h.cycles > 6000, "{name}: {} cycles", h.cycles);
+    let check = |name: &str, recount: &dyn Fn(&Health) -> (u64, u64)| {
+        let end = &health.latest[name];
+        let (counted, told) = recount(end);
+        assert_eq!(told, counted, "{name}: monitor against recount");
+        assert!(end.cycles > 6000, "{name}: {} cycles", end.cycles);
     };
-    check("sensor-sim", &|window, p, d| sensor.recount(window, p, d));
-    check("detector", &|window, p, d| detection.recount(window, p, d));
-    check("identifier", &|window, p, d| {
-        diagnosis.recount(window, p, d)
-    });
-    check("supervisor", &|window, p, d| action.recount(window, p, d));
+    check("sensor-sim", &|end| sensor.recount(end));
+    check("detector", &|end| detection.recount(end));
+    check("identifier", &|end| diagnosis.recount(end));
+    check("supervisor", &|end| action.recount(end));
 }

@@ -175,6 +175,7 @@ impl Stage for IdentifierStage {
     }
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        health.add_input(&self.frame_account);
         let Reported {
             mode,
             p_mode,

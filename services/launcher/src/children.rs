@@ -21,7 +21,9 @@ struct Supervised {
     name: ServiceName,
     child: Child,
     report: PathBuf,
+    /// Those within the window.
     restarts: Vec<Instant>,
+    restart_count: usize,
     restart_at: Option<Instant>,
     last_exit: String,
 }
@@ -42,19 +44,18 @@ impl Children {
         for name in plan.services() {
             let report = domain.folder().join(format!("{}.report", name.as_str()));
             let _ = std::fs::remove_file(&report);
-            match spawn(plan, name, &report, None) {
+            match spawn(plan.command(name), &report) {
                 Ok(child) => children.services.push(Supervised {
                     name,
                     child,
                     report,
                     restarts: Vec::new(),
+                    restart_count: 0,
                     restart_at: None,
                     last_exit: String::new(),
                 }),
-                Err(error) => {
-                    children.stop();
-                    return Err(error);
-                }
+                // Those already started stop when `children` is dropped.
+                Err(error) => return Err(error),
             }
         }
         children.list(domain)?;
@@ -82,12 +83,13 @@ impl Children {
                 let count = service.restarts.len() as u32;
                 let name = service.name.as_str();
                 // What was refused at a restart is refused at the next.
-                if count >= policy.max_restarts || status.code() == Some(2) {
-                    eprintln!("vigil: {name} ended ({status}); given up after {count} restarts");
+                let is_final = status.code() == Some(2) || plan.cannot_resume(service.name);
+                if count >= policy.max_restarts || is_final {
+                    tell!("vigil: {name} ended ({status}); given up after {count} restarts");
                     self.gave_up = Some(service.name);
                     return true;
                 }
-                eprintln!("vigil: {name} ended ({status}); restarting");
+                tell!("vigil: {name} ended ({status}); restarting");
                 let delay_ms = policy.delay_ms * f64::from(2_u32.saturating_pow(count));
                 service.restart_at = Some(now + Duration::from_secs_f64(delay_ms * 1e-3));
                 observer.remove_dead_peers();
@@ -96,10 +98,12 @@ impl Children {
             if service.restart_at.is_some_and(|at| now >= at) && !signal::stop_requested() {
                 service.restart_at = None;
                 service.restarts.push(now);
-                match spawn(plan, service.name, &service.report, observer.ready_ns()) {
+                service.restart_count += 1;
+                let command = plan.command_again(service.name, observer.drive().as_ref());
+                match spawn(command, &service.report) {
                     Ok(child) => service.child = child,
                     Err(error) => {
-                        eprintln!(
+                        tell!(
                             "vigil: {} cannot be started: {error}",
                             service.name.as_str()
                         );
@@ -124,7 +128,7 @@ impl Children {
                 std::thread::sleep(POLL);
             }
             if matches!(service.child.try_wait(), Ok(None)) {
-                eprintln!("vigil: {} did not stop: killed", service.name.as_str());
+                tell!("vigil: {} did not stop: killed", service.name.as_str());
                 let _ = service.child.kill();
             }
             let _ = service.child.wait();
@@ -136,7 +140,7 @@ impl Children {
         let read = |service: &Supervised| match RunReport::read(&service.report) {
             Ok(report) => Some(report),
             Err(error) => {
-                eprintln!("vigil: no report of {}: {error}", service.name.as_str());
+                tell!("vigil: no report of {}: {error}", service.name.as_str());
                 None
             }
         };
@@ -151,7 +155,7 @@ impl Children {
         self.services
             .iter()
             .find(|s| s.name == name)
-            .map_or(0, |s| s.restarts.len())
+            .map_or(0, |s| s.restart_count)
     }
 
     /// The service that was given up, and how it last ended.
@@ -162,21 +166,18 @@ impl Children {
     }
 }
 
-/// Starts a service; a simulator goes on with the drive that began at `began_ns`.
-fn spawn(
-    plan: &Plan,
-    name: ServiceName,
-    report: &Path,
-    began_ns: Option<u64>,
-) -> io::Result<Child> {
-    let (program, line) = plan.command(name);
-    let mut command = Command::new(&program);
-    command.args(line).arg("--report").arg(report);
-    if let (ServiceName::SensorSim, Some(began_ns)) = (name, began_ns) {
-        command.args(["--began-ns", &began_ns.to_string()]);
+impl Drop for Children {
+    fn drop(&mut self) {
+        self.stop();
     }
+}
+
+fn spawn((program, line): (PathBuf, Vec<String>), report: &Path) -> io::Result<Child> {
     // A group of its own: Ctrl-C reaches the launcher alone, which stops the services in order.
-    command
+    Command::new(&program)
+        .args(line)
+        .arg("--report")
+        .arg(report)
         .process_group(0)
         .stdin(Stdio::null())
         .stdout(Stdio::null())

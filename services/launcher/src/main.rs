@@ -4,6 +4,14 @@
 //! It is not in the data path: it only reads Health. Exit codes: 0 done, 1 the run had a failure,
 //! 2 usage or configuration (nothing was started).
 
+/// Writes a line to standard error; that nobody reads it is no reason to end a graph.
+macro_rules! tell {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+
 mod children;
 mod observer;
 mod plan;
@@ -28,15 +36,16 @@ use crate::summary::Summary;
 const POLL: Duration = Duration::from_millis(4);
 /// Time that all services may take until the first action comes back.
 const STARTUP_LIMIT: Duration = Duration::from_secs(20);
-/// Time that the last events may take to arrive after the end of a recording.
-const DRAIN: Duration = Duration::from_millis(300);
+/// Time that the last answers may take after the end of a recording. Shorter than the time after
+/// which the supervisor stops a robot that nobody sees.
+const DRAIN: Duration = Duration::from_millis(80);
 
 fn main() -> ExitCode {
     let args = LauncherArgs::parse();
     let plan = match Plan::new(&args) {
         Ok(plan) => plan,
         Err(error) => {
-            eprintln!("{error}");
+            tell!("{error}");
             return ExitCode::from(2);
         }
     };
@@ -45,7 +54,7 @@ fn main() -> ExitCode {
         Ok(Outcome::Failed) => ExitCode::from(1),
         Ok(Outcome::Refused) => ExitCode::from(2),
         Err(error) => {
-            eprintln!("vigil: {error}");
+            tell!("vigil: {error}");
             ExitCode::from(1)
         }
     }
@@ -62,7 +71,7 @@ fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, Box<dyn std::error::
     let Some(lock) = domain.lock()? else {
         let name = domain.graph();
         let processes = std::fs::read_to_string(domain.processes_file()).unwrap_or_default();
-        eprintln!(
+        tell!(
             "vigil: a graph named '{name}' is running on this machine ({}); stop it, or give this \
              one another name with --graph",
             processes.trim().replace('\n', ", ")
@@ -76,7 +85,7 @@ fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, Box<dyn std::error::
     let mut observer = Observer::new(link, plan)?;
     let mut children = Children::start(plan, &domain)?;
     let ended = watch(args, plan, &mut observer, &mut children);
-    observer.close();
+    observer.close(DRAIN);
     children.stop();
     observer.poll(!args.json);
     let reports = children.reports();
@@ -118,7 +127,7 @@ fn watch(
         }
         if observer.ready_ns().is_none() && plan.waits_for_ready() {
             if started.elapsed() > STARTUP_LIMIT {
-                eprintln!(
+                tell!(
                     "vigil: no action came back within {} s",
                     STARTUP_LIMIT.as_secs()
                 );

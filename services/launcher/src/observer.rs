@@ -1,11 +1,13 @@
 //! Reads the Health of every service.
 
-use vigil_blocks::{Block, EventKind, Health};
+use std::time::Duration;
+
+use vigil_blocks::{Block, Health};
 use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Graph, Monotonic, PortError, Receiver, Topic, health};
 
-use crate::plan::Plan;
+use crate::plan::{Drive, Plan};
 use crate::timeline::Timeline;
 
 /// What the launcher knows of one service.
@@ -46,13 +48,11 @@ impl Counters {
     }
 }
 
-/// Instants that `health` accounts from `end_ns` on: nothing was published for them, so all of them
-/// are among its misses.
-fn accounted_from(health: &Health, end_ns: u64) -> u64 {
+/// Instants that `health` accounts after the last frame's, `end_ns`: nothing was published for
+/// them, so all of them are among its misses.
+fn accounted_after(health: &Health, end_ns: u64) -> u64 {
     let period_ns = health.period_ns.max(1);
-    (health.accounted_ns[1] + period_ns / 2)
-        .checked_sub(end_ns)
-        .map_or(0, |ns| ns / period_ns + 1)
+    (health.accounted_ns[1] + period_ns / 2).saturating_sub(end_ns) / period_ns
 }
 
 /// Reads Health and keeps the timeline.
@@ -60,6 +60,7 @@ pub struct Observer {
     graph: Graph,
     watched: Vec<Watched>,
     timeline: Timeline,
+    is_external: bool,
 }
 
 impl Observer {
@@ -85,6 +86,7 @@ impl Observer {
             watched,
             graph,
             timeline: Timeline::new(plan),
+            is_external: !plan.waits_for_ready(),
         })
     }
 
@@ -112,15 +114,28 @@ impl Observer {
                     timeline.add(service.name, event);
                 });
                 timeline.add_overwritten(overwritten);
+                // An external sensor does not say when the drive begins: the first action does.
+                if self.is_external && service.name == ServiceName::Supervisor && block.cycles > 0 {
+                    self.timeline.begin(block.accounted_ns[0]);
+                }
                 service.latest = Some(Box::new(*block));
             }
         }
         self.timeline.settle(show);
     }
 
+    /// What a simulator that replaces another has to know; `None` before the drive has begun.
+    pub fn drive(&self) -> Option<Drive> {
+        Some(Drive {
+            began_ns: self.ready_ns()?,
+            t_s: self.since_ready_s()?,
+            changes: self.timeline.changes(),
+        })
+    }
+
     /// Instant of the first cycle in which every service answered, ns.
     pub fn ready_ns(&self) -> Option<u64> {
-        self.timeline.first(EventKind::Ready)
+        self.timeline.origin_ns()
     }
 
     /// Seconds since then.
@@ -136,7 +151,7 @@ impl Observer {
         if let Some(health) = &service.latest {
             counters.add(health);
             if let Some(end_ns) = self.timeline.recording_end_ns() {
-                let unowed = accounted_from(health, end_ns);
+                let unowed = accounted_after(health, end_ns);
                 counters.missed = counters.missed.saturating_sub(unowed);
             }
         }
@@ -154,14 +169,41 @@ impl Observer {
     }
 
     /// The services are about to be stopped: what they say of that is no event.
-    pub fn close(&mut self) {
-        self.timeline.close(Monotonic.now_ns());
+    /// After the end of a recording they may answer for as long as `drain`.
+    pub fn close(&mut self, drain: Duration) {
+        let drained_ns = |end_ns: u64| end_ns.saturating_add(drain.as_nanos() as u64);
+        let limit_ns = self
+            .timeline
+            .recording_end_ns()
+            .map_or(u64::MAX, drained_ns);
+        self.timeline.close(Monotonic.now_ns().min(limit_ns));
     }
 
     /// Removes what dead processes left behind.
     pub fn remove_dead_peers(&self) {
         if let Graph::SharedMemory(link) = &self.graph {
             link.remove_dead_peers();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn instants_after_the_last_frame_are_counted_exactly() {
+        let health = |last_ns| Health {
+            period_ns: 1000,
+            accounted_ns: [1000, last_ns],
+            ..Health::default()
+        };
+        for (last_ns, expected) in [(4000, 0), (5000, 0), (6000, 1), (9000, 4), (8990, 4)] {
+            assert_eq!(
+                accounted_after(&health(last_ns), 5000),
+                expected,
+                "{last_ns}"
+            );
         }
     }
 }

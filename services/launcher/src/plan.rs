@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 
 use vigil_cycle::topic::ServiceName;
 use vigil_evaluation::frames;
+use vigil_robot::Injection;
 use vigil_setup::schema::Source;
 use vigil_setup::{GraphArgs, Setup};
 
@@ -26,6 +27,20 @@ pub struct LauncherArgs {
     pub json: bool,
 }
 
+/// Changes younger than this may not have been told by a simulator that has died, s.
+const UNTOLD_S: f64 = 0.2;
+
+/// What a simulator that replaces another has to know.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drive {
+    /// When the drive began, ns.
+    pub began_ns: u64,
+    /// Seconds since then.
+    pub t_s: f64,
+    /// What was broken and mended until now: `stuck:RM@5.02`, `clear:RM@9.4`.
+    pub changes: Vec<String>,
+}
+
 /// A checked start.
 pub struct Plan {
     /// The configuration, options applied.
@@ -43,10 +58,14 @@ impl Plan {
         }
         let mut graph = args.graph.clone();
         let mut setup = graph.load()?;
+        if !args.inject.is_empty() && setup.file.sensor.source != Source::Simulator {
+            return Err("--inject: only the simulator can be broken; the source is another".into());
+        }
         if setup.file.sensor.source == Source::Playback {
             if graph.rate.is_some() {
                 return Err(
-                    "--rate: recorded frames have their own rate; change it with --speed".into(),
+                    "--rate: recorded frames have their own; change it with --speed or sensor.speed"
+                        .into(),
                 );
             }
             graph.rate = Some(playback_rate_hz(&setup)?);
@@ -73,7 +92,10 @@ impl Plan {
                 .output()
                 .map_err(|error| format!("{}: {error}", program.display()))?;
             if !output.status.success() {
-                let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+                let mut said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+                if said.is_empty() {
+                    said = format!("{} --check: {}", name.as_str(), output.status);
+                }
                 if !problems.contains(&said) {
                     problems.push(said);
                 }
@@ -91,6 +113,11 @@ impl Plan {
         self.setup.file.sensor.source != Source::External
     }
 
+    /// True for a source that could only begin its recording again.
+    pub fn cannot_resume(&self, service: ServiceName) -> bool {
+        service == ServiceName::SensorSim && self.setup.file.sensor.source == Source::Playback
+    }
+
     /// The services to start: not sensor-sim when the sensor is external.
     pub fn services(&self) -> impl Iterator<Item = ServiceName> {
         let external = self.setup.file.sensor.source == Source::External;
@@ -99,19 +126,52 @@ impl Plan {
             .filter(move |&service| !(external && service == ServiceName::SensorSim))
     }
 
-    /// Program of a service, and the options that say what it is to do.
+    /// Program of a service, and the options that say what it is to do from the start.
     pub fn command(&self, name: ServiceName) -> (PathBuf, Vec<String>) {
+        let (program, mut line) = self.program(name);
+        if name == ServiceName::SensorSim {
+            line.extend(
+                self.inject
+                    .iter()
+                    .flat_map(|spec| ["--inject".into(), spec.clone()]),
+            );
+        }
+        (program, line)
+    }
+
+    /// The same for a service that replaces one that has died, in the middle of a `drive`.
+    pub fn command_again(
+        &self,
+        name: ServiceName,
+        drive: Option<&Drive>,
+    ) -> (PathBuf, Vec<String>) {
+        let (program, mut line) = self.program(name);
+        let (ServiceName::SensorSim, Some(drive)) = (name, drive) else {
+            return self.command(name);
+        };
+        line.extend(["--began-ns".into(), drive.began_ns.to_string()]);
+        let parse = |spec: &String| Injection::parse(spec, &self.setup.robot).ok();
+        // What was due just now may not have been told.
+        let is_to_come = |spec: &&String| {
+            parse(spec).is_some_and(|injection| {
+                let is_same = |told: Injection| {
+                    told.change == injection.change && (told.at_s - injection.at_s).abs() < UNTOLD_S
+                };
+                injection.at_s > drive.t_s - UNTOLD_S
+                    && !drive.changes.iter().filter_map(parse).any(is_same)
+            })
+        };
+        let specs = self.inject.iter().filter(is_to_come).chain(&drive.changes);
+        line.extend(specs.flat_map(|spec| ["--inject".into(), spec.clone()]));
+        (program, line)
+    }
+
+    fn program(&self, name: ServiceName) -> (PathBuf, Vec<String>) {
         let program = format!("vigil-{}", name.as_str());
         let beside = std::env::current_exe()
             .unwrap_or_default()
             .with_file_name(program);
-        let mut line = self.options.clone();
-        if name == ServiceName::SensorSim {
-            for spec in &self.inject {
-                line.extend(["--inject".to_owned(), spec.clone()]);
-            }
-        }
-        (beside, line)
+        (beside, self.options.clone())
     }
 }
 
@@ -120,7 +180,6 @@ fn playback_rate_hz(setup: &Setup) -> Result<f64, Box<dyn Error>> {
     let sensor = &setup.file.sensor;
     let path = setup.resolve(sensor.frames.as_deref().unwrap_or_default());
     let runs = frames::read(&path, &setup.robot)?;
-    let interval_s = frames::interval_s(&runs)
-        .ok_or_else(|| format!("{}: no run has two frames", path.display()))?;
-    Ok(sensor.speed.unwrap_or(1.0) / interval_s)
+    let rate_hz = frames::playback_rate_hz(&runs, sensor.speed.unwrap_or(1.0));
+    Ok(rate_hz.map_err(|error| format!("{}: {error}", path.display()))?)
 }

@@ -29,17 +29,16 @@ pub struct Timeline {
     raw: Vec<(ServiceName, Event)>,
     shown: usize,
     overwritten: u64,
-    deadlines_ns: [u64; ServiceName::ALL.len()],
+    origin_ns: Option<u64>,
     closed_ns: Option<u64>,
 }
 
 impl Timeline {
     /// An empty timeline for the services of a plan.
     pub fn new(plan: &Plan) -> Self {
-        let deadline_ns = |name| plan.setup.plan(name, None).schedule.deadline_ns;
         Self {
             namer: Namer::new(plan),
-            deadlines_ns: ServiceName::ALL.map(deadline_ns),
+            origin_ns: None,
             raw: Vec::new(),
             shown: 0,
             overwritten: 0,
@@ -53,6 +52,9 @@ impl Timeline {
             .closed_ns
             .is_none_or(|closed_ns| event.t_ns <= closed_ns)
         {
+            if event.kind == EventKind::Ready as u32 {
+                self.begin(event.t_ns);
+            }
             self.raw.push((service, *event));
         }
     }
@@ -72,27 +74,52 @@ impl Timeline {
         self.overwritten
     }
 
-    /// First instant of the schedule that no recorded frame answers any more, ns.
+    /// Instant from which times count, ns: the first cycle in which every service answered.
+    pub const fn origin_ns(&self) -> Option<u64> {
+        self.origin_ns
+    }
+
+    /// The drive began at `origin_ns`, unless it had begun before.
+    pub fn begin(&mut self, origin_ns: u64) {
+        self.origin_ns.get_or_insert(origin_ns);
+    }
+
+    /// Scheduled instant of a recording's last frame, ns, once it has been played.
     pub fn recording_end_ns(&self) -> Option<u64> {
         let end = |(_, e): &&(_, Event)| e.kind == EventKind::EndOfRecording as u32;
         self.raw.iter().find(end).map(|(_, event)| event.value)
     }
 
     /// False for what a service says because the recording is at its end: that it misses input.
-    fn is_told(&self, service: ServiceName, event: &Event) -> bool {
-        let deadline_ns = self.deadlines_ns[service.index()];
-        self.recording_end_ns()
-            .is_none_or(|end_ns| event.t_ns <= end_ns + deadline_ns)
-            || event.kind == EventKind::EndOfRecording as u32
+    fn is_told(&self, event: &Event) -> bool {
+        use EventKind::{InputBack, InputLost, Miss};
+        let is_missing = [Miss, InputLost, InputBack]
+            .map(|kind| kind as u32)
+            .contains(&event.kind);
+        !is_missing
+            || self
+                .recording_end_ns()
+                .is_none_or(|end_ns| event.t_ns <= end_ns)
+    }
+
+    /// What was broken and mended, in the words of `--inject`, with the time since the origin.
+    pub fn changes(&self) -> Vec<String> {
+        let told = self.told();
+        let changes = told
+            .iter()
+            .filter(|told| ["injected", "restored"].contains(&told.event));
+        changes
+            .map(|told| format!("{}@{}", told.what, told.t_s.max(0.0)))
+            .collect()
     }
 
     /// Puts the newly added events in order; prints them to standard error if `show`.
     pub fn settle(&mut self, show: bool) {
-        let origin_ns = self.first(EventKind::Ready);
+        let origin_ns = self.origin_ns;
         self.raw[self.shown..].sort_by_key(|(_, event)| event.t_ns);
         if show && origin_ns.is_some() {
             let new = self.raw[self.shown..].iter();
-            for (service, event) in new.filter(|(service, e)| self.is_told(*service, e)) {
+            for (service, event) in new.filter(|(_, event)| self.is_told(event)) {
                 let told = self.namer.tell(*service, event, origin_ns);
                 let p = told.p.map_or_else(String::new, |p| format!("  p={p:.3}"));
                 let Told {
@@ -102,7 +129,7 @@ impl Timeline {
                     what,
                     ..
                 } = told;
-                eprintln!("{t_s:9.3} s  {service:<10}  {event:<10}  {what}{p}");
+                tell!("{t_s:9.3} s  {service:<10}  {event:<10}  {what}{p}");
             }
         }
         if origin_ns.is_some() || !show {
@@ -125,12 +152,12 @@ impl Timeline {
 
     /// Every event in words, in order.
     pub fn told(&self) -> Vec<Told> {
-        let origin_ns = self.first(EventKind::Ready);
+        let origin_ns = self.origin_ns;
         let mut sorted = self.raw.clone();
         sorted.sort_by_key(|(_, event)| event.t_ns);
         sorted
             .iter()
-            .filter(|(service, event)| self.is_told(*service, event))
+            .filter(|(_, event)| self.is_told(event))
             .map(|(service, event)| self.namer.tell(*service, event, origin_ns))
             .collect()
     }

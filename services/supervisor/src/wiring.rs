@@ -131,6 +131,7 @@ impl Stage for SupervisorStage {
     }
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        health.add_input(&self.detection_account);
         let Decided {
             seq,
             action,

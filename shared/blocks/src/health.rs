@@ -57,8 +57,7 @@ pub enum EventKind {
     Refused = 13,
     /// A new run began. `value`: its id.
     Run = 14,
-    /// Recorded frames are at their end. `value`: the first instant of the schedule that no frame
-    /// answers any more, ns.
+    /// Recorded frames are at their end. `value`: scheduled instant of the last frame, ns.
     EndOfRecording = 15,
     /// The robot begins to obey another decision. `what` and `value` as for `Action`.
     Obeys = 16,

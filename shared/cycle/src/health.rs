@@ -4,15 +4,21 @@ use vigil_blocks::{EVENTS, Event, EventKind, Health, ServiceState};
 
 use crate::clock::Clock;
 use crate::deadline::Schedule;
+use crate::input::InputAccount;
 use crate::placement::{self, Placement, Wanted};
 use crate::port::{PortError, Sender, Stamp};
 
 /// Health goes out at least this often, ns; at once when something happens.
 pub const HEALTH_PERIOD_NS: u64 = 50_000_000;
 
+/// Misses are told at most this often, ns, summed up: a flood must not push out other events.
+const MISS_EVENT_INTERVAL_NS: u64 = 100_000_000;
+
 /// Collects counters and events, and publishes them.
 pub struct HealthBoard {
     block: Health,
+    untold_misses: u64,
+    next_miss_event_ns: u64,
     sender: Box<dyn Sender<Health>>,
     published_ns: u64,
     changed: bool,
@@ -43,6 +49,8 @@ impl HealthBoard {
         };
         Self {
             block,
+            untold_misses: 0,
+            next_miss_event_ns: 0,
             sender,
             published_ns: 0,
             changed: true,
@@ -107,6 +115,23 @@ impl HealthBoard {
         };
         self.block.event_count += 1;
         self.changed = true;
+    }
+
+    /// Tells misses: at once, but summed up when they come in a flood.
+    pub fn miss(&mut self, now_ns: u64, count: u64) {
+        self.untold_misses += count;
+        if self.untold_misses > 0 && now_ns >= self.next_miss_event_ns {
+            self.event(now_ns, EventKind::Miss, 0, 0.0, self.untold_misses);
+            self.untold_misses = 0;
+            self.next_miss_event_ns = now_ns + MISS_EVENT_INTERVAL_NS;
+        }
+    }
+
+    /// Adds what the account of a further input says.
+    pub const fn add_input(&mut self, account: &InputAccount) {
+        self.block.lost += account.lost;
+        self.block.duplicate += account.duplicate;
+        self.block.invalid += account.invalid;
     }
 
     /// When the block has to go out next, ns.

@@ -14,7 +14,7 @@ pub struct Wanted {
 pub struct Placement {
     /// Core on which the thread runs now.
     pub core: usize,
-    /// True if that core is the only one it may run on.
+    /// True if the core that was asked for is the only one it may run on.
     pub pinned: bool,
     /// Scheduling policy (`SCHED_FIFO` is 1, `SCHED_OTHER` 0).
     pub policy: u32,
@@ -54,7 +54,7 @@ pub fn apply(wanted: Wanted) -> Placement {
     };
     Placement {
         memory_locked: locked,
-        ..read_back()
+        ..read_back(wanted.core)
     }
 }
 
@@ -67,23 +67,24 @@ pub fn current_core() -> usize {
     usize::try_from(core).unwrap_or(usize::MAX)
 }
 
-/// Reads the placement of the calling thread from the kernel (`memory_locked` is not known here
-/// and false).
+/// Reads the placement of the calling thread, which was to run on `core`, from the kernel
+/// (`memory_locked` is not known here and false).
 #[must_use]
-pub fn read_back() -> Placement {
+pub fn read_back(core: usize) -> Placement {
     let mut param = libc::sched_param { sched_priority: 0 };
     // SAFETY: both calls only write into the locals that they are given; the cpu set is plain bits.
     #[allow(unsafe_code)]
-    let (policy, allowed) = unsafe {
+    let (policy, pinned) = unsafe {
         let policy = libc::sched_getscheduler(0);
         libc::sched_getparam(0, &raw mut param);
         let mut set: libc::cpu_set_t = std::mem::zeroed();
         libc::sched_getaffinity(0, size_of::<libc::cpu_set_t>(), &raw mut set);
-        (policy, libc::CPU_COUNT(&set))
+        let is_in = core < libc::CPU_SETSIZE as usize && libc::CPU_ISSET(core, &set);
+        (policy, is_in && libc::CPU_COUNT(&set) == 1)
     };
     Placement {
         core: current_core(),
-        pinned: allowed == 1,
+        pinned,
         policy: u32::try_from(policy).unwrap_or(u32::MAX),
         priority: u32::try_from(param.sched_priority).unwrap_or(0),
         memory_locked: false,

@@ -1,4 +1,4 @@
-//! Orderly stop on SIGINT and SIGTERM.
+//! Orderly stop on SIGINT, SIGTERM, SIGHUP and SIGQUIT.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -8,10 +8,10 @@ extern "C" fn on_signal(_: libc::c_int) {
     STOP.store(true, Ordering::Relaxed);
 }
 
-/// From now on SIGINT and SIGTERM only set the flag that [`stop_requested`] reads. Blocking calls
+/// From now on these signals only set the flag that [`stop_requested`] reads. Blocking calls
 /// return early (no `SA_RESTART`).
 pub fn install() {
-    for signal in [libc::SIGINT, libc::SIGTERM] {
+    for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP, libc::SIGQUIT] {
         // SAFETY: the handler is async-signal-safe (one atomic store); the zeroed sigaction has an
         // empty mask and no flags.
         #[allow(unsafe_code)]
@@ -23,7 +23,7 @@ pub fn install() {
     }
 }
 
-/// True once SIGINT or SIGTERM has arrived.
+/// True once a stop was asked for.
 #[must_use]
 pub fn stop_requested() -> bool {
     STOP.load(Ordering::Relaxed)

@@ -114,10 +114,7 @@ impl SourceCycle {
         let health = self.health.block();
         health.slips += slips;
         (health.missed, health.accounted_ns) = (total, accounted_ns);
-        if missed > 0 {
-            let kind = vigil_blocks::EventKind::Miss;
-            self.health.event(published_ns, kind, 0, 0.0, missed);
-        }
+        self.health.miss(published_ns, missed);
     }
 
     /// Announces the end.

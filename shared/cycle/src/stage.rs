@@ -11,8 +11,6 @@ use crate::port::{PortError, Stamp};
 
 /// Misses in a row after which the input counts as lost, and the service as degraded.
 const LOST_AFTER_MISSES: u64 = 3;
-/// Misses are told at most this often, ns, summed up: a flood must not push out other events.
-const MISS_EVENT_INTERVAL_NS: u64 = 100_000_000;
 
 /// A service's work, as the cycle sees it. Implementations hold the ports and the filter.
 pub trait Stage {
@@ -30,7 +28,8 @@ pub trait Stage {
     /// The transport's.
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError>;
 
-    /// Reports events of the last step, and handles control commands. Off the critical path.
+    /// Reports events of the last step, adds the accounts of further inputs (anew in each turn),
+    /// handles control commands. Off the critical path.
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64);
 }
 
@@ -116,8 +115,6 @@ pub struct StageCycle {
     last_cause: Cause,
     last_stamp: Stamp,
     misses_in_a_row: u64,
-    untold_misses: u64,
-    next_miss_event_ns: u64,
 }
 
 impl StageCycle {
@@ -134,8 +131,6 @@ impl StageCycle {
             last_cause: Cause::default(),
             last_stamp: Stamp::default(),
             misses_in_a_row: 0,
-            untold_misses: 0,
-            next_miss_event_ns: 0,
         })
     }
 
@@ -221,14 +216,9 @@ impl StageCycle {
         overdue: u64,
         clock: &impl Clock,
     ) -> Result<(), PortError> {
-        use vigil_blocks::EventKind::{InputBack, InputLost, Miss};
+        use vigil_blocks::EventKind::{InputBack, InputLost};
         let now_ns = clock.now_ns();
-        self.untold_misses += overdue;
-        if self.untold_misses > 0 && now_ns >= self.next_miss_event_ns {
-            self.health.event(now_ns, Miss, 0, 0.0, self.untold_misses);
-            self.untold_misses = 0;
-            self.next_miss_event_ns = now_ns + MISS_EVENT_INTERVAL_NS;
-        }
+        self.health.miss(now_ns, overdue);
         let was_lost = self.misses_in_a_row >= LOST_AFTER_MISSES;
         self.misses_in_a_row = if frames > 0 {
             0

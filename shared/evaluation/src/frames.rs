@@ -142,22 +142,32 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
     Ok(runs)
 }
 
-/// Median interval between consecutive frames of a run, s; `None` if no run has two frames.
-#[must_use]
-pub fn interval_s(runs: &[Run]) -> Option<f64> {
+/// Rate at which recorded runs are played at `speed` times their own, Hz: from the median interval
+/// between consecutive frames. A message if it is not within 1 to 10000 Hz.
+///
+/// # Errors
+/// What is wrong, and what is allowed.
+pub fn playback_rate_hz(runs: &[Run], speed: f64) -> Result<f64, String> {
     let pairs = runs.iter().flat_map(|run| run.frames.windows(2));
     let mut intervals_ns: Vec<u64> = pairs
         .map(|pair| pair[1].header.t_capture_ns - pair[0].header.t_capture_ns)
         .collect();
     let middle = intervals_ns.len() / 2;
     if intervals_ns.is_empty() {
-        return None;
+        return Err("no run has two frames".into());
     }
     let (_, median_ns, _) = intervals_ns.select_nth_unstable(middle);
-    Some(*median_ns as f64 * 1e-9)
+    let interval_s = *median_ns as f64 * 1e-9;
+    let rate_hz = speed / interval_s;
+    if (1.0..=1e4).contains(&rate_hz) {
+        return Ok(rate_hz);
+    }
+    Err(format!(
+        "a frame every {interval_s:.4} s, played at --speed {speed} (sensor.speed), makes \
+         {rate_hz} Hz: allowed is 1 to 10000 Hz"
+    ))
 }
 
-/// Checks a frame against the ones before it in its run.
 fn follows(table: &Table, run: &Run, frame: &SensorFrame) -> Result<(), FramesError> {
     let Some(before) = run.frames.last() else {
         return Ok(());

@@ -2,8 +2,8 @@
 //!
 //! With k occupied cells, `n` particles keep the Kullback-Leibler distance between their histogram
 //! and the belief below `error` with the probability of the quantile `z` if
-//! `n = (k-1)/(2 error) · (1 - 2/(9(k-1)) + sqrt(2/(9(k-1))) z)³` (Fox, *Adapting the Sample Size in
-//! Particle Filters Through KLD-Sampling*, 2003, equation 12, by the Wilson-Hilferty
+//! `n = (k-1)/(2 error) · (1 - 2/(9(k-1)) + sqrt(2/(9(k-1))) z)³` (Fox, *Adapting the Sample Size
+//! in Particle Filters Through KLD-Sampling*, 2003, equation 12, by the Wilson-Hilferty
 //! approximation). The cells are counted on the weighted particles before resampling.
 
 /// Counts occupied cells and gives the number of particles for the next step.
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn the_count_is_half_a_chi_squared_quantile_over_the_error() {
-        // Tabulated 99 % quantiles of chi-squared: 1 degree of freedom 6.635, 10: 23.209, 50: 76.154.
+        // 99 % quantiles of chi-squared for 1, 10 and 50 degrees of freedom.
         let adaptive = Adaptive::new(0.01, 2.326_347_9, 1, 1_000_000);
         for (occupied, quantile) in [(2, 6.635), (11, 23.209), (51, 76.154)] {
             let expected = quantile / (2.0 * 0.01);

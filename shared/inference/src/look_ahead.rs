@@ -3,9 +3,9 @@
 //! A particle is a mode and a Gaussian over the continuous state. Before anything is drawn, every
 //! mode is tried: `l_k = ln P(k | d) + ln p(z | k, Gaussian)` by one Kalman step each. Parents are
 //! resampled by `Σ_k exp(l_k)` first, then the mode is drawn by `exp(l_k)`: both drawings know the
-//! observation (Morales-Menéndez, de Freitas and Poole, *Real-Time Monitoring of Complex Industrial
-//! Processes with Particle Filters*, 2002). The belief over modes sums the `exp(l_k)` themselves, so
-//! it has no sampling noise of this step.
+//! observation (Morales-Menéndez, de Freitas and Poole, *Real-Time Monitoring of Complex
+//! Industrial Processes with Particle Filters*, 2002). The belief over modes sums the `exp(l_k)`
+//! themselves, so it has no sampling noise of this step.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;

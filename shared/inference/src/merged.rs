@@ -2,8 +2,9 @@
 //!
 //! Exact mode sequences grow without bound; here the Gaussians that lead into one mode are merged
 //! into one of the same mean and covariance before each prediction (Blom and Bar-Shalom, *The
-//! Interacting Multiple Model Algorithm*, 1988): `μ_ij = b_i P_ij / Σ_i`, mean `m̄_j = Σ_i μ_ij m_i`,
-//! covariance `Σ_i μ_ij (V_i + (m_i - m̄_j)(m_i - m̄_j)ᵀ)`.
+//! Interacting Multiple Model
+//! Algorithm*, 1988): `μ_ij = b_i P_ij / Σ_i`, mean `m_j = Σ_i μ_ij m_i`,
+//! covariance `Σ_i μ_ij (V_i + (m_i - m_j)(m_i - m_j)ᵀ)`.
 
 use crate::filter::{Event, Filter, Step, normalise_into};
 use crate::gaussian::Gaussian;

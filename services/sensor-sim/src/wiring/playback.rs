@@ -17,7 +17,9 @@ pub struct PlaybackSource {
     run_id: u64,
     run_told: u64,
     ready_told: bool,
-    ended_ns: Option<u64>,
+    /// Scheduled instant of the last frame.
+    last_ns: u64,
+    ended: bool,
     end_told: bool,
 }
 
@@ -35,7 +37,8 @@ impl PlaybackSource {
             run_id: 0,
             run_told: 0,
             ready_told: false,
-            ended_ns: None,
+            last_ns: 0,
+            ended: false,
             end_told: false,
         })
     }
@@ -48,11 +51,11 @@ impl Source for PlaybackSource {
         }
         self.actions.take(t_schedule_ns, self.frames.epoch());
         let Some(frame) = self.playback.next() else {
-            self.ended_ns = Some(t_schedule_ns);
+            self.ended = true;
             return Ok(Produced::End);
         };
         *self.frames.block() = *frame;
-        self.run_id = frame.run_id;
+        (self.run_id, self.last_ns) = (frame.run_id, t_schedule_ns);
         let stamp = Stamp {
             t_schedule_ns,
             t_capture_ns: frame.header.t_capture_ns,
@@ -70,8 +73,8 @@ impl Source for PlaybackSource {
             health.event(now_ns, EventKind::Run, 0, 0.0, self.run_id - 1);
             self.run_told = self.run_id;
         }
-        if let Some(ended_ns) = self.ended_ns.filter(|_| !self.end_told) {
-            health.event(now_ns, EventKind::EndOfRecording, 0, 0.0, ended_ns);
+        if self.ended && !self.end_told {
+            health.event(now_ns, EventKind::EndOfRecording, 0, 0.0, self.last_ns);
             self.end_told = true;
         }
     }

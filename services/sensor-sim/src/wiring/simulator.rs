@@ -32,8 +32,9 @@ pub struct SimulatorSource {
     ready_told: bool,
     refusal: Option<Refusal>,
     refusal_told: Option<Refusal>,
-    obeyed_seq: u64,
-    obeyed_told: u64,
+    /// Epoch and number of the decision obeyed.
+    obeyed: (u64, u64),
+    obeyed_told: (u64, u64),
 }
 
 impl SimulatorSource {
@@ -67,8 +68,8 @@ impl SimulatorSource {
             ready_told: false,
             refusal: None,
             refusal_told: None,
-            obeyed_seq: 0,
-            obeyed_told: 0,
+            obeyed: (0, 0),
+            obeyed_told: (0, 0),
         })
     }
 
@@ -140,7 +141,10 @@ impl Source for SimulatorSource {
         let command = self
             .obedience
             .apply(planned, self.actions.newest(), clock.now_ns());
-        (self.refusal, self.obeyed_seq) = (command.refusal, command.action_seq);
+        self.refusal = command.refusal;
+        if let (None, Some(action)) = (command.refusal, self.actions.newest()) {
+            self.obeyed = (action.header.epoch, command.action_seq);
+        }
         let last_ns = self.last_ns.replace(t_schedule_ns);
         let passed_ns = last_ns.map_or(self.period_ns, |last_ns| t_schedule_ns - last_ns);
         self.world.step(passed_ns as f64 * 1e-9, command);
@@ -159,12 +163,12 @@ impl Source for SimulatorSource {
             self.refusal_told = None;
         }
         if self.ready_told
-            && self.obeyed_seq != self.obeyed_told
+            && self.obeyed != self.obeyed_told
             && let Some(action) = self.actions.newest()
         {
             let (what, wheel) = (action.action, u64::from(action.wheel));
             health.event(now_ns, EventKind::Obeys, what, 0.0, wheel);
-            self.obeyed_told = self.obeyed_seq;
+            self.obeyed_told = self.obeyed;
         }
         self.take_control(health, now_ns);
         for (at_ns, change) in self.changes.drain(..) {

@@ -10,6 +10,7 @@ use vigil_blocks::{
 use vigil_cycle::domain::shared_memory_free_bytes;
 use vigil_cycle::placement::{self, Placement, Wanted};
 use vigil_cycle::topic::ServiceName;
+use vigil_evaluation::frames;
 use vigil_setup::schema::Source;
 use vigil_setup::{GraphArgs, Setup};
 
@@ -112,8 +113,13 @@ fn configuration(setup: &Setup) -> Finding {
 /// Lets each service assemble what it runs on.
 fn models(setup: &Setup) -> Finding {
     let assembled = || -> Result<(), Box<dyn Error>> {
-        if setup.file.sensor.source != Source::External {
+        let sensor = &setup.file.sensor;
+        if sensor.source != Source::External {
             vigil_sensor_sim::assemble(setup, &[])?;
+        }
+        if let (Source::Playback, Some(frames)) = (sensor.source, &sensor.frames) {
+            let runs = frames::read(&setup.resolve(frames), &setup.robot)?;
+            frames::playback_rate_hz(&runs, sensor.speed.unwrap_or(1.0))?;
         }
         vigil_detector::assemble(setup)?;
         vigil_identifier::assemble(setup)?;

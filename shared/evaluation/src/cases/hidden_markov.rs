@@ -16,10 +16,13 @@ const SENSORS: usize = 6;
 /// The hidden Markov model, its observations and exact beliefs.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct HiddenMarkov {
+    /// Transition probabilities, row by row.
     #[serde(rename = "P")]
     transition: [[f64; MODES]; MODES],
+    /// Means of the observations in each mode.
     #[serde(rename = "M")]
     means: [[f64; SENSORS]; MODES],
+    /// Standard deviation of every observation.
     sigma: f64,
     /// One row per step.
     #[serde(rename = "obs")]

@@ -19,21 +19,31 @@ const MODES: usize = 3;
 /// `~ N(mu[d_t], sigma_w² I)`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct JumpLinear {
+    /// Transition probabilities, row by row.
     #[serde(rename = "P")]
     transition: [[f64; MODES]; MODES],
+    /// Shift of the pose in each mode.
     #[serde(rename = "B")]
     shift: [[f64; 3]; MODES],
+    /// Variances of the motion.
     #[serde(rename = "Q")]
     noise: [f64; 3],
+    /// Variances of the measured pose.
     #[serde(rename = "R")]
     sensor_noise: [f64; 3],
+    /// Mean wheel rates in each mode.
     mu: [[f64; 2]; MODES],
+    /// Standard deviation of a measured wheel rate.
     sigma_w: f64,
+    /// Mean before the first transition.
     #[serde(rename = "m0")]
     mean_before: [f64; 3],
+    /// Variances before the first transition.
     #[serde(rename = "C0")]
     variance_before: [f64; 3],
+    /// Measured poses, one row per step.
     obs: Vec<[f64; 3]>,
+    /// Measured wheel rates, one row per step.
     wheel: Vec<[f64; 2]>,
     /// `p(d_t | z_1 .. z_t)`.
     pub filter: Vec<[f64; MODES]>,

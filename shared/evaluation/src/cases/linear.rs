@@ -18,16 +18,22 @@ type Rows = [[f64; 3]; 3];
 /// `x' = A x + b + N(0, Q)`, `z = x + N(0, R)`; Q and R are diagonal.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Linear {
+    /// A.
     #[serde(rename = "A")]
     transition: Rows,
+    /// b.
     #[serde(rename = "b")]
     shift: [f64; 3],
+    /// Q.
     #[serde(rename = "Q")]
     noise: Rows,
+    /// R.
     #[serde(rename = "R")]
     sensor_noise: Rows,
+    /// Mean before the first transition.
     #[serde(rename = "m0")]
     mean_before: [f64; 3],
+    /// Covariance before the first transition.
     #[serde(rename = "C0")]
     covariance_before: Rows,
     /// One row per step.
