@@ -8,6 +8,7 @@ use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Linear};
 use vigil_inference::bootstrap::ParticleFilter;
 use vigil_inference::filter::Filter;
 use vigil_inference::forward::Forward;
+use vigil_inference::hierarchical::Hierarchical;
 use vigil_inference::hybrid::Conditional;
 use vigil_inference::look_ahead::LookAhead;
 use vigil_inference::merged::Merged;
@@ -285,6 +286,38 @@ fn better_proposals_keep_belief_and_evidence_and_need_fewer_particles() {
         let (found, bias) = at(proposal, 10_000);
         assert!(found < 0.015 && bias.abs() < 0.3, "{found}, bias {bias}");
     }
+}
+
+#[test]
+fn the_hierarchy_keeps_belief_and_evidence_and_needs_fewer_particles() {
+    let case = hidden_markov();
+    let exact = *case.log_evidence.last().unwrap();
+    // Left and right wheels stuck, broken encoders.
+    let nodes = [vec![1, 2, 3], vec![4, 5, 6], (7..13).collect()];
+    let at = |count| {
+        mean_of(20, exact, |seed| {
+            let resampling = Resampling::default();
+            let filter = Hierarchical::new(case.clone(), &nodes, resampling, count, seed);
+            run(&mut filter.unwrap(), case.observations.iter(), &case.filter)
+        })
+    };
+    let (flat, _) = mean_of(20, exact, |seed| {
+        let mut filter = bootstrap(&case, Resampling::default(), 300, seed);
+        run(&mut filter, case.observations.iter(), &case.filter)
+    });
+    let (few, _) = at(300);
+    assert!(few < 0.8 * flat, "{few}, flat {flat}");
+    let (many, bias) = at(10_000);
+    assert!(many < 0.015 && bias.abs() < 0.3, "{many}, bias {bias}");
+
+    let case = jump_linear();
+    let exact = *case.log_evidence.last().unwrap();
+    let (found, bias) = mean_of(20, exact, |seed| {
+        let resampling = Resampling::default();
+        let filter = Hierarchical::new(case.clone(), &[vec![1, 2]], resampling, 10_000, seed);
+        run(&mut filter.unwrap(), case.observations(), &case.filter)
+    });
+    assert!(found < 0.04 && bias.abs() < 0.3, "{found}, bias {bias}");
 }
 
 #[test]

@@ -33,6 +33,12 @@ pub trait Sampled: Modes {
     /// `ln p(z_t | d_t, c_t)`; minus infinity for what is impossible.
     fn log_likelihood(&self, mode: usize, state: &Self::State, z: &Self::Observation) -> f64;
 
+    /// `ln p(c_t | d_t, c_{t-1})`, up to a term that is the same in every mode: for filters that
+    /// compare modes on one path. 0 where the mode does not move the state.
+    fn log_motion(&self, _mode: usize, _before: &Self::State, _after: &Self::State) -> f64 {
+        0.0
+    }
+
     /// A state that explains the observation by itself, for a filter that has lost its track;
     /// `None` if an observation says too little.
     fn locate(

@@ -122,6 +122,11 @@ impl Sampled for JumpLinear {
         state + vector(&self.shift[mode]) + noise(&self.noise, rng)
     }
 
+    fn log_motion(&self, mode: usize, before: &Vector3<f64>, after: &Vector3<f64>) -> f64 {
+        let apart = after - before - vector(&self.shift[mode]);
+        (0..3).map(|i| log_normal(apart[i], self.noise[i])).sum()
+    }
+
     fn log_likelihood(&self, mode: usize, state: &Vector3<f64>, z: &PoseAndWheels) -> f64 {
         let pose: f64 = (0..3)
             .map(|i| log_normal(z.pose[i] - state[i], self.sensor_noise[i]))

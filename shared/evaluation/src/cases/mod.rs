@@ -4,6 +4,7 @@
 mod hidden_markov;
 mod jump_linear;
 mod linear;
+mod planar;
 
 use std::path::Path;
 
@@ -14,6 +15,7 @@ use vigil_inference::gaussian::Gaussian;
 pub use hidden_markov::HiddenMarkov;
 pub use jump_linear::{JumpLinear, PoseAndWheels};
 pub use linear::Linear;
+pub use planar::{Planar, PlanarObservation};
 
 /// Why a case could not be read.
 #[derive(Debug, thiserror::Error)]

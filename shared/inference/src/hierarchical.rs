@@ -1,0 +1,346 @@
+//! Hierarchical identification: faults are tracked together until the data can tell them apart.
+//!
+//! The paper's identification filter (Verma, Fernandez and Simmons 2002, section 4.3) moves
+//! particles down a tree: from nominal to an abstract node (a stuck wheel on the left), from there
+//! to a leaf (the left front wheel). A classical filter commits each of its few fault particles to
+//! one leaf at once; an abstract particle stands for all leaves below it.
+//!
+//! Here an abstract particle carries the probability of each leaf below it, given its own path: with
+//! predicted shares `s_k`, a state drawn from the mixture `Σ s_k p(c' | k, c)` and the observation,
+//! `s_k' ∝ s_k p(c' | k, c) p(z | k, c')`, and the particle's weight is multiplied by
+//! `Σ s_k p(c'|k,c) p(z|k,c') / Σ s_k p(c'|k,c)`. So nothing is lost when it moves down.
+//!
+//! When an abstract node is worth its coarseness is decided by the rule of the variable resolution
+//! filter (Verma, Thrun and Simmons, IJCAI 2003): with the mass p_A of a node, p_k of its leaves,
+//! their prior shares π_k and N particles, the squared error of the coarse answer
+//! `Σ (p_k - π_k p_A)² + p_A (1 - p_A) Σ π_k² / N` is set against that of the fine one
+//! `Σ p_k (1 - p_k) / N`; a node is split when the coarse error is larger, merged again when it is
+//! smaller by the factor 2.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use crate::filter::{Event, Filter, Step};
+use crate::hybrid::Sampled;
+use crate::resample::Resampling;
+use crate::weights::Weights;
+
+/// A node is merged again when the coarse error is smaller than the fine one by this factor.
+const HYSTERESIS: f64 = 2.0;
+
+/// Why a hierarchy was refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum HierarchyError {
+    /// An abstract node needs two modes at least, none of them the nominal one.
+    #[error("abstract node {0} needs two or more modes other than the nominal one")]
+    Node(usize),
+    /// A mode belongs to two abstract nodes, or does not exist.
+    #[error("mode {mode} of abstract node {node} does not exist or belongs to another node too")]
+    Mode {
+        /// Index of the abstract node.
+        node: usize,
+        /// Index of the mode.
+        mode: usize,
+    },
+}
+
+#[derive(Debug, Clone)]
+struct Node {
+    leaves: Vec<usize>,
+    /// π: shares of the leaves in what the nominal mode passes on to the node.
+    prior: Vec<f64>,
+    merged: bool,
+}
+
+/// The hierarchical filter over the modes and states of `M`.
+#[derive(Debug, Clone)]
+pub struct Hierarchical<M: Sampled> {
+    model: M,
+    nodes: Vec<Node>,
+    /// Abstract node above each mode.
+    node_of: Vec<Option<usize>>,
+    resampling: Resampling,
+    rng: Pcg64Mcg,
+    states: Vec<M::State>,
+    other_states: Vec<M::State>,
+    /// Row i: the share of each mode in particle i.
+    shares: Vec<f64>,
+    other_shares: Vec<f64>,
+    weights: Weights,
+    increments: Vec<f64>,
+    ancestors: Vec<u32>,
+    predicted: Vec<f64>,
+    posterior: Vec<f64>,
+}
+
+impl<M: Sampled> Hierarchical<M> {
+    /// A filter of `count` particles, at least 1. `abstract_nodes` lists the modes below each
+    /// abstract node; modes below none stand for themselves.
+    ///
+    /// # Errors
+    /// [`HierarchyError`] naming the node.
+    pub fn new(
+        model: M,
+        abstract_nodes: &[Vec<usize>],
+        resampling: Resampling,
+        count: usize,
+        seed: u64,
+    ) -> Result<Self, HierarchyError> {
+        let (count, modes) = (count.max(1), model.modes());
+        let mut node_of = vec![None; modes];
+        let mut nodes = Vec::new();
+        for (node, leaves) in abstract_nodes.iter().enumerate() {
+            if leaves.len() < 2 || leaves.contains(&0) {
+                return Err(HierarchyError::Node(node));
+            }
+            for &mode in leaves {
+                match node_of.get_mut(mode) {
+                    Some(above @ None) => *above = Some(node),
+                    _ => return Err(HierarchyError::Mode { node, mode }),
+                }
+            }
+            let births: Vec<f64> = leaves.iter().map(|&k| model.transition(0, k)).collect();
+            let total: f64 = births.iter().sum();
+            let equal = 1.0 / leaves.len() as f64;
+            let share = |birth: f64| if total > 0.0 { birth / total } else { equal };
+            nodes.push(Node {
+                leaves: leaves.clone(),
+                prior: births.into_iter().map(share).collect(),
+                merged: true,
+            });
+        }
+        let mut rng = Pcg64Mcg::seed_from_u64(seed);
+        let state = model.draw(0, &mut rng);
+        let mut filter = Self {
+            nodes,
+            node_of,
+            resampling,
+            rng,
+            states: vec![state; count],
+            other_states: vec![state; count],
+            shares: vec![0.0; count * modes],
+            other_shares: vec![0.0; count * modes],
+            weights: Weights::equal(count),
+            increments: vec![0.0; count],
+            ancestors: vec![0; count],
+            predicted: vec![0.0; modes],
+            posterior: vec![0.0; modes],
+            model,
+        };
+        filter.reset();
+        Ok(filter)
+    }
+
+    /// True while the leaves of an abstract node are tracked together.
+    #[must_use]
+    pub fn is_merged(&self, node: usize) -> bool {
+        self.nodes.get(node).is_some_and(|node| node.merged)
+    }
+
+    /// The abstract node as which mode `k` is tracked at present.
+    fn group(&self, k: usize) -> Option<usize> {
+        self.node_of[k].filter(|&node| self.nodes[node].merged)
+    }
+
+    /// Draws the group of particle i for the next step and fills `predicted` with the shares in it.
+    fn predict_shares(&mut self, i: usize) {
+        let modes = self.model.modes();
+        let row = &self.shares[i * modes..(i + 1) * modes];
+        self.predicted.fill(0.0);
+        for (from, share) in row.iter().enumerate().filter(|(_, share)| **share > 0.0) {
+            for (to, predicted) in self.predicted.iter_mut().enumerate() {
+                *predicted += share * self.model.transition(from, to);
+            }
+        }
+        let drawn = draw(&self.predicted, &mut self.rng);
+        let group = self.group(drawn);
+        let mut total = 0.0;
+        for k in 0..modes {
+            let stays = k == drawn || (group.is_some() && self.group(k) == group);
+            if !stays {
+                self.predicted[k] = 0.0;
+            }
+            total += self.predicted[k];
+        }
+        if total > 0.0 {
+            self.predicted.iter_mut().for_each(|share| *share /= total);
+        } else {
+            // Rows that do not sum to 1 lead nowhere.
+            self.predicted[drawn] = 1.0;
+        }
+    }
+
+    /// Moves particle i and conditions its shares; returns the logarithm of its weight's factor.
+    fn move_particle(&mut self, i: usize, z: &M::Observation) -> f64 {
+        let modes = self.model.modes();
+        let leaf = draw(&self.predicted, &mut self.rng);
+        let before = self.states[i];
+        let after = self.model.propagate(leaf, &before, &mut self.rng);
+        self.states[i] = after;
+        let row = &mut self.shares[i * modes..(i + 1) * modes];
+        if self.predicted[leaf] >= 1.0 {
+            row.copy_from_slice(&self.predicted);
+            return self.model.log_likelihood(leaf, &after, z);
+        }
+        // Motion relative to the drawn leaf's, so that nothing underflows.
+        let reference = self.model.log_motion(leaf, &before, &after);
+        let (mut moved, mut highest) = (0.0, f64::NEG_INFINITY);
+        for (k, share) in row.iter_mut().enumerate() {
+            *share = f64::NEG_INFINITY;
+            if self.predicted[k] > 0.0 {
+                let motion = self.model.log_motion(k, &before, &after) - reference;
+                let prior = self.predicted[k] * motion.exp();
+                moved += prior;
+                *share = prior.ln() + self.model.log_likelihood(k, &after, z);
+                highest = highest.max(*share);
+            }
+        }
+        if !(highest.is_finite() && moved.is_finite() && moved > 0.0) {
+            row.copy_from_slice(&self.predicted);
+            return f64::NEG_INFINITY;
+        }
+        let mut total = 0.0;
+        for share in row.iter_mut() {
+            let value = (*share - highest).exp();
+            *share = if value.is_nan() { 0.0 } else { value };
+            total += *share;
+        }
+        for share in row.iter_mut() {
+            *share /= total;
+        }
+        highest + total.ln() - moved.ln()
+    }
+
+    fn sum_modes(&mut self) {
+        let modes = self.model.modes();
+        self.posterior.fill(0.0);
+        for (row, weight) in self.shares.chunks_exact(modes).zip(self.weights.linear()) {
+            for (p, share) in self.posterior.iter_mut().zip(row) {
+                *p += weight * share;
+            }
+        }
+        let total: f64 = self.posterior.iter().sum();
+        for p in &mut self.posterior {
+            *p /= total;
+        }
+    }
+
+    fn resample(&mut self) {
+        let modes = self.model.modes();
+        let scheme = self.resampling.scheme;
+        let weights = self.weights.linear();
+        if !scheme.resample(
+            weights,
+            &mut self.increments,
+            &mut self.ancestors,
+            &mut self.rng,
+        ) {
+            return;
+        }
+        for (i, &ancestor) in self.ancestors.iter().enumerate() {
+            let from = ancestor as usize;
+            self.other_states[i] = self.states[from];
+            let row = &self.shares[from * modes..(from + 1) * modes];
+            self.other_shares[i * modes..(i + 1) * modes].copy_from_slice(row);
+        }
+        std::mem::swap(&mut self.states, &mut self.other_states);
+        std::mem::swap(&mut self.shares, &mut self.other_shares);
+        self.weights.level(self.states.len());
+    }
+
+    /// Splits and merges nodes by the rule above.
+    fn choose_resolution(&mut self) {
+        let count = self.states.len() as f64;
+        for index in 0..self.nodes.len() {
+            let node = &self.nodes[index];
+            let mass: f64 = node.leaves.iter().map(|&k| self.posterior[k]).sum();
+            let mut coarse = 0.0;
+            let mut fine = 0.0;
+            for (&k, prior) in node.leaves.iter().zip(&node.prior) {
+                let p = self.posterior[k];
+                let bias = p - prior * mass;
+                coarse += bias * bias + mass * (1.0 - mass) * prior * prior / count;
+                fine += p * (1.0 - p) / count;
+            }
+            if node.merged && coarse > fine {
+                self.nodes[index].merged = false;
+                self.split(index);
+            } else if !node.merged && coarse * HYSTERESIS < fine {
+                self.nodes[index].merged = true;
+            }
+        }
+    }
+
+    /// Each particle of a node becomes one of its leaves, by its shares.
+    fn split(&mut self, node: usize) {
+        let modes = self.model.modes();
+        for row in self.shares.chunks_exact_mut(modes) {
+            let first = row.iter().position(|&share| share > 0.0).unwrap_or(0);
+            if self.node_of[first] == Some(node) && row[first] < 1.0 {
+                let leaf = draw(row, &mut self.rng);
+                row.fill(0.0);
+                row[leaf] = 1.0;
+            }
+        }
+    }
+}
+
+/// Index drawn by probabilities that sum to 1.
+fn draw(p: &[f64], rng: &mut Pcg64Mcg) -> usize {
+    let mut left = rng.random::<f64>();
+    let mut last = 0;
+    for (k, p) in p.iter().enumerate().filter(|(_, p)| **p > 0.0) {
+        last = k;
+        left -= p;
+        if left < 0.0 {
+            break;
+        }
+    }
+    last
+}
+
+impl<M: Sampled> Filter for Hierarchical<M> {
+    type Observation = M::Observation;
+
+    fn step(&mut self, z: &M::Observation) -> Step {
+        for i in 0..self.states.len() {
+            self.predict_shares(i);
+            self.increments[i] = self.move_particle(i, z);
+        }
+        let updated = self.weights.absorb(&self.increments);
+        self.sum_modes();
+        let effective_sample_size = self.weights.effective_sample_size();
+        let limit = self.resampling.threshold * self.states.len() as f64;
+        if effective_sample_size < limit || self.resampling.threshold >= 1.0 {
+            self.resample();
+        }
+        self.choose_resolution();
+        Step {
+            log_evidence: updated.unwrap_or(0.0),
+            effective_sample_size,
+            event: updated.is_none().then_some(Event::Coasted),
+        }
+    }
+
+    fn posterior(&self) -> &[f64] {
+        &self.posterior
+    }
+
+    fn reset(&mut self) {
+        let modes = self.model.modes();
+        for node in &mut self.nodes {
+            node.merged = true;
+        }
+        for mode in 0..modes {
+            self.predicted[mode] = self.model.initial(mode);
+        }
+        self.weights.level(self.states.len());
+        self.shares.fill(0.0);
+        for i in 0..self.states.len() {
+            let mode = draw(&self.predicted, &mut self.rng);
+            self.states[i] = self.model.draw(mode, &mut self.rng);
+            self.shares[i * modes + mode] = 1.0;
+        }
+        self.sum_modes();
+    }
+}
