@@ -1,4 +1,17 @@
-//! What every measuring program shares: the archive, and the facts about the machine.
+//! What the measuring programs share: the archive, the facts about the machine, the filters that
+//! are compared.
 
 pub mod archive;
+pub mod filters;
 pub mod machine;
+pub mod rare;
+
+/// The value below which the share `q` of `values` lies; sorts them. NaN if there are none.
+pub fn quantile(values: &mut [f64], q: f64) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    let at = (q * values.len() as f64) as usize;
+    values
+        .get(at.min(values.len().saturating_sub(1)))
+        .copied()
+        .unwrap_or(f64::NAN)
+}

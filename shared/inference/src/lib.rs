@@ -20,6 +20,7 @@ pub mod angle;
 pub mod bank;
 pub mod bootstrap;
 pub mod constant;
+pub mod fault_sets;
 pub mod filter;
 pub mod forward;
 pub mod gaussian;

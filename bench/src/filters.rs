@@ -1,0 +1,141 @@
+//! The filters that are compared, behind one constructor.
+
+use vigil_inference::bootstrap::ParticleFilter;
+use vigil_inference::filter::Filter;
+use vigil_inference::hierarchical::Hierarchical;
+use vigil_inference::hybrid::{Conditional, Modes, Sampled};
+use vigil_inference::look_ahead::LookAhead;
+use vigil_inference::merged::Merged;
+use vigil_inference::proposal::Proposal;
+use vigil_inference::resample::Resampling;
+use vigil_inference::sequences::Sequences;
+
+/// Share of the draws that leave a mode in the raised proposal.
+const RAISED: f64 = 0.5;
+/// Mode sequences that the pruned exact filter keeps.
+const SEQUENCES: usize = 300;
+
+/// A filter to compare.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The paper's classical filter.
+    Bootstrap,
+    /// With raised fault proposals.
+    Raised,
+    /// Risk-sensitive, every fault a hundred times as risky as nominal.
+    Risk,
+    /// Hierarchical, split and merged by rule.
+    Hierarchical,
+    /// Look-ahead, Rao-Blackwellised.
+    LookAhead,
+    /// One Kalman filter per mode.
+    Merged,
+    /// The most likely sequences of modes.
+    Sequences,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Bootstrap,
+        Self::Raised,
+        Self::Risk,
+        Self::Hierarchical,
+        Self::LookAhead,
+        Self::Merged,
+        Self::Sequences,
+    ];
+
+    /// As tables name it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Bootstrap => "bootstrap",
+            Self::Raised => "raised proposals",
+            Self::Risk => "risk-sensitive",
+            Self::Hierarchical => "hierarchical",
+            Self::LookAhead => "look-ahead",
+            Self::Merged => "merged (one per mode)",
+            Self::Sequences => "mode sequences (300)",
+        }
+    }
+
+    /// True if it has particles.
+    #[must_use]
+    pub const fn is_sampled(self) -> bool {
+        !matches!(self, Self::Merged | Self::Sequences)
+    }
+
+    /// False for numbers of particles that take long and show nothing new.
+    #[must_use]
+    pub const fn is_sensible(self, count: usize) -> bool {
+        match self {
+            Self::LookAhead => count <= 1_000,
+            Self::Hierarchical => count <= 10_000,
+            _ => true,
+        }
+    }
+}
+
+/// A model that every filter can take.
+pub trait Model<const N: usize>:
+    Sampled<Observation = <Self as Model<N>>::Seen>
+    + Conditional<N, Observation = <Self as Model<N>>::Seen>
+    + Clone
+    + 'static
+{
+    /// What is observed in one step.
+    type Seen: ?Sized;
+}
+
+impl<M, O: ?Sized, const N: usize> Model<N> for M
+where
+    M: Sampled<Observation = O> + Conditional<N, Observation = O> + Clone + 'static,
+{
+    type Seen = O;
+}
+
+/// Builds a filter; `nodes` are the abstract nodes of the hierarchical one.
+///
+/// # Panics
+/// If `nodes` are not a hierarchy over the model's modes.
+pub fn build<M: Model<N>, const N: usize>(
+    kind: Kind,
+    model: &M,
+    nodes: &[Vec<usize>],
+    count: usize,
+    seed: u64,
+) -> Box<dyn Filter<Observation = <M as Model<N>>::Seen>> {
+    let resampling = Resampling::default();
+    let sampled = |proposal| {
+        Box::new(ParticleFilter::new(
+            model.clone(),
+            proposal,
+            resampling,
+            count,
+            seed,
+        ))
+    };
+    let mut risk = vec![100.0; Modes::modes(model)];
+    risk[0] = 1.0;
+    match kind {
+        Kind::Bootstrap => sampled(Proposal::prior(model)),
+        Kind::Raised => sampled(fits(Proposal::raised(model, RAISED))),
+        Kind::Risk => sampled(fits(Proposal::risk_sensitive(model, &risk))),
+        Kind::Hierarchical => Box::new(fits(Hierarchical::new(
+            model.clone(),
+            nodes,
+            resampling,
+            count,
+            seed,
+        ))),
+        Kind::LookAhead => Box::new(LookAhead::<M, N>::new(model.clone(), count, seed)),
+        Kind::Merged => Box::new(Merged::<M, N>::new(model.clone())),
+        Kind::Sequences => Box::new(Sequences::<M, N>::new(model.clone(), SEQUENCES)),
+    }
+}
+
+#[allow(clippy::panic)] // A measuring program's own settings.
+fn fits<T, E: std::fmt::Display>(result: Result<T, E>) -> T {
+    result.unwrap_or_else(|error| panic!("{error}"))
+}
