@@ -114,34 +114,90 @@ fn weight<L: Lanes>(l: L, log: L::Real) -> L::Real {
     exp2(l, l.max(log, l.real(EXPONENT_MIN)))
 }
 
-/// Draws the next modes and moves the poses; `normals` are three independent draws.
+/// Bundles that go through one stage of a step before any goes through the next. In each stage
+/// the calculations of several bundles overlap; what is handed over stays in the fastest cache.
+const STAGED: usize = 16;
+
+/// What one stage hands to the next, beside the bundles.
+struct Staged {
+    /// For each axis standard normal draws.
+    normals: [[Block<f32>; 3]; STAGED],
+    /// Uniform words.
+    draws: [Block<u32>; STAGED],
+    /// Base-2 logarithms of the weights that the particles bring along.
+    brought: [Block<f32>; STAGED],
+}
+
+/// Draws for up to [`STAGED`] bundles, an even number.
 #[inline(always)]
-fn propagate<L: Lanes>(
+fn draw<L: Lanes>(l: L, from: &mut Draws<L>, bundles: usize, staged: &mut Staged) {
+    let normals = staged.normals.as_chunks_mut::<2>().0.iter_mut();
+    let words = staged.draws.as_chunks_mut::<2>().0;
+    // In pairs: three draws for each of two bundles are three pairs of draws.
+    for (normals, words) in normals.zip(words).take(bundles / 2) {
+        let mut last = from.normals();
+        for (normals, word) in normals.iter_mut().zip(words) {
+            let (first, second) = from.normals();
+            l.store(first, &mut normals[0]);
+            l.store(second, &mut normals[1]);
+            l.store(last.0, &mut normals[2]);
+            last = (last.1, last.0);
+            l.store_word(from.word(), word);
+        }
+    }
+}
+
+/// Fetches the ancestors into `next` and draws their next modes.
+#[inline(always)]
+fn fetch<L: Lanes>(
+    l: L,
+    origins: &mut Origins<'_, L>,
+    (from, alias): (&[Bundle], &[u32; MODES_MAX * LANES]),
+    (next, first): (&mut [Bundle], &mut [Block<u32>]),
+    staged: &mut Staged,
+) {
+    let drawn = staged.draws.iter().zip(&mut staged.brought);
+    for ((next, first), (draw, kept)) in next.iter_mut().zip(first).zip(drawn) {
+        let (at, brought) = origins.next(l, first);
+        l.store(brought, kept);
+        let ancestor = l.gather(from, at);
+        l.store(ancestor.x, &mut next.x);
+        l.store(ancestor.y, &mut next.y);
+        l.store(ancestor.yaw, &mut next.yaw);
+        let draw = l.load_word(draw);
+        let column = l.shift_right(draw, 28);
+        let entry = l.look_up_entry(alias, l.or(l.shift_left(ancestor.mode, 4), column));
+        let mode = l.select_less(
+            l.and(draw, l.word(0x0fff_ffff)),
+            l.shift_right(entry, 4),
+            column,
+            l.and(entry, l.word(15)),
+        );
+        l.store_word(mode, &mut next.mode);
+    }
+}
+
+/// The pose after a step in the mode `at.mode`.
+#[inline(always)]
+fn moved<L: Lanes>(
     l: L,
     model: &PlanarModel,
-    from: &Gathered<L>,
-    draw: L::Word,
-    normals: [L::Real; 3],
+    at: &Gathered<L>,
+    normals: &[Block<f32>; 3],
 ) -> Gathered<L> {
-    let column = l.shift_right(draw, 28);
-    let entry = l.look_up_entry(&model.alias, l.or(l.shift_left(from.mode, 4), column));
-    let mode = l.select_less(
-        l.and(draw, l.word(0x0fff_ffff)),
-        l.shift_right(entry, 4),
-        column,
-        l.and(entry, l.word(15)),
-    );
-    let (sine, cosine) = sin_cos(l, from.yaw);
+    let mode = at.mode;
+    let (sine, cosine) = sin_cos(l, at.yaw);
     let (dx, dy) = (l.look_up(&model.dx, mode), l.look_up(&model.dy, mode));
     let turn = l.look_up(&model.dyaw, mode);
     let [sx, sy, syaw] = model.motion_sd.map(|sd| l.real(sd));
-    let x = l.mul_add(sx, normals[0], from.x);
+    let [nx, ny, nyaw] = normals.each_ref().map(|n| l.load(n));
+    let x = l.mul_add(sx, nx, at.x);
     let x = l.mul_add(cosine, dx, x);
     let x = l.sub(x, l.mul(sine, dy));
-    let y = l.mul_add(sy, normals[1], from.y);
+    let y = l.mul_add(sy, ny, at.y);
     let y = l.mul_add(sine, dx, y);
     let y = l.mul_add(cosine, dy, y);
-    let yaw = wrap(l, l.mul_add(syaw, normals[2], l.add(from.yaw, turn)));
+    let yaw = wrap(l, l.mul_add(syaw, nyaw, l.add(at.yaw, turn)));
     Gathered { x, y, yaw, mode }
 }
 
@@ -159,43 +215,41 @@ impl Kernel for Advance<'_> {
         let mut draws = Draws::begin(l, streams);
         let scale = Scale::new(l, weighing);
         let mut origins = Origins::new(l, ancestry, &cloud.logs);
-        let from = cloud.bundles.as_slice();
-        let mut next_logs = cloud.next_logs.chunks_mut(CHUNK);
-        let mut first = cloud.first.chunks_mut(CHUNK);
+        let mut staged = Staged {
+            normals: [[Block::splat(0.0); 3]; STAGED],
+            draws: [Block::splat(0); STAGED],
+            brought: [Block::splat(0.0); STAGED],
+        };
+        let from = (cloud.bundles.as_slice(), &model.alias);
+        let mut next_logs = cloud.next_logs.chunks_mut(STAGED);
+        let mut first = cloud.first.chunks_mut(STAGED);
         let chunks = cloud
             .next
             .chunks_mut(CHUNK)
             .zip(cloud.weights.chunks_mut(CHUNK));
-        for ((next, weights), first) in chunks.zip(&mut first) {
-            let next_logs = next_logs.next().unwrap_or_default();
+        for (next, weights) in chunks {
             let mut distances = Distances::zero(l);
-            // In pairs: three draws for each of two bundles are three pairs of normals.
-            let mut pairs = next
-                .as_chunks_mut::<2>()
-                .0
-                .iter_mut()
-                .zip(weights.as_chunks_mut::<2>().0)
-                .zip(first.as_chunks_mut::<2>().0)
-                .enumerate();
-            for (pair, ((next, weights), first)) in &mut pairs {
-                let (n, m) = ([draws.normals(), draws.normals()], draws.normals());
-                let normals = [[n[0].0, n[0].1, m.0], [n[1].0, n[1].1, m.1]];
-                for half in 0..2 {
-                    let (at, brought) = origins.next(l, &mut first[half]);
-                    let moved =
-                        propagate(l, model, &l.gather(from, at), draws.word(), normals[half]);
-                    let (log, distance) = scale.weigh(l, &moved);
-                    let log = l.add(log, brought);
-                    let weight = weight(l, log);
-                    distances.add(l, weight, distance);
-                    l.store(moved.x, &mut next[half].x);
-                    l.store(moved.y, &mut next[half].y);
-                    l.store(moved.yaw, &mut next[half].yaw);
-                    l.store_word(moved.mode, &mut next[half].mode);
-                    l.store(weight, &mut weights[half]);
-                    if let Some(kept) = next_logs.get_mut(2 * pair + half) {
+            let stages = next.chunks_mut(STAGED).zip(weights.chunks_mut(STAGED));
+            for ((next, weights), first) in stages.zip(&mut first) {
+                draw(l, &mut draws, next.len(), &mut staged);
+                fetch(l, &mut origins, from, (next, first), &mut staged);
+                let mut kept = next_logs.next().unwrap_or_default().iter_mut();
+                let handed = staged.normals.iter().zip(&staged.brought);
+                for ((bundle, weights), (normals, brought)) in
+                    next.iter_mut().zip(weights).zip(handed)
+                {
+                    let at = moved(l, model, &loaded(l, bundle), normals);
+                    l.store(at.x, &mut bundle.x);
+                    l.store(at.y, &mut bundle.y);
+                    l.store(at.yaw, &mut bundle.yaw);
+                    let (log, distance) = scale.weigh(l, &at);
+                    let log = l.add(log, l.load(brought));
+                    if let Some(kept) = kept.next() {
                         l.store(log, kept);
                     }
+                    let weight = weight(l, log);
+                    distances.add(l, weight, distance);
+                    l.store(weight, weights);
                 }
             }
             distances.flush(l, sums);
@@ -360,4 +414,5 @@ impl Kernel for Select<'_> {
     }
 }
 
-const _: () = assert!(CHUNK.is_multiple_of(2) && LANES == MODES_MAX);
+const _: () =
+    assert!(CHUNK.is_multiple_of(STAGED) && STAGED.is_multiple_of(2) && LANES == MODES_MAX);
