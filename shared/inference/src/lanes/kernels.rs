@@ -260,7 +260,7 @@ impl Kernel for Advance<'_> {
 }
 
 /// Where the particles of one bundle after the other come from.
-struct Origins<'a, L: Lanes> {
+pub(super) struct Origins<'a, L: Lanes> {
     /// Latest address of a selected particle.
     latest: L::Word,
     /// Addresses in the bundle itself, if nothing was selected.
@@ -271,7 +271,7 @@ struct Origins<'a, L: Lanes> {
 
 impl<'a, L: Lanes> Origins<'a, L> {
     #[inline(always)]
-    fn new(l: L, ancestry: Ancestry, logs: &'a [Block<f32>]) -> Self {
+    pub(super) fn new(l: L, ancestry: Ancestry, logs: &'a [Block<f32>]) -> Self {
         let lane = Block(std::array::from_fn(|lane| lane as u32));
         let (own, logs, offset) = match ancestry {
             Ancestry::Selected => (None, [].iter(), 0.0),
@@ -288,7 +288,7 @@ impl<'a, L: Lanes> Origins<'a, L> {
     /// Addresses of the ancestors, and the logarithms of the weights that they bring along. Clears
     /// `first`.
     #[inline(always)]
-    fn next(&mut self, l: L, first: &mut Block<u32>) -> (L::Word, L::Real) {
+    pub(super) fn next(&mut self, l: L, first: &mut Block<u32>) -> (L::Word, L::Real) {
         if let Some(own) = self.own {
             self.own = Some(l.add_word(own, l.word(address(1))));
             let logs = self.logs.next();

@@ -46,6 +46,9 @@ pub(super) const PLAIN_IS_FUSED: bool =
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Processor {
     Plain(Plain<PLAIN_IS_FUSED>),
+    /// Fused by a function, to hold the others' bits against.
+    #[cfg(test)]
+    Fused(Plain<true>),
     #[cfg(target_arch = "x86_64")]
     Avx2(x86::Avx2),
     #[cfg(target_arch = "x86_64")]
@@ -75,6 +78,8 @@ impl Processor {
     pub(super) fn run(self, kernel: impl Kernel) {
         match self {
             Self::Plain(lanes) => kernel.run(lanes),
+            #[cfg(test)]
+            Self::Fused(lanes) => kernel.run(lanes),
             // SAFETY: the value exists only where the processor was found to have the features.
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(lanes) => unsafe { x86::run_avx2(lanes, kernel) },

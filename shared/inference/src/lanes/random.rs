@@ -31,6 +31,12 @@ impl Streams {
         }
         Self(words)
     }
+
+    /// The state of one stream.
+    #[cfg(test)]
+    pub(super) fn lane(&self, lane: usize) -> [u32; 4] {
+        self.0.map(|word| word.0[lane])
+    }
 }
 
 /// The streams in registers.

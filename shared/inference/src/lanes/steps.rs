@@ -141,6 +141,13 @@ impl LaneFilter {
         Some(self)
     }
 
+    /// The same filter on a processor of the tests.
+    #[cfg(test)]
+    pub(super) fn on(mut self, processor: Processor) -> Self {
+        self.processor = processor;
+        self
+    }
+
     /// The same filter, resampling only when the effective sample size falls below this share of
     /// the particles, 0 to 1.
     #[must_use]
