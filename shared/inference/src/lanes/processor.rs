@@ -5,7 +5,7 @@
 #![allow(unsafe_code)]
 
 use super::plain::Plain;
-use super::vector::{Kernel, Lanes};
+use super::vector::Kernel;
 
 /// What a processor offers to the kernels, from the least to the most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -94,8 +94,8 @@ impl Processor {
 mod x86 {
     use std::arch::x86_64::*;
 
-    use super::super::vector::{BUNDLE_WORDS, Block, Bundle, Gathered, LANES};
-    use super::{Kernel, Lanes, Plain};
+    use super::super::vector::{BUNDLE_WORDS, Block, Bundle, Gathered, LANES, Lanes};
+    use super::{Kernel, Plain};
 
     /// Two registers of 8 lanes. Made by [`Avx2::detect`] only.
     #[derive(Debug, Clone, Copy)]
