@@ -8,6 +8,7 @@
 //! | [`particles`] | planar pose particles, structure of arrays |
 //! | [`gaussian`] | the Kalman filter |
 //! | [`track`] | a pose track with run offsets and coloured deviations |
+//! | [`lanes`] | planar robots with tables per mode: the fast particle filter |
 //! | [`forward`] | the exact forward filter of a small hidden Markov model |
 //! | [`ages`] | detection: nominal against nominal plus an unknown constant bias |
 //! | [`constant`] | detection: nominal against a constant likelihood |
@@ -26,6 +27,7 @@ pub mod forward;
 pub mod gaussian;
 pub mod hierarchical;
 pub mod hybrid;
+pub mod lanes;
 pub mod logspace;
 pub mod look_ahead;
 pub mod merged;
