@@ -3,9 +3,14 @@
 
 use std::path::Path;
 
+use vigil_bench::filters::{Kind, build};
 use vigil_bench::naive::Naive;
 use vigil_bench::workload::Rover13;
 use vigil_cycle::allocation::{CountingAllocator, allocations};
+use vigil_evaluation::cases::{HiddenMarkov, JumpLinear};
+use vigil_inference::adaptive::Adaptive;
+use vigil_inference::bootstrap::ParticleFilter;
+use vigil_inference::filter::Filter;
 use vigil_inference::lanes::{Event, LaneFilter, Level, PlanarModel};
 
 #[global_allocator]
@@ -37,4 +42,44 @@ fn ten_thousand_steps_allocate_nothing() {
         naive.step(z);
     }
     assert_eq!(allocations() - before, 0);
+}
+
+#[test]
+fn no_filter_allocates_in_a_step() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/filters");
+    let hidden = HiddenMarkov::read(&data.join("case1_hmm13.json")).unwrap();
+    let jump = JumpLinear::read(&data.join("case3_jmls3_full.json")).unwrap();
+    let observations: Vec<_> = jump.observations().collect();
+    let nodes = [vec![1, 2, 3], vec![4, 5, 6], (7..13).collect()];
+    for kind in Kind::ALL {
+        let mut filter = build::<_, 0>(kind, &hidden, &nodes, 64, 1);
+        let before = allocations();
+        // Every other round starts with an observation that nothing explains.
+        for z in [[f64::NAN; 6], [1e200; 6]]
+            .iter()
+            .chain(hidden.observations.iter().cycle())
+            .take(5_000)
+        {
+            filter.step(z);
+        }
+        assert_eq!(allocations() - before, 0, "{}", kind.name());
+        let mut filter = build::<_, 3>(kind, &jump, &[vec![1, 2]], 64, 1);
+        let before = allocations();
+        for z in observations.iter().cycle().take(1_000) {
+            filter.step(z);
+        }
+        assert_eq!(allocations() - before, 0, "{}", kind.name());
+    }
+    let proposal = vigil_inference::proposal::Proposal::prior(&hidden);
+    let adaptive = Adaptive::new(0.05, 2.33, 50, 500);
+    let resampling = vigil_inference::resample::Resampling::EVERY_STEP;
+    let mut filter = ParticleFilter::new(hidden.clone(), proposal, resampling, 500, 1)
+        .with_adaptive_count(adaptive);
+    let (before, mut fewest) = (allocations(), 500);
+    for z in hidden.observations.iter().cycle().take(5_000) {
+        filter.step(z);
+        fewest = fewest.min(filter.count());
+    }
+    assert_eq!(allocations() - before, 0);
+    assert!(fewest < 100, "{fewest} particles at the least");
 }

@@ -89,8 +89,8 @@ where
             let n = (seeds as usize * steps.len()) as f64;
             let [p50, p99] = [0.5, 0.99].map(|q| vigil_bench::quantile(&mut times_ns, q));
             rows.push(json!({
-                "filter": kind.name(), "particles": kind.is_sampled().then_some(count), "l1": l1 / n,
-                "kl": kl / n, "step_ns_p50": p50, "step_ns_p99": p99, "seeds": seeds,
+                "filter": kind.name(), "particles": kind.is_sampled().then_some(count),
+                "l1": l1 / n, "kl": kl / n, "step_ns_p50": p50, "step_ns_p99": p99, "seeds": seeds,
             }));
             if !kind.is_sampled() {
                 break;
@@ -143,7 +143,8 @@ fn rare_table(archive: &mut Archive, scenario: &Scenario, cells: &[Cell]) {
         "## {runs} faults of p = {p:e} per step, {sensors}\n"
     ));
     archive.say(
-        "| filter | particles | missed | false alarms | mean delay, steps | leaf right | side right |",
+        "| filter | particles | missed | false alarms | mean delay, steps | leaf right | side \
+         right |",
     );
     archive.say("|---|---|---|---|---|---|---|");
     for cell in cells {

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
-use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Linear};
+use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Linear, PoseAndWheels};
 use vigil_inference::bootstrap::ParticleFilter;
 use vigil_inference::filter::Filter;
 use vigil_inference::forward::Forward;
@@ -318,6 +318,40 @@ fn the_hierarchy_keeps_belief_and_evidence_and_needs_fewer_particles() {
         run(&mut filter.unwrap(), case.observations(), &case.filter)
     });
     assert!(found < 0.04 && bias.abs() < 0.3, "{found}, bias {bias}");
+}
+
+fn is_sound(p: &[f64]) -> bool {
+    p.iter().all(|p| (0.0..=1.0).contains(p)) && (p.iter().sum::<f64>() - 1.0).abs() < 1e-9
+}
+
+proptest::proptest! {
+    #[test]
+    fn no_observation_breaks_a_filter(
+        steps in proptest::collection::vec(proptest::array::uniform5(proptest::num::f64::ANY), 1..25)
+    ) {
+        let case = jump_linear();
+        let good = case.observations().next().unwrap();
+        let filters: [Box<dyn Filter<Observation = PoseAndWheels>>; 5] = [
+            Box::new(bootstrap(&case, Resampling::default(), 30, 1)),
+            Box::new(Hierarchical::new(case.clone(), &[vec![1, 2]], Resampling::default(), 30, 1).unwrap()),
+            Box::new(LookAhead::<_, 3>::new(case.clone(), 10, 1)),
+            Box::new(Merged::<_, 3>::new(case.clone())),
+            Box::new(Sequences::<_, 3>::new(case.clone(), 30)),
+        ];
+        for mut filter in filters {
+            for z in &steps {
+                let bad = PoseAndWheels { pose: [z[0], z[1], z[2]], wheels: [z[3], z[4]] };
+                for z in [bad, good] {
+                    let step = filter.step(&z);
+                    proptest::prop_assert!(is_sound(filter.posterior()), "{:?}", filter.posterior());
+                    proptest::prop_assert!(step.log_evidence.is_finite());
+                    proptest::prop_assert!(step.effective_sample_size.is_finite());
+                }
+            }
+            filter.reset();
+            proptest::prop_assert!(is_sound(filter.posterior()));
+        }
+    }
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Exact belief over sets of faults: several at once, coming and going.
 //!
-//! K components, each broken or not, make 2^K sets. Every component breaks and heals by itself, with
-//! its own probabilities per step, so the prediction factors: for each component j and every pair
-//! of sets that differ in it, `n0 = (1 - a) p0 + r p1`, `n1 = a p0 + (1 - r) p1`. The update
+//! K components, each broken or not, make 2^K sets. Every component breaks and heals by itself,
+//! with its own probabilities per step, so the prediction factors: for each component j and every
+//! pair of sets that differ in it, `n0 = (1 - a) p0 + r p1`, `n1 = a p0 + (1 - r) p1`. The update
 //! multiplies by the likelihood of each set. For wheels the likelihood factors too: the stuck
 //! wheels move the body, and each wheel's reading depends on whether it is stuck and whether its
 //! encoder is broken. [`FaultSets::update_wheels`] builds all 2^K products by doubling, without an

@@ -5,8 +5,8 @@
 //! to a leaf (the left front wheel). A classical filter commits each of its few fault particles to
 //! one leaf at once; an abstract particle stands for all leaves below it.
 //!
-//! Here an abstract particle carries the probability of each leaf below it, given its own path: with
-//! predicted shares `s_k`, a state drawn from the mixture `Σ s_k p(c' | k, c)` and the observation,
+//! Here an abstract particle carries the probability of each leaf below it, given its own path:
+//! with predicted shares `s_k`, a state drawn from the mixture `Σ s_k p(c' | k, c)` and the observation,
 //! `s_k' ∝ s_k p(c' | k, c) p(z | k, c')`, and the particle's weight is multiplied by
 //! `Σ s_k p(c'|k,c) p(z|k,c') / Σ s_k p(c'|k,c)`. So nothing is lost when it moves down.
 //!

@@ -10,8 +10,11 @@ pub trait Modes {
     /// Number of modes, at least 1. Mode 0 is the nominal one where a filter makes a difference.
     fn modes(&self) -> usize;
 
-    /// Probability of a mode before the first transition; sums to 1.
-    fn initial(&self, mode: usize) -> f64;
+    /// Probability of a mode before the first transition; sums to 1. Nominal unless said
+    /// otherwise.
+    fn initial(&self, mode: usize) -> f64 {
+        f64::from(u8::from(mode == 0))
+    }
 
     /// Probability of `to` one step after `from`; sums to 1 over `to`.
     fn transition(&self, from: usize, to: usize) -> f64;

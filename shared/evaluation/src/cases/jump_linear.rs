@@ -101,10 +101,6 @@ impl Modes for JumpLinear {
         MODES
     }
 
-    fn initial(&self, mode: usize) -> f64 {
-        f64::from(u8::from(mode == 0))
-    }
-
     fn transition(&self, from: usize, to: usize) -> f64 {
         self.transition[from][to]
     }

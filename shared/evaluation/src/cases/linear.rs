@@ -69,10 +69,6 @@ impl Modes for Linear {
         1
     }
 
-    fn initial(&self, _mode: usize) -> f64 {
-        1.0
-    }
-
     fn transition(&self, _from: usize, _to: usize) -> f64 {
         1.0
     }

@@ -1,5 +1,5 @@
-//! Thirteen modes of a six-wheel rover in the plane: one table of motion per mode, wheel rates given
-//! by the mode. Its pose is turned by the heading, so only sampling is exact.
+//! Thirteen modes of a six-wheel rover in the plane: one table of motion per mode, wheel rates
+//! given by the mode. Its pose is turned by the heading, so only sampling is exact.
 
 use std::path::Path;
 
@@ -147,10 +147,6 @@ fn squares(sd: [f64; 3]) -> Matrix3<f64> {
 impl Modes for Planar {
     fn modes(&self) -> usize {
         MODES
-    }
-
-    fn initial(&self, mode: usize) -> f64 {
-        f64::from(u8::from(mode == 0))
     }
 
     fn transition(&self, from: usize, to: usize) -> f64 {
