@@ -26,6 +26,8 @@ pub enum Kind {
     Risk,
     /// Hierarchical, split and merged by rule.
     Hierarchical,
+    /// The same with raised proposals.
+    RaisedHierarchical,
     /// Look-ahead, Rao-Blackwellised.
     LookAhead,
     /// One Kalman filter per mode.
@@ -36,11 +38,12 @@ pub enum Kind {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Bootstrap,
         Self::Raised,
         Self::Risk,
         Self::Hierarchical,
+        Self::RaisedHierarchical,
         Self::LookAhead,
         Self::Merged,
         Self::Sequences,
@@ -54,6 +57,7 @@ impl Kind {
             Self::Raised => "raised proposals",
             Self::Risk => "risk-sensitive",
             Self::Hierarchical => "hierarchical",
+            Self::RaisedHierarchical => "hierarchical, raised",
             Self::LookAhead => "look-ahead",
             Self::Merged => "merged (one per mode)",
             Self::Sequences => "mode sequences (300)",
@@ -71,7 +75,7 @@ impl Kind {
     pub const fn is_sensible(self, count: usize) -> bool {
         match self {
             Self::LookAhead => count <= 1_000,
-            Self::Hierarchical => count <= 10_000,
+            Self::Hierarchical | Self::RaisedHierarchical => count <= 10_000,
             _ => true,
         }
     }
@@ -116,19 +120,23 @@ pub fn build<M: Model<N>, const N: usize>(
             seed,
         ))
     };
+    let hierarchical = || {
+        fits(Hierarchical::new(
+            model.clone(),
+            nodes,
+            resampling,
+            count,
+            seed,
+        ))
+    };
     let mut risk = vec![100.0; Modes::modes(model)];
     risk[0] = 1.0;
     match kind {
         Kind::Bootstrap => sampled(Proposal::prior(model)),
         Kind::Raised => sampled(fits(Proposal::raised(model, RAISED))),
         Kind::Risk => sampled(fits(Proposal::risk_sensitive(model, &risk))),
-        Kind::Hierarchical => Box::new(fits(Hierarchical::new(
-            model.clone(),
-            nodes,
-            resampling,
-            count,
-            seed,
-        ))),
+        Kind::Hierarchical => Box::new(hierarchical()),
+        Kind::RaisedHierarchical => Box::new(hierarchical().with_raised_proposals(RAISED)),
         Kind::LookAhead => Box::new(LookAhead::<M, N>::new(model.clone(), count, seed)),
         Kind::Merged => Box::new(Merged::<M, N>::new(model.clone())),
         Kind::Sequences => Box::new(Sequences::<M, N>::new(model.clone(), SEQUENCES)),

@@ -87,7 +87,8 @@ pub fn rare_faults(planar: &Planar, nodes: &[Vec<usize>], scenario: &Scenario) -
     let mut cells = Vec::new();
     for kind in Kind::ALL {
         for count in COUNTS {
-            if kind == Kind::LookAhead && count > 100 || kind == Kind::Hierarchical && count > 1_000
+            if kind == Kind::LookAhead && count > 100
+                || matches!(kind, Kind::Hierarchical | Kind::RaisedHierarchical) && count > 1_000
             {
                 continue;
             }

@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
+use proptest::prelude::*;
 use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Linear, PoseAndWheels};
 use vigil_inference::bootstrap::ParticleFilter;
 use vigil_inference::filter::Filter;
@@ -294,21 +295,27 @@ fn the_hierarchy_keeps_belief_and_evidence_and_needs_fewer_particles() {
     let exact = *case.log_evidence.last().unwrap();
     // Left and right wheels stuck, broken encoders.
     let nodes = [vec![1, 2, 3], vec![4, 5, 6], (7..13).collect()];
-    let at = |count| {
+    let at = |count, leave: Option<f64>| {
         mean_of(20, exact, |seed| {
             let resampling = Resampling::default();
             let filter = Hierarchical::new(case.clone(), &nodes, resampling, count, seed);
-            run(&mut filter.unwrap(), case.observations.iter(), &case.filter)
+            let mut filter = filter.unwrap();
+            if let Some(leave) = leave {
+                filter = filter.with_raised_proposals(leave);
+            }
+            run(&mut filter, case.observations.iter(), &case.filter)
         })
     };
     let (flat, _) = mean_of(20, exact, |seed| {
         let mut filter = bootstrap(&case, Resampling::default(), 300, seed);
         run(&mut filter, case.observations.iter(), &case.filter)
     });
-    let (few, _) = at(300);
-    assert!(few < 0.8 * flat, "{few}, flat {flat}");
-    let (many, bias) = at(10_000);
-    assert!(many < 0.015 && bias.abs() < 0.3, "{many}, bias {bias}");
+    for leave in [None, Some(0.5)] {
+        let (few, _) = at(300, leave);
+        assert!(few < 0.8 * flat, "{few}, flat {flat}");
+        let (many, bias) = at(10_000, leave);
+        assert!(many < 0.015 && bias.abs() < 0.3, "{many}, bias {bias}");
+    }
 
     let case = jump_linear();
     let exact = *case.log_evidence.last().unwrap();
@@ -324,32 +331,38 @@ fn is_sound(p: &[f64]) -> bool {
     p.iter().all(|p| (0.0..=1.0).contains(p)) && (p.iter().sum::<f64>() - 1.0).abs() < 1e-9
 }
 
-proptest::proptest! {
+fn small_filters(case: &JumpLinear) -> Vec<Box<dyn Filter<Observation = PoseAndWheels>>> {
+    let resampling = Resampling::default();
+    let hierarchical = Hierarchical::new(case.clone(), &[vec![1, 2]], resampling, 30, 1).unwrap();
+    vec![
+        Box::new(bootstrap(case, resampling, 30, 1)),
+        Box::new(hierarchical.clone()),
+        Box::new(hierarchical.with_raised_proposals(0.5)),
+        Box::new(LookAhead::<_, 3>::new(case.clone(), 10, 1)),
+        Box::new(Merged::<_, 3>::new(case.clone())),
+        Box::new(Sequences::<_, 3>::new(case.clone(), 30)),
+    ]
+}
+
+proptest! {
     #[test]
     fn no_observation_breaks_a_filter(
-        steps in proptest::collection::vec(proptest::array::uniform5(proptest::num::f64::ANY), 1..25)
+        steps in prop::collection::vec(prop::array::uniform5(prop::num::f64::ANY), 1..25)
     ) {
         let case = jump_linear();
         let good = case.observations().next().unwrap();
-        let filters: [Box<dyn Filter<Observation = PoseAndWheels>>; 5] = [
-            Box::new(bootstrap(&case, Resampling::default(), 30, 1)),
-            Box::new(Hierarchical::new(case.clone(), &[vec![1, 2]], Resampling::default(), 30, 1).unwrap()),
-            Box::new(LookAhead::<_, 3>::new(case.clone(), 10, 1)),
-            Box::new(Merged::<_, 3>::new(case.clone())),
-            Box::new(Sequences::<_, 3>::new(case.clone(), 30)),
-        ];
-        for mut filter in filters {
+        for mut filter in small_filters(&case) {
             for z in &steps {
                 let bad = PoseAndWheels { pose: [z[0], z[1], z[2]], wheels: [z[3], z[4]] };
                 for z in [bad, good] {
                     let step = filter.step(&z);
-                    proptest::prop_assert!(is_sound(filter.posterior()), "{:?}", filter.posterior());
-                    proptest::prop_assert!(step.log_evidence.is_finite());
-                    proptest::prop_assert!(step.effective_sample_size.is_finite());
+                    prop_assert!(is_sound(filter.posterior()), "{:?}", filter.posterior());
+                    prop_assert!(step.log_evidence.is_finite());
+                    prop_assert!(step.effective_sample_size.is_finite());
                 }
             }
             filter.reset();
-            proptest::prop_assert!(is_sound(filter.posterior()));
+            prop_assert!(is_sound(filter.posterior()));
         }
     }
 }

@@ -6,8 +6,8 @@
 //! one leaf at once; an abstract particle stands for all leaves below it.
 //!
 //! Here an abstract particle carries the probability of each leaf below it, given its own path:
-//! with predicted shares `s_k`, a state drawn from the mixture `Σ s_k p(c' | k, c)` and the observation,
-//! `s_k' ∝ s_k p(c' | k, c) p(z | k, c')`, and the particle's weight is multiplied by
+//! with predicted shares `s_k`, a state drawn from the mixture `Σ s_k p(c' | k, c)` and the
+//! observation, `s_k' ∝ s_k p(c' | k, c) p(z | k, c')`, and the particle's weight is multiplied by
 //! `Σ s_k p(c'|k,c) p(z|k,c') / Σ s_k p(c'|k,c)`. So nothing is lost when it moves down.
 //!
 //! When an abstract node is worth its coarseness is decided by the rule of the variable resolution
@@ -70,6 +70,11 @@ pub struct Hierarchical<M: Sampled> {
     increments: Vec<f64>,
     ancestors: Vec<u32>,
     predicted: Vec<f64>,
+    /// Predicted mass of each group, at the index of its first mode; and the probabilities by
+    /// which one is drawn.
+    mass: Vec<f64>,
+    proposed: Vec<f64>,
+    leave: Option<f64>,
     posterior: Vec<f64>,
 }
 
@@ -124,6 +129,9 @@ impl<M: Sampled> Hierarchical<M> {
             increments: vec![0.0; count],
             ancestors: vec![0; count],
             predicted: vec![0.0; modes],
+            mass: vec![0.0; modes],
+            proposed: vec![0.0; modes],
+            leave: None,
             posterior: vec![0.0; modes],
             model,
         };
@@ -137,13 +145,25 @@ impl<M: Sampled> Hierarchical<M> {
         self.nodes.get(node).is_some_and(|node| node.merged)
     }
 
-    /// The abstract node as which mode `k` is tracked at present.
-    fn group(&self, k: usize) -> Option<usize> {
-        self.node_of[k].filter(|&node| self.nodes[node].merged)
+    /// The same filter with raised proposals: a share `leave` (0 to 1) of the draws leaves the
+    /// particle's node for the others that it can reach, in equal parts; weights pay for it.
+    #[must_use]
+    pub fn with_raised_proposals(mut self, leave: f64) -> Self {
+        self.leave = Some(leave.clamp(0.0, 1.0));
+        self
     }
 
-    /// Draws the group of particle i for the next step and fills `predicted` with the shares in it.
-    fn predict_shares(&mut self, i: usize) {
+    /// What mode `k` is tracked as at present: itself, or the first leaf of its abstract node.
+    fn group(&self, k: usize) -> usize {
+        match self.node_of[k] {
+            Some(node) if self.nodes[node].merged => self.nodes[node].leaves[0],
+            _ => k,
+        }
+    }
+
+    /// Draws the group of particle i for the next step and fills `predicted` with the shares in
+    /// it; returns what the weight pays for the proposal.
+    fn predict_shares(&mut self, i: usize) -> f64 {
         let modes = self.model.modes();
         let row = &self.shares[i * modes..(i + 1) * modes];
         self.predicted.fill(0.0);
@@ -152,22 +172,44 @@ impl<M: Sampled> Hierarchical<M> {
                 *predicted += share * self.model.transition(from, to);
             }
         }
-        let drawn = draw(&self.predicted, &mut self.rng);
-        let group = self.group(drawn);
-        let mut total = 0.0;
+        let own = row.iter().position(|&share| share > 0.0).unwrap_or(0);
+        self.mass.fill(0.0);
         for k in 0..modes {
-            let stays = k == drawn || (group.is_some() && self.group(k) == group);
-            if !stays {
-                self.predicted[k] = 0.0;
-            }
-            total += self.predicted[k];
+            let group = self.group(k);
+            self.mass[group] += self.predicted[k];
         }
-        if total > 0.0 {
-            self.predicted.iter_mut().for_each(|share| *share /= total);
+        let drawn = self.propose(self.group(own));
+        let mass = self.mass[drawn];
+        for k in 0..modes {
+            let stays = self.group(k) == drawn;
+            self.predicted[k] = if stays { self.predicted[k] / mass } else { 0.0 };
+        }
+        if mass > 0.0 {
+            (mass / self.proposed[drawn]).ln()
         } else {
             // Rows that do not sum to 1 lead nowhere.
-            self.predicted[drawn] = 1.0;
+            self.predicted.fill(0.0);
+            self.predicted[own] = 1.0;
+            f64::NEG_INFINITY
         }
+    }
+
+    /// Draws a group by `proposed`, which follows from the groups' masses.
+    fn propose(&mut self, own: usize) -> usize {
+        self.proposed.copy_from_slice(&self.mass);
+        let others = self.mass.iter().enumerate();
+        let others = others.filter(|&(k, mass)| k != own && *mass > 0.0).count();
+        if let (Some(leave), 1..) = (self.leave, others) {
+            let leave = if self.mass[own] > 0.0 { leave } else { 1.0 };
+            for (k, (q, mass)) in self.proposed.iter_mut().zip(&self.mass).enumerate() {
+                *q = match *mass > 0.0 {
+                    _ if k == own => 1.0 - leave,
+                    true => leave / others as f64,
+                    false => 0.0,
+                };
+            }
+        }
+        draw(&self.proposed, &mut self.rng)
     }
 
     /// Moves particle i and conditions its shares; returns the logarithm of its weight's factor.
@@ -304,8 +346,8 @@ impl<M: Sampled> Filter for Hierarchical<M> {
 
     fn step(&mut self, z: &M::Observation) -> Step {
         for i in 0..self.states.len() {
-            self.predict_shares(i);
-            self.increments[i] = self.move_particle(i, z);
+            let paid = self.predict_shares(i);
+            self.increments[i] = paid + self.move_particle(i, z);
         }
         let updated = self.weights.absorb(&self.increments);
         self.sum_modes();

@@ -2,9 +2,10 @@
 //!
 //! A filter's particles either cover a mode (tracked) or not (lost); the two change into each other
 //! with a small probability per step. While tracked, the robot takes the best action; while lost,
-//! it does something: a mixture of the worst and the average action. The risk of a mode is what being
-//! lost in it costs more than being tracked (Thrun, Langford and Verma, *Risk Sensitive Particle
-//! Filters*, 2001). It follows from the recovery model by value iteration and is not set by hand.
+//! it does something: a mixture of the worst and the average action. The risk of a mode is what
+//! being lost in it costs more than being tracked (Thrun, Langford and Verma, *Risk Sensitive
+//! Particle Filters*, 2001). It follows from the recovery model by value iteration and is not set
+//! by hand.
 
 /// The fully observed recovery problem: costs and transitions per action.
 #[derive(Debug, Clone, PartialEq)]
