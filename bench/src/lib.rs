@@ -1,12 +1,11 @@
-//! What measuring programs share: the archive, the facts about the machine, workloads, yardsticks
-//! and the filters that are compared.
+//! What measuring programs share: the archive, the facts about the machine, the yardstick and
+//! the filters that are compared.
 
 pub mod archive;
 pub mod filters;
 pub mod machine;
 pub mod naive;
 pub mod rare;
-pub mod workload;
 
 /// The value below which the share `q` of `values` lies; sorts them. NaN if there are none.
 pub fn quantile(values: &mut [f64], q: f64) -> f64 {

@@ -10,9 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::Normal;
 use rand_pcg::Pcg64;
 use vigil_inference::angle::wrap;
-use vigil_inference::lanes::Observation;
-
-use crate::workload::Rover13;
+use vigil_inference::lanes::{Observation, PlanarParameters};
 
 #[derive(Debug, Clone, Copy)]
 struct Particle {
@@ -25,7 +23,7 @@ struct Particle {
 /// The filter.
 #[derive(Debug)]
 pub struct Naive {
-    model: Rover13,
+    model: PlanarParameters,
     next_mode: Vec<WeightedIndex<f64>>,
     noise: [Normal<f64>; 3],
     particles: Vec<Particle>,
@@ -41,36 +39,37 @@ impl Naive {
     /// # Errors
     /// A model that is not one.
     pub fn new(
-        model: &Rover13,
+        model: &PlanarParameters,
         count: usize,
         seed: u64,
     ) -> Result<Self, Box<dyn std::error::Error>> {
         let mut rng = Pcg64::seed_from_u64(seed);
+        let initial = WeightedIndex::new(&model.initial)?;
         let mut particles = Vec::new();
         for _ in 0..count {
-            let mut at = model.x0;
-            for (at, sd) in at.iter_mut().zip(model.s0) {
+            let mut at = model.start;
+            for (at, sd) in at.iter_mut().zip(model.start_sd) {
                 *at += Normal::new(0.0, sd)?.sample(&mut rng);
             }
             particles.push(Particle {
-                mode: model.initial_mode,
+                mode: initial.sample(&mut rng),
                 x: at[0],
                 y: at[1],
                 theta: at[2],
             });
         }
-        let rows = model.p.iter().map(WeightedIndex::new);
+        let rows = model.transition.iter().map(WeightedIndex::new);
         Ok(Self {
             next_mode: rows.collect::<Result<_, _>>()?,
             noise: [
-                Normal::new(0.0, model.sx)?,
-                Normal::new(0.0, model.sy)?,
-                Normal::new(0.0, model.sth)?,
+                Normal::new(0.0, model.motion_sd[0])?,
+                Normal::new(0.0, model.motion_sd[1])?,
+                Normal::new(0.0, model.motion_sd[2])?,
             ],
             others: particles.clone(),
             particles,
             weights: vec![0.0; count],
-            posterior: vec![0.0; model.dx.len()],
+            posterior: vec![0.0; model.initial.len()],
             rng,
             model: model.clone(),
         })
@@ -88,19 +87,19 @@ impl Naive {
         for p in &mut self.particles {
             p.mode = self.next_mode[p.mode].sample(&mut self.rng);
             let (sin, cos) = p.theta.sin_cos();
-            let (dx, dy) = (m.dx[p.mode], m.dy[p.mode]);
+            let [dx, dy, turn] = m.motion[p.mode];
             p.x += cos * dx - sin * dy + self.noise[0].sample(&mut self.rng);
             p.y += sin * dx + cos * dy + self.noise[1].sample(&mut self.rng);
-            p.theta += m.dth[p.mode] + self.noise[2].sample(&mut self.rng);
+            p.theta += turn + self.noise[2].sample(&mut self.rng);
         }
         let mut highest = f64::NEG_INFINITY;
         for (p, log_weight) in self.particles.iter().zip(&mut self.weights) {
-            let ex = (z.pose[0] - p.x) / m.rx;
-            let ey = (z.pose[1] - p.y) / m.ry;
-            let et = wrap(z.pose[2] - p.theta) / m.rth;
+            let ex = (z.pose[0] - p.x) / m.pose_sd[0];
+            let ey = (z.pose[1] - p.y) / m.pose_sd[1];
+            let et = wrap(z.pose[2] - p.theta) / m.pose_sd[2];
             let mut sum = ex * ex + ey * ey + et * et;
-            for (rate, mean) in z.wheel_rates.iter().zip(&m.mu[p.mode]) {
-                let e = (rate - mean) / m.rw;
+            for (rate, mean) in z.wheel_rates.iter().zip(&m.wheel_rates[p.mode]) {
+                let e = (rate - mean) / m.wheel_rate_sd;
                 sum += e * e;
             }
             *log_weight = -0.5 * sum;

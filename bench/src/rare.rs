@@ -4,9 +4,10 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
-use vigil_evaluation::cases::{Planar, PlanarObservation};
+use vigil_evaluation::cases::Planar;
 use vigil_inference::filter::Filter;
 use vigil_inference::hybrid::{Modes, Sampled};
+use vigil_inference::lanes::Observation;
 
 use crate::filters::{Kind, build};
 
@@ -117,9 +118,9 @@ pub fn rare_faults(planar: &Planar, nodes: &[Vec<usize>], scenario: &Scenario) -
 
 fn judge(
     cell: &mut Cell,
-    filter: &mut dyn Filter<Observation = PlanarObservation>,
+    filter: &mut dyn Filter<Observation = Observation>,
     fault: usize,
-    observations: &[PlanarObservation],
+    observations: &[Observation],
     nodes: &[Vec<usize>],
 ) {
     let mut alarm = None;
@@ -145,7 +146,7 @@ fn judge(
 }
 
 /// A fault and what is seen of a run with it.
-fn simulate(model: &Planar, scenario: &Scenario, seed: u64) -> (usize, Vec<PlanarObservation>) {
+fn simulate(model: &Planar, scenario: &Scenario, seed: u64) -> (usize, Vec<Observation>) {
     let mut rng = Pcg64Mcg::seed_from_u64(1_000_000 + seed);
     // Without wheel rates a broken encoder shows nowhere.
     let last = if scenario.with_wheels {

@@ -5,9 +5,8 @@ use std::path::Path;
 
 use vigil_bench::filters::{Kind, build};
 use vigil_bench::naive::Naive;
-use vigil_bench::workload::Rover13;
 use vigil_cycle::allocation::{CountingAllocator, allocations};
-use vigil_evaluation::cases::{HiddenMarkov, JumpLinear};
+use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Planar};
 use vigil_inference::adaptive::Adaptive;
 use vigil_inference::bootstrap::ParticleFilter;
 use vigil_inference::filter::Filter;
@@ -19,8 +18,8 @@ static ALLOCATOR: CountingAllocator = CountingAllocator;
 #[test]
 fn ten_thousand_steps_allocate_nothing() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/filters");
-    let (rover, observations) = Rover13::read(&data).unwrap();
-    let model = PlanarModel::new(&rover.parameters()).unwrap();
+    let (Planar { parameters }, observations) = Planar::read(&data).unwrap();
+    let model = PlanarModel::new(&parameters).unwrap();
     for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
         for share in [1.0, 0.5] {
             let filter = LaneFilter::new(model.clone(), 64, 1).at_level(level);
@@ -36,7 +35,7 @@ fn ten_thousand_steps_allocate_nothing() {
             assert!(events > 10, "{events}");
         }
     }
-    let mut naive = Naive::new(&rover, 64, 1).unwrap();
+    let mut naive = Naive::new(&parameters, 64, 1).unwrap();
     let before = allocations();
     for z in observations.iter().cycle().take(1_000) {
         naive.step(z);

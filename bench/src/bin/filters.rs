@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     report(&mut archive, "three modes that move a pose", &rows);
     archive.store("jump-linear.json", &json!(rows))?;
 
-    let planar = Planar::read(&folder.join("rover13_model.json"))?;
+    let (planar, _) = Planar::read(&folder)?;
     let mut cells = Vec::new();
     for with_wheels in [true, false] {
         for p_fault in [1e-3, 1e-5, 1e-6] {

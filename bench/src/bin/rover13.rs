@@ -11,8 +11,8 @@ use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::machine;
 use vigil_bench::naive::Naive;
-use vigil_bench::workload::Rover13;
-use vigil_inference::lanes::{LaneFilter, Level, Observation, PlanarModel};
+use vigil_evaluation::cases::Planar;
+use vigil_inference::lanes::{LaneFilter, Level, Observation, PlanarModel, PlanarParameters};
 
 /// Particles, and how often the 200 steps are repeated.
 const SIZES: [(usize, usize); 4] = [(1_000, 200), (10_000, 30), (100_000, 7), (1_000_000, 3)];
@@ -42,10 +42,10 @@ fn run() -> Result<(), Box<dyn Error>> {
         return Err(format!("{options:?}: the only option is --json").into());
     }
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/filters");
-    let (rover, observations) = Rover13::read(&data)?;
+    let (Planar { parameters }, observations) = Planar::read(&data)?;
     let mut rows = Vec::new();
     for (count, repetitions) in SIZES {
-        rows.extend(measure(&rover, &observations, count, repetitions)?);
+        rows.extend(measure(&parameters, &observations, count, repetitions)?);
     }
     let document =
         json!({ "machine": machine::facts(), "steps": observations.len(), "rows": rows });
@@ -90,8 +90,12 @@ impl Contender {
 }
 
 /// All that can run here.
-fn contenders(rover: &Rover13, count: usize, seed: u64) -> Result<Vec<Contender>, Box<dyn Error>> {
-    let model = PlanarModel::new(&rover.parameters())?;
+fn contenders(
+    rover: &PlanarParameters,
+    count: usize,
+    seed: u64,
+) -> Result<Vec<Contender>, Box<dyn Error>> {
+    let model = PlanarModel::new(rover)?;
     let naive = Contender::Naive(Box::new(Naive::new(rover, count, seed)?));
     let lanes = |level| LaneFilter::new(model.clone(), count, seed).at_level(level);
     let levels = Level::ALL.into_iter().filter_map(lanes);
@@ -101,7 +105,7 @@ fn contenders(rover: &Rover13, count: usize, seed: u64) -> Result<Vec<Contender>
 
 /// Rows of one number of particles; the contenders take turns, one run of all steps each.
 fn measure(
-    rover: &Rover13,
+    rover: &PlanarParameters,
     observations: &[Observation],
     count: usize,
     repetitions: usize,

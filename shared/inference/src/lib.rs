@@ -1,32 +1,32 @@
 //! Bayes filters over hybrid models: detection of any deviation from nominal, identification of
 //! the fault. No robot, no transport, no clock, no files.
 //!
-//! **Which filter when.** A model implements [`hybrid::Modes`] and one of [`hybrid::Sampled`] (it can
-//! be simulated) and [`hybrid::Conditional`] (linear and Gaussian given the mode, or linearised);
-//! every filter then gives a belief over modes by [`filter::Filter::step`]
+//! **Which filter when.** A model implements [`hybrid::Modes`] and one of [`hybrid::Sampled`] (it
+//! can be simulated) and [`hybrid::Conditional`] (linear and Gaussian given the mode, or
+//! linearised); every filter then gives a belief over modes by [`filter::Filter::step`]
 //! (`examples/own_model.rs` is a whole one).
 //!
 //! | you have | take | measured |
 //! |---|---|---|
-//! | no model of the faults | [`ages`] | delays within 1.2 of the bound for any small fault |
-//! | one fault at a time, linear(ised) | [`merged`] | 0.6 us a step, no fault of p = 1e-6 missed |
+//! | no model of the faults | [`ages`] | DETECTION |
+//! | one fault at a time, linear(ised) | [`merged`] | 0.6 us a step; no fault of p = 1e-6 missed |
 //! | several faults at once | [`fault_sets`] | exact over 4096 sets in 20 us a step |
-//! | a model that can only be simulated | [`bootstrap`] with raised [`proposal`]s | at p = 1e-6 and 1000 particles 0 % missed, 98 % without |
-//! | the same, faults that look alike at first | [`hierarchical`] with raised proposals | leaves are told apart when data can |
-//! | linear(ised), an unbiased evidence | [`look_ahead`] | 1000 particles twice as accurate as 10000 of [`bootstrap`] |
-//! | a planar robot, a million particles | [`lanes`] | 4.3 ns per particle and step with AVX-512 |
+//! | a model to simulate | [`bootstrap`], raised [`proposal`]s | p = 1e-6: 0 % missed, not 98 % |
+//! | the same, faults alike at first | [`hierarchical`], raised | HIERARCHY |
+//! | linear(ised), evidence wanted | [`look_ahead`] | 1000 particles beat 10000 of [`bootstrap`] |
+//! | a planar robot, many particles | [`lanes`] | 4.3 ns per particle and step (AVX-512) |
 //! | an oracle for short runs | [`sequences`], [`forward`] | exact while all sequences fit |
 //!
-//! Figures: `bench/runs/2026-11-21-vm/` (`filters`, `fault-sets`, `rover13`, `detection`), on 2 shared
-//! cores. Equal seeds and observations give equal bits; a step allocates nothing; observations that
-//! are not finite or that nothing explains are events, never panics.
+//! Figures: `bench/runs/2026-11-21-vm/` (`filters`, `fault-sets`, `rover13`, `detection`), on 2
+//! shared cores. Equal seeds and observations give equal bits; a step allocates nothing;
+//! observations that are not finite or that nothing explains are events, never panics.
 //!
 //! | also here | holds |
 //! |---|---|
-//! | [`constant`] | the paper's detection: nominal against a constant likelihood, and its blind spot |
+//! | [`constant`] | the paper's detection: a constant likelihood, and its blind spot |
 //! | [`risk`] | what losing track of a mode costs, for risk-sensitive proposals |
-//! | [`resample`], [`weights`], [`adaptive`] | four schemes, log-weights, the number of particles |
-//! | [`gaussian`], [`track`], [`particles`] | Kalman filter, pose track with coloured deviations, pose particles |
+//! | [`resample`], [`weights`], [`adaptive`] | four schemes, log-weights, number of particles |
+//! | [`gaussian`], [`track`], [`particles`] | Kalman filter, pose track, pose particles |
 //! | [`bank`] | exact single faults: one hypothesis per (mode, onset) |
 //! | [`tree`] | the fault tree |
 //! | [`logspace`], [`angle`] | probabilities as logarithms, angles on the circle |

@@ -15,7 +15,7 @@ use vigil_inference::gaussian::Gaussian;
 pub use hidden_markov::HiddenMarkov;
 pub use jump_linear::{JumpLinear, PoseAndWheels};
 pub use linear::Linear;
-pub use planar::{Planar, PlanarObservation};
+pub use planar::Planar;
 
 /// Why a case could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -23,6 +23,9 @@ pub enum CaseError {
     /// The file could not be read.
     #[error("{0}: {1}")]
     Io(String, std::io::Error),
+    /// The table is not this case's.
+    #[error("{0}: {1}")]
+    Table(String, csv::Error),
     /// The file is not this case.
     #[error("{0}: {1}")]
     Format(String, serde_json::Error),

@@ -11,128 +11,166 @@ use serde::Deserialize;
 use vigil_inference::angle::wrap;
 use vigil_inference::gaussian::Gaussian;
 use vigil_inference::hybrid::{Conditional, Modes, Sampled};
+use vigil_inference::lanes::{Observation, PlanarParameters};
 use vigil_inference::logspace::log_normal;
 
 use super::{CaseError, read};
 
-const MODES: usize = 13;
-const WHEELS: usize = 6;
-
-/// The model: x, y, yaw move by `DX`, `DY`, `DTH` of the mode, turned by the heading before.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+/// A planar robot as a model for every filter. Channels that are not a number are not measured.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Planar {
-    /// Forward displacement per step in each mode, m.
-    #[serde(rename = "DX")]
-    forward_m: [f64; MODES],
-    /// Lateral displacement per step in each mode, m.
-    #[serde(rename = "DY")]
-    lateral_m: [f64; MODES],
-    /// Turn per step in each mode, rad.
-    #[serde(rename = "DTH")]
-    turn_rad: [f64; MODES],
-    /// Mean wheel rates in each mode.
-    #[serde(rename = "MU")]
-    wheel_rates: [[f64; WHEELS]; MODES],
-    /// Transition probabilities, row by row.
-    #[serde(rename = "P")]
-    transition: [[f64; MODES]; MODES],
-    /// Standard deviation of the motion in x, m.
-    #[serde(rename = "SX")]
-    motion_x_m: f64,
-    /// The same in y, m.
-    #[serde(rename = "SY")]
-    motion_y_m: f64,
-    /// The same in yaw, rad.
-    #[serde(rename = "STH")]
-    motion_yaw_rad: f64,
-    /// Standard deviation of the measured x, m.
-    #[serde(rename = "RX")]
-    sensor_x_m: f64,
-    /// The same of y, m.
-    #[serde(rename = "RY")]
-    sensor_y_m: f64,
-    /// The same of yaw, rad.
-    #[serde(rename = "RTH")]
-    sensor_yaw_rad: f64,
-    /// Standard deviation of a measured wheel rate.
-    #[serde(rename = "RW")]
-    sensor_wheel: f64,
-    /// Pose before the first step.
-    #[serde(rename = "X0")]
-    pose_before: [f64; 3],
-    /// Its standard deviations.
-    #[serde(rename = "S0")]
-    pose_before_sd: [f64; 3],
+    /// Its tables.
+    pub parameters: PlanarParameters,
 }
 
-/// One step's observation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlanarObservation {
-    /// Measured x m, y m, yaw rad.
-    pub pose: [f64; 3],
-    /// Measured wheel rates; `None` when only the pose is used.
-    pub wheels: Option<[f64; WHEELS]>,
+/// The model as its file has it.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+struct File {
+    /// Increment of x in the body's frame, m, by mode.
+    dx: Vec<f64>,
+    /// The same of y.
+    dy: Vec<f64>,
+    /// The same of yaw, rad.
+    dth: Vec<f64>,
+    /// Mean wheel rates by mode.
+    mu: Vec<Vec<f64>>,
+    /// Transition probabilities, row by row.
+    p: Vec<Vec<f64>>,
+    /// Standard deviation of the motion's noise: x, m.
+    sx: f64,
+    /// The same of y.
+    sy: f64,
+    /// The same of yaw, rad.
+    sth: f64,
+    /// Standard deviation of the measured x, m.
+    rx: f64,
+    /// The same of y.
+    ry: f64,
+    /// The same of yaw, rad.
+    rth: f64,
+    /// The same of a wheel rate.
+    rw: f64,
+    /// Mean pose before the first step.
+    x0: [f64; 3],
+    /// Its standard deviation.
+    s0: [f64; 3],
+    /// Mode before the first step.
+    #[serde(rename = "init_mode")]
+    initial_mode: usize,
+}
+
+/// One recorded step: measured pose and wheel rates.
+#[derive(Debug, Deserialize)]
+struct Row {
+    /// x, m.
+    zx: f64,
+    /// y, m.
+    zy: f64,
+    /// Yaw, rad.
+    ztheta: f64,
+    /// Rate of the first wheel.
+    e0: f64,
+    /// Of the second.
+    e1: f64,
+    /// Of the third.
+    e2: f64,
+    /// Of the fourth.
+    e3: f64,
+    /// Of the fifth.
+    e4: f64,
+    /// Of the sixth.
+    e5: f64,
 }
 
 impl Planar {
-    /// Reads `rover13_model.json`.
+    /// Reads `rover13_model.json` and the 200 steps of `rover13_obs.csv` in `folder`.
     ///
     /// # Errors
     /// [`CaseError`].
-    pub fn read(path: &Path) -> Result<Self, CaseError> {
-        read(path)
+    pub fn read(folder: &Path) -> Result<(Self, Vec<Observation>), CaseError> {
+        let file: File = read(&folder.join("rover13_model.json"))?;
+        let path = folder.join("rover13_obs.csv");
+        let wrong = |error| CaseError::Table(path.display().to_string(), error);
+        let mut table = csv::Reader::from_path(&path).map_err(wrong)?;
+        let observation = |row: Row| {
+            let mut z = Observation::MISSING;
+            z.pose = [row.zx, row.zy, row.ztheta];
+            let rates = [row.e0, row.e1, row.e2, row.e3, row.e4, row.e5];
+            z.wheel_rates[..rates.len()].copy_from_slice(&rates);
+            z
+        };
+        let rows = table.deserialize().map(|row| row.map(observation));
+        let observations = rows.collect::<Result<_, _>>().map_err(wrong)?;
+        let modes = file.dx.len();
+        let motion = (0..modes).map(|k| [file.dx[k], file.dy[k], file.dth[k]]);
+        let initial = (0..modes).map(|k| f64::from(u8::from(k == file.initial_mode)));
+        let parameters = PlanarParameters {
+            initial: initial.collect(),
+            transition: file.p,
+            motion: motion.collect(),
+            motion_sd: [file.sx, file.sy, file.sth],
+            pose_sd: [file.rx, file.ry, file.rth],
+            wheel_rates: file.mu,
+            wheel_rate_sd: file.rw,
+            start: file.x0,
+            start_sd: file.s0,
+        };
+        Ok((Self { parameters }, observations))
     }
 
     /// The same model with other probabilities: a fault appears with `p_fault` in all, in equal
     /// parts, and vanishes with `p_recovery`.
     #[must_use]
     pub fn with_rates(mut self, p_fault: f64, p_recovery: f64) -> Self {
-        self.transition = [[0.0; MODES]; MODES];
-        self.transition[0] = [p_fault / (MODES - 1) as f64; MODES];
-        self.transition[0][0] = 1.0 - p_fault;
-        for (mode, row) in self.transition.iter_mut().enumerate().skip(1) {
-            (row[0], row[mode]) = (p_recovery, 1.0 - p_recovery);
+        let modes = self.modes();
+        for (from, row) in self.parameters.transition.iter_mut().enumerate() {
+            for (to, p) in row.iter_mut().enumerate() {
+                *p = match (from, to) {
+                    (0, 0) => 1.0 - p_fault,
+                    (0, _) => p_fault / (modes - 1) as f64,
+                    (_, 0) => p_recovery,
+                    _ if from == to => 1.0 - p_recovery,
+                    _ => 0.0,
+                };
+            }
         }
         self
     }
 
-    /// What is measured in a given state.
+    /// What is measured in a given state; without wheel rates if not `with_wheels`.
     pub fn measure(
         &self,
         mode: usize,
         pose: &Vector3<f64>,
         with_wheels: bool,
         rng: &mut Pcg64Mcg,
-    ) -> PlanarObservation {
-        let sd = self.sensor_sd();
-        let mut normal = || rng.sample::<f64, _>(StandardNormal);
-        let pose = std::array::from_fn(|i| pose[i] + sd[i] * normal());
-        let wheels = self.wheel_rates[mode].map(|mean| mean + self.sensor_wheel * normal());
-        PlanarObservation {
-            pose,
-            wheels: with_wheels.then_some(wheels),
+    ) -> Observation {
+        let parameters = &self.parameters;
+        let mut noise = |sd: f64| sd * rng.sample::<f64, _>(StandardNormal);
+        let mut z = Observation::MISSING;
+        z.pose = std::array::from_fn(|i| pose[i] + noise(parameters.pose_sd[i]));
+        for (rate, mean) in z.wheel_rates.iter_mut().zip(&parameters.wheel_rates[mode]) {
+            let measured = mean + noise(parameters.wheel_rate_sd);
+            *rate = if with_wheels { measured } else { f64::NAN };
         }
-    }
-
-    const fn sensor_sd(&self) -> [f64; 3] {
-        [self.sensor_x_m, self.sensor_y_m, self.sensor_yaw_rad]
-    }
-
-    const fn motion_sd(&self) -> [f64; 3] {
-        [self.motion_x_m, self.motion_y_m, self.motion_yaw_rad]
+        z
     }
 
     fn moved(&self, mode: usize, pose: &Vector3<f64>) -> Vector3<f64> {
         let (sin, cos) = pose[2].sin_cos();
-        let (forward, lateral) = (self.forward_m[mode], self.lateral_m[mode]);
+        let [forward, lateral, turn] = self.parameters.motion[mode];
         let (dx, dy) = (cos * forward - sin * lateral, sin * forward + cos * lateral);
-        pose + Vector3::new(dx, dy, self.turn_rad[mode])
+        pose + Vector3::new(dx, dy, turn)
     }
 
-    fn log_wheels(&self, mode: usize, wheels: Option<&[f64; WHEELS]>) -> f64 {
-        let variance = self.sensor_wheel * self.sensor_wheel;
-        let pairs = wheels.into_iter().flatten().zip(&self.wheel_rates[mode]);
-        pairs.map(|(z, mean)| log_normal(z - mean, variance)).sum()
+    fn log_wheels(&self, mode: usize, z: &Observation) -> f64 {
+        let variance = self.parameters.wheel_rate_sd.powi(2);
+        let pairs = z.wheel_rates.iter().zip(&self.parameters.wheel_rates[mode]);
+        let measured = pairs.filter(|(rate, _)| !rate.is_nan());
+        measured
+            .map(|(rate, mean)| log_normal(rate - mean, variance))
+            .sum()
     }
 }
 
@@ -146,49 +184,61 @@ fn squares(sd: [f64; 3]) -> Matrix3<f64> {
 
 impl Modes for Planar {
     fn modes(&self) -> usize {
-        MODES
+        self.parameters.initial.len()
+    }
+
+    fn initial(&self, mode: usize) -> f64 {
+        self.parameters.initial[mode]
     }
 
     fn transition(&self, from: usize, to: usize) -> f64 {
-        self.transition[from][to]
+        self.parameters.transition[from][to]
     }
 }
 
 impl Sampled for Planar {
     type State = Vector3<f64>;
-    type Observation = PlanarObservation;
+    type Observation = Observation;
 
     fn draw(&self, _mode: usize, rng: &mut Pcg64Mcg) -> Vector3<f64> {
-        Vector3::from_fn(|i, _| {
-            self.pose_before[i] + self.pose_before_sd[i] * rng.sample::<f64, _>(StandardNormal)
-        })
+        let (start, sd) = (self.parameters.start, self.parameters.start_sd);
+        Vector3::from_fn(|i, _| start[i] + sd[i] * rng.sample::<f64, _>(StandardNormal))
     }
 
     fn propagate(&self, mode: usize, state: &Vector3<f64>, rng: &mut Pcg64Mcg) -> Vector3<f64> {
-        let sd = self.motion_sd();
+        let sd = self.parameters.motion_sd;
         let noise = Vector3::from_fn(|i, _| sd[i] * rng.sample::<f64, _>(StandardNormal));
         self.moved(mode, state) + noise
     }
 
     fn log_motion(&self, mode: usize, before: &Vector3<f64>, after: &Vector3<f64>) -> f64 {
-        let (residual, sd) = (apart(after, &self.moved(mode, before)), self.motion_sd());
+        let (residual, sd) = (
+            apart(after, &self.moved(mode, before)),
+            self.parameters.motion_sd,
+        );
         (0..3).map(|i| log_normal(residual[i], sd[i] * sd[i])).sum()
     }
 
-    fn log_likelihood(&self, mode: usize, state: &Vector3<f64>, z: &PlanarObservation) -> f64 {
-        let (residual, sd) = (apart(&Vector3::from(z.pose), state), self.sensor_sd());
-        let pose: f64 = (0..3).map(|i| log_normal(residual[i], sd[i] * sd[i])).sum();
-        pose + self.log_wheels(mode, z.wheels.as_ref())
+    fn log_likelihood(&self, mode: usize, state: &Vector3<f64>, z: &Observation) -> f64 {
+        let (residual, sd) = (
+            apart(&Vector3::from(z.pose), state),
+            self.parameters.pose_sd,
+        );
+        let measured = (0..3).filter(|&i| !residual[i].is_nan());
+        let pose: f64 = measured
+            .map(|i| log_normal(residual[i], sd[i] * sd[i]))
+            .sum();
+        pose + self.log_wheels(mode, z)
     }
 }
 
 impl Conditional<3> for Planar {
-    type Observation = PlanarObservation;
+    type Observation = Observation;
 
     fn prior(&self, _mode: usize) -> Gaussian<3> {
         Gaussian {
-            mean: Vector3::from(self.pose_before),
-            covariance: squares(self.pose_before_sd),
+            mean: Vector3::from(self.parameters.start),
+            covariance: squares(self.parameters.start_sd),
         }
     }
 
@@ -197,16 +247,19 @@ impl Conditional<3> for Planar {
         let (dx, dy) = (moved[0] - state.mean[0], moved[1] - state.mean[1]);
         let jacobian = Matrix3::new(1.0, 0.0, -dy, 0.0, 1.0, dx, 0.0, 0.0, 1.0);
         let shift = moved - jacobian * state.mean;
-        state.predict(&jacobian, &shift, &squares(self.motion_sd()));
+        state.predict(&jacobian, &shift, &squares(self.parameters.motion_sd));
     }
 
-    fn update(&self, mode: usize, state: &mut Gaussian<3>, z: &PlanarObservation) -> Option<f64> {
-        let wheels = self.log_wheels(mode, z.wheels.as_ref());
+    fn update(&self, mode: usize, state: &mut Gaussian<3>, z: &Observation) -> Option<f64> {
+        let wheels = self.log_wheels(mode, z);
         if !wheels.is_finite() {
             return None;
         }
         let innovation = apart(&Vector3::from(z.pose), &state.mean);
-        let noise = squares(self.sensor_sd());
+        if innovation.iter().all(|residual| residual.is_nan()) {
+            return Some(wheels);
+        }
+        let noise = squares(self.parameters.pose_sd);
         let pose = state.update(&innovation, &SMatrix::<f64, 3, 3>::identity(), &noise)?;
         Some(pose + wheels)
     }
