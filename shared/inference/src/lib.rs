@@ -12,7 +12,7 @@
 //! | one fault at a time, linear(ised) | [`merged`] | 0.6 us a step; no fault of p = 1e-6 missed |
 //! | several faults at once | [`fault_sets`] | exact over 4096 sets in 20 us a step |
 //! | a model to simulate | [`bootstrap`], raised [`proposal`]s | p = 1e-6: 0 % missed, not 98 % |
-//! | the same, faults alike at first | [`hierarchical`], raised | 100 particles equal 1000 of [`bootstrap`] |
+//! | the same, faults alike at first | [`hierarchical`], raised | 100 particles: 1000 of the flat |
 //! | linear(ised), evidence wanted | [`look_ahead`] | 1000 particles beat 10000 of [`bootstrap`] |
 //! | a planar robot, many particles | [`lanes`] | 4.3 ns per particle and step (AVX-512) |
 //! | an oracle for short runs | [`sequences`], [`forward`] | exact while all sequences fit |
