@@ -4,10 +4,12 @@ use nalgebra::{Cholesky, Matrix3, Vector3};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock, WHEELS};
+use vigil_blocks::{MODE_MULTIPLE, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock, WHEELS};
 use vigil_inference::angle::wrap;
+use vigil_robot::learned::Moved;
 
-use crate::exact::{Exact, NOMINAL, UNKNOWN};
+use crate::encoders::Encoders;
+use crate::exact::Exact;
 use crate::modes::Leaves;
 
 /// Variance added to a cloud's covariance: particles are carried in single precision.
@@ -53,30 +55,24 @@ pub fn draw(
     let count = count.min(PARTICLE_CAPACITY);
     let offset: f64 = rng.random();
     let (mut filled, mut sum) = (0, 0.0);
-    let hypotheses = exact.hypotheses();
-    for (i, hypothesis) in hypotheses.iter().enumerate() {
+    let last = exact.hypotheses().len().saturating_sub(1);
+    for (i, (moved, hypothesis)) in exact.hypotheses().enumerate() {
         sum += hypothesis.log_weight.exp();
-        let last = i + 1 == hypotheses.len();
         let share = (sum * count as f64 - offset).ceil().max(0.0) as usize;
-        let until = if last { count } else { share.min(count) };
+        let until = if i == last { count } else { share.min(count) };
         if until <= filled {
             continue;
         }
         let mean = hypothesis.state.track.pose();
         let spread = hypothesis.state.track.pose_covariance() + Matrix3::identity() * PRECISION;
         let factor = Cholesky::new(spread).map_or(Matrix3::zeros(), |factor| factor.l());
-        let broken: [f64; WHEELS] =
-            std::array::from_fn(|wheel| match (hypothesis.mode, leaves.encoder[wheel]) {
-                (NOMINAL, Some(_)) => hypothesis.state.encoders.p_broken(wheel),
-                _ => 0.0,
-            });
         for slot in filled..until {
             let normal = Vector3::from_fn(|_, _| rng.sample(StandardNormal));
             let pose = mean + factor * normal;
             out.x[slot] = pose[0] as f32;
             out.y[slot] = pose[1] as f32;
             out.yaw[slot] = wrap(pose[2]) as f32;
-            out.mode[slot] = node(leaves, hypothesis.mode, &broken, rng.random());
+            out.mode[slot] = mode(leaves, moved, &hypothesis.state.encoders, rng);
         }
         filled = until;
     }
@@ -84,21 +80,25 @@ pub fn draw(
     out.log_weight[..filled].fill(-(filled.max(1) as f32).ln());
 }
 
-/// Node of a particle in a motion mode; nominal motion is divided among the encoders' states.
-fn node(leaves: &Leaves, mode: usize, broken: &[f64; WHEELS], u: f64) -> u32 {
-    match mode {
-        UNKNOWN.. => MODE_UNKNOWN,
-        NOMINAL => {
-            let mut sum = 0.0;
-            for (leaf, p) in leaves.encoder.iter().zip(broken) {
-                sum += p;
-                if let Some(leaf) = leaf.filter(|_| u < sum) {
-                    return leaf as u32;
-                }
-            }
-            0
+/// Mode of a particle: the encoders' states are drawn.
+fn mode(leaves: &Leaves, moved: Moved, encoders: &Encoders, rng: &mut Pcg64Mcg) -> u32 {
+    if moved.is_unknown() {
+        return MODE_UNKNOWN;
+    }
+    let mut nodes = 0_u64;
+    for wheel in 0..WHEELS {
+        if let Some(leaf) = leaves.stuck[wheel].filter(|_| moved.is_stuck(wheel)) {
+            nodes |= 1 << leaf;
         }
-        stuck => leaves.stuck[stuck - 1].map_or(0, |leaf| leaf as u32),
+        if let Some(leaf) = leaves.encoder[wheel] {
+            let broken = rng.random::<f64>() < encoders.p_broken(wheel);
+            nodes |= u64::from(broken) << leaf;
+        }
+    }
+    match nodes.count_ones() {
+        0 => 0,
+        1 => nodes.trailing_zeros(),
+        _ => MODE_MULTIPLE,
     }
 }
 

@@ -1,138 +1,129 @@
-//! What the encoders do while the robot moves as it should: a small hidden Markov model with one
-//! broken encoder at most.
+//! What each encoder does, given how the robot moves: a small hidden Markov model per wheel.
+//!
+//! Given the motion, the wheels' readings do not depend on each other, so any number of broken
+//! encoders costs no more than one.
 
 use vigil_blocks::WHEELS;
-use vigil_inference::forward::Forward;
-use vigil_robot::learned::{EncoderModel, EncoderState, Observation};
+use vigil_robot::learned::wheel_evidence::{BREAKAGE_SHARES, BREAKAGES};
 
-use crate::modes::Leaves;
+/// States of an encoder: whole, or broken in one way.
+pub const STATES: usize = 1 + BREAKAGES.len();
 
-/// Ways in which an encoder breaks: zero, frozen, noise, dead (zero plus the sensor's noise).
-const KINDS: [EncoderState; 4] = [
-    EncoderState::Zero,
-    EncoderState::Frozen,
-    EncoderState::Noise,
-    EncoderState::Dead,
-];
-/// Their prior shares.
-const SHARES: [f64; KINDS.len()] = [0.32, 0.32, 0.32, 0.04];
-/// States: all healthy, or one encoder broken in one way.
-const STATES: usize = 1 + KINDS.len() * WHEELS;
-
-const fn state(wheel: usize, kind: usize) -> usize {
-    1 + KINDS.len() * wheel + kind
-}
-
-/// Prior shares of the states among faults.
+/// Log-likelihoods of one observation's readings in each state, prepared for many hypotheses.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Births([f64; STATES]);
+pub struct Likelihoods {
+    /// Relative to the largest of a wheel, which is 1.
+    relative: [[f64; STATES]; WHEELS],
+    log_largest: [f64; WHEELS],
+    wheels: usize,
+}
 
-/// Log-likelihood of the readings in each state.
-pub type Patterns = [f64; STATES];
-
-impl Births {
-    /// Every encoder that is a leaf breaks with probability `each`, given a fault.
-    #[must_use]
-    pub fn new(leaves: &Leaves, each: f64) -> Self {
-        let mut births = [0.0; STATES];
-        for (wheel, _) in leaves
-            .encoder
-            .iter()
-            .enumerate()
-            .filter(|(_, leaf)| leaf.is_some())
-        {
-            for (kind, share) in SHARES.iter().enumerate() {
-                births[state(wheel, kind)] = share * each;
+impl Likelihoods {
+    /// Of the first `wheels` wheels: `log_likelihood(wheel, state)`.
+    pub fn new(wheels: usize, log_likelihood: impl Fn(usize, usize) -> f64) -> Self {
+        let mut out = Self {
+            relative: [[1.0; STATES]; WHEELS],
+            log_largest: [0.0; WHEELS],
+            wheels: wheels.min(WHEELS),
+        };
+        for wheel in 0..out.wheels {
+            let logs: [f64; STATES] = std::array::from_fn(|state| log_likelihood(wheel, state));
+            let largest = logs.into_iter().fold(f64::NEG_INFINITY, f64::max);
+            if largest.is_finite() {
+                out.relative[wheel] = logs.map(|log| (log - largest).exp());
+                out.log_largest[wheel] = largest;
             }
         }
-        Self(births)
-    }
-
-    /// Log-likelihood of an observation's wheel rates in each state, given that of each wheel's
-    /// reading in health.
-    #[must_use]
-    pub fn patterns(
-        &self,
-        encoder: &EncoderModel,
-        observation: &Observation,
-        sample_sd: f64,
-        healthy: &[f64],
-    ) -> Patterns {
-        let all: f64 = healthy.iter().sum();
-        let mut patterns = [f64::NEG_INFINITY; STATES];
-        patterns[0] = all;
-        for (wheel, health) in healthy.iter().enumerate() {
-            let reading = &observation.wheels[wheel];
-            for (kind, broken) in KINDS.into_iter().enumerate() {
-                if self.0[state(wheel, kind)] > 0.0 {
-                    let seen = encoder.log_likelihood(broken, reading, sample_sd);
-                    patterns[state(wheel, kind)] = all - health + seen;
-                }
-            }
-        }
-        patterns
+        out
     }
 }
 
-/// Belief over the encoders' states.
+/// Probabilities of the encoders' states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Encoders {
-    belief: Forward<STATES>,
-    onset: [u64; STATES],
+    p: [[f64; STATES]; WHEELS],
+    onset: [u64; WHEELS],
 }
 
 impl Encoders {
     /// All encoders are healthy at `t_ns`.
     #[must_use]
     pub fn healthy(t_ns: u64) -> Self {
+        let mut whole = [0.0; STATES];
+        whole[0] = 1.0;
         Self {
-            belief: Forward::at(0),
-            onset: [t_ns; STATES],
+            p: [whole; WHEELS],
+            onset: [t_ns; WHEELS],
         }
     }
 
-    /// One observation: an encoder breaks with probability `birth`, recovers with `death`. Returns
-    /// the log-evidence.
+    /// One observation: encoder w breaks with the probability `births[w]`, recovers with `death`.
+    /// Returns the log-evidence of all readings.
     pub fn step(
         &mut self,
-        births: &Births,
-        birth: f64,
+        births: &[f64; WHEELS],
         death: f64,
-        patterns: &Patterns,
+        likelihoods: &Likelihoods,
         t_ns: u64,
     ) -> f64 {
-        let births = births.0.map(|share| share * birth);
-        let before = *self.belief.log_p();
-        for i in (1..STATES).filter(|&i| births[i] > 0.0) {
+        let (mut evidence, mut product) = (0.0, 1.0);
+        let wheels = births.iter().enumerate().take(likelihoods.wheels);
+        for (wheel, &birth) in wheels {
+            let p = &mut self.p[wheel];
+            let (whole, broken) = (p[0], p[1..].iter().sum::<f64>());
             // The onset is that of the mass that came last in quantity.
-            if before[0] + births[i].ln() > before[i] {
-                self.onset[i] = t_ns;
+            if whole * birth > broken {
+                self.onset[wheel] = t_ns;
+            }
+            p[0] = whole * (1.0 - birth) + broken * death;
+            for (p, share) in p[1..].iter_mut().zip(BREAKAGE_SHARES) {
+                *p = *p * (1.0 - death) + whole * birth * share;
+            }
+            let joint: [f64; STATES] =
+                std::array::from_fn(|state| p[state] * likelihoods.relative[wheel][state]);
+            let total: f64 = joint.iter().sum();
+            evidence += likelihoods.log_largest[wheel];
+            product *= total;
+            if total > 0.0 {
+                *p = joint.map(|joint| joint / total);
             }
         }
-        self.belief.predict_star(0, &births, death);
-        self.belief.update(patterns).unwrap_or(patterns[0])
-    }
-
-    /// Probability that all encoders are healthy.
-    #[must_use]
-    pub fn p_healthy(&self) -> f64 {
-        self.belief.log_p()[0].exp()
+        // Each factor is at least the prior of a state: their product needs one logarithm only.
+        evidence + product.ln()
     }
 
     /// Probability that this wheel's encoder is broken.
     #[must_use]
     pub fn p_broken(&self, wheel: usize) -> f64 {
-        (0..KINDS.len())
-            .map(|kind| self.belief.log_p()[state(wheel, kind)].exp())
-            .sum()
+        self.p[wheel][1..].iter().sum::<f64>().min(1.0)
     }
 
-    /// Most probable onset of this wheel's broken encoder.
+    /// Onset of this wheel's broken encoder, if it is broken.
     #[must_use]
-    pub fn onset(&self, wheel: usize) -> u64 {
-        let log_p = self.belief.log_p();
-        let kinds = (0..KINDS.len()).map(|kind| state(wheel, kind));
-        let best = kinds.max_by(|&a, &b| log_p[a].total_cmp(&log_p[b]));
-        best.map_or(0, |state| self.onset[state])
+    pub const fn onset(&self, wheel: usize) -> u64 {
+        self.onset[wheel]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wheel_is_a_two_state_bayes_filter_when_every_breakage_reads_alike() {
+        let likelihoods = Likelihoods::new(1, |_, state| if state == 0 { -3.0 } else { -1.0 });
+        let (births, death) = ([0.1; WHEELS], 0.2);
+        let mut encoders = Encoders::healthy(0);
+        let (mut whole, mut broken) = (1.0_f64, 0.0_f64);
+        for step in 1..=5 {
+            (whole, broken) = (0.9 * whole + 0.2 * broken, 0.1 * whole + 0.8 * broken);
+            let (a, b) = (whole * (-3.0_f64).exp(), broken * (-1.0_f64).exp());
+            let evidence = encoders.step(&births, death, &likelihoods, step);
+            assert!((evidence - (a + b).ln()).abs() < 1e-12);
+            (whole, broken) = (a / (a + b), b / (a + b));
+            assert!((encoders.p_broken(0) - broken).abs() < 1e-12);
+        }
+        assert_eq!(encoders.onset(0), 1);
+        assert_eq!(encoders.p_broken(1), 0.0);
     }
 }

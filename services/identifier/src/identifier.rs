@@ -6,7 +6,8 @@ use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{
-    DetectionBelief, Entry, FaultBelief, PARTICLE_CAPACITY, ParticleBlock, SensorFrame,
+    DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock,
+    SensorFrame,
 };
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
@@ -17,11 +18,14 @@ use crate::draw::{copy, draw, moments};
 use crate::exact::{BIRTH_1_S, DEATH_1_S, Exact};
 use crate::modes::{IdentifierError, Leaves};
 use crate::posterior::Posterior;
+use crate::reasons::Reasons;
 
 /// A ring is worked off in about this time after an alarm, s.
 const CATCH_UP_S: f64 = 0.1;
 /// Observations worked off per cycle at least while catching up: more than arrive.
 const CATCH_UP_MIN: usize = 2;
+/// Observations since which the reasons of a diagnosis are looked for, at most.
+const REASONS_MAX: usize = 20;
 /// Probability of the nominal mode at which an identification ends, once the alarm has fallen.
 const RECOVERED: f64 = 0.95;
 
@@ -40,6 +44,14 @@ struct Kept {
     observation: Observation,
     noise_scale: f64,
     pose: Option<(Vector3<f64>, Matrix3<f64>)>,
+}
+
+impl Kept {
+    /// The pose as the detector knew it, or as it was measured.
+    fn pose(&self) -> (Vector3<f64>, Matrix3<f64>) {
+        let measured = Vector3::from(self.observation.pose);
+        self.pose.unwrap_or((measured, Matrix3::identity() * 1e-4))
+    }
 }
 
 /// What the identifier is doing.
@@ -78,6 +90,7 @@ pub struct Identifier {
     detection: Detection,
     posterior: Posterior,
     predicted: Posterior,
+    reasons: Reasons,
     mode: u32,
     mode_changes: u32,
     run_id: u64,
@@ -131,6 +144,7 @@ impl Identifier {
             },
             posterior: Posterior::nominal(),
             predicted: Posterior::nominal(),
+            reasons: Reasons::default(),
             mode: 0,
             mode_changes: 0,
             run_id: 0,
@@ -176,6 +190,7 @@ impl Identifier {
         };
         self.posterior = Posterior::nominal();
         self.predicted = self.posterior;
+        self.reasons = Reasons::default();
     }
 
     fn take(&mut self, input: &Input<'_>) {
@@ -202,7 +217,10 @@ impl Identifier {
         }
         match self.phase {
             Phase::Watching if self.detection.alarm => self.begin(),
-            Phase::Watching => self.posterior = Posterior::watching(self.detection.p_fault),
+            Phase::Watching => {
+                self.posterior = Posterior::watching(self.detection.p_fault);
+                self.reasons = Reasons::default();
+            }
             Phase::Identifying(_) => {}
         }
         if let Phase::Identifying(next) = self.phase {
@@ -236,8 +254,7 @@ impl Identifier {
         let Some(kept) = self.ring.get(start) else {
             return;
         };
-        let measured = Vector3::from(kept.observation.pose);
-        let (mean, covariance) = kept.pose.unwrap_or((measured, Matrix3::identity() * 1e-4));
+        let (mean, covariance) = kept.pose();
         self.exact.restart(mean, covariance, kept.observation.t_ns);
         self.phase = Phase::Identifying(start + 1);
         // What was unknown so far is now any of the faults, by their priors.
@@ -272,11 +289,46 @@ impl Identifier {
         self.predicted = self
             .predicted
             .predicted(&self.leaves, self.p_unknown, birth, death);
-        self.posterior = self.exact.posterior();
+        self.exact.posterior(&mut self.posterior);
+        self.find_reasons(next + taken);
         self.updated = true;
         let recovered = self.posterior.nodes[0] > RECOVERED;
         if recovered && !self.detection.alarm {
             self.phase = Phase::Watching;
+        }
+    }
+
+    /// Follows the diagnosis and its rival: anew from the onset when the diagnosis has changed. The
+    /// observations before index `end` have been taken.
+    fn find_reasons(&mut self, end: usize) {
+        let (mode, _) = self.posterior.mode(&self.leaves);
+        if mode == self.mode {
+            if let Some(last) = self.ring.get(end.saturating_sub(1)) {
+                let (observation, scale) = (&last.observation, last.noise_scale);
+                self.reasons.follow(&self.exact, observation, scale);
+            }
+            return;
+        }
+        self.reasons = Reasons::default();
+        let onset_ns = match mode {
+            0 => return,
+            MODE_UNKNOWN => self.exact.onset_unknown(),
+            _ => self.onset_of_leaf(),
+        };
+        // The last pose from before the onset, not too long ago: the work of a cycle is bounded.
+        let earliest = end.saturating_sub(REASONS_MAX);
+        let taken = self.ring.range(earliest..end.min(self.ring.len()));
+        let before = taken.take_while(|kept| kept.observation.t_ns <= onset_ns);
+        let start = earliest + before.count().saturating_sub(1);
+        let Some(pose) = self.ring.get(start).map(Kept::pose) else {
+            return;
+        };
+        let (posterior, exact, leaves) = (&self.posterior, &self.exact, &self.leaves);
+        self.reasons.begin(posterior, exact, leaves, pose, onset_ns);
+        for i in start + 1..end {
+            let Some(kept) = self.ring.get(i) else { break };
+            let (observation, scale) = (&kept.observation, kept.noise_scale);
+            self.reasons.follow(&self.exact, observation, scale);
         }
     }
 
@@ -293,7 +345,7 @@ impl Identifier {
 
     fn report(&mut self, belief: &mut FaultBelief) {
         self.posterior.write(&self.leaves, belief);
-        belief.p_predicted = self.predicted.tree(&self.leaves);
+        belief.p_predicted = self.predicted.nodes;
         belief.p_unknown_predicted = self.predicted.unknown;
         belief.run_id = self.run_id;
         let (mode, p_mode) = match self.phase {
@@ -315,6 +367,8 @@ impl Identifier {
         };
         belief.onset_t_capture_ns = self.onset();
         belief.identifying = u32::from(self.phase != Phase::Watching);
+        belief.runner_up = self.reasons.runner_up;
+        belief.channel_evidence = self.reasons.channel_evidence();
         belief.degenerate_count = self.exact.degenerate_count();
     }
 
@@ -322,6 +376,11 @@ impl Identifier {
         if self.phase == Phase::Watching || self.is_catching_up() {
             return 0;
         }
+        self.onset_of_leaf()
+    }
+
+    /// Onset of the most probable leaf.
+    fn onset_of_leaf(&self) -> u64 {
         let leaves = self
             .leaves
             .stuck

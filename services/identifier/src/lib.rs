@@ -9,6 +9,8 @@ mod exact;
 mod identifier;
 mod modes;
 mod posterior;
+mod reasons;
+mod sets;
 pub mod wiring;
 
 pub use assemble::assemble;

@@ -60,10 +60,10 @@ pub struct Leaves {
     pub encoder: [Option<usize>; WHEELS],
     /// Number of leaves.
     pub count: usize,
-    /// Parent of each node.
-    pub parents: [Option<usize>; FAULT_NODES],
     /// Depth of each node.
     pub depths: [usize; FAULT_NODES],
+    /// Leaves at or below each node, as bits.
+    pub below: [u64; FAULT_NODES],
     /// Number of nodes.
     pub nodes: usize,
     /// Hash of the tree.
@@ -85,13 +85,12 @@ impl Leaves {
             stuck: [None; WHEELS],
             encoder: [None; WHEELS],
             count: 0,
-            parents: [None; FAULT_NODES],
             depths: [0; FAULT_NODES],
+            below: [0; FAULT_NODES],
             nodes: tree.nodes().len(),
             hash: tree.hash(),
         };
-        for (i, node) in tree.nodes().iter().enumerate() {
-            leaves.parents[i] = node.parent;
+        for i in 0..tree.nodes().len() {
             leaves.depths[i] = tree.depth(i);
         }
         for i in tree.leaves() {
@@ -113,8 +112,28 @@ impl Leaves {
                 return Err(IdentifierError::Twice(other, node.name.clone()));
             }
             leaves.count += 1;
+            let above = std::iter::successors(Some(i), |&at| tree.nodes()[at].parent);
+            for at in above {
+                leaves.below[at] |= 1 << i;
+            }
         }
         Ok(leaves)
+    }
+
+    /// Prior share of a node's leaves among all faults, the unknown having `prior_unknown`.
+    #[must_use]
+    pub fn share(&self, node: usize, prior_unknown: f64) -> f64 {
+        let leaves = f64::from(self.below[node].count_ones());
+        leaves * (1.0 - prior_unknown) / self.count.max(1) as f64
+    }
+
+    /// Wheels that may be stuck, as bits.
+    #[must_use]
+    pub fn stuck_wheels(&self) -> u32 {
+        let wheels = self.stuck.iter().enumerate();
+        wheels.fold(0, |bits, (wheel, leaf)| {
+            bits | u32::from(leaf.is_some()) << wheel
+        })
     }
 }
 

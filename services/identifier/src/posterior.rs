@@ -1,30 +1,62 @@
-//! Probabilities of the modes, in the words of the fault tree.
+//! What is believed about the faults, in the words of the fault tree.
 
-use vigil_blocks::{FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_UNKNOWN};
+use vigil_blocks::{FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_MULTIPLE, MODE_UNKNOWN};
 
 use crate::modes::Leaves;
+use crate::sets::{entropy, rank};
 
-/// Probabilities of the nominal mode, every leaf and the unknown. They sum to 1.
+/// Probabilities of nodes, sets of leaves and the unknown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Posterior {
-    /// By node: nominal and leaves only, abstract nodes are 0.
+    /// Of the nominal mode, of each leaf's fault (alone or with others), and of any fault below
+    /// each abstract node.
     pub nodes: [f64; FAULT_NODES],
     /// No modelled fault explains the data.
     pub unknown: f64,
+    /// The most probable sets of leaves, in falling order; the empty set is the nominal mode.
+    pub sets: [FaultSet; FAULT_SETS],
+    /// Sets in use.
+    pub set_count: usize,
+    /// Entropy over sets and unknown, nat.
+    pub entropy: f64,
 }
-
-/// No probability is reported smaller: what can return must not be impossible.
-const FLOOR: f64 = 1e-12;
 
 impl Posterior {
     /// Nothing is wrong.
     #[must_use]
-    pub const fn nominal() -> Self {
-        let mut nodes = [0.0; FAULT_NODES];
-        nodes[0] = 1.0;
-        Self {
-            nodes,
+    pub fn nominal() -> Self {
+        let mut out = Self {
+            nodes: [0.0; FAULT_NODES],
             unknown: 0.0,
+            sets: [FaultSet::default(); FAULT_SETS],
+            set_count: 1,
+            entropy: 0.0,
+        };
+        out.nodes[0] = 1.0;
+        out.sets[0].p = 1.0;
+        out
+    }
+
+    /// Nothing is believed: sets are to be added.
+    pub fn clear(&mut self) {
+        *self = Self::nominal();
+        self.nodes[0] = 0.0;
+        self.sets[0].p = 0.0;
+        self.set_count = 0;
+    }
+
+    /// Adds a set of leaves and its probability.
+    pub fn add(&mut self, set: FaultSet, leaves: &Leaves) {
+        self.entropy += entropy(set.p);
+        rank(&mut self.sets, &mut self.set_count, set);
+        if set.leaves == 0 {
+            self.nodes[0] += set.p;
+            return;
+        }
+        for node in 1..leaves.nodes {
+            if leaves.below[node] & set.leaves != 0 {
+                self.nodes[node] = (self.nodes[node] + set.p).min(1.0);
+            }
         }
     }
 
@@ -38,7 +70,9 @@ impl Posterior {
         };
         let mut out = Self::nominal();
         out.nodes[0] = 1.0 - p_fault;
+        out.sets[0].p = out.nodes[0];
         out.unknown = p_fault;
+        out.entropy = entropy(out.nodes[0]) + entropy(p_fault);
         out
     }
 
@@ -46,111 +80,53 @@ impl Posterior {
     #[must_use]
     pub fn divided(mut self, leaves: &Leaves, prior_unknown: f64) -> Self {
         let fault = self.unknown;
-        let each = (1.0 - prior_unknown) / leaves.count.max(1) as f64;
-        for node in leaves.stuck.iter().chain(&leaves.encoder).flatten() {
-            self.nodes[*node] += fault * each;
+        for node in 1..leaves.nodes {
+            self.nodes[node] += fault * leaves.share(node, prior_unknown);
         }
         self.unknown = fault * prior_unknown;
         self
     }
 
-    /// After `birth` of the nominal mass went to the faults by their priors and `death` of each
-    /// fault's returned.
+    /// Nodes and unknown after `birth` of the mass without a fault went to it by its prior, and
+    /// `death` of each fault's mass lost it.
     #[must_use]
     pub fn predicted(&self, leaves: &Leaves, prior_unknown: f64, birth: f64, death: f64) -> Self {
         let mut out = *self;
         let nominal = self.nodes[0];
-        let each = (1.0 - prior_unknown) / leaves.count.max(1) as f64;
-        for node in leaves.stuck.iter().chain(&leaves.encoder).flatten() {
-            out.nodes[*node] = self.nodes[*node] * (1.0 - death) + nominal * birth * each;
+        for node in 1..leaves.nodes {
+            let p = self.nodes[node];
+            let without = (1.0 - p - self.unknown).max(0.0);
+            let born = without * birth * leaves.share(node, prior_unknown);
+            out.nodes[node] = p * (1.0 - death) + born;
         }
         out.unknown = self.unknown * (1.0 - death) + nominal * birth * prior_unknown;
         out.nodes[0] = nominal * (1.0 - birth) + (1.0 - nominal) * death;
         out
     }
 
-    /// Keeps every mode possible and the sum 1.
-    pub fn normalise(&mut self, leaves: &Leaves) {
-        let named = leaves.stuck.iter().chain(&leaves.encoder).flatten();
-        let mut sum = 0.0;
-        for node in named.copied().chain([0]) {
-            let p = &mut self.nodes[node];
-            *p = if p.is_finite() { p.max(FLOOR) } else { FLOOR };
-            sum += *p;
-        }
-        self.unknown = if self.unknown.is_finite() {
-            self.unknown.max(FLOOR)
-        } else {
-            FLOOR
-        };
-        sum += self.unknown;
-        self.unknown /= sum;
-        self.nodes = self.nodes.map(|p| p / sum);
-    }
-
-    /// Nodes with the sums of their children.
-    #[must_use]
-    pub fn tree(&self, leaves: &Leaves) -> [f64; FAULT_NODES] {
-        let mut out = self.nodes;
-        // Parents come before their children.
-        for i in (1..leaves.nodes).rev() {
-            if let Some(parent) = leaves.parents[i] {
-                out[parent] += out[i];
-            }
-        }
-        out.map(|p| p.min(1.0))
-    }
-
     /// Writes probabilities, sets and entropy.
     pub fn write(&self, leaves: &Leaves, belief: &mut FaultBelief) {
-        belief.p = self.tree(leaves);
+        belief.p = self.nodes;
         belief.p_unknown = self.unknown;
         belief.node_count = leaves.nodes as u32;
         belief.tree_hash = leaves.hash;
-        let term = |p: f64| if p > 0.0 { -p * p.ln() } else { 0.0 };
-        belief.entropy = self.nodes[..leaves.nodes]
-            .iter()
-            .map(|&p| term(p))
-            .sum::<f64>()
-            + term(self.unknown);
-        belief.sets = [FaultSet::default(); FAULT_SETS];
-        let mut count = 0;
-        for node in 0..leaves.nodes {
-            let is_set = node == 0
-                || leaves
-                    .stuck
-                    .iter()
-                    .chain(&leaves.encoder)
-                    .any(|&n| n == Some(node));
-            if !is_set {
-                continue;
-            }
-            let set = FaultSet {
-                leaves: if node == 0 { 0 } else { 1 << node },
-                p: self.nodes[node],
-            };
-            let place = belief.sets[..count]
-                .iter()
-                .position(|other| other.p < set.p);
-            let place = place.unwrap_or(count);
-            if place < FAULT_SETS {
-                let end = (count + 1).min(FAULT_SETS);
-                belief.sets[place..end].rotate_right(1);
-                belief.sets[place] = set;
-                count = end;
-            }
-        }
-        belief.set_count = count as u32;
+        belief.entropy = self.entropy;
+        belief.sets = self.sets;
+        belief.set_count = self.set_count as u32;
     }
 
-    /// The mode to report and its probability: unknown above one half, else the deepest node of at
-    /// least one half, else nominal.
+    /// The mode to report and its probability: unknown above one half, else several faults if a set
+    /// of them has one half, else the deepest node of at least one half, else nominal.
     #[must_use]
     pub fn mode(&self, leaves: &Leaves) -> (u32, f64) {
         if self.unknown > 0.5 {
             return (MODE_UNKNOWN, self.unknown);
         }
-        let p = self.tree(leaves);
+        let best = &self.sets[0];
+        if best.leaves.count_ones() >= 2 && best.p >= 0.5 {
+            return (MODE_MULTIPLE, best.p);
+        }
+        let p = &self.nodes;
         let mut best = None;
         for node in (0..leaves.nodes).filter(|&node| p[node] >= 0.5) {
             let better =

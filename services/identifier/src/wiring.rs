@@ -40,6 +40,8 @@ struct Reported {
     p_mode: f64,
     leaves: u64,
     changes: u32,
+    /// The channel that speaks most for the diagnosis, its evidence, and against what.
+    reason: (u32, f64, u32),
 }
 
 impl IdentifierStage {
@@ -161,11 +163,15 @@ impl Stage for IdentifierStage {
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
         let belief = self.belief.block();
         belief.cause = cause;
+        let evidence = belief.channel_evidence.iter().enumerate();
+        let strongest = evidence.max_by(|a, b| a.1.total_cmp(b.1));
+        let (channel, evidence) = strongest.map_or((0, 0.0), |(i, value)| (i, *value));
         self.reported = Reported {
             mode: belief.mode,
             p_mode: belief.p_mode,
             leaves: belief.sets[0].leaves,
             changes: belief.mode_change_count,
+            reason: (channel as u32, evidence, belief.runner_up),
         };
         self.particles.block().cause = cause;
         let published_ns = self.belief.send(stamp, clock)?;
@@ -181,6 +187,7 @@ impl Stage for IdentifierStage {
             p_mode,
             leaves,
             changes,
+            reason: (channel, evidence, runner_up),
         } = self.reported;
         if changes != self.told {
             let kind = if mode == 0 {
@@ -189,6 +196,10 @@ impl Stage for IdentifierStage {
                 EventKind::Diagnosis
             };
             health.event(now_ns, kind, mode, p_mode, leaves);
+            if evidence > 0.0 {
+                let against = u64::from(runner_up);
+                health.event(now_ns, EventKind::Reason, channel, evidence, against);
+            }
             self.told = changes;
         }
     }

@@ -7,7 +7,7 @@ mod recorded;
 use alarm::Alarm;
 use proptest::prelude::*;
 use recorded::{model, path, robot, unseen};
-use vigil_blocks::{Entry, FaultBelief, MODE_UNKNOWN, ParticleBlock, SensorFrame};
+use vigil_blocks::{Entry, FaultBelief, MODE_MULTIPLE, MODE_UNKNOWN, ParticleBlock, SensorFrame};
 use vigil_identifier::{Identifier, IdentifierError, Input};
 use vigil_inference::FaultTree;
 use vigil_inference::tree::Node;
@@ -57,16 +57,28 @@ impl Bench {
     /// What must hold of every belief.
     fn check(&self) {
         let b = &self.belief;
-        for (p, nodes) in [(b.p, b.p_unknown), (b.p_predicted, b.p_unknown_predicted)] {
-            let leaves: f64 = self.tree.leaves().map(|leaf| p[leaf]).sum();
-            assert!((p[0] + leaves + nodes - 1.0).abs() < 1e-9, "{p:?} {nodes}");
-            let children = self.tree.nodes().iter().enumerate();
-            for (parent, _) in children.filter(|(_, n)| n.fault.is_none()).skip(1) {
-                let below = (0..self.tree.nodes().len())
-                    .filter(|&i| self.tree.nodes()[i].parent == Some(parent));
-                assert!((p[parent] - below.map(|i| p[i]).sum::<f64>()).abs() < 1e-9);
+        for (p, unknown) in [(b.p, b.p_unknown), (b.p_predicted, b.p_unknown_predicted)] {
+            assert!((0.0..=1.0).contains(&unknown));
+            assert!(p.iter().all(|p| (0.0..=1.0 + 1e-12).contains(p)), "{p:?}");
+            for (parent, node) in self.tree.nodes().iter().enumerate().skip(1) {
+                let children = || {
+                    let nodes = self.tree.nodes().iter().enumerate();
+                    nodes
+                        .filter(|(_, n)| n.parent == Some(parent))
+                        .map(|(i, _)| p[i])
+                };
+                // Any of several faults: no less than one of them, no more than their sum.
+                if node.fault.is_none() {
+                    let highest = children().fold(0.0, f64::max);
+                    let sum: f64 = children().sum();
+                    assert!(highest - 1e-9 <= p[parent] && p[parent] <= sum + 1e-9);
+                }
             }
         }
+        // One fault may be there with others: the leaves' sum may exceed what is left.
+        let leaves: f64 = self.tree.leaves().map(|leaf| b.p[leaf]).sum();
+        assert!(b.p[0] + leaves + b.p_unknown > 1.0 - 1e-9, "{b:?}");
+        assert!(b.channel_evidence.iter().all(|value| value.is_finite()));
         assert!(b.entropy.is_finite() && b.entropy >= 0.0 && (0.0..=1.0).contains(&b.p_mode));
         assert!(b.sets[..b.set_count as usize].is_sorted_by(|x, y| x.p >= y.p));
         let count = self.particles.count as usize;
@@ -77,6 +89,7 @@ impl Bench {
     fn mode(&self) -> &str {
         match self.belief.mode {
             MODE_UNKNOWN => "UNKNOWN",
+            MODE_MULTIPLE => "MULTIPLE",
             node => &self.tree.nodes()[node as usize].name,
         }
     }

@@ -237,15 +237,7 @@ impl fmt::Display for Summary {
         }
         writeln!(f, "  timeline:")?;
         for event in &self.events {
-            let p = event.p.map_or_else(String::new, |p| format!("  p={p:.3}"));
-            let Told {
-                t_s,
-                service,
-                event,
-                what,
-                ..
-            } = event;
-            writeln!(f, "  {t_s:9.3} s  {service:<10}  {event:<10}  {what}{p}")?;
+            writeln!(f, "  {event}")?;
         }
         if let Some(gave_up) = &self.gave_up {
             writeln!(f, "  given up: {gave_up}")?;

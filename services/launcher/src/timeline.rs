@@ -1,7 +1,9 @@
 //! What happened, in order, in words.
 
+use std::fmt;
+
 use serde::Serialize;
-use vigil_blocks::{Event, EventKind, MODE_MULTIPLE, MODE_UNKNOWN, Refusal};
+use vigil_blocks::{Channel, Event, EventKind, MODE_MULTIPLE, MODE_UNKNOWN, Refusal};
 use vigil_cycle::topic::ServiceName;
 use vigil_robot::{Fault, FaultKind};
 
@@ -21,6 +23,26 @@ pub struct Told {
     /// Probability, where the event has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub p: Option<f64>,
+    /// Of a diagnosis of several faults: the most probable set, joined by `+`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fault_set: Option<String>,
+}
+
+impl fmt::Display for Told {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            t_s,
+            service,
+            event,
+            what,
+            ..
+        } = self;
+        write!(f, "{t_s:9.3} s  {service:<10}  {event:<10}  {what}")?;
+        if let Some(set) = &self.fault_set {
+            write!(f, " {set}")?;
+        }
+        self.p.map_or(Ok(()), |p| write!(f, "  p={p:.3}"))
+    }
 }
 
 /// All events of a run.
@@ -121,15 +143,7 @@ impl Timeline {
             let new = self.raw[self.shown..].iter();
             for (service, event) in new.filter(|(_, event)| self.is_told(event)) {
                 let told = self.namer.tell(*service, event, origin_ns);
-                let p = told.p.map_or_else(String::new, |p| format!("  p={p:.3}"));
-                let Told {
-                    t_s,
-                    service,
-                    event,
-                    what,
-                    ..
-                } = told;
-                tell!("{t_s:9.3} s  {service:<10}  {event:<10}  {what}{p}");
+                tell!("{told}");
             }
         }
         if origin_ns.is_some() || !show {
@@ -199,12 +213,41 @@ impl Namer {
             event: kind.map_or("unknown", kind_name),
             what: kind.map_or_else(String::new, |kind| self.what(kind, event)),
             p: has_p.then_some(event.p),
+            fault_set: (kind == Some(EventKind::Diagnosis) && event.what == MODE_MULTIPLE)
+                .then(|| self.set(event.value)),
+        }
+    }
+
+    /// Leaves, given as bits, joined by `+`.
+    fn set(&self, leaves: u64) -> String {
+        let nodes = self.nodes.iter().enumerate();
+        let names = nodes.filter(|(i, _)| leaves >> i & 1 == 1);
+        let names: Vec<&str> = names.map(|(_, name)| name.as_str()).collect();
+        names.join("+")
+    }
+
+    fn channel(&self, channel: usize) -> String {
+        let wheel = |first: usize| self.robot.wheels.get(channel - first);
+        let named = |kind: &str, first| match wheel(first) {
+            Some(wheel) => format!("{kind} {}", wheel.name),
+            None => "?".into(),
+        };
+        match channel {
+            Channel::POSE => "pose".into(),
+            8..16 => named("wheel rate", Channel::wheel_rate(0)),
+            16..24 => "steering".into(),
+            _ => "?".into(),
         }
     }
 
     fn what(&self, kind: EventKind, event: &Event) -> String {
         match kind {
             EventKind::Diagnosis | EventKind::Cleared => self.mode(event.what),
+            EventKind::Reason => {
+                let (channel, evidence) = (self.channel(event.what as usize), event.p);
+                let runner_up = self.mode(event.value as u32);
+                format!("{channel} says so by {evidence:.1} nat, against {runner_up}")
+            }
             EventKind::Action | EventKind::Obeys => {
                 let action = self.actions.get(event.what as usize);
                 let wheel = usize::try_from(event.value)
@@ -270,5 +313,6 @@ const fn kind_name(kind: EventKind) -> &'static str {
         EventKind::Run => "run",
         EventKind::EndOfRecording => "end-of-recording",
         EventKind::Obeys => "obeys",
+        EventKind::Reason => "reason",
     }
 }

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::block::block;
-use crate::{Cause, Header};
+use crate::{CHANNELS, Cause, Header};
 
 /// Capacity of nodes of the fault tree.
 pub const FAULT_NODES: usize = 64;
@@ -27,7 +27,7 @@ pub struct FaultSet {
 block! {
     /// Written by the identifier every cycle. Before an alarm it reports nominal with
     /// probability 1 - p_fault and the rest as unknown.
-    pub struct FaultBelief, size 1312 {
+    pub struct FaultBelief, size 1576 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -36,8 +36,8 @@ block! {
         pub run_id: u64,
         /// Hash of the fault tree that gives the nodes their meaning.
         pub tree_hash: u64,
-        /// Probability of each node: a leaf's own, an abstract node's sum of its children.
-        /// Node 0 is nominal.
+        /// Probability of each node: that a leaf's fault is present, alone or with others; that any
+        /// fault below an abstract node is. Node 0 is nominal: no fault at all.
         pub p: [f64; FAULT_NODES],
         /// The same before this cycle's data: prediction from the last cycle.
         pub p_predicted: [f64; FAULT_NODES],
@@ -47,8 +47,13 @@ block! {
         pub p_unknown_predicted: f64,
         /// Most probable sets of leaves, in falling order.
         pub sets: [FaultSet; FAULT_SETS],
-        /// Entropy of the distribution over leaves and unknown, nats.
+        /// Entropy of the distribution over sets and unknown, nats.
         pub entropy: f64,
+        /// Why this diagnosis and not the next best one: by channel, how much more the readings since
+        /// the start of the identification are expected under the most probable set (the unknown,
+        /// if that is reported) than under `runner_up`, natural log-likelihood. 0 before an
+        /// identification, and for filters that keep no such account.
+        pub channel_evidence: [f64; CHANNELS],
         /// Probability of `mode`.
         pub p_mode: f64,
         /// Capture time of the frame that raised the alarm, ns; 0 before an alarm.
@@ -57,6 +62,11 @@ block! {
         pub onset_t_capture_ns: u64,
         /// Reported mode: a node's index, [`MODE_UNKNOWN`] or [`MODE_MULTIPLE`].
         pub mode: u32,
+        /// The next best explanation that is not the best and one more fault: a node's index (0 is
+        /// nominal), [`MODE_UNKNOWN`] or [`MODE_MULTIPLE`].
+        pub runner_up: u32,
+        /// Reserved, zero.
+        pub reserved: u32,
         /// Changes of `mode` so far.
         pub mode_change_count: u32,
         /// Nodes in use.

@@ -61,6 +61,9 @@ pub enum EventKind {
     EndOfRecording = 15,
     /// The robot begins to obey another decision. `what` and `value` as for `Action`.
     Obeys = 16,
+    /// Why the last diagnosis and not the next best. `what`: the channel that speaks most for it;
+    /// `p`: its evidence, nat; `value`: the next best mode.
+    Reason = 17,
 }
 
 impl EventKind {
@@ -84,6 +87,7 @@ impl EventKind {
             14 => Self::Run,
             15 => Self::EndOfRecording,
             16 => Self::Obeys,
+            17 => Self::Reason,
             _ => return None,
         })
     }

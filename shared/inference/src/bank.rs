@@ -25,20 +25,18 @@ pub struct Hypothesis<T> {
 pub struct Bank<T> {
     hypotheses: Vec<Hypothesis<T>>,
     scratch: Vec<f64>,
-    capacity: usize,
-    per_mode: usize,
+    capacities: Vec<usize>,
 }
 
 impl<T: Copy> Bank<T> {
-    /// An empty bank of at most `per_mode` hypotheses for each of `modes` modes. Allocates once.
+    /// An empty bank of at most `capacities[mode]` hypotheses for each mode. Allocates once.
     #[must_use]
-    pub fn new(modes: usize, per_mode: usize) -> Self {
-        let capacity = modes * per_mode;
+    pub fn new(capacities: &[usize]) -> Self {
+        let capacity = capacities.iter().sum();
         Self {
             hypotheses: Vec::with_capacity(capacity),
             scratch: Vec::with_capacity(capacity),
-            capacity,
-            per_mode,
+            capacities: capacities.to_vec(),
         }
     }
 
@@ -78,28 +76,28 @@ impl<T: Copy> Bank<T> {
             .max_by(|a, b| a.log_weight.total_cmp(&b.log_weight))
     }
 
-    /// Adds a hypothesis. A mode that has its share of places gives up its least likely one, if
-    /// the new one is more likely or as young as to have no evidence yet.
+    /// Adds a hypothesis. A mode that has its share of places gives up its least likely one; a mode
+    /// without places takes none.
     pub fn add(&mut self, hypothesis: Hypothesis<T>) {
         let same = self
             .hypotheses
             .iter()
             .filter(|other| other.mode == hypothesis.mode)
             .count();
-        if same >= self.per_mode || self.hypotheses.len() >= self.capacity {
-            let least = (0..self.hypotheses.len())
-                .filter(|&i| self.hypotheses[i].mode == hypothesis.mode)
-                .min_by(|&a, &b| {
-                    let (a, b) = (&self.hypotheses[a], &self.hypotheses[b]);
-                    a.log_weight.total_cmp(&b.log_weight)
-                });
-            match least {
-                Some(i) => self.hypotheses[i] = hypothesis,
-                None => return,
-            }
+        let capacity = self.capacities.get(hypothesis.mode).copied().unwrap_or(0);
+        if same < capacity {
+            self.hypotheses.push(hypothesis);
             return;
         }
-        self.hypotheses.push(hypothesis);
+        let mode = hypothesis.mode;
+        let alike = self
+            .hypotheses
+            .iter_mut()
+            .filter(|other| other.mode == mode);
+        let least = alike.min_by(|a, b| a.log_weight.total_cmp(&b.log_weight));
+        if let Some(least) = least {
+            *least = hypothesis;
+        }
     }
 
     /// Drops hypotheses whose log-weight is below `floor`, or not a number, and normalises the
@@ -150,7 +148,7 @@ mod tests {
 
     #[test]
     fn weights_add_up_per_mode() {
-        let mut bank = Bank::new(3, 4);
+        let mut bank = Bank::new(&[4; 3]);
         bank.restart(0, 0, ());
         bank.add(hypothesis(1, 1, 0.5));
         bank.add(hypothesis(1, 2, 0.5));
@@ -165,7 +163,7 @@ mod tests {
 
     #[test]
     fn the_unlikely_are_dropped_and_the_bank_stays_bounded() {
-        let mut bank = Bank::new(2, 3);
+        let mut bank = Bank::new(&[3; 2]);
         bank.restart(0, 0, ());
         for onset in 0..50 {
             bank.add(hypothesis(1, onset, 1e-3));
@@ -178,7 +176,7 @@ mod tests {
 
     #[test]
     fn impossible_weights_are_told() {
-        let mut bank = Bank::new(1, 2);
+        let mut bank = Bank::new(&[2]);
         bank.restart(0, 0, ());
         bank.hypotheses_mut()[0].log_weight = f64::NAN;
         assert_eq!(bank.normalise(-30.0), None);

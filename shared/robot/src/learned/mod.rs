@@ -6,6 +6,8 @@
 //! | [`motion`] | displacement per commanded metre, and its noise |
 //! | [`wheels`] | wheel rates and steering angles, and what an encoder says about its wheel |
 //! | [`observation`] | frames averaged into observations of about the learned interval |
+//! | [`motion_modes`] | the ways in which a robot may move: nominal, wheels stuck, unknown |
+//! | [`wheel_evidence`] | what the wheels say, for everything that each may be doing |
 //! | [`noise_scale`] | how much noisier the sensors are than the learned ones |
 //! | [`calibration`] | alarm thresholds for a stated mean time between false alarms |
 //! | [`monitor`] | the detection filter over observations |
@@ -14,15 +16,19 @@ pub mod calibration;
 pub mod model;
 pub mod monitor;
 pub mod motion;
+pub mod motion_modes;
 pub mod noise_scale;
 pub mod observation;
 mod reading;
+pub mod wheel_evidence;
 pub mod wheels;
 
 pub use calibration::Calibration;
 pub use model::{Model, ModelError};
 pub use monitor::Monitor;
 pub use motion::{Curve, MotionModel};
+pub use motion_modes::{FaultRates, MotionMode, Moved, motion_modes};
 pub use observation::{Intake, Observation, Observer};
 pub use reading::Reading;
+pub use wheel_evidence::WheelEvidence;
 pub use wheels::{EncoderModel, EncoderState, RateModel};

@@ -63,6 +63,17 @@ impl Observation {
         sample_variance / f64::from(valid.max(1))
     }
 
+    /// Variances of the mean pose (x, y, yaw) when the pose's noise is `noise_scale` times the
+    /// learned one.
+    #[must_use]
+    pub fn pose_variance(&self, model: &Model, noise_scale: f64) -> [f64; 3] {
+        let noise = &model.noise;
+        [noise.position_m, noise.position_m, noise.yaw_rad].map(|sd| {
+            let sample = model.sample_variance(sd, self.frame_s) * noise_scale * noise_scale;
+            self.mean_variance(sample, self.pose_frames)
+        })
+    }
+
     /// Variance of the yaw, forward and lateral displacement beyond the motion model: the body's
     /// lag behind a changing command is known only roughly, and the error is coherent.
     #[must_use]

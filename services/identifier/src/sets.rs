@@ -1,0 +1,133 @@
+//! Probabilities of all sets of faults, from hypotheses about motion and encoders.
+
+use vigil_blocks::{FAULT_SETS, FaultSet};
+use vigil_robot::learned::{MotionMode, Moved};
+
+use crate::modes::Leaves;
+use crate::posterior::Posterior;
+
+/// Hypotheses less probable than this are not divided among sets.
+const NEGLIGIBLE: f64 = 1e-13;
+/// No set of one fault at most is reported less probable: what can return must not be impossible.
+const FLOOR: f64 = 1e-12;
+
+/// Sums over hypotheses.
+#[derive(Debug, Clone)]
+pub struct Sets {
+    /// Row i: motion mode i; column e: the encoders `e` (bits) are broken.
+    p: Vec<f64>,
+    moved: Vec<Moved>,
+    wheels: usize,
+    unknown: f64,
+    products: Vec<f64>,
+}
+
+impl Sets {
+    /// Sets over motion modes and `wheels` encoders. Allocates all that it will need.
+    #[must_use]
+    pub fn new(modes: &[MotionMode], wheels: usize) -> Self {
+        let subsets = 1 << wheels;
+        Self {
+            p: vec![0.0; modes.len() * subsets],
+            moved: modes.iter().map(|mode| mode.moved).collect(),
+            wheels,
+            unknown: 0.0,
+            products: vec![0.0; subsets],
+        }
+    }
+
+    /// Forgets the sums.
+    pub fn clear(&mut self) {
+        self.p.fill(0.0);
+        self.unknown = 0.0;
+    }
+
+    /// Adds a hypothesis of probability `p`, under which encoder w is broken with `broken(w)`.
+    pub fn add(&mut self, mode: usize, p: f64, broken: impl Fn(usize) -> f64) {
+        if p.is_nan() || p < NEGLIGIBLE {
+            return;
+        }
+        if self.moved[mode].is_unknown() {
+            self.unknown += p;
+            return;
+        }
+        self.products[0] = p;
+        for wheel in 0..self.wheels {
+            let broken = broken(wheel);
+            let (whole, with) = self.products[..2 << wheel].split_at_mut(1 << wheel);
+            for (whole, with) in whole.iter_mut().zip(with) {
+                *with = *whole * broken;
+                *whole *= 1.0 - broken;
+            }
+        }
+        let subsets = self.products.len();
+        let row = &mut self.p[mode * subsets..(mode + 1) * subsets];
+        for (sum, product) in row.iter_mut().zip(&self.products) {
+            *sum += product;
+        }
+    }
+
+    /// Nodes of a set; None if a fault of it is no leaf.
+    fn nodes(&self, index: usize, leaves: &Leaves) -> Option<u64> {
+        let encoders = (index % self.products.len()) as u32;
+        let stuck = self.moved[index / self.products.len()].stuck();
+        let mut nodes = 0_u64;
+        for wheel in 0..self.wheels {
+            if stuck >> wheel & 1 == 1 {
+                nodes |= 1 << leaves.stuck[wheel]?;
+            }
+            if encoders >> wheel & 1 == 1 {
+                nodes |= 1 << leaves.encoder[wheel]?;
+            }
+        }
+        Some(nodes)
+    }
+
+    /// Normalises, and fills the probabilities of nodes, sets and unknown.
+    pub fn posterior(&mut self, leaves: &Leaves, out: &mut Posterior) {
+        let subsets = self.products.len();
+        let mut total = 0.0;
+        for (index, p) in self.p.iter_mut().enumerate() {
+            let moved = self.moved[index / subsets];
+            let faults = moved.stuck().count_ones() + ((index % subsets) as u32).count_ones();
+            let possible = faults <= 1 && !moved.is_unknown();
+            *p = if p.is_finite() { *p } else { 0.0 }.max(if possible { FLOOR } else { 0.0 });
+            total += *p;
+        }
+        self.unknown = if self.unknown.is_finite() {
+            self.unknown.max(FLOOR)
+        } else {
+            FLOOR
+        };
+        total += self.unknown;
+        out.clear();
+        out.unknown = self.unknown / total;
+        out.entropy = entropy(out.unknown);
+        for index in 0..self.p.len() {
+            let p = self.p[index] / total;
+            if p <= 0.0 {
+                continue;
+            }
+            let Some(nodes) = self.nodes(index, leaves) else {
+                continue;
+            };
+            out.add(FaultSet { leaves: nodes, p }, leaves);
+        }
+    }
+}
+
+/// `-p ln p`; 0 for 0.
+pub fn entropy(p: f64) -> f64 {
+    if p > 0.0 { -p * p.ln() } else { 0.0 }
+}
+
+/// Puts a set among the most probable ones.
+pub fn rank(sets: &mut [FaultSet; FAULT_SETS], count: &mut usize, set: FaultSet) {
+    let place = sets[..*count].iter().position(|other| other.p < set.p);
+    let place = place.unwrap_or(*count);
+    if place < FAULT_SETS {
+        *count = (*count + 1).min(FAULT_SETS);
+        sets[place..*count].rotate_right(1);
+        sets[place] = set;
+    }
+}

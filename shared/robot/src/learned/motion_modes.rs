@@ -1,0 +1,221 @@
+//! The ways in which a robot may move: nominal, wheels stuck, unknown.
+
+use nalgebra::{Matrix3, Vector3};
+use vigil_blocks::WHEELS;
+use vigil_inference::track::MotionNoise;
+
+use super::{Curve, Model, MotionModel};
+
+/// The unknown: standard deviation of its constant deviation per metre (yaw, forward, lateral).
+const UNKNOWN_SD: [f64; 3] = [0.25, 0.2, 0.12];
+/// Correlation length of the unknown's coloured deviations, m.
+const UNKNOWN_LENGTH_M: f64 = 0.2;
+/// Soil other than that learned from: deviation of a stuck wheel's effect, relative to the effect.
+const TERRAIN: f64 = 0.1;
+/// The same for two stuck wheels, whose effects are added: nothing was learned of both together.
+const TERRAIN_BOTH: f64 = 0.3;
+
+/// What moves the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moved {
+    /// All wheels as commanded.
+    Nominal,
+    /// These wheels are stuck: bit w is wheel w.
+    Stuck(u32),
+    /// A large constant deviation; wheels turn as commanded.
+    Unknown,
+    /// A large constant deviation; wheels and steering may do anything.
+    UnknownAny,
+}
+
+impl Moved {
+    /// True if `wheel` is stuck.
+    #[must_use]
+    pub const fn is_stuck(self, wheel: usize) -> bool {
+        matches!(self, Self::Stuck(mask) if mask >> wheel & 1 == 1)
+    }
+
+    /// True for both kinds of unknown.
+    #[must_use]
+    pub const fn is_unknown(self) -> bool {
+        matches!(self, Self::Unknown | Self::UnknownAny)
+    }
+
+    /// Bits of the stuck wheels.
+    #[must_use]
+    pub const fn stuck(self) -> u32 {
+        match self {
+            Self::Stuck(mask) => mask,
+            _ => 0,
+        }
+    }
+}
+
+/// One way to move.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotionMode {
+    /// What moves the robot.
+    pub moved: Moved,
+    /// Displacement per commanded metre.
+    pub motion: MotionModel,
+    /// Its noise.
+    pub noise: MotionNoise,
+}
+
+/// How often faults come and go, per second of motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FaultRates {
+    /// Rate at which one modelled fault appears, 1/s.
+    pub fault_1_s: f64,
+    /// Rate at which something unknown happens, 1/s.
+    pub unknown_1_s: f64,
+    /// Rate at which a fault vanishes, 1/s.
+    pub death_1_s: f64,
+}
+
+impl FaultRates {
+    /// Rate at which `from` becomes `to`, 1/s; 0 if it takes several steps.
+    #[must_use]
+    pub fn rate_1_s(&self, from: Moved, to: Moved) -> f64 {
+        let (before, after) = (from.stuck(), to.stuck());
+        match to {
+            _ if from == to => 0.0,
+            Moved::Nominal if before.count_ones() <= 1 => self.death_1_s,
+            Moved::Nominal => 0.0,
+            Moved::Unknown | Moved::UnknownAny => 0.5 * self.unknown_1_s,
+            Moved::Stuck(_) if after.count_ones() == 1 && before.count_ones() <= 1 => {
+                self.fault_1_s
+            }
+            Moved::Stuck(_) if before != 0 && before & after == before => self.fault_1_s,
+            Moved::Stuck(_) if before & after == after => self.death_1_s,
+            Moved::Stuck(_) => 0.0,
+        }
+    }
+}
+
+/// The ways in which a robot may move whose wheels `stuck` (bits) may stick: nominal first, then
+/// single wheels, pairs if `pairs`, and both kinds of unknown.
+#[must_use]
+pub fn motion_modes(model: &Model, stuck: u32, pairs: bool) -> Vec<MotionMode> {
+    let nominal = model.nominal.motion;
+    let mut modes = vec![MotionMode {
+        moved: Moved::Nominal,
+        motion: nominal,
+        noise: nominal.noise(),
+    }];
+    let known = |w: usize| stuck >> w & 1 == 1 && model.stuck(w).is_some();
+    let wheels = || (0..WHEELS).filter(|&w| known(w));
+    modes.extend(wheels().map(|w| stuck_mode(model, &[w])));
+    if pairs {
+        let both = |a: usize| wheels().filter(move |&b| b > a).map(move |b| [a, b]);
+        modes.extend(wheels().flat_map(both).map(|both| stuck_mode(model, &both)));
+    }
+    modes.extend([Moved::Unknown, Moved::UnknownAny].map(|moved| MotionMode {
+        moved,
+        motion: nominal,
+        noise: unknown_noise(model),
+    }));
+    modes
+}
+
+fn unknown_noise(model: &Model) -> MotionNoise {
+    let nominal = model.nominal.motion.noise();
+    // As coloured as the stuck modes: an unknown fault meets the same soil.
+    let coloured = model.stuck.iter().map(|s| s.motion.noise().deviation);
+    let count = model.stuck.len().max(1) as f64;
+    let deviation = coloured.fold(Matrix3::zeros(), |sum, next| sum + next) / count;
+    MotionNoise {
+        offset: Matrix3::from_diagonal(&Vector3::from(UNKNOWN_SD.map(|sd| sd * sd))),
+        deviation: Matrix3::from_diagonal(&deviation.diagonal()) + nominal.deviation,
+        length_m: UNKNOWN_LENGTH_M,
+        white: nominal.white * 4.0,
+    }
+}
+
+/// Wheels stuck. The effects of several add up. Another soil changes the size of an effect, not its
+/// sign: the run's offset may also lie along the effect itself.
+fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
+    let nominal = &model.nominal.motion;
+    let terrain = if wheels.len() > 1 {
+        TERRAIN_BOTH
+    } else {
+        TERRAIN
+    };
+    let mut motion = *nominal;
+    let mut noise: Option<MotionNoise> = None;
+    for stuck in wheels.iter().filter_map(|&w| model.stuck(w)) {
+        motion.yaw = plus(&motion.yaw, &stuck.motion.yaw, &nominal.yaw);
+        motion.forward = plus(&motion.forward, &stuck.motion.forward, &nominal.forward);
+        motion.lateral = plus(&motion.lateral, &stuck.motion.lateral, &nominal.lateral);
+        let at_zero = |curve: &Curve| curve.curvature[0];
+        let effect = Vector3::new(
+            at_zero(&stuck.motion.yaw) - at_zero(&nominal.yaw),
+            at_zero(&stuck.motion.forward) - at_zero(&nominal.forward),
+            0.0,
+        );
+        let own = stuck.motion.noise();
+        let along = effect * effect.transpose() * (terrain * terrain);
+        noise = Some(match noise {
+            None => MotionNoise {
+                offset: own.offset + along,
+                ..own
+            },
+            Some(sum) => MotionNoise {
+                offset: sum.offset + own.offset + along,
+                deviation: sum.deviation + own.deviation,
+                length_m: sum.length_m.max(own.length_m),
+                white: sum.white + own.white,
+            },
+        });
+    }
+    MotionMode {
+        moved: Moved::Stuck(wheels.iter().fold(0, |mask, w| mask | 1 << w)),
+        motion,
+        noise: noise.unwrap_or_else(|| nominal.noise()),
+    }
+}
+
+/// `base + stuck - nominal`; exactly `stuck` if `base` is the nominal curve.
+fn plus(base: &Curve, stuck: &Curve, nominal: &Curve) -> Curve {
+    if base == nominal {
+        return *stuck;
+    }
+    let (base, stuck, nominal) = (base.terms(), stuck.terms(), nominal.terms());
+    Curve::from_terms(std::array::from_fn(|i| base[i] + stuck[i] - nominal[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_change_is_one_fault_more_or_less_or_another_one() {
+        let rates = FaultRates {
+            fault_1_s: 2.0,
+            unknown_1_s: 6.0,
+            death_1_s: 5.0,
+        };
+        use Moved::{Nominal, Stuck, Unknown, UnknownAny};
+        let cases = [
+            (Nominal, Nominal, 0.0),
+            (Nominal, Stuck(1), 2.0),
+            (Nominal, Stuck(3), 0.0),
+            (Nominal, UnknownAny, 3.0),
+            (Stuck(1), Nominal, 5.0),
+            (Stuck(1), Stuck(2), 2.0),
+            (Stuck(1), Stuck(3), 2.0),
+            (Stuck(4), Stuck(3), 0.0),
+            (Stuck(3), Stuck(2), 5.0),
+            (Stuck(3), Stuck(4), 0.0),
+            (Stuck(3), Stuck(5), 0.0),
+            (Stuck(3), Nominal, 0.0),
+            (Stuck(3), Unknown, 3.0),
+            (Unknown, Stuck(2), 2.0),
+            (Unknown, Stuck(3), 0.0),
+            (Unknown, Nominal, 5.0),
+        ];
+        for (from, to, expected) in cases {
+            assert_eq!(rates.rate_1_s(from, to), expected, "{from:?} to {to:?}");
+        }
+    }
+}

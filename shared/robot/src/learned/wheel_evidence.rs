@@ -1,0 +1,166 @@
+//! What the wheels of one observation say, for everything that each may be doing.
+
+use vigil_blocks::WHEELS;
+use vigil_inference::logspace::{log_add, log_normal};
+
+use super::wheels::{rolling_rate, steering_angle};
+use super::{EncoderState, Model, Moved, Observation, RateModel};
+use crate::Description;
+
+/// Ways in which an encoder breaks: zero, frozen, noise, dead (zero plus the sensor's noise).
+pub const BREAKAGES: [EncoderState; 4] = [
+    EncoderState::Zero,
+    EncoderState::Frozen,
+    EncoderState::Noise,
+    EncoderState::Dead,
+];
+/// Prior shares of [`BREAKAGES`].
+pub const BREAKAGE_SHARES: [f64; BREAKAGES.len()] = [0.32, 0.32, 0.32, 0.04];
+
+/// Share of healthy wheels' rates in the tail: while all is well, and while another wheel drags.
+const TAIL: f64 = 0.02;
+const TAIL_DRAGGED: f64 = 0.1;
+/// Share of wheels that do anything, in the unknown.
+const ANYTHING: f64 = 0.2;
+/// Standard deviation of a steering angle that does anything, rad.
+const STEER_ANY_RAD: f64 = 0.3;
+/// Variance of a standing wheel's rate, (rad/s)².
+const STANDING_VARIANCE: f64 = 4e-4;
+
+/// Natural log-likelihoods of one observation's wheel readings; comparable within a wheel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WheelEvidence {
+    /// The wheel turns as in nominal motion.
+    pub healthy: [f64; WHEELS],
+    /// Its encoder is broken in each of [`BREAKAGES`].
+    pub broken: [[f64; BREAKAGES.len()]; WHEELS],
+    /// It stands.
+    pub standing: [f64; WHEELS],
+    /// It does anything.
+    pub any: [f64; WHEELS],
+    /// Steering angles that may be anything, relative to angles as commanded.
+    pub steering: f64,
+    /// Rate by rolling, and its variance by the lag of the body.
+    rolling: [(f64, f64); WHEELS],
+    sample_sd: f64,
+}
+
+impl WheelEvidence {
+    /// The evidence of an observation.
+    #[must_use]
+    pub fn new(model: &Model, robot: &Description, observation: &Observation) -> Self {
+        let sd = model.noise.wheel_rate_rad_s;
+        let sample_sd = model.sample_variance(sd, observation.frame_s).sqrt();
+        let mut evidence = Self {
+            healthy: [0.0; WHEELS],
+            broken: [[0.0; BREAKAGES.len()]; WHEELS],
+            standing: [0.0; WHEELS],
+            any: [0.0; WHEELS],
+            steering: steering(model, robot, observation),
+            rolling: [(0.0, 0.0); WHEELS],
+            sample_sd,
+        };
+        let command = observation.command;
+        for i in 0..robot.wheels.len().min(WHEELS) {
+            let read = |state| {
+                let reading = &observation.wheels[i];
+                model.encoder.log_likelihood(state, reading, sample_sd)
+            };
+            let rate = rolling_rate(robot, i, command[0], command[1]);
+            let lagged = rolling_rate(robot, i, observation.curvature, observation.speed);
+            let behind = (rate - lagged) * (rate - lagged);
+            evidence.rolling[i] = (rate, behind);
+            let (mean, variance) = model.nominal.rates[i].rate(rate, command[0]);
+            evidence.healthy[i] = read(EncoderState::Turning(mean, variance + behind, TAIL));
+            evidence.standing[i] = read(EncoderState::Turning(0.0, STANDING_VARIANCE, TAIL));
+            evidence.any[i] = read(EncoderState::Any);
+            evidence.broken[i] = BREAKAGES.map(read);
+        }
+        evidence
+    }
+
+    /// Wheel `i` with a whole encoder while the robot is moved so. At the onset (`is_new`) a stuck
+    /// wheel may read anything, as an observation may hold the very moment, and the others may still
+    /// turn as before: the robot slows down within a few tenths of a second.
+    #[must_use]
+    pub fn whole(
+        &self,
+        model: &Model,
+        observation: &Observation,
+        moved: Moved,
+        is_new: bool,
+        i: usize,
+    ) -> f64 {
+        let either = |a: f64, b: f64| match is_new {
+            true => log_add(a, b) - std::f64::consts::LN_2,
+            false => a,
+        };
+        match moved {
+            _ if moved.is_stuck(i) => either(self.standing[i], self.any[i]),
+            Moved::Stuck(stuck) => {
+                let dragged = self.dragged(model, observation, stuck, i);
+                either(dragged, self.healthy[i])
+            }
+            Moved::UnknownAny => self.unsure(i),
+            Moved::Nominal | Moved::Unknown => self.healthy[i],
+        }
+    }
+
+    /// Wheel `i` turns while the wheels `stuck` (bits, not i) drag. Effects of several add up.
+    fn dragged(&self, model: &Model, observation: &Observation, stuck: u32, i: usize) -> f64 {
+        let (rolling, behind) = self.rolling[i];
+        let curvature = observation.command[0];
+        let rate = |rates: &[RateModel]| rates[i].rate(rolling, curvature);
+        let (nominal, _) = rate(&model.nominal.rates);
+        let (mut mean, mut variance) = (nominal, behind);
+        let dragging = (0..WHEELS).filter(|&w| stuck >> w & 1 == 1);
+        for stuck in dragging.filter_map(|w| model.stuck(w)) {
+            let (with, its) = rate(&stuck.rates);
+            mean += with - nominal;
+            variance += its;
+        }
+        let state = EncoderState::Turning(mean, variance, TAIL_DRAGGED);
+        let reading = &observation.wheels[i];
+        model.encoder.log_likelihood(state, reading, self.sample_sd)
+    }
+
+    /// Wheel `i` may do anything or turn as it should, as in the unknown.
+    fn unsure(&self, i: usize) -> f64 {
+        log_add(
+            (1.0 - ANYTHING).ln() + self.healthy[i],
+            ANYTHING.ln() + self.any[i],
+        )
+    }
+
+    /// Any of the ways to break, by their shares.
+    #[must_use]
+    pub fn broken_anyhow(&self, i: usize) -> f64 {
+        let parts = self.broken[i].iter().zip(BREAKAGE_SHARES);
+        parts.fold(f64::NEG_INFINITY, |sum, (log_p, share)| {
+            log_add(sum, share.ln() + log_p)
+        })
+    }
+}
+
+/// What the steering angles say for the unknown: relative to angles as commanded, which every named
+/// mode has.
+fn steering(model: &Model, robot: &Description, observation: &Observation) -> f64 {
+    let sample = model.sample_variance(model.noise.steer_rad, observation.frame_s);
+    let extra = model.nominal.steer_sd_rad;
+    let mut sum = 0.0;
+    for i in (0..robot.wheels.len().min(WHEELS)).filter(|&i| robot.wheels[i].steered) {
+        let reading = &observation.steer[i];
+        if reading.plain == 0 {
+            continue;
+        }
+        let angle = steering_angle(robot, i, observation.command[0]);
+        let behind = angle - steering_angle(robot, i, observation.curvature);
+        let noise = observation.mean_variance(sample, reading.plain);
+        let variance = noise + extra * extra + behind * behind;
+        let apart = reading.mean - angle;
+        let wide = variance + STEER_ANY_RAD * STEER_ANY_RAD;
+        let ratio = log_normal(apart, wide) - log_normal(apart, variance);
+        sum += log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + ratio.min(30.0));
+    }
+    sum
+}

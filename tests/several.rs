@@ -1,0 +1,174 @@
+//! Several faults at once, and faults that come and go: the simulated rover, watched by detector
+//! and identifier.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use std::path::PathBuf;
+
+use vigil_blocks::{
+    Channel, DetectionBelief, Entry, FaultBelief, MODE_MULTIPLE, ParticleBlock, SensorFrame,
+};
+use vigil_detector::Detector;
+use vigil_identifier::{Identifier, Input};
+use vigil_robot::{Fault, FaultKind};
+use vigil_sensor_sim::{EffectiveCommand, World};
+use vigil_setup::{GraphArgs, Setup};
+
+const RATE_HZ: f64 = 100.0;
+const PERIOD_NS: u64 = 10_000_000;
+
+fn setup() -> Setup {
+    let config = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../config/rover.toml");
+    let args = GraphArgs {
+        config,
+        ..GraphArgs::default()
+    };
+    args.load().unwrap()
+}
+
+/// The rover and its watchers in one thread.
+struct Watched {
+    setup: Setup,
+    world: World,
+    detector: Detector,
+    identifier: Identifier,
+    frame: SensorFrame,
+    detection: Box<DetectionBelief>,
+    diagnosis: Box<FaultBelief>,
+    particles: [Box<ParticleBlock>; 2],
+}
+
+impl Watched {
+    fn new(seed: u64) -> Self {
+        let setup = setup();
+        let file = &setup.file;
+        let world = World::new(&setup.robot, &file.simulator, &file.drive, RATE_HZ, seed);
+        Self {
+            world: world.unwrap(),
+            detector: vigil_detector::assemble(&setup).unwrap(),
+            identifier: vigil_identifier::assemble(&setup).unwrap(),
+            frame: SensorFrame::default(),
+            detection: Box::default(),
+            diagnosis: Box::default(),
+            particles: [Box::default(), Box::default()],
+            setup,
+        }
+    }
+
+    fn step(&mut self) {
+        let command = EffectiveCommand::as_planned(self.world.planned());
+        self.world.step(1.0 / RATE_HZ, command);
+        self.world.measure(&mut self.frame);
+        self.frame.header.t_capture_ns += PERIOD_NS;
+        let [detected, drawn] = &mut self.particles;
+        let entry = Entry::Frame(&self.frame);
+        self.detector.step(entry, &mut self.detection, detected);
+        let input = Input {
+            frame: &self.frame,
+            detection: Some((&*self.detection, &**detected)),
+        };
+        let entry = Entry::Frame(input);
+        self.identifier.step(entry, &mut self.diagnosis, drawn);
+    }
+
+    fn drive(&mut self, seconds: f64) {
+        for _ in 0..(seconds * RATE_HZ) as usize {
+            self.step();
+        }
+    }
+
+    fn leaf(&self, fault: Fault) -> usize {
+        let wheel = &self.setup.robot.wheels[fault.wheel].name;
+        let kind = match fault.kind {
+            FaultKind::Stuck => "STUCK",
+            _ => "ENC",
+        };
+        self.setup.tree.index(&format!("{wheel}_{kind}")).unwrap()
+    }
+}
+
+/// Two different faults, of different wheels, in an order that uses every kind and wheel.
+fn pair(trial: usize) -> [Fault; 2] {
+    use FaultKind::{EncoderFrozen, EncoderNoise, EncoderZero, Stuck};
+    let kinds = [
+        [Stuck, EncoderZero],
+        [EncoderNoise, EncoderFrozen],
+        [Stuck, EncoderNoise],
+        [EncoderFrozen, Stuck],
+        [Stuck, Stuck],
+    ];
+    let (first, apart) = (trial % 6, 1 + trial / 6 % 5);
+    let wheels = [first, (first + apart) % 6];
+    let [a, b] = kinds[trial % kinds.len()];
+    [(a, wheels[0]), (b, wheels[1])].map(|(kind, wheel)| Fault { kind, wheel })
+}
+
+#[test]
+fn two_faults_at_once_are_both_named() {
+    const TRIALS: usize = 60;
+    let mut wrong = Vec::new();
+    for trial in 0..TRIALS {
+        let mut watched = Watched::new(100 + trial as u64);
+        let faults = pair(trial);
+        watched.drive(3.0);
+        watched.world.inject(faults[0]).unwrap();
+        watched.drive(1.0);
+        watched.world.inject(faults[1]).unwrap();
+        watched.drive(5.0);
+        let expected: u64 = faults
+            .map(|fault| 1_u64 << watched.leaf(fault))
+            .iter()
+            .sum();
+        let belief = &watched.diagnosis;
+        if belief.mode != MODE_MULTIPLE || belief.sets[0].leaves != expected {
+            let found = (belief.mode, belief.sets[0], belief.p_unknown);
+            wrong.push(format!("{faults:?}: {found:?}"));
+        }
+    }
+    assert!(wrong.len() * 20 <= TRIALS, "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_wheel_that_sticks_frees_itself_and_sticks_again_is_followed() {
+    let mut watched = Watched::new(7);
+    let fault = Fault {
+        kind: FaultKind::Stuck,
+        wheel: 4,
+    };
+    let node = watched.leaf(fault) as u32;
+    watched.drive(3.0);
+    for _ in 0..3 {
+        watched.world.inject(fault).unwrap();
+        watched.drive(1.0);
+        assert_eq!(watched.diagnosis.mode, node);
+        watched.drive(2.0);
+        watched.world.clear(fault.wheel).unwrap();
+        watched.drive(1.0);
+        assert_eq!(watched.diagnosis.mode, 0);
+        watched.drive(2.0);
+    }
+}
+
+#[test]
+fn a_diagnosis_says_which_channels_speak_for_it() {
+    let mut watched = Watched::new(8);
+    let fault = Fault {
+        kind: FaultKind::Stuck,
+        wheel: 4,
+    };
+    watched.drive(3.0);
+    assert_eq!(watched.diagnosis.channel_evidence, [0.0; 32]);
+    watched.world.inject(fault).unwrap();
+    watched.drive(2.0);
+    let belief = &watched.diagnosis;
+    assert_eq!(belief.mode, watched.leaf(fault) as u32);
+    // The nearest rival reads the same encoder as broken: it is the motion that speaks, and the
+    // other wheels, which the stuck one brakes.
+    let evidence = &belief.channel_evidence;
+    let total: f64 = evidence.iter().sum();
+    let others = evidence.iter().enumerate();
+    let others = others
+        .filter(|(i, _)| *i != Channel::wheel_rate(4))
+        .map(|(_, e)| e);
+    assert!(total > 5.0 && others.sum::<f64>() > 5.0, "{evidence:?}");
+    assert_ne!(belief.runner_up, belief.mode);
+}
