@@ -1,8 +1,25 @@
 //! From the configuration to an identifier.
 
+use vigil_decision::Pomdp;
+use vigil_inference::FaultTree;
+use vigil_robot::Description;
+use vigil_robot::learned::Model;
 use vigil_setup::Setup;
 
 use crate::{Identifier, IdentifierError};
+
+/// The models that an identifier is built from.
+#[derive(Debug, Clone, Copy)]
+pub struct Models<'a> {
+    /// How the robot behaves.
+    pub model: &'a Model,
+    /// The robot.
+    pub robot: &'a Description,
+    /// Its faults.
+    pub tree: &'a FaultTree,
+    /// What faults cost; only the risk-sensitive filter needs it.
+    pub decision: Option<&'a Pomdp>,
+}
 
 /// The identifier that a configuration describes.
 ///
@@ -14,8 +31,15 @@ pub fn assemble(setup: &Setup) -> Result<Identifier, IdentifierError> {
         model,
         robot,
         tree,
+        decision,
         ..
     } = setup;
+    let models = Models {
+        model,
+        robot,
+        tree,
+        decision: Some(decision),
+    };
     let (settings, sensors) = (&file.identifier, file.detector.sensors);
-    Identifier::new(model, robot, tree, settings, sensors, file.graph.seed)
+    Identifier::new(&models, settings, sensors, file.graph.seed)
 }

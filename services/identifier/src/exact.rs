@@ -7,9 +7,9 @@
 //! with a large constant deviation, and wheels that may do anything.
 
 use nalgebra::{Matrix3, Vector3};
-use vigil_blocks::{CHANNELS, Channel, WHEELS};
+use vigil_blocks::WHEELS;
 use vigil_inference::bank::{Bank, Hypothesis};
-use vigil_inference::track::{Displacement, Track};
+use vigil_inference::track::Track;
 use vigil_robot::Description;
 use vigil_robot::learned::{
     FaultRates, Model, MotionMode, Moved, Observation, WheelEvidence, motion_modes,
@@ -18,7 +18,6 @@ use vigil_robot::learned::{
 use crate::encoders::{Encoders, Likelihoods};
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
-use crate::reasons::Lineage;
 use crate::sets::Sets;
 
 /// Index of the nominal motion among the modes.
@@ -157,7 +156,7 @@ impl Exact {
     fn predict(&mut self, observation: &Observation) {
         for index in 0..self.modes.len() {
             let mode = &self.modes[index];
-            let step = self.displacement(mode, observation);
+            let step = observation.displacement(&self.model, &mode.motion);
             let all = self.bank.hypotheses_mut().iter_mut();
             for hypothesis in all.filter(|hypothesis| hypothesis.mode == index) {
                 hypothesis.state.track.predict(&step, &mode.noise);
@@ -232,71 +231,6 @@ impl Exact {
             broken if broken > 0 && !moved.is_unknown() => evidence.broken[wheel][broken - 1],
             _ => evidence.whole(&self.model, observation, moved, is_new, wheel),
         })
-    }
-
-    /// An explanation to follow from a pose on; None if the robot cannot move so.
-    #[must_use]
-    pub fn lineage(
-        &self,
-        moved: Moved,
-        broken: u32,
-        (mean, covariance): (Vector3<f64>, Matrix3<f64>),
-    ) -> Option<Lineage> {
-        let mode = self.modes.iter().find(|mode| mode.moved == moved)?;
-        Some(Lineage {
-            moved,
-            broken,
-            track: Track::new(mean, covariance, &mode.noise),
-            heard: [0.0; CHANNELS],
-        })
-    }
-
-    /// Takes one observation along one explanation alone.
-    pub fn follow(
-        &self,
-        lineage: &mut Lineage,
-        observation: &Observation,
-        noise_scale: f64,
-        is_new: bool,
-    ) {
-        let variance = observation.pose_variance(&self.model, noise_scale);
-        let Some(mode) = self.modes.iter().find(|mode| mode.moved == lineage.moved) else {
-            return;
-        };
-        if observation.anchor {
-            if observation.pose_frames > 0 {
-                lineage.track.anchor(observation.pose, variance);
-            }
-            return;
-        }
-        lineage
-            .track
-            .predict(&self.displacement(mode, observation), &mode.noise);
-        if !observation.moving {
-            return;
-        }
-        if self.use_wheels {
-            let evidence = WheelEvidence::new(&self.model, &self.robot, observation);
-            let moved = lineage.moved;
-            let whole = |wheel| evidence.whole(&self.model, observation, moved, is_new, wheel);
-            lineage.hear(&evidence, whole, self.robot.wheels.len().min(WHEELS));
-        }
-        if observation.pose_frames > 0 {
-            let gained = lineage.track.update(observation.pose, variance);
-            lineage.heard[Channel::POSE] += gained.unwrap_or(0.0);
-        }
-    }
-
-    fn displacement(&self, mode: &MotionMode, observation: &Observation) -> Displacement {
-        let Observation {
-            curvature, speed, ..
-        } = *observation;
-        let limit = self.model.command.curvature_max_1_m;
-        Displacement {
-            per_metre: mode.motion.per_metre(curvature, speed, limit),
-            travel_m: observation.travel_m,
-            extra: observation.lag_variance(&self.model),
-        }
     }
 
     /// Fills the probabilities of nodes, sets and unknown.

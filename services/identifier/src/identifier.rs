@@ -9,13 +9,14 @@ use vigil_blocks::{
     DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock,
     SensorFrame,
 };
-use vigil_inference::FaultTree;
-use vigil_robot::Description;
-use vigil_robot::learned::{Model, Observation, Observer};
+use vigil_robot::learned::{Observation, Observer};
 use vigil_setup::schema;
 
-use crate::draw::{copy, draw, moments};
+use crate::assemble::Models;
+use crate::draw::{copy, moments};
+use crate::engine::Engine;
 use crate::exact::{BIRTH_1_S, DEATH_1_S, Exact};
+use crate::generic::Generic;
 use crate::modes::{IdentifierError, Leaves};
 use crate::posterior::Posterior;
 use crate::reasons::Reasons;
@@ -75,7 +76,7 @@ enum Phase {
 #[derive(Debug, Clone)]
 pub struct Identifier {
     leaves: Leaves,
-    exact: Exact,
+    engine: Engine,
     observer: Observer,
     p_unknown: f64,
     particles: usize,
@@ -112,20 +113,33 @@ impl Identifier {
     /// [`IdentifierError`] if the model is of another robot or lacks a leaf's fault, or a setting
     /// is out of range.
     pub fn new(
-        model: &Model,
-        robot: &Description,
-        tree: &FaultTree,
+        models: &Models<'_>,
         settings: &schema::Identifier,
         sensors: schema::Sensors,
         seed: u64,
     ) -> Result<Self, IdentifierError> {
+        let Models {
+            model, robot, tree, ..
+        } = *models;
         model.check_robot(robot)?;
         check(settings)?;
         let leaves = Leaves::new(tree, model, robot)?;
         let use_wheels = sensors == schema::Sensors::PoseEncoders;
+        let engine = match settings.filter {
+            schema::IdentifierFilter::Exact => {
+                let p_unknown = settings.p_unknown;
+                let filter = Exact::new(model, robot, &leaves, use_wheels, p_unknown);
+                Engine::Exact(Box::new(filter))
+            }
+            _ => {
+                let filter = Generic::new(models, &leaves, settings, use_wheels, seed)?;
+                Engine::Generic(Box::new(filter))
+            }
+        };
         let capacity = (settings.ring_s / model.interval_s).ceil().max(2.0) as usize;
         Ok(Self {
-            exact: Exact::new(model, robot, &leaves, use_wheels, settings.p_unknown),
+            engine,
+            reasons: Reasons::new(model, robot, &leaves, use_wheels),
             leaves,
             observer: Observer::new(model, robot),
             p_unknown: settings.p_unknown,
@@ -144,7 +158,6 @@ impl Identifier {
             },
             posterior: Posterior::nominal(),
             predicted: Posterior::nominal(),
-            reasons: Reasons::default(),
             mode: 0,
             mode_changes: 0,
             run_id: 0,
@@ -190,7 +203,7 @@ impl Identifier {
         };
         self.posterior = Posterior::nominal();
         self.predicted = self.posterior;
-        self.reasons = Reasons::default();
+        self.reasons.clear();
     }
 
     fn take(&mut self, input: &Input<'_>) {
@@ -219,7 +232,7 @@ impl Identifier {
             Phase::Watching if self.detection.alarm => self.begin(),
             Phase::Watching => {
                 self.posterior = Posterior::watching(self.detection.p_fault);
-                self.reasons = Reasons::default();
+                self.reasons.clear();
             }
             Phase::Identifying(_) => {}
         }
@@ -255,7 +268,7 @@ impl Identifier {
             return;
         };
         let (mean, covariance) = kept.pose();
-        self.exact.restart(mean, covariance, kept.observation.t_ns);
+        self.engine.restart(mean, covariance, kept.observation.t_ns);
         self.phase = Phase::Identifying(start + 1);
         // What was unknown so far is now any of the faults, by their priors.
         self.predicted = self.predicted.divided(&self.leaves, self.p_unknown);
@@ -269,7 +282,7 @@ impl Identifier {
         let mut moved_s = 0.0;
         for i in next..next + taken {
             let Some(kept) = self.ring.get(i) else { break };
-            self.exact.step(&kept.observation, kept.noise_scale);
+            self.engine.step(&kept.observation, kept.noise_scale);
             moved_s += if kept.observation.moving {
                 kept.observation.dt_s
             } else {
@@ -289,7 +302,7 @@ impl Identifier {
         self.predicted = self
             .predicted
             .predicted(&self.leaves, self.p_unknown, birth, death);
-        self.exact.posterior(&mut self.posterior);
+        self.engine.posterior(&self.leaves, &mut self.posterior);
         self.find_reasons(next + taken);
         self.updated = true;
         let recovered = self.posterior.nodes[0] > RECOVERED;
@@ -305,14 +318,14 @@ impl Identifier {
         if mode == self.mode {
             if let Some(last) = self.ring.get(end.saturating_sub(1)) {
                 let (observation, scale) = (&last.observation, last.noise_scale);
-                self.reasons.follow(&self.exact, observation, scale);
+                self.reasons.follow(observation, scale);
             }
             return;
         }
-        self.reasons = Reasons::default();
+        self.reasons.clear();
         let onset_ns = match mode {
             0 => return,
-            MODE_UNKNOWN => self.exact.onset_unknown(),
+            MODE_UNKNOWN => self.engine.onset_unknown(),
             _ => self.onset_of_leaf(),
         };
         // The last pose from before the onset, not too long ago: the work of a cycle is bounded.
@@ -323,12 +336,12 @@ impl Identifier {
         let Some(pose) = self.ring.get(start).map(Kept::pose) else {
             return;
         };
-        let (posterior, exact, leaves) = (&self.posterior, &self.exact, &self.leaves);
-        self.reasons.begin(posterior, exact, leaves, pose, onset_ns);
+        let (posterior, leaves) = (&self.posterior, &self.leaves);
+        self.reasons.begin(posterior, leaves, pose, onset_ns);
         for i in start + 1..end {
             let Some(kept) = self.ring.get(i) else { break };
             let (observation, scale) = (&kept.observation, kept.noise_scale);
-            self.reasons.follow(&self.exact, observation, scale);
+            self.reasons.follow(observation, scale);
         }
     }
 
@@ -367,9 +380,9 @@ impl Identifier {
         };
         belief.onset_t_capture_ns = self.onset();
         belief.identifying = u32::from(self.phase != Phase::Watching);
-        belief.runner_up = self.reasons.runner_up;
+        belief.runner_up = self.reasons.runner_up();
         belief.channel_evidence = self.reasons.channel_evidence();
-        belief.degenerate_count = self.exact.degenerate_count();
+        belief.degenerate_count = self.engine.degenerate_count();
     }
 
     fn onset(&self) -> u64 {
@@ -390,7 +403,7 @@ impl Identifier {
         let p = &self.posterior.nodes;
         leaves
             .max_by(|&&a, &&b| p[a].total_cmp(&p[b]))
-            .map_or(0, |&node| self.exact.onset(node))
+            .map_or(0, |&node| self.engine.onset(node))
     }
 
     /// Particles of the identification are drawn once per observation; before one, the detector's
@@ -398,13 +411,9 @@ impl Identifier {
     fn publish(&mut self, detected: Option<&ParticleBlock>, out: &mut ParticleBlock) {
         if self.phase != Phase::Watching && !self.is_catching_up() {
             if self.updated {
-                draw(
-                    &self.exact,
-                    &self.leaves,
-                    self.budget,
-                    &mut self.rng,
-                    &mut self.drawn,
-                );
+                let (leaves, count) = (&self.leaves, self.budget);
+                self.engine
+                    .draw(leaves, count, &mut self.rng, &mut self.drawn);
             }
             copy(&self.drawn, self.budget, out);
             return;
@@ -417,9 +426,6 @@ impl Identifier {
 }
 
 fn check(settings: &schema::Identifier) -> Result<(), IdentifierError> {
-    if settings.filter != "exact" {
-        return Err(IdentifierError::Filter(settings.filter.clone()));
-    }
     let refuse = |key, value, allowed| {
         Err(IdentifierError::Value {
             key,

@@ -5,15 +5,18 @@
 mod assemble;
 mod draw;
 mod encoders;
+mod engine;
 mod exact;
+mod generic;
 mod identifier;
 mod modes;
 mod posterior;
 mod reasons;
+mod risk;
 mod sets;
 pub mod wiring;
 
-pub use assemble::assemble;
+pub use assemble::{Models, assemble};
 pub use identifier::{Identifier, Input};
 pub use modes::IdentifierError;
 pub use wiring::IdentifierStage;

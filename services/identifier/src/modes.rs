@@ -27,9 +27,9 @@ pub enum IdentifierError {
     /// Two leaves stand for one fault.
     #[error("leaves '{0}' and '{1}' stand for the same fault")]
     Twice(String, String),
-    /// A filter that does not exist.
-    #[error("identifier.filter: '{0}' is not a filter: expected exact")]
-    Filter(String),
+    /// The filter cannot be built from these models.
+    #[error("identifier.filter: {0}")]
+    Build(String),
     /// A setting is out of range.
     #[error("identifier.{key}: {value} is not allowed: {allowed}")]
     Value {
@@ -130,11 +130,21 @@ impl Leaves {
     /// Wheels that may be stuck, as bits.
     #[must_use]
     pub fn stuck_wheels(&self) -> u32 {
-        let wheels = self.stuck.iter().enumerate();
-        wheels.fold(0, |bits, (wheel, leaf)| {
-            bits | u32::from(leaf.is_some()) << wheel
-        })
+        bits(&self.stuck)
     }
+
+    /// Wheels whose encoders may be broken, as bits.
+    #[must_use]
+    pub fn encoder_wheels(&self) -> u32 {
+        bits(&self.encoder)
+    }
+}
+
+fn bits(leaves: &[Option<usize>; WHEELS]) -> u32 {
+    let wheels = leaves.iter().enumerate();
+    wheels.fold(0, |bits, (wheel, leaf)| {
+        bits | u32::from(leaf.is_some()) << wheel
+    })
 }
 
 fn leaf_fault(text: &str, model: &Model, robot: &Description) -> Option<LeafFault> {

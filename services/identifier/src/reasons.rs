@@ -8,9 +8,10 @@
 use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
 use vigil_inference::track::Track;
-use vigil_robot::learned::{Moved, Observation, WheelEvidence};
+use vigil_robot::Description;
+use vigil_robot::learned::{Model, MotionMode, Moved, Observation, WheelEvidence, motion_modes};
 
-use crate::exact::{Exact, is_new};
+use crate::exact::is_new;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
 
@@ -25,35 +26,74 @@ enum Explanation {
 
 /// An explanation that is taken to be true since the onset.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lineage {
-    /// What moves the robot.
-    pub moved: Moved,
+struct Lineage {
+    /// Index of the motion mode.
+    mode: usize,
     /// Wheels whose encoders are broken, as bits.
-    pub broken: u32,
-    /// Pose and deviations.
-    pub track: Track,
+    broken: u32,
+    track: Track,
     /// Log-likelihood of the readings, by channel.
-    pub heard: [f64; CHANNELS],
+    heard: [f64; CHANNELS],
 }
 
 /// The diagnosis and its rival.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone)]
 pub struct Reasons {
+    model: Model,
+    robot: Description,
+    modes: Vec<MotionMode>,
+    use_wheels: bool,
     followed: Option<[Lineage; 2]>,
     onset_ns: u64,
-    /// The next best when the diagnosis was made: a node, unknown or multiple, as
-    /// `FaultBelief::mode`.
-    pub runner_up: u32,
+    runner_up: u32,
 }
 
 impl Reasons {
+    /// No diagnosis yet.
+    #[must_use]
+    pub fn new(model: &Model, robot: &Description, leaves: &Leaves, use_wheels: bool) -> Self {
+        Self {
+            model: model.clone(),
+            robot: robot.clone(),
+            modes: motion_modes(model, leaves.stuck_wheels(), true),
+            use_wheels,
+            followed: None,
+            onset_ns: 0,
+            runner_up: 0,
+        }
+    }
+
+    /// Forgets the diagnosis.
+    pub fn clear(&mut self) {
+        (self.followed, self.runner_up) = (None, 0);
+    }
+
+    /// The next best when the diagnosis was made: a node, unknown or multiple, as
+    /// `FaultBelief::mode`.
+    #[must_use]
+    pub const fn runner_up(&self) -> u32 {
+        self.runner_up
+    }
+
+    /// By channel: how much more the readings since the onset are expected under the diagnosis than
+    /// under its rival, natural log-likelihood. The steering angles, which are weighed together,
+    /// stand at the first wheel's.
+    #[must_use]
+    pub fn channel_evidence(&self) -> [f64; CHANNELS] {
+        self.followed.map_or([0.0; CHANNELS], |[named, rival]| {
+            std::array::from_fn(|i| {
+                let apart = named.heard[i] - rival.heard[i];
+                if apart.is_finite() { apart } else { 0.0 }
+            })
+        })
+    }
+
     /// Begins to follow the diagnosis of `posterior` and its rival from a pose at `onset_ns`.
     pub fn begin(
         &mut self,
         posterior: &Posterior,
-        exact: &Exact,
         leaves: &Leaves,
-        pose: (Vector3<f64>, Matrix3<f64>),
+        (mean, covariance): (Vector3<f64>, Matrix3<f64>),
         onset_ns: u64,
     ) {
         let (named, rival) = contenders(posterior);
@@ -72,49 +112,62 @@ impl Reasons {
                     stuck => (Moved::Stuck(stuck), wheels(&leaves.encoder, set)),
                 },
             };
-            exact.lineage(moved, broken, pose)
+            let mode = self.modes.iter().position(|mode| mode.moved == moved)?;
+            Some(Lineage {
+                mode,
+                broken,
+                track: Track::new(mean, covariance, &self.modes[mode].noise),
+                heard: [0.0; CHANNELS],
+            })
         };
         self.followed = lineage(named).zip(lineage(rival)).map(<[_; 2]>::from);
     }
 
     /// Takes the next observation.
-    pub fn follow(&mut self, exact: &Exact, observation: &Observation, noise_scale: f64) {
-        let Some(followed) = &mut self.followed else {
+    pub fn follow(&mut self, observation: &Observation, noise_scale: f64) {
+        let Some(mut followed) = self.followed else {
             return;
         };
+        let variance = observation.pose_variance(&self.model, noise_scale);
+        for Lineage { mode, track, .. } in &mut followed {
+            let mode = &self.modes[*mode];
+            if !observation.anchor {
+                let step = observation.displacement(&self.model, &mode.motion);
+                track.predict(&step, &mode.noise);
+            } else if observation.pose_frames > 0 {
+                track.anchor(observation.pose, variance);
+            }
+        }
+        if observation.moving && !observation.anchor {
+            if self.use_wheels {
+                self.hear_wheels(&mut followed, observation);
+            }
+            if observation.pose_frames > 0 {
+                for Lineage { track, heard, .. } in &mut followed {
+                    let gained = track.update(observation.pose, variance);
+                    heard[Channel::POSE] += gained.unwrap_or(0.0);
+                }
+            }
+        }
+        self.followed = Some(followed);
+    }
+
+    fn hear_wheels(&self, followed: &mut [Lineage; 2], observation: &Observation) {
+        let evidence = WheelEvidence::new(&self.model, &self.robot, observation);
         let is_new = is_new(observation.t_ns, self.onset_ns);
         for lineage in followed {
-            exact.follow(lineage, observation, noise_scale, is_new);
-        }
-    }
-
-    /// By channel: how much more the readings since the onset are expected under the diagnosis than
-    /// under its rival, natural log-likelihood.
-    #[must_use]
-    pub fn channel_evidence(&self) -> [f64; CHANNELS] {
-        self.followed.map_or([0.0; CHANNELS], |[named, rival]| {
-            std::array::from_fn(|i| {
-                let apart = named.heard[i] - rival.heard[i];
-                if apart.is_finite() { apart } else { 0.0 }
-            })
-        })
-    }
-}
-
-impl Lineage {
-    /// Adds one observation's wheels and steering angles; the latter, which are weighed together,
-    /// stand at the first wheel's.
-    pub fn hear(&mut self, evidence: &WheelEvidence, whole: impl Fn(usize) -> f64, count: usize) {
-        for wheel in 0..count {
-            let is_broken = self.broken >> wheel & 1 == 1;
-            self.heard[Channel::wheel_rate(wheel)] += if is_broken {
-                evidence.broken_anyhow(wheel)
-            } else {
-                whole(wheel)
-            };
-        }
-        if self.moved == Moved::UnknownAny {
-            self.heard[Channel::steer(0)] += evidence.steering;
+            let moved = self.modes[lineage.mode].moved;
+            for wheel in 0..self.robot.wheels.len().min(WHEELS) {
+                let is_broken = lineage.broken >> wheel & 1 == 1;
+                lineage.heard[Channel::wheel_rate(wheel)] += if is_broken {
+                    evidence.broken_anyhow(wheel)
+                } else {
+                    evidence.whole(&self.model, observation, moved, is_new, wheel)
+                };
+            }
+            if moved == Moved::UnknownAny {
+                lineage.heard[Channel::steer(0)] += evidence.steering;
+            }
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::posterior::Posterior;
 /// Hypotheses less probable than this are not divided among sets.
 const NEGLIGIBLE: f64 = 1e-13;
 /// No set of one fault at most is reported less probable: what can return must not be impossible.
-const FLOOR: f64 = 1e-12;
+pub const FLOOR: f64 = 1e-12;
 
 /// Sums over hypotheses.
 #[derive(Debug, Clone)]

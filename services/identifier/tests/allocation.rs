@@ -6,33 +6,46 @@ mod recorded;
 
 use vigil_blocks::{Entry, FaultBelief, ParticleBlock};
 use vigil_cycle::allocation::{CountingAllocator, allocations};
-use vigil_identifier::{Identifier, Input};
+use vigil_identifier::{Identifier, Input, Models};
 use vigil_setup::schema;
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 #[test]
-fn steady_cycles_allocate_nothing() {
+fn steady_cycles_of_every_filter_allocate_nothing() {
     let (frames, label) = recorded::unseen("RM_STUCK", "stuck");
     let tree = vigil_setup::load_tree(&recorded::path("config/trees/rover.toml")).unwrap();
+    let decision = vigil_setup::load_decision(&recorded::path("config/rover.pomdp")).unwrap();
     let (model, robot) = (recorded::model(), recorded::robot());
-    let settings = schema::Identifier::default();
-    let sensors = schema::Sensors::Pose;
-    let mut identifier = Identifier::new(&model, &robot, &tree, &settings, sensors, 1).unwrap();
-    let mut belief = FaultBelief::default();
-    let mut particles: Box<ParticleBlock> = Box::default();
-    let mut alarm = alarm::Alarm::between(label.onset_s.unwrap() + 0.5, 10.0);
-    let before = allocations();
-    for frame in &frames {
-        alarm.set(frame);
-        let detection = Some((&alarm.belief, &*alarm.particles));
-        let entry = Entry::Frame(Input { frame, detection });
-        identifier.step(entry, &mut belief, &mut particles);
-        identifier.step(Entry::Missed(1), &mut belief, &mut particles);
+    let models = Models {
+        model: &model,
+        robot: &robot,
+        tree: &tree,
+        decision: Some(&decision),
+    };
+    for (name, filter) in schema::IdentifierFilter::ALL {
+        let settings = schema::Identifier {
+            filter,
+            ..schema::Identifier::default()
+        };
+        let sensors = schema::Sensors::PoseEncoders;
+        let mut identifier = Identifier::new(&models, &settings, sensors, 1).unwrap();
+        let mut belief = FaultBelief::default();
+        let mut particles: Box<ParticleBlock> = Box::default();
+        let mut alarm = alarm::Alarm::between(label.onset_s.unwrap() + 0.5, 10.0);
+        let before = allocations();
+        for frame in &frames {
+            alarm.set(frame);
+            let detection = Some((&alarm.belief, &*alarm.particles));
+            let entry = Entry::Frame(Input { frame, detection });
+            identifier.step(entry, &mut belief, &mut particles);
+            identifier.step(Entry::Missed(1), &mut belief, &mut particles);
+        }
+        identifier.step(Entry::Budget(64), &mut belief, &mut particles);
+        assert_eq!(allocations() - before, 0, "{name}");
+        // It did identify.
+        let leaf = tree.index("RM_STUCK").unwrap();
+        assert_eq!(belief.mode as usize, leaf, "{name}");
     }
-    identifier.step(Entry::Budget(64), &mut belief, &mut particles);
-    assert_eq!(allocations() - before, 0);
-    // It did identify.
-    assert_eq!(belief.mode as usize, tree.index("RM_STUCK").unwrap());
 }

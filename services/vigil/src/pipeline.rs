@@ -6,10 +6,7 @@ use vigil_blocks::{
 use vigil_detector::{Detector, DetectorError};
 use vigil_evaluation::frames::Run;
 use vigil_evaluation::scoring::{MULTIPLE, Side, Taxonomy, UNKNOWN, Verdict};
-use vigil_identifier::{Identifier, IdentifierError, Input};
-use vigil_inference::FaultTree;
-use vigil_robot::Description;
-use vigil_robot::learned::Model;
+use vigil_identifier::{Identifier, IdentifierError, Input, Models};
 use vigil_setup::schema;
 
 /// Why a pipeline was refused.
@@ -40,18 +37,16 @@ impl Pipeline {
     /// # Errors
     /// [`PipelineError`] if model, robot, tree and settings do not fit together.
     pub fn new(
-        model: &Model,
-        robot: &Description,
-        tree: &FaultTree,
+        models: &Models<'_>,
         detector: &schema::Detector,
         identifier: &schema::Identifier,
         seed: u64,
     ) -> Result<Self, PipelineError> {
         let sensors = detector.sensors;
         Ok(Self {
-            detector: Detector::new(model, robot, detector, seed)?,
-            identifier: Identifier::new(model, robot, tree, identifier, sensors, seed)?,
-            taxonomy: Taxonomy::new(tree, robot),
+            detector: Detector::new(models.model, models.robot, detector, seed)?,
+            identifier: Identifier::new(models, identifier, sensors, seed)?,
+            taxonomy: Taxonomy::new(models.tree, models.robot),
             detection: Box::default(),
             detection_particles: Box::default(),
             diagnosis: Box::default(),

@@ -268,6 +268,7 @@ fn better_proposals_keep_belief_and_evidence_and_need_fewer_particles() {
         Proposal::prior(&case),
         Proposal::raised(&case, 0.5).unwrap(),
         Proposal::risk_sensitive(&case, &risk).unwrap(),
+        Proposal::risk_raised(&case, 0.5, &risk).unwrap(),
     ];
     let at = |proposal: &Proposal, count| {
         mean_of(20, exact, |seed| {
@@ -277,16 +278,53 @@ fn better_proposals_keep_belief_and_evidence_and_need_fewer_particles() {
             run(&mut filter, case.observations.iter(), &case.filter)
         })
     };
-    let [prior, raised, tilted] = proposals.each_ref().map(|proposal| at(proposal, 300));
+    let [prior, raised, tilted, both] = proposals.each_ref().map(|proposal| at(proposal, 300));
     assert!(
         raised.0 < 0.7 * prior.0,
         "raised {raised:?}, prior {prior:?}"
     );
+    assert!(both.0 < 0.7 * prior.0, "both {both:?}, prior {prior:?}");
     assert!(tilted.0 < 0.7 * prior.0, "risk {tilted:?}, prior {prior:?}");
     for proposal in &proposals {
         let (found, bias) = at(proposal, 10_000);
         assert!(found < 0.015 && bias.abs() < 0.3, "{found}, bias {bias}");
     }
+}
+
+#[test]
+fn a_tree_of_several_levels_is_as_right_as_a_flat_one() {
+    let case = hidden_markov();
+    let flat = [vec![1, 2, 3], vec![4, 5, 6], (7..13).collect::<Vec<_>>()];
+    let mut deep = vec![(1..7).collect::<Vec<_>>(), (1..13).collect()];
+    deep.extend(flat.clone());
+    let exact = case.log_evidence[case.log_evidence.len() - 1];
+    let both = [flat.to_vec(), deep].map(|nodes| {
+        mean_of(20, exact, |seed| {
+            let resampling = Resampling::default();
+            let filter = Hierarchical::new(case.clone(), &nodes, resampling, 1_000, seed);
+            let mut filter = filter.unwrap().with_raised_proposals(0.5);
+            run(&mut filter, case.observations.iter(), &case.filter)
+        })
+    });
+    for (distance, bias) in both {
+        assert!(distance < 0.035 && bias.abs() < 1.0, "{both:?}");
+    }
+}
+
+#[test]
+fn what_is_no_hierarchy_is_refused() {
+    use vigil_inference::hierarchical::HierarchyError::{Mode, Node, Overlap};
+    let build = |nodes: &[Vec<usize>]| {
+        let resampling = Resampling::default();
+        Hierarchical::new(hidden_markov(), nodes, resampling, 10, 1)
+            .map(|_| ())
+            .unwrap_err()
+    };
+    assert_eq!(build(&[vec![0, 1]]), Node(0));
+    assert_eq!(build(&[vec![1, 2], vec![3]]), Node(1));
+    assert_eq!(build(&[vec![1, 13]]), Mode { node: 0, mode: 13 });
+    assert_eq!(build(&[vec![1, 2, 3], vec![3, 4]]), Overlap(0, 1));
+    assert_eq!(build(&[vec![1, 2], vec![2, 1]]), Overlap(0, 1));
 }
 
 #[test]

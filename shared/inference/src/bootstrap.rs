@@ -95,6 +95,18 @@ impl<M: Sampled> ParticleFilter<M> {
         &self.model
     }
 
+    /// Begins anew from the prior and with the generator at `seed`: equal runs then have equal
+    /// beliefs, whatever came before.
+    pub fn restart(&mut self, seed: u64) {
+        self.rng = Pcg64Mcg::seed_from_u64(seed);
+        self.reset();
+    }
+
+    /// The model, to give it the command of the next step.
+    pub const fn model_mut(&mut self) -> &mut M {
+        &mut self.model
+    }
+
     /// Particles at present.
     #[must_use]
     pub const fn count(&self) -> usize {

@@ -15,13 +15,14 @@
 //! their prior shares π_k and N particles, the squared error of the coarse answer
 //! `Σ (p_k - π_k p_A)² + p_A (1 - p_A) Σ π_k² / N` is set against that of the fine one
 //! `Σ p_k (1 - p_k) / N`; a node is split when the coarse error is larger, merged again when it is
-//! smaller by the factor 2.
+//! smaller by the factor 2. In a tree of several levels the fine answer is that of the node's
+//! children, so that particles move down one level at a time.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use crate::filter::{Event, Filter, Step};
-use crate::hybrid::Sampled;
+use crate::hybrid::{Modes, Sampled};
 use crate::resample::Resampling;
 use crate::weights::Weights;
 
@@ -34,14 +35,17 @@ pub enum HierarchyError {
     /// An abstract node needs two modes at least, none of them the nominal one.
     #[error("abstract node {0} needs two or more modes other than the nominal one")]
     Node(usize),
-    /// A mode belongs to two abstract nodes, or does not exist.
-    #[error("mode {mode} of abstract node {node} does not exist or belongs to another node too")]
+    /// A mode does not exist.
+    #[error("mode {mode} of abstract node {node} does not exist")]
     Mode {
         /// Index of the abstract node.
         node: usize,
         /// Index of the mode.
         mode: usize,
     },
+    /// Two nodes share some modes, and neither lies below the other.
+    #[error("abstract nodes {0} and {1} overlap: one must lie below the other, or apart")]
+    Overlap(usize, usize),
 }
 
 #[derive(Debug, Clone)]
@@ -49,6 +53,9 @@ struct Node {
     leaves: Vec<usize>,
     /// π: shares of the leaves in what the nominal mode passes on to the node.
     prior: Vec<f64>,
+    /// Nodes directly below, and leaves below none of them.
+    nodes_below: Vec<usize>,
+    leaves_below: Vec<usize>,
     merged: bool,
 }
 
@@ -57,8 +64,8 @@ struct Node {
 pub struct Hierarchical<M: Sampled> {
     model: M,
     nodes: Vec<Node>,
-    /// Abstract node above each mode.
-    node_of: Vec<Option<usize>>,
+    /// Abstract nodes above each mode, from the top.
+    above: Vec<Vec<usize>>,
     resampling: Resampling,
     rng: Pcg64Mcg,
     states: Vec<M::State>,
@@ -80,7 +87,7 @@ pub struct Hierarchical<M: Sampled> {
 
 impl<M: Sampled> Hierarchical<M> {
     /// A filter of `count` particles, at least 1. `abstract_nodes` lists the modes below each
-    /// abstract node; modes below none stand for themselves.
+    /// abstract node, those of nodes below it included; modes below none stand for themselves.
     ///
     /// # Errors
     /// [`HierarchyError`] naming the node.
@@ -92,33 +99,12 @@ impl<M: Sampled> Hierarchical<M> {
         seed: u64,
     ) -> Result<Self, HierarchyError> {
         let (count, modes) = (count.max(1), model.modes());
-        let mut node_of = vec![None; modes];
-        let mut nodes = Vec::new();
-        for (node, leaves) in abstract_nodes.iter().enumerate() {
-            if leaves.len() < 2 || leaves.contains(&0) {
-                return Err(HierarchyError::Node(node));
-            }
-            for &mode in leaves {
-                match node_of.get_mut(mode) {
-                    Some(above @ None) => *above = Some(node),
-                    _ => return Err(HierarchyError::Mode { node, mode }),
-                }
-            }
-            let births: Vec<f64> = leaves.iter().map(|&k| model.transition(0, k)).collect();
-            let total: f64 = births.iter().sum();
-            let equal = 1.0 / leaves.len() as f64;
-            let share = |birth: f64| if total > 0.0 { birth / total } else { equal };
-            nodes.push(Node {
-                leaves: leaves.clone(),
-                prior: births.into_iter().map(share).collect(),
-                merged: true,
-            });
-        }
+        let (nodes, above) = arrange(&model, abstract_nodes)?;
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let state = model.draw(0, &mut rng);
         let mut filter = Self {
             nodes,
-            node_of,
+            above,
             resampling,
             rng,
             states: vec![state; count],
@@ -139,6 +125,25 @@ impl<M: Sampled> Hierarchical<M> {
         Ok(filter)
     }
 
+    /// Begins anew from the prior and with the generator at `seed`: equal runs then have equal
+    /// beliefs, whatever came before.
+    pub fn restart(&mut self, seed: u64) {
+        self.rng = Pcg64Mcg::seed_from_u64(seed);
+        self.reset();
+    }
+
+    /// The model, to give it the command of the next step.
+    pub const fn model_mut(&mut self) -> &mut M {
+        &mut self.model
+    }
+
+    /// State, share of each mode and weight of each particle; the weights sum to 1.
+    pub fn particles(&self) -> impl Iterator<Item = (&M::State, &[f64], f64)> {
+        let rows = self.shares.chunks_exact(self.model.modes());
+        let particles = self.states.iter().zip(rows).zip(self.weights.linear());
+        particles.map(|((state, shares), &weight)| (state, shares, weight))
+    }
+
     /// True while the leaves of an abstract node are tracked together.
     #[must_use]
     pub fn is_merged(&self, node: usize) -> bool {
@@ -153,12 +158,11 @@ impl<M: Sampled> Hierarchical<M> {
         self
     }
 
-    /// What mode `k` is tracked as at present: itself, or the first leaf of its abstract node.
+    /// What mode `k` is tracked as at present: itself, or the first leaf of the highest abstract node
+    /// above it whose leaves are tracked together.
     fn group(&self, k: usize) -> usize {
-        match self.node_of[k] {
-            Some(node) if self.nodes[node].merged => self.nodes[node].leaves[0],
-            _ => k,
-        }
+        let merged = self.above[k].iter().find(|&&node| self.nodes[node].merged);
+        merged.map_or(k, |&node| self.nodes[node].leaves[0])
     }
 
     /// Draws the group of particle i for the next step and fills `predicted` with the shares in
@@ -290,41 +294,117 @@ impl<M: Sampled> Hierarchical<M> {
         self.weights.level(self.states.len());
     }
 
-    /// Splits and merges nodes by the rule above.
+    /// Squared error of the coarse answer of a node: bias and variance.
+    fn coarse(&self, index: usize) -> f64 {
+        let node = &self.nodes[index];
+        let count = self.states.len() as f64;
+        let mass: f64 = node.leaves.iter().map(|&k| self.posterior[k]).sum();
+        let terms = node.leaves.iter().zip(&node.prior).map(|(&k, prior)| {
+            let bias = self.posterior[k] - prior * mass;
+            bias * bias + mass * (1.0 - mass) * prior * prior / count
+        });
+        terms.sum()
+    }
+
+    /// Splits and merges nodes by the rule above, one level at a time.
     fn choose_resolution(&mut self) {
         let count = self.states.len() as f64;
         for index in 0..self.nodes.len() {
             let node = &self.nodes[index];
-            let mass: f64 = node.leaves.iter().map(|&k| self.posterior[k]).sum();
-            let mut coarse = 0.0;
-            let mut fine = 0.0;
-            for (&k, prior) in node.leaves.iter().zip(&node.prior) {
-                let p = self.posterior[k];
-                let bias = p - prior * mass;
-                coarse += bias * bias + mass * (1.0 - mass) * prior * prior / count;
-                fine += p * (1.0 - p) / count;
-            }
+            let leaf = |&k: &usize| self.posterior[k] * (1.0 - self.posterior[k]) / count;
+            let below = node.nodes_below.iter().map(|&child| self.coarse(child));
+            let fine = node.leaves_below.iter().map(leaf).chain(below).sum::<f64>();
+            let coarse = self.coarse(index);
+            let is_parent_of_merged = node.nodes_below.iter().all(|&n| self.nodes[n].merged);
             if node.merged && coarse > fine {
                 self.nodes[index].merged = false;
                 self.split(index);
-            } else if !node.merged && coarse * HYSTERESIS < fine {
+            } else if !node.merged && is_parent_of_merged && coarse * HYSTERESIS < fine {
                 self.nodes[index].merged = true;
             }
         }
     }
 
-    /// Each particle of a node becomes one of its leaves, by its shares.
+    /// Each particle of a node becomes one of what is below it, by its shares.
     fn split(&mut self, node: usize) {
         let modes = self.model.modes();
-        for row in self.shares.chunks_exact_mut(modes) {
+        for i in 0..self.states.len() {
+            let row = &self.shares[i * modes..(i + 1) * modes];
             let first = row.iter().position(|&share| share > 0.0).unwrap_or(0);
-            if self.node_of[first] == Some(node) && row[first] < 1.0 {
-                let leaf = draw(row, &mut self.rng);
-                row.fill(0.0);
-                row[leaf] = 1.0;
+            if !self.above[first].contains(&node) || row[first] >= 1.0 {
+                continue;
+            }
+            let drawn = draw(row, &mut self.rng);
+            let group = self.group(drawn);
+            let mut kept = 0.0;
+            for k in 0..modes {
+                let stays = self.group(k) == group;
+                let share = &mut self.shares[i * modes + k];
+                *share = if stays { *share } else { 0.0 };
+                kept += *share;
+            }
+            for share in &mut self.shares[i * modes..(i + 1) * modes] {
+                *share /= kept;
             }
         }
     }
+}
+
+/// Nodes and, for each mode, the nodes above it from the top.
+fn arrange(
+    model: &impl Modes,
+    abstract_nodes: &[Vec<usize>],
+) -> Result<(Vec<Node>, Vec<Vec<usize>>), HierarchyError> {
+    let modes = model.modes();
+    let mut above: Vec<Vec<usize>> = vec![Vec::new(); modes];
+    for (node, leaves) in abstract_nodes.iter().enumerate() {
+        if leaves.len() < 2 || leaves.contains(&0) {
+            return Err(HierarchyError::Node(node));
+        }
+        for &mode in leaves {
+            let Some(above) = above.get_mut(mode) else {
+                return Err(HierarchyError::Mode { node, mode });
+            };
+            above.push(node);
+        }
+        for (other, others) in abstract_nodes[..node].iter().enumerate() {
+            let shared = leaves.iter().filter(|mode| others.contains(mode)).count();
+            let nested = shared == leaves.len().min(others.len()) && leaves.len() != others.len();
+            if shared > 0 && !nested {
+                return Err(HierarchyError::Overlap(other, node));
+            }
+        }
+    }
+    for nodes in &mut above {
+        nodes.sort_by_key(|&node| std::cmp::Reverse(abstract_nodes[node].len()));
+    }
+    // What lies directly above a mode, or above a node (seen from its first mode).
+    let next_above = |mode: usize, size: usize| {
+        let larger = above[mode].iter().rev();
+        larger
+            .copied()
+            .find(|&node| abstract_nodes[node].len() > size)
+    };
+    let nodes = abstract_nodes.iter().enumerate().map(|(index, leaves)| {
+        let births: Vec<f64> = leaves.iter().map(|&k| model.transition(0, k)).collect();
+        let total: f64 = births.iter().sum();
+        let equal = 1.0 / leaves.len() as f64;
+        let share = |birth: f64| if total > 0.0 { birth / total } else { equal };
+        let others = abstract_nodes.iter().enumerate();
+        let nodes_below = others.filter(|(_, o)| next_above(o[0], o.len()) == Some(index));
+        let leaves_below = leaves.iter().copied();
+        Node {
+            prior: births.iter().map(|&birth| share(birth)).collect(),
+            nodes_below: nodes_below.map(|(other, _)| other).collect(),
+            leaves_below: leaves_below
+                .filter(|&k| next_above(k, 1) == Some(index))
+                .collect(),
+            leaves: leaves.clone(),
+            merged: true,
+        }
+    });
+    let nodes = nodes.collect();
+    Ok((nodes, above))
 }
 
 /// Index drawn by probabilities that sum to 1.

@@ -1,5 +1,8 @@
 //! What a user's model is to the filters: discrete modes that follow a Markov chain, and a
 //! continuous state that moves and is observed as the mode says.
+//!
+//! A model that moves by a command keeps the command of the step that comes next; every filter lends
+//! its model for that (`model_mut`).
 
 use rand_pcg::Pcg64Mcg;
 
@@ -68,6 +71,10 @@ pub trait Conditional<const N: usize>: Modes {
 
     /// The continuous state before the first step.
     fn prior(&self, mode: usize) -> Gaussian<N>;
+
+    /// What becomes of the state when `from` gives way to `to`, before the prediction in `to`;
+    /// nothing unless said otherwise.
+    fn enter(&self, _from: usize, _to: usize, _state: &mut Gaussian<N>) {}
 
     /// Predicts one step in `mode`.
     fn predict(&self, mode: usize, state: &mut Gaussian<N>);

@@ -62,6 +62,18 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
         filter
     }
 
+    /// Begins anew from the prior and with the generator at `seed`: equal runs then have equal
+    /// beliefs, whatever came before.
+    pub fn restart(&mut self, seed: u64) {
+        self.rng = Pcg64Mcg::seed_from_u64(seed);
+        self.reset();
+    }
+
+    /// The model, to give it the command of the next step.
+    pub const fn model_mut(&mut self) -> &mut M {
+        &mut self.model
+    }
+
     /// Mode and Gaussian of each particle; their weights are equal.
     pub fn particles(&self) -> impl Iterator<Item = (usize, &Gaussian<N>)> {
         self.particles
@@ -80,6 +92,9 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
                 let mut state = particle.state;
                 *log_joint = f64::NEG_INFINITY;
                 if p > 0.0 {
+                    if mode != particle.mode {
+                        self.model.enter(particle.mode, mode, &mut state);
+                    }
                     self.model.predict(mode, &mut state);
                     if let Some(log_likelihood) = self.model.update(mode, &mut state, z) {
                         *log_joint = p.ln() + log_likelihood;
@@ -101,10 +116,11 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
             let i = ancestor as usize;
             let row = &self.log_joint[i * modes..(i + 1) * modes];
             let mode = draw_index(row, self.log_parent[i], self.rng.random());
-            let mut child = Particle {
-                mode,
-                ..self.particles[i]
-            };
+            let parent = &self.particles[i];
+            let mut child = Particle { mode, ..*parent };
+            if mode != parent.mode {
+                self.model.enter(parent.mode, mode, &mut child.state);
+            }
             self.model.predict(mode, &mut child.state);
             // It was possible a moment ago, in the look-ahead.
             let _ = self.model.update(mode, &mut child.state, z);
@@ -125,6 +141,9 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
                 left < 0.0
             });
             particle.mode = drawn.unwrap_or(from);
+            if particle.mode != from {
+                self.model.enter(from, particle.mode, &mut particle.state);
+            }
             self.model.predict(particle.mode, &mut particle.state);
             self.posterior[particle.mode] += share;
         }

@@ -38,6 +38,11 @@ impl<M: Conditional<N>, const N: usize> Merged<M, N> {
         filter
     }
 
+    /// The model, to give it the command of the next step.
+    pub const fn model_mut(&mut self) -> &mut M {
+        &mut self.model
+    }
+
     /// The continuous state given each mode.
     #[must_use]
     pub fn states(&self) -> &[Gaussian<N>] {
@@ -47,7 +52,12 @@ impl<M: Conditional<N>, const N: usize> Merged<M, N> {
     /// Mean and covariance of the continuous state over all modes.
     #[must_use]
     pub fn state(&self) -> Gaussian<N> {
-        merge(self.posterior.iter().copied().zip(&self.states))
+        merge(
+            self.posterior
+                .iter()
+                .copied()
+                .zip(self.states.iter().copied()),
+        )
     }
 
     fn predict(&mut self) {
@@ -55,13 +65,20 @@ impl<M: Conditional<N>, const N: usize> Merged<M, N> {
             let share = |from: usize| self.posterior[from] * self.model.transition(from, to);
             let total: f64 = (0..self.states.len()).map(share).sum();
             self.predicted[to] = total;
-            self.mixed[to] = if total > 0.0 {
-                let shares = (0..self.states.len()).map(|from| share(from) / total);
-                merge(shares.zip(&self.states))
+            if total > 0.0 {
+                let sources = (0..self.states.len()).filter(|&from| share(from) > 0.0);
+                let parts = sources.map(|from| {
+                    let mut state = self.states[from];
+                    if from != to {
+                        self.model.enter(from, to, &mut state);
+                    }
+                    (share(from) / total, state)
+                });
+                self.mixed[to] = merge(parts);
             } else {
                 // Nothing leads here: what this mode would have made of its own state.
-                self.states[to]
-            };
+                self.mixed[to] = self.states[to];
+            }
             self.model.predict(to, &mut self.mixed[to]);
         }
         std::mem::swap(&mut self.states, &mut self.mixed);
@@ -69,9 +86,7 @@ impl<M: Conditional<N>, const N: usize> Merged<M, N> {
 }
 
 /// The Gaussian with the mean and covariance of a mixture; weights sum to 1.
-fn merge<'a, const N: usize>(
-    parts: impl Iterator<Item = (f64, &'a Gaussian<N>)> + Clone,
-) -> Gaussian<N> {
+fn merge<const N: usize>(parts: impl Iterator<Item = (f64, Gaussian<N>)> + Clone) -> Gaussian<N> {
     let mut merged = Gaussian {
         mean: nalgebra::SVector::zeros(),
         covariance: nalgebra::SMatrix::zeros(),

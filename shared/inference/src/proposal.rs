@@ -63,23 +63,8 @@ impl Proposal {
     /// # Errors
     /// [`ProposalError::Share`].
     pub fn raised(model: &impl Modes, leave: f64) -> Result<Self, ProposalError> {
-        if !(0.0..=1.0).contains(&leave) {
-            return Err(ProposalError::Share(leave));
-        }
-        let modes = model.modes();
-        let reachable = |from: usize| {
-            (0..modes)
-                .filter(|&to| to != from && model.transition(from, to) > 0.0)
-                .count()
-        };
-        let q = |from: usize, to: usize| match reachable(from) {
-            0 => f64::from(u8::from(from == to)),
-            _ if from == to && model.transition(from, from) > 0.0 => 1.0 - leave,
-            _ if from == to => 0.0,
-            n if model.transition(from, to) > 0.0 => leave / n as f64,
-            _ => 0.0,
-        };
-        Ok(Self::build(model, q, &vec![1.0; modes]))
+        let risk = vec![1.0; model.modes()];
+        Self::risk_raised(model, leave, &risk)
     }
 
     /// Draws from `q ∝ r(d') P(d' | d)` and tracks the belief tilted by the risk `r`.
@@ -87,17 +72,41 @@ impl Proposal {
     /// # Errors
     /// [`ProposalError`] unless there is one finite risk above 0 for each mode.
     pub fn risk_sensitive(model: &impl Modes, risk: &[f64]) -> Result<Self, ProposalError> {
-        let modes = model.modes();
-        if risk.len() != modes {
-            let found = risk.len();
-            return Err(ProposalError::Length { found, modes });
-        }
-        let bad = |r: &f64| !(r.is_finite() && *r > 0.0);
-        if let Some(mode) = risk.iter().position(bad) {
-            let found = risk[mode];
-            return Err(ProposalError::Risk { mode, found });
-        }
+        check(model, risk)?;
         let q = |from: usize, to: usize| risk[to] * model.transition(from, to);
+        Ok(Self::build(model, q, risk))
+    }
+
+    /// Both: a share `leave` of the draws goes to other modes, in proportion to their risks, and the
+    /// belief is tracked tilted by the risk. Where risks differ by less than faults are rare, the
+    /// risk alone leads too few particles to them.
+    ///
+    /// # Errors
+    /// [`ProposalError`].
+    pub fn risk_raised(
+        model: &impl Modes,
+        leave: f64,
+        risk: &[f64],
+    ) -> Result<Self, ProposalError> {
+        if !(0.0..=1.0).contains(&leave) {
+            return Err(ProposalError::Share(leave));
+        }
+        check(model, risk)?;
+        let is_other = |from: usize, to: usize| to != from && model.transition(from, to) > 0.0;
+        let reached = |from: usize| -> f64 {
+            let others = (0..risk.len()).filter(|&to| is_other(from, to));
+            others.map(|to| risk[to]).sum()
+        };
+        let q = |from: usize, to: usize| {
+            let total = reached(from);
+            let stays = model.transition(from, from) > 0.0;
+            match from == to {
+                true if total <= 0.0 => 1.0,
+                true if stays => 1.0 - leave,
+                false if is_other(from, to) => leave * risk[to] / total,
+                _ => 0.0,
+            }
+        };
         Ok(Self::build(model, q, risk))
     }
 
@@ -148,5 +157,22 @@ impl Proposal {
     #[must_use]
     pub fn log_risk(&self, mode: usize) -> f64 {
         self.log_risk[mode]
+    }
+}
+
+/// One finite risk above 0 for each mode.
+fn check(model: &impl Modes, risk: &[f64]) -> Result<(), ProposalError> {
+    let modes = model.modes();
+    if risk.len() != modes {
+        let found = risk.len();
+        return Err(ProposalError::Length { found, modes });
+    }
+    let bad = |r: &f64| !(r.is_finite() && *r > 0.0);
+    match risk.iter().position(bad) {
+        Some(mode) => {
+            let found = risk[mode];
+            Err(ProposalError::Risk { mode, found })
+        }
+        None => Ok(()),
     }
 }

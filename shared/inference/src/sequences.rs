@@ -48,6 +48,11 @@ impl<M: Conditional<N>, const N: usize> Sequences<M, N> {
         filter
     }
 
+    /// The model, to give it the command of the next step.
+    pub const fn model_mut(&mut self) -> &mut M {
+        &mut self.model
+    }
+
     /// Logarithm of the share of the belief that was dropped since the start, as if every dropped
     /// sequence had explained the later observations as well as the kept ones; minus infinity
     /// while the filter is exact.
@@ -80,6 +85,9 @@ impl<M: Conditional<N>, const N: usize> Sequences<M, N> {
                 if p > 0.0 {
                     let mut next = *sequence;
                     (next.mode, next.log_weight) = (to, sequence.log_weight + p.ln());
+                    if to != sequence.mode {
+                        self.model.enter(sequence.mode, to, &mut next.state);
+                    }
                     self.model.predict(to, &mut next.state);
                     self.grown.push(next);
                 }

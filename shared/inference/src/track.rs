@@ -8,9 +8,10 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use crate::angle::wrap;
-use crate::gaussian::log_density;
+use crate::gaussian::{Gaussian, log_density};
 
-/// Dimension of the state.
+/// Dimension of a track's state.
+pub const TRACK_DIMENSION: usize = N;
 const N: usize = 9;
 
 /// How far the motion per metre deviates from its model; order yaw, forward, lateral.
@@ -42,6 +43,18 @@ pub struct Displacement {
 pub struct Track {
     mean: SVector<f64, N>,
     covariance: SMatrix<f64, N, N>,
+}
+
+impl From<Gaussian<N>> for Track {
+    fn from(Gaussian { mean, covariance }: Gaussian<N>) -> Self {
+        Self { mean, covariance }
+    }
+}
+
+impl From<Track> for Gaussian<N> {
+    fn from(Track { mean, covariance }: Track) -> Self {
+        Self { mean, covariance }
+    }
 }
 
 impl Track {
@@ -203,7 +216,6 @@ impl Track {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::gaussian::Gaussian;
 
     fn noise() -> MotionNoise {
         MotionNoise {

@@ -9,8 +9,6 @@ use crate::schema::{GraphFile, Service, Source};
 
 /// Largest length of a graph's name: it is part of shared-memory and socket names.
 const NAME_LENGTH_MAX: usize = 24;
-/// Filters that the identifier offers.
-const IDENTIFIERS: [&str; 1] = ["exact"];
 /// Policies that the supervisor offers.
 const POLICIES: [&str; 3] = ["qmdp", "mls", "av"];
 
@@ -60,12 +58,6 @@ pub(crate) fn graph(
     services(file, &mut report);
     sensor(file, path, &mut report);
     drive(file, robot, &mut report);
-    choice(
-        "identifier.filter",
-        &file.identifier.filter,
-        &IDENTIFIERS,
-        &mut report,
-    );
     choice(
         "supervisor.policy",
         &file.supervisor.policy,

@@ -13,4 +13,6 @@ mod place;
 pub mod schema;
 
 pub use args::{GraphArgs, ServiceArgs};
-pub use load::{Problem, Setup, SetupError, load_graph, load_model, load_robot, load_tree};
+pub use load::{
+    Problem, Setup, SetupError, load_decision, load_graph, load_model, load_robot, load_tree,
+};

@@ -210,7 +210,11 @@ pub fn load_model(path: &Path, robot: Option<&Description>) -> Result<Model, Set
     Ok(model)
 }
 
-fn load_decision(path: &Path) -> Result<Pomdp, SetupError> {
+/// Reads a decision model.
+///
+/// # Errors
+/// The first problem found.
+pub fn load_decision(path: &Path) -> Result<Pomdp, SetupError> {
     let text = read(path)?;
     Pomdp::parse(&text).map_err(|error| {
         Problem {

@@ -241,9 +241,11 @@ pub enum Sensors {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Identifier {
-    /// Filter: `exact` is the only one so far.
-    pub filter: String,
-    /// Particles published, drawn from the belief, 32 to 4096.
+    /// Filter: `exact` (sets of faults), or one of those over single faults: `bootstrap`, `raised`,
+    /// `adaptive`, `risk-sensitive`, `hierarchical`, `look-ahead`, `imm`.
+    pub filter: IdentifierFilter,
+    /// Particles of the filter, 32 to 4096; `look-ahead` has an eighth of them. Those of `exact` and
+    /// `imm`, which have none of their own, are drawn from the belief for observers.
     pub particles: usize,
     /// Kept frames from which an identification starts, s, 0.5 to 30.
     pub ring_s: f64,
@@ -251,10 +253,47 @@ pub struct Identifier {
     pub p_unknown: f64,
 }
 
+/// An identification filter, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum IdentifierFilter {
+    /// All sets of faults and their onsets.
+    #[default]
+    Exact,
+    /// The classical particle filter: the model's own transitions.
+    Bootstrap,
+    /// Faults are tried more often than they occur, and weights pay for it.
+    Raised,
+    /// The same with a number of particles that follows the belief's spread.
+    Adaptive,
+    /// As `raised`, and particles stay where a lost track is expensive, by the decision model.
+    RiskSensitive,
+    /// Faults are tracked together along the fault tree until the data tell them apart.
+    Hierarchical,
+    /// Every mode is tried on every particle before any is drawn.
+    LookAhead,
+    /// One Kalman filter per mode, merged.
+    Imm,
+}
+
+impl IdentifierFilter {
+    /// All of them, with the names that files and options use.
+    pub const ALL: [(&'static str, Self); 8] = [
+        ("exact", Self::Exact),
+        ("bootstrap", Self::Bootstrap),
+        ("raised", Self::Raised),
+        ("adaptive", Self::Adaptive),
+        ("risk-sensitive", Self::RiskSensitive),
+        ("hierarchical", Self::Hierarchical),
+        ("look-ahead", Self::LookAhead),
+        ("imm", Self::Imm),
+    ];
+}
+
 impl Default for Identifier {
     fn default() -> Self {
         Self {
-            filter: "exact".into(),
+            filter: IdentifierFilter::Exact,
             particles: 256,
             ring_s: 3.0,
             p_unknown: 0.01,

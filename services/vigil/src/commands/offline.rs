@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::builder::PossibleValuesParser;
 use serde::Serialize;
 use vigil_evaluation::frames::{self, Run};
+use vigil_identifier::Models;
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
 use vigil_robot::learned::Model;
-use vigil_setup::schema::{self, Sensors};
-use vigil_setup::{load_robot, load_tree};
+use vigil_setup::schema::{self, IdentifierFilter, Sensors};
+use vigil_setup::{load_decision, load_robot, load_tree};
 
 use super::CommandError;
 use crate::pipeline::Pipeline;
@@ -51,7 +52,7 @@ pub struct FilterArgs {
         long,
         value_name = "NAME",
         default_value = "exact",
-        value_parser = PossibleValuesParser::new(["exact"])
+        value_parser = PossibleValuesParser::new(IdentifierFilter::ALL.map(|(name, _)| name))
     )]
     identifier: String,
     /// Particles of detector and identifier, 32 to 4096.
@@ -70,6 +71,9 @@ pub struct FilterArgs {
     /// Fault tree (TOML).
     #[arg(long, value_name = "F", default_value = "config/trees/rover.toml")]
     tree: PathBuf,
+    /// Decision model (`.pomdp`), read for `--identifier risk-sensitive` only.
+    #[arg(long, value_name = "F", default_value = "config/rover.pomdp")]
+    decision: PathBuf,
 }
 
 /// What was used, for the record.
@@ -142,12 +146,25 @@ impl FilterArgs {
             },
             ..schema::Detector::default()
         };
+        let named = IdentifierFilter::ALL.iter();
+        let mut named = named.filter(|(name, _)| *name == self.identifier);
         let identifier = schema::Identifier {
-            filter: self.identifier.clone(),
+            filter: named
+                .next()
+                .map_or_else(Default::default, |(_, filter)| *filter),
             particles: self.particles.into(),
             ..schema::Identifier::default()
         };
-        Pipeline::new(model, robot, tree, &detector, &identifier, self.seed)
+        let needs_decision = identifier.filter == IdentifierFilter::RiskSensitive;
+        let decision = needs_decision.then(|| load_decision(&self.decision));
+        let decision = decision.transpose().map_err(CommandError::usage)?;
+        let models = Models {
+            model,
+            robot,
+            tree,
+            decision: decision.as_ref(),
+        };
+        Pipeline::new(&models, &detector, &identifier, self.seed)
             .map_err(|error| CommandError::usage(format!("{}: {error}", self.model.display())))
     }
 }

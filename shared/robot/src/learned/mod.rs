@@ -8,6 +8,7 @@
 //! | [`observation`] | frames averaged into observations of about the learned interval |
 //! | [`motion_modes`] | the ways in which a robot may move: nominal, wheels stuck, unknown |
 //! | [`wheel_evidence`] | what the wheels say, for everything that each may be doing |
+//! | [`switching`] | the learned model as a hybrid system, for filters that take any |
 //! | [`noise_scale`] | how much noisier the sensors are than the learned ones |
 //! | [`calibration`] | alarm thresholds for a stated mean time between false alarms |
 //! | [`monitor`] | the detection filter over observations |
@@ -20,6 +21,7 @@ pub mod motion_modes;
 pub mod noise_scale;
 pub mod observation;
 mod reading;
+pub mod switching;
 pub mod wheel_evidence;
 pub mod wheels;
 
@@ -30,5 +32,6 @@ pub use motion::{Curve, MotionModel};
 pub use motion_modes::{FaultRates, MotionMode, Moved, motion_modes};
 pub use observation::{Intake, Observation, Observer};
 pub use reading::Reading;
+pub use switching::Switching;
 pub use wheel_evidence::WheelEvidence;
 pub use wheels::{EncoderModel, EncoderState, RateModel};

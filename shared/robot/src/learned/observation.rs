@@ -7,8 +7,9 @@
 
 use vigil_blocks::{SensorFrame, Valid, WHEELS};
 use vigil_inference::angle::wrap;
+use vigil_inference::track::Displacement;
 
-use super::{Model, Reading};
+use super::{Model, MotionModel, Reading};
 use crate::Description;
 
 /// A gap in the frames beyond which the pose starts anew, s.
@@ -72,6 +73,17 @@ impl Observation {
             let sample = model.sample_variance(sd, self.frame_s) * noise_scale * noise_scale;
             self.mean_variance(sample, self.pose_frames)
         })
+    }
+
+    /// The displacement to this observation that a motion model expects.
+    #[must_use]
+    pub fn displacement(&self, model: &Model, motion: &MotionModel) -> Displacement {
+        let limit = model.command.curvature_max_1_m;
+        Displacement {
+            per_metre: motion.per_metre(self.curvature, self.speed, limit),
+            travel_m: self.travel_m,
+            extra: self.lag_variance(model),
+        }
     }
 
     /// Variance of the yaw, forward and lateral displacement beyond the motion model: the body's

@@ -1,0 +1,82 @@
+//! The filter that an identification runs on.
+
+use nalgebra::{Matrix3, Vector3};
+use rand_pcg::Pcg64Mcg;
+use vigil_blocks::ParticleBlock;
+use vigil_robot::learned::Observation;
+
+use crate::draw::draw;
+use crate::exact::Exact;
+use crate::generic::Generic;
+use crate::modes::Leaves;
+use crate::posterior::Posterior;
+
+/// The exact filter over sets of faults, or one of the library's over single faults.
+#[derive(Debug, Clone)]
+pub enum Engine {
+    /// Sets of faults.
+    Exact(Box<Exact>),
+    /// Single faults.
+    Generic(Box<Generic>),
+}
+
+impl Engine {
+    /// Starts from the nominal mode, its pose known to these moments at `t_ns`.
+    pub fn restart(&mut self, mean: Vector3<f64>, covariance: Matrix3<f64>, t_ns: u64) {
+        match self {
+            Self::Exact(filter) => filter.restart(mean, covariance, t_ns),
+            Self::Generic(filter) => filter.restart(mean, covariance, t_ns),
+        }
+    }
+
+    /// Takes one observation; the pose's noise is `noise_scale` times the learned one.
+    pub fn step(&mut self, observation: &Observation, noise_scale: f64) {
+        match self {
+            Self::Exact(filter) => filter.step(observation, noise_scale),
+            Self::Generic(filter) => filter.step(observation, noise_scale),
+        }
+    }
+
+    /// Fills the probabilities of nodes, sets and unknown.
+    pub fn posterior(&mut self, leaves: &Leaves, out: &mut Posterior) {
+        match self {
+            Self::Exact(filter) => filter.posterior(out),
+            Self::Generic(filter) => filter.posterior(leaves, out),
+        }
+    }
+
+    /// Most probable onset of a leaf's fault, capture time ns; 0 if it is no leaf.
+    #[must_use]
+    pub fn onset(&self, node: usize) -> u64 {
+        match self {
+            Self::Exact(filter) => filter.onset(node),
+            Self::Generic(filter) => filter.onset(node),
+        }
+    }
+
+    /// Most probable onset of the unknown, capture time ns; 0 if it was never supposed.
+    #[must_use]
+    pub fn onset_unknown(&self) -> u64 {
+        match self {
+            Self::Exact(filter) => filter.onset_unknown(),
+            Self::Generic(filter) => filter.onset_unknown(),
+        }
+    }
+
+    /// Observations that nothing explained, and were passed over.
+    #[must_use]
+    pub const fn degenerate_count(&self) -> u32 {
+        match self {
+            Self::Exact(filter) => filter.degenerate_count(),
+            Self::Generic(filter) => filter.degenerate_count(),
+        }
+    }
+
+    /// Fills `out` with at most `count` particles.
+    pub fn draw(&self, leaves: &Leaves, count: usize, rng: &mut Pcg64Mcg, out: &mut ParticleBlock) {
+        match self {
+            Self::Exact(filter) => draw(filter, leaves, count, rng, out),
+            Self::Generic(filter) => filter.draw(count, rng, out),
+        }
+    }
+}
