@@ -28,6 +28,10 @@ pub enum Kind {
     Hierarchical,
     /// The same with raised proposals.
     RaisedHierarchical,
+    /// With raised proposals, its nodes always merged.
+    Coarse,
+    /// With raised proposals, its nodes always split.
+    Fine,
     /// Look-ahead, Rao-Blackwellised.
     LookAhead,
     /// One Kalman filter per mode.
@@ -38,12 +42,14 @@ pub enum Kind {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::Bootstrap,
         Self::Raised,
         Self::Risk,
         Self::Hierarchical,
         Self::RaisedHierarchical,
+        Self::Coarse,
+        Self::Fine,
         Self::LookAhead,
         Self::Merged,
         Self::Sequences,
@@ -58,6 +64,8 @@ impl Kind {
             Self::Risk => "risk-sensitive",
             Self::Hierarchical => "hierarchical",
             Self::RaisedHierarchical => "hierarchical, raised",
+            Self::Coarse => "hierarchical, raised, always merged",
+            Self::Fine => "hierarchical, raised, always split",
             Self::LookAhead => "look-ahead",
             Self::Merged => "merged (one per mode)",
             Self::Sequences => "mode sequences (300)",
@@ -76,9 +84,35 @@ impl Kind {
         match self {
             Self::LookAhead => count <= 1_000,
             Self::Hierarchical | Self::RaisedHierarchical => count <= 10_000,
+            Self::Coarse | Self::Fine => count <= 1_000,
+            Self::Raised | Self::Risk => count <= 100_000,
             _ => true,
         }
     }
+}
+
+/// A filter that lends its model, for the command of the next step.
+pub trait Driven<M>: Filter {
+    /// The model.
+    fn model(&mut self) -> &mut M;
+}
+
+macro_rules! driven {
+    ($($filter:ty, $model:path, [$($dimension:tt)*];)*) => { $(
+        impl<M: $model, $($dimension)*> Driven<M> for $filter {
+            fn model(&mut self) -> &mut M {
+                self.model_mut()
+            }
+        }
+    )* };
+}
+
+driven! {
+    ParticleFilter<M>, Sampled, [];
+    Hierarchical<M>, Sampled, [];
+    LookAhead<M, N>, Conditional<N>, [const N: usize];
+    Merged<M, N>, Conditional<N>, [const N: usize];
+    Sequences<M, N>, Conditional<N>, [const N: usize];
 }
 
 /// A model that every filter can take.
@@ -109,7 +143,7 @@ pub fn build<M: Model<N>, const N: usize>(
     nodes: &[Vec<usize>],
     count: usize,
     seed: u64,
-) -> Box<dyn Filter<Observation = <M as Model<N>>::Seen>> {
+) -> Box<dyn Driven<M, Observation = <M as Model<N>>::Seen>> {
     let resampling = Resampling::default();
     let sampled = |proposal| {
         Box::new(ParticleFilter::new(
@@ -129,6 +163,7 @@ pub fn build<M: Model<N>, const N: usize>(
             seed,
         ))
     };
+    let raised = || hierarchical().with_raised_proposals(RAISED);
     let mut risk = vec![100.0; Modes::modes(model)];
     risk[0] = 1.0;
     match kind {
@@ -136,7 +171,9 @@ pub fn build<M: Model<N>, const N: usize>(
         Kind::Raised => sampled(fits(Proposal::raised(model, RAISED))),
         Kind::Risk => sampled(fits(Proposal::risk_sensitive(model, &risk))),
         Kind::Hierarchical => Box::new(hierarchical()),
-        Kind::RaisedHierarchical => Box::new(hierarchical().with_raised_proposals(RAISED)),
+        Kind::RaisedHierarchical => Box::new(raised()),
+        Kind::Coarse => Box::new(raised().with_fixed_resolution(true)),
+        Kind::Fine => Box::new(raised().with_fixed_resolution(false)),
         Kind::LookAhead => Box::new(LookAhead::<M, N>::new(model.clone(), count, seed)),
         Kind::Merged => Box::new(Merged::<M, N>::new(model.clone())),
         Kind::Sequences => Box::new(Sequences::<M, N>::new(model.clone(), SEQUENCES)),

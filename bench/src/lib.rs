@@ -4,8 +4,11 @@
 pub mod archive;
 pub mod filters;
 pub mod machine;
+pub mod matched;
 pub mod naive;
 pub mod rare;
+pub mod recorded;
+pub mod speed;
 
 /// The value below which the share `q` of `values` lies; sorts them. NaN if there are none.
 pub fn quantile(values: &mut [f64], q: f64) -> f64 {

@@ -52,9 +52,18 @@ fn record(graph: &mut Running) -> Recorded {
 
 #[test]
 fn beliefs_live_and_offline_are_bit_identical() {
+    compare(&["--duration", "8", "--inject", "stuck:LM@3"]);
+}
+
+#[test]
+fn beliefs_of_a_sampled_filter_are_bit_identical_too() {
+    let filter = ["--identifier", "hierarchical"];
+    compare(&[&["--duration", "8", "--inject", "stuck:LM@3"], &filter[..]].concat());
+}
+
+fn compare(options: &[&str]) {
     let _machine = machine();
-    let options = ["--duration", "8", "--inject", "stuck:LM@3"];
-    let mut graph = Running::start("identity", &options);
+    let mut graph = Running::start("identity", options);
     let recorded = record(&mut graph);
     let setup = graph.setup.clone();
     graph.finish();

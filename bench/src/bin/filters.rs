@@ -10,12 +10,62 @@ use std::time::Instant;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::filters::{Kind, Model, build};
-use vigil_bench::rare::{Cell, Scenario, rare_faults};
+use vigil_bench::matched::{HEAD, Outcome, compare};
+use vigil_bench::rare::{STEP_S, Scenario, rare_faults};
+use vigil_bench::recorded::Recorded;
+use vigil_bench::speed;
 use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Planar};
 
-const COUNTS: [usize; 5] = [32, 100, 1_000, 10_000, 100_000];
+const COUNTS: [usize; 6] = [32, 100, 1_000, 10_000, 100_000, 1_000_000];
 /// Simulated runs per cell of the rare faults.
-const RUNS: u64 = 60;
+const RUNS: u64 = 100;
+/// Filters and particles on simulated runs.
+const SIMULATED: [(Kind, usize); 18] = [
+    (Kind::Bootstrap, 100),
+    (Kind::Bootstrap, 1_000),
+    (Kind::Bootstrap, 10_000),
+    (Kind::Raised, 32),
+    (Kind::Raised, 100),
+    (Kind::Raised, 1_000),
+    (Kind::Risk, 100),
+    (Kind::Risk, 1_000),
+    (Kind::Hierarchical, 100),
+    (Kind::Hierarchical, 1_000),
+    (Kind::RaisedHierarchical, 32),
+    (Kind::RaisedHierarchical, 100),
+    (Kind::RaisedHierarchical, 1_000),
+    (Kind::Coarse, 100),
+    (Kind::Fine, 100),
+    (Kind::LookAhead, 32),
+    (Kind::Merged, 0),
+    (Kind::Sequences, 0),
+];
+/// The same on recorded runs.
+const RECORDED: [(Kind, usize); 16] = [
+    (Kind::Bootstrap, 100),
+    (Kind::Bootstrap, 1_000),
+    (Kind::Bootstrap, 10_000),
+    (Kind::Raised, 32),
+    (Kind::Raised, 100),
+    (Kind::Raised, 1_000),
+    (Kind::Risk, 100),
+    (Kind::Risk, 1_000),
+    (Kind::Hierarchical, 100),
+    (Kind::Hierarchical, 1_000),
+    (Kind::RaisedHierarchical, 32),
+    (Kind::RaisedHierarchical, 100),
+    (Kind::RaisedHierarchical, 1_000),
+    (Kind::Coarse, 100),
+    (Kind::Fine, 100),
+    (Kind::Merged, 0),
+];
+/// What is compared run by run, at equal numbers of particles.
+const PAIRS: [(Kind, Kind); 4] = [
+    (Kind::Hierarchical, Kind::Bootstrap),
+    (Kind::RaisedHierarchical, Kind::Raised),
+    (Kind::RaisedHierarchical, Kind::Coarse),
+    (Kind::RaisedHierarchical, Kind::Fine),
+];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new("filters")?;
@@ -38,6 +88,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     report(&mut archive, "three modes that move a pose", &rows);
     archive.store("jump-linear.json", &json!(rows))?;
 
+    let speeds = speed::rows(&folder)?;
+    archive.say("## Time per particle: thirteen modes, pose and wheel rates\n");
+    speed::report(&mut archive, &speeds);
+    archive.store("speed.json", &json!(speeds))?;
+
     let (planar, _) = Planar::read(&folder)?;
     let mut cells = Vec::new();
     for with_wheels in [true, false] {
@@ -47,14 +102,31 @@ fn main() -> Result<(), Box<dyn Error>> {
                 with_wheels,
                 runs: RUNS,
             };
-            eprintln!("simulating p(fault) = {p_fault}, wheels: {with_wheels}");
-            let found = rare_faults(&planar, &nodes, &scenario);
-            rare_table(&mut archive, &scenario, &found);
-            let raw: Vec<Value> = found.iter().map(Cell::json).collect();
+            eprintln!("simulating p(fault) = {p_fault:e}, wheel rates: {with_wheels}");
+            let found = rare_faults(&planar, &nodes, &scenario, &SIMULATED);
+            let title = format!("{RUNS} simulated faults of p = {p_fault:e} per step");
+            matched_table(&mut archive, &title, with_wheels, STEP_S, &found);
+            let raw: Vec<Value> = found.iter().map(Outcome::json).collect();
             cells.push(json!({"p_fault": p_fault, "wheels": with_wheels, "cells": raw}));
         }
     }
-    archive.store("rare-faults.json", &json!(cells))?;
+    archive.store("simulated.json", &json!(cells))?;
+
+    let recorded = Recorded::read(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."))?;
+    let mut cells = Vec::new();
+    for with_wheels in [true, false] {
+        for p_fault in [1e-3, 1e-5, 1e-6] {
+            let runs = recorded.runs(with_wheels);
+            eprintln!("recorded runs, p(fault) = {p_fault:e}, wheel rates: {with_wheels}");
+            let found = recorded.outcomes(p_fault, with_wheels, &RECORDED);
+            let title =
+                format!("{runs} recorded runs, the filters expect p = {p_fault:e} per step");
+            matched_table(&mut archive, &title, with_wheels, recorded.step_s(), &found);
+            let raw: Vec<Value> = found.iter().map(Outcome::json).collect();
+            cells.push(json!({"p_fault": p_fault, "wheels": with_wheels, "cells": raw}));
+        }
+    }
+    archive.store("recorded.json", &json!(cells))?;
     let folder = archive.close()?;
     println!("archived in {}", folder.display());
     Ok(())
@@ -73,7 +145,11 @@ where
     for kind in Kind::ALL {
         for count in COUNTS.into_iter().filter(|&count| kind.is_sensible(count)) {
             eprintln!("{} with {count}", kind.name());
-            let seeds = if count >= 100_000 { 3 } else { 20 };
+            let seeds = match count {
+                1_000_000.. => 1,
+                100_000.. => 3,
+                _ => 20,
+            };
             let seeds = if kind.is_sampled() { seeds } else { 1 };
             let (mut l1, mut kl, mut times_ns) = (0.0, 0.0, Vec::new());
             for seed in 0..seeds {
@@ -132,23 +208,36 @@ fn report(archive: &mut Archive, title: &str, rows: &[Value]) {
     archive.say("");
 }
 
-fn rare_table(archive: &mut Archive, scenario: &Scenario, cells: &[Cell]) {
-    let sensors = if scenario.with_wheels {
+fn matched_table(
+    archive: &mut Archive,
+    title: &str,
+    with_wheels: bool,
+    step_s: f64,
+    found: &[Outcome],
+) {
+    let sensors = if with_wheels {
         "pose and wheel rates"
     } else {
         "pose"
     };
-    let (runs, p) = (scenario.runs, scenario.p_fault);
-    archive.say(&format!(
-        "## {runs} faults of p = {p:e} per step, {sensors}\n"
-    ));
-    archive.say(
-        "| filter | particles | missed | false alarms | mean delay, steps | leaf right | side \
-         right |",
-    );
-    archive.say("|---|---|---|---|---|---|---|");
-    for cell in cells {
-        archive.say(&cell.row());
+    archive.say(&format!("## {title}, {sensors}\n"));
+    for line in HEAD {
+        archive.say(line);
+    }
+    for outcome in found {
+        archive.say(&outcome.row(step_s));
+    }
+    archive.say("");
+    let with = |kind: Kind, count| {
+        let mut all = found.iter();
+        all.find(|o| o.name == kind.name() && o.count == Some(count))
+    };
+    for (a, b) in PAIRS {
+        for count in [100, 1_000] {
+            if let (Some(a), Some(b)) = (with(a, count), with(b, count)) {
+                archive.say(&compare(a, b, step_s));
+            }
+        }
     }
     archive.say("");
 }

@@ -5,6 +5,7 @@ mod alarm;
 mod recorded;
 
 use alarm::Alarm;
+use clap::ValueEnum;
 use proptest::prelude::*;
 use recorded::{model, path, robot, unseen};
 use vigil_blocks::{Entry, FaultBelief, MODE_MULTIPLE, MODE_UNKNOWN, ParticleBlock, SensorFrame};
@@ -255,7 +256,7 @@ fn equal_input_and_seed_give_equal_bits_whatever_came_before() {
     let (frames, label) = unseen("RM_STUCK", "stuck");
     let (others, _) = unseen("LF_STUCK", "stuck");
     let onset_s = label.onset_s.unwrap();
-    for (name, filter) in schema::IdentifierFilter::ALL {
+    for &filter in schema::IdentifierFilter::value_variants() {
         let alarm = || Alarm::between(onset_s + 0.5, 99.0);
         let fresh = || Bench::with(filter, schema::Sensors::Pose, alarm());
         let (mut a, mut b) = (fresh(), fresh());
@@ -267,7 +268,7 @@ fn equal_input_and_seed_give_equal_bits_whatever_came_before() {
             b.step(frame);
             let (a_told, mut b_told) = (a.belief, b.belief);
             b_told.mode_change_count = a_told.mode_change_count;
-            assert_eq!(a_told, b_told, "{name}");
+            assert_eq!(a_told, b_told, "{filter}");
             // What lies beyond the particles in use is unspecified.
             let used = |bench: &Bench| {
                 let (p, n) = (&bench.particles, bench.particles.count as usize);
@@ -277,7 +278,7 @@ fn equal_input_and_seed_give_equal_bits_whatever_came_before() {
                     p.log_weight[..n].to_vec(),
                 )
             };
-            assert!(used(&a) == used(&b), "{name}");
+            assert!(used(&a) == used(&b), "{filter}");
         }
     }
 }
@@ -286,8 +287,8 @@ fn equal_input_and_seed_give_equal_bits_whatever_came_before() {
 fn every_filter_names_single_faults() {
     // The classical filter has a fault only if one of its particles arrives there by chance, and is
     // shown in `bench` to be often wrong.
-    let good = schema::IdentifierFilter::ALL.into_iter();
-    for (name, filter) in good.filter(|(name, _)| *name != "bootstrap") {
+    let all = schema::IdentifierFilter::value_variants().iter().copied();
+    for filter in all.filter(|filter| *filter != schema::IdentifierFilter::Bootstrap) {
         for (mode, kind) in [
             ("RM_STUCK", "stuck"),
             ("RF_ENC", "zero"),
@@ -305,11 +306,11 @@ fn every_filter_names_single_faults() {
                     wrong_s += t_s - time_s(&pair[0]);
                 }
             }
-            assert!(wrong_s < 1.0, "{name}, {mode}: wrong for {wrong_s} s");
+            assert!(wrong_s < 1.0, "{filter}, {mode}: wrong for {wrong_s} s");
             let found_s = bench.belief.onset_t_capture_ns as f64 * 1e-9;
             assert!(
                 (found_s - onset_s).abs() < 1.0,
-                "{name}, {mode}: {found_s} s"
+                "{filter}, {mode}: {found_s} s"
             );
         }
     }

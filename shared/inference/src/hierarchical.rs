@@ -82,6 +82,7 @@ pub struct Hierarchical<M: Sampled> {
     mass: Vec<f64>,
     proposed: Vec<f64>,
     leave: Option<f64>,
+    is_fixed: bool,
     posterior: Vec<f64>,
 }
 
@@ -118,6 +119,7 @@ impl<M: Sampled> Hierarchical<M> {
             mass: vec![0.0; modes],
             proposed: vec![0.0; modes],
             leave: None,
+            is_fixed: false,
             posterior: vec![0.0; modes],
             model,
         };
@@ -155,6 +157,17 @@ impl<M: Sampled> Hierarchical<M> {
     #[must_use]
     pub fn with_raised_proposals(mut self, leave: f64) -> Self {
         self.leave = Some(leave.clamp(0.0, 1.0));
+        self
+    }
+
+    /// The same filter with all its nodes merged for good, or all split: what the rule is measured
+    /// against.
+    #[must_use]
+    pub fn with_fixed_resolution(mut self, merged: bool) -> Self {
+        self.is_fixed = true;
+        for node in &mut self.nodes {
+            node.merged = merged;
+        }
         self
     }
 
@@ -308,6 +321,9 @@ impl<M: Sampled> Hierarchical<M> {
 
     /// Splits and merges nodes by the rule above, one level at a time.
     fn choose_resolution(&mut self) {
+        if self.is_fixed {
+            return;
+        }
         let count = self.states.len() as f64;
         for index in 0..self.nodes.len() {
             let node = &self.nodes[index];
@@ -450,7 +466,7 @@ impl<M: Sampled> Filter for Hierarchical<M> {
 
     fn reset(&mut self) {
         let modes = self.model.modes();
-        for node in &mut self.nodes {
+        for node in self.nodes.iter_mut().filter(|_| !self.is_fixed) {
             node.merged = true;
         }
         for mode in 0..modes {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::load::{Setup, SetupError, load_graph};
-use crate::schema::Source;
+use crate::schema::{IdentifierFilter, Source};
 
 /// Which graph, and what to change in it for this start.
 #[derive(Debug, Clone, Default, PartialEq, clap::Args)]
@@ -25,6 +25,9 @@ pub struct GraphArgs {
     /// Seed; replaces `graph.seed`.
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
+    /// Identification filter; replaces `identifier.filter`.
+    #[arg(long, value_name = "NAME")]
+    pub identifier: Option<IdentifierFilter>,
     /// Play these recorded frames (CSV or CSV.gz) instead of the simulator.
     #[arg(long, value_name = "F")]
     pub replay: Option<PathBuf>,
@@ -67,6 +70,9 @@ impl GraphArgs {
             if let Some(seed) = self.seed {
                 file.graph.seed = seed;
             }
+            if let Some(filter) = self.identifier {
+                file.identifier.filter = filter;
+            }
             if let Some(frames) = &self.replay {
                 file.sensor.source = Source::Playback;
                 let absolute = std::path::absolute(frames).unwrap_or_else(|_| frames.clone());
@@ -90,6 +96,7 @@ impl GraphArgs {
         option("--rate", self.rate.map(|v| v.to_string()));
         option("--graph", self.graph.clone());
         option("--seed", self.seed.map(|v| v.to_string()));
+        option("--identifier", self.identifier.map(|v| v.to_string()));
         option(
             "--replay",
             self.replay.as_ref().map(|p| p.display().to_string()),

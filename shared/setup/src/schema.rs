@@ -5,7 +5,9 @@
 //! the graph file. Keys end in their unit. Unknown keys are errors.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
+use clap::ValueEnum;
 use serde::Deserialize;
 
 /// A whole graph file.
@@ -254,7 +256,7 @@ pub struct Identifier {
 }
 
 /// An identification filter, by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum IdentifierFilter {
     /// All sets of faults and their onsets.
@@ -276,18 +278,11 @@ pub enum IdentifierFilter {
     Imm,
 }
 
-impl IdentifierFilter {
-    /// All of them, with the names that files and options use.
-    pub const ALL: [(&'static str, Self); 8] = [
-        ("exact", Self::Exact),
-        ("bootstrap", Self::Bootstrap),
-        ("raised", Self::Raised),
-        ("adaptive", Self::Adaptive),
-        ("risk-sensitive", Self::RiskSensitive),
-        ("hierarchical", Self::Hierarchical),
-        ("look-ahead", Self::LookAhead),
-        ("imm", Self::Imm),
-    ];
+impl fmt::Display for IdentifierFilter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let value = self.to_possible_value();
+        f.write_str(value.as_ref().map_or("", |value| value.get_name()))
+    }
 }
 
 impl Default for Identifier {

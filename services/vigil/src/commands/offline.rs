@@ -48,13 +48,8 @@ pub struct FilterArgs {
     )]
     sensors: String,
     /// Identification filter.
-    #[arg(
-        long,
-        value_name = "NAME",
-        default_value = "exact",
-        value_parser = PossibleValuesParser::new(IdentifierFilter::ALL.map(|(name, _)| name))
-    )]
-    identifier: String,
+    #[arg(long, value_name = "NAME", value_enum, default_value_t)]
+    identifier: IdentifierFilter,
     /// Particles of detector and identifier, 32 to 4096.
     #[arg(
         long,
@@ -119,7 +114,7 @@ impl FilterArgs {
             model_hash: format!("{:016x}", model.hash()),
             tree_hash: format!("{:016x}", tree.hash()),
             sensors: self.sensors.clone(),
-            identifier: self.identifier.clone(),
+            identifier: self.identifier.to_string(),
             particles: self.particles,
             seed: self.seed,
         };
@@ -146,12 +141,8 @@ impl FilterArgs {
             },
             ..schema::Detector::default()
         };
-        let named = IdentifierFilter::ALL.iter();
-        let mut named = named.filter(|(name, _)| *name == self.identifier);
         let identifier = schema::Identifier {
-            filter: named
-                .next()
-                .map_or_else(Default::default, |(_, filter)| *filter),
+            filter: self.identifier,
             particles: self.particles.into(),
             ..schema::Identifier::default()
         };

@@ -1,0 +1,233 @@
+//! The filters on recorded runs of the rover that its model was not learned from.
+
+use std::error::Error;
+use std::path::Path;
+
+use vigil_evaluation::frames::{self, Run};
+use vigil_evaluation::labels::{self, Label};
+use vigil_inference::hybrid::Modes;
+use vigil_inference::track::TRACK_DIMENSION;
+use vigil_robot::Description;
+use vigil_robot::learned::{FaultRates, Model, Moved, Observation, Observer, Switching};
+
+use crate::filters::{Kind, build};
+use crate::matched::{Outcome, Trace, in_parallel, log_odds, threshold};
+
+/// Share of nominal stretches with a false alarm.
+const FALSE_ALARMS: f64 = 0.05;
+/// Steps after the onset at which leaf and side are judged: 2 s.
+const JUDGED: usize = 40;
+/// Rates at which faults vanish, and at which something unknown happens, relative to all faults.
+const DEATH_1_S: f64 = 1.0 / 60.0;
+const UNKNOWN: f64 = 0.01;
+
+/// Recorded runs, ready for the filters.
+pub struct Recorded {
+    robot: Description,
+    model: Model,
+    nominal: Vec<Prepared>,
+    stuck: Vec<Prepared>,
+    encoders: Vec<Prepared>,
+}
+
+/// A run as observations in motion, and its fault.
+struct Prepared {
+    observations: Vec<Observation>,
+    fault: Option<(Moved, Option<usize>)>,
+    onset: usize,
+}
+
+impl Recorded {
+    /// Reads the runs that the shipped model was not learned from.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read(root: &Path) -> Result<Self, Box<dyn Error>> {
+        let robot = vigil_setup::load_robot(&root.join("config/robots/rover.toml"))?;
+        let model = vigil_setup::load_model(&root.join("config/models/rover.toml"), Some(&robot))?;
+        let data = root.join("tests/data/rover");
+        let runs = frames::read(&data.join("learn_frames.csv.gz"), &robot)?;
+        let labels = labels::read(&data.join("learn_runs.csv"), &robot)?;
+        let mut recorded = Self {
+            nominal: Vec::new(),
+            stuck: Vec::new(),
+            encoders: Vec::new(),
+            robot,
+            model,
+        };
+        let held_out = recorded.model.provenance.runs_held_out.clone();
+        for run in runs.iter().filter(|run| held_out.contains(&run.id)) {
+            if let Some(label) = labels.iter().find(|label| label.run == run.id) {
+                let prepared = recorded.prepare(run, label);
+                match prepared.fault {
+                    None => recorded.nominal.push(prepared),
+                    Some((Moved::Nominal, _)) => recorded.encoders.push(prepared),
+                    Some(_) => recorded.stuck.push(prepared),
+                }
+            }
+        }
+        Ok(recorded)
+    }
+
+    fn prepare(&self, run: &Run, label: &Label) -> Prepared {
+        let mut observer = Observer::new(&self.model, &self.robot);
+        let complete = run.frames.iter().filter_map(|frame| {
+            let intake = observer.push(frame);
+            intake.complete.then(|| *observer.observation())
+        });
+        let observations: Vec<Observation> = complete.filter(|o| o.moving || o.anchor).collect();
+        let onset_s = label.onset_s.unwrap_or(f64::INFINITY);
+        let is_before = |o: &&Observation| (o.t_ns as f64) * 1e-9 < onset_s;
+        let wheel = label
+            .mode
+            .split('_')
+            .next()
+            .and_then(|w| self.robot.wheel_index(w));
+        let fault = wheel.map(|wheel| match label.mode.ends_with("_STUCK") {
+            true => (Moved::Stuck(1 << wheel), None),
+            false => (Moved::Nominal, Some(wheel)),
+        });
+        Prepared {
+            onset: observations.iter().take_while(is_before).count(),
+            observations,
+            fault,
+        }
+    }
+
+    /// Time of a step, s.
+    #[must_use]
+    pub const fn step_s(&self) -> f64 {
+        self.model.interval_s
+    }
+
+    /// Faulty runs that are judged.
+    #[must_use]
+    pub const fn runs(&self, with_wheels: bool) -> usize {
+        self.stuck.len() + if with_wheels { self.encoders.len() } else { 0 }
+    }
+
+    /// Every filter over the same runs, a fault appearing with `p_fault` per step in the filters'
+    /// eyes. Without wheel rates encoders break unseen: those runs are left out.
+    #[must_use]
+    pub fn outcomes(
+        &self,
+        p_fault: f64,
+        with_wheels: bool,
+        wanted: &[(Kind, usize)],
+    ) -> Vec<Outcome> {
+        let wheels: u32 = (1 << self.robot.wheels.len()) - 1;
+        let encoders = if with_wheels { wheels } else { 0_u32 };
+        let faults = f64::from(wheels.count_ones() + encoders.count_ones());
+        let all_1_s = p_fault / self.model.interval_s;
+        let rates = FaultRates {
+            fault_1_s: all_1_s * (1.0 - UNKNOWN) / faults,
+            unknown_1_s: all_1_s * UNKNOWN,
+            death_1_s: DEATH_1_S,
+        };
+        let switching = Switching::new(&self.model, &self.robot, wheels, encoders, &rates);
+        let nodes = self.nodes(&switching);
+        let mut faulty: Vec<&Prepared> = self.stuck.iter().collect();
+        if with_wheels {
+            faulty.extend(&self.encoders);
+        }
+        let nominal: Vec<&Prepared> = self.nominal.iter().chain(&self.stuck).collect();
+        let outcome = |&(kind, count): &(Kind, usize)| {
+            let traces = |runs: &[&Prepared], until_onset: bool| -> Vec<Trace> {
+                let follow = |(seed, run): (usize, &&Prepared)| {
+                    let seed = seed as u64;
+                    let filter = (kind, count, seed);
+                    self.follow(&switching, &nodes, filter, run, with_wheels, until_onset)
+                };
+                runs.iter().enumerate().map(follow).collect()
+            };
+            // Stretches without a fault: nominal runs, and the others up to the onset. They set the
+            // threshold of each filter in the same way; no other figure comes from them.
+            let threshold = threshold(&traces(&nominal, true), FALSE_ALARMS);
+            let count = kind.is_sampled().then_some(count);
+            Outcome::of(kind.name(), count, threshold, &traces(&faulty, false))
+        };
+        in_parallel(wanted, outcome)
+    }
+
+    fn follow(
+        &self,
+        switching: &Switching,
+        nodes: &[Vec<usize>],
+        (kind, count, seed): (Kind, usize, u64),
+        run: &Prepared,
+        with_wheels: bool,
+        until_onset: bool,
+    ) -> Trace {
+        let mut switching = switching.clone();
+        if let Some(first) = run.observations.first() {
+            let variance = first.pose_variance(&self.model, 1.0);
+            let spread = nalgebra::Matrix3::from_diagonal(&variance.into());
+            switching.start_at(first.pose.into(), spread);
+        }
+        let mut filter = build::<_, TRACK_DIMENSION>(kind, &switching, nodes, count, seed);
+        let steps = if until_onset {
+            run.onset
+        } else {
+            run.observations.len()
+        };
+        let mut trace = Trace {
+            log_odds: Vec::with_capacity(steps),
+            onset: run.onset,
+            leaf_right: false,
+            side_right: false,
+        };
+        for (t, observation) in run.observations[..steps].iter().enumerate() {
+            let seen = filter.model().look(observation, 1.0, with_wheels);
+            filter.step(&seen);
+            trace.log_odds.push(log_odds(filter.posterior()));
+            if t == run.onset + JUDGED {
+                let p = filter.posterior();
+                let best = (0..p.len()).max_by(|&a, &b| p[a].total_cmp(&p[b]));
+                let named = best.map(|best| switching.meaning(best));
+                trace.leaf_right = named == run.fault;
+                trace.side_right = named.is_some_and(|named| self.side(named) == run.side(self));
+            }
+        }
+        trace
+    }
+
+    /// Modes of stuck wheels of the left and right, and of the encoders.
+    fn nodes(&self, switching: &Switching) -> Vec<Vec<usize>> {
+        let of = |side| {
+            let modes = 1..Modes::modes(switching);
+            modes
+                .filter(|&mode| self.side(switching.meaning(mode)) == side)
+                .collect()
+        };
+        let nodes: Vec<Vec<usize>> = [Side::Left, Side::Right, Side::Encoder].map(of).into();
+        nodes.into_iter().filter(|modes| modes.len() > 1).collect()
+    }
+
+    fn side(&self, (moved, broken): (Moved, Option<usize>)) -> Side {
+        match (moved, broken) {
+            (Moved::Stuck(mask), _) => {
+                let wheel = mask.trailing_zeros() as usize;
+                match self.robot.wheels[wheel].y > 0.0 {
+                    true => Side::Left,
+                    false => Side::Right,
+                }
+            }
+            (_, Some(_)) => Side::Encoder,
+            _ => Side::None,
+        }
+    }
+}
+
+impl Prepared {
+    fn side(&self, recorded: &Recorded) -> Side {
+        self.fault.map_or(Side::None, |fault| recorded.side(fault))
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Left,
+    Right,
+    Encoder,
+    None,
+}
