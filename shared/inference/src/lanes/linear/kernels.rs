@@ -66,6 +66,8 @@ pub(super) struct Found {
     pub total: f64,
     /// Sum of the squares of the particles' weights.
     pub squares: f64,
+    /// False if a child has left the range of numbers.
+    pub stays_finite: bool,
 }
 
 impl Found {
@@ -74,15 +76,16 @@ impl Found {
         modes: [0.0; MODES_MAX],
         total: 0.0,
         squares: 0.0,
+        stays_finite: false,
     };
 
     /// True if there is a pair to draw.
-    pub(super) fn is_possible(&self) -> bool {
+    fn is_possible(&self) -> bool {
         self.log2_unit.is_finite() && self.total.is_finite() && self.total > 0.0
     }
 }
 
-/// One step of all particles. Leaves them as they are if nothing is possible.
+/// One step of all particles, if any is possible.
 pub(super) struct Advance<'a, const N: usize, const M: usize, const W: usize> {
     pub model: &'a LinearModel<N, M, W>,
     pub differences: &'a Differences<N, M, W>,
@@ -109,7 +112,7 @@ impl<const N: usize, const M: usize, const W: usize> Kernel for Advance<'_, N, M
         sum_up(l, model.log_p.len(), cloud, found);
         if found.is_possible() {
             select(l, model.log_p.len(), cloud, u, found);
-            follow(l, look, &by_mode, cloud);
+            found.stays_finite = follow(l, look, &by_mode, cloud);
         }
     }
 }
@@ -308,15 +311,16 @@ fn select<L: Lanes, const N: usize>(
     }
 }
 
-/// Puts the children in the place of their parents, moved.
+/// Puts the children in the place of their parents, moved; false if one is beyond all numbers.
 #[inline(always)]
 fn follow<L: Lanes, const N: usize, const M: usize, const W: usize>(
     l: L,
     look: &Look<N, M, W>,
     by_mode: &ByMode<N, M>,
     cloud: &mut Cloud<N>,
-) {
-    let mut latest = l.word(0);
+) -> bool {
+    let (mut latest, zero) = (l.word(0), l.real(0.0));
+    let mut check = zero;
     for b in 0..cloud.mode.len() {
         let first = &mut cloud.first[b];
         let pair = l.max_word(l.prefix_max(l.load_word(first)), latest);
@@ -330,9 +334,12 @@ fn follow<L: Lanes, const N: usize, const M: usize, const W: usize>(
             for (from, factor) in from.iter().zip(&look.motion[n]) {
                 state = l.mul_add(l.real(*factor), *from, state);
             }
+            // 0 unless it is not finite.
+            check = l.mul_add(state, zero, check);
             l.store(state, &mut to[b]);
         }
         l.store_word(mode, &mut cloud.mode[b]);
     }
     std::mem::swap(&mut cloud.state, &mut cloud.next);
+    l.last(l.prefix_sum(check)) == 0.0
 }

@@ -16,11 +16,11 @@
 //!
 //! ```text
 //! s[k] = V (H (b[k] - b*) + h[k] - h*)        v = V H A δ        y[δ] = y - v
-//! ln P(k|d) N(z; k, δ) = ln P(k|d) + y[δ]·s[k] - ½ s[k]·s[k] + v·(y - ½ v) + ln N(z; *, 0)
+//! ln [P(k|d) N(z; k, δ)] = ln P(k|d) + y[δ]·s[k] - ½ |s[k]|² + v·(y - ½ v) + ln N(z; *, 0)
 //! δ' = (A - B V H A) δ + (b[k] - b*) - B s[k]
 //! ```
 //!
-//! (the first line holds `-½ |y[δ] - s[k]|²` without the large `-½ |y|²`). The measurement of the
+//! (the second line holds `-½ |y[δ] - s[k]|²` without the large `-½ |y|²`). The measurement of the
 //! mode alone, such as wheel rates, is one more term of the same kind that no δ enters.
 //!
 //! Both drawings of the look-ahead, of the parent by `Σ_k e^l` and of its next mode by `e^l`, are

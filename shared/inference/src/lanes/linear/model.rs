@@ -81,6 +81,8 @@ pub struct LinearModel<const N: usize, const M: usize, const W: usize> {
     pub(super) parameters: LinearParameters<N, M, W>,
     /// Base-2 logarithm of the probability of each mode, by the mode before.
     pub(super) log_p: Vec<Block<f32>>,
+    /// `ln √(2π sd²)` of each rate.
+    pub(super) log_rate_scale: [f64; W],
     /// For each mode the differences from it.
     pub(super) differences: Vec<Differences<N, M, W>>,
 }
@@ -119,6 +121,7 @@ impl<const N: usize, const M: usize, const W: usize> LinearModel<N, M, W> {
         }
         let differences = (0..modes).map(|from| differences(&p, from)).collect();
         Ok(Self {
+            log_rate_scale: p.rate_sd.map(|sd| -log_normal(0.0, sd * sd)),
             parameters: p,
             log_p,
             differences,
@@ -177,8 +180,12 @@ fn covariance<const N: usize>(
 ) -> Result<(), ModelError> {
     in_range(table, found.as_slice(), -MAGNITUDE_MAX)?;
     let largest = (0..N).map(|i| found[(i, i)]).fold(0.0, f64::max);
-    // Variances may be 0: the rounding of a factorisation must not refuse them.
-    let margin = 1e-12 * largest + f64::MIN_POSITIVE - sd_min * sd_min * (1.0 - 1e-9);
+    let margin = if sd_min > 0.0 {
+        -sd_min * sd_min * (1.0 - 1e-9)
+    } else {
+        // Variances may be 0: the rounding of a factorisation must not refuse them.
+        1e-12 * largest + f64::MIN_POSITIVE
+    };
     let raised = found + SMatrix::identity() * margin;
     let symmetric = (found - found.transpose()).abs().max() <= 1e-12 * largest;
     if N == 0 || (symmetric && Cholesky::new(raised).is_some()) {

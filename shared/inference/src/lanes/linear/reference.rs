@@ -56,66 +56,90 @@ impl<const N: usize> Reference<N> {
             &SVector::from(p.shift[self.mode]),
             &p.motion_noise,
         );
-        // What is left out becomes a measurement of nothing, with noise of its own.
-        let (mut observe, mut noise) = (p.observe, p.sensor_noise);
+        let mut observe = p.observe;
         let expected = observe * next.mean + SVector::from(p.offset[self.mode]);
         let mut innovation = SVector::from(z.state) - expected;
-        let mut left_out = 0;
-        for (m, _) in z.state.iter().enumerate().filter(|(_, z)| !z.is_finite()) {
+        let mut noise = p.sensor_noise;
+        let used = z.state.map(f64::is_finite);
+        for m in (0..M).filter(|&m| !used[m]) {
+            // A measurement of nothing, with noise of its own.
             observe.row_mut(m).fill(0.0);
             noise.row_mut(m).fill(0.0);
             noise.column_mut(m).fill(0.0);
             (noise[(m, m)], innovation[m]) = (1.0, 0.0);
-            left_out += 1;
         }
         let cross = next.covariance * observe.transpose();
         let factor = Cholesky::new(observe * cross + noise)?;
         let factor = factor.l_dirty();
-        let whiten = inverse_lower(factor);
+        let mut whiten = inverse_lower(factor);
         let back = cross * whiten.transpose();
         let sight = whiten * observe * p.motion;
         let distance = whiten * innovation;
         next.mean += back * distance;
         let covariance = next.covariance - back * back.transpose();
         next.covariance = 0.5 * (covariance + covariance.transpose());
+        for m in (0..M).filter(|&m| !used[m]) {
+            whiten[(m, m)] = 0.0;
+        }
+        let rates = self.rates(model, &z.rates);
+        let channels = used.iter().filter(|&&used| used).count();
         let determinant: f64 = (0..M).map(|m| factor[(m, m)]).product();
-        let used = (M - left_out) as f64;
-        let mut log_density = -0.5 * (distance.norm_squared() + used * TAU.ln()) - determinant.ln();
-        let mut seen = whiten;
-        for (m, _) in z.state.iter().enumerate().filter(|(_, z)| !z.is_finite()) {
-            seen[(m, m)] = 0.0;
-        }
-        let mut rates = [None; W];
-        let mut farthest = distance.amax();
-        let means = z.rates.iter().zip(&p.rates[self.mode]).zip(&p.rate_sd);
-        for (rate, ((z, mean), sd)) in rates.iter_mut().zip(means) {
-            if z.is_finite() {
-                let apart = (z - mean) / sd;
-                *rate = Some((ROOT_LOG2_E * apart) as f32);
-                log_density -= 0.5 * apart * apart + (TAU.sqrt() * sd).ln();
-                farthest = farthest.max(apart.abs());
-            } else {
-                left_out += 1;
-            }
-        }
-        let known = next.mean.iter().chain(&next.covariance);
-        let fits = farthest <= DISTANCE_MAX && log_density.is_finite();
-        if !(fits && known.into_iter().all(|value| value.is_finite())) {
+        let square = distance.norm_squared() + channels as f64 * TAU.ln();
+        let log_density = rates.log_density - 0.5 * square - determinant.ln();
+        let mut known = next.mean.iter().chain(&next.covariance);
+        let fits = distance.amax().max(rates.farthest) <= DISTANCE_MAX && log_density.is_finite();
+        if !(fits && known.all(|value| value.is_finite())) {
             return None;
         }
         let look = Look {
             innovation: std::array::from_fn(|m| (ROOT_LOG2_E * distance[m]) as f32),
-            whiten: rows(&(seen * ROOT_LOG2_E)),
+            whiten: rows(&(whiten * ROOT_LOG2_E)),
             sight: rows(&(sight * ROOT_LOG2_E)),
             back: rows(&(back / ROOT_LOG2_E)),
             motion: rows(&(p.motion - back * sight)),
-            rates,
+            rates: rates.apart,
             log_density,
-            left_out,
+            left_out: M - channels + rates.left_out,
         };
         let (state, mode) = (next, self.mode);
         Some((Self { state, mode }, look))
     }
+
+    /// What is measured of the mode alone, as the reference's mode expects it.
+    fn rates<const M: usize, const W: usize>(
+        &self,
+        model: &LinearModel<N, M, W>,
+        rates: &[f64; W],
+    ) -> Rates<W> {
+        let p = &model.parameters;
+        let mut found = Rates {
+            apart: [None; W],
+            farthest: 0.0,
+            log_density: 0.0,
+            left_out: 0,
+        };
+        for (w, z) in rates.iter().enumerate() {
+            if z.is_finite() {
+                let apart = (z - p.rates[self.mode][w]) / p.rate_sd[w];
+                found.apart[w] = Some((ROOT_LOG2_E * apart) as f32);
+                found.farthest = found.farthest.max(apart.abs());
+                found.log_density -= 0.5 * apart * apart + model.log_rate_scale[w];
+            } else {
+                found.left_out += 1;
+            }
+        }
+        found
+    }
+}
+
+/// The part of an observation that knows the mode only.
+struct Rates<const W: usize> {
+    /// See [`Look::rates`].
+    apart: [Option<f32>; W],
+    /// The largest of these distances, in standard deviations.
+    farthest: f64,
+    log_density: f64,
+    left_out: usize,
 }
 
 /// The inverse of the lower triangle.

@@ -198,7 +198,7 @@ impl<const N: usize, const M: usize, const W: usize> Filter for LaneLookAhead<N,
             u,
             found: &mut found,
         });
-        if !found.is_possible() {
+        if !found.stays_finite {
             return self.restart();
         }
         self.reference = next;
