@@ -125,7 +125,7 @@ impl<const N: usize, const M: usize, const W: usize> LaneLookAhead<N, M, W> {
         &self.model
     }
 
-    /// Channels of the last observation that were left out, as they were not finite.
+    /// Channels of the last observation that were left out: not finite, or all too far away.
     #[must_use]
     pub const fn left_out(&self) -> usize {
         self.left_out
