@@ -11,6 +11,10 @@ use super::reference::Look;
 /// Far above the least number, so that what remains after subtracting it is a normal number.
 const LOG2_MIN: f32 = -100.0;
 
+/// What is far below this becomes 0. Distances between particles of equal modes shrink in every
+/// step, and with numbers below the normal ones arithmetic is a hundred times slower.
+const TINY: f32 = 1.0 / (1_u64 << 40) as f32;
+
 /// A pair of mode and parent is one word: the mode above this many bits of the parent's index.
 const INDEX_BITS: u32 = 24;
 
@@ -145,6 +149,7 @@ impl<const N: usize, const M: usize> ByMode<N, M> {
             for (factor, offset) in whiten.iter().zip(&differences.offset) {
                 shift = l.mul_add(l.real(*factor), l.load(offset), shift);
             }
+            shift = settled(l, shift);
             log = l.mul_add(l.mul(shift, half), shift, log);
             l.store(shift, to);
         }
@@ -166,6 +171,12 @@ impl<const N: usize, const M: usize> ByMode<N, M> {
     }
 }
 
+/// The number, or 0 far below [`TINY`].
+#[inline(always)]
+fn settled<L: Lanes>(l: L, value: L::Real) -> L::Real {
+    l.sub(l.add(value, l.real(TINY)), l.real(TINY))
+}
+
 /// Base-2 logarithms of all weights, relative to the reference's density; returns the largest.
 #[inline(always)]
 fn weigh<L: Lanes, const N: usize, const M: usize, const W: usize>(
@@ -185,7 +196,7 @@ fn weigh<L: Lanes, const N: usize, const M: usize, const W: usize>(
             for (n, state) in cloud.state.iter().enumerate() {
                 apart = l.mul_add(l.real(look.sight[m][n]), l.load(&state[b]), apart);
             }
-            let at = l.real(look.innovation[m]);
+            let (apart, at) = (settled(l, apart), l.real(look.innovation[m]));
             own = l.mul_add(apart, l.mul_add(apart, l.real(-0.5), at), own);
             *away = l.sub(at, apart);
         }
@@ -237,7 +248,7 @@ fn sum_up<L: Lanes, const N: usize>(l: L, modes: usize, cloud: &mut Cloud<N>, fo
     for parents in cloud.parents.chunks(CHUNK) {
         let mut squares = zero;
         for parent in parents {
-            let weight = l.load(parent);
+            let weight = settled(l, l.load(parent));
             squares = l.mul_add(weight, weight, squares);
         }
         found.squares += f64::from(l.last(l.prefix_sum(squares)));
@@ -334,6 +345,7 @@ fn follow<L: Lanes, const N: usize, const M: usize, const W: usize>(
             for (from, factor) in from.iter().zip(&look.motion[n]) {
                 state = l.mul_add(l.real(*factor), *from, state);
             }
+            state = settled(l, state);
             // 0 unless it is not finite.
             check = l.mul_add(state, zero, check);
             l.store(state, &mut to[b]);

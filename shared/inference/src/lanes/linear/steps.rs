@@ -107,6 +107,13 @@ impl<const N: usize, const M: usize, const W: usize> LaneLookAhead<N, M, W> {
         self
     }
 
+    /// Distances of the particles from the reference.
+    #[cfg(test)]
+    pub(super) fn distances(&self) -> impl Iterator<Item = f32> {
+        let blocks = self.cloud.state.iter().flatten();
+        blocks.flat_map(|block| block.0)
+    }
+
     /// Particles.
     #[must_use]
     pub const fn count(&self) -> usize {

@@ -320,6 +320,29 @@ fn what_grows_beyond_all_numbers_begins_anew() {
     assert!((3..30).contains(&restarts), "{restarts}");
 }
 
+/// Numbers below the normal ones would make a quiet drive slower than any other.
+#[test]
+fn distances_that_shrink_never_become_subnormal() {
+    let mut p = parameters();
+    p.rate_sd = [0.03; 2];
+    // Only the last mode lasts.
+    for row in &mut p.transition {
+        row.copy_from_slice(&[0.0, 0.0, 0.1, 0.9]);
+    }
+    p.transition[3] = vec![0.0, 0.0, 0.0, 1.0];
+    for (processor, _) in processors() {
+        let filter = LaneLookAhead::new(LinearModel::new(p.clone()).unwrap(), 64, 3);
+        let mut filter = filter.on(processor);
+        for z in drive(&p, 2000, 3) {
+            filter.step(&z);
+            let least = f32::EPSILON / (1_u64 << 42) as f32;
+            assert!(filter.distances().all(|x| x == 0.0 || x.abs() > least));
+        }
+        // Rounding may keep a few units.
+        assert!(filter.distances().all(|x| x.abs() < 1e-17));
+    }
+}
+
 fn refused(change: impl Fn(&mut Parameters)) -> ModelError {
     let mut parameters = parameters();
     change(&mut parameters);
