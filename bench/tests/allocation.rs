@@ -10,6 +10,7 @@ use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Planar};
 use vigil_inference::adaptive::Adaptive;
 use vigil_inference::bootstrap::ParticleFilter;
 use vigil_inference::filter::Filter;
+use vigil_inference::lanes::linear::{LaneLookAhead, Observation};
 use vigil_inference::lanes::{Event, LaneFilter, Level, PlanarModel};
 
 #[global_allocator]
@@ -87,4 +88,25 @@ fn no_filter_allocates_in_a_step() {
     }
     assert_eq!(allocations() - before, 0);
     assert!(fewest < 100, "{fewest} particles at the least");
+}
+
+#[test]
+fn the_look_ahead_filter_on_lanes_allocates_nothing() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/filters");
+    let jump = JumpLinear::read(&data.join("case3_jmls3_full.json")).unwrap();
+    let mut observations: Vec<Observation<3, 2>> = jump.observations().map(Into::into).collect();
+    // The ways out are taken too; each round begins with a jump back.
+    observations.push(Observation::MISSING);
+    observations[3].state[1] = f64::NAN;
+    observations[5].state[0] = 1e200;
+    for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
+        let filter = LaneLookAhead::new(jump.linear_model().unwrap(), 64, 1);
+        let mut filter = filter.at_level(level).unwrap();
+        let (before, mut events) = (allocations(), 0);
+        for z in observations.iter().cycle().take(100_000) {
+            events += u32::from(filter.step(z).event.is_some());
+        }
+        assert_eq!(allocations() - before, 0);
+        assert!(events > 10_000, "{events}");
+    }
 }

@@ -6,6 +6,8 @@ use rand_pcg::Pcg64Mcg;
 use serde::Deserialize;
 use vigil_inference::gaussian::Gaussian;
 use vigil_inference::hybrid::{Conditional, Modes, Sampled};
+use vigil_inference::lanes::ModelError;
+use vigil_inference::lanes::linear::{LinearModel, LinearParameters};
 use vigil_inference::logspace::log_normal;
 
 use super::{CaseError, read};
@@ -47,6 +49,27 @@ impl HiddenMarkov {
     #[must_use]
     pub const fn transitions(&self) -> &[[f64; MODES]; MODES] {
         &self.transition
+    }
+
+    /// The same model for the look-ahead filter on lanes.
+    ///
+    /// # Errors
+    /// [`ModelError`] if the case's numbers are no model.
+    pub fn linear_model(&self) -> Result<LinearModel<0, 0, SENSORS>, ModelError> {
+        LinearModel::new(LinearParameters {
+            initial: (0..MODES).map(|mode| self.initial(mode)).collect(),
+            transition: self.transition.iter().map(|row| row.to_vec()).collect(),
+            motion: nalgebra::SMatrix::zeros(),
+            shift: vec![[]; MODES],
+            motion_noise: nalgebra::SMatrix::zeros(),
+            observe: nalgebra::SMatrix::zeros(),
+            offset: vec![[]; MODES],
+            sensor_noise: nalgebra::SMatrix::zeros(),
+            rates: self.means.to_vec(),
+            rate_sd: [self.sigma; SENSORS],
+            start: [],
+            start_covariance: nalgebra::SMatrix::zeros(),
+        })
     }
 
     /// `ln p(z | mode)`.

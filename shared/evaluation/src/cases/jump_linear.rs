@@ -9,6 +9,8 @@ use rand_pcg::Pcg64Mcg;
 use serde::Deserialize;
 use vigil_inference::gaussian::Gaussian;
 use vigil_inference::hybrid::{Conditional, Modes, Sampled};
+use vigil_inference::lanes::ModelError;
+use vigil_inference::lanes::linear::{LinearModel, LinearParameters, Observation};
 use vigil_inference::logspace::log_normal;
 
 use super::{CaseError, observe, read, vector};
@@ -81,10 +83,40 @@ impl JumpLinear {
         pairs.map(|(&pose, &wheels)| PoseAndWheels { pose, wheels })
     }
 
+    /// The same model for the look-ahead filter on lanes.
+    ///
+    /// # Errors
+    /// [`ModelError`] if the case's numbers are no model.
+    pub fn linear_model(&self) -> Result<LinearModel<3, 3, 2>, ModelError> {
+        LinearModel::new(LinearParameters {
+            initial: (0..MODES).map(|mode| self.initial(mode)).collect(),
+            transition: self.transition.iter().map(|row| row.to_vec()).collect(),
+            motion: Matrix3::identity(),
+            shift: self.shift.to_vec(),
+            motion_noise: diagonal(&self.noise),
+            observe: Matrix3::identity(),
+            offset: vec![[0.0; 3]; MODES],
+            sensor_noise: diagonal(&self.sensor_noise),
+            rates: self.mu.to_vec(),
+            rate_sd: [self.sigma_w; 2],
+            start: self.mean_before,
+            start_covariance: diagonal(&self.variance_before),
+        })
+    }
+
     fn log_wheels(&self, mode: usize, wheels: &[f64; 2]) -> f64 {
         let variance = self.sigma_w * self.sigma_w;
         let pairs = wheels.iter().zip(&self.mu[mode]);
         pairs.map(|(z, mean)| log_normal(z - mean, variance)).sum()
+    }
+}
+
+impl From<PoseAndWheels> for Observation<3, 2> {
+    fn from(z: PoseAndWheels) -> Self {
+        Self {
+            state: z.pose,
+            rates: z.wheels,
+        }
     }
 }
 

@@ -11,6 +11,7 @@
 //! | `plain`, `processor` | the lanes as arrays, as AVX2 and as AVX-512; the choice at run time |
 //! | `elementary`, `random`, `alias` | exp, ln, sine; normal draws; draws of modes |
 //! | `cloud` | the particles' memory |
+//! | [`linear`] | another filter on the same lanes: look-ahead, for linear models |
 //!
 //! A step is: ancestors from a running maximum; gather; mode, pose, weight; sums in one pass over
 //! what is still in the cache; ancestors of the next step by a prefix sum and one scatter. There
@@ -21,6 +22,7 @@ mod alias;
 mod cloud;
 mod elementary;
 mod kernels;
+pub mod linear;
 mod model;
 mod plain;
 mod processor;

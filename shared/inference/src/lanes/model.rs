@@ -89,6 +89,13 @@ pub enum ModelError {
         /// The largest allowed.
         high: f64,
     },
+    /// A covariance is symmetric and has no negative variance in any direction; that of a
+    /// measurement has none below [`MEASUREMENT_SD_MIN`] squared.
+    #[error("`{table}` is not a covariance, or that of a measurement is too small")]
+    Covariance {
+        /// Name of the field.
+        table: &'static str,
+    },
 }
 
 /// A checked model, with its tables as the kernels read them.
@@ -182,7 +189,7 @@ impl PlanarModel {
     }
 }
 
-fn length(table: &'static str, found: usize, wanted: usize) -> Result<(), ModelError> {
+pub(super) fn length(table: &'static str, found: usize, wanted: usize) -> Result<(), ModelError> {
     if found == wanted {
         Ok(())
     } else {
@@ -195,7 +202,7 @@ fn length(table: &'static str, found: usize, wanted: usize) -> Result<(), ModelE
 }
 
 /// All of `values` between `low` and [`MAGNITUDE_MAX`].
-fn in_range(table: &'static str, values: &[f64], low: f64) -> Result<(), ModelError> {
+pub(super) fn in_range(table: &'static str, values: &[f64], low: f64) -> Result<(), ModelError> {
     let allowed = low..=MAGNITUDE_MAX;
     match values.iter().find(|value| !allowed.contains(*value)) {
         None => Ok(()),
@@ -209,7 +216,7 @@ fn in_range(table: &'static str, values: &[f64], low: f64) -> Result<(), ModelEr
 }
 
 /// The probabilities of a row, zeros behind.
-fn distribution(
+pub(super) fn distribution(
     table: &'static str,
     row: usize,
     probabilities: &[f64],

@@ -149,6 +149,14 @@ impl<const FUSED: bool> Lanes for Plain<FUSED> {
         }
     }
     #[inline(always)]
+    fn pick(self, from: &[Block<f32>], at: Word) -> Real {
+        let last = from.len() * LANES - 1;
+        at.map(|at| {
+            let at = (at as usize).min(last);
+            from[at / LANES].0[at % LANES]
+        })
+    }
+    #[inline(always)]
     fn scatter(self, to: &mut [Block<u32>], at: Word, values: Word) {
         let last = to.len() * LANES - 1;
         for (at, value) in at.into_iter().zip(values) {

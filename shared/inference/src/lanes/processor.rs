@@ -152,7 +152,7 @@ mod x86 {
     }
 
     #[inline(always)]
-    fn last_index(to: &[Block<u32>]) -> i32 {
+    fn last_index<T>(to: &[Block<T>]) -> i32 {
         assert!(!to.is_empty() && to.len() <= i32::MAX as usize / LANES);
         (to.len() * LANES - 1) as i32
     }
@@ -261,6 +261,15 @@ mod x86 {
                     yaw: _mm512_i32gather_ps::<4>(at, words.add(2 * LANES)),
                     mode: _mm512_i32gather_epi32::<4>(at, words.add(3 * LANES).cast()),
                 }
+            }
+        }
+        #[inline(always)]
+        fn pick(self, from: &[Block<f32>], at: __m512i) -> __m512 {
+            let last = last_index(from);
+            // SAFETY: as unsigned numbers the indices are at most `last`, within the blocks.
+            unsafe {
+                let at = _mm512_min_epu32(at, _mm512_set1_epi32(last));
+                _mm512_i32gather_ps::<4>(at, from.as_ptr().cast())
             }
         }
         #[inline(always)]
@@ -462,6 +471,15 @@ mod x86 {
                     mode: self.bits(part(3 * LANES)),
                 }
             }
+        }
+        #[inline(always)]
+        fn pick(self, from: &[Block<f32>], at: WordPair) -> Pair {
+            let (last, numbers) = (last_index(from), from.as_ptr().cast::<f32>());
+            // SAFETY: as unsigned numbers the indices are at most `last`, within the blocks.
+            at.map(|at| unsafe {
+                let at = _mm256_min_epu32(at, _mm256_set1_epi32(last));
+                _mm256_i32gather_ps::<4>(numbers, at)
+            })
         }
         #[inline(always)]
         fn scatter(self, to: &mut [Block<u32>], at: WordPair, values: WordPair) {

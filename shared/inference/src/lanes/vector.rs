@@ -103,6 +103,8 @@ pub(super) trait Lanes: Copy {
     /// The particles at the addresses `at`: 64 times the bundle's index, plus the lane. Addresses
     /// out of range are clamped; there must be a bundle.
     fn gather(self, from: &[Bundle], at: Self::Word) -> Gathered<Self>;
+    /// The numbers at the indices `at`. Indices out of range are clamped; there must be a block.
+    fn pick(self, from: &[Block<f32>], at: Self::Word) -> Self::Real;
     /// Writes `values` at the indices `at`, in the order of lanes: of equal indices the last wins.
     /// Indices out of range are clamped; there must be a block.
     fn scatter(self, to: &mut [Block<u32>], at: Self::Word, values: Self::Word);

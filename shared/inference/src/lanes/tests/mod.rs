@@ -11,7 +11,7 @@ use super::plain::Plain;
 use super::processor::{Level, Processor};
 
 /// Every way to compute that this machine has, and whether it rounds as fused operations do.
-fn processors() -> Vec<(Processor, bool)> {
+pub(super) fn processors() -> Vec<(Processor, bool)> {
     let available = Level::ALL.into_iter().filter_map(|level| {
         let is_fused = level != Level::Plain || super::processor::PLAIN_IS_FUSED;
         Some((Processor::at(level)?, is_fused))
