@@ -15,6 +15,8 @@ use vigil_bench::rare::{STEP_S, Scenario, rare_faults};
 use vigil_bench::recorded::Recorded;
 use vigil_bench::speed;
 use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Planar};
+use vigil_inference::filter::Filter;
+use vigil_inference::lanes::{self, linear::LaneLookAhead};
 
 const COUNTS: [usize; 6] = [32, 100, 1_000, 10_000, 100_000, 1_000_000];
 /// Simulated runs per cell of the rare faults.
@@ -84,7 +86,22 @@ fn main() -> Result<(), Box<dyn Error>> {
     let jump = JumpLinear::read(&folder.join("case3_jmls3_full.json"))?;
     let observations: Vec<_> = jump.observations().collect();
     let steps: Vec<_> = observations.iter().zip(&jump.filter).collect();
-    let rows = distances::<_, 3>(&jump, &[vec![1, 2]], &steps);
+    let mut rows = distances::<_, 3>(&jump, &[vec![1, 2]], &steps);
+    let seen: Vec<_> = observations
+        .iter()
+        .map(|z| lanes::linear::Observation {
+            state: z.pose,
+            rates: z.wheels,
+        })
+        .collect();
+    let on_lanes: Vec<_> = seen.iter().zip(&jump.filter).collect();
+    let linear = jump.linear_model()?;
+    for count in [32, 100, 1_000, 10_000, 100_000] {
+        let make = |seed| -> Box<dyn Filter<Observation = _>> {
+            Box::new(LaneLookAhead::new(linear.clone(), count, seed))
+        };
+        rows.push(row("look-ahead, lanes", Some(count), make, &on_lanes));
+    }
     report(&mut archive, "three modes that move a pose", &rows);
     archive.store("jump-linear.json", &json!(rows))?;
 
@@ -144,36 +161,50 @@ where
     let mut rows = Vec::new();
     for kind in Kind::ALL {
         for count in COUNTS.into_iter().filter(|&count| kind.is_sensible(count)) {
-            eprintln!("{} with {count}", kind.name());
-            let seeds = match count {
-                1_000_000.. => 1,
-                100_000.. => 3,
-                _ => 20,
+            let sampled = kind.is_sampled().then_some(count);
+            let make = |seed| -> Box<dyn Filter<Observation = _>> {
+                build::<M, N>(kind, model, nodes, count, seed)
             };
-            let seeds = if kind.is_sampled() { seeds } else { 1 };
-            let (mut l1, mut kl, mut times_ns) = (0.0, 0.0, Vec::new());
-            for seed in 0..seeds {
-                let mut filter = build::<M, N>(kind, model, nodes, count, seed);
-                for (z, exact) in steps {
-                    let started = Instant::now();
-                    filter.step(z);
-                    times_ns.push(started.elapsed().as_nanos() as f64);
-                    let (d, k) = distance(filter.posterior(), exact.as_ref());
-                    (l1, kl) = (l1 + d, kl + k);
-                }
-            }
-            let n = (seeds as usize * steps.len()) as f64;
-            let [p50, p99] = [0.5, 0.99].map(|q| vigil_bench::quantile(&mut times_ns, q));
-            rows.push(json!({
-                "filter": kind.name(), "particles": kind.is_sampled().then_some(count),
-                "l1": l1 / n, "kl": kl / n, "step_ns_p50": p50, "step_ns_p99": p99, "seeds": seeds,
-            }));
-            if !kind.is_sampled() {
+            rows.push(row(kind.name(), sampled, make, steps));
+            if sampled.is_none() {
                 break;
             }
         }
     }
     rows
+}
+
+/// One filter against the exact beliefs, over several seeds.
+fn row<Z>(
+    name: &str,
+    count: Option<usize>,
+    make: impl Fn(u64) -> Box<dyn Filter<Observation = Z>>,
+    steps: &[(&Z, &impl AsRef<[f64]>)],
+) -> Value {
+    eprintln!("{name}, {} particles", count.unwrap_or(0));
+    let seeds = match count {
+        None => 1,
+        Some(1_000_000..) => 1,
+        Some(100_000..) => 3,
+        Some(_) => 20,
+    };
+    let (mut l1, mut kl, mut times_ns) = (0.0, 0.0, Vec::new());
+    for seed in 0..seeds {
+        let mut filter = make(seed);
+        for (z, exact) in steps {
+            let started = Instant::now();
+            filter.step(z);
+            times_ns.push(started.elapsed().as_nanos() as f64);
+            let (d, k) = distance(filter.posterior(), exact.as_ref());
+            (l1, kl) = (l1 + d, kl + k);
+        }
+    }
+    let n = (seeds as usize * steps.len()) as f64;
+    let [p50, p99] = [0.5, 0.99].map(|q| vigil_bench::quantile(&mut times_ns, q));
+    json!({
+        "filter": name, "particles": count, "l1": l1 / n, "kl": kl / n, "step_ns_p50": p50,
+        "step_ns_p99": p99, "seeds": seeds,
+    })
 }
 
 /// `Σ|p - q|` and `KL(q|p)`; a mode that the filter holds impossible counts as 1e-12.
@@ -188,21 +219,26 @@ fn distance(p: &[f64], q: &[f64]) -> (f64, f64) {
 
 fn report(archive: &mut Archive, title: &str, rows: &[Value]) {
     archive.say(&format!("## {title}\n"));
-    archive.say("| filter | particles | L1 | KL | step, us | ns per particle |");
-    archive.say("|---|---|---|---|---|---|");
+    archive
+        .say("| filter | particles | L1 | KL | step p50, us | p99 | ns per particle p50 | p99 |");
+    archive.say("|---|---|---|---|---|---|---|---|");
     for row in rows {
         let number = |key: &str| row[key].as_f64().unwrap_or(f64::NAN);
-        let step_ns = number("step_ns_p50");
+        let [p50, p99] = [number("step_ns_p50"), number("step_ns_p99")];
         let (particles, each) = match row["particles"].as_f64() {
-            Some(count) => (format!("{count}"), format!("{:.1}", step_ns / count)),
-            None => ("-".into(), "-".into()),
+            Some(count) => (
+                format!("{count}"),
+                format!("{:.1} | {:.1}", p50 / count, p99 / count),
+            ),
+            None => ("-".into(), "- | -".into()),
         };
         archive.say(&format!(
-            "| {} | {particles} | {:.4} | {:.2e} | {:.2} | {each} |",
+            "| {} | {particles} | {:.4} | {:.2e} | {:.2} | {:.2} | {each} |",
             row["filter"].as_str().unwrap_or("?"),
             number("l1"),
             number("kl"),
-            step_ns * 1e-3,
+            p50 * 1e-3,
+            p99 * 1e-3,
         ));
     }
     archive.say("");
