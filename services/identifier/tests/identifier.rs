@@ -36,6 +36,15 @@ impl Bench {
     }
 
     fn with(filter: schema::IdentifierFilter, sensors: schema::Sensors, alarm: Alarm) -> Self {
+        Self::over(tree(), filter, sensors, alarm)
+    }
+
+    fn over(
+        tree: FaultTree,
+        filter: schema::IdentifierFilter,
+        sensors: schema::Sensors,
+        alarm: Alarm,
+    ) -> Self {
         let settings = schema::Identifier {
             filter,
             ..schema::Identifier::default()
@@ -44,14 +53,14 @@ impl Bench {
         let models = Models {
             model: &model(),
             robot: &robot(),
-            tree: &tree(),
+            tree: &tree,
             decision: Some(&decision),
         };
         let identifier = Identifier::new(&models, &settings, sensors, 1).unwrap();
         let belief = FaultBelief::default();
         Self {
             identifier,
-            tree: tree(),
+            tree,
             alarm,
             belief,
             particles: Box::default(),
@@ -313,6 +322,46 @@ fn every_filter_names_single_faults() {
                 "{filter}, {mode}: {found_s} s"
             );
         }
+    }
+}
+
+/// The shipped tree below two more levels.
+fn deep_tree() -> FaultTree {
+    let node = |name: &str, parent| Node {
+        name: name.into(),
+        parent,
+        fault: None,
+    };
+    let mut nodes = vec![node("ND", None), node("ANY", None), node("STUCK", Some(1))];
+    for shipped in tree().nodes().iter().skip(1) {
+        let parent = match (shipped.name.as_str(), shipped.parent) {
+            ("LSS" | "RSS", _) => Some(2),
+            (_, None) => Some(1),
+            (_, Some(parent)) => Some(parent + 2),
+        };
+        nodes.push(Node {
+            parent,
+            ..shipped.clone()
+        });
+    }
+    FaultTree::new(nodes).unwrap()
+}
+
+#[test]
+fn a_tree_may_have_any_depth() {
+    use schema::IdentifierFilter::{Exact, Hierarchical};
+    let (frames, label) = unseen("LM_STUCK", "stuck");
+    for filter in [Exact, Hierarchical] {
+        let alarm = Alarm::between(label.onset_s.unwrap() + 0.1, 99.0);
+        let sensors = schema::Sensors::PoseEncoders;
+        let mut bench = Bench::over(deep_tree(), filter, sensors, alarm);
+        for frame in &frames {
+            bench.step(frame);
+        }
+        assert_eq!(bench.mode(), "LM_STUCK", "{filter}");
+        let p = |name: &str| bench.belief.p[bench.tree.index(name).unwrap()];
+        assert!(p("ANY") >= p("STUCK") && p("STUCK") >= p("LSS") && p("LSS") > 0.9);
+        assert!((p("ANY") + p("ND") + bench.belief.p_unknown - 1.0).abs() < 1e-9);
     }
 }
 
