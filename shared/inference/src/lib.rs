@@ -24,6 +24,7 @@
 //! | also here | holds |
 //! |---|---|
 //! | [`constant`] | the paper's detection: a constant likelihood, and its blind spot |
+//! | [`windowed`] | the same on sums over overlapping windows: a smaller blind spot |
 //! | [`risk`] | what losing track of a mode costs, for risk-sensitive proposals |
 //! | [`resample`], [`weights`], [`adaptive`] | four schemes, log-weights, number of particles |
 //! | [`gaussian`], [`track`], [`particles`] | Kalman filter, pose track, pose particles |
@@ -55,5 +56,6 @@ pub mod sequences;
 pub mod track;
 pub mod tree;
 pub mod weights;
+pub mod windowed;
 
 pub use tree::FaultTree;
