@@ -8,7 +8,7 @@
 //!
 //! | you have | take | measured |
 //! |---|---|---|
-//! | no model of the faults | [`ages`] | delay 1.2 to 1.3 of the Lorden bound |
+//! | no model of the faults | [`ages`] | delay 1.1 to 1.3 of the Lorden bound |
 //! | one fault at a time, linear(ised) | [`merged`] | 0.6 us a step; no fault of p = 1e-6 missed |
 //! | several faults at once | [`fault_sets`] | exact over 4096 sets in 20 us a step |
 //! | a model to simulate | [`bootstrap`], raised [`proposal`]s | p = 1e-6: 0 % missed, not 98 % |

@@ -212,6 +212,9 @@ pub struct Detector {
     pub fault_rate_1_h: f64,
     /// Channels used: `pose` or `pose+encoders`.
     pub sensors: Sensors,
+    /// What a fault is taken for: `learned-bias`, `constant` or `windowed`. The model holds a
+    /// calibration for each.
+    pub form: Form,
 }
 
 impl Default for Detector {
@@ -221,6 +224,7 @@ impl Default for Detector {
             false_alarm_interval_h: 24.0,
             fault_rate_1_h: 1.0,
             sensors: Sensors::PoseEncoders,
+            form: Form::LearnedBias,
         }
     }
 }
@@ -235,6 +239,20 @@ pub enum Sensors {
     #[default]
     #[serde(rename = "pose+encoders")]
     PoseEncoders,
+}
+
+/// What the detection filter takes a fault for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Form {
+    /// An unknown constant bias of the residual, learned; no fault is too small to be seen.
+    #[default]
+    LearnedBias,
+    /// A constant likelihood (Verma, Fernandez, Simmons 2002), for comparison: it never sees faults
+    /// below a size.
+    Constant,
+    /// A constant likelihood over windows of ten observations: that size is ten times smaller.
+    Windowed,
 }
 
 /// The identification filter.

@@ -8,7 +8,7 @@ use vigil_evaluation::frames::{self, Run};
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
 use vigil_robot::learned::Model;
-use vigil_setup::schema::{self, Sensors};
+use vigil_setup::schema::{self, Form, Sensors};
 use vigil_setup::{load_robot, load_tree};
 
 use super::CommandError;
@@ -46,6 +46,15 @@ pub struct FilterArgs {
         value_parser = PossibleValuesParser::new(["pose", "pose+encoders"])
     )]
     sensors: String,
+    /// What the detection filter takes a fault for: an unknown bias of the residual, a constant
+    /// likelihood, or a constant likelihood over windows.
+    #[arg(
+        long,
+        value_name = "FORM",
+        default_value = "learned-bias",
+        value_parser = PossibleValuesParser::new(["learned-bias", "constant", "windowed"])
+    )]
+    detector: String,
     /// Identification filter.
     #[arg(
         long,
@@ -81,6 +90,8 @@ pub struct Used {
     pub tree_hash: String,
     /// Channels.
     pub sensors: String,
+    /// Form of the detection filter.
+    pub detector: String,
     /// Identification filter.
     pub identifier: String,
     /// Particles.
@@ -115,6 +126,7 @@ impl FilterArgs {
             model_hash: format!("{:016x}", model.hash()),
             tree_hash: format!("{:016x}", tree.hash()),
             sensors: self.sensors.clone(),
+            detector: self.detector.clone(),
             identifier: self.identifier.clone(),
             particles: self.particles,
             seed: self.seed,
@@ -139,6 +151,11 @@ impl FilterArgs {
             sensors: match self.sensors.as_str() {
                 "pose" => Sensors::Pose,
                 _ => Sensors::PoseEncoders,
+            },
+            form: match self.detector.as_str() {
+                "constant" => Form::Constant,
+                "windowed" => Form::Windowed,
+                _ => Form::LearnedBias,
             },
             ..schema::Detector::default()
         };
