@@ -3,10 +3,10 @@
 //! Particles of the nominal mode track the pose; the fault flag is integrated exactly (a fault
 //! state has no dynamics, so its probability follows from the nominal predictive density alone).
 //! Residuals are whitened by that density, per group of channels: pose (3), each wheel rate, each
-//! steering angle. Per group the fault state takes one [`Form`]: it learns an unknown constant bias,
-//! or has a constant likelihood. An encoder that repeats itself exactly has a flag of its own; over
-//! the pose stands the paper's constant likelihood besides ([`Constant`]). The groups' odds add up:
-//! a fault enters by one of them.
+//! steering angle. Per group the fault state takes one [`Form`]: it learns an unknown constant
+//! bias, or has a constant likelihood. An encoder that repeats itself exactly has a flag of its
+//! own; over the pose stands the paper's constant likelihood besides ([`Constant`]). The groups'
+//! odds add up: a fault enters by one of them.
 
 use nalgebra::{Matrix3, SVector, Vector3};
 use rand::SeedableRng;
