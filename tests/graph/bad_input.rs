@@ -44,7 +44,7 @@ fn assert_refused(output: &Output, expected: &[&str]) {
 }
 
 /// File, text in it, what replaces it, and what the message names.
-const BAD: [(&str, &str, &str, &[&str]); 12] = [
+const BAD: [(&str, &str, &str, &[&str]); 13] = [
     (
         "rover.toml",
         "rate_hz = 100.0",
@@ -62,6 +62,12 @@ const BAD: [(&str, &str, &str, &[&str]); 12] = [
         "core = 0,",
         "core = 99,",
         &["services.sensor-sim.core", "99 does not"],
+    ),
+    (
+        "rover.toml",
+        "false_alarm_interval_h = 24.0",
+        "form = \"chi2\"",
+        &["rover.toml:", "`chi2`", "learned-bias"],
     ),
     (
         "rover.toml",

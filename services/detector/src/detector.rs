@@ -6,7 +6,7 @@ use vigil_blocks::{
 use vigil_inference::logspace::probability;
 use vigil_robot::Description;
 use vigil_robot::learned::monitor::Channels;
-use vigil_robot::learned::{Model, ModelError, Monitor, Observer};
+use vigil_robot::learned::{Form, Model, ModelError, Monitor, Observer};
 use vigil_setup::schema;
 
 /// Time from the start of a run at which alarms begin, s: the noise scale must be known first.
@@ -68,8 +68,8 @@ impl Detector {
     /// calibration and `settings.false_alarm_interval_h`.
     ///
     /// # Errors
-    /// [`DetectorError`] if the model is of another robot, has no calibration for the channels, or
-    /// a setting is out of range.
+    /// [`DetectorError`] if the model is of another robot, has no calibration for channels and
+    /// form, or a setting is out of range.
     pub fn new(
         model: &Model,
         robot: &Description,
@@ -86,13 +86,19 @@ impl Detector {
             schema::Sensors::Pose => Channels::Pose,
             schema::Sensors::PoseEncoders => Channels::PoseEncoders,
         };
-        let calibration = model.calibration(channels.name())?;
+        let form = match settings.form {
+            schema::Form::LearnedBias => Form::LearnedBias,
+            schema::Form::Constant => Form::Constant,
+            schema::Form::Windowed => Form::Windowed,
+        };
+        let calibration = model.calibration(channels, form)?;
+        let particles = settings.particles;
         Ok(Self {
             observer: Observer::new(model, robot),
-            monitor: Monitor::new(model, robot, channels, settings.particles, rate, seed),
+            monitor: Monitor::new(model, robot, channels, form, particles, rate, seed),
             fault_rate_1_s: rate / 3600.0,
             alarm_log_odds: calibration.alarm_log_odds(interval, rate),
-            particles: settings.particles,
+            particles,
             run_s: 0.0,
             armed: false,
             period_s: model.interval_s,

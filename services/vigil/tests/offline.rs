@@ -122,6 +122,12 @@ fn a_learned_model_names_the_faults_of_runs_left_out() {
     let detected = pose["detection"]["stuck"]["detected"].as_f64().unwrap();
     assert!(detected >= 0.97 * pose["detection"]["stuck"]["n"].as_f64().unwrap());
 
+    for form in ["constant", "windowed"] {
+        let score = json(&[&evaluate[..], &["--detector", form]].concat());
+        assert_eq!(score["detector"], form);
+        check_score(&score, &report["runs_held_out"]);
+    }
+
     // Not one run of this file was left out: a clear refusal, not an empty score.
     let frames = folder.path().join("few.csv");
     let held_out = report["held_out_run_ids"].as_array().unwrap().clone();
@@ -198,7 +204,7 @@ fn wrong_input_is_refused_with_its_name_and_exit_code_2() {
     fs::write(&model, "version = 1\n").unwrap();
     let learn = ["learn", "--runs", RUNS, "--out", &out];
     let diagnose = ["diagnose", "--frames", FRAMES, "--out", &out];
-    let cases: [(Vec<&str>, &str); 8] = [
+    let cases: [(Vec<&str>, &str); 9] = [
         (
             [&learn[..], &["--frames", "no.csv"]].concat(),
             "no.csv: No such file",
@@ -226,6 +232,10 @@ fn wrong_input_is_refused_with_its_name_and_exit_code_2() {
         (
             [&diagnose[..], &["--model", &model, "--sensors", "lidar"]].concat(),
             "pose+encoders",
+        ),
+        (
+            [&diagnose[..], &["--model", &model, "--detector", "chi2"]].concat(),
+            "learned-bias, constant, windowed",
         ),
         (
             [&diagnose[..], &["--model", &model, "--particles", "31"]].concat(),

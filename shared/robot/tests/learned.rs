@@ -40,7 +40,7 @@ fn the_shipped_model_is_read_and_written() {
 fn broken_models_are_refused_by_key() {
     let text = read("models/rover.toml");
     let cases = [
-        ("version = 1", "version = 7", "layout version 7"),
+        ("version = 2", "version = 7", "layout version 7"),
         (
             "interval_s = 0.05",
             "interval_s = nan",

@@ -214,6 +214,9 @@ pub struct Detector {
     pub fault_rate_1_h: f64,
     /// Channels used: `pose` or `pose+encoders`.
     pub sensors: Sensors,
+    /// What a fault is taken for: `learned-bias`, `constant` or `windowed`. The model holds a
+    /// calibration for each.
+    pub form: Form,
 }
 
 impl Default for Detector {
@@ -223,6 +226,7 @@ impl Default for Detector {
             false_alarm_interval_h: 24.0,
             fault_rate_1_h: 1.0,
             sensors: Sensors::PoseEncoders,
+            form: Form::LearnedBias,
         }
     }
 }
@@ -237,6 +241,20 @@ pub enum Sensors {
     #[default]
     #[serde(rename = "pose+encoders")]
     PoseEncoders,
+}
+
+/// What the detection filter takes a fault for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Form {
+    /// An unknown constant bias of the residual, learned; no fault is too small to be seen.
+    #[default]
+    LearnedBias,
+    /// A constant likelihood (Verma, Fernandez, Simmons 2002), for comparison: it never sees faults
+    /// below a size.
+    Constant,
+    /// A constant likelihood over windows of ten observations: that size is ten times smaller.
+    Windowed,
 }
 
 /// The identification filter.
@@ -280,9 +298,20 @@ pub enum IdentifierFilter {
 
 impl fmt::Display for IdentifierFilter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let value = self.to_possible_value();
-        f.write_str(value.as_ref().map_or("", |value| value.get_name()))
+        write_name(self, f)
     }
+}
+
+impl fmt::Display for Form {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_name(self, f)
+    }
+}
+
+/// Writes the name that files and options use.
+fn write_name(value: &impl ValueEnum, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let value = value.to_possible_value();
+    f.write_str(value.as_ref().map_or("", |value| value.get_name()))
 }
 
 impl Default for Identifier {

@@ -9,7 +9,7 @@ use vigil_identifier::Models;
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
 use vigil_robot::learned::Model;
-use vigil_setup::schema::{self, IdentifierFilter, Sensors};
+use vigil_setup::schema::{self, Form, IdentifierFilter, Sensors};
 use vigil_setup::{load_decision, load_robot, load_tree};
 
 use super::CommandError;
@@ -47,6 +47,10 @@ pub struct FilterArgs {
         value_parser = PossibleValuesParser::new(["pose", "pose+encoders"])
     )]
     sensors: String,
+    /// What the detection filter takes a fault for: an unknown bias of the residual, a constant
+    /// likelihood, or a constant likelihood over windows.
+    #[arg(long, value_name = "FORM", value_enum, default_value_t)]
+    detector: Form,
     /// Identification filter.
     #[arg(long, value_name = "NAME", value_enum, default_value_t)]
     identifier: IdentifierFilter,
@@ -80,6 +84,8 @@ pub struct Used {
     pub tree_hash: String,
     /// Channels.
     pub sensors: String,
+    /// Form of the detection filter.
+    pub detector: String,
     /// Identification filter.
     pub identifier: String,
     /// Particles.
@@ -114,6 +120,7 @@ impl FilterArgs {
             model_hash: format!("{:016x}", model.hash()),
             tree_hash: format!("{:016x}", tree.hash()),
             sensors: self.sensors.clone(),
+            detector: self.detector.to_string(),
             identifier: self.identifier.to_string(),
             particles: self.particles,
             seed: self.seed,
@@ -139,6 +146,7 @@ impl FilterArgs {
                 "pose" => Sensors::Pose,
                 _ => Sensors::PoseEncoders,
             },
+            form: self.detector,
             ..schema::Detector::default()
         };
         let identifier = schema::Identifier {

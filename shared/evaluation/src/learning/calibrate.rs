@@ -2,7 +2,7 @@
 
 use vigil_robot::Description;
 use vigil_robot::learned::monitor::{Channels, Monitor};
-use vigil_robot::learned::{Calibration, Model};
+use vigil_robot::learned::{Calibration, Form, Model};
 
 use super::segments::{by_run, observations};
 use super::{LearnError, Options};
@@ -19,7 +19,7 @@ const FAULT_RATE_1_H: f64 = 1.0;
 const WINDOWS_MIN: usize = 30;
 
 /// Runs the detection filter over all nominal driving that was learned from, and stores the tail
-/// of its log-odds for each set of channels.
+/// of its log-odds for each set of channels and each form.
 ///
 /// # Errors
 /// [`LearnError::Exposure`] if there is too little of it.
@@ -31,45 +31,56 @@ pub fn fit(
     options: &Options,
 ) -> Result<(), LearnError> {
     let labels = by_run(labels);
+    let mut driving = Vec::with_capacity(runs.len());
+    for run in runs {
+        let label = labels.get(&run.id).ok_or(LearnError::Label(run.id))?;
+        driving.push((*run, label.onset_s.unwrap_or(f64::INFINITY)));
+    }
     for channels in [Channels::Pose, Channels::PoseEncoders] {
-        let mut maxima = Vec::new();
-        let mut monitor = Monitor::new(
-            model,
-            robot,
-            channels,
-            options.particles,
-            FAULT_RATE_1_H,
-            options.seed,
-        );
-        for run in runs {
-            let label = labels.get(&run.id).ok_or(LearnError::Label(run.id))?;
-            let onset = label.onset_s.unwrap_or(f64::INFINITY);
-            monitor.reset();
-            let (mut run_s, mut in_window_s, mut highest) = (0.0, 0.0, f64::NEG_INFINITY);
-            for observation in observations(run, robot, model) {
-                if observation.t_ns as f64 * 1e-9 > onset {
-                    break;
-                }
-                monitor.step(&observation, false);
-                run_s += observation.dt_s;
-                if run_s < ARM_S {
-                    monitor.forget_evidence();
-                    continue;
-                }
-                highest = monitor.report().log_odds.max(highest);
-                in_window_s += observation.dt_s;
-                if in_window_s >= WINDOW_S {
-                    maxima.push(highest);
-                    (in_window_s, highest) = (0.0, f64::NEG_INFINITY);
-                }
-            }
+        for form in Form::ALL {
+            let (particles, seed) = (options.particles, options.seed);
+            let rate = FAULT_RATE_1_H;
+            let monitor = Monitor::new(model, robot, channels, form, particles, rate, seed);
+            let mut maxima = maxima(monitor, &driving, robot, model);
+            let found_s = maxima.len() as f64 * WINDOW_S;
+            let fit = Calibration::fit(channels, form, rate, &mut maxima, WINDOW_S);
+            let needed_s = WINDOWS_MIN as f64 * WINDOW_S;
+            model
+                .calibration
+                .push(fit.ok_or(LearnError::Exposure { found_s, needed_s })?);
         }
-        let found_s = maxima.len() as f64 * WINDOW_S;
-        let fit = Calibration::fit(channels.name(), FAULT_RATE_1_H, &mut maxima, WINDOW_S);
-        let needed_s = WINDOWS_MIN as f64 * WINDOW_S;
-        model
-            .calibration
-            .push(fit.ok_or(LearnError::Exposure { found_s, needed_s })?);
     }
     Ok(())
+}
+
+/// Highest log-odds of each window of the runs, each up to its time in seconds.
+fn maxima(
+    mut monitor: Monitor,
+    driving: &[(&Run, f64)],
+    robot: &Description,
+    model: &Model,
+) -> Vec<f64> {
+    let mut maxima = Vec::new();
+    for (run, until_s) in driving {
+        monitor.reset();
+        let (mut run_s, mut in_window_s, mut highest) = (0.0, 0.0, f64::NEG_INFINITY);
+        for observation in observations(run, robot, model) {
+            if observation.t_ns as f64 * 1e-9 > *until_s {
+                break;
+            }
+            monitor.step(&observation, false);
+            run_s += observation.dt_s;
+            if run_s < ARM_S {
+                monitor.forget_evidence();
+                continue;
+            }
+            highest = monitor.report().log_odds.max(highest);
+            in_window_s += observation.dt_s;
+            if in_window_s >= WINDOW_S {
+                maxima.push(highest);
+                (in_window_s, highest) = (0.0, f64::NEG_INFINITY);
+            }
+        }
+    }
+    maxima
 }

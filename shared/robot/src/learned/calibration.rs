@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::form::Form;
+use super::monitor::Channels;
+
 /// Tail of the nominal log-odds, from which the alarm threshold follows.
 ///
 /// Exceedances of a level by the log-odds of nominal runs grow rarer exponentially with the level:
@@ -12,6 +15,8 @@ use serde::{Deserialize, Serialize};
 pub struct Calibration {
     /// Channels for which it holds: `pose` or `pose+encoders`.
     pub sensors: String,
+    /// Form of the detection filter for which it holds: `learned-bias`, `constant` or `windowed`.
+    pub form: String,
     /// Prior fault rate under which the log-odds were collected, 1/h.
     pub fault_rate_1_h: f64,
     /// Level above which the tail was fitted, natural log-odds.
@@ -42,7 +47,8 @@ impl Calibration {
     /// exponential exceedances over the median. None if there are fewer than 30 maxima.
     #[must_use]
     pub fn fit(
-        sensors: &str,
+        channels: Channels,
+        form: Form,
         fault_rate_1_h: f64,
         maxima: &mut [f64],
         window_s: f64,
@@ -61,7 +67,8 @@ impl Calibration {
         let mean = above.iter().sum::<f64>() / count;
         let lower = 1.0 - 1.645 / count.sqrt();
         Some(Self {
-            sensors: sensors.to_owned(),
+            sensors: channels.name().to_owned(),
+            form: form.name().to_owned(),
             fault_rate_1_h,
             level_log_odds: level,
             interval_at_level_h: window_s / 3600.0 * maxima.len() as f64 / count,
@@ -76,6 +83,10 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
+    fn fit(maxima: &mut [f64], window_s: f64) -> Option<Calibration> {
+        Calibration::fit(Channels::Pose, Form::Windowed, 1.0, maxima, window_s)
+    }
+
     #[test]
     fn an_exponential_tail_is_recovered_and_extrapolated() {
         // Quantiles of an exponential with slope .8: the median is ln 2 / .8.
@@ -83,7 +94,11 @@ mod tests {
         let mut maxima: Vec<f64> = (0..n)
             .map(|i| -(1.0 - (f64::from(i) + 0.5) / f64::from(n)).ln() / 0.8)
             .collect();
-        let fit = Calibration::fit("pose", 1.0, &mut maxima, 3.6).unwrap();
+        let fit = fit(&mut maxima, 3.6).unwrap();
+        assert_eq!(
+            (fit.sensors.as_str(), fit.form.as_str()),
+            ("pose", "windowed")
+        );
         assert!((fit.level_log_odds - 2.0_f64.ln() / 0.8).abs() < 2e-3);
         let expected = 0.8 * (1.0 - 1.645 / 2000.0_f64.sqrt());
         assert!(
@@ -100,7 +115,7 @@ mod tests {
 
     #[test]
     fn too_little_data_gives_no_calibration() {
-        assert!(Calibration::fit("pose", 1.0, &mut [0.0; 29], 1.0).is_none());
-        assert!(Calibration::fit("pose", 1.0, &mut [f64::NAN; 40], 1.0).is_none());
+        assert!(fit(&mut [0.0; 29], 1.0).is_none());
+        assert!(fit(&mut [f64::NAN; 40], 1.0).is_none());
     }
 }

@@ -11,9 +11,11 @@
 //! | [`switching`] | the learned model as a hybrid system, for filters that take any |
 //! | [`noise_scale`] | how much noisier the sensors are than the learned ones |
 //! | [`calibration`] | alarm thresholds for a stated mean time between false alarms |
+//! | [`form`] | what the detection filter's fault state says of a residual |
 //! | [`monitor`] | the detection filter over observations |
 
 pub mod calibration;
+pub mod form;
 pub mod model;
 pub mod monitor;
 pub mod motion;
@@ -26,6 +28,7 @@ pub mod wheel_evidence;
 pub mod wheels;
 
 pub use calibration::Calibration;
+pub use form::Form;
 pub use model::{Model, ModelError};
 pub use monitor::Monitor;
 pub use motion::{Curve, MotionModel};

@@ -4,11 +4,13 @@ use serde::{Deserialize, Serialize};
 use vigil_blocks::{WHEELS, fnv1a};
 
 use super::calibration::Calibration;
+use super::form::Form;
+use super::monitor::Channels;
 use super::motion::{Curve, MotionModel};
 use super::wheels::{EncoderModel, RateModel};
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Everything learned about one robot on one kind of ground.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -34,7 +36,7 @@ pub struct Model {
     pub nominal: NominalModel,
     /// One model per wheel that may be stuck.
     pub stuck: Vec<StuckModel>,
-    /// Alarm thresholds, one per set of channels.
+    /// Alarm thresholds, one per set of channels and form of the detection filter.
     pub calibration: Vec<Calibration>,
 }
 
@@ -139,9 +141,14 @@ pub enum ModelError {
         /// Its wheels.
         robot_wheels: String,
     },
-    /// The model has no calibration for the channels.
-    #[error("the model has no calibration for '{0}'; learn it again")]
-    Calibration(String),
+    /// The model has no calibration for the channels and the form of detection.
+    #[error("the model has no calibration for '{sensors}' and '{form}'; learn it again")]
+    Calibration {
+        /// Channels.
+        sensors: &'static str,
+        /// Form.
+        form: &'static str,
+    },
 }
 
 impl Model {
@@ -199,15 +206,16 @@ impl Model {
         })
     }
 
-    /// The calibration for a set of channels.
+    /// The calibration for a set of channels and a form of detection.
     ///
     /// # Errors
     /// [`ModelError::Calibration`].
-    pub fn calibration(&self, sensors: &str) -> Result<&Calibration, ModelError> {
+    pub fn calibration(&self, channels: Channels, form: Form) -> Result<&Calibration, ModelError> {
+        let (sensors, form) = (channels.name(), form.name());
         self.calibration
             .iter()
-            .find(|calibration| calibration.sensors == sensors)
-            .ok_or_else(|| ModelError::Calibration(sensors.to_owned()))
+            .find(|calibration| calibration.sensors == sensors && calibration.form == form)
+            .ok_or(ModelError::Calibration { sensors, form })
     }
 
     /// The model of `wheel` stuck.
@@ -394,7 +402,8 @@ fn check_rates(key: &str, rates: &[RateModel], count: usize) -> Result<(), Model
 }
 
 fn check_calibration(calibration: &Calibration) -> Result<(), ModelError> {
-    let key = |name: &str| format!("calibration.{}.{name}", calibration.sensors);
+    let of = format!("calibration.{}.{}", calibration.sensors, calibration.form);
+    let key = |name: &str| format!("{of}.{name}");
     check_range(
         &key("fault_rate_1_h"),
         calibration.fault_rate_1_h,

@@ -3,21 +3,22 @@
 //! Particles of the nominal mode track the pose; the fault flag is integrated exactly (a fault
 //! state has no dynamics, so its probability follows from the nominal predictive density alone).
 //! Residuals are whitened by that density, per group of channels: pose (3), each wheel rate, each
-//! steering angle. Per group the fault state learns an unknown constant bias ([`Ages`]); an encoder
-//! that repeats itself exactly has a flag of its own; over all groups together stands the paper's
-//! constant likelihood ([`Constant`]). The groups' odds add up: a fault enters by one of them.
+//! steering angle. Per group the fault state takes one [`Form`]: it learns an unknown constant
+//! bias, or has a constant likelihood. An encoder that repeats itself exactly has a flag of its
+//! own; over the pose stands the paper's constant likelihood besides ([`Constant`]). The groups'
+//! odds add up: a fault enters by one of them.
 
 use nalgebra::{Matrix3, SVector, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{CHANNELS, Channel, WHEELS};
-use vigil_inference::ages::Ages;
 use vigil_inference::angle::wrap;
 use vigil_inference::constant::Constant;
 use vigil_inference::gaussian::log_density;
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 use vigil_inference::particles::PoseParticles;
 
+use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION};
 use super::noise_scale::NoiseScale;
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Model, Observation};
@@ -32,8 +33,6 @@ const SHARE_ANY: f64 = 0.05;
 /// Standard deviation of a fault's bias in units of the whitened residual.
 const BIAS_POSE: f64 = 1.0;
 const BIAS_CHANNEL: f64 = 3.0;
-/// Constant of the paper's form per dimension: above 1, or nominal residuals are evidence.
-const TAU_SQUARED_PER_DIMENSION: f64 = 1.6;
 /// Probability that a frozen encoder does not repeat itself.
 const REPEAT_FAILS: f64 = 0.01;
 /// Bound of the flag of exact repeats.
@@ -71,6 +70,7 @@ pub struct Monitor {
     model: Model,
     robot: Description,
     channels: Channels,
+    form: Form,
     fault_rate_1_s: f64,
     seed: u64,
     rng: Pcg64Mcg,
@@ -78,9 +78,9 @@ pub struct Monitor {
     tracking: bool,
     coasted: u32,
     anchor_variance: f64,
-    pose: Ages<3>,
-    wheels: [Ages<1>; WHEELS],
-    steer: [Ages<1>; WHEELS],
+    pose: Evidence<3>,
+    wheels: [Evidence<1>; WHEELS],
+    steer: [Evidence<1>; WHEELS],
     repeats: [f64; WHEELS],
     any: Constant,
     scale_pose: NoiseScale,
@@ -105,12 +105,13 @@ pub struct Report {
 }
 
 impl Monitor {
-    /// A monitor with `particles` particles and a prior fault rate.
+    /// A monitor with `particles` particles and a prior fault rate; `form` holds for every group.
     #[must_use]
     pub fn new(
         model: &Model,
         robot: &Description,
         channels: Channels,
+        form: Form,
         particles: usize,
         fault_rate_1_h: f64,
         seed: u64,
@@ -119,6 +120,7 @@ impl Monitor {
             model: model.clone(),
             robot: robot.clone(),
             channels,
+            form,
             fault_rate_1_s: fault_rate_1_h / 3600.0,
             seed,
             rng: Pcg64Mcg::seed_from_u64(seed),
@@ -126,9 +128,9 @@ impl Monitor {
             tracking: false,
             coasted: 0,
             anchor_variance: 0.0,
-            pose: Ages::new(BIAS_POSE),
-            wheels: [Ages::new(BIAS_CHANNEL); WHEELS],
-            steer: [Ages::new(BIAS_CHANNEL); WHEELS],
+            pose: Evidence::new(form, BIAS_POSE),
+            wheels: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
+            steer: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
             repeats: [0.0; WHEELS],
             any: Constant::default(),
             scale_pose: NoiseScale::default(),
@@ -163,9 +165,9 @@ impl Monitor {
 
     /// Forgets what speaks for a fault, and keeps the track.
     pub fn forget_evidence(&mut self) {
-        self.pose = Ages::new(BIAS_POSE);
-        self.wheels = [Ages::new(BIAS_CHANNEL); WHEELS];
-        self.steer = [Ages::new(BIAS_CHANNEL); WHEELS];
+        self.pose = Evidence::new(self.form, BIAS_POSE);
+        self.wheels = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
+        self.steer = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
         self.repeats = [self.birth(self.model.interval_s, SHARE_REPEATS).ln(); WHEELS];
         self.any = Constant::default();
         self.sum_up();
