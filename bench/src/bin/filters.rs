@@ -4,7 +4,7 @@
 #![allow(missing_docs)]
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::{Value, json};
@@ -76,11 +76,30 @@ fn main() -> Result<(), Box<dyn Error>> {
         .say("Distance to the exact belief: mean over steps of `Σ|p - q|` and of `KL(exact|p)`.");
     archive.say("Time: one step, p50; per particle for the sampled filters.\n");
 
-    let hidden = HiddenMarkov::read(&folder.join("case1_hmm13.json"))?;
     let nodes = [vec![1, 2, 3], vec![4, 5, 6], (7..13).collect()];
+    exact_cases(&mut archive, &folder, &nodes)?;
+    let speeds = speed::rows(&folder)?;
+    archive.say("## Time per particle: thirteen modes, pose and wheel rates\n");
+    speed::report(&mut archive, &speeds);
+    archive.store("speed.json", &json!(speeds))?;
+
+    simulated_runs(&mut archive, &folder, &nodes)?;
+    recorded_runs(&mut archive)?;
+    let folder = archive.close()?;
+    println!("archived in {}", folder.display());
+    Ok(())
+}
+
+/// The cases with exact answers.
+fn exact_cases(
+    archive: &mut Archive,
+    folder: &Path,
+    nodes: &[Vec<usize>],
+) -> Result<(), Box<dyn Error>> {
+    let hidden = HiddenMarkov::read(&folder.join("case1_hmm13.json"))?;
     let steps: Vec<_> = hidden.observations.iter().zip(&hidden.filter).collect();
-    let rows = distances::<_, 0>(&hidden, &nodes, &steps);
-    report(&mut archive, "thirteen modes, no continuous state", &rows);
+    let rows = distances::<_, 0>(&hidden, nodes, &steps);
+    report(archive, "thirteen modes, no continuous state", &rows);
     archive.store("hidden-markov.json", &json!(rows))?;
 
     let jump = JumpLinear::read(&folder.join("case3_jmls3_full.json"))?;
@@ -102,15 +121,18 @@ fn main() -> Result<(), Box<dyn Error>> {
         };
         rows.push(row("look-ahead, lanes", Some(count), make, &on_lanes));
     }
-    report(&mut archive, "three modes that move a pose", &rows);
+    report(archive, "three modes that move a pose", &rows);
     archive.store("jump-linear.json", &json!(rows))?;
+    Ok(())
+}
 
-    let speeds = speed::rows(&folder)?;
-    archive.say("## Time per particle: thirteen modes, pose and wheel rates\n");
-    speed::report(&mut archive, &speeds);
-    archive.store("speed.json", &json!(speeds))?;
-
-    let (planar, _) = Planar::read(&folder)?;
+/// Rare faults in simulated runs.
+fn simulated_runs(
+    archive: &mut Archive,
+    folder: &Path,
+    nodes: &[Vec<usize>],
+) -> Result<(), Box<dyn Error>> {
+    let (planar, _) = Planar::read(folder)?;
     let mut cells = Vec::new();
     for with_wheels in [true, false] {
         for p_fault in [1e-3, 1e-5, 1e-6] {
@@ -120,15 +142,19 @@ fn main() -> Result<(), Box<dyn Error>> {
                 runs: RUNS,
             };
             eprintln!("simulating p(fault) = {p_fault:e}, wheel rates: {with_wheels}");
-            let found = rare_faults(&planar, &nodes, &scenario, &SIMULATED);
+            let found = rare_faults(&planar, nodes, &scenario, &SIMULATED);
             let title = format!("{RUNS} simulated faults of p = {p_fault:e} per step");
-            matched_table(&mut archive, &title, with_wheels, STEP_S, &found);
+            matched_table(archive, &title, with_wheels, STEP_S, &found);
             let raw: Vec<Value> = found.iter().map(Outcome::json).collect();
             cells.push(json!({"p_fault": p_fault, "wheels": with_wheels, "cells": raw}));
         }
     }
     archive.store("simulated.json", &json!(cells))?;
+    Ok(())
+}
 
+/// Recorded runs that the model was not learned from.
+fn recorded_runs(archive: &mut Archive) -> Result<(), Box<dyn Error>> {
     let recorded = Recorded::read(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."))?;
     let mut cells = Vec::new();
     for with_wheels in [true, false] {
@@ -138,14 +164,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             let found = recorded.outcomes(p_fault, with_wheels, &RECORDED);
             let title =
                 format!("{runs} recorded runs, the filters expect p = {p_fault:e} per step");
-            matched_table(&mut archive, &title, with_wheels, recorded.step_s(), &found);
+            matched_table(archive, &title, with_wheels, recorded.step_s(), &found);
             let raw: Vec<Value> = found.iter().map(Outcome::json).collect();
             cells.push(json!({"p_fault": p_fault, "wheels": with_wheels, "cells": raw}));
         }
     }
     archive.store("recorded.json", &json!(cells))?;
-    let folder = archive.close()?;
-    println!("archived in {}", folder.display());
     Ok(())
 }
 

@@ -2,8 +2,8 @@
 //!
 //! When a diagnosis is made, it and the next best explanation are both followed from the onset on,
 //! each as if it alone were true, and the log-likelihoods of their readings are summed by channel.
-//! The filter's own hypotheses cannot say this: the next best of them has usually become it a moment
-//! ago, and owes its past to the best.
+//! The filter's own hypotheses cannot say this: the next best of them has usually become it a
+//! moment ago, and owes its past to the best.
 
 use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};

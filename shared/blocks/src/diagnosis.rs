@@ -49,10 +49,9 @@ block! {
         pub sets: [FaultSet; FAULT_SETS],
         /// Entropy of the distribution over sets and unknown, nats.
         pub entropy: f64,
-        /// Why this diagnosis and not the next best one: by channel, how much more the readings since
-        /// the start of the identification are expected under the most probable set (the unknown,
-        /// if that is reported) than under `runner_up`, natural log-likelihood. 0 before an
-        /// identification, and for filters that keep no such account.
+        /// Why this diagnosis and not the next best one: by channel, how much more the readings
+        /// since the onset are expected under it than under `runner_up`, natural log-likelihood;
+        /// see [`crate::Channel`]. 0 while nothing is diagnosed.
         pub channel_evidence: [f64; CHANNELS],
         /// Probability of `mode`.
         pub p_mode: f64,

@@ -160,8 +160,8 @@ impl<M: Sampled> Hierarchical<M> {
         self
     }
 
-    /// The same filter with all its nodes merged for good, or all split: what the rule is measured
-    /// against.
+    /// The same filter with all its nodes merged for good, or all split: what the rule is
+    /// measured against.
     #[must_use]
     pub fn with_fixed_resolution(mut self, merged: bool) -> Self {
         self.is_fixed = true;
@@ -171,8 +171,8 @@ impl<M: Sampled> Hierarchical<M> {
         self
     }
 
-    /// What mode `k` is tracked as at present: itself, or the first leaf of the highest abstract node
-    /// above it whose leaves are tracked together.
+    /// What mode `k` is tracked as at present: itself, or the first leaf of the highest abstract
+    /// node above it whose leaves are tracked together.
     fn group(&self, k: usize) -> usize {
         let merged = self.above[k].iter().find(|&&node| self.nodes[node].merged);
         merged.map_or(k, |&node| self.nodes[node].leaves[0])

@@ -1,8 +1,8 @@
 //! What a user's model is to the filters: discrete modes that follow a Markov chain, and a
 //! continuous state that moves and is observed as the mode says.
 //!
-//! A model that moves by a command keeps the command of the step that comes next; every filter lends
-//! its model for that (`model_mut`).
+//! A model that moves by a command keeps the command of the step that comes next; every filter
+//! lends its model for that (`model_mut`).
 
 use rand_pcg::Pcg64Mcg;
 

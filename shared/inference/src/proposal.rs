@@ -77,9 +77,9 @@ impl Proposal {
         Ok(Self::build(model, q, risk))
     }
 
-    /// Both: a share `leave` of the draws goes to other modes, in proportion to their risks, and the
-    /// belief is tracked tilted by the risk. Where risks differ by less than faults are rare, the
-    /// risk alone leads too few particles to them.
+    /// Both: a share `leave` of the draws goes to other modes, in proportion to their risks, and
+    /// the belief is tracked tilted by the risk. Where risks differ by less than faults are rare,
+    /// the risk alone leads too few particles to them.
     ///
     /// # Errors
     /// [`ProposalError`].

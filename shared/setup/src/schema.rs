@@ -264,8 +264,8 @@ pub struct Identifier {
     /// Filter: `exact` (sets of faults), or one of those over single faults: `bootstrap`, `raised`,
     /// `adaptive`, `risk-sensitive`, `hierarchical`, `look-ahead`, `imm`.
     pub filter: IdentifierFilter,
-    /// Particles of the filter, 32 to 4096; `look-ahead` has an eighth of them. Those of `exact` and
-    /// `imm`, which have none of their own, are drawn from the belief for observers.
+    /// Particles of the filter, 32 to 4096; `look-ahead` has an eighth of them. Those of `exact`
+    /// and `imm`, which have none of their own, are drawn from the belief for observers.
     pub particles: usize,
     /// Kept frames from which an identification starts, s, 0.5 to 30.
     pub ring_s: f64,

@@ -80,8 +80,8 @@ impl WheelEvidence {
     }
 
     /// Wheel `i` with a whole encoder while the robot is moved so. At the onset (`is_new`) a stuck
-    /// wheel may read anything, as an observation may hold the very moment, and the others may still
-    /// turn as before: the robot slows down within a few tenths of a second.
+    /// wheel may read anything, as an observation may hold the very moment, and the others may
+    /// still turn as before: the robot slows down within a few tenths of a second.
     #[must_use]
     pub fn whole(
         &self,
