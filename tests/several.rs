@@ -39,7 +39,12 @@ struct Watched {
 
 impl Watched {
     fn new(seed: u64) -> Self {
-        let setup = setup();
+        Self::with_noise(seed, 1.0)
+    }
+
+    fn with_noise(seed: u64, noise_scale: f64) -> Self {
+        let mut setup = setup();
+        setup.file.simulator.noise_scale = noise_scale;
         let file = &setup.file;
         let world = World::new(&setup.robot, &file.simulator, &file.drive, RATE_HZ, seed);
         Self {
@@ -145,6 +150,31 @@ fn a_wheel_that_sticks_frees_itself_and_sticks_again_is_followed() {
         watched.drive(1.0);
         assert_eq!(watched.diagnosis.mode, 0);
         watched.drive(2.0);
+    }
+}
+
+#[test]
+fn the_sensors_may_be_noisier_or_quieter_than_the_learned_ones() {
+    for (seed, noise_scale) in [(20, 0.5), (21, 2.0)] {
+        for (kind, name) in [
+            (FaultKind::Stuck, "STUCK"),
+            (FaultKind::EncoderNoise, "ENC"),
+        ] {
+            let mut watched = Watched::with_noise(seed, noise_scale);
+            watched.drive(30.0);
+            assert_eq!(watched.detection.alarm_count, 0, "{noise_scale}");
+            let fault = Fault { kind, wheel: 1 };
+            watched.world.inject(fault).unwrap();
+            watched.drive(2.0);
+            let node = watched.diagnosis.mode as usize;
+            let named = watched
+                .setup
+                .tree
+                .nodes()
+                .get(node)
+                .map(|n| n.name.as_str());
+            assert_eq!(named, Some(format!("LM_{name}").as_str()), "{noise_scale}");
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The filters that are compared, behind one constructor.
 
+use vigil_inference::adaptive::Adaptive;
 use vigil_inference::bootstrap::ParticleFilter;
 use vigil_inference::filter::Filter;
 use vigil_inference::hierarchical::Hierarchical;
@@ -8,10 +9,16 @@ use vigil_inference::look_ahead::LookAhead;
 use vigil_inference::merged::Merged;
 use vigil_inference::proposal::Proposal;
 use vigil_inference::resample::Resampling;
+use vigil_inference::risk;
 use vigil_inference::sequences::Sequences;
 
 /// Share of the draws that leave a mode in the raised proposal.
 const RAISED: f64 = 0.5;
+/// Risks leave the nominal mode this many particles, in so many steps without a fault.
+const NOMINAL_MIN: f64 = 50.0;
+const STEPS: f64 = 30.0;
+/// KLD-sampling: distance, quantile (99 %), least number of particles.
+const ADAPTIVE: (f64, f64, usize) = (0.05, 2.326, 32);
 /// Mode sequences that the pruned exact filter keeps.
 const SEQUENCES: usize = 300;
 
@@ -22,7 +29,9 @@ pub enum Kind {
     Bootstrap,
     /// With raised fault proposals.
     Raised,
-    /// Risk-sensitive, every fault a hundred times as risky as nominal.
+    /// The same with as many particles as the belief needs.
+    Adaptive,
+    /// Raised and risk-sensitive, by the risks given.
     Risk,
     /// Hierarchical, split and merged by rule.
     Hierarchical,
@@ -42,9 +51,10 @@ pub enum Kind {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Bootstrap,
         Self::Raised,
+        Self::Adaptive,
         Self::Risk,
         Self::Hierarchical,
         Self::RaisedHierarchical,
@@ -61,7 +71,8 @@ impl Kind {
         match self {
             Self::Bootstrap => "bootstrap",
             Self::Raised => "raised proposals",
-            Self::Risk => "risk-sensitive",
+            Self::Adaptive => "raised, adaptive",
+            Self::Risk => "raised, risk-sensitive",
             Self::Hierarchical => "hierarchical",
             Self::RaisedHierarchical => "hierarchical, raised",
             Self::Coarse => "hierarchical, raised, always merged",
@@ -86,6 +97,7 @@ impl Kind {
             Self::Hierarchical | Self::RaisedHierarchical => count <= 10_000,
             Self::Coarse | Self::Fine => count <= 1_000,
             Self::Raised | Self::Risk => count <= 100_000,
+            Self::Adaptive => count >= 1_000 && count <= 10_000,
             _ => true,
         }
     }
@@ -133,14 +145,15 @@ where
     type Seen = O;
 }
 
-/// Builds a filter; `nodes` are the abstract nodes of the hierarchical one.
+/// Builds a filter; `nodes` are the abstract nodes of the hierarchical one, `risk` is that of each
+/// mode.
 ///
 /// # Panics
 /// If `nodes` are not a hierarchy over the model's modes.
 pub fn build<M: Model<N>, const N: usize>(
     kind: Kind,
     model: &M,
-    nodes: &[Vec<usize>],
+    (nodes, risk): (&[Vec<usize>], &[f64]),
     count: usize,
     seed: u64,
 ) -> Box<dyn Driven<M, Observation = <M as Model<N>>::Seen>> {
@@ -164,12 +177,21 @@ pub fn build<M: Model<N>, const N: usize>(
         ))
     };
     let raised = || hierarchical().with_raised_proposals(RAISED);
-    let mut risk = vec![100.0; Modes::modes(model)];
-    risk[0] = 1.0;
     match kind {
         Kind::Bootstrap => sampled(Proposal::prior(model)),
         Kind::Raised => sampled(fits(Proposal::raised(model, RAISED))),
-        Kind::Risk => sampled(fits(Proposal::risk_sensitive(model, &risk))),
+        Kind::Adaptive => {
+            let (error, quantile, least) = ADAPTIVE;
+            let adaptive = Adaptive::new(error, quantile, least, count);
+            let filter = sampled(fits(Proposal::raised(model, RAISED)));
+            Box::new(filter.with_adaptive_count(adaptive))
+        }
+        Kind::Risk => {
+            let mut risk = risk.to_vec();
+            let p: Vec<f64> = (0..risk.len()).map(|k| prior(model, k)).collect();
+            risk::bound(&mut risk, &p, count, NOMINAL_MIN.min(0.5 * count as f64));
+            sampled(fits(Proposal::risk_raised(model, RAISED, &risk)))
+        }
         Kind::Hierarchical => Box::new(hierarchical()),
         Kind::RaisedHierarchical => Box::new(raised()),
         Kind::Coarse => Box::new(raised().with_fixed_resolution(true)),
@@ -177,6 +199,15 @@ pub fn build<M: Model<N>, const N: usize>(
         Kind::LookAhead => Box::new(LookAhead::<M, N>::new(model.clone(), count, seed)),
         Kind::Merged => Box::new(Merged::<M, N>::new(model.clone())),
         Kind::Sequences => Box::new(Sequences::<M, N>::new(model.clone(), SEQUENCES)),
+    }
+}
+
+/// Probability of a mode before the data speak, some steps after the start.
+fn prior<M: Modes>(model: &M, mode: usize) -> f64 {
+    let fault = |k| STEPS * model.transition(0, k);
+    match mode {
+        0 => 1.0 - (1..model.modes()).map(fault).sum::<f64>().min(0.9),
+        _ => fault(mode),
     }
 }
 

@@ -21,6 +21,19 @@ pub struct Trace {
     pub side_right: bool,
 }
 
+impl Trace {
+    /// Nothing yet, of a run whose fault begins at step `onset`.
+    #[must_use]
+    pub const fn new(onset: usize) -> Self {
+        Self {
+            log_odds: Vec::new(),
+            onset,
+            leaf_right: false,
+            side_right: false,
+        }
+    }
+}
+
 /// Log-odds of any fault in a posterior whose mode 0 is nominal.
 #[must_use]
 pub fn log_odds(posterior: &[f64]) -> f64 {
@@ -28,12 +41,16 @@ pub fn log_odds(posterior: &[f64]) -> f64 {
     log_sum_exp(&faults) - posterior.first().map_or(0.0, |p| p.ln())
 }
 
-/// The log-odds that nominal runs exceed in the share `share` of runs of this length at most.
+/// The log-odds that nominal runs exceed in the share `share` of runs of this length at most. None
+/// if they are infinite: the filter has lost the nominal mode too often. Log-odds so low that a
+/// single particle exceeds them count as a millionth.
 #[must_use]
-pub fn threshold(nominal: &[Trace], share: f64) -> f64 {
-    let highest = |trace: &Trace| trace.log_odds.iter().copied().fold(f64::MIN, f64::max);
+pub fn threshold(nominal: &[Trace], share: f64) -> Option<f64> {
+    let lowest = 1e-6_f64.ln();
+    let highest = |trace: &Trace| trace.log_odds.iter().copied().fold(lowest, f64::max);
     let mut highest: Vec<f64> = nominal.iter().map(highest).collect();
-    quantile(&mut highest, 1.0 - share)
+    let found = quantile(&mut highest, 1.0 - share);
+    found.is_finite().then_some(found)
 }
 
 /// `f` of each item, on all cores, in the items' order: nothing here is timed.
@@ -52,7 +69,10 @@ pub fn in_parallel<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync) ->
     };
     let mut results: Vec<(usize, R)> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
-        let joined = workers.into_iter().filter_map(|worker| worker.join().ok());
+        let joined = workers.into_iter().map(|worker| match worker.join() {
+            Ok(done) => done,
+            Err(panic) => std::panic::resume_unwind(panic),
+        });
         joined.flatten().collect()
     });
     results.sort_by_key(|(i, _)| *i);
@@ -66,8 +86,8 @@ pub struct Outcome {
     pub name: &'static str,
     /// Its particles.
     pub count: Option<usize>,
-    /// Threshold of the log-odds.
-    pub threshold: f64,
+    /// Threshold of the log-odds; None if no threshold gives so few false alarms.
+    pub threshold: Option<f64>,
     /// Runs with an alarm before the fault.
     pub false_alarms: usize,
     /// Runs without an alarm after the onset.
@@ -83,7 +103,12 @@ pub struct Outcome {
 impl Outcome {
     /// Judges the traces of faulty runs with a threshold.
     #[must_use]
-    pub fn of(name: &'static str, count: Option<usize>, threshold: f64, faulty: &[Trace]) -> Self {
+    pub fn of(
+        name: &'static str,
+        count: Option<usize>,
+        threshold: Option<f64>,
+        faulty: &[Trace],
+    ) -> Self {
         let mut outcome = Self {
             name,
             count,
@@ -98,7 +123,7 @@ impl Outcome {
             let (before, after) = trace
                 .log_odds
                 .split_at(trace.onset.min(trace.log_odds.len()));
-            let alarms = |odds: &f64| *odds > threshold;
+            let alarms = |odds: &f64| threshold.is_some_and(|threshold| *odds > threshold);
             outcome.false_alarms += usize::from(before.iter().any(alarms));
             let delay = after.iter().position(alarms);
             outcome.missed += usize::from(delay.is_none());
@@ -111,12 +136,18 @@ impl Outcome {
         outcome
     }
 
+    /// Share of runs with the right leaf.
+    #[must_use]
+    pub fn leaf_share(&self) -> f64 {
+        mean(&self.leaves)
+    }
+
     /// Raw data.
     #[must_use]
     pub fn json(&self) -> Value {
         json!({
             "filter": self.name, "particles": self.count, "runs": self.delays.len(),
-            "threshold_log_odds": self.threshold.is_finite().then_some(self.threshold),
+            "threshold_log_odds": self.threshold,
             "false_alarms": self.false_alarms, "missed": self.missed,
             "delays_steps": self.delays, "leaves": self.leaves, "sides": self.sides,
         })
@@ -127,14 +158,19 @@ impl Outcome {
     pub fn row(&self, step_s: f64) -> String {
         let runs = self.delays.len().max(1) as f64;
         let percent = |n: usize| 100.0 * n as f64 / runs;
+        let count = self.count.map_or_else(|| "-".into(), |n| n.to_string());
+        let alarms = match self.threshold {
+            None => "no threshold | - | -".to_owned(),
+            Some(_) => format!(
+                "{:.0} % | {:.0} % | {:.2}",
+                percent(self.false_alarms),
+                percent(self.missed),
+                mean(&self.delays) * step_s,
+            ),
+        };
         format!(
-            "| {} | {} | {:.0} % | {:.0} % | {:.2} | {:.0} % | {:.0} % |",
+            "| {} | {count} | {alarms} | {:.0} % | {:.0} % |",
             self.name,
-            self.count
-                .map_or_else(|| "-".into(), |count| count.to_string()),
-            percent(self.false_alarms),
-            percent(self.missed),
-            mean(&self.delays) * step_s,
             100.0 * mean(&self.leaves),
             100.0 * mean(&self.sides),
         )
@@ -170,16 +206,43 @@ pub fn compare(a: &Outcome, b: &Outcome, step_s: f64) -> String {
         Some(count) => format!("{} {count}", o.name),
         None => o.name.to_owned(),
     };
+    let delay = match a.threshold.and(b.threshold) {
+        None => "no threshold for one of them".to_owned(),
+        Some(_) => format!(
+            "delay {:+.2} ± {:.2} s",
+            delay * step_s,
+            delay_half * step_s
+        ),
+    };
     format!(
-        "- {} against {}: delay {:+.2} ± {:.2} s, leaf {:+.0} ± {:.0} points, side {:+.0} ± {:.0} \
-         points",
+        "- {} against {}: {delay}, leaf {:+.0} ± {:.0} points, side {:+.0} ± {:.0} points",
         name(a),
         name(b),
-        delay * step_s,
-        delay_half * step_s,
         100.0 * leaf,
         100.0 * leaf_half,
         100.0 * side,
         100.0 * side_half,
+    )
+}
+
+/// The fewest particles with which each filter names as many leaves as `level`, in words.
+#[must_use]
+pub fn particles_for(found: &[Outcome], level: f64) -> String {
+    let mut names: Vec<&str> = found.iter().map(|outcome| outcome.name).collect();
+    names.dedup();
+    let fewest = |name: &&str| {
+        let of = found.iter().filter(|outcome| outcome.name == *name);
+        let enough = of.filter(|outcome| mean(&outcome.leaves) >= level);
+        match enough.filter_map(|outcome| outcome.count).min() {
+            Some(count) => format!("{name} {count}"),
+            None if found.iter().any(|o| o.name == *name && o.count.is_none()) => String::new(),
+            None => format!("{name} more than tried"),
+        }
+    };
+    let fewest: Vec<String> = names.iter().map(fewest).filter(|s| !s.is_empty()).collect();
+    format!(
+        "- particles for {:.0} % of the leaves right: {}",
+        100.0 * level,
+        fewest.join(", ")
     )
 }

@@ -16,6 +16,8 @@ const NOMINAL: usize = 100;
 const FAULTY: usize = 150;
 /// Share of nominal runs of as many steps with a false alarm.
 const FALSE_ALARMS: f64 = 0.05;
+/// Probability per step that a fault vanishes, as the filters know it; those simulated stay.
+const RECOVERY: f64 = 0.01;
 /// Nominal runs that set the threshold.
 const CALIBRATION_RUNS: u64 = 100;
 /// Time of a step, s.
@@ -39,11 +41,11 @@ type Run = (usize, Vec<Observation>);
 #[must_use]
 pub fn rare_faults(
     planar: &Planar,
-    nodes: &[Vec<usize>],
+    (nodes, risk): (&[Vec<usize>], &[f64]),
     scenario: &Scenario,
     wanted: &[(Kind, usize)],
 ) -> Vec<Outcome> {
-    let model = planar.clone().with_rates(scenario.p_fault, 0.0);
+    let model = planar.clone().with_rates(scenario.p_fault, RECOVERY);
     let nominal: Vec<Run> = (0..CALIBRATION_RUNS)
         .map(|seed| simulate(&model, scenario, false, 2_000_000 + seed))
         .collect();
@@ -54,7 +56,7 @@ pub fn rare_faults(
         let traces = |runs: &[Run]| -> Vec<Trace> {
             let runs = runs.iter().enumerate();
             runs.map(|(seed, run)| {
-                let mut filter = build::<_, 3>(kind, &model, nodes, count, seed as u64);
+                let mut filter = build::<_, 3>(kind, &model, (nodes, risk), count, seed as u64);
                 follow(&mut *filter, run, nodes)
             })
             .collect()

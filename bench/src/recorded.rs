@@ -3,16 +3,23 @@
 use std::error::Error;
 use std::path::Path;
 
+use vigil_decision::Pomdp;
 use vigil_evaluation::frames::{self, Run};
 use vigil_evaluation::labels::{self, Label};
+use vigil_identifier::{Exact, Leaves, Posterior, risks};
+use vigil_inference::FaultTree;
 use vigil_inference::hybrid::Modes;
 use vigil_inference::track::TRACK_DIMENSION;
 use vigil_robot::Description;
-use vigil_robot::learned::{FaultRates, Model, Moved, Observation, Observer, Switching};
+use vigil_robot::learned::{
+    FaultRates, Model, Moved, NoiseScales, Observation, Observer, Switching,
+};
 
 use crate::filters::{Kind, build};
 use crate::matched::{Outcome, Trace, in_parallel, log_odds, threshold};
 
+/// The live default, as tables name it.
+pub const EXACT: &str = "sets of faults (live default)";
 /// Share of nominal stretches with a false alarm.
 const FALSE_ALARMS: f64 = 0.05;
 /// Steps after the onset at which leaf and side are judged: 2 s.
@@ -25,6 +32,9 @@ const UNKNOWN: f64 = 0.01;
 pub struct Recorded {
     robot: Description,
     model: Model,
+    tree: FaultTree,
+    leaves: Leaves,
+    decision: Pomdp,
     nominal: Vec<Prepared>,
     stuck: Vec<Prepared>,
     encoders: Vec<Prepared>,
@@ -45,6 +55,8 @@ impl Recorded {
     pub fn read(root: &Path) -> Result<Self, Box<dyn Error>> {
         let robot = vigil_setup::load_robot(&root.join("config/robots/rover.toml"))?;
         let model = vigil_setup::load_model(&root.join("config/models/rover.toml"), Some(&robot))?;
+        let tree = vigil_setup::load_tree(&root.join("config/trees/rover.toml"))?;
+        let decision = vigil_setup::load_decision(&root.join("config/rover.pomdp"))?;
         let data = root.join("tests/data/rover");
         let runs = frames::read(&data.join("learn_frames.csv.gz"), &robot)?;
         let labels = labels::read(&data.join("learn_runs.csv"), &robot)?;
@@ -52,6 +64,9 @@ impl Recorded {
             nominal: Vec::new(),
             stuck: Vec::new(),
             encoders: Vec::new(),
+            leaves: Leaves::new(&tree, &model, &robot)?,
+            tree,
+            decision,
             robot,
             model,
         };
@@ -126,6 +141,7 @@ impl Recorded {
         };
         let switching = Switching::new(&self.model, &self.robot, wheels, encoders, &rates);
         let nodes = self.nodes(&switching);
+        let risk = self.risks(&switching);
         let mut faulty: Vec<&Prepared> = self.stuck.iter().collect();
         if with_wheels {
             faulty.extend(&self.encoders);
@@ -136,7 +152,14 @@ impl Recorded {
                 let follow = |(seed, run): (usize, &&Prepared)| {
                     let seed = seed as u64;
                     let filter = (kind, count, seed);
-                    self.follow(&switching, &nodes, filter, run, with_wheels, until_onset)
+                    self.follow(
+                        &switching,
+                        (&nodes, &risk),
+                        filter,
+                        run,
+                        with_wheels,
+                        until_onset,
+                    )
                 };
                 runs.iter().enumerate().map(follow).collect()
             };
@@ -146,13 +169,80 @@ impl Recorded {
             let count = kind.is_sampled().then_some(count);
             Outcome::of(kind.name(), count, threshold, &traces(&faulty, false))
         };
-        in_parallel(wanted, outcome)
+        let mut outcomes = in_parallel(wanted, outcome);
+        let traces = |runs: &[&Prepared], until_onset: bool| -> Vec<Trace> {
+            let follow = |run: &&Prepared| self.follow_exact(run, rates, with_wheels, until_onset);
+            in_parallel(runs, follow)
+        };
+        let threshold = threshold(&traces(&nominal, true), FALSE_ALARMS);
+        outcomes.push(Outcome::of(EXACT, None, threshold, &traces(&faulty, false)));
+        outcomes
+    }
+
+    /// The identifier's own filter over sets of faults.
+    fn follow_exact(
+        &self,
+        run: &Prepared,
+        rates: FaultRates,
+        with_wheels: bool,
+        until_onset: bool,
+    ) -> Trace {
+        let mut filter = Exact::new(&self.model, &self.robot, &self.leaves, with_wheels, rates);
+        if let Some(first) = run.observations.first() {
+            let variance = first.pose_variance(&self.model, 1.0);
+            let spread = nalgebra::Matrix3::from_diagonal(&variance.into());
+            filter.restart(first.pose.into(), spread, first.t_ns);
+        }
+        let steps = run.steps(until_onset);
+        let mut trace = Trace::new(run.onset);
+        let mut posterior = Posterior::nominal();
+        for (t, observation) in run.observations[..steps].iter().enumerate() {
+            filter.step(observation, NoiseScales::default());
+            filter.posterior(&mut posterior);
+            let p = posterior.nodes[0];
+            trace.log_odds.push(((1.0 - p) / p).ln());
+            if t == run.onset + JUDGED {
+                let named = self.meaning(posterior.sets[0].leaves);
+                trace.leaf_right = named == run.fault;
+                trace.side_right = named.is_some_and(|named| self.side(named) == run.side(self));
+            }
+        }
+        trace
+    }
+
+    /// What a set of one leaf says.
+    fn meaning(&self, leaves: u64) -> Option<(Moved, Option<usize>)> {
+        let is = |leaf: &Option<usize>| leaf.is_some_and(|node| leaves == 1 << node);
+        let stuck = self.leaves.stuck.iter().position(is);
+        let broken = || self.leaves.encoder.iter().position(is);
+        let stuck = stuck.map(|wheel| (Moved::Stuck(1 << wheel), None));
+        stuck.or_else(|| broken().map(|wheel| (Moved::Nominal, Some(wheel))))
+    }
+
+    /// Risk of each mode, from the decision model that ships.
+    fn risks(&self, switching: &Switching) -> Vec<f64> {
+        let name = |mode| {
+            let leaf = match switching.meaning(mode) {
+                (Moved::Unknown | Moved::UnknownAny, _) => return "UNKNOWN",
+                (_, Some(wheel)) => self.leaves.encoder[wheel],
+                (moved, None) => {
+                    let stuck = self.leaves.stuck.iter().enumerate();
+                    let mut stuck = stuck.filter(|(wheel, _)| moved.is_stuck(*wheel));
+                    stuck.next().and_then(|(_, leaf)| *leaf)
+                }
+            };
+            self.tree.nodes()[leaf.unwrap_or(0)].name.as_str()
+        };
+        let named: Vec<(&str, f64)> = (0..Modes::modes(switching))
+            .map(|k| (name(k), 0.0))
+            .collect();
+        risks(&self.decision, &named, usize::MAX).unwrap_or_else(|_| vec![1.0; named.len()])
     }
 
     fn follow(
         &self,
         switching: &Switching,
-        nodes: &[Vec<usize>],
+        models: (&[Vec<usize>], &[f64]),
         (kind, count, seed): (Kind, usize, u64),
         run: &Prepared,
         with_wheels: bool,
@@ -164,20 +254,13 @@ impl Recorded {
             let spread = nalgebra::Matrix3::from_diagonal(&variance.into());
             switching.start_at(first.pose.into(), spread);
         }
-        let mut filter = build::<_, TRACK_DIMENSION>(kind, &switching, nodes, count, seed);
-        let steps = if until_onset {
-            run.onset
-        } else {
-            run.observations.len()
-        };
-        let mut trace = Trace {
-            log_odds: Vec::with_capacity(steps),
-            onset: run.onset,
-            leaf_right: false,
-            side_right: false,
-        };
+        let mut filter = build::<_, TRACK_DIMENSION>(kind, &switching, models, count, seed);
+        let steps = run.steps(until_onset);
+        let mut trace = Trace::new(run.onset);
         for (t, observation) in run.observations[..steps].iter().enumerate() {
-            let seen = filter.model().look(observation, 1.0, with_wheels);
+            let seen = filter
+                .model()
+                .look(observation, NoiseScales::default(), with_wheels);
             filter.step(&seen);
             trace.log_odds.push(log_odds(filter.posterior()));
             if t == run.onset + JUDGED {
@@ -219,6 +302,14 @@ impl Recorded {
 }
 
 impl Prepared {
+    const fn steps(&self, until_onset: bool) -> usize {
+        if until_onset {
+            self.onset
+        } else {
+            self.observations.len()
+        }
+    }
+
     fn side(&self, recorded: &Recorded) -> Side {
         self.fault.map_or(Side::None, |fault| recorded.side(fault))
     }

@@ -58,7 +58,7 @@ fn no_filter_allocates_in_a_step() {
         } else {
             100_000
         };
-        let mut filter = build::<_, 0>(kind, &hidden, &nodes, 64, 1);
+        let mut filter = build::<_, 0>(kind, &hidden, (&nodes, &[1.0; 13]), 64, 1);
         let before = allocations();
         // It begins with observations that nothing explains.
         for z in [[f64::NAN; 6], [1e200; 6]]
@@ -69,7 +69,7 @@ fn no_filter_allocates_in_a_step() {
             filter.step(z);
         }
         assert_eq!(allocations() - before, 0, "{}", kind.name());
-        let mut filter = build::<_, 3>(kind, &jump, &[vec![1, 2]], 64, 1);
+        let mut filter = build::<_, 3>(kind, &jump, (&[vec![1, 2]], &[1.0; 3]), 64, 1);
         let before = allocations();
         for z in observations.iter().cycle().take(1_000) {
             filter.step(z);

@@ -10,11 +10,12 @@ use std::time::Instant;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::filters::{Kind, Model, build};
-use vigil_bench::matched::{HEAD, Outcome, compare};
+use vigil_bench::matched::{HEAD, Outcome, compare, particles_for};
 use vigil_bench::rare::{STEP_S, Scenario, rare_faults};
 use vigil_bench::recorded::Recorded;
 use vigil_bench::speed;
 use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Planar};
+use vigil_identifier::risks;
 use vigil_inference::filter::Filter;
 use vigil_inference::lanes::{self, linear::LaneLookAhead};
 
@@ -22,13 +23,15 @@ const COUNTS: [usize; 6] = [32, 100, 1_000, 10_000, 100_000, 1_000_000];
 /// Simulated runs per cell of the rare faults.
 const RUNS: u64 = 100;
 /// Filters and particles on simulated runs.
-const SIMULATED: [(Kind, usize); 18] = [
+const SIMULATED: [(Kind, usize); 20] = [
+    (Kind::Bootstrap, 32),
     (Kind::Bootstrap, 100),
     (Kind::Bootstrap, 1_000),
     (Kind::Bootstrap, 10_000),
     (Kind::Raised, 32),
     (Kind::Raised, 100),
     (Kind::Raised, 1_000),
+    (Kind::Adaptive, 1_000),
     (Kind::Risk, 100),
     (Kind::Risk, 1_000),
     (Kind::Hierarchical, 100),
@@ -43,13 +46,15 @@ const SIMULATED: [(Kind, usize); 18] = [
     (Kind::Sequences, 0),
 ];
 /// The same on recorded runs.
-const RECORDED: [(Kind, usize); 16] = [
+const RECORDED: [(Kind, usize); 19] = [
+    (Kind::Bootstrap, 32),
     (Kind::Bootstrap, 100),
     (Kind::Bootstrap, 1_000),
     (Kind::Bootstrap, 10_000),
     (Kind::Raised, 32),
     (Kind::Raised, 100),
     (Kind::Raised, 1_000),
+    (Kind::Adaptive, 1_000),
     (Kind::Risk, 100),
     (Kind::Risk, 1_000),
     (Kind::Hierarchical, 100),
@@ -59,6 +64,7 @@ const RECORDED: [(Kind, usize); 16] = [
     (Kind::RaisedHierarchical, 1_000),
     (Kind::Coarse, 100),
     (Kind::Fine, 100),
+    (Kind::LookAhead, 32),
     (Kind::Merged, 0),
 ];
 /// What is compared run by run, at equal numbers of particles.
@@ -98,14 +104,14 @@ fn exact_cases(
 ) -> Result<(), Box<dyn Error>> {
     let hidden = HiddenMarkov::read(&folder.join("case1_hmm13.json"))?;
     let steps: Vec<_> = hidden.observations.iter().zip(&hidden.filter).collect();
-    let rows = distances::<_, 0>(&hidden, nodes, &steps);
+    let rows = distances::<_, 0>(&hidden, (nodes, &risks_of_thirteen()?), &steps);
     report(archive, "thirteen modes, no continuous state", &rows);
     archive.store("hidden-markov.json", &json!(rows))?;
 
     let jump = JumpLinear::read(&folder.join("case3_jmls3_full.json"))?;
     let observations: Vec<_> = jump.observations().collect();
     let steps: Vec<_> = observations.iter().zip(&jump.filter).collect();
-    let mut rows = distances::<_, 3>(&jump, &[vec![1, 2]], &steps);
+    let mut rows = distances::<_, 3>(&jump, (&[vec![1, 2]], &[1.0; 3]), &steps);
     let seen: Vec<_> = observations
         .iter()
         .map(|z| lanes::linear::Observation {
@@ -133,6 +139,7 @@ fn simulated_runs(
     nodes: &[Vec<usize>],
 ) -> Result<(), Box<dyn Error>> {
     let (planar, _) = Planar::read(folder)?;
+    let risk = risks_of_thirteen()?;
     let mut cells = Vec::new();
     for with_wheels in [true, false] {
         for p_fault in [1e-3, 1e-5, 1e-6] {
@@ -142,7 +149,7 @@ fn simulated_runs(
                 runs: RUNS,
             };
             eprintln!("simulating p(fault) = {p_fault:e}, wheel rates: {with_wheels}");
-            let found = rare_faults(&planar, nodes, &scenario, &SIMULATED);
+            let found = rare_faults(&planar, (nodes, &risk), &scenario, &SIMULATED);
             let title = format!("{RUNS} simulated faults of p = {p_fault:e} per step");
             matched_table(archive, &title, with_wheels, STEP_S, &found);
             let raw: Vec<Value> = found.iter().map(Outcome::json).collect();
@@ -151,6 +158,19 @@ fn simulated_runs(
     }
     archive.store("simulated.json", &json!(cells))?;
     Ok(())
+}
+
+/// Risk of each of thirteen modes: nominal, six stuck wheels, six broken encoders.
+fn risks_of_thirteen() -> Result<Vec<f64>, Box<dyn Error>> {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..");
+    let decision = vigil_setup::load_decision(&root.join("config/rover.pomdp"))?;
+    let wheels = ["LF", "LM", "LR", "RF", "RM", "RR"];
+    let mut names = vec!["ND".to_owned()];
+    for kind in ["STUCK", "ENC"] {
+        names.extend(wheels.iter().map(|wheel| format!("{wheel}_{kind}")));
+    }
+    let modes: Vec<(&str, f64)> = names.iter().map(|name| (name.as_str(), 0.0)).collect();
+    Ok(risks(&decision, &modes, usize::MAX)?)
 }
 
 /// Recorded runs that the model was not learned from.
@@ -176,7 +196,7 @@ fn recorded_runs(archive: &mut Archive) -> Result<(), Box<dyn Error>> {
 /// Every filter at every number of particles against the exact beliefs.
 fn distances<M: Model<N>, const N: usize>(
     model: &M,
-    nodes: &[Vec<usize>],
+    (nodes, risk): (&[Vec<usize>], &[f64]),
     steps: &[(&<M as Model<N>>::Seen, &impl AsRef<[f64]>)],
 ) -> Vec<Value>
 where
@@ -187,7 +207,7 @@ where
         for count in COUNTS.into_iter().filter(|&count| kind.is_sensible(count)) {
             let sampled = kind.is_sampled().then_some(count);
             let make = |seed| -> Box<dyn Filter<Observation = _>> {
-                build::<M, N>(kind, model, nodes, count, seed)
+                build::<M, N>(kind, model, (nodes, risk), count, seed)
             };
             rows.push(row(kind.name(), sampled, make, steps));
             if sampled.is_none() {
@@ -298,6 +318,9 @@ fn matched_table(
                 archive.say(&compare(a, b, step_s));
             }
         }
+    }
+    if let Some(level) = with(Kind::Bootstrap, 10_000).map(Outcome::leaf_share) {
+        archive.say(&particles_for(found, level));
     }
     archive.say("");
 }

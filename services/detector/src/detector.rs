@@ -37,6 +37,17 @@ pub enum DetectorError {
         /// What was found.
         value: f64,
     },
+    /// The calibrated threshold lies above what the form's log-odds can reach.
+    #[error(
+        "detector.form: '{form}' cannot reach the alarm at log-odds {alarm_log_odds:.1} that \
+         false_alarm_interval_h and fault_rate_1_h ask for: lower one of them, or take learned-bias"
+    )]
+    Unreachable {
+        /// Name of the form.
+        form: &'static str,
+        /// The threshold.
+        alarm_log_odds: f64,
+    },
 }
 
 /// The detection filter at frame rate.
@@ -92,12 +103,20 @@ impl Detector {
             schema::Form::Windowed => Form::Windowed,
         };
         let calibration = model.calibration(channels, form)?;
+        let alarm_log_odds = calibration.alarm_log_odds(interval, rate);
+        if alarm_log_odds > form.log_odds_max() {
+            let form = form.name();
+            return Err(DetectorError::Unreachable {
+                form,
+                alarm_log_odds,
+            });
+        }
         let particles = settings.particles;
         Ok(Self {
             observer: Observer::new(model, robot),
             monitor: Monitor::new(model, robot, channels, form, particles, rate, seed),
             fault_rate_1_s: rate / 3600.0,
-            alarm_log_odds: calibration.alarm_log_odds(interval, rate),
+            alarm_log_odds,
             particles,
             run_s: 0.0,
             armed: false,
@@ -230,6 +249,7 @@ impl Detector {
         };
         belief.effective_sample_size = report.effective_sample_size;
         belief.noise_scale = self.monitor.noise_scale();
+        belief.noise_scale_wheels = self.monitor.noise_scale_wheels();
         belief.channel_log_odds = report.channels;
         belief.alarm_t_capture_ns = self.alarm_t_ns;
         belief.alarm = u32::from(self.alarm_t_ns != 0);

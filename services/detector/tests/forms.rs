@@ -102,3 +102,21 @@ fn an_encoder_that_is_a_little_off_is_in_the_blind_spot_of_the_constant_only() {
     });
     assert!(learned >= 18 && windowed >= 18 && constant <= 5);
 }
+
+#[test]
+fn an_alarm_that_could_never_rise_is_refused() {
+    let settings = |form| schema::Detector {
+        form,
+        sensors: Sensors::Pose,
+        false_alarm_interval_h: 1e4,
+        fault_rate_1_h: 3600.0,
+        ..schema::Detector::default()
+    };
+    let build = |form| Detector::new(&model(), &robot(), &settings(form), 1).map(|_| ());
+    assert!(build(Form::LearnedBias).is_ok());
+    let error = build(Form::Constant).unwrap_err().to_string();
+    assert!(
+        error.contains("constant") && error.contains("fault_rate_1_h"),
+        "{error}"
+    );
+}

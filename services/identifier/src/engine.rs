@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::ParticleBlock;
-use vigil_robot::learned::Observation;
+use vigil_robot::learned::{NoiseScales, Observation};
 
 use crate::draw::draw;
 use crate::exact::Exact;
@@ -29,11 +29,11 @@ impl Engine {
         }
     }
 
-    /// Takes one observation; the pose's noise is `noise_scale` times the learned one.
-    pub fn step(&mut self, observation: &Observation, noise_scale: f64) {
+    /// Takes one observation.
+    pub fn step(&mut self, observation: &Observation, noise: NoiseScales) {
         match self {
-            Self::Exact(filter) => filter.step(observation, noise_scale),
-            Self::Generic(filter) => filter.step(observation, noise_scale),
+            Self::Exact(filter) => filter.step(observation, noise),
+            Self::Generic(filter) => filter.step(observation, noise),
         }
     }
 

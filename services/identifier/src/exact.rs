@@ -1,4 +1,7 @@
-//! Exact Bayes over sets of faults and the unknown.
+//! Bayes over sets of faults and the unknown, without sampling.
+//!
+//! Exact for a robot with two stuck wheels at most, but for onsets: hypotheses about them start from
+//! the most probable one of each kind, and the least probable are dropped.
 //!
 //! The motion tells stuck wheels apart: one track per (motion mode, onset), a motion mode being
 //! nominal, one stuck wheel, two, or unknown. Broken encoders do not move the robot: given the
@@ -12,7 +15,7 @@ use vigil_inference::bank::{Bank, Hypothesis};
 use vigil_inference::track::Track;
 use vigil_robot::Description;
 use vigil_robot::learned::{
-    FaultRates, Model, MotionMode, Moved, Observation, WheelEvidence, motion_modes,
+    FaultRates, Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
 };
 
 use crate::encoders::{Encoders, Likelihoods};
@@ -61,16 +64,15 @@ pub struct Exact {
 }
 
 impl Exact {
-    /// A filter over the leaves of a tree. `p_unknown` is the prior share of the unknown.
+    /// A filter over the leaves of a tree, whose faults come and go with these rates.
     #[must_use]
     pub fn new(
         model: &Model,
         robot: &Description,
         leaves: &Leaves,
         use_wheels: bool,
-        p_unknown: f64,
+        rates: FaultRates,
     ) -> Self {
-        let rates = fault_rates(leaves, p_unknown);
         // A pose alone cannot tell two stuck wheels from one on another soil.
         let modes = motion_modes(model, leaves.stuck_wheels(), use_wheels);
         let is_leaf = leaves.encoder.map(|leaf| leaf.is_some());
@@ -117,9 +119,9 @@ impl Exact {
         all.map(|hypothesis| (self.modes[hypothesis.mode].moved, hypothesis))
     }
 
-    /// Takes one observation; the pose's noise is `noise_scale` times the learned one.
-    pub fn step(&mut self, observation: &Observation, noise_scale: f64) {
-        let variance = observation.pose_variance(&self.model, noise_scale);
+    /// Takes one observation.
+    pub fn step(&mut self, observation: &Observation, noise: NoiseScales) {
+        let variance = observation.pose_variance(&self.model, noise.pose);
         if observation.anchor {
             if observation.pose_frames > 0 {
                 for hypothesis in self.bank.hypotheses_mut() {
@@ -137,18 +139,18 @@ impl Exact {
             return;
         }
         if self.use_wheels {
-            self.weigh_wheels(observation);
+            self.weigh_wheels(observation, noise.wheels);
         }
         let mut failed = false;
         if observation.pose_frames > 0 {
             for hypothesis in self.bank.hypotheses_mut() {
-                match hypothesis.state.track.update(observation.pose, variance) {
-                    Some(log_likelihood) => hypothesis.log_weight += log_likelihood,
-                    None => failed = true,
-                }
+                let gained = hypothesis.state.track.update(observation.pose, variance);
+                // Those that cannot take it are dropped, unless none can: then nothing changes.
+                failed |= gained.is_none();
+                hypothesis.log_weight += gained.unwrap_or(2.0 * FLOOR);
             }
         }
-        if failed || self.bank.normalise(FLOOR).is_none() {
+        if self.bank.normalise(FLOOR).is_none() || failed {
             self.degenerate_count = self.degenerate_count.saturating_add(1);
         }
     }
@@ -194,8 +196,8 @@ impl Exact {
     }
 
     /// Weighs by the wheels' readings. Each is evaluated once per motion mode, not per hypothesis.
-    fn weigh_wheels(&mut self, observation: &Observation) {
-        let evidence = WheelEvidence::new(&self.model, &self.robot, observation);
+    fn weigh_wheels(&mut self, observation: &Observation, noise_scale: f64) {
+        let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise_scale);
         let births = self.births_1_s.map(|rate| rate * observation.dt_s);
         let death = self.rates.death_1_s * observation.dt_s;
         let first_ns = observation.t_first_ns;

@@ -19,7 +19,7 @@ use vigil_inference::proposal::Proposal;
 use vigil_inference::resample::Resampling;
 use vigil_inference::track::TRACK_DIMENSION;
 use vigil_robot::learned::switching::{MODES_MAX, Seen};
-use vigil_robot::learned::{Moved, Observation, Switching};
+use vigil_robot::learned::{Moved, NoiseScales, Observation, Switching};
 use vigil_setup::schema::{self, IdentifierFilter};
 
 use crate::assemble::Models;
@@ -180,8 +180,8 @@ impl Generic {
         self.degenerate_count
     }
 
-    /// Takes one observation; the pose's noise is `noise_scale` times the learned one.
-    pub fn step(&mut self, observation: &Observation, noise_scale: f64) {
+    /// Takes one observation.
+    pub fn step(&mut self, observation: &Observation, noise: NoiseScales) {
         let mut observation = *observation;
         observation.travel_m += std::mem::take(&mut self.pending_m);
         let is_useful = observation.moving || observation.anchor && observation.pose_frames > 0;
@@ -191,7 +191,7 @@ impl Generic {
             return;
         }
         let use_wheels = self.use_wheels;
-        let seen = self.model_mut().look(&observation, noise_scale, use_wheels);
+        let seen = self.model_mut().look(&observation, noise, use_wheels);
         let step = match &mut self.kind {
             Kind::Sampled(filter) => filter.step(&seen),
             Kind::Hierarchical(filter) => filter.step(&seen),
@@ -255,23 +255,27 @@ impl Generic {
             .map_or(0, |mode| self.since_ns[mode])
     }
 
-    /// Fills `out` with at most `count` particles.
+    /// Fills `out` with at most `count` particles; of more, evenly chosen ones (after resampling
+    /// they lie in order).
     pub fn draw(&self, count: usize, rng: &mut Pcg64Mcg, out: &mut ParticleBlock) {
         let count = count.min(PARTICLE_CAPACITY);
         out.count = 0;
         match &self.kind {
             Kind::Sampled(filter) => {
-                for (mode, state, weight) in filter.particles().take(count) {
+                let stride = filter.count().div_ceil(count.max(1)).max(1);
+                for (mode, state, weight) in filter.particles().step_by(stride) {
                     self.push(out, state.pose, mode, weight);
                 }
             }
             Kind::Hierarchical(filter) => {
-                for (state, shares, weight) in filter.particles().take(count) {
+                let stride = filter.particles().count().div_ceil(count.max(1)).max(1);
+                for (state, shares, weight) in filter.particles().step_by(stride) {
                     self.push(out, state.pose, pick(shares, rng), weight);
                 }
             }
             Kind::LookAhead(filter) => {
-                for (mode, state) in filter.particles().take(count) {
+                let stride = filter.particles().count().div_ceil(count.max(1)).max(1);
+                for (mode, state) in filter.particles().step_by(stride) {
                     self.push(out, scatter(state, rng), mode, 1.0);
                 }
             }

@@ -9,13 +9,13 @@ use vigil_blocks::{
     DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock,
     SensorFrame,
 };
-use vigil_robot::learned::{Observation, Observer};
+use vigil_robot::learned::{NoiseScales, Observation, Observer};
 use vigil_setup::schema;
 
 use crate::assemble::Models;
 use crate::draw::{copy, moments};
 use crate::engine::Engine;
-use crate::exact::{BIRTH_1_S, DEATH_1_S, Exact};
+use crate::exact::{BIRTH_1_S, DEATH_1_S, Exact, fault_rates};
 use crate::generic::Generic;
 use crate::modes::{IdentifierError, Leaves};
 use crate::posterior::Posterior;
@@ -43,7 +43,7 @@ pub struct Input<'a> {
 #[derive(Debug, Clone, Copy)]
 struct Kept {
     observation: Observation,
-    noise_scale: f64,
+    noise: NoiseScales,
     pose: Option<(Vector3<f64>, Matrix3<f64>)>,
 }
 
@@ -67,7 +67,7 @@ enum Phase {
 /// The identification filter at frame rate.
 ///
 /// Before an alarm it reports nominal with 1 - p(fault) and keeps a ring of observations, each
-/// with the moments of the detector's particles. An alarm starts the exact filter from the pose
+/// with the moments of the detector's particles. An alarm starts the filter from the pose
 /// that the detector's particles had at the beginning of the ring: the fault had not happened yet,
 /// and the particles of later cycles follow a nominal model that no longer holds. The ring is
 /// worked off within about 0.1 s, a bounded number of observations per cycle; until then the
@@ -103,7 +103,7 @@ struct Detection {
     alarm: bool,
     t_ns: u64,
     p_fault: f64,
-    noise_scale: f64,
+    noise: NoiseScales,
 }
 
 impl Identifier {
@@ -127,8 +127,8 @@ impl Identifier {
         let use_wheels = sensors == schema::Sensors::PoseEncoders;
         let engine = match settings.filter {
             schema::IdentifierFilter::Exact => {
-                let p_unknown = settings.p_unknown;
-                let filter = Exact::new(model, robot, &leaves, use_wheels, p_unknown);
+                let rates = fault_rates(&leaves, settings.p_unknown);
+                let filter = Exact::new(model, robot, &leaves, use_wheels, rates);
                 Engine::Exact(Box::new(filter))
             }
             _ => {
@@ -152,10 +152,7 @@ impl Identifier {
             ring: VecDeque::with_capacity(capacity),
             capacity,
             phase: Phase::Watching,
-            detection: Detection {
-                noise_scale: 1.0,
-                ..Detection::default()
-            },
+            detection: Detection::default(),
             posterior: Posterior::nominal(),
             predicted: Posterior::nominal(),
             mode: 0,
@@ -197,10 +194,7 @@ impl Identifier {
         self.ring.clear();
         self.drawn.count = 0;
         self.phase = Phase::Watching;
-        self.detection = Detection {
-            noise_scale: 1.0,
-            ..Detection::default()
-        };
+        self.detection = Detection::default();
         self.posterior = Posterior::nominal();
         self.predicted = self.posterior;
         self.reasons.clear();
@@ -213,15 +207,17 @@ impl Identifier {
         }
         self.run_id = input.frame.run_id;
         if let Some((belief, _)) = input.detection {
-            let scale = belief.noise_scale;
+            let sane = |scale: f64| match scale > 0.1 && scale < 100.0 {
+                true => scale,
+                false => 1.0,
+            };
             self.detection = Detection {
                 alarm: belief.alarm != 0,
                 t_ns: belief.alarm_t_capture_ns,
                 p_fault: belief.p_fault,
-                noise_scale: if scale > 0.1 && scale < 100.0 {
-                    scale
-                } else {
-                    1.0
+                noise: NoiseScales {
+                    pose: sane(belief.noise_scale),
+                    wheels: sane(belief.noise_scale_wheels),
                 },
             };
         }
@@ -252,7 +248,7 @@ impl Identifier {
         }
         self.ring.push_back(Kept {
             observation: *self.observer.observation(),
-            noise_scale: self.detection.noise_scale,
+            noise: self.detection.noise,
             pose: input.detection.and_then(|(_, block)| moments(block)),
         });
     }
@@ -282,7 +278,7 @@ impl Identifier {
         let mut moved_s = 0.0;
         for i in next..next + taken {
             let Some(kept) = self.ring.get(i) else { break };
-            self.engine.step(&kept.observation, kept.noise_scale);
+            self.engine.step(&kept.observation, kept.noise);
             moved_s += if kept.observation.moving {
                 kept.observation.dt_s
             } else {
@@ -303,7 +299,7 @@ impl Identifier {
             .predicted
             .predicted(&self.leaves, self.p_unknown, birth, death);
         self.engine.posterior(&self.leaves, &mut self.posterior);
-        self.find_reasons(next + taken);
+        self.find_reasons(next, next + taken);
         self.updated = true;
         let recovered = self.posterior.nodes[0] > RECOVERED;
         if recovered && !self.detection.alarm {
@@ -311,15 +307,12 @@ impl Identifier {
         }
     }
 
-    /// Follows the diagnosis and its rival: anew from the onset when the diagnosis has changed. The
-    /// observations before index `end` have been taken.
-    fn find_reasons(&mut self, end: usize) {
+    /// Follows the diagnosis and its rival over the observations `first..end`, which have just been
+    /// taken: anew from the onset when the diagnosis has changed.
+    fn find_reasons(&mut self, first: usize, end: usize) {
         let (mode, _) = self.posterior.mode(&self.leaves);
         if mode == self.mode {
-            if let Some(last) = self.ring.get(end.saturating_sub(1)) {
-                let (observation, scale) = (&last.observation, last.noise_scale);
-                self.reasons.follow(observation, scale);
-            }
+            self.follow(first, end);
             return;
         }
         self.reasons.clear();
@@ -329,8 +322,9 @@ impl Identifier {
             _ => self.onset_of_leaf(),
         };
         // The last pose from before the onset, not too long ago: the work of a cycle is bounded.
+        let end = end.min(self.ring.len());
         let earliest = end.saturating_sub(REASONS_MAX);
-        let taken = self.ring.range(earliest..end.min(self.ring.len()));
+        let taken = self.ring.range(earliest..end);
         let before = taken.take_while(|kept| kept.observation.t_ns <= onset_ns);
         let start = earliest + before.count().saturating_sub(1);
         let Some(pose) = self.ring.get(start).map(Kept::pose) else {
@@ -338,10 +332,13 @@ impl Identifier {
         };
         let (posterior, leaves) = (&self.posterior, &self.leaves);
         self.reasons.begin(posterior, leaves, pose, onset_ns);
-        for i in start + 1..end {
+        self.follow(start + 1, end);
+    }
+
+    fn follow(&mut self, first: usize, end: usize) {
+        for i in first..end {
             let Some(kept) = self.ring.get(i) else { break };
-            let (observation, scale) = (&kept.observation, kept.noise_scale);
-            self.reasons.follow(observation, scale);
+            self.reasons.follow(&kept.observation, kept.noise);
         }
     }
 
@@ -433,14 +430,14 @@ fn check(settings: &schema::Identifier) -> Result<(), IdentifierError> {
             allowed,
         })
     };
-    if !(1..=PARTICLE_CAPACITY).contains(&settings.particles) {
-        return refuse("particles", settings.particles as f64, "1 to 4096");
+    if !(32..=PARTICLE_CAPACITY).contains(&settings.particles) {
+        return refuse("particles", settings.particles as f64, "32 to 4096");
     }
-    if !(settings.ring_s >= 0.1 && settings.ring_s <= 60.0) {
-        return refuse("ring_s", settings.ring_s, "0.1 to 60");
+    if !(0.5..=30.0).contains(&settings.ring_s) {
+        return refuse("ring_s", settings.ring_s, "0.5 to 30");
     }
-    if !(settings.p_unknown >= 0.0 && settings.p_unknown <= 0.9) {
-        return refuse("p_unknown", settings.p_unknown, "0 to 0.9");
+    if !(0.0..=0.5).contains(&settings.p_unknown) {
+        return refuse("p_unknown", settings.p_unknown, "0 to 0.5");
     }
     Ok(())
 }

@@ -17,6 +17,9 @@ mod sets;
 pub mod wiring;
 
 pub use assemble::{Models, assemble};
+pub use exact::Exact;
 pub use identifier::{Identifier, Input};
-pub use modes::IdentifierError;
+pub use modes::{IdentifierError, Leaves};
+pub use posterior::Posterior;
+pub use risk::risks;
 pub use wiring::IdentifierStage;

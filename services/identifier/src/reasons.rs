@@ -9,7 +9,9 @@ use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
 use vigil_inference::track::Track;
 use vigil_robot::Description;
-use vigil_robot::learned::{Model, MotionMode, Moved, Observation, WheelEvidence, motion_modes};
+use vigil_robot::learned::{
+    Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
+};
 
 use crate::exact::is_new;
 use crate::modes::Leaves;
@@ -124,11 +126,11 @@ impl Reasons {
     }
 
     /// Takes the next observation.
-    pub fn follow(&mut self, observation: &Observation, noise_scale: f64) {
+    pub fn follow(&mut self, observation: &Observation, noise: NoiseScales) {
         let Some(mut followed) = self.followed else {
             return;
         };
-        let variance = observation.pose_variance(&self.model, noise_scale);
+        let variance = observation.pose_variance(&self.model, noise.pose);
         for Lineage { mode, track, .. } in &mut followed {
             let mode = &self.modes[*mode];
             if !observation.anchor {
@@ -140,7 +142,7 @@ impl Reasons {
         }
         if observation.moving && !observation.anchor {
             if self.use_wheels {
-                self.hear_wheels(&mut followed, observation);
+                self.hear_wheels(&mut followed, observation, noise.wheels);
             }
             if observation.pose_frames > 0 {
                 for Lineage { track, heard, .. } in &mut followed {
@@ -152,8 +154,13 @@ impl Reasons {
         self.followed = Some(followed);
     }
 
-    fn hear_wheels(&self, followed: &mut [Lineage; 2], observation: &Observation) {
-        let evidence = WheelEvidence::new(&self.model, &self.robot, observation);
+    fn hear_wheels(
+        &self,
+        followed: &mut [Lineage; 2],
+        observation: &Observation,
+        noise_scale: f64,
+    ) {
+        let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise_scale);
         let is_new = is_new(observation.t_ns, self.onset_ns);
         for lineage in followed {
             let moved = self.modes[lineage.mode].moved;

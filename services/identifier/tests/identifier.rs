@@ -439,7 +439,7 @@ fn frame() -> impl Strategy<Value = SensorFrame> {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: 100,
+        cases: 200,
         failure_persistence: None,
         ..ProptestConfig::default()
     })]
@@ -447,8 +447,10 @@ proptest! {
     fn no_input_breaks_the_belief(
         frames in prop::collection::vec(frame(), 1..60),
         p_fault in any::<f64>(), noise_scale in any::<f64>(), from_s in 0.0..2.0_f64,
+        filter in prop::sample::select(schema::IdentifierFilter::value_variants()),
     ) {
-        let mut bench = Bench::new(schema::Sensors::PoseEncoders, Alarm::between(from_s, 1e9));
+        let alarm = Alarm::between(from_s, 1e9);
+        let mut bench = Bench::with(filter, schema::Sensors::PoseEncoders, alarm);
         let mut t_ns = 0_u64;
         for (i, mut frame) in frames.into_iter().enumerate() {
             if i % 5 != 0 {
@@ -458,6 +460,7 @@ proptest! {
             bench.alarm.set(&frame);
             bench.alarm.belief.p_fault = p_fault;
             bench.alarm.belief.noise_scale = noise_scale;
+            bench.alarm.belief.noise_scale_wheels = noise_scale;
             let detection = (i % 4 != 0).then_some((&bench.alarm.belief, &*bench.alarm.particles));
             let entry = Entry::Frame(Input { frame: &frame, detection });
             bench.identifier.step(entry, &mut bench.belief, &mut bench.particles);

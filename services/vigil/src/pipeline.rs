@@ -90,10 +90,7 @@ impl Pipeline {
             .filter(|i| leaves >> i & 1 == 1)
             .map(name)
             .collect();
-        let stuck = |side| {
-            let leaves = self.taxonomy.leaves("stuck", side);
-            leaves.map(|i| belief.p[i]).sum::<f64>().min(1.0)
-        };
+        let stuck = |side| any_of(belief, self.taxonomy.leaves("stuck", side));
         Verdict {
             t_s: t_ns as f64 / 1e9,
             p_fault: self.detection.p_fault,
@@ -110,5 +107,41 @@ impl Pipeline {
             p_right_stuck: stuck(Side::Right),
             p_nodes: belief.p[..(belief.node_count as usize).min(belief.p.len())].to_vec(),
         }
+    }
+}
+
+/// Probability that any of some leaves' faults is present. Leaves may be present together, so that
+/// their probabilities may add up to more: the most probable sets are counted once each, what they
+/// leave of each leaf is added.
+fn any_of(belief: &FaultBelief, leaves: impl Iterator<Item = usize>) -> f64 {
+    let sets = &belief.sets[..(belief.set_count as usize).min(belief.sets.len())];
+    let (mut wanted, mut sum) = (0_u64, 0.0);
+    for leaf in leaves {
+        wanted |= 1 << leaf;
+        let counted = sets.iter().filter(|set| set.leaves >> leaf & 1 == 1);
+        sum += (belief.p[leaf] - counted.map(|set| set.p).sum::<f64>()).max(0.0);
+    }
+    let any = sets.iter().filter(|set| set.leaves & wanted != 0);
+    (sum + any.map(|set| set.p).sum::<f64>()).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vigil_blocks::FaultSet;
+
+    #[test]
+    fn leaves_that_are_present_together_are_counted_once() {
+        let mut belief = FaultBelief::default();
+        (belief.p[3], belief.p[4], belief.set_count) = (0.55, 0.52, 3);
+        let set = |leaves, p| FaultSet { leaves, p };
+        belief.sets[..3].copy_from_slice(&[
+            set(1 << 3 | 1 << 4, 0.5),
+            set(0, 0.4),
+            set(1 << 3, 0.04),
+        ]);
+        // Half for both, 0.04 for one alone, and what no listed set accounts for: 0.01 and 0.02.
+        assert!((any_of(&belief, [3, 4].into_iter()) - 0.57).abs() < 1e-12);
+        assert!((any_of(&belief, [4].into_iter()) - 0.52).abs() < 1e-12);
     }
 }

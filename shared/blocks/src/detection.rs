@@ -37,7 +37,7 @@ impl Channel {
 
 block! {
     /// Written by the detector every cycle.
-    pub struct DetectionBelief, size 416 {
+    pub struct DetectionBelief, size 424 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -54,8 +54,10 @@ block! {
         pub evidence: f64,
         /// Effective sample size of the particles, before resampling.
         pub effective_sample_size: f64,
-        /// Estimated ratio of the measurement noise to the learned one.
+        /// Estimated ratio of the pose's noise to the learned one (standard deviations).
         pub noise_scale: f64,
+        /// The same for the wheel rates.
+        pub noise_scale_wheels: f64,
         /// Log-odds of a fault seen by each channel alone (see [`Channel`]).
         pub channel_log_odds: [f64; CHANNELS],
         /// Capture time of the frame that raised the present alarm, ns; 0 without alarm.

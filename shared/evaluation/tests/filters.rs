@@ -5,12 +5,14 @@ use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
-use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Linear, PoseAndWheels};
+use rand::SeedableRng;
+use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Linear, Planar, PoseAndWheels};
+use vigil_inference::adaptive::Adaptive;
 use vigil_inference::bootstrap::ParticleFilter;
 use vigil_inference::filter::Filter;
 use vigil_inference::forward::Forward;
 use vigil_inference::hierarchical::Hierarchical;
-use vigil_inference::hybrid::Conditional;
+use vigil_inference::hybrid::{Conditional, Modes, Sampled};
 use vigil_inference::look_ahead::LookAhead;
 use vigil_inference::merged::Merged;
 use vigil_inference::proposal::Proposal;
@@ -365,6 +367,85 @@ fn the_hierarchy_keeps_belief_and_evidence_and_needs_fewer_particles() {
     assert!(found < 0.04 && bias.abs() < 0.3, "{found}, bias {bias}");
 }
 
+#[test]
+fn nothing_measured_is_nothing_learned_by_raised_proposals() {
+    let case = jump_linear();
+    let observations: Vec<_> = case.observations().take(4).collect();
+    let nothing = PoseAndWheels {
+        pose: [f64::NAN; 3],
+        wheels: [f64::NAN; 2],
+    };
+    let resampling = Resampling::default();
+    let raised = Proposal::raised(&case, 0.5).unwrap();
+    let hierarchical = Hierarchical::new(case.clone(), &[vec![1, 2]], resampling, 20_000, 1);
+    let filters: [Box<dyn Filter<Observation = PoseAndWheels>>; 2] = [
+        Box::new(ParticleFilter::new(
+            case.clone(),
+            raised,
+            resampling,
+            20_000,
+            1,
+        )),
+        Box::new(hierarchical.unwrap().with_raised_proposals(0.5)),
+    ];
+    for mut filter in filters {
+        for z in &observations {
+            filter.step(z);
+        }
+        let before = filter.posterior().to_vec();
+        assert!(filter.step(&nothing).event.is_some());
+        let chain = |to: usize| -> f64 {
+            let from = before.iter().enumerate();
+            from.map(|(from, p)| p * case.transition(from, to)).sum()
+        };
+        let expected = [0, 1, 2].map(chain);
+        let found = filter.posterior();
+        assert!(
+            distance(found, &expected) < 0.02,
+            "{found:?}, not {expected:?}"
+        );
+    }
+}
+
+/// Share of simulated faults whose leaf a hierarchical filter names by the pose alone, with the
+/// nodes tracked as the rule says, always merged, always split.
+#[test]
+fn the_rule_is_about_as_good_as_the_best_fixed_resolution() {
+    const RUNS: u64 = 60;
+    let folder = path("");
+    let (planar, _) = Planar::read(&folder).unwrap();
+    let model = planar.with_rates(1e-3, 0.01);
+    let nodes = [vec![1, 2, 3], vec![4, 5, 6]];
+    let right = |fixed: Option<bool>| {
+        let named = |seed: u64| {
+            let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
+            let fault = 1 + (seed % 6) as usize;
+            let resampling = Resampling::default();
+            let filter = Hierarchical::new(model.clone(), &nodes, resampling, 100, seed);
+            let mut filter = filter.unwrap().with_raised_proposals(0.5);
+            if let Some(merged) = fixed {
+                filter = filter.with_fixed_resolution(merged);
+            }
+            let mut pose = model.draw(0, &mut rng);
+            for t in 0..120 {
+                let mode = if t < 20 { 0 } else { fault };
+                pose = model.propagate(mode, &pose, &mut rng);
+                filter.step(&model.measure(mode, &pose, false, &mut rng));
+            }
+            let p = filter.posterior();
+            (0..p.len()).max_by(|&a, &b| p[a].total_cmp(&p[b])) == Some(fault)
+        };
+        (0..RUNS).filter(|&seed| named(seed)).count()
+    };
+    let (rule, merged, split) = (right(None), right(Some(true)), right(Some(false)));
+    // Three runs are five points: what 60 runs can resolve.
+    assert!(
+        rule + 3 >= merged.max(split),
+        "rule {rule}, merged {merged}, split {split}"
+    );
+    assert!(rule * 2 > RUNS as usize, "{rule} of {RUNS}");
+}
+
 fn is_sound(p: &[f64]) -> bool {
     p.iter().all(|p| (0.0..=1.0).contains(p)) && (p.iter().sum::<f64>() - 1.0).abs() < 1e-9
 }
@@ -372,8 +453,15 @@ fn is_sound(p: &[f64]) -> bool {
 fn small_filters(case: &JumpLinear) -> Vec<Box<dyn Filter<Observation = PoseAndWheels>>> {
     let resampling = Resampling::default();
     let hierarchical = Hierarchical::new(case.clone(), &[vec![1, 2]], resampling, 30, 1).unwrap();
+    let sampled = |proposal| ParticleFilter::new(case.clone(), proposal, resampling, 30, 1);
+    let raised = || Proposal::raised(case, 0.5).unwrap();
+    let risk = Proposal::risk_raised(case, 0.5, &[1.0, 9.0, 3.0]).unwrap();
+    let adaptive = Adaptive::new(0.05, 2.33, 10, 30);
     vec![
         Box::new(bootstrap(case, resampling, 30, 1)),
+        Box::new(sampled(raised())),
+        Box::new(sampled(risk)),
+        Box::new(sampled(raised()).with_adaptive_count(adaptive)),
         Box::new(hierarchical.clone()),
         Box::new(hierarchical.with_raised_proposals(0.5)),
         Box::new(LookAhead::<_, 3>::new(case.clone(), 10, 1)),

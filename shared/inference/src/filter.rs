@@ -46,7 +46,9 @@ pub(crate) fn normalise_into(log_p: &[f64], p: &mut [f64]) -> bool {
     }
     let mut sum = 0.0;
     for (p, log_p) in p.iter_mut().zip(log_p) {
-        *p = (log_p - highest).exp();
+        let value = (log_p - highest).exp();
+        // Not a number is impossible.
+        *p = if value.is_nan() { 0.0 } else { value };
         sum += *p;
     }
     for p in p.iter_mut() {

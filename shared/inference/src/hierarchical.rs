@@ -10,13 +10,16 @@
 //! observation, `s_k' ∝ s_k p(c' | k, c) p(z | k, c')`, and the particle's weight is multiplied by
 //! `Σ s_k p(c'|k,c) p(z|k,c') / Σ s_k p(c'|k,c)`. So nothing is lost when it moves down.
 //!
-//! When an abstract node is worth its coarseness is decided by the rule of the variable resolution
-//! filter (Verma, Thrun and Simmons, IJCAI 2003): with the mass p_A of a node, p_k of its leaves,
-//! their prior shares π_k and N particles, the squared error of the coarse answer
-//! `Σ (p_k - π_k p_A)² + p_A (1 - p_A) Σ π_k² / N` is set against that of the fine one
-//! `Σ p_k (1 - p_k) / N`; a node is split when the coarse error is larger, merged again when it is
-//! smaller by the factor 2. In a tree of several levels the fine answer is that of the node's
-//! children, so that particles move down one level at a time.
+//! When is an abstract node worth its coarseness? The rule of the variable resolution filter (Verma,
+//! Thrun and Simmons, IJCAI 2003) weighs the bias of a coarse answer, which divides the node's mass
+//! `p_A` by prior shares, against the variance `p_k (1 - p_k) / N` of the fine one. As shares are
+//! carried here, the coarse answer has no such bias: per node, the variance of both answers is that
+//! of the node's mass, and a split adds `p_A Σ s_k (1 - s_k) / N`, with the shares `s_k` of what
+//! lies directly below: noise that the other leaves, should the data turn, have to grow from. So a
+//! node is split when that is next to nothing, its leaves having been told apart (a share above
+//! 0.999), for a split node costs one likelihood per particle and not one per leaf; it is merged
+//! again when they blur (below 0.99). In a tree of several levels particles move down one level at
+//! a time.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -26,8 +29,11 @@ use crate::hybrid::{Modes, Sampled};
 use crate::resample::Resampling;
 use crate::weights::Weights;
 
-/// A node is merged again when the coarse error is smaller than the fine one by this factor.
-const HYSTERESIS: f64 = 2.0;
+/// Largest share below a node at which it is split, and below which it is merged again.
+const SPLIT: f64 = 0.999;
+const MERGE: f64 = 0.99;
+/// A node whose mass is less than this many particles' is merged: nothing is told apart there.
+const PARTICLES_MIN: f64 = 3.0;
 
 /// Why a hierarchy was refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -51,8 +57,6 @@ pub enum HierarchyError {
 #[derive(Debug, Clone)]
 struct Node {
     leaves: Vec<usize>,
-    /// π: shares of the leaves in what the nominal mode passes on to the node.
-    prior: Vec<f64>,
     /// Nodes directly below, and leaves below none of them.
     nodes_below: Vec<usize>,
     leaves_below: Vec<usize>,
@@ -74,6 +78,8 @@ pub struct Hierarchical<M: Sampled> {
     shares: Vec<f64>,
     other_shares: Vec<f64>,
     weights: Weights,
+    /// What each particle's weight pays for its proposal.
+    paid: Vec<f64>,
     increments: Vec<f64>,
     ancestors: Vec<u32>,
     predicted: Vec<f64>,
@@ -113,6 +119,7 @@ impl<M: Sampled> Hierarchical<M> {
             shares: vec![0.0; count * modes],
             other_shares: vec![0.0; count * modes],
             weights: Weights::equal(count),
+            paid: vec![0.0; count],
             increments: vec![0.0; count],
             ancestors: vec![0; count],
             predicted: vec![0.0; modes],
@@ -307,18 +314,6 @@ impl<M: Sampled> Hierarchical<M> {
         self.weights.level(self.states.len());
     }
 
-    /// Squared error of the coarse answer of a node: bias and variance.
-    fn coarse(&self, index: usize) -> f64 {
-        let node = &self.nodes[index];
-        let count = self.states.len() as f64;
-        let mass: f64 = node.leaves.iter().map(|&k| self.posterior[k]).sum();
-        let terms = node.leaves.iter().zip(&node.prior).map(|(&k, prior)| {
-            let bias = self.posterior[k] - prior * mass;
-            bias * bias + mass * (1.0 - mass) * prior * prior / count
-        });
-        terms.sum()
-    }
-
     /// Splits and merges nodes by the rule above, one level at a time.
     fn choose_resolution(&mut self) {
         if self.is_fixed {
@@ -327,15 +322,22 @@ impl<M: Sampled> Hierarchical<M> {
         let count = self.states.len() as f64;
         for index in 0..self.nodes.len() {
             let node = &self.nodes[index];
-            let leaf = |&k: &usize| self.posterior[k] * (1.0 - self.posterior[k]) / count;
-            let below = node.nodes_below.iter().map(|&child| self.coarse(child));
-            let fine = node.leaves_below.iter().map(leaf).chain(below).sum::<f64>();
-            let coarse = self.coarse(index);
+            let mass = |leaves: &[usize]| leaves.iter().map(|&k| self.posterior[k]).sum::<f64>();
+            let nodes = node
+                .nodes_below
+                .iter()
+                .map(|&n| mass(&self.nodes[n].leaves));
+            let leaves = node.leaves_below.iter().map(|&k| self.posterior[k]);
+            let (total, largest) = (mass(&node.leaves), leaves.chain(nodes).fold(0.0, f64::max));
             let is_parent_of_merged = node.nodes_below.iter().all(|&n| self.nodes[n].merged);
-            if node.merged && coarse > fine {
+            let is_populated = total * count >= PARTICLES_MIN;
+            if node.merged && is_populated && largest > SPLIT * total {
                 self.nodes[index].merged = false;
                 self.split(index);
-            } else if !node.merged && is_parent_of_merged && coarse * HYSTERESIS < fine {
+            } else if !node.merged
+                && is_parent_of_merged
+                && (!is_populated || largest < MERGE * total)
+            {
                 self.nodes[index].merged = true;
             }
         }
@@ -402,15 +404,10 @@ fn arrange(
             .find(|&node| abstract_nodes[node].len() > size)
     };
     let nodes = abstract_nodes.iter().enumerate().map(|(index, leaves)| {
-        let births: Vec<f64> = leaves.iter().map(|&k| model.transition(0, k)).collect();
-        let total: f64 = births.iter().sum();
-        let equal = 1.0 / leaves.len() as f64;
-        let share = |birth: f64| if total > 0.0 { birth / total } else { equal };
         let others = abstract_nodes.iter().enumerate();
         let nodes_below = others.filter(|(_, o)| next_above(o[0], o.len()) == Some(index));
         let leaves_below = leaves.iter().copied();
         Node {
-            prior: births.iter().map(|&birth| share(birth)).collect(),
             nodes_below: nodes_below.map(|(other, _)| other).collect(),
             leaves_below: leaves_below
                 .filter(|&k| next_above(k, 1) == Some(index))
@@ -442,10 +439,14 @@ impl<M: Sampled> Filter for Hierarchical<M> {
 
     fn step(&mut self, z: &M::Observation) -> Step {
         for i in 0..self.states.len() {
-            let paid = self.predict_shares(i);
-            self.increments[i] = paid + self.move_particle(i, z);
+            self.paid[i] = self.predict_shares(i);
+            self.increments[i] = self.paid[i] + self.move_particle(i, z);
         }
         let updated = self.weights.absorb(&self.increments);
+        if updated.is_none() {
+            // Predicted, not updated: the proposal is to be paid all the same.
+            self.weights.absorb(&self.paid);
+        }
         self.sum_modes();
         let effective_sample_size = self.weights.effective_sample_size();
         let limit = self.resampling.threshold * self.states.len() as f64;

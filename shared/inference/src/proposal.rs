@@ -42,7 +42,7 @@ pub enum ProposalError {
         found: f64,
     },
     /// A probability of leaving is out of range.
-    #[error("the share {0} is out of range: allowed is 0 to 1")]
+    #[error("the share {0} is out of range: allowed is above 0 and below 1")]
     Share(f64),
 }
 
@@ -88,7 +88,7 @@ impl Proposal {
         leave: f64,
         risk: &[f64],
     ) -> Result<Self, ProposalError> {
-        if !(0.0..=1.0).contains(&leave) {
+        if !(leave > 0.0 && leave < 1.0) {
             return Err(ProposalError::Share(leave));
         }
         check(model, risk)?;

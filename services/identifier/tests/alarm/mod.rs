@@ -14,6 +14,7 @@ impl Alarm {
     pub fn between(from_s: f64, to_s: f64) -> Self {
         let belief = DetectionBelief {
             noise_scale: 1.0,
+            noise_scale_wheels: 1.0,
             ..DetectionBelief::default()
         };
         Self {

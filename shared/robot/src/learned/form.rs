@@ -26,6 +26,16 @@ pub enum Form {
 }
 
 impl Form {
+    /// Log-odds that a group of channels cannot exceed for long: an alarm above them might never
+    /// rise.
+    #[must_use]
+    pub fn log_odds_max(self) -> f64 {
+        match self {
+            Self::LearnedBias => f64::INFINITY,
+            Self::Constant | Self::Windowed => -VANISHES.ln(),
+        }
+    }
+
     /// Every form.
     pub const ALL: [Self; 3] = [Self::LearnedBias, Self::Constant, Self::Windowed];
 

@@ -9,6 +9,24 @@ const PRIOR: f64 = 60.0;
 /// Samples over which the estimate forgets.
 const MEMORY: f64 = 900.0;
 
+/// How much noisier the sensors are than the learned ones, as ratios of standard deviations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseScales {
+    /// The pose sensor.
+    pub pose: f64,
+    /// The wheels' encoders.
+    pub wheels: f64,
+}
+
+impl Default for NoiseScales {
+    fn default() -> Self {
+        Self {
+            pose: 1.0,
+            wheels: 1.0,
+        }
+    }
+}
+
 /// Running estimate of the ratio of measurement variance to the learned variance, from differences
 /// that no slow motion and no persistent fault affects.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -16,7 +16,9 @@ use vigil_inference::hybrid::{Conditional, Modes, Sampled};
 use vigil_inference::logspace::{log_add, log_normal};
 use vigil_inference::track::{Displacement, TRACK_DIMENSION, Track};
 
-use super::{FaultRates, Model, MotionMode, Moved, Observation, WheelEvidence, motion_modes};
+use super::{
+    FaultRates, Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
+};
 use crate::Description;
 
 /// Most modes that there can be: nominal, stuck wheels, broken encoders, unknown.
@@ -155,10 +157,14 @@ impl Switching {
         self.start_factor = factor(covariance);
     }
 
-    /// Prepares the step to an observation and says what is seen in it; the pose's noise is
-    /// `noise_scale` times the learned one. The observation is to be one in motion, or an anchor.
-    pub fn look(&mut self, observation: &Observation, noise_scale: f64, use_wheels: bool) -> Seen {
-        let variance = observation.pose_variance(&self.model, noise_scale);
+    /// Prepares the step to an observation and says what is seen in it. The observation is to be one in motion, or an anchor.
+    pub fn look(
+        &mut self,
+        observation: &Observation,
+        noise: NoiseScales,
+        use_wheels: bool,
+    ) -> Seen {
+        let variance = observation.pose_variance(&self.model, noise.pose);
         let is_measured = observation.pose_frames > 0;
         let pose = is_measured.then_some((observation.pose, variance));
         self.anchor = pose.filter(|_| observation.anchor);
@@ -167,7 +173,7 @@ impl Switching {
         }
         let mut wheels = [0.0; MODES_MAX];
         if use_wheels && !observation.anchor {
-            let evidence = WheelEvidence::new(&self.model, &self.robot, observation);
+            let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise.wheels);
             for (sum, mode) in wheels.iter_mut().zip(&self.modes) {
                 *sum = self.weigh(mode, observation, &evidence);
             }
@@ -294,6 +300,10 @@ impl Sampled for Switching {
 
     fn log_motion(&self, mode: usize, before: &RoverState, after: &RoverState) -> f64 {
         let (step, mode) = (&self.steps[mode], &self.modes[mode]);
+        if mode.family() != after.family {
+            // This mode would have drawn another offset.
+            return f64::NEG_INFINITY;
+        }
         let entered = before.family != after.family;
         let offset = if entered {
             log_density(&mode.offset, &after.offset)

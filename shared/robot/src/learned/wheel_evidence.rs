@@ -46,10 +46,15 @@ pub struct WheelEvidence {
 }
 
 impl WheelEvidence {
-    /// The evidence of an observation.
+    /// The evidence of an observation whose wheel rates have `noise_scale` times the learned noise.
     #[must_use]
-    pub fn new(model: &Model, robot: &Description, observation: &Observation) -> Self {
-        let sd = model.noise.wheel_rate_rad_s;
+    pub fn new(
+        model: &Model,
+        robot: &Description,
+        observation: &Observation,
+        noise_scale: f64,
+    ) -> Self {
+        let sd = model.noise.wheel_rate_rad_s * noise_scale;
         let sample_sd = model.sample_variance(sd, observation.frame_s).sqrt();
         let mut evidence = Self {
             healthy: [0.0; WHEELS],
