@@ -6,11 +6,9 @@ use vigil_blocks::{
 use vigil_inference::logspace::probability;
 use vigil_robot::Description;
 use vigil_robot::learned::monitor::Channels;
-use vigil_robot::learned::{Form, Model, ModelError, Monitor, Observer};
+use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
 use vigil_setup::schema;
 
-/// Time from the start of a run at which alarms begin, s: the noise scale must be known first.
-const ARM_S: f64 = 1.0;
 /// An alarm falls when the log-odds have stayed this far below those that raise it ..
 const CLEAR_BELOW: f64 = 8.0;
 /// .. and below these odds, whatever the threshold ..
@@ -61,7 +59,6 @@ pub struct Detector {
     fault_rate_1_s: f64,
     alarm_log_odds: f64,
     particles: usize,
-    run_s: f64,
     armed: bool,
     period_s: f64,
     t_last_ns: u64,
@@ -118,7 +115,6 @@ impl Detector {
             fault_rate_1_s: rate / 3600.0,
             alarm_log_odds,
             particles,
-            run_s: 0.0,
             armed: false,
             period_s: model.interval_s,
             t_last_ns: 0,
@@ -165,7 +161,7 @@ impl Detector {
 
     fn begin_run(&mut self) {
         self.monitor.reset();
-        (self.run_s, self.armed, self.quiet_s) = (0.0, false, 0.0);
+        (self.armed, self.quiet_s) = (false, 0.0);
         (self.alarm_t_ns, self.symptoms) = (0, 0);
     }
 
@@ -191,10 +187,9 @@ impl Detector {
         let observation = self.observer.observation();
         let moving = observation.moving;
         self.monitor.step(observation, self.alarm_t_ns != 0);
-        self.run_s += observation.dt_s;
         if !self.armed {
             // Evidence from before the noise scale is known is no evidence.
-            self.armed = self.run_s >= ARM_S;
+            self.armed = self.monitor.is_ready();
             self.monitor.forget_evidence();
         }
         let log_odds = self.monitor.report().log_odds;
@@ -248,8 +243,14 @@ impl Detector {
             0.0
         };
         belief.effective_sample_size = report.effective_sample_size;
-        belief.noise_scale = self.monitor.noise_scale();
-        belief.noise_scale_wheels = self.monitor.noise_scale_wheels();
+        let NoiseScales {
+            pose,
+            wheels,
+            steer,
+        } = self.monitor.noise().scales();
+        belief.noise_scale = pose;
+        belief.noise_scale_wheels = wheels;
+        belief.noise_scale_steer = steer;
         belief.channel_log_odds = report.channels;
         belief.alarm_t_capture_ns = self.alarm_t_ns;
         belief.alarm = u32::from(self.alarm_t_ns != 0);

@@ -139,7 +139,7 @@ impl Exact {
             return;
         }
         if self.use_wheels {
-            self.weigh_wheels(observation, noise.wheels);
+            self.weigh_wheels(observation, noise);
         }
         let mut failed = false;
         if observation.pose_frames > 0 {
@@ -196,8 +196,8 @@ impl Exact {
     }
 
     /// Weighs by the wheels' readings. Each is evaluated once per motion mode, not per hypothesis.
-    fn weigh_wheels(&mut self, observation: &Observation, noise_scale: f64) {
-        let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise_scale);
+    fn weigh_wheels(&mut self, observation: &Observation, noise: NoiseScales) {
+        let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise);
         let births = self.births_1_s.map(|rate| rate * observation.dt_s);
         let death = self.rates.death_1_s * observation.dt_s;
         let first_ns = observation.t_first_ns;

@@ -218,6 +218,7 @@ impl Identifier {
                 noise: NoiseScales {
                     pose: sane(belief.noise_scale),
                     wheels: sane(belief.noise_scale_wheels),
+                    steer: sane(belief.noise_scale_steer),
                 },
             };
         }

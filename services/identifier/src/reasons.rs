@@ -142,7 +142,7 @@ impl Reasons {
         }
         if observation.moving && !observation.anchor {
             if self.use_wheels {
-                self.hear_wheels(&mut followed, observation, noise.wheels);
+                self.hear_wheels(&mut followed, observation, noise);
             }
             if observation.pose_frames > 0 {
                 for Lineage { track, heard, .. } in &mut followed {
@@ -158,9 +158,9 @@ impl Reasons {
         &self,
         followed: &mut [Lineage; 2],
         observation: &Observation,
-        noise_scale: f64,
+        noise: NoiseScales,
     ) {
-        let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise_scale);
+        let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise);
         let is_new = is_new(observation.t_ns, self.onset_ns);
         for lineage in followed {
             let moved = self.modes[lineage.mode].moved;

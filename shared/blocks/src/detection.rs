@@ -37,7 +37,7 @@ impl Channel {
 
 block! {
     /// Written by the detector every cycle.
-    pub struct DetectionBelief, size 424 {
+    pub struct DetectionBelief, size 432 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -58,6 +58,8 @@ block! {
         pub noise_scale: f64,
         /// The same for the wheel rates.
         pub noise_scale_wheels: f64,
+        /// The same for the steering angles.
+        pub noise_scale_steer: f64,
         /// Log-odds of a fault seen by each channel alone (see [`Channel`]).
         pub channel_log_odds: [f64; CHANNELS],
         /// Capture time of the frame that raised the present alarm, ns; 0 without alarm.

@@ -15,6 +15,7 @@ impl Alarm {
         let belief = DetectionBelief {
             noise_scale: 1.0,
             noise_scale_wheels: 1.0,
+            noise_scale_steer: 1.0,
             ..DetectionBelief::default()
         };
         Self {

@@ -11,8 +11,6 @@ use crate::labels::Label;
 
 /// Windows over which maxima are taken, s.
 const WINDOW_S: f64 = 2.0;
-/// The detector arms after this time, s.
-const ARM_S: f64 = 1.0;
 /// Prior rate under which the log-odds are collected, 1/h.
 const FAULT_RATE_1_H: f64 = 1.0;
 /// Windows needed.
@@ -63,14 +61,13 @@ fn maxima(
     let mut maxima = Vec::new();
     for (run, until_s) in driving {
         monitor.reset();
-        let (mut run_s, mut in_window_s, mut highest) = (0.0, 0.0, f64::NEG_INFINITY);
+        let (mut in_window_s, mut highest) = (0.0, f64::NEG_INFINITY);
         for observation in observations(run, robot, model) {
             if observation.t_ns as f64 * 1e-9 > *until_s {
                 break;
             }
             monitor.step(&observation, false);
-            run_s += observation.dt_s;
-            if run_s < ARM_S {
+            if !monitor.is_ready() {
                 monitor.forget_evidence();
                 continue;
             }

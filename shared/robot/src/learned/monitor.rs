@@ -19,7 +19,7 @@ use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 use vigil_inference::particles::PoseParticles;
 
 use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION};
-use super::noise_scale::NoiseScale;
+use super::noise_scale::SensorNoise;
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Model, Observation};
 use crate::Description;
@@ -41,6 +41,9 @@ const REPEATS_LOG_ODDS_MAX: f64 = 40.0;
 const FOLLOWING: f64 = 0.1;
 /// Residuals beyond this many deviations mean a lost track.
 const LOST: f64 = 10.0;
+/// Time after which evidence counts, s: once the noise is known, and at the latest.
+const READY_S: f64 = 1.0;
+const READY_LATEST_S: f64 = 5.0;
 /// Observations in a row without usable weights after which the pose starts anew.
 const COAST_MAX: u32 = 10;
 
@@ -83,9 +86,8 @@ pub struct Monitor {
     steer: [Evidence<1>; WHEELS],
     repeats: [f64; WHEELS],
     any: Constant,
-    scale_pose: NoiseScale,
-    scale_wheels: NoiseScale,
-    history: [Option<Observation>; 2],
+    noise: SensorNoise,
+    run_s: f64,
     report: Report,
 }
 
@@ -133,9 +135,8 @@ impl Monitor {
             steer: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
             repeats: [0.0; WHEELS],
             any: Constant::default(),
-            scale_pose: NoiseScale::default(),
-            scale_wheels: NoiseScale::default(),
-            history: [None; 2],
+            noise: SensorNoise::default(),
+            run_s: 0.0,
             report: Report {
                 log_odds: f64::NEG_INFINITY,
                 channels: [f64::NEG_INFINITY; CHANNELS],
@@ -155,9 +156,8 @@ impl Monitor {
         self.tracking = false;
         self.coasted = 0;
         self.anchor_variance = 0.0;
-        self.scale_pose = NoiseScale::default();
-        self.scale_wheels = NoiseScale::default();
-        self.history = [None; 2];
+        self.noise = SensorNoise::default();
+        self.run_s = 0.0;
         self.report.evidence = 0.0;
         self.report.effective_sample_size = self.particles.len() as f64;
         self.forget_evidence();
@@ -190,16 +190,17 @@ impl Monitor {
         self.particles.resize(particles, &mut self.rng);
     }
 
-    /// Ratio of the pose sensor's noise to the learned one, as standard deviations.
+    /// True once evidence counts: the track has settled, and the noise is known or the drive shows
+    /// nothing of it for long.
     #[must_use]
-    pub fn noise_scale(&self) -> f64 {
-        self.scale_pose.variance_ratio().sqrt()
+    pub fn is_ready(&self) -> bool {
+        self.run_s >= READY_S && (self.noise.is_known() || self.run_s >= READY_LATEST_S)
     }
 
-    /// The same for the wheel rates.
+    /// How noisy the sensors are.
     #[must_use]
-    pub fn noise_scale_wheels(&self) -> f64 {
-        self.scale_wheels.variance_ratio().sqrt()
+    pub const fn noise(&self) -> &SensorNoise {
+        &self.noise
     }
 
     /// Probability that a fault appears in `dt_s`, in one of the groups with this share.
@@ -211,7 +212,8 @@ impl Monitor {
     /// that the return of a robot to its nominal mode is seen after a fault has led it away.
     pub fn step(&mut self, observation: &Observation, following: bool) {
         self.report.evidence = 0.0;
-        self.update_noise_scale(observation);
+        self.run_s += observation.dt_s;
+        self.noise.update(&self.model, &self.robot, observation);
         self.step_pose(observation, following);
         if observation.moving && self.channels == Channels::PoseEncoders {
             self.step_wheels(observation);
@@ -220,17 +222,9 @@ impl Monitor {
         self.sum_up();
     }
 
-    fn pose_variance(&self, observation: &Observation) -> [f64; 3] {
-        let noise = &self.model.noise;
-        let ratio = self.scale_pose.variance_ratio();
-        [noise.position_m, noise.position_m, noise.yaw_rad].map(|sd| {
-            let sample = self.model.sample_variance(sd, observation.frame_s) * ratio;
-            observation.mean_variance(sample, observation.pose_frames)
-        })
-    }
-
     fn step_pose(&mut self, observation: &Observation, following: bool) {
-        let variance = self.pose_variance(observation);
+        let scale = self.noise.scales().pose;
+        let variance = observation.pose_variance(&self.model, scale);
         let lost = self.coasted >= COAST_MAX;
         // A cloud much wider than the measurement has too few particles where it matters.
         let coarse = observation.pose_frames > 0 && self.anchor_variance > 4.0 * variance[0];
@@ -323,9 +317,8 @@ impl Monitor {
     }
 
     fn step_wheels(&mut self, observation: &Observation) {
-        let ratio = self.scale_wheels.variance_ratio();
-        let sd = self.model.noise.wheel_rate_rad_s;
-        let sample = self.model.sample_variance(sd, observation.frame_s) * ratio;
+        let sd = self.model.noise.wheel_rate_rad_s * self.noise.scales().wheels;
+        let sample = self.model.sample_variance(sd, observation.frame_s);
         let share = 1.0 / self.robot.wheels.len() as f64;
         let birth = self.birth(observation.dt_s, SHARE_WHEELS * share);
         let birth_repeats = self.birth(observation.dt_s, SHARE_REPEATS * share);
@@ -360,9 +353,8 @@ impl Monitor {
     }
 
     fn step_steer(&mut self, observation: &Observation) {
-        let sample = self
-            .model
-            .sample_variance(self.model.noise.steer_rad, observation.frame_s);
+        let sd = self.model.noise.steer_rad * self.noise.scales().steer;
+        let sample = self.model.sample_variance(sd, observation.frame_s);
         let extra = self.model.nominal.steer_sd_rad;
         let steered = self
             .robot
@@ -384,58 +376,6 @@ impl Monitor {
             let apart = reading.mean - angle;
             self.steer[i].step(&SVector::from([apart / variance.sqrt()]), birth);
             self.report.evidence += log_normal(apart, variance);
-        }
-    }
-
-    /// Second differences of the pose and first differences of the wheel rates, at constant
-    /// command: neither a curve nor a fault that persists shows in them.
-    fn update_noise_scale(&mut self, now: &Observation) {
-        let [before, last] = self.history;
-        self.history = [last, Some(*now)];
-        let (Some(before), Some(last)) = (before, last) else {
-            return;
-        };
-        let all = [&before, &last, now];
-        let steady = all
-            .iter()
-            .all(|o| o.moving && (o.command[0] - o.curvature).abs() < 0.02 && o.dt_s > 0.0);
-        let even = all
-            .iter()
-            .all(|o| (o.dt_s - now.dt_s).abs() < 0.2 * now.dt_s);
-        if !steady || !even || now.anchor || last.anchor {
-            return;
-        }
-        let noise = &self.model.noise;
-        if all
-            .iter()
-            .all(|o| o.pose_frames == now.pose_frames && o.pose_frames > 0)
-        {
-            for (i, sd) in [noise.position_m, noise.position_m, noise.yaw_rad]
-                .into_iter()
-                .enumerate()
-            {
-                let sample = self.model.sample_variance(sd, now.frame_s);
-                let variance = 6.0 * now.mean_variance(sample, now.pose_frames);
-                let (up, down) = (now.pose[i] - last.pose[i], last.pose[i] - before.pose[i]);
-                let bend = if i == 2 {
-                    wrap(wrap(up) - wrap(down))
-                } else {
-                    up - down
-                };
-                self.scale_pose.push(bend * bend / variance);
-            }
-        }
-        let surge = (now.command[1] - last.command[1]).abs();
-        for i in 0..self.robot.wheels.len() {
-            let (a, b) = (&last.wheels[i], &now.wheels[i]);
-            if surge < 1e-3 && a.plain == b.plain && a.plain > 0 {
-                let sample = self
-                    .model
-                    .sample_variance(noise.wheel_rate_rad_s, now.frame_s);
-                let step = b.mean - a.mean;
-                self.scale_wheels
-                    .push(step * step / (2.0 * now.mean_variance(sample, b.plain)));
-            }
         }
     }
 

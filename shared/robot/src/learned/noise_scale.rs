@@ -1,11 +1,20 @@
 //! How much noisier the sensors are than the learned ones.
 
-/// Normalised squares above this one say nothing about noise (a jump, a fault).
+use vigil_blocks::WHEELS;
+use vigil_inference::angle::wrap;
+
+use super::{Model, Observation, Reading};
+use crate::Description;
+
+/// Squares above this many times the believed variance say nothing about noise (a jump, a fault).
 const CLIP: f64 = 9.0;
 /// Mean of a squared standard normal clipped at [`CLIP`].
 const CLIPPED_MEAN: f64 = 0.99;
+/// Bounds of the ratio.
+const RATIO_MIN: f64 = 0.1;
+const RATIO_MAX: f64 = 100.0;
 /// Samples that the learned scale of 1 counts for.
-const PRIOR: f64 = 60.0;
+const PRIOR: f64 = 20.0;
 /// Samples over which the estimate forgets.
 const MEMORY: f64 = 900.0;
 
@@ -16,6 +25,8 @@ pub struct NoiseScales {
     pub pose: f64,
     /// The wheels' encoders.
     pub wheels: f64,
+    /// The steering angles.
+    pub steer: f64,
 }
 
 impl Default for NoiseScales {
@@ -23,6 +34,7 @@ impl Default for NoiseScales {
         Self {
             pose: 1.0,
             wheels: 1.0,
+            steer: 1.0,
         }
     }
 }
@@ -45,13 +57,16 @@ impl Default for NoiseScale {
 }
 
 impl NoiseScale {
-    /// Takes the square of a difference divided by its variance under the learned noise.
+    /// Takes the square of a difference divided by its variance under the learned noise. What is
+    /// too large is told by the noise as it is believed to be: so the estimate is right at every
+    /// ratio, and not only near 1.
     pub fn push(&mut self, normalised_square: f64) {
         if normalised_square.is_nan() {
             return;
         }
         let fading = 1.0 - 1.0 / MEMORY;
-        self.sum = self.sum * fading + normalised_square.clamp(0.0, CLIP) / CLIPPED_MEAN;
+        let largest = CLIP * (self.sum / self.count).max(RATIO_MIN);
+        self.sum = self.sum * fading + normalised_square.clamp(0.0, largest) / CLIPPED_MEAN;
         self.count = self.count * fading + 1.0;
     }
 
@@ -60,7 +75,98 @@ impl NoiseScale {
     #[must_use]
     pub fn variance_ratio(&self) -> f64 {
         let lean = 1.0 + 0.8 * (3.9 / self.count).sqrt();
-        (self.sum / self.count * lean).clamp(0.25, 16.0)
+        (self.sum / self.count * lean).clamp(RATIO_MIN, RATIO_MAX)
+    }
+}
+
+/// Samples of a kind after which its noise counts as known.
+const KNOWN: f64 = 30.0;
+/// Difference of commanded and lagged curvature, 1/m, and change of speed, m/s, up to which a drive
+/// counts as steady.
+const STEADY_1_M: f64 = 0.02;
+const STEADY_M_S: f64 = 1e-3;
+
+/// How noisy the sensors are, from differences between successive observations.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SensorNoise {
+    pose: NoiseScale,
+    wheels: NoiseScale,
+    steer: NoiseScale,
+    history: [Option<Observation>; 2],
+}
+
+impl SensorNoise {
+    /// The ratios at present.
+    #[must_use]
+    pub fn scales(&self) -> NoiseScales {
+        let sd = |scale: &NoiseScale| scale.variance_ratio().sqrt();
+        NoiseScales {
+            pose: sd(&self.pose),
+            wheels: sd(&self.wheels),
+            steer: sd(&self.steer),
+        }
+    }
+
+    /// True once the pose's noise has been seen often enough; the other sensors are seen with it.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        self.pose.count >= PRIOR + KNOWN
+    }
+
+    /// Second differences of the pose and first differences of wheel rates and steering angles, at
+    /// constant command: neither a curve nor a fault that persists shows in them.
+    pub fn update(&mut self, model: &Model, robot: &Description, now: &Observation) {
+        let [before, last] = self.history;
+        self.history = [last, Some(*now)];
+        let (Some(before), Some(last)) = (before, last) else {
+            return;
+        };
+        let all = [&before, &last, now];
+        let is_steady = |o: &&Observation| {
+            o.moving && (o.command[0] - o.curvature).abs() < STEADY_1_M && o.dt_s > 0.0
+        };
+        let is_even = |o: &&Observation| (o.dt_s - now.dt_s).abs() < 0.2 * now.dt_s;
+        let steady = all.iter().all(is_steady) && all.iter().all(is_even);
+        if !steady || now.anchor || last.anchor {
+            return;
+        }
+        let has_pose = |o: &&Observation| o.pose_frames == now.pose_frames && o.pose_frames > 0;
+        if all.iter().all(has_pose) {
+            for (i, variance) in now.pose_variance(model, 1.0).into_iter().enumerate() {
+                let (up, down) = (now.pose[i] - last.pose[i], last.pose[i] - before.pose[i]);
+                let bend = if i == 2 {
+                    wrap(wrap(up) - wrap(down))
+                } else {
+                    up - down
+                };
+                self.pose.push(bend * bend / (6.0 * variance));
+            }
+        }
+        let surge = (now.command[1] - last.command[1]).abs();
+        if surge < STEADY_M_S {
+            let count = robot.wheels.len().min(WHEELS);
+            let (rate, angle) = (model.noise.wheel_rate_rad_s, model.noise.steer_rad);
+            let wheels = last.wheels[..count].iter().zip(&now.wheels);
+            push_steps(&mut self.wheels, model, now, rate, wheels);
+            let steered = last.steer[..count].iter().zip(&now.steer);
+            push_steps(&mut self.steer, model, now, angle, steered);
+        }
+    }
+}
+
+/// First differences of channels whose samples have the learned standard deviation `sd`.
+fn push_steps<'a>(
+    scale: &mut NoiseScale,
+    model: &Model,
+    now: &Observation,
+    sd: f64,
+    pairs: impl Iterator<Item = (&'a Reading, &'a Reading)>,
+) {
+    let sample = model.sample_variance(sd, now.frame_s);
+    for (last, now_read) in pairs.filter(|(a, b)| a.plain == b.plain && a.plain > 0) {
+        let step = now_read.mean - last.mean;
+        let variance = now.mean_variance(sample, now_read.plain);
+        scale.push(step * step / (2.0 * variance));
     }
 }
 
@@ -72,7 +178,7 @@ mod tests {
 
     #[test]
     fn the_ratio_follows_the_noise_and_ignores_jumps() {
-        for ratio in [0.5, 1.0, 2.0] {
+        for ratio in [0.25, 0.5, 1.0, 2.0, 4.0, 16.0] {
             let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(3);
             let mut scale = NoiseScale::default();
             for i in 0..3000 {

@@ -173,7 +173,7 @@ impl Switching {
         }
         let mut wheels = [0.0; MODES_MAX];
         if use_wheels && !observation.anchor {
-            let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise.wheels);
+            let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise);
             for (sum, mode) in wheels.iter_mut().zip(&self.modes) {
                 *sum = self.weigh(mode, observation, &evidence);
             }

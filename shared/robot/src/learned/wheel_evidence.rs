@@ -4,7 +4,7 @@ use vigil_blocks::WHEELS;
 use vigil_inference::logspace::{log_add, log_normal};
 
 use super::wheels::{rolling_rate, steering_angle};
-use super::{EncoderState, Model, Moved, Observation, RateModel};
+use super::{EncoderState, Model, Moved, NoiseScales, Observation, RateModel};
 use crate::Description;
 
 /// Ways in which an encoder breaks: zero, frozen, noise, dead (zero plus the sensor's noise).
@@ -46,22 +46,22 @@ pub struct WheelEvidence {
 }
 
 impl WheelEvidence {
-    /// The evidence of an observation whose wheel rates have `noise_scale` times the learned noise.
+    /// The evidence of an observation whose sensors are so noisy.
     #[must_use]
     pub fn new(
         model: &Model,
         robot: &Description,
         observation: &Observation,
-        noise_scale: f64,
+        noise: NoiseScales,
     ) -> Self {
-        let sd = model.noise.wheel_rate_rad_s * noise_scale;
+        let sd = model.noise.wheel_rate_rad_s * noise.wheels;
         let sample_sd = model.sample_variance(sd, observation.frame_s).sqrt();
         let mut evidence = Self {
             healthy: [0.0; WHEELS],
             broken: [[0.0; BREAKAGES.len()]; WHEELS],
             standing: [0.0; WHEELS],
             any: [0.0; WHEELS],
-            steering: steering(model, robot, observation),
+            steering: steering(model, robot, observation, noise.steer),
             rolling: [(0.0, 0.0); WHEELS],
             sample_sd,
         };
@@ -149,8 +149,14 @@ impl WheelEvidence {
 
 /// What the steering angles say for the unknown: relative to angles as commanded, which every named
 /// mode has.
-fn steering(model: &Model, robot: &Description, observation: &Observation) -> f64 {
-    let sample = model.sample_variance(model.noise.steer_rad, observation.frame_s);
+fn steering(
+    model: &Model,
+    robot: &Description,
+    observation: &Observation,
+    noise_scale: f64,
+) -> f64 {
+    let sd = model.noise.steer_rad * noise_scale;
+    let sample = model.sample_variance(sd, observation.frame_s);
     let extra = model.nominal.steer_sd_rad;
     let mut sum = 0.0;
     for i in (0..robot.wheels.len().min(WHEELS)).filter(|&i| robot.wheels[i].steered) {
