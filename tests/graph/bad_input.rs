@@ -85,7 +85,7 @@ const BAD: [(&str, &str, &str, &[&str]); 13] = [
         "rover.toml",
         "filter = \"exact\"",
         "filter = \"x\"",
-        &["'x' is not known", "exact"],
+        &["unknown variant `x`", "exact"],
     ),
     (
         "robots/rover.toml",

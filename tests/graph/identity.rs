@@ -7,6 +7,7 @@ use vigil_blocks::{
 };
 use vigil_cycle::Topic;
 use vigil_identifier::Input;
+use vigil_setup::schema::IdentifierFilter;
 
 use crate::harness::{Running, drain, machine};
 
@@ -52,20 +53,29 @@ fn record(graph: &mut Running) -> Recorded {
 
 #[test]
 fn beliefs_live_and_offline_are_bit_identical() {
-    compare(&["--duration", "8", "--inject", "stuck:LM@3"]);
+    compare(IdentifierFilter::Exact);
 }
 
 #[test]
 fn beliefs_of_a_sampled_filter_are_bit_identical_too() {
-    let filter = ["--identifier", "hierarchical"];
-    compare(&[&["--duration", "8", "--inject", "stuck:LM@3"], &filter[..]].concat());
+    compare(IdentifierFilter::Hierarchical);
 }
 
-fn compare(options: &[&str]) {
+fn compare(filter: IdentifierFilter) {
     let _machine = machine();
-    let mut graph = Running::start("identity", options);
+    let name = filter.to_string();
+    let options = [
+        "--duration",
+        "8",
+        "--inject",
+        "stuck:LM@3",
+        "--identifier",
+        &name,
+    ];
+    let mut graph = Running::start("identity", &options);
     let recorded = record(&mut graph);
-    let setup = graph.setup.clone();
+    let mut setup = graph.setup.clone();
+    setup.file.identifier.filter = filter;
     graph.finish();
     assert_eq!(
         recorded.first_detection_seq,

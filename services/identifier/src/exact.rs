@@ -1,7 +1,7 @@
 //! Bayes over sets of faults and the unknown, without sampling.
 //!
-//! Exact for a robot with two stuck wheels at most, but for onsets: hypotheses about them start from
-//! the most probable one of each kind, and the least probable are dropped.
+//! Exact for a robot with two stuck wheels at most, but for onsets: hypotheses about them start
+//! from the most probable one of each kind, and the least probable are dropped.
 //!
 //! The motion tells stuck wheels apart: one track per (motion mode, onset), a motion mode being
 //! nominal, one stuck wheel, two, or unknown. Broken encoders do not move the robot: given the

@@ -10,8 +10,8 @@
 //! observation, `s_k' ∝ s_k p(c' | k, c) p(z | k, c')`, and the particle's weight is multiplied by
 //! `Σ s_k p(c'|k,c) p(z|k,c') / Σ s_k p(c'|k,c)`. So nothing is lost when it moves down.
 //!
-//! When is an abstract node worth its coarseness? The rule of the variable resolution filter (Verma,
-//! Thrun and Simmons, IJCAI 2003) weighs the bias of a coarse answer, which divides the node's mass
+//! When is an abstract node worth its coarseness? The rule of the variable resolution filter
+//! (Verma, Thrun and Simmons, IJCAI 2003) weighs the bias of a coarse answer, which divides the node's mass
 //! `p_A` by prior shares, against the variance `p_k (1 - p_k) / N` of the fine one. As shares are
 //! carried here, the coarse answer has no such bias: per node, the variance of both answers is that
 //! of the node's mass, and a split adds `p_A Σ s_k (1 - s_k) / N`, with the shares `s_k` of what

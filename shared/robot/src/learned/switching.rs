@@ -157,7 +157,8 @@ impl Switching {
         self.start_factor = factor(covariance);
     }
 
-    /// Prepares the step to an observation and says what is seen in it. The observation is to be one in motion, or an anchor.
+    /// Prepares the step to an observation and says what is seen in it. The observation is to be
+    /// one in motion, or an anchor.
     pub fn look(
         &mut self,
         observation: &Observation,
