@@ -11,15 +11,15 @@
 //! `Σ s_k p(c'|k,c) p(z|k,c') / Σ s_k p(c'|k,c)`. So nothing is lost when it moves down.
 //!
 //! When is an abstract node worth its coarseness? The rule of the variable resolution filter
-//! (Verma, Thrun and Simmons, IJCAI 2003) weighs the bias of a coarse answer, which divides the node's mass
-//! `p_A` by prior shares, against the variance `p_k (1 - p_k) / N` of the fine one. As shares are
-//! carried here, the coarse answer has no such bias: per node, the variance of both answers is that
-//! of the node's mass, and a split adds `p_A Σ s_k (1 - s_k) / N`, with the shares `s_k` of what
-//! lies directly below: noise that the other leaves, should the data turn, have to grow from. So a
-//! node is split when that is next to nothing, its leaves having been told apart (a share above
-//! 0.999), for a split node costs one likelihood per particle and not one per leaf; it is merged
-//! again when they blur (below 0.99). In a tree of several levels particles move down one level at
-//! a time.
+//! (Verma, Thrun and Simmons, IJCAI 2003) weighs the bias of a coarse answer, which divides the
+//! node's mass `p_A` by prior shares, against the variance `p_k (1 - p_k) / N` of the fine one. As
+//! shares are carried here, the coarse answer has no such bias: per node, the variance of both
+//! answers is that of the node's mass, and a split adds `p_A Σ s_k (1 - s_k) / N`, with the shares
+//! `s_k` of what lies directly below: noise that the other leaves, should the data turn, have to
+//! grow from. So a node is split when that is next to nothing, its leaves having been told apart
+//! (a share above 0.999), for a split node costs one likelihood per particle and not one per leaf;
+//! it is merged again when they blur (below 0.99). In a tree of several levels particles move down
+//! one level at a time.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
