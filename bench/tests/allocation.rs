@@ -8,10 +8,16 @@ use vigil_bench::naive::Naive;
 use vigil_cycle::allocation::{CountingAllocator, allocations};
 use vigil_evaluation::cases::{HiddenMarkov, JumpLinear, Planar};
 use vigil_inference::adaptive::Adaptive;
+use vigil_inference::ages::Ages;
+use vigil_inference::bank::{Bank, Hypothesis};
 use vigil_inference::bootstrap::ParticleFilter;
+use vigil_inference::constant::Constant;
+use vigil_inference::fault_sets::{Component, FaultSets};
 use vigil_inference::filter::Filter;
+use vigil_inference::forward::Forward;
 use vigil_inference::lanes::linear::{LaneLookAhead, Observation};
 use vigil_inference::lanes::{Event, LaneFilter, Level, PlanarModel};
+use vigil_inference::windowed::Windowed;
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
@@ -109,4 +115,44 @@ fn the_look_ahead_filter_on_lanes_allocates_nothing() {
         assert_eq!(allocations() - before, 0);
         assert!(events > 10_000, "{events}");
     }
+}
+
+#[test]
+fn no_detection_filter_and_no_exact_one_allocates_in_a_step() {
+    let component = Component {
+        prior: 0.0,
+        birth: 1e-4,
+        death: 1e-3,
+    };
+    let mut sets = FaultSets::new(&[component; 4]).unwrap();
+    let mut forward = Forward::<3>::at(0);
+    let transition = [[0.98, 0.01, 0.01], [0.1, 0.9, 0.0], [0.1, 0.0, 0.9]];
+    let mut bank = Bank::new(&[1, 8]);
+    bank.restart(0, 0, ());
+    let (mut ages, mut constant) = (Ages::<3>::new(1.0), Constant::default());
+    let mut windowed = Windowed::<3, 10>::default();
+    let before = allocations();
+    for step in 0..100_000_u64 {
+        // Quiet, then off, then garbage, again and again.
+        let value = [0.1, 2.0, f64::NAN][(step / 50 % 3) as usize];
+        let residual = [value, -value, 0.5].into();
+        ages.step(&residual, 1e-6);
+        constant.step(value * value, 5.0, 1e-6, 1e-9);
+        windowed.step(&residual, 5.0, 1e-6, 1e-9);
+        forward.predict(&transition);
+        forward.update(&[0.0, value, -value]);
+        sets.predict();
+        sets.update_wheels(&[0.0, value, 0.0, -1.0], &[[0.0, value, -1.0, -2.0]; 2]);
+        bank.add(Hypothesis {
+            mode: 1,
+            onset: step,
+            log_weight: -5.0,
+            state: (),
+        });
+        for hypothesis in bank.hypotheses_mut() {
+            hypothesis.log_weight += value;
+        }
+        bank.normalise(-30.0);
+    }
+    assert_eq!(allocations() - before, 0);
 }

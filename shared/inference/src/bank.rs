@@ -51,11 +51,6 @@ impl<T: Copy> Bank<T> {
         });
     }
 
-    /// Forgets everything.
-    pub fn clear(&mut self) {
-        self.hypotheses.clear();
-    }
-
     /// The hypotheses.
     #[must_use]
     pub fn hypotheses(&self) -> &[Hypothesis<T>] {

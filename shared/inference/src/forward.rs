@@ -34,19 +34,6 @@ impl<const N: usize> Forward<N> {
         }
     }
 
-    /// State `home` gives the mass `birth[j]` of its own to each other state j, and gets from each
-    /// of them the fraction `death`: the transitions of a single fault, in linear time.
-    pub fn predict_star(&mut self, home: usize, birth: &[f64; N], death: f64) {
-        let before = self.log_p.map(f64::exp);
-        let (mut left, mut returned) = (0.0, 0.0);
-        for j in (0..N).filter(|&j| j != home) {
-            left += birth[j];
-            returned += before[j] * death;
-            self.log_p[j] = (before[home] * birth[j] + before[j] * (1.0 - death)).ln();
-        }
-        self.log_p[home] = (before[home] * (1.0 - left) + returned).ln();
-    }
-
     /// Multiplies by the likelihoods and normalises; returns the log-evidence. None, unchanged,
     /// when every state is impossible or a value is not a number.
     pub fn update(&mut self, log_likelihood: &[f64; N]) -> Option<f64> {
@@ -65,24 +52,7 @@ impl<const N: usize> Forward<N> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
-
-    #[test]
-    fn star_transitions_equal_the_full_matrix() {
-        let (birth, death) = ([0.0, 0.1, 0.2], 0.05);
-        let full = [[0.7, 0.1, 0.2], [0.05, 0.95, 0.0], [0.05, 0.0, 0.95]];
-        let (mut star, mut matrix) = (Forward::<3>::at(0), Forward::<3>::at(0));
-        for likelihood in [[-0.3, -2.0, -1.0], [-5.0, -0.1, -0.2]] {
-            star.predict_star(0, &birth, death);
-            matrix.predict(&full);
-            star.update(&likelihood).unwrap();
-            matrix.update(&likelihood).unwrap();
-            for (a, b) in star.log_p().iter().zip(matrix.log_p()) {
-                assert!((a - b).abs() < 1e-12);
-            }
-        }
-    }
 
     #[test]
     fn impossible_evidence_changes_nothing() {
