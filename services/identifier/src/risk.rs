@@ -67,9 +67,9 @@ mod tests {
     fn the_risk_is_what_being_lost_costs_more() {
         let decision = Pomdp::parse(MODEL).unwrap();
         let found = risks(&decision, &[("ND", 0.999), ("A", 0.001)], 1000).unwrap();
-        // x = V(lost) - V(tracked) solves x = c + 0.5 (1 - 2 · 0.02) x; lost is half the worst and
-        // half the mean action: c = 1/2 (1 + 1/2) in ND, 1/2 (8 + 4) in A; but what is best while
-        // lost is worst to leave, so that the differences are those of the costs alone.
+        // Modes do not change, so x = V(lost) - V(tracked) solves x = c + 0.5 (1 - 2 · 0.02) x with
+        // the extra cost c of half the worst and half the mean action over the best: in ND
+        // (1 + 1/2) / 2, in A (8 + 4) / 2.
         for (risk, extra) in found.iter().zip([0.75, 6.0]) {
             assert!(
                 (risk - extra / (1.0 - 0.5 * 0.96)).abs() < 1e-6,
