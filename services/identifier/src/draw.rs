@@ -64,11 +64,9 @@ pub fn draw(
             continue;
         }
         let mean = hypothesis.state.track.pose();
-        let spread = hypothesis.state.track.pose_covariance() + Matrix3::identity() * PRECISION;
-        let factor = Cholesky::new(spread).map_or(Matrix3::zeros(), |factor| factor.l());
+        let factor = factor(hypothesis.state.track.pose_covariance());
         for slot in filled..until {
-            let normal = Vector3::from_fn(|_, _| rng.sample(StandardNormal));
-            let pose = mean + factor * normal;
+            let pose = mean + factor * normal(rng);
             out.x[slot] = pose[0] as f32;
             out.y[slot] = pose[1] as f32;
             out.yaw[slot] = wrap(pose[2]) as f32;
@@ -78,6 +76,17 @@ pub fn draw(
     }
     out.count = filled as u32;
     out.log_weight[..filled].fill(-(filled.max(1) as f32).ln());
+}
+
+/// What standard normals are multiplied by to have this covariance; 0 if it is none.
+pub fn factor(covariance: Matrix3<f64>) -> Matrix3<f64> {
+    let spread = covariance + Matrix3::identity() * PRECISION;
+    Cholesky::new(spread).map_or(Matrix3::zeros(), |factor| factor.l())
+}
+
+/// Three standard normals.
+pub fn normal(rng: &mut Pcg64Mcg) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| rng.sample(StandardNormal))
 }
 
 /// Mode of a particle: the encoders' states are drawn.

@@ -1,8 +1,7 @@
 //! The library's filters over single faults, by name.
 
-use nalgebra::{Cholesky, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
-use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{FaultSet, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock, WHEELS};
 use vigil_inference::FaultTree;
@@ -23,6 +22,7 @@ use vigil_robot::learned::{Moved, NoiseScales, Observation, Switching};
 use vigil_setup::schema::{self, IdentifierFilter};
 
 use crate::assemble::Models;
+use crate::draw::{factor, normal};
 use crate::exact::fault_rates;
 use crate::modes::{IdentifierError, Leaves};
 use crate::posterior::Posterior;
@@ -37,8 +37,6 @@ const LOOK_AHEAD_SHARE: usize = 8;
 const ADAPTIVE: (f64, f64, usize) = (0.05, 2.326, 32);
 /// A fault began when its probability was last below this.
 const ONSET: f64 = 0.1;
-/// Variance added where a Gaussian is drawn from: particles are carried in single precision.
-const PRECISION: f64 = 1e-10;
 
 /// A filter and its model.
 #[derive(Debug, Clone)]
@@ -174,6 +172,15 @@ impl Generic {
         }
     }
 
+    fn filter_mut(&mut self) -> &mut dyn Filter<Observation = Seen> {
+        match &mut self.kind {
+            Kind::Sampled(filter) => filter,
+            Kind::Hierarchical(filter) => filter,
+            Kind::LookAhead(filter) => filter,
+            Kind::Merged(filter) => filter,
+        }
+    }
+
     /// Observations that nothing explained, and were passed over.
     #[must_use]
     pub const fn degenerate_count(&self) -> u32 {
@@ -192,12 +199,7 @@ impl Generic {
         }
         let use_wheels = self.use_wheels;
         let seen = self.model_mut().look(&observation, noise, use_wheels);
-        let step = match &mut self.kind {
-            Kind::Sampled(filter) => filter.step(&seen),
-            Kind::Hierarchical(filter) => filter.step(&seen),
-            Kind::LookAhead(filter) => filter.step(&seen),
-            Kind::Merged(filter) => filter.step(&seen),
-        };
+        let step = self.filter_mut().step(&seen);
         if step.event.is_some() {
             self.degenerate_count = self.degenerate_count.saturating_add(1);
         }
@@ -360,8 +362,6 @@ fn pick(p: &[f64], rng: &mut Pcg64Mcg) -> usize {
 
 /// A pose drawn from a track.
 fn scatter(state: &Gaussian<TRACK_DIMENSION>, rng: &mut Pcg64Mcg) -> Vector3<f64> {
-    let spread = state.covariance.fixed_view::<3, 3>(0, 0) + Matrix3::identity() * PRECISION;
-    let factor = Cholesky::new(spread).map_or(Matrix3::zeros(), |factor| factor.l());
-    let normal = Vector3::from_fn(|_, _| rng.sample(StandardNormal));
-    state.mean.fixed_rows::<3>(0) + factor * normal
+    let factor = factor(state.covariance.fixed_view::<3, 3>(0, 0).into());
+    state.mean.fixed_rows::<3>(0) + factor * normal(rng)
 }
