@@ -32,7 +32,7 @@ pub struct Args {
     /// Part of the runs of every mode and kind to leave out, 0 to 0.9.
     #[arg(long, value_name = "X", default_value_t = 0.333, value_parser = test_fraction)]
     test_fraction: f64,
-    /// Seed of the split and of the detector's calibration.
+    /// Seed of the split.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
@@ -79,12 +79,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         .cloned()
         .collect();
     let held_out = split(&with_frames, args.test_fraction, args.seed);
-    let options = Options {
-        seed: args.seed,
-        ..Options::default()
-    };
-    let (model, report) = learning::learn(&runs, &labels, &held_out, &robot, &options)
-        .map_err(|error| CommandError::usage(format!("{}: {error}", args.frames.display())))?;
+    let (model, report) =
+        learning::learn(&runs, &labels, &held_out, &robot, &Options::default())
+            .map_err(|error| CommandError::usage(format!("{}: {error}", args.frames.display())))?;
     let text = model.to_toml().map_err(CommandError::failure)?;
     write_whole(&args.out, &text)
         .map_err(|error| CommandError::failure(format!("{}: {error}", args.out.display())))?;

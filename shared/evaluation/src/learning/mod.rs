@@ -34,10 +34,6 @@ use segments::Segments;
 pub struct Options {
     /// Interval over which frames are averaged into one observation, s.
     pub interval_s: f64,
-    /// Seed of the detector's particles while it is calibrated.
-    pub seed: u64,
-    /// Particles of the detector while it is calibrated.
-    pub particles: usize,
     /// Evaluations of the likelihood per noise model.
     pub evaluations: usize,
 }
@@ -46,8 +42,6 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             interval_s: 0.05,
-            seed: 1,
-            particles: 256,
             evaluations: 400,
         }
     }
@@ -159,7 +153,7 @@ pub fn learn(
             rates: wheels::fit(robot, &pooled, &mode)?,
         });
     }
-    calibrate::fit(&mut model, &learned, labels, robot, options)?;
+    calibrate::fit(&mut model, &learned, labels, robot)?;
     let tested: Vec<&Run> = runs
         .iter()
         .filter(|run| left_out.contains(&run.id))
