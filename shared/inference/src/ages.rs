@@ -7,7 +7,9 @@
 //! of the summed weights: with equal births a Shiryaev-Roberts statistic.
 //!
 //! Onsets are resolved in proportion to their age ([`crate::onsets`]); where two components become
-//! one, their first two moments are kept. One prior deviation serves faults of every size: it enters the delay by its
+//! one, their first two moments are kept.
+//!
+//! One prior deviation serves faults of every size: it enters the delay by its
 //! logarithm only, and mixtures of several gained on small faults what they lost on others.
 
 use nalgebra::SVector;

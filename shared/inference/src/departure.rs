@@ -17,7 +17,7 @@ use crate::track::{Displacement, MotionNoise, Track};
 /// Log-odds beyond which more evidence changes nothing, but delays recovery.
 const LOG_ODDS_MAX: f64 = 40.0;
 /// Components less probable than this, by their log-odds, are dropped.
-const LOG_ODDS_MIN: f64 = -60.0;
+const LOG_ODDS_MIN: f64 = -30.0;
 
 /// A fault that began at one of some successive steps.
 #[derive(Debug, Clone, Copy, PartialEq)]

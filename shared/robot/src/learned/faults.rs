@@ -1,16 +1,15 @@
-//! What faults may do to the motion, as far as the detector cares: something, or about what the
-//! learned faults do that turn the robot to the left, or to the right.
+//! What faults may do to the motion, as far as the detector cares: anything, or what the learned
+//! ones do. Trying those besides the unknown lets the detector see them sooner, and nothing later.
 
-use nalgebra::{Matrix3, Vector3};
+use vigil_blocks::WHEELS;
 use vigil_inference::departure::Kind;
 use vigil_inference::track::{Displacement, MotionNoise};
 
-use super::model::StuckModel;
 use super::motion_modes::unknown_noise;
-use super::{Model, Observation};
+use super::{Model, MotionModel, Observation};
 
-/// Kinds of faults: anything, like those learned that turn left, like those that turn right.
-pub const KINDS: usize = 3;
+/// Kinds of faults: anything, and each wheel stuck.
+pub const KINDS: usize = 1 + WHEELS;
 /// Share of faults that do anything.
 const SHARE_ANYTHING: f64 = 0.5;
 
@@ -18,21 +17,17 @@ const SHARE_ANYTHING: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub struct Faults {
     anything: MotionNoise,
-    learned: [Vec<StuckModel>; KINDS - 1],
+    learned: [Option<(MotionModel, MotionNoise)>; WHEELS],
 }
 
 impl Faults {
-    /// The faults that a model knows, divided by the way they turn the robot on a straight path.
+    /// The faults that a model knows.
     #[must_use]
     pub fn new(model: &Model) -> Self {
-        let straight = model.nominal.motion.yaw.curvature[0];
-        let turning = |left: bool| {
-            let of = |stuck: &&StuckModel| (stuck.motion.yaw.curvature[0] > straight) == left;
-            model.stuck.iter().filter(of).cloned().collect()
-        };
+        let stuck = |wheel: usize| model.stuck(wheel).map(|stuck| stuck.motion);
         Self {
             anything: unknown_noise(model),
-            learned: [turning(true), turning(false)],
+            learned: std::array::from_fn(|w| stuck(w).map(|motion| (motion, motion.noise()))),
         }
     }
 
@@ -44,42 +39,23 @@ impl Faults {
         observation: &Observation,
         step: &Displacement,
     ) -> [Kind; KINDS] {
+        let known = self.learned.iter().flatten().count();
+        let anything = if known == 0 { 1.0 } else { SHARE_ANYTHING };
         let mut kinds = [Kind {
-            share: 1.0,
+            share: anything,
             step: *step,
             noise: self.anything,
         }; KINDS];
-        for (kind, faults) in kinds[1..].iter_mut().zip(&self.learned) {
+        for (kind, learned) in kinds[1..].iter_mut().zip(&self.learned) {
             kind.share = 0.0;
-            if faults.is_empty() {
-                continue;
+            if let Some((motion, noise)) = learned {
+                *kind = Kind {
+                    share: (1.0 - SHARE_ANYTHING) / known as f64,
+                    step: observation.displacement(model, motion),
+                    noise: *noise,
+                };
             }
-            let limit = model.command.curvature_max_1_m;
-            let share = 1.0 / faults.len() as f64;
-            let (mut mean, mut square) = (Vector3::zeros(), Matrix3::zeros());
-            let mut noise = MotionNoise {
-                offset: Matrix3::zeros(),
-                deviation: Matrix3::zeros(),
-                length_m: 0.0,
-                white: Vector3::zeros(),
-            };
-            for fault in faults {
-                let motion = &fault.motion;
-                let at = motion.per_metre(observation.curvature, observation.speed, limit);
-                let (at, own) = (Vector3::from(at), motion.noise());
-                mean += at * share;
-                square += at * at.transpose() * share;
-                noise.offset += own.offset * share;
-                noise.deviation += own.deviation * share;
-                noise.length_m += own.length_m * share;
-                noise.white += own.white * share;
-            }
-            noise.offset += square - mean * mean.transpose();
-            kind.step.per_metre = mean.into();
-            kind.noise = noise;
-            kind.share = (1.0 - SHARE_ANYTHING) / self.learned.len() as f64;
         }
-        kinds[0].share = 1.0 - kinds[1].share - kinds[2].share;
         kinds
     }
 }
