@@ -7,6 +7,10 @@ use rover::{robot, tree};
 use vigil_evaluation::labels::Label;
 use vigil_evaluation::scoring::{Case, Claims, Ratio, Score, Side, Taxonomy, Verdict, score};
 
+/// Threshold of the hand-made verdicts' alarms, which have log-odds of 20 while they stand, -20
+/// otherwise.
+const ALARM: f64 = 10.0;
+
 fn label(run: u32, mode: &str, kind: &str, onset_s: Option<f64>) -> Label {
     Label {
         run,
@@ -34,6 +38,7 @@ fn case(label: Label, end_s: f64, changes: &[(f64, bool, &str, f64)]) -> Case {
         }
         Verdict {
             t_s,
+            log_odds: if alarm { 20.0 } else { -20.0 },
             alarm,
             mode: mode.into(),
             p_mode: p,
@@ -48,12 +53,11 @@ fn case(label: Label, end_s: f64, changes: &[(f64, bool, &str, f64)]) -> Case {
 }
 
 fn scored(cases: &[Case]) -> Score {
-    score(cases, &Taxonomy::new(&tree(), &robot()))
+    score(cases, &Taxonomy::new(&tree(), &robot()), ALARM)
 }
 
 fn ratio(right: usize, n: usize) -> Ratio {
-    let fraction = (n > 0).then(|| right as f64 / n as f64);
-    Ratio { n, right, fraction }
+    Ratio { n, right }
 }
 
 #[test]
