@@ -1,6 +1,6 @@
 //! What was believed over time, run by run.
 
-use super::chart::{Axis, COLOURS, Chart, ChartError, Curve, INK, Stroke};
+use super::chart::{Axis, Chart, ChartError, Curve, INK, Stroke};
 use super::page::{beside, escaped, key, section as page_section};
 use super::{Report, words};
 use crate::scoring::{Case, Taxonomy, UNKNOWN, Verdict};
@@ -31,8 +31,15 @@ impl Of {
     }
 }
 
+/// A mode to draw: the true one, nominal driving and unknown have colours of their own.
+struct Mode<'a> {
+    of: Of,
+    name: &'a str,
+    colour: usize,
+}
+
 /// The true mode first, then the others that reached most.
-fn leading<'a>(case: &Case, taxonomy: &'a Taxonomy) -> Vec<(Of, &'a str)> {
+fn leading<'a>(case: &Case, taxonomy: &'a Taxonomy) -> Vec<Mode<'a>> {
     let nodes = taxonomy.leaf_names().map(|(i, name)| (Of::Node(i), name));
     let all = nodes.chain([(Of::Unknown, UNKNOWN)]);
     let highest = |of: Of| case.verdicts.iter().map(|v| of.p(v)).fold(0.0, f64::max);
@@ -46,7 +53,17 @@ fn leading<'a>(case: &Case, taxonomy: &'a Taxonomy) -> Vec<(Of, &'a str)> {
         .collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.truncate(MODES);
-    found.into_iter().map(|(_, of, name)| (of, name)).collect()
+    let mut free = [3, 4, 6].into_iter();
+    let coloured = found.into_iter().map(|(highest, of, name)| {
+        let colour = match of {
+            _ if highest.is_infinite() => 1,
+            Of::Node(0) => 2,
+            Of::Unknown => 5,
+            Of::Node(_) => free.next().unwrap_or(INK),
+        };
+        Mode { of, name, colour }
+    });
+    coloured.collect()
 }
 
 /// Points of a curve without those that change nothing to the eye.
@@ -79,10 +96,10 @@ fn chart(case: &Case, taxonomy: &Taxonomy, set: &str) -> Result<String, ChartErr
         });
     }
     // The true mode lies on top.
-    curves.extend(modes.iter().enumerate().rev().map(|(i, (of, _))| Curve {
-        colour: i % COLOURS + 1,
+    curves.extend(modes.iter().rev().map(|mode| Curve {
+        colour: mode.colour,
         stroke: Stroke::Solid,
-        points: thinned(case, *of),
+        points: thinned(case, mode.of),
     }));
     let chart = Chart {
         caption: format!("Belief over time, run {}, {set}", case.label.run),
@@ -94,10 +111,7 @@ fn chart(case: &Case, taxonomy: &Taxonomy, set: &str) -> Result<String, ChartErr
         },
         curves,
     };
-    let names = modes.iter().enumerate();
-    let names: Vec<_> = names
-        .map(|(i, (_, name))| (i % COLOURS + 1, *name, false))
-        .collect();
+    let names: Vec<_> = modes.iter().map(|m| (m.colour, m.name, false)).collect();
     Ok(format!("{}{}\n", key(&names), chart.svg()?))
 }
 
@@ -112,7 +126,7 @@ fn run(report: &Report<'_>, i: usize) -> Result<String, ChartError> {
         let label = &case.label;
         heading = match label.onset_s {
             Some(s) => format!(
-                "run {}: {} {} from {s:.2} s on",
+                "run {}: {} ({}), onset {s:.2} s",
                 label.run, label.mode, label.kind
             ),
             None => format!("run {}: nominal", label.run),

@@ -81,6 +81,8 @@ impl Axis {
 pub enum Stroke {
     /// A line.
     Solid,
+    /// A thin line.
+    Thin,
     /// A broken line.
     Dashed,
     /// A filled circle at each point.
@@ -183,7 +185,7 @@ impl Chart {
             .build_cartesian_2d(Ticked::of(&self.x), Ticked::of(&self.y))?;
         chart
             .configure_mesh()
-            .max_light_lines(0)
+            .light_line_style(TRANSPARENT)
             .bold_line_style(GRID.stroke_width(1))
             .axis_style(GRID.stroke_width(2))
             .label_style(("sans-serif", LETTER).into_font().color(&marker(INK)))
@@ -195,10 +197,11 @@ impl Chart {
             .draw()?;
         for curve in &self.curves {
             let (points, colour) = (curve.points.iter().copied(), marker(curve.colour));
-            let width = if curve.colour == INK { 2 } else { 4 };
+            let is_thin = curve.colour == INK || curve.stroke == Stroke::Thin;
+            let width = if is_thin { 2 } else { 4 };
             let style = colour.stroke_width(width);
             match curve.stroke {
-                Stroke::Solid => {
+                Stroke::Solid | Stroke::Thin => {
                     chart.draw_series(LineSeries::new(points, style))?;
                 }
                 Stroke::Dashed => {

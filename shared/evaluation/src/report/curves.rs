@@ -40,17 +40,25 @@ fn curve(colour: usize, stroke: Stroke, points: Vec<(f64, f64)>) -> Curve {
 
 /// Reliability: how often claims of like probability were true.
 pub fn calibration(report: &Report<'_>) -> Result<String, ChartError> {
+    let names = types(report);
+    // All of them are the sum of what is drawn.
+    let drawn = |class: &str| class != "all" || names.len() == 1;
     let charts = pair(report, |set| {
-        let found = set.score.calibration.get("all");
-        let bins: &[Bin] = found.map_or(&[], |found| &found.reliability);
-        let at = |bin: &Bin| Some((bin.p_mean, bin.is_true.fraction()?));
         let mut curves = vec![curve(INK, Stroke::Dashed, vec![(0.0, 0.0), (1.0, 1.0)])];
-        curves.extend(bins.iter().filter_map(|bin| {
-            let bounds = bin.is_true.bounds_95()?;
-            let bar = vec![(bin.p_mean, bounds.lower), (bin.p_mean, bounds.upper)];
-            Some(curve(INK, Stroke::Solid, bar))
-        }));
-        curves.push(curve(1, Stroke::Dots, bins.iter().filter_map(at).collect()));
+        let mut tables = String::new();
+        for (i, class) in names.iter().enumerate().filter(|(_, class)| drawn(class)) {
+            let found = set.score.calibration.get(class);
+            let bins: &[Bin] = found.map_or(&[], |found| &found.reliability);
+            curves.extend(bins.iter().filter_map(|bin| {
+                let bounds = bin.is_true.bounds_95()?;
+                let bar = vec![(bin.p_mean, bounds.lower), (bin.p_mean, bounds.upper)];
+                Some(curve(colour(i), Stroke::Thin, bar))
+            }));
+            let at = |bin: &Bin| Some((bin.p_mean, bin.is_true.fraction()?));
+            let points = bins.iter().filter_map(at).collect();
+            curves.push(curve(colour(i), Stroke::Dots, points));
+            tables.push_str(&reliability(class, bins));
+        }
         let chart = Chart {
             caption: format!("Reliability, {}", words(set.name)),
             size: SIZE,
@@ -58,16 +66,19 @@ pub fn calibration(report: &Report<'_>) -> Result<String, ChartError> {
             y: Axis::share("share true"),
             curves,
         };
-        Ok(format!("{}{}", chart.svg()?, reliability(bins)))
+        let tables = format!("<details><summary>as tables</summary>\n{tables}</details>\n");
+        Ok(format!("{}{tables}", chart.svg()?))
     })?;
     let about = "The probability that came with the name 2 s after the onset, in up to 15 bins of \
                  equally many runs, against the share that was true, with 95 % bounds. An abstract \
-                 node above the true leaf is true. On the broken line names deserve the belief \
-                 they ask for; above it they deserve more.";
-    Ok(section("calibration", "Calibration", about, &charts))
+                 node above the true leaf is true. Below the broken line names are less often true \
+                 than they claim, above it more often.";
+    let legend = legend(&names, drawn, &[("", false)]);
+    let inside = format!("{legend}{charts}");
+    Ok(section("calibration", "Calibration", about, &inside))
 }
 
-fn reliability(bins: &[Bin]) -> String {
+fn reliability(class: &str, bins: &[Bin]) -> String {
     let row = |bin: &Bin| {
         format!(
             "<tr><td class=\"n\">{}</td><td class=\"n\">{:.4} to {:.4}</td>\
@@ -81,9 +92,10 @@ fn reliability(bins: &[Bin]) -> String {
     };
     let rows: String = bins.iter().map(row).collect();
     format!(
-        "<details><summary>as a table</summary>\n<table>\n<thead><tr><th class=\"n\">runs</th>\
+        "<table>\n<caption>{}</caption><thead><tr><th class=\"n\">runs</th>\
          <th class=\"n\">probability</th><th class=\"n\">mean</th>\
-         <th class=\"n\">share true</th></tr></thead>\n<tbody>\n{rows}</tbody></table></details>\n"
+         <th class=\"n\">share true</th></tr></thead>\n<tbody>\n{rows}</tbody></table>\n",
+        escaped(class)
     )
 }
 
@@ -91,35 +103,35 @@ fn reliability(bins: &[Bin]) -> String {
 pub fn delays(report: &Report<'_>) -> Result<String, ChartError> {
     let names = types(report);
     let charts = pair(report, |set| {
-        let place = |s: f64| s.max(DELAYS_S[0]).log10();
         let curves = names.iter().enumerate().filter_map(|(i, class)| {
             let found = set.score.detection.get(class)?;
             let n = found.n.max(1) as f64;
-            let mut points = vec![(place(0.0), 0.0)];
+            let mut points = vec![(place_delay(0.0), 0.0)];
             for (k, delay_s) in found.delays_s.iter().enumerate() {
-                let at = place(*delay_s);
+                let at = place_delay(*delay_s);
                 points.extend([(at, k as f64 / n), (at, (k + 1) as f64 / n)]);
             }
             let end = points.last().map_or(0.0, |last| last.1);
-            points.push((place(10.0), end));
+            points.push((place_delay(10.0), end));
             Some(curve(colour(i), Stroke::Solid, points))
         });
         let chart = Chart {
             caption: format!("Share of faults found within a time, {}", words(set.name)),
             size: SIZE,
-            x: Axis::placed("delay, s", &DELAYS_S, place),
+            x: Axis::placed("delay, s", &DELAYS_S, place_delay),
             y: Axis::share("share of faults found"),
             curves: curves.collect(),
         };
         chart.svg()
     })?;
     let about = "From the onset of the fault to the alarm, at the configured threshold.";
-    let inside = format!("{}{charts}", legend(&names, &[("", false)]));
+    let inside = format!("{}{charts}", legend(&names, |_| true, &[("", false)]));
     Ok(section("delay", "Time to the alarm", about, &inside))
 }
 
-fn legend(names: &[String], strokes: &[(&str, bool)]) -> String {
-    let all = names.iter().enumerate().flat_map(|(i, name)| {
+fn legend(names: &[String], drawn: impl Fn(&str) -> bool, strokes: &[(&str, bool)]) -> String {
+    let names = names.iter().enumerate().filter(|(_, name)| drawn(name));
+    let all = names.flat_map(|(i, name)| {
         let name = move |&(stroke, dashed): &(&str, bool)| {
             let text = format!("{name} {stroke}");
             (colour(i), text.trim_end().to_owned(), dashed)
@@ -132,6 +144,11 @@ fn legend(names: &[String], strokes: &[(&str, bool)]) -> String {
         .map(|(c, name, d)| (*c, name.as_str(), *d))
         .collect();
     key(&all)
+}
+
+/// Place of a delay on its axis: logarithmic, what lies outside at its ends.
+fn place_delay(delay_s: f64) -> f64 {
+    delay_s.clamp(0.02, 10.0).log10()
 }
 
 /// Place of a rate on its axis: linear near none, logarithmic far from it.
@@ -153,13 +170,13 @@ fn over_thresholds(
     score: &Score,
     class: &str,
     of: impl Fn(&Found) -> Option<f64>,
-) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
+) -> [Vec<(f64, f64)>; 2] {
     let at = |point: &Point| {
         let rate = point.rate.false_alarms_per_h?;
         Some((place_rate(rate), of(point.detection.get(class)?)?))
     };
     let curve = score.trade_off.points.iter().filter_map(at).collect();
-    (curve, at(&score.trade_off.configured).into_iter().collect())
+    [curve, at(&score.trade_off.configured).into_iter().collect()]
 }
 
 /// Delay and misses against false alarms.
@@ -169,22 +186,22 @@ pub fn trade_off(report: &Report<'_>) -> Result<String, ChartError> {
         let score = set.score;
         let (mut delay, mut missed) = (Vec::new(), Vec::new());
         for (i, class) in names.iter().enumerate() {
-            let (points, here) = over_thresholds(score, class, |found| found.delay.p50_s);
+            let [points, here] =
+                over_thresholds(score, class, |found| found.delay.p50_s.map(place_delay));
             delay.push(curve(colour(i), Stroke::Solid, points));
             delay.push(curve(colour(i), Stroke::Dots, here));
-            let (points, _) = over_thresholds(score, class, |found| found.delay_mean_s);
+            let [points, _] =
+                over_thresholds(score, class, |found| found.delay_mean_s.map(place_delay));
             delay.push(curve(colour(i), Stroke::Dashed, points));
-            let (points, here) = over_thresholds(score, class, |found| found.miss_rate);
+            let [points, here] = over_thresholds(score, class, |found| found.miss_rate);
             missed.push(curve(colour(i), Stroke::Solid, points));
             missed.push(curve(colour(i), Stroke::Dots, here));
         }
-        let highest = delay.iter().flat_map(|curve| &curve.points);
-        let highest = highest.fold(0.0, |high: f64, point| high.max(point.1));
         let delay = Chart {
             caption: format!("Delay against false alarms, {}", words(set.name)),
             size: SIZE,
             x: rate_axis(score),
-            y: Axis::linear("delay, s", 1.05 * highest, 5.0),
+            y: Axis::placed("delay, s", &DELAYS_S, place_delay),
             curves: delay,
         };
         let missed = Chart {
@@ -206,7 +223,7 @@ pub fn trade_off(report: &Report<'_>) -> Result<String, ChartError> {
                  finds nothing, so that misses rise again where false alarms are many. Delays are \
                  those of the faults found. To the left of the dots delays are upper bounds: once \
                  its own alarm stands, the detector follows the robot and collects less.";
-    let legend = legend(&names, &[("median", false), ("mean", true)]);
+    let legend = legend(&names, |_| true, &[("median", false), ("mean", true)]);
     let inside = format!("{legend}{charts}");
     Ok(section(
         "trade-off",
