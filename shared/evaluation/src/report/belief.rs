@@ -188,8 +188,8 @@ pub fn section(report: &Report<'_>) -> Result<String, ChartError> {
         inside.push_str(&format!("<p class=\"soft\">{}</p>\n", escaped(&text)));
     }
     let about = "Probability of the leading modes over time, s; before an alarm, of nominal \
-                 driving and unknown. The first name is the true one; the broken line is the onset. \
-                 First the runs with a false alarm, a missed fault or a wrong leaf 2 s after the \
-                 onset, with any of the channels.";
+                 driving and unknown. The first name is the true one; the broken line is the \
+                 onset. First the runs with a false alarm, a missed fault or a wrong leaf 2 s \
+                 after the onset, with any of the channels.";
     Ok(page_section("belief", "Belief over time", about, &inside))
 }

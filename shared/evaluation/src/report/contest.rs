@@ -12,7 +12,7 @@ fn apart(difference: Option<&Difference>, scale: f64, decimals: usize) -> String
     };
     let text = |x: f64| format!("{:+.decimals$}", scale * x);
     let (mean, lower, upper) = (text(found.mean), text(found.lower_95), text(found.upper_95));
-    format!("<br/><span class=\"soft\">{mean} ({lower} to {upper})</span>")
+    format!("<br/><span class=\"soft\">{mean} ({lower}, {upper})</span>")
 }
 
 fn share(share: &Share) -> String {
@@ -28,8 +28,8 @@ fn row(row: &Row) -> String {
         let at = [&of.after_2_s, &of.after_5_s, &of.after_10_s];
         at.map(share).concat()
     });
-    let log_score = number(row.log_score_nats, 3);
-    let log_apart = apart(row.log_score_difference.as_ref(), 1.0, 3);
+    let log_score = number(row.log_score_nats, 2);
+    let log_apart = apart(row.log_score_difference.as_ref(), 1.0, 2);
     format!(
         "<tr><th>{}</th>{leaf}{side}<td>{log_score}{log_apart}</td>{}</tr>\n",
         escaped(&row.filter),
@@ -55,7 +55,7 @@ fn table(rows: &[Row], caption: &str) -> String {
         .collect();
     let rows: String = rows.iter().map(row).collect();
     format!(
-        "<div class=\"wide\"><table><caption>{}</caption>\n<thead><tr>{heads}</tr></thead>\n\
+        "<div class=\"wide\"><table class=\"close\"><caption>{}</caption>\n<thead><tr>{heads}</tr></thead>\n\
          <tbody>\n{rows}</tbody></table></div>\n",
         escaped(caption)
     )

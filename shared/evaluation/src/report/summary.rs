@@ -216,8 +216,8 @@ pub fn section(report: &Report<'_>) -> String {
             "<details><summary>by kind of fault</summary>\n{kinds}</details>\n"
         ));
     }
-    let about = "In brackets: runs, and exact 95 % bounds (Clopper and Pearson; for false alarms an \
-                 hour Garwood). Times count from the onset of the fault; runs that end earlier do \
+    let about = "In brackets: runs, and exact 95 % bounds (Clopper and Pearson; for false alarms \
+                 an hour Garwood). Times count from the onset of the fault; runs that end earlier do \
                  not count. An abstract node is a wrong leaf, and a right side or type if all its \
                  leaves are of it.";
     format!(
