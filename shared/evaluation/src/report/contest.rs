@@ -55,7 +55,8 @@ fn table(rows: &[Row], caption: &str) -> String {
         .collect();
     let rows: String = rows.iter().map(row).collect();
     format!(
-        "<div class=\"wide\"><table class=\"close\"><caption>{}</caption>\n<thead><tr>{heads}</tr></thead>\n\
+        "<div class=\"wide\"><table class=\"close\">\n<caption>{}</caption>\n\
+         <thead><tr>{heads}</tr></thead>\n\
          <tbody>\n{rows}</tbody></table></div>\n",
         escaped(caption)
     )

@@ -29,7 +29,8 @@ th{font-weight:600}td.n,th.n{text-align:right}tr.group th{padding-top:1rem}
 .key i{display:inline-block;width:1.3em;height:0;border-top:3px solid;vertical-align:middle;\
 margin-right:.35em}.key i.dashed{border-top-style:dashed}
 .close{font-size:.78rem;margin-bottom:1rem}.close th,.close td{padding:.2rem .35rem;\
-white-space:nowrap}.close .soft{font-size:inherit}.run{margin:.9rem 0;border-top:1px solid var(--grid);padding-top:.4rem}
+white-space:nowrap}.close .soft{font-size:inherit}
+.run{margin:.9rem 0;border-top:1px solid var(--grid);padding-top:.4rem}
 code{overflow-wrap:anywhere}details{margin:.5rem 0}summary{cursor:pointer}\
 ";
 
