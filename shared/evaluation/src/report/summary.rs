@@ -217,9 +217,9 @@ pub fn section(report: &Report<'_>) -> String {
         ));
     }
     let about = "In brackets: runs, and exact 95 % bounds (Clopper and Pearson; for false alarms \
-                 an hour Garwood). Times count from the onset of the fault; runs that end earlier \
-                 do not count. An abstract node is a wrong leaf, and a right side or type if all its \
-                 leaves are of it.";
+                 an hour Garwood). Times count from the onset of the fault; runs that end \
+                 earlier do not count. An abstract node is a wrong leaf, and a right side or type \
+                 if all its leaves are of it.";
     format!(
         "<header><h1>Vigil: evaluation</h1></header>\n{}",
         super::page::section("summary", "Figures", about, &inside)
