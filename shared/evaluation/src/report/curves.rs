@@ -221,8 +221,9 @@ pub fn trade_off(report: &Report<'_>) -> Result<String, ChartError> {
     let about = "All thresholds of the detector over one pass, the alarm armed again after each; \
                  the dots are the configured threshold. An alarm that already stands at the onset \
                  finds nothing, so that misses rise again where false alarms are many. Delays are \
-                 those of the faults found. To the left of the dots delays are upper bounds: once \
-                 its own alarm stands, the detector follows the robot and collects less.";
+                 those of the faults found. To the left \
+                 of the dots they may come out too long: once its own alarm stands, the detector \
+                 follows the robot and gathers less evidence.";
     let legend = legend(&names, |_| true, &[("median", false), ("mean", true)]);
     let inside = format!("{legend}{charts}");
     Ok(section(

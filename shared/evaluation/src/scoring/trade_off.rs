@@ -3,9 +3,9 @@
 //! The activity monitoring curve of Fawcett and Provost (1999): detection delay against false
 //! alarms, over all thresholds on the detector's log-odds, all from one pass. At each threshold
 //! the alarm rises and falls as the detector's own does, so that it is armed again after each; at
-//! the configured threshold the curve says what was measured. Above it the curve can only be too
-//! late: once its own alarm stands, the detector's pose track follows the measurement, and
-//! log-odds grow no further. Time at rest counts as time in motion here.
+//! the configured threshold the curve says what was measured. Above it delays may come out too long:
+//! once its own alarm stands, the detector's pose track follows the measurement, which slows the
+//! growth of the log-odds. Time at rest counts as time in motion here.
 
 use std::collections::BTreeMap;
 
@@ -20,8 +20,9 @@ const CLEAR_BELOW: f64 = 8.0;
 const CLEAR_LOG_ODDS: f64 = -4.0;
 /// .. for this long, s.
 const CLEAR_S: f64 = 1.0;
-/// Thresholds taken from healthy driving, and as many from driving with a fault.
-const LEVELS: usize = 40;
+/// Thresholds taken from the top of healthy driving, as many from the rest of it, and as many from
+/// driving with a fault.
+const LEVELS: usize = 30;
 
 /// Detection of the faults of one class at one threshold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -72,7 +73,8 @@ pub struct TradeOff {
     /// The threshold that was set.
     pub configured: Point,
     /// Thresholds, rising. They are log-odds that a run reaches for the first time, where the
-    /// curve changes, evenly thinned by rank.
+    /// curve changes: the highest of healthy driving, where false alarms are few, and others evenly
+    /// thinned by rank.
     pub points: Vec<Point>,
 }
 
@@ -157,7 +159,11 @@ fn thresholds(cases: &[Case]) -> Vec<f64> {
             }
         }
     }
-    let mut levels = [thinned(healthy), thinned(faulty)].concat();
+    // Highest first: each of these is one false alarm more.
+    healthy.sort_by(|a, b| b.total_cmp(a));
+    healthy.dedup();
+    let rest = healthy.split_off(healthy.len().min(LEVELS));
+    let mut levels = [healthy, thinned(rest), thinned(faulty)].concat();
     levels.sort_by(f64::total_cmp);
     levels.dedup();
     levels
