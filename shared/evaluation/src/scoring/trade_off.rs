@@ -3,9 +3,9 @@
 //! The activity monitoring curve of Fawcett and Provost (1999): detection delay against false
 //! alarms, over all thresholds on the detector's log-odds, all from one pass. At each threshold
 //! the alarm rises and falls as the detector's own does, so that it is armed again after each; at
-//! the configured threshold the curve says what was measured. Above it delays may come out too long:
-//! once its own alarm stands, the detector's pose track follows the measurement, which slows the
-//! growth of the log-odds. Time at rest counts as time in motion here.
+//! the configured threshold the curve says what was measured. Above it delays may come out too
+//! long: once its own alarm stands, the detector's pose track follows the measurement, which slows
+//! the growth of the log-odds. Time at rest counts as time in motion here.
 
 use std::collections::BTreeMap;
 
