@@ -102,7 +102,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 }
 
 /// Writes a file so that its place holds either the old one or the whole new one.
-fn write_whole(path: &Path, text: &str) -> io::Result<()> {
+pub(super) fn write_whole(path: &Path, text: &str) -> io::Result<()> {
     let mut name = path.as_os_str().to_owned();
     name.push(format!(".{}.part", std::process::id()));
     let part = PathBuf::from(name);

@@ -244,7 +244,9 @@ fn blank(robot: &Description, options: &Options) -> Model {
     }
 }
 
-fn data_hash(runs: &[&Run]) -> String {
+/// Hash of what frames hold: ids of the runs, times, poses, commands, wheel rates.
+#[must_use]
+pub fn data_hash(runs: &[&Run]) -> String {
     let mut hash = fnv1a::BASIS;
     for run in runs {
         hash = fnv1a::hash_u64(hash, u64::from(run.id));
