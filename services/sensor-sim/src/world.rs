@@ -318,7 +318,8 @@ impl World {
         self.run_id = run_id;
     }
 
-    /// Equilibria that were not found; the last one was kept.
+    /// Equilibria that were not found (where forces from outside exceed the soil's strength there
+    /// is none); the last one was kept.
     #[must_use]
     pub const fn unsolved(&self) -> u64 {
         self.unsolved

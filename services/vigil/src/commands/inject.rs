@@ -21,7 +21,7 @@ pub struct Args {
     #[command(flatten)]
     graph: GraphArgs,
     /// `stuck:RM`, `encoder:LF:zero|frozen|noise`, `clear:RM`, `clear:all`, or one of many that no
-    /// model contains (`tether:20`, `brush:RM`; `vigil inject help` names all).
+    /// model contains (`tether:20`, `brush:RM`; a wrong word lists all).
     #[arg(value_name = "SPEC")]
     spec: String,
 }
