@@ -2,6 +2,7 @@
 //! the filters that are compared.
 
 pub mod archive;
+pub mod figure7;
 pub mod filters;
 pub mod machine;
 pub mod matched;
