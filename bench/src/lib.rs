@@ -4,6 +4,7 @@
 pub mod archive;
 pub mod figure7;
 pub mod filters;
+pub mod ground;
 pub mod machine;
 pub mod matched;
 pub mod naive;

@@ -117,3 +117,62 @@ fn readings(rover: &Rover, healthy: &Step, faulty: &Step) -> f64 {
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::simulated::{Conditions, constant};
+    use std::path::Path;
+    use vigil_robot::Injection;
+    use vigil_setup::schema::Simulator;
+
+    const ONSET_S: f64 = 4.0;
+
+    fn found(rover: &Rover, spec: &str) -> [f64; 2] {
+        let change = Injection::parse_change(spec, &rover.robot).unwrap();
+        let conditions = Conditions {
+            simulator: Simulator {
+                noise_scale: 0.0,
+                ..Simulator::default()
+            },
+            drive: constant(0.0, 0.2),
+            rate_hz: 20.0,
+            seed: 3,
+        };
+        let follow = |change| {
+            let mut follower = Follower::new(rover);
+            let take = |_, frame: &SensorFrame| follower.take(frame);
+            conditions.drive(rover, 6.0, change, take).unwrap();
+            follower
+        };
+        between(&follow(None), &follow(Some((change, ONSET_S))), 80, 120)
+    }
+
+    #[test]
+    fn readings_beside_the_pose_add_their_squares_and_the_pose_its_innovations() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let rover = Rover::read(&root).unwrap();
+        assert_eq!(found(&rover, "clear:all"), [0.0, 0.0]);
+        // 40 readings of one encoder, each off by a tenth of about 2.5 rad/s.
+        let model = &rover.model;
+        let [pose, all] = found(&rover, "encoder-scale:LM:1.1");
+        let (_, process) = model.nominal.rates[1].rate(2.49, 0.0);
+        let variance = process + model.sample_variance(model.noise.wheel_rate_rad_s, 0.05);
+        assert_eq!(pose, 0.0);
+        let expected = 40.0 * 0.249 * 0.249 / variance;
+        assert!((all / expected - 1.0).abs() < 0.02, "{all} {expected}");
+        // A late pose: one jump of 0.06 m, which the track follows slowly. No innovation exceeds it,
+        // and each has at least the sensor's variance.
+        let [pose, all] = found(&rover, "pose-delay:0.3");
+        let jump = 0.06_f64.powi(2) / model.noise.position_m.powi(2);
+        assert_eq!(pose, all);
+        assert!((0.3 * jump..40.0 * jump).contains(&pose), "{pose} {jump}");
+        // Without poses there is nothing to compare.
+        assert_eq!(found(&rover, "pose-drop"), [0.0, 0.0]);
+        // Twice the drift, four times the squares.
+        let [slow, _] = found(&rover, "pose-drift:0.01");
+        let [fast, _] = found(&rover, "pose-drift:0.02");
+        assert!((fast / slow - 4.0).abs() < 0.1, "{slow} {fast}");
+    }
+}

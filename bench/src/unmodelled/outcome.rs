@@ -150,3 +150,71 @@ impl Run {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(mode: &str, p_mode: f64) -> Said {
+        Said {
+            alarm: true,
+            mode: mode.to_owned(),
+            p_mode,
+            p_unknown: 0.0,
+            fault_set: String::new(),
+        }
+    }
+
+    fn run(encoder: Option<&'static str>) -> Run {
+        let cell = Cell {
+            kind: "encoder-scale",
+            spec: String::new(),
+            encoder,
+            curvature_1_m: 0.0,
+            speed_m_s: 0.2,
+            weaves: false,
+        };
+        Run::new(&cell, "pose", 20.0, 1, 3.0)
+    }
+
+    #[test]
+    fn unknown_and_the_disturbed_encoder_are_right_and_all_other_names_are_not() {
+        for (mode, p, encoder, verdict) in [
+            ("UNKNOWN", 0.6, None, Verdict::Right),
+            ("LF_ENC", 0.95, Some("LF"), Verdict::Right),
+            ("LF_ENC", 0.95, Some("LM"), Verdict::Wrong),
+            ("LF_ENC", 0.95, None, Verdict::Wrong),
+            ("LSS", 0.95, None, Verdict::Wrong),
+            ("MULTIPLE", 0.95, None, Verdict::Wrong),
+            ("LF_STUCK", 0.9, None, Verdict::Doubtful),
+            ("ND", 1.0, None, Verdict::Nominal),
+        ] {
+            let mut run = run(encoder);
+            run.said[1] = Some(said(mode, p));
+            assert_eq!(run.verdict(1), Some(verdict), "{mode}");
+            assert_eq!(run.verdict(0), None);
+        }
+    }
+
+    #[test]
+    fn each_instant_is_judged_once_when_it_is_due() {
+        let mut run = run(None);
+        for k in 0..300_i32 {
+            let t_s = f64::from(k) * 0.05;
+            let alarm = t_s >= 3.5;
+            run.take(t_s, alarm, || said("UNKNOWN", t_s));
+        }
+        assert!(!run.alarmed_before);
+        assert!(run.delay_s.is_some_and(|d| (d - 0.5).abs() < 1e-9));
+        let at = run
+            .said
+            .each_ref()
+            .map(|said| said.as_ref().map_or(0.0, |s| s.p_mode));
+        for (at, expected) in at.into_iter().zip([5.5, 8.0, 13.0]) {
+            assert!((at - expected).abs() < 0.051, "{at}");
+        }
+        let mut early = super::tests::run(None);
+        early.take(2.0, true, || said("ND", 1.0));
+        assert!(early.alarmed_before && early.delay_s.is_none());
+    }
+}
