@@ -6,9 +6,9 @@ mod outcome;
 mod report;
 
 pub use grid::{Cell, cells};
-pub use nominal::{Nominal, RUN_S, drive_nominal};
+pub use nominal::{Nominal, RUN_S, drive_nominal, share_soon};
 pub use outcome::{Run, Verdict};
-pub use report::{Totals, by_kind, excluded, totals};
+pub use report::{Totals, bands, by_kind, excluded, totals};
 
 use std::error::Error;
 

@@ -16,12 +16,14 @@ use vigil_bench::options::Options;
 use vigil_bench::shares::poisson_upper;
 use vigil_bench::simulated::{Rover, SENSOR_SETS};
 use vigil_bench::unmodelled::{
-    self, Cell, NONCENTRALITY_MIN, Nominal, Run, Totals, by_kind, drive_nominal, excluded, totals,
+    self, Cell, NONCENTRALITY_MIN, Nominal, Run, Totals, bands, by_kind, drive_nominal, excluded,
+    totals,
 };
 
-/// Rates at which frames come: all cells at the first, every third at the second.
+/// Rates at which frames come: all cells at the first, every fourth at the second. Four shares no
+/// factor with the turns and speeds of a size, so that all of them come up.
 const RATES_HZ: [f64; 2] = [20.0, 100.0];
-const EVERY: usize = 3;
+const EVERY: usize = 4;
 
 fn main() -> ExitCode {
     match run() {
@@ -118,7 +120,11 @@ fn figures(runs: &[Run], sensors: &str, rate_hz: f64) -> Value {
         .into_iter()
         .map(|(kind, totals)| (kind.to_owned(), totals.json()))
         .collect();
-    json!({ "all": totals(&runs).json(), "kinds": kinds })
+    let bands = bands(&runs).into_iter().map(
+        |(from, to, detected)| json!({ "noncentrality": [from, to], "detected": detected.json() }),
+    );
+    let bands: Vec<Value> = bands.collect();
+    json!({ "all": totals(&runs).json(), "kinds": kinds, "bands": bands })
 }
 
 fn report(archive: &mut Archive, runs: &[Run]) {
@@ -137,6 +143,14 @@ fn report(archive: &mut Archive, runs: &[Run]) {
             let all = totals(&runs);
             archive.say(&all.row("all"));
             archive.say(&format!("\nAll: {}.", all.words()));
+            let bands = bands(&runs)
+                .into_iter()
+                .map(|(from, to, detected)| format!("{from} to {to}: {}", detected.short()));
+            let bands: Vec<String> = bands.collect();
+            archive.say(&format!(
+                "Detected within 2 s, by noncentrality: {}.",
+                bands.join(", ")
+            ));
         }
     }
 }
@@ -153,7 +167,7 @@ fn nominal_json(nominal: &[Nominal]) -> Value {
         let raised = raised.map(|run| {
             json!({
                 "seed": run.seed, "noise_scale": run.noise_scale, "scatter": run.scatter,
-                "alarms_s": run.alarms_s[i],
+                "alarms_s": run.alarms_s[i], "commands_change_s": run.changes_s,
             })
         });
         let figures = json!({
@@ -176,8 +190,11 @@ fn report_nominal(archive: &mut Archive, nominal: &[Nominal]) {
     for (i, (_, sensors)) in SENSOR_SETS.iter().enumerate() {
         let count = alarms(nominal, i);
         let upper = poisson_upper(count) / hours;
+        let soon: usize = nominal.iter().map(|run| run.soon_after_a_command(i)).sum();
         archive.say(&format!(
-            "- {sensors}: {count} alarms in {hours:.1} h (95 %: at most {upper:.3} per hour)"
+            "- {sensors}: {count} alarms in {hours:.1} h (95 %: at most {upper:.3} per hour), {soon} \
+             of them within 1.5 s of a new command (a share of {:.0} % of the time)",
+            100.0 * unmodelled::share_soon(nominal)
         ));
     }
 }

@@ -15,6 +15,7 @@ const SPECS: [&str; 53] = [
     "torque-loss:W:0.3",
     "torque-loss:W:0.5",
     "torque-loss:W:0.7",
+    "torque-loss:W:1",
     "yaw-rate-bias:0.01",
     "yaw-rate-bias:0.02",
     "yaw-rate-bias:-0.05",
@@ -55,7 +56,6 @@ const SPECS: [&str; 53] = [
     "payload-shift:-0.08:0.1",
     "payload-shift:0.1:-0.15",
     "payload-shift:-0.1:0.15",
-    "torque-loss:W:1",
 ];
 const CURVATURES_1_M: [f64; 5] = [0.0, 0.3, -0.3, 0.7, -0.7];
 const SPEEDS_M_S: [f64; 3] = [0.1, 0.2, 0.3];

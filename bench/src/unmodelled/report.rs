@@ -6,6 +6,9 @@ use super::{NONCENTRALITY_MIN, Run, Verdict, WINDOW_S};
 use crate::quantile;
 use crate::shares::Share;
 
+/// Ends of the bands of noncentrality.
+const BANDS: [f64; 7] = [NONCENTRALITY_MIN, 40.0, 60.0, 100.0, 200.0, 500.0, 1e12];
+
 /// Figures of a group of runs, those in cells that no nominal model could tell from nominal left
 /// out.
 #[derive(Debug, Clone)]
@@ -119,6 +122,22 @@ pub fn by_kind(runs: &[&Run]) -> Vec<(&'static str, Totals)> {
         (kind, totals(&own))
     };
     kinds.into_iter().map(of).collect()
+}
+
+/// Detected within 2 s, by noncentrality from and up to.
+#[must_use]
+pub fn bands(runs: &[&Run]) -> Vec<(f64, f64, Share)> {
+    BANDS
+        .windows(2)
+        .map(|ends| {
+            let within = |run: &&&Run| {
+                (ends[0]..ends[1]).contains(&run.noncentrality) && !run.alarmed_before
+            };
+            let own = runs.iter().filter(within);
+            let detected = Share::of(own, |run| run.is_detected(WINDOW_S));
+            (ends[0], ends[1], detected)
+        })
+        .collect()
 }
 
 /// Every run left out for its noncentrality.
