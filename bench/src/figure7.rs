@@ -1,8 +1,8 @@
 //! How a stuck wheel bends the path of the rover: the slip model beside recorded runs of an
 //! independent physics engine, radius by radius, wheel by wheel.
 //!
-//! The paper's figure 7 and its claim: a wheel stuck on the inside of a turn sharpens it, one on the
-//! outside makes it shallower.
+//! The paper's figure 7 and its claim: a wheel stuck on the inside of a turn sharpens it, one on
+//! the outside makes it shallower.
 
 mod drawing;
 mod measured;

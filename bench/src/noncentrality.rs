@@ -3,8 +3,8 @@
 //! The same world, without sensor noise, is driven twice, with and without the fault. In each a
 //! Kalman track of the nominal model follows the poses; the difference of the two innovations,
 //! whitened by their covariance, is the mean shift of an otherwise white sequence. The squares of
-//! that shift add up to the noncentrality: the most that any detector can have, on average, as twice
-//! the log-likelihood ratio. The track is put onto its first pose and never anchored again. Wheel
+//! that shift add up to the noncentrality: twice the log-likelihood ratio that a detector can have
+//! on average, at most. The track is put onto its first pose and never anchored again. Wheel
 //! rates and steering angles add the squares of their differences over the variance of a reading.
 
 use nalgebra::Matrix3;
@@ -162,8 +162,8 @@ mod tests {
         assert_eq!(pose, 0.0);
         let expected = 40.0 * 0.249 * 0.249 / variance;
         assert!((all / expected - 1.0).abs() < 0.02, "{all} {expected}");
-        // A late pose: one jump of 0.06 m, which the track follows slowly. No innovation exceeds it,
-        // and each has at least the sensor's variance.
+        // A late pose: one jump of 0.06 m, which the track follows slowly. No innovation exceeds
+        // it, and each has at least the sensor's variance.
         let [pose, all] = found(&rover, "pose-delay:0.3");
         let jump = 0.06_f64.powi(2) / model.noise.position_m.powi(2);
         assert_eq!(pose, all);

@@ -1,7 +1,7 @@
 //! Is what no model contains detected, and called unknown? And what does nominal driving raise?
 //!
-//! `--seeds N` worlds per cell (2), `--hours H` of nominal driving (24), `--json`: the document only,
-//! nothing is archived.
+//! `--seeds N` worlds per cell (2), `--hours H` of nominal driving (24), `--json`: the document
+//! only, nothing is archived.
 
 use std::error::Error;
 use std::path::Path;
@@ -145,7 +145,10 @@ fn report(archive: &mut Archive, runs: &[Run]) {
             archive.say(&format!("\nAll: {}.", all.words()));
             let bands = bands(&runs)
                 .into_iter()
-                .map(|(from, to, detected)| format!("{from} to {to}: {}", detected.short()));
+                .map(|(from, to, detected)| match to {
+                    to if to < 1e9 => format!("{from} to {to}: {}", detected.short()),
+                    _ => format!("from {from}: {}", detected.short()),
+                });
             let bands: Vec<String> = bands.collect();
             archive.say(&format!(
                 "Detected within 2 s, by noncentrality: {}.",
@@ -192,8 +195,8 @@ fn report_nominal(archive: &mut Archive, nominal: &[Nominal]) {
         let upper = poisson_upper(count) / hours;
         let soon: usize = nominal.iter().map(|run| run.soon_after_a_command(i)).sum();
         archive.say(&format!(
-            "- {sensors}: {count} alarms in {hours:.1} h (95 %: at most {upper:.3} per hour), {soon} \
-             of them within 1.5 s of a new command (a share of {:.0} % of the time)",
+            "- {sensors}: {count} alarms in {hours:.1} h (95 %: at most {upper:.3} per hour), \
+             {soon} of them within 1.5 s of a new command (a share of {:.0} % of the time)",
             100.0 * unmodelled::share_soon(nominal)
         ));
     }

@@ -1,7 +1,7 @@
 //! Which disturbances, in which sizes and turns, at which speeds.
 
-/// Sizes of each kind; `W` stands for a wheel, `S` for a steered one, `side` for a side: they change
-/// from cell to cell.
+/// Sizes of each kind; `W` stands for a wheel, `S` for a steered one, `side` for a side: they
+/// change from cell to cell.
 const SPECS: [&str; 53] = [
     "steer-jump:S:0.1",
     "steer-jump:S:0.2",
