@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use vigil_evaluation::frames;
 use vigil_evaluation::labels;
-use vigil_evaluation::learning::{self, Options, Report};
+use vigil_evaluation::learning::{self, Options, RESIDUAL_BAR, Report, Residual};
 use vigil_evaluation::split::split;
 
 use super::offline::RobotArgs;
@@ -122,34 +122,65 @@ fn write_whole(path: &Path, text: &str) -> io::Result<()> {
 }
 
 fn table(report: &Report, out: &Path) -> String {
-    let mut lines =
-        vec![
+    let mut lines = vec![
         format!("model        {}", out.display()),
-        format!("learned from {} runs, {} left out", report.runs_learned, report.runs_held_out),
-        format!("alarms       calibrated on {:.2} h without a fault", report.exposure_h),
+        format!(
+            "learned from {} runs, {} left out",
+            report.runs_learned, report.runs_held_out
+        ),
+        format!(
+            "alarms       calibrated on {:.2} h without a fault",
+            report.exposure_h
+        ),
         String::new(),
-        "error of the motion one interval ahead on the runs left out, against the sensor's noise"
+        "error of the motion one interval ahead on the runs left out, against the sensor's noise;"
+            .into(),
+        "in brackets what the model itself predicts of it, as the ground varies within a run"
             .into(),
         format!(
-            "{:<10} {:>8} {:>7} {:>12} {:>8} {:>9} {:>8} {:>10}",
-            "mode", "segments", "poses", "position, mm", "x noise", "yaw, mrad", "x noise", "ln p"
+            "{:<10} {:>6} {:>12} {:>11} {:>9} {:>18} {:>5} {:>6} {:>7}",
+            "mode",
+            "poses",
+            "position, mm",
+            "x noise",
+            "yaw, mrad",
+            "x noise",
+            "left",
+            "right",
+            "ln p"
         ),
     ];
     for mode in &report.modes {
+        let turn = |turn: &Option<Residual>| match turn {
+            Some(turn) => format!("{:.2}", turn.to_floor),
+            None => "-".into(),
+        };
+        let (position, yaw) = (&mode.position, &mode.yaw);
         lines.push(format!(
-            "{:<10} {:>8} {:>7} {:>12.2} {:>8.2} {:>9.2} {:>8.2} {:>10.3}",
+            "{:<10} {:>6} {:>12.2} {:>4.2} ({:.2}) {:>9.2} {:>4.2} +-{:.2} ({:.2}) {:>5} {:>6} {:>7.2}",
             mode.mode,
-            mode.segments,
             mode.poses,
-            1e3 * mode.position_rms_m,
-            mode.position_to_floor,
-            1e3 * mode.yaw_rms_rad,
-            mode.yaw_to_floor,
+            1e3 * position.rms,
+            position.to_floor,
+            position.predicted_to_floor,
+            1e3 * yaw.rms,
+            yaw.to_floor,
+            yaw.to_floor_error,
+            yaw.predicted_to_floor,
+            turn(&mode.yaw_left),
+            turn(&mode.yaw_right),
             mode.log_likelihood,
         ));
     }
     if report.modes.is_empty() {
         lines.push("none: no runs were left out".into());
     }
+    let above = report.modes.iter().filter(|mode| !mode.is_within_bar());
+    lines.extend(above.map(|mode| {
+        format!(
+            "{} exceeds {RESIDUAL_BAR} times the sensor's noise",
+            mode.mode
+        )
+    }));
     lines.join("\n")
 }

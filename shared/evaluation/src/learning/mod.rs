@@ -26,7 +26,7 @@ use vigil_robot::learned::{Curve, EncoderModel, MotionModel, RateModel};
 
 use crate::frames::Run;
 use crate::labels::Label;
-pub use report::{ModeError, Report};
+pub use report::{ModeError, RESIDUAL_BAR, Report, Residual};
 use segments::Segments;
 
 /// How to learn.

@@ -226,32 +226,42 @@ fn with_noise(motion: &MotionModel, x: &[f64; 7]) -> MotionModel {
 #[must_use]
 pub fn log_likelihood(model: &Model, motion: &MotionModel, segment: &Segment) -> f64 {
     let mut sum = 0.0;
-    follow(model, motion, segment, |_, log_likelihood| {
-        sum += log_likelihood
-    });
+    follow(model, motion, segment, |step| sum += step.log_likelihood);
     sum
 }
 
-/// Tracks a piece from its first pose; tells for each pose after it the innovation (x, y, yaw) and
-/// its log-density.
+/// What the tracking filter said of one pose before it saw it, and what it then saw.
+#[derive(Debug, Clone, Copy)]
+pub struct Predicted {
+    /// Time since the track began, s.
+    pub tracked_s: f64,
+    /// Measured less predicted pose: x m, y m, yaw rad.
+    pub innovation: Vector3<f64>,
+    /// Its variance by the filter's own account, same order.
+    pub variance: [f64; 3],
+    /// The sensor's part of that variance.
+    pub sensor: [f64; 3],
+    /// Log-density of the innovation.
+    pub log_likelihood: f64,
+}
+
+/// Tracks a piece from its first pose; tells what was predicted of each pose after it.
 pub fn follow(
     model: &Model,
     motion: &MotionModel,
     segment: &Segment,
-    mut tell: impl FnMut(Vector3<f64>, f64),
+    mut tell: impl FnMut(&Predicted),
 ) {
     let noise = motion.noise();
     let limit = model.command.curvature_max_1_m;
     let mut track: Option<Track> = None;
+    let mut tracked_s = 0.0;
     for observation in segment {
-        let sensor = &model.noise;
-        let variance = [sensor.position_m, sensor.position_m, sensor.yaw_rad].map(|sd| {
-            let sample = model.sample_variance(sd, observation.frame_s);
-            observation.mean_variance(sample, observation.pose_frames)
-        });
+        let sensor = observation.pose_variance(model, 1.0);
         let Some(track) = track.as_mut().filter(|_| !observation.anchor) else {
             if observation.pose_frames > 0 {
-                let spread = Matrix3::from_diagonal(&Vector3::from(variance));
+                let spread = Matrix3::from_diagonal(&Vector3::from(sensor));
+                tracked_s = 0.0;
                 track = Some(Track::new(Vector3::from(observation.pose), spread, &noise));
             }
             continue;
@@ -262,10 +272,17 @@ pub fn follow(
             extra: observation.lag_variance(model),
         };
         track.predict(&step, &noise);
+        tracked_s += observation.dt_s;
         if observation.pose_frames > 0 {
-            let (innovation, _) = track.innovation(observation.pose, variance);
-            if let Some(log_likelihood) = track.update(observation.pose, variance) {
-                tell(innovation, log_likelihood);
+            let (innovation, covariance) = track.innovation(observation.pose, sensor);
+            if let Some(log_likelihood) = track.update(observation.pose, sensor) {
+                tell(&Predicted {
+                    tracked_s,
+                    innovation,
+                    variance: covariance.diagonal().into(),
+                    sensor,
+                    log_likelihood,
+                });
             }
         }
     }
