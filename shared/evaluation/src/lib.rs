@@ -4,6 +4,7 @@ pub mod cases;
 pub mod frames;
 pub mod labels;
 pub mod learning;
+pub mod plausible;
 pub mod scoring;
 pub mod split;
 mod table;

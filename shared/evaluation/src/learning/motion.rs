@@ -10,7 +10,7 @@ use vigil_robot::learned::{Curve, Model, MotionModel, Observation};
 use super::least_squares::LeastSquares;
 use super::segments::Segment;
 use super::simplex::minimise;
-use super::{LearnError, Options};
+use super::{LearnError, Options, SPEEDS_MIN};
 
 /// Length of the window over which a displacement is measured, s.
 const WINDOW_S: f64 = 2.0;
@@ -18,6 +18,8 @@ const WINDOW_S: f64 = 2.0;
 const END: usize = 5;
 /// Different curvatures that a 4th-order polynomial needs.
 const CURVATURES_MIN: usize = 5;
+/// Curvature below which a robot drives straight ahead, 1/m.
+const STRAIGHT_1_M: f64 = 0.02;
 /// Soil scatter per metre assumed for weighting windows against sensor noise.
 const SCATTER: f64 = 0.02;
 /// Noise of the lateral motion, which no stuck wheel changes much, as a fraction of the forward's.
@@ -54,6 +56,7 @@ pub fn fit(
             needed,
         });
     }
+    check_range(&steps, mode)?;
     let singular = || LearnError::Singular {
         mode: mode.to_owned(),
         what: "polynomial",
@@ -85,6 +88,28 @@ pub fn fit(
         ..model.nominal.motion
     };
     Ok(fit_noise(model, &motion, segments, options))
+}
+
+/// Refuses driving that does not determine the odd terms or the effect of speed.
+fn check_range(steps: &[Window], mode: &str) -> Result<(), LearnError> {
+    let left = steps.iter().any(|step| step.curvature > STRAIGHT_1_M);
+    let right = steps.iter().any(|step| step.curvature < -STRAIGHT_1_M);
+    if left != right {
+        let (mode, side) = (mode.to_owned(), if left { "left" } else { "right" });
+        return Err(LearnError::OneSide { mode, side });
+    }
+    let speeds = || steps.iter().map(|step| step.speed.abs());
+    let low_m_s = speeds().fold(f64::INFINITY, f64::min);
+    let high_m_s = speeds().fold(0.0, f64::max);
+    if high_m_s < SPEEDS_MIN * low_m_s {
+        let mode = mode.to_owned();
+        return Err(LearnError::Speeds {
+            mode,
+            low_m_s,
+            high_m_s,
+        });
+    }
+    Ok(())
 }
 
 /// One measured displacement.
