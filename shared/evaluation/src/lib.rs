@@ -1,6 +1,7 @@
 //! Data sets, learning of models, scoring. Reads files; knows no transport and no clock.
 
 pub mod cases;
+pub mod derived;
 pub mod frames;
 pub mod labels;
 pub mod learning;
