@@ -103,7 +103,7 @@ const BAD: [(&str, &str, &str, &[&str]); 13] = [
         "models/rover.toml",
         "robot = \"",
         "robot = \"no-",
-        &["models/rover.toml", "is of robot 'no-"],
+        &["models/rover.toml", "was changed or cut short"],
     ),
     (
         "models/rover.toml",

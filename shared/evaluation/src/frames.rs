@@ -17,6 +17,8 @@ pub use crate::table::TableError as FramesError;
 
 /// A gap in time longer than this many usual intervals is refused.
 const GAP_INTERVALS_MAX: f64 = 10.0;
+/// A gap in time longer than this is refused whatever is usual, s.
+const GAP_MAX_S: f64 = 1.0;
 /// Distance between two frames that no robot of this kind can drive, m.
 const JUMP_M_MAX: f64 = 2.0;
 
@@ -180,18 +182,30 @@ fn follows(table: &Table, run: &Run, frame: &SensorFrame) -> Result<(), FramesEr
             "t is {now} after {last}: time must rise within a run"
         )));
     }
+    let gap_s = (now_ns - last_ns) as f64 * 1e-9;
     if let [first, second, ..] = run.frames.as_slice() {
-        let usual_ns = (t_ns(second) - t_ns(first)) as f64;
-        let gap_ns = (now_ns - last_ns) as f64;
-        if gap_ns > GAP_INTERVALS_MAX * usual_ns {
-            let (gap, usual) = (gap_ns * 1e-9, usual_ns * 1e-9);
-            let message = format!("a gap of {gap:.3} s, usual are {usual:.3} s: start a new run");
-            return Err(table.wrong(message));
+        let usual_s = (t_ns(second) - t_ns(first)) as f64 * 1e-9;
+        if gap_s > GAP_INTERVALS_MAX * usual_s {
+            let (id, usual) = (run.id, usual_s);
+            let message = format!("run {id}: a gap of {gap_s:.3} s, usual are {usual:.3} s");
+            return Err(table.wrong(format!("{message}: start a new run")));
         }
+    }
+    if gap_s > GAP_MAX_S {
+        let message = format!(
+            "run {}: a gap of {gap_s:.3} s, allowed is {GAP_MAX_S} s",
+            run.id
+        );
+        return Err(table.wrong(format!("{message}: start a new run; or is t in ms?")));
     }
     let moved = (frame.pose[0] - before.pose[0]).hypot(frame.pose[1] - before.pose[1]);
     if moved > JUMP_M_MAX {
-        let message = format!("the pose jumps by {moved:.2} m; allowed are {JUMP_M_MAX} m");
+        let mut message = format!("the pose jumps by {moved:.2} m; allowed are {JUMP_M_MAX} m");
+        let commanded = before.command[1].abs() * gap_s;
+        if commanded > 0.0 {
+            let factor = moved / commanded;
+            message += &format!("; {factor:.0} times the commanded travel: are x and y in mm?");
+        }
         return Err(table.wrong(message));
     }
     Ok(())

@@ -2,7 +2,7 @@
 //!
 //! CSV: `run`, `mode` (`ND`, `<WHEEL>_STUCK`, `<WHEEL>_ENC`), `kind` (`stuck`, `zero`, `frozen`,
 //! `noise`, or empty), `wheel` (or empty), `onset_s` (-1 for none), `cmd_curv`, `cmd_speed`,
-//! `dur_s`. Other columns are ignored.
+//! `dur_s`; if wanted, `terrain`. Other columns are ignored.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -69,6 +69,26 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Label>, LabelsError>
         labels.push(label);
     }
     Ok(labels)
+}
+
+/// The grounds that the column `terrain` names for these runs, each once and in order, joined by
+/// `+`; empty without such a column.
+///
+/// # Errors
+/// [`LabelsError`].
+pub fn terrain(path: &Path, runs: &[u32]) -> Result<String, LabelsError> {
+    let mut table = Table::open(path)?;
+    let run = table.require(&["run".to_owned()])?;
+    let (Some(&run), Some(terrain)) = (run.first(), table.position("terrain")) else {
+        return Ok(String::new());
+    };
+    let mut found = BTreeSet::new();
+    while table.advance()? {
+        if runs.contains(&table.whole(run)?) && !table.text(terrain).is_empty() {
+            found.insert(quoted(table.text(terrain)));
+        }
+    }
+    Ok(found.into_iter().collect::<Vec<_>>().join("+"))
 }
 
 fn label(table: &Table, at: &[usize], robot: &Description) -> Result<Label, LabelsError> {

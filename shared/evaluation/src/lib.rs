@@ -1,9 +1,11 @@
 //! Data sets, learning of models, scoring, reports. Reads files; knows no transport and no clock.
 
 pub mod cases;
+pub mod derived;
 pub mod frames;
 pub mod labels;
 pub mod learning;
+pub mod plausible;
 pub mod report;
 pub mod scoring;
 pub mod split;

@@ -124,11 +124,16 @@ fn malformed_tables_are_refused_with_row_column_and_what_is_allowed() {
         ),
         (
             two(row("7", "0.10", "1000", "0", "0")),
-            "row 2: the pose jumps by 999.00 m; allowed are 2 m",
+            "row 2: the pose jumps by 999.00 m; allowed are 2 m; 99900 times the commanded travel: \
+             are x and y in mm?",
         ),
         (
             table(&[good("0.05"), good("0.10"), good("0.90")]),
-            "row 3: a gap of 0.800 s, usual are 0.050 s: start a new run",
+            "row 3: run 7: a gap of 0.800 s, usual are 0.050 s: start a new run",
+        ),
+        (
+            table(&[good("50"), good("100")]),
+            "row 2: run 7: a gap of 50.000 s, allowed is 1 s: start a new run; or is t in ms?",
         ),
         (
             table(&[good("0.05"), row("8", "0.05", "1", "0", "0"), good("0.10")]),

@@ -27,6 +27,7 @@ fn the_shipped_model_is_read_and_written() {
     let text = model.to_toml().unwrap();
     let again = Model::from_toml(&text).unwrap();
     assert_eq!((&again, again.hash()), (&model, model.hash()));
+    assert_eq!(model.clone().sealed(), model);
     let learned = &model.provenance;
     assert!(
         learned
@@ -40,7 +41,11 @@ fn the_shipped_model_is_read_and_written() {
 fn broken_models_are_refused_by_key() {
     let text = read("models/rover.toml");
     let cases = [
-        ("version = 2", "version = 7", "layout version 7"),
+        (
+            "version = 3",
+            "version = 2",
+            "layout version 2; this program reads version 3: learn it again",
+        ),
         (
             "interval_s = 0.05",
             "interval_s = nan",
@@ -61,11 +66,27 @@ fn broken_models_are_refused_by_key() {
             "wheel = \"XX\"",
             "stuck.XX: XX is not allowed: a name listed in wheels",
         ),
+        (
+            "yaw_rad = 0.00",
+            "yaw_rad = 0.01",
+            "it was changed or cut short. Learn it again; if the change is meant, write hash = \
+             \"edited\"",
+        ),
     ];
     for (from, to, expected) in cases {
         let error = Model::from_toml(&text.replacen(from, to, 1)).unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");
     }
+    let cut = &text[..text.rfind("[[calibration]]").unwrap()];
+    assert!(matches!(
+        Model::from_toml(cut),
+        Err(ModelError::Hash { .. })
+    ));
+    let seal = format!("hash = \"{}\"", model().hash);
+    let edited = Model::from_toml(&cut.replacen(&seal, "hash = \"edited\"", 1)).unwrap();
+    assert!(edited.is_edited() && !model().is_edited());
+    let calibrations = model().calibration.len();
+    assert_eq!(edited.calibration.len(), calibrations - 1);
     let mut other = robot();
     other.name = "other".into();
     let error = model().check_robot(&other).unwrap_err();

@@ -1,4 +1,4 @@
-//! `vigil learn`: learns a robot's model from labelled runs.
+//! `vigil learn`: learns a robot's model from labelled runs, or shows a learned one.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use vigil_evaluation::frames;
 use vigil_evaluation::labels;
-use vigil_evaluation::learning::{self, Options, Report};
+use vigil_evaluation::learning::{self, Options, RESIDUAL_BAR, Report, Residual, View};
 use vigil_evaluation::split::split;
+use vigil_robot::learned::model::Provenance;
 
-use super::offline::RobotArgs;
+use super::offline::{RobotArgs, load_model};
 use super::{CommandError, Outcome};
 use crate::output;
 
@@ -18,28 +19,44 @@ use crate::output;
 const TEST_FRACTION_MAX: f64 = 0.9;
 
 /// Learns the transition models from labelled runs, and tests them on the runs left out.
+///
+/// With `--show`, prints a learned model instead.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Recorded frames (CSV, plain or gzip).
-    #[arg(long, value_name = "F")]
-    frames: PathBuf,
+    #[arg(long, value_name = "F", required_unless_present = "show")]
+    frames: Option<PathBuf>,
     /// Labels of the runs (CSV).
-    #[arg(long, value_name = "R")]
-    runs: PathBuf,
+    #[arg(long, value_name = "R", required_unless_present = "show")]
+    runs: Option<PathBuf>,
     /// Where to write the model (TOML).
-    #[arg(long, value_name = "MODEL")]
-    out: PathBuf,
+    #[arg(long, value_name = "MODEL", required_unless_present = "show")]
+    out: Option<PathBuf>,
+    /// Print the model given with --model as text, and learn nothing.
+    #[arg(long, requires = "model", conflicts_with_all = ["frames", "runs", "out"])]
+    show: bool,
+    /// Learned model to show (TOML).
+    #[arg(long, value_name = "MODEL", requires = "show")]
+    model: Option<PathBuf>,
     /// Part of the runs of every mode and kind to leave out, 0 to 0.9.
     #[arg(long, value_name = "X", default_value_t = 0.333, value_parser = test_fraction)]
     test_fraction: f64,
     /// Seed of the split.
-    #[arg(long, value_name = "S", default_value_t = 1)]
+    #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed())]
     seed: u64,
     #[command(flatten)]
     robot: RobotArgs,
-    /// Print the report as one JSON document.
+    /// Print the report, or the model shown, as one JSON document.
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Shown<'a> {
+    schema_version: u32,
+    model: String,
+    #[serde(flatten)]
+    view: &'a View,
 }
 
 #[derive(Debug, Serialize)]
@@ -53,6 +70,11 @@ struct Document<'a> {
     held_out_run_ids: &'a [u32],
 }
 
+/// A model file holds whole numbers up to this one.
+fn seed() -> clap::builder::RangedU64ValueParser {
+    clap::value_parser!(u64).range(0..=i64::MAX.unsigned_abs())
+}
+
 fn test_fraction(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=TEST_FRACTION_MAX).contains(&value) => Ok(value),
@@ -60,45 +82,94 @@ fn test_fraction(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Writes the model and prints its error.
+/// Writes the model and prints its error, or shows a model.
 ///
 /// # Errors
 /// An input that is refused; an output that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let folder = args.out.parent().filter(|f| !f.as_os_str().is_empty());
+    match (&args.model, &args.frames, &args.runs, &args.out) {
+        (Some(model), ..) => show(model, args.json),
+        (None, Some(frames), Some(runs), Some(out)) => learn(args, frames, runs, out),
+        _ => Err(CommandError::usage("--frames, --runs and --out are needed")),
+    }
+}
+
+fn show(path: &Path, is_json: bool) -> Result<Outcome, CommandError> {
+    let model = load_model(path)?;
+    let view = View::new(
+        &model,
+        vigil_setup::schema::Detector::default().fault_rate_1_h,
+    );
+    let printed = if is_json {
+        output::json(&Shown {
+            schema_version: 1,
+            model: path.display().to_string(),
+            view: &view,
+        })
+    } else {
+        output::line(&view.to_string())
+    };
+    printed.map_err(CommandError::failure)?;
+    Ok(Outcome::Done)
+}
+
+fn learn(
+    args: &Args,
+    frames_file: &Path,
+    labels_file: &Path,
+    out: &Path,
+) -> Result<Outcome, CommandError> {
+    let folder = out.parent().filter(|f| !f.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
         let refused = format!("--out: there is no folder {}", folder.display());
         return Err(CommandError::usage(refused));
     }
     let robot = args.robot.load()?;
-    let labels = labels::read(&args.runs, &robot).map_err(CommandError::usage)?;
-    let runs = frames::read(&args.frames, &robot).map_err(CommandError::usage)?;
+    let labels = labels::read(labels_file, &robot).map_err(CommandError::usage)?;
+    let runs = frames::read(frames_file, &robot).map_err(CommandError::usage)?;
     let with_frames: Vec<_> = labels
         .iter()
         .filter(|label| runs.iter().any(|run| run.id == label.run))
         .cloned()
         .collect();
     let held_out = split(&with_frames, args.test_fraction, args.seed);
-    let (model, report) =
-        learning::learn(&runs, &labels, &held_out, &robot, &Options::default())
-            .map_err(|error| CommandError::usage(format!("{}: {error}", args.frames.display())))?;
+    let options = Options::default();
+    let (mut model, report) = learning::learn(&runs, &labels, &held_out, &robot, &options)
+        .map_err(|error| CommandError::usage(format!("{}: {error}", frames_file.display())))?;
+    let terrain = labels::terrain(labels_file, &model.provenance.runs_learned);
+    model.provenance = Provenance {
+        frames_file: file_name(frames_file),
+        labels_file: file_name(labels_file),
+        test_fraction: args.test_fraction,
+        seed: args.seed,
+        terrain: terrain.map_err(CommandError::usage)?,
+        software_version: env!("CARGO_PKG_VERSION").to_owned(),
+        ..model.provenance
+    };
+    let model = model.sealed();
     let text = model.to_toml().map_err(CommandError::failure)?;
-    write_whole(&args.out, &text)
-        .map_err(|error| CommandError::failure(format!("{}: {error}", args.out.display())))?;
+    write_whole(out, &text)
+        .map_err(|error| CommandError::failure(format!("{}: {error}", out.display())))?;
     let printed = if args.json {
         output::json(&Document {
             schema_version: 1,
-            model: args.out.display().to_string(),
+            model: out.display().to_string(),
             model_hash: format!("{:016x}", model.hash()),
             seed: args.seed,
             report: &report,
             held_out_run_ids: &model.provenance.runs_held_out,
         })
     } else {
-        output::line(&table(&report, &args.out))
+        output::line(&table(&report, out))
     };
     printed.map_err(CommandError::failure)?;
     Ok(Outcome::Done)
+}
+
+/// The last part of a path: where a file lay is of no interest to others.
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
 }
 
 /// Writes a file so that its place holds either the old one or the whole new one.
@@ -119,34 +190,65 @@ pub(super) fn write_whole(path: &Path, text: &str) -> io::Result<()> {
 }
 
 fn table(report: &Report, out: &Path) -> String {
-    let mut lines =
-        vec![
+    let mut lines = vec![
         format!("model        {}", out.display()),
-        format!("learned from {} runs, {} left out", report.runs_learned, report.runs_held_out),
-        format!("alarms       calibrated on {:.2} h without a fault", report.exposure_h),
+        format!(
+            "learned from {} runs, {} left out",
+            report.runs_learned, report.runs_held_out
+        ),
+        format!(
+            "alarms       calibrated on {:.2} h without a fault",
+            report.exposure_h
+        ),
         String::new(),
-        "error of the motion one interval ahead on the runs left out, against the sensor's noise"
+        "error of the motion one interval ahead on the runs left out, against the sensor's noise;"
+            .into(),
+        "in brackets what the model itself predicts of it, as the ground varies within a run"
             .into(),
         format!(
-            "{:<10} {:>8} {:>7} {:>12} {:>8} {:>9} {:>8} {:>10}",
-            "mode", "segments", "poses", "position, mm", "x noise", "yaw, mrad", "x noise", "ln p"
+            "{:<10} {:>6} {:>12} {:>11} {:>9} {:>18} {:>5} {:>6} {:>7}",
+            "mode",
+            "poses",
+            "position, mm",
+            "x noise",
+            "yaw, mrad",
+            "x noise",
+            "left",
+            "right",
+            "ln p"
         ),
     ];
     for mode in &report.modes {
+        let turn = |turn: &Option<Residual>| match turn {
+            Some(turn) => format!("{:.2}", turn.to_floor),
+            None => "-".into(),
+        };
+        let (position, yaw) = (&mode.position, &mode.yaw);
         lines.push(format!(
-            "{:<10} {:>8} {:>7} {:>12.2} {:>8.2} {:>9.2} {:>8.2} {:>10.3}",
+            "{:<10} {:>6} {:>12.2} {:>4.2} ({:.2}) {:>9.2} {:>4.2} +-{:.2} ({:.2}) {:>5} {:>6} {:>7.2}",
             mode.mode,
-            mode.segments,
             mode.poses,
-            1e3 * mode.position_rms_m,
-            mode.position_to_floor,
-            1e3 * mode.yaw_rms_rad,
-            mode.yaw_to_floor,
+            1e3 * position.rms,
+            position.to_floor,
+            position.predicted_to_floor,
+            1e3 * yaw.rms,
+            yaw.to_floor,
+            yaw.to_floor_error,
+            yaw.predicted_to_floor,
+            turn(&mode.yaw_left),
+            turn(&mode.yaw_right),
             mode.log_likelihood,
         ));
     }
     if report.modes.is_empty() {
         lines.push("none: no runs were left out".into());
     }
+    let above = report.modes.iter().filter(|mode| !mode.is_within_bar());
+    lines.extend(above.map(|mode| {
+        format!(
+            "{} exceeds {RESIDUAL_BAR} times the sensor's noise",
+            mode.mode
+        )
+    }));
     lines.join("\n")
 }

@@ -177,7 +177,8 @@ impl FilterArgs {
     }
 }
 
-fn load_model(path: &Path) -> Result<Model, CommandError> {
+/// Reads a learned model.
+pub fn load_model(path: &Path) -> Result<Model, CommandError> {
     let refuse =
         |error: &dyn std::fmt::Display| CommandError::usage(format!("{}: {error}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| refuse(&error))?;

@@ -13,6 +13,7 @@ mod report;
 mod segments;
 mod sensors;
 mod simplex;
+mod view;
 mod wheels;
 
 use std::collections::BTreeSet;
@@ -26,8 +27,10 @@ use vigil_robot::learned::{Curve, EncoderModel, MotionModel, RateModel};
 
 use crate::frames::Run;
 use crate::labels::Label;
-pub use report::{ModeError, Report};
+use crate::plausible::{self, Doubtful};
+pub use report::{ModeError, RESIDUAL_BAR, Report, Residual};
 use segments::Segments;
+pub use view::View;
 
 /// How to learn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +65,30 @@ pub enum LearnError {
         found: usize,
         /// Runs needed.
         needed: usize,
+    },
+    /// A run cannot mean what its columns say.
+    #[error("{0}")]
+    Doubtful(Doubtful),
+    /// All runs turn to one side.
+    #[error("the runs of {mode} turn only {side}, runs that turn to either side are needed")]
+    OneSide {
+        /// Mode.
+        mode: String,
+        /// `left` or `right`.
+        side: &'static str,
+    },
+    /// All runs drive at one speed.
+    #[error(
+        "the runs of {mode} drive at {low_m_s:.3} to {high_m_s:.3} m/s: the effect of speed needs \
+         speeds of which the highest is at least {SPEEDS_MIN} times the lowest"
+    )]
+    Speeds {
+        /// Mode.
+        mode: String,
+        /// Lowest found, m/s.
+        low_m_s: f64,
+        /// Highest found, m/s.
+        high_m_s: f64,
     },
     /// Too few different curvatures to fit a polynomial.
     #[error("runs of {mode} have {found} different curvatures, at least {needed} are needed")]
@@ -101,6 +128,8 @@ pub enum LearnError {
 
 /// Runs of a mode that a fit needs at least.
 const RUNS_MIN: usize = 3;
+/// Ratio of the highest speed to the lowest that the effect of speed needs at least.
+const SPEEDS_MIN: f64 = 1.2;
 
 /// Learns a model from the runs that are not in `held_out`, and tells its error on those that are.
 ///
@@ -127,7 +156,9 @@ pub fn learn(
             .map(|run| run.id)
             .filter(|id| left_out.contains(id))
             .collect(),
+        ..Provenance::default()
     };
+    check_columns(&learned, labels, robot)?;
     let mut segments = Segments::collect(&learned, labels, robot, &model)?;
     check_runs(&segments, robot)?;
     sensors::fit(&mut model, &segments, robot)?;
@@ -159,7 +190,20 @@ pub fn learn(
         .filter(|run| left_out.contains(&run.id))
         .collect();
     let report = report::report(&model, &tested, labels, robot)?;
-    Ok((model, report))
+    Ok((model.sealed(), report))
+}
+
+/// Refuses runs whose nominal part cannot mean what its columns say.
+fn check_columns(runs: &[&Run], labels: &[Label], robot: &Description) -> Result<(), LearnError> {
+    let labels = segments::by_run(labels);
+    for run in runs {
+        let label = labels.get(&run.id).ok_or(LearnError::Label(run.id))?;
+        let until_s = label.onset_s.unwrap_or(f64::INFINITY);
+        if let Some(doubt) = plausible::doubt(run, robot, until_s) {
+            return Err(LearnError::Doubtful(doubt));
+        }
+    }
+    Ok(())
 }
 
 fn check_runs(segments: &Segments, robot: &Description) -> Result<(), LearnError> {
@@ -206,6 +250,7 @@ fn blank(robot: &Description, options: &Options) -> Model {
     let noise = &robot.noise;
     Model {
         version: VERSION,
+        hash: String::new(),
         robot: robot.name.clone(),
         wheels: robot
             .wheels

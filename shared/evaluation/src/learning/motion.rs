@@ -10,7 +10,7 @@ use vigil_robot::learned::{Curve, Model, MotionModel, Observation};
 use super::least_squares::LeastSquares;
 use super::segments::Segment;
 use super::simplex::minimise;
-use super::{LearnError, Options};
+use super::{LearnError, Options, SPEEDS_MIN};
 
 /// Length of the window over which a displacement is measured, s.
 const WINDOW_S: f64 = 2.0;
@@ -18,6 +18,8 @@ const WINDOW_S: f64 = 2.0;
 const END: usize = 5;
 /// Different curvatures that a 4th-order polynomial needs.
 const CURVATURES_MIN: usize = 5;
+/// Curvature below which a robot drives straight ahead, 1/m.
+const STRAIGHT_1_M: f64 = 0.02;
 /// Soil scatter per metre assumed for weighting windows against sensor noise.
 const SCATTER: f64 = 0.02;
 /// Noise of the lateral motion, which no stuck wheel changes much, as a fraction of the forward's.
@@ -54,6 +56,7 @@ pub fn fit(
             needed,
         });
     }
+    check_range(&steps, mode)?;
     let singular = || LearnError::Singular {
         mode: mode.to_owned(),
         what: "polynomial",
@@ -85,6 +88,28 @@ pub fn fit(
         ..model.nominal.motion
     };
     Ok(fit_noise(model, &motion, segments, options))
+}
+
+/// Refuses driving that does not determine the odd terms or the effect of speed.
+fn check_range(steps: &[Window], mode: &str) -> Result<(), LearnError> {
+    let left = steps.iter().any(|step| step.curvature > STRAIGHT_1_M);
+    let right = steps.iter().any(|step| step.curvature < -STRAIGHT_1_M);
+    if left != right {
+        let (mode, side) = (mode.to_owned(), if left { "left" } else { "right" });
+        return Err(LearnError::OneSide { mode, side });
+    }
+    let speeds = || steps.iter().map(|step| step.speed.abs());
+    let low_m_s = speeds().fold(f64::INFINITY, f64::min);
+    let high_m_s = speeds().fold(0.0, f64::max);
+    if high_m_s < SPEEDS_MIN * low_m_s {
+        let mode = mode.to_owned();
+        return Err(LearnError::Speeds {
+            mode,
+            low_m_s,
+            high_m_s,
+        });
+    }
+    Ok(())
 }
 
 /// One measured displacement.
@@ -226,32 +251,42 @@ fn with_noise(motion: &MotionModel, x: &[f64; 7]) -> MotionModel {
 #[must_use]
 pub fn log_likelihood(model: &Model, motion: &MotionModel, segment: &Segment) -> f64 {
     let mut sum = 0.0;
-    follow(model, motion, segment, |_, log_likelihood| {
-        sum += log_likelihood
-    });
+    follow(model, motion, segment, |step| sum += step.log_likelihood);
     sum
 }
 
-/// Tracks a piece from its first pose; tells for each pose after it the innovation (x, y, yaw) and
-/// its log-density.
+/// What the tracking filter said of one pose before it saw it, and what it then saw.
+#[derive(Debug, Clone, Copy)]
+pub struct Predicted {
+    /// Time since the track began, s.
+    pub tracked_s: f64,
+    /// Measured less predicted pose: x m, y m, yaw rad.
+    pub innovation: Vector3<f64>,
+    /// Its variance by the filter's own account, same order.
+    pub variance: [f64; 3],
+    /// The sensor's part of that variance.
+    pub sensor: [f64; 3],
+    /// Log-density of the innovation.
+    pub log_likelihood: f64,
+}
+
+/// Tracks a piece from its first pose; tells what was predicted of each pose after it.
 pub fn follow(
     model: &Model,
     motion: &MotionModel,
     segment: &Segment,
-    mut tell: impl FnMut(Vector3<f64>, f64),
+    mut tell: impl FnMut(&Predicted),
 ) {
     let noise = motion.noise();
     let limit = model.command.curvature_max_1_m;
     let mut track: Option<Track> = None;
+    let mut tracked_s = 0.0;
     for observation in segment {
-        let sensor = &model.noise;
-        let variance = [sensor.position_m, sensor.position_m, sensor.yaw_rad].map(|sd| {
-            let sample = model.sample_variance(sd, observation.frame_s);
-            observation.mean_variance(sample, observation.pose_frames)
-        });
+        let sensor = observation.pose_variance(model, 1.0);
         let Some(track) = track.as_mut().filter(|_| !observation.anchor) else {
             if observation.pose_frames > 0 {
-                let spread = Matrix3::from_diagonal(&Vector3::from(variance));
+                let spread = Matrix3::from_diagonal(&Vector3::from(sensor));
+                tracked_s = 0.0;
                 track = Some(Track::new(Vector3::from(observation.pose), spread, &noise));
             }
             continue;
@@ -262,10 +297,17 @@ pub fn follow(
             extra: observation.lag_variance(model),
         };
         track.predict(&step, &noise);
+        tracked_s += observation.dt_s;
         if observation.pose_frames > 0 {
-            let (innovation, _) = track.innovation(observation.pose, variance);
-            if let Some(log_likelihood) = track.update(observation.pose, variance) {
-                tell(innovation, log_likelihood);
+            let (innovation, covariance) = track.innovation(observation.pose, sensor);
+            if let Some(log_likelihood) = track.update(observation.pose, sensor) {
+                tell(&Predicted {
+                    tracked_s,
+                    innovation,
+                    variance: covariance.diagonal().into(),
+                    sensor,
+                    log_likelihood,
+                });
             }
         }
     }

@@ -10,7 +10,9 @@ use super::motion::{Curve, MotionModel};
 use super::wheels::{EncoderModel, RateModel};
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
+/// What stands for the hash in a file that a person has changed on purpose.
+pub const EDITED: &str = "edited";
 
 /// Everything learned about one robot on one kind of ground.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -18,6 +20,9 @@ pub const VERSION: u32 = 2;
 pub struct Model {
     /// Layout of the file.
     pub version: u32,
+    /// Hash over everything else in the file, so that a file cut short or changed by accident is
+    /// noticed: `fnv1a64:` and 16 digits. [`EDITED`] in a file that was changed on purpose.
+    pub hash: String,
     /// Name of the robot.
     pub robot: String,
     /// Names of its wheels, in the order of every per-wheel array.
@@ -50,6 +55,18 @@ pub struct Provenance {
     pub runs_learned: Vec<u32>,
     /// Runs left out, for the test.
     pub runs_held_out: Vec<u32>,
+    /// Name of the file with the frames, without its folder.
+    pub frames_file: String,
+    /// Name of the file with the labels, without its folder.
+    pub labels_file: String,
+    /// Seed of the split and of the detector's calibration.
+    pub seed: u64,
+    /// Part of the runs of every mode and kind that was left out.
+    pub test_fraction: f64,
+    /// Ground on which the runs were driven, as their labels call it; empty if they do not say.
+    pub terrain: String,
+    /// Version of the program that learned the model.
+    pub software_version: String,
 }
 
 /// Standard deviations of the sensors' white noise per sample at the reference rate; at another
@@ -117,8 +134,22 @@ pub enum ModelError {
     #[error("not a learned model: {0}")]
     Parse(String),
     /// Another layout.
-    #[error("the model has layout version {0}; this program reads version {VERSION}")]
+    #[error(
+        "the model has layout version {0}; this program reads version {VERSION}: learn it again \
+         with `vigil learn`"
+    )]
     Version(u32),
+    /// The content does not fit the hash that the file carries.
+    #[error(
+        "the content has the hash {found}, but the file says hash = \"{stored}\": it was changed \
+         or cut short. Learn it again; if the change is meant, write hash = \"{EDITED}\""
+    )]
+    Hash {
+        /// Hash that the file carries.
+        stored: String,
+        /// Hash of the content.
+        found: String,
+    },
     /// A value is not finite or out of range.
     #[error("{key}: {value} is not allowed: {allowed}")]
     Value {
@@ -157,16 +188,18 @@ impl Model {
     /// # Errors
     /// [`ModelError`] naming the key, what was found and what is allowed.
     pub fn from_toml(text: &str) -> Result<Self, ModelError> {
-        let model: Self = toml::from_str(text).map_err(|error| {
-            let until = text
-                .as_bytes()
-                .iter()
-                .take(error.span().map_or(0, |s| s.start));
-            let line = 1 + until.filter(|&&byte| byte == b'\n').count();
-            let message = error.message().replace('\n', " ");
-            ModelError::Parse(format!("line {line}: {message}"))
-        })?;
+        // The version comes first: what a file of another layout lacks is of no interest.
+        let layout: Layout = toml::from_str(text).map_err(|error| parse_error(text, &error))?;
+        if layout.version != VERSION {
+            return Err(ModelError::Version(layout.version));
+        }
+        let model: Self = toml::from_str(text).map_err(|error| parse_error(text, &error))?;
         model.check()?;
+        let found = model.content_hash();
+        if model.hash != found && !model.is_edited() {
+            let stored = model.hash;
+            return Err(ModelError::Hash { stored, found });
+        }
         Ok(model)
     }
 
@@ -178,11 +211,32 @@ impl Model {
         toml::to_string(self).map_err(|error| ModelError::Parse(error.to_string()))
     }
 
-    /// Hash over the file's text; equal for equal models.
+    /// Hash over the content; equal for equal models.
     #[must_use]
     pub fn hash(&self) -> u64 {
-        let text = self.to_toml().unwrap_or_default();
+        let content = Self {
+            hash: String::new(),
+            ..self.clone()
+        };
+        let text = content.to_toml().unwrap_or_default();
         fnv1a::hash(fnv1a::BASIS, text.as_bytes())
+    }
+
+    /// The same with the hash that its content has, as [`Self::from_toml`] expects it.
+    #[must_use]
+    pub fn sealed(mut self) -> Self {
+        self.hash = self.content_hash();
+        self
+    }
+
+    /// True if the file says that a person has changed it.
+    #[must_use]
+    pub fn is_edited(&self) -> bool {
+        self.hash == EDITED
+    }
+
+    fn content_hash(&self) -> String {
+        format!("fnv1a64:{:016x}", self.hash())
     }
 
     /// Checks that the model is of this robot.
@@ -252,14 +306,13 @@ impl Model {
     }
 
     fn check(&self) -> Result<(), ModelError> {
-        if self.version != VERSION {
-            return Err(ModelError::Version(self.version));
-        }
         let count = self.wheels.len();
         if count == 0 || count > WHEELS {
             return refuse("wheels", count, "1 to 8 names");
         }
         check_range("interval_s", self.interval_s, 1e-3, 1.0)?;
+        let fraction = self.provenance.test_fraction;
+        check_range("provenance.test_fraction", fraction, 0.0, 1.0)?;
         self.noise.check()?;
         self.command.check()?;
         let encoder = &self.encoder;
@@ -295,6 +348,23 @@ impl Model {
         }
         self.calibration.iter().try_for_each(check_calibration)
     }
+}
+
+/// What every layout has.
+#[derive(Deserialize)]
+struct Layout {
+    /// Layout of the file.
+    version: u32,
+}
+
+fn parse_error(text: &str, error: &toml::de::Error) -> ModelError {
+    let until = text
+        .as_bytes()
+        .iter()
+        .take(error.span().map_or(0, |s| s.start));
+    let line = 1 + until.filter(|&&byte| byte == b'\n').count();
+    let message = error.message().replace('\n', " ");
+    ModelError::Parse(format!("line {line}: {message}"))
 }
 
 impl Noise {
