@@ -42,7 +42,8 @@ impl Share {
         let (n, p) = (self.of as f64, self.hits as f64 / self.of as f64);
         let centre = p + Z * Z / (2.0 * n);
         let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
-        [centre - half, centre + half].map(|bound| 100.0 * bound / (1.0 + Z * Z / n))
+        [centre - half, centre + half]
+            .map(|bound| (100.0 * bound / (1.0 + Z * Z / n)).clamp(0.0, 100.0))
     }
 
     /// `97.5 % (80)`, or `-` of none.

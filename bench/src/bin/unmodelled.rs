@@ -159,18 +159,25 @@ fn report(archive: &mut Archive, runs: &[Run]) {
 }
 
 fn alarms(nominal: &[Nominal], set: usize) -> usize {
-    nominal.iter().map(|run| run.alarms_s[set].len()).sum()
+    nominal.iter().map(|run| run.alarms[set].len()).sum()
 }
 
 fn nominal_json(nominal: &[Nominal]) -> Value {
     let hours = nominal.len() as f64 * unmodelled::RUN_S / 3600.0;
     let set = |(i, (_, sensors)): (usize, &(_, &str))| {
         let count = alarms(nominal, i);
-        let raised = nominal.iter().filter(|run| !run.alarms_s[i].is_empty());
+        let raised = nominal.iter().filter(|run| !run.alarms[i].is_empty());
         let raised = raised.map(|run| {
+            let alarms = run.alarms[i].iter().map(|alarm| {
+                json!({
+                    "t_s": alarm.t_s, "curvature_1_m": alarm.curvature_1_m,
+                    "speed_m_s": alarm.speed_m_s,
+                })
+            });
+            let alarms: Vec<Value> = alarms.collect();
             json!({
                 "seed": run.seed, "noise_scale": run.noise_scale, "scatter": run.scatter,
-                "alarms_s": run.alarms_s[i], "commands_change_s": run.changes_s,
+                "alarms": alarms, "commands_change_s": run.changes_s,
             })
         });
         let figures = json!({

@@ -32,8 +32,19 @@ pub struct Nominal {
     pub scatter: f64,
     /// Instants at which the command changes, s.
     pub changes_s: Vec<f64>,
-    /// Instants at which an alarm rose, s, for each set of sensors.
-    pub alarms_s: [Vec<f64>; SENSOR_SETS.len()],
+    /// Alarms that rose, for each set of sensors.
+    pub alarms: [Vec<Alarm>; SENSOR_SETS.len()],
+}
+
+/// An alarm, and what was driven.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alarm {
+    /// When it rose, s.
+    pub t_s: f64,
+    /// Executed curvature then, 1/m.
+    pub curvature_1_m: f64,
+    /// Executed speed then, m/s.
+    pub speed_m_s: f64,
 }
 
 /// Drives one run over the whole range of commands.
@@ -71,16 +82,21 @@ pub fn drive_nominal(rover: &Rover, seed: u64) -> Result<Nominal, Box<dyn Error>
         rate_hz: RATE_HZ,
         seed,
     };
-    let mut alarms_s = [const { Vec::new() }; SENSOR_SETS.len()];
+    let mut alarms = [const { Vec::new() }; SENSOR_SETS.len()];
     let mut chains = Vec::new();
     for (sensors, _) in SENSOR_SETS {
         chains.push((Chain::new(rover, sensors, seed)?, false));
     }
     conditions.drive(rover, RUN_S, None, |t_s, frame| {
-        for ((chain, stands), alarms_s) in chains.iter_mut().zip(&mut alarms_s) {
+        for ((chain, stands), alarms) in chains.iter_mut().zip(&mut alarms) {
             let alarm = chain.take(frame);
             if alarm && !*stands {
-                alarms_s.push(t_s);
+                let [curvature_1_m, speed_m_s, ..] = frame.command;
+                alarms.push(Alarm {
+                    t_s,
+                    curvature_1_m,
+                    speed_m_s,
+                });
             }
             *stands = alarm;
         }
@@ -90,7 +106,7 @@ pub fn drive_nominal(rover: &Rover, seed: u64) -> Result<Nominal, Box<dyn Error>
         noise_scale,
         scatter,
         changes_s,
-        alarms_s,
+        alarms,
     })
 }
 
@@ -98,13 +114,14 @@ impl Nominal {
     /// Alarms of a set of sensors soon after a new command.
     #[must_use]
     pub fn soon_after_a_command(&self, set: usize) -> usize {
-        let soon = |at_s: &&f64| {
-            let changes = self.changes_s.iter();
-            changes
-                .into_iter()
-                .any(|change_s| (0.0..SOON_S).contains(&(*at_s - change_s)))
+        let soon = |alarm: &&Alarm| {
+            let since_s = |change_s: &f64| alarm.t_s - change_s;
+            self.changes_s
+                .iter()
+                .map(since_s)
+                .any(|s| (0.0..SOON_S).contains(&s))
         };
-        self.alarms_s[set].iter().filter(soon).count()
+        self.alarms[set].iter().filter(soon).count()
     }
 }
 
