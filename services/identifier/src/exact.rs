@@ -25,9 +25,10 @@ use crate::sets::Sets;
 
 /// Index of the nominal motion among the modes.
 const NOMINAL: usize = 0;
-/// Onset hypotheses kept per mode: of two stuck wheels fewer, as there are many pairs.
+/// Onset hypotheses kept per mode: fewer of two stuck wheels and of stuck wheels on other ground, as
+/// there are many such modes.
 const PER_MODE: usize = 32;
-const PER_PAIR: usize = 8;
+const PER_RARE: usize = 8;
 /// Hypotheses less probable than this are dropped (natural logarithm).
 const FLOOR: f64 = -30.0;
 /// So long after a supposed onset, ns, wheels may still read as before.
@@ -78,9 +79,9 @@ impl Exact {
         let is_leaf = leaves.encoder.map(|leaf| leaf.is_some());
         let capacities: Vec<usize> = modes
             .iter()
-            .map(|mode| match mode.moved.stuck().count_ones() {
-                2.. => PER_PAIR,
-                _ => PER_MODE,
+            .map(|mode| {
+                let is_rare = mode.moved.stuck().count_ones() > 1 || mode.ground.0 != 1.0;
+                if is_rare { PER_RARE } else { PER_MODE }
             })
             .collect();
         Self {
@@ -131,7 +132,7 @@ impl Exact {
             return;
         }
         if observation.moving {
-            self.spawn(observation.t_first_ns, observation.dt_s);
+            self.spawn(observation);
         }
         self.predict(observation);
         // A robot at rest tells nothing: no fault appears, fades or is named.
@@ -168,7 +169,8 @@ impl Exact {
 
     /// New hypotheses: one fault more, one less, or another one, from the most probable hypothesis
     /// without a fault, the most probable one with a fault, and that with one stuck wheel.
-    fn spawn(&mut self, t_ns: u64, dt_s: f64) {
+    fn spawn(&mut self, observation: &Observation) {
+        let (t_ns, dt_s) = (observation.t_first_ns, observation.dt_s);
         let modes = &self.modes;
         let best = |wanted: &dyn Fn(usize) -> bool| self.bank.best(wanted).copied();
         let sources = [
@@ -185,7 +187,9 @@ impl Exact {
                     continue;
                 }
                 let mut state = from.state;
-                state.track = state.track.fork(&self.modes[mode].noise);
+                let (curvature, speed) = (observation.curvature, observation.speed);
+                let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
+                state.track = state.track.fork(&noise);
                 self.bank.add(Hypothesis {
                     mode,
                     onset: t_ns,

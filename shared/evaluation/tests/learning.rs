@@ -27,7 +27,6 @@ fn data(robot: &Description) -> (Vec<Run>, Vec<Label>) {
 fn quick() -> Options {
     Options {
         evaluations: 40,
-        particles: 64,
         ..Options::default()
     }
 }

@@ -24,6 +24,8 @@ const STRAIGHT_1_M: f64 = 0.02;
 const SCATTER: f64 = 0.02;
 /// Noise of the lateral motion, which no stuck wheel changes much, as a fraction of the forward's.
 const LATERAL: f64 = 0.15;
+/// No robot repeats its own motion better than to a thousandth, and no fit knows it better.
+const OFFSET_SD_MIN: f64 = 1e-3;
 /// Segments to which the noise is fitted at most: more add time, not precision.
 const SEGMENTS_MAX: usize = 120;
 
@@ -230,14 +232,15 @@ fn fit_noise(
 
 fn with_noise(motion: &MotionModel, x: &[f64; 7]) -> MotionModel {
     let bounded = |value: f64, low: f64, high: f64| value.exp().clamp(low, high);
-    let (offset_yaw, offset_forward) = (bounded(x[0], 2e-4, 1.0), bounded(x[1], 2e-4, 1.0));
+    let offset = |x: f64| bounded(x, OFFSET_SD_MIN, 1.0);
+    let (offset_yaw, offset_forward) = (offset(x[0]), offset(x[1]));
     let (yaw, forward) = (bounded(x[2], 2e-4, 2.0), bounded(x[3], 2e-4, 2.0));
     let white = bounded(x[6], 1e-4, 0.1);
     MotionModel {
         offset_sd: [
             offset_yaw,
             offset_forward,
-            (LATERAL * offset_forward).max(3e-4),
+            (LATERAL * offset_forward).max(OFFSET_SD_MIN),
         ],
         deviation_sd: [yaw, forward, (LATERAL * forward).max(3e-4)],
         deviation_length_m: bounded(x[4], 0.03, 3.0),

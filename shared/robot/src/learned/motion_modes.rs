@@ -10,10 +10,12 @@ use super::{Curve, Model, MotionModel};
 const UNKNOWN_SD: [f64; 3] = [0.25, 0.2, 0.12];
 /// Correlation length of the unknown's coloured deviations, m.
 const UNKNOWN_LENGTH_M: f64 = 0.2;
-/// Ground that is much stiffer or softer than that learned from: how probable, and the factor by
-/// which it changes effects, mean and deviation.
-const OTHER_GROUND: f64 = 0.1;
-const OTHER_GROUND_FACTOR: (f64, f64) = (0.75, 0.4);
+/// Ground other than that learned from changes a stuck wheel's effect by one factor: how probable,
+/// the factor's mean and deviation.
+const OTHER_GROUNDS: [(f64, f64, f64); 3] =
+    [(0.04, 0.3, 0.12), (0.04, 0.65, 0.2), (0.02, 1.5, 0.35)];
+/// Deviation of such an effect from one that is changed as a whole: yaw, forward, lateral.
+const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
 /// Two stuck wheels, whose effects are added, as nothing was learned of both together: deviation
 /// from the sum, relative to each effect.
 const BOTH: f64 = 0.3;
@@ -65,6 +67,32 @@ pub struct MotionMode {
     pub motion: MotionModel,
     /// Its noise.
     pub noise: MotionNoise,
+    /// Factor by which the ground changes the learned effect, and the factor's deviation; (1, 0) on
+    /// ground like that learned from.
+    pub ground: (f64, f64),
+}
+
+impl MotionMode {
+    /// The noise with which this mode begins at a curvature (1/m) and speed (m/s): the run's offset
+    /// also lies along the effect itself, as far as the ground is not known.
+    #[must_use]
+    pub fn noise_at(&self, model: &Model, curvature: f64, speed: f64) -> MotionNoise {
+        let (factor, sd) = self.ground;
+        if sd <= 0.0 {
+            return self.noise;
+        }
+        let limit = model.command.curvature_max_1_m;
+        let at = |motion: &MotionModel| Vector3::from(motion.per_metre(curvature, speed, limit));
+        let effect = at(&self.motion) - at(&model.nominal.motion);
+        let shape = effect.component_mul(&Vector3::from(SHAPE));
+        let along = effect * (sd / factor);
+        MotionNoise {
+            offset: self.noise.offset
+                + along * along.transpose()
+                + Matrix3::from_diagonal(&shape.component_mul(&shape)),
+            ..self.noise
+        }
+    }
 }
 
 /// How often faults come and go, per second of motion.
@@ -103,24 +131,29 @@ impl FaultRates {
 /// unknown.
 #[must_use]
 pub fn motion_modes(model: &Model, stuck: u32, other_ground: bool, pairs: bool) -> Vec<MotionMode> {
-    let other = if other_ground { OTHER_GROUND } else { 0.0 };
+    let grounds = match other_ground {
+        true => OTHER_GROUNDS.as_slice(),
+        false => &[],
+    };
+    let learned = 1.0 - grounds.iter().map(|(share, ..)| share).sum::<f64>();
     let nominal = model.nominal.motion;
     let mut modes = vec![MotionMode {
         moved: Moved::Nominal,
         share: 1.0,
         motion: nominal,
         noise: nominal.noise(),
+        ground: (1.0, 0.0),
     }];
     let known = |w: usize| stuck >> w & 1 == 1 && model.stuck(w).is_some();
     let wheels = || (0..WHEELS).filter(|&w| known(w));
     modes.extend(wheels().map(|w| MotionMode {
-        share: 1.0 - other,
+        share: learned,
         ..stuck_mode(model, &[w])
     }));
-    if other > 0.0 {
+    for &(share, factor, sd) in grounds {
         modes.extend(wheels().map(|w| MotionMode {
-            share: other,
-            ..on_other_ground(model, &stuck_mode(model, &[w]))
+            share,
+            ..on_other_ground(model, w, (factor, sd))
         }));
     }
     if pairs {
@@ -132,6 +165,7 @@ pub fn motion_modes(model: &Model, stuck: u32, other_ground: bool, pairs: bool) 
         share: 1.0,
         motion: nominal,
         noise: unknown_noise(model),
+        ground: (1.0, 0.0),
     }));
     modes
 }
@@ -188,41 +222,54 @@ fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
         moved: Moved::Stuck(wheels.iter().fold(0, |mask, w| mask | 1 << w)),
         motion,
         noise: noise.unwrap_or_else(|| nominal.noise()),
+        ground: (1.0, 0.0),
     }
 }
 
-/// The same on ground that changes the whole effect by one unknown factor: it is the shear of the
-/// soil under the driven wheels that lets a dragged one slow and turn the robot.
-fn on_other_ground(model: &Model, mode: &MotionMode) -> MotionMode {
+/// A wheel stuck on ground that changes its effect by one unknown factor: it is the shear of the
+/// soil under the driven wheels that lets a dragged one slow and turn the robot. That the motors
+/// turn slower under the load does not depend on the ground.
+fn on_other_ground(model: &Model, wheel: usize, ground: (f64, f64)) -> MotionMode {
     let nominal = &model.nominal.motion;
-    let (factor, sd) = OTHER_GROUND_FACTOR;
-    let scaled = |stuck: &Curve, nominal: &Curve| {
+    let mode = stuck_mode(model, &[wheel]);
+    let (factor, sd) = ground;
+    let scaled = |stuck: &Curve, nominal: &Curve, kept: f64| {
         let (stuck, nominal) = (stuck.terms(), nominal.terms());
-        Curve::from_terms(std::array::from_fn(|i| {
-            nominal[i] + factor * (stuck[i] - nominal[i])
-        }))
+        let mut terms: [f64; Curve::TERMS] =
+            std::array::from_fn(|i| nominal[i] + factor * (stuck[i] - nominal[i]));
+        terms[0] += (1.0 - factor) * kept;
+        Curve::from_terms(terms)
     };
-    let apart = |stuck: &Curve, nominal: &Curve| stuck.curvature[0] - nominal.curvature[0];
-    let effect = Vector3::new(
-        apart(&mode.motion.yaw, &nominal.yaw),
-        apart(&mode.motion.forward, &nominal.forward),
-        apart(&mode.motion.lateral, &nominal.lateral),
-    );
-    let square = factor * factor + sd * sd;
+    let (square, healthy) = (factor * factor + sd * sd, nominal.noise());
     MotionMode {
         motion: MotionModel {
-            yaw: scaled(&mode.motion.yaw, &nominal.yaw),
-            forward: scaled(&mode.motion.forward, &nominal.forward),
-            lateral: scaled(&mode.motion.lateral, &nominal.lateral),
+            yaw: scaled(&mode.motion.yaw, &nominal.yaw, 0.0),
+            forward: scaled(&mode.motion.forward, &nominal.forward, droop(model, wheel)),
+            lateral: scaled(&mode.motion.lateral, &nominal.lateral, 0.0),
             ..mode.motion
         },
         noise: MotionNoise {
-            offset: mode.noise.offset * square + effect * effect.transpose() * (sd * sd),
-            deviation: mode.noise.deviation * square,
+            offset: mode.noise.offset * square + healthy.offset,
+            deviation: mode.noise.deviation * square + healthy.deviation,
             ..mode.noise
         },
-        ..mode.clone()
+        ground,
+        ..mode
     }
+}
+
+/// Change of the rates of the wheels that turn while `wheel` is stuck, straight ahead, relative to
+/// rolling.
+fn droop(model: &Model, wheel: usize) -> f64 {
+    let Some(stuck) = model.stuck(wheel) else {
+        return 0.0;
+    };
+    let pairs = stuck.rates.iter().zip(&model.nominal.rates).enumerate();
+    let turning = pairs.filter(|(other, _)| *other != wheel);
+    let (count, sum) = turning.fold((0.0, 0.0), |(count, sum), (_, (with, healthy))| {
+        (count + 1.0, sum + with.ratio[0] - healthy.ratio[0])
+    });
+    if count > 0.0 { sum / count } else { 0.0 }
 }
 
 /// `base + stuck - nominal`; exactly `stuck` if `base` is the nominal curve.
