@@ -41,6 +41,14 @@ impl Archive {
         fs::write(self.folder.join(name), format!("{data:#}\n"))
     }
 
+    /// Stores raw data as text.
+    ///
+    /// # Errors
+    /// The file system's.
+    pub fn store_text(&self, name: &str, text: &str) -> io::Result<()> {
+        fs::write(self.folder.join(name), text)
+    }
+
     /// Adds a line to the summary, and shows it.
     pub fn say(&mut self, line: &str) {
         println!("{line}");

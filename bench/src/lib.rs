@@ -2,13 +2,20 @@
 //! the filters that are compared.
 
 pub mod archive;
+pub mod figure7;
 pub mod filters;
+pub mod ground;
 pub mod machine;
 pub mod matched;
 pub mod naive;
+pub mod noncentrality;
+pub mod options;
 pub mod rare;
 pub mod recorded;
+pub mod shares;
+pub mod simulated;
 pub mod speed;
+pub mod unmodelled;
 
 /// The value below which the share `q` of `values` lies; sorts them. NaN if there are none.
 pub fn quantile(values: &mut [f64], q: f64) -> f64 {

@@ -1,9 +1,13 @@
 //! The detector's `step`: guard, observe, monitor, alarm, report.
 
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{
     Channel, DetectionBelief, Entry, PARTICLE_CAPACITY, ParticleBlock, SensorFrame, Symptoms,
 };
+use vigil_inference::angle::wrap;
 use vigil_inference::logspace::probability;
+use vigil_inference::particles::PoseParticles;
 use vigil_robot::Description;
 use vigil_robot::learned::monitor::Channels;
 use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
@@ -56,6 +60,9 @@ pub enum DetectorError {
 pub struct Detector {
     observer: Observer,
     monitor: Monitor,
+    cloud: PoseParticles,
+    seed: u64,
+    rng: Pcg64Mcg,
     fault_rate_1_s: f64,
     alarm_log_odds: f64,
     particles: usize,
@@ -111,7 +118,10 @@ impl Detector {
         let particles = settings.particles;
         Ok(Self {
             observer: Observer::new(model, robot),
-            monitor: Monitor::new(model, robot, channels, form, particles, rate, seed),
+            monitor: Monitor::new(model, robot, channels, form, rate),
+            cloud: PoseParticles::new(particles),
+            seed,
+            rng: Pcg64Mcg::seed_from_u64(seed),
             fault_rate_1_s: rate / 3600.0,
             alarm_log_odds,
             particles,
@@ -148,7 +158,7 @@ impl Detector {
             Entry::Missed(count) => missed = count,
             Entry::Budget(count) => {
                 let count = (count as usize).clamp(1, self.particles);
-                self.monitor.resize(count);
+                self.cloud.resize(count);
             }
             Entry::Reset => {
                 self.observer.reset();
@@ -161,6 +171,7 @@ impl Detector {
 
     fn begin_run(&mut self) {
         self.monitor.reset();
+        self.rng = Pcg64Mcg::seed_from_u64(self.seed);
         (self.armed, self.quiet_s) = (false, 0.0);
         (self.alarm_t_ns, self.symptoms) = (0, 0);
     }
@@ -187,6 +198,9 @@ impl Detector {
         let observation = self.observer.observation();
         let moving = observation.moving;
         self.monitor.step(observation, self.alarm_t_ns != 0);
+        let track = self.monitor.track();
+        self.cloud
+            .draw(track.pose(), track.pose_covariance(), &mut self.rng);
         if !self.armed {
             // Evidence from before the noise scale is known is no evidence.
             self.armed = self.monitor.is_ready();
@@ -242,7 +256,8 @@ impl Detector {
         } else {
             0.0
         };
-        belief.effective_sample_size = report.effective_sample_size;
+        // Drawn anew after every observation: all of equal weight.
+        belief.effective_sample_size = self.cloud.poses().len() as f64;
         let NoiseScales {
             pose,
             wheels,
@@ -258,19 +273,19 @@ impl Detector {
         belief.symptoms = self.symptoms | self.external;
         belief.invalid_count = self.invalid_count;
         belief.degenerate_count = report.degenerate_count;
-        belief.particle_count = self.monitor.particles().len() as u32;
+        belief.particle_count = self.cloud.poses().len() as u32;
     }
 
     fn publish(&self, block: &mut ParticleBlock) {
-        let cloud = self.monitor.particles();
-        let count = cloud.len().min(PARTICLE_CAPACITY);
+        let poses = self.cloud.poses();
+        let count = poses.len().min(PARTICLE_CAPACITY);
         block.count = count as u32;
         block.mode[..count].fill(0);
-        for i in 0..count {
-            block.x[i] = cloud.x[i] as f32;
-            block.y[i] = cloud.y[i] as f32;
-            block.yaw[i] = cloud.yaw[i] as f32;
-            block.log_weight[i] = cloud.log_weight[i] as f32;
+        block.log_weight[..count].fill(-(count as f32).ln());
+        for (i, pose) in poses.iter().enumerate().take(count) {
+            block.x[i] = pose[0] as f32;
+            block.y[i] = pose[1] as f32;
+            block.yaw[i] = wrap(pose[2]) as f32;
         }
     }
 }

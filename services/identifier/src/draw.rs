@@ -1,19 +1,16 @@
 //! Particles: moments of a block, and a block drawn from the belief.
 
-use nalgebra::{Cholesky, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
-use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{MODE_MULTIPLE, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock, WHEELS};
 use vigil_inference::angle::wrap;
+use vigil_inference::particles::{PRECISION, factor, normal};
 use vigil_robot::learned::Moved;
 
 use crate::encoders::Encoders;
 use crate::exact::Exact;
 use crate::modes::Leaves;
-
-/// Variance added to a cloud's covariance: particles are carried in single precision.
-const PRECISION: f64 = 1e-10;
 
 /// Weighted mean and covariance of a block (x, y, yaw); None if it is empty or not finite.
 #[must_use]
@@ -76,17 +73,6 @@ pub fn draw(
     }
     out.count = filled as u32;
     out.log_weight[..filled].fill(-(filled.max(1) as f32).ln());
-}
-
-/// What standard normals are multiplied by to have this covariance; 0 if it is none.
-pub fn factor(covariance: Matrix3<f64>) -> Matrix3<f64> {
-    let spread = covariance + Matrix3::identity() * PRECISION;
-    Cholesky::new(spread).map_or(Matrix3::zeros(), |factor| factor.l())
-}
-
-/// Three standard normals.
-pub fn normal(rng: &mut Pcg64Mcg) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| rng.sample(StandardNormal))
 }
 
 /// Mode of a particle: the encoders' states are drawn.

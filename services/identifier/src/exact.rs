@@ -74,7 +74,7 @@ impl Exact {
         rates: FaultRates,
     ) -> Self {
         // A pose alone cannot tell two stuck wheels from one on another soil.
-        let modes = motion_modes(model, leaves.stuck_wheels(), use_wheels);
+        let modes = motion_modes(model, leaves.stuck_wheels(), true, use_wheels);
         let is_leaf = leaves.encoder.map(|leaf| leaf.is_some());
         let capacities: Vec<usize> = modes
             .iter()
@@ -179,7 +179,8 @@ impl Exact {
         for from in sources.into_iter().flatten() {
             for mode in 0..self.modes.len() {
                 let (before, after) = (self.modes[from.mode].moved, self.modes[mode].moved);
-                let log_weight = from.log_weight + (self.rates.rate_1_s(before, after) * dt_s).ln();
+                let rate_1_s = self.rates.rate_1_s(before, after) * self.modes[mode].share;
+                let log_weight = from.log_weight + (rate_1_s * dt_s).ln();
                 if log_weight <= FLOOR || log_weight.is_nan() {
                     continue;
                 }

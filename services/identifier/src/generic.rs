@@ -14,6 +14,7 @@ use vigil_inference::hierarchical::Hierarchical;
 use vigil_inference::hybrid::Modes;
 use vigil_inference::look_ahead::LookAhead;
 use vigil_inference::merged::Merged;
+use vigil_inference::particles::{factor, normal};
 use vigil_inference::proposal::Proposal;
 use vigil_inference::resample::Resampling;
 use vigil_inference::track::TRACK_DIMENSION;
@@ -22,7 +23,6 @@ use vigil_robot::learned::{Moved, NoiseScales, Observation, Switching};
 use vigil_setup::schema::{self, IdentifierFilter};
 
 use crate::assemble::Models;
-use crate::draw::{factor, normal};
 use crate::exact::fault_rates;
 use crate::modes::{IdentifierError, Leaves};
 use crate::posterior::Posterior;

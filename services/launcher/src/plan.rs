@@ -19,7 +19,9 @@ pub struct LauncherArgs {
     /// Stop after this many seconds, counted from the first cycle in which every service answers.
     #[arg(long, value_name = "S")]
     pub duration: Option<f64>,
-    /// Inject a fault: `stuck:RM@5`, `encoder:LF:zero@3`, `clear:RM@9` (seconds after the start).
+    /// Inject a fault: `stuck:RM@5`, `encoder:LF:zero@3`, `clear:RM@9` (seconds after the start),
+    /// or what no model contains: `tether:20@5`, `steer-jump:LF:0.2@5`, `clear:all@9`; a wrong
+    /// word lists all 18 kinds.
     #[arg(long, value_name = "SPEC@T")]
     pub inject: Vec<String>,
     /// Print one JSON document at the end, nothing else on standard output.

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use vigil_blocks::{Channel, Event, EventKind, MODE_MULTIPLE, MODE_UNKNOWN, Refusal};
 use vigil_cycle::topic::ServiceName;
-use vigil_robot::{Fault, FaultKind};
+use vigil_robot::injection::{Change, Wire};
 
 use crate::plan::Plan;
 
@@ -256,17 +256,9 @@ impl Namer {
                 let action = action.map_or("?", String::as_str);
                 wheel.map_or_else(|| action.to_owned(), |w| format!("{action}:{}", w.name))
             }
-            EventKind::Injected => match FaultKind::from_wire(event.what >> 8) {
-                Some(kind) => Fault {
-                    kind,
-                    wheel: (event.what & 255) as usize,
-                }
-                .text(&self.robot),
-                None => "?".into(),
-            },
-            EventKind::Restored => {
-                let wheel = self.robot.wheels.get(event.what as usize);
-                format!("clear:{}", wheel.map_or("all", |w| w.name.as_str()))
+            EventKind::Injected | EventKind::Restored => {
+                let wire = Wire::of_event(kind == EventKind::Injected, event);
+                Change::from_wire(&wire).map_or("?".into(), |change| change.text(&self.robot))
             }
             EventKind::Miss => format!("{} cycles", event.value),
             EventKind::SafeStop => match Refusal::from_wire(event.what) {

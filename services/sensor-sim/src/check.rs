@@ -1,6 +1,7 @@
 //! What a world may be made of.
 
 use vigil_robot::Description;
+use vigil_robot::fault::FaultError;
 use vigil_robot::kinematics::{GeometryError, ROVER_WHEELS};
 use vigil_setup::schema::{DriveSegment, Simulator};
 
@@ -19,6 +20,17 @@ pub enum WorldError {
         found: f64,
         /// What is allowed.
         allowed: &'static str,
+    },
+    /// A parameter of a disturbance is out of range.
+    #[error(transparent)]
+    Parameter(#[from] FaultError),
+    /// A disturbance cannot act there.
+    #[error("{kind}: place {found} does not exist: allowed are the indices of its places")]
+    Place {
+        /// Form of the disturbance.
+        kind: String,
+        /// Index of the place.
+        found: usize,
     },
     /// There is no such wheel.
     #[error("wheel {found} does not exist: allowed is 0 to 5")]

@@ -1,9 +1,12 @@
-//! Wheel encoders, healthy and broken.
+//! Wheel encoders, healthy, disturbed and broken.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vigil_robot::FaultKind;
 use vigil_robot::kinematics::ROVER_WHEELS;
+use vigil_robot::{DisturbanceKind, FaultKind};
+
+use crate::disturbed::Disturbed;
+use crate::history::History;
 
 /// Smallest rate that a noisy encoder reports, rad/s.
 pub const NOISE_MIN_RAD_S: f64 = -4.0;
@@ -15,12 +18,14 @@ pub const NOISE_MAX_RAD_S: f64 = 8.0;
 pub(crate) struct Encoders {
     fault: [Option<FaultKind>; ROVER_WHEELS],
     last_rad_s: [Option<f64>; ROVER_WHEELS],
+    past: History<ROVER_WHEELS>,
     rng: Pcg64Mcg,
 }
 
 impl Encoders {
-    pub(crate) fn new(seed: u64) -> Self {
+    pub(crate) fn new(rate_hz: f64, seed: u64) -> Self {
         Self {
+            past: History::new(rate_hz),
             fault: [None; ROVER_WHEELS],
             last_rad_s: [None; ROVER_WHEELS],
             rng: Pcg64Mcg::seed_from_u64(seed),
@@ -32,16 +37,41 @@ impl Encoders {
         self.fault[wheel] = fault;
     }
 
-    /// What encoder `wheel` reports when a healthy one would report `healthy_rad_s`.
-    pub(crate) fn report(&mut self, wheel: usize, healthy_rad_s: f64) -> f64 {
+    /// The rates seen, before noise, of wheels that turn at `rate_rad_s`.
+    pub(crate) fn scaled(&self, wheel: usize, rate_rad_s: f64, on: &Disturbed) -> f64 {
+        match on.at(DisturbanceKind::EncoderScale, wheel) {
+            Some(factor) => factor * rate_rad_s,
+            None => rate_rad_s,
+        }
+    }
+
+    /// What the encoders report at `t_s` when timely, unbroken ones would report `healthy_rad_s`.
+    pub(crate) fn report(
+        &mut self,
+        t_s: f64,
+        healthy_rad_s: [f64; ROVER_WHEELS],
+        on: &Disturbed,
+    ) -> [f64; ROVER_WHEELS] {
+        self.past.keep(t_s, healthy_rad_s);
+        std::array::from_fn(|wheel| {
+            let seen = match on.at(DisturbanceKind::EncoderDelay, wheel) {
+                Some(delay_s) => self.past.before(t_s, delay_s)[wheel],
+                None => healthy_rad_s[wheel],
+            };
+            self.one(wheel, seen)
+        })
+    }
+
+    /// What encoder `wheel` reports when an unbroken one would report `seen_rad_s`.
+    fn one(&mut self, wheel: usize, seen_rad_s: f64) -> f64 {
         let last = &mut self.last_rad_s[wheel];
         let reported = match self.fault[wheel] {
             Some(FaultKind::EncoderZero) => 0.0,
-            Some(FaultKind::EncoderFrozen) => last.unwrap_or(healthy_rad_s),
+            Some(FaultKind::EncoderFrozen) => last.unwrap_or(seen_rad_s),
             Some(FaultKind::EncoderNoise) => {
                 self.rng.random_range(NOISE_MIN_RAD_S..NOISE_MAX_RAD_S)
             }
-            Some(FaultKind::Stuck) | None => healthy_rad_s,
+            Some(FaultKind::Stuck) | None => seen_rad_s,
         };
         *last = Some(reported);
         reported

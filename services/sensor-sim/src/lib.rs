@@ -1,6 +1,6 @@
 //! The simulated rover, and playback of recorded frames.
 //!
-//! - [`World`]: the rover on its soil, its sensors, and the faults injected into both;
+//! - [`World`]: the rover on its soil, its sensors, and the faults and disturbances of both;
 //! - [`Obedience`]: what the rover makes of the supervisor's actions;
 //! - [`Playback`]: recorded frames, one run after the other;
 //! - [`Schedule`]: injections that are due at given times.
@@ -10,11 +10,14 @@
 
 mod assemble;
 mod check;
+mod disturbed;
 mod drive;
 mod encoders;
+mod history;
 mod noise;
 mod obedience;
 mod playback;
+mod pose_sensor;
 mod schedule;
 mod soil;
 mod wiring;

@@ -16,7 +16,7 @@ use vigil_setup::{ServiceArgs, Setup};
 struct Args {
     #[command(flatten)]
     service: ServiceArgs,
-    /// Inject a fault: `stuck:RM@5` (seconds after the start).
+    /// Inject a fault or disturbance: `stuck:RM@5`, `tether:20@5` (seconds after the start).
     #[arg(long, value_name = "SPEC@T")]
     inject: Vec<String>,
     /// The drive began at this instant, ns of CLOCK_MONOTONIC: for a simulator that replaces one

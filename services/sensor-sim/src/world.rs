@@ -1,16 +1,19 @@
 //! The simulated rover: drive, soil, slip, sensors, faults.
 
 use vigil_blocks::{ActionOutcome, SensorFrame, Valid};
+use vigil_robot::disturbance::{KINDS, Place, SIDES};
 use vigil_robot::injection::Change;
 use vigil_robot::kinematics::{ROVER_WHEELS, advance, wrap_angle};
-use vigil_robot::slip::{Situation, SlipModel, Solution};
-use vigil_robot::{Description, Fault, FaultKind};
+use vigil_robot::slip::{Condition, Situation, SlipModel, Soil, Solution};
+use vigil_robot::{Description, Disturbance, DisturbanceKind, Fault, FaultKind};
 use vigil_setup::schema::{DriveSegment, Simulator};
 
 use crate::check::{self, WorldError};
+use crate::disturbed::Disturbed;
 use crate::drive::{Drive, Servo};
 use crate::encoders::Encoders;
 use crate::noise::Noise;
+use crate::pose_sensor::PoseSensor;
 use crate::soil::SoilPath;
 use crate::{DriveCommand, EffectiveCommand};
 
@@ -55,7 +58,13 @@ pub struct World {
     motion: Solution,
     motion_age_s: f64,
     stuck: [bool; ROVER_WHEELS],
+    disturbed: Disturbed,
+    /// What the disturbances make of body and wheels.
+    condition: Condition,
+    pose_sensor: PoseSensor,
     encoders: Encoders,
+    /// Since the start, s.
+    elapsed_s: f64,
     noise: Noise,
     run_id: u64,
     safe_stop: bool,
@@ -86,7 +95,8 @@ impl World {
             curvature_1_m: 0.0,
             speed_m_s: 0.0,
             stuck: [false; ROVER_WHEELS],
-            soil: vigil_robot::slip::Soil::default(),
+            soil: Soil::default(),
+            condition: Condition::default(),
         };
         let Ok(motion) = model.solve(&rest, None) else {
             return Err(check::quantity("speed at rest", 0.0, "always solvable"));
@@ -106,7 +116,11 @@ impl World {
             motion,
             motion_age_s: f64::INFINITY,
             stuck: [false; ROVER_WHEELS],
-            encoders: Encoders::new(stream(1)),
+            disturbed: Disturbed::nothing(),
+            condition: Condition::default(),
+            pose_sensor: PoseSensor::new(rate_hz, stream(3)),
+            encoders: Encoders::new(rate_hz, stream(1)),
+            elapsed_s: 0.0,
             noise: Noise::new(&robot.noise, rate_hz, settings.noise_scale, stream(2)),
             run_id: 1,
             safe_stop: false,
@@ -134,6 +148,8 @@ impl World {
         }
         let command = self.checked(command);
         let cycle_s = dt_s.min(CYCLE_MAX_S);
+        self.elapsed_s += cycle_s;
+        self.pose_sensor.advance(cycle_s, &self.disturbed);
         let parts = (cycle_s / STEP_MAX_S).ceil().max(1.0);
         let part_s = cycle_s / parts;
         for _ in 0..parts as u32 {
@@ -168,28 +184,39 @@ impl World {
         (frame.command[0], frame.command[1]) = (curvature_1_m, speed_m_s);
         frame.valid = Valid::command(0) | Valid::command(1);
 
+        let on = &self.disturbed;
         let noise = &mut self.noise;
-        frame.pose[0] = self.pose[0] + noise.draw(noise.position_m);
-        frame.pose[1] = self.pose[1] + noise.draw(noise.position_m);
-        frame.pose[2] = wrap_angle(self.pose[2] + noise.draw(noise.yaw_rad));
-        frame.yaw_rate = self.velocity[2] + noise.draw(noise.yaw_rate_rad_s);
+        let mut pose = self.pose_sensor.distort(self.pose, on);
+        pose[0] += noise.draw(noise.position_m);
+        pose[1] += noise.draw(noise.position_m);
+        pose[2] = wrap_angle(pose[2] + noise.draw(noise.yaw_rad));
+        if let Some(pose) = self.pose_sensor.report(self.elapsed_s, pose, on) {
+            frame.pose = pose;
+            frame.valid |= Valid::POSE;
+        }
+        let gyro_bias = on.at(DisturbanceKind::YawRateBias, 0).unwrap_or(0.0);
+        frame.yaw_rate = self.velocity[2] + gyro_bias + noise.draw(noise.yaw_rate_rad_s);
         let [x, y, yaw] = self.planned_pose;
         frame.planned_pose = [x, y, wrap_angle(yaw)];
-        frame.valid |= Valid::POSE | Valid::PLANNED_POSE | Valid::YAW_RATE;
+        frame.valid |= Valid::PLANNED_POSE | Valid::YAW_RATE;
 
         let kinematics = self.model.kinematics();
         let steer_rad = kinematics.targets(curvature_1_m, speed_m_s).steer_rad;
+        let mut rates_rad_s = [0.0; ROVER_WHEELS];
         for (i, &steer) in steer_rad.iter().enumerate() {
-            let rate = self.motion.wheel_rate_rad_s[i] + noise.draw(noise.wheel_rate_rad_s);
-            frame.wheel_rate[i] = self.encoders.report(i, rate);
+            let rate = self.encoders.scaled(i, self.motion.wheel_rate_rad_s[i], on);
+            rates_rad_s[i] = rate + noise.draw(noise.wheel_rate_rad_s);
             let current = CURRENT_PER_TORQUE_A_N_M * self.motion.torque_n_m[i];
             frame.current[i] = current + noise.draw(noise.current_a);
             frame.valid |= Valid::wheel_rate(i) | Valid::current(i);
             if kinematics.steered[i] {
-                frame.steer[i] = steer + noise.draw(noise.steer_rad);
+                let seen = on.at(DisturbanceKind::SteerJump, i).unwrap_or(0.0);
+                frame.steer[i] = steer + seen + noise.draw(noise.steer_rad);
                 frame.valid |= Valid::steer(i);
             }
         }
+        let rates_rad_s = self.encoders.report(self.elapsed_s, rates_rad_s, on);
+        frame.wheel_rate[..ROVER_WHEELS].copy_from_slice(&rates_rad_s);
     }
 
     /// Breaks something. A wheel may be stuck and have a broken encoder at once; a new fault of an
@@ -206,7 +233,32 @@ impl World {
         Ok(())
     }
 
-    /// Mends everything of one wheel.
+    /// Begins a disturbance; it takes the place of one of its kind at its place.
+    ///
+    /// # Errors
+    /// [`WorldError`] if its place does not exist or a parameter is out of range.
+    pub fn disturb(&mut self, disturbance: Disturbance) -> Result<(), WorldError> {
+        disturbance.check()?;
+        let place = disturbance.place;
+        let kinematics = self.model.kinematics();
+        let there = match disturbance.kind.row().place {
+            Place::Rover => place == 0,
+            Place::Side => place < SIDES.len(),
+            Place::Wheel => place < ROVER_WHEELS,
+            Place::SteeredWheel => kinematics.steered.get(place) == Some(&true),
+        };
+        if !(there && self.disturbed.set(&disturbance)) {
+            return Err(WorldError::Place {
+                kind: disturbance.kind.row().form(),
+                found: place,
+            });
+        }
+        self.pose_sensor.begin(&disturbance, self.pose);
+        self.resolve();
+        Ok(())
+    }
+
+    /// Mends everything of one wheel, and ends every disturbance of it.
     ///
     /// # Errors
     /// [`WorldError::Wheel`].
@@ -214,17 +266,38 @@ impl World {
         check::wheel(wheel)?;
         self.set_stuck(wheel, false);
         self.encoders.set(wheel, None);
+        for row in &KINDS {
+            if matches!(row.place, Place::Wheel | Place::SteeredWheel) {
+                self.disturbed.calm(row.kind, Some(wheel));
+            }
+        }
+        self.resolve();
         Ok(())
+    }
+
+    /// Ends a kind of disturbance, at one place or everywhere.
+    pub fn calm(&mut self, kind: DisturbanceKind, place: Option<usize>) {
+        self.disturbed.calm(kind, place);
+        self.resolve();
     }
 
     /// Does what an injection asks for.
     ///
     /// # Errors
-    /// [`WorldError::Wheel`].
+    /// [`WorldError`] naming what does not exist or is out of range.
     pub fn change(&mut self, change: Change) -> Result<(), WorldError> {
         match change {
             Change::Inject(fault) => self.inject(fault),
+            Change::Disturb(disturbance) => self.disturb(disturbance),
             Change::Clear(wheel) => self.clear(wheel),
+            Change::Calm(kind, place) => {
+                self.calm(kind, place);
+                Ok(())
+            }
+            Change::ClearAll => {
+                KINDS.iter().for_each(|row| self.calm(row.kind, None));
+                (0..ROVER_WHEELS).try_for_each(|wheel| self.clear(wheel))
+            }
         }
     }
 
@@ -245,7 +318,8 @@ impl World {
         self.run_id = run_id;
     }
 
-    /// Equilibria that were not found; the last one was kept.
+    /// Equilibria that were not found (where forces from outside exceed the soil's strength there
+    /// is none); the last one was kept.
     #[must_use]
     pub const fn unsolved(&self) -> u64 {
         self.unsolved
@@ -259,6 +333,12 @@ impl World {
 
     fn set_stuck(&mut self, wheel: usize, stuck: bool) {
         self.stuck[wheel] = stuck;
+        self.motion_age_s = f64::INFINITY;
+    }
+
+    /// What is on has changed: the next step finds the equilibrium anew.
+    fn resolve(&mut self) {
+        self.condition = self.disturbed.condition();
         self.motion_age_s = f64::INFINITY;
     }
 
@@ -329,7 +409,10 @@ impl World {
             curvature_1_m: at.curvature_1_m,
             speed_m_s: at.speed_m_s,
             stuck: self.stuck,
-            soil: self.soil.here(),
+            soil: self
+                .disturbed
+                .soil(self.soil.here(), self.model.kinematics()),
+            condition: self.condition,
         };
         // From rest the ideal motion is the better start.
         let moves = self.motion.velocity != [0.0; 3];

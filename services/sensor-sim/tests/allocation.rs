@@ -29,7 +29,15 @@ fn steady_cycles_with_faults_and_actions_allocate_nothing() {
         change: Change::Inject(Fault { kind, wheel }),
         at_s,
     };
+    let disturbance = |spec, at_s| vigil_robot::Injection {
+        change: vigil_robot::Injection::parse_change(spec, &robot).unwrap(),
+        at_s,
+    };
     let mut schedule = Schedule::new(vec![
+        disturbance("pose-delay:0.3", 0.5),
+        disturbance("encoder-delay:RF:0.2", 0.6),
+        disturbance("tether:5", 0.7),
+        disturbance("clear:tether", 0.9),
         injection(FaultKind::Stuck, 4, 1.0),
         injection(FaultKind::EncoderFrozen, 0, 1.5),
         injection(FaultKind::EncoderNoise, 2, 2.0),

@@ -54,6 +54,11 @@ impl Pipeline {
         })
     }
 
+    /// Log-odds at which the detector's alarm rises, nats.
+    pub const fn alarm_log_odds(&self) -> f64 {
+        self.detector.alarm_log_odds()
+    }
+
     /// Sides and types of the faults that the verdicts name.
     pub const fn taxonomy(&self) -> &Taxonomy {
         &self.taxonomy
@@ -94,6 +99,7 @@ impl Pipeline {
         Verdict {
             t_s: t_ns as f64 / 1e9,
             p_fault: self.detection.p_fault,
+            log_odds: self.detection.log_odds,
             alarm: self.detection.alarm != 0,
             mode,
             p_mode: belief.p_mode,

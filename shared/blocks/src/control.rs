@@ -10,13 +10,13 @@ block! {
         pub header: Header,
         /// A [`ControlCommand`].
         pub command: u32,
-        /// Fault to inject or clear: a kind code of the robot's faults.
+        /// Fault or disturbance to inject or clear: its kind code; 0 to clear all kinds.
         pub fault: u32,
-        /// Wheel, by index in the robot's description; `u32::MAX` for all.
+        /// Wheel, by index in the robot's description, or side; `u32::MAX` for all.
         pub wheel: u32,
         /// Reserved, zero.
         pub reserved: u32,
-        /// Parameters of the fault.
+        /// Parameters of a disturbance; the last two are reserved, zero.
         pub parameter: [f64; 4],
     }
 }

@@ -18,7 +18,7 @@ pub struct Event {
     pub kind: u32,
     /// See [`EventKind`].
     pub what: u32,
-    /// Probability, where the event has one; else 0.
+    /// Probability, where the event has one; else as [`EventKind`] says, or 0.
     pub p: f64,
     /// See [`EventKind`].
     pub value: u64,
@@ -30,9 +30,11 @@ pub struct Event {
 pub enum EventKind {
     /// The drive begins: every stage answers. `value`: the sensor's sequence number.
     Ready = 1,
-    /// A fault was injected. `what`: wheel + 256 x kind code of the fault.
+    /// A fault or disturbance was injected. `what`: wheel or side (255 for none) + 256 x kind
+    /// code; `p` and the bits of `value`: parameters of a disturbance, else 0.
     Injected = 2,
-    /// The faults of a wheel were removed. `what`: the wheel.
+    /// Faults or disturbances were removed. `what`: wheel or side (255 for all) + 256 x kind code
+    /// (0 for all).
     Restored = 3,
     /// The detector's alarm rose.
     Alarm = 4,

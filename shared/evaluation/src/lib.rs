@@ -1,4 +1,4 @@
-//! Data sets, learning of models, scoring. Reads files; knows no transport and no clock.
+//! Data sets, learning of models, scoring, reports. Reads files; knows no transport and no clock.
 
 pub mod cases;
 pub mod derived;
@@ -6,6 +6,7 @@ pub mod frames;
 pub mod labels;
 pub mod learning;
 pub mod plausible;
+pub mod report;
 pub mod scoring;
 pub mod split;
 mod table;

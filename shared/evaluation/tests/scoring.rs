@@ -7,6 +7,10 @@ use rover::{robot, tree};
 use vigil_evaluation::labels::Label;
 use vigil_evaluation::scoring::{Case, Claims, Ratio, Score, Side, Taxonomy, Verdict, score};
 
+/// Threshold of the hand-made verdicts' alarms, which have log-odds of 20 while they stand, -20
+/// otherwise.
+const ALARM: f64 = 10.0;
+
 fn label(run: u32, mode: &str, kind: &str, onset_s: Option<f64>) -> Label {
     Label {
         run,
@@ -34,6 +38,7 @@ fn case(label: Label, end_s: f64, changes: &[(f64, bool, &str, f64)]) -> Case {
         }
         Verdict {
             t_s,
+            log_odds: if alarm { 20.0 } else { -20.0 },
             alarm,
             mode: mode.into(),
             p_mode: p,
@@ -48,12 +53,11 @@ fn case(label: Label, end_s: f64, changes: &[(f64, bool, &str, f64)]) -> Case {
 }
 
 fn scored(cases: &[Case]) -> Score {
-    score(cases, &Taxonomy::new(&tree(), &robot()))
+    score(cases, &Taxonomy::new(&tree(), &robot()), ALARM)
 }
 
 fn ratio(right: usize, n: usize) -> Ratio {
-    let fraction = (n > 0).then(|| right as f64 / n as f64);
-    Ratio { n, right, fraction }
+    Ratio { n, right }
 }
 
 #[test]
@@ -154,8 +158,18 @@ fn alarms_are_counted_by_their_rise_before_and_after_the_onset() {
         (of("zero").missed, of("noise").missed, of("noise").detected),
         (1, 1, 1)
     );
+    // 0.0 and 0.3 s; 2.0 s; two never.
+    assert_eq!(of("all").within.after_2_s, ratio(3, 5));
+    assert_eq!(of("noise").within.after_2_s, ratio(1, 2));
+    assert_eq!(of("all").within.at_end, ratio(3, 5));
     assert!(of("zero").delay.p50_s.is_none());
     let near = |value: Option<f64>, wanted: f64| (value.unwrap() - wanted).abs() < 1e-9;
+    let rate = &false_alarms.rate;
+    assert!(near(rate.false_alarms_per_h, 4.0 * 3600.0 / exposure_s));
+    // Garwood's bounds on 4 events: 1.0899 and 10.2416.
+    let an_hour = 3600.0 / exposure_s;
+    assert!((rate.lower_95_per_h.unwrap() - 1.089_87 * an_hour).abs() < 1e-3);
+    assert!((rate.upper_95_per_h.unwrap() - 10.241_59 * an_hour).abs() < 1e-3);
     assert!(near(of("stuck").delay.p50_s, 0.0) && near(of("stuck").delay.max_s, 0.3));
     assert!(near(of("all").delay.p50_s, 0.3) && near(of("all").delay.p90_s, 2.0));
     assert_eq!(score.runs["nominal"], 2);
@@ -204,6 +218,15 @@ fn leaf_side_and_type_are_judged_at_instants_after_the_onset() {
     assert_eq!(of.isolation.n, 2);
     assert!((of.isolation.p50_s.unwrap() - 0.5).abs() < 1e-9);
     assert!((of.isolation.max_s.unwrap() - 5.0).abs() < 1e-9);
+    let by = &score.confusion_by;
+    assert_eq!(
+        (by.side["right"]["right"], by.side["right"]["left"]),
+        (3, 1)
+    );
+    assert_eq!(
+        (by.class["stuck"]["stuck"], by.class["stuck"]["encoder"]),
+        (3, 1)
+    );
     let row = &score.confusion["RM_STUCK"];
     assert_eq!(row.values().sum::<usize>(), 4);
     assert_eq!(
@@ -267,6 +290,13 @@ fn calibration_counts_an_abstract_node_above_the_truth_as_true() {
     // One claim a bin: |1 - 0.5|, |1 - 0.95|, |0 - 0.95|.
     let error = (0.5 + 0.05 + 0.95) / 3.0;
     assert!((calibration.expected_calibration_error.unwrap() - error).abs() < 1e-12);
+    let brier = (0.25 + 0.0025 + 0.9025) / 3.0;
+    assert!((calibration.brier_score.unwrap() - brier).abs() < 1e-12);
+    let bins = calibration.reliability.iter();
+    let bins: Vec<_> = bins
+        .map(|bin| (bin.n, bin.p_mean, bin.is_true.right))
+        .collect();
+    assert_eq!(bins, [(1, 0.5, 1), (1, 0.95, 1), (1, 0.95, 0)]);
     let log_score = (-0.5_f64.ln() + 24.0 * 10.0_f64.ln()) / 3.0;
     assert!((calibration.log_score_nats.unwrap() - log_score).abs() < 1e-9);
 }

@@ -6,21 +6,17 @@
 //! component is conditioned on `r` (a Kalman filter of a constant). The log-odds are the logarithm
 //! of the summed weights: with equal births a Shiryaev-Roberts statistic.
 //!
-//! Onsets are resolved in proportion to their age: the last one or two are kept one by one,
-//! older ones in pairs, then in fours, and so on; where two components become one, their first two
-//! moments are kept. One prior deviation serves faults of every size: it enters the delay by its
+//! Onsets are resolved in proportion to their age ([`crate::onsets`]); where two components become
+//! one, their first two moments are kept.
+//!
+//! One prior deviation serves faults of every size: it enters the delay by its
 //! logarithm only, and mixtures of several gained on small faults what they lost on others.
 
 use nalgebra::SVector;
 
-use crate::logspace::{log_add, log_sum_exp};
+use crate::logspace::log_add;
+use crate::onsets::{Onset, Onsets};
 
-/// Levels: a component of level j holds 2^j successive onsets, one of the last level any number.
-const LEVELS: usize = 9;
-/// Components per level at most. With one, delays are longer by up to a third; with four they are
-/// not shorter.
-const PER_LEVEL: usize = 2;
-const COMPONENTS: usize = LEVELS * PER_LEVEL;
 /// Log-odds beyond which more evidence changes nothing.
 const LOG_ODDS_MAX: f64 = 700.0;
 
@@ -35,10 +31,7 @@ struct Component<const D: usize> {
 /// Learned-bias detection filter over a whitened residual of D dimensions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ages<const D: usize> {
-    /// By level, the younger of a level first.
-    components: [Component<D>; COMPONENTS],
-    /// Components in use on each level.
-    count: [usize; LEVELS],
+    components: Onsets<Component<D>>,
     prior_variance: f64,
 }
 
@@ -47,24 +40,18 @@ impl<const D: usize> Ages<D> {
     /// residual's.
     #[must_use]
     pub fn new(bias_sd: f64) -> Self {
-        let prior_variance = bias_sd * bias_sd;
-        let absent = Component {
-            log_weight: f64::NEG_INFINITY,
-            bias: SVector::zeros(),
-            variance: prior_variance,
-        };
         Self {
-            components: [absent; COMPONENTS],
-            count: [0; LEVELS],
-            prior_variance,
+            components: Onsets::default(),
+            prior_variance: bias_sd * bias_sd,
         }
     }
 
     /// Natural log-odds of the fault state.
     #[must_use]
     pub fn log_odds(&self) -> f64 {
-        let log_weight = self.components.map(|component| component.log_weight);
-        log_sum_exp(&log_weight).clamp(-LOG_ODDS_MAX, LOG_ODDS_MAX)
+        let log_weights = self.components.iter().map(|component| component.log_weight);
+        let log_odds = log_weights.fold(f64::NEG_INFINITY, log_add);
+        log_odds.clamp(-LOG_ODDS_MAX, LOG_ODDS_MAX)
     }
 
     /// One step with the whitened residual and the probability `birth` that a fault appears in it.
@@ -74,48 +61,21 @@ impl<const D: usize> Ages<D> {
         if !nominal.is_finite() {
             return;
         }
-        self.enter(Component {
+        self.components.enter(Component {
             log_weight: birth.ln(),
             bias: SVector::zeros(),
             variance: self.prior_variance,
         });
         let stays = (-birth).ln_1p();
         let mut highest = f64::NEG_INFINITY;
-        for level in 0..LEVELS {
-            for i in 0..self.count[level] {
-                let component = &mut self.components[level * PER_LEVEL + i];
-                component.take(residual, nominal);
-                component.log_weight -= stays;
-                highest = highest.max(component.log_weight);
-            }
+        for component in self.components.iter_mut() {
+            component.take(residual, nominal);
+            component.log_weight -= stays;
+            highest = highest.max(component.log_weight);
         }
-        let excess = highest - LOG_ODDS_MAX;
-        if excess > 0.0 {
-            for component in &mut self.components {
-                component.log_weight -= excess;
-            }
-        }
-    }
-
-    /// Adds the youngest component. A full level hands its two on as one.
-    fn enter(&mut self, mut younger: Component<D>) {
-        for level in 0..LEVELS {
-            let first = level * PER_LEVEL;
-            if self.count[level] < PER_LEVEL {
-                self.components[first + 1] = self.components[first];
-                self.components[first] = younger;
-                self.count[level] += 1;
-                return;
-            }
-            let both = self.components[first].merged(&self.components[first + 1]);
-            self.components[first] = younger;
-            if level == LEVELS - 1 {
-                self.components[first + 1] = both;
-                return;
-            }
-            self.components[first + 1].log_weight = f64::NEG_INFINITY;
-            self.count[level] = 1;
-            younger = both;
+        let excess = (highest - LOG_ODDS_MAX).max(0.0);
+        for component in self.components.iter_mut() {
+            component.log_weight -= excess;
         }
     }
 }
@@ -131,18 +91,20 @@ impl<const D: usize> Component<D> {
         self.bias += gain * deviation;
         self.variance *= 1.0 - gain;
     }
+}
 
-    /// One component with the weight and the first two moments of both.
-    fn merged(&self, other: &Self) -> Self {
-        let total = log_add(self.log_weight, other.log_weight);
+impl<const D: usize> Onset for Component<D> {
+    /// Keeps the weight and the first two moments of both.
+    fn merged(&self, older: &Self) -> Self {
+        let total = log_add(self.log_weight, older.log_weight);
         if total == f64::NEG_INFINITY {
             return *self;
         }
         let (one, two) = (
             (self.log_weight - total).exp(),
-            (other.log_weight - total).exp(),
+            (older.log_weight - total).exp(),
         );
-        let apart = (self.bias - other.bias).norm_squared() / D as f64;
+        let apart = (self.bias - older.bias).norm_squared() / D as f64;
         // A distance beyond all numbers, after residuals beyond all sense, says nothing.
         let between = if one * two > 0.0 && apart.is_finite() {
             one * two * apart
@@ -151,8 +113,8 @@ impl<const D: usize> Component<D> {
         };
         Self {
             log_weight: total,
-            bias: self.bias * one + other.bias * two,
-            variance: one * self.variance + two * other.variance + between,
+            bias: self.bias * one + older.bias * two,
+            variance: one * self.variance + two * older.variance + between,
         }
     }
 }
@@ -160,6 +122,7 @@ impl<const D: usize> Component<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::logspace::log_sum_exp;
     use proptest::prelude::*;
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;

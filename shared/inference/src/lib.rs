@@ -28,10 +28,12 @@
 //! | also here | holds |
 //! |---|---|
 //! | [`constant`] | the paper's detection: a constant likelihood, and its blind spot |
+//! | [`departure`] | a planar robot departing from its nominal motion by an unknown amount |
 //! | [`windowed`] | the same on sums over overlapping windows: a smaller blind spot |
 //! | [`risk`] | what losing track of a mode costs, for risk-sensitive proposals |
 //! | [`resample`], [`weights`], [`adaptive`] | four schemes, log-weights, number of particles |
 //! | [`gaussian`], [`track`], [`particles`] | Kalman filter, pose track, pose particles |
+//! | [`onsets`] | components by the age of their onset, in bounded number |
 //! | [`bank`] | exact single faults: one hypothesis per (mode, onset) |
 //! | [`tree`] | the fault tree |
 //! | [`logspace`], [`angle`] | probabilities as logarithms, angles on the circle |
@@ -42,6 +44,7 @@ pub mod angle;
 pub mod bank;
 pub mod bootstrap;
 pub mod constant;
+pub mod departure;
 pub mod fault_sets;
 pub mod filter;
 pub mod forward;
@@ -52,6 +55,7 @@ pub mod lanes;
 pub mod logspace;
 pub mod look_ahead;
 pub mod merged;
+pub mod onsets;
 pub mod particles;
 pub mod proposal;
 pub mod resample;

@@ -129,6 +129,27 @@ impl Track {
             .copy_from(&block);
     }
 
+    /// Adds variance to the pose (x, y, yaw).
+    pub fn diffuse(&mut self, variance: [f64; 3]) {
+        for (i, variance) in variance.into_iter().enumerate() {
+            self.covariance[(i, i)] += variance;
+        }
+    }
+
+    /// The Gaussian with the first two moments of this track, taken with the probability `share`,
+    /// and another one. Their headings must be less than a turn apart.
+    #[must_use]
+    pub fn mixed(&self, other: &Self, share: f64) -> Self {
+        let rest = 1.0 - share;
+        let apart = self.mean - other.mean;
+        Self {
+            mean: self.mean * share + other.mean * rest,
+            covariance: self.covariance * share
+                + other.covariance * rest
+                + apart * apart.transpose() * (share * rest),
+        }
+    }
+
     /// Moves by one displacement.
     pub fn predict(&mut self, step: &Displacement, noise: &MotionNoise) {
         let travel = step.travel_m;
@@ -300,6 +321,23 @@ mod tests {
         }
         assert!((plain.mean - track.mean).abs().max() < 1e-6);
         assert!((plain.covariance - track.covariance).abs().max() < 1e-8);
+    }
+
+    #[test]
+    fn a_mixture_keeps_the_first_two_moments() {
+        let one = Track::new(Vector3::new(1.0, 0.0, 0.2), Matrix3::identity(), &noise());
+        let other = Track::new(
+            Vector3::new(2.0, 0.5, 0.0),
+            Matrix3::identity() * 3.0,
+            &noise(),
+        );
+        let mixed = one.mixed(&other, 0.25);
+        assert!((mixed.pose() - Vector3::new(1.75, 0.375, 0.05)).abs().max() < 1e-12);
+        // E[x²] - E[x]²: .25 (1 + 1) + .75 (3 + 4) - 1.75².
+        assert!((mixed.pose_covariance()[(0, 0)] - (0.5 + 5.25 - 3.0625)).abs() < 1e-12);
+        let mut wider = one;
+        wider.diffuse([0.5, 0.0, 0.0]);
+        assert!((wider.pose_covariance()[(0, 0)] - 1.5).abs() < 1e-12);
     }
 
     #[test]

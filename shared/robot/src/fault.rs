@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::Description;
+use crate::{Description, disturbance};
 
 /// Kind of a wheel fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -42,13 +42,54 @@ pub struct Fault {
 }
 
 /// Why a fault's text was refused.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FaultError {
     /// The form is wrong.
     #[error(
-        "'{0}' is not a fault: expected stuck:WHEEL, encoder:WHEEL:zero|frozen|noise or clear:WHEEL"
+        "'{found}' is not a fault: expected stuck:WHEEL, encoder:WHEEL:zero|frozen|noise, \
+         clear:WHEEL|KIND[:PLACE]|all, or what no model contains: {disturbances}"
     )]
-    Form(String),
+    Form {
+        /// What was given.
+        found: String,
+        /// Forms of all disturbances.
+        disturbances: String,
+    },
+    /// The form of a disturbance is wrong.
+    #[error("'{found}' does not have the form {form}")]
+    Disturbance {
+        /// What was given.
+        found: String,
+        /// Form of this kind.
+        form: String,
+    },
+    /// A parameter is out of range.
+    #[error("{name}: {unit} is {found}: allowed is {low} to {high}")]
+    Parameter {
+        /// Name of the kind.
+        name: &'static str,
+        /// Unit or meaning of the parameter.
+        unit: &'static str,
+        /// What was given.
+        found: f64,
+        /// Least value.
+        low: f64,
+        /// Greatest value.
+        high: f64,
+    },
+    /// There is no such side.
+    #[error("'{0}' is not a side: expected left or right")]
+    Side(String),
+    /// The wheel cannot be steered.
+    #[error("wheel {wheel} of {robot} has no steering servo: expected one of {allowed}")]
+    NotSteered {
+        /// What was given.
+        wheel: String,
+        /// Name of the robot.
+        robot: String,
+        /// Names of its steered wheels.
+        allowed: String,
+    },
     /// The wheel does not exist.
     #[error("'{wheel}' is not a wheel of {robot}: expected one of {allowed}")]
     Wheel {
@@ -59,6 +100,17 @@ pub enum FaultError {
         /// Names of its wheels.
         allowed: String,
     },
+}
+
+impl FaultError {
+    /// `text` is nothing that can be injected.
+    pub(crate) fn form(text: &str) -> Self {
+        let forms: Vec<String> = disturbance::KINDS.iter().map(|kind| kind.form()).collect();
+        Self::Form {
+            found: text.to_owned(),
+            disturbances: forms.join(" "),
+        }
+    }
 }
 
 impl Fault {
@@ -73,7 +125,7 @@ impl Fault {
             ["encoder", wheel, "zero"] => (FaultKind::EncoderZero, *wheel),
             ["encoder", wheel, "frozen"] => (FaultKind::EncoderFrozen, *wheel),
             ["encoder", wheel, "noise"] => (FaultKind::EncoderNoise, *wheel),
-            _ => return Err(FaultError::Form(text.to_owned())),
+            _ => return Err(FaultError::form(text)),
         };
         Self::wheel_of(wheel, robot).map(|wheel| Self { kind, wheel })
     }

@@ -1,15 +1,24 @@
 //! What an operator asks for when breaking a simulated robot, and when.
 
+use vigil_blocks::Event;
+
 use crate::Description;
-use crate::fault::{Fault, FaultError};
+use crate::disturbance::{Disturbance, DisturbanceKind, PARAMETERS};
+use crate::fault::{Fault, FaultError, FaultKind};
 
 /// A change of the simulated robot's health.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Change {
-    /// Break something.
+    /// Break something that the models contain.
     Inject(Fault),
+    /// Do something that no model contains.
+    Disturb(Disturbance),
     /// Mend everything of the wheel with this index.
     Clear(usize),
+    /// End a kind of disturbance, at one place or everywhere.
+    Calm(DisturbanceKind, Option<usize>),
+    /// Mend and end everything.
+    ClearAll,
 }
 
 /// A change at a time.
@@ -55,14 +64,149 @@ impl Injection {
         })
     }
 
-    /// Parses `stuck:WHEEL`, `encoder:WHEEL:zero|frozen|noise` or `clear:WHEEL`.
+    /// Parses a change: a fault ([`Fault::parse`]), a disturbance ([`Disturbance::parse`]),
+    /// `clear:WHEEL`, `clear:KIND[:PLACE]` or `clear:all`.
     ///
     /// # Errors
     /// [`FaultError`] naming what was given and what is allowed.
     pub fn parse_change(text: &str, robot: &Description) -> Result<Change, FaultError> {
-        match text.split_once(':') {
-            Some(("clear", wheel)) => Fault::wheel_of(wheel, robot).map(Change::Clear),
+        let parts: Vec<&str> = text.split(':').collect();
+        match parts.as_slice() {
+            ["clear", "all"] => Ok(Change::ClearAll),
+            ["clear", name] => match DisturbanceKind::named(name) {
+                Some(kind) => Ok(Change::Calm(kind, None)),
+                None => Fault::wheel_of(name, robot).map(Change::Clear),
+            },
+            ["clear", name, place] => {
+                let kind = DisturbanceKind::named(name).ok_or_else(|| FaultError::form(text))?;
+                let place = kind.row().place_of(place, robot)?;
+                Ok(Change::Calm(kind, Some(place)))
+            }
+            [name, ..] if DisturbanceKind::named(name).is_some() => {
+                Disturbance::parse(text, robot).map(Change::Disturb)
+            }
             _ => Fault::parse(text, robot).map(Change::Inject),
+        }
+    }
+}
+
+/// A change as numbers, for [`vigil_blocks::Control`] and [`vigil_blocks::Event`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wire {
+    /// True to break, false to mend.
+    pub injects: bool,
+    /// Code of a [`FaultKind`] or [`DisturbanceKind`]; 0 for everything.
+    pub kind: u32,
+    /// Index of wheel or side; [`EVERYWHERE`] for none or all.
+    pub place: u32,
+    /// Parameters of a disturbance, else 0.
+    pub parameter: [f64; PARAMETERS],
+}
+
+/// Stands for no place, or for all.
+pub const EVERYWHERE: u32 = u32::MAX;
+
+/// Place in an event's `what` that stands for [`EVERYWHERE`].
+const EVERYWHERE_EVENT: u32 = 0xff;
+
+impl Wire {
+    /// `what`, `p` and `value` of the event that tells of this change.
+    #[must_use]
+    pub const fn event(&self) -> (u32, f64, u64) {
+        let place = if self.place < EVERYWHERE_EVENT {
+            self.place
+        } else {
+            EVERYWHERE_EVENT
+        };
+        let [first, second] = self.parameter;
+        (place | (self.kind << 8), first, second.to_bits())
+    }
+
+    /// What an event tells of; `injects` says of which kind the event is.
+    #[must_use]
+    pub const fn of_event(injects: bool, event: &Event) -> Self {
+        let place = event.what & EVERYWHERE_EVENT;
+        Self {
+            injects,
+            kind: event.what >> 8,
+            place: if place == EVERYWHERE_EVENT {
+                EVERYWHERE
+            } else {
+                place
+            },
+            parameter: [event.p, f64::from_bits(event.value)],
+        }
+    }
+}
+
+impl Change {
+    /// The change as numbers.
+    #[must_use]
+    pub fn to_wire(self) -> Wire {
+        let (injects, kind, place, parameter) = match self {
+            Self::Inject(Fault { kind, wheel }) => (true, kind as u32, Some(wheel), None),
+            Self::Disturb(this) => (
+                true,
+                this.kind as u32,
+                Some(this.place),
+                Some(this.parameter),
+            ),
+            Self::Clear(wheel) => (false, 0, Some(wheel), None),
+            Self::Calm(kind, place) => (false, kind as u32, place, None),
+            Self::ClearAll => (false, 0, None, None),
+        };
+        Wire {
+            injects,
+            kind,
+            place: place.map_or(EVERYWHERE, |place| {
+                u32::try_from(place).unwrap_or(EVERYWHERE)
+            }),
+            parameter: parameter.unwrap_or_default(),
+        }
+    }
+
+    /// The change behind numbers, if this version knows it and its parameters are in range.
+    #[must_use]
+    pub fn from_wire(wire: &Wire) -> Option<Self> {
+        let place = (wire.place != EVERYWHERE).then_some(wire.place as usize);
+        if let Some(kind) = DisturbanceKind::from_wire(wire.kind) {
+            if !wire.injects {
+                return Some(Self::Calm(kind, place));
+            }
+            let this = Disturbance {
+                kind,
+                place: place?,
+                parameter: wire.parameter,
+            };
+            return this.check().is_ok().then_some(Self::Disturb(this));
+        }
+        match (wire.injects, wire.kind, place) {
+            (true, kind, Some(wheel)) => {
+                let kind = FaultKind::from_wire(kind)?;
+                Some(Self::Inject(Fault { kind, wheel }))
+            }
+            (false, 0, Some(wheel)) => Some(Self::Clear(wheel)),
+            (false, 0, None) => Some(Self::ClearAll),
+            _ => None,
+        }
+    }
+
+    /// Text form, as [`Injection::parse_change`] takes it.
+    #[must_use]
+    pub fn text(&self, robot: &Description) -> String {
+        let wheel = |i: usize| robot.wheels.get(i).map_or("?", |wheel| wheel.name.as_str());
+        match *self {
+            Self::Inject(fault) => fault.text(robot),
+            Self::Disturb(disturbance) => disturbance.text(robot),
+            Self::Clear(i) => format!("clear:{}", wheel(i)),
+            Self::Calm(kind, place) => {
+                let row = kind.row();
+                match place.and_then(|place| row.place_name(place, robot)) {
+                    Some(place) => format!("clear:{}:{place}", row.name),
+                    None => format!("clear:{}", row.name),
+                }
+            }
+            Self::ClearAll => "clear:all".to_owned(),
         }
     }
 }

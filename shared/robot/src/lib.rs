@@ -4,6 +4,7 @@
 //! configuration); its behaviour is either simulated ([`slip`]) or learned ([`learned`]).
 
 pub mod description;
+pub mod disturbance;
 pub mod fault;
 pub mod injection;
 pub mod kinematics;
@@ -11,5 +12,6 @@ pub mod learned;
 pub mod slip;
 
 pub use description::Description;
+pub use disturbance::{Disturbance, DisturbanceKind};
 pub use fault::{Fault, FaultKind};
 pub use injection::Injection;

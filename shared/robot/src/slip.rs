@@ -10,13 +10,16 @@
 //! Without the load transfer the front and rear wheel of one side would turn the rover equally,
 //! and no pose sensor could tell which of them is stuck.
 //!
-//! Left out: lateral load transfer, slopes, an off-centre mass, transients.
+//! Slopes, an off-centre mass, forces from outside and wheels that are not as built enter by a
+//! [`Condition`]. Left out: load transfer by lateral forces of the wheels, transients.
 
 mod balance;
+mod condition;
 pub mod loads;
 pub mod shear;
 mod solver;
 
+pub use condition::{Condition, WheelCondition};
 pub use loads::RockerBogie;
 pub use solver::Unknowns;
 
@@ -50,6 +53,14 @@ impl Default for Motor {
             dry_friction_n_m: 0.02,
             viscous_friction_n_m_s: 0.02,
         }
+    }
+}
+
+impl Motor {
+    /// Torque of a motor of which `share` is left, N m.
+    fn torque(&self, share: f64, commanded_rad_s: f64, rate_rad_s: f64) -> f64 {
+        let limit = share * self.torque_max_n_m;
+        (share * self.gain_n_m_s * (commanded_rad_s - rate_rad_s)).clamp(-limit, limit)
     }
 }
 
@@ -91,6 +102,8 @@ pub struct Situation {
     pub stuck: [bool; ROVER_WHEELS],
     /// The soil.
     pub soil: Soil,
+    /// What is not as built, and forces from outside.
+    pub condition: Condition,
 }
 
 /// Steady motion of the rover.
@@ -123,7 +136,10 @@ impl Solution {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SlipError {
     /// A number of the situation is not finite, or the soil is impossible.
-    #[error("{0} is impossible: it must be finite, and friction and shear modulus above 0")]
+    #[error(
+        "{0} is impossible: it must be finite, friction, shear modulus and radii above 0, shares \
+         of torque 0 to 1"
+    )]
     Input(&'static str),
     /// Neither method converged.
     #[error(
@@ -212,10 +228,10 @@ impl SlipModel {
             .kinematics
             .targets(situation.curvature_1_m, situation.speed_m_s);
         if situation.speed_m_s == 0.0 {
-            return Ok(self.at_rest([0.0; ROVER_WHEELS], &targets));
+            return Ok(self.at_rest([0.0; ROVER_WHEELS], situation, &targets));
         }
         if situation.stuck.iter().filter(|&&stuck| stuck).count() >= IMMOBILE_STUCK {
-            return Ok(self.at_rest(self.spinning(situation, &targets), &targets));
+            return Ok(self.at_rest(self.spinning(situation, &targets), situation, &targets));
         }
         let balance = balance::Balance::new(self, situation, &targets);
         let ideal = balance.ideal(situation.speed_m_s, situation.curvature_1_m);
@@ -225,37 +241,48 @@ impl SlipModel {
             wheel_rate_rad_s: std::array::from_fn(|i| unknowns[3 + i]),
             load_n: balance.loads(&unknowns),
             torque_n_m: std::array::from_fn(|i| {
-                self.torque(targets.rate_rad_s[i], unknowns[3 + i])
+                self.torque(situation, i, targets.rate_rad_s[i], unknowns[3 + i])
             }),
             iterations,
         })
     }
 
-    fn torque(&self, commanded_rad_s: f64, rate_rad_s: f64) -> f64 {
-        let limit = self.motor.torque_max_n_m;
-        (self.motor.gain_n_m_s * (commanded_rad_s - rate_rad_s)).clamp(-limit, limit)
+    fn torque(&self, situation: &Situation, i: usize, commanded_rad_s: f64, rate: f64) -> f64 {
+        let share = situation.condition.wheels[i].torque_share;
+        self.motor.torque(share, commanded_rad_s, rate)
     }
 
     /// Standing still on the static loads.
-    fn at_rest(&self, wheel_rate_rad_s: [f64; ROVER_WHEELS], targets: &WheelTargets) -> Solution {
-        let load_n = self.static_loads();
+    fn at_rest(
+        &self,
+        wheel_rate_rad_s: [f64; ROVER_WHEELS],
+        situation: &Situation,
+        targets: &WheelTargets,
+    ) -> Solution {
+        let load_n = self.static_loads(situation);
         Solution {
             velocity: [0.0; 3],
             wheel_rate_rad_s,
             load_n,
             torque_n_m: std::array::from_fn(|i| {
-                self.torque(targets.rate_rad_s[i], wheel_rate_rad_s[i])
+                self.torque(situation, i, targets.rate_rad_s[i], wheel_rate_rad_s[i])
             }),
             iterations: 0,
         }
     }
 
-    fn static_loads(&self) -> [f64; ROVER_WHEELS] {
+    /// Weight on each side and how far ahead of the pivot it acts, N and m.
+    fn side_weights(&self, condition: &Condition) -> [(f64, f64); 2] {
+        let (linkage, kinematics) = (&self.linkage, &self.kinematics);
+        let sides_n = condition.sides_n(self.weight_n, linkage, kinematics, &self.sides);
+        sides_n.map(|side_n| (side_n, condition.mass_offset_m[0]))
+    }
+
+    fn static_loads(&self, situation: &Situation) -> [f64; ROVER_WHEELS] {
         let mut load_n = [0.0; ROVER_WHEELS];
-        for side in &self.sides {
-            let side_loads =
-                self.linkage
-                    .loads(&self.kinematics, side, 0.5 * self.weight_n, [0.0; 3]);
+        let weights = self.side_weights(&situation.condition);
+        for (side, weight) in self.sides.iter().zip(weights) {
+            let side_loads = self.linkage.loads(&self.kinematics, side, weight, [0.0; 3]);
             for (&wheel, load) in side.iter().zip(side_loads) {
                 load_n[wheel] = load;
             }
@@ -266,7 +293,7 @@ impl SlipModel {
     /// Rates of free wheels that spin under a body that does not move: the motor against the
     /// shear at full slip and the bearing.
     fn spinning(&self, situation: &Situation, targets: &WheelTargets) -> [f64; ROVER_WHEELS] {
-        let load_n = self.static_loads();
+        let load_n = self.static_loads(situation);
         let shear = 1.0 - (-1.0 / situation.soil.shear_modulus).exp();
         let motor = &self.motor;
         std::array::from_fn(|i| {
@@ -274,10 +301,13 @@ impl SlipModel {
                 return 0.0;
             }
             let commanded = targets.rate_rad_s[i];
+            let wheel = &situation.condition.wheels[i];
             let traction = situation.soil.friction[i] * shear * load_n[i];
-            let resistance = traction * self.kinematics.wheel_radius_m + motor.dry_friction_n_m;
-            let drive = (motor.gain_n_m_s * commanded.abs() - resistance).max(0.0);
-            (drive / (motor.gain_n_m_s + motor.viscous_friction_n_m_s)).copysign(commanded)
+            let radius_m = self.kinematics.wheel_radius_m * wheel.radius_share;
+            let resistance = traction * radius_m + motor.dry_friction_n_m;
+            let gain = motor.gain_n_m_s * wheel.torque_share;
+            let drive = (gain * commanded.abs() - resistance).max(0.0);
+            (drive / (gain + motor.viscous_friction_n_m_s)).copysign(commanded)
         })
     }
 }
@@ -295,6 +325,9 @@ fn check(situation: &Situation) -> Result<(), SlipError> {
     }
     if !positive(situation.soil.shear_modulus) {
         return Err(SlipError::Input("shear_modulus"));
+    }
+    if !situation.condition.is_possible() {
+        return Err(SlipError::Input("condition"));
     }
     Ok(())
 }

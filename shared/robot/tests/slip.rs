@@ -3,7 +3,9 @@
 
 use vigil_robot::Description;
 use vigil_robot::description::{Kinematics, Limits, SensorNoise, Wheel};
-use vigil_robot::slip::{Motor, RockerBogie, Situation, SlipError, SlipModel, Soil, Solution};
+use vigil_robot::slip::{
+    Condition, Motor, RockerBogie, Situation, SlipError, SlipModel, Soil, Solution,
+};
 
 const LM: usize = 1;
 /// Left and right wheels exchanged, front to rear kept.
@@ -60,6 +62,7 @@ fn situation(curvature_1_m: f64, speed_m_s: f64, stuck: &[usize]) -> Situation {
         speed_m_s,
         stuck: std::array::from_fn(|i| stuck.contains(&i)),
         soil: Soil::default(),
+        condition: Condition::default(),
     }
 }
 

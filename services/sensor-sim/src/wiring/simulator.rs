@@ -5,8 +5,8 @@ use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
     Clock, Graph, HealthBoard, PortError, Produced, Receiver, Sender, Source, Stamp, Topic,
 };
-use vigil_robot::injection::Change;
-use vigil_robot::{Fault, FaultKind};
+use vigil_robot::disturbance::PARAMETERS;
+use vigil_robot::injection::{Change, Wire};
 
 use super::actions::Actions;
 use super::peers::Peers;
@@ -122,12 +122,17 @@ impl SimulatorSource {
 
 /// The change that a command asks for, if it is one.
 fn change_of(command: &Control) -> Option<Change> {
-    let wheel = command.wheel as usize;
-    if command.command == ControlCommand::Inject as u32 {
-        let kind = FaultKind::from_wire(command.fault)?;
-        return Some(Change::Inject(Fault { kind, wheel }));
-    }
-    (command.command == ControlCommand::Clear as u32).then_some(Change::Clear(wheel))
+    let injects = command.command == ControlCommand::Inject as u32;
+    let known = injects || command.command == ControlCommand::Clear as u32;
+    let mut parameter = [0.0; PARAMETERS];
+    parameter.copy_from_slice(&command.parameter[..PARAMETERS]);
+    let wire = Wire {
+        injects,
+        kind: command.fault,
+        place: command.wheel,
+        parameter,
+    };
+    known.then(|| Change::from_wire(&wire)).flatten()
 }
 
 impl Source for SimulatorSource {
@@ -172,15 +177,13 @@ impl Source for SimulatorSource {
         }
         self.take_control(health, now_ns);
         for (at_ns, change) in self.changes.drain(..) {
-            match change {
-                Change::Inject(Fault { kind, wheel }) => {
-                    let what = wheel as u32 | ((kind as u32) << 8);
-                    health.event(at_ns, EventKind::Injected, what, 0.0, 0);
-                }
-                Change::Clear(wheel) => {
-                    health.event(at_ns, EventKind::Restored, wheel as u32, 0.0, 0);
-                }
-            }
+            let wire = change.to_wire();
+            let (what, p, value) = wire.event();
+            let kind = match wire.injects {
+                true => EventKind::Injected,
+                false => EventKind::Restored,
+            };
+            health.event(at_ns, kind, what, p, value);
         }
         // Standing still before the first action is no event.
         if self.ready_told && self.refusal != self.refusal_told {

@@ -1,7 +1,7 @@
 //! Faults of wheels and encoders.
 
 use vigil_robot::FaultKind::{EncoderFrozen, EncoderNoise, EncoderZero, Stuck};
-use vigil_robot::slip::{Situation, SlipModel, Soil};
+use vigil_robot::slip::{Condition, Situation, SlipModel, Soil};
 use vigil_sensor_sim::{World, WorldError};
 use vigil_setup::schema::Simulator;
 
@@ -37,6 +37,7 @@ fn a_stuck_wheel_settles_at_the_models_equilibrium_and_mends() {
             speed_m_s: 0.2,
             stuck,
             soil: Soil::default(),
+            condition: Condition::default(),
         };
         model.solve(&situation, None).unwrap()
     };

@@ -7,7 +7,7 @@ use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Graph, Monotonic, Receiver, Stamp, Topic};
 use vigil_robot::Injection;
-use vigil_robot::injection::Change;
+use vigil_robot::disturbance::PARAMETERS;
 use vigil_setup::GraphArgs;
 
 use super::{CommandError, Outcome};
@@ -20,7 +20,8 @@ const ANSWER_LIMIT: Duration = Duration::from_secs(2);
 pub struct Args {
     #[command(flatten)]
     graph: GraphArgs,
-    /// `stuck:RM`, `encoder:LF:zero|frozen|noise`, or `clear:RM`.
+    /// `stuck:RM`, `encoder:LF:zero|frozen|noise`, `clear:RM`, `clear:all`, or one of many that no
+    /// model contains (`tether:20`, `brush:RM`; a wrong word lists all).
     #[arg(value_name = "SPEC")]
     spec: String,
 }
@@ -54,17 +55,13 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         .sender::<Control>(Topic::Control(simulator))
         .map_err(CommandError::failure)?;
     let block = sender.block();
-    match change {
-        Change::Inject(fault) => {
-            block.command = ControlCommand::Inject as u32;
-            block.fault = fault.kind as u32;
-            block.wheel = fault.wheel as u32;
-        }
-        Change::Clear(wheel) => {
-            block.command = ControlCommand::Clear as u32;
-            block.wheel = wheel as u32;
-        }
-    }
+    let wire = change.to_wire();
+    let command = match wire.injects {
+        true => ControlCommand::Inject,
+        false => ControlCommand::Clear,
+    };
+    (block.command, block.fault, block.wheel) = (command as u32, wire.kind, wire.place);
+    block.parameter[..PARAMETERS].copy_from_slice(&wire.parameter);
     let (epoch, seq) = (sender.epoch(), sender.next_seq());
     sender
         .send(Stamp::default(), &Monotonic)

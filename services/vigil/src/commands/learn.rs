@@ -41,7 +41,7 @@ pub struct Args {
     /// Part of the runs of every mode and kind to leave out, 0 to 0.9.
     #[arg(long, value_name = "X", default_value_t = 0.333, value_parser = test_fraction)]
     test_fraction: f64,
-    /// Seed of the split and of the detector's calibration.
+    /// Seed of the split.
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed())]
     seed: u64,
     #[command(flatten)]
@@ -133,10 +133,7 @@ fn learn(
         .cloned()
         .collect();
     let held_out = split(&with_frames, args.test_fraction, args.seed);
-    let options = Options {
-        seed: args.seed,
-        ..Options::default()
-    };
+    let options = Options::default();
     let (mut model, report) = learning::learn(&runs, &labels, &held_out, &robot, &options)
         .map_err(|error| CommandError::usage(format!("{}: {error}", frames_file.display())))?;
     let terrain = labels::terrain(labels_file, &model.provenance.runs_learned);
@@ -144,6 +141,7 @@ fn learn(
         frames_file: file_name(frames_file),
         labels_file: file_name(labels_file),
         test_fraction: args.test_fraction,
+        seed: args.seed,
         terrain: terrain.map_err(CommandError::usage)?,
         software_version: env!("CARGO_PKG_VERSION").to_owned(),
         ..model.provenance
@@ -175,7 +173,7 @@ fn file_name(path: &Path) -> String {
 }
 
 /// Writes a file so that its place holds either the old one or the whole new one.
-fn write_whole(path: &Path, text: &str) -> io::Result<()> {
+pub(super) fn write_whole(path: &Path, text: &str) -> io::Result<()> {
     let mut name = path.as_os_str().to_owned();
     name.push(format!(".{}.part", std::process::id()));
     let part = PathBuf::from(name);

@@ -15,6 +15,9 @@ use vigil_setup::{load_decision, load_robot, load_tree};
 use super::CommandError;
 use crate::pipeline::Pipeline;
 
+/// Sets of channels, as `--sensors` names them.
+pub const SENSOR_SETS: [&str; 2] = ["pose", "pose+encoders"];
+
 /// Which robot.
 #[derive(Debug, clap::Args)]
 pub struct RobotArgs {
@@ -44,16 +47,16 @@ pub struct FilterArgs {
     #[arg(
         long,
         default_value = "pose+encoders",
-        value_parser = PossibleValuesParser::new(["pose", "pose+encoders"])
+        value_parser = PossibleValuesParser::new(SENSOR_SETS)
     )]
-    sensors: String,
+    pub sensors: String,
     /// What the detection filter takes a fault for: an unknown bias of the residual, a constant
     /// likelihood, or a constant likelihood over windows.
     #[arg(long, value_name = "FORM", value_enum, default_value_t)]
     detector: Form,
     /// Identification filter.
     #[arg(long, value_name = "NAME", value_enum, default_value_t)]
-    identifier: IdentifierFilter,
+    pub identifier: IdentifierFilter,
     /// Particles of detector and identifier, 32 to 4096.
     #[arg(
         long,
@@ -100,6 +103,8 @@ pub struct Prepared {
     pub robot: Description,
     /// The learned model.
     pub model: Model,
+    /// The fault tree.
+    pub tree: FaultTree,
     /// Detector and identifier.
     pub pipeline: Pipeline,
     /// All runs of the frames file.
@@ -114,7 +119,7 @@ impl FilterArgs {
         let robot = self.robot.load()?;
         let tree = load_tree(&self.tree).map_err(CommandError::usage)?;
         let model = load_model(&self.model)?;
-        let pipeline = self.pipeline(&model, &robot, &tree)?;
+        let pipeline = self.pipeline(&model, &robot, &tree, &self.sensors, self.identifier)?;
         let runs = frames::read(&self.frames, &robot).map_err(CommandError::usage)?;
         let used = Used {
             model_hash: format!("{:016x}", model.hash()),
@@ -128,21 +133,25 @@ impl FilterArgs {
         Ok(Prepared {
             robot,
             model,
+            tree,
             pipeline,
             runs,
             used,
         })
     }
 
-    fn pipeline(
+    /// Detector and identifier with the settings given, but for channels and filter.
+    pub fn pipeline(
         &self,
         model: &Model,
         robot: &Description,
         tree: &FaultTree,
+        sensors: &str,
+        filter: IdentifierFilter,
     ) -> Result<Pipeline, CommandError> {
         let detector = schema::Detector {
             particles: self.particles.into(),
-            sensors: match self.sensors.as_str() {
+            sensors: match sensors {
                 "pose" => Sensors::Pose,
                 _ => Sensors::PoseEncoders,
             },
@@ -150,7 +159,7 @@ impl FilterArgs {
             ..schema::Detector::default()
         };
         let identifier = schema::Identifier {
-            filter: self.identifier,
+            filter,
             particles: self.particles.into(),
             ..schema::Identifier::default()
         };

@@ -4,8 +4,8 @@ use vigil_robot::Description;
 use vigil_robot::learned::monitor::{Channels, Monitor};
 use vigil_robot::learned::{Calibration, Form, Model};
 
+use super::LearnError;
 use super::segments::{by_run, observations};
-use super::{LearnError, Options};
 use crate::frames::Run;
 use crate::labels::Label;
 
@@ -26,7 +26,6 @@ pub fn fit(
     runs: &[&Run],
     labels: &[Label],
     robot: &Description,
-    options: &Options,
 ) -> Result<(), LearnError> {
     let labels = by_run(labels);
     let mut driving = Vec::with_capacity(runs.len());
@@ -36,9 +35,8 @@ pub fn fit(
     }
     for channels in [Channels::Pose, Channels::PoseEncoders] {
         for form in Form::ALL {
-            let (particles, seed) = (options.particles, options.seed);
             let rate = FAULT_RATE_1_H;
-            let monitor = Monitor::new(model, robot, channels, form, particles, rate, seed);
+            let monitor = Monitor::new(model, robot, channels, form, rate);
             let mut maxima = maxima(monitor, &driving, robot, model);
             let found_s = maxima.len() as f64 * WINDOW_S;
             let fit = Calibration::fit(channels, form, rate, &mut maxima, WINDOW_S);

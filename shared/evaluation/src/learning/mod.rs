@@ -37,10 +37,6 @@ pub use view::View;
 pub struct Options {
     /// Interval over which frames are averaged into one observation, s.
     pub interval_s: f64,
-    /// Seed of the detector's particles while it is calibrated.
-    pub seed: u64,
-    /// Particles of the detector while it is calibrated.
-    pub particles: usize,
     /// Evaluations of the likelihood per noise model.
     pub evaluations: usize,
 }
@@ -49,8 +45,6 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             interval_s: 0.05,
-            seed: 1,
-            particles: 256,
             evaluations: 400,
         }
     }
@@ -162,7 +156,6 @@ pub fn learn(
             .map(|run| run.id)
             .filter(|id| left_out.contains(id))
             .collect(),
-        seed: options.seed,
         ..Provenance::default()
     };
     check_columns(&learned, labels, robot)?;
@@ -191,7 +184,7 @@ pub fn learn(
             rates: wheels::fit(robot, &pooled, &mode)?,
         });
     }
-    calibrate::fit(&mut model, &learned, labels, robot, options)?;
+    calibrate::fit(&mut model, &learned, labels, robot)?;
     let tested: Vec<&Run> = runs
         .iter()
         .filter(|run| left_out.contains(&run.id))
@@ -296,7 +289,9 @@ fn blank(robot: &Description, options: &Options) -> Model {
     }
 }
 
-fn data_hash(runs: &[&Run]) -> String {
+/// Hash of what frames hold: ids of the runs, times, poses, commands, wheel rates.
+#[must_use]
+pub fn data_hash(runs: &[&Run]) -> String {
     let mut hash = fnv1a::BASIS;
     for run in runs {
         hash = fnv1a::hash_u64(hash, u64::from(run.id));

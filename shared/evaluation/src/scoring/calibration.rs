@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Case, JUDGED_S, Ratio, Taxonomy};
+use super::{Case, JUDGED_S, Ratio, Taxonomy, Verdict};
 
 /// Bins of the expected calibration error.
 const BINS: usize = 15;
@@ -23,23 +23,89 @@ impl Claims {
         self.claims.push((p, is_true));
     }
 
-    /// Expected calibration error: mean over bins of equally many claims (in order of their
-    /// probability, 15 bins, fewer if there are fewer claims) of |fraction true - mean
-    /// probability|, weighted by the claims in each. `None` without a claim.
+    /// Bins of equally many claims in order of their probability: 15, or fewer if there are fewer
+    /// claims.
     #[must_use]
-    pub fn expected_calibration_error(&self) -> Option<f64> {
+    pub fn bins(&self) -> Vec<Bin> {
         let mut sorted = self.claims.clone();
         sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
         let n = sorted.len();
         let bins = BINS.min(n);
-        let mut error = 0.0;
-        for bin in 0..bins {
-            let of = &sorted[bin * n / bins..(bin + 1) * n / bins];
-            let claimed: f64 = of.iter().map(|claim| claim.0).sum();
-            let was_true = of.iter().filter(|claim| claim.1).count() as f64;
-            error += (was_true - claimed).abs();
-        }
-        (n > 0).then(|| error / n as f64)
+        let cuts = (0..bins).map(|bin| bin * n / bins..(bin + 1) * n / bins);
+        cuts.filter_map(|cut| Bin::of(sorted.get(cut)?)).collect()
+    }
+
+    /// Expected calibration error: mean over the bins of |fraction true - mean probability|,
+    /// weighted by the claims in each. `None` without a claim.
+    #[must_use]
+    pub fn expected_calibration_error(&self) -> Option<f64> {
+        let error = |bin: &Bin| (bin.is_true.right as f64 - bin.n as f64 * bin.p_mean).abs();
+        let n = self.claims.len();
+        (n > 0).then(|| self.bins().iter().map(error).sum::<f64>() / n as f64)
+    }
+
+    /// Mean of (probability - 1 if true, 0 if not) squared. `None` without a claim.
+    #[must_use]
+    pub fn brier_score(&self) -> Option<f64> {
+        let square = |&(p, is_true): &(f64, bool)| (p - f64::from(u8::from(is_true))).powi(2);
+        let n = self.claims.len();
+        (n > 0).then(|| self.claims.iter().map(square).sum::<f64>() / n as f64)
+    }
+}
+
+/// Claims of like probability.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Bin {
+    /// Claims.
+    pub n: usize,
+    /// Least probability claimed.
+    pub p_min: f64,
+    /// Mean probability claimed.
+    pub p_mean: f64,
+    /// Largest probability claimed.
+    pub p_max: f64,
+    /// Claims that were true.
+    #[serde(rename = "true")]
+    pub is_true: Ratio,
+}
+
+impl Bin {
+    /// Of claims in order of their probability; `None` without one.
+    fn of(claims: &[(f64, bool)]) -> Option<Self> {
+        let mut is_true = Ratio::default();
+        claims.iter().for_each(|claim| is_true.add(claim.1));
+        Some(Self {
+            n: claims.len(),
+            p_min: claims.first()?.0,
+            p_mean: claims.iter().map(|claim| claim.0).sum::<f64>() / claims.len() as f64,
+            p_max: claims.last()?.0,
+            is_true,
+        })
+    }
+}
+
+/// What a verdict was worth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Judged {
+    /// The mode named is the true one, or an abstract node above it.
+    pub is_true: bool,
+    /// -ln p(true mode), nats.
+    pub log_score_nats: f64,
+    /// Something false was said with more than 0.9.
+    pub is_confident_wrong: bool,
+}
+
+/// Judges a verdict when `truth` is true.
+pub(super) fn judge(verdict: &Verdict, truth: &str, taxonomy: &Taxonomy) -> Judged {
+    let is_true = taxonomy.covers(&verdict.mode, truth);
+    let p = match taxonomy.index(truth) {
+        Some(index) => verdict.p_nodes.get(index).copied().unwrap_or(0.0),
+        None => verdict.p_unknown,
+    };
+    Judged {
+        is_true,
+        log_score_nats: -p.clamp(P_MIN, 1.0).ln(),
+        is_confident_wrong: !is_true && verdict.p_mode > CONFIDENT_P,
     }
 }
 
@@ -51,6 +117,10 @@ pub struct Calibration {
     /// Expected calibration error of `p_mode` (15 bins of equally many runs). An abstract node
     /// above the true leaf is true.
     pub expected_calibration_error: Option<f64>,
+    /// Mean squared error of `p_mode` as the probability that the name is true.
+    pub brier_score: Option<f64>,
+    /// The bins of the calibration error.
+    pub reliability: Vec<Bin>,
     /// Mean of -ln p(true mode), nats; the probability of unknown if the tree lacks the mode.
     pub log_score_nats: Option<f64>,
     /// Runs in which something false was reported with more than 0.9 (`right` counts them).
@@ -65,20 +135,17 @@ impl Calibration {
             let Some(verdict) = case.at(JUDGED_S) else {
                 continue;
             };
-            let truth = &case.label.mode;
-            let is_true = taxonomy.covers(&verdict.mode, truth);
-            claims.add(verdict.p_mode, is_true);
-            let p = match taxonomy.index(truth) {
-                Some(index) => verdict.p_nodes.get(index).copied().unwrap_or(0.0),
-                None => verdict.p_unknown,
-            };
-            log_score -= p.clamp(P_MIN, 1.0).ln();
-            confident_wrong.add(!is_true && verdict.p_mode > CONFIDENT_P);
+            let judged = judge(verdict, &case.label.mode, taxonomy);
+            claims.add(verdict.p_mode, judged.is_true);
+            log_score += judged.log_score_nats;
+            confident_wrong.add(judged.is_confident_wrong);
         }
         let n = claims.claims.len();
         Self {
             n,
             expected_calibration_error: claims.expected_calibration_error(),
+            brier_score: claims.brier_score(),
+            reliability: claims.bins(),
             log_score_nats: (n > 0).then(|| log_score / n as f64),
             confident_wrong,
         }

@@ -2,7 +2,31 @@
 
 use serde::Serialize;
 
-use super::{Case, Spread, TIME_SLACK_S, Verdict};
+use super::{Case, Instants, Spread, TIME_SLACK_S, Verdict, bounds};
+
+/// False alarms an hour, with exact 95 % bounds (Garwood) as if they came independently: several in
+/// one run may have one cause. Null without a time.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Rate {
+    /// False alarms an hour.
+    pub false_alarms_per_h: Option<f64>,
+    /// Lower bound.
+    pub lower_95_per_h: Option<f64>,
+    /// Upper bound.
+    pub upper_95_per_h: Option<f64>,
+}
+
+impl Rate {
+    pub(super) fn of(alarms: usize, exposure_h: f64) -> Self {
+        let an_hour = |events: f64| (exposure_h > 0.0).then(|| events / exposure_h);
+        let bounds = bounds::poisson(alarms);
+        Self {
+            false_alarms_per_h: an_hour(alarms as f64),
+            lower_95_per_h: an_hour(bounds.lower),
+            upper_95_per_h: an_hour(bounds.upper),
+        }
+    }
+}
 
 /// Alarms without a fault.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -19,6 +43,9 @@ pub struct FalseAlarms {
     pub alarms: usize,
     /// Time without a fault, h.
     pub exposure_h: f64,
+    /// Alarms over time.
+    #[serde(flatten)]
+    pub rate: Rate,
     /// Ids of the runs with a false alarm.
     pub run_ids: Vec<u32>,
 }
@@ -27,16 +54,7 @@ impl FalseAlarms {
     pub(super) fn of(cases: &[Case]) -> Self {
         let mut found = Self::default();
         for case in cases {
-            let onset_s = case.label.onset_s.unwrap_or(f64::INFINITY);
-            let nominal: Vec<&Verdict> = case
-                .verdicts
-                .iter()
-                .filter(|verdict| verdict.t_s < onset_s - TIME_SLACK_S)
-                .collect();
-            if let (Some(first), Some(last)) = (nominal.first(), nominal.last()) {
-                found.exposure_h += (last.t_s - first.t_s) / 3600.0;
-            }
-            let rises = rises(nominal.into_iter()).count();
+            let rises = rises(healthy(case)).count();
             found.alarms += rises;
             let alarmed = usize::from(rises > 0);
             if case.label.is_nominal() {
@@ -50,8 +68,26 @@ impl FalseAlarms {
                 found.run_ids.push(case.label.run);
             }
         }
+        found.exposure_h = exposure_h(cases);
+        found.rate = Rate::of(found.alarms, found.exposure_h);
         found
     }
+}
+
+/// Verdicts without a fault.
+fn healthy(case: &Case) -> impl DoubleEndedIterator<Item = &Verdict> {
+    let onset_s = case.label.onset_s.unwrap_or(f64::INFINITY);
+    let before = move |verdict: &&Verdict| verdict.t_s < onset_s - TIME_SLACK_S;
+    case.verdicts.iter().filter(before)
+}
+
+/// Time without a fault in all runs, h.
+pub(super) fn exposure_h(cases: &[Case]) -> f64 {
+    let of = |case: &Case| {
+        let first = healthy(case).next()?;
+        Some((healthy(case).next_back()?.t_s - first.t_s) / 3600.0)
+    };
+    cases.iter().filter_map(of).fold(0.0, |sum, h| sum + h)
 }
 
 /// Verdicts at which the alarm rises.
@@ -73,8 +109,12 @@ pub struct Detection {
     pub detected: usize,
     /// The others.
     pub missed: usize,
+    /// Detected by then. Runs that end earlier do not count.
+    pub within: Instants,
     /// From the onset to the alarm, of the faults detected.
     pub delay: Spread,
+    /// Every delay, rising, s.
+    pub delays_s: Vec<f64>,
     /// Ids of the runs missed.
     pub missed_run_ids: Vec<u32>,
 }
@@ -92,6 +132,12 @@ impl Detection {
             n: cases.len(),
             detected: delays.len(),
             missed: missed_run_ids.len(),
+            within: Instants::of(cases, |case, verdict| {
+                let onset_s = case.label.onset_s.unwrap_or(f64::INFINITY);
+                let passed_s = verdict.t_s - onset_s + TIME_SLACK_S;
+                delay_s(case).is_some_and(|delay_s| delay_s <= passed_s)
+            }),
+            delays_s: sorted(&delays),
             delay: Spread::of(delays),
             missed_run_ids,
         }
@@ -104,4 +150,10 @@ fn delay_s(case: &Case) -> Option<f64> {
     after
         .find(|delay_s| *delay_s >= -TIME_SLACK_S)
         .map(|delay_s| delay_s.max(0.0))
+}
+
+fn sorted(values: &[f64]) -> Vec<f64> {
+    let mut values = values.to_vec();
+    values.sort_by(f64::total_cmp);
+    values
 }

@@ -18,7 +18,7 @@ pub struct Instants {
 }
 
 impl Instants {
-    fn of(cases: &[&Case], right: impl Fn(&Case, &Verdict) -> bool) -> Self {
+    pub(super) fn of(cases: &[&Case], right: impl Fn(&Case, &Verdict) -> bool) -> Self {
         let mut found = Self::default();
         for &case in cases {
             let note = |ratio: &mut Ratio, verdict: Option<&Verdict>| {
@@ -55,16 +55,9 @@ pub struct Identification {
 
 impl Identification {
     pub(super) fn of(cases: &[&Case], taxonomy: &Taxonomy) -> Self {
-        let leaf =
-            |case: &Case, verdict: &Verdict| verdict.mode == taxonomy.expected(&case.label.mode);
-        let side = |case: &Case, verdict: &Verdict| match taxonomy.side(&case.label.mode) {
-            Some(side) => taxonomy.side(&verdict.mode) == Some(side),
-            None => leaf(case, verdict),
-        };
-        let class = |case: &Case, verdict: &Verdict| match taxonomy.class(&case.label.mode) {
-            Some(class) => taxonomy.class(&verdict.mode) == Some(class),
-            None => leaf(case, verdict),
-        };
+        let leaf = |case: &Case, v: &Verdict| taxonomy.is_leaf_right(&v.mode, &case.label.mode);
+        let side = |case: &Case, v: &Verdict| taxonomy.is_side_right(&v.mode, &case.label.mode);
+        let class = |case: &Case, v: &Verdict| taxonomy.is_class_right(&v.mode, &case.label.mode);
         let isolated_s = |case: &&Case| {
             let onset_s = case.label.onset_s?;
             let right = case

@@ -11,20 +11,29 @@
 //! - *isolation*: the time from the onset until the right leaf is named for good, of the runs
 //!   that end with it.
 
+pub mod bounds;
 mod calibration;
+mod confusion;
+mod contest;
 mod detection;
 mod identification;
+mod ratio;
 mod table;
 mod taxonomy;
+mod trade_off;
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-pub use calibration::{Calibration, Claims};
-pub use detection::{Detection, FalseAlarms};
+pub use calibration::{Bin, Calibration, Claims};
+pub use confusion::{Coarse, Matrix};
+pub use contest::{Contest, Entrant, Row, Share, Shares, contest};
+pub use detection::{Detection, FalseAlarms, Rate};
 pub use identification::{Identification, Instants};
+pub use ratio::{Ratio, Spread};
 pub use taxonomy::{Side, Taxonomy};
+pub use trade_off::{Found, Point, TradeOff};
 
 use crate::labels::Label;
 
@@ -45,6 +54,8 @@ pub struct Verdict {
     pub t_s: f64,
     /// Probability that anything is wrong.
     pub p_fault: f64,
+    /// Its log-odds, natural logarithm, as the detector compares them with its threshold.
+    pub log_odds: f64,
     /// True while the alarm stands.
     pub alarm: bool,
     /// Reported mode: a node of the fault tree, [`UNKNOWN`] or [`MULTIPLE`].
@@ -88,60 +99,12 @@ impl Case {
 
     /// Classes under which a faulty run is counted: all, its type, its kind.
     fn classes(&self, taxonomy: &Taxonomy) -> Vec<String> {
-        let class = taxonomy.class(&self.label.mode).unwrap_or("unmodelled");
+        let class = taxonomy.class_or_unmodelled(&self.label.mode);
         let mut classes = vec!["all".to_owned(), class.to_owned()];
         if !self.label.kind.is_empty() && self.label.kind != class {
             classes.push(self.label.kind.clone());
         }
         classes
-    }
-}
-
-/// Cases that were right.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Ratio {
-    /// Cases that count.
-    pub n: usize,
-    /// Cases that were right.
-    pub right: usize,
-    /// `right / n`; null without a case.
-    pub fraction: Option<f64>,
-}
-
-impl Ratio {
-    fn add(&mut self, right: bool) {
-        self.n += 1;
-        self.right += usize::from(right);
-        self.fraction = Some(self.right as f64 / self.n as f64);
-    }
-}
-
-/// Percentiles (nearest rank) of times, s; null without a value.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Spread {
-    /// Values.
-    pub n: usize,
-    /// Median, s.
-    pub p50_s: Option<f64>,
-    /// 90th percentile, s.
-    pub p90_s: Option<f64>,
-    /// Largest, s.
-    pub max_s: Option<f64>,
-}
-
-impl Spread {
-    fn of(mut values: Vec<f64>) -> Self {
-        values.sort_by(f64::total_cmp);
-        let rank = |q: f64| {
-            let rank = (q * values.len() as f64).ceil() as usize;
-            values.get(rank.saturating_sub(1)).copied()
-        };
-        Self {
-            n: values.len(),
-            p50_s: rank(0.5),
-            p90_s: rank(0.9),
-            max_s: rank(1.0),
-        }
     }
 }
 
@@ -157,15 +120,19 @@ pub struct Score {
     /// Identification by class of fault; `all` is every one.
     pub identification: BTreeMap<String, Identification>,
     /// True mode, reported mode, runs: 2 s after the onset, and at the end of nominal runs.
-    pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
+    pub confusion: Matrix,
+    /// The same by side and by type.
+    pub confusion_by: Coarse,
     /// Whether the probabilities can be believed, 2 s after the onset, by class of fault; `all` is
     /// every one.
     pub calibration: BTreeMap<String, Calibration>,
+    /// Detection delay against false alarms over all thresholds of the detector.
+    pub trade_off: TradeOff,
 }
 
-/// Scores runs.
+/// Scores runs. `alarm_log_odds`: the detector's threshold, nats.
 #[must_use]
-pub fn score(cases: &[Case], taxonomy: &Taxonomy) -> Score {
+pub fn score(cases: &[Case], taxonomy: &Taxonomy, alarm_log_odds: f64) -> Score {
     let mut runs = BTreeMap::new();
     let mut classes: BTreeMap<String, Vec<&Case>> = BTreeMap::new();
     for case in cases {
@@ -195,22 +162,9 @@ pub fn score(cases: &[Case], taxonomy: &Taxonomy) -> Score {
         false_alarms: FalseAlarms::of(cases),
         detection: detection.collect(),
         identification: identification.collect(),
-        confusion: confusion(cases),
+        confusion: confusion::leaves(cases),
+        confusion_by: Coarse::of(cases, taxonomy),
         calibration: calibration.collect(),
+        trade_off: TradeOff::of(cases, taxonomy, alarm_log_odds),
     }
-}
-
-fn confusion(cases: &[Case]) -> BTreeMap<String, BTreeMap<String, usize>> {
-    let mut confusion: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
-    for case in cases {
-        let verdict = match case.label.onset_s {
-            Some(_) => case.at(JUDGED_S),
-            None => case.verdicts.last(),
-        };
-        if let Some(verdict) = verdict {
-            let row = confusion.entry(case.label.mode.clone()).or_default();
-            *row.entry(verdict.mode.clone()).or_default() += 1;
-        }
-    }
-    confusion
 }

@@ -7,7 +7,7 @@ use super::{Ratio, Score, Spread};
 impl fmt::Display for Ratio {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let percent = self
-            .fraction
+            .fraction()
             .map_or("-".to_owned(), |p| format!("{:.1} %", 100.0 * p));
         let text = format!("{percent} ({}/{})", self.right, self.n);
         f.pad(&text)
@@ -48,9 +48,15 @@ impl Score {
             f,
             "false alarms    {alarms} in {exposure_h:.2} h without a fault: "
         )?;
+        writeln!(f, "{nominal} nominal runs, {faulty} runs before the onset")?;
+        let rate = &found.rate;
+        let number = |value: Option<f64>| value.map_or("-".to_owned(), |x| format!("{x:.2}"));
         writeln!(
             f,
-            "{nominal} nominal runs, {faulty} runs before the onset\n"
+            "an hour         {} (95 %: {} to {})\n",
+            number(rate.false_alarms_per_h),
+            number(rate.lower_95_per_h),
+            number(rate.upper_95_per_h)
         )?;
         let heads = ["detection", "detected", "missed", "delay, s"];
         writeln!(

@@ -99,6 +99,44 @@ impl Taxonomy {
         self.node(mode)?.class.as_deref()
     }
 
+    /// The same, or `unmodelled` for a fault that the tree lacks.
+    #[must_use]
+    pub fn class_or_unmodelled(&self, mode: &str) -> &str {
+        self.class(mode).unwrap_or("unmodelled")
+    }
+
+    /// Names of the nominal mode and of all leaves with their indices, in the tree's order.
+    pub fn leaf_names(&self) -> impl Iterator<Item = (usize, &str)> {
+        let nodes = self.nodes.iter().enumerate();
+        nodes
+            .filter(|(i, node)| *i == 0 || node.is_leaf)
+            .map(|(i, node)| (i, node.name.as_str()))
+    }
+
+    /// True if `mode` is the leaf that should be named when `truth` is true.
+    #[must_use]
+    pub fn is_leaf_right(&self, mode: &str, truth: &str) -> bool {
+        mode == self.expected(truth)
+    }
+
+    /// True if `mode` is of the side of `truth`; without a side, if it is the leaf.
+    #[must_use]
+    pub fn is_side_right(&self, mode: &str, truth: &str) -> bool {
+        match self.side(truth) {
+            Some(side) => self.side(mode) == Some(side),
+            None => self.is_leaf_right(mode, truth),
+        }
+    }
+
+    /// True if `mode` is of the type of `truth`; without a type, if it is the leaf.
+    #[must_use]
+    pub fn is_class_right(&self, mode: &str, truth: &str) -> bool {
+        match self.class(truth) {
+            Some(class) => self.class(mode) == Some(class),
+            None => self.is_leaf_right(mode, truth),
+        }
+    }
+
     /// Indices of the leaves of a type on a side.
     pub fn leaves(&self, class: &str, side: Side) -> impl Iterator<Item = usize> {
         let has = move |node: &Node| {

@@ -1,23 +1,23 @@
 //! The detection filter over observations: only the nominal mode is modelled.
 //!
-//! Particles of the nominal mode track the pose; the fault flag is integrated exactly (a fault
-//! state has no dynamics, so its probability follows from the nominal predictive density alone).
-//! Residuals are whitened by that density, per group of channels: pose (3), each wheel rate, each
-//! steering angle. Per group the fault state takes one [`Form`]: it learns an unknown constant
-//! bias, or has a constant likelihood. An encoder that repeats itself exactly has a flag of its
-//! own; over the pose stands the paper's constant likelihood besides ([`Constant`]). The groups'
-//! odds add up: a fault enters by one of them.
+//! A Gaussian track follows the pose in the nominal mode ([`Departure`]); residuals are whitened by
+//! its predictive density, per group of channels: pose (3), each wheel rate, each steering angle.
+//! Per group the fault state takes one [`Form`]: it learns an unknown constant departure, of the
+//! motion or of the channel, or has a constant likelihood. An encoder that repeats itself exactly
+//! has a flag of its own; over the pose stands the paper's constant likelihood besides
+//! ([`Constant`]). The groups' odds add up: a fault enters by one of them.
+//!
+//! The belief about the pose is as good as Gaussian, so no particles are needed to find the
+//! residuals: 256 of them were too few to tell a misjudged first heading from a fault.
 
-use nalgebra::{Matrix3, SVector, Vector3};
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
+use nalgebra::SVector;
 use vigil_blocks::{CHANNELS, Channel, WHEELS};
-use vigil_inference::angle::wrap;
 use vigil_inference::constant::Constant;
-use vigil_inference::gaussian::log_density;
+use vigil_inference::departure::Departure;
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
-use vigil_inference::particles::PoseParticles;
+use vigil_inference::track::Track;
 
+use super::faults::{Faults, KINDS};
 use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION};
 use super::noise_scale::SensorNoise;
 use super::wheels::{rolling_rate, steering_angle};
@@ -75,12 +75,10 @@ pub struct Monitor {
     channels: Channels,
     form: Form,
     fault_rate_1_s: f64,
-    seed: u64,
-    rng: Pcg64Mcg,
-    particles: PoseParticles,
     tracking: bool,
     coasted: u32,
-    anchor_variance: f64,
+    departure: Departure<KINDS>,
+    faults: Faults,
     pose: Evidence<3>,
     wheels: [Evidence<1>; WHEELS],
     steer: [Evidence<1>; WHEELS],
@@ -100,23 +98,19 @@ pub struct Report {
     pub channels: [f64; CHANNELS],
     /// Log-likelihood of the observation under the nominal mode.
     pub evidence: f64,
-    /// Effective sample size before resampling.
-    pub effective_sample_size: f64,
-    /// Observations whose weights degenerated, or after which the pose started anew.
+    /// Observations that the track could not take.
     pub degenerate_count: u32,
 }
 
 impl Monitor {
-    /// A monitor with `particles` particles and a prior fault rate; `form` holds for every group.
+    /// A monitor with a prior fault rate; `form` holds for every group.
     #[must_use]
     pub fn new(
         model: &Model,
         robot: &Description,
         channels: Channels,
         form: Form,
-        particles: usize,
         fault_rate_1_h: f64,
-        seed: u64,
     ) -> Self {
         let mut monitor = Self {
             model: model.clone(),
@@ -124,12 +118,10 @@ impl Monitor {
             channels,
             form,
             fault_rate_1_s: fault_rate_1_h / 3600.0,
-            seed,
-            rng: Pcg64Mcg::seed_from_u64(seed),
-            particles: PoseParticles::new(particles),
             tracking: false,
             coasted: 0,
-            anchor_variance: 0.0,
+            departure: Departure::new(model.nominal.motion.noise()),
+            faults: Faults::new(model),
             pose: Evidence::new(form, BIAS_POSE),
             wheels: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
             steer: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
@@ -141,7 +133,6 @@ impl Monitor {
                 log_odds: f64::NEG_INFINITY,
                 channels: [f64::NEG_INFINITY; CHANNELS],
                 evidence: 0.0,
-                effective_sample_size: particles as f64,
                 degenerate_count: 0,
             },
         };
@@ -149,22 +140,19 @@ impl Monitor {
         monitor
     }
 
-    /// Forgets everything; the generator starts from its seed again, so that equal runs have equal
-    /// beliefs whatever came before.
+    /// Forgets everything.
     pub fn reset(&mut self) {
-        self.rng = Pcg64Mcg::seed_from_u64(self.seed);
         self.tracking = false;
         self.coasted = 0;
-        self.anchor_variance = 0.0;
         self.noise = SensorNoise::default();
         self.run_s = 0.0;
         self.report.evidence = 0.0;
-        self.report.effective_sample_size = self.particles.len() as f64;
         self.forget_evidence();
     }
 
     /// Forgets what speaks for a fault, and keeps the track.
     pub fn forget_evidence(&mut self) {
+        self.departure.forget();
         self.pose = Evidence::new(self.form, BIAS_POSE);
         self.wheels = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
         self.steer = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
@@ -179,15 +167,10 @@ impl Monitor {
         &self.report
     }
 
-    /// The pose particles.
+    /// Where the robot is if it is nominal.
     #[must_use]
-    pub const fn particles(&self) -> &PoseParticles {
-        &self.particles
-    }
-
-    /// Changes the number of particles, at most to the number at the start.
-    pub fn resize(&mut self, particles: usize) {
-        self.particles.resize(particles, &mut self.rng);
+    pub const fn track(&self) -> &Track {
+        self.departure.track()
     }
 
     /// True once evidence counts: the track has settled, and the noise is known or the drive shows
@@ -223,97 +206,61 @@ impl Monitor {
     }
 
     fn step_pose(&mut self, observation: &Observation, following: bool) {
-        let scale = self.noise.scales().pose;
-        let variance = observation.pose_variance(&self.model, scale);
-        let lost = self.coasted >= COAST_MAX;
-        // A cloud much wider than the measurement has too few particles where it matters.
-        let coarse = observation.pose_frames > 0 && self.anchor_variance > 4.0 * variance[0];
-        if !self.tracking || observation.anchor || lost || coarse {
-            if observation.pose_frames > 0 {
-                self.anchor_variance = variance[0];
-                let sd = variance.map(f64::sqrt);
-                self.particles.scatter(observation.pose, sd, &mut self.rng);
+        let variance = observation.pose_variance(&self.model, self.noise.scales().pose);
+        let measured = observation.pose_frames > 0;
+        if !self.tracking {
+            if measured {
+                self.departure.start(observation.pose, variance);
                 self.tracking = true;
+            }
+            return;
+        }
+        if observation.anchor || self.coasted >= COAST_MAX {
+            if measured {
+                self.departure.anchor(observation.pose, variance);
                 self.coasted = 0;
             }
             return;
         }
-        self.anchor_variance = 0.0;
-        self.advance(observation, following, variance);
-        if observation.pose_frames == 0 {
+        let step = observation.displacement(&self.model, &self.model.nominal.motion);
+        let birth = match observation.moving {
+            true => self.birth(observation.dt_s, SHARE_POSE),
+            false => 0.0,
+        };
+        let follow = match following {
+            true => variance.map(|variance| FOLLOWING * FOLLOWING * variance),
+            false => [0.0; 3],
+        };
+        let kinds = self.faults.kinds(&self.model, observation, &step);
+        self.departure.predict(&step, &kinds, birth, follow);
+        if measured {
+            self.weigh_pose(observation, variance);
+        }
+    }
+
+    /// Evidence of the pose's residual. A standing robot tells nothing about its motion, but its
+    /// pose stays known.
+    fn weigh_pose(&mut self, observation: &Observation, variance: [f64; 3]) {
+        let counts = observation.moving;
+        let Some(said) = self.departure.update(observation.pose, variance, counts) else {
+            self.coasted += 1;
+            self.report.degenerate_count += 1;
+            return;
+        };
+        let norm = said.residual.norm_squared();
+        let lost = norm >= LOST * LOST;
+        self.coasted = if lost { self.coasted + 1 } else { 0 };
+        if !counts {
             return;
         }
-        let usable = self.weigh_pose(observation, variance);
-        // A standing robot tells nothing about its motion, but its pose stays known.
-        match self
-            .particles
-            .weigh(observation.pose, variance)
-            .filter(|_| usable || !following)
-        {
-            Some(size) => {
-                self.report.effective_sample_size = size;
-                if size < 0.5 * self.particles.len() as f64 {
-                    self.particles.resample(&mut self.rng);
-                }
-                self.coasted = if usable { 0 } else { self.coasted + 1 };
-            }
-            None => self.coasted += 1,
+        if self.form != Form::LearnedBias {
+            let birth = self.birth(observation.dt_s, SHARE_POSE);
+            self.pose.step(&said.residual, birth);
         }
-        if self.coasted > 0 {
-            self.report.degenerate_count += 1;
-        }
-    }
-
-    fn advance(&mut self, observation: &Observation, following: bool, variance: [f64; 3]) {
-        let motion = &self.model.nominal.motion;
-        let limit = self.model.command.curvature_max_1_m;
-        let per_metre = motion.per_metre(observation.curvature, observation.speed, limit);
-        let travel = observation.travel_m;
-        let lag = observation.lag_variance(&self.model);
-        let white = motion.whitened();
-        let follow = if following {
-            FOLLOWING * FOLLOWING
-        } else {
-            0.0
-        };
-        let measured = [variance[2], variance[0], variance[1]];
-        let sd: [f64; 3] = std::array::from_fn(|i| {
-            (white[i] * travel.abs() + lag[i] + follow * measured[i]).sqrt()
-        });
-        self.particles
-            .advance(per_metre.map(|value| value * travel), sd, &mut self.rng);
-    }
-
-    /// Evidence of the pose's residual; false if the track is lost.
-    fn weigh_pose(&mut self, observation: &Observation, variance: [f64; 3]) -> bool {
-        let moments = self.particles.moments();
-        let pose = observation.pose;
-        let apart = Vector3::new(
-            pose[0] - moments.mean[0],
-            pose[1] - moments.mean[1],
-            wrap(pose[2] - moments.mean[2]),
-        );
-        let (sin, cos) = moments.mean[2].sin_cos();
-        let turn = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
-        let spread = moments.covariance + Matrix3::from_diagonal(&Vector3::from(variance));
-        let spread = turn * spread * turn.transpose();
-        let apart = turn * apart;
-        let Some((evidence, factor)) = log_density(&apart, spread) else {
-            return false;
-        };
-        let Some(whitened) = factor.l_dirty().solve_lower_triangular(&apart) else {
-            return false;
-        };
-        if observation.moving {
-            let share = self.birth(observation.dt_s, SHARE_POSE);
-            self.pose.step(&whitened, share);
-            let birth = self.birth(observation.dt_s, SHARE_ANY);
-            let norm = whitened.norm_squared();
-            self.any
-                .step(norm, 3.0 * TAU_SQUARED_PER_DIMENSION, birth, birth);
-            self.report.evidence += evidence;
-        }
-        whitened.norm_squared() < LOST * LOST
+        let birth = self.birth(observation.dt_s, SHARE_ANY);
+        self.any
+            .step(norm, 3.0 * TAU_SQUARED_PER_DIMENSION, birth, birth);
+        self.report.evidence += said.log_density;
     }
 
     fn step_wheels(&mut self, observation: &Observation) {
@@ -381,7 +328,10 @@ impl Monitor {
 
     fn sum_up(&mut self) {
         let mut channels = [f64::NEG_INFINITY; CHANNELS];
-        channels[Channel::POSE] = self.pose.log_odds();
+        channels[Channel::POSE] = match self.form {
+            Form::LearnedBias => self.departure.log_odds(),
+            Form::Constant | Form::Windowed => self.pose.log_odds(),
+        };
         channels[Channel::ANY] = self.any.log_odds();
         if self.channels == Channels::PoseEncoders {
             for i in 0..self.robot.wheels.len() {

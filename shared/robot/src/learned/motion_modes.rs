@@ -10,10 +10,13 @@ use super::{Curve, Model, MotionModel};
 const UNKNOWN_SD: [f64; 3] = [0.25, 0.2, 0.12];
 /// Correlation length of the unknown's coloured deviations, m.
 const UNKNOWN_LENGTH_M: f64 = 0.2;
-/// Soil other than that learned from: deviation of a stuck wheel's effect, relative to the effect.
-const TERRAIN: f64 = 0.1;
-/// The same for two stuck wheels, whose effects are added: nothing was learned of both together.
-const TERRAIN_BOTH: f64 = 0.3;
+/// Ground that is much stiffer or softer than that learned from: how probable, and the factor by
+/// which it changes effects, mean and deviation.
+const OTHER_GROUND: f64 = 0.1;
+const OTHER_GROUND_FACTOR: (f64, f64) = (0.75, 0.4);
+/// Two stuck wheels, whose effects are added, as nothing was learned of both together: deviation
+/// from the sum, relative to each effect.
+const BOTH: f64 = 0.3;
 
 /// What moves the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,6 +59,8 @@ impl Moved {
 pub struct MotionMode {
     /// What moves the robot.
     pub moved: Moved,
+    /// Share of what moves the robot so that it does in this way.
+    pub share: f64,
     /// Displacement per commanded metre.
     pub motion: MotionModel,
     /// Its noise.
@@ -94,31 +99,46 @@ impl FaultRates {
 }
 
 /// The ways in which a robot may move whose wheels `stuck` (bits) may stick: nominal first, then
-/// single wheels, pairs if `pairs`, and both kinds of unknown.
+/// single wheels, the same on other ground if `other_ground`, pairs if `pairs`, and both kinds of
+/// unknown.
 #[must_use]
-pub fn motion_modes(model: &Model, stuck: u32, pairs: bool) -> Vec<MotionMode> {
+pub fn motion_modes(model: &Model, stuck: u32, other_ground: bool, pairs: bool) -> Vec<MotionMode> {
+    let other = if other_ground { OTHER_GROUND } else { 0.0 };
     let nominal = model.nominal.motion;
     let mut modes = vec![MotionMode {
         moved: Moved::Nominal,
+        share: 1.0,
         motion: nominal,
         noise: nominal.noise(),
     }];
     let known = |w: usize| stuck >> w & 1 == 1 && model.stuck(w).is_some();
     let wheels = || (0..WHEELS).filter(|&w| known(w));
-    modes.extend(wheels().map(|w| stuck_mode(model, &[w])));
+    modes.extend(wheels().map(|w| MotionMode {
+        share: 1.0 - other,
+        ..stuck_mode(model, &[w])
+    }));
+    if other > 0.0 {
+        modes.extend(wheels().map(|w| MotionMode {
+            share: other,
+            ..on_other_ground(model, &stuck_mode(model, &[w]))
+        }));
+    }
     if pairs {
         let both = |a: usize| wheels().filter(move |&b| b > a).map(move |b| [a, b]);
         modes.extend(wheels().flat_map(both).map(|both| stuck_mode(model, &both)));
     }
     modes.extend([Moved::Unknown, Moved::UnknownAny].map(|moved| MotionMode {
         moved,
+        share: 1.0,
         motion: nominal,
         noise: unknown_noise(model),
     }));
     modes
 }
 
-fn unknown_noise(model: &Model) -> MotionNoise {
+/// Noise of nominal motion with a large constant deviation: what is not known about a fault.
+#[must_use]
+pub fn unknown_noise(model: &Model) -> MotionNoise {
     let nominal = model.nominal.motion.noise();
     // As coloured as the stuck modes: an unknown fault meets the same soil.
     let coloured = model.stuck.iter().map(|s| s.motion.noise().deviation);
@@ -132,15 +152,10 @@ fn unknown_noise(model: &Model) -> MotionNoise {
     }
 }
 
-/// Wheels stuck. The effects of several add up. Another soil changes the size of an effect, not its
-/// sign: the run's offset may also lie along the effect itself.
+/// Wheels stuck. The effects of several add up.
 fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
     let nominal = &model.nominal.motion;
-    let terrain = if wheels.len() > 1 {
-        TERRAIN_BOTH
-    } else {
-        TERRAIN
-    };
+    let of_both = if wheels.len() > 1 { BOTH } else { 0.0 };
     let mut motion = *nominal;
     let mut noise: Option<MotionNoise> = None;
     for stuck in wheels.iter().filter_map(|&w| model.stuck(w)) {
@@ -154,7 +169,7 @@ fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
             0.0,
         );
         let own = stuck.motion.noise();
-        let along = effect * effect.transpose() * (terrain * terrain);
+        let along = effect * effect.transpose() * (of_both * of_both);
         noise = Some(match noise {
             None => MotionNoise {
                 offset: own.offset + along,
@@ -169,9 +184,44 @@ fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
         });
     }
     MotionMode {
+        share: 1.0,
         moved: Moved::Stuck(wheels.iter().fold(0, |mask, w| mask | 1 << w)),
         motion,
         noise: noise.unwrap_or_else(|| nominal.noise()),
+    }
+}
+
+/// The same on ground that changes the whole effect by one unknown factor: it is the shear of the
+/// soil under the driven wheels that lets a dragged one slow and turn the robot.
+fn on_other_ground(model: &Model, mode: &MotionMode) -> MotionMode {
+    let nominal = &model.nominal.motion;
+    let (factor, sd) = OTHER_GROUND_FACTOR;
+    let scaled = |stuck: &Curve, nominal: &Curve| {
+        let (stuck, nominal) = (stuck.terms(), nominal.terms());
+        Curve::from_terms(std::array::from_fn(|i| {
+            nominal[i] + factor * (stuck[i] - nominal[i])
+        }))
+    };
+    let apart = |stuck: &Curve, nominal: &Curve| stuck.curvature[0] - nominal.curvature[0];
+    let effect = Vector3::new(
+        apart(&mode.motion.yaw, &nominal.yaw),
+        apart(&mode.motion.forward, &nominal.forward),
+        apart(&mode.motion.lateral, &nominal.lateral),
+    );
+    let square = factor * factor + sd * sd;
+    MotionMode {
+        motion: MotionModel {
+            yaw: scaled(&mode.motion.yaw, &nominal.yaw),
+            forward: scaled(&mode.motion.forward, &nominal.forward),
+            lateral: scaled(&mode.motion.lateral, &nominal.lateral),
+            ..mode.motion
+        },
+        noise: MotionNoise {
+            offset: mode.noise.offset * square + effect * effect.transpose() * (sd * sd),
+            deviation: mode.noise.deviation * square,
+            ..mode.noise
+        },
+        ..mode.clone()
     }
 }
 

@@ -4,7 +4,7 @@ use nalgebra::SMatrix;
 
 use super::shear::{Contact, Shear};
 use super::solver::{UNKNOWNS, Unknowns};
-use super::{Situation, SlipModel};
+use super::{Condition, Situation, SlipModel};
 use crate::kinematics::{ROVER_WHEELS, WheelTargets};
 
 /// Weight of the motors' rows (N m) against the forces' (N), for conditioning.
@@ -23,17 +23,29 @@ pub(super) struct Balance<'a> {
     contacts: [Contact; ROVER_WHEELS],
     commanded_rad_s: [f64; ROVER_WHEELS],
     stuck: [bool; ROVER_WHEELS],
+    condition: &'a Condition,
+    /// Weight on each side and how far ahead of the pivot it acts, N and m.
+    side_weights: [(f64, f64); 2],
+    /// Force and moment from outside, but for drag.
+    wrench: [f64; 3],
 }
 
 impl<'a> Balance<'a> {
-    pub(super) fn new(model: &'a SlipModel, situation: &Situation, targets: &WheelTargets) -> Self {
+    pub(super) fn new(
+        model: &'a SlipModel,
+        situation: &'a Situation,
+        targets: &WheelTargets,
+    ) -> Self {
+        let condition = &situation.condition;
         let contacts = std::array::from_fn(|i| {
-            let (sin, cos) = targets.steer_rad[i].sin_cos();
+            let wheel = &condition.wheels[i];
+            let (sin, cos) = (targets.steer_rad[i] + wheel.steer_offset_rad).sin_cos();
             Contact {
                 heading: (cos, sin),
-                radius_m: model.kinematics.wheel_radius_m,
+                radius_m: model.kinematics.wheel_radius_m * wheel.radius_share,
                 friction: situation.soil.friction[i],
                 shear_modulus: situation.soil.shear_modulus,
+                resistance: wheel.resistance,
             }
         });
         Self {
@@ -41,6 +53,9 @@ impl<'a> Balance<'a> {
             contacts,
             commanded_rad_s: targets.rate_rad_s,
             stuck: situation.stuck,
+            condition,
+            side_weights: model.side_weights(condition),
+            wrench: condition.wrench(model.weight_n),
         }
     }
 
@@ -77,8 +92,13 @@ impl<'a> Balance<'a> {
         let loads = self.loads_of(&shears);
         let (x, y) = (&self.model.kinematics.x_m, &self.model.kinematics.y_m);
         let mut residual = Unknowns::zeros();
+        for (row, force) in self.wrench.into_iter().enumerate() {
+            residual[row] = force;
+        }
         for i in 0..ROVER_WHEELS {
-            let (fx, fy) = (loads[i] * shears[i].x, loads[i] * shears[i].y);
+            let drag = self.condition.wheels[i].drag(self.hub(i, unknowns));
+            let fx = loads[i] * shears[i].x + drag.0;
+            let fy = loads[i] * shears[i].y + drag.1;
             residual[0] += fx;
             residual[1] += fy;
             residual[2] += x[i] * fy - y[i] * fx;
@@ -86,7 +106,7 @@ impl<'a> Balance<'a> {
             residual[3 + i] = if self.stuck[i] {
                 -rate
             } else {
-                MOTOR_SCALE * (self.drive(i, rate) - loads[i] * shears[i].along * self.radius())
+                MOTOR_SCALE * (self.drive(i, rate) - loads[i] * shears[i].along * self.radius(i))
             };
         }
         residual
@@ -103,16 +123,17 @@ impl<'a> Balance<'a> {
         let gradients: [[Unknowns; 3]; ROVER_WHEELS] =
             std::array::from_fn(|i| self.shear_gradient(i, unknowns, &shears[i]));
         let mut jacobian = Jacobian::zeros();
-        for side in &self.model.sides {
-            let sensitivity = self.load_sensitivity(side, &shears);
+        for (side, weight) in self.model.sides.iter().zip(self.side_weights) {
+            let sensitivity = self.load_sensitivity(side, weight, &shears);
             for (k, &i) in side.iter().enumerate() {
                 let [by_x, by_y, by_along] = &gradients[i];
                 let mut load = Unknowns::zeros();
                 for (j, &other) in side.iter().enumerate() {
                     load += gradients[other][0] * sensitivity[k][j];
                 }
-                let fx = by_x * loads[i] + load * shears[i].x;
-                let fy = by_y * loads[i] + load * shears[i].y;
+                let drag = self.drag_gradient(i, unknowns);
+                let fx = by_x * loads[i] + load * shears[i].x + drag[0];
+                let fy = by_y * loads[i] + load * shears[i].y + drag[1];
                 let along = by_along * loads[i] + load * shears[i].along;
                 for column in 0..UNKNOWNS {
                     jacobian[(0, column)] += fx[column];
@@ -127,7 +148,7 @@ impl<'a> Balance<'a> {
                 let rate = unknowns[row];
                 let drive = (self.drive(i, rate + DIFFERENCE) - self.drive(i, rate)) / DIFFERENCE;
                 for column in 0..UNKNOWNS {
-                    jacobian[(row, column)] = -MOTOR_SCALE * self.radius() * along[column];
+                    jacobian[(row, column)] = -MOTOR_SCALE * self.radius(i) * along[column];
                 }
                 jacobian[(row, row)] += MOTOR_SCALE * drive;
             }
@@ -135,14 +156,15 @@ impl<'a> Balance<'a> {
         jacobian
     }
 
-    fn radius(&self) -> f64 {
-        self.model.kinematics.wheel_radius_m
+    fn radius(&self, i: usize) -> f64 {
+        self.contacts[i].radius_m
     }
 
     /// Torque of motor and bearing on wheel `i`, N m.
     fn drive(&self, i: usize, rate: f64) -> f64 {
         let motor = &self.model.motor;
-        motor.gain_n_m_s * (self.commanded_rad_s[i] - rate)
+        let share = self.condition.wheels[i].torque_share;
+        motor.torque(share, self.commanded_rad_s[i], rate)
             - motor.viscous_friction_n_m_s * rate
             - motor.dry_friction_n_m * (rate / DRY_SMOOTHING_RAD_S).tanh()
     }
@@ -161,8 +183,8 @@ impl<'a> Balance<'a> {
 
     fn loads_of(&self, shears: &[Shear; ROVER_WHEELS]) -> [f64; ROVER_WHEELS] {
         let mut loads = [0.0; ROVER_WHEELS];
-        for side in &self.model.sides {
-            let side_loads = self.side_loads(side, side.map(|i| shears[i].x));
+        for (side, weight) in self.model.sides.iter().zip(self.side_weights) {
+            let side_loads = self.side_loads(side, weight, side.map(|i| shears[i].x));
             for (&i, load) in side.iter().zip(side_loads) {
                 loads[i] = load;
             }
@@ -170,22 +192,27 @@ impl<'a> Balance<'a> {
         loads
     }
 
-    fn side_loads(&self, side: &[usize; 3], traction: [f64; 3]) -> [f64; 3] {
+    fn side_loads(&self, side: &[usize; 3], weight: (f64, f64), traction: [f64; 3]) -> [f64; 3] {
         let model = self.model;
         model
             .linkage
-            .loads(&model.kinematics, side, 0.5 * model.weight_n, traction)
+            .loads(&model.kinematics, side, weight, traction)
     }
 
     /// d(load k)/d(forward force j per unit of load) on one side, N.
-    fn load_sensitivity(&self, side: &[usize; 3], shears: &[Shear; ROVER_WHEELS]) -> [[f64; 3]; 3] {
+    fn load_sensitivity(
+        &self,
+        side: &[usize; 3],
+        weight: (f64, f64),
+        shears: &[Shear; ROVER_WHEELS],
+    ) -> [[f64; 3]; 3] {
         let traction = side.map(|i| shears[i].x);
-        let loads = self.side_loads(side, traction);
+        let loads = self.side_loads(side, weight, traction);
         let mut sensitivity = [[0.0; 3]; 3];
         for j in 0..3 {
             let mut moved = traction;
             moved[j] += DIFFERENCE;
-            let moved = self.side_loads(side, moved);
+            let moved = self.side_loads(side, weight, moved);
             for k in 0..3 {
                 sensitivity[k][j] = (moved[k] - loads[k]) / DIFFERENCE;
             }
@@ -203,14 +230,33 @@ impl<'a> Balance<'a> {
         let by_forward = by(contact.shear((hub.0 + DIFFERENCE, hub.1), rate));
         let by_left = by(contact.shear((hub.0, hub.1 + DIFFERENCE), rate));
         let by_rate = by(contact.shear(hub, rate + DIFFERENCE));
-        let kinematics = &self.model.kinematics;
         std::array::from_fn(|q| {
-            let mut gradient = Unknowns::zeros();
-            gradient[0] = by_forward[q];
-            gradient[1] = by_left[q];
-            gradient[2] = kinematics.x_m[i] * by_left[q] - kinematics.y_m[i] * by_forward[q];
+            let mut gradient = self.by_body(i, by_forward[q], by_left[q]);
             gradient[3 + i] = by_rate[q];
             gradient
         })
+    }
+    /// Gradients of the drag above wheel `i`, forward and left, by all unknowns.
+    fn drag_gradient(&self, i: usize, unknowns: &Unknowns) -> [Unknowns; 2] {
+        let wheel = &self.condition.wheels[i];
+        if wheel.drag_n == 0.0 {
+            return [Unknowns::zeros(); 2];
+        }
+        let hub = self.hub(i, unknowns);
+        let at = wheel.drag(hub);
+        let by = |moved: (f64, f64)| [moved.0 - at.0, moved.1 - at.1].map(|d| d / DIFFERENCE);
+        let by_forward = by(wheel.drag((hub.0 + DIFFERENCE, hub.1)));
+        let by_left = by(wheel.drag((hub.0, hub.1 + DIFFERENCE)));
+        std::array::from_fn(|q| self.by_body(i, by_forward[q], by_left[q]))
+    }
+
+    /// A gradient by the velocity of hub `i`, as one by the body's velocity.
+    fn by_body(&self, i: usize, by_forward: f64, by_left: f64) -> Unknowns {
+        let kinematics = &self.model.kinematics;
+        let mut gradient = Unknowns::zeros();
+        gradient[0] = by_forward;
+        gradient[1] = by_left;
+        gradient[2] = kinematics.x_m[i] * by_left - kinematics.y_m[i] * by_forward;
+        gradient
     }
 }

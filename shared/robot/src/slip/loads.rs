@@ -102,8 +102,9 @@ impl RockerBogie {
             && front - self.bogie_x_m > rocker_pull + drop_pull
     }
 
-    /// Loads on (front, middle, rear) of one side, N, for the weight `side_n` on it and the
-    /// forward forces per unit of load, `traction`, of the same wheels.
+    /// Loads on (front, middle, rear) of one side, N, for the weight `side_n` on it, which acts
+    /// `mass_x_m` ahead of the rocker's pivot, and the forward forces per unit of load, `traction`,
+    /// of the same wheels.
     ///
     /// The moments about the bogie's pivot give the ratio of rear to middle load, those about the
     /// rocker's pivot the load on the bogie. Forces are linear in the loads, so no iteration is
@@ -113,7 +114,7 @@ impl RockerBogie {
         &self,
         kinematics: &Ackermann6,
         side: &[usize; 3],
-        side_n: f64,
+        (side_n, mass_x_m): (f64, f64),
         traction: [f64; 3],
     ) -> [f64; 3] {
         let [front_x, middle_x, rear_x] = side.map(|i| kinematics.x_m[i]);
@@ -127,8 +128,8 @@ impl RockerBogie {
             (middle_arm + self.bogie_z_m * traction[1]) / (rear_arm - self.bogie_z_m * traction[2]);
         let bogie_traction = (traction[1] + ratio * traction[2]) / (1.0 + ratio);
         let front_moment = self.rocker_z_m * traction[0];
-        let bogie =
-            side_n * (front_arm + front_moment) / (span + front_moment - drop * bogie_traction);
+        let bogie = side_n * (front_arm - mass_x_m + front_moment)
+            / (span + front_moment - drop * bogie_traction);
         let middle = bogie / (1.0 + ratio);
         [side_n - bogie, middle, ratio * middle].map(|load| load.max(LOAD_MIN_N))
     }

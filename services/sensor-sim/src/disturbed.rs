@@ -1,0 +1,86 @@
+//! Which disturbances are on, and what they make of the rover.
+
+use vigil_robot::disturbance::{KINDS, PARAMETERS};
+use vigil_robot::kinematics::{Ackermann6, ROVER_WHEELS};
+use vigil_robot::slip::{Condition, Soil, WheelCondition};
+use vigil_robot::{Disturbance, DisturbanceKind};
+
+/// Rolling resistance of firm soil, force per unit of load, that `sinkage` multiplies. The part up
+/// to 1 is in the learned models, as it is in the bearing's friction here.
+const FIRM_RESISTANCE: f64 = 0.05;
+
+/// At most one disturbance of each kind at each place.
+#[derive(Debug, Clone)]
+pub(crate) struct Disturbed {
+    on: [[Option<[f64; PARAMETERS]>; ROVER_WHEELS]; KINDS.len()],
+}
+
+impl Disturbed {
+    pub(crate) const fn nothing() -> Self {
+        Self {
+            on: [[None; ROVER_WHEELS]; KINDS.len()],
+        }
+    }
+
+    /// Switches one on; it takes the place of one of its kind. False if its place does not exist.
+    pub(crate) fn set(&mut self, disturbance: &Disturbance) -> bool {
+        let kind = &mut self.on[disturbance.kind.index()];
+        kind.get_mut(disturbance.place).is_some_and(|place| {
+            *place = Some(disturbance.parameter);
+            true
+        })
+    }
+
+    /// Switches a kind off, at one place or everywhere.
+    pub(crate) fn calm(&mut self, kind: DisturbanceKind, place: Option<usize>) {
+        for (i, on) in self.on[kind.index()].iter_mut().enumerate() {
+            if place.is_none_or(|place| place == i) {
+                *on = None;
+            }
+        }
+    }
+
+    /// What is on of a kind at a place: its first parameter.
+    pub(crate) fn at(&self, kind: DisturbanceKind, place: usize) -> Option<f64> {
+        self.on[kind.index()]
+            .get(place)
+            .copied()
+            .flatten()
+            .map(|p| p[0])
+    }
+
+    /// The state of body and wheels.
+    pub(crate) fn condition(&self) -> Condition {
+        use DisturbanceKind as D;
+        let rover = |kind| self.at(kind, 0).unwrap_or(0.0);
+        let shift = self.on[D::PayloadShift.index()][0].unwrap_or_default();
+        Condition {
+            wheels: std::array::from_fn(|i| {
+                let of = |kind, otherwise| self.at(kind, i).unwrap_or(otherwise);
+                WheelCondition {
+                    steer_offset_rad: of(D::SteerJump, 0.0) + of(D::SteerOffsetHidden, 0.0),
+                    torque_share: 1.0 - of(D::TorqueLoss, 0.0),
+                    radius_share: of(D::Puncture, 1.0),
+                    resistance: FIRM_RESISTANCE * (of(D::Sinkage, 1.0) - 1.0),
+                    drag_n: of(D::Brush, 0.0),
+                }
+            }),
+            force_n: [-rover(D::Tether), 0.0],
+            slope_rad: rover(D::Slope),
+            side_slope_rad: rover(D::SideSlope),
+            mass_offset_m: shift,
+        }
+    }
+
+    /// `soil` with what is soft about it.
+    pub(crate) fn soil(&self, soil: Soil, kinematics: &Ackermann6) -> Soil {
+        let share = |i: usize| {
+            let side = usize::from(kinematics.y_m[i] < 0.0);
+            self.at(DisturbanceKind::SoilSoft, side).unwrap_or(1.0)
+        };
+        Soil {
+            friction: std::array::from_fn(|i| soil.friction[i] * share(i)),
+            ..soil
+        }
+    }
+}

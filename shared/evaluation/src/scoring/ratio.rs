@@ -1,0 +1,88 @@
+//! Shares of runs and spreads of times.
+
+use serde::{Serialize, Serializer};
+
+use super::bounds::{self, Bounds};
+
+/// Cases that were right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Ratio {
+    /// Cases that count.
+    pub n: usize,
+    /// Cases that were right.
+    pub right: usize,
+}
+
+/// How a ratio is written.
+#[derive(Serialize)]
+struct Written {
+    n: usize,
+    right: usize,
+    fraction: Option<f64>,
+    lower_95: Option<f64>,
+    upper_95: Option<f64>,
+}
+
+impl Ratio {
+    pub(super) fn add(&mut self, right: bool) {
+        self.n += 1;
+        self.right += usize::from(right);
+    }
+
+    /// `right / n`; `None` without a case.
+    #[must_use]
+    pub fn fraction(self) -> Option<f64> {
+        (self.n > 0).then(|| self.right as f64 / self.n as f64)
+    }
+
+    /// Exact 95 % bounds on the fraction (Clopper and Pearson); `None` without a case.
+    #[must_use]
+    pub fn bounds_95(self) -> Option<Bounds> {
+        bounds::binomial(self.right, self.n)
+    }
+}
+
+impl Serialize for Ratio {
+    /// Keys `n`, `right`, `fraction`, `lower_95`, `upper_95`; the last three are null without a
+    /// case.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let bounds = self.bounds_95();
+        let written = Written {
+            n: self.n,
+            right: self.right,
+            fraction: self.fraction(),
+            lower_95: bounds.map(|bounds| bounds.lower),
+            upper_95: bounds.map(|bounds| bounds.upper),
+        };
+        written.serialize(serializer)
+    }
+}
+
+/// Percentiles (nearest rank) of times, s; null without a value.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Spread {
+    /// Values.
+    pub n: usize,
+    /// Median, s.
+    pub p50_s: Option<f64>,
+    /// 90th percentile, s.
+    pub p90_s: Option<f64>,
+    /// Largest, s.
+    pub max_s: Option<f64>,
+}
+
+impl Spread {
+    pub(super) fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let rank = |q: f64| {
+            let rank = (q * values.len() as f64).ceil() as usize;
+            values.get(rank.saturating_sub(1)).copied()
+        };
+        Self {
+            n: values.len(),
+            p50_s: rank(0.5),
+            p90_s: rank(0.9),
+            max_s: rank(1.0),
+        }
+    }
+}

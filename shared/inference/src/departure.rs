@@ -1,0 +1,343 @@
+//! Detection on a planar pose: nominal motion against nominal motion plus an unknown departure.
+//!
+//! Under the fault the robot moves, from an onset on, by an unknown constant amount per metre more
+//! than its nominal model says. Each onset (a bounded number of them, [`crate::onsets`]) has a
+//! [`Track`] that learns that amount, forked from the nominal one. As the nominal track is pulled
+//! along by the measurements, the residuals of such a fault are no constant, but grow and settle;
+//! here they are what they should be for every fault, and a fault is seen sooner than by a constant
+//! bias of the residual.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::angle::wrap;
+use crate::logspace::log_add;
+use crate::onsets::{Onset, Onsets};
+use crate::track::{Displacement, MotionNoise, Track};
+
+/// Log-odds beyond which more evidence changes nothing, but delays recovery.
+const LOG_ODDS_MAX: f64 = 40.0;
+/// Components less probable than this, by their log-odds, are dropped.
+const LOG_ODDS_MIN: f64 = -30.0;
+
+/// A fault that began at one of some successive steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Fault {
+    log_weight: f64,
+    track: Track,
+}
+
+/// What faults of one kind do to the motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kind {
+    /// Share of all faults.
+    pub share: f64,
+    /// Displacement at the mean departure.
+    pub step: Displacement,
+    /// How far faults of this kind depart from that.
+    pub noise: MotionNoise,
+}
+
+/// The filter, over K kinds of faults.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Departure<const K: usize> {
+    nominal: MotionNoise,
+    track: Track,
+    faults: [Onsets<Fault>; K],
+}
+
+/// What a pose said.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Said {
+    /// Log-density of the pose under nominal motion.
+    pub log_density: f64,
+    /// Its residual in the body frame (forward, left, yaw), whitened.
+    pub residual: Vector3<f64>,
+}
+
+impl<const K: usize> Departure<K> {
+    /// A filter at the origin, whose motion per metre departs from its model as `nominal` says in
+    /// health.
+    #[must_use]
+    pub fn new(nominal: MotionNoise) -> Self {
+        Self {
+            track: Track::new(Vector3::zeros(), Matrix3::identity(), &nominal),
+            faults: [Onsets::default(); K],
+            nominal,
+        }
+    }
+
+    /// Starts from a pose (x, y, yaw) known with these variances, without a fault.
+    pub fn start(&mut self, pose: [f64; 3], variance: [f64; 3]) {
+        let covariance = Matrix3::from_diagonal(&Vector3::from(variance));
+        self.track = Track::new(Vector3::from(pose), covariance, &self.nominal);
+        self.forget();
+    }
+
+    /// Forgets what speaks for a fault, and keeps the track.
+    pub fn forget(&mut self) {
+        self.faults = [Onsets::default(); K];
+    }
+
+    /// Puts every track at this pose and keeps what is known of the motion: the frame of the
+    /// measurement has jumped, or the pose was lost.
+    pub fn anchor(&mut self, pose: [f64; 3], variance: [f64; 3]) {
+        self.track.anchor(pose, variance);
+        for fault in self.all_mut() {
+            fault.track.anchor(pose, variance);
+        }
+    }
+
+    /// The nominal track.
+    #[must_use]
+    pub const fn track(&self) -> &Track {
+        &self.track
+    }
+
+    /// Natural log-odds of a fault.
+    #[must_use]
+    pub fn log_odds(&self) -> f64 {
+        let faults = self.faults.iter().flat_map(Onsets::iter);
+        let log_weights = faults.map(|fault| fault.log_weight);
+        log_weights.fold(f64::NEG_INFINITY, log_add)
+    }
+
+    fn all_mut(&mut self) -> impl Iterator<Item = &mut Fault> {
+        self.faults.iter_mut().flat_map(Onsets::iter_mut)
+    }
+
+    /// Moves by one displacement, each fault by that of its kind. A fault begins before it with the
+    /// probability `birth`, 0 for none. The nominal track diffuses by `follow` (variances of x, y,
+    /// yaw) besides.
+    pub fn predict(
+        &mut self,
+        step: &Displacement,
+        kinds: &[Kind; K],
+        birth: f64,
+        follow: [f64; 3],
+    ) {
+        for (faults, kind) in self.faults.iter_mut().zip(kinds) {
+            let born = birth * kind.share;
+            if born > 0.0 {
+                faults.enter(Fault {
+                    log_weight: born.ln(),
+                    track: self.track.fork(&kind.noise),
+                });
+            }
+            for fault in faults.iter_mut() {
+                fault.track.predict(&kind.step, &kind.noise);
+            }
+        }
+        self.track.predict(step, &self.nominal);
+        self.track.diffuse(follow);
+    }
+
+    /// Conditions on a measured pose (x, y, yaw) with independent noise of `variance`; it is
+    /// evidence if `counts`. None, unchanged, if the nominal track cannot take it.
+    pub fn update(&mut self, pose: [f64; 3], variance: [f64; 3], counts: bool) -> Option<Said> {
+        let said = self.residual(pose, variance)?;
+        self.track.update(pose, variance)?;
+        let mut highest = f64::NEG_INFINITY;
+        for fault in self.all_mut() {
+            let gained = fault.track.update(pose, variance);
+            // What cannot take it is impossible.
+            let gained = gained.map_or(f64::NEG_INFINITY, |gained| gained - said.log_density);
+            if counts || gained == f64::NEG_INFINITY {
+                fault.log_weight += gained;
+            }
+            highest = highest.max(fault.log_weight);
+        }
+        let excess = (highest - LOG_ODDS_MAX).max(0.0);
+        for faults in &mut self.faults {
+            for fault in faults.iter_mut() {
+                fault.log_weight -= excess;
+            }
+            faults.retain(|fault| fault.log_weight > LOG_ODDS_MIN);
+        }
+        Some(said)
+    }
+
+    /// What a pose would say of the nominal motion.
+    fn residual(&self, pose: [f64; 3], variance: [f64; 3]) -> Option<Said> {
+        let (apart, spread) = self.track.innovation(pose, variance);
+        let (sin, cos) = wrap(self.track.pose()[2]).sin_cos();
+        let turn = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
+        let (apart, spread) = (turn * apart, turn * spread * turn.transpose());
+        let (log_density, factor) = crate::gaussian::log_density(&apart, spread)?;
+        let residual = factor.l_dirty().solve_lower_triangular(&apart)?;
+        Some(Said {
+            log_density,
+            residual,
+        })
+    }
+}
+
+impl Onset for Fault {
+    /// Keeps the weight and the first two moments of both.
+    fn merged(&self, older: &Self) -> Self {
+        let log_weight = log_add(self.log_weight, older.log_weight);
+        if log_weight == f64::NEG_INFINITY {
+            return *self;
+        }
+        let share = (self.log_weight - log_weight).exp();
+        Self {
+            log_weight,
+            track: self.track.mixed(&older.track, share),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use proptest::prelude::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64Mcg;
+
+    const VARIANCE: [f64; 3] = [2.5e-5; 3];
+    const BIRTH: f64 = 1e-4;
+
+    fn noise(offset: f64, deviation: f64) -> MotionNoise {
+        MotionNoise {
+            offset: Matrix3::identity() * offset * offset,
+            deviation: Matrix3::identity() * deviation * deviation,
+            length_m: 0.3,
+            white: Vector3::repeat(1e-8),
+        }
+    }
+
+    const STEP: Displacement = Displacement {
+        per_metre: [0.5, 1.0, 0.0],
+        travel_m: 0.01,
+        extra: [0.0; 3],
+    };
+
+    fn kinds() -> [Kind; 2] {
+        let anything = Kind {
+            share: 0.6,
+            step: STEP,
+            noise: noise(0.25, 0.03),
+        };
+        let slower = Kind {
+            share: 0.4,
+            step: Displacement {
+                per_metre: [0.5, 0.9, 0.0],
+                ..STEP
+            },
+            noise: noise(0.05, 0.03),
+        };
+        [anything, slower]
+    }
+
+    /// Poses measured on a path that turns by `apart` rad/m more from step `onset` on.
+    fn poses(apart: f64, onset: usize, steps: usize, seed: u64) -> Vec<[f64; 3]> {
+        let mut rng = Pcg64Mcg::seed_from_u64(seed);
+        let mut at = [0.0_f64; 3];
+        let drive = |step: usize| {
+            let turn = (0.5 + if step < onset { 0.0 } else { apart }) * 0.01;
+            let middle = at[2] + 0.5 * turn;
+            at = [
+                at[0] + 0.01 * middle.cos(),
+                at[1] + 0.01 * middle.sin(),
+                at[2] + turn,
+            ];
+            std::array::from_fn(|i| at[i] + 0.005 * rng.sample::<f64, _>(StandardNormal))
+        };
+        (0..steps).map(drive).collect()
+    }
+
+    fn filter() -> Departure<2> {
+        let mut filter = Departure::new(noise(0.001, 0.001));
+        filter.start([0.0; 3], [1e-4; 3]);
+        filter
+    }
+
+    /// The log-odds from one track per onset and kind, none merged.
+    fn every_onset(poses: &[[f64; 3]]) -> f64 {
+        let mut nominal = filter().track;
+        let mut all: Vec<(usize, f64, Track)> = Vec::new();
+        for pose in poses {
+            for (kind, its) in kinds().iter().enumerate() {
+                all.push((kind, (BIRTH * its.share).ln(), nominal.fork(&its.noise)));
+            }
+            nominal.predict(&STEP, &noise(0.001, 0.001));
+            let healthy = nominal.update(*pose, VARIANCE).unwrap();
+            for (kind, log_weight, track) in &mut all {
+                track.predict(&kinds()[*kind].step, &kinds()[*kind].noise);
+                *log_weight += track.update(*pose, VARIANCE).unwrap() - healthy;
+            }
+        }
+        let log_weights = all.iter().map(|(_, log_weight, _)| *log_weight);
+        log_weights.fold(f64::NEG_INFINITY, log_add)
+    }
+
+    #[test]
+    fn sharing_components_between_onsets_costs_little_against_every_onset() {
+        for (apart, onset, steps) in [(0.0, 0, 150), (0.2, 60, 68), (-0.1, 60, 71), (0.05, 20, 40)]
+        {
+            let poses = poses(apart, onset, steps, 7);
+            let mut filter = filter();
+            for pose in &poses {
+                filter.predict(&STEP, &kinds(), BIRTH, [0.0; 3]);
+                filter.update(*pose, VARIANCE, true).unwrap();
+            }
+            let expected = every_onset(&poses);
+            assert!(expected < LOG_ODDS_MAX - 5.0, "{apart}: {expected}");
+            let found = filter.log_odds();
+            assert!(
+                (found - expected).abs() < 0.7,
+                "{apart}: {found}, {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_departure_is_seen_and_its_end_too() {
+        let mut filter = filter();
+        let (there, back) = (poses(0.2, 100, 300, 3), poses(0.0, 0, 300, 4));
+        let mut seen = None;
+        for (step, pose) in there.iter().enumerate() {
+            let follow = if seen.is_some() {
+                [2.5e-7; 3]
+            } else {
+                [0.0; 3]
+            };
+            filter.predict(&STEP, &kinds(), BIRTH, follow);
+            filter.update(*pose, VARIANCE, true).unwrap();
+            if seen.is_none() && filter.log_odds() > 3.0 {
+                seen = Some(step);
+            }
+        }
+        assert!((103..130).contains(&seen.unwrap()), "{seen:?}");
+        filter.anchor(back[0], VARIANCE);
+        for pose in &back[1..] {
+            filter.predict(&STEP, &kinds(), BIRTH, [2.5e-7; 3]);
+            filter.update(*pose, VARIANCE, true).unwrap();
+        }
+        assert!(filter.log_odds() < -3.0, "{}", filter.log_odds());
+    }
+
+    #[test]
+    fn what_does_not_count_is_no_evidence() {
+        let mut filter = filter();
+        for pose in poses(0.3, 0, 100, 5) {
+            filter.predict(&STEP, &kinds(), 0.0, [0.0; 3]);
+            filter.update(pose, VARIANCE, false).unwrap();
+        }
+        assert_eq!(filter.log_odds(), f64::NEG_INFINITY);
+    }
+
+    proptest! {
+        #[test]
+        fn no_pose_breaks_the_filter(values in prop::collection::vec(any::<[f64; 3]>(), 1..40)) {
+            let mut filter = filter();
+            for pose in values {
+                filter.predict(&STEP, &kinds(), BIRTH, [0.0; 3]);
+                filter.update(pose, VARIANCE, true);
+                prop_assert!(!filter.log_odds().is_nan() && filter.log_odds() < 1e3);
+                prop_assert!(filter.track().pose().iter().all(|value| value.is_finite()));
+            }
+        }
+    }
+}
