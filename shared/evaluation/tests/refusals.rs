@@ -49,7 +49,6 @@ impl Data {
     fn learn(&self) -> Result<(), String> {
         let options = Options {
             evaluations: 20,
-            particles: 64,
             ..Options::default()
         };
         learn(&self.runs, &self.labels, &[], &self.robot, &options)
