@@ -21,8 +21,9 @@ use vigil_robot::learned::Model;
 const MODEL: &str = "config/models/rover.toml";
 /// How much noisier the sensors are made.
 const FACTOR: f64 = 2.0;
-/// When encoders die, s (half way between two frames), and what is left of them, rad/s: the noise of a healthy one.
+/// When encoders die, s: half way between two frames.
 const ONSET_S: f64 = 3.975;
+/// What is left of them, rad/s: the noise of a healthy one.
 const DEAD_SD_RAD_S: f64 = 0.05;
 const SEED: u64 = 1;
 /// Ids of runs with a dead encoder: above all recorded ones.

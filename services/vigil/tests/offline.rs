@@ -11,6 +11,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 const FRAMES: &str = "tests/data/rover/learn_frames.csv.gz";
+const MODEL: &str = "config/models/rover.toml";
 const RUNS: &str = "tests/data/rover/learn_runs.csv";
 
 fn root() -> PathBuf {
@@ -64,10 +65,17 @@ fn check_report(report: &Value) {
     let modes = report["modes"].as_array().unwrap();
     assert_eq!(modes.len(), 7);
     for mode in modes {
-        // No better than the sensor's noise, and not much worse.
-        for key in ["position_to_floor", "yaw_to_floor"] {
-            let ratio = mode[key].as_f64().unwrap();
-            assert!((0.95..1.3).contains(&ratio), "{mode}");
+        // No better than the sensor's noise, and as much worse as the model itself predicts.
+        for key in ["position", "yaw"] {
+            let of = |name: &str| mode[key][name].as_f64().unwrap();
+            let (ratio, error) = (of("to_floor"), of("to_floor_error"));
+            assert_eq!(mode[format!("{key}_to_floor")], ratio);
+            assert!((0.95..1.1 + error).contains(&ratio), "{mode}");
+            let apart = ratio - of("predicted_to_floor");
+            assert!(error < 0.03 && apart.abs() < 0.03, "{mode}");
+        }
+        for turn in ["yaw_left", "yaw_right"] {
+            assert!(mode[turn]["to_floor"].as_f64().unwrap() > 0.95, "{mode}");
         }
     }
     let held_out = report["held_out_run_ids"].as_array().unwrap().len();
@@ -145,38 +153,64 @@ fn a_learned_model_names_the_faults_of_runs_left_out() {
         "{message}"
     );
 
-    verdicts_are_causal(&folder, &model);
     a_closed_pipe_is_success(&model, &few);
 }
 
-/// Rows of a run cut short, alone in its file, equal the first rows of the whole run among others.
-fn verdicts_are_causal(folder: &TempDir, model: &str) {
-    let diagnose = |name: &str, keep: &dyn Fn(u32, f64) -> bool| {
-        let (frames, out) = (folder.path().join("in.csv"), folder.path().join(name));
-        cut(&frames, keep);
-        let paths = [frames, out.clone()].map(|path| path.display().to_string());
-        let output = run(&[
-            "diagnose", "--model", model, "--frames", &paths[0], "--out", &paths[1],
-        ]);
-        assert!(output.status.success() && output.stdout.is_empty());
-        fs::read_to_string(out).unwrap()
-    };
-    let whole = diagnose("whole.csv", &|run, _| [60, 100, 300].contains(&run));
-    assert_eq!(whole.lines().count(), 1 + 3 * 300);
-    let header = "run,t,p_fault,alarm,mode,p_mode,p_unknown,fault_set,p_left_stuck,p_right_stuck";
-    assert_eq!(whole.lines().next(), Some(header));
-    for id in [100, 300] {
-        // Runs of this data are not longer than 15 s; their faults begin before 5 s.
-        let short = diagnose("short.csv", &|run, t_s| run == id && t_s < 7.0);
-        let wanted: Vec<&str> = whole
-            .lines()
-            .filter(|line| {
+/// Rows of a run cut short equal the first rows of the whole run among others, for each set of
+/// channels: cut before, at and after the onset of a fault, alone in its file or not.
+#[test]
+fn verdicts_are_causal() {
+    let folder = TempDir::new().unwrap();
+    // A nominal run, a stuck wheel and a frozen encoder; runs of this data last 15 s.
+    let ids = [0, 100, 450];
+    for sensors in ["pose", "pose+encoders"] {
+        let diagnose = |name: &str, keep: &dyn Fn(u32, f64) -> bool| {
+            let (frames, out) = (folder.path().join("in.csv"), folder.path().join(name));
+            cut(&frames, keep);
+            let paths = [frames, out.clone()].map(|path| path.display().to_string());
+            let output = run(&[
+                "diagnose",
+                "--model",
+                MODEL,
+                "--frames",
+                &paths[0],
+                "--out",
+                &paths[1],
+                "--sensors",
+                sensors,
+            ]);
+            assert!(output.status.success() && output.stdout.is_empty());
+            assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+            fs::read_to_string(out).unwrap()
+        };
+        let whole = diagnose("whole.csv", &|run, _| ids.contains(&run));
+        assert_eq!(whole.lines().count(), 1 + 3 * 300);
+        let header =
+            "run,t,p_fault,alarm,mode,p_mode,p_unknown,fault_set,p_left_stuck,p_right_stuck";
+        assert_eq!(whole.lines().next(), Some(header));
+        assert!(whole.contains(",1,RM_STUCK,"), "something is diagnosed");
+        // Runs, seconds, and frames of each run until then.
+        let cuts: [(&[u32], f64, usize); 6] = [
+            (&ids, 0.07, 1),
+            (&ids, 1.52, 30),
+            (&ids, 4.52, 90),
+            (&ids[1..], 5.03, 100),
+            (&[100], 7.0, 139),
+            (&[450], 11.0, 219),
+        ];
+        for (kept, until_s, frames) in cuts {
+            let short = diagnose("short.csv", &|run, t_s| {
+                kept.contains(&run) && t_s < until_s
+            });
+            let is_kept = |line: &&str| {
                 let fields: Vec<&str> = line.split(',').collect();
-                fields[0] == id.to_string() && fields[1].parse::<f64>().unwrap() < 7.0
-            })
-            .collect();
-        assert!(wanted.len() > 100);
-        assert_eq!(short.lines().skip(1).collect::<Vec<_>>(), wanted);
+                kept.contains(&fields[0].parse().unwrap())
+                    && fields[1].parse::<f64>().unwrap() < until_s
+            };
+            let wanted: Vec<&str> = whole.lines().skip(1).filter(is_kept).collect();
+            assert_eq!(wanted.len(), kept.len() * frames);
+            assert_eq!(short.lines().skip(1).collect::<Vec<_>>(), wanted);
+        }
     }
 }
 
@@ -227,7 +261,7 @@ fn wrong_input_is_refused_with_its_name_and_exit_code_2() {
         ),
         (
             [&diagnose[..], &["--model", &model]].concat(),
-            "model.toml: not a learned model",
+            "model.toml: the model has layout version 1; this program reads version 3: learn it",
         ),
         (
             [&diagnose[..], &["--model", &model, "--sensors", "lidar"]].concat(),

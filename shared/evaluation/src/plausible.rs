@@ -17,9 +17,9 @@ use crate::frames::Run;
 
 /// Speed from which a robot counts as commanded to move, m/s.
 const MOVING_M_S: f64 = 0.02;
-/// Time over which a pose is averaged at either end of a chord, and the chord's length, s.
-const MEAN_S: f64 = 0.2;
+/// Least duration of a chord, s, and frames in it: a fifth of them is averaged at either end.
 const CHORD_S: f64 = 1.0;
+const CHORD_FRAMES: usize = 10;
 /// Commanded travel (m) and turn (rad) below which nothing is judged.
 const TRAVEL_MIN_M: f64 = 0.25;
 const TURN_MIN_RAD: f64 = 0.15;
@@ -211,23 +211,24 @@ fn driven(frames: &[&SensorFrame]) -> Driven {
     let mut from = 0;
     while let Some(start) = frames.get(from) {
         let until = seconds(start) + CHORD_S;
-        let Some(to) = frames[from..].iter().position(|f| seconds(f) >= until) else {
+        let Some(long) = frames[from..].iter().position(|f| seconds(f) >= until) else {
             break;
         };
-        out.add(&frames[from..=from + to]);
-        from += to;
+        let to = from + long.max(CHORD_FRAMES);
+        let Some(chord) = frames.get(from..=to) else {
+            break;
+        };
+        out.add(chord);
+        from = to;
     }
     out
 }
 
 impl Driven {
     fn add(&mut self, chord: &[&SensorFrame]) {
-        let (Some(first), Some(last)) = (chord.first(), chord.last()) else {
-            return;
-        };
-        let (begin, end) = (seconds(first) + MEAN_S, seconds(last) - MEAN_S);
-        let (start, start_s) = mean(chord, |t| t <= begin);
-        let (stop, stop_s) = mean(chord, |t| t >= end);
+        let end = chord.len().div_ceil(5);
+        let (start, start_s) = mean(&chord[..end]);
+        let (stop, stop_s) = mean(&chord[chord.len() - end..]);
         let speed = chord.iter().map(|f| f.command[1]).sum::<f64>() / chord.len() as f64;
         let curved: f64 = chord.iter().map(|f| f.command[0] * f.command[1]).sum();
         let commanded = curved / chord.len() as f64 * (stop_s - start_s);
@@ -243,22 +244,21 @@ impl Driven {
     }
 }
 
-/// Mean pose and mean time of those frames of a chord whose time is `wanted`.
-fn mean(chord: &[&SensorFrame], wanted: impl Fn(f64) -> bool) -> ([f64; 3], f64) {
-    let used = || chord.iter().filter(|frame| wanted(seconds(frame)));
-    let count = used().count().max(1) as f64;
-    let Some(first) = used().next() else {
+/// Mean pose and mean time.
+fn mean(frames: &[&SensorFrame]) -> ([f64; 3], f64) {
+    let Some(first) = frames.first() else {
         return ([0.0; 3], 0.0);
     };
+    let count = frames.len() as f64;
     let apart = |axis: usize, frame: &SensorFrame| match axis {
         2 => wrap(frame.pose[2] - first.pose[2]),
         _ => frame.pose[axis] - first.pose[axis],
     };
     let axis = |axis: usize| {
-        let sum: f64 = used().map(|frame| apart(axis, frame)).sum();
+        let sum: f64 = frames.iter().map(|frame| apart(axis, frame)).sum();
         first.pose[axis] + sum / count
     };
-    let time = used().map(|frame| seconds(frame)).sum::<f64>() / count;
+    let time = frames.iter().map(|frame| seconds(frame)).sum::<f64>() / count;
     ([axis(0), axis(1), axis(2)], time)
 }
 

@@ -75,6 +75,27 @@ fn columns_are_found_by_name_and_only_present_channels_are_valid() {
 }
 
 #[test]
+fn gaps_in_time_are_refused_with_run_and_row() {
+    let cases = [
+        (
+            [good("0.05"), good("0.10"), good("0.90")],
+            "row 3: run 7: a gap of 0.800 s, usual are 0.050 s: start a new run",
+        ),
+        (
+            [good("50"), good("100"), good("150")],
+            "row 2: run 7: a gap of 50.000 s, allowed is 1 s: start a new run; or is t in ms?",
+        ),
+        (
+            [good("0.5"), good("1"), good("2.5")],
+            "row 3: run 7: a gap of 1.500 s, allowed is 1 s: start a new run; or is t in ms?",
+        ),
+    ];
+    for (rows, wanted) in cases {
+        assert_eq!(message(&table(&rows)), wanted);
+    }
+}
+
+#[test]
 fn malformed_tables_are_refused_with_row_column_and_what_is_allowed() {
     let two = |second: String| table(&[good("0.05"), second]);
     let cases = [
@@ -126,14 +147,6 @@ fn malformed_tables_are_refused_with_row_column_and_what_is_allowed() {
             two(row("7", "0.10", "1000", "0", "0")),
             "row 2: the pose jumps by 999.00 m; allowed are 2 m; 99900 times the commanded travel: \
              are x and y in mm?",
-        ),
-        (
-            table(&[good("0.05"), good("0.10"), good("0.90")]),
-            "row 3: run 7: a gap of 0.800 s, usual are 0.050 s: start a new run",
-        ),
-        (
-            table(&[good("50"), good("100")]),
-            "row 2: run 7: a gap of 50.000 s, allowed is 1 s: start a new run; or is t in ms?",
         ),
         (
             table(&[good("0.05"), row("8", "0.05", "1", "0", "0"), good("0.10")]),

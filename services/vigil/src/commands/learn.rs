@@ -206,13 +206,14 @@ fn table(report: &Report, out: &Path) -> String {
         "in brackets what the model itself predicts of it, as the ground varies within a run"
             .into(),
         format!(
-            "{:<10} {:>6} {:>12} {:>11} {:>9} {:>18} {:>5} {:>6} {:>7}",
+            "{:<10} {:>6} {:>12} {:>11} {:>9} {:>11} {:>6} {:>5} {:>6} {:>7}",
             "mode",
             "poses",
             "position, mm",
             "x noise",
             "yaw, mrad",
             "x noise",
+            "",
             "left",
             "right",
             "ln p"
@@ -224,17 +225,16 @@ fn table(report: &Report, out: &Path) -> String {
             None => "-".into(),
         };
         let (position, yaw) = (&mode.position, &mode.yaw);
+        let floor = |of: &Residual| format!("{:.2} ({:.2})", of.to_floor, of.predicted_to_floor);
         lines.push(format!(
-            "{:<10} {:>6} {:>12.2} {:>4.2} ({:.2}) {:>9.2} {:>4.2} +-{:.2} ({:.2}) {:>5} {:>6} {:>7.2}",
+            "{:<10} {:>6} {:>12.2} {:>11} {:>9.2} {:>11} +-{:.2} {:>5} {:>6} {:>7.2}",
             mode.mode,
             mode.poses,
             1e3 * position.rms,
-            position.to_floor,
-            position.predicted_to_floor,
+            floor(position),
             1e3 * yaw.rms,
-            yaw.to_floor,
+            floor(yaw),
             yaw.to_floor_error,
-            yaw.predicted_to_floor,
             turn(&mode.yaw_left),
             turn(&mode.yaw_right),
             mode.log_likelihood,

@@ -23,6 +23,7 @@ pub mod motion;
 pub mod motion_modes;
 pub mod noise_scale;
 pub mod observation;
+mod provenance;
 mod reading;
 pub mod switching;
 pub mod wheel_evidence;

@@ -7,6 +7,7 @@ use super::calibration::Calibration;
 use super::form::Form;
 use super::monitor::Channels;
 use super::motion::{Curve, MotionModel};
+pub use super::provenance::Provenance;
 use super::wheels::{EncoderModel, RateModel};
 
 /// Version of the file's layout.
@@ -43,30 +44,6 @@ pub struct Model {
     pub stuck: Vec<StuckModel>,
     /// Alarm thresholds, one per set of channels and form of the detection filter.
     pub calibration: Vec<Calibration>,
-}
-
-/// Where a model comes from.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Provenance {
-    /// Hash over the frames that were learned from.
-    pub data_hash: String,
-    /// Runs learned from.
-    pub runs_learned: Vec<u32>,
-    /// Runs left out, for the test.
-    pub runs_held_out: Vec<u32>,
-    /// Name of the file with the frames, without its folder.
-    pub frames_file: String,
-    /// Name of the file with the labels, without its folder.
-    pub labels_file: String,
-    /// Seed of the split and of the detector's calibration.
-    pub seed: u64,
-    /// Part of the runs of every mode and kind that was left out.
-    pub test_fraction: f64,
-    /// Ground on which the runs were driven, as their labels call it; empty if they do not say.
-    pub terrain: String,
-    /// Version of the program that learned the model.
-    pub software_version: String,
 }
 
 /// Standard deviations of the sensors' white noise per sample at the reference rate; at another
