@@ -13,7 +13,7 @@ const UNKNOWN_LENGTH_M: f64 = 0.2;
 /// Ground other than that learned from changes a stuck wheel's effect by one factor: how probable,
 /// the factor's mean and deviation.
 const OTHER_GROUNDS: [(f64, f64, f64); 3] =
-    [(0.04, 0.3, 0.12), (0.04, 0.65, 0.2), (0.02, 1.5, 0.35)];
+    [(0.08, 0.3, 0.12), (0.08, 0.65, 0.2), (0.04, 1.5, 0.35)];
 /// Deviation of such an effect from one that is changed as a whole: yaw, forward, lateral.
 const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
 /// Two stuck wheels, whose effects are added, as nothing was learned of both together: deviation
