@@ -2,8 +2,10 @@
 
 pub mod cases;
 pub mod frames;
+pub mod import;
 pub mod labels;
 pub mod learning;
+pub mod learning_nominal;
 pub mod scoring;
 pub mod split;
 mod table;
