@@ -7,6 +7,7 @@ pub mod machine;
 pub mod matched;
 pub mod naive;
 pub mod rare;
+pub mod real;
 pub mod recorded;
 pub mod speed;
 

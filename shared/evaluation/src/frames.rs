@@ -49,6 +49,22 @@ pub enum Field {
     Current(usize),
 }
 
+impl Field {
+    /// Writes a value to its place in a frame, and marks it as measured.
+    pub fn put(self, value: f64, frame: &mut SensorFrame) {
+        let (place, bit) = match self {
+            Self::Command(i) => (&mut frame.command[i], Valid::command(i)),
+            Self::Pose(i) => (&mut frame.pose[i], Valid::POSE),
+            Self::WheelRate(i) => (&mut frame.wheel_rate[i], Valid::wheel_rate(i)),
+            Self::Steer(i) => (&mut frame.steer[i], Valid::steer(i)),
+            Self::YawRate => (&mut frame.yaw_rate, Valid::YAW_RATE),
+            Self::Current(i) => (&mut frame.current[i], Valid::current(i)),
+        };
+        *place = value;
+        frame.valid |= bit;
+    }
+}
+
 /// Names and contents of the columns of a robot's frames, after `run` and `t`.
 #[must_use]
 pub fn fields(robot: &Description) -> Vec<(String, Field)> {
@@ -97,7 +113,9 @@ impl Columns {
         Ok(Self {
             run: *run,
             t: *t,
-            fields: fields.map(|((name, field), &at)| (at, name, field)).collect(),
+            fields: fields
+                .map(|((name, field), &at)| (at, name, field))
+                .collect(),
         })
     }
 
@@ -112,16 +130,7 @@ impl Columns {
         frame.header.t_capture_ns = (t_s * 1e9).round() as u64;
         for (column, name, field) in &self.fields {
             let value = table.number(*column)?;
-            let (place, bit) = match *field {
-                Field::Command(i) => (&mut frame.command[i], Valid::command(i)),
-                Field::Pose(i) => (&mut frame.pose[i], Valid::POSE),
-                Field::WheelRate(i) => (&mut frame.wheel_rate[i], Valid::wheel_rate(i)),
-                Field::Steer(i) => (&mut frame.steer[i], Valid::steer(i)),
-                Field::YawRate => (&mut frame.yaw_rate, Valid::YAW_RATE),
-                Field::Current(i) => (&mut frame.current[i], Valid::current(i)),
-            };
-            *place = value;
-            frame.valid |= bit;
+            field.put(value, &mut frame);
             if matches!(field, Field::Pose(2) | Field::Steer(_)) {
                 angle(table, name, value)?;
             }

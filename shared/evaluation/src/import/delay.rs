@@ -44,7 +44,9 @@ fn best(log: &LogDescription, late: &Series, against: &[(f64, &Series)]) -> Opti
     }
     let times = |i: usize| start_s + i as f64 / log.rate_hz;
     let sum = |t_s: f64| {
-        let terms = against.iter().map(|(factor, series)| Some(factor * series.between(t_s)?));
+        let terms = against
+            .iter()
+            .map(|(factor, series)| Some(factor * series.between(t_s)?));
         terms.sum::<Option<f64>>()
     };
     let reference: Vec<Option<f64>> = (0..count).map(|i| sum(times(i))).collect();
@@ -61,7 +63,9 @@ fn best(log: &LogDescription, late: &Series, against: &[(f64, &Series)]) -> Opti
 
 fn correlation(pairs: &[(f64, f64)]) -> f64 {
     let n = pairs.len().max(1) as f64;
-    let (ma, mb) = pairs.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+    let (ma, mb) = pairs
+        .iter()
+        .fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
     let (mut aa, mut bb, mut ab) = (1e-12, 1e-12, 0.0);
     for (x, y) in pairs {
         aa += (x - ma) * (x - ma);

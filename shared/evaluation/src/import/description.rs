@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
@@ -79,7 +81,8 @@ pub struct Source {
     /// a source that has both; the median difference, a constant of the run, is added.
     #[serde(default)]
     pub time_as: Option<[String; 2]>,
-    /// Clock of the device, against which counters are differentiated; left out: `time`.
+    /// Clock of the device, against which counters are differentiated; left out: `time`. Rows are
+    /// placed by it, too: `time` gives its offset and its rate, constants of a run.
     #[serde(default)]
     pub device_clock: Option<Clock>,
 }
@@ -223,12 +226,43 @@ fn forty() -> f64 {
 }
 
 impl LogDescription {
+    /// Reads a description.
+    ///
+    /// # Errors
+    /// [`ImportError::Io`], or [`ImportError::Description`] with file, line and reason.
+    pub fn load(path: &Path) -> Result<Self, ImportError> {
+        let text = fs::read_to_string(path).map_err(|error| ImportError::Io {
+            path: path.to_path_buf(),
+            error,
+        })?;
+        toml::from_str(&text).map_err(|error: toml::de::Error| {
+            let start = error.span().map_or(0, |span| span.start);
+            let line = 1 + text
+                .bytes()
+                .take(start)
+                .filter(|&byte| byte == b'\n')
+                .count();
+            let message = error.message().replace('\n', " ");
+            ImportError::description(format!("{}:{line}", path.display()), message)
+        })
+    }
+
+    /// Path of the robot's description; `own` is the path of this file.
+    #[must_use]
+    pub fn robot_path(&self, own: &Path) -> PathBuf {
+        own.parent()
+            .unwrap_or_else(|| Path::new("."))
+            .join(&self.robot)
+    }
+
     /// The channels in the order of `columns`, which [`Self::check`] has found complete.
     pub(super) fn in_order<'a>(
         &'a self,
         columns: &'a [String],
     ) -> impl Iterator<Item = &'a ChannelSource> {
-        columns.iter().filter_map(|column| self.channel.iter().find(|c| c.name == *column))
+        columns
+            .iter()
+            .filter_map(|column| self.channel.iter().find(|c| c.name == *column))
     }
 
     /// Checks that every column has one channel, and every channel a source.

@@ -33,7 +33,11 @@ pub(super) fn runs(folder: &Path, patterns: &[String]) -> Result<Vec<PathBuf>, I
 fn children(folder: &Path, part: &str) -> Result<Vec<PathBuf>, ImportError> {
     if !part.contains('*') {
         let path = folder.join(part);
-        return Ok(if path.exists() { vec![path] } else { Vec::new() });
+        return Ok(if path.exists() {
+            vec![path]
+        } else {
+            Vec::new()
+        });
     }
     if !folder.is_dir() {
         return Ok(Vec::new());

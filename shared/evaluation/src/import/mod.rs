@@ -17,10 +17,11 @@ use std::path::{Path, PathBuf};
 pub use description::{ChannelSource, Clock, Delay, LogDescription, Method, Source, Unit};
 use resample::Grid;
 use series::Series;
+use vigil_blocks::SensorFrame;
 use vigil_robot::Description;
 pub use write::write;
 
-use crate::frames::fields;
+use crate::frames::{Field, Run, fields};
 use crate::table::TableError;
 
 /// Why a log was refused.
@@ -72,6 +73,37 @@ impl ImportError {
     }
 }
 
+impl Imported {
+    /// The runs as frames, as [`crate::frames::read`] would read them from the written file, but
+    /// for its rounding and its checks.
+    #[must_use]
+    pub fn frames(&self, robot: &Description) -> Vec<Run> {
+        let fields = fields(robot);
+        let run = |run: &ImportedRun| Run {
+            id: run.id,
+            frames: run
+                .rows
+                .iter()
+                .enumerate()
+                .map(|(seq, row)| frame(&fields, run.id, seq, row))
+                .collect(),
+        };
+        self.runs.iter().map(run).collect()
+    }
+}
+
+fn frame(fields: &[(String, Field)], run: u32, seq: usize, row: &[f64]) -> SensorFrame {
+    let mut frame = SensorFrame::default();
+    frame.run_id = u64::from(run) + 1;
+    frame.header.seq = seq as u64;
+    let t_s = row.first().copied().unwrap_or(0.0);
+    frame.header.t_capture_ns = (t_s * 1e9).round() as u64;
+    for ((_, field), value) in fields.iter().zip(row.iter().skip(1)) {
+        field.put(*value, &mut frame);
+    }
+    frame
+}
+
 /// One imported run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedRun {
@@ -115,7 +147,9 @@ pub fn import(
                 .channel
                 .iter()
                 .find(|channel| channel.name == *column)
-                .ok_or_else(|| ImportError::description("channel", format!("{column} is missing")))?;
+                .ok_or_else(|| {
+                    ImportError::description("channel", format!("{column} is missing"))
+                })?;
             series.push(Series::new(channel, &tables)?);
         }
         if id == 0 {
@@ -123,7 +157,11 @@ pub fn import(
         }
         for (channel, series) in log.in_order(&columns).zip(&mut series) {
             let estimated = delays.iter().find(|(name, _)| *name == channel.name);
-            series.advance(channel.delay_s.given_s(estimated.map(|(_, delay_s)| *delay_s)));
+            series.advance(
+                channel
+                    .delay_s
+                    .given_s(estimated.map(|(_, delay_s)| *delay_s)),
+            );
         }
         let grid = Grid::new(log, &columns, &series, path)?;
         let name = path.strip_prefix(folder).unwrap_or(path);

@@ -78,7 +78,9 @@ impl Grid {
             Method::Hold => held,
             Method::Interpolate => series.between(t_s).unwrap_or(held),
             Method::Mean => {
-                let since = series.last_at(t_s - self.period_s).map_or(0, |before| before + 1);
+                let since = series
+                    .last_at(t_s - self.period_s)
+                    .map_or(0, |before| before + 1);
                 let fresh = series.value.get(since..=last).unwrap_or(&[]);
                 if fresh.is_empty() {
                     held

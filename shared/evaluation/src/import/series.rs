@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use vigil_inference::angle::wrap;
 
-use super::description::{ChannelSource, Clock, LogDescription, Source};
 use super::ImportError;
+use super::description::{ChannelSource, Clock, LogDescription, Source};
 use crate::table::{Layout, Table};
 
 /// Columns of one source that are needed, with their rows.
@@ -48,31 +48,47 @@ pub(super) fn tables(log: &LogDescription, run: &Path) -> Result<Vec<SourceTable
             .and_then(|table| {
                 let factor = source.time.unit.factor();
                 let theirs = table.column(column)?.iter().map(|value| value * factor);
-                let mut apart: Vec<f64> = table.time_s.iter().zip(theirs).map(|(a, b)| a - b).collect();
+                let mut apart: Vec<f64> = table
+                    .time_s
+                    .iter()
+                    .zip(theirs)
+                    .map(|(a, b)| a - b)
+                    .collect();
                 apart.sort_by(f64::total_cmp);
                 apart.get(apart.len() / 2).copied()
             })
             .unwrap_or(0.0);
         if let Some(table) = tables.get_mut(i) {
-            table.time_s.iter_mut().for_each(|time_s| *time_s += shift_s);
+            table
+                .time_s
+                .iter_mut()
+                .for_each(|time_s| *time_s += shift_s);
         }
     }
     Ok(tables)
 }
 
 fn read(log: &LogDescription, source: &Source, run: &Path) -> Result<SourceTable, ImportError> {
-    let path = source.file.as_ref().map_or(run.to_path_buf(), |file| run.join(file));
+    let path = source
+        .file
+        .as_ref()
+        .map_or(run.to_path_buf(), |file| run.join(file));
     let mut columns: Vec<String> = vec![source.time.column.clone()];
     let mut add = |name: &String| {
         if !columns.contains(name) {
             columns.push(name.clone());
         }
     };
-    source.device_clock.iter().for_each(|clock| add(&clock.column));
+    source
+        .device_clock
+        .iter()
+        .for_each(|clock| add(&clock.column));
     let channels = log.channel.iter().filter(|c| c.source == source.name);
     channels.for_each(|channel| add(&channel.column));
     let others = log.source.iter().filter_map(|other| other.time_as.as_ref());
-    others.filter(|[name, _]| *name == source.name).for_each(|[_, column]| add(column));
+    others
+        .filter(|[name, _]| *name == source.name)
+        .for_each(|[_, column]| add(column));
     let layout = Layout {
         delimiter: source.delimiter as u8,
         skip_rows: source.skip_rows,
@@ -98,6 +114,9 @@ fn read(log: &LogDescription, source: &Source, run: &Path) -> Result<SourceTable
         None => out.time_s.clone(),
         Some(device) => clock(&out, device)?,
     };
+    if source.device_clock.is_some() {
+        out.time_s = steady(&out.device_s, &out.time_s);
+    }
     Ok(out)
 }
 
@@ -108,13 +127,33 @@ fn clock(table: &SourceTable, clock: &Clock) -> Result<Vec<f64>, ImportError> {
         Some(modulus) => unwrap(values, modulus),
         None => values.to_vec(),
     };
-    let times: Vec<f64> = unwrapped.iter().map(|value| value * clock.unit.factor()).collect();
+    let times: Vec<f64> = unwrapped
+        .iter()
+        .map(|value| value * clock.unit.factor())
+        .collect();
     if let Some(row) = times.windows(2).position(|pair| pair[1] < pair[0] - 1.0) {
         let (name, back_s) = (&clock.column, times[row] - times[row + 1]);
         let message = format!("{name} goes back by {back_s:.3} s: time must rise within a run");
         return Err(table.wrong(row + 1, message));
     }
     Ok(times)
+}
+
+/// The device's clock brought to the other by a line, whose offset and rate are constants of the
+/// run: the device keeps time better than the computer that stamps what arrives.
+fn steady(device_s: &[f64], time_s: &[f64]) -> Vec<f64> {
+    let n = device_s.len().max(1) as f64;
+    let middle = |values: &[f64]| values.iter().sum::<f64>() / n;
+    let (md, mt) = (middle(device_s), middle(time_s));
+    let (mut dd, mut dt) = (1e-12, 0.0);
+    for (device, time) in device_s.iter().zip(time_s) {
+        dd += (device - md) * (device - md);
+        dt += (device - md) * (time - mt);
+    }
+    device_s
+        .iter()
+        .map(|device| mt + (device - md) * dt / dd)
+        .collect()
 }
 
 /// A counter without its jumps by `modulus`.
@@ -189,7 +228,9 @@ impl Series {
 
     /// The last sample not after `t_s`, by its index.
     pub fn last_at(&self, t_s: f64) -> Option<usize> {
-        self.time_s.partition_point(|&time_s| time_s <= t_s).checked_sub(1)
+        self.time_s
+            .partition_point(|&time_s| time_s <= t_s)
+            .checked_sub(1)
     }
 
     /// The value on the line between the samples around `t_s`.

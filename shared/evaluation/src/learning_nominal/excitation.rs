@@ -14,10 +14,7 @@ const WIDTH_MIN: f64 = 0.05;
 const TOGETHER: f64 = 0.98;
 
 /// Ranges of the command in motion.
-pub(super) fn ranges(
-    records: &[Record],
-    robot: &Description,
-) -> Result<Vec<Range>, NominalError> {
+pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Range>, NominalError> {
     let found_s: f64 = records.iter().map(Record::moving_s).sum();
     if found_s < MOVING_MIN_S {
         return Err(NominalError::Still {
@@ -25,12 +22,20 @@ pub(super) fn ranges(
             needed_s: MOVING_MIN_S,
         });
     }
-    let newest = || records.iter().flat_map(|r| &r.histories).filter_map(|h| h.ago(0));
+    let newest = || {
+        records
+            .iter()
+            .flat_map(|r| &r.histories)
+            .filter_map(|h| h.ago(0))
+    };
     let moving = || newest().filter(|now| now.moving);
     let mut ranges = Vec::with_capacity(robot.command.len());
     for (i, axis) in robot.command.iter().enumerate() {
         let commands = || moving().filter_map(|now| now.command.get(i).copied());
-        let (min, max) = (commands().fold(f64::INFINITY, f64::min), commands().fold(f64::NEG_INFINITY, f64::max));
+        let (min, max) = (
+            commands().fold(f64::INFINITY, f64::min),
+            commands().fold(f64::NEG_INFINITY, f64::max),
+        );
         let needed = WIDTH_MIN * axis.limit;
         if max - min < needed {
             return Err(NominalError::Unexcited {
@@ -50,7 +55,9 @@ pub(super) fn ranges(
     }
     for i in 0..ranges.len() {
         for j in 0..i {
-            let pairs: Vec<(f64, f64)> = moving().map(|now| (now.command[i], now.command[j])).collect();
+            let pairs: Vec<(f64, f64)> = moving()
+                .map(|now| (now.command[i], now.command[j]))
+                .collect();
             let correlation = correlation(&pairs);
             if correlation.abs() > TOGETHER {
                 return Err(NominalError::Together {
@@ -66,7 +73,9 @@ pub(super) fn ranges(
 
 fn correlation(pairs: &[(f64, f64)]) -> f64 {
     let n = pairs.len().max(1) as f64;
-    let (ma, mb) = pairs.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+    let (ma, mb) = pairs
+        .iter()
+        .fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
     let (mut aa, mut bb, mut ab) = (1e-12, 1e-12, 0.0);
     for (x, y) in pairs {
         aa += (x - ma) * (x - ma);

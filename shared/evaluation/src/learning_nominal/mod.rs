@@ -2,7 +2,8 @@
 //!
 //! Every measured channel is regressed on the command and on the other channels (ridge, Huber
 //! weights); what is left gets a variance that may grow with speed, a colour, and the scatter of
-//! its mean from run to run. The runs left out (one run: its last third) tell whether all this
+//! its mean from run to run. The runs left out (one run: every
+//! third block of it) tell whether all this
 //! holds; a short log widens the deviations. Last comes the tail of the detector's log-odds.
 
 mod calibrate;
@@ -25,8 +26,8 @@ pub use report::{ChannelError, Report};
 
 /// Logs shorter than this are learned from with a warning and wider deviations, s.
 const LONG_ENOUGH_S: f64 = 600.0;
-/// Part of a single run that is left out for the test, at its end.
-const TEST_PART: f64 = 1.0 / 3.0;
+/// Blocks into which a single run is cut; every third is left out for the test.
+const BLOCKS: usize = 9;
 
 /// Why a nominal model could not be learned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -73,7 +74,9 @@ pub enum NominalError {
         correlation: f64,
     },
     /// The description measures nothing that a model could be made of.
-    #[error("no channel can be predicted: measured must have pose, wheel_rates, yaw_rate or currents")]
+    #[error(
+        "no channel can be predicted: measured must have pose, wheel_rates, yaw_rate or currents"
+    )]
     NoChannels,
     /// A channel has too few observations.
     #[error("{channel}: {found} observations to learn {needed} weights from")]
@@ -88,7 +91,7 @@ pub enum NominalError {
 }
 
 /// Learns a model from the runs that are not in `held_out`, up to `until_s` of each, and tests it
-/// on the others (a single run: on its last third, from which the final model learns too).
+/// on the others (a single run: on every third block of it, from which the final model learns too).
 ///
 /// # Errors
 /// [`NominalError`] naming what is missing.
@@ -111,10 +114,14 @@ pub fn learn(
         kind: KIND.to_owned(),
         version: VERSION,
         robot: robot.name.clone(),
-        wheels: robot.wheels.iter().map(|wheel| wheel.name.clone()).collect(),
+        wheels: robot
+            .wheels
+            .iter()
+            .map(|wheel| wheel.name.clone())
+            .collect(),
         interval_s: robot.interval_s,
         exposure_s,
-        widened: widening(exposure_s),
+        widened: widening(exposure_s, robot.interval_s),
         provenance: Provenance {
             data_hash: data_hash(&learned, until_s),
             runs_learned: learned.iter().map(|run| run.id).collect(),
@@ -132,7 +139,7 @@ pub fn learn(
     for (target, terms) in targets {
         let name = report::name(target, robot);
         let (train, test): (Vec<Record>, Vec<Record>) = if tests.is_empty() {
-            records.iter().map(|record| record.split(1.0 - TEST_PART)).unzip()
+            records.iter().map(|record| record.split(BLOCKS)).unzip()
         } else {
             (records.clone(), tests.clone())
         };
@@ -162,23 +169,26 @@ fn fit(
         target,
         terms: terms.to_vec(),
         weights: vec![0.0; terms.len()],
-        variance: [1.0, 0.0],
+        variance: [1.0, 0.0, 0.0],
         correlation: 0.0,
         offset_sd: 0.0,
+        drift_sd: 0.0,
+        scatter: 1.0,
         held_out_ratio: 1.0,
+        tails: Vec::new(),
     };
     regression::fit(&mut channel, records, &model.sizes(), name)?;
     noise::fit(&mut channel, records, model);
     Ok(channel)
 }
 
-/// Factor on the deviations of a short log: two standard errors of a deviation that was measured
-/// so long, at one independent reading a second.
-fn widening(exposure_s: f64) -> f64 {
+/// Factor on the deviations of a short log: two standard errors of a deviation from so many
+/// observations.
+fn widening(exposure_s: f64, interval_s: f64) -> f64 {
     if exposure_s >= LONG_ENOUGH_S {
         return 1.0;
     }
-    1.0 + 2.0 / (2.0 * exposure_s.max(1.0)).sqrt()
+    1.0 + 2.0 / (2.0 * exposure_s / interval_s).max(2.0).sqrt()
 }
 
 fn data_hash(runs: &[&Run], until_s: f64) -> String {
@@ -187,7 +197,11 @@ fn data_hash(runs: &[&Run], until_s: f64) -> String {
         hash = fnv1a::hash_u64(hash, u64::from(run.id));
         for frame in &run.frames {
             hash = fnv1a::hash_u64(hash, frame.header.t_capture_ns);
-            let values = frame.pose.iter().chain(&frame.command).chain(&frame.wheel_rate);
+            let values = frame
+                .pose
+                .iter()
+                .chain(&frame.command)
+                .chain(&frame.wheel_rate);
             for value in values.chain(&frame.current).chain([&frame.yaw_rate]) {
                 hash = fnv1a::hash_u64(hash, value.to_bits());
             }

@@ -19,14 +19,19 @@ impl Record {
         newest.filter(|now| now.moving).map(|now| now.dt_s).sum()
     }
 
-    /// The first part and the rest.
-    pub fn split(&self, part: f64) -> (Self, Self) {
-        let at = (self.histories.len() as f64 * part).round() as usize;
-        let (first, rest) = self.histories.split_at(at.min(self.histories.len()));
-        let of = |histories: &[History]| Self {
-            histories: histories.to_vec(),
+    /// Cut into blocks: all but every third, and every third.
+    pub fn split(&self, blocks: usize) -> (Self, Self) {
+        let length = self.histories.len().div_ceil(blocks.max(3)).max(1);
+        let part = |is_test: bool| {
+            let chunks = self.histories.chunks(length).enumerate();
+            let chunks = chunks.filter(|(i, _)| (i % 3 == 2) == is_test);
+            Self {
+                histories: chunks
+                    .flat_map(|(_, chunk)| chunk.iter().copied())
+                    .collect(),
+            }
         };
-        (of(first), of(rest))
+        (part(false), part(true))
     }
 }
 

@@ -31,7 +31,11 @@ pub(super) fn fit(
             continue;
         }
         let value = history.ago(0).and_then(|now| channel.target.value(now));
-        let row: Option<Vec<f64>> = channel.terms.iter().map(|t| t.value(history, sizes)).collect();
+        let row: Option<Vec<f64>> = channel
+            .terms
+            .iter()
+            .map(|t| t.value(history, 0, sizes))
+            .collect();
         if let (Some(value), Some(row)) = (value, row) {
             rows.extend(row);
             values.push(value);
@@ -84,5 +88,8 @@ fn solve(matrix: &DMatrix<f64>, values: &DVector<f64>) -> Option<DVector<f64>> {
     for (value, scale) in solution.iter_mut().zip(&scale) {
         *value /= scale;
     }
-    solution.iter().all(|value| value.is_finite()).then_some(solution)
+    solution
+        .iter()
+        .all(|value| value.is_finite())
+        .then_some(solution)
 }

@@ -22,6 +22,10 @@ pub struct ChannelError {
     pub correlation: f64,
     /// Scatter of the mean from run to run.
     pub offset_sd: f64,
+    /// Change of that mean from one observation to the next.
+    pub drift_sd: f64,
+    /// Mean square of the whitened residual in the noisiest usual run.
+    pub scatter: f64,
     /// Root mean square of the whitened residual on the part left out: 1 is the floor.
     pub held_out_ratio: f64,
     /// Factor by which the deviations were widened.
@@ -86,13 +90,18 @@ impl Report {
             residual_sd: channel.variance[0].sqrt(),
             correlation: channel.correlation,
             offset_sd: channel.offset_sd,
+            drift_sd: channel.drift_sd,
+            scatter: channel.scatter,
             held_out_ratio: channel.held_out_ratio,
             widened,
         });
     }
 
     pub(super) fn finish(&mut self, model: &Model) {
-        let short = model.calibration.iter().any(|c| c.exposure_h * 3600.0 < LONG_ENOUGH_S);
+        let short = model
+            .calibration
+            .iter()
+            .any(|c| c.exposure_h * 3600.0 < LONG_ENOUGH_S);
         if short {
             self.warnings.push(
                 "alarm thresholds extrapolate far beyond this log: expect rarer, later alarms \
@@ -105,7 +114,10 @@ impl Report {
 
 /// A channel's name in messages.
 pub(super) fn name(target: Target, robot: &Description) -> String {
-    let wheel = robot.wheels.get(target.wheel).map_or("?", |wheel| &wheel.name);
+    let wheel = robot
+        .wheels
+        .get(target.wheel)
+        .map_or("?", |wheel| &wheel.name);
     match target.quantity {
         Quantity::Forward => "pose, forward".to_owned(),
         Quantity::Lateral => "pose, lateral".to_owned(),
@@ -125,17 +137,26 @@ impl fmt::Display for Report {
         )?;
         writeln!(
             f,
-            "{:<16} {:>12} {:>12} {:>12} {:>10} {:>8}",
-            "channel", "deviation", "correlation", "run offset", "left out", "widened"
+            "{:<16} {:>12} {:>12} {:>12} {:>10} {:>8} {:>10} {:>8}",
+            "channel",
+            "deviation",
+            "correlation",
+            "run offset",
+            "drift",
+            "scatter",
+            "left out",
+            "widened"
         )?;
         for channel in &self.channels {
             writeln!(
                 f,
-                "{:<16} {:>12.5} {:>12.2} {:>12.5} {:>10.2} {:>8.2}",
+                "{:<16} {:>12.5} {:>12.2} {:>12.5} {:>10.5} {:>8.2} {:>10.2} {:>8.2}",
                 channel.channel,
                 channel.residual_sd,
                 channel.correlation,
                 channel.offset_sd,
+                channel.drift_sd,
+                channel.scatter,
                 channel.held_out_ratio,
                 channel.widened
             )?;

@@ -100,14 +100,15 @@ pub enum Term {
 }
 
 impl Term {
-    /// Its value; `size` holds the learned size of each axis. None if it was not measured.
+    /// Its value `ago` observations before the newest; `size` holds the learned size of each axis.
+    /// None if it was not measured.
     #[must_use]
-    pub fn value(&self, history: &History, size: &[f64; COMMANDS]) -> Option<f64> {
+    pub fn value(&self, history: &History, ago: usize, size: &[f64; COMMANDS]) -> Option<f64> {
         let axis = |lag: usize, i: usize| {
-            let command = history.ago(lag)?.command.get(i)?;
+            let command = history.ago(ago + lag)?.command.get(i)?;
             Some(command / size.get(i)?)
         };
-        let wheel = |lag: usize, i: usize| *history.ago(lag)?.wheels.get(i)?;
+        let wheel = |lag: usize, i: usize| *history.ago(ago + lag)?.wheels.get(i)?;
         match *self {
             Self::Constant => Some(1.0),
             Self::Command { powers } => {
@@ -136,31 +137,84 @@ pub struct Channel {
     /// Weight of each term.
     pub weights: Vec<f64>,
     /// Variance of the residual of one observation: the first value, plus the second times the
-    /// square of the commanded path speed in m/s.
-    pub variance: [f64; 2],
+    /// square of the commanded path speed in m/s, plus the third times the square of what the
+    /// prediction has changed by since the last observation (no two channels keep the same time).
+    pub variance: [f64; 3],
     /// Correlation of successive residuals. Negative: each carries an error that the next takes
     /// back (increments of a noisy pose), above -0.5. Positive: it decays, below 1.
     pub correlation: f64,
     /// Standard deviation of a run's own constant offset (its ground, its battery).
     pub offset_sd: f64,
+    /// Standard deviation of the offset's change from one observation to the next (a ground that
+    /// is not even), in the least even usual run.
+    pub drift_sd: f64,
+    /// Mean square of the whitened residual in the noisiest usual run, at least 1: more than that
+    /// counts as scatter.
+    pub scatter: f64,
     /// Root mean square of the whitened residual on the part left out, over that expected: about 1.
     pub held_out_ratio: f64,
+    /// How its log-odds behave without a fault, one per form of the detection filter.
+    #[serde(default)]
+    pub tails: Vec<Tail>,
+}
+
+/// How often the log-odds of one channel exceed a level without a fault: more rarely by `exp(-slope)`
+/// per unit. No channel is as regular as its model: what little regular ones claim, counts less.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tail {
+    /// Form of the detection filter.
+    pub form: String,
+    /// Level, natural log-odds at a prior rate of one fault an hour.
+    pub level_log_odds: f64,
+    /// Mean time between exceedances of it, h.
+    pub interval_h: f64,
+    /// Slope.
+    pub slope: f64,
+}
+
+impl Tail {
+    /// The log-odds that a channel without flaw would give for an event as rare. For such a one
+    /// they grow as the logarithm of the time between exceedances, at a prior rate of 1/h.
+    #[must_use]
+    pub fn tempered(&self, log_odds: f64) -> f64 {
+        self.interval_h.ln() + self.slope * (log_odds - self.level_log_odds)
+    }
 }
 
 impl Channel {
-    /// Measured less predicted value; none if one of them is not known.
+    /// Measured less predicted value, and how much the prediction has changed since the last
+    /// observation; none if one of them is not known.
     #[must_use]
-    pub fn residual(&self, history: &History, size: &[f64; COMMANDS]) -> Option<f64> {
-        let mut residual = self.target.value(history.ago(0)?)?;
-        for (term, weight) in self.terms.iter().zip(&self.weights) {
-            residual -= weight * term.value(history, size)?;
-        }
-        Some(residual)
+    pub fn residual(&self, history: &History, size: &[f64; COMMANDS]) -> Option<Residual> {
+        let now = history.ago(0)?;
+        let predicted = self.predict(history, 0, size)?;
+        let change = predicted - self.predict(history, 1, size)?;
+        let [base, by_speed, by_change] = self.variance;
+        let speed = now.path_speed_m_s;
+        Some(Residual {
+            apart: self.target.value(now)? - predicted,
+            basis: [1.0, speed * speed, change * change],
+            variance: base + by_speed * speed * speed + by_change * change * change,
+        })
     }
 
-    /// Variance of the residual at a commanded path speed, m/s.
-    #[must_use]
-    pub fn variance_at(&self, speed_m_s: f64) -> f64 {
-        self.variance[0] + self.variance[1] * speed_m_s * speed_m_s
+    fn predict(&self, history: &History, ago: usize, size: &[f64; COMMANDS]) -> Option<f64> {
+        let mut predicted = 0.0;
+        for (term, weight) in self.terms.iter().zip(&self.weights) {
+            predicted += weight * term.value(history, ago, size)?;
+        }
+        Some(predicted)
     }
+}
+
+/// What is left of a measured value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residual {
+    /// Measured less predicted value.
+    pub apart: f64,
+    /// What [`Channel::variance`] is multiplied by.
+    pub basis: [f64; 3],
+    /// Its variance.
+    pub variance: f64,
 }

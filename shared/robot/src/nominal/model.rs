@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use vigil_blocks::{COMMANDS, WHEELS, fnv1a};
 
-use super::channel::Channel;
+use super::channel::{Channel, Tail};
 use crate::Description;
 use crate::learned::model::{ModelError, Provenance};
 use crate::learned::monitor::Channels;
@@ -114,7 +114,10 @@ impl Model {
             return Ok(());
         }
         let shown = |wheels: String, axes: Vec<&str>, interval_s: f64| {
-            format!("wheels {wheels}; command {}; {interval_s} s", axes.join(" "))
+            format!(
+                "wheels {wheels}; command {}; {interval_s} s",
+                axes.join(" ")
+            )
         };
         let model_axes = self.command.iter().map(|range| range.name.as_str());
         let robot_axes = robot.command.iter().map(|axis| axis.name.as_str());
@@ -163,9 +166,16 @@ impl Model {
             return refuse("kind".into(), self.kind.clone(), "nominal");
         }
         if !(0.02..=1.0).contains(&self.interval_s) {
-            return refuse("interval_s".into(), self.interval_s.to_string(), "0.02 to 1");
+            return refuse(
+                "interval_s".into(),
+                self.interval_s.to_string(),
+                "0.02 to 1",
+            );
         }
-        let ranges = self.command.iter().all(|r| r.min.is_finite() && r.max >= r.min);
+        let ranges = self
+            .command
+            .iter()
+            .all(|r| r.min.is_finite() && r.max >= r.min);
         if self.command.is_empty() || self.command.len() > COMMANDS || !ranges {
             let found = format!("{} axes", self.command.len());
             return refuse("command".into(), found, "1 to 4 axes, min up to max");
@@ -195,15 +205,28 @@ fn unusable(channel: &Channel) -> Option<String> {
     if channel.weights.iter().any(|weight| !weight.is_finite()) {
         return Some("a weight that is not finite".into());
     }
-    let [base, by_speed] = channel.variance;
-    if !(base.is_finite() && base > 0.0 && by_speed.is_finite() && by_speed >= 0.0) {
-        return Some(format!("variance {base}, {by_speed}"));
+    let variance = channel.variance;
+    if !(variance[0] > 0.0 && variance.iter().all(|v| v.is_finite() && *v >= 0.0)) {
+        return Some(format!("variance {variance:?}"));
     }
     if !(channel.correlation > -0.5 && channel.correlation < 1.0) {
         return Some(format!("correlation {}", channel.correlation));
     }
     if !(channel.offset_sd.is_finite() && channel.offset_sd >= 0.0) {
         return Some(format!("offset_sd {}", channel.offset_sd));
+    }
+    if !(channel.scatter.is_finite() && channel.scatter >= 1.0) {
+        return Some(format!("scatter {}", channel.scatter));
+    }
+    let is_sane = |tail: &Tail| {
+        let positive = tail.slope > 0.0 && tail.interval_h > 0.0 && tail.interval_h.is_finite();
+        positive && tail.slope.is_finite() && tail.level_log_odds.is_finite()
+    };
+    if !channel.tails.iter().all(is_sane) {
+        return Some(format!("tails {:?}", channel.tails));
+    }
+    if !(channel.drift_sd.is_finite() && channel.drift_sd >= 0.0) {
+        return Some(format!("drift_sd {}", channel.drift_sd));
     }
     None
 }

@@ -3,18 +3,18 @@
 //! Each channel's residual is whitened by its [`Track`]. Two fault states stand against the nominal
 //! one, per channel: an unknown constant bias, which is learned ([`Form::LearnedBias`]), and the
 //! constant likelihood of any large residual, for faults that show as scatter (a taped wheel jolts
-//! the robot once a turn and has no mean). The channels' odds add up: a fault enters by one of
-//! them.
+//! the robot once a turn and has no mean). The channels' odds, each tempered by its [`Tail`], add up:
+//! a fault enters by one of them.
 //!
-//! The noise is that of this very robot, measured on its own log; a rise of it is a symptom and is
-//! not explained away.
+//! The noise is that of this very robot, measured on its own log; a rise beyond what its runs have
+//! shown is a symptom and is not explained away.
 
 use nalgebra::SVector;
 use vigil_blocks::{CHANNELS, Channel as Slot, WHEELS};
 use vigil_inference::constant::Constant;
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 
-use super::channel::{Channel, Quantity};
+use super::channel::{Channel, Quantity, Tail};
 use super::model::Model;
 use super::observation::{History, Observation};
 use super::track::Track;
@@ -29,7 +29,7 @@ const CLIP: f64 = 6.0;
 /// A robot that has just begun to move is taken up to speed first, s.
 const START_S: f64 = 0.5;
 /// A pose says nothing on the model until the command has been steady for so long, s.
-const SETTLE_S: f64 = 0.5;
+const SETTLE_S: f64 = 1.0;
 /// Observed motion after which evidence counts, s.
 const READY_S: f64 = 1.0;
 /// Growth of the deviation per width of the learned range by which a command lies outside it.
@@ -44,6 +44,8 @@ struct Watched {
     track: Track,
     bias: Evidence<1>,
     scatter: Constant,
+    /// Its tail for the form in use; none while it is being learned.
+    tail: Option<Tail>,
 }
 
 /// The detection filter.
@@ -71,6 +73,11 @@ impl Monitor {
             track: Track::new(channel),
             bias: Evidence::new(form, BIAS),
             scatter: Constant::default(),
+            tail: channel
+                .tails
+                .iter()
+                .find(|tail| tail.form == form.name())
+                .cloned(),
         });
         let mut monitor = Self {
             sizes: model.sizes(),
@@ -152,6 +159,7 @@ impl Monitor {
                 track,
                 bias,
                 scatter,
+                ..
             } = watched;
             let settled = now.steady_s >= SETTLE_S || !channel.target.quantity.is_pose();
             let residual = channel.residual(history, &self.sizes);
@@ -159,11 +167,11 @@ impl Monitor {
                 track.interrupt();
                 continue;
             };
-            let variance = widening * channel.variance_at(now.path_speed_m_s);
-            let (apart, spread) = track.step(channel, residual, variance, following);
+            let variance = widening * residual.variance;
+            let (apart, spread) = track.step(channel, residual.apart, variance, following);
             let whitened = (apart / spread.sqrt()).clamp(-CLIP, CLIP);
             bias.step(&SVector::from([whitened]), birth);
-            let square = whitened * whitened;
+            let square = whitened * whitened / channel.scatter;
             scatter.step(square, TAU_SQUARED_PER_DIMENSION, birth, birth);
             self.report.evidence += log_normal(apart, spread);
         }
@@ -192,6 +200,10 @@ impl Monitor {
                 _ => Slot::POSE,
             };
             let odds = log_add(watched.bias.log_odds(), watched.scatter.log_odds());
+            let odds = watched
+                .tail
+                .as_ref()
+                .map_or(odds, |tail| tail.tempered(odds));
             channels[slot] = log_add(channels[slot], odds);
         }
         self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);

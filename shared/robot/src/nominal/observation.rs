@@ -7,7 +7,7 @@ use crate::Description;
 use crate::learned::Intake;
 
 /// Observations that a prediction may look back, the newest included.
-pub const DEPTH: usize = 4;
+pub const DEPTH: usize = 5;
 /// A pause between frames longer than this breaks the record, s.
 const GAP_S: f64 = 0.5;
 /// A frame that comes this part of a period early still completes an observation.
@@ -261,8 +261,7 @@ impl Observer {
         let twist = self.robot.twist(&now.command);
         now.path_speed_m_s = self.robot.path_speed_m_s(twist);
         let rolls = |rate: &f64| rate.abs() * self.robot.wheel_radius_m > STANDING_M_S;
-        now.moving =
-            now.path_speed_m_s > STANDING_M_S || now.wheels.iter().flatten().any(rolls);
+        now.moving = now.path_speed_m_s > STANDING_M_S || now.wheels.iter().flatten().any(rolls);
         now.per_metre = self.moved(twist, &now);
         self.pose_before = self.pose.take();
         let changed = last.is_none_or(|last| {

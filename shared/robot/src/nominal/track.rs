@@ -1,6 +1,6 @@
 //! A run's offset and the noise's colour: residuals of a channel become white.
 //!
-//! State: the run's constant offset, and one carried over from the last residual. With a negative
+//! State: the run's offset, constant but for a slow drift, and one carried over from the last residual. With a negative
 //! correlation `residual = offset + w + n - n'` (w white, n' the error that the last one made);
 //! with a positive one `residual = offset + a`, a first-order process. A Kalman filter gives the
 //! innovation; divided by its deviation it is white with variance 1, if the model holds.
@@ -56,6 +56,7 @@ impl Track {
             };
             self.carried = true;
         }
+        self.covariance[0] += channel.drift_sd * channel.drift_sd;
         if following {
             self.covariance[0] += FOLLOWING * variance;
         }
