@@ -4,10 +4,16 @@ use vigil_blocks::{
     Channel, DetectionBelief, Entry, PARTICLE_CAPACITY, ParticleBlock, SensorFrame, Symptoms,
 };
 use vigil_inference::logspace::probability;
+use vigil_inference::particles::PoseParticles;
 use vigil_robot::Description;
 use vigil_robot::learned::monitor::Channels;
-use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
+use vigil_robot::learned::{
+    Calibration, Form, Model, ModelError, Monitor, NoiseScales, Observer,
+};
+use vigil_robot::nominal;
 use vigil_setup::schema;
+
+use crate::watch::{Observed, Watch};
 
 /// An alarm falls when the log-odds have stayed this far below those that raise it ..
 const CLEAR_BELOW: f64 = 8.0;
@@ -54,8 +60,7 @@ pub enum DetectorError {
 /// the steps between repeat it. Equal entries and seeds give bit-identical beliefs.
 #[derive(Debug, Clone)]
 pub struct Detector {
-    observer: Observer,
-    monitor: Monitor,
+    watch: Watch,
     fault_rate_1_s: f64,
     alarm_log_odds: f64,
     particles: usize,
@@ -85,21 +90,51 @@ impl Detector {
         seed: u64,
     ) -> Result<Self, DetectorError> {
         model.check_robot(robot)?;
+        let (channels, form) = chosen(settings);
+        let calibration = model.calibration(channels, form)?;
+        let rate = settings.fault_rate_1_h;
+        Self::watching(model.interval_s, calibration, form, settings, |particles| {
+            Watch::Faults {
+                observer: Observer::new(model, robot),
+                monitor: Monitor::new(model, robot, channels, form, particles, rate, seed),
+            }
+        })
+    }
+
+    /// A detector for a robot of which only the nominal behaviour is known.
+    ///
+    /// # Errors
+    /// As [`Detector::new`].
+    pub fn nominal(
+        model: &nominal::Model,
+        robot: &Description,
+        settings: &schema::Detector,
+    ) -> Result<Self, DetectorError> {
+        model.check_robot(robot)?;
+        let (channels, form) = chosen(settings);
+        let calibration = model.calibration(channels, form)?;
+        let rate = settings.fault_rate_1_h;
+        Self::watching(model.interval_s, calibration, form, settings, |_| {
+            Watch::Nominal {
+                observer: Box::new(nominal::Observer::new(robot)),
+                monitor: nominal::Monitor::new(model, channels, form, rate),
+                last: Observed::default(),
+            }
+        })
+    }
+
+    fn watching(
+        interval_s: f64,
+        calibration: &Calibration,
+        form: Form,
+        settings: &schema::Detector,
+        watch: impl FnOnce(usize) -> Watch,
+    ) -> Result<Self, DetectorError> {
         if !(1..=PARTICLE_CAPACITY).contains(&settings.particles) {
             return Err(DetectorError::Particles(settings.particles));
         }
         let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
         let interval = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
-        let channels = match settings.sensors {
-            schema::Sensors::Pose => Channels::Pose,
-            schema::Sensors::PoseEncoders => Channels::PoseEncoders,
-        };
-        let form = match settings.form {
-            schema::Form::LearnedBias => Form::LearnedBias,
-            schema::Form::Constant => Form::Constant,
-            schema::Form::Windowed => Form::Windowed,
-        };
-        let calibration = model.calibration(channels, form)?;
         let alarm_log_odds = calibration.alarm_log_odds(interval, rate);
         if alarm_log_odds > form.log_odds_max() {
             let form = form.name();
@@ -110,13 +145,12 @@ impl Detector {
         }
         let particles = settings.particles;
         Ok(Self {
-            observer: Observer::new(model, robot),
-            monitor: Monitor::new(model, robot, channels, form, particles, rate, seed),
+            watch: watch(particles),
             fault_rate_1_s: rate / 3600.0,
             alarm_log_odds,
             particles,
             armed: false,
-            period_s: model.interval_s,
+            period_s: interval_s,
             t_last_ns: 0,
             run_id: 0,
             alarm_t_ns: 0,
@@ -148,10 +182,10 @@ impl Detector {
             Entry::Missed(count) => missed = count,
             Entry::Budget(count) => {
                 let count = (count as usize).clamp(1, self.particles);
-                self.monitor.resize(count);
+                self.watch.resize(count);
             }
             Entry::Reset => {
-                self.observer.reset();
+                self.watch.reset_observer();
                 self.begin_run();
             }
         }
@@ -160,13 +194,13 @@ impl Detector {
     }
 
     fn begin_run(&mut self) {
-        self.monitor.reset();
+        self.watch.reset();
         (self.armed, self.quiet_s) = (false, 0.0);
         (self.alarm_t_ns, self.symptoms) = (0, 0);
     }
 
     fn take(&mut self, frame: &SensorFrame) {
-        let intake = self.observer.push(frame);
+        let intake = self.watch.push(frame);
         self.external = frame.symptoms & Symptoms::ALL;
         self.invalid_count = self.invalid_count.saturating_add(u32::from(intake.invalid));
         if intake.new_run {
@@ -184,15 +218,14 @@ impl Detector {
     }
 
     fn observe(&mut self) {
-        let observation = self.observer.observation();
+        let observation = self.watch.step(self.alarm_t_ns != 0);
         let moving = observation.moving;
-        self.monitor.step(observation, self.alarm_t_ns != 0);
         if !self.armed {
             // Evidence from before the noise scale is known is no evidence.
-            self.armed = self.monitor.is_ready();
-            self.monitor.forget_evidence();
+            self.armed = self.watch.is_ready();
+            self.watch.forget_evidence();
         }
-        let log_odds = self.monitor.report().log_odds;
+        let log_odds = self.watch.report().log_odds;
         if self.alarm_t_ns == 0 {
             if self.armed && log_odds > self.alarm_log_odds {
                 self.alarm_t_ns = observation.t_ns.max(1);
@@ -212,7 +245,7 @@ impl Detector {
                 self.alarm_t_ns = 0;
             }
         }
-        let off_course = self.monitor.report().channels[Channel::POSE] > SYMPTOM_LOG_ODDS;
+        let off_course = self.watch.report().channels[Channel::POSE] > SYMPTOM_LOG_ODDS;
         self.symptoms = if !off_course {
             0
         } else if moving {
@@ -223,7 +256,7 @@ impl Detector {
     }
 
     fn report(&self, missed: u32, belief: &mut DetectionBelief) {
-        let report = self.monitor.report();
+        let report = self.watch.report();
         let p_now = probability(report.log_odds);
         // The state stays at the last frame; what is told is its prediction.
         let appears = self.fault_rate_1_s * self.period_s * f64::from(missed);
@@ -247,7 +280,7 @@ impl Detector {
             pose,
             wheels,
             steer,
-        } = self.monitor.noise().scales();
+        } = self.watch.scales();
         belief.noise_scale = pose;
         belief.noise_scale_wheels = wheels;
         belief.noise_scale_steer = steer;
@@ -258,11 +291,14 @@ impl Detector {
         belief.symptoms = self.symptoms | self.external;
         belief.invalid_count = self.invalid_count;
         belief.degenerate_count = report.degenerate_count;
-        belief.particle_count = self.monitor.particles().len() as u32;
+        belief.particle_count = self.watch.particles().map_or(0, PoseParticles::len) as u32;
     }
 
     fn publish(&self, block: &mut ParticleBlock) {
-        let cloud = self.monitor.particles();
+        let Some(cloud) = self.watch.particles() else {
+            block.count = 0;
+            return;
+        };
         let count = cloud.len().min(PARTICLE_CAPACITY);
         block.count = count as u32;
         block.mode[..count].fill(0);
@@ -273,6 +309,19 @@ impl Detector {
             block.log_weight[i] = cloud.log_weight[i] as f32;
         }
     }
+}
+
+fn chosen(settings: &schema::Detector) -> (Channels, Form) {
+    let channels = match settings.sensors {
+        schema::Sensors::Pose => Channels::Pose,
+        schema::Sensors::PoseEncoders => Channels::PoseEncoders,
+    };
+    let form = match settings.form {
+        schema::Form::LearnedBias => Form::LearnedBias,
+        schema::Form::Constant => Form::Constant,
+        schema::Form::Windowed => Form::Windowed,
+    };
+    (channels, form)
 }
 
 fn positive(key: &'static str, value: f64) -> Result<f64, DetectorError> {

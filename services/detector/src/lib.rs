@@ -4,6 +4,7 @@
 
 mod assemble;
 mod detector;
+mod watch;
 pub mod wiring;
 
 pub use assemble::assemble;

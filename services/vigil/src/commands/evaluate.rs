@@ -64,7 +64,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut labels: BTreeMap<u32, Label> =
         labels.into_iter().map(|label| (label.run, label)).collect();
     if args.part == Part::Heldout {
-        let held_out = &model.provenance.runs_held_out;
+        let held_out = model.runs_held_out();
         runs.retain(|run| held_out.contains(&run.id));
         if runs.is_empty() {
             let (model, frames) = (args.filter.model.display(), args.filter.frames.display());

@@ -1,4 +1,4 @@
-//! `vigil learn`: learns a robot's model from labelled runs.
+//! `vigil learn`: learns a robot's model, from labelled runs or from healthy ones alone.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -9,23 +9,31 @@ use vigil_evaluation::frames;
 use vigil_evaluation::labels;
 use vigil_evaluation::learning::{self, Options, Report};
 use vigil_evaluation::split::split;
+use vigil_robot::Description;
 
 use super::offline::RobotArgs;
-use super::{CommandError, Outcome};
+use super::{CommandError, Outcome, learn_nominal};
 use crate::output;
 
 /// Largest part of the runs that may be left out.
 const TEST_FRACTION_MAX: f64 = 0.9;
 
-/// Learns the transition models from labelled runs, and tests them on the runs left out.
+/// Learns a robot's model, and tests it on the runs left out.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Recorded frames (CSV, plain or gzip).
     #[arg(long, value_name = "F")]
     frames: PathBuf,
-    /// Labels of the runs (CSV).
+    /// Labels of the runs (CSV). Without them every run counts as one without a fault, and the
+    /// model is of nominal behaviour alone.
     #[arg(long, value_name = "R")]
-    runs: PathBuf,
+    runs: Option<PathBuf>,
+    /// Runs to learn from, by their ids, separated by commas; without labels only.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', conflicts_with = "runs")]
+    only: Vec<u32>,
+    /// End of what is learned from in each run, s; without labels only.
+    #[arg(long, value_name = "S", conflicts_with = "runs")]
+    until: Option<f64>,
     /// Where to write the model (TOML).
     #[arg(long, value_name = "MODEL")]
     out: PathBuf,
@@ -71,7 +79,15 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         return Err(CommandError::usage(refused));
     }
     let robot = args.robot.load()?;
-    let labels = labels::read(&args.runs, &robot).map_err(CommandError::usage)?;
+    let Some(labels) = &args.runs else {
+        return unlabelled(args, &robot);
+    };
+    if !robot.has_fault_models() {
+        let refused = "--runs: faults are learned for an ackermann6 only; leave the labels out, and \
+                       the faulty runs too (--only)";
+        return Err(CommandError::usage(refused));
+    }
+    let labels = labels::read(labels, &robot).map_err(CommandError::usage)?;
     let runs = frames::read(&args.frames, &robot).map_err(CommandError::usage)?;
     let with_frames: Vec<_> = labels
         .iter()
@@ -104,8 +120,31 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     Ok(Outcome::Done)
 }
 
+/// Learns from runs without labels.
+fn unlabelled(args: &Args, robot: &Description) -> Result<Outcome, CommandError> {
+    let mut runs = frames::read(&args.frames, robot).map_err(CommandError::usage)?;
+    let ids: Vec<u32> = runs.iter().map(|run| run.id).collect();
+    if let Some(id) = args.only.iter().find(|id| !ids.contains(id)) {
+        let refused = format!("--only: {} has no run {id}", args.frames.display());
+        return Err(CommandError::usage(refused));
+    }
+    if !args.only.is_empty() {
+        runs.retain(|run| args.only.contains(&run.id));
+    }
+    learn_nominal::run(&learn_nominal::Task {
+        robot,
+        runs: &runs,
+        frames: &args.frames,
+        out: &args.out,
+        test_fraction: args.test_fraction,
+        seed: args.seed,
+        until_s: args.until.unwrap_or(f64::INFINITY),
+        json: args.json,
+    })
+}
+
 /// Writes a file so that its place holds either the old one or the whole new one.
-fn write_whole(path: &Path, text: &str) -> io::Result<()> {
+pub(super) fn write_whole(path: &Path, text: &str) -> io::Result<()> {
     let mut name = path.as_os_str().to_owned();
     name.push(format!(".{}.part", std::process::id()));
     let part = PathBuf::from(name);
