@@ -161,9 +161,6 @@ impl fmt::Display for Report {
                 channel.widened
             )?;
         }
-        for warning in &self.warnings {
-            writeln!(f, "warning: {warning}")?;
-        }
         Ok(())
     }
 }
