@@ -11,6 +11,7 @@ pub mod naive;
 pub mod noncentrality;
 pub mod options;
 pub mod rare;
+pub mod real;
 pub mod recorded;
 pub mod shares;
 pub mod simulated;

@@ -55,6 +55,9 @@ impl Recorded {
     pub fn read(root: &Path) -> Result<Self, Box<dyn Error>> {
         let robot = vigil_setup::load_robot(&root.join("config/robots/rover.toml"))?;
         let model = vigil_setup::load_model(&root.join("config/models/rover.toml"), Some(&robot))?;
+        let model = model
+            .with_faults()
+            .ok_or("the rover's model has no faults")?;
         let tree = vigil_setup::load_tree(&root.join("config/trees/rover.toml"))?;
         let decision = vigil_setup::load_decision(&root.join("config/rover.pomdp"))?;
         let data = root.join("tests/data/rover");

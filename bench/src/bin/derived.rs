@@ -47,6 +47,9 @@ fn run() -> Result<(), Box<dyn Error>> {
     }
     let robot = vigil_setup::load_robot(&root().join("config/robots/rover.toml"))?;
     let model = vigil_setup::load_model(&root().join(MODEL), Some(&robot))?;
+    let model = model
+        .with_faults()
+        .ok_or("the rover's model has no faults")?;
     let folder = std::env::temp_dir().join(format!("vigil-derived-{}", std::process::id()));
     fs::create_dir_all(&folder)?;
     let scored = score_all(&folder, &robot, &model);

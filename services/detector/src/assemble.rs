@@ -1,5 +1,6 @@
 //! From the configuration to a detector.
 
+use vigil_robot::RobotModel;
 use vigil_setup::Setup;
 
 use crate::{Detector, DetectorError};
@@ -10,5 +11,10 @@ use crate::{Detector, DetectorError};
 /// [`DetectorError`] if model, robot and settings do not fit together.
 pub fn assemble(setup: &Setup) -> Result<Detector, DetectorError> {
     let file = &setup.file;
-    Detector::new(&setup.model, &setup.robot, &file.detector, file.graph.seed)
+    match &setup.model {
+        RobotModel::Faults(model) => {
+            Detector::new(model, &setup.robot, &file.detector, file.graph.seed)
+        }
+        RobotModel::Nominal(model) => Detector::nominal(model, &setup.robot, &file.detector),
+    }
 }

@@ -1,17 +1,17 @@
 //! The detector's `step`: guard, observe, monitor, alarm, report.
 
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{
     Channel, DetectionBelief, Entry, PARTICLE_CAPACITY, ParticleBlock, SensorFrame, Symptoms,
 };
-use vigil_inference::angle::wrap;
 use vigil_inference::logspace::probability;
-use vigil_inference::particles::PoseParticles;
 use vigil_robot::Description;
 use vigil_robot::learned::monitor::Channels;
-use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
+use vigil_robot::learned::{Calibration, Form, Model, ModelError, Monitor, NoiseScales, Observer};
+use vigil_robot::nominal;
 use vigil_setup::schema;
+
+use crate::cloud::Cloud;
+use crate::watch::{Observed, Watch};
 
 /// An alarm falls when the log-odds have stayed this far below those that raise it ..
 const CLEAR_BELOW: f64 = 8.0;
@@ -58,11 +58,7 @@ pub enum DetectorError {
 /// the steps between repeat it. Equal entries and seeds give bit-identical beliefs.
 #[derive(Debug, Clone)]
 pub struct Detector {
-    observer: Observer,
-    monitor: Monitor,
-    cloud: PoseParticles,
-    seed: u64,
-    rng: Pcg64Mcg,
+    watch: Watch,
     fault_rate_1_s: f64,
     alarm_log_odds: f64,
     particles: usize,
@@ -92,21 +88,52 @@ impl Detector {
         seed: u64,
     ) -> Result<Self, DetectorError> {
         model.check_robot(robot)?;
+        let (channels, form) = chosen(settings);
+        let calibration = model.calibration(channels, form)?;
+        let rate = settings.fault_rate_1_h;
+        Self::watching(model.interval_s, calibration, form, settings, |particles| {
+            Watch::Faults {
+                observer: Observer::new(model, robot),
+                monitor: Monitor::new(model, robot, channels, form, rate),
+                cloud: Cloud::new(particles, seed),
+            }
+        })
+    }
+
+    /// A detector for a robot of which only the nominal behaviour is known.
+    ///
+    /// # Errors
+    /// As [`Detector::new`].
+    pub fn nominal(
+        model: &nominal::Model,
+        robot: &Description,
+        settings: &schema::Detector,
+    ) -> Result<Self, DetectorError> {
+        model.check_robot(robot)?;
+        let (channels, form) = chosen(settings);
+        let calibration = model.calibration(channels, form)?;
+        let rate = settings.fault_rate_1_h;
+        Self::watching(model.interval_s, calibration, form, settings, |_| {
+            Watch::Nominal {
+                observer: Box::new(nominal::Observer::new(robot)),
+                monitor: nominal::Monitor::new(model, channels, form, rate),
+                last: Observed::default(),
+            }
+        })
+    }
+
+    fn watching(
+        interval_s: f64,
+        calibration: &Calibration,
+        form: Form,
+        settings: &schema::Detector,
+        watch: impl FnOnce(usize) -> Watch,
+    ) -> Result<Self, DetectorError> {
         if !(1..=PARTICLE_CAPACITY).contains(&settings.particles) {
             return Err(DetectorError::Particles(settings.particles));
         }
         let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
         let interval = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
-        let channels = match settings.sensors {
-            schema::Sensors::Pose => Channels::Pose,
-            schema::Sensors::PoseEncoders => Channels::PoseEncoders,
-        };
-        let form = match settings.form {
-            schema::Form::LearnedBias => Form::LearnedBias,
-            schema::Form::Constant => Form::Constant,
-            schema::Form::Windowed => Form::Windowed,
-        };
-        let calibration = model.calibration(channels, form)?;
         let alarm_log_odds = calibration.alarm_log_odds(interval, rate);
         if alarm_log_odds > form.log_odds_max() {
             let form = form.name();
@@ -117,16 +144,12 @@ impl Detector {
         }
         let particles = settings.particles;
         Ok(Self {
-            observer: Observer::new(model, robot),
-            monitor: Monitor::new(model, robot, channels, form, rate),
-            cloud: PoseParticles::new(particles),
-            seed,
-            rng: Pcg64Mcg::seed_from_u64(seed),
+            watch: watch(particles),
             fault_rate_1_s: rate / 3600.0,
             alarm_log_odds,
             particles,
             armed: false,
-            period_s: model.interval_s,
+            period_s: interval_s,
             t_last_ns: 0,
             run_id: 0,
             alarm_t_ns: 0,
@@ -158,10 +181,10 @@ impl Detector {
             Entry::Missed(count) => missed = count,
             Entry::Budget(count) => {
                 let count = (count as usize).clamp(1, self.particles);
-                self.cloud.resize(count);
+                self.watch.resize(count);
             }
             Entry::Reset => {
-                self.observer.reset();
+                self.watch.reset_observer();
                 self.begin_run();
             }
         }
@@ -170,14 +193,13 @@ impl Detector {
     }
 
     fn begin_run(&mut self) {
-        self.monitor.reset();
-        self.rng = Pcg64Mcg::seed_from_u64(self.seed);
+        self.watch.reset();
         (self.armed, self.quiet_s) = (false, 0.0);
         (self.alarm_t_ns, self.symptoms) = (0, 0);
     }
 
     fn take(&mut self, frame: &SensorFrame) {
-        let intake = self.observer.push(frame);
+        let intake = self.watch.push(frame);
         self.external = frame.symptoms & Symptoms::ALL;
         self.invalid_count = self.invalid_count.saturating_add(u32::from(intake.invalid));
         if intake.new_run {
@@ -195,18 +217,14 @@ impl Detector {
     }
 
     fn observe(&mut self) {
-        let observation = self.observer.observation();
+        let observation = self.watch.step(self.alarm_t_ns != 0);
         let moving = observation.moving;
-        self.monitor.step(observation, self.alarm_t_ns != 0);
-        let track = self.monitor.track();
-        self.cloud
-            .draw(track.pose(), track.pose_covariance(), &mut self.rng);
         if !self.armed {
             // Evidence from before the noise scale is known is no evidence.
-            self.armed = self.monitor.is_ready();
-            self.monitor.forget_evidence();
+            self.armed = self.watch.is_ready();
+            self.watch.forget_evidence();
         }
-        let log_odds = self.monitor.report().log_odds;
+        let log_odds = self.watch.report().log_odds;
         if self.alarm_t_ns == 0 {
             if self.armed && log_odds > self.alarm_log_odds {
                 self.alarm_t_ns = observation.t_ns.max(1);
@@ -226,7 +244,7 @@ impl Detector {
                 self.alarm_t_ns = 0;
             }
         }
-        let off_course = self.monitor.report().channels[Channel::POSE] > SYMPTOM_LOG_ODDS;
+        let off_course = self.watch.report().channels[Channel::POSE] > SYMPTOM_LOG_ODDS;
         self.symptoms = if !off_course {
             0
         } else if moving {
@@ -237,7 +255,7 @@ impl Detector {
     }
 
     fn report(&self, missed: u32, belief: &mut DetectionBelief) {
-        let report = self.monitor.report();
+        let report = self.watch.report();
         let p_now = probability(report.log_odds);
         // The state stays at the last frame; what is told is its prediction.
         let appears = self.fault_rate_1_s * self.period_s * f64::from(missed);
@@ -257,12 +275,12 @@ impl Detector {
             0.0
         };
         // Drawn anew after every observation: all of equal weight.
-        belief.effective_sample_size = self.cloud.poses().len() as f64;
+        belief.effective_sample_size = self.watch.cloud().map_or(0, Cloud::len) as f64;
         let NoiseScales {
             pose,
             wheels,
             steer,
-        } = self.monitor.noise().scales();
+        } = self.watch.scales();
         belief.noise_scale = pose;
         belief.noise_scale_wheels = wheels;
         belief.noise_scale_steer = steer;
@@ -273,21 +291,28 @@ impl Detector {
         belief.symptoms = self.symptoms | self.external;
         belief.invalid_count = self.invalid_count;
         belief.degenerate_count = report.degenerate_count;
-        belief.particle_count = self.cloud.poses().len() as u32;
+        belief.particle_count = self.watch.cloud().map_or(0, Cloud::len) as u32;
     }
 
     fn publish(&self, block: &mut ParticleBlock) {
-        let poses = self.cloud.poses();
-        let count = poses.len().min(PARTICLE_CAPACITY);
-        block.count = count as u32;
-        block.mode[..count].fill(0);
-        block.log_weight[..count].fill(-(count as f32).ln());
-        for (i, pose) in poses.iter().enumerate().take(count) {
-            block.x[i] = pose[0] as f32;
-            block.y[i] = pose[1] as f32;
-            block.yaw[i] = wrap(pose[2]) as f32;
+        match self.watch.cloud() {
+            Some(cloud) => cloud.publish(block),
+            None => block.count = 0,
         }
     }
+}
+
+fn chosen(settings: &schema::Detector) -> (Channels, Form) {
+    let channels = match settings.sensors {
+        schema::Sensors::Pose => Channels::Pose,
+        schema::Sensors::PoseEncoders => Channels::PoseEncoders,
+    };
+    let form = match settings.form {
+        schema::Form::LearnedBias => Form::LearnedBias,
+        schema::Form::Constant => Form::Constant,
+        schema::Form::Windowed => Form::Windowed,
+    };
+    (channels, form)
 }
 
 fn positive(key: &'static str, value: f64) -> Result<f64, DetectorError> {

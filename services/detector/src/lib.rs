@@ -3,7 +3,9 @@
 //! [`Detector`] is a pure function of journal entries; [`wiring`] connects it to its ports.
 
 mod assemble;
+mod cloud;
 mod detector;
+mod watch;
 pub mod wiring;
 
 pub use assemble::assemble;

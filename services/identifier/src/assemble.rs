@@ -2,11 +2,11 @@
 
 use vigil_decision::Pomdp;
 use vigil_inference::FaultTree;
-use vigil_robot::Description;
 use vigil_robot::learned::Model;
+use vigil_robot::{Description, RobotModel};
 use vigil_setup::Setup;
 
-use crate::{Identifier, IdentifierError};
+use crate::{Diagnoser, Identifier, IdentifierError, Watcher};
 
 /// The models that an identifier is built from.
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +25,7 @@ pub struct Models<'a> {
 ///
 /// # Errors
 /// [`IdentifierError`] if model, robot, tree and settings do not fit together.
-pub fn assemble(setup: &Setup) -> Result<Identifier, IdentifierError> {
+pub fn assemble(setup: &Setup) -> Result<Diagnoser, IdentifierError> {
     let Setup {
         file,
         model,
@@ -34,6 +34,10 @@ pub fn assemble(setup: &Setup) -> Result<Identifier, IdentifierError> {
         decision,
         ..
     } = setup;
+    let model = match model {
+        RobotModel::Faults(model) => model,
+        RobotModel::Nominal(_) => return Ok(Diagnoser::Watcher(Watcher::new(tree))),
+    };
     let models = Models {
         model,
         robot,
@@ -41,5 +45,6 @@ pub fn assemble(setup: &Setup) -> Result<Identifier, IdentifierError> {
         decision: Some(decision),
     };
     let (settings, sensors) = (&file.identifier, file.detector.sensors);
-    Identifier::new(&models, settings, sensors, file.graph.seed)
+    let identifier = Identifier::new(&models, settings, sensors, file.graph.seed)?;
+    Ok(Diagnoser::from(identifier))
 }

@@ -14,6 +14,7 @@ mod posterior;
 mod reasons;
 mod risk;
 mod sets;
+mod watcher;
 pub mod wiring;
 
 pub use assemble::{Models, assemble};
@@ -22,4 +23,5 @@ pub use identifier::{Identifier, Input};
 pub use modes::{IdentifierError, Leaves};
 pub use posterior::Posterior;
 pub use risk::risks;
+pub use watcher::{Diagnoser, Watcher};
 pub use wiring::IdentifierStage;

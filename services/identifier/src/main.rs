@@ -8,7 +8,7 @@ use vigil_blocks::DetectionBelief;
 use vigil_cycle::Topic;
 use vigil_cycle::serve::{self, ServeError};
 use vigil_cycle::topic::ServiceName;
-use vigil_identifier::{Identifier, IdentifierStage, assemble};
+use vigil_identifier::{Diagnoser, IdentifierStage, assemble};
 use vigil_setup::{ServiceArgs, Setup};
 
 /// Identifies the fault.
@@ -44,7 +44,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn prepare(args: &ServiceArgs) -> Result<(Setup, Identifier), Box<dyn std::error::Error>> {
+fn prepare(args: &ServiceArgs) -> Result<(Setup, Diagnoser), Box<dyn std::error::Error>> {
     let setup = args.graph.load()?;
     let identifier = assemble(&setup).map_err(|e| format!("{}: {e}", setup.path.display()))?;
     Ok((setup, identifier))

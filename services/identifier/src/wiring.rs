@@ -10,7 +10,7 @@ use vigil_cycle::{
     Topic,
 };
 
-use crate::{Identifier, Input};
+use crate::{Diagnoser, Input};
 
 /// Sensor frames that may wait for their detection.
 const PENDING_MAX: usize = 64;
@@ -20,7 +20,7 @@ const PENDING_MAX: usize = 64;
 /// It is woken by the detection and joins it with its sensor frame by (epoch, seq). A frame whose
 /// detection was folded or lost is stepped without one.
 pub struct IdentifierStage {
-    identifier: Identifier,
+    identifier: Diagnoser,
     detections: Box<dyn Receiver<DetectionBelief>>,
     detected: Box<dyn Receiver<ParticleBlock>>,
     frames: Box<dyn Receiver<SensorFrame>>,
@@ -49,7 +49,7 @@ impl IdentifierStage {
     ///
     /// # Errors
     /// The transport's.
-    pub fn new(identifier: Identifier, graph: &Graph, period_ns: u64) -> Result<Self, PortError> {
+    pub fn new(identifier: Diagnoser, graph: &Graph, period_ns: u64) -> Result<Self, PortError> {
         Ok(Self {
             identifier,
             detections: graph.receiver(Topic::Detection)?,

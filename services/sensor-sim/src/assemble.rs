@@ -76,7 +76,7 @@ fn chosen(
     match wanted {
         None | Some("all") => {}
         Some("heldout") => {
-            let held_out = &setup.model.provenance.runs_held_out;
+            let held_out = &setup.model.provenance().runs_held_out;
             runs.retain(|run| held_out.contains(&run.id));
             if runs.is_empty() {
                 let (path, model) = (path.display(), setup.model_path.display());

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use commands::{Outcome, check, diagnose, evaluate, inject, learn};
+use commands::{Outcome, check, diagnose, evaluate, import, inject, learn};
 
 /// Fault detection, diagnosis and recovery for mobile robots.
 ///
@@ -22,6 +22,7 @@ struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Import(import::Args),
     Learn(learn::Args),
     Diagnose(diagnose::Args),
     Evaluate(evaluate::Args),
@@ -31,6 +32,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let result = match Args::parse().command {
+        Command::Import(args) => import::run(&args),
         Command::Learn(args) => learn::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),

@@ -6,7 +6,9 @@ use vigil_blocks::{
 use vigil_detector::{Detector, DetectorError};
 use vigil_evaluation::frames::Run;
 use vigil_evaluation::scoring::{MULTIPLE, Side, Taxonomy, UNKNOWN, Verdict};
-use vigil_identifier::{Identifier, IdentifierError, Input, Models};
+use vigil_identifier::{Diagnoser, Identifier, IdentifierError, Input, Models, Watcher};
+use vigil_inference::FaultTree;
+use vigil_robot::{Description, nominal};
 use vigil_setup::schema;
 
 /// Why a pipeline was refused.
@@ -23,7 +25,7 @@ pub enum PipelineError {
 /// Detector and identifier in one process.
 pub struct Pipeline {
     detector: Detector,
-    identifier: Identifier,
+    identifier: Diagnoser,
     taxonomy: Taxonomy,
     detection: Box<DetectionBelief>,
     detection_particles: Box<ParticleBlock>,
@@ -42,16 +44,41 @@ impl Pipeline {
         identifier: &schema::Identifier,
         seed: u64,
     ) -> Result<Self, PipelineError> {
-        let sensors = detector.sensors;
-        Ok(Self {
-            detector: Detector::new(models.model, models.robot, detector, seed)?,
-            identifier: Identifier::new(models, identifier, sensors, seed)?,
-            taxonomy: Taxonomy::new(models.tree, models.robot),
+        let identifier = Identifier::new(models, identifier, detector.sensors, seed)?;
+        Ok(Self::of(
+            Detector::new(models.model, models.robot, detector, seed)?,
+            Diagnoser::from(identifier),
+            Taxonomy::new(models.tree, models.robot),
+        ))
+    }
+
+    /// A pipeline for a robot of which only the nominal behaviour is known.
+    ///
+    /// # Errors
+    /// [`PipelineError`] if model, robot and settings do not fit together.
+    pub fn nominal(
+        model: &nominal::Model,
+        robot: &Description,
+        tree: &FaultTree,
+        detector: &schema::Detector,
+    ) -> Result<Self, PipelineError> {
+        Ok(Self::of(
+            Detector::nominal(model, robot, detector)?,
+            Diagnoser::Watcher(Watcher::new(tree)),
+            Taxonomy::new(tree, robot),
+        ))
+    }
+
+    fn of(detector: Detector, identifier: Diagnoser, taxonomy: Taxonomy) -> Self {
+        Self {
+            detector,
+            identifier,
+            taxonomy,
             detection: Box::default(),
             detection_particles: Box::default(),
             diagnosis: Box::default(),
             diagnosis_particles: Box::default(),
-        })
+        }
     }
 
     /// Log-odds at which the detector's alarm rises, nats.

@@ -1,15 +1,17 @@
 //! Recorded sensor frames.
 //!
-//! CSV, plain or gzip: `run, t` (s), `x, y` (m), `yaw` (rad, wrapped), `enc_<WHEEL>` (rad/s) for
-//! every wheel, `steer_<WHEEL>` (rad) for every steered wheel, `cmd_curv` (1/m, left positive),
-//! `cmd_speed` (m/s). Columns are found by name, in any order; others are ignored. The rows of a
-//! run are contiguous and in order of time. Several runs may follow each other.
+//! CSV, plain or gzip: `run, t` (s), the axes of the robot's command by their names (rover:
+//! `cmd_curv` 1/m, left positive, and `cmd_speed` m/s), and what the robot's description says is
+//! measured: `x, y` (m), `yaw` (rad, wrapped), `enc_<WHEEL>` (rad/s) for every wheel,
+//! `steer_<WHEEL>` (rad) for every steered wheel, `yaw_rate` (rad/s), `current_<WHEEL>` (A).
+//! Columns are found by name, in any order; others are ignored. The rows of a run are contiguous
+//! and in order of time. Several runs may follow each other.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::path::Path;
 
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::{COMMANDS, SensorFrame, Valid, WHEELS};
 use vigil_robot::Description;
 
 use crate::table::Table;
@@ -32,73 +34,108 @@ pub struct Run {
     pub frames: Vec<SensorFrame>,
 }
 
-/// Positions of the columns.
-struct Columns {
-    fixed: Vec<usize>,
-    encoders: Vec<(usize, usize)>,
-    steers: Vec<(usize, usize)>,
+/// What a column holds besides run and time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Field {
+    /// An axis of the command, in its own unit.
+    Command(usize),
+    /// x m, y m or yaw rad.
+    Pose(usize),
+    /// Rate of a wheel, rad/s.
+    WheelRate(usize),
+    /// Angle of a steered wheel, rad.
+    Steer(usize),
+    /// Yaw rate, rad/s.
+    YawRate,
+    /// Motor current of a wheel, A.
+    Current(usize),
 }
 
-const FIXED: [&str; 7] = ["run", "t", "x", "y", "yaw", "cmd_curv", "cmd_speed"];
+impl Field {
+    /// Writes a value to its place in a frame, and marks it as measured.
+    pub fn put(self, value: f64, frame: &mut SensorFrame) {
+        let (place, bit) = match self {
+            Self::Command(i) => (&mut frame.command[i], Valid::command(i)),
+            Self::Pose(i) => (&mut frame.pose[i], Valid::POSE),
+            Self::WheelRate(i) => (&mut frame.wheel_rate[i], Valid::wheel_rate(i)),
+            Self::Steer(i) => (&mut frame.steer[i], Valid::steer(i)),
+            Self::YawRate => (&mut frame.yaw_rate, Valid::YAW_RATE),
+            Self::Current(i) => (&mut frame.current[i], Valid::current(i)),
+        };
+        *place = value;
+        frame.valid |= bit;
+    }
+}
+
+/// Names and contents of the columns of a robot's frames, after `run` and `t`.
+#[must_use]
+pub fn fields(robot: &Description) -> Vec<(String, Field)> {
+    let mut out = Vec::new();
+    let measured = &robot.measured;
+    if measured.pose {
+        let names = ["x", "y", "yaw"].into_iter().enumerate();
+        out.extend(names.map(|(i, name)| (name.to_owned(), Field::Pose(i))));
+    }
+    let axes = robot.command.iter().enumerate().take(COMMANDS);
+    out.extend(axes.map(|(i, axis)| (axis.name.clone(), Field::Command(i))));
+    let wheels = || robot.wheels.iter().enumerate().take(WHEELS);
+    if measured.wheel_rates {
+        out.extend(wheels().map(|(i, w)| (format!("enc_{}", w.name), Field::WheelRate(i))));
+    }
+    if measured.steer {
+        let steered = wheels().filter(|(_, w)| w.steered);
+        out.extend(steered.map(|(i, w)| (format!("steer_{}", w.name), Field::Steer(i))));
+    }
+    if measured.yaw_rate {
+        out.push(("yaw_rate".to_owned(), Field::YawRate));
+    }
+    if measured.currents {
+        out.extend(wheels().map(|(i, w)| (format!("current_{}", w.name), Field::Current(i))));
+    }
+    out
+}
+
+/// Positions of the columns.
+struct Columns {
+    run: usize,
+    t: usize,
+    fields: Vec<(usize, String, Field)>,
+}
 
 impl Columns {
     fn find(table: &Table, robot: &Description) -> Result<Self, FramesError> {
-        let wheels = || robot.wheels.iter().enumerate();
-        let encoders: Vec<(usize, String)> = wheels()
-            .map(|(i, w)| (i, format!("enc_{}", w.name)))
-            .collect();
-        let steers: Vec<(usize, String)> = wheels()
-            .filter(|(_, w)| w.steered)
-            .map(|(i, w)| (i, format!("steer_{}", w.name)))
-            .collect();
-        let mut names: Vec<String> = FIXED.iter().map(|&name| name.to_owned()).collect();
-        names.extend(encoders.iter().chain(&steers).map(|(_, name)| name.clone()));
+        let fields = fields(robot);
+        let mut names = vec!["run".to_owned(), "t".to_owned()];
+        names.extend(fields.iter().map(|(name, _)| name.clone()));
         let at = table.require(&names)?;
-        let (fixed, rest) = at.split_at(FIXED.len());
-        let (enc, steer) = rest.split_at(encoders.len());
-        let pair = |wheels: &[(usize, String)], at: &[usize]| {
-            wheels
-                .iter()
-                .map(|(i, _)| *i)
-                .zip(at.iter().copied())
-                .collect()
+        let [run, t, at @ ..] = at.as_slice() else {
+            return Err(table.wrong("columns are missing".into()));
         };
+        let fields = fields.into_iter().zip(at);
         Ok(Self {
-            fixed: fixed.to_vec(),
-            encoders: pair(&encoders, enc),
-            steers: pair(&steers, steer),
+            run: *run,
+            t: *t,
+            fields: fields
+                .map(|((name, field), &at)| (at, name, field))
+                .collect(),
         })
     }
 
-    fn frame(&self, table: &Table, robot: &Description) -> Result<(u32, SensorFrame), FramesError> {
-        let [run, t, x, y, yaw, curvature, speed] = self.fixed[..] else {
-            return Err(table.wrong("columns are missing".into()));
-        };
+    fn frame(&self, table: &Table) -> Result<(u32, SensorFrame), FramesError> {
         let mut frame = SensorFrame::default();
-        let id = table.whole(run)?;
+        let id = table.whole(self.run)?;
         frame.run_id = u64::from(id) + 1;
-        let t_s = table.number(t)?;
+        let t_s = table.number(self.t)?;
         if !(0.0..=1e9).contains(&t_s) {
             return Err(table.wrong(format!("t is {t_s}, allowed is 0 to 1e9 s")));
         }
         frame.header.t_capture_ns = (t_s * 1e9).round() as u64;
-        frame.pose = [table.number(x)?, table.number(y)?, table.number(yaw)?];
-        angle(table, "yaw", frame.pose[2])?;
-        frame.command[0] = table.number(curvature)?;
-        frame.command[1] = table.number(speed)?;
-        frame.valid = Valid::POSE | Valid::command(0) | Valid::command(1);
-        for &(wheel, column) in &self.encoders {
-            frame.wheel_rate[wheel] = table.number(column)?;
-            frame.valid |= Valid::wheel_rate(wheel);
-        }
-        for &(wheel, column) in &self.steers {
-            frame.steer[wheel] = table.number(column)?;
-            angle(
-                table,
-                &format!("steer_{}", robot.wheels[wheel].name),
-                frame.steer[wheel],
-            )?;
-            frame.valid |= Valid::steer(wheel);
+        for (column, name, field) in &self.fields {
+            let value = table.number(*column)?;
+            field.put(value, &mut frame);
+            if matches!(field, Field::Pose(2) | Field::Steer(_)) {
+                angle(table, name, value)?;
+            }
         }
         Ok((id, frame))
     }
@@ -122,7 +159,7 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
     let columns = Columns::find(&table, robot)?;
     let (mut runs, mut seen) = (Vec::<Run>::new(), BTreeSet::new());
     while table.advance()? {
-        let (id, mut frame) = columns.frame(&table, robot)?;
+        let (id, mut frame) = columns.frame(&table)?;
         if runs.last().is_none_or(|run| run.id != id) {
             if !seen.insert(id) {
                 let message = format!("run {id} appears again: the rows of a run are contiguous");

@@ -2,7 +2,8 @@
 //!
 //! CSV: `run`, `mode` (`ND`, `<WHEEL>_STUCK`, `<WHEEL>_ENC`), `kind` (`stuck`, `zero`, `frozen`,
 //! `noise`, or empty), `wheel` (or empty), `onset_s` (-1 for none), `cmd_curv`, `cmd_speed`,
-//! `dur_s`; if wanted, `terrain`. Other columns are ignored.
+//! `dur_s`; if wanted, `terrain`. Other columns are ignored. For a robot whose faults are not
+//! modelled, `run`, `mode` and `onset_s` are enough, and a mode may have any name.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -52,17 +53,28 @@ const COLUMNS: [&str; 8] = [
     "dur_s",
 ];
 
+/// What is needed for a robot whose faults are not modelled.
+const NOMINAL: [&str; 3] = ["run", "mode", "onset_s"];
+
 /// Reads the labels of a file.
 ///
 /// # Errors
 /// [`LabelsError`] naming file, row, column, what was found and what is allowed.
 pub fn read(path: &Path, robot: &Description) -> Result<Vec<Label>, LabelsError> {
     let mut table = Table::open(path)?;
-    let names: Vec<String> = COLUMNS.iter().map(|&name| name.to_owned()).collect();
+    let needed = if robot.has_fault_models() {
+        &COLUMNS[..]
+    } else {
+        &NOMINAL[..]
+    };
+    let names: Vec<String> = needed.iter().map(|&name| name.to_owned()).collect();
     let at = table.require(&names)?;
     let (mut labels, mut seen) = (Vec::new(), BTreeSet::new());
     while table.advance()? {
-        let label = label(&table, &at, robot)?;
+        let label = match at[..] {
+            [run, mode, onset] => unnamed(&table, run, mode, onset)?,
+            _ => label(&table, &at, robot)?,
+        };
         if !seen.insert(label.run) {
             return Err(table.wrong(format!("run {} appears twice", label.run)));
         }
@@ -106,13 +118,7 @@ fn label(table: &Table, at: &[usize], robot: &Description) -> Result<Label, Labe
         );
         return Err(table.wrong(message));
     }
-    let onset_s = Some(table.number(onset)?).filter(|s| *s >= 0.0);
-    let mode = table.text(mode).to_owned();
-    if (mode == "ND") != onset_s.is_none() {
-        let (mode, onset) = (quoted(&mode), quoted(table.text(onset)));
-        let message = format!("mode is '{mode}' but onset_s is {onset}");
-        return Err(table.wrong(format!("{message}: only ND has none (-1)")));
-    }
+    let (mode, onset_s) = fault(table, mode, onset)?;
     Ok(Label {
         run: table.whole(run)?,
         mode,
@@ -123,4 +129,31 @@ fn label(table: &Table, at: &[usize], robot: &Description) -> Result<Label, Labe
         command_speed_m_s: table.number(speed)?,
         duration_s: table.number(duration)?,
     })
+}
+
+/// Label of a run whose fault, if any, has only a name.
+fn unnamed(table: &Table, run: usize, mode: usize, onset: usize) -> Result<Label, LabelsError> {
+    let (mode, onset_s) = fault(table, mode, onset)?;
+    Ok(Label {
+        run: table.whole(run)?,
+        mode,
+        kind: String::new(),
+        wheel: None,
+        onset_s,
+        command_curvature_1_m: 0.0,
+        command_speed_m_s: 0.0,
+        duration_s: 0.0,
+    })
+}
+
+/// Mode and onset, which must agree.
+fn fault(table: &Table, mode: usize, onset: usize) -> Result<(String, Option<f64>), LabelsError> {
+    let onset_s = Some(table.number(onset)?).filter(|s| *s >= 0.0);
+    let mode = table.text(mode).to_owned();
+    if (mode == "ND") != onset_s.is_none() {
+        let (mode, onset) = (quoted(&mode), quoted(table.text(onset)));
+        let message = format!("mode is '{mode}' but onset_s is {onset}");
+        return Err(table.wrong(format!("{message}: only ND has none (-1)")));
+    }
+    Ok((mode, onset_s))
 }

@@ -3,8 +3,10 @@
 pub mod cases;
 pub mod derived;
 pub mod frames;
+pub mod import;
 pub mod labels;
 pub mod learning;
+pub mod learning_nominal;
 pub mod plausible;
 pub mod report;
 pub mod scoring;

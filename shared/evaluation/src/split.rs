@@ -31,6 +31,18 @@ pub fn split(labels: &[Label], test_fraction: f64, seed: u64) -> Vec<u32> {
     held_out
 }
 
+/// Ids to leave out of runs without labels: about `test_fraction` of them, drawn with `seed`, in
+/// rising order.
+#[must_use]
+pub fn split_runs(runs: &[u32], test_fraction: f64, seed: u64) -> Vec<u32> {
+    let mut held_out = runs.to_vec();
+    held_out.sort_unstable();
+    held_out.shuffle(&mut Pcg64Mcg::seed_from_u64(seed));
+    held_out.truncate((runs.len() as f64 * test_fraction.clamp(0.0, 1.0)).round() as usize);
+    held_out.sort_unstable();
+    held_out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -70,6 +70,24 @@ impl<R: Read> Read for Limited<R> {
     }
 }
 
+/// How a table is laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Layout {
+    /// Separator of columns.
+    pub delimiter: u8,
+    /// Rows before the one that names the columns.
+    pub skip_rows: usize,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        Self {
+            delimiter: b',',
+            skip_rows: 0,
+        }
+    }
+}
+
 /// An open table: its header is read.
 pub(crate) struct Table {
     path: PathBuf,
@@ -82,6 +100,11 @@ pub(crate) struct Table {
 impl Table {
     /// Opens a file; compression is recognised by its content.
     pub(crate) fn open(path: &Path) -> Result<Self, TableError> {
+        Self::open_as(path, Layout::default())
+    }
+
+    /// Opens a file of another layout.
+    pub(crate) fn open_as(path: &Path, layout: Layout) -> Result<Self, TableError> {
         let io = |error| TableError::Io {
             path: path.to_path_buf(),
             error,
@@ -94,13 +117,25 @@ impl Table {
             Box::new(plain)
         };
         let left = TABLE_BYTES_MAX;
-        Self::new(path, Box::new(Limited { content, left }))
+        let mut content = BufReader::new(Limited { content, left });
+        let mut skipped = Vec::new();
+        for _ in 0..layout.skip_rows {
+            skipped.clear();
+            content.read_until(b'\n', &mut skipped).map_err(io)?;
+        }
+        Self::delimited(path, Box::new(content), layout.delimiter)
     }
 
     /// Reads the header of `content`; `path` only names it.
+    #[cfg(test)]
     pub(crate) fn new(path: &Path, content: Box<dyn Read>) -> Result<Self, TableError> {
+        Self::delimited(path, content, b',')
+    }
+
+    fn delimited(path: &Path, content: Box<dyn Read>, by: u8) -> Result<Self, TableError> {
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
+            .delimiter(by)
             .from_reader(content);
         let headers = reader
             .headers()
@@ -194,7 +229,7 @@ pub(crate) fn quoted(text: &str) -> String {
     shown.replace(char::is_control, "?")
 }
 
-fn wrong_row(path: &Path, row: u64, message: String) -> TableError {
+pub(crate) fn wrong_row(path: &Path, row: u64, message: String) -> TableError {
     TableError::Row {
         path: path.to_path_buf(),
         row,

@@ -9,6 +9,51 @@ pub enum Kinematics {
     /// Six wheels on rocker-bogies, corner wheels steered about a common centre; the command is
     /// (signed curvature 1/m, speed m/s).
     Ackermann6,
+    /// Two driven wheels, one on each side; the command is (speed m/s, yaw rate rad/s).
+    Differential,
+    /// Three omnidirectional wheels; the command is (velocity forward m/s, velocity left m/s) and,
+    /// if the robot is turned too, yaw rate rad/s.
+    Omni3,
+}
+
+/// One axis of the command vector.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    /// Name: of its column in recorded frames, and in messages.
+    pub name: String,
+    /// Unit, for messages: `m/s`, `rad/s`, `1/m`.
+    pub unit: String,
+    /// Largest magnitude that the robot is ever given, in that unit.
+    pub limit: f64,
+}
+
+/// Which channels are measured, besides the command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Measured {
+    /// Pose: columns `x`, `y`, `yaw`.
+    pub pose: bool,
+    /// Rates of all wheels: columns `enc_<WHEEL>`.
+    pub wheel_rates: bool,
+    /// Angles of all steered wheels: columns `steer_<WHEEL>`.
+    pub steer: bool,
+    /// Yaw rate of a gyro: column `yaw_rate`.
+    pub yaw_rate: bool,
+    /// Motor currents of all wheels: columns `current_<WHEEL>`.
+    pub currents: bool,
+}
+
+impl Default for Measured {
+    fn default() -> Self {
+        Self {
+            pose: true,
+            wheel_rates: true,
+            steer: true,
+            yaw_rate: false,
+            currents: false,
+        }
+    }
 }
 
 /// One wheel. Lengths in m from `base_link` (ground projection of the centre; x forward, y left).
@@ -50,7 +95,8 @@ pub struct SensorNoise {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
-    /// Largest magnitude of commanded curvature, 1/m.
+    /// Largest magnitude of commanded curvature, 1/m; only an `ackermann6` has one.
+    #[serde(default = "any_curvature_1_m")]
     pub curvature_1_m: f64,
     /// Largest speed, m/s.
     pub speed_m_s: f64,
@@ -70,17 +116,114 @@ pub struct Description {
     pub kinematics: Kinematics,
     /// Radius of the wheels, m.
     pub wheel_radius_m: f64,
-    /// Mass, kg.
+    /// Mass, kg; only the simulator needs it, which drives an `ackermann6`.
+    #[serde(default = "unknown_mass_kg")]
     pub mass_kg: f64,
+    /// Axes of the command, in the order that the kinematics give; left out: those of the rover,
+    /// `cmd_curv` and `cmd_speed`.
+    #[serde(default = "rover_command")]
+    pub command: Vec<Axis>,
+    /// Measured channels; left out: those of the rover.
+    #[serde(default)]
+    pub measured: Measured,
+    /// Order of the polynomials of the command in a nominal model, 1 to 4.
+    #[serde(default = "four")]
+    pub polynomial_order: usize,
+    /// Interval over which a nominal model averages frames into one observation, s, 0.02 to 1.
+    #[serde(default = "tenth")]
+    pub interval_s: f64,
     /// Wheels, at most [`vigil_blocks::WHEELS`].
     pub wheels: Vec<Wheel>,
-    /// Sensor noise.
+    /// Sensor noise; left out, or "estimate": a nominal model learns it from the log.
+    #[serde(default, deserialize_with = "given_or_estimated")]
     pub noise: SensorNoise,
     /// Limits.
     pub limits: Limits,
 }
 
+impl Default for SensorNoise {
+    /// Small and harmless values, for a robot whose noise is learned: nothing reads them.
+    fn default() -> Self {
+        Self {
+            reference_rate_hz: 20.0,
+            position_m: 0.005,
+            yaw_rad: 0.005,
+            yaw_rate_rad_s: 0.01,
+            wheel_rate_rad_s: 0.05,
+            steer_rad: 0.003,
+            current_a: 0.05,
+        }
+    }
+}
+
+fn unknown_mass_kg() -> f64 {
+    10.0
+}
+
+fn rover_command() -> Vec<Axis> {
+    let axis = |name: &str, unit: &str, limit| Axis {
+        name: name.to_owned(),
+        unit: unit.to_owned(),
+        limit,
+    };
+    vec![axis("cmd_curv", "1/m", 1.2), axis("cmd_speed", "m/s", 0.5)]
+}
+
+fn four() -> usize {
+    4
+}
+
+fn tenth() -> f64 {
+    0.1
+}
+
+fn any_curvature_1_m() -> f64 {
+    1e3
+}
+
+/// Sensor noise as a table, or the word "estimate".
+fn given_or_estimated<'de, D: serde::Deserializer<'de>>(from: D) -> Result<SensorNoise, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Given {
+        Table(SensorNoise),
+        Word(String),
+    }
+    match Given::deserialize(from)? {
+        Given::Table(noise) => Ok(noise),
+        Given::Word(word) if word == "estimate" => Ok(SensorNoise::default()),
+        Given::Word(word) => Err(serde::de::Error::custom(format!(
+            "noise is '{word}': allowed are \"estimate\" and a table of standard deviations"
+        ))),
+    }
+}
+
 impl Description {
+    /// True if the robot's faults are modelled one by one, false if only its nominal behaviour is.
+    #[must_use]
+    pub fn has_fault_models(&self) -> bool {
+        self.kinematics == Kinematics::Ackermann6
+    }
+
+    /// Velocity that a command asks for: forward m/s, left m/s, yaw rate rad/s.
+    #[must_use]
+    pub fn twist(&self, command: &[f64]) -> [f64; 3] {
+        let axis = |i: usize| command.get(i).copied().unwrap_or(0.0);
+        match self.kinematics {
+            Kinematics::Ackermann6 => [axis(1), 0.0, axis(0) * axis(1)],
+            Kinematics::Differential => [axis(0), 0.0, axis(1)],
+            Kinematics::Omni3 => [axis(0), axis(1), axis(2)],
+        }
+    }
+
+    /// Speed of the fastest point between the outermost wheels for a velocity, m/s.
+    #[must_use]
+    pub fn path_speed_m_s(&self, twist: [f64; 3]) -> f64 {
+        let reach = |wheel: &Wheel| wheel.x.hypot(wheel.y);
+        let reach_m = self.wheels.iter().map(reach).fold(0.0, f64::max);
+        twist[0].hypot(twist[1]).hypot(reach_m * twist[2])
+    }
+
     /// Index of the wheel called `name`.
     #[must_use]
     pub fn wheel_index(&self, name: &str) -> Option<usize> {

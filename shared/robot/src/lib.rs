@@ -1,7 +1,8 @@
 //! Robots as models: description, kinematics, slip physics, faults, learned transitions.
 //!
 //! No I/O, no clock, no transport. A robot is described by a [`Description`] (from the
-//! configuration); its behaviour is either simulated ([`slip`]) or learned ([`learned`]).
+//! configuration); its behaviour is either simulated ([`slip`]) or learned: with its faults
+//! ([`learned`]), or its nominal behaviour alone ([`nominal`]).
 
 pub mod description;
 pub mod disturbance;
@@ -9,9 +10,12 @@ pub mod fault;
 pub mod injection;
 pub mod kinematics;
 pub mod learned;
+pub mod nominal;
+mod robot_model;
 pub mod slip;
 
 pub use description::Description;
 pub use disturbance::{Disturbance, DisturbanceKind};
 pub use fault::{Fault, FaultKind};
 pub use injection::Injection;
+pub use robot_model::RobotModel;

@@ -25,6 +25,10 @@ fn rover() -> Description {
         kinematics: Kinematics::Ackermann6,
         wheel_radius_m: 0.08,
         mass_kg: 14.2,
+        command: Vec::new(),
+        measured: vigil_robot::description::Measured::default(),
+        polynomial_order: 4,
+        interval_s: 0.1,
         wheels: places
             .iter()
             .map(|&(name, x, y)| Wheel {

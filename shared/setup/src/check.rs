@@ -4,6 +4,7 @@ use std::path::Path;
 
 use vigil_blocks::WHEELS;
 use vigil_robot::Description;
+use vigil_robot::description::Kinematics;
 
 use crate::schema::{GraphFile, Service, Source};
 
@@ -279,6 +280,7 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
             report(&format!("wheels.{i}"), "x and y must be finite".into());
         }
     }
+    command(robot, &mut report);
     let (noise, limits) = (&robot.noise, &robot.limits);
     let positive = [
         ("wheel_radius_m", robot.wheel_radius_m),
@@ -302,6 +304,46 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
                 format!("{value} is out of range: allowed is any finite value above 0"),
             );
         }
+    }
+}
+
+/// Axes of the command, and what a nominal model takes from a description.
+fn command(robot: &Description, report: &mut impl FnMut(&str, String)) {
+    let axes = robot.command.len();
+    let (needed, shown) = match robot.kinematics {
+        Kinematics::Ackermann6 => (2..=2, "curvature and speed"),
+        Kinematics::Differential => (2..=2, "speed and yaw rate"),
+        Kinematics::Omni3 => (
+            2..=3,
+            "forward and left velocity, and yaw rate if it is commanded",
+        ),
+    };
+    if !needed.contains(&axes) {
+        report("command", format!("{axes} axes: allowed are {shown}"));
+    }
+    for (i, axis) in robot.command.iter().enumerate() {
+        if !(axis.limit.is_finite() && axis.limit > 0.0) {
+            let message = format!("{}: allowed is any finite value above 0", axis.limit);
+            report(&format!("command.{i}.limit"), message);
+        }
+        if axis.name.is_empty() || matches!(axis.name.as_str(), "run" | "t" | "x" | "y" | "yaw") {
+            let message = format!("'{}' cannot be the name of an axis", axis.name);
+            report(&format!("command.{i}.name"), message);
+        }
+    }
+    if !(1..=4).contains(&robot.polynomial_order) {
+        let order = robot.polynomial_order;
+        report(
+            "polynomial_order",
+            format!("{order} is out of range: allowed is 1 to 4"),
+        );
+    }
+    if !(0.02..=1.0).contains(&robot.interval_s) {
+        let interval_s = robot.interval_s;
+        report(
+            "interval_s",
+            format!("{interval_s} is out of range: allowed is 0.02 to 1 s"),
+        );
     }
 }
 

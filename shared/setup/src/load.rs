@@ -8,8 +8,8 @@ use vigil_blocks::fnv1a;
 use vigil_decision::Pomdp;
 use vigil_inference::FaultTree;
 use vigil_inference::tree::Node;
-use vigil_robot::Description;
-use vigil_robot::learned::{Model, ModelError};
+use vigil_robot::learned::ModelError;
+use vigil_robot::{Description, RobotModel};
 
 use crate::check;
 use crate::locate::{line_of_byte, line_of_key};
@@ -29,7 +29,7 @@ pub struct Setup {
     /// The fault tree.
     pub tree: FaultTree,
     /// The learned model.
-    pub model: Model,
+    pub model: RobotModel,
     /// Where it was read from.
     pub model_path: PathBuf,
     /// The decision model.
@@ -203,9 +203,9 @@ pub fn load_tree(path: &Path) -> Result<FaultTree, SetupError> {
 ///
 /// # Errors
 /// The first problem found.
-pub fn load_model(path: &Path, robot: Option<&Description>) -> Result<Model, SetupError> {
+pub fn load_model(path: &Path, robot: Option<&Description>) -> Result<RobotModel, SetupError> {
     let problem = |error: ModelError| whole_file(path, error.to_string());
-    let model = Model::from_toml(&read(path)?).map_err(problem)?;
+    let model = RobotModel::from_toml(&read(path)?).map_err(problem)?;
     robot.map_or(Ok(()), |robot| model.check_robot(robot).map_err(problem))?;
     Ok(model)
 }

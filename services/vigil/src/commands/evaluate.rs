@@ -13,7 +13,7 @@ use vigil_evaluation::frames::Run;
 use vigil_evaluation::labels::{self, Label};
 use vigil_evaluation::learning;
 use vigil_evaluation::report::{Report, SensorSet};
-use vigil_robot::learned::Model;
+use vigil_robot::RobotModel;
 use vigil_setup::schema::IdentifierFilter;
 
 use super::learn::write_whole;
@@ -114,11 +114,11 @@ impl Args {
         with_label.collect()
     }
 
-    fn part<'a>(&self, model: &Model, runs: &'a [Run]) -> Result<Vec<&'a Run>, CommandError> {
+    fn part<'a>(&self, model: &RobotModel, runs: &'a [Run]) -> Result<Vec<&'a Run>, CommandError> {
         if self.part == Part::All {
             return Ok(runs.iter().collect());
         }
-        let held_out = &model.provenance.runs_held_out;
+        let held_out = &model.provenance().runs_held_out;
         let wanted: Vec<&Run> = runs.iter().filter(|r| held_out.contains(&r.id)).collect();
         if wanted.is_empty() {
             let (model, frames) = (self.filter.model.display(), self.filter.frames.display());
@@ -239,7 +239,10 @@ fn facts(args: &Args, prepared: &Prepared, runs: &[(Run, Label)]) -> Vec<(&'stat
             "model",
             format!("{}, hash {model_hash}", filter.model.display()),
         ),
-        ("learned from", prepared.model.provenance.data_hash.clone()),
+        (
+            "learned from",
+            prepared.model.provenance().data_hash.clone(),
+        ),
         (
             "frames",
             format!("{}, {}", filter.frames.display(), learning::data_hash(&all)),

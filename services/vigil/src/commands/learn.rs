@@ -1,4 +1,4 @@
-//! `vigil learn`: learns a robot's model from labelled runs, or shows a learned one.
+//! `vigil learn`: learns a robot's model, from labelled runs or from healthy ones alone, or shows one.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -10,15 +10,16 @@ use vigil_evaluation::labels;
 use vigil_evaluation::learning::{self, Options, RESIDUAL_BAR, Report, Residual, View};
 use vigil_evaluation::split::split;
 use vigil_robot::learned::model::Provenance;
+use vigil_robot::{Description, RobotModel};
 
 use super::offline::{RobotArgs, load_model};
-use super::{CommandError, Outcome};
+use super::{CommandError, Outcome, learn_nominal};
 use crate::output;
 
 /// Largest part of the runs that may be left out.
 const TEST_FRACTION_MAX: f64 = 0.9;
 
-/// Learns the transition models from labelled runs, and tests them on the runs left out.
+/// Learns a robot's model, and tests it on the runs left out.
 ///
 /// With `--show`, prints a learned model instead.
 #[derive(Debug, clap::Args)]
@@ -26,9 +27,21 @@ pub struct Args {
     /// Recorded frames (CSV, plain or gzip).
     #[arg(long, value_name = "F", required_unless_present = "show")]
     frames: Option<PathBuf>,
-    /// Labels of the runs (CSV).
-    #[arg(long, value_name = "R", required_unless_present = "show")]
+    /// Labels of the runs (CSV). Without them every run counts as one without a fault, and the
+    /// model is of nominal behaviour alone.
+    #[arg(long, value_name = "R")]
     runs: Option<PathBuf>,
+    /// Runs to learn from, by their ids, separated by commas; without labels only.
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        conflicts_with = "runs"
+    )]
+    only: Vec<u32>,
+    /// End of what is learned from in each run, s; without labels only.
+    #[arg(long, value_name = "S", conflicts_with = "runs")]
+    until: Option<f64>,
     /// Where to write the model (TOML).
     #[arg(long, value_name = "MODEL", required_unless_present = "show")]
     out: Option<PathBuf>,
@@ -87,15 +100,21 @@ fn test_fraction(text: &str) -> Result<f64, String> {
 /// # Errors
 /// An input that is refused; an output that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    match (&args.model, &args.frames, &args.runs, &args.out) {
+    match (&args.model, &args.frames, &args.out) {
         (Some(model), ..) => show(model, args.json),
-        (None, Some(frames), Some(runs), Some(out)) => learn(args, frames, runs, out),
-        _ => Err(CommandError::usage("--frames, --runs and --out are needed")),
+        (None, Some(frames), Some(out)) => learn(args, frames, out),
+        _ => Err(CommandError::usage("--frames and --out are needed")),
     }
 }
 
 fn show(path: &Path, is_json: bool) -> Result<Outcome, CommandError> {
-    let model = load_model(path)?;
+    let RobotModel::Faults(model) = load_model(path)? else {
+        let refused = format!(
+            "{}: a model of nominal behaviour alone is its own plain text: open the file",
+            path.display()
+        );
+        return Err(CommandError::usage(refused));
+    };
     let view = View::new(
         &model,
         vigil_setup::schema::Detector::default().fault_rate_1_h,
@@ -113,18 +132,21 @@ fn show(path: &Path, is_json: bool) -> Result<Outcome, CommandError> {
     Ok(Outcome::Done)
 }
 
-fn learn(
-    args: &Args,
-    frames_file: &Path,
-    labels_file: &Path,
-    out: &Path,
-) -> Result<Outcome, CommandError> {
+fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, CommandError> {
     let folder = out.parent().filter(|f| !f.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
         let refused = format!("--out: there is no folder {}", folder.display());
         return Err(CommandError::usage(refused));
     }
     let robot = args.robot.load()?;
+    let Some(labels_file) = &args.runs else {
+        return unlabelled(args, frames_file, out, &robot);
+    };
+    if !robot.has_fault_models() {
+        let refused = "--runs: faults are learned for an ackermann6 only; leave the labels out, and \
+                       the faulty runs too (--only)";
+        return Err(CommandError::usage(refused));
+    }
     let labels = labels::read(labels_file, &robot).map_err(CommandError::usage)?;
     let runs = frames::read(frames_file, &robot).map_err(CommandError::usage)?;
     let with_frames: Vec<_> = labels
@@ -167,9 +189,37 @@ fn learn(
 }
 
 /// The last part of a path: where a file lay is of no interest to others.
-fn file_name(path: &Path) -> String {
+pub(super) fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default();
     name.to_string_lossy().into_owned()
+}
+
+/// Learns from runs without labels.
+fn unlabelled(
+    args: &Args,
+    frames_file: &Path,
+    out: &Path,
+    robot: &Description,
+) -> Result<Outcome, CommandError> {
+    let mut runs = frames::read(frames_file, robot).map_err(CommandError::usage)?;
+    let ids: Vec<u32> = runs.iter().map(|run| run.id).collect();
+    if let Some(id) = args.only.iter().find(|id| !ids.contains(id)) {
+        let refused = format!("--only: {} has no run {id}", frames_file.display());
+        return Err(CommandError::usage(refused));
+    }
+    if !args.only.is_empty() {
+        runs.retain(|run| args.only.contains(&run.id));
+    }
+    learn_nominal::run(&learn_nominal::Task {
+        robot,
+        runs: &runs,
+        frames: frames_file,
+        out,
+        test_fraction: args.test_fraction,
+        seed: args.seed,
+        until_s: args.until.unwrap_or(f64::INFINITY),
+        json: args.json,
+    })
 }
 
 /// Writes a file so that its place holds either the old one or the whole new one.

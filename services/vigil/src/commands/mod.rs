@@ -5,8 +5,10 @@ use std::fmt;
 pub mod check;
 pub mod diagnose;
 pub mod evaluate;
+pub mod import;
 pub mod inject;
 pub mod learn;
+mod learn_nominal;
 mod offline;
 
 /// How a command ended that could do its work.

@@ -7,8 +7,8 @@ use serde::Serialize;
 use vigil_evaluation::frames::{self, Run};
 use vigil_identifier::Models;
 use vigil_inference::FaultTree;
-use vigil_robot::Description;
-use vigil_robot::learned::Model;
+use vigil_inference::tree::Node;
+use vigil_robot::{Description, RobotModel};
 use vigil_setup::schema::{self, Form, IdentifierFilter, Sensors};
 use vigil_setup::{load_decision, load_robot, load_tree};
 
@@ -70,7 +70,7 @@ pub struct FilterArgs {
     seed: u64,
     #[command(flatten)]
     robot: RobotArgs,
-    /// Fault tree (TOML).
+    /// Fault tree (TOML); a nominal model needs none.
     #[arg(long, value_name = "F", default_value = "config/trees/rover.toml")]
     tree: PathBuf,
     /// Decision model (`.pomdp`), read for `--identifier risk-sensitive` only.
@@ -102,7 +102,7 @@ pub struct Prepared {
     /// The robot.
     pub robot: Description,
     /// The learned model.
-    pub model: Model,
+    pub model: RobotModel,
     /// The fault tree.
     pub tree: FaultTree,
     /// Detector and identifier.
@@ -117,8 +117,11 @@ impl FilterArgs {
     /// Reads and checks all files and settings.
     pub fn prepare(&self) -> Result<Prepared, CommandError> {
         let robot = self.robot.load()?;
-        let tree = load_tree(&self.tree).map_err(CommandError::usage)?;
         let model = load_model(&self.model)?;
+        let tree = match &model {
+            RobotModel::Faults(_) => load_tree(&self.tree).map_err(CommandError::usage)?,
+            RobotModel::Nominal(_) => nominal_tree()?,
+        };
         let pipeline = self.pipeline(&model, &robot, &tree, &self.sensors, self.identifier)?;
         let runs = frames::read(&self.frames, &robot).map_err(CommandError::usage)?;
         let used = Used {
@@ -143,7 +146,7 @@ impl FilterArgs {
     /// Detector and identifier with the settings given, but for channels and filter.
     pub fn pipeline(
         &self,
-        model: &Model,
+        model: &RobotModel,
         robot: &Description,
         tree: &FaultTree,
         sensors: &str,
@@ -157,6 +160,15 @@ impl FilterArgs {
             },
             form: self.detector,
             ..schema::Detector::default()
+        };
+        let refuse = |error: &dyn std::fmt::Display| {
+            CommandError::usage(format!("{}: {error}", self.model.display()))
+        };
+        let model = match model {
+            RobotModel::Faults(model) => model,
+            RobotModel::Nominal(model) => {
+                return Pipeline::nominal(model, robot, tree, &detector).map_err(|e| refuse(&e));
+            }
         };
         let identifier = schema::Identifier {
             filter,
@@ -172,15 +184,24 @@ impl FilterArgs {
             tree,
             decision: decision.as_ref(),
         };
-        Pipeline::new(&models, &detector, &identifier, self.seed)
-            .map_err(|error| CommandError::usage(format!("{}: {error}", self.model.display())))
+        Pipeline::new(&models, &detector, &identifier, self.seed).map_err(|e| refuse(&e))
     }
 }
 
-/// Reads a learned model.
-pub fn load_model(path: &Path) -> Result<Model, CommandError> {
+/// The tree of a robot whose faults nobody has modelled.
+fn nominal_tree() -> Result<FaultTree, CommandError> {
+    let nominal = Node {
+        name: "ND".to_owned(),
+        parent: None,
+        fault: None,
+    };
+    FaultTree::new(vec![nominal]).map_err(CommandError::failure)
+}
+
+/// Reads a learned model of either kind.
+pub fn load_model(path: &Path) -> Result<RobotModel, CommandError> {
     let refuse =
         |error: &dyn std::fmt::Display| CommandError::usage(format!("{}: {error}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| refuse(&error))?;
-    Model::from_toml(&text).map_err(|error| refuse(&error))
+    RobotModel::from_toml(&text).map_err(|error| refuse(&error))
 }

@@ -52,7 +52,7 @@ impl Form {
 
 /// Detection over the residuals of one group, of D dimensions.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Evidence<const D: usize> {
+pub(crate) enum Evidence<const D: usize> {
     LearnedBias(Ages<D>),
     Constant(Constant),
     Windowed(Windowed<D, WINDOW>),
@@ -61,7 +61,7 @@ pub(super) enum Evidence<const D: usize> {
 impl<const D: usize> Evidence<D> {
     /// None yet. `bias_sd`: standard deviation of a fault's bias in units of the residual's, where
     /// it is learned.
-    pub(super) fn new(form: Form, bias_sd: f64) -> Self {
+    pub(crate) fn new(form: Form, bias_sd: f64) -> Self {
         match form {
             Form::LearnedBias => Self::LearnedBias(Ages::new(bias_sd)),
             Form::Constant => Self::Constant(Constant::default()),
@@ -70,7 +70,7 @@ impl<const D: usize> Evidence<D> {
     }
 
     /// Natural log-odds of a fault in this group.
-    pub(super) fn log_odds(&self) -> f64 {
+    pub(crate) fn log_odds(&self) -> f64 {
         match self {
             Self::LearnedBias(filter) => filter.log_odds(),
             Self::Constant(filter) => filter.log_odds(),
@@ -79,7 +79,7 @@ impl<const D: usize> Evidence<D> {
     }
 
     /// Takes a whitened residual; `birth` is the probability that a fault appears with it.
-    pub(super) fn step(&mut self, residual: &SVector<f64, D>, birth: f64) {
+    pub(crate) fn step(&mut self, residual: &SVector<f64, D>, birth: f64) {
         let tau_squared = TAU_SQUARED_PER_DIMENSION * D as f64;
         match self {
             Self::LearnedBias(filter) => filter.step(residual, birth),

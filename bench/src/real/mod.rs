@@ -1,0 +1,88 @@
+//! Logs of real robots: unpacked, imported, learned from.
+
+pub mod kobuki;
+pub mod robotino;
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use vigil_evaluation::frames::Run;
+use vigil_evaluation::import::{LogDescription, import};
+use vigil_robot::Description;
+use vigil_setup::load_robot;
+
+/// Mean time between false alarms that every alarm is set to, h.
+pub const FALSE_ALARM_INTERVAL_H: f64 = 24.0;
+/// Prior rate of faults, 1/h.
+pub const FAULT_RATE_1_H: f64 = 1.0;
+
+/// A robot's log.
+#[derive(Debug)]
+pub struct Log {
+    /// The robot.
+    pub robot: Description,
+    /// Its runs.
+    pub runs: Vec<Run>,
+    /// Where each came from.
+    pub names: Vec<String>,
+    /// Folder of the unpacked archive.
+    pub folder: PathBuf,
+}
+
+/// Unpacks `$VIGIL_DATA/real/<archive>.tar.xz` below the build folder and imports it by
+/// `config/logs/<log>.toml`.
+///
+/// # Errors
+/// What is missing or malformed.
+pub fn log(archive: &str, log: &str) -> Result<Log, Box<dyn Error>> {
+    let data = std::env::var("VIGIL_DATA").map_err(
+        |_| "VIGIL_DATA is not set: the folder that holds real/kobuki_wheel_fault.tar.xz",
+    )?;
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let into = root.join("target/real");
+    let folder = into.join(archive);
+    if !folder.is_dir() {
+        std::fs::create_dir_all(&into)?;
+        let packed = Path::new(&data)
+            .join("real")
+            .join(format!("{archive}.tar.xz"));
+        let status = Command::new("tar")
+            .arg("-xJf")
+            .arg(&packed)
+            .arg("-C")
+            .arg(&into)
+            .status()?;
+        if !status.success() {
+            return Err(format!("{}: tar failed", packed.display()).into());
+        }
+    }
+    let path = root.join(format!("config/logs/{log}.toml"));
+    let description = LogDescription::load(&path)?;
+    let robot = load_robot(&description.robot_path(&path))?;
+    let imported = import(&description, &robot, &folder)?;
+    for (channel, delay_s) in &imported.delays_s {
+        eprintln!("{log}: {channel} is late by {delay_s:.3} s");
+    }
+    Ok(Log {
+        runs: imported.frames(&robot),
+        names: imported.runs.into_iter().map(|run| run.name).collect(),
+        robot,
+        folder,
+    })
+}
+
+/// Area under the receiver operating characteristic: the probability that a faulty score is above
+/// a nominal one, ties halved. None without scores.
+#[must_use]
+pub fn auc(nominal: &[f64], faulty: &[f64]) -> Option<f64> {
+    if nominal.is_empty() || faulty.is_empty() {
+        return None;
+    }
+    let above = |a: f64, b: f64| f64::from(u8::from(a > b)) + 0.5 * f64::from(u8::from(a == b));
+    let sum: f64 = faulty
+        .iter()
+        .flat_map(|&f| nominal.iter().map(move |&n| above(f, n)))
+        .sum();
+    Some(sum / (nominal.len() * faulty.len()) as f64)
+}

@@ -1,0 +1,205 @@
+//! Robotino: learned on single grounds, watched while it runs onto another.
+
+use std::collections::BTreeMap;
+use std::error::Error;
+
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_pcg::Pcg64Mcg;
+use serde::Serialize;
+use vigil_evaluation::frames::Run;
+use vigil_evaluation::learning_nominal::{self, Report};
+use vigil_robot::learned::Form;
+use vigil_robot::learned::monitor::Channels;
+use vigil_robot::nominal::{Model, Monitor, Observer};
+
+use super::{FALSE_ALARM_INTERVAL_H, FAULT_RATE_1_H, Log};
+
+/// Runs held out of each ground.
+const HELD_OUT_PER_GROUND: usize = 5;
+/// Seed of that choice.
+const SEED: u64 = 1;
+/// Jump, in deviations, from which a run's change of ground counts.
+const JUMP_SD: f64 = 2.0;
+/// An alarm so close to the change, s, has found it.
+const WITHIN_S: f64 = 1.0;
+
+/// One run over two grounds.
+#[derive(Debug, Clone, Serialize)]
+pub struct Change {
+    /// File.
+    pub file: String,
+    /// Its change of ground, s.
+    pub change_t_s: f64,
+    /// Size of the change in the displacement, deviations.
+    pub z: f64,
+    /// First alarm, s.
+    pub alarm_t_s: Option<f64>,
+    /// Commanded speed, m/s.
+    pub speed_m_s: f64,
+}
+
+/// What was measured.
+#[derive(Debug, Serialize)]
+pub struct Robotino {
+    /// What was learned.
+    pub learned: Report,
+    /// Log-odds of the alarm.
+    pub alarm_log_odds: f64,
+    /// Runs over two grounds, those with a clear change first.
+    pub changes: Vec<Change>,
+    /// Runs held out, and those of them with an alarm.
+    pub held_out: (usize, usize),
+    /// Runs learned from, and those of them with an alarm.
+    pub learned_alarms: (usize, usize),
+}
+
+/// Learns on single grounds and watches the others.
+///
+/// # Errors
+/// What is missing or malformed.
+pub fn measure() -> Result<Robotino, Box<dyn Error>> {
+    let log = super::log("robotino_slip", "robotino")?;
+    let ground = |name: &str| -> Option<String> {
+        let (_, rest) = name.split_once("one_surface_type/")?;
+        Some(rest.split('/').next()?.to_owned())
+    };
+    let mut grounds = BTreeMap::<String, Vec<u32>>::new();
+    for (run, name) in log.runs.iter().zip(&log.names) {
+        if let Some(ground) = ground(name) {
+            grounds.entry(ground).or_default().push(run.id);
+        }
+    }
+    let mut rng = Pcg64Mcg::seed_from_u64(SEED);
+    let mut held_out = Vec::new();
+    for ids in grounds.values_mut() {
+        ids.shuffle(&mut rng);
+        held_out.extend(ids.iter().take(HELD_OUT_PER_GROUND));
+    }
+    let single: Vec<Run> = log
+        .runs
+        .iter()
+        .zip(&log.names)
+        .filter(|(_, name)| ground(name).is_some())
+        .map(|(run, _)| run.clone())
+        .collect();
+    let (model, learned) = learning_nominal::learn(&single, &held_out, f64::INFINITY, &log.robot)?;
+    let calibration = model.calibration(Channels::PoseEncoders, Form::LearnedBias)?;
+    let alarm = calibration.alarm_log_odds(FALSE_ALARM_INTERVAL_H, FAULT_RATE_1_H);
+    let count = |is_held_out: bool| {
+        let runs = single
+            .iter()
+            .filter(|run| held_out.contains(&run.id) == is_held_out);
+        let alarms = runs.map(|run| first_alarm(&model, &log, run, alarm));
+        let alarms: Vec<bool> = alarms.map(|t| t.is_some()).collect();
+        (alarms.len(), alarms.iter().filter(|&&alarm| alarm).count())
+    };
+    Ok(Robotino {
+        held_out: count(true),
+        learned_alarms: count(false),
+        changes: changes(&model, &log, alarm)?,
+        alarm_log_odds: alarm,
+        learned,
+    })
+}
+
+/// The runs of `derived_change_points.csv`, watched.
+fn changes(model: &Model, log: &Log, alarm: f64) -> Result<Vec<Change>, Box<dyn Error>> {
+    let text = std::fs::read_to_string(log.folder.join("derived_change_points.csv"))?;
+    let mut out = Vec::new();
+    for line in text.lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let [file, speed, change, .., z] = cells.as_slice() else {
+            return Err(format!("derived_change_points.csv: '{line}' has too few cells").into());
+        };
+        let mut runs = log.runs.iter().zip(&log.names);
+        let run = runs.find(|(_, name)| name.ends_with(*file));
+        let (run, _) = run.ok_or_else(|| format!("there is no run {file}"))?;
+        out.push(Change {
+            file: (*file).to_owned(),
+            change_t_s: change.parse()?,
+            z: z.parse()?,
+            alarm_t_s: first_alarm(model, log, run, alarm),
+            speed_m_s: speed.parse()?,
+        });
+    }
+    out.sort_by(|a, b| b.z.abs().total_cmp(&a.z.abs()));
+    Ok(out)
+}
+
+fn first_alarm(model: &Model, log: &Log, run: &Run, alarm: f64) -> Option<f64> {
+    let mut monitor = Monitor::new(
+        model,
+        Channels::PoseEncoders,
+        Form::LearnedBias,
+        FAULT_RATE_1_H,
+    );
+    let mut observer = Observer::new(&log.robot);
+    for frame in &run.frames {
+        if !observer.push(frame).complete {
+            continue;
+        }
+        monitor.step(observer.history(), false);
+        if !monitor.is_ready() {
+            monitor.forget_evidence();
+        } else if monitor.report().log_odds > alarm {
+            return Some(frame.header.t_capture_ns as f64 * 1e-9);
+        }
+    }
+    None
+}
+
+impl Robotino {
+    /// The summary.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        let clear: Vec<&Change> = self
+            .changes
+            .iter()
+            .filter(|c| c.z.abs() > JUMP_SD)
+            .collect();
+        let late = |c: &&&Change| c.alarm_t_s.map(|t| t - c.change_t_s);
+        let count = |low: f64, high: f64| {
+            clear
+                .iter()
+                .filter(|c| late(c).is_some_and(|l| l >= low && l <= high))
+                .count()
+        };
+        let unclear = self.changes.iter().filter(|c| c.z.abs() <= JUMP_SD);
+        let (others, alarmed) = unclear.fold((0, 0), |(n, a), c| {
+            (n + 1, a + usize::from(c.alarm_t_s.is_some()))
+        });
+        let mut delays: Vec<f64> = clear.iter().filter_map(|c| late(&c)).collect();
+        delays.sort_by(f64::total_cmp);
+        let never = clear.len() - delays.len();
+        vec![
+            "\n## Robotino: learned on single grounds\n".to_owned(),
+            self.learned.to_string(),
+            format!(
+                "alarm at log-odds {:.1} ({FALSE_ALARM_INTERVAL_H} h between false alarms)\n",
+                self.alarm_log_odds
+            ),
+            format!(
+                "single ground, held out: {} of {} alarm; learned from: {} of {}",
+                self.held_out.1, self.held_out.0, self.learned_alarms.1, self.learned_alarms.0
+            ),
+            format!(
+                "two grounds, jump above {JUMP_SD} sd: {} runs; first alarm within {WITHIN_S} s of the change: {}; \
+                earlier: {}; later: {}; never: {never}; in all by {WITHIN_S} s after it: {}",
+                clear.len(),
+                count(-WITHIN_S, WITHIN_S),
+                count(f64::NEG_INFINITY, -WITHIN_S - 1e-9),
+                count(WITHIN_S + 1e-9, f64::INFINITY),
+                count(f64::NEG_INFINITY, WITHIN_S)
+            ),
+            format!(
+                "alarm less change, s: {:?}",
+                delays
+                    .iter()
+                    .map(|d| (d * 100.0).round() / 100.0)
+                    .collect::<Vec<_>>()
+            ),
+            format!("two grounds, no clear jump (not scored): {others} runs, {alarmed} alarm"),
+        ]
+    }
+}

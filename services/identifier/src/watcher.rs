@@ -1,0 +1,134 @@
+//! Diagnosis of a robot whose faults nobody has modelled: nominal, or unknown.
+
+use vigil_blocks::{DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, ParticleBlock};
+use vigil_inference::FaultTree;
+
+use crate::posterior::Posterior;
+use crate::{Identifier, Input};
+
+/// Reports ND with 1 - p(fault) of the detector and the rest as unknown.
+#[derive(Debug, Clone)]
+pub struct Watcher {
+    tree_hash: u64,
+    node_count: u32,
+    posterior: Posterior,
+    run_id: u64,
+    alarm_t_ns: u64,
+    mode: u32,
+    mode_changes: u32,
+}
+
+impl Watcher {
+    /// A watcher that reports in the words of `tree`, of which it uses the nominal node alone.
+    #[must_use]
+    pub fn new(tree: &FaultTree) -> Self {
+        Self {
+            tree_hash: tree.hash(),
+            node_count: tree.nodes().len() as u32,
+            posterior: Posterior::nominal(),
+            run_id: 0,
+            alarm_t_ns: 0,
+            mode: 0,
+            mode_changes: 0,
+        }
+    }
+
+    /// Takes one entry of the journal and fills the belief and the particles (headers and causes
+    /// are the caller's).
+    pub fn step(
+        &mut self,
+        entry: Entry<Input<'_>>,
+        belief: &mut FaultBelief,
+        particles: &mut ParticleBlock,
+    ) {
+        let predicted = self.posterior;
+        match entry {
+            Entry::Frame(input) => {
+                if input.frame.run_id != self.run_id {
+                    self.begin_run();
+                    self.run_id = input.frame.run_id;
+                }
+                if let Some((detection, _)) = input.detection {
+                    self.take(detection);
+                }
+            }
+            Entry::Reset => self.begin_run(),
+            Entry::Missed(_) | Entry::Budget(_) => {}
+        }
+        particles.count = 0;
+        self.report(&predicted, belief);
+    }
+
+    fn begin_run(&mut self) {
+        self.posterior = Posterior::nominal();
+        self.alarm_t_ns = 0;
+    }
+
+    fn take(&mut self, detection: &DetectionBelief) {
+        self.posterior = Posterior::watching(detection.p_fault);
+        self.alarm_t_ns = match detection.alarm {
+            0 => 0,
+            _ => detection.alarm_t_capture_ns,
+        };
+    }
+
+    /// Before the alarm the mode is nominal, whatever the odds are in passing.
+    fn report(&mut self, predicted: &Posterior, belief: &mut FaultBelief) {
+        let posterior = &self.posterior;
+        let alarm = self.alarm_t_ns != 0;
+        let (mode, p_mode) = match alarm && posterior.unknown > 0.5 {
+            true => (MODE_UNKNOWN, posterior.unknown),
+            false => (0, posterior.nodes[0]),
+        };
+        if mode != self.mode {
+            self.mode = mode;
+            self.mode_changes = self.mode_changes.saturating_add(1);
+        }
+        belief.run_id = self.run_id;
+        belief.p = posterior.nodes;
+        belief.p_unknown = posterior.unknown;
+        belief.p_predicted = predicted.nodes;
+        belief.p_unknown_predicted = predicted.unknown;
+        belief.node_count = self.node_count;
+        belief.tree_hash = self.tree_hash;
+        belief.entropy = posterior.entropy;
+        belief.sets = posterior.sets;
+        belief.set_count = posterior.set_count as u32;
+        belief.mode = mode;
+        belief.p_mode = p_mode;
+        belief.mode_change_count = self.mode_changes;
+        belief.alarm_t_capture_ns = self.alarm_t_ns;
+        belief.onset_t_capture_ns = 0;
+        belief.identifying = u32::from(alarm);
+    }
+}
+
+/// An identifier of either kind.
+#[derive(Debug, Clone)]
+pub enum Diagnoser {
+    /// Tells faults apart.
+    Identifier(Box<Identifier>),
+    /// Tells nominal from unknown.
+    Watcher(Watcher),
+}
+
+impl Diagnoser {
+    /// Takes one entry of the journal; see [`Identifier::step`].
+    pub fn step(
+        &mut self,
+        entry: Entry<Input<'_>>,
+        belief: &mut FaultBelief,
+        particles: &mut ParticleBlock,
+    ) {
+        match self {
+            Self::Identifier(identifier) => identifier.step(entry, belief, particles),
+            Self::Watcher(watcher) => watcher.step(entry, belief, particles),
+        }
+    }
+}
+
+impl From<Identifier> for Diagnoser {
+    fn from(identifier: Identifier) -> Self {
+        Self::Identifier(Box::new(identifier))
+    }
+}

@@ -1,0 +1,320 @@
+//! What a log's files mean, as read from `config/logs/*.toml`.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::ImportError;
+
+/// Unit of a column, brought to SI.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Unit {
+    /// As it is.
+    #[default]
+    Si,
+    /// Degrees.
+    Deg,
+    /// Millimetres.
+    Mm,
+    /// Revolutions per minute.
+    Rpm,
+    /// Seconds.
+    S,
+    /// Milliseconds.
+    Ms,
+    /// Microseconds.
+    Us,
+    /// Nanoseconds.
+    Ns,
+}
+
+impl Unit {
+    /// One such unit in SI.
+    #[must_use]
+    pub fn factor(self) -> f64 {
+        match self {
+            Self::Si | Self::S => 1.0,
+            Self::Deg => PI / 180.0,
+            Self::Mm | Self::Ms => 1e-3,
+            Self::Rpm => PI / 30.0,
+            Self::Us => 1e-6,
+            Self::Ns => 1e-9,
+        }
+    }
+}
+
+/// A column that holds time.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Clock {
+    /// Column.
+    pub column: String,
+    /// Unit: `s`, `ms`, `us` or `ns`.
+    pub unit: Unit,
+    /// Value at which the counter wraps around to 0, in its unit.
+    #[serde(default)]
+    pub modulus: Option<f64>,
+}
+
+/// One kind of file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    /// Name, by which channels refer to it.
+    pub name: String,
+    /// File within a run's folder; left out: the run is the file.
+    #[serde(default)]
+    pub file: Option<String>,
+    /// Separator of columns.
+    #[serde(default = "comma")]
+    pub delimiter: char,
+    /// Rows before the one that names the columns.
+    #[serde(default)]
+    pub skip_rows: usize,
+    /// When a row was measured.
+    pub time: Clock,
+    /// The time column is on another clock than that of the other sources: `[source, column]` names
+    /// a source that has both; the median difference, a constant of the run, is added.
+    #[serde(default)]
+    pub time_as: Option<[String; 2]>,
+    /// Clock of the device, against which counters are differentiated; left out: `time`. Rows are
+    /// placed by it, too: `time` gives its offset and its rate, constants of a run.
+    #[serde(default)]
+    pub device_clock: Option<Clock>,
+}
+
+/// How a channel gets its value at the time of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Mean of the samples since the last frame; the last one where there is none.
+    #[default]
+    Mean,
+    /// The last sample, however old; `initial` before the first. For commands.
+    Hold,
+    /// On the line between the samples before and after.
+    Interpolate,
+}
+
+/// How late a channel is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Delay {
+    /// By so much, s.
+    Given(f64),
+    /// To be found where it correlates most with `delay_against`, in the first run.
+    Estimate,
+}
+
+impl Delay {
+    /// The delay, s; `estimated` if it was not given.
+    #[must_use]
+    pub fn given_s(self, estimated: Option<f64>) -> f64 {
+        match self {
+            Self::Given(delay_s) => delay_s,
+            Self::Estimate => estimated.unwrap_or(0.0),
+        }
+    }
+}
+
+impl Default for Delay {
+    fn default() -> Self {
+        Self::Given(0.0)
+    }
+}
+
+impl<'de> Deserialize<'de> for Delay {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(untagged)]
+        enum Given {
+            Number(f64),
+            Word(String),
+        }
+        match Given::deserialize(from)? {
+            Given::Number(delay_s) if (-1.0..=1.0).contains(&delay_s) => Ok(Self::Given(delay_s)),
+            Given::Word(word) if word == "estimate" => Ok(Self::Estimate),
+            Given::Number(delay_s) => Err(serde::de::Error::custom(format!(
+                "delay_s is {delay_s}: allowed is -1 to 1 s, or \"estimate\""
+            ))),
+            Given::Word(word) => Err(serde::de::Error::custom(format!(
+                "delay_s is '{word}': allowed is -1 to 1 s, or \"estimate\""
+            ))),
+        }
+    }
+}
+
+/// Where a channel of the frames comes from.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChannelSource {
+    /// Column of Vigil's frames (`enc_L`, `yaw_rate`, the name of a command's axis).
+    pub name: String,
+    /// Source.
+    pub source: String,
+    /// Column of the source.
+    pub column: String,
+    /// Unit of the column: `si`, `deg`, `mm`, `rpm`.
+    #[serde(default)]
+    pub unit: Unit,
+    /// Value at which a counter wraps around, in the column's unit.
+    #[serde(default)]
+    pub modulus: Option<f64>,
+    /// True for a counter or position of which the rate of change is wanted.
+    #[serde(default)]
+    pub differentiate: bool,
+    /// Factor, its sign included, after unit and differentiation.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// Added at the end.
+    #[serde(default)]
+    pub offset: f64,
+    /// True for an angle: unwrapped before resampling, wrapped to ±pi after.
+    #[serde(default)]
+    pub angle: bool,
+    /// How it gets its value at the time of a frame: `mean`, `hold`, `interpolate`.
+    #[serde(default)]
+    pub method: Method,
+    /// Value before the first sample; for `hold`.
+    #[serde(default)]
+    pub initial: f64,
+    /// By how much the channel is late, s, or "estimate". It is moved forward by so much: a live
+    /// publisher must hold the other channels back by the same time.
+    #[serde(default)]
+    pub delay_s: Delay,
+    /// Channels, each with a factor, whose sum it is compared with for "estimate".
+    #[serde(default)]
+    pub delay_against: BTreeMap<String, f64>,
+}
+
+/// A log.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LogDescription {
+    /// The robot's description, relative to this file.
+    pub robot: String,
+    /// Rate of the frames, Hz, 1 to 1000.
+    pub rate_hz: f64,
+    /// Runs: folders or files below the log's folder, in this order; `*` stands for any part of a
+    /// name. Each match is one run.
+    pub runs: Vec<String>,
+    /// Longest pause of a measured channel, s.
+    #[serde(default = "one")]
+    pub gap_max_s: f64,
+    /// Beginning of the first run from which delays are estimated, s.
+    #[serde(default = "forty")]
+    pub estimate_s: f64,
+    /// Files.
+    pub source: Vec<Source>,
+    /// Channels.
+    pub channel: Vec<ChannelSource>,
+}
+
+fn comma() -> char {
+    ','
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn forty() -> f64 {
+    40.0
+}
+
+impl LogDescription {
+    /// Reads a description.
+    ///
+    /// # Errors
+    /// [`ImportError::Io`], or [`ImportError::Description`] with file, line and reason.
+    pub fn load(path: &Path) -> Result<Self, ImportError> {
+        let text = fs::read_to_string(path).map_err(|error| ImportError::Io {
+            path: path.to_path_buf(),
+            error,
+        })?;
+        toml::from_str(&text).map_err(|error: toml::de::Error| {
+            let start = error.span().map_or(0, |span| span.start);
+            let line = 1 + text
+                .bytes()
+                .take(start)
+                .filter(|&byte| byte == b'\n')
+                .count();
+            let message = error.message().replace('\n', " ");
+            ImportError::description(format!("{}:{line}", path.display()), message)
+        })
+    }
+
+    /// Path of the robot's description; `own` is the path of this file.
+    #[must_use]
+    pub fn robot_path(&self, own: &Path) -> PathBuf {
+        own.parent()
+            .unwrap_or_else(|| Path::new("."))
+            .join(&self.robot)
+    }
+
+    /// The channels in the order of `columns`, which [`Self::check`] has found complete.
+    pub(super) fn in_order<'a>(
+        &'a self,
+        columns: &'a [String],
+    ) -> impl Iterator<Item = &'a ChannelSource> {
+        columns
+            .iter()
+            .filter_map(|column| self.channel.iter().find(|c| c.name == *column))
+    }
+
+    /// Checks that every column has one channel, and every channel a source.
+    pub(super) fn check(&self, columns: &[String]) -> Result<(), ImportError> {
+        let wrong = |key: String, message| Err(ImportError::Description { key, message });
+        if !(1.0..=1000.0).contains(&self.rate_hz) {
+            let message = format!("{} is out of range: allowed is 1 to 1000 Hz", self.rate_hz);
+            return wrong("rate_hz".into(), message);
+        }
+        let source = |name: &str| self.source.iter().any(|source| source.name == name);
+        for (i, channel) in self.channel.iter().enumerate() {
+            if !columns.contains(&channel.name) {
+                let message = format!(
+                    "the robot has no channel '{}': allowed are {}",
+                    channel.name,
+                    columns.join(", ")
+                );
+                return wrong(format!("channel.{i}.name"), message);
+            }
+            if !source(&channel.source) {
+                let message = format!("there is no source '{}'", channel.source);
+                return wrong(format!("channel.{i}.source"), message);
+            }
+            if channel.delay_s == Delay::Estimate && channel.delay_against.is_empty() {
+                let message = "is required for delay_s = \"estimate\"".to_owned();
+                return wrong(format!("channel.{i}.delay_against"), message);
+            }
+            let mut others = channel.delay_against.keys();
+            if let Some(name) = others.find(|name| !columns.contains(*name)) {
+                let message = format!("the robot has no channel '{name}'");
+                return wrong(format!("channel.{i}.delay_against"), message);
+            }
+        }
+        for column in columns {
+            let count = self.channel.iter().filter(|c| c.name == *column).count();
+            if count != 1 {
+                let message = format!("{column} is described {count} times: once is needed");
+                return wrong("channel".into(), message);
+            }
+        }
+        for (i, described) in self.source.iter().enumerate() {
+            if let Some([other, _]) = &described.time_as
+                && !source(other)
+            {
+                let message = format!("there is no source '{other}'");
+                return wrong(format!("source.{i}.time_as"), message);
+            }
+            if !described.delimiter.is_ascii() {
+                let message = "a single ASCII character is needed".to_owned();
+                return wrong(format!("source.{i}.delimiter"), message);
+            }
+        }
+        Ok(())
+    }
+}

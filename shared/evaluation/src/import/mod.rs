@@ -1,0 +1,179 @@
+//! Recordings of other programs, turned into Vigil's frames of a described robot.
+//!
+//! A [`LogDescription`] says which columns of which files become which channels, and how. Each
+//! run's channels are put on one clock at a stated rate. Everything is causal: a frame holds
+//! nothing that was measured after it, but for interpolated channels, which wait for the next
+//! sample.
+
+mod delay;
+mod description;
+mod find;
+mod resample;
+mod series;
+mod write;
+
+use std::path::{Path, PathBuf};
+
+pub use description::{ChannelSource, Clock, Delay, LogDescription, Method, Source, Unit};
+use resample::Grid;
+use series::Series;
+use vigil_blocks::SensorFrame;
+use vigil_robot::Description;
+pub use write::write;
+
+use crate::frames::{Field, Run, fields};
+use crate::table::TableError;
+
+/// Why a log was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// A file is malformed: file, row, column and reason.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// The description does not fit the robot or itself.
+    #[error("{key}: {message}")]
+    Description {
+        /// Key of the description.
+        key: String,
+        /// What is wrong and what is allowed.
+        message: String,
+    },
+    /// No run was found.
+    #[error("{folder}: nothing there matches {patterns}")]
+    NoRuns {
+        /// Where was looked.
+        folder: PathBuf,
+        /// For what.
+        patterns: String,
+    },
+    /// A folder cannot be listed, a file not written.
+    #[error("{path}: {error}")]
+    Io {
+        /// The folder or file.
+        path: PathBuf,
+        /// What the system said.
+        error: std::io::Error,
+    },
+    /// A run's channels share no time.
+    #[error("{path}: its channels have less than {needed_s} s in common")]
+    Apart {
+        /// The run.
+        path: PathBuf,
+        /// What is needed, s.
+        needed_s: f64,
+    },
+}
+
+impl ImportError {
+    fn description(key: impl Into<String>, message: impl Into<String>) -> Self {
+        Self::Description {
+            key: key.into(),
+            message: message.into(),
+        }
+    }
+}
+
+impl Imported {
+    /// The runs as frames, as [`crate::frames::read`] would read them from the written file, but
+    /// for its rounding and its checks.
+    #[must_use]
+    pub fn frames(&self, robot: &Description) -> Vec<Run> {
+        let fields = fields(robot);
+        let run = |run: &ImportedRun| Run {
+            id: run.id,
+            frames: run
+                .rows
+                .iter()
+                .enumerate()
+                .map(|(seq, row)| frame(&fields, run.id, seq, row))
+                .collect(),
+        };
+        self.runs.iter().map(run).collect()
+    }
+}
+
+fn frame(fields: &[(String, Field)], run: u32, seq: usize, row: &[f64]) -> SensorFrame {
+    let mut frame = SensorFrame::default();
+    frame.run_id = u64::from(run) + 1;
+    frame.header.seq = seq as u64;
+    let t_s = row.first().copied().unwrap_or(0.0);
+    frame.header.t_capture_ns = (t_s * 1e9).round() as u64;
+    for ((_, field), value) in fields.iter().zip(row.iter().skip(1)) {
+        field.put(*value, &mut frame);
+    }
+    frame
+}
+
+/// One imported run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportedRun {
+    /// Its id, from 0 in the order found.
+    pub id: u32,
+    /// File or folder that it came from, relative to the log's folder.
+    pub name: String,
+    /// Frames: time since the first, s, then the values in the order of [`Imported::columns`].
+    pub rows: Vec<Vec<f64>>,
+}
+
+/// An imported log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Imported {
+    /// Names of the columns after `run` and `t`.
+    pub columns: Vec<String>,
+    /// Runs.
+    pub runs: Vec<ImportedRun>,
+    /// Channels whose delay was estimated, and the delay, s.
+    pub delays_s: Vec<(String, f64)>,
+}
+
+/// Reads every run below `folder` that the description names.
+///
+/// # Errors
+/// [`ImportError`] naming what was found and what is allowed.
+pub fn import(
+    log: &LogDescription,
+    robot: &Description,
+    folder: &Path,
+) -> Result<Imported, ImportError> {
+    let columns: Vec<String> = fields(robot).into_iter().map(|(name, _)| name).collect();
+    log.check(&columns)?;
+    let found = find::runs(folder, &log.runs)?;
+    let (mut runs, mut delays) = (Vec::new(), Vec::new());
+    for (id, path) in found.iter().enumerate() {
+        let mut series = Vec::with_capacity(columns.len());
+        let tables = series::tables(log, path)?;
+        for column in &columns {
+            let channel = log
+                .channel
+                .iter()
+                .find(|channel| channel.name == *column)
+                .ok_or_else(|| {
+                    ImportError::description("channel", format!("{column} is missing"))
+                })?;
+            series.push(Series::new(channel, &tables)?);
+        }
+        if id == 0 {
+            delays = delay::estimate(log, &columns, &series)?;
+        }
+        for (channel, series) in log.in_order(&columns).zip(&mut series) {
+            let estimated = delays.iter().find(|(name, _)| *name == channel.name);
+            series.advance(
+                channel
+                    .delay_s
+                    .given_s(estimated.map(|(_, delay_s)| *delay_s)),
+            );
+        }
+        let grid = Grid::new(log, &columns, &series, path)?;
+        let name = path.strip_prefix(folder).unwrap_or(path);
+        runs.push(ImportedRun {
+            id: id as u32,
+            name: name.display().to_string(),
+            rows: grid.rows(log, &columns, &series)?,
+        });
+    }
+    Ok(Imported {
+        columns,
+        runs,
+        delays_s: delays,
+    })
+}

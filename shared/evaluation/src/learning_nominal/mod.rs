@@ -1,0 +1,212 @@
+//! Learns the nominal behaviour of any described robot from its own log, without labels.
+//!
+//! Every measured channel is regressed on the command and on the other channels (ridge, Huber
+//! weights); what is left gets a variance that may grow with speed, a colour, and the scatter of
+//! its mean from run to run. The runs left out (one run: every
+//! third block of it) tell whether all this
+//! holds; a short log widens the deviations. Last comes the tail of the detector's log-odds.
+
+mod calibrate;
+mod excitation;
+mod noise;
+mod record;
+mod regression;
+mod report;
+mod terms;
+
+use vigil_blocks::fnv1a;
+use vigil_robot::Description;
+use vigil_robot::learned::model::Provenance;
+use vigil_robot::nominal::model::{KIND, VERSION};
+use vigil_robot::nominal::{Channel, Model};
+
+use crate::frames::Run;
+use record::Record;
+pub use report::{ChannelError, Report};
+
+/// Logs shorter than this are learned from with a warning and wider deviations, s.
+const LONG_ENOUGH_S: f64 = 600.0;
+/// Blocks into which a single run is cut; every third is left out for the test.
+const BLOCKS: usize = 9;
+
+/// Why a nominal model could not be learned.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NominalError {
+    /// Nothing to learn from.
+    #[error("there are no runs to learn from")]
+    NoRuns,
+    /// The robot hardly moves.
+    #[error("the robot moves for {found_s:.1} s, at least {needed_s:.0} s are needed")]
+    Still {
+        /// Time in motion, s.
+        found_s: f64,
+        /// Needed, s.
+        needed_s: f64,
+    },
+    /// An axis of the command is not excited.
+    #[error(
+        "{axis} stays between {min:.3} and {max:.3} {unit}: its effect cannot be learned; record \
+         driving over at least {needed:.3} {unit} of it, or leave it out of the description"
+    )]
+    Unexcited {
+        /// Axis.
+        axis: String,
+        /// Its unit.
+        unit: String,
+        /// Smallest command.
+        min: f64,
+        /// Largest command.
+        max: f64,
+        /// Width needed.
+        needed: f64,
+    },
+    /// Two axes always change together.
+    #[error(
+        "{one} and {other} always change together (correlation {correlation:.3}): record driving \
+         in which each changes without the other"
+    )]
+    Together {
+        /// One axis.
+        one: String,
+        /// The other.
+        other: String,
+        /// Their correlation.
+        correlation: f64,
+    },
+    /// The description measures nothing that a model could be made of.
+    #[error(
+        "no channel can be predicted: measured must have pose, wheel_rates, yaw_rate or currents"
+    )]
+    NoChannels,
+    /// A channel has too few observations.
+    #[error("{channel}: {found} observations to learn {needed} weights from")]
+    Few {
+        /// Channel.
+        channel: String,
+        /// Observations.
+        found: usize,
+        /// Needed.
+        needed: usize,
+    },
+}
+
+/// Learns a model from the runs that are not in `held_out`, up to `until_s` of each, and tests it
+/// on the others (a single run: on every third block of it, from which the final model learns too).
+///
+/// # Errors
+/// [`NominalError`] naming what is missing.
+pub fn learn(
+    runs: &[Run],
+    held_out: &[u32],
+    until_s: f64,
+    robot: &Description,
+) -> Result<(Model, Report), NominalError> {
+    let (left_out, learned): (Vec<&Run>, Vec<&Run>) =
+        runs.iter().partition(|run| held_out.contains(&run.id));
+    if learned.is_empty() {
+        return Err(NominalError::NoRuns);
+    }
+    let records = record::all(&learned, until_s, robot);
+    let tests = record::all(&left_out, until_s, robot);
+    let command = excitation::ranges(&records, robot)?;
+    let exposure_s = records.iter().map(|record| record.moving_s()).sum();
+    let mut model = Model {
+        kind: KIND.to_owned(),
+        version: VERSION,
+        robot: robot.name.clone(),
+        wheels: robot
+            .wheels
+            .iter()
+            .map(|wheel| wheel.name.clone())
+            .collect(),
+        interval_s: robot.interval_s,
+        exposure_s,
+        widened: widening(exposure_s, robot.interval_s),
+        provenance: Provenance {
+            data_hash: data_hash(&learned, until_s),
+            runs_learned: learned.iter().map(|run| run.id).collect(),
+            runs_held_out: left_out.iter().map(|run| run.id).collect(),
+            ..Provenance::default()
+        },
+        command,
+        channel: Vec::new(),
+        calibration: Vec::new(),
+    };
+    let mut report = Report::new(&model, runs.len() - left_out.len(), left_out.len());
+    let targets = terms::targets(robot);
+    if targets.is_empty() {
+        return Err(NominalError::NoChannels);
+    }
+    for (target, terms) in targets {
+        let name = report::name(target, robot);
+        let (train, test): (Vec<Record>, Vec<Record>) = if tests.is_empty() {
+            records.iter().map(|record| record.split(BLOCKS)).unzip()
+        } else {
+            (records.clone(), tests.clone())
+        };
+        let trial = fit(&model, target, &terms, &train, &name)?;
+        let ratio = noise::whitened_rms(&trial, &test, &model);
+        let mut channel = fit(&model, target, &terms, &records, &name)?;
+        channel.held_out_ratio = ratio;
+        let widen = model.widened * ratio.max(1.0);
+        channel.variance = channel.variance.map(|variance| variance * widen * widen);
+        report.add(&name, &channel, widen);
+        model.channel.push(channel);
+    }
+    calibrate::fit(&mut model, &records, robot);
+    report.finish(&model);
+    Ok((model, report))
+}
+
+/// Fits weights and noise of one channel.
+fn fit(
+    model: &Model,
+    target: vigil_robot::nominal::Target,
+    terms: &[vigil_robot::nominal::Term],
+    records: &[Record],
+    name: &str,
+) -> Result<Channel, NominalError> {
+    let mut channel = Channel {
+        target,
+        terms: terms.to_vec(),
+        weights: vec![0.0; terms.len()],
+        variance: [1.0, 0.0, 0.0],
+        correlation: 0.0,
+        offset_sd: 0.0,
+        drift_sd: 0.0,
+        scatter: 1.0,
+        held_out_ratio: 1.0,
+        tails: Vec::new(),
+    };
+    regression::fit(&mut channel, records, &model.sizes(), name)?;
+    noise::fit(&mut channel, records, model);
+    Ok(channel)
+}
+
+/// Factor on the deviations of a short log: two standard errors of a deviation from so many
+/// observations.
+fn widening(exposure_s: f64, interval_s: f64) -> f64 {
+    if exposure_s >= LONG_ENOUGH_S {
+        return 1.0;
+    }
+    1.0 + 2.0 / (2.0 * exposure_s / interval_s).max(2.0).sqrt()
+}
+
+fn data_hash(runs: &[&Run], until_s: f64) -> String {
+    let mut hash = fnv1a::hash_u64(fnv1a::BASIS, until_s.to_bits());
+    for run in runs {
+        hash = fnv1a::hash_u64(hash, u64::from(run.id));
+        for frame in &run.frames {
+            hash = fnv1a::hash_u64(hash, frame.header.t_capture_ns);
+            let values = frame
+                .pose
+                .iter()
+                .chain(&frame.command)
+                .chain(&frame.wheel_rate);
+            for value in values.chain(&frame.current).chain([&frame.yaw_rate]) {
+                hash = fnv1a::hash_u64(hash, value.to_bits());
+            }
+        }
+    }
+    format!("fnv1a64:{hash:016x}")
+}

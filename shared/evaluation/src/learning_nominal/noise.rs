@@ -1,0 +1,253 @@
+//! What is left of a channel: its variance by speed, its colour, its scatter from run to run.
+
+use vigil_inference::logspace::log_normal;
+use vigil_robot::nominal::{Channel, History, Model, Residual, Track};
+
+use super::record::Record;
+
+/// Motion before an observation counts, s, and how long the command must be steady for a pose.
+const MOVING_S: f64 = 0.5;
+const SETTLED_S: f64 = 1.0;
+/// Part of the runs whose scatter counts as usual, and the largest scatter.
+const USUAL: f64 = 0.95;
+const SCATTER_MAX: f64 = 10.0;
+/// Part of the runs whose drift counts as usual.
+const UNEVEN: f64 = 0.75;
+/// Rounds of the fit of the variance.
+const STEPS: usize = 60;
+/// Bounds of the correlation.
+const CORRELATION: (f64, f64) = (-0.45, 0.97);
+/// Length of the pieces whose means tell the scatter of an offset where there is one run,
+/// observations.
+const PIECE: usize = 100;
+const PIECE_MIN: usize = 4;
+/// Smallest deviation, relative to the channel's usual size: a channel that follows its prediction
+/// exactly would else see a fault in every rounding.
+const FLOOR: f64 = 1e-3;
+
+/// Drifts tried, per observation, relative to the residual's deviation.
+const DRIFTS: [f64; 7] = [0.0, 0.01, 0.02, 0.04, 0.07, 0.12, 0.2];
+/// Residuals beyond so many deviations say nothing more on the noise.
+const CLIP: f64 = 4.0;
+
+/// True if an observation takes part in learning a channel.
+pub(super) fn counts(history: &History, channel: &Channel) -> bool {
+    history.ago(0).is_some_and(|now| {
+        let steady = now.steady_s >= SETTLED_S || !channel.target.quantity.is_pose();
+        now.moving && now.moving_s >= MOVING_S && steady
+    })
+}
+
+/// Residuals, and whether each follows the one before.
+fn residuals(channel: &Channel, record: &[History], model: &Model) -> Vec<(Residual, bool)> {
+    let (mut out, mut follows) = (Vec::new(), false);
+    for history in record {
+        let residual = channel.residual(history, &model.sizes());
+        let Some(residual) = residual.filter(|_| counts(history, channel)) else {
+            follows = false;
+            continue;
+        };
+        out.push((residual, follows));
+        follows = true;
+    }
+    out
+}
+
+/// Fits variance, correlation, offset and drift.
+pub(super) fn fit(channel: &mut Channel, records: &[Record], model: &Model) {
+    let several = records.len() > 1;
+    let of = |record: &Record| residuals(channel, &record.histories, model);
+    let whole: Vec<Vec<(Residual, bool)>> = records.iter().map(of).collect();
+    let length = if several { usize::MAX } else { PIECE };
+    let pieces = whole.iter().flat_map(|record| record.chunks(length));
+    let pieces: Vec<_> = pieces.filter(|piece| piece.len() >= PIECE_MIN).collect();
+    let means: Vec<f64> = pieces
+        .iter()
+        .map(|piece| mean(piece.iter().map(|r| r.0.apart)))
+        .collect();
+    let mut squares = Vec::new();
+    for (piece, &mean) in pieces.iter().zip(&means) {
+        // Only where each run has its own offset is it taken out.
+        let mean = if several { mean } else { 0.0 };
+        let n = piece.len() as f64;
+        let used = if several { (n / (n - 1.0)).sqrt() } else { 1.0 };
+        for &(residual, follows) in *piece {
+            squares.push(((residual.apart - mean) * used, residual.basis, follows));
+        }
+    }
+    channel.variance = variance(&squares);
+    let floor = FLOOR * usual_size(channel, records);
+    channel.variance[0] = channel.variance[0].max(floor * floor).max(1e-12);
+    channel.correlation = correlation(channel, &squares);
+    let within = mean(
+        squares
+            .iter()
+            .map(|&(apart, basis, _)| apart * apart / at(channel, basis)),
+    );
+    let usual = mean(squares.iter().map(|&(_, basis, _)| at(channel, basis)));
+    let longest = squares.len() as f64 / pieces.len().max(1) as f64;
+    let rho = channel.correlation;
+    let of_mean = within * usual * ((1.0 + rho) / (1.0 - rho)).max(0.1) / longest.max(1.0);
+    let between = mean(means.iter().map(|mean| mean * mean));
+    let offset = (between - of_mean).max(0.0).sqrt();
+    channel.offset_sd = if means.len() > 1 { offset } else { 0.0 };
+    channel.drift_sd = drift(channel, &whole, length);
+    channel.scatter = scatter(channel, &whole, length);
+}
+
+/// Mean square of the whitened residuals in the noisiest usual run, or piece of one: no run's noise
+/// is quite that of another.
+fn scatter(channel: &Channel, records: &[Vec<(Residual, bool)>], length: usize) -> f64 {
+    let mut squares = Vec::new();
+    for record in records {
+        let mut track = Track::new(channel);
+        let whitened = innovations(channel, &mut track, record);
+        let whitened: Vec<f64> = whitened
+            .map(|(apart, spread)| apart * apart / spread)
+            .collect();
+        for piece in whitened
+            .chunks(length)
+            .filter(|piece| piece.len() >= PIECE_MIN)
+        {
+            squares.push(mean(piece.iter().map(|square| square.min(CLIP * CLIP))));
+        }
+    }
+    squares.sort_by(f64::total_cmp);
+    let at = (USUAL * squares.len().saturating_sub(1) as f64).round() as usize;
+    squares
+        .get(at)
+        .copied()
+        .unwrap_or(1.0)
+        .clamp(1.0, SCATTER_MAX)
+}
+
+fn at(channel: &Channel, basis: [f64; 3]) -> f64 {
+    channel
+        .variance
+        .iter()
+        .zip(basis)
+        .map(|(part, basis)| part * basis)
+        .sum()
+}
+
+/// The parts of the variance, by maximum likelihood: multiplicative steps keep them positive.
+fn variance(squares: &[(f64, [f64; 3], bool)]) -> [f64; 3] {
+    let size = |i: usize| mean(squares.iter().map(|square| square.1[i]));
+    let all = mean(squares.iter().map(|square| square.0 * square.0)).max(1e-12);
+    let mut parts: [f64; 3] = std::array::from_fn(|i| match size(i) > 1e-12 {
+        true => all / (3.0 * size(i)),
+        false => 0.0,
+    });
+    for _ in 0..STEPS {
+        let (mut up, mut down) = ([0.0; 3], [1e-300; 3]);
+        for &(apart, basis, _) in squares {
+            let total: f64 = parts
+                .iter()
+                .zip(basis)
+                .map(|(part, basis)| part * basis)
+                .sum();
+            let total = total.max(1e-12);
+            let ratio = (apart * apart / total).min(CLIP * CLIP);
+            for i in 0..3 {
+                up[i] += basis[i] * ratio / total;
+                down[i] += basis[i] / total;
+            }
+        }
+        for i in 0..3 {
+            parts[i] *= up[i] / down[i];
+        }
+    }
+    parts
+}
+
+/// Correlation of successive normalised residuals.
+fn correlation(channel: &Channel, squares: &[(f64, [f64; 3], bool)]) -> f64 {
+    let (mut along, mut all, mut before) = (0.0, 1e-300, 0.0);
+    for &(apart, basis, follows) in squares {
+        let normal = (apart / at(channel, basis).sqrt()).clamp(-CLIP, CLIP);
+        all += normal * normal;
+        along += if follows { normal * before } else { 0.0 };
+        before = normal;
+    }
+    (along / all).clamp(CORRELATION.0, CORRELATION.1)
+}
+
+/// The drift of the offset in the least even usual run, or piece of one: in each, that under which
+/// its residuals are most likely.
+fn drift(channel: &Channel, records: &[Vec<(Residual, bool)>], length: usize) -> f64 {
+    let usual = records
+        .iter()
+        .flatten()
+        .map(|(residual, _)| at(channel, residual.basis));
+    let usual_sd = mean(usual).sqrt();
+    let mut tried = channel.clone();
+    let pieces = records.iter().flat_map(|record| record.chunks(length));
+    let mut found: Vec<f64> = pieces
+        .filter(|piece| piece.len() >= PIECE_MIN)
+        .map(|piece| {
+            let mut best = (f64::NEG_INFINITY, 0.0);
+            for part in DRIFTS {
+                tried.drift_sd = part * usual_sd;
+                let mut track = Track::new(&tried);
+                let mut likelihood = 0.0;
+                for (apart, spread) in innovations(&tried, &mut track, piece) {
+                    let most = CLIP * spread.sqrt();
+                    likelihood += log_normal(apart.clamp(-most, most), spread);
+                }
+                if likelihood > best.0 {
+                    best = (likelihood, tried.drift_sd);
+                }
+            }
+            best.1
+        })
+        .collect();
+    found.sort_by(f64::total_cmp);
+    let at = (UNEVEN * found.len().saturating_sub(1) as f64).round() as usize;
+    found.get(at).copied().unwrap_or(0.0)
+}
+
+fn innovations<'a>(
+    channel: &'a Channel,
+    track: &'a mut Track,
+    record: &'a [(Residual, bool)],
+) -> impl Iterator<Item = (f64, f64)> + 'a {
+    record.iter().map(move |(residual, follows)| {
+        if !follows {
+            track.interrupt();
+        }
+        track.step(channel, residual.apart, at(channel, residual.basis), false)
+    })
+}
+
+fn usual_size(channel: &Channel, records: &[Record]) -> f64 {
+    let newest = records
+        .iter()
+        .flat_map(|r| &r.histories)
+        .filter_map(|h| h.ago(0));
+    let values = newest.filter_map(|now| channel.target.value(now));
+    mean(values.map(|value| value * value)).sqrt()
+}
+
+/// Root mean square of the whitened residuals of other records: 1 if the model holds there, or if
+/// there is nothing to tell.
+pub(super) fn whitened_rms(channel: &Channel, records: &[Record], model: &Model) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for record in records {
+        let mut track = Track::new(channel);
+        let record = residuals(channel, &record.histories, model);
+        for (apart, spread) in innovations(channel, &mut track, &record) {
+            sum += (apart * apart / spread).min(CLIP * CLIP);
+            count += 1.0;
+        }
+    }
+    if count < 10.0 {
+        1.0
+    } else {
+        f64::sqrt(sum / count)
+    }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    if count > 0.0 { sum / count } else { 0.0 }
+}

@@ -1,0 +1,98 @@
+//! Which channels a robot's description allows, and from what each is predicted.
+
+use vigil_blocks::COMMANDS;
+use vigil_robot::Description;
+use vigil_robot::nominal::{Quantity, Target, Term};
+
+/// How many observations back a wheel's rate matters to the gyro and the current.
+const WHEEL_LAGS: usize = 3;
+/// How many observations back the command matters to what a drive does.
+const COMMAND_LAGS: usize = 4;
+/// Highest power of the command in a motor's part: beyond this it is friction, which other terms
+/// tell.
+const ORDER_MAX: usize = 4;
+
+/// Channels with the terms of their predictions.
+pub(super) fn targets(robot: &Description) -> Vec<(Target, Vec<Term>)> {
+    let mut out = Vec::new();
+    let measured = &robot.measured;
+    let target = |quantity, wheel| Target { quantity, wheel };
+    let polynomial = polynomial(robot.command.len(), robot.polynomial_order.min(ORDER_MAX));
+    if measured.pose {
+        for quantity in [Quantity::Forward, Quantity::Lateral, Quantity::Turn] {
+            out.push((target(quantity, 0), polynomial.clone()));
+        }
+    }
+    let mut driven = polynomial.clone();
+    for lag in 1..COMMAND_LAGS {
+        driven.extend((0..robot.command.len()).map(|axis| Term::Lagged { axis, lag }));
+    }
+    if measured.yaw_rate {
+        let terms = if measured.wheel_rates {
+            let mut terms = vec![Term::Constant];
+            (0..robot.wheels.len()).for_each(|wheel| terms.extend(rates(wheel)));
+            terms
+        } else {
+            driven.clone()
+        };
+        out.push((target(Quantity::YawRate, 0), terms));
+    }
+    for wheel in 0..robot.wheels.len() {
+        if measured.wheel_rates {
+            out.push((target(Quantity::WheelRate, wheel), driven.clone()));
+        }
+        if measured.currents {
+            let mut terms = driven.clone();
+            if measured.wheel_rates {
+                terms.extend(rates(wheel));
+                terms.extend([Term::WheelSpeed { wheel }, Term::WheelSense { wheel }]);
+            }
+            out.push((target(Quantity::Current, wheel), terms));
+        }
+    }
+    out
+}
+
+/// A wheel's last rates.
+fn rates(wheel: usize) -> impl Iterator<Item = Term> {
+    (0..WHEEL_LAGS).map(move |lag| Term::Wheel { wheel, lag })
+}
+
+/// Every product of powers of the axes up to an order, the constant first.
+fn polynomial(axes: usize, order: usize) -> Vec<Term> {
+    let mut products = vec![[0_u8; COMMANDS]];
+    for axis in 0..axes.min(COMMANDS) {
+        let mut more = Vec::new();
+        for powers in &products {
+            let used: usize = powers.iter().map(|&power| usize::from(power)).sum();
+            for power in 0..=order - used.min(order) {
+                let mut powers = *powers;
+                powers[axis] = power as u8;
+                more.push(powers);
+            }
+        }
+        products = more;
+    }
+    let term = |powers: [u8; COMMANDS]| match powers.iter().all(|&power| power == 0) {
+        true => Term::Constant,
+        false => Term::Command { powers },
+    };
+    products.into_iter().map(term).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_polynomial_has_every_product_once() {
+        for (axes, order, count) in [(1, 4, 5), (2, 4, 15), (3, 2, 10), (2, 1, 3)] {
+            let terms = polynomial(axes, order);
+            assert_eq!(terms.len(), count, "{axes} axes, order {order}");
+            assert_eq!(terms[0], Term::Constant);
+            for (i, term) in terms.iter().enumerate() {
+                assert!(!terms[..i].contains(term), "{term:?} twice");
+            }
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! One channel of a nominal model: what it measures, from what it is predicted, and how well.
+
+use serde::{Deserialize, Serialize};
+use vigil_blocks::COMMANDS;
+
+use super::observation::{History, Observation};
+
+/// Rate at which a wheel's sense of turning counts as half decided, rad/s: friction changes its
+/// sign with it.
+const SENSE_RAD_S: f64 = 0.5;
+
+/// What a channel measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Displacement along the commanded direction per commanded metre of path.
+    Forward,
+    /// Displacement to the left of the commanded direction per commanded metre of path.
+    Lateral,
+    /// Turn per commanded metre of path, rad/m.
+    Turn,
+    /// Yaw rate of the gyro, rad/s.
+    YawRate,
+    /// Rate of a wheel, rad/s.
+    WheelRate,
+    /// Current of a motor, A.
+    Current,
+}
+
+impl Quantity {
+    /// True for what is taken from the pose.
+    #[must_use]
+    pub const fn is_pose(self) -> bool {
+        matches!(self, Self::Forward | Self::Lateral | Self::Turn)
+    }
+}
+
+/// A measured channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    /// What it measures.
+    pub quantity: Quantity,
+    /// Index of its wheel; 0 where it has none.
+    #[serde(default)]
+    pub wheel: usize,
+}
+
+impl Target {
+    /// The channel's value in the newest observation; none if it was not measured, or says nothing
+    /// there (a pose while no motion is commanded).
+    #[must_use]
+    pub fn value(&self, now: &Observation) -> Option<f64> {
+        match self.quantity {
+            Quantity::Forward => now.per_metre.map(|moved| moved[0]),
+            Quantity::Lateral => now.per_metre.map(|moved| moved[1]),
+            Quantity::Turn => now.per_metre.map(|moved| moved[2]),
+            Quantity::YawRate => now.yaw_rate,
+            Quantity::WheelRate => *now.wheels.get(self.wheel)?,
+            Quantity::Current => *now.currents.get(self.wheel)?,
+        }
+    }
+}
+
+/// One term of a prediction. Lags count observations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Term {
+    /// 1.
+    Constant,
+    /// Product of powers of the command's axes, each divided by its learned size.
+    Command {
+        /// Powers, one per axis of the block's command vector.
+        powers: [u8; COMMANDS],
+    },
+    /// One axis of the command, some observations ago, divided by its learned size.
+    Lagged {
+        /// Axis.
+        axis: usize,
+        /// Observations ago.
+        lag: usize,
+    },
+    /// Rate of a wheel some observations ago, rad/s.
+    Wheel {
+        /// Wheel.
+        wheel: usize,
+        /// Observations ago.
+        lag: usize,
+    },
+    /// Magnitude of a wheel's rate, rad/s.
+    WheelSpeed {
+        /// Wheel.
+        wheel: usize,
+    },
+    /// Sense of a wheel's turning, -1 to 1.
+    WheelSense {
+        /// Wheel.
+        wheel: usize,
+    },
+}
+
+impl Term {
+    /// Its value `ago` observations before the newest; `size` holds the learned size of each axis.
+    /// None if it was not measured.
+    #[must_use]
+    pub fn value(&self, history: &History, ago: usize, size: &[f64; COMMANDS]) -> Option<f64> {
+        let axis = |lag: usize, i: usize| {
+            let command = history.ago(ago + lag)?.command.get(i)?;
+            Some(command / size.get(i)?)
+        };
+        let wheel = |lag: usize, i: usize| *history.ago(ago + lag)?.wheels.get(i)?;
+        match *self {
+            Self::Constant => Some(1.0),
+            Self::Command { powers } => {
+                let mut product = 1.0;
+                for (i, power) in powers.into_iter().enumerate().filter(|&(_, p)| p > 0) {
+                    product *= axis(0, i)?.powi(i32::from(power));
+                }
+                Some(product)
+            }
+            Self::Lagged { axis: i, lag } => axis(lag, i),
+            Self::Wheel { wheel: i, lag } => wheel(lag, i),
+            Self::WheelSpeed { wheel: i } => Some(wheel(0, i)?.abs()),
+            Self::WheelSense { wheel: i } => Some((wheel(0, i)? / SENSE_RAD_S).tanh()),
+        }
+    }
+}
+
+/// A channel's prediction and what is known of its error.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Channel {
+    /// What is measured.
+    pub target: Target,
+    /// Terms of the prediction.
+    pub terms: Vec<Term>,
+    /// Weight of each term.
+    pub weights: Vec<f64>,
+    /// Variance of the residual of one observation: the first value, plus the second times the
+    /// square of the commanded path speed in m/s, plus the third times the square of what the
+    /// prediction has changed by since the last observation (no two channels keep the same time).
+    pub variance: [f64; 3],
+    /// Correlation of successive residuals. Negative: each carries an error that the next takes
+    /// back (increments of a noisy pose), above -0.5. Positive: it decays, below 1.
+    pub correlation: f64,
+    /// Standard deviation of a run's own constant offset (its ground, its battery).
+    pub offset_sd: f64,
+    /// Standard deviation of the offset's change from one observation to the next (a ground that
+    /// is not even), in the least even usual run.
+    pub drift_sd: f64,
+    /// Mean square of the whitened residual in the noisiest usual run, at least 1: more than that
+    /// counts as scatter.
+    pub scatter: f64,
+    /// Root mean square of the whitened residual on the part left out, over that expected: about 1.
+    pub held_out_ratio: f64,
+    /// How its log-odds behave without a fault, one per form of the detection filter.
+    #[serde(default)]
+    pub tails: Vec<Tail>,
+}
+
+/// How often the log-odds of one channel exceed a level without a fault: more rarely by `exp(-slope)`
+/// per unit. No channel is as regular as its model: what little regular ones claim, counts less.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tail {
+    /// Form of the detection filter.
+    pub form: String,
+    /// Level, natural log-odds at a prior rate of one fault an hour.
+    pub level_log_odds: f64,
+    /// Mean time between exceedances of it, h.
+    pub interval_h: f64,
+    /// Slope.
+    pub slope: f64,
+}
+
+impl Tail {
+    /// The log-odds that a channel without flaw would give for an event as rare. For such a one
+    /// they grow as the logarithm of the time between exceedances, at a prior rate of 1/h.
+    #[must_use]
+    pub fn tempered(&self, log_odds: f64) -> f64 {
+        self.interval_h.ln() + self.slope * (log_odds - self.level_log_odds)
+    }
+}
+
+impl Channel {
+    /// Measured less predicted value, and how much the prediction has changed since the last
+    /// observation; none if one of them is not known.
+    #[must_use]
+    pub fn residual(&self, history: &History, size: &[f64; COMMANDS]) -> Option<Residual> {
+        let now = history.ago(0)?;
+        let predicted = self.predict(history, 0, size)?;
+        let change = predicted - self.predict(history, 1, size)?;
+        let [base, by_speed, by_change] = self.variance;
+        let speed = now.path_speed_m_s;
+        Some(Residual {
+            apart: self.target.value(now)? - predicted,
+            basis: [1.0, speed * speed, change * change],
+            variance: base + by_speed * speed * speed + by_change * change * change,
+        })
+    }
+
+    fn predict(&self, history: &History, ago: usize, size: &[f64; COMMANDS]) -> Option<f64> {
+        let mut predicted = 0.0;
+        for (term, weight) in self.terms.iter().zip(&self.weights) {
+            predicted += weight * term.value(history, ago, size)?;
+        }
+        Some(predicted)
+    }
+}
+
+/// What is left of a measured value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residual {
+    /// Measured less predicted value.
+    pub apart: f64,
+    /// What [`Channel::variance`] is multiplied by.
+    pub basis: [f64; 3],
+    /// Its variance.
+    pub variance: f64,
+}

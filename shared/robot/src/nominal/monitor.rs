@@ -1,0 +1,211 @@
+//! The detection filter of a nominal model: is this still the robot that was learned?
+//!
+//! Each channel's residual is whitened by its [`Track`]. Two fault states stand against the nominal
+//! one, per channel: an unknown constant bias, which is learned ([`Form::LearnedBias`]), and the
+//! constant likelihood of any large residual, for faults that show as scatter (a taped wheel jolts
+//! the robot once a turn and has no mean). The channels' odds, each tempered by its [`Tail`], add up:
+//! a fault enters by one of them.
+//!
+//! The noise is that of this very robot, measured on its own log; a rise beyond what its runs have
+//! shown is a symptom and is not explained away.
+
+use nalgebra::SVector;
+use vigil_blocks::{CHANNELS, Channel as Slot, WHEELS};
+use vigil_inference::constant::Constant;
+use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
+
+use super::channel::{Channel, Quantity, Tail};
+use super::model::Model;
+use super::observation::{History, Observation};
+use super::track::Track;
+use crate::learned::Form;
+use crate::learned::form::{Evidence, TAU_SQUARED_PER_DIMENSION};
+use crate::learned::monitor::{Channels, Report};
+
+/// Standard deviation of a fault's bias in units of the whitened residual.
+const BIAS: f64 = 3.0;
+/// Whitened residuals are clipped here: one reading may be a glitch, several in a row are not.
+const CLIP: f64 = 6.0;
+/// A robot that has just begun to move is taken up to speed first, s.
+const START_S: f64 = 0.5;
+/// A pose says nothing on the model until the command has been steady for so long, s.
+const SETTLE_S: f64 = 1.0;
+/// Observed motion after which evidence counts, s.
+const READY_S: f64 = 1.0;
+/// Growth of the deviation per width of the learned range by which a command lies outside it.
+const EXTRAPOLATION: f64 = 4.0;
+/// Log-odds below this are reported as this: no evidence for a fault at all.
+const LOG_ODDS_MIN: f64 = -700.0;
+
+/// One channel at work.
+#[derive(Debug, Clone)]
+struct Watched {
+    channel: Channel,
+    track: Track,
+    bias: Evidence<1>,
+    scatter: Constant,
+    /// Its tail for the form in use; none while it is being learned.
+    tail: Option<Tail>,
+}
+
+/// The detection filter.
+#[derive(Debug, Clone)]
+pub struct Monitor {
+    model: Model,
+    sizes: [f64; vigil_blocks::COMMANDS],
+    form: Form,
+    fault_rate_1_s: f64,
+    watched: Vec<Watched>,
+    run_s: f64,
+    extrapolated: bool,
+    report: Report,
+}
+
+impl Monitor {
+    /// A monitor of the channels of `model` that are among `channels`, with a prior fault rate.
+    #[must_use]
+    pub fn new(model: &Model, channels: Channels, form: Form, fault_rate_1_h: f64) -> Self {
+        let all = channels == Channels::PoseEncoders;
+        let used = model.channel.iter();
+        let used = used.filter(|channel| all || channel.target.quantity.is_pose());
+        let watched = used.map(|channel| Watched {
+            channel: channel.clone(),
+            track: Track::new(channel),
+            bias: Evidence::new(form, BIAS),
+            scatter: Constant::default(),
+            tail: channel
+                .tails
+                .iter()
+                .find(|tail| tail.form == form.name())
+                .cloned(),
+        });
+        let mut monitor = Self {
+            sizes: model.sizes(),
+            form,
+            fault_rate_1_s: fault_rate_1_h / 3600.0,
+            watched: watched.collect(),
+            run_s: 0.0,
+            extrapolated: false,
+            report: Report {
+                log_odds: f64::NEG_INFINITY,
+                channels: [f64::NEG_INFINITY; CHANNELS],
+                evidence: 0.0,
+                degenerate_count: 0,
+            },
+            model: model.clone(),
+        };
+        monitor.reset();
+        monitor
+    }
+
+    /// Forgets everything.
+    pub fn reset(&mut self) {
+        for watched in &mut self.watched {
+            watched.track = Track::new(&watched.channel);
+        }
+        self.run_s = 0.0;
+        self.extrapolated = false;
+        self.report.evidence = 0.0;
+        self.forget_evidence();
+    }
+
+    /// Forgets what speaks for a fault, and keeps what is known of the run.
+    pub fn forget_evidence(&mut self) {
+        for watched in &mut self.watched {
+            watched.bias = Evidence::new(self.form, BIAS);
+            watched.scatter = Constant::default();
+        }
+        self.sum_up();
+    }
+
+    /// What the last observation did.
+    #[must_use]
+    pub const fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// True once evidence counts.
+    #[must_use]
+    pub fn is_ready(&self) -> bool {
+        self.run_s >= READY_S
+    }
+
+    /// True if the last command lay outside the range that was learned from.
+    #[must_use]
+    pub const fn is_extrapolating(&self) -> bool {
+        self.extrapolated
+    }
+
+    /// Takes the newest observation of `history`. While `following`, offsets give way; see
+    /// [`Track::step`].
+    pub fn step(&mut self, history: &History, following: bool) {
+        self.report.evidence = 0.0;
+        let Some(now) = history.ago(0) else { return };
+        let widening = self.widening(now);
+        if !now.moving || now.moving_s < START_S {
+            for watched in &mut self.watched {
+                watched.track.interrupt();
+            }
+            self.sum_up();
+            return;
+        }
+        self.run_s += now.dt_s;
+        let share = 1.0 / self.watched.len().max(1) as f64;
+        let birth = (self.fault_rate_1_s * now.dt_s * share).clamp(1e-300, 0.1);
+        for watched in &mut self.watched {
+            let Watched {
+                channel,
+                track,
+                bias,
+                scatter,
+                ..
+            } = watched;
+            let settled = now.steady_s >= SETTLE_S || !channel.target.quantity.is_pose();
+            let residual = channel.residual(history, &self.sizes);
+            let Some(residual) = residual.filter(|_| settled) else {
+                track.interrupt();
+                continue;
+            };
+            let variance = widening * residual.variance;
+            let (apart, spread) = track.step(channel, residual.apart, variance, following);
+            let whitened = (apart / spread.sqrt()).clamp(-CLIP, CLIP);
+            bias.step(&SVector::from([whitened]), birth);
+            let square = whitened * whitened / channel.scatter;
+            scatter.step(square, TAU_SQUARED_PER_DIMENSION, birth, birth);
+            self.report.evidence += log_normal(apart, spread);
+        }
+        self.sum_up();
+    }
+
+    /// Factor on all variances for a command outside the learned range.
+    fn widening(&mut self, now: &Observation) -> f64 {
+        let axes = self.model.command.iter().zip(&now.command);
+        let beyond = axes.map(|(range, value)| range.beyond(*value));
+        let beyond = beyond.fold(0.0, f64::max);
+        self.extrapolated = beyond > 0.0;
+        let factor = 1.0 + EXTRAPOLATION * beyond;
+        factor * factor
+    }
+
+    fn sum_up(&mut self) {
+        let mut channels = [f64::NEG_INFINITY; CHANNELS];
+        for watched in &self.watched {
+            let target = watched.channel.target;
+            let wheel = target.wheel.min(WHEELS - 1);
+            let slot = match target.quantity {
+                Quantity::YawRate => Slot::YAW_RATE,
+                Quantity::WheelRate => Slot::wheel_rate(wheel),
+                Quantity::Current => Slot::current(wheel),
+                _ => Slot::POSE,
+            };
+            let odds = log_add(watched.bias.log_odds(), watched.scatter.log_odds());
+            let odds = watched
+                .tail
+                .as_ref()
+                .map_or(odds, |tail| tail.tempered(odds));
+            channels[slot] = log_add(channels[slot], odds);
+        }
+        self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);
+        self.report.channels = channels.map(|value| value.max(LOG_ODDS_MIN));
+    }
+}

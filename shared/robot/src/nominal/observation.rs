@@ -1,0 +1,298 @@
+//! Frames averaged into observations, for robots of any kind.
+
+use vigil_blocks::{COMMANDS, SensorFrame, Valid, WHEELS};
+use vigil_inference::angle::wrap;
+
+use crate::Description;
+use crate::learned::Intake;
+
+/// Observations that a prediction may look back, the newest included.
+pub const DEPTH: usize = 5;
+/// A pause between frames longer than this breaks the record, s.
+const GAP_S: f64 = 0.5;
+/// A frame that comes this part of a period early still completes an observation.
+const NEARLY: f64 = 0.5;
+/// Readings beyond so many times the robot's limits are garbage.
+const GARBAGE: f64 = 10.0;
+/// Change of a command's axis, relative to its limit, after which the robot has to settle anew.
+const CHANGE: f64 = 0.1;
+/// Commanded or driven speed below which a robot stands, m/s.
+pub const STANDING_M_S: f64 = 0.02;
+
+/// What was measured over one interval.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Observation {
+    /// Capture time of its last frame, ns.
+    pub t_ns: u64,
+    /// Its length, s.
+    pub dt_s: f64,
+    /// Mean command, in the units of the robot's description.
+    pub command: [f64; COMMANDS],
+    /// Commanded speed of the fastest point of the robot, m/s.
+    pub path_speed_m_s: f64,
+    /// Mean yaw rate, rad/s.
+    pub yaw_rate: Option<f64>,
+    /// Mean wheel rates, rad/s.
+    pub wheels: [Option<f64>; WHEELS],
+    /// Mean motor currents, A.
+    pub currents: [Option<f64>; WHEELS],
+    /// Displacement along and across (left) the commanded direction, and turn (rad), each per
+    /// commanded metre of path; none without pose or command.
+    pub per_metre: Option<[f64; 3]>,
+    /// True if the robot moves or is told to.
+    pub moving: bool,
+    /// How long it has been moving, s.
+    pub moving_s: f64,
+    /// How long the command has hardly changed, s.
+    pub steady_s: f64,
+}
+
+/// The last few observations of one unbroken record.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct History {
+    last: [Observation; DEPTH],
+    count: usize,
+}
+
+impl History {
+    /// The observation so many before the newest; none before the record began.
+    #[must_use]
+    pub fn ago(&self, lag: usize) -> Option<&Observation> {
+        if lag < self.count {
+            self.last.get(lag)
+        } else {
+            None
+        }
+    }
+
+    /// Adds the newest.
+    pub fn push(&mut self, observation: Observation) {
+        self.last.rotate_right(1);
+        self.last[0] = observation;
+        self.count = (self.count + 1).min(DEPTH);
+    }
+
+    /// Begins a new record.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+}
+
+/// Sum of the readings of one channel.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mean {
+    sum: f64,
+    count: u32,
+}
+
+impl Mean {
+    fn push(&mut self, value: f64) {
+        self.sum += value;
+        self.count += 1;
+    }
+
+    fn take(&mut self) -> Option<f64> {
+        let count = std::mem::take(&mut self.count);
+        let sum = std::mem::take(&mut self.sum);
+        (count > 0).then(|| sum / f64::from(count))
+    }
+}
+
+/// Builds observations from frames.
+#[derive(Debug, Clone)]
+pub struct Observer {
+    robot: Description,
+    history: History,
+    started: bool,
+    run_id: u64,
+    t_ns: u64,
+    reset_count: u32,
+    elapsed_s: f64,
+    command: [Mean; COMMANDS],
+    yaw_rate: Mean,
+    wheels: [Mean; WHEELS],
+    currents: [Mean; WHEELS],
+    pose: Option<[f64; 3]>,
+    pose_before: Option<[f64; 3]>,
+}
+
+impl Observer {
+    /// An observer of a robot.
+    #[must_use]
+    pub fn new(robot: &Description) -> Self {
+        Self {
+            robot: robot.clone(),
+            history: History::default(),
+            started: false,
+            run_id: 0,
+            t_ns: 0,
+            reset_count: 0,
+            elapsed_s: 0.0,
+            command: [Mean::default(); COMMANDS],
+            yaw_rate: Mean::default(),
+            wheels: [Mean::default(); WHEELS],
+            currents: [Mean::default(); WHEELS],
+            pose: None,
+            pose_before: None,
+        }
+    }
+
+    /// The last observations.
+    #[must_use]
+    pub const fn history(&self) -> &History {
+        &self.history
+    }
+
+    /// Forgets everything: the next frame begins a new run.
+    pub fn reset(&mut self) {
+        self.started = false;
+    }
+
+    /// Takes a frame.
+    pub fn push(&mut self, frame: &SensorFrame) -> Intake {
+        let new_run = !self.started || frame.run_id != self.run_id;
+        let t_ns = frame.header.t_capture_ns;
+        if !new_run && t_ns <= self.t_ns {
+            return Intake {
+                invalid: true,
+                ..Intake::default()
+            };
+        }
+        let dt_s = if new_run {
+            0.0
+        } else {
+            (t_ns - self.t_ns) as f64 * 1e-9
+        };
+        let broken = new_run || dt_s > GAP_S;
+        if broken {
+            self.begin();
+        }
+        if broken || frame.pose_reset_count != self.reset_count {
+            (self.pose, self.pose_before) = (None, None);
+        }
+        self.reset_count = frame.pose_reset_count;
+        (self.started, self.run_id, self.t_ns) = (true, frame.run_id, t_ns);
+        let invalid = self.collect(frame);
+        if broken {
+            // The first frame only says where the first observation begins.
+            self.clear();
+            self.pose_before = self.pose;
+            return Intake {
+                complete: false,
+                invalid,
+                new_run,
+            };
+        }
+        self.elapsed_s += dt_s;
+        let complete = self.elapsed_s + NEARLY * dt_s >= self.robot.interval_s;
+        if complete {
+            self.complete();
+        }
+        Intake {
+            complete,
+            invalid,
+            new_run,
+        }
+    }
+
+    fn begin(&mut self) {
+        self.history.clear();
+        self.clear();
+    }
+
+    fn clear(&mut self) {
+        self.elapsed_s = 0.0;
+        self.command = [Mean::default(); COMMANDS];
+        self.yaw_rate = Mean::default();
+        self.wheels = [Mean::default(); WHEELS];
+        self.currents = [Mean::default(); WHEELS];
+    }
+
+    /// Adds a frame's readings; true if one was refused.
+    fn collect(&mut self, frame: &SensorFrame) -> bool {
+        let mut invalid = false;
+        let mut push = |mean: &mut Mean, bit: u64, value: f64, largest: f64| {
+            if !frame.has(bit) {
+                return;
+            }
+            if value.abs() <= largest {
+                mean.push(value);
+            } else {
+                invalid = true;
+            }
+        };
+        for (i, axis) in self.robot.command.iter().enumerate().take(COMMANDS) {
+            let (bit, value) = (Valid::command(i), frame.command[i]);
+            push(&mut self.command[i], bit, value, GARBAGE * axis.limit);
+        }
+        let limits = &self.robot.limits;
+        let largest = GARBAGE * limits.yaw_rate_rad_s;
+        push(&mut self.yaw_rate, Valid::YAW_RATE, frame.yaw_rate, largest);
+        for i in 0..self.robot.wheels.len().min(WHEELS) {
+            let (rate, current) = (frame.wheel_rate[i], frame.current[i]);
+            let largest = GARBAGE * limits.wheel_rate_rad_s;
+            push(&mut self.wheels[i], Valid::wheel_rate(i), rate, largest);
+            push(&mut self.currents[i], Valid::current(i), current, 1e4);
+        }
+        if frame.has(Valid::POSE) {
+            let sane = frame.pose.iter().all(|value| value.abs() < 1e7);
+            self.pose = sane.then_some(frame.pose);
+            invalid |= !sane;
+        }
+        invalid
+    }
+
+    fn complete(&mut self) {
+        let last = self.history.ago(0).copied();
+        let mut now = Observation {
+            t_ns: self.t_ns,
+            dt_s: std::mem::take(&mut self.elapsed_s),
+            yaw_rate: self.yaw_rate.take(),
+            ..Observation::default()
+        };
+        for (i, mean) in self.command.iter_mut().enumerate() {
+            let before = last.map_or(0.0, |last| last.command[i]);
+            now.command[i] = mean.take().unwrap_or(before);
+        }
+        for i in 0..WHEELS {
+            now.wheels[i] = self.wheels[i].take();
+            now.currents[i] = self.currents[i].take();
+        }
+        let twist = self.robot.twist(&now.command);
+        now.path_speed_m_s = self.robot.path_speed_m_s(twist);
+        let rolls = |rate: &f64| rate.abs() * self.robot.wheel_radius_m > STANDING_M_S;
+        now.moving = now.path_speed_m_s > STANDING_M_S || now.wheels.iter().flatten().any(rolls);
+        now.per_metre = self.moved(twist, &now);
+        self.pose_before = self.pose.take();
+        let changed = last.is_none_or(|last| {
+            let axes = self.robot.command.iter().enumerate().take(COMMANDS);
+            let mut apart = axes.map(|(i, a)| (now.command[i] - last.command[i]).abs() / a.limit);
+            apart.any(|apart| apart > CHANGE)
+        });
+        if let Some(last) = last.filter(|_| now.moving) {
+            now.moving_s = last.moving_s + now.dt_s;
+            now.steady_s = last.steady_s + now.dt_s;
+        }
+        if changed {
+            now.steady_s = 0.0;
+        }
+        self.history.push(now);
+    }
+
+    fn moved(&self, twist: [f64; 3], now: &Observation) -> Option<[f64; 3]> {
+        let (from, to) = (self.pose_before?, self.pose?);
+        let path_m = now.path_speed_m_s * now.dt_s;
+        if now.path_speed_m_s < STANDING_M_S {
+            return None;
+        }
+        let turn = wrap(to[2] - from[2]);
+        let along = if twist[0].hypot(twist[1]) > STANDING_M_S {
+            twist[1].atan2(twist[0])
+        } else {
+            0.0
+        };
+        let (sin, cos) = (from[2] + 0.5 * turn + along).sin_cos();
+        let (x, y) = (to[0] - from[0], to[1] - from[1]);
+        Some([x * cos + y * sin, y * cos - x * sin, turn].map(|value| value / path_m))
+    }
+}

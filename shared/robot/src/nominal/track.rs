@@ -1,0 +1,106 @@
+//! A run's offset and the noise's colour: residuals of a channel become white.
+//!
+//! State: the run's offset, constant but for a slow drift, and one carried over from the last residual. With a negative
+//! correlation `residual = offset + w + n - n'` (w white, n' the error that the last one made);
+//! with a positive one `residual = offset + a`, a first-order process. A Kalman filter gives the
+//! innovation; divided by its deviation it is white with variance 1, if the model holds.
+
+use super::channel::Channel;
+
+/// Least part of a variance that is white: a filter must not believe that it knows everything.
+const WHITE_MIN: f64 = 0.05;
+/// Growth of the offset's variance per observation while following, as part of the residual's.
+const FOLLOWING: f64 = 0.01;
+
+/// Filter of one channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Track {
+    mean: [f64; 2],
+    covariance: [f64; 3],
+    carried: bool,
+}
+
+impl Track {
+    /// The track of a channel at the start of a run.
+    #[must_use]
+    pub fn new(channel: &Channel) -> Self {
+        Self {
+            mean: [0.0; 2],
+            covariance: [channel.offset_sd * channel.offset_sd, 0.0, 0.0],
+            carried: false,
+        }
+    }
+
+    /// The record was broken: the offset stays, the last residual says nothing on the next.
+    pub fn interrupt(&mut self) {
+        self.carried = false;
+    }
+
+    /// Takes a residual with its variance; returns the innovation and its variance. While
+    /// `following`, the offset gives way, so that the return of a robot to its nominal mode, or
+    /// its getting used to another ground, is seen.
+    pub fn step(
+        &mut self,
+        channel: &Channel,
+        residual: f64,
+        variance: f64,
+        following: bool,
+    ) -> (f64, f64) {
+        if !self.carried {
+            // Nothing is known of the last error but its variance.
+            self.mean[1] = 0.0;
+            self.covariance[1] = 0.0;
+            self.covariance[2] = match channel.correlation < 0.0 {
+                true => -channel.correlation * variance,
+                false => variance,
+            };
+            self.carried = true;
+        }
+        self.covariance[0] += channel.drift_sd * channel.drift_sd;
+        if following {
+            self.covariance[0] += FOLLOWING * variance;
+        }
+        if channel.correlation < 0.0 {
+            self.taken_back(-channel.correlation, residual, variance)
+        } else {
+            self.decaying(channel.correlation, residual, variance)
+        }
+    }
+
+    fn taken_back(&mut self, part: f64, residual: f64, variance: f64) -> (f64, f64) {
+        let [offset, cross, error] = self.covariance;
+        let new = part * variance;
+        let white = ((1.0 - 2.0 * part) * variance).max(WHITE_MIN * variance);
+        let spread = offset - 2.0 * cross + error + new + white;
+        let apart = residual - (self.mean[0] - self.mean[1]);
+        // Gains of the offset and of the error that this residual makes.
+        let gains = [(offset - cross) / spread, new / spread];
+        self.mean = [self.mean[0] + gains[0] * apart, gains[1] * apart];
+        self.covariance = [
+            offset - gains[0] * gains[0] * spread,
+            -gains[0] * gains[1] * spread,
+            new - gains[1] * gains[1] * spread,
+        ];
+        (apart, spread)
+    }
+
+    fn decaying(&mut self, correlation: f64, residual: f64, variance: f64) -> (f64, f64) {
+        let [offset, cross, coloured] = self.covariance;
+        let white = WHITE_MIN * variance;
+        let spread = offset + 2.0 * cross + coloured + white;
+        let apart = residual - (self.mean[0] + self.mean[1]);
+        let gains = [(offset + cross) / spread, (cross + coloured) / spread];
+        let rest = coloured - gains[1] * gains[1] * spread;
+        let new = variance * (1.0 - correlation * correlation);
+        self.mean = [
+            self.mean[0] + gains[0] * apart,
+            correlation * (self.mean[1] + gains[1] * apart),
+        ];
+        self.covariance = [
+            offset - gains[0] * gains[0] * spread,
+            correlation * (cross - gains[0] * gains[1] * spread),
+            correlation * correlation * rest + new,
+        ];
+        (apart, spread)
+    }
+}

@@ -1,0 +1,78 @@
+//! A learned model of either kind.
+
+use crate::Description;
+use crate::learned::model::Provenance;
+use crate::learned::{self, ModelError};
+use crate::nominal;
+
+/// What was learned of a robot.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RobotModel {
+    /// Its nominal behaviour and its faults.
+    Faults(Box<learned::Model>),
+    /// Its nominal behaviour alone: whatever else it does is unknown.
+    Nominal(Box<nominal::Model>),
+}
+
+impl RobotModel {
+    /// Reads and checks a model; a nominal one says so by its first key, `kind = "nominal"`.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming the key, what was found and what is allowed.
+    pub fn from_toml(text: &str) -> Result<Self, ModelError> {
+        let is_kind = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
+        let first = text.lines().find(is_kind).unwrap_or("");
+        if first.trim_start().starts_with("kind") {
+            return Ok(Self::Nominal(Box::new(nominal::Model::from_toml(text)?)));
+        }
+        Ok(Self::Faults(Box::new(learned::Model::from_toml(text)?)))
+    }
+
+    /// The model with faults, if it is one.
+    #[must_use]
+    pub fn with_faults(self) -> Option<learned::Model> {
+        match self {
+            Self::Faults(model) => Some(*model),
+            Self::Nominal(_) => None,
+        }
+    }
+
+    /// Hash over the file's text; equal for equal models.
+    #[must_use]
+    pub fn hash(&self) -> u64 {
+        match self {
+            Self::Faults(model) => model.hash(),
+            Self::Nominal(model) => model.hash(),
+        }
+    }
+
+    /// Checks that the model is of this robot.
+    ///
+    /// # Errors
+    /// [`ModelError::Robot`].
+    pub fn check_robot(&self, robot: &Description) -> Result<(), ModelError> {
+        match self {
+            Self::Faults(model) => model.check_robot(robot),
+            Self::Nominal(model) => model.check_robot(robot),
+        }
+    }
+
+    /// Where it comes from.
+    #[must_use]
+    pub fn provenance(&self) -> &Provenance {
+        match self {
+            Self::Faults(model) => &model.provenance,
+            Self::Nominal(model) => &model.provenance,
+        }
+    }
+
+    /// Counter-steering for a stuck wheel, see [`learned::Model::compensation`]; none (1, 0) where
+    /// no fault is modelled.
+    #[must_use]
+    pub fn compensation(&self, wheel: usize) -> (f64, f64) {
+        match self {
+            Self::Faults(model) => model.compensation(wheel),
+            Self::Nominal(_) => (1.0, 0.0),
+        }
+    }
+}
