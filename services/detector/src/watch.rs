@@ -24,9 +24,9 @@ pub(crate) enum Watch {
     /// Of a model with faults: tracks the pose.
     Faults {
         /// Frames to observations.
-        observer: Observer,
+        observer: Box<Observer>,
         /// Detection filter.
-        monitor: Monitor,
+        monitor: Box<Monitor>,
         /// Drawn from its belief about the pose.
         cloud: Cloud,
     },
@@ -35,7 +35,7 @@ pub(crate) enum Watch {
         /// Frames to observations.
         observer: Box<nominal::Observer>,
         /// Detection filter.
-        monitor: nominal::Monitor,
+        monitor: Box<nominal::Monitor>,
         /// The last observation.
         last: Observed,
     },

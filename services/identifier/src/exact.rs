@@ -190,6 +190,7 @@ impl Exact {
                 let (curvature, speed) = (observation.curvature, observation.speed);
                 let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
                 state.track = state.track.fork(&noise);
+                state.track.diffuse(self.modes[mode].jump);
                 self.bank.add(Hypothesis {
                     mode,
                     onset: t_ns,

@@ -109,7 +109,7 @@ pub enum Diagnoser {
     /// Tells faults apart.
     Identifier(Box<Identifier>),
     /// Tells nominal from unknown.
-    Watcher(Watcher),
+    Watcher(Box<Watcher>),
 }
 
 impl Diagnoser {

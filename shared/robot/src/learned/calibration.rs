@@ -23,7 +23,7 @@ pub struct Calibration {
     pub level_log_odds: f64,
     /// Mean time between exceedances of that level, h.
     pub interval_at_level_h: f64,
-    /// Slope of the tail (maximum likelihood).
+    /// Slope of the tail (lower end of its 90 % interval).
     pub tail_slope: f64,
     /// Nominal driving behind the fit, h. A false-alarm interval above it is an extrapolation.
     pub exposure_h: f64,
@@ -65,13 +65,14 @@ impl Calibration {
             .collect();
         let count = above.len().max(1) as f64;
         let mean = above.iter().sum::<f64>() / count;
+        let lower = 1.0 - 1.645 / count.sqrt();
         Some(Self {
             sensors: channels.name().to_owned(),
             form: form.name().to_owned(),
             fault_rate_1_h,
             level_log_odds: level,
             interval_at_level_h: window_s / 3600.0 * maxima.len() as f64 / count,
-            tail_slope: (1.0 / mean.max(1e-3)).clamp(0.2, 1.0),
+            tail_slope: (lower / mean.max(1e-3)).clamp(0.2, 1.0),
             exposure_h: window_s / 3600.0 * maxima.len() as f64,
         })
     }
@@ -99,7 +100,8 @@ mod tests {
             ("pose", "windowed")
         );
         assert!((fit.level_log_odds - 2.0_f64.ln() / 0.8).abs() < 2e-3);
-        assert!((fit.tail_slope - 0.8).abs() < 5e-3, "{}", fit.tail_slope);
+        let expected = 0.8 * (1.0 - 1.645 / 2000.0_f64.sqrt());
+        assert!((fit.tail_slope - expected).abs() < 5e-3, "{fit:?}");
         assert!((fit.exposure_h - 4.0).abs() < 1e-9);
         let threshold = fit.alarm_log_odds(24.0, 1.0);
         let by_hand = fit.level_log_odds + (24.0 / 0.002_f64).ln() / fit.tail_slope;

@@ -8,6 +8,10 @@ use super::{Curve, Model, MotionModel};
 
 /// The unknown: standard deviation of its constant deviation per metre (yaw, forward, lateral).
 const UNKNOWN_SD: [f64; 3] = [0.25, 0.2, 0.12];
+/// Share of the unknown that only makes the pose jump, and how far: x m, y m, yaw rad. A sensor that
+/// begins to lag, a slip of the map.
+const JUMP_SHARE: f64 = 0.1;
+const JUMP_SD: [f64; 3] = [0.1, 0.1, 0.1];
 /// Correlation length of the unknown's coloured deviations, m.
 const UNKNOWN_LENGTH_M: f64 = 0.2;
 /// Ground other than that learned from changes a stuck wheel's effect by one factor: how probable,
@@ -70,6 +74,8 @@ pub struct MotionMode {
     /// Factor by which the ground changes the learned effect, and the factor's deviation; (1, 0) on
     /// ground like that learned from.
     pub ground: (f64, f64),
+    /// Variance of a jump of the pose (x, y, yaw) at the onset.
+    pub jump: [f64; 3],
 }
 
 impl MotionMode {
@@ -127,11 +133,11 @@ impl FaultRates {
 }
 
 /// The ways in which a robot may move whose wheels `stuck` (bits) may stick: nominal first, then
-/// single wheels, the same on other ground if `other_ground`, pairs if `pairs`, and both kinds of
-/// unknown.
+/// single wheels, pairs if `pairs`, and both kinds of unknown; if `rare`, single wheels on other
+/// ground and a jump of the pose too.
 #[must_use]
-pub fn motion_modes(model: &Model, stuck: u32, other_ground: bool, pairs: bool) -> Vec<MotionMode> {
-    let grounds = match other_ground {
+pub fn motion_modes(model: &Model, stuck: u32, rare: bool, pairs: bool) -> Vec<MotionMode> {
+    let grounds = match rare {
         true => OTHER_GROUNDS.as_slice(),
         false => &[],
     };
@@ -143,6 +149,7 @@ pub fn motion_modes(model: &Model, stuck: u32, other_ground: bool, pairs: bool) 
         motion: nominal,
         noise: nominal.noise(),
         ground: (1.0, 0.0),
+        jump: [0.0; 3],
     }];
     let known = |w: usize| stuck >> w & 1 == 1 && model.stuck(w).is_some();
     let wheels = || (0..WHEELS).filter(|&w| known(w));
@@ -160,13 +167,27 @@ pub fn motion_modes(model: &Model, stuck: u32, other_ground: bool, pairs: bool) 
         let both = |a: usize| wheels().filter(move |&b| b > a).map(move |b| [a, b]);
         modes.extend(wheels().flat_map(both).map(|both| stuck_mode(model, &both)));
     }
-    modes.extend([Moved::Unknown, Moved::UnknownAny].map(|moved| MotionMode {
+    let drives_on = |moved| MotionMode {
         moved,
         share: 1.0,
         motion: nominal,
         noise: unknown_noise(model),
         ground: (1.0, 0.0),
-    }));
+        jump: [0.0; 3],
+    };
+    modes.push(MotionMode {
+        share: 1.0 - JUMP_SHARE,
+        ..drives_on(Moved::Unknown)
+    });
+    modes.push(drives_on(Moved::UnknownAny));
+    if rare {
+        modes.push(MotionMode {
+            share: JUMP_SHARE,
+            noise: nominal.noise(),
+            jump: JUMP_SD.map(|sd| sd * sd),
+            ..drives_on(Moved::Unknown)
+        });
+    }
     modes
 }
 
@@ -223,6 +244,7 @@ fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
         motion,
         noise: noise.unwrap_or_else(|| nominal.noise()),
         ground: (1.0, 0.0),
+        jump: [0.0; 3],
     }
 }
 

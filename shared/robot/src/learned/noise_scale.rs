@@ -15,6 +15,8 @@ const RATIO_MIN: f64 = 0.1;
 const RATIO_MAX: f64 = 100.0;
 /// Samples that the learned scale of 1 counts for.
 const PRIOR: f64 = 20.0;
+/// Standard errors of the estimate by which it leans to the high side.
+const LEAN: f64 = 1.0;
 /// Samples over which the estimate forgets.
 const MEMORY: f64 = 900.0;
 
@@ -74,13 +76,13 @@ impl NoiseScale {
     /// from noise taken as smaller than it is.
     #[must_use]
     pub fn variance_ratio(&self) -> f64 {
-        let lean = 1.0 + 0.8 * (3.9 / self.count).sqrt();
+        let lean = 1.0 + LEAN * (3.9 / self.count).sqrt();
         (self.sum / self.count * lean).clamp(RATIO_MIN, RATIO_MAX)
     }
 }
 
 /// Samples of a kind after which its noise counts as known.
-const KNOWN: f64 = 30.0;
+const KNOWN: f64 = 100.0;
 /// Difference of commanded and lagged curvature, 1/m, and change of speed, m/s, up to which a drive
 /// counts as steady.
 const STEADY_1_M: f64 = 0.02;
