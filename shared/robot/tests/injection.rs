@@ -17,6 +17,10 @@ fn rover() -> Description {
     Description {
         name: "rover".to_owned(),
         kinematics: Kinematics::Ackermann6,
+        command: Vec::new(),
+        measured: vigil_robot::description::Measured::default(),
+        polynomial_order: 4,
+        interval_s: 0.1,
         wheel_radius_m: 0.08,
         mass_kg: 14.2,
         wheels: vec![wheel("LF", true), wheel("LM", false)],
