@@ -11,6 +11,7 @@ use vigil_inference::FaultTree;
 use vigil_inference::hybrid::Modes;
 use vigil_inference::track::TRACK_DIMENSION;
 use vigil_robot::Description;
+use vigil_robot::RobotModel;
 use vigil_robot::learned::{
     FaultRates, Model, Moved, NoiseScales, Observation, Observer, Switching,
 };
@@ -55,6 +56,9 @@ impl Recorded {
     pub fn read(root: &Path) -> Result<Self, Box<dyn Error>> {
         let robot = vigil_setup::load_robot(&root.join("config/robots/rover.toml"))?;
         let model = vigil_setup::load_model(&root.join("config/models/rover.toml"), Some(&robot))?;
+        let RobotModel::Faults(model) = model else {
+            return Err("config/models/rover.toml: a model with faults is needed".into());
+        };
         let tree = vigil_setup::load_tree(&root.join("config/trees/rover.toml"))?;
         let decision = vigil_setup::load_decision(&root.join("config/rover.pomdp"))?;
         let data = root.join("tests/data/rover");
@@ -68,7 +72,7 @@ impl Recorded {
             tree,
             decision,
             robot,
-            model,
+            model: *model,
         };
         let held_out = recorded.model.provenance.runs_held_out.clone();
         for run in runs.iter().filter(|run| held_out.contains(&run.id)) {

@@ -7,9 +7,7 @@ use vigil_inference::logspace::probability;
 use vigil_inference::particles::PoseParticles;
 use vigil_robot::Description;
 use vigil_robot::learned::monitor::Channels;
-use vigil_robot::learned::{
-    Calibration, Form, Model, ModelError, Monitor, NoiseScales, Observer,
-};
+use vigil_robot::learned::{Calibration, Form, Model, ModelError, Monitor, NoiseScales, Observer};
 use vigil_robot::nominal;
 use vigil_setup::schema;
 

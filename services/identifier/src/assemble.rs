@@ -2,8 +2,8 @@
 
 use vigil_decision::Pomdp;
 use vigil_inference::FaultTree;
-use vigil_robot::{Description, RobotModel};
 use vigil_robot::learned::Model;
+use vigil_robot::{Description, RobotModel};
 use vigil_setup::Setup;
 
 use crate::{Diagnoser, Identifier, IdentifierError, Watcher};

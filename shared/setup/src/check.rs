@@ -313,7 +313,10 @@ fn command(robot: &Description, report: &mut impl FnMut(&str, String)) {
     let (needed, shown) = match robot.kinematics {
         Kinematics::Ackermann6 => (2..=2, "curvature and speed"),
         Kinematics::Differential => (2..=2, "speed and yaw rate"),
-        Kinematics::Omni3 => (2..=3, "forward and left velocity, and yaw rate if it is commanded"),
+        Kinematics::Omni3 => (
+            2..=3,
+            "forward and left velocity, and yaw rate if it is commanded",
+        ),
     };
     if !needed.contains(&axes) {
         report("command", format!("{axes} axes: allowed are {shown}"));
@@ -330,11 +333,17 @@ fn command(robot: &Description, report: &mut impl FnMut(&str, String)) {
     }
     if !(1..=4).contains(&robot.polynomial_order) {
         let order = robot.polynomial_order;
-        report("polynomial_order", format!("{order} is out of range: allowed is 1 to 4"));
+        report(
+            "polynomial_order",
+            format!("{order} is out of range: allowed is 1 to 4"),
+        );
     }
     if !(0.02..=1.0).contains(&robot.interval_s) {
         let interval_s = robot.interval_s;
-        report("interval_s", format!("{interval_s} is out of range: allowed is 0.02 to 1 s"));
+        report(
+            "interval_s",
+            format!("{interval_s} is out of range: allowed is 0.02 to 1 s"),
+        );
     }
 }
 

@@ -66,12 +66,20 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         run: run.id,
         name: run.name.clone(),
         frames: run.rows.len(),
-        duration_s: run.rows.last().and_then(|row| row.first()).copied().unwrap_or(0.0),
+        duration_s: run
+            .rows
+            .last()
+            .and_then(|row| row.first())
+            .copied()
+            .unwrap_or(0.0),
     });
-    let delays = imported.delays_s.iter().map(|(channel, delay_s)| Estimated {
-        channel: channel.clone(),
-        delay_s: *delay_s,
-    });
+    let delays = imported
+        .delays_s
+        .iter()
+        .map(|(channel, delay_s)| Estimated {
+            channel: channel.clone(),
+            delay_s: *delay_s,
+        });
     let document = Document {
         schema_version: 1,
         robot: robot.name,
@@ -109,7 +117,10 @@ fn table(document: &Document) -> String {
             delay.channel, delay.delay_s
         ));
     }
-    lines.push(format!("{:>5} {:>8} {:>10}  from", "run", "frames", "length, s"));
+    lines.push(format!(
+        "{:>5} {:>8} {:>10}  from",
+        "run", "frames", "length, s"
+    ));
     for run in &document.runs {
         lines.push(format!(
             "{:>5} {:>8} {:>10.2}  {}",

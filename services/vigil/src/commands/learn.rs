@@ -29,7 +29,12 @@ pub struct Args {
     #[arg(long, value_name = "R")]
     runs: Option<PathBuf>,
     /// Runs to learn from, by their ids, separated by commas; without labels only.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', conflicts_with = "runs")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        conflicts_with = "runs"
+    )]
     only: Vec<u32>,
     /// End of what is learned from in each run, s; without labels only.
     #[arg(long, value_name = "S", conflicts_with = "runs")]

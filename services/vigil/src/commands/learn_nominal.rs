@@ -54,8 +54,9 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
         true => Vec::new(),
         false => split_runs(&ids, task.test_fraction, task.seed),
     };
-    let (model, report) = learning_nominal::learn(task.runs, &held_out, task.until_s, task.robot)
-        .map_err(|error| CommandError::usage(format!("{}: {error}", task.frames.display())))?;
+    let (model, report) =
+        learning_nominal::learn(task.runs, &held_out, task.until_s, task.robot)
+            .map_err(|error| CommandError::usage(format!("{}: {error}", task.frames.display())))?;
     let text = model.to_toml().map_err(CommandError::failure)?;
     super::learn::write_whole(task.out, &text)
         .map_err(|error| CommandError::failure(format!("{}: {error}", task.out.display())))?;
