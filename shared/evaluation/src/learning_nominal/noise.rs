@@ -11,8 +11,8 @@ const SETTLED_S: f64 = 1.0;
 /// Part of the runs whose scatter counts as usual, and the largest scatter.
 const USUAL: f64 = 0.95;
 const SCATTER_MAX: f64 = 10.0;
-/// Part of the runs whose drift counts as usual.
-const UNEVEN: f64 = 0.75;
+/// Time in which an offset may change as much as from run to run, s.
+const DRIFT_S: f64 = 60.0;
 /// Rounds of the fit of the variance.
 const STEPS: usize = 60;
 /// Bounds of the correlation.
@@ -91,7 +91,10 @@ pub(super) fn fit(channel: &mut Channel, records: &[Record], model: &Model) {
     let between = mean(means.iter().map(|mean| mean * mean));
     let offset = (between - of_mean).max(0.0).sqrt();
     channel.offset_sd = if means.len() > 1 { offset } else { 0.0 };
-    channel.drift_sd = drift(channel, &whole, length);
+    // In a minute, an offset may change as much as from run to run, and no more: a faster one would
+    // explain a fault away.
+    let limit = channel.offset_sd * (model.interval_s / DRIFT_S).sqrt();
+    channel.drift_sd = drift(channel, &whole).min(limit);
     channel.scatter = scatter(channel, &whole, length);
 }
 
@@ -172,38 +175,27 @@ fn correlation(channel: &Channel, squares: &[(f64, [f64; 3], bool)]) -> f64 {
     (along / all).clamp(CORRELATION.0, CORRELATION.1)
 }
 
-/// The drift of the offset in the least even usual run, or piece of one: in each, that under which
-/// its residuals are most likely.
-fn drift(channel: &Channel, records: &[Vec<(Residual, bool)>], length: usize) -> f64 {
-    let usual = records
-        .iter()
-        .flatten()
-        .map(|(residual, _)| at(channel, residual.basis));
-    let usual_sd = mean(usual).sqrt();
+/// The drift of the offset under which all residuals are most likely.
+fn drift(channel: &Channel, records: &[Vec<(Residual, bool)>]) -> f64 {
+    let usual = records.iter().flatten();
+    let usual_sd = mean(usual.map(|(residual, _)| at(channel, residual.basis))).sqrt();
     let mut tried = channel.clone();
-    let pieces = records.iter().flat_map(|record| record.chunks(length));
-    let mut found: Vec<f64> = pieces
-        .filter(|piece| piece.len() >= PIECE_MIN)
-        .map(|piece| {
-            let mut best = (f64::NEG_INFINITY, 0.0);
-            for part in DRIFTS {
-                tried.drift_sd = part * usual_sd;
-                let mut track = Track::new(&tried);
-                let mut likelihood = 0.0;
-                for (apart, spread) in innovations(&tried, &mut track, piece) {
-                    let most = CLIP * spread.sqrt();
-                    likelihood += log_normal(apart.clamp(-most, most), spread);
-                }
-                if likelihood > best.0 {
-                    best = (likelihood, tried.drift_sd);
-                }
+    let mut best = (f64::NEG_INFINITY, 0.0);
+    for part in DRIFTS {
+        tried.drift_sd = part * usual_sd;
+        let mut likelihood = 0.0;
+        for record in records {
+            let mut track = Track::new(&tried);
+            for (apart, spread) in innovations(&tried, &mut track, record) {
+                let most = CLIP * spread.sqrt();
+                likelihood += log_normal(apart.clamp(-most, most), spread);
             }
-            best.1
-        })
-        .collect();
-    found.sort_by(f64::total_cmp);
-    let at = (UNEVEN * found.len().saturating_sub(1) as f64).round() as usize;
-    found.get(at).copied().unwrap_or(0.0)
+        }
+        if likelihood > best.0 {
+            best = (likelihood, tried.drift_sd);
+        }
+    }
+    best.1
 }
 
 fn innovations<'a>(

@@ -146,7 +146,7 @@ pub struct Channel {
     /// Standard deviation of a run's own constant offset (its ground, its battery).
     pub offset_sd: f64,
     /// Standard deviation of the offset's change from one observation to the next (a ground that
-    /// is not even), in the least even usual run.
+    /// is not even).
     pub drift_sd: f64,
     /// Mean square of the whitened residual in the noisiest usual run, at least 1: more than that
     /// counts as scatter.
@@ -158,8 +158,8 @@ pub struct Channel {
     pub tails: Vec<Tail>,
 }
 
-/// How often the log-odds of one channel exceed a level without a fault: more rarely by `exp(-slope)`
-/// per unit. No channel is as regular as its model: what little regular ones claim, counts less.
+/// How often the log-odds of one channel exceed a level without a fault: more rarely by
+/// `exp(-slope)` per unit. No channel is as regular as its model: what little regular ones claim, counts less.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tail {

@@ -104,3 +104,84 @@ impl Track {
         (apart, spread)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nominal::{Quantity, Target};
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+
+    fn channel(correlation: f64, offset_sd: f64) -> Channel {
+        Channel {
+            target: Target {
+                quantity: Quantity::YawRate,
+                wheel: 0,
+            },
+            terms: Vec::new(),
+            weights: Vec::new(),
+            variance: [1.0, 0.0, 0.0],
+            correlation,
+            offset_sd,
+            drift_sd: 0.0,
+            scatter: 1.0,
+            held_out_ratio: 1.0,
+            tails: Vec::new(),
+        }
+    }
+
+    /// Mean square and correlation of the whitened innovations of coloured noise with an offset.
+    fn whiteness(correlation: f64) -> (f64, f64) {
+        let channel = channel(correlation, 3.0);
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
+        let mut normal = || -> f64 { rng.sample(StandardNormal) };
+        let mut track = Track::new(&channel);
+        let (mut carried, mut before) = (normal(), 0.0);
+        let (mut square, mut along) = (0.0, 0.0);
+        let count = 20_000;
+        for _ in 0..count {
+            let residual = if correlation < 0.0 {
+                let error = (-correlation).sqrt() * normal();
+                let value = (1.0 + 2.0 * correlation).sqrt() * normal() + error - carried;
+                carried = error;
+                value
+            } else {
+                carried =
+                    correlation * carried + (1.0 - correlation * correlation).sqrt() * normal();
+                carried
+            };
+            let (apart, spread) = track.step(&channel, 2.0 + residual, 1.0, false);
+            let white = apart / spread.sqrt();
+            square += white * white / f64::from(count);
+            along += white * before / f64::from(count);
+            before = white;
+        }
+        (square, along)
+    }
+
+    #[test]
+    fn coloured_residuals_with_an_offset_become_white() {
+        for correlation in [-0.4, -0.2, 0.0, 0.5, 0.8] {
+            let (square, along) = whiteness(correlation);
+            // The white part that is always assumed makes them a little too small.
+            assert!((0.8..1.05).contains(&square), "{correlation}: {square}");
+            assert!(along.abs() < 0.08, "{correlation}: {along}");
+        }
+    }
+
+    #[test]
+    fn an_offset_is_learned_and_gives_way_only_while_following() {
+        let channel = channel(0.0, 3.0);
+        let mut track = Track::new(&channel);
+        for _ in 0..200 {
+            track.step(&channel, 2.0, 1.0, false);
+        }
+        let (kept, _) = track.step(&channel, 8.0, 1.0, false);
+        assert!((kept - 6.0).abs() < 0.1, "{kept}");
+        for _ in 0..200 {
+            track.step(&channel, 8.0, 1.0, true);
+        }
+        let (followed, _) = track.step(&channel, 8.0, 1.0, true);
+        assert!(followed.abs() < 0.1, "{followed}");
+    }
+}
