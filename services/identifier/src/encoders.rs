@@ -6,6 +6,9 @@
 use vigil_blocks::WHEELS;
 use vigil_robot::learned::wheel_evidence::{BREAKAGE_SHARES, BREAKAGES};
 
+/// Share of wheels that do anything, in the unknown.
+const ANYTHING: f64 = 0.2;
+
 /// States of an encoder: whole, or broken in one way.
 pub const STATES: usize = 1 + BREAKAGES.len();
 
@@ -53,6 +56,20 @@ impl Encoders {
         whole[0] = 1.0;
         Self {
             p: [whole; WHEELS],
+            onset: [t_ns; WHEELS],
+        }
+    }
+
+    /// Each encoder may be broken from `t_ns` on, or its wheel may do what a broken encoder would
+    /// tell: in the unknown these are the same.
+    #[must_use]
+    pub fn unsure(t_ns: u64) -> Self {
+        let mut p = [1.0 - ANYTHING; STATES];
+        for (p, share) in p[1..].iter_mut().zip(BREAKAGE_SHARES) {
+            *p = ANYTHING * share;
+        }
+        Self {
+            p: [p; WHEELS],
             onset: [t_ns; WHEELS],
         }
     }

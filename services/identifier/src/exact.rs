@@ -44,7 +44,7 @@ pub const DEATH_1_S: f64 = 1.0 / 60.0;
 pub struct State {
     /// Pose and deviations.
     pub track: Track,
-    /// Encoders; not used by the unknown.
+    /// Encoders; in the unknown, encoders or wheels.
     pub encoders: Encoders,
 }
 
@@ -191,6 +191,11 @@ impl Exact {
                 let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
                 state.track = state.track.fork(&noise);
                 state.track.diffuse(self.modes[mode].jump);
+                state.encoders = match (before, after) {
+                    (_, Moved::UnknownAny) => Encoders::unsure(t_ns),
+                    (Moved::UnknownAny, _) => Encoders::healthy(t_ns),
+                    _ => state.encoders,
+                };
                 self.bank.add(Hypothesis {
                     mode,
                     onset: t_ns,
@@ -234,10 +239,10 @@ impl Exact {
         is_new: bool,
     ) -> Likelihoods {
         let moved = self.modes[mode].moved;
-        Likelihoods::new(self.robot.wheels.len(), |wheel, state| match state {
-            // In the unknown, encoders are not told apart from what wheels do.
-            broken if broken > 0 && !moved.is_unknown() => evidence.broken[wheel][broken - 1],
-            _ => evidence.whole(&self.model, observation, moved, is_new, wheel),
+        Likelihoods::new(self.robot.wheels.len(), |wheel, state| match (state, moved) {
+            (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
+            (0, _) => evidence.whole(&self.model, observation, moved, is_new, wheel),
+            (broken, _) => evidence.broken[wheel][broken - 1],
         })
     }
 
