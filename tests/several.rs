@@ -8,7 +8,7 @@ use vigil_blocks::{
     Channel, DetectionBelief, Entry, FaultBelief, MODE_MULTIPLE, ParticleBlock, SensorFrame,
 };
 use vigil_detector::Detector;
-use vigil_identifier::{Identifier, Input};
+use vigil_identifier::{Diagnoser, Input};
 use vigil_robot::{Fault, FaultKind};
 use vigil_sensor_sim::{EffectiveCommand, World};
 use vigil_setup::{GraphArgs, Setup};
@@ -30,7 +30,7 @@ struct Watched {
     setup: Setup,
     world: World,
     detector: Detector,
-    identifier: Identifier,
+    identifier: Diagnoser,
     frame: SensorFrame,
     detection: Box<DetectionBelief>,
     diagnosis: Box<FaultBelief>,

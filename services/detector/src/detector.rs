@@ -93,8 +93,10 @@ impl Detector {
         let rate = settings.fault_rate_1_h;
         Self::watching(model.interval_s, calibration, form, settings, |particles| {
             Watch::Faults {
-                observer: Observer::new(model, robot),
-                monitor: Monitor::new(model, robot, channels, form, particles, rate, seed),
+                observer: Box::new(Observer::new(model, robot)),
+                monitor: Box::new(Monitor::new(
+                    model, robot, channels, form, particles, rate, seed,
+                )),
             }
         })
     }
@@ -115,7 +117,7 @@ impl Detector {
         Self::watching(model.interval_s, calibration, form, settings, |_| {
             Watch::Nominal {
                 observer: Box::new(nominal::Observer::new(robot)),
-                monitor: nominal::Monitor::new(model, channels, form, rate),
+                monitor: Box::new(nominal::Monitor::new(model, channels, form, rate)),
                 last: Observed::default(),
             }
         })

@@ -23,16 +23,16 @@ pub(crate) enum Watch {
     /// Of a model with faults: tracks the pose by particles.
     Faults {
         /// Frames to observations.
-        observer: Observer,
+        observer: Box<Observer>,
         /// Detection filter.
-        monitor: Monitor,
+        monitor: Box<Monitor>,
     },
     /// Of a nominal model.
     Nominal {
         /// Frames to observations.
         observer: Box<nominal::Observer>,
         /// Detection filter.
-        monitor: nominal::Monitor,
+        monitor: Box<nominal::Monitor>,
         /// The last observation.
         last: Observed,
     },

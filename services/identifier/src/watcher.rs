@@ -109,7 +109,7 @@ pub enum Diagnoser {
     /// Tells faults apart.
     Identifier(Box<Identifier>),
     /// Tells nominal from unknown.
-    Watcher(Watcher),
+    Watcher(Box<Watcher>),
 }
 
 impl Diagnoser {
@@ -124,6 +124,12 @@ impl Diagnoser {
             Self::Identifier(identifier) => identifier.step(entry, belief, particles),
             Self::Watcher(watcher) => watcher.step(entry, belief, particles),
         }
+    }
+}
+
+impl From<Watcher> for Diagnoser {
+    fn from(watcher: Watcher) -> Self {
+        Self::Watcher(Box::new(watcher))
     }
 }
 

@@ -88,8 +88,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         return unlabelled(args, &robot);
     };
     if !robot.has_fault_models() {
-        let refused = "--runs: faults are learned for an ackermann6 only; leave the labels out, and \
-                       the faulty runs too (--only)";
+        let refused = "--runs: faults are learned for an ackermann6 only; leave the labels out, \
+                       and the faulty runs too (--only)";
         return Err(CommandError::usage(refused));
     }
     let labels = labels::read(labels, &robot).map_err(CommandError::usage)?;

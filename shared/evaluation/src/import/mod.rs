@@ -93,8 +93,10 @@ impl Imported {
 }
 
 fn frame(fields: &[(String, Field)], run: u32, seq: usize, row: &[f64]) -> SensorFrame {
-    let mut frame = SensorFrame::default();
-    frame.run_id = u64::from(run) + 1;
+    let mut frame = SensorFrame {
+        run_id: u64::from(run) + 1,
+        ..SensorFrame::default()
+    };
     frame.header.seq = seq as u64;
     let t_s = row.first().copied().unwrap_or(0.0);
     frame.header.t_capture_ns = (t_s * 1e9).round() as u64;
