@@ -6,7 +6,8 @@ use crate::struct_fields::{Field, fields};
 use std::collections::BTreeSet;
 
 /// Where the keys of the files below a folder of `config/` are defined; the first match holds.
-const DEFINITIONS: [(&str, &[&str]); 4] = [
+const DEFINITIONS: [(&str, &[&str]); 5] = [
+    ("config/logs/", &["shared/evaluation/src/import/"]),
     ("config/robots/", &["shared/robot/src/"]),
     ("config/trees/", &["shared/setup/src/schema"]),
     (

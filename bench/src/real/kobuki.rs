@@ -25,8 +25,8 @@ const SPEED_BIN_M_S: f64 = 0.1;
 pub struct Window {
     /// Highest log-odds in it, all evidence from before it forgotten.
     pub log_odds: f64,
-    /// Root mean square of the gyro's yaw rate less that of the wheels, rad/s: what a monitor without
-    /// a model would look at.
+    /// Root mean square of the gyro's yaw rate less that of the wheels, rad/s: what a monitor
+    /// without a model would look at.
     pub yaw_rate_rms: f64,
     /// Mean speed of the wheels, m/s; not used for the score.
     pub speed_m_s: f64,
@@ -219,7 +219,8 @@ impl Kobuki {
             format!("## Kobuki: learned from the first {LEARN_S} s of the run without a fault\n"),
             self.learned.to_string(),
             format!(
-                "windows of {WINDOW_S} s, each judged alone; alarm at log-odds {:.1} ({} h between false alarms)\n",
+                "windows of {WINDOW_S} s, each judged alone; alarm at log-odds {:.1} \
+                 ({} h between false alarms)\n",
                 self.alarm_log_odds, FALSE_ALARM_INTERVAL_H
             ),
             "| run | windows | AUC | AUC, same speed (pairs) | AUC, plain rms of yaw rates | \

@@ -184,7 +184,8 @@ impl Robotino {
                 self.held_out.1, self.held_out.0, self.learned_alarms.1, self.learned_alarms.0
             ),
             format!(
-                "two grounds, jump above {JUMP_SD} sd: {} runs; first alarm within {WITHIN_S} s of the change: {}; \
+                "two grounds, jump above {JUMP_SD} sd: {} runs; first alarm within \
+                 {WITHIN_S} s of the change: {}; \
                 earlier: {}; later: {}; never: {never}; in all by {WITHIN_S} s after it: {}",
                 clear.len(),
                 count(-WITHIN_S, WITHIN_S),

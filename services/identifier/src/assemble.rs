@@ -36,7 +36,7 @@ pub fn assemble(setup: &Setup) -> Result<Diagnoser, IdentifierError> {
     } = setup;
     let model = match model {
         RobotModel::Faults(model) => model,
-        RobotModel::Nominal(_) => return Ok(Diagnoser::Watcher(Box::new(Watcher::new(tree)))),
+        RobotModel::Nominal(_) => return Ok(Diagnoser::from(Watcher::new(tree))),
     };
     let models = Models {
         model,

@@ -239,10 +239,12 @@ impl Exact {
         is_new: bool,
     ) -> Likelihoods {
         let moved = self.modes[mode].moved;
-        Likelihoods::new(self.robot.wheels.len(), |wheel, state| match (state, moved) {
-            (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
-            (0, _) => evidence.whole(&self.model, observation, moved, is_new, wheel),
-            (broken, _) => evidence.broken[wheel][broken - 1],
+        Likelihoods::new(self.robot.wheels.len(), |wheel, state| {
+            match (state, moved) {
+                (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
+                (0, _) => evidence.whole(&self.model, observation, moved, is_new, wheel),
+                (broken, _) => evidence.broken[wheel][broken - 1],
+            }
         })
     }
 

@@ -127,6 +127,12 @@ impl Diagnoser {
     }
 }
 
+impl From<Watcher> for Diagnoser {
+    fn from(watcher: Watcher) -> Self {
+        Self::Watcher(Box::new(watcher))
+    }
+}
+
 impl From<Identifier> for Diagnoser {
     fn from(identifier: Identifier) -> Self {
         Self::Identifier(Box::new(identifier))

@@ -64,7 +64,7 @@ impl Pipeline {
     ) -> Result<Self, PipelineError> {
         Ok(Self::of(
             Detector::nominal(model, robot, detector)?,
-            Diagnoser::Watcher(Box::new(Watcher::new(tree))),
+            Diagnoser::from(Watcher::new(tree)),
             Taxonomy::new(tree, robot),
         ))
     }

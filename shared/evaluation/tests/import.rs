@@ -68,7 +68,10 @@ kinematics = "differential"
 wheel_radius_m = 0.1
 noise = "estimate"
 command = [{ name = "v", unit = "m/s", limit = 1.0 }, { name = "w", unit = "rad/s", limit = 2.0 }]
-wheels = [{ name = "L", x = 0.0, y = 0.1, steered = false }, { name = "R", x = 0.0, y = -0.1, steered = false }]
+wheels = [
+  { name = "L", x = 0.0, y = 0.1, steered = false },
+  { name = "R", x = 0.0, y = -0.1, steered = false },
+]
 measured = { pose = false, wheel_rates = true, steer = false, yaw_rate = true, currents = false }
 limits = { speed_m_s = 1.0, yaw_rate_rad_s = 2.0, wheel_rate_rad_s = 50.0 }
 "#,

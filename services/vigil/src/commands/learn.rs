@@ -143,8 +143,8 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
         return unlabelled(args, frames_file, out, &robot);
     };
     if !robot.has_fault_models() {
-        let refused = "--runs: faults are learned for an ackermann6 only; leave the labels out, and \
-                       the faulty runs too (--only)";
+        let refused = "--runs: faults are learned for an ackermann6 only; leave the labels out, \
+                       and the faulty runs too (--only)";
         return Err(CommandError::usage(refused));
     }
     let labels = labels::read(labels_file, &robot).map_err(CommandError::usage)?;

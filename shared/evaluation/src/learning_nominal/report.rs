@@ -52,8 +52,8 @@ impl Report {
         let mut warnings = Vec::new();
         if model.widened > 1.0 {
             warnings.push(format!(
-                "the log shows {:.0} s of motion, less than {LONG_ENOUGH_S:.0} s: its noise is known to \
-                 about {:.0} % only, all deviations are widened by a factor {:.2}",
+                "the log shows {:.0} s of motion, less than {LONG_ENOUGH_S:.0} s: its noise is \
+                 known to about {:.0} % only, all deviations are widened by a factor {:.2}",
                 model.exposure_s,
                 100.0 * (model.widened - 1.0),
                 model.widened

@@ -2,7 +2,7 @@
 
 use vigil_blocks::COMMANDS;
 use vigil_robot::Description;
-use vigil_robot::nominal::{Quantity, Target, Term};
+use vigil_robot::nominal::{Of, Quantity, Target, Term};
 
 /// How many observations back a wheel's rate matters to the gyro and the current.
 const WHEEL_LAGS: usize = 3;
@@ -25,11 +25,11 @@ pub(super) fn targets(robot: &Description) -> Vec<(Target, Vec<Term>)> {
     }
     let mut driven = polynomial.clone();
     for lag in 1..COMMAND_LAGS {
-        driven.extend((0..robot.command.len()).map(|axis| Term::Lagged { axis, lag }));
+        driven.extend((0..robot.command.len()).map(|axis| Term::new(Of::Lagged, axis, lag)));
     }
     if measured.yaw_rate {
         let terms = if measured.wheel_rates {
-            let mut terms = vec![Term::Constant];
+            let mut terms = vec![Term::new(Of::Constant, 0, 0)];
             (0..robot.wheels.len()).for_each(|wheel| terms.extend(rates(wheel)));
             terms
         } else {
@@ -45,7 +45,7 @@ pub(super) fn targets(robot: &Description) -> Vec<(Target, Vec<Term>)> {
             let mut terms = driven.clone();
             if measured.wheel_rates {
                 terms.extend(rates(wheel));
-                terms.extend([Term::WheelSpeed { wheel }, Term::WheelSense { wheel }]);
+                terms.extend([Of::WheelSpeed, Of::WheelSense].map(|of| Term::new(of, wheel, 0)));
             }
             out.push((target(Quantity::Current, wheel), terms));
         }
@@ -55,7 +55,7 @@ pub(super) fn targets(robot: &Description) -> Vec<(Target, Vec<Term>)> {
 
 /// A wheel's last rates.
 fn rates(wheel: usize) -> impl Iterator<Item = Term> {
-    (0..WHEEL_LAGS).map(move |lag| Term::Wheel { wheel, lag })
+    (0..WHEEL_LAGS).map(move |lag| Term::new(Of::Wheel, wheel, lag))
 }
 
 /// Every product of powers of the axes up to an order, the constant first.
@@ -73,11 +73,7 @@ fn polynomial(axes: usize, order: usize) -> Vec<Term> {
         }
         products = more;
     }
-    let term = |powers: [u8; COMMANDS]| match powers.iter().all(|&power| power == 0) {
-        true => Term::Constant,
-        false => Term::Command { powers },
-    };
-    products.into_iter().map(term).collect()
+    products.into_iter().map(Term::command).collect()
 }
 
 #[cfg(test)]
@@ -89,7 +85,7 @@ mod tests {
         for (axes, order, count) in [(1, 4, 5), (2, 4, 15), (3, 2, 10), (2, 1, 3)] {
             let terms = polynomial(axes, order);
             assert_eq!(terms.len(), count, "{axes} axes, order {order}");
-            assert_eq!(terms[0], Term::Constant);
+            assert_eq!(terms[0].of, Of::Constant);
             for (i, term) in terms.iter().enumerate() {
                 assert!(!terms[..i].contains(term), "{term:?} twice");
             }

@@ -62,66 +62,97 @@ impl Target {
     }
 }
 
-/// One term of a prediction. Lags count observations.
+/// What a term is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Term {
+#[serde(rename_all = "snake_case")]
+pub enum Of {
     /// 1.
     Constant,
     /// Product of powers of the command's axes, each divided by its learned size.
-    Command {
-        /// Powers, one per axis of the block's command vector.
-        powers: [u8; COMMANDS],
-    },
+    Command,
     /// One axis of the command, some observations ago, divided by its learned size.
-    Lagged {
-        /// Axis.
-        axis: usize,
-        /// Observations ago.
-        lag: usize,
-    },
+    Lagged,
     /// Rate of a wheel some observations ago, rad/s.
-    Wheel {
-        /// Wheel.
-        wheel: usize,
-        /// Observations ago.
-        lag: usize,
-    },
+    Wheel,
     /// Magnitude of a wheel's rate, rad/s.
-    WheelSpeed {
-        /// Wheel.
-        wheel: usize,
-    },
+    WheelSpeed,
     /// Sense of a wheel's turning, -1 to 1.
-    WheelSense {
-        /// Wheel.
-        wheel: usize,
-    },
+    WheelSense,
+}
+
+/// One term of a prediction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Term {
+    /// What it is.
+    pub of: Of,
+    /// Axis of the command, or wheel.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub index: usize,
+    /// Observations ago.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub lag: usize,
+    /// Powers, one per axis of the block's command vector; for `command`.
+    #[serde(default, skip_serializing_if = "are_zero")]
+    pub powers: [u8; COMMANDS],
+}
+
+fn is_zero(value: &usize) -> bool {
+    *value == 0
+}
+
+fn are_zero(powers: &[u8; COMMANDS]) -> bool {
+    powers.iter().all(|&power| power == 0)
 }
 
 impl Term {
+    /// A term of one axis or wheel.
+    #[must_use]
+    pub const fn new(of: Of, index: usize, lag: usize) -> Self {
+        Self {
+            of,
+            index,
+            lag,
+            powers: [0; COMMANDS],
+        }
+    }
+
+    /// A product of powers of the command's axes; without any, the constant.
+    #[must_use]
+    pub fn command(powers: [u8; COMMANDS]) -> Self {
+        let of = if are_zero(&powers) {
+            Of::Constant
+        } else {
+            Of::Command
+        };
+        Self {
+            of,
+            index: 0,
+            lag: 0,
+            powers,
+        }
+    }
+
     /// Its value `ago` observations before the newest; `size` holds the learned size of each axis.
     /// None if it was not measured.
     #[must_use]
     pub fn value(&self, history: &History, ago: usize, size: &[f64; COMMANDS]) -> Option<f64> {
-        let axis = |lag: usize, i: usize| {
-            let command = history.ago(ago + lag)?.command.get(i)?;
-            Some(command / size.get(i)?)
-        };
-        let wheel = |lag: usize, i: usize| *history.ago(ago + lag)?.wheels.get(i)?;
-        match *self {
-            Self::Constant => Some(1.0),
-            Self::Command { powers } => {
+        let then = history.ago(ago + self.lag)?;
+        let axis = |i: usize| Some(then.command.get(i)? / size.get(i)?);
+        let wheel = || *then.wheels.get(self.index)?;
+        match self.of {
+            Of::Constant => Some(1.0),
+            Of::Command => {
                 let mut product = 1.0;
-                for (i, power) in powers.into_iter().enumerate().filter(|&(_, p)| p > 0) {
-                    product *= axis(0, i)?.powi(i32::from(power));
+                for (i, power) in self.powers.into_iter().enumerate().filter(|&(_, p)| p > 0) {
+                    product *= axis(i)?.powi(i32::from(power));
                 }
                 Some(product)
             }
-            Self::Lagged { axis: i, lag } => axis(lag, i),
-            Self::Wheel { wheel: i, lag } => wheel(lag, i),
-            Self::WheelSpeed { wheel: i } => Some(wheel(0, i)?.abs()),
-            Self::WheelSense { wheel: i } => Some((wheel(0, i)? / SENSE_RAD_S).tanh()),
+            Of::Lagged => axis(self.index),
+            Of::Wheel => wheel(),
+            Of::WheelSpeed => Some(wheel()?.abs()),
+            Of::WheelSense => Some((wheel()? / SENSE_RAD_S).tanh()),
         }
     }
 }
@@ -159,7 +190,8 @@ pub struct Channel {
 }
 
 /// How often the log-odds of one channel exceed a level without a fault: more rarely by
-/// `exp(-slope)` per unit. No channel is as regular as its model: what little regular ones claim, counts less.
+/// `exp(-slope)` per unit. No channel is as regular as its model: what the less regular ones claim
+/// counts less.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tail {

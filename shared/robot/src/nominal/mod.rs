@@ -19,7 +19,7 @@ pub mod monitor;
 pub mod observation;
 pub mod track;
 
-pub use channel::{Channel, Quantity, Residual, Tail, Target, Term};
+pub use channel::{Channel, Of, Quantity, Residual, Tail, Target, Term};
 pub use model::{Model, Range};
 pub use monitor::Monitor;
 pub use observation::{History, Observation, Observer};

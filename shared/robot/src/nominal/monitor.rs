@@ -3,8 +3,8 @@
 //! Each channel's residual is whitened by its [`Track`]. Two fault states stand against the nominal
 //! one, per channel: an unknown constant bias, which is learned ([`Form::LearnedBias`]), and the
 //! constant likelihood of any large residual, for faults that show as scatter (a taped wheel jolts
-//! the robot once a turn and has no mean). The channels' odds, each tempered by its [`Tail`], add up:
-//! a fault enters by one of them.
+//! the robot once a turn and has no mean). The channels' odds, each tempered by its [`Tail`], add
+//! up: a fault enters by one of them.
 //!
 //! The noise is that of this very robot, measured on its own log; a rise beyond what its runs have
 //! shown is a symptom and is not explained away.

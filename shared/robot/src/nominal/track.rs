@@ -1,9 +1,10 @@
 //! A run's offset and the noise's colour: residuals of a channel become white.
 //!
-//! State: the run's offset, constant but for a slow drift, and one carried over from the last residual. With a negative
-//! correlation `residual = offset + w + n - n'` (w white, n' the error that the last one made);
-//! with a positive one `residual = offset + a`, a first-order process. A Kalman filter gives the
-//! innovation; divided by its deviation it is white with variance 1, if the model holds.
+//! State: the run's offset, constant but for a slow drift, and one carried over from the last
+//! residual. With a negative correlation `residual = offset + w + n - n'` (w white, n' the error
+//! that the last one made); with a positive one `residual = offset + a`, a first-order process. A
+//! Kalman filter gives the innovation; divided by its deviation it is white with variance 1, if
+//! the model holds.
 
 use super::channel::Channel;
 
