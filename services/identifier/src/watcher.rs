@@ -41,12 +41,13 @@ impl Watcher {
         belief: &mut FaultBelief,
         particles: &mut ParticleBlock,
     ) {
-        let predicted = self.posterior;
+        let mut predicted = self.posterior;
         match entry {
             Entry::Frame(input) => {
                 if input.frame.run_id != self.run_id {
                     self.begin_run();
                     self.run_id = input.frame.run_id;
+                    predicted = self.posterior;
                 }
                 if let Some((detection, _)) = input.detection {
                     self.take(detection);

@@ -205,7 +205,8 @@ impl Default for Simulator {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Detector {
-    /// Particles of the nominal pose track, 32 to 4096.
+    /// Particles drawn from the belief about the pose for those who read them, 32 to 4096; they
+    /// influence no belief.
     pub particles: usize,
     /// Mean time between false alarms to which the alarm threshold is set, h, 0.01 to 10000. The
     /// model holds the calibration from nominal runs.

@@ -140,6 +140,11 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
     }
     let robot = args.robot.load()?;
     let Some(labels_file) = &args.runs else {
+        if robot.has_fault_models() {
+            let refused = "--runs is needed: the faults of this kind of robot are learned too, and \
+                           without labels faulty runs would count as healthy";
+            return Err(CommandError::usage(refused));
+        }
         return unlabelled(args, frames_file, out, &robot);
     };
     if !robot.has_fault_models() {

@@ -448,7 +448,8 @@ fn check_rates(key: &str, rates: &[RateModel], count: usize) -> Result<(), Model
     Ok(())
 }
 
-fn check_calibration(calibration: &Calibration) -> Result<(), ModelError> {
+/// Checks the numbers of a calibration.
+pub(crate) fn check_calibration(calibration: &Calibration) -> Result<(), ModelError> {
     let of = format!("calibration.{}.{}", calibration.sensors, calibration.form);
     let key = |name: &str| format!("{of}.{name}");
     check_range(

@@ -1,4 +1,5 @@
-//! The detection filter over observations: only the nominal mode is modelled.
+//! The detection filter over observations: nominal, or not. What else the robot may do is unknown;
+//! the learned faults are tried besides, as they are seen sooner so ([`super::faults`]).
 //!
 //! A Gaussian track follows the pose in the nominal mode ([`Departure`]); residuals are whitened by
 //! its predictive density, per group of channels: pose (3), each wheel rate, each steering angle.

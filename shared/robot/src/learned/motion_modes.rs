@@ -74,6 +74,8 @@ pub struct MotionMode {
     /// Factor by which the ground changes the learned effect, and the factor's deviation; (1, 0) on
     /// ground like that learned from.
     pub ground: (f64, f64),
+    /// Forward motion per metre that no ground changes.
+    pub kept: f64,
     /// Variance of a jump of the pose (x, y, yaw) at the onset.
     pub jump: [f64; 3],
 }
@@ -91,7 +93,7 @@ impl MotionMode {
         let at = |motion: &MotionModel| Vector3::from(motion.per_metre(curvature, speed, limit));
         let effect = at(&self.motion) - at(&model.nominal.motion);
         let shape = effect.component_mul(&Vector3::from(SHAPE));
-        let along = effect * (sd / factor);
+        let along = (effect - Vector3::new(0.0, self.kept, 0.0)) * (sd / factor);
         MotionNoise {
             offset: self.noise.offset
                 + along * along.transpose()
@@ -149,6 +151,7 @@ pub fn motion_modes(model: &Model, stuck: u32, rare: bool, pairs: bool) -> Vec<M
         motion: nominal,
         noise: nominal.noise(),
         ground: (1.0, 0.0),
+        kept: 0.0,
         jump: [0.0; 3],
     }];
     let known = |w: usize| stuck >> w & 1 == 1 && model.stuck(w).is_some();
@@ -173,6 +176,7 @@ pub fn motion_modes(model: &Model, stuck: u32, rare: bool, pairs: bool) -> Vec<M
         motion: nominal,
         noise: unknown_noise(model),
         ground: (1.0, 0.0),
+        kept: 0.0,
         jump: [0.0; 3],
     };
     modes.push(MotionMode {
@@ -244,6 +248,7 @@ fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
         motion,
         noise: noise.unwrap_or_else(|| nominal.noise()),
         ground: (1.0, 0.0),
+        kept: 0.0,
         jump: [0.0; 3],
     }
 }
@@ -255,6 +260,7 @@ fn on_other_ground(model: &Model, wheel: usize, ground: (f64, f64)) -> MotionMod
     let nominal = &model.nominal.motion;
     let mode = stuck_mode(model, &[wheel]);
     let (factor, sd) = ground;
+    let kept = droop(model, wheel);
     let scaled = |stuck: &Curve, nominal: &Curve, kept: f64| {
         let (stuck, nominal) = (stuck.terms(), nominal.terms());
         let mut terms: [f64; Curve::TERMS] =
@@ -266,7 +272,7 @@ fn on_other_ground(model: &Model, wheel: usize, ground: (f64, f64)) -> MotionMod
     MotionMode {
         motion: MotionModel {
             yaw: scaled(&mode.motion.yaw, &nominal.yaw, 0.0),
-            forward: scaled(&mode.motion.forward, &nominal.forward, droop(model, wheel)),
+            forward: scaled(&mode.motion.forward, &nominal.forward, kept),
             lateral: scaled(&mode.motion.lateral, &nominal.lateral, 0.0),
             ..mode.motion
         },
@@ -276,6 +282,7 @@ fn on_other_ground(model: &Model, wheel: usize, ground: (f64, f64)) -> MotionMod
             ..mode.noise
         },
         ground,
+        kept,
         ..mode
     }
 }

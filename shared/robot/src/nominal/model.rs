@@ -5,7 +5,7 @@ use vigil_blocks::{COMMANDS, WHEELS, fnv1a};
 
 use super::channel::{Channel, Tail};
 use crate::Description;
-use crate::learned::model::{ModelError, Provenance};
+use crate::learned::model::{ModelError, Provenance, check_calibration};
 use crate::learned::monitor::Channels;
 use crate::learned::{Calibration, Form};
 
@@ -189,7 +189,7 @@ impl Model {
                 return refuse(format!("channel.{i}"), message, "see the model's layout");
             }
         }
-        Ok(())
+        self.calibration.iter().try_for_each(check_calibration)
     }
 }
 
