@@ -1,4 +1,4 @@
-//! `vigil learn`: learns a robot's model, from labelled runs or from healthy ones alone, or shows one.
+//! `vigil learn`: learns a robot's model, from labelled runs or healthy ones alone, or shows one.
 
 use std::fs::{self, File};
 use std::io::{self, Write};

@@ -8,8 +8,8 @@ use super::{Curve, Model, MotionModel};
 
 /// The unknown: standard deviation of its constant deviation per metre (yaw, forward, lateral).
 const UNKNOWN_SD: [f64; 3] = [0.25, 0.2, 0.12];
-/// Share of the unknown that only makes the pose jump, and how far: x m, y m, yaw rad. A sensor that
-/// begins to lag, a slip of the map.
+/// Share of the unknown that only makes the pose jump, and how far: x m, y m, yaw rad. A sensor
+/// that begins to lag, a slip of the map.
 const JUMP_SHARE: f64 = 0.1;
 const JUMP_SD: [f64; 3] = [0.1, 0.1, 0.1];
 /// Correlation length of the unknown's coloured deviations, m.
