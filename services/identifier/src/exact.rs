@@ -25,8 +25,8 @@ use crate::sets::Sets;
 
 /// Index of the nominal motion among the modes.
 const NOMINAL: usize = 0;
-/// Onset hypotheses kept per mode: fewer of two stuck wheels, and of what is rare, as there are many
-/// such modes.
+/// Onset hypotheses kept per mode: fewer of two stuck wheels and of what is rare, as there are
+/// many such modes.
 const PER_MODE: usize = 32;
 const PER_RARE: usize = 8;
 /// Hypotheses less probable than this are dropped (natural logarithm).
