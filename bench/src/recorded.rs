@@ -17,6 +17,7 @@ use vigil_robot::learned::{
 
 use crate::filters::{Kind, build};
 use crate::matched::{Outcome, Trace, in_parallel, log_odds, threshold};
+use crate::simulated::Rover;
 
 /// The live default, as tables name it.
 pub const EXACT: &str = "sets of faults (live default)";
@@ -53,12 +54,7 @@ impl Recorded {
     /// # Errors
     /// A file that cannot be read.
     pub fn read(root: &Path) -> Result<Self, Box<dyn Error>> {
-        let robot = vigil_setup::load_robot(&root.join("config/robots/rover.toml"))?;
-        let model = vigil_setup::load_model(&root.join("config/models/rover.toml"), Some(&robot))?;
-        let model = model
-            .with_faults()
-            .ok_or("the rover's model has no faults")?;
-        let tree = vigil_setup::load_tree(&root.join("config/trees/rover.toml"))?;
+        let Rover { robot, model, tree } = Rover::read(root)?;
         let decision = vigil_setup::load_decision(&root.join("config/rover.pomdp"))?;
         let data = root.join("tests/data/rover");
         let runs = frames::read(&data.join("learn_frames.csv.gz"), &robot)?;

@@ -1,6 +1,7 @@
 //! Data sets, learning of models, scoring, reports. Reads files; knows no transport and no clock.
 
 pub mod cases;
+mod correlation;
 pub mod derived;
 pub mod frames;
 pub mod import;

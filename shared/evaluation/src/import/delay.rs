@@ -3,6 +3,7 @@
 use super::ImportError;
 use super::description::{Delay, LogDescription};
 use super::series::Series;
+use crate::correlation::correlation;
 
 /// Delays tried: up to this, both ways, s, in such steps.
 const DELAY_MAX_S: f64 = 0.5;
@@ -59,18 +60,4 @@ fn best(log: &LogDescription, late: &Series, against: &[(f64, &Series)]) -> Opti
     });
     let (found, delay_s) = tried.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (found > 0.3).then_some(delay_s)
-}
-
-fn correlation(pairs: &[(f64, f64)]) -> f64 {
-    let n = pairs.len().max(1) as f64;
-    let (ma, mb) = pairs
-        .iter()
-        .fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
-    let (mut aa, mut bb, mut ab) = (1e-12, 1e-12, 0.0);
-    for (x, y) in pairs {
-        aa += (x - ma) * (x - ma);
-        bb += (y - mb) * (y - mb);
-        ab += (x - ma) * (y - mb);
-    }
-    ab / (aa * bb).sqrt()
 }

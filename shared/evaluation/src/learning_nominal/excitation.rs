@@ -5,6 +5,7 @@ use vigil_robot::nominal::Range;
 
 use super::NominalError;
 use super::record::Record;
+use crate::correlation::correlation;
 
 /// Motion needed, s.
 const MOVING_MIN_S: f64 = 10.0;
@@ -69,18 +70,4 @@ pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Rang
         }
     }
     Ok(ranges)
-}
-
-fn correlation(pairs: &[(f64, f64)]) -> f64 {
-    let n = pairs.len().max(1) as f64;
-    let (ma, mb) = pairs
-        .iter()
-        .fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
-    let (mut aa, mut bb, mut ab) = (1e-12, 1e-12, 0.0);
-    for (x, y) in pairs {
-        aa += (x - ma) * (x - ma);
-        bb += (y - mb) * (y - mb);
-        ab += (x - ma) * (y - mb);
-    }
-    ab / (aa * bb).sqrt()
 }

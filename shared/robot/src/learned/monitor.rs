@@ -224,7 +224,9 @@ impl Monitor {
             return;
         }
         let step = observation.displacement(&self.model, &self.model.nominal.motion);
-        let birth = match observation.moving {
+        // Other forms read the residual of the nominal track only.
+        let counts = observation.moving && self.form == Form::LearnedBias;
+        let birth = match counts {
             true => self.birth(observation.dt_s, SHARE_POSE),
             false => 0.0,
         };
