@@ -1,6 +1,6 @@
 //! Does a model that was learned on one soil fail honestly on stiffer ones?
 //!
-//! `--seeds N` worlds per cell (2); `--json`: the document only, nothing is archived.
+//! `--seeds N` worlds per cell (2), the first of them `--first-seed S` (1); `--json`: the document only, nothing is archived.
 
 use std::error::Error;
 use std::path::Path;
@@ -34,10 +34,11 @@ fn run() -> Result<(), Box<dyn Error>> {
     if cfg!(debug_assertions) {
         return Err("a debug build takes hours: use scripts/bench".into());
     }
-    let options = Options::parse(&[("--seeds", 2.0)])?;
+    let options = Options::parse(&[("--seeds", 2.0), ("--first-seed", 1.0)])?;
     let rover = Rover::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))?;
     let taxonomy = Taxonomy::new(&rover.tree, &rover.robot);
-    let jobs = ground::jobs(&rover, options.number("--seeds") as u64);
+    let [seeds, first_seed] = ["--seeds", "--first-seed"].map(|key| options.number(key) as u64);
+    let jobs = ground::jobs(&rover, seeds, first_seed);
     let began = Instant::now();
     let drive = |job: &_| ground::drive(&rover, &taxonomy, job).map_err(|e| e.to_string());
     let runs: Result<Vec<Vec<Run>>, String> = in_parallel(&jobs, drive).into_iter().collect();
