@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde::Serialize;
+use vigil_evaluation::data_hash;
 use vigil_evaluation::frames::Run;
 use vigil_evaluation::labels::{self, Label};
-use vigil_evaluation::learning;
 use vigil_evaluation::report::{Report, SensorSet};
 use vigil_robot::RobotModel;
 use vigil_setup::schema::IdentifierFilter;
@@ -245,7 +245,11 @@ fn facts(args: &Args, prepared: &Prepared, runs: &[(Run, Label)]) -> Vec<(&'stat
         ),
         (
             "frames",
-            format!("{}, {}", filter.frames.display(), learning::data_hash(&all)),
+            format!(
+                "{}, {}",
+                filter.frames.display(),
+                data_hash(&all, f64::INFINITY)
+            ),
         ),
         ("labels", args.runs.display().to_string()),
         ("fault tree", format!("hash {tree_hash}")),

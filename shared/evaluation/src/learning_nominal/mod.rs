@@ -13,16 +13,19 @@ mod record;
 mod regression;
 mod report;
 mod terms;
+mod view;
 
-use vigil_blocks::fnv1a;
 use vigil_robot::Description;
 use vigil_robot::learned::model::Provenance;
 use vigil_robot::nominal::model::{KIND, VERSION};
 use vigil_robot::nominal::{Channel, Model};
 
+use crate::data_hash::data_hash;
 use crate::frames::Run;
+use crate::plausible::{self, Doubtful};
 use record::Record;
 pub use report::{ChannelError, Report};
+pub use view::View;
 
 /// Logs shorter than this are learned from with a warning and wider deviations, s.
 const LONG_ENOUGH_S: f64 = 600.0;
@@ -35,6 +38,9 @@ pub enum NominalError {
     /// Nothing to learn from.
     #[error("there are no runs to learn from")]
     NoRuns,
+    /// A run cannot mean what its columns say.
+    #[error("{0}")]
+    Doubtful(Doubtful),
     /// The robot hardly moves.
     #[error("the robot moves for {found_s:.1} s, at least {needed_s:.0} s are needed")]
     Still {
@@ -106,6 +112,12 @@ pub fn learn(
     if learned.is_empty() {
         return Err(NominalError::NoRuns);
     }
+    let doubt = learned
+        .iter()
+        .find_map(|run| plausible::doubt(run, robot, until_s));
+    if let Some(doubt) = doubt {
+        return Err(NominalError::Doubtful(doubt));
+    }
     let records = record::all(&learned, until_s, robot);
     let tests = record::all(&left_out, until_s, robot);
     let command = excitation::ranges(&records, robot)?;
@@ -113,6 +125,7 @@ pub fn learn(
     let mut model = Model {
         kind: KIND.to_owned(),
         version: VERSION,
+        hash: String::new(),
         robot: robot.name.clone(),
         wheels: robot
             .wheels
@@ -126,6 +139,7 @@ pub fn learn(
             data_hash: data_hash(&learned, until_s),
             runs_learned: learned.iter().map(|run| run.id).collect(),
             runs_held_out: left_out.iter().map(|run| run.id).collect(),
+            until_s: until_s.is_finite().then_some(until_s),
             ..Provenance::default()
         },
         command,
@@ -138,7 +152,7 @@ pub fn learn(
         return Err(NominalError::NoChannels);
     }
     for (target, terms) in targets {
-        let name = report::name(target, robot);
+        let name = report::name(target, &model.wheels);
         let (train, test): (Vec<Record>, Vec<Record>) = if tests.is_empty() {
             records.iter().map(|record| record.split(BLOCKS)).unzip()
         } else {
@@ -155,7 +169,7 @@ pub fn learn(
     }
     calibrate::fit(&mut model, &records, robot);
     report.finish(&model);
-    Ok((model, report))
+    Ok((model.sealed(), report))
 }
 
 /// Fits weights and noise of one channel.
@@ -190,23 +204,4 @@ fn widening(exposure_s: f64, interval_s: f64) -> f64 {
         return 1.0;
     }
     1.0 + 2.0 / (2.0 * exposure_s / interval_s).max(2.0).sqrt()
-}
-
-fn data_hash(runs: &[&Run], until_s: f64) -> String {
-    let mut hash = fnv1a::hash_u64(fnv1a::BASIS, until_s.to_bits());
-    for run in runs {
-        hash = fnv1a::hash_u64(hash, u64::from(run.id));
-        for frame in &run.frames {
-            hash = fnv1a::hash_u64(hash, frame.header.t_capture_ns);
-            let values = frame
-                .pose
-                .iter()
-                .chain(&frame.command)
-                .chain(&frame.wheel_rate);
-            for value in values.chain(&frame.current).chain([&frame.yaw_rate]) {
-                hash = fnv1a::hash_u64(hash, value.to_bits());
-            }
-        }
-    }
-    format!("fnv1a64:{hash:016x}")
 }
