@@ -38,7 +38,7 @@ pub enum NominalError {
     /// Nothing to learn from.
     #[error("there are no runs to learn from")]
     NoRuns,
-    /// A run cannot mean what its columns say.
+    /// Half of the runs, or more, cannot mean what their columns say: one of them.
     #[error("{0}")]
     Doubtful(Doubtful),
     /// The robot hardly moves.
@@ -112,12 +112,7 @@ pub fn learn(
     if learned.is_empty() {
         return Err(NominalError::NoRuns);
     }
-    let doubt = learned
-        .iter()
-        .find_map(|run| plausible::doubt(run, robot, until_s));
-    if let Some(doubt) = doubt {
-        return Err(NominalError::Doubtful(doubt));
-    }
+    let doubt = doubt(&learned, until_s, robot)?;
     let records = record::all(&learned, until_s, robot);
     let tests = record::all(&left_out, until_s, robot);
     let command = excitation::ranges(&records, robot)?;
@@ -147,6 +142,7 @@ pub fn learn(
         calibration: Vec::new(),
     };
     let mut report = Report::new(&model, runs.len() - left_out.len(), left_out.len());
+    report.warnings.extend(doubt);
     let targets = terms::targets(robot);
     if targets.is_empty() {
         return Err(NominalError::NoChannels);
@@ -170,6 +166,21 @@ pub fn learn(
     calibrate::fit(&mut model, &records, robot);
     report.finish(&model);
     Ok((model.sealed(), report))
+}
+
+/// What is doubtful about a few of the runs, on ground that lets a robot slip; what is doubtful about
+/// half of them and more is so about the columns, and refused.
+fn doubt(runs: &[&Run], until_s: f64, robot: &Description) -> Result<Option<String>, NominalError> {
+    let of = |run: &&Run| plausible::doubt(run, robot, until_s);
+    let doubts: Vec<Doubtful> = runs.iter().filter_map(of).collect();
+    let (found, all) = (doubts.len(), runs.len());
+    match doubts.into_iter().next() {
+        Some(doubt) if 2 * found >= all => Err(NominalError::Doubtful(doubt)),
+        Some(doubt) => Ok(Some(format!(
+            "{found} of {all} runs are doubtful and learned from nevertheless: {doubt}"
+        ))),
+        None => Ok(None),
+    }
 }
 
 /// Fits weights and noise of one channel.
