@@ -2,7 +2,7 @@
 
 use crate::learned::model::Provenance;
 use crate::learned::monitor::Channels;
-use crate::learned::{self, Form, ModelError};
+use crate::learned::{self, Calibration, Form, ModelError};
 use crate::nominal;
 use crate::{AlarmError, Description};
 
@@ -64,6 +64,17 @@ impl RobotModel {
         match self {
             Self::Faults(model) => &model.provenance,
             Self::Nominal(model) => &model.provenance,
+        }
+    }
+
+    /// The calibration for a set of channels and a form of detection.
+    ///
+    /// # Errors
+    /// [`ModelError::Calibration`].
+    pub fn calibration(&self, channels: Channels, form: Form) -> Result<&Calibration, ModelError> {
+        match self {
+            Self::Faults(model) => model.calibration(channels, form),
+            Self::Nominal(model) => model.calibration(channels, form),
         }
     }
 
