@@ -10,47 +10,51 @@ use std::process::{Command, Output};
 use serde_json::Value;
 use tempfile::TempDir;
 
-fn evaluate(folder: &Path, more: &[&str]) -> Output {
-    let [frames, labels] = ["frames.csv", "labels.csv"].map(|name| folder.join(name));
-    let mut command = Command::new(env!("CARGO_BIN_EXE_vigil"));
-    command.args(["evaluate", "--robot", "config/robots/kobuki.toml"]);
-    command.args(["--model", "config/models/kobuki.toml", "--part", "all"]);
-    command
-        .arg("--frames")
-        .arg(frames)
-        .arg("--runs")
-        .arg(labels)
-        .args(more);
+const SHIPPED: &str = "config/models/kobuki.toml";
+
+fn vigil(command: &str, folder: &Path, more: &[&str]) -> Output {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
-    command.current_dir(root).output().unwrap()
+    let mut program = Command::new(env!("CARGO_BIN_EXE_vigil"));
+    program.args([command, "--robot", "config/robots/kobuki.toml"]);
+    program.arg("--frames").arg(folder.join("frames.csv"));
+    program.args(more).current_dir(root).output().unwrap()
 }
 
-/// Two runs of 20 s: one as commanded, one whose left wheel stands from 10 s on. `sense`: sign of the
+fn evaluate(folder: &Path, model: &str, more: &[&str]) -> Output {
+    let labels = folder.join("labels.csv").display().to_string();
+    let given = ["--model", model, "--part", "all", "--runs", &labels];
+    vigil("evaluate", folder, &[&given[..], more].concat())
+}
+
+/// Two runs of 60 s: one as commanded, one whose left wheel stands from 30 s on. `sense`: sign of the
 /// gyro.
 fn record(folder: &Path, sense: f64) {
     let mut text =
         String::from("run,t,cmd_speed,cmd_yaw_rate,enc_L,enc_R,yaw_rate,current_L,current_R\n");
     for run in 0..2 {
-        for i in 0..1000_u32 {
+        for i in 0..3000_u32 {
             let t_s = f64::from(i) * 0.02;
-            let jitter = 0.02 * (f64::from(i * 7919 % 1000) / 500.0 - 1.0);
-            let (speed, turn) = (0.3, -0.4 + 0.2 * (0.5 * t_s).sin());
-            let [left, right] = [-0.115, 0.115].map(|y| (speed + y * turn) / 0.035 + jitter);
-            let stands = run == 1 && t_s >= 10.0;
-            let left = if stands { 0.0 } else { left };
-            let gyro = sense * ((right - left) * 0.035 / 0.23 + jitter);
-            let current = if stands { 1.5 } else { 0.05 };
-            writeln!(
-                text,
-                "{run},{t_s},{speed},{turn},{left},{right},{gyro},{current},0.05"
-            )
-            .unwrap();
+            // As good as white, and another one for every channel.
+            let jitter = |k: u32| f64::from((i * (7919 + 2 * k) + run * 31) % 1009) / 504.5 - 1.0;
+            let (speed, turn) = (
+                0.3 + 0.15 * (0.7 * t_s).sin(),
+                -0.4 + 0.3 * (0.5 * t_s).sin(),
+            );
+            let rate = |y: f64, k| (speed + y * turn) / 0.035 + 0.1 * jitter(k);
+            let stands = run == 1 && t_s >= 30.0;
+            let left = if stands { 0.0 } else { rate(-0.115, 1) };
+            let right = rate(0.115, 2);
+            let gyro = sense * ((right - left) * 0.035 / 0.23 + 0.02 * jitter(3));
+            let current = if stands { 1.5 } else { 0.05 } + 0.01 * jitter(4);
+            let other = 0.05 + 0.01 * jitter(5);
+            let row = format!("{left},{right},{gyro},{current},{other}");
+            writeln!(text, "{run},{t_s},{speed},{turn},{row}").unwrap();
         }
     }
     fs::write(folder.join("frames.csv"), text).unwrap();
     fs::write(
         folder.join("labels.csv"),
-        "run,mode,onset_s\n0,ND,-1\n1,STUCK,10\n",
+        "run,mode,onset_s\n0,ND,-1\n1,STUCK,30\n",
     )
     .unwrap();
 }
@@ -74,8 +78,10 @@ fn labels_count_as_fault_or_no_fault_and_the_page_has_what_applies() {
         (&score["identifies"], &score["identifier"]),
         (&false.into(), &"none".into())
     );
-    assert_eq!(score["detection"]["STUCK"]["n"], 1);
-    assert_eq!(score["detection"]["STUCK"]["detected"], 1);
+    let found = &score["detection"]["STUCK"];
+    assert_eq!((&found["n"], &found["detected"]), (&1.into(), &1.into()));
+    assert!(found["delay"]["max_s"].as_f64().unwrap() < 2.0, "{found}");
+    assert_eq!(score["false_alarms"]["alarms"], 0);
     assert_eq!(score["identification"], serde_json::json!({}));
     assert_eq!(score["calibration"], serde_json::json!({}));
     // Each run warms up for a second of motion, and half a second in which it begins to move.
@@ -123,7 +129,7 @@ fn what_has_no_meaning_there_is_refused_by_name() {
         ),
         (["--detector", "windowed"], "reach 8.64 at the highest"),
     ] {
-        let output = evaluate(folder.path(), &more);
+        let output = evaluate(folder.path(), SHIPPED, &more);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{more:?}: {errors}");
         assert!(
@@ -137,7 +143,7 @@ fn what_has_no_meaning_there_is_refused_by_name() {
 fn columns_that_mean_something_else_are_told() {
     let folder = TempDir::new().unwrap();
     record(folder.path(), -1.0);
-    let output = evaluate(folder.path(), &[]);
+    let output = evaluate(folder.path(), SHIPPED, &[]);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
         errors.contains("is yaw_rate or cmd_yaw_rate positive to the right?"),
