@@ -185,7 +185,7 @@ fn another_prior_rate_adds_its_logarithm_to_tempered_log_odds_as_a_direct_comput
     );
     let channel = model.channel[0].clone();
     let at_one = log_odds(&model, &robot, 1.0);
-    for rate_1_h in [1e-3, 0.1, 30.0] {
+    for rate_1_h in [1e-3, 0.1, 10.0] {
         let shift = f64::ln(rate_1_h);
         let found = log_odds(&model, &robot, rate_1_h);
         let raw = directly(&channel, &model, &robot, rate_1_h);
