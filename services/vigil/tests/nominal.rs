@@ -1,5 +1,5 @@
-//! `vigil evaluate` on a robot of which only the nominal behaviour is known: what it says, and what it
-//! refuses.
+//! `vigil evaluate` on a robot of which only the nominal behaviour is known: what it says, and what
+//! it refuses.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::fmt::Write as _;
@@ -26,8 +26,8 @@ fn evaluate(folder: &Path, model: &str, more: &[&str]) -> Output {
     vigil("evaluate", folder, &[&given[..], more].concat())
 }
 
-/// Two runs of 60 s: one as commanded, one whose left wheel stands from 30 s on. `sense`: sign of the
-/// gyro.
+/// Two runs of 60 s: one as commanded, one whose left wheel stands from 30 s on. `sense`: sign of
+/// the gyro.
 fn record(folder: &Path, sense: f64) {
     let mut text =
         String::from("run,t,cmd_speed,cmd_yaw_rate,enc_L,enc_R,yaw_rate,current_L,current_R\n");

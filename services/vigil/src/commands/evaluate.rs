@@ -36,7 +36,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Part::Heldout)]
     part: Part,
     /// Also write everything as one page (HTML), for pose only and for pose and encoders, whatever
-    /// --sensors says. For a model of nominal behaviour alone: detection, for the sets that it knows.
+    /// --sensors says. For a model of nominal behaviour alone: detection, by the sets it knows.
     #[arg(long, value_name = "OUT")]
     report: Option<PathBuf>,
     /// Also compare these identification filters with `exact` on the same runs, for both sets of
@@ -90,7 +90,7 @@ impl Args {
             .collect()
     }
 
-    /// Sets of channels to run, as `--sensors` names them: for a comparison all that the model knows.
+    /// Sets of channels to run, as `--sensors` names them: for a comparison all that the model has.
     fn sets(&self, model: &RobotModel) -> Vec<&str> {
         match self.report.is_some() || !self.filters.is_empty() {
             true => self.filter.sets(model),

@@ -9,8 +9,8 @@
 //! - a channel that comes late is moved forward by its delay; live, the others wait as long. An
 //!   estimated delay is a constant of the log, found in the beginning of its first run;
 //! - `interpolate` waits for the next sample;
-//! - with a `device_clock`, a line through all stamps of the run places each row: its offset and rate
-//!   are constants of the run. So is the median difference of clocks that `time_as` adds;
+//! - with a `device_clock`, a line through all stamps of the run places each row: its offset and
+//!   rate are constants of the run. So is the median difference of clocks that `time_as` adds;
 //! - a run begins and ends where all its measured channels have values;
 //! - rows out of order are put in order ([`Disorder`]).
 //!

@@ -1,5 +1,5 @@
-//! Stretches of a second of motion, over which commands and measurements are compared: so short that
-//! a path is nearly straight, so long that noise and lag hardly count.
+//! Stretches of a second of motion, over which commands and measurements are compared: so short
+//! that a path is nearly straight, so long that noise and lag hardly count.
 
 use vigil_blocks::SensorFrame;
 use vigil_inference::angle::wrap;

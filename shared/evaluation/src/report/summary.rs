@@ -220,11 +220,12 @@ pub fn section(report: &Report<'_>) -> String {
     }
     let names = match report.identifies() {
         true => {
-            "An abstract node is a wrong leaf, and a right side or type if all its leaves are of it."
+            "An abstract node is a wrong leaf, and a right side or type if all its leaves are of \
+             it."
         }
         false => {
-            "The model is of nominal behaviour alone: labels say fault or no fault, and leaf, side, \
-             type and calibration do not apply."
+            "The model is of nominal behaviour alone: labels say fault or no fault, and leaf, \
+             side, type and calibration do not apply."
         }
     };
     let about = format!(

@@ -2,16 +2,16 @@
 //!
 //! Works on rows of verdicts only and knows no filter. Definitions:
 //!
-//! - *false alarm*: an alarm in a nominal run, or before the onset of a fault; their rate is over the
-//!   time in which one was possible, so without the detector's warm-up at the beginning of each run
+//! - *false alarm*: an alarm in a nominal run, or before the onset of a fault; their rate is over
+//!   the time in which one was possible, so without the detector's warm-up at the beginning of each run
 //!   (given beside it);
 //! - *detection*: the first rise of the alarm at or after the onset; without one, the fault is
 //!   missed; the delay is counted from the onset;
 //! - *at h seconds*: the last verdict at or before onset + h; runs that end earlier do not count;
 //! - *right leaf*: the reported mode is the true one (`UNKNOWN` if the tree does not know the true
 //!   one); an abstract node is a wrong leaf, and a right side or type if all its leaves are of it;
-//! - a model of nominal behaviour alone names no faults: its verdicts are *fault* (`UNKNOWN`) or *no
-//!   fault* (`ND`), labels count as no more than that, and only detection is scored;
+//! - a model of nominal behaviour alone names no faults: its verdicts are *fault* (`UNKNOWN`) or
+//!   *no fault* (`ND`), labels count as no more than that, and only detection is scored;
 //! - *isolation*: the time from the onset until the right leaf is named for good, of the runs
 //!   that end with it.
 

@@ -54,7 +54,8 @@ impl Score {
         let faulty = format!("{before} of {}", found.faulty_runs);
         write!(
             f,
-            "false alarms    {alarms} in {exposure_h:.2} h without a fault (and {:.2} h of warm-up): ",
+            "false alarms    {alarms} in {exposure_h:.2} h without a fault (and {:.2} h of \
+             warm-up): ",
             found.warm_up_h
         )?;
         writeln!(f, "{nominal} nominal runs, {faulty} runs before the onset")?;
