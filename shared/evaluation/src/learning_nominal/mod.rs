@@ -168,8 +168,8 @@ pub fn learn(
     Ok((model.sealed(), report))
 }
 
-/// What is doubtful about a few of the runs, as on ground that lets a robot slip; where half of them
-/// and more are doubtful, the columns are, and refused.
+/// What is doubtful about a few of the runs, as on ground that lets a robot slip; where half of
+/// them and more are doubtful, the columns are, and refused.
 fn doubt(runs: &[&Run], until_s: f64, robot: &Description) -> Result<Option<String>, NominalError> {
     let of = |run: &&Run| plausible::doubt(run, robot, until_s);
     let doubts: Vec<Doubtful> = runs.iter().filter_map(of).collect();

@@ -3,8 +3,8 @@
 //! Works on rows of verdicts only and knows no filter. Definitions:
 //!
 //! - *false alarm*: an alarm in a nominal run, or before the onset of a fault; their rate is over
-//!   the time in which one was possible, so without the detector's warm-up at the beginning of each run
-//!   (given beside it);
+//!   the time in which one was possible, so without the detector's warm-up at the beginning of each
+//!   run (given beside it);
 //! - *detection*: the first rise of the alarm at or after the onset; without one, the fault is
 //!   missed; the delay is counted from the onset;
 //! - *at h seconds*: the last verdict at or before onset + h; runs that end earlier do not count;
