@@ -63,11 +63,12 @@ fn record(folder: &Path, sense: f64) {
 fn labels_count_as_fault_or_no_fault_and_the_page_has_what_applies() {
     let folder = TempDir::new().unwrap();
     record(folder.path(), 1.0);
-    let page = folder.path().join("page.html");
-    let output = evaluate(
-        folder.path(),
-        &["--report", page.to_str().unwrap(), "--json"],
-    );
+    let [model, page] = ["model.toml", "page.html"].map(|name| folder.path().join(name));
+    let model = model.to_str().unwrap();
+    let learned = vigil("learn", folder.path(), &["--only", "0", "--out", model]);
+    assert!(learned.status.success());
+    let asked = ["--report", page.to_str().unwrap(), "--json"];
+    let output = evaluate(folder.path(), model, &asked);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
         output.status.success() && !errors.contains("warning"),
