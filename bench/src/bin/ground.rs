@@ -21,13 +21,7 @@ use vigil_evaluation::scoring::Taxonomy;
 const TYPES: [&str; 2] = ["stuck", "encoder"];
 
 fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("ground: {error}");
-            ExitCode::from(1)
-        }
-    }
+    vigil_bench::ended("ground", run())
 }
 
 fn run() -> Result<(), Box<dyn Error>> {

@@ -27,13 +27,7 @@ const RATES_HZ: [f64; 2] = [20.0, 100.0];
 const EVERY: usize = 4;
 
 fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("unmodelled: {error}");
-            ExitCode::from(1)
-        }
-    }
+    vigil_bench::ended("unmodelled", run())
 }
 
 fn run() -> Result<(), Box<dyn Error>> {

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use vigil_blocks::WHEELS;
-use vigil_robot::Description;
 use vigil_robot::description::Kinematics;
+use vigil_robot::{AlarmError, Description, RobotModel};
 
 use crate::schema::{GraphFile, Service, Source};
 
@@ -255,6 +255,20 @@ fn choice(key: &str, value: &str, allowed: &[&str], report: &mut impl FnMut(&str
             key,
             format!("'{value}' is not known: allowed are {}", allowed.join(", ")),
         );
+    }
+}
+
+/// Checks that the detector's alarm can rise with this model.
+pub(crate) fn alarm(file: &GraphFile, model: &RobotModel, mut report: impl FnMut(&str, String)) {
+    let detector = &file.detector;
+    let of = (detector.sensors.into(), detector.form.into());
+    let (interval_h, rate_1_h) = (detector.false_alarm_interval_h, detector.fault_rate_1_h);
+    match model.alarm_log_odds(of, interval_h, rate_1_h) {
+        Ok(_) => {}
+        Err(error @ AlarmError::Model(_)) => report("detector.sensors", error.to_string()),
+        Err(error @ AlarmError::Unreachable { .. }) => {
+            report("detector.false_alarm_interval_h", error.to_string());
+        }
     }
 }
 

@@ -9,6 +9,8 @@ use std::fmt;
 
 use clap::ValueEnum;
 use serde::Deserialize;
+use vigil_robot::learned;
+use vigil_robot::learned::monitor::Channels;
 
 /// A whole graph file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -244,6 +246,15 @@ pub enum Sensors {
     PoseEncoders,
 }
 
+impl From<Sensors> for Channels {
+    fn from(sensors: Sensors) -> Self {
+        match sensors {
+            Sensors::Pose => Self::Pose,
+            Sensors::PoseEncoders => Self::PoseEncoders,
+        }
+    }
+}
+
 /// What the detection filter takes a fault for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
@@ -256,6 +267,16 @@ pub enum Form {
     Constant,
     /// A constant likelihood over windows of ten observations: that size is ten times smaller.
     Windowed,
+}
+
+impl From<Form> for learned::Form {
+    fn from(form: Form) -> Self {
+        match form {
+            Form::LearnedBias => Self::LearnedBias,
+            Form::Constant => Self::Constant,
+            Form::Windowed => Self::Windowed,
+        }
+    }
 }
 
 /// The identification filter.
