@@ -51,8 +51,8 @@ pub struct Job {
     pub seed: u64,
 }
 
-/// Every wheel stuck in every turn at every speed on every soil, with `seeds` worlds each, from `first_seed`
-/// on; nominal runs; and encoder faults of every kind and wheel.
+/// Every wheel stuck in every turn at every speed on every soil, with `seeds` worlds each, from
+/// `first_seed` on; nominal runs; and encoder faults of every kind and wheel.
 #[must_use]
 pub fn jobs(rover: &Rover, seeds: u64, first_seed: u64) -> Vec<Job> {
     let mut jobs = Vec::new();
