@@ -12,6 +12,7 @@ pub mod mdp;
 pub mod model;
 pub mod policy;
 mod reader;
+mod writer;
 
 pub use belief::{Evidence, Tracker};
 pub use model::{Pomdp, Warning};
