@@ -12,6 +12,7 @@ pub mod mdp;
 pub mod model;
 pub mod policy;
 mod reader;
+mod weights;
 mod writer;
 
 pub use belief::{Evidence, Tracker};

@@ -2,12 +2,14 @@
 
 mod build;
 mod hash;
+mod joint;
 pub(crate) mod rewards;
 pub(crate) mod sparse;
 
 pub(crate) use build::{Parts, ROW_SUM_TOLERANCE};
 
 use crate::reader::{self, ParseError, Position};
+use joint::Joint;
 use rewards::Rewards;
 use sparse::Sparse;
 
@@ -38,6 +40,8 @@ pub struct Pomdp {
     rewards: Rewards,
     /// R[a][s], expected.
     reward: Vec<f64>,
+    /// T and Z in one, unless that is too large.
+    joint: Option<Joint>,
     hash: u64,
     warnings: Vec<Warning>,
 }
@@ -150,6 +154,10 @@ impl Pomdp {
     #[must_use]
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
+    }
+
+    pub(crate) const fn joint(&self) -> Option<&Joint> {
+        self.joint.as_ref()
     }
 
     pub(crate) const fn rewards(&self) -> &Rewards {

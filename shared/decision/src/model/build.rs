@@ -1,6 +1,7 @@
 //! From what a reader has collected to a model: rows are checked, expected rewards computed.
 
 use super::hash::hash;
+use super::joint::Joint;
 use super::rewards::Rewards;
 use super::sparse::Sparse;
 use super::{Pomdp, Warning};
@@ -62,6 +63,7 @@ impl Pomdp {
             let message = format!("{} overflows", parts.row_name("R", row / n, row % n));
             return Err(ParseError::new(parts.start_at, message));
         }
+        let joint = Joint::new(&parts.transitions, &parts.observation, n);
         let mut model = Self {
             discount: parts.discount,
             is_cost: parts.is_cost,
@@ -73,6 +75,7 @@ impl Pomdp {
             observation: parts.observation,
             rewards: parts.rewards,
             reward,
+            joint,
             hash: 0,
             warnings: told.warnings(),
         };
