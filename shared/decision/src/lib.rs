@@ -1,6 +1,6 @@
 //! Decisions under uncertainty: POMDP models, their solution, policies, belief tracking.
 //!
-//! A [`Pomdp`] is read from Cassandra's `.pomdp` format; its fully observable relaxation is solved
+//! A [`Pomdp`] is read from Cassandra's `.pomdp` format or APPL's `.pomdpx`; its fully observable relaxation is solved
 //! by [`mdp::solve`]; a [`Policy`] turns a belief into an action; a [`Tracker`] keeps the belief.
 //! Deciding and tracking allocate nothing. No transport, no clock, no files.
 //!
@@ -11,6 +11,7 @@ pub mod belief;
 pub mod mdp;
 pub mod model;
 pub mod policy;
+mod pomdpx;
 mod reader;
 mod weights;
 mod writer;

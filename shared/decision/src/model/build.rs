@@ -108,8 +108,7 @@ impl Told {
             return Ok(());
         }
         let message = || format!("{} sums to {sum}, not to 1", name());
-        // What is not a number is refused too.
-        if !(error <= ROW_SUM_TOLERANCE) {
+        if error > ROW_SUM_TOLERANCE {
             let message = format!("{}; allowed is 1 within {ROW_SUM_TOLERANCE}", message());
             return Err(ParseError::new(at, message));
         }

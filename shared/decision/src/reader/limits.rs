@@ -15,8 +15,11 @@ pub(crate) const ENTRIES_MAX: usize = 1 << 24;
 /// Most entries that all rules of one table write, those that are overwritten included.
 pub(crate) const WRITES_MAX: usize = 1 << 26;
 
+/// To write a reward takes about so many times as long as to write a probability.
+pub(crate) const WRITES_PER_REWARD: usize = 8;
+
 /// Refuses `count` beyond `most`.
-pub(super) fn check(
+pub(crate) fn check(
     count: Option<usize>,
     most: usize,
     at: Position,

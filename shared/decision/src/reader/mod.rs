@@ -6,7 +6,7 @@
 
 mod cursor;
 mod lexer;
-mod limits;
+pub(crate) mod limits;
 mod preamble;
 mod probability_rows;
 mod replay;
@@ -17,6 +17,7 @@ mod start;
 use std::fmt;
 
 use cursor::Cursor;
+pub(crate) use cursor::is_reserved;
 
 use crate::model::{Parts, Pomdp};
 

@@ -8,9 +8,6 @@ use super::limits::{self, ENTRIES_MAX};
 use super::replay::Rules;
 use crate::model::rewards::{Block, Rewards};
 
-/// To write a reward takes about so many times as long as to write a probability.
-pub(super) const WRITES_PER_REWARD: usize = 8;
-
 /// What a rule writes into R(s,a,.,.).
 #[derive(Debug)]
 pub(super) enum RewardFill {

@@ -2,11 +2,11 @@
 
 use super::cursor::{Cursor, Names, Pick};
 use super::lexer::Token;
-use super::limits::{self, ENTRIES_MAX};
+use super::limits::{self, ENTRIES_MAX, WRITES_PER_REWARD};
 use super::preamble::{Preamble, Sizes};
 use super::probability_rows::Fill;
 use super::replay::{Rule, Rules};
-use super::reward_blocks::{RewardFill, WRITES_PER_REWARD};
+use super::reward_blocks::RewardFill;
 use super::{ParseError, Position};
 use crate::model::sparse::Sparse;
 
