@@ -105,27 +105,42 @@ impl Pomdp {
             self.observations()
         };
         let same = |state| (1..self.actions().len()).all(|a| row(a, state) == row(0, state));
-        let shared: Vec<bool> = (0..n).map(same).collect();
         let uniform = |row: &[(usize, f64)]| {
             row.len() == width && row.iter().all(|(_, p)| *p == 1.0 / width as f64)
         };
-        let mut write_state = |action: &str, state: usize, row: &[(usize, f64)]| {
-            let name = &self.states()[state];
-            if width > 1 && uniform(row) {
-                put(text, format_args!("{table}: {action} : {name} uniform"));
+        let is_identity =
+            |state: usize, row: &[(usize, f64)]| is_square && width > 1 && *row == [(state, 1.0)];
+        let is_uniform = |row: &[(usize, f64)]| width > 1 && uniform(row);
+        // The rows of one action; `*` stands for all.
+        let mut write_action = |action: &str, a: usize, states: &[usize]| {
+            let whole = |is: &dyn Fn(usize, &[(usize, f64)]) -> bool| {
+                states.len() == n && states.iter().all(|&state| is(state, &row(a, state)))
+            };
+            if whole(&is_identity) {
+                put(text, format_args!("{table}: {action} identity"));
                 return;
             }
-            for &(column, p) in row {
-                let (to, p) = (&columns[column], Number(p));
-                put(text, format_args!("{table}: {action} : {name} : {to} {p}"));
+            if whole(&|_, row| is_uniform(row)) {
+                put(text, format_args!("{table}: {action} uniform"));
+                return;
+            }
+            for &state in states {
+                let (name, row) = (&self.states()[state], row(a, state));
+                if is_uniform(&row) {
+                    put(text, format_args!("{table}: {action} : {name} uniform"));
+                    continue;
+                }
+                for (column, p) in row {
+                    let (to, p) = (&columns[column], Number(p));
+                    put(text, format_args!("{table}: {action} : {name} : {to} {p}"));
+                }
             }
         };
-        for state in (0..n).filter(|&state| shared[state]) {
-            write_state("*", state, &row(0, state));
-        }
-        for (a, action) in self.actions().iter().enumerate() {
-            for state in (0..n).filter(|&state| !shared[state]) {
-                write_state(action, state, &row(a, state));
+        let (shared, own): (Vec<usize>, Vec<usize>) = (0..n).partition(|&state| same(state));
+        write_action("*", 0, &shared);
+        if !own.is_empty() {
+            for (a, action) in self.actions().iter().enumerate() {
+                write_action(action, a, &own);
             }
         }
         text.push('\n');

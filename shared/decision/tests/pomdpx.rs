@@ -166,32 +166,32 @@ fn errors_name_the_place_and_what_is_allowed() {
         ),
         (
             tiger().replace("0.15 0.85", "0.15"),
-            "line 18",
+            "line 21",
             "3 numbers, wanted are 4",
         ),
         (
             tiger().replace("0.15 0.85", "0.15 0.95"),
-            "line 16",
-            "sums to 1.1",
+            "line 19",
+            "sums to 1.0999",
         ),
         (
             tiger().replace("0.85 0.15", "0.85 -0.15"),
-            "line 18",
+            "line 21",
             "allowed is 0 to 1",
         ),
         (
             tiger().replace("listen - -", "lissen - -"),
-            "line 14",
+            "line 16",
             "'lissen' is no value of 'a'",
         ),
         (
             tiger().replace("<Var>s1", "<Var>s2"),
-            "line 12",
+            "line 14",
             "'s2' is no variable",
         ),
         (
             tiger().replace("a s0</Parent>", "s1</Parent>"),
-            "line 12",
+            "line 14",
             "cannot depend on 's1'",
         ),
         (
@@ -206,8 +206,8 @@ fn errors_name_the_place_and_what_is_allowed() {
         ),
         (
             tiger().replace("<ValueEnum>left right</ValueEnum>", many),
-            "line 5",
-            "no value",
+            "line 21",
+            "4 numbers, wanted are 2000",
         ),
         (
             tiger().replace("InitialStateBelief", "Initial"),
@@ -221,18 +221,17 @@ fn errors_name_the_place_and_what_is_allowed() {
             "allowed are 100000",
         ),
         (
-            factored().replace("<Parent>null", "<Parent>charge0"),
-            "line 11",
+            factored()
+                .replace("<Parent>null", "<Parent>charge0")
+                .replace("<Instance>-<", "<Instance>* -<"),
+            "line 12",
             "depend on each other",
         ),
     ];
     for (text, place, part) in cases {
         let message = Pomdp::parse_pomdpx(&text).unwrap_err().to_string();
-        assert!(message.contains(part), "{part}: {message}");
-        assert!(
-            message.starts_with(place) || part == "no value",
-            "{place}: {message}"
-        );
+        let is_right = message.starts_with(place) && message.contains(part);
+        assert!(is_right, "{place}, {part}: {message}");
     }
 }
 

@@ -168,11 +168,10 @@ fn what_is_written_is_readable() {
         written,
         "discount: 0.95\nvalues: cost\nstates: left right\nactions: listen open\n\
          observations: hear-left hear-right\n\nstart include: left\n\n\
-         T: listen : left : left 1\nT: listen : right : right 1\n\
-         T: open : left uniform\nT: open : right uniform\n\n\
+         T: listen identity\nT: open uniform\n\n\
          O: listen : left : hear-left 0.85\nO: listen : left : hear-right 0.15\n\
          O: listen : right : hear-left 0.15\nO: listen : right : hear-right 0.85\n\
-         O: open : left uniform\nO: open : right uniform\n\n\
+         O: open uniform\n\n\
          R: listen : * : * : * 1\nR: open : left : * : * -3\n\
          R: open : left : * : hear-left 1e-12\n\
          R: open : right : * : hear-right -3\n"
