@@ -6,7 +6,7 @@ mod joint;
 pub(crate) mod rewards;
 pub(crate) mod sparse;
 
-pub(crate) use build::{Parts, ROW_SUM_TOLERANCE};
+pub(crate) use build::{Parts, ROW_SUM_TOLERANCE, refuse_sum};
 
 use crate::reader::{self, ParseError, Position};
 use joint::Joint;

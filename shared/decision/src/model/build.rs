@@ -90,6 +90,20 @@ impl Parts {
     }
 }
 
+/// Refuses what cannot be a distribution; `name` says which.
+pub(crate) fn refuse_sum(
+    sum: f64,
+    at: Position,
+    name: impl Fn() -> String,
+) -> Result<(), ParseError> {
+    if (sum - 1.0).abs() <= ROW_SUM_TOLERANCE {
+        return Ok(());
+    }
+    let allowed = format!("allowed is 1 within {ROW_SUM_TOLERANCE}");
+    let message = format!("{} sums to {sum}, not to 1; {allowed}", name());
+    Err(ParseError::new(at, message))
+}
+
 /// Warnings so far.
 struct Told {
     warnings: Vec<Warning>,
@@ -107,13 +121,9 @@ impl Told {
         if error <= ROW_SUM_WARNING {
             return Ok(());
         }
-        let message = || format!("{} sums to {sum}, not to 1", name());
-        if error > ROW_SUM_TOLERANCE {
-            let message = format!("{}; allowed is 1 within {ROW_SUM_TOLERANCE}", message());
-            return Err(ParseError::new(at, message));
-        }
+        refuse_sum(sum, at, &name)?;
         if self.warnings.len() < WARNINGS_MAX {
-            let message = message();
+            let message = format!("{} sums to {sum}, not to 1", name());
             self.warnings.push(Warning { at, message });
         } else {
             self.left_out += 1;

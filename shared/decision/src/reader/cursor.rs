@@ -64,6 +64,11 @@ impl Names {
         self.names.len()
     }
 
+    /// The name at an index; empty beyond the last.
+    pub(super) fn name(&self, index: usize) -> &str {
+        self.names.get(index).map_or("", String::as_str)
+    }
+
     pub(super) fn into_names(self) -> Vec<String> {
         self.names
     }

@@ -63,7 +63,12 @@ pub(crate) fn parse(text: &str) -> Result<Pomdp, ParseError> {
     let start = start::read(&mut cursor, &preamble.states)?;
     let rules = rules::read(&mut cursor, &preamble, &start)?;
     let sizes = preamble.sizes();
-    let (transitions, transition_at) = probability_rows::transitions(&rules.transition, &start)?;
+    let name = |action, state| {
+        let (action, state) = (preamble.actions.name(action), preamble.states.name(state));
+        format!("T: {action} : {state}")
+    };
+    let (transitions, transition_at) =
+        probability_rows::transitions(&rules.transition, &start, name)?;
     let (observation, observation_at) = if preamble.is_mdp {
         (vec![1.0; sizes.actions * sizes.states], Vec::new())
     } else {

@@ -3,6 +3,7 @@
 use super::limits::{self, ENTRIES_MAX};
 use super::replay::Rules;
 use super::{ParseError, Position};
+use crate::model::refuse_sum;
 use crate::model::sparse::Sparse;
 
 /// What a rule writes into a row of probabilities.
@@ -124,14 +125,18 @@ fn rows(
     Ok(written_at)
 }
 
-/// T, per action, and where each row was written.
+/// T, per action, and where each row was written. `name` is that of a row: the first that is no
+/// distribution ends the reading, before more work goes into the model.
 pub(super) fn transitions(
     rules: &Rules<Fill>,
     start: &[f64],
+    name: impl Fn(usize, usize) -> String,
 ) -> Result<(Vec<Sparse>, Vec<Position>), ParseError> {
     let mut all: Vec<Sparse> = Vec::with_capacity(rules.actions);
     let mut kept = 0;
-    let at = rows(rules, rules.states, start, |action, _, row, at| {
+    let at = rows(rules, rules.states, start, |action, state, row, at| {
+        let sum = row.entries().map(|(_, p)| p).sum();
+        refuse_sum(sum, at, || name(action, state))?;
         if all.len() == action {
             all.push(Sparse::default());
         }

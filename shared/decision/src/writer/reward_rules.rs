@@ -15,13 +15,23 @@ pub(super) fn write(model: &Pomdp, text: &mut String) {
         write_block(model, text, ("*", "*"), block(0, 0));
         return;
     }
+    let is_shared = |state| (1..actions).all(|action| id(state, action) == id(state, 0));
+    let (shared, own): (Vec<usize>, Vec<usize>) = (0..n).partition(|&state| is_shared(state));
+    for state in shared {
+        write_block(model, text, ("*", &model.states()[state]), block(state, 0));
+    }
     for (a, action) in model.actions().iter().enumerate() {
-        if is_one(a) {
+        if own.len() == n && is_one(a) {
             write_block(model, text, (action, "*"), block(0, a));
             continue;
         }
-        for (s, state) in model.states().iter().enumerate() {
-            write_block(model, text, (action, state), block(s, a));
+        for &state in &own {
+            write_block(
+                model,
+                text,
+                (action, &model.states()[state]),
+                block(state, a),
+            );
         }
     }
 }
