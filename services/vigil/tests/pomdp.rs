@@ -140,7 +140,7 @@ fn a_model_is_described() {
     for wanted in [
         "2 can be reached",
         "noisy",
-        "warning: line 11",
+        "warning: line 10",
         "values: reward",
     ] {
         assert!(shown.contains(wanted), "{wanted}: {shown}");

@@ -140,6 +140,8 @@ impl Reader<'_, '_, '_> {
         ])?;
         let cursor = &mut *self.cursor;
         let fill = match count {
+            // The only observation is all of them.
+            3 | 4 if k == 1 => RewardFill::One(picks[2], None, cursor.number()?),
             4 => RewardFill::One(picks[2], picks[3], cursor.number()?),
             3 => RewardFill::Row(picks[2], numbers(cursor, k)?),
             2 => RewardFill::Matrix(numbers(cursor, n * k)?),
