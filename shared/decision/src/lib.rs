@@ -1,7 +1,8 @@
 //! Decisions under uncertainty: POMDP models, their solution, policies, belief tracking.
 //!
-//! A [`Pomdp`] is read from Cassandra's `.pomdp` format; its fully observable relaxation is solved
-//! by [`mdp::solve`]; a [`Policy`] turns a belief into an action; a [`Tracker`] keeps the belief.
+//! A [`Pomdp`] is read from Cassandra's `.pomdp` format or APPL's `.pomdpx`, and written as
+//! `.pomdp`; its fully observable relaxation is solved by [`mdp::solve`]; a [`Policy`] turns a
+//! belief into an action; a [`Tracker`] keeps the belief.
 //! Deciding and tracking allocate nothing. No transport, no clock, no files.
 //!
 //! Notation of Verma, Fernandez and Simmons (2002): states S, actions A, observations Z,
@@ -11,7 +12,10 @@ pub mod belief;
 pub mod mdp;
 pub mod model;
 pub mod policy;
+mod pomdpx;
 mod reader;
+mod weights;
+mod writer;
 
 pub use belief::{Evidence, Tracker};
 pub use model::{Pomdp, Warning};
