@@ -15,5 +15,5 @@ mod reader;
 
 pub use belief::{Evidence, Tracker};
 pub use model::{Pomdp, Warning};
-pub use policy::{ActionVoting, Choice, MostLikelyState, Policy, QMdp};
+pub use policy::{ActionVoting, Choice, Control, Decider, MostLikelyState, Policy, QMdp};
 pub use reader::{ParseError, Position};
