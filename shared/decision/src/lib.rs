@@ -10,8 +10,10 @@
 pub mod belief;
 pub mod mdp;
 pub mod model;
+pub mod navigation;
 pub mod policy;
 mod reader;
+pub mod simulation;
 
 pub use belief::{Evidence, Tracker};
 pub use model::{Pomdp, Warning};
