@@ -40,10 +40,7 @@ pub fn generate(parameters: &Parameters) -> Result<String, ParameterError> {
     // A task begins as any step does: nominal, but for what may just have arisen.
     let arises = parameters.arises.values();
     let nominal = 1.0 - arises.iter().sum::<f64>();
-    let start: Vec<String> = std::iter::once(nominal)
-        .chain(arises)
-        .map(number)
-        .collect();
+    let start: Vec<String> = std::iter::once(nominal).chain(arises).map(number).collect();
     line(&mut text, &format!("start: {}", start.join(" ")));
     transitions(&mut text, parameters, &start);
     observe_rows(&mut text, parameters);
@@ -53,7 +50,10 @@ pub fn generate(parameters: &Parameters) -> Result<String, ParameterError> {
 
 /// What mends or passes leads to NOM; nothing else changes between exceptions.
 fn transitions(text: &mut String, parameters: &Parameters, nominal_row: &[String]) {
-    line(text, "\n# What arises, what passes by itself, what an action mends.");
+    line(
+        text,
+        "\n# What arises, what passes by itself, what an action mends.",
+    );
     line(text, "T: * identity");
     line(text, &format!("T: * : NOM\n{}", nominal_row.join(" ")));
     let remedies = &parameters.remedies;
@@ -136,8 +136,14 @@ fn observations() -> impl Iterator<Item = Observation> {
 /// p(z|a,s') as the product over the basic observations; rules for any action first, then GO and
 /// NP, which report outcomes.
 fn observe_rows(text: &mut String, parameters: &Parameters) {
-    line(text, "\n# Monitors are independent given the state reached; EPS and EPM exclude each");
-    line(text, "# other. Outcomes answer GO (BO) and NP (ALT, NNA) only.");
+    line(
+        text,
+        "\n# Monitors are independent given the state reached; EPS and EPM exclude each",
+    );
+    line(
+        text,
+        "# other. Outcomes answer GO (BO) and NP (ALT, NNA) only.",
+    );
     for action in ["*", "GO", "NP"] {
         for (index, state) in STATES.iter().enumerate() {
             let outcomes = outcome_chances(parameters, action, index);
@@ -171,13 +177,18 @@ fn outcome_chances(parameters: &Parameters, action: &str, state: usize) -> [f64;
 }
 
 fn rewards(text: &mut String, parameters: &Parameters) {
-    line(text, "\n# In units of what a nominal robot makes in one step.");
+    line(
+        text,
+        "\n# In units of what a nominal robot makes in one step.",
+    );
     let rewards = &parameters.rewards;
     for (state, value) in STATES.iter().zip(rewards.fp.values()) {
         line(text, &format!("R: FP : {state} : * : * {}", number(value)));
     }
     let prices = &rewards.prices;
-    let table = [prices.np, prices.rl, prices.go, prices.ma, prices.sh, prices.gu];
+    let table = [
+        prices.np, prices.rl, prices.go, prices.ma, prices.sh, prices.gu,
+    ];
     for (action, price) in ACTIONS[1..].iter().zip(table) {
         line(text, &format!("R: {action} : * : * : * {}", number(-price)));
     }

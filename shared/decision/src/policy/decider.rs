@@ -48,7 +48,9 @@ impl Decider {
         let actions = model.actions().len();
         Self {
             policy,
-            best: (0..model.states().len()).map(|s| solution.best(s)).collect(),
+            best: (0..model.states().len())
+                .map(|s| solution.best(s))
+                .collect(),
             values: vec![0.0; actions],
             votes: vec![0.0; actions],
         }

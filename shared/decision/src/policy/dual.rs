@@ -143,7 +143,9 @@ impl DualControl {
             settings,
             look_ahead: LookAhead::new(model, solution),
             is_allowed,
-            best: (0..model.states().len()).map(|s| solution.best(s)).collect(),
+            best: (0..model.states().len())
+                .map(|s| solution.best(s))
+                .collect(),
             votes: vec![0.0; actions],
             run: Run::default(),
         })

@@ -68,9 +68,7 @@ fn informed_backup(model: &Pomdp, q: &[Vec<f64>], s: usize, a: usize) -> f64 {
         let likelihood = model.likelihood(a, z);
         let of = |q: &Vec<f64>| -> f64 {
             let successors = model.successors(s, a).iter();
-            successors
-                .map(|(to, p)| p * likelihood[*to] * q[*to])
-                .sum()
+            successors.map(|(to, p)| p * likelihood[*to] * q[*to]).sum()
         };
         next += q.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
     }

@@ -106,12 +106,7 @@ impl Outlook {
             if column.iter().any(|p| *p > 0.0) {
                 outlook.columns.extend(column);
             }
-            for ((mass, noise), p) in outlook
-                .mass
-                .iter_mut()
-                .zip(&mut outlook.noise)
-                .zip(column)
-            {
+            for ((mass, noise), p) in outlook.mass.iter_mut().zip(&mut outlook.noise).zip(column) {
                 *mass += p;
                 *noise += minus_p_ln_p(*p);
             }

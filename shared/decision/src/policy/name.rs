@@ -39,9 +39,7 @@ impl Base {
             Self::MostLikelyState => Box::new(MostLikelyState::new(solution.clone())),
             Self::ActionVoting => Box::new(ActionVoting::new(solution.clone())),
             Self::QMdp => Box::new(QMdp::new(solution.clone())),
-            Self::FastInformed => {
-                Box::new(FastInformed::new(informed_values(model, solution)))
-            }
+            Self::FastInformed => Box::new(FastInformed::new(informed_values(model, solution))),
         }
     }
 }

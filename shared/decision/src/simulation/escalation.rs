@@ -59,7 +59,11 @@ impl Escalation {
         }
         Ok(Self {
             usual: action(usual)?,
-            ladder: ladder.iter().copied().map(action).collect::<Result<_, _>>()?,
+            ladder: ladder
+                .iter()
+                .copied()
+                .map(action)
+                .collect::<Result<_, _>>()?,
             is_quiet,
             patience,
             firings: 0,

@@ -55,8 +55,7 @@ impl<'m> World<'m> {
         let successors = self.model.successors(self.state, action).iter().copied();
         self.state = drawn(successors, self.draw.state);
         let observations = 0..self.model.observations().len();
-        let likelihoods =
-            observations.map(|z| (z, self.model.likelihood(action, z)[self.state]));
+        let likelihoods = observations.map(|z| (z, self.model.likelihood(action, z)[self.state]));
         let observation = drawn(likelihoods, self.draw.observation);
         self.draw = self.stream.draw();
         Event {
