@@ -252,13 +252,18 @@ fn guarded(information: vigil_decision::policy::Information, k: f64) -> Dual {
 }
 
 /// Time of update and decision with its record, on beliefs as missions bring them. With K = 0
-/// every step that is not certain looks ahead: the dearest case.
+/// and no guard every step looks ahead: the dearest case.
 fn times(model: &Pomdp) -> Result<Vec<Value>, Failure> {
     let solution = mdp::solve(model)?;
     let mut rows = Vec::new();
     for name in names() {
         let policy: PolicyName = name.parse()?;
-        let mut decider = policy.build(model, &solution, |i| guarded(i, 0.0))?;
+        let unguarded = |information| {
+            let mut dual = guarded(information, 0.0);
+            dual.stall_steps = 0;
+            dual
+        };
+        let mut decider = policy.build(model, &solution, unguarded)?;
         let mut tracker = Tracker::new(model);
         let (mut decide_ns, mut both_ns) = (Vec::new(), Vec::new());
         let mut episode = 0;
@@ -291,6 +296,15 @@ fn times(model: &Pomdp) -> Result<Vec<Value>, Failure> {
 
 fn number(row: &Value, key: &str) -> f64 {
     row[key].as_f64().unwrap_or(f64::NAN)
+}
+
+/// A probability; what has vanished below the smallest double is told as such.
+fn chance(p: f64) -> String {
+    if p < 1e-300 {
+        "< 1e-300".to_owned()
+    } else {
+        format!("{p:.1e}")
+    }
 }
 
 fn say_public(archive: &mut Archive, rows: &[Value], episodes: u64) {
@@ -336,7 +350,7 @@ fn say_missions(archive: &mut Archive, rows: &[Value], episodes: u64) {
                 .as_f64()
                 .map_or_else(|| "-".to_owned(), |k| k.to_string());
             archive.say(&format!(
-                "| {} | {k} | {:.3} +- {:.3} | {:.3} | {:.3} | {:.3} +- {:.3} | {:.1e} |",
+                "| {} | {k} | {:.3} +- {:.3} | {:.3} | {:.3} | {:.3} +- {:.3} | {} |",
                 row["policy"].as_str().unwrap_or_default(),
                 number(row, "mean"),
                 number(row, "half_width_95"),
@@ -344,7 +358,7 @@ fn say_missions(archive: &mut Archive, rows: &[Value], episodes: u64) {
                 number(row, "worst_5_percent"),
                 number(row, "difference"),
                 number(row, "difference_half_width_95"),
-                number(row, "p"),
+                chance(number(row, "p")),
             ));
         }
         archive.say("");

@@ -54,6 +54,8 @@ fn policies_and_thresholds_are_the_rows_and_the_escalation_is_beaten() {
         ".2,.8",
         "--episodes",
         "300",
+        "--information-actions",
+        "FP,NP,RL,GO,MA",
         "--seed",
         "5",
     ];
@@ -93,8 +95,11 @@ fn policies_and_thresholds_are_the_rows_and_the_escalation_is_beaten() {
     assert_eq!(rows.iter().filter(|r| r["is_best"] == true).count(), 1);
     // The same again, to the bit; other missions with another seed.
     assert_eq!(without_times(&compare(&options)), without_times(&document));
-    let other = compare(&[&options[..7], &["6"]].concat());
+    let other = compare(&[&options[..9], &["6"]].concat());
     assert_ne!(other["rows"][1]["mean"], rows[1]["mean"]);
+    // Where calls for help may be made to know more, they are, and cost more than they teach.
+    let all = compare(&[&options[..6], &options[8..]].concat());
+    assert!(number(&all["rows"][3], "mean") < number(&rows[3], "mean") - 10.0);
 }
 
 #[test]

@@ -133,7 +133,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let printed = if args.json {
         output::json(&contest.document(&setting, &knowledge, &name))
     } else {
-        output::line(&table::text(&contest, &setting, &name))
+        output::line(&table::text(&contest, &setting, &knowledge, &name))
     };
     printed.map_err(CommandError::failure)?;
     Ok(Outcome::Done)

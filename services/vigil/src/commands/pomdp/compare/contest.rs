@@ -117,13 +117,11 @@ impl Contest {
     pub fn document(&self, setting: &Setting<'_>, of: &Knowledge<'_>, file: &str) -> Value {
         let discount = setting.world.discount();
         let against = &self.rows[setting.against];
-        let names = |is_in: &dyn Fn(usize) -> bool| -> Vec<&String> {
-            let all = of.model.actions().iter().enumerate();
-            all.filter(|(a, _)| is_in(*a))
-                .map(|(_, name)| name)
-                .collect()
-        };
-        let allowed = of.allowed.as_ref();
+        let ends = setting.world.actions().iter().zip(&setting.rules.is_end);
+        let ends: Vec<&String> = ends
+            .filter(|(_, is_end)| **is_end)
+            .map(|(a, _)| a)
+            .collect();
         json!({
             "file": file,
             "model_hash": format!("{:016x}", of.model.hash()),
@@ -133,8 +131,8 @@ impl Contest {
             "seed": setting.seed,
             "steps_max": setting.rules.steps_max,
             "weight_beyond_horizon": discount.powi(setting.rules.steps_max as i32),
-            "ends": names(&|a| setting.rules.is_end[a]),
-            "information_actions": names(&|a| allowed.is_none_or(|list| list.contains(&a))),
+            "ends": ends,
+            "information_actions": of.information_actions(),
             "stall_guard_steps": of.stall_steps,
             "upper": setting.upper,
             "against": {"policy": against.policy, "threshold": against.threshold},

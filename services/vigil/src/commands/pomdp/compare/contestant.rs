@@ -46,6 +46,20 @@ pub struct Knowledge<'a> {
     pub escalation: (&'a str, &'a [String], &'a [String]),
 }
 
+impl Knowledge<'_> {
+    /// Names of the actions that dual control may take for information.
+    pub fn information_actions(&self) -> Vec<&str> {
+        let is_in = |action: usize| match &self.allowed {
+            None => true,
+            Some(list) => list.contains(&action),
+        };
+        let all = self.model.actions().iter().enumerate();
+        all.filter(|(action, _)| is_in(*action))
+            .map(|(_, name)| name.as_str())
+            .collect()
+    }
+}
+
 impl Contestant {
     /// Every policy; those with dual control once for each threshold.
     pub fn all(names: &[String], thresholds: &[f64]) -> Result<Vec<Self>, CommandError> {

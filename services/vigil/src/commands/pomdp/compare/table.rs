@@ -3,9 +3,10 @@
 use std::fmt::Write;
 
 use super::contest::{Contest, Row, Setting};
+use super::contestant::Knowledge;
 
 /// The table, and below it what its columns mean.
-pub fn text(contest: &Contest, setting: &Setting<'_>, file: &str) -> String {
+pub fn text(contest: &Contest, setting: &Setting<'_>, of: &Knowledge<'_>, file: &str) -> String {
     let discount = setting.world.discount();
     let steps = setting.rules.steps_max;
     let mut text = format!(
@@ -22,7 +23,12 @@ pub fn text(contest: &Contest, setting: &Setting<'_>, file: &str) -> String {
     let k = against
         .threshold
         .map_or_else(String::new, |k| format!(" K={k}"));
-    let _ = writeln!(text, "{bound}; differences are to {}{k}\n", against.policy);
+    let _ = writeln!(text, "{bound}; differences are to {}{k}", against.policy);
+    let information = of.information_actions().join(", ");
+    let _ = writeln!(
+        text,
+        "dual control may take for information: {information}\n"
+    );
     let _ = writeln!(
         text,
         "  {:<13}{:>5} {:>21} {:>10} {:>10} {:>9} {:>10} {:>6} {:>6} {:>6} {:>6}/{:<7} {:>21} {:>8}",
@@ -67,7 +73,7 @@ fn line(row: &Row) -> String {
     let with_interval = |value: f64, half: f64| format!("{value:.4} +- {half:.4}");
     format!(
         "{mark} {:<13}{:>5} {:>21} {:>10.4} {:>10.4} {:>9} {:>10.3} {:>5.1}% {:>5.1}% {:>6} \
-         {:>6.0}/{:<7.0} {:>21} {:>8.1e}\n",
+         {:>6.0}/{:<7.0} {:>21} {:>8}\n",
         row.policy,
         threshold,
         with_interval(row.mean, row.half_width_95),
@@ -81,6 +87,15 @@ fn line(row: &Row) -> String {
         row.decision_p50_ns,
         row.decision_p99_ns,
         with_interval(row.difference, row.difference_half_width_95),
-        row.difference_p,
+        chance(row.difference_p),
     )
+}
+
+/// A probability; what has vanished below the smallest double is told as such.
+fn chance(p: f64) -> String {
+    if p < 1e-300 {
+        "<1e-300".to_owned()
+    } else {
+        format!("{p:.1e}")
+    }
 }
