@@ -206,7 +206,8 @@ fn the_configuration_is_checked_before_anything_is_built() {
             .map_or_else(String::new, |error| error.to_string())
     };
     assert_eq!(problems(|_| {}), "");
-    let cases: [(fn(&mut Settings), &str); 7] = [
+    type Case = (fn(&mut Settings), &'static str);
+    let cases: [Case; 7] = [
         (
             |s| s.policy = "best".into(),
             "supervisor.policy: policy 'best' is not known",

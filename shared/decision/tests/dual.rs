@@ -274,8 +274,8 @@ fn fast_informed_bound(model: &Pomdp) -> Vec<Vec<f64>> {
     let mut q = vec![vec![0.0; states]; actions];
     for _ in 0..3000 {
         let old = q.clone();
-        for a in 0..actions {
-            for s in 0..states {
+        for (a, row) in q.iter_mut().enumerate() {
+            for (s, slot) in row.iter_mut().enumerate() {
                 let mut sum = 0.0;
                 for z in 0..model.observations().len() {
                     let mut best = f64::NEG_INFINITY;
@@ -288,7 +288,7 @@ fn fast_informed_bound(model: &Pomdp) -> Vec<Vec<f64>> {
                     }
                     sum += best;
                 }
-                q[a][s] = model.reward(s, a) + model.discount() * sum;
+                *slot = model.reward(s, a) + model.discount() * sum;
             }
         }
     }

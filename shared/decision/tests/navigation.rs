@@ -257,7 +257,7 @@ fn missions(agent: &mut dyn Agent, ends: bool) -> Vec<f64> {
     let is_end = |a: &&str| ends && ENDS.contains(a);
     let rules = Rules {
         steps_max: horizon(model.discount(), 1000),
-        is_end: ACTIONS.iter().map(|a| is_end(&a)).collect(),
+        is_end: ACTIONS.iter().map(is_end).collect(),
     };
     let one = |episode| run(&model, agent, &rules, (7, episode)).discounted;
     (0..1000).map(one).collect()

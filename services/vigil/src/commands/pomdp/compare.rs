@@ -6,6 +6,7 @@ mod table;
 
 use std::path::PathBuf;
 
+use clap::builder::RangedU64ValueParser;
 use clap::{ArgAction, ValueEnum};
 use vigil_decision::policy::{Gate, informed_values};
 use vigil_decision::simulation::{Rules, horizon};
@@ -39,14 +40,14 @@ pub struct Args {
     #[arg(long, value_delimiter = ',', default_value = "0.5")]
     thresholds: Vec<f64>,
     /// Missions of each policy, 2 to 10000000.
-    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(2..=10_000_000))]
+    #[arg(long, default_value_t = 1000, value_parser = count(2))]
     episodes: u64,
     /// Seed from which the missions' random numbers start.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// A mission ends when what follows weighs less than 1e-4 by the discount, but after so many
     /// steps at the latest.
-    #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    #[arg(long, default_value_t = 2000, value_parser = count(1))]
     steps_max: u64,
     /// Actions that end a mission. No regret is given then: bounds are for missions without end.
     #[arg(long, value_delimiter = ',')]
@@ -89,6 +90,11 @@ pub struct Args {
 enum GateName {
     State,
     Action,
+}
+
+/// Reads a count of at least `least`.
+fn count(least: u64) -> RangedU64ValueParser<u64> {
+    clap::value_parser!(u64).range(least..=10_000_000)
 }
 
 /// Runs the command.
