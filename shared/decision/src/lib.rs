@@ -11,13 +11,15 @@
 pub mod belief;
 pub mod mdp;
 pub mod model;
+pub mod navigation;
 pub mod policy;
 mod pomdpx;
 mod reader;
+pub mod simulation;
 mod weights;
 mod writer;
 
 pub use belief::{Evidence, Tracker};
 pub use model::{Pomdp, Warning};
-pub use policy::{ActionVoting, Choice, MostLikelyState, Policy, QMdp};
+pub use policy::{ActionVoting, Choice, Control, Decider, MostLikelyState, Policy, QMdp};
 pub use reader::{ParseError, Position};

@@ -3,15 +3,14 @@
 use std::path::Path;
 
 use vigil_blocks::WHEELS;
+use vigil_decision::policy::PolicyName;
 use vigil_robot::description::Kinematics;
 use vigil_robot::{AlarmError, Description, RobotModel};
 
-use crate::schema::{GraphFile, Service, Source};
+use crate::schema::{GraphFile, Service, Source, Supervisor};
 
 /// Largest length of a graph's name: it is part of shared-memory and socket names.
 const NAME_LENGTH_MAX: usize = 24;
-/// Policies that the supervisor offers.
-const POLICIES: [&str; 3] = ["qmdp", "mls", "av"];
 
 /// Checks a graph file; `report` gets the key and a message for each problem.
 pub(crate) fn graph(
@@ -59,12 +58,33 @@ pub(crate) fn graph(
     services(file, &mut report);
     sensor(file, path, &mut report);
     drive(file, robot, &mut report);
-    choice(
-        "supervisor.policy",
-        &file.supervisor.policy,
-        &POLICIES,
-        &mut report,
-    );
+    policy(&file.supervisor, &mut report);
+}
+
+/// Name of the policy, and what its dual control needs.
+fn policy(settings: &Supervisor, report: &mut impl FnMut(&str, String)) {
+    let is_dual = match settings.policy.parse::<PolicyName>() {
+        Ok(name) => name.information.is_some(),
+        Err(error) => return report("supervisor.policy", error.to_string()),
+    };
+    let key = "supervisor.information_actions";
+    let named = &settings.information_actions;
+    if settings.as_published && (!named.is_empty() || settings.gate.is_some()) {
+        let message = "with as_published neither information_actions nor gate has a meaning";
+        report("supervisor.as_published", message.to_owned());
+    } else if is_dual && named.is_empty() && !settings.as_published {
+        let message = format!(
+            "is required by {}: one or more actions of the decision model that do not end or \
+             interrupt the task",
+            settings.policy
+        );
+        report(key, message);
+    }
+    for (i, name) in named.iter().enumerate() {
+        if named[..i].contains(name) {
+            report(key, format!("'{name}' appears twice"));
+        }
+    }
 }
 
 fn simulator_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
@@ -129,6 +149,13 @@ fn filter_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) 
         "supervisor.validity_periods",
         file.supervisor.validity_periods,
         1.0,
+        1000.0,
+    );
+    range("supervisor.threshold", file.supervisor.threshold, 0.0, 1.0);
+    range(
+        "supervisor.stall_guard_steps",
+        f64::from(file.supervisor.stall_guard_steps),
+        0.0,
         1000.0,
     );
     for (name, action) in &file.supervisor.actions {
@@ -246,15 +273,6 @@ fn drive(file: &GraphFile, robot: Option<&Description>, report: &mut impl FnMut(
             curvature,
         );
         range("speed_m_s", segment.speed_m_s, 0.0, speed);
-    }
-}
-
-fn choice(key: &str, value: &str, allowed: &[&str], report: &mut impl FnMut(&str, String)) {
-    if !allowed.contains(&value) {
-        report(
-            key,
-            format!("'{value}' is not known: allowed are {}", allowed.join(", ")),
-        );
     }
 }
 
