@@ -7,13 +7,18 @@
 //! Notation of Verma, Fernandez and Simmons (2002): states S, actions A, observations Z,
 //! T(s,a,s') = p(s'|s,a), Z(a,s',z) = p(z|a,s'), R(s,a), discount gamma.
 
+#![allow(dead_code)]
 pub mod belief;
-pub mod mdp;
+pub mod bounds;
+pub mod budget;
 pub mod model;
 pub mod policy;
 mod reader;
+mod sparse_beliefs;
 
 pub use belief::{Evidence, Tracker};
+pub use bounds::mdp;
+pub use budget::Budget;
 pub use model::{Pomdp, Warning};
 pub use policy::{ActionVoting, Choice, MostLikelyState, Policy, QMdp};
 pub use reader::{ParseError, Position};
