@@ -14,6 +14,7 @@ pub mod budget;
 pub mod model;
 pub mod policy;
 mod reader;
+pub mod solver;
 mod sparse_beliefs;
 
 pub use belief::{Evidence, Tracker};
