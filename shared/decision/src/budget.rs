@@ -14,6 +14,7 @@ pub struct Budget<'a> {
     stop: &'a mut dyn FnMut() -> bool,
     is_stopped: bool,
     work: usize,
+    spent: u64,
 }
 
 impl<'a> Budget<'a> {
@@ -23,6 +24,7 @@ impl<'a> Budget<'a> {
             stop,
             is_stopped: false,
             work: 0,
+            spent: 0,
         }
     }
 
@@ -32,6 +34,7 @@ impl<'a> Budget<'a> {
     /// [`Stopped`] once the budget has ended.
     pub fn spend(&mut self, work: usize) -> Result<(), Stopped> {
         self.work += work;
+        self.spent += work as u64;
         if !self.is_stopped && self.work >= WORK_PER_QUESTION {
             self.work = 0;
             self.is_stopped = (self.stop)();
@@ -41,6 +44,12 @@ impl<'a> Budget<'a> {
         } else {
             Ok(())
         }
+    }
+
+    /// Elementary operations so far.
+    #[must_use]
+    pub const fn spent(&self) -> u64 {
+        self.spent
     }
 }
 

@@ -15,7 +15,7 @@
 pub mod blind;
 pub mod fib;
 mod informed;
-mod linear;
+pub(crate) mod linear;
 pub mod mdp;
 pub mod tib;
 

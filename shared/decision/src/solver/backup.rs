@@ -19,6 +19,7 @@ impl Tree<'_> {
         budget: &mut Budget<'_>,
     ) -> Result<usize, Stopped> {
         let before = self.upper(id, budget)?;
+        budget.spend(10 * self.model.actions().len())?;
         let first = self.branches_of(id, budget)?;
         let actions = self.model.actions().len();
         let mut fresh = vec![false; actions];
@@ -34,7 +35,9 @@ impl Tree<'_> {
             }
             fresh[best] = true;
             let mut next = 0.0;
-            for child in self.children_of(id, best, budget)? {
+            let children = self.children_of(id, best, budget)?;
+            budget.spend(10 * children.len())?;
+            for child in children {
                 let child = self.children[child];
                 next += child.probability * self.upper(child.node, budget)?;
             }
@@ -63,7 +66,9 @@ impl Tree<'_> {
                 continue;
             }
             let mut next = 0.0;
-            for child in self.children_of(id, a, budget)? {
+            let children = self.children_of(id, a, budget)?;
+            budget.spend(10 * children.len())?;
+            for child in children {
                 let child = self.children[child];
                 next += child.probability * self.lower(child.node, budget)?;
             }

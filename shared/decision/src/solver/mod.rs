@@ -6,6 +6,9 @@
 
 mod alphas;
 mod backup;
+mod controller;
+mod grid;
+mod prune;
 mod sawtooth;
 mod tree;
 mod trial;

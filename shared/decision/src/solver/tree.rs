@@ -16,6 +16,8 @@ pub(super) struct Node {
     pub alphas_seen: u32,
     pub upper: f64,
     pub points_seen: u32,
+    /// The last trial that came by.
+    pub trial: u32,
     /// Its first branch.
     pub branches: Option<u32>,
 }
@@ -107,6 +109,7 @@ impl<'m> Tree<'m> {
             alphas_seen: 0,
             upper,
             points_seen: 0,
+            trial: 0,
             branches: None,
         });
         Ok(id)

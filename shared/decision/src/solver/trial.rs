@@ -24,19 +24,82 @@ pub(super) fn search(
         .collect();
     let root = tree.node(&start, budget)?;
     let mut progress = state(&mut tree, root, 0, 0, budget)?;
+    let mut due = Due { controller: Rhythm { at: 0, pause: 8 }, grid: Rhythm { at: 0, pause: 8 }, active: 0, points: 0 };
+    let mut share = 1.0_f64;
     while progress.bracket.gap() > options.precision && progress.bytes < options.memory_bytes_max {
-        let target = options.precision.max(zeta * progress.bracket.gap());
-        let depth = match trial(&mut tree, root, target, budget) {
+        let before = (tree.children.len(), progress.bracket.gap());
+        let target = options.precision.max(zeta * share * progress.bracket.gap());
+        let depth = match trial(&mut tree, root, target, if share < 1.0 { progress.trials as u32 + 1 } else { 0 }, budget) {
             Ok(depth) => depth,
             Err(Stopped) => break,
         };
+        if sweep(&mut tree, root, &mut due, budget).is_err() {
+            break;
+        }
         match state(&mut tree, root, progress.trials + 1, depth, budget) {
             Ok(next) => progress = next,
             Err(Stopped) => break,
         }
+        let is_stuck =
+            tree.children.len() == before.0 && progress.bracket.gap() > (1.0 - 1e-4) * before.1;
+        share = if is_stuck { 0.5 * share } else { (2.0 * share).min(1.0) };
+        share = share.max(1e-6);
         watch(&progress);
     }
     Ok(progress)
+}
+
+/// When what is done now and then is next due.
+struct Due {
+    controller: Rhythm,
+    grid: Rhythm,
+    active: usize,
+    points: usize,
+}
+
+/// Work that pays is done more often.
+struct Rhythm {
+    at: u64,
+    pause: u64,
+}
+
+impl Rhythm {
+    fn done(&mut self, before: u64, after: u64, pays: bool) {
+        self.pause = if pays { (self.pause / 2).max(4) } else { (self.pause * 2).min(1024) };
+        self.at = after + self.pause * (after - before);
+    }
+}
+
+fn sweep(
+    tree: &mut Tree<'_>,
+    root: BeliefId,
+    due: &mut Due,
+    budget: &mut Budget<'_>,
+) -> Result<(), Stopped> {
+    let lower = tree.lower(root, budget)?;
+    let upper = tree.upper(root, budget)?;
+    let pays = 0.01 * (upper - lower);
+    if budget.spent() >= due.controller.at {
+        let before = budget.spent();
+        tree.value_controller(root, budget)?;
+        let gain = tree.lower(root, budget)? - lower;
+        due.controller.done(before, budget.spent(), gain > pays);
+    }
+    if budget.spent() >= due.grid.at {
+        let before = budget.spent();
+        tree.lower_all(budget)?;
+        let gain = upper - tree.upper(root, budget)?;
+        due.grid.done(before, budget.spent(), gain > pays);
+    }
+    if tree.alphas.active_count() > due.active.max(200) {
+        tree.prune_alphas(budget)?;
+        due.active = tree.alphas.active_count() * 3 / 2;
+    }
+    if tree.sawtooth.point_count() > due.points.max(200) {
+        tree.prune_points(budget)?;
+        due.points = tree.sawtooth.point_count() * 3 / 2;
+    }
+    Ok(())
 }
 
 fn state(
@@ -66,12 +129,14 @@ fn trial(
     tree: &mut Tree<'_>,
     root: BeliefId,
     target: f64,
+    number: u32,
     budget: &mut Budget<'_>,
 ) -> Result<usize, Stopped> {
     let mut path = vec![root];
     let mut node = root;
     let mut allowed = target;
     while path.len() < DEPTH_MAX {
+        tree.nodes[node as usize].trial = number;
         if tree.upper(node, budget)? - tree.lower(node, budget)? <= allowed {
             break;
         }
@@ -82,7 +147,7 @@ fn trial(
             let child = tree.children[child];
             let gap = tree.upper(child.node, budget)? - tree.lower(child.node, budget)?;
             let excess = child.probability * (gap - allowed);
-            if excess > best.0 {
+            if excess > best.0 && (number == 0 || tree.nodes[child.node as usize].trial != number) {
                 best = (excess, Some(child.node));
             }
         }
