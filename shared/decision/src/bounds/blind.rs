@@ -27,7 +27,16 @@ pub fn solve(model: &Pomdp, budget: &mut Budget<'_>) -> Result<ActionValues, Sol
             right: &right,
             discount: model.discount(),
         };
-        values.extend(system.solve(vec![0.0; n], budget)?);
+        let mut alpha = system.solve_roughly(vec![0.0; n], budget)?;
+        // A vector that falls short of its own backup by no more than this lies below its value.
+        let residual = system.residual(&alpha);
+        let short = residual.into_iter().fold(0.0_f64, |m, r| m.max(-r));
+        let error = short / (1.0 - model.discount() * rows.sum_max());
+        if short > 0.0 && !(error.is_finite() && error > 0.0) {
+            return Err(SolveError::Unbounded(model.discount()));
+        }
+        alpha.iter_mut().for_each(|v| *v -= error);
+        values.extend(alpha);
     }
     Ok(ActionValues::new(n, values))
 }

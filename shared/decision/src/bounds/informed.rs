@@ -110,7 +110,7 @@ impl Mixtures {
                 right: &self.rewards,
                 discount,
             };
-            q = system.solve(q, budget)?;
+            q = system.solve_roughly(q, budget)?;
         }
         self.certify(q, &held, discount, budget)
     }

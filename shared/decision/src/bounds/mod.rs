@@ -63,9 +63,11 @@ pub enum SolveError {
          that come to an end, and rewards whose sums are finite"
     )]
     Unbounded(f64),
-    /// Too many states for the dense solve, when nothing else helped.
-    #[error("a system of {0} equations that only a dense solve could master, allowed are {max}",
-        max = linear::DENSE_MAX)]
+    /// A linear system that iteration does not solve, too large for a dense solve.
+    #[error(
+        "iteration does not solve {0} equations; a dense solve is allowed up to {max}",
+        max = linear::DENSE_MAX
+    )]
     Size(usize),
     /// The tables of the bound would take too much memory.
     #[error("the bound needs {0} table entries, allowed are {max}", max = informed::ENTRIES_MAX)]

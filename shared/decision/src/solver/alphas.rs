@@ -4,6 +4,7 @@
 //! they are a controller, whose value the vectors never exceed.
 
 use crate::bounds::ActionValues;
+use crate::sparse_beliefs::BeliefId;
 
 /// Index of a vector.
 pub(super) type AlphaId = u32;
@@ -16,6 +17,8 @@ pub(super) struct Alphas {
     values: Vec<f64>,
     actions: Vec<u32>,
     successors: Vec<AlphaId>,
+    /// The belief at which each was made; none for the blind policies.
+    origins: Vec<Option<BeliefId>>,
     /// Those that are looked at, by the instant of their last change.
     active: Vec<(u32, AlphaId)>,
     stamp: u32,
@@ -30,12 +33,13 @@ impl Alphas {
             values: Vec::new(),
             actions: Vec::new(),
             successors: Vec::new(),
+            origins: Vec::new(),
             active: Vec::new(),
             stamp: 0,
         };
         for (action, row) in blind.rows().enumerate() {
             let itself = vec![action as AlphaId; observations];
-            alphas.push(action, row, &itself);
+            alphas.push(None, action, row, &itself);
         }
         alphas
     }
@@ -59,6 +63,11 @@ impl Alphas {
         &self.values[id as usize * self.states..][..self.states]
     }
 
+    /// The belief at which a vector was made; none for a blind policy.
+    pub(super) fn origin(&self, id: AlphaId) -> Option<BeliefId> {
+        self.origins[id as usize]
+    }
+
     pub(super) fn action(&self, id: AlphaId) -> usize {
         self.actions[id as usize] as usize
     }
@@ -75,42 +84,19 @@ impl Alphas {
 
     pub(super) fn push(
         &mut self,
+        origin: Option<BeliefId>,
         action: usize,
         values: &[f64],
         successors: &[AlphaId],
     ) -> AlphaId {
         let id = self.len() as AlphaId;
+        self.origins.push(origin);
         self.actions.push(action as u32);
         self.values.extend_from_slice(values);
         self.successors.extend_from_slice(successors);
         self.stamp += 1;
         self.active.push((self.stamp, id));
         id
-    }
-
-    /// Raises a vector where `values` are larger; true if they are somewhere.
-    pub(super) fn raise(&mut self, id: AlphaId, values: &[f64]) -> bool {
-        let alpha = &mut self.values[id as usize * self.states..][..self.states];
-        let mut is_raised = false;
-        for (old, new) in alpha.iter_mut().zip(values) {
-            if *new > *old {
-                *old = *new;
-                is_raised = true;
-            }
-        }
-        is_raised
-    }
-
-    /// Vectors were raised: those of them that are looked at count as new.
-    pub(super) fn renew(&mut self, is_raised: impl Fn(AlphaId) -> bool) {
-        self.stamp += 1;
-        let stamp = self.stamp;
-        for slot in &mut self.active {
-            if is_raised(slot.1) {
-                slot.0 = stamp;
-            }
-        }
-        self.active.sort_by_key(|(stamp, _)| *stamp);
     }
 
     /// The best vector at a belief among those newer than `seen`, if it beats `best`; and the

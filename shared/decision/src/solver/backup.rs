@@ -61,8 +61,15 @@ impl Tree<'_> {
         let before = self.lower(id, budget)?;
         let first = self.branches_of(id, budget)?;
         let mut best = (0, before + ROUNDING * before.abs().max(1e-3), false);
+        let held = self.alphas.action(self.nodes[id as usize].witness);
+        let greedy = (1..self.model.actions().len()).fold(0, |best, a| {
+            if self.branches[first + a].upper > self.branches[first + best].upper { a } else { best }
+        });
         for a in 0..self.model.actions().len() {
             if self.branches[first + a].upper <= best.1 {
+                continue;
+            }
+            if !self.is_thorough && a != held && a != greedy {
                 continue;
             }
             let mut next = 0.0;
@@ -100,7 +107,7 @@ impl Tree<'_> {
             successors[child.observation as usize] = self.nodes[child.node as usize].witness;
         }
         let values = self.backed_up(action, &successors);
-        self.alphas.push(action, &values, &successors);
+        self.alphas.push(Some(id), action, &values, &successors);
         let states = self.model.states().len();
         budget.spend(states * (states + successors.len()) / 2)
     }

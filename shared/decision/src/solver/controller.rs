@@ -8,7 +8,7 @@
 
 use std::collections::HashMap;
 
-use super::alphas::AlphaId;
+use super::alphas::{AlphaId, Alphas};
 use super::tree::Tree;
 use crate::bounds::SolveError;
 use crate::bounds::linear::{Rows, System};
@@ -17,6 +17,24 @@ use crate::sparse_beliefs::BeliefId;
 
 /// Largest number of matrix entries.
 const ENTRIES_MAX: usize = 400_000;
+
+/// Takes out the belief with the largest weight; of equal ones the lowest, so that the order of a
+/// hash table never shows.
+pub(super) fn heaviest(weights: &mut HashMap<BeliefId, f64>) -> Option<(BeliefId, f64)> {
+    let mut best: Option<(BeliefId, f64)> = None;
+    for (&id, &weight) in weights.iter() {
+        let is_heavier = best.is_none_or(|(held, most)| {
+            weight > most || (weight.to_bits() == most.to_bits() && id < held)
+        });
+        if is_heavier {
+            best = Some((id, weight));
+        }
+    }
+    if let Some((id, _)) = best {
+        weights.remove(&id);
+    }
+    best
+}
 
 /// Where a plan goes on.
 #[derive(Debug, Clone, Copy)]
@@ -70,7 +88,8 @@ impl Tree<'_> {
                 })
                 .collect();
             let alpha = &values[part * states..][..states];
-            self.alphas.push(controller.actions[part], alpha, &successors);
+            let origin = Some(controller.parts[part]);
+            self.alphas.push(origin, controller.actions[part], alpha, &successors);
         }
         Ok(())
     }
@@ -88,15 +107,9 @@ impl Tree<'_> {
         let mut weights: HashMap<BeliefId, f64> = HashMap::from([(root, 1.0)]);
         let mut entries = 0;
         loop {
-            // Determinism: ties go to the lowest belief.
-            let best = weights.iter().fold(None, |best: Option<(BeliefId, f64)>, (id, w)| {
-                match best {
-                    Some((held, weight)) if weight > *w || (weight == *w && held < *id) => best,
-                    _ => Some((*id, *w)),
-                }
-            });
-            let Some((id, weight)) = best else { break };
-            weights.remove(&id);
+            let Some((id, weight)) = heaviest(&mut weights) else {
+                break;
+            };
             budget.spend(weights.len())?;
             if self.nodes[id as usize].branches.is_none() {
                 continue;
@@ -141,17 +154,20 @@ impl Tree<'_> {
             let witness = self.nodes[*id as usize].witness;
             let action = self.alphas.action(witness);
             let successors = self.alphas.successors(witness).iter();
-            let mut next: Vec<Next> = successors.map(|id| Next::Vector(*id)).collect();
+            let go_on = |alphas: &Alphas, id: AlphaId| {
+                let part = alphas.origin(id).and_then(|origin| place.get(&origin));
+                part.map_or(Next::Vector(id), |part| Next::Part(*part))
+            };
+            let mut next: Vec<Next> = successors.map(|id| go_on(&self.alphas, *id)).collect();
             for child in self.children_of(*id, action, budget)? {
                 let child = self.children[child];
-                let go_on = match place.get(&child.node) {
+                next[child.observation as usize] = match place.get(&child.node) {
                     Some(part) => Next::Part(*part),
                     None => {
                         self.lower(child.node, budget)?;
-                        Next::Vector(self.nodes[child.node as usize].witness)
+                        go_on(&self.alphas, self.nodes[child.node as usize].witness)
                     }
                 };
-                next[child.observation as usize] = go_on;
             }
             controller.actions.push(action);
             controller.next.extend(next);
@@ -200,7 +216,7 @@ impl Tree<'_> {
             right: &right,
             discount: model.discount(),
         };
-        let mut values = system.solve(guess, budget)?;
+        let mut values = system.solve_roughly(guess, budget)?;
         let short = system.residual(&values).into_iter().fold(0.0_f64, |m, r| m.max(-r));
         let error = short / (1.0 - model.discount() * mass_max);
         if error.is_nan() || error < 0.0 {

@@ -157,7 +157,7 @@ impl Tree<'_> {
                 right: &right,
                 discount,
             };
-            values = system.solve(values, budget)?;
+            values = system.solve_roughly(values, budget)?;
         }
         let excess = (0..values.len())
             .map(|belief| choices.best(belief, discount, &values).1 - values[belief])

@@ -7,6 +7,7 @@
 mod alphas;
 mod backup;
 mod controller;
+mod frontier;
 mod grid;
 mod prune;
 mod sawtooth;

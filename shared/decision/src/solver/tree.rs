@@ -16,8 +16,6 @@ pub(super) struct Node {
     pub alphas_seen: u32,
     pub upper: f64,
     pub points_seen: u32,
-    /// The last trial that came by.
-    pub trial: u32,
     /// Its first branch.
     pub branches: Option<u32>,
 }
@@ -51,6 +49,8 @@ pub(super) struct Tree<'m> {
     pub children: Vec<Child>,
     pub alphas: Alphas,
     pub sawtooth: Sawtooth,
+    /// Backups of the lower bound try every action, not only the most promising ones.
+    pub is_thorough: bool,
     predicted: Vec<f64>,
     entries: Vec<(u32, f64)>,
 }
@@ -71,6 +71,7 @@ impl<'m> Tree<'m> {
             children: Vec::new(),
             alphas,
             sawtooth,
+            is_thorough: false,
             predicted: vec![0.0; model.states().len()],
             entries: Vec::new(),
         }
@@ -109,7 +110,6 @@ impl<'m> Tree<'m> {
             alphas_seen: 0,
             upper,
             points_seen: 0,
-            trial: 0,
             branches: None,
         });
         Ok(id)

@@ -25,14 +25,17 @@ pub(super) fn search(
     let root = tree.node(&start, budget)?;
     let mut progress = state(&mut tree, root, 0, 0, budget)?;
     let mut due = Due { controller: Rhythm { at: 0, pause: 8 }, grid: Rhythm { at: 0, pause: 8 }, active: 0, points: 0 };
-    let mut share = 1.0_f64;
+    let mut is_stuck = false;
     while progress.bracket.gap() > options.precision && progress.bytes < options.memory_bytes_max {
+        tree.is_thorough = is_stuck;
         let before = (tree.children.len(), progress.bracket.gap());
-        let target = options.precision.max(zeta * share * progress.bracket.gap());
-        let depth = match trial(&mut tree, root, target, if share < 1.0 { progress.trials as u32 + 1 } else { 0 }, budget) {
-            Ok(depth) => depth,
-            Err(Stopped) => break,
+        let target = options.precision.max(zeta * progress.bracket.gap());
+        let walked = if is_stuck {
+            tree.advance_frontier(root, budget)
+        } else {
+            trial(&mut tree, root, target, budget)
         };
+        let Ok(depth) = walked else { break };
         if sweep(&mut tree, root, &mut due, budget).is_err() {
             break;
         }
@@ -40,10 +43,8 @@ pub(super) fn search(
             Ok(next) => progress = next,
             Err(Stopped) => break,
         }
-        let is_stuck =
+        is_stuck =
             tree.children.len() == before.0 && progress.bracket.gap() > (1.0 - 1e-4) * before.1;
-        share = if is_stuck { 0.5 * share } else { (2.0 * share).min(1.0) };
-        share = share.max(1e-6);
         watch(&progress);
     }
     Ok(progress)
@@ -81,8 +82,16 @@ fn sweep(
     let pays = 0.01 * (upper - lower);
     if budget.spent() >= due.controller.at {
         let before = budget.spent();
-        tree.value_controller(root, budget)?;
-        let gain = tree.lower(root, budget)? - lower;
+        let mut value = lower;
+        for _ in 0..10 {
+            tree.value_controller(root, budget)?;
+            let next = tree.lower(root, budget)?;
+            let is_enough = next - value <= pays;
+            value = next;
+            if is_enough { break; }
+        }
+        let gain = value - lower;
+        if std::env::var("DBG").is_ok() { eprintln!("controller gain {gain} lower {lower} cost {}", budget.spent() - before); }
         due.controller.done(before, budget.spent(), gain > pays);
     }
     if budget.spent() >= due.grid.at {
@@ -91,7 +100,7 @@ fn sweep(
         let gain = upper - tree.upper(root, budget)?;
         due.grid.done(before, budget.spent(), gain > pays);
     }
-    if tree.alphas.active_count() > due.active.max(200) {
+    if tree.alphas.active_count() > due.active.max(32) {
         tree.prune_alphas(budget)?;
         due.active = tree.alphas.active_count() * 3 / 2;
     }
@@ -129,14 +138,12 @@ fn trial(
     tree: &mut Tree<'_>,
     root: BeliefId,
     target: f64,
-    number: u32,
     budget: &mut Budget<'_>,
 ) -> Result<usize, Stopped> {
     let mut path = vec![root];
     let mut node = root;
     let mut allowed = target;
     while path.len() < DEPTH_MAX {
-        tree.nodes[node as usize].trial = number;
         if tree.upper(node, budget)? - tree.lower(node, budget)? <= allowed {
             break;
         }
@@ -147,7 +154,7 @@ fn trial(
             let child = tree.children[child];
             let gap = tree.upper(child.node, budget)? - tree.lower(child.node, budget)?;
             let excess = child.probability * (gap - allowed);
-            if excess > best.0 && (number == 0 || tree.nodes[child.node as usize].trial != number) {
+            if excess > best.0 {
                 best = (excess, Some(child.node));
             }
         }
