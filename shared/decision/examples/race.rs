@@ -1,7 +1,6 @@
 //! x
 #![allow(missing_docs, clippy::unwrap_used)]
 use vigil_decision::{Budget, Pomdp, solver};
-use std::time::Instant;
 fn cpu() -> f64 {
     let s = std::fs::read_to_string("/proc/self/schedstat").unwrap();
     s.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-9
@@ -11,13 +10,12 @@ fn main() {
     let limit: f64 = args[2].parse().unwrap();
     let precision: f64 = args.get(3).map_or(1e-9, |p| p.parse().unwrap());
     let model = Pomdp::parse(&std::fs::read_to_string(&args[1]).unwrap()).unwrap();
-    let t0 = Instant::now(); let _ = t0;
     let mut stop = || cpu() > limit;
     let mut budget = Budget::new(&mut stop);
     let mut next = 0.1;
     let opts = solver::Options { precision, ..Default::default() };
-    let p = solver::solve(&model, &opts, &mut budget, &mut |p| {
-        if cpu() > next { next *= 1.6; println!("{:.2} {:.6} [{:.8} {:.8}] {p:?}", cpu(), p.bracket.gap(), p.bracket.lower, p.bracket.upper); }
+    let f = solver::solve(&model, &opts, &mut budget, &mut |p| {
+        if cpu() > next { next *= 1.6; println!("{:.2} {:.6} {p:?}", cpu(), p.bracket.gap()); }
     }).unwrap();
-    println!("{:.4} {:.3e} [{:.8} {:.8}] {p:?}", cpu(), p.bracket.gap(), p.bracket.lower, p.bracket.upper);
+    println!("{:.4} {:.3e} [{:.8} {:.8}] {:?} {:?} export {}", cpu(), f.bracket.gap(), f.bracket.lower, f.bracket.upper, f.progress, f.ended, f.vectors.as_ref().map_or(0, |v| v.len()));
 }

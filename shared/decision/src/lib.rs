@@ -7,7 +7,8 @@
 //! Notation of Verma, Fernandez and Simmons (2002): states S, actions A, observations Z,
 //! T(s,a,s') = p(s'|s,a), Z(a,s',z) = p(z|a,s'), R(s,a), discount gamma.
 
-#![allow(dead_code)]
+
+pub mod alpha_vectors;
 pub mod belief;
 pub mod bounds;
 pub mod budget;
@@ -17,9 +18,10 @@ mod reader;
 pub mod solver;
 mod sparse_beliefs;
 
+pub use alpha_vectors::AlphaVectors;
 pub use belief::{Evidence, Tracker};
 pub use bounds::mdp;
 pub use budget::Budget;
 pub use model::{Pomdp, Warning};
-pub use policy::{ActionVoting, Choice, MostLikelyState, Policy, QMdp};
+pub use policy::{ActionVoting, Choice, MostLikelyState, PointBased, Policy, QMdp};
 pub use reader::{ParseError, Position};

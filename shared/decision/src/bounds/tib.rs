@@ -29,16 +29,18 @@ impl Tib {
     /// Q(b,a) = R(b,a) + gamma sum_o max_a' sum_s b(s) p(o|s,a) Q(b_sao,a').
     #[must_use]
     pub fn q(&self, belief: &[f64], action: usize) -> f64 {
-        let entries: Vec<(u32, f64)> = support(belief);
-        self.q_sparse(&entries, action)
+        self.q_sparse(&support(belief), action)
     }
 
     /// max_a Q(b,a): an upper bound of V*(b).
     #[must_use]
     pub fn value(&self, belief: &[f64]) -> f64 {
-        let entries: Vec<(u32, f64)> = support(belief);
+        self.value_sparse(&support(belief))
+    }
+
+    pub(crate) fn value_sparse(&self, belief: &[(u32, f64)]) -> f64 {
         (0..self.actions)
-            .map(|a| self.q_sparse(&entries, a))
+            .map(|a| self.q_sparse(belief, a))
             .fold(f64::NEG_INFINITY, f64::max)
     }
 

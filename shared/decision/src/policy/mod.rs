@@ -1,10 +1,12 @@
 //! Policies: from a belief to an action. Definitions: Verma, Fernandez, Simmons (2002), section 2.
 
 mod most_likely_state;
+mod point_based;
 mod qmdp;
 mod voting;
 
 pub use most_likely_state::MostLikelyState;
+pub use point_based::PointBased;
 pub use qmdp::QMdp;
 pub use voting::ActionVoting;
 

@@ -21,14 +21,14 @@ impl Tree<'_> {
         &mut self,
         root: BeliefId,
         budget: &mut Budget<'_>,
-    ) -> Result<usize, Stopped> {
+    ) -> Result<(), Stopped> {
         let mut weights = HashMap::from([(root, 1.0)]);
         let mut is_seen = vec![false; self.nodes.len()];
         let (mut visited, mut edge) = (Vec::new(), Vec::new());
         while let Some((id, weight)) = heaviest(&mut weights) {
             budget.spend(weights.len() + 10)?;
             is_seen[id as usize] = true;
-            let gap = self.upper(id, budget)? - self.lower(id, budget)?;
+            let gap = self.gap(id, budget)?;
             if self.nodes[id as usize].branches.is_none() {
                 edge.push((weight * gap, id));
                 continue;
@@ -61,6 +61,6 @@ impl Tree<'_> {
             self.lower_upper(id, budget)?;
             self.raise_lower(id, budget)?;
         }
-        Ok(edge.len())
+        Ok(())
     }
 }

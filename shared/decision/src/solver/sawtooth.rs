@@ -47,10 +47,9 @@ pub(super) struct Query<'a> {
 }
 
 impl Sawtooth {
-    pub(super) fn new(base: ActionValues, states: usize) -> Self {
-        let corners = (0..states)
-            .map(|s| base.rows().map(|q| q[s]).fold(f64::NEG_INFINITY, f64::max))
-            .collect();
+    /// `corners` are upper bounds where the state is certain.
+    pub(super) fn new(base: ActionValues, corners: Vec<f64>) -> Self {
+        let states = corners.len();
         Self {
             base,
             corners,
@@ -78,25 +77,6 @@ impl Sawtooth {
         let dot = |q: &[f64]| -> f64 { belief.iter().map(|(s, b)| b * q[*s as usize]).sum() };
         let fast = self.base.rows().map(dot).fold(f64::NEG_INFINITY, f64::max);
         fast.min(dot(&self.corners))
-    }
-
-    /// Lowers the value of a corner, if it is lower. [`Self::renew`] must follow before beliefs
-    /// are valued.
-    pub(super) fn lower_corner(&mut self, state: usize, value: f64) {
-        self.corners[state] = self.corners[state].min(value);
-    }
-
-    /// Value of a corner.
-    pub(super) fn corner(&self, state: usize) -> f64 {
-        self.corners[state]
-    }
-
-    /// Corners have changed: points stand against another plane.
-    pub(super) fn renew(&mut self, beliefs: &SparseBeliefs) {
-        for point in &mut self.points {
-            let entries = beliefs.of(point.belief).iter();
-            point.plane = entries.map(|(s, b)| b * self.corners[*s as usize]).sum();
-        }
     }
 
     /// Stores or lowers the value of a point.

@@ -99,10 +99,8 @@ impl<'m> Tree<'m> {
         }
         let mut upper = self.sawtooth.base_value(entries);
         if let Some(tib) = self.tib {
-            let actions = 0..self.model.actions().len();
-            budget.spend(tib.work() * actions.len() * entries.len())?;
-            let q = actions.map(|a| tib.q_sparse(entries, a));
-            upper = upper.min(q.fold(f64::NEG_INFINITY, f64::max));
+            budget.spend(tib.work() * self.model.actions().len() * entries.len())?;
+            upper = upper.min(tib.value_sparse(entries));
         }
         self.nodes.push(Node {
             lower: f64::NEG_INFINITY,
@@ -144,6 +142,11 @@ impl<'m> Tree<'m> {
             budget.spend(work)?;
         }
         Ok(node.upper)
+    }
+
+    /// Upper less lower bound of a node.
+    pub(super) fn gap(&mut self, id: BeliefId, budget: &mut Budget<'_>) -> Result<f64, Stopped> {
+        Ok(self.upper(id, budget)? - self.lower(id, budget)?)
     }
 
     /// The first branch of a node; made if it is not there yet.
