@@ -13,9 +13,25 @@ fn main() {
     let mut stop = || cpu() > limit;
     let mut budget = Budget::new(&mut stop);
     let mut next = 0.1;
-    let opts = solver::Options { precision, ..Default::default() };
+    let opts = solver::Options {
+        precision,
+        ..Default::default()
+    };
     let f = solver::solve(&model, &opts, &mut budget, &mut |p| {
-        if cpu() > next { next *= 1.6; println!("{:.2} {:.6} {p:?}", cpu(), p.bracket.gap()); }
-    }).unwrap();
-    println!("{:.4} {:.3e} [{:.8} {:.8}] {:?} {:?} export {}", cpu(), f.bracket.gap(), f.bracket.lower, f.bracket.upper, f.progress, f.ended, f.vectors.as_ref().map_or(0, |v| v.len()));
+        if cpu() > next {
+            next *= 1.6;
+            println!("{:.2} {:.6} {p:?}", cpu(), p.bracket.gap());
+        }
+    })
+    .unwrap();
+    println!(
+        "{:.4} {:.3e} [{:.8} {:.8}] {:?} {:?} export {}",
+        cpu(),
+        f.bracket.gap(),
+        f.bracket.lower,
+        f.bracket.upper,
+        f.progress,
+        f.ended,
+        f.vectors.as_ref().map_or(0, |v| v.len())
+    );
 }

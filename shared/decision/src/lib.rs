@@ -7,13 +7,13 @@
 //! Notation of Verma, Fernandez and Simmons (2002): states S, actions A, observations Z,
 //! T(s,a,s') = p(s'|s,a), Z(a,s',z) = p(z|a,s'), R(s,a), discount gamma.
 
-
 pub mod alpha_vectors;
 pub mod belief;
 pub mod bounds;
 pub mod budget;
 pub mod model;
 pub mod policy;
+pub mod policy_file;
 mod reader;
 pub mod solver;
 mod sparse_beliefs;

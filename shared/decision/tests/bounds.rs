@@ -145,7 +145,11 @@ fn all(model: &Pomdp) -> [f64; 5] {
         .map(|(s, b)| b * relaxed.value(s))
         .sum();
     let lower = blind::solve(model, &mut budget).unwrap().value(b0);
-    eprintln!("mdp+fib {t1:?} tib {:?} blind etc {:?}", t2 - t1, t.elapsed() - t2);
+    eprintln!(
+        "mdp+fib {t1:?} tib {:?} blind etc {:?}",
+        t2 - t1,
+        t.elapsed() - t2
+    );
     [lower, tighter, fast.value(b0), qmdp, v_mdp]
 }
 

@@ -63,7 +63,11 @@ impl Tree<'_> {
         let mut best = (0, before + ROUNDING * before.abs().max(1e-3), false);
         let held = self.alphas.action(self.nodes[id as usize].witness);
         let greedy = (1..self.model.actions().len()).fold(0, |best, a| {
-            if self.branches[first + a].upper > self.branches[first + best].upper { a } else { best }
+            if self.branches[first + a].upper > self.branches[first + best].upper {
+                a
+            } else {
+                best
+            }
         });
         for a in 0..self.model.actions().len() {
             if self.branches[first + a].upper <= best.1 {
@@ -92,7 +96,12 @@ impl Tree<'_> {
     }
 
     /// Adds the vector of the plan: `action` at this node, then what is best at its children.
-    fn plan(&mut self, id: BeliefId, action: usize, budget: &mut Budget<'_>) -> Result<(), Stopped> {
+    fn plan(
+        &mut self,
+        id: BeliefId,
+        action: usize,
+        budget: &mut Budget<'_>,
+    ) -> Result<(), Stopped> {
         let children = self.children_of(id, action, budget)?;
         let children = &self.children[children];
         // What cannot be observed here goes on as what is most probable.

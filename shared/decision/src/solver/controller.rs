@@ -89,7 +89,8 @@ impl Tree<'_> {
                 .collect();
             let alpha = &values[part * states..][..states];
             let origin = Some(controller.parts[part]);
-            self.alphas.push(origin, controller.actions[part], alpha, &successors);
+            self.alphas
+                .push(origin, controller.actions[part], alpha, &successors);
         }
         Ok(())
     }
@@ -217,7 +218,10 @@ impl Tree<'_> {
             discount: model.discount(),
         };
         let mut values = system.solve_roughly(guess, budget)?;
-        let short = system.residual(&values).into_iter().fold(0.0_f64, |m, r| m.max(-r));
+        let short = system
+            .residual(&values)
+            .into_iter()
+            .fold(0.0_f64, |m, r| m.max(-r));
         let error = short / (1.0 - model.discount() * mass_max);
         if error.is_nan() || error < 0.0 {
             return Err(SolveError::Unbounded(model.discount()));

@@ -28,7 +28,9 @@ impl Tree<'_> {
             if !std::mem::replace(&mut is_settled[id as usize], true) {
                 comparisons += needed.len();
                 let is_compared = comparisons < COMPARISONS_MAX;
-                let better = needed.iter().find(|one| is_compared && self.beats(**one, id));
+                let better = needed
+                    .iter()
+                    .find(|one| is_compared && self.beats(**one, id));
                 match better {
                     Some(better) => {
                         is_closed[id as usize] = true;

@@ -53,7 +53,10 @@ impl Tree<'_> {
             return Ok(());
         }
         let choices = self.choices(&ids, budget)?;
-        let guess = ids.iter().map(|id| self.nodes[*id as usize].upper).collect();
+        let guess = ids
+            .iter()
+            .map(|id| self.nodes[*id as usize].upper)
+            .collect();
         let values = match self.grid_values(&choices, guess, budget) {
             Ok(values) => values,
             Err(SolveError::Stopped) => return Err(Stopped),
@@ -70,11 +73,7 @@ impl Tree<'_> {
         Ok(())
     }
 
-    fn choices(
-        &mut self,
-        ids: &[BeliefId],
-        budget: &mut Budget<'_>,
-    ) -> Result<Choices, Stopped> {
+    fn choices(&mut self, ids: &[BeliefId], budget: &mut Budget<'_>) -> Result<Choices, Stopped> {
         let mut place = vec![u32::MAX; self.nodes.len()];
         for (at, id) in ids.iter().enumerate() {
             place[*id as usize] = at as u32;

@@ -58,7 +58,10 @@ impl Initial {
         let corner = |s: usize| {
             let fast = self.fast.iter().flat_map(ActionValues::rows).map(|q| q[s]);
             let fast = fast.fold(f64::NEG_INFINITY, f64::max);
-            let tighter = self.tighter.iter().map(|tib| tib.value_sparse(&[(s as u32, 1.0)]));
+            let tighter = self
+                .tighter
+                .iter()
+                .map(|tib| tib.value_sparse(&[(s as u32, 1.0)]));
             tighter.fold(fast, f64::min)
         };
         (0..states).map(corner).collect()
