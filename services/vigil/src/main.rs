@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use commands::{Outcome, check, diagnose, evaluate, import, inject, learn};
+use commands::{Outcome, check, diagnose, evaluate, import, inject, learn, pomdp};
 
 /// Fault detection, diagnosis and recovery for mobile robots.
 ///
@@ -28,6 +28,7 @@ enum Command {
     Evaluate(evaluate::Args),
     Inject(inject::Args),
     Check(check::Args),
+    Pomdp(pomdp::Args),
 }
 
 fn main() -> ExitCode {
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Inject(args) => inject::run(&args),
         Command::Check(args) => check::run(&args),
+        Command::Pomdp(args) => pomdp::run(&args),
     };
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

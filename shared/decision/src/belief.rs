@@ -1,6 +1,11 @@
 //! Belief tracking: exact, preallocated, never NaN.
+//!
+//! A step costs what can happen, not what the model holds: it visits the states that the belief
+//! does not rule out, and from each the successors that the observation leaves possible. Nothing is
+//! dropped for being small: probabilities down to the smallest normal double (2.2e-308) are kept.
 
 use crate::model::Pomdp;
+use crate::weights::Weights;
 
 /// Weight of the start belief that is mixed in after an impossible observation.
 const RESTART_WEIGHT: f64 = 0.01;
@@ -8,20 +13,30 @@ const RESTART_WEIGHT: f64 = 0.01;
 /// What an observation or soft evidence did to the belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Evidence {
-    /// Taken; its probability under the predicted belief (for soft evidence: its expected
-    /// likelihood).
+    /// Taken; its probability p(z|a,b) before the step (for soft evidence: its expected
+    /// likelihood). The logarithm, summed, is the log-likelihood of all that was seen.
     Taken(f64),
-    /// Impossible under the belief, or not finite: the belief is the prediction with a little of
-    /// the start belief mixed in, so that no state is ruled out for ever.
+    /// Impossible under the belief, or not finite. The belief is restored by one rule: it becomes
+    /// the prediction (for soft evidence: stays what it was), with 0.01 of the start belief mixed
+    /// in, so that no state is ruled out for ever.
     Impossible,
 }
 
-/// A belief over the states of one model.
-#[derive(Debug, Clone, PartialEq)]
+/// A belief over the states of one model. Every call must be given that model, and actions and
+/// observations that it has; nothing is allocated after [`Tracker::new`].
+#[derive(Debug, Clone)]
 pub struct Tracker {
-    belief: Vec<f64>,
-    next: Vec<f64>,
+    /// Sums to 1.
+    belief: Weights,
+    /// All 0 between calls.
+    next: Weights,
     start: Vec<f64>,
+}
+
+impl PartialEq for Tracker {
+    fn eq(&self, other: &Self) -> bool {
+        self.belief() == other.belief() && self.start == other.start
+    }
 }
 
 impl Tracker {
@@ -29,116 +44,129 @@ impl Tracker {
     #[must_use]
     pub fn new(model: &Pomdp) -> Self {
         let start = model.start().to_vec();
-        Self {
-            belief: start.clone(),
-            next: vec![0.0; start.len()],
+        let mut tracker = Self {
+            belief: Weights::new(start.len()),
+            next: Weights::new(start.len()),
             start,
-        }
+        };
+        tracker.reset();
+        tracker
     }
 
     /// The belief: non-negative, sums to 1.
     #[must_use]
     pub fn belief(&self) -> &[f64] {
-        &self.belief
+        self.belief.values()
+    }
+
+    /// The states that the belief does not rule out, in no particular order.
+    #[must_use]
+    pub fn support(&self) -> &[u32] {
+        self.belief.support()
     }
 
     /// Back to the start belief.
     pub fn reset(&mut self) {
-        self.belief.copy_from_slice(&self.start);
+        self.next.set(self.start.iter().copied());
+        self.accept(self.next.sum());
     }
 
     /// Takes over a belief from elsewhere; entries that are not finite or negative count as 0.
     /// Without any mass left, the belief stays as it is, and `false` is returned.
     pub fn anchor(&mut self, weights: &[f64]) -> bool {
-        for (slot, weight) in self.next.iter_mut().zip(weights) {
-            *slot = if weight.is_finite() {
-                weight.max(0.0)
-            } else {
-                0.0
-            };
-        }
-        let taken = normalise(&mut self.next).is_some();
-        if taken {
-            std::mem::swap(&mut self.belief, &mut self.next);
-        }
-        taken
+        let sound = |w: &f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
+        self.next.set(weights.iter().map(sound));
+        self.accept(self.next.sum()).is_some()
     }
 
-    /// b'(s') = sum_s T(s,a,s') b(s).
+    /// b'(s') = sum_s T(s,a,s') b(s), normalised: rows may be off 1 by the reader's tolerance.
     pub fn predict(&mut self, model: &Pomdp, action: usize) {
-        self.next.fill(0.0);
-        for (s, b) in self.belief.iter().enumerate().filter(|(_, b)| **b > 0.0) {
-            for (to, p) in model.successors(s, action) {
-                self.next[*to] += b * p;
+        for &s in self.belief.support() {
+            let b = self.belief.at(s);
+            for &(to, p) in model.successors(s as usize, action) {
+                self.next.add(to as u32, b * p);
             }
         }
-        // Row sums may be off by the reader's tolerance.
-        if normalise(&mut self.next).is_some() {
-            std::mem::swap(&mut self.belief, &mut self.next);
-        }
+        self.accept(self.next.sum());
     }
 
-    /// Prediction and observation: b'(s') = Z(a,s',z) sum_s T(s,a,s') b(s) / p(z|a,b).
+    /// Prediction and observation: b'(s') = Z(a,s',z) sum_s T(s,a,s') b(s) / p(z|a,b), where
+    /// p(z|a,b) is the sum of the numerator over s'.
     pub fn update(&mut self, model: &Pomdp, action: usize, observation: usize) -> Evidence {
+        if let Some(joint) = model.joint() {
+            let rows = joint.rows(action, observation);
+            for &s in self.belief.support() {
+                let b = self.belief.at(s);
+                let (columns, values) = rows.row(s as usize);
+                for (to, p) in columns.iter().zip(values) {
+                    self.next.add(*to, b * p);
+                }
+            }
+        } else {
+            let likelihood = model.likelihood(action, observation);
+            for &s in self.belief.support() {
+                let b = self.belief.at(s);
+                for &(to, p) in model.successors(s as usize, action) {
+                    self.next.add(to as u32, b * (p * likelihood[to]));
+                }
+            }
+        }
+        if let Some(p) = self.accept(self.next.sum()) {
+            return Evidence::Taken(p);
+        }
         self.predict(model, action);
-        weigh(
-            &mut self.belief,
-            &mut self.next,
-            &self.start,
-            model.likelihood(action, observation),
-        )
+        self.restore();
+        Evidence::Impossible
     }
 
     /// Soft (virtual) evidence: b'(s) proportional to L(s) b(s). Likelihoods that are not finite
-    /// or negative count as 0.
+    /// or negative count as 0, as do those for which the product is below 2.2e-308.
     pub fn weigh(&mut self, likelihood: &[f64]) -> Evidence {
-        weigh(&mut self.belief, &mut self.next, &self.start, likelihood)
+        for &s in self.belief.support() {
+            let l = likelihood.get(s as usize).copied().unwrap_or(0.0);
+            if l.is_finite() {
+                self.next.add(s, self.belief.at(s) * l);
+            }
+        }
+        if let Some(p) = self.accept(self.next.sum()) {
+            return Evidence::Taken(p);
+        }
+        self.restore();
+        Evidence::Impossible
     }
 
     /// Entropy of the belief, divided by that of the uniform one: 0 certain, 1 uniform.
     #[must_use]
     pub fn entropy(&self) -> f64 {
-        let nats: f64 = self
-            .belief
-            .iter()
-            .filter(|b| **b > 0.0)
-            .map(|b| -b * b.ln())
-            .sum();
-        let states = self.belief.len() as f64;
+        let belief = self.belief.support().iter().map(|&s| self.belief.at(s));
+        let nats: f64 = belief.map(|b| -b * b.ln()).sum();
+        let states = self.start.len() as f64;
         if states > 1.0 {
             (nats / states.ln()).clamp(0.0, 1.0)
         } else {
             0.0
         }
     }
-}
 
-fn weigh(
-    belief: &mut Vec<f64>,
-    next: &mut Vec<f64>,
-    start: &[f64],
-    likelihood: &[f64],
-) -> Evidence {
-    for ((slot, b), l) in next.iter_mut().zip(belief.iter()).zip(likelihood) {
-        *slot = if l.is_finite() { b * l.max(0.0) } else { 0.0 };
+    /// Makes `next`, divided by its sum, the belief; `None`, and no change, if the sum is 0 or not
+    /// finite. `next` is 0 afterwards.
+    fn accept(&mut self, sum: f64) -> Option<f64> {
+        if !(sum.is_finite() && sum > 0.0) {
+            self.next.clear();
+            return None;
+        }
+        self.belief.clear();
+        self.belief.take_scaled(&mut self.next, 1.0 / sum);
+        Some(sum)
     }
-    if let Some(p) = normalise(next) {
-        std::mem::swap(belief, next);
-        return Evidence::Taken(p);
-    }
-    for (b, s) in belief.iter_mut().zip(start) {
-        *b = (1.0 - RESTART_WEIGHT) * *b + RESTART_WEIGHT * s;
-    }
-    normalise(belief);
-    Evidence::Impossible
-}
 
-/// Divides by the sum and returns it; `None`, and no change, if the sum is 0 or not finite.
-fn normalise(weights: &mut [f64]) -> Option<f64> {
-    let sum: f64 = weights.iter().sum();
-    if !(sum.is_finite() && sum > 0.0) {
-        return None;
+    /// Mixes in the start belief.
+    fn restore(&mut self) {
+        let belief = self.belief.values().iter();
+        let mixed = belief
+            .zip(&self.start)
+            .map(|(b, s)| (1.0 - RESTART_WEIGHT) * b + RESTART_WEIGHT * s);
+        self.next.set(mixed);
+        self.accept(self.next.sum());
     }
-    weights.iter_mut().for_each(|w| *w /= sum);
-    weights.iter().all(|w| w.is_finite()).then_some(sum)
 }

@@ -1,6 +1,6 @@
 //! Decisions under uncertainty: POMDP models, their solution, policies, belief tracking.
 //!
-//! A [`Pomdp`] is read from Cassandra's `.pomdp` format; its fully observable relaxation is solved
+//! A [`Pomdp`] is read from Cassandra's `.pomdp` format or APPL's `.pomdpx`; its fully observable relaxation is solved
 //! by [`mdp::solve`]; a [`Policy`] turns a belief into an action; a [`Tracker`] keeps the belief.
 //! Deciding and tracking allocate nothing. No transport, no clock, no files.
 //!
@@ -14,9 +14,12 @@ pub mod budget;
 pub mod model;
 pub mod policy;
 pub mod policy_file;
+mod pomdpx;
 mod reader;
 pub mod solver;
 mod sparse_beliefs;
+mod weights;
+mod writer;
 
 pub use alpha_vectors::AlphaVectors;
 pub use belief::{Evidence, Tracker};

@@ -1,13 +1,17 @@
 //! A POMDP in the form that tracking and deciding need: sparse transitions, dense columns of Z.
 
-use vigil_blocks::fnv1a;
+mod build;
+mod hash;
+mod joint;
+pub(crate) mod rewards;
+pub(crate) mod sparse;
+
+pub(crate) use build::{Parts, ROW_SUM_TOLERANCE, refuse_sum};
 
 use crate::reader::{self, ParseError, Position};
-
-/// Row sums may differ from 1 by this much; beyond it the model is refused.
-const ROW_SUM_TOLERANCE: f64 = 1e-5;
-/// Row sums that differ from 1 by more than this are worth a warning.
-const ROW_SUM_WARNING: f64 = 1e-9;
+use joint::Joint;
+use rewards::Rewards;
+use sparse::Sparse;
 
 /// Something about a model that its author may want to mend.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,105 +23,54 @@ pub struct Warning {
 }
 
 /// A partially observable Markov decision process.
-#[derive(Debug, Clone, PartialEq)]
+///
+/// Two models are equal if all their names and numbers are; warnings do not count.
+#[derive(Debug, Clone)]
 pub struct Pomdp {
     discount: f64,
+    is_cost: bool,
     states: Vec<String>,
     actions: Vec<String>,
     observations: Vec<String>,
     start: Vec<f64>,
-    /// Per action, compressed sparse rows: for each s the successors and their probabilities.
+    /// Per action: for each s the successors and their probabilities.
     transitions: Vec<Sparse>,
     /// Z[a][z][s'].
     observation: Vec<f64>,
-    /// R[a][s].
+    rewards: Rewards,
+    /// R[a][s], expected.
     reward: Vec<f64>,
+    /// T and Z in one, unless that is too large.
+    joint: Option<Joint>,
     hash: u64,
     warnings: Vec<Warning>,
 }
 
-/// Compressed sparse rows of one action's transitions.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Sparse {
-    starts: Vec<usize>,
-    entries: Vec<(usize, f64)>,
-}
-
-impl Sparse {
-    /// Successors of state `s` and their probabilities.
-    pub(crate) fn row(&self, s: usize) -> &[(usize, f64)] {
-        &self.entries[self.starts[s]..self.starts[s + 1]]
+impl PartialEq for Pomdp {
+    fn eq(&self, other: &Self) -> bool {
+        self.hash == other.hash
+            && self.is_cost == other.is_cost
+            && self.discount == other.discount
+            && self.states == other.states
+            && self.actions == other.actions
+            && self.observations == other.observations
+            && self.start == other.start
+            && self.transitions == other.transitions
+            && self.observation == other.observation
+            && self.rewards == other.rewards
+            && self.reward == other.reward
     }
-}
-
-/// What the reader has collected; tables are dense.
-pub(crate) struct Parts {
-    pub discount: f64,
-    pub states: Vec<String>,
-    pub actions: Vec<String>,
-    pub observations: Vec<String>,
-    pub start: Vec<f64>,
-    /// T[a][s][s'].
-    pub transition: Vec<f64>,
-    /// O[a][s'][z].
-    pub observation: Vec<f64>,
-    /// R[a][s][s'][z].
-    pub reward: Vec<f64>,
-    /// 1 for rewards, -1 for costs.
-    pub reward_sign: f64,
-    /// Where row (a, s) of T and of O was written.
-    pub row_at: [Vec<Position>; 2],
 }
 
 impl Pomdp {
     /// Reads Cassandra's `.pomdp` format.
     ///
+    /// Memory: at most about ten times the text, besides tables of 2^24 entries.
+    ///
     /// # Errors
     /// [`ParseError`] with line and column, what was found and what is allowed.
     pub fn parse(text: &str) -> Result<Self, ParseError> {
         reader::parse(text)
-    }
-
-    pub(crate) fn from_parts(parts: Parts) -> Result<Self, ParseError> {
-        let (n, k) = (parts.states.len(), parts.observations.len());
-        let mut warnings = Vec::new();
-        check_rows(
-            &parts,
-            ("T", &parts.transition, n, &parts.row_at[0]),
-            &mut warnings,
-        )?;
-        check_rows(
-            &parts,
-            ("O", &parts.observation, k, &parts.row_at[1]),
-            &mut warnings,
-        )?;
-        let transitions: Vec<Sparse> = parts
-            .transition
-            .chunks(n * n)
-            .map(|matrix| sparse(matrix, n))
-            .collect();
-        let mut observation = vec![0.0; parts.observation.len()];
-        for (row, chunk) in parts.observation.chunks(k).enumerate() {
-            let (action, state) = (row / n, row % n);
-            for (z, p) in chunk.iter().enumerate() {
-                observation[(action * k + z) * n + state] = *p;
-            }
-        }
-        let reward = expected_rewards(&parts, &transitions);
-        let mut model = Self {
-            discount: parts.discount,
-            states: parts.states,
-            actions: parts.actions,
-            observations: parts.observations,
-            start: parts.start,
-            transitions,
-            observation,
-            reward,
-            hash: 0,
-            warnings,
-        };
-        model.hash = model.compute_hash();
-        Ok(model)
     }
 
     /// Names of the states.
@@ -144,7 +97,13 @@ impl Pomdp {
         self.discount
     }
 
-    /// Start belief.
+    /// True if the file states costs (`values: cost`). Rewards here are their negatives.
+    #[must_use]
+    pub const fn is_cost(&self) -> bool {
+        self.is_cost
+    }
+
+    /// Start belief, as the file gives it: its sum may be off 1 by up to 1e-5.
     #[must_use]
     pub fn start(&self) -> &[f64] {
         &self.start
@@ -156,7 +115,21 @@ impl Pomdp {
         self.reward[action * self.states.len() + state]
     }
 
-    /// Successors of `state` under `action`: (s', probability).
+    /// R(s,a,s',z), the reward of one outcome; costs count negative. [`Self::reward`] is its
+    /// expectation.
+    #[must_use]
+    pub fn reward_of(&self, state: usize, action: usize, next: usize, observation: usize) -> f64 {
+        self.rewards.block(state, action).at(next, observation)
+    }
+
+    /// True if some reward depends on s' or z.
+    #[must_use]
+    pub fn has_outcome_rewards(&self) -> bool {
+        let mut blocks = self.rewards.blocks().iter();
+        blocks.any(|block| !block.others.is_empty())
+    }
+
+    /// Successors of `state` under `action`: (s', probability), s' ascending.
     #[must_use]
     pub fn successors(&self, state: usize, action: usize) -> &[(usize, f64)] {
         self.transitions[action].row(state)
@@ -170,7 +143,8 @@ impl Pomdp {
         &self.observation[first..first + n]
     }
 
-    /// Hash over everything that has a meaning: numbers and names, not comments or layout.
+    /// Hash over everything that has a meaning: numbers and names, not comments or layout. A cost
+    /// hashes as the negative reward that it is.
     #[must_use]
     pub const fn hash(&self) -> u64 {
         self.hash
@@ -182,84 +156,11 @@ impl Pomdp {
         &self.warnings
     }
 
-    fn compute_hash(&self) -> u64 {
-        let mut hash = fnv1a::hash_u64(fnv1a::BASIS, self.discount.to_bits());
-        for names in [&self.states, &self.actions, &self.observations] {
-            hash = fnv1a::hash_u64(hash, names.len() as u64);
-            for name in names {
-                hash = fnv1a::hash(fnv1a::hash(hash, name.as_bytes()), b"\0");
-            }
-        }
-        for sparse in &self.transitions {
-            for s in 0..self.states.len() {
-                for (to, p) in sparse.row(s) {
-                    hash = fnv1a::hash_u64(fnv1a::hash_u64(hash, *to as u64), p.to_bits());
-                }
-                hash = fnv1a::hash_u64(hash, u64::MAX);
-            }
-        }
-        let numbers = self
-            .start
-            .iter()
-            .chain(&self.observation)
-            .chain(&self.reward);
-        numbers.fold(hash, |hash, value| fnv1a::hash_u64(hash, value.to_bits()))
+    pub(crate) const fn joint(&self) -> Option<&Joint> {
+        self.joint.as_ref()
     }
-}
 
-fn sparse(matrix: &[f64], n: usize) -> Sparse {
-    let mut sparse = Sparse {
-        starts: vec![0],
-        entries: Vec::new(),
-    };
-    for row in matrix.chunks(n) {
-        let some = row.iter().copied().enumerate().filter(|(_, p)| *p > 0.0);
-        sparse.entries.extend(some);
-        sparse.starts.push(sparse.entries.len());
+    pub(crate) const fn rewards(&self) -> &Rewards {
+        &self.rewards
     }
-    sparse
-}
-
-/// R(s,a) = sum over s' and z of T(s,a,s') Z(a,s',z) R(s,a,s',z).
-fn expected_rewards(parts: &Parts, transitions: &[Sparse]) -> Vec<f64> {
-    let (n, k) = (parts.states.len(), parts.observations.len());
-    let mut reward = vec![0.0; parts.actions.len() * n];
-    for (a, sparse) in transitions.iter().enumerate() {
-        for s in 0..n {
-            let mut sum = 0.0;
-            for &(to, p) in sparse.row(s) {
-                let z = &parts.observation[(a * n + to) * k..][..k];
-                let r = &parts.reward[((a * n + s) * n + to) * k..][..k];
-                sum += p * z.iter().zip(r).map(|(z, r)| z * r).sum::<f64>();
-            }
-            reward[a * n + s] = parts.reward_sign * sum;
-        }
-    }
-    reward
-}
-
-/// Checks that every row of a table is a distribution.
-fn check_rows(
-    parts: &Parts,
-    (name, table, width, row_at): (&str, &[f64], usize, &[Position]),
-    warnings: &mut Vec<Warning>,
-) -> Result<(), ParseError> {
-    let n = parts.states.len();
-    for (row, chunk) in table.chunks(width).enumerate() {
-        let sum: f64 = chunk.iter().sum();
-        let error = (sum - 1.0).abs();
-        if error > ROW_SUM_WARNING {
-            let (action, state) = (&parts.actions[row / n], &parts.states[row % n]);
-            let message = format!("{name}: {action} : {state} sums to {sum}, not to 1");
-            if error > ROW_SUM_TOLERANCE {
-                let message = format!("{message}; allowed is 1 within {ROW_SUM_TOLERANCE}");
-                return Err(ParseError::new(row_at[row], message));
-            }
-            warnings.push(Warning {
-                at: row_at[row],
-                message,
-            });
-        }
-    }
-    Ok(())
 }

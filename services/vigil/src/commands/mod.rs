@@ -10,6 +10,7 @@ pub mod inject;
 pub mod learn;
 mod learn_nominal;
 mod offline;
+pub mod pomdp;
 
 /// How a command ended that could do its work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

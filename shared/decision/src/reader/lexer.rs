@@ -1,9 +1,6 @@
 //! Words, numbers and signs of a `.pomdp` text. New lines mean nothing; `#` comments a line out.
 
-use super::{ParseError, Position};
-
-/// Longest text that is read, bytes.
-const TEXT_BYTES_MAX: usize = 256 << 20;
+use super::{ParseError, Position, limits};
 
 /// A piece of the text.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,36 +23,32 @@ pub(super) struct Placed<'a> {
     pub at: Position,
 }
 
-/// Splits a text into tokens; the last is [`Token::End`].
-pub(super) fn tokens(text: &str) -> Result<Vec<Placed<'_>>, ParseError> {
-    let mut lexer = Lexer {
-        text,
-        byte: 0,
-        at: Position { line: 1, column: 1 },
-    };
-    if text.len() > TEXT_BYTES_MAX {
-        let message = format!("{} bytes, allowed are {TEXT_BYTES_MAX}", text.len());
-        return Err(ParseError::new(lexer.at, message));
-    }
-    let mut all = Vec::new();
-    loop {
-        lexer.skip_space();
-        let at = lexer.at;
-        let token = lexer.next()?;
-        all.push(Placed { token, at });
-        if token == Token::End {
-            return Ok(all);
-        }
-    }
-}
-
-struct Lexer<'a> {
+/// Reads one token after the other.
+#[derive(Debug, Clone)]
+pub(super) struct Lexer<'a> {
     text: &'a str,
     byte: usize,
     at: Position,
 }
 
 impl<'a> Lexer<'a> {
+    /// Begins at the start of a text; a byte order mark is passed over.
+    pub(super) fn new(text: &'a str) -> Result<Self, ParseError> {
+        let at = Position { line: 1, column: 1 };
+        let bytes = Some(text.len());
+        limits::check(bytes, limits::TEXT_BYTES_MAX, at, "bytes of text")?;
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        Ok(Self { text, byte: 0, at })
+    }
+
+    /// The next token; [`Token::End`] again and again at the end.
+    pub(super) fn next(&mut self) -> Result<Placed<'a>, ParseError> {
+        self.skip_space();
+        let at = self.at;
+        let token = self.token()?;
+        Ok(Placed { token, at })
+    }
+
     fn rest(&self) -> &'a str {
         &self.text[self.byte..]
     }
@@ -70,10 +63,15 @@ impl<'a> Lexer<'a> {
     fn skip_space(&mut self) {
         while let Some(c) = self.rest().chars().next() {
             if c == '#' {
-                let length = self.rest().find('\n').unwrap_or(self.rest().len());
-                self.take(length);
-            } else if c == '\n' {
-                self.byte += 1;
+                let end = self.rest().find(['\n', '\r']);
+                self.take(end.unwrap_or(self.rest().len()));
+            } else if c == '\n' || c == '\r' {
+                // A line ends with LF, CR LF or CR.
+                self.byte += if self.rest().starts_with("\r\n") {
+                    2
+                } else {
+                    1
+                };
                 self.at = Position {
                     line: self.at.line + 1,
                     column: 1,
@@ -86,7 +84,7 @@ impl<'a> Lexer<'a> {
         }
     }
 
-    fn next(&mut self) -> Result<Token<'a>, ParseError> {
+    fn token(&mut self) -> Result<Token<'a>, ParseError> {
         let at = self.at;
         let Some(c) = self.rest().chars().next() else {
             return Ok(Token::End);
