@@ -22,11 +22,14 @@ mod export;
 mod frontier;
 mod grid;
 mod initial;
+mod method;
 mod prune;
 mod sawtooth;
 mod search;
 mod tree;
 mod trial;
+
+pub use method::{Answer, Method, MethodError, bound};
 
 use crate::alpha_vectors::AlphaVectors;
 use crate::bounds::SolveError;

@@ -2,6 +2,7 @@
 
 mod convert;
 mod info;
+mod solve;
 mod track;
 
 use std::path::Path;
@@ -10,7 +11,7 @@ use vigil_decision::Pomdp;
 
 use super::{CommandError, Outcome};
 
-/// Looks at, follows, and converts decision models (`.pomdp`, `.pomdpx`).
+/// Looks at, follows, solves and converts decision models (`.pomdp`, `.pomdpx`).
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -22,6 +23,7 @@ enum Command {
     Info(info::Args),
     Track(track::Args),
     Convert(convert::Args),
+    Solve(solve::Args),
 }
 
 /// Does what the subcommand says.
@@ -33,6 +35,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         Command::Info(args) => info::run(args),
         Command::Track(args) => track::run(args),
         Command::Convert(args) => convert::run(args),
+        Command::Solve(args) => solve::run(args),
     }
 }
 
