@@ -36,10 +36,20 @@ pub struct Args {
     #[arg(long, default_value = "sarsop")]
     method: Method,
     /// Processor time after which to end, s, from the start of the program.
-    #[arg(long, value_name = "S", default_value_t = 60.0)]
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 60.0,
+        allow_negative_numbers = true
+    )]
     timeout: f64,
     /// Gap between the bounds at which sarsop ends, in units of reward.
-    #[arg(long, value_name = "E", default_value_t = 1e-3)]
+    #[arg(
+        long,
+        value_name = "E",
+        default_value_t = 1e-3,
+        allow_negative_numbers = true
+    )]
     precision: f64,
     /// Where to write the policy: Vigil's own format; that of APPL if the name ends in .policy,
     /// of pomdp-solve if in .alpha.
