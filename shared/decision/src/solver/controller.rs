@@ -107,10 +107,7 @@ impl Tree<'_> {
         let mut parts = Vec::new();
         let mut weights: HashMap<BeliefId, f64> = HashMap::from([(root, 1.0)]);
         let mut entries = 0;
-        loop {
-            let Some((id, weight)) = heaviest(&mut weights) else {
-                break;
-            };
+        while let Some((id, weight)) = heaviest(&mut weights) {
             budget.spend(weights.len())?;
             if self.nodes[id as usize].branches.is_none() {
                 continue;
