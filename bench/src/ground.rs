@@ -51,14 +51,14 @@ pub struct Job {
     pub seed: u64,
 }
 
-/// Every wheel stuck in every turn at every speed on every soil, with `seeds` worlds each; nominal
-/// runs; and encoder faults of every kind and wheel.
+/// Every wheel stuck in every turn at every speed on every soil, with `seeds` worlds each, from
+/// `first_seed` on; nominal runs; and encoder faults of every kind and wheel.
 #[must_use]
-pub fn jobs(rover: &Rover, seeds: u64) -> Vec<Job> {
+pub fn jobs(rover: &Rover, seeds: u64, first_seed: u64) -> Vec<Job> {
     let mut jobs = Vec::new();
     let mut add = |stiffer, fault: Option<(String, String)>, radius_m, speed_m_s| {
         for _ in 0..seeds {
-            let seed = jobs.len() as u64 + 1;
+            let seed = first_seed + jobs.len() as u64;
             jobs.push(Job {
                 stiffer,
                 fault: fault.clone(),

@@ -1,6 +1,8 @@
 //! What measuring programs share: the archive, the facts about the machine, the yardstick and
 //! the filters that are compared.
 
+use std::process::ExitCode;
+
 pub mod archive;
 pub mod figure7;
 pub mod filters;
@@ -17,6 +19,17 @@ pub mod shares;
 pub mod simulated;
 pub mod speed;
 pub mod unmodelled;
+
+/// What a program of this name ends with: 0, or 1 and the reason.
+pub fn ended(name: &str, result: Result<(), Box<dyn std::error::Error>>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{name}: {error}");
+            ExitCode::from(1)
+        }
+    }
+}
 
 /// The value below which the share `q` of `values` lies; sorts them. NaN if there are none.
 pub fn quantile(values: &mut [f64], q: f64) -> f64 {

@@ -8,7 +8,7 @@ mod report;
 pub use grid::{Cell, cells};
 pub use nominal::{Nominal, RUN_S, drive_nominal, share_soon};
 pub use outcome::{Run, Verdict};
-pub use report::{Totals, bands, by_kind, excluded, totals};
+pub use report::{Band, Totals, bands, by_kind, excluded, totals};
 
 use std::error::Error;
 

@@ -6,13 +6,17 @@ use crate::struct_fields::{Field, fields};
 use std::collections::BTreeSet;
 
 /// Where the keys of the files below a folder of `config/` are defined; the first match holds.
-const DEFINITIONS: [(&str, &[&str]); 5] = [
+const DEFINITIONS: [(&str, &[&str]); 6] = [
     ("config/logs/", &["shared/evaluation/src/import/"]),
     ("config/robots/", &["shared/robot/src/"]),
     ("config/trees/", &["shared/setup/src/schema"]),
     (
         "config/models/",
         &["shared/robot/src/", "shared/evaluation/src/"],
+    ),
+    (
+        "config/navigation.toml",
+        &["shared/decision/src/navigation/"],
     ),
     ("config/", &["shared/setup/src/schema"]),
 ];

@@ -30,13 +30,7 @@ const SEED: u64 = 1;
 const FIRST_ID: u32 = 10_000;
 
 fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("derived: {error}");
-            ExitCode::from(1)
-        }
-    }
+    vigil_bench::ended("derived", run())
 }
 
 fn run() -> Result<(), Box<dyn Error>> {

@@ -11,13 +11,7 @@ use vigil_bench::archive::Archive;
 use vigil_bench::{machine, speed};
 
 fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("rover13: {error}");
-            ExitCode::from(1)
-        }
-    }
+    vigil_bench::ended("rover13", run())
 }
 
 fn run() -> Result<(), Box<dyn Error>> {

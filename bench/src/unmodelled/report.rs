@@ -1,6 +1,7 @@
 //! Runs in figures.
 
 use serde_json::{Value, json};
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::{NONCENTRALITY_MIN, Run, Verdict, WINDOW_S};
 use crate::quantile;
@@ -124,18 +125,45 @@ pub fn by_kind(runs: &[&Run]) -> Vec<(&'static str, Totals)> {
     kinds.into_iter().map(of).collect()
 }
 
-/// Detected within 2 s, by noncentrality from and up to.
+/// Runs of one noncentrality.
+#[derive(Debug, Clone)]
+pub struct Band {
+    /// Noncentrality from ..
+    pub from: f64,
+    /// .. and up to.
+    pub to: f64,
+    /// Detected within 2 s.
+    pub detected: Share,
+    /// Mean probability with which a test could detect them that is told the fault's every effect
+    /// and its onset, and looks once in 2 s: no detector at this rate of false alarms sees more.
+    pub p_clairvoyant: f64,
+}
+
+/// Probability that a test of known signal finds one of this noncentrality, at one false alarm in
+/// 24 h of tests that follow one another (Neyman and Pearson).
+fn p_clairvoyant(noncentrality: f64) -> f64 {
+    let standard = Normal::standard();
+    let threshold = standard.inverse_cdf(1.0 - WINDOW_S / 86_400.0);
+    standard.cdf(noncentrality.max(0.0).sqrt() - threshold)
+}
+
+/// Runs by noncentrality.
 #[must_use]
-pub fn bands(runs: &[&Run]) -> Vec<(f64, f64, Share)> {
+pub fn bands(runs: &[&Run]) -> Vec<Band> {
     BANDS
         .windows(2)
         .map(|ends| {
             let within = |run: &&&Run| {
                 (ends[0]..ends[1]).contains(&run.noncentrality) && !run.alarmed_before
             };
-            let own = runs.iter().filter(within);
-            let detected = Share::of(own, |run| run.is_detected(WINDOW_S));
-            (ends[0], ends[1], detected)
+            let own: Vec<&&Run> = runs.iter().filter(within).collect();
+            let sum: f64 = own.iter().map(|r| p_clairvoyant(r.noncentrality)).sum();
+            Band {
+                from: ends[0],
+                to: ends[1],
+                p_clairvoyant: sum / own.len().max(1) as f64,
+                detected: Share::of(own, |run| run.is_detected(WINDOW_S)),
+            }
         })
         .collect()
 }

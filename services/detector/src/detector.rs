@@ -4,21 +4,15 @@ use vigil_blocks::{
     Channel, DetectionBelief, Entry, PARTICLE_CAPACITY, ParticleBlock, SensorFrame, Symptoms,
 };
 use vigil_inference::logspace::probability;
-use vigil_robot::Description;
 use vigil_robot::learned::monitor::Channels;
-use vigil_robot::learned::{Calibration, Form, Model, ModelError, Monitor, NoiseScales, Observer};
+use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
 use vigil_robot::nominal;
+use vigil_robot::{Alarm, AlarmError, Description};
 use vigil_setup::schema;
 
 use crate::cloud::Cloud;
 use crate::watch::{Observed, Watch};
 
-/// An alarm falls when the log-odds have stayed this far below those that raise it ..
-const CLEAR_BELOW: f64 = 8.0;
-/// .. and below these odds, whatever the threshold ..
-const CLEAR_LOG_ODDS: f64 = -4.0;
-/// .. for this long, moving, s.
-const CLEAR_S: f64 = 1.0;
 /// Pose log-odds beyond which the detector reports an error in position.
 const SYMPTOM_LOG_ODDS: f64 = 0.0;
 
@@ -39,17 +33,9 @@ pub enum DetectorError {
         /// What was found.
         value: f64,
     },
-    /// The calibrated threshold lies above what the form's log-odds can reach.
-    #[error(
-        "detector.form: '{form}' cannot reach the alarm at log-odds {alarm_log_odds:.1} that \
-         false_alarm_interval_h and fault_rate_1_h ask for: lower one of them, or take learned-bias"
-    )]
-    Unreachable {
-        /// Name of the form.
-        form: &'static str,
-        /// The threshold.
-        alarm_log_odds: f64,
-    },
+    /// There is no threshold for the alarm, or it could never rise.
+    #[error("detector: {0}")]
+    Alarm(#[from] AlarmError),
 }
 
 /// The detection filter at frame rate.
@@ -60,7 +46,7 @@ pub enum DetectorError {
 pub struct Detector {
     watch: Watch,
     fault_rate_1_s: f64,
-    alarm_log_odds: f64,
+    alarm: Alarm,
     particles: usize,
     armed: bool,
     period_s: f64,
@@ -68,7 +54,6 @@ pub struct Detector {
     run_id: u64,
     alarm_t_ns: u64,
     alarm_count: u32,
-    quiet_s: f64,
     invalid_count: u32,
     symptoms: u32,
     external: u32,
@@ -89,9 +74,10 @@ impl Detector {
     ) -> Result<Self, DetectorError> {
         model.check_robot(robot)?;
         let (channels, form) = chosen(settings);
-        let calibration = model.calibration(channels, form)?;
-        let rate = settings.fault_rate_1_h;
-        Self::watching(model.interval_s, calibration, form, settings, |particles| {
+        let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
+        let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
+        let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
+        Self::watching(model.interval_s, alarm_log_odds, settings, |particles| {
             Watch::Faults {
                 observer: Box::new(Observer::new(model, robot)),
                 monitor: Box::new(Monitor::new(model, robot, channels, form, rate)),
@@ -111,9 +97,10 @@ impl Detector {
     ) -> Result<Self, DetectorError> {
         model.check_robot(robot)?;
         let (channels, form) = chosen(settings);
-        let calibration = model.calibration(channels, form)?;
-        let rate = settings.fault_rate_1_h;
-        Self::watching(model.interval_s, calibration, form, settings, |_| {
+        let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
+        let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
+        let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
+        Self::watching(model.interval_s, alarm_log_odds, settings, |_| {
             Watch::Nominal {
                 observer: Box::new(nominal::Observer::new(robot)),
                 monitor: Box::new(nominal::Monitor::new(model, channels, form, rate)),
@@ -124,29 +111,18 @@ impl Detector {
 
     fn watching(
         interval_s: f64,
-        calibration: &Calibration,
-        form: Form,
+        alarm_log_odds: f64,
         settings: &schema::Detector,
         watch: impl FnOnce(usize) -> Watch,
     ) -> Result<Self, DetectorError> {
         if !(1..=PARTICLE_CAPACITY).contains(&settings.particles) {
             return Err(DetectorError::Particles(settings.particles));
         }
-        let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
-        let interval = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
-        let alarm_log_odds = calibration.alarm_log_odds(interval, rate);
-        if alarm_log_odds > form.log_odds_max() {
-            let form = form.name();
-            return Err(DetectorError::Unreachable {
-                form,
-                alarm_log_odds,
-            });
-        }
         let particles = settings.particles;
         Ok(Self {
             watch: watch(particles),
-            fault_rate_1_s: rate / 3600.0,
-            alarm_log_odds,
+            fault_rate_1_s: settings.fault_rate_1_h / 3600.0,
+            alarm: Alarm::new(alarm_log_odds),
             particles,
             armed: false,
             period_s: interval_s,
@@ -154,7 +130,6 @@ impl Detector {
             run_id: 0,
             alarm_t_ns: 0,
             alarm_count: 0,
-            quiet_s: 0.0,
             invalid_count: 0,
             symptoms: 0,
             external: 0,
@@ -164,7 +139,14 @@ impl Detector {
     /// Log-odds at which the alarm rises.
     #[must_use]
     pub const fn alarm_log_odds(&self) -> f64 {
-        self.alarm_log_odds
+        self.alarm.threshold_log_odds()
+    }
+
+    /// True once an alarm can rise: evidence from before the track has settled and the noise is
+    /// known is no evidence.
+    #[must_use]
+    pub const fn is_armed(&self) -> bool {
+        self.armed
     }
 
     /// Takes one entry of the journal and fills the belief and the particles (headers and causes
@@ -194,7 +176,8 @@ impl Detector {
 
     fn begin_run(&mut self) {
         self.watch.reset();
-        (self.armed, self.quiet_s) = (false, 0.0);
+        self.armed = false;
+        self.alarm.reset();
         (self.alarm_t_ns, self.symptoms) = (0, 0);
     }
 
@@ -217,7 +200,7 @@ impl Detector {
     }
 
     fn observe(&mut self) {
-        let observation = self.watch.step(self.alarm_t_ns != 0);
+        let observation = self.watch.step(self.alarm.stands());
         let moving = observation.moving;
         if !self.armed {
             // Evidence from before the noise scale is known is no evidence.
@@ -225,24 +208,12 @@ impl Detector {
             self.watch.forget_evidence();
         }
         let log_odds = self.watch.report().log_odds;
-        if self.alarm_t_ns == 0 {
-            if self.armed && log_odds > self.alarm_log_odds {
-                self.alarm_t_ns = observation.t_ns.max(1);
-                self.alarm_count = self.alarm_count.saturating_add(1);
-                self.quiet_s = 0.0;
-            }
-        } else if moving {
-            // Clearing needs evidence: time at rest does not count.
-            let clear = (self.alarm_log_odds - CLEAR_BELOW).min(CLEAR_LOG_ODDS);
-            let quiet = log_odds < clear;
-            self.quiet_s = if quiet {
-                self.quiet_s + observation.dt_s
-            } else {
-                0.0
-            };
-            if self.quiet_s >= CLEAR_S {
-                self.alarm_t_ns = 0;
-            }
+        // Clearing needs evidence: time at rest does not count.
+        if self.armed && self.alarm.take(log_odds, observation.dt_s, moving) {
+            self.alarm_t_ns = observation.t_ns.max(1);
+            self.alarm_count = self.alarm_count.saturating_add(1);
+        } else if !self.alarm.stands() {
+            self.alarm_t_ns = 0;
         }
         let off_course = self.watch.report().channels[Channel::POSE] > SYMPTOM_LOG_ODDS;
         self.symptoms = if !off_course {
@@ -268,7 +239,7 @@ impl Detector {
         } else {
             report.log_odds
         };
-        belief.alarm_log_odds = self.alarm_log_odds;
+        belief.alarm_log_odds = self.alarm_log_odds();
         belief.evidence = if report.evidence.is_finite() {
             report.evidence
         } else {
@@ -286,7 +257,7 @@ impl Detector {
         belief.noise_scale_steer = steer;
         belief.channel_log_odds = report.channels;
         belief.alarm_t_capture_ns = self.alarm_t_ns;
-        belief.alarm = u32::from(self.alarm_t_ns != 0);
+        belief.alarm = u32::from(self.alarm.stands());
         belief.alarm_count = self.alarm_count;
         belief.symptoms = self.symptoms | self.external;
         belief.invalid_count = self.invalid_count;
@@ -303,16 +274,7 @@ impl Detector {
 }
 
 fn chosen(settings: &schema::Detector) -> (Channels, Form) {
-    let channels = match settings.sensors {
-        schema::Sensors::Pose => Channels::Pose,
-        schema::Sensors::PoseEncoders => Channels::PoseEncoders,
-    };
-    let form = match settings.form {
-        schema::Form::LearnedBias => Form::LearnedBias,
-        schema::Form::Constant => Form::Constant,
-        schema::Form::Windowed => Form::Windowed,
-    };
-    (channels, form)
+    (settings.sensors.into(), settings.form.into())
 }
 
 fn positive(key: &'static str, value: f64) -> Result<f64, DetectorError> {

@@ -120,3 +120,21 @@ fn an_alarm_that_could_never_rise_is_refused() {
         "{error}"
     );
 }
+
+#[test]
+fn an_alarm_above_the_bound_of_the_poses_log_odds_is_refused_with_that_bound() {
+    let settings = schema::Detector::default();
+    let build = |level| {
+        let mut model = model();
+        model
+            .calibration
+            .iter_mut()
+            .for_each(|c| c.level_log_odds = level);
+        Detector::new(&model, &robot(), &settings, 1).map(|detector| detector.alarm_log_odds())
+    };
+    let above = build(0.0).unwrap();
+    assert!(build(39.9 - above).is_ok_and(|alarm| (alarm - 39.9).abs() < 1e-6));
+    let error = build(40.1 - above).unwrap_err().to_string();
+    assert!(error.contains("above log-odds 40.10"), "{error}");
+    assert!(error.contains("reach 40.00 at the highest"), "{error}");
+}

@@ -4,10 +4,16 @@
 //! encoders costs no more than one.
 
 use vigil_blocks::WHEELS;
+use vigil_robot::learned::Moved;
 use vigil_robot::learned::wheel_evidence::{BREAKAGE_SHARES, BREAKAGES};
 
-/// Share of wheels that do anything, in the unknown.
-const ANYTHING: f64 = 0.2;
+/// Share of wheels that do anything, in the unknown; what those do: most slip, or are driven.
+const ANYTHING: f64 = 0.3;
+const ANYTHING_SHARES: [f64; BREAKAGES.len()] = [0.05, 0.05, 0.1, 0.1, 0.7];
+/// The breakage that is also what a slipping wheel reads: the last one.
+pub const WANDERS: usize = BREAKAGES.len();
+/// Share of wheels that slip otherwise than learned while another one drags.
+const SLIPS: f64 = 0.05;
 
 /// States of an encoder: whole, or broken in one way.
 pub const STATES: usize = 1 + BREAKAGES.len();
@@ -65,13 +71,25 @@ impl Encoders {
     #[must_use]
     pub fn unsure(t_ns: u64) -> Self {
         let mut p = [1.0 - ANYTHING; STATES];
-        for (p, share) in p[1..].iter_mut().zip(BREAKAGE_SHARES) {
+        for (p, share) in p[1..].iter_mut().zip(ANYTHING_SHARES) {
             *p = ANYTHING * share;
         }
         Self {
             p: [p; WHEELS],
             onset: [t_ns; WHEELS],
         }
+    }
+
+    /// The robot is moved otherwise from now on: a wheel slips if another one drags, and not if
+    /// none does.
+    #[must_use]
+    pub fn moved(mut self, moved: Moved) -> Self {
+        for (wheel, p) in self.p.iter_mut().enumerate() {
+            let whole = p[0] + p[WANDERS];
+            let slips = if slips(moved, wheel) { SLIPS } else { 0.0 };
+            (p[0], p[WANDERS]) = (whole * (1.0 - slips), whole * slips);
+        }
+        self
     }
 
     /// One observation: encoder w breaks with the probability `births[w]`, recovers with `death`.
@@ -109,10 +127,12 @@ impl Encoders {
         evidence + product.ln()
     }
 
-    /// Probability that this wheel's encoder is broken.
+    /// Probability that this wheel's encoder is broken, if the robot is moved so. One that wanders
+    /// is not, if another wheel drags: its wheel slips.
     #[must_use]
-    pub fn p_broken(&self, wheel: usize) -> f64 {
-        self.p[wheel][1..].iter().sum::<f64>().min(1.0)
+    pub fn p_broken(&self, wheel: usize, moved: Moved) -> f64 {
+        let states = if slips(moved, wheel) { WANDERS } else { STATES };
+        self.p[wheel][1..states].iter().sum::<f64>().min(1.0)
     }
 
     /// Onset of this wheel's broken encoder, if it is broken.
@@ -120,6 +140,11 @@ impl Encoders {
     pub const fn onset(&self, wheel: usize) -> u64 {
         self.onset[wheel]
     }
+}
+
+/// True if `wheel` may slip otherwise than learned: another one drags, and it turns.
+const fn slips(moved: Moved, wheel: usize) -> bool {
+    moved.stuck() != 0 && !moved.is_stuck(wheel)
 }
 
 #[cfg(test)]
@@ -138,9 +163,28 @@ mod tests {
             let evidence = encoders.step(&births, death, &likelihoods, step);
             assert!((evidence - (a + b).ln()).abs() < 1e-12);
             (whole, broken) = (a / (a + b), b / (a + b));
-            assert!((encoders.p_broken(0) - broken).abs() < 1e-12);
+            assert!((encoders.p_broken(0, Moved::Nominal) - broken).abs() < 1e-12);
         }
         assert_eq!(encoders.onset(0), 1);
-        assert_eq!(encoders.p_broken(1), 0.0);
+        assert_eq!(encoders.p_broken(1, Moved::Nominal), 0.0);
+    }
+
+    #[test]
+    fn what_wanders_is_slip_beside_a_dragging_wheel_and_a_broken_encoder_otherwise() {
+        let wanders = Likelihoods::new(2, |_, state| if state == WANDERS { 0.0 } else { -2.0 });
+        let births = [1e-4; WHEELS];
+        let dragging = Moved::Stuck(0b10);
+        let mut encoders = Encoders::healthy(0).moved(dragging);
+        for step in 1..=10 {
+            encoders.step(&births, 0.0, &wanders, step);
+        }
+        assert!(encoders.p_broken(0, dragging) < 0.01);
+        assert!(
+            encoders.p_broken(1, dragging) > 0.99,
+            "it stands, and does not slip"
+        );
+        assert!(encoders.p_broken(0, Moved::Nominal) > 0.99);
+        // When nothing drags any more, slip is over.
+        assert!(encoders.moved(Moved::Nominal).p_broken(0, Moved::Nominal) < 0.01);
     }
 }

@@ -18,7 +18,7 @@ use vigil_robot::learned::{
     FaultRates, Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
 };
 
-use crate::encoders::{Encoders, Likelihoods};
+use crate::encoders::{Encoders, Likelihoods, WANDERS};
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
 use crate::sets::Sets;
@@ -193,7 +193,8 @@ impl Exact {
                 state.track.diffuse(self.modes[mode].jump);
                 state.encoders = match (before, after) {
                     (_, Moved::UnknownAny) => Encoders::unsure(t_ns),
-                    (Moved::UnknownAny, _) => Encoders::healthy(t_ns),
+                    (Moved::UnknownAny, _) => Encoders::healthy(t_ns).moved(after),
+                    _ if before.stuck() != after.stuck() => state.encoders.moved(after),
                     _ => state.encoders,
                 };
                 self.bank.add(Hypothesis {
@@ -243,6 +244,8 @@ impl Exact {
             match (state, moved) {
                 (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
                 (0, _) => evidence.whole(&self.model, observation, moved, is_new, wheel),
+                // A scaled or late encoder of a wheel that stands reads zero.
+                (WANDERS, _) if moved.is_stuck(wheel) => evidence.standing[wheel],
                 (broken, _) => evidence.broken[wheel][broken - 1],
             }
         })
@@ -253,8 +256,9 @@ impl Exact {
         self.sets.clear();
         for hypothesis in self.bank.hypotheses() {
             let (p, encoders) = (hypothesis.log_weight.exp(), &hypothesis.state.encoders);
+            let moved = self.modes[hypothesis.mode].moved;
             self.sets
-                .add(hypothesis.mode, p, |wheel| encoders.p_broken(wheel));
+                .add(hypothesis.mode, p, |wheel| encoders.p_broken(wheel, moved));
         }
         self.sets.posterior(&self.leaves, out);
     }
@@ -279,7 +283,10 @@ impl Exact {
         if let Some(wheel) = wheel(&self.leaves.encoder) {
             let known = self.bank.hypotheses().iter();
             let known = known.filter(|h| !self.modes[h.mode].moved.is_unknown());
-            let p = |h: &Hypothesis<State>| h.log_weight + h.state.encoders.p_broken(wheel).ln();
+            let p = |h: &Hypothesis<State>| {
+                let p_broken = h.state.encoders.p_broken(wheel, self.modes[h.mode].moved);
+                h.log_weight + p_broken.ln()
+            };
             let best = known.max_by(|a, b| p(a).total_cmp(&p(b)));
             return best.map_or(0, |best| best.state.encoders.onset(wheel));
         }

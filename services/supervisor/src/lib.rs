@@ -6,6 +6,7 @@
 mod assemble;
 mod evidence;
 mod mapping;
+mod policy;
 mod restraint;
 mod supervisor;
 mod wiring;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use vigil_blocks::{DECISION_ACTIONS, DECISION_STATES, RecoveryKind};
 use vigil_decision::Pomdp;
 use vigil_decision::mdp::SolveError;
+use vigil_decision::policy::{DualError, NameError};
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
 use vigil_setup::schema::{Recovery, RecoveryAction};
@@ -56,8 +57,22 @@ pub enum SupervisorError {
     )]
     NoCompensation(usize, String),
     /// The policy is not known.
-    #[error("policy '{0}' is not known: allowed are qmdp, mls, av")]
-    Policy(String),
+    #[error("supervisor.policy: {0}")]
+    Policy(#[from] NameError),
+    /// Dual control cannot be set up.
+    #[error("supervisor: {0}")]
+    Dual(#[from] DualError),
+    /// An action for information is not in the model.
+    #[error(
+        "supervisor.information_actions: the decision model has no action '{found}'; allowed are \
+         {allowed}"
+    )]
+    InformationAction {
+        /// Name that was given.
+        found: String,
+        /// Names of the model's actions.
+        allowed: String,
+    },
     /// The model has no solution.
     #[error("decision model: {0}")]
     Solve(#[from] SolveError),

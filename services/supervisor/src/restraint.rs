@@ -6,8 +6,8 @@
 //!   then the best of the other actions is taken.
 
 use vigil_blocks::RecoveryKind;
-use vigil_decision::Choice;
 use vigil_decision::policy::choose_among;
+use vigil_decision::{Choice, Control};
 
 use crate::mapping::ActionMeaning;
 
@@ -56,7 +56,10 @@ impl Restraint {
             let calling = current.is_some_and(is_help);
             let others = (0..values.len()).any(|action| !is_help(action));
             if self.help_epochs < HELP_EPOCHS && !calling && others {
-                choice = choose_among(values, |action| !is_help(action));
+                choice = Choice {
+                    control: best.control,
+                    ..choose_among(values, |action| !is_help(action))
+                };
             }
         } else {
             self.help_epochs = 0;
@@ -85,6 +88,7 @@ impl Restraint {
             return Choice {
                 action: current,
                 margin: 0.0,
+                control: Control::Policy,
             };
         }
         choice

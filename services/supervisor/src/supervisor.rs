@@ -4,15 +4,14 @@ use vigil_blocks::{
     Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, DetectionBelief, Entry, FaultBelief,
     RecoveryKind,
 };
-use vigil_decision::{
-    ActionVoting, Choice, Evidence, MostLikelyState, Policy, Pomdp, QMdp, Tracker, mdp,
-};
+use vigil_decision::{Choice, Control, Decider, Evidence, Pomdp, Tracker, mdp};
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
 use vigil_setup::schema;
 
 use crate::evidence::{self, Effect, Gathered};
 use crate::mapping::{self, ActionMeaning, Compensation, StateMeaning, SupervisorError};
+use crate::policy;
 use crate::restraint::Restraint;
 
 /// Diagnoses missed in a row after which the identifier counts as lost.
@@ -34,7 +33,7 @@ pub struct Inputs<'a> {
 /// Tracks the belief of the recovery POMDP and chooses actions.
 pub struct Supervisor {
     model: Pomdp,
-    policy: Box<dyn Policy>,
+    decider: Decider,
     tree_hash: u64,
     tracker: Tracker,
     states: Vec<StateMeaning>,
@@ -44,7 +43,6 @@ pub struct Supervisor {
     epoch_ns: u64,
     gathered: Gathered,
     restraint: Restraint,
-    values: Vec<f64>,
     scratch: Vec<f64>,
     epoch_t_capture_ns: Option<u64>,
     choice: Choice,
@@ -87,25 +85,20 @@ impl Supervisor {
         let actions = mapping::actions(&model, &settings.actions)?;
         mapping::check_compensation(&model, &states, &actions, &compensation)?;
         let solution = mdp::solve(&model)?;
-        let policy: Box<dyn Policy> = match settings.policy.as_str() {
-            "qmdp" => Box::new(QMdp::new(solution)),
-            "mls" => Box::new(MostLikelyState::new(solution)),
-            "av" => Box::new(ActionVoting::new(solution)),
-            other => return Err(SupervisorError::Policy(other.to_owned())),
-        };
+        let decider = policy::decider(&model, &solution, settings)?;
         let mut supervisor = Self {
-            policy,
+            decider,
             tree_hash: tree.hash(),
             tracker: Tracker::new(&model),
             epoch_ns: (settings.epoch_ms * 1e6) as u64,
             gathered: Gathered::new(),
             restraint: Restraint::new(),
-            values: vec![0.0; actions.len()],
             scratch: vec![0.0; states.len()],
             epoch_t_capture_ns: None,
             choice: Choice {
                 action: 0,
                 margin: 0.0,
+                control: Control::Policy,
             },
             is_held: false,
             decided: None,
@@ -255,6 +248,7 @@ impl Supervisor {
 
     fn reset(&mut self) {
         self.tracker.reset();
+        self.decider.reset();
         self.gathered.forget();
         self.restraint = Restraint::new();
         self.epoch_t_capture_ns = None;
@@ -264,13 +258,12 @@ impl Supervisor {
     }
 
     fn decide(&mut self, timed: bool) {
-        let best = self
-            .policy
-            .evaluate(self.tracker.belief(), &mut self.values);
+        let best = self.decider.decide(self.tracker.belief()).choice();
+        let values = self.decider.values();
         let current = self.decided.map(|decided| decided.action);
         self.choice = self
             .restraint
-            .decide(current, best, &self.values, &self.actions, timed);
+            .decide(current, best, values, &self.actions, timed);
         self.is_held = current == Some(self.choice.action) && self.choice.action != best.action;
     }
 
@@ -335,9 +328,9 @@ impl Supervisor {
         action.model_hash = self.model.hash();
         action.belief = [0.0; DECISION_STATES];
         action.value = [0.0; DECISION_ACTIONS];
-        let belief = self.tracker.belief();
+        let (belief, values) = (self.tracker.belief(), self.decider.values());
         action.belief[..belief.len()].copy_from_slice(belief);
-        action.value[..self.values.len()].copy_from_slice(&self.values);
+        action.value[..values.len()].copy_from_slice(values);
         action.entropy = self.tracker.entropy();
         action.margin = self.choice.margin;
         action.log_evidence = self.log_evidence;
@@ -347,12 +340,20 @@ impl Supervisor {
         action.action = decided.action as u32;
         action.kind = decided.kind as u32;
         action.wheel = decided.wheel.map_or(u32::MAX, |wheel| wheel as u32);
-        action.control_mode = self.control_mode as u32;
+        action.control_mode = self.control_mode() as u32;
         action.state_count = belief.len() as u32;
-        action.action_count = self.values.len() as u32;
+        action.action_count = values.len() as u32;
         action.impossible_count = self.impossible_count;
         action.lost_stages = self.lost_stages();
         action.reserved = [0; 4];
+    }
+
+    /// Gathering information is a way to use a belief with fresh evidence, and no other.
+    fn control_mode(&self) -> ControlMode {
+        match (self.control_mode, self.choice.control) {
+            (ControlMode::Policy, Control::Dual) => ControlMode::Dual,
+            (mode, _) => mode,
+        }
     }
 
     fn lost_stages(&self) -> u32 {

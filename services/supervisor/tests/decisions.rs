@@ -2,117 +2,23 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use std::path::PathBuf;
+mod world;
 
 use proptest::prelude::*;
-use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
+use vigil_blocks::{ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
 use vigil_cycle::allocation::{CountingAllocator, allocations};
 use vigil_decision::{Policy, Pomdp, QMdp, mdp};
-use vigil_inference::FaultTree;
-use vigil_robot::Description;
 use vigil_setup::schema::GraphFile;
 use vigil_supervisor::{Compensation, Inputs, Supervisor};
+use world::{CYCLE_NS, World, config, model};
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-const CYCLE_NS: u64 = 10_000_000;
-
-fn config() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config")
-}
-
-fn model() -> Pomdp {
-    Pomdp::parse(&std::fs::read_to_string(config().join("rover.pomdp")).unwrap()).unwrap()
-}
-
-struct World {
-    supervisor: Supervisor,
-    tree: FaultTree,
-    robot: Description,
-    t_ns: u64,
-    action: Action,
-}
-
-impl World {
-    fn new() -> Self {
-        let tree = vigil_setup::load_tree(&config().join("trees/rover.toml")).unwrap();
-        let robot = vigil_setup::load_robot(&config().join("robots/rover.toml")).unwrap();
-        let text = std::fs::read_to_string(config().join("rover.toml")).unwrap();
-        let file: GraphFile = toml::from_str(&text).unwrap();
-        let compensation = (0..6)
-            .map(|wheel| Compensation {
-                wheel,
-                curvature_gain: 1.1,
-                curvature_offset_1_m: wheel as f64,
-            })
-            .collect();
-        let supervisor =
-            Supervisor::new(model(), &tree, &robot, &file.supervisor, compensation, 10).unwrap();
-        Self {
-            supervisor,
-            tree,
-            robot,
-            t_ns: 0,
-            action: Action::default(),
-        }
-    }
-
-    /// One cycle in which the identifier believes `p` (by name), having predicted `predicted`.
-    fn cycle(&mut self, identifying: bool, p: &[(&str, f64)], predicted: &[(&str, f64)]) {
-        self.t_ns += CYCLE_NS;
-        let mut belief = FaultBelief {
-            identifying: u32::from(identifying),
-            tree_hash: self.tree.hash(),
-            ..Default::default()
-        };
-        belief.header.t_capture_ns = self.t_ns;
-        for (of, list) in [(false, p), (true, predicted)] {
-            for (name, value) in list {
-                let node = self.tree.index(name);
-                match (node, of) {
-                    (Some(i), false) => belief.p[i] = *value,
-                    (Some(i), true) => belief.p_predicted[i] = *value,
-                    (None, false) => belief.p_unknown = *value,
-                    (None, true) => belief.p_unknown_predicted = *value,
-                }
-            }
-        }
-        let inputs = Inputs {
-            diagnosis: Some(&belief),
-            detection: None,
-        };
-        self.supervisor.step(Entry::Frame(inputs), &mut self.action);
-    }
-
-    /// Cycles with a belief that no data changes.
-    fn rest(&mut self, cycles: usize, identifying: bool, p: &[(&str, f64)]) {
-        (0..cycles).for_each(|_| self.cycle(identifying, p, p));
-    }
-
-    /// One cycle with an arbitrary diagnosis and no detection.
-    fn told(&mut self, diagnosis: &FaultBelief) {
-        let inputs = Inputs {
-            diagnosis: Some(diagnosis),
-            detection: None,
-        };
-        self.supervisor.step(Entry::Frame(inputs), &mut self.action);
-    }
-
-    fn kind(&self) -> RecoveryKind {
-        RecoveryKind::from_wire(self.action.kind).unwrap()
-    }
-
-    fn belief(&self, name: &str) -> f64 {
-        let states = model().states().to_vec();
-        self.action.belief[states.iter().position(|s| s == name).unwrap()]
-    }
-}
-
 #[test]
 fn every_certain_state_has_the_action_that_a_driver_would_expect() {
     let model = model();
-    let policy = QMdp::new(mdp::solve(&model).unwrap());
+    let mut policy = QMdp::new(mdp::solve(&model).unwrap());
     let mut values = vec![0.0; model.actions().len()];
     for (i, state) in model.states().iter().enumerate() {
         let mut belief = vec![0.0; model.states().len()];

@@ -105,11 +105,11 @@ impl Pipeline {
             };
             let (diagnosis, particles) = (&mut *self.diagnosis, &mut *self.diagnosis_particles);
             identifier.step(Entry::Frame(input), diagnosis, particles);
-            take(self.verdict(frame.header.t_capture_ns));
+            take(self.verdict(frame.header.t_capture_ns, !detector.is_armed()));
         }
     }
 
-    fn verdict(&self, t_ns: u64) -> Verdict {
+    fn verdict(&self, t_ns: u64, warming_up: bool) -> Verdict {
         let belief = &self.diagnosis;
         let name = |i: usize| self.taxonomy.name(i).unwrap_or(UNKNOWN).to_owned();
         let mode = match belief.mode {
@@ -128,6 +128,7 @@ impl Pipeline {
             p_fault: self.detection.p_fault,
             log_odds: self.detection.log_odds,
             alarm: self.detection.alarm != 0,
+            warming_up,
             mode,
             p_mode: belief.p_mode,
             p_unknown: belief.p_unknown,

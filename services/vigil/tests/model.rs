@@ -175,3 +175,49 @@ fn diagnose_warns_of_columns_that_mean_something_else() {
     );
     assert!(message.contains("3 of 3 runs begin like this"), "{message}");
 }
+
+#[test]
+fn a_nominal_model_is_shown_and_an_edited_one_refused_in_the_same_way() {
+    const NOMINAL: &str = "config/models/kobuki.toml";
+    let shown = text(&["learn", "--show", "--model", NOMINAL]);
+    for wanted in [
+        "robot          kobuki (L R)",
+        "file layout    version 2",
+        "frames         kobuki.csv.gz",
+        "runs learned   1: 0",
+        "of each run    the first 40 s",
+        "learned range  cmd_yaw_rate -1.320 to 0.330 rad/s",
+        "\nwheel rate L, rad/s\n",
+        "cmd_speed*cmd_yaw_rate",
+        "pose+encoders  windowed",
+        "highest log-odds of a lasting fault",
+    ] {
+        assert!(shown.contains(wanted), "{wanted}\n{shown}");
+    }
+    let json = text(&["learn", "--show", "--model", NOMINAL, "--json"]);
+    let json: Value = serde_json::from_str(&json).unwrap();
+    assert!(shown.contains(&format!(
+        "model hash     {}",
+        json["model_hash"].as_str().unwrap()
+    )));
+    assert_eq!(json["channels"].as_array().unwrap().len(), 5);
+    assert_eq!(json["channels"][0]["name"], "yaw rate");
+    assert_eq!(json["edited"], false);
+    assert!(json["alarms"][0]["alarm_log_odds_24_h"].as_f64().unwrap() > 0.0);
+
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("model.toml");
+    let name = path.display().to_string();
+    let show = ["learn", "--show", "--model", &name];
+    let shipped = fs::read_to_string(root().join(NOMINAL)).unwrap();
+    let changed = shipped.replacen("widened = 1.08", "widened = 1.18", 1);
+    assert_ne!(changed, shipped);
+    fs::write(&path, &changed).unwrap();
+    assert!(refused(&show).contains("write hash = \"edited\""));
+    let stored = shipped
+        .lines()
+        .find(|line| line.starts_with("hash = "))
+        .unwrap();
+    fs::write(&path, changed.replacen(stored, "hash = \"edited\"", 1)).unwrap();
+    assert!(text(&show).contains(", edited by hand\n"));
+}

@@ -1,7 +1,8 @@
 //! Decisions under uncertainty: POMDP models, their solution, policies, belief tracking.
 //!
-//! A [`Pomdp`] is read from Cassandra's `.pomdp` format or APPL's `.pomdpx`; its fully observable relaxation is solved
-//! by [`mdp::solve`]; a [`Policy`] turns a belief into an action; a [`Tracker`] keeps the belief.
+//! A [`Pomdp`] is read from Cassandra's `.pomdp` format or APPL's `.pomdpx`, and written as
+//! `.pomdp`; its fully observable relaxation is solved by [`mdp::solve`]; a [`Policy`] turns a
+//! belief into an action; a [`Tracker`] keeps the belief.
 //! Deciding and tracking allocate nothing. No transport, no clock, no files.
 //!
 //! Notation of Verma, Fernandez and Simmons (2002): states S, actions A, observations Z,
@@ -12,12 +13,12 @@ pub mod belief;
 pub mod bounds;
 pub mod budget;
 pub mod model;
+pub mod navigation;
 pub mod policy;
 pub mod policy_file;
 mod pomdpx;
 mod reader;
-pub mod solver;
-mod sparse_beliefs;
+pub mod simulation;
 mod weights;
 mod writer;
 
@@ -26,5 +27,5 @@ pub use belief::{Evidence, Tracker};
 pub use bounds::mdp;
 pub use budget::Budget;
 pub use model::{Pomdp, Warning};
-pub use policy::{ActionVoting, Choice, MostLikelyState, PointBased, Policy, QMdp};
+pub use policy::{ActionVoting, Choice, Control, Decider, MostLikelyState, Policy, QMdp};
 pub use reader::{ParseError, Position};

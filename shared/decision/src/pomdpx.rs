@@ -24,8 +24,8 @@ use xml::Element;
 const NODES_MAX: u32 = 1 << 22;
 
 impl Pomdp {
-    /// Reads APPL's `.pomdpx` format: tables (`TBL`) over discrete variables. Names that Cassandra's
-    /// format does not allow are changed, with a warning.
+    /// Reads APPL's `.pomdpx` format: tables (`TBL`) over discrete variables. Names that
+    /// Cassandra's format does not allow are changed, with a warning.
     ///
     /// # Errors
     /// [`ParseError`] with line and column, what was found and what is allowed.

@@ -113,19 +113,18 @@ impl Pomdp {
         let is_uniform = |row: &[(usize, f64)]| width > 1 && uniform(row);
         // The rows of one action; `*` stands for all.
         let mut write_action = |action: &str, a: usize, states: &[usize]| {
-            let whole = |is: &dyn Fn(usize, &[(usize, f64)]) -> bool| {
-                states.len() == n && states.iter().all(|&state| is(state, &row(a, state)))
-            };
-            if whole(&is_identity) {
+            let rows: Vec<_> = states.iter().map(|&state| (state, row(a, state))).collect();
+            let is_whole = rows.len() == n;
+            if is_whole && rows.iter().all(|(state, row)| is_identity(*state, row)) {
                 put(text, format_args!("{table}: {action} identity"));
                 return;
             }
-            if whole(&|_, row| is_uniform(row)) {
+            if is_whole && rows.iter().all(|(_, row)| is_uniform(row)) {
                 put(text, format_args!("{table}: {action} uniform"));
                 return;
             }
-            for &state in states {
-                let (name, row) = (&self.states()[state], row(a, state));
+            for (state, row) in rows {
+                let name = &self.states()[state];
                 if is_uniform(&row) {
                     put(text, format_args!("{table}: {action} : {name} uniform"));
                     continue;

@@ -1,6 +1,6 @@
 //! Every form of the grammar, each against the same model written out.
 
-#![allow(clippy::unwrap_used, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use vigil_decision::Pomdp;
 

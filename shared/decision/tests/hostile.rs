@@ -8,6 +8,11 @@ use vigil_decision::{Pomdp, Tracker};
 const MODEL: &str = "discount: 0.9\nstates: a b\nactions: go stay\nobservations: x y\n\
     start: 0.5 0.5\nT: go identity\nT: stay uniform\nO: * uniform\nR: * : * : * : * -1.5\n";
 
+/// What may stand after the places that a rule names.
+const TAILS: &str = "uniform|identity|reset|0|1|0.5|-2|1e-12|0.5 0.5|1 0 0 1|0.25 0.75 1 0|1 2 3 4";
+/// Makes most of what came before a model.
+const GOOD_END: &str = "T: * : a reset T: * : b : * 0.5 O: go uniform O: stay : * 0.5 0.5\n";
+
 proptest! {
     #[test]
     fn any_text_is_read_or_refused(text in ".{0,400}") {
@@ -22,6 +27,19 @@ proptest! {
         let text = format!("{}{with}{}", &MODEL[..at], &MODEL[end..]);
         if let Ok(model) = Pomdp::parse(&text) {
             prop_assert!(model.discount() >= 0.0 && model.discount() <= 1.0);
+        }
+    }
+
+    #[test]
+    fn any_rules_are_read_or_refused(
+        rules in prop::collection::vec(("[TOR]", "( ?: ?(\\*|[0-3]|go|a|b|x)){1,4}", TAILS), 0..12)
+    ) {
+        let rules: String = rules.iter().map(|(table, picks, tail)| {
+            format!("{table}{picks} {tail}\n")
+        }).collect();
+        let text = format!("{}{rules}{GOOD_END}", &MODEL[..MODEL.find("T:").unwrap()]);
+        if let Ok(model) = Pomdp::parse(&text) {
+            prop_assert_eq!(&model, &Pomdp::parse(&model.to_cassandra()).unwrap());
         }
     }
 

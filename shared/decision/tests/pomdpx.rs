@@ -155,79 +155,54 @@ fn factored_models_are_multiplied_out() {
     assert_eq!(model, Pomdp::parse(&model.to_cassandra()).unwrap());
 }
 
+/// What is replaced in the tiger, by what, and the error's place and part.
+const BROKEN: [[&str; 4]; 11] = [
+    ["type=\"TBL\"", "type=\"DD\"", "line 10", "'DD' is not read"],
+    ["0.15 0.85", "0.15", "line 21", "3 numbers, wanted are 4"],
+    ["0.15 0.85", "0.15 0.95", "line 19", "sums to 1.0999"],
+    ["0.85 0.15", "0.85 -0.15", "line 21", "allowed is 0 to 1"],
+    [
+        "listen - -",
+        "lissen - -",
+        "line 16",
+        "'lissen' is no value of 'a'",
+    ],
+    ["<Var>s1", "<Var>s2", "line 14", "'s2' is no variable"],
+    [
+        "a s0</Parent>",
+        "s1</Parent>",
+        "line 14",
+        "cannot depend on 's1'",
+    ],
+    ["0.95</Disc", "1.95</Disc", "line 4, column 1", "'1.95'"],
+    ["<Variable>", "<Variable", "line 6", "not XML"],
+    [
+        "<ValueEnum>left right</ValueEnum>",
+        "<NumValues>1000</NumValues>",
+        "line 21",
+        "4 numbers, wanted are 2000",
+    ],
+    [
+        "InitialStateBelief",
+        "Initial",
+        "line 2",
+        "InitialStateBelief",
+    ],
+];
+
 #[test]
 fn errors_name_the_place_and_what_is_allowed() {
-    let many = "<NumValues>1000</NumValues>";
-    let cases = [
-        (
-            tiger().replace("type=\"TBL\"", "type=\"DD\""),
-            "line 10",
-            "'DD' is not read",
-        ),
-        (
-            tiger().replace("0.15 0.85", "0.15"),
-            "line 21",
-            "3 numbers, wanted are 4",
-        ),
-        (
-            tiger().replace("0.15 0.85", "0.15 0.95"),
-            "line 19",
-            "sums to 1.0999",
-        ),
-        (
-            tiger().replace("0.85 0.15", "0.85 -0.15"),
-            "line 21",
-            "allowed is 0 to 1",
-        ),
-        (
-            tiger().replace("listen - -", "lissen - -"),
-            "line 16",
-            "'lissen' is no value of 'a'",
-        ),
-        (
-            tiger().replace("<Var>s1", "<Var>s2"),
-            "line 14",
-            "'s2' is no variable",
-        ),
-        (
-            tiger().replace("a s0</Parent>", "s1</Parent>"),
-            "line 14",
-            "cannot depend on 's1'",
-        ),
-        (
-            tiger().replace("0.95</Disc", "1.95</Disc"),
-            "line 4, column 1",
-            "'1.95'",
-        ),
-        (
-            tiger().replace("<Variable>", "<Variable"),
-            "line 6",
-            "not XML",
-        ),
-        (
-            tiger().replace("<ValueEnum>left right</ValueEnum>", many),
-            "line 21",
-            "4 numbers, wanted are 2000",
-        ),
-        (
-            tiger().replace("InitialStateBelief", "Initial"),
-            "line 2",
-            "InitialStateBelief",
-        ),
-        ("<pomdp/>".into(), "line 1, column 1", "wanted is <pomdpx>"),
-        (
-            factored().replace("<NumValues>3<", "<NumValues>60000<"),
-            "line 5",
-            "allowed are 100000",
-        ),
-        (
-            factored()
-                .replace("<Parent>null", "<Parent>charge0")
-                .replace("<Instance>-<", "<Instance>* -<"),
-            "line 12",
-            "depend on each other",
-        ),
-    ];
+    let mut cases: Vec<(String, &str, &str)> = Vec::new();
+    for [what, by, place, part] in BROKEN {
+        cases.push((tiger().replace(what, by), place, part));
+    }
+    let other = ("<pomdp/>".into(), "line 1, column 1", "wanted is <pomdpx>");
+    cases.push(other);
+    let text = factored().replace("<NumValues>3<", "<NumValues>60000<");
+    cases.push((text, "line 5", "allowed are 100000"));
+    let text = factored().replace("<Parent>null", "<Parent>charge0");
+    let text = text.replace("<Instance>-<", "<Instance>* -<");
+    cases.push((text, "line 12", "depend on each other"));
     for (text, place, part) in cases {
         let message = Pomdp::parse_pomdpx(&text).unwrap_err().to_string();
         let is_right = message.starts_with(place) && message.contains(part);

@@ -171,7 +171,7 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
             });
         }
         let Some(run) = runs.last_mut() else { continue };
-        follows(&table, run, &frame)?;
+        follows(&table, run, &frame, robot)?;
         frame.header.seq = run.frames.len() as u64;
         run.frames.push(frame);
     }
@@ -207,7 +207,12 @@ pub fn playback_rate_hz(runs: &[Run], speed: f64) -> Result<f64, String> {
     ))
 }
 
-fn follows(table: &Table, run: &Run, frame: &SensorFrame) -> Result<(), FramesError> {
+fn follows(
+    table: &Table,
+    run: &Run,
+    frame: &SensorFrame,
+    robot: &Description,
+) -> Result<(), FramesError> {
     let Some(before) = run.frames.last() else {
         return Ok(());
     };
@@ -238,7 +243,8 @@ fn follows(table: &Table, run: &Run, frame: &SensorFrame) -> Result<(), FramesEr
     let moved = (frame.pose[0] - before.pose[0]).hypot(frame.pose[1] - before.pose[1]);
     if moved > JUMP_M_MAX {
         let mut message = format!("the pose jumps by {moved:.2} m; allowed are {JUMP_M_MAX} m");
-        let commanded = before.command[1].abs() * gap_s;
+        let [forward, left, _] = robot.twist(&before.command);
+        let commanded = forward.hypot(left) * gap_s;
         if commanded > 0.0 {
             let factor = moved / commanded;
             message += &format!("; {factor:.0} times the commanded travel: are x and y in mm?");

@@ -3,23 +3,24 @@
 //! A healthy robot does roughly what it is commanded. Where it moves a thousand times as far, turns
 //! the other way or rolls on the wrong side, the columns hold something else than they should. Each
 //! figure is a ratio to the command over the whole of a stretch, so that sensor noise and soil
-//! leave it near 1; a doubt needs a ratio that no ground explains.
+//! leave it near 1; a doubt needs a ratio that no ground explains. What the command means says the
+//! robot's description ([`Description::twist`]); channels that are not measured are not judged, nor
+//! are the wheels of an omnidirectional robot, the senses of which differ from maker to maker.
+
+mod chords;
 
 use std::f64::consts::{PI, TAU};
 use std::fmt;
 
 use vigil_blocks::{SensorFrame, Valid};
-use vigil_inference::angle::wrap;
 use vigil_robot::Description;
-use vigil_robot::learned::wheels::rolling_rate;
+use vigil_robot::description::Kinematics;
 
 use crate::frames::Run;
+use chords::Chord;
 
 /// Speed from which a robot counts as commanded to move, m/s.
 const MOVING_M_S: f64 = 0.02;
-/// Least duration of a chord, s, and frames in it: a fifth of them is averaged at either end.
-const CHORD_S: f64 = 1.0;
-const CHORD_FRAMES: usize = 10;
 /// Commanded travel (m) and turn (rad) below which nothing is judged.
 const TRAVEL_MIN_M: f64 = 0.25;
 const TURN_MIN_RAD: f64 = 0.15;
@@ -27,6 +28,10 @@ const TURN_MIN_RAD: f64 = 0.15;
 const RATIO_MAX: f64 = 3.0;
 /// Curvature from which left and right wheels differ enough to be told apart, 1/m.
 const TURNING_1_M: f64 = 0.15;
+/// Frames from which wheel rates are judged.
+const FRAMES_MIN: usize = 20;
+/// Commanded motion at the beginning of a run in which it is judged what its columns mean, s.
+const BEGINNING_S: f64 = 3.0;
 
 /// What cannot be as the columns say.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,6 +44,8 @@ pub enum Doubt {
     Turn(f64),
     /// Every yaw is the same, this one, in a turn.
     YawConstant(f64),
+    /// The gyro turns so many times the commanded angle.
+    Gyro(f64),
     /// The wheels turn so many times as fast as they should roll.
     Rates(f64),
     /// Every rate of this wheel is the same, this one.
@@ -56,11 +63,15 @@ pub struct Doubtful {
     pub doubt: Doubt,
     /// Name of the wheel, where the doubt is about one.
     pub wheel: String,
+    /// Names of the command's axes that ask for speed and for turns.
+    pub axes: [String; 2],
 }
 
 impl fmt::Display for Doubtful {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "run {}: ", self.run)?;
+        let [_, turning] = &self.axes;
+        let unit = |ratio: f64, units: &[(f64, &str)]| self.unit(ratio, units);
         match self.doubt {
             Doubt::Travel(ratio) => {
                 write!(f, "x and y move {ratio:.4} times the commanded travel")?;
@@ -78,10 +89,19 @@ impl fmt::Display for Doubtful {
                 if ratio < 0.0 {
                     return write!(
                         f,
-                        ": is yaw or cmd_curv positive to the right? Left is positive"
+                        ": is yaw or {turning} positive to the right? Left is positive"
                     );
                 }
                 write!(f, "{}", unit(ratio, &TURN_UNITS))
+            }
+            Doubt::Gyro(ratio) => {
+                write!(f, "yaw_rate is {ratio:.3} times the commanded one")?;
+                write!(f, "; 1 is expected")?;
+                if ratio < 0.0 {
+                    let question = "positive to the right? Left is positive";
+                    return write!(f, ": is yaw_rate or {turning} {question}");
+                }
+                write!(f, "{}", unit(ratio, &GYRO_UNITS))
             }
             Doubt::YawConstant(yaw) => {
                 write!(f, "yaw is {yaw} throughout, though a turn is commanded")
@@ -107,40 +127,52 @@ impl fmt::Display for Doubtful {
                 )?;
                 write!(
                     f,
-                    "are their columns exchanged, or is cmd_curv positive to the right?"
+                    "are their columns exchanged, or is {turning} positive to the right?"
                 )
             }
         }
     }
 }
 
-/// Factors that units make, and the units.
+/// Factors that units make, and the units; `{speed}` and `{turn}` stand for the command's axes.
 const TRAVEL_UNITS: [(f64, &str); 6] = [
-    (1000.0, "x and y in mm (or cmd_speed in km/s)"),
+    (1000.0, "x and y in mm (or {speed} in km/s)"),
     (100.0, "x and y in cm"),
     (39.37, "x and y in inches"),
     (3.281, "x and y in feet"),
-    (0.01, "cmd_speed in cm/s"),
-    (0.001, "t in ms, cmd_speed in mm/s, or x and y in km"),
+    (0.01, "{speed} in cm/s"),
+    (0.001, "t in ms, {speed} in mm/s, or x and y in km"),
 ];
-const TURN_UNITS: [(f64, &str); 2] = [
+const TURN_UNITS: [(f64, &str); 3] = [
     (180.0 / PI, "yaw in degrees"),
-    (0.001, "t in ms, cmd_speed in mm/s or cmd_curv in 1/km"),
+    (PI / 180.0, "{turn} in degrees"),
+    (0.001, "t in ms, {speed} in mm/s or {turn} in thousandths"),
+];
+const GYRO_UNITS: [(f64, &str); 3] = [
+    (180.0 / PI, "yaw_rate in deg/s"),
+    (PI / 180.0, "{turn} in degrees"),
+    (1000.0, "yaw_rate in mrad/s"),
 ];
 const RATE_UNITS: [(f64, &str); 5] = [
     (180.0 / PI, "rates in deg/s"),
     (60.0 / TAU, "rates in rpm"),
     (1.0 / TAU, "rates in revolutions per second"),
-    (0.001, "cmd_speed in mm/s"),
+    (0.001, "{speed} in mm/s"),
     (-1.0, "rates of the other sign"),
 ];
 
-/// Names the unit whose factor is within a fifth of the ratio.
-fn unit(ratio: f64, units: &[(f64, &str)]) -> String {
-    let near = |factor: f64| (0.8..1.25).contains(&(ratio / factor));
-    match units.iter().find(|(factor, _)| near(*factor)) {
-        Some((_, name)) => format!(": {name}?"),
-        None => String::new(),
+impl Doubtful {
+    /// Names the unit whose factor is within a fifth of the ratio.
+    fn unit(&self, ratio: f64, units: &[(f64, &str)]) -> String {
+        let near = |factor: f64| (0.8..1.25).contains(&(ratio / factor));
+        let [speed, turn] = &self.axes;
+        match units.iter().find(|(factor, _)| near(*factor)) {
+            Some((_, name)) => {
+                let name = name.replace("{speed}", speed).replace("{turn}", turn);
+                format!(": {name}?")
+            }
+            None => String::new(),
+        }
     }
 }
 
@@ -148,23 +180,88 @@ fn unit(ratio: f64, units: &[(f64, &str)]) -> String {
 /// healthy. None if all is well or the stretch tells nothing.
 #[must_use]
 pub fn doubt(run: &Run, robot: &Description, until_s: f64) -> Option<Doubtful> {
-    let moving: Vec<&SensorFrame> = run
-        .frames
-        .iter()
-        .take_while(|frame| frame.header.t_capture_ns as f64 * 1e-9 <= until_s)
-        .filter(|frame| frame.command[1].abs() >= MOVING_M_S)
+    let moves = |frame: &&SensorFrame| is_moving(frame, robot);
+    let until = |frame: &&SensorFrame| seconds(frame) <= until_s;
+    let frames: Vec<&SensorFrame> = run.frames.iter().take_while(until).collect();
+    let pieces: Vec<&[&SensorFrame]> = frames
+        .chunk_by(|a, b| moves(a) == moves(b))
+        .filter(|piece| piece.first().is_some_and(moves))
         .collect();
-    let found = doubt_pose(&moving).or_else(|| doubt_wheels(&moving, robot))?;
+    let found = doubt_pose(&pieces, robot)
+        .or_else(|| doubt_gyro(&pieces, robot))
+        .or_else(|| doubt_wheels(&pieces, robot))?;
     let wheel = match found {
-        Doubt::RateConstant(wheel, _) => robot.wheels[wheel].name.clone(),
-        _ => String::new(),
+        Doubt::RateConstant(wheel, _) => robot.wheels.get(wheel).map(|wheel| wheel.name.clone()),
+        _ => None,
     };
-    let run = run.id;
+    let [speed, turn] = match robot.kinematics {
+        Kinematics::Ackermann6 => [1, 0],
+        Kinematics::Differential => [0, 1],
+        Kinematics::Omni3 => [0, 2],
+    };
+    let axis = |i: usize| {
+        robot
+            .command
+            .get(i)
+            .map_or("the command", |axis| &axis.name)
+    };
     Some(Doubtful {
-        run,
+        run: run.id,
         doubt: found,
-        wheel,
+        wheel: wheel.unwrap_or_default(),
+        axes: [axis(speed).to_owned(), axis(turn).to_owned()],
     })
+}
+
+/// What the beginnings of most runs have in common, so that single runs that begin with a fault are
+/// no reason to doubt the columns. Each run comes with the time until which it may be healthy, s.
+#[must_use]
+pub fn warnings<'a>(
+    runs: impl IntoIterator<Item = (&'a Run, f64)>,
+    robot: &Description,
+) -> Vec<String> {
+    let (mut doubts, mut all) = (Vec::new(), 0);
+    for (run, healthy_s) in runs {
+        all += 1;
+        doubts.extend(doubt(run, robot, beginning_s(run, robot).min(healthy_s)));
+    }
+    let found = doubts.len();
+    match doubts.first().filter(|_| 2 * found >= all) {
+        None => Vec::new(),
+        Some(first) => vec![
+            first.to_string(),
+            format!(
+                "{found} of {all} runs begin like this: unless all are faulty, verdicts are wrong"
+            ),
+        ],
+    }
+}
+
+/// Time at which a run has been told to move for [`BEGINNING_S`], s.
+fn beginning_s(run: &Run, robot: &Description) -> f64 {
+    let mut moved_s = 0.0;
+    for pair in run.frames.windows(2) {
+        let [before, now] = pair else { continue };
+        if is_moving(now, robot) {
+            moved_s += seconds(now) - seconds(before);
+        }
+        if moved_s >= BEGINNING_S {
+            return seconds(now);
+        }
+    }
+    f64::INFINITY
+}
+
+fn is_moving(frame: &SensorFrame, robot: &Description) -> bool {
+    robot.path_speed_m_s(robot.twist(&frame.command)) >= MOVING_M_S
+}
+
+fn seconds(frame: &SensorFrame) -> f64 {
+    frame.header.t_capture_ns as f64 * 1e-9
+}
+
+fn is_doubtful(ratio: f64) -> bool {
+    !(1.0 / RATIO_MAX..=RATIO_MAX).contains(&ratio)
 }
 
 /// Sums over the chords of a stretch.
@@ -174,131 +271,178 @@ struct Driven {
     commanded_m: f64,
     turn_rad: f64,
     commanded_rad: f64,
-    /// Displacement along and to the left of the heading, in the direction commanded.
+    /// Displacement along the commanded direction and to its left.
     along_m: f64,
     left_m: f64,
 }
 
-fn doubt_pose(frames: &[&SensorFrame]) -> Option<Doubt> {
-    let driven = driven(frames);
-    if driven.commanded_m < TRAVEL_MIN_M {
+impl Driven {
+    fn add(&mut self, chord: &Chord<'_>, robot: &Description) {
+        let twist = chord.mean_twist(robot);
+        let (duration_s, [x, y, turn]) = (chord.duration_s(), chord.moved());
+        let speed = twist[0].hypot(twist[1]);
+        let commanded = twist[2] * duration_s;
+        self.turn_rad += turn * commanded.signum();
+        self.commanded_rad += commanded.abs();
+        // A turn in place goes nowhere.
+        if speed >= MOVING_M_S {
+            let (sin, cos) = twist[1].atan2(twist[0]).sin_cos();
+            self.travel_m += x.hypot(y);
+            self.commanded_m += speed * duration_s;
+            self.along_m += x * cos + y * sin;
+            self.left_m += y * cos - x * sin;
+        }
+    }
+}
+
+fn doubt_pose(pieces: &[&[&SensorFrame]], robot: &Description) -> Option<Doubt> {
+    if !have(pieces, Valid::POSE) {
         return None;
     }
-    let travel = driven.travel_m / driven.commanded_m;
-    if !(1.0 / RATIO_MAX..=RATIO_MAX).contains(&travel) {
-        return Some(Doubt::Travel(travel));
+    let mut driven = Driven::default();
+    chords::of(pieces).for_each(|chord| driven.add(&chord, robot));
+    if driven.commanded_m >= TRAVEL_MIN_M {
+        let travel = driven.travel_m / driven.commanded_m;
+        if is_doubtful(travel) {
+            return Some(Doubt::Travel(travel));
+        }
     }
     if driven.commanded_rad >= TURN_MIN_RAD {
-        let first = frames.first()?.pose[2];
-        if frames.iter().all(|frame| frame.pose[2] == first) {
+        let mut yaws = pieces
+            .iter()
+            .flat_map(|p| p.iter())
+            .map(|frame| frame.pose[2]);
+        let first = yaws.next()?;
+        if yaws.all(|yaw| yaw == first) {
             return Some(Doubt::YawConstant(first));
         }
         let turn = driven.turn_rad / driven.commanded_rad;
-        if !(1.0 / RATIO_MAX..=RATIO_MAX).contains(&turn) {
+        if is_doubtful(turn) {
             return Some(Doubt::Turn(turn));
         }
+    }
+    if driven.commanded_m < TRAVEL_MIN_M {
+        return None;
     }
     let angle = driven.left_m.atan2(driven.along_m);
     (angle.abs() > 0.5).then_some(Doubt::Heading(angle))
 }
 
-fn seconds(frame: &SensorFrame) -> f64 {
-    frame.header.t_capture_ns as f64 * 1e-9
+/// True if every frame holds a channel.
+fn have(pieces: &[&[&SensorFrame]], bit: u64) -> bool {
+    pieces
+        .iter()
+        .flat_map(|p| p.iter())
+        .all(|frame| frame.has(bit))
 }
 
-fn driven(frames: &[&SensorFrame]) -> Driven {
-    let mut out = Driven::default();
-    let mut from = 0;
-    while let Some(start) = frames.get(from) {
-        let until = seconds(start) + CHORD_S;
-        let Some(long) = frames[from..].iter().position(|f| seconds(f) >= until) else {
-            break;
-        };
-        let to = from + long.max(CHORD_FRAMES);
-        let Some(chord) = frames.get(from..=to) else {
-            break;
-        };
-        out.add(chord);
-        from = to;
-    }
-    out
-}
-
-impl Driven {
-    fn add(&mut self, chord: &[&SensorFrame]) {
-        let end = chord.len().div_ceil(5);
-        let (start, start_s) = mean(&chord[..end]);
-        let (stop, stop_s) = mean(&chord[chord.len() - end..]);
-        let speed = chord.iter().map(|f| f.command[1]).sum::<f64>() / chord.len() as f64;
-        let curved: f64 = chord.iter().map(|f| f.command[0] * f.command[1]).sum();
-        let commanded = curved / chord.len() as f64 * (stop_s - start_s);
-        let (dx, dy) = (stop[0] - start[0], stop[1] - start[1]);
-        let turn = wrap(stop[2] - start[2]);
-        let (sin, cos) = (start[2] + 0.5 * turn).sin_cos();
-        self.travel_m += dx.hypot(dy);
-        self.commanded_m += speed.abs() * (stop_s - start_s);
-        self.turn_rad += turn * commanded.signum();
-        self.commanded_rad += commanded.abs();
-        self.along_m += (dx * cos + dy * sin) * speed.signum();
-        self.left_m += (dy * cos - dx * sin) * speed.signum();
-    }
-}
-
-/// Mean pose and mean time.
-fn mean(frames: &[&SensorFrame]) -> ([f64; 3], f64) {
-    let Some(first) = frames.first() else {
-        return ([0.0; 3], 0.0);
-    };
-    let count = frames.len() as f64;
-    let apart = |axis: usize, frame: &SensorFrame| match axis {
-        2 => wrap(frame.pose[2] - first.pose[2]),
-        _ => frame.pose[axis] - first.pose[axis],
-    };
-    let axis = |axis: usize| {
-        let sum: f64 = frames.iter().map(|frame| apart(axis, frame)).sum();
-        first.pose[axis] + sum / count
-    };
-    let time = frames.iter().map(|frame| seconds(frame)).sum::<f64>() / count;
-    ([axis(0), axis(1), axis(2)], time)
-}
-
-fn doubt_wheels(frames: &[&SensorFrame], robot: &Description) -> Option<Doubt> {
-    let wheels = robot.wheels.len();
-    let has = |wheel| {
-        frames
-            .iter()
-            .all(|frame| frame.has(Valid::wheel_rate(wheel)))
-    };
-    if frames.len() < 20 || !(0..wheels).all(has) {
+fn doubt_gyro(pieces: &[&[&SensorFrame]], robot: &Description) -> Option<Doubt> {
+    if !have(pieces, Valid::YAW_RATE) {
         return None;
     }
-    let rolling =
-        |wheel, frame: &SensorFrame| rolling_rate(robot, wheel, frame.command[0], frame.command[1]);
-    let mut ratios: Vec<f64> = Vec::new();
-    for wheel in 0..wheels {
-        let first = frames[0].wheel_rate[wheel];
-        if frames.iter().all(|frame| frame.wheel_rate[wheel] == first) {
-            return Some(Doubt::RateConstant(wheel, first));
+    let (mut turned_rad, mut found, mut expected) = (0.0, 0.0, 0.0);
+    for chord in chords::of(pieces) {
+        let commanded = chord.mean_twist(robot)[2];
+        turned_rad += commanded.abs() * chord.duration_s();
+        found += chord.mean(|frame| frame.yaw_rate) * commanded;
+        expected += commanded * commanded;
+    }
+    let ratio = found / expected;
+    (turned_rad >= TURN_MIN_RAD && is_doubtful(ratio)).then_some(Doubt::Gyro(ratio))
+}
+
+/// Rates at which the wheels roll without slip, rad/s; none where that depends on how they are
+/// built in.
+fn rolling(robot: &Description, wheel: usize, command: &[f64]) -> Option<f64> {
+    let [speed, _, turn] = robot.twist(command);
+    match robot.kinematics {
+        Kinematics::Ackermann6 => {
+            let curvature = command.first().copied().unwrap_or(0.0);
+            let rate = vigil_robot::learned::wheels::rolling_rate;
+            Some(rate(robot, wheel, curvature, speed))
         }
-        let found: f64 = frames.iter().map(|frame| frame.wheel_rate[wheel]).sum();
-        let expected: f64 = frames.iter().map(|frame| rolling(wheel, frame)).sum();
+        Kinematics::Differential => {
+            let y = robot.wheels.get(wheel)?.y;
+            Some((speed - y * turn) / robot.wheel_radius_m)
+        }
+        Kinematics::Omni3 => None,
+    }
+}
+
+/// The command for the same turn to the other side.
+fn mirrored(robot: &Description, frame: &SensorFrame) -> Vec<f64> {
+    let mut command = frame.command.to_vec();
+    let turn = match robot.kinematics {
+        Kinematics::Ackermann6 => 0,
+        Kinematics::Differential => 1,
+        Kinematics::Omni3 => 2,
+    };
+    if let Some(turn) = command.get_mut(turn) {
+        *turn = -*turn;
+    }
+    command
+}
+
+fn doubt_wheels(pieces: &[&[&SensorFrame]], robot: &Description) -> Option<Doubt> {
+    let frames: Vec<&SensorFrame> = pieces.iter().flat_map(|p| p.iter().copied()).collect();
+    let wheels = 0..robot.wheels.len();
+    if frames.len() < FRAMES_MIN || !wheels.clone().all(|i| have(pieces, Valid::wheel_rate(i))) {
+        return None;
+    }
+    if let Some(constant) = constant_wheel(&frames, robot) {
+        return Some(constant);
+    }
+    let mut ratios: Vec<f64> = Vec::new();
+    for wheel in wheels.clone() {
+        let (mut found, mut expected) = (0.0, 0.0);
+        for chord in chords::of(pieces) {
+            rolling(robot, wheel, &[])?;
+            let rate = chord.mean(|f| rolling(robot, wheel, &f.command).unwrap_or(0.0));
+            found += chord.mean(|frame| frame.wheel_rate[wheel]) * rate;
+            expected += rate * rate;
+        }
         ratios.push(found / expected);
     }
     ratios.sort_by(f64::total_cmp);
-    let middle = ratios.get(wheels / 2).copied().filter(|r| r.is_finite())?;
-    if !(1.0 / RATIO_MAX..=RATIO_MAX).contains(&middle) {
+    let middle = ratios.get(ratios.len() / 2).copied();
+    let middle = middle.filter(|ratio| ratio.is_finite())?;
+    if is_doubtful(middle) {
         return Some(Doubt::Rates(middle));
     }
-    // With the curvature's sign changed a wheel rolls as the one opposite does.
+    // With the turn's sign changed a wheel rolls as the one opposite does.
     let (mut as_named, mut exchanged, mut turning) = (0.0, 0.0, 0);
-    for frame in frames.iter().filter(|f| f.command[0].abs() >= TURNING_1_M) {
+    for frame in frames {
+        let [forward, left, turn] = robot.twist(&frame.command);
+        if turn.abs() < TURNING_1_M * forward.hypot(left) {
+            continue;
+        }
         turning += 1;
-        for wheel in 0..wheels {
+        let other = mirrored(robot, frame);
+        for wheel in wheels.clone() {
             let rate = frame.wheel_rate[wheel];
-            let other = rolling_rate(robot, wheel, -frame.command[0], frame.command[1]);
-            as_named += (rate - rolling(wheel, frame)).powi(2);
-            exchanged += (rate - other).powi(2);
+            as_named += (rate - rolling(robot, wheel, &frame.command)?).powi(2);
+            exchanged += (rate - rolling(robot, wheel, &other)?).powi(2);
         }
     }
-    (turning >= 20 && exchanged < 0.5 * as_named).then_some(Doubt::Sides)
+    (turning >= FRAMES_MIN && exchanged < 0.5 * as_named).then_some(Doubt::Sides)
+}
+
+/// A wheel that reads the same throughout, though it is told to roll; where that is not known, all
+/// of them must.
+fn constant_wheel(frames: &[&SensorFrame], robot: &Description) -> Option<Doubt> {
+    let first = frames.first()?;
+    let is_constant = |wheel: usize| {
+        let mut rates = frames.iter().map(|frame| frame.wheel_rate[wheel]);
+        rates.all(|rate| rate == first.wheel_rate[wheel])
+    };
+    let mut wheels = 0..robot.wheels.len();
+    let rolls = |wheel: usize| {
+        let told = |frame: &&SensorFrame| rolling(robot, wheel, &frame.command);
+        frames.iter().filter_map(told).any(|rate| rate != 0.0)
+    };
+    let constant = match robot.kinematics {
+        Kinematics::Omni3 => wheels.clone().all(is_constant).then_some(0),
+        _ => wheels.find(|&wheel| rolls(wheel) && is_constant(wheel)),
+    }?;
+    Some(Doubt::RateConstant(constant, first.wheel_rate[constant]))
 }

@@ -230,3 +230,51 @@ fn the_shipped_descriptions_can_be_read() {
         assert_eq!(robot.name, name);
     }
 }
+
+#[test]
+fn a_gap_is_told_by_file_row_and_column_of_the_user() {
+    let folder = TempDir::new().unwrap();
+    // Rows 200 to 259 are missing; row 100 comes twice.
+    write(&folder.path().join("run0"), |text| {
+        let lines: Vec<&str> = text.lines().collect();
+        let kept = [&lines[..102], &lines[101..201], &lines[261..]].concat();
+        kept.iter()
+            .fold(String::new(), |all, line| all + line + "\n")
+    });
+    let mut log = log();
+    log.channel[4].delay_s = vigil_evaluation::import::Delay::Given(0.1);
+    log.source[0].device_clock = None;
+    let message = import(&log, &robot(), folder.path())
+        .unwrap_err()
+        .to_string();
+    // Two lines before the first row, and the row that comes twice: the one after the gap is 201.
+    assert!(
+        message.contains("run0/base.csv: row 201: column left: a gap of 1.2"),
+        "{message}"
+    );
+}
+
+#[test]
+fn rows_out_of_order_are_put_in_order_and_counted() {
+    let folder = TempDir::new().unwrap();
+    write(&folder.path().join("run0"), |text| text);
+    let gyro = folder.path().join("run0/gyro.csv");
+    let text = fs::read_to_string(&gyro).unwrap();
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines.swap(100, 102);
+    lines.swap(300, 301);
+    let mut log = log();
+    log.channel[4].delay_s = vigil_evaluation::import::Delay::Given(0.1);
+    let ordered = import(&log, &robot(), folder.path()).unwrap();
+    assert!(ordered.runs[0].disorder.is_empty());
+    fs::write(&gyro, lines.join("\n")).unwrap();
+    let found = import(&log, &robot(), folder.path()).unwrap();
+    assert_eq!(found.runs[0].rows, ordered.runs[0].rows);
+    let [disorder] = &found.runs[0].disorder[..] else {
+        unreachable!("one clock is out of order")
+    };
+    assert!(disorder.path.ends_with("run0/gyro.csv") && disorder.column == "t");
+    // 102 101 100 goes back twice, 301 300 once.
+    assert_eq!((disorder.rows, disorder.first_row), (3, 101));
+    assert!((disorder.back_s - 0.02).abs() < 1e-9, "{disorder:?}");
+}

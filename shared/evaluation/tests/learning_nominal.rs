@@ -205,3 +205,43 @@ fn commands_outside_the_learned_range_widen_the_noise() {
     }
     assert!(monitor.is_extrapolating());
 }
+
+#[test]
+fn columns_that_mean_something_else_are_refused_in_the_words_of_the_description() {
+    let refused = |change: &dyn Fn(&mut SensorFrame)| {
+        let mut run = run(3, 60.0, weave, Fault::None);
+        run.frames.iter_mut().for_each(change);
+        let refused = learn(&[run], &[], f64::INFINITY, &robot()).unwrap_err();
+        assert!(matches!(refused, NominalError::Doubtful(_)), "{refused}");
+        refused.to_string()
+    };
+    let message = refused(&|frame| frame.yaw_rate = frame.yaw_rate.to_degrees());
+    assert!(message.contains("yaw_rate in deg/s?"), "{message}");
+    let message = refused(&|frame| frame.yaw_rate *= -1.0);
+    assert!(
+        message.contains("is yaw_rate or w positive to the right?"),
+        "{message}"
+    );
+    let message = refused(&|frame| frame.wheel_rate.swap(0, 1));
+    assert!(
+        message.contains("exchanged, or is w positive to the right?"),
+        "{message}"
+    );
+    let message = refused(&|frame| frame.command[0] *= 1000.0);
+    assert!(message.contains("v in mm/s?"), "{message}");
+    let message = refused(&|frame| frame.wheel_rate[1] = 3.0);
+    assert!(message.contains("enc_R is 3 throughout"), "{message}");
+}
+
+#[test]
+fn one_doubtful_run_among_many_is_told_and_learned_from() {
+    let mut runs: Vec<Run> = (0..5).map(|id| run(id, 60.0, weave, Fault::None)).collect();
+    runs[2]
+        .frames
+        .iter_mut()
+        .for_each(|frame| frame.yaw_rate *= -1.0);
+    let (_, report) = learn(&runs, &[], f64::INFINITY, &robot()).unwrap();
+    let told =
+        |w: &String| w.starts_with("1 of 5 runs are doubtful") && w.contains("run 2: yaw_rate");
+    assert!(report.warnings.iter().any(told), "{:?}", report.warnings);
+}

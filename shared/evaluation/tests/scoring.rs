@@ -6,6 +6,8 @@ mod rover;
 use rover::{robot, tree};
 use vigil_evaluation::labels::Label;
 use vigil_evaluation::scoring::{Case, Claims, Ratio, Score, Side, Taxonomy, Verdict, score};
+use vigil_inference::FaultTree;
+use vigil_inference::tree::Node;
 
 /// Threshold of the hand-made verdicts' alarms, which have log-odds of 20 while they stand, -20
 /// otherwise.
@@ -331,4 +333,56 @@ fn no_runs_give_a_score_without_fractions() {
     let score = scored(&[silent]);
     assert_eq!(score.detection["all"].missed, 1);
     assert_eq!(score.identification["all"].leaf.at_end, ratio(0, 0));
+}
+
+#[test]
+fn the_detectors_warm_up_is_no_exposure() {
+    let mut cases = alarms();
+    for verdict in cases.iter_mut().flat_map(|case| &mut case.verdicts) {
+        verdict.warming_up = verdict.t_s < 1.05;
+    }
+    let found = &scored(&cases).false_alarms;
+    // Of each of the seven runs the part from 0.1 to 1.0 s.
+    let (exposure_s, warm_up_s) = (2.0 * 9.9 + 5.0 * 3.8 - 7.0 * 0.9, 7.0 * 0.9);
+    assert!((found.exposure_h * 3600.0 - exposure_s).abs() < 1e-9);
+    assert!((found.warm_up_h * 3600.0 - warm_up_s).abs() < 1e-9);
+    let rate = found.rate.false_alarms_per_h.unwrap();
+    assert!((rate - found.alarms as f64 * 3600.0 / exposure_s).abs() < 1e-6);
+    assert!(scored(&cases).to_string().contains("h of warm-up"));
+}
+
+#[test]
+fn a_model_of_nominal_behaviour_is_scored_by_fault_or_no_fault() {
+    let nominal = Node {
+        name: "ND".into(),
+        parent: None,
+        fault: None,
+    };
+    let tree = FaultTree::new(vec![nominal]).unwrap();
+    let mut cases = alarms();
+    for case in &mut cases {
+        for verdict in &mut case.verdicts {
+            verdict.mode = if verdict.alarm { "UNKNOWN" } else { "ND" }.into();
+        }
+    }
+    let score = score(&cases, &Taxonomy::new(&tree, &robot()), ALARM);
+    assert!(!score.identifies && scored(&cases).identifies);
+    assert_eq!(score.detection["all"], scored(&cases).detection["all"]);
+    assert_eq!(score.false_alarms, scored(&cases).false_alarms);
+    let modes = cases
+        .iter()
+        .filter(|case| !case.label.is_nominal())
+        .map(|case| &case.label.mode);
+    for mode in modes {
+        assert!(score.detection[mode].n > 0, "{mode} is a class of its own");
+    }
+    assert!(score.identification.is_empty() && score.calibration.is_empty());
+    assert!(score.confusion_by.side.is_empty() && score.confusion_by.class.is_empty());
+    let reported = score.confusion.values().flat_map(|row| row.keys());
+    assert!(
+        reported
+            .into_iter()
+            .all(|mode| mode == "ND" || mode == "UNKNOWN")
+    );
+    assert!(score.to_string().contains("do not apply"));
 }

@@ -159,3 +159,16 @@ fn a_long_curve_is_thinned_and_keeps_its_ends() {
     assert_eq!((levels[0], levels[30], levels[59]), (1.0, 470.0, 499.0));
     assert!(levels.windows(2).all(|pair| pair[1] - pair[0] < 18.0));
 }
+
+#[test]
+fn no_alarm_rises_while_the_detector_warms_up_and_that_time_is_no_exposure() {
+    let mut cases = cases();
+    for verdict in &mut cases[0].verdicts {
+        verdict.warming_up = verdict.t_s < 21.95;
+    }
+    let found = trade_off(&cases, 2.5).configured;
+    // The rise at 20 s does not count, that at 23 s does.
+    assert_eq!(found.false_alarms, 1);
+    let exposure_h = (36.1 - 21.9 + 3.0 * 9.8) / 3600.0;
+    near(found.rate.false_alarms_per_h, 1.0 / exposure_h);
+}

@@ -18,7 +18,7 @@ use crate::logspace::log_add;
 use crate::onsets::{Onset, Onsets};
 
 /// Log-odds beyond which more evidence changes nothing.
-const LOG_ODDS_MAX: f64 = 700.0;
+pub const LOG_ODDS_MAX: f64 = 700.0;
 
 /// A fault that began at one of some successive steps.
 #[derive(Debug, Clone, Copy, PartialEq)]

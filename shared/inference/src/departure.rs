@@ -15,7 +15,7 @@ use crate::onsets::{Onset, Onsets};
 use crate::track::{Displacement, MotionNoise, Track};
 
 /// Log-odds beyond which more evidence changes nothing, but delays recovery.
-const LOG_ODDS_MAX: f64 = 40.0;
+pub const LOG_ODDS_MAX: f64 = 40.0;
 /// Components less probable than this, by their log-odds, are dropped.
 const LOG_ODDS_MIN: f64 = -30.0;
 

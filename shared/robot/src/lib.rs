@@ -4,16 +4,19 @@
 //! configuration); its behaviour is either simulated ([`slip`]) or learned: with its faults
 //! ([`learned`]), or its nominal behaviour alone ([`nominal`]).
 
+pub mod alarm;
 pub mod description;
 pub mod disturbance;
 pub mod fault;
 pub mod injection;
 pub mod kinematics;
 pub mod learned;
+mod model_file;
 pub mod nominal;
 mod robot_model;
 pub mod slip;
 
+pub use alarm::{Alarm, AlarmError};
 pub use description::Description;
 pub use disturbance::{Disturbance, DisturbanceKind};
 pub use fault::{Fault, FaultKind};

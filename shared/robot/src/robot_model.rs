@@ -1,9 +1,10 @@
 //! A learned model of either kind.
 
-use crate::Description;
 use crate::learned::model::Provenance;
-use crate::learned::{self, ModelError};
+use crate::learned::monitor::Channels;
+use crate::learned::{self, Calibration, Form, ModelError};
 use crate::nominal;
+use crate::{AlarmError, Description};
 
 /// What was learned of a robot.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,7 +38,7 @@ impl RobotModel {
         }
     }
 
-    /// Hash over the file's text; equal for equal models.
+    /// Hash over the content; equal for equal models.
     #[must_use]
     pub fn hash(&self) -> u64 {
         match self {
@@ -63,6 +64,34 @@ impl RobotModel {
         match self {
             Self::Faults(model) => &model.provenance,
             Self::Nominal(model) => &model.provenance,
+        }
+    }
+
+    /// The calibration for a set of channels and a form of detection.
+    ///
+    /// # Errors
+    /// [`ModelError::Calibration`].
+    pub fn calibration(&self, channels: Channels, form: Form) -> Result<&Calibration, ModelError> {
+        match self {
+            Self::Faults(model) => model.calibration(channels, form),
+            Self::Nominal(model) => model.calibration(channels, form),
+        }
+    }
+
+    /// Log-odds at which to alarm, so that `interval_h` pass on average between false alarms at a
+    /// prior fault rate of `fault_rate_1_h`.
+    ///
+    /// # Errors
+    /// [`AlarmError`].
+    pub fn alarm_log_odds(
+        &self,
+        of: (Channels, Form),
+        interval_h: f64,
+        fault_rate_1_h: f64,
+    ) -> Result<f64, AlarmError> {
+        match self {
+            Self::Faults(model) => model.alarm_log_odds(of, interval_h, fault_rate_1_h),
+            Self::Nominal(model) => model.alarm_log_odds(of, interval_h, fault_rate_1_h),
         }
     }
 

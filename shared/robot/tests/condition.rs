@@ -1,49 +1,15 @@
 //! The slip model on a rover that is not as built: forces and moments recomputed from the solution.
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use vigil_robot::Description;
-use vigil_robot::description::{Kinematics, Limits, SensorNoise, Wheel};
+mod rover;
+
+use rover::rover;
 use vigil_robot::slip::shear::Contact;
 use vigil_robot::slip::{Condition, Situation, SlipModel, Soil, WheelCondition};
 
 const X: [f64; 6] = [0.35, 0.0, -0.35, 0.35, 0.0, -0.35];
 const Y: [f64; 6] = [0.30, 0.30, 0.30, -0.30, -0.30, -0.30];
 const WEIGHT_N: f64 = 14.2 * 9.81;
-
-fn rover() -> Description {
-    let wheels = (0..6).map(|i| Wheel {
-        name: i.to_string(),
-        x: X[i],
-        y: Y[i],
-        steered: X[i] != 0.0,
-    });
-    Description {
-        name: "rover".to_owned(),
-        kinematics: Kinematics::Ackermann6,
-        command: Vec::new(),
-        measured: vigil_robot::description::Measured::default(),
-        polynomial_order: 4,
-        interval_s: 0.1,
-        wheel_radius_m: 0.08,
-        mass_kg: 14.2,
-        wheels: wheels.collect(),
-        noise: SensorNoise {
-            reference_rate_hz: 20.0,
-            position_m: 0.0,
-            yaw_rad: 0.0,
-            yaw_rate_rad_s: 0.0,
-            wheel_rate_rad_s: 0.0,
-            steer_rad: 0.0,
-            current_a: 0.0,
-        },
-        limits: Limits {
-            curvature_1_m: 1.2,
-            speed_m_s: 0.5,
-            yaw_rate_rad_s: 2.0,
-            wheel_rate_rad_s: 40.0,
-        },
-    }
-}
 
 fn situation(condition: Condition) -> Situation {
     Situation {

@@ -1,45 +1,18 @@
 //! The text and the numbers of faults and disturbances.
 #![allow(clippy::unwrap_used, missing_docs)]
 
+mod rover;
+
 use vigil_blocks::Event;
-use vigil_robot::description::{Kinematics, Limits, SensorNoise, Wheel};
 use vigil_robot::disturbance::{Disturbance, KINDS, Place};
 use vigil_robot::injection::{Change, Wire};
 use vigil_robot::{Description, DisturbanceKind, Injection};
 
+/// A rover of which only the first two wheels are left.
 fn rover() -> Description {
-    let wheel = |name: &str, steered| Wheel {
-        name: name.to_owned(),
-        x: 0.0,
-        y: 0.0,
-        steered,
-    };
-    Description {
-        name: "rover".to_owned(),
-        kinematics: Kinematics::Ackermann6,
-        command: Vec::new(),
-        measured: vigil_robot::description::Measured::default(),
-        polynomial_order: 4,
-        interval_s: 0.1,
-        wheel_radius_m: 0.08,
-        mass_kg: 14.2,
-        wheels: vec![wheel("LF", true), wheel("LM", false)],
-        noise: SensorNoise {
-            reference_rate_hz: 20.0,
-            position_m: 0.0,
-            yaw_rad: 0.0,
-            yaw_rate_rad_s: 0.0,
-            wheel_rate_rad_s: 0.0,
-            steer_rad: 0.0,
-            current_a: 0.0,
-        },
-        limits: Limits {
-            curvature_1_m: 1.0,
-            speed_m_s: 1.0,
-            yaw_rate_rad_s: 1.0,
-            wheel_rate_rad_s: 1.0,
-        },
-    }
+    let mut robot = rover::rover();
+    robot.wheels.truncate(2);
+    robot
 }
 
 fn parse(text: &str) -> Result<Change, String> {

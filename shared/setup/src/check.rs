@@ -3,15 +3,14 @@
 use std::path::Path;
 
 use vigil_blocks::WHEELS;
-use vigil_robot::Description;
+use vigil_decision::policy::PolicyName;
 use vigil_robot::description::Kinematics;
+use vigil_robot::{AlarmError, Description, RobotModel};
 
-use crate::schema::{GraphFile, Service, Source};
+use crate::schema::{GraphFile, Service, Source, Supervisor};
 
 /// Largest length of a graph's name: it is part of shared-memory and socket names.
 const NAME_LENGTH_MAX: usize = 24;
-/// Policies that the supervisor offers.
-const POLICIES: [&str; 3] = ["qmdp", "mls", "av"];
 
 /// Checks a graph file; `report` gets the key and a message for each problem.
 pub(crate) fn graph(
@@ -59,12 +58,33 @@ pub(crate) fn graph(
     services(file, &mut report);
     sensor(file, path, &mut report);
     drive(file, robot, &mut report);
-    choice(
-        "supervisor.policy",
-        &file.supervisor.policy,
-        &POLICIES,
-        &mut report,
-    );
+    policy(&file.supervisor, &mut report);
+}
+
+/// Name of the policy, and what its dual control needs.
+fn policy(settings: &Supervisor, report: &mut impl FnMut(&str, String)) {
+    let is_dual = match settings.policy.parse::<PolicyName>() {
+        Ok(name) => name.information.is_some(),
+        Err(error) => return report("supervisor.policy", error.to_string()),
+    };
+    let key = "supervisor.information_actions";
+    let named = &settings.information_actions;
+    if settings.as_published && (!named.is_empty() || settings.gate.is_some()) {
+        let message = "with as_published neither information_actions nor gate has a meaning";
+        report("supervisor.as_published", message.to_owned());
+    } else if is_dual && named.is_empty() && !settings.as_published {
+        let message = format!(
+            "is required by {}: one or more actions of the decision model that do not end or \
+             interrupt the task",
+            settings.policy
+        );
+        report(key, message);
+    }
+    for (i, name) in named.iter().enumerate() {
+        if named[..i].contains(name) {
+            report(key, format!("'{name}' appears twice"));
+        }
+    }
 }
 
 fn simulator_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
@@ -129,6 +149,13 @@ fn filter_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) 
         "supervisor.validity_periods",
         file.supervisor.validity_periods,
         1.0,
+        1000.0,
+    );
+    range("supervisor.threshold", file.supervisor.threshold, 0.0, 1.0);
+    range(
+        "supervisor.stall_guard_steps",
+        f64::from(file.supervisor.stall_guard_steps),
+        0.0,
         1000.0,
     );
     for (name, action) in &file.supervisor.actions {
@@ -249,12 +276,17 @@ fn drive(file: &GraphFile, robot: Option<&Description>, report: &mut impl FnMut(
     }
 }
 
-fn choice(key: &str, value: &str, allowed: &[&str], report: &mut impl FnMut(&str, String)) {
-    if !allowed.contains(&value) {
-        report(
-            key,
-            format!("'{value}' is not known: allowed are {}", allowed.join(", ")),
-        );
+/// Checks that the detector's alarm can rise with this model.
+pub(crate) fn alarm(file: &GraphFile, model: &RobotModel, mut report: impl FnMut(&str, String)) {
+    let detector = &file.detector;
+    let of = (detector.sensors.into(), detector.form.into());
+    let (interval_h, rate_1_h) = (detector.false_alarm_interval_h, detector.fault_rate_1_h);
+    match model.alarm_log_odds(of, interval_h, rate_1_h) {
+        Ok(_) => {}
+        Err(error @ AlarmError::Model(_)) => report("detector.sensors", error.to_string()),
+        Err(error @ AlarmError::Unreachable { .. }) => {
+            report("detector.false_alarm_interval_h", error.to_string());
+        }
     }
 }
 

@@ -115,6 +115,16 @@ pub fn load_graph(path: &Path, change: impl FnOnce(&mut GraphFile)) -> Result<Se
             message,
         });
     });
+    if let Some(model) = model.as_ref().filter(|_| problems.is_empty()) {
+        check::alarm(&file, model, |key, message| {
+            problems.push(Problem {
+                file: path.clone(),
+                line: line_of_key(&text, key),
+                key: key.to_owned(),
+                message,
+            });
+        });
+    }
     let (Some(robot), Some(tree), Some(model), Some(decision), true) =
         (robot, tree, model, decision, problems.is_empty())
     else {

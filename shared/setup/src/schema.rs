@@ -9,6 +9,8 @@ use std::fmt;
 
 use clap::ValueEnum;
 use serde::Deserialize;
+use vigil_robot::learned;
+use vigil_robot::learned::monitor::Channels;
 
 /// A whole graph file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -244,6 +246,15 @@ pub enum Sensors {
     PoseEncoders,
 }
 
+impl From<Sensors> for Channels {
+    fn from(sensors: Sensors) -> Self {
+        match sensors {
+            Sensors::Pose => Self::Pose,
+            Sensors::PoseEncoders => Self::PoseEncoders,
+        }
+    }
+}
+
 /// What the detection filter takes a fault for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
@@ -256,6 +267,16 @@ pub enum Form {
     Constant,
     /// A constant likelihood over windows of ten observations: that size is ten times smaller.
     Windowed,
+}
+
+impl From<Form> for learned::Form {
+    fn from(form: Form) -> Self {
+        match form {
+            Form::LearnedBias => Self::LearnedBias,
+            Form::Constant => Self::Constant,
+            Form::Windowed => Self::Windowed,
+        }
+    }
 }
 
 /// The identification filter.
@@ -330,8 +351,24 @@ impl Default for Identifier {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Supervisor {
-    /// Policy: `qmdp`, `mls` (the best action of the most likely state) or `av` (action voting).
+    /// Policy: `qmdp`, `mls` (the best action of the most likely state), `av` (action voting),
+    /// `fib` (fast informed bound), or one of these with dual control, which gathers information
+    /// while the belief is too uncertain: `dm-X` about the state, `adm-X` about the best action.
     pub policy: String,
+    /// Dual control: information is gathered above this entropy, 0 (certain) to 1; 1 never.
+    pub threshold: f64,
+    /// Dual control: whose entropy the threshold is for, `state` or `action`; default `state` for
+    /// `dm-X`, `action` for `adm-X`.
+    pub gate: Option<Gate>,
+    /// Dual control: actions of the decision model that may be taken for information. Required by
+    /// `dm-X` and `adm-X`: a restart or a call for help must not be made merely to know more.
+    pub information_actions: Vec<String>,
+    /// Dual control: after so many steps for information in a row without falling entropy, X acts
+    /// until it has fallen, 0 to 1000; 0 never.
+    pub stall_guard_steps: u32,
+    /// Dual control as published in 2002: gated on the state's entropy, any action may be taken
+    /// for information, no guard. Default false.
+    pub as_published: bool,
     /// Interval between decision epochs, ms, 1 to 10000. A change of the diagnosed mode opens an
     /// epoch at once.
     pub epoch_ms: f64,
@@ -345,11 +382,26 @@ impl Default for Supervisor {
     fn default() -> Self {
         Self {
             policy: "qmdp".into(),
+            threshold: 0.5,
+            gate: None,
+            information_actions: Vec::new(),
+            stall_guard_steps: 5,
+            as_published: false,
             epoch_ms: 100.0,
             validity_periods: 10.0,
             actions: BTreeMap::new(),
         }
     }
+}
+
+/// Whose entropy decides whether information is gathered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Gate {
+    /// That of the belief over states.
+    State,
+    /// That of the states' votes for their best actions.
+    Action,
 }
 
 /// What an action makes the robot do.

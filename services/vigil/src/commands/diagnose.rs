@@ -3,10 +3,8 @@
 use std::fs::File;
 use std::path::PathBuf;
 
-use vigil_evaluation::frames::Run;
-use vigil_evaluation::plausible::{self, Doubtful};
+use vigil_evaluation::plausible;
 use vigil_evaluation::scoring::Verdict;
-use vigil_robot::Description;
 
 use super::offline::{FilterArgs, Prepared};
 use super::{CommandError, Outcome};
@@ -47,7 +45,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         runs,
         ..
     } = args.filter.prepare()?;
-    for warning in warnings(&runs, &robot) {
+    let all = runs.iter().map(|run| (run, f64::INFINITY));
+    for warning in plausible::warnings(all, &robot) {
         eprintln!("warning: {}: {warning}", args.filter.frames.display());
     }
     let at_out = |error: &dyn std::fmt::Display| format!("{}: {error}", args.out.display());
@@ -67,28 +66,6 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         .and_then(|()| writer.flush().map_err(csv::Error::from))
         .map_err(|error| CommandError::failure(at_out(&error)))?;
     Ok(Outcome::Done)
-}
-
-/// Beginning of a run in which it is judged whether the columns mean what they should, s.
-const JUDGED_S: f64 = 3.0;
-
-/// What is doubtful about the file: what the beginnings of most runs have in common, so that single
-/// runs that begin with a fault are no reason to doubt the columns.
-fn warnings(runs: &[Run], robot: &Description) -> Vec<String> {
-    let begins_s = |run: &Run| {
-        let first = run.frames.first().map_or(0, |f| f.header.t_capture_ns);
-        first as f64 * 1e-9
-    };
-    let judge = |run: &Run| plausible::doubt(run, robot, begins_s(run) + JUDGED_S);
-    let doubts: Vec<Doubtful> = runs.iter().filter_map(judge).collect();
-    let Some(first) = doubts.first().filter(|_| 2 * doubts.len() >= runs.len()) else {
-        return Vec::new();
-    };
-    let (found, all) = (doubts.len(), runs.len());
-    vec![
-        first.to_string(),
-        format!("{found} of {all} runs begin like this: unless all are faulty, verdicts are wrong"),
-    ]
 }
 
 fn row(run: u32, verdict: &Verdict) -> [String; 10] {

@@ -9,15 +9,16 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde::Serialize;
+use vigil_evaluation::data_hash;
 use vigil_evaluation::frames::Run;
 use vigil_evaluation::labels::{self, Label};
-use vigil_evaluation::learning;
+use vigil_evaluation::plausible;
 use vigil_evaluation::report::{Report, SensorSet};
 use vigil_robot::RobotModel;
 use vigil_setup::schema::IdentifierFilter;
 
 use super::learn::write_whole;
-use super::offline::{FilterArgs, Prepared, SENSOR_SETS, Used};
+use super::offline::{FilterArgs, Prepared, Used};
 use super::{CommandError, Outcome};
 use crate::output;
 use document::{Document, filters_text};
@@ -35,11 +36,11 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Part::Heldout)]
     part: Part,
     /// Also write everything as one page (HTML), for pose only and for pose and encoders, whatever
-    /// --sensors says.
+    /// --sensors says. For a model of nominal behaviour alone: detection, by the sets it knows.
     #[arg(long, value_name = "OUT")]
     report: Option<PathBuf>,
     /// Also compare these identification filters with `exact` on the same runs, for both sets of
-    /// channels.
+    /// channels. A model of nominal behaviour alone names no faults: refused there.
     #[arg(
         long,
         value_name = "LIST",
@@ -89,10 +90,10 @@ impl Args {
             .collect()
     }
 
-    /// Sets of channels to run, as `--sensors` names them.
-    fn sets(&self) -> Vec<&str> {
+    /// Sets of channels to run, as `--sensors` names them: for a comparison all that the model has.
+    fn sets(&self, model: &RobotModel) -> Vec<&str> {
         match self.report.is_some() || !self.filters.is_empty() {
-            true => SENSOR_SETS.to_vec(),
+            true => self.filter.sets(model),
             false => vec![self.filter.sensors.as_str()],
         }
     }
@@ -142,8 +143,16 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         check_place(out)?;
     }
     let prepared = args.filter.prepare()?;
+    if matches!(prepared.model, RobotModel::Nominal(_)) && !args.filters.is_empty() {
+        return Err(args.filter.names_nothing("--filters"));
+    }
     let runs = args.cases(&prepared)?;
-    let (sets, entrants) = (args.sets(), args.entrants());
+    let healthy = |label: &Label| label.onset_s.unwrap_or(f64::INFINITY);
+    let beginnings = runs.iter().map(|(run, label)| (run, healthy(label)));
+    for warning in plausible::warnings(beginnings, &prepared.robot) {
+        eprintln!("warning: {}: {warning}", args.filter.frames.display());
+    }
+    let (sets, entrants) = (args.sets(&prepared.model), args.entrants());
     let passes = Passes::new(args, &prepared, &runs);
     let found = passes.run(&sets, &entrants)?;
     if let Some(out) = &args.report {
@@ -245,7 +254,11 @@ fn facts(args: &Args, prepared: &Prepared, runs: &[(Run, Label)]) -> Vec<(&'stat
         ),
         (
             "frames",
-            format!("{}, {}", filter.frames.display(), learning::data_hash(&all)),
+            format!(
+                "{}, {}",
+                filter.frames.display(),
+                data_hash(&all, f64::INFINITY)
+            ),
         ),
         ("labels", args.runs.display().to_string()),
         ("fault tree", format!("hash {tree_hash}")),

@@ -1,9 +1,12 @@
 //! `vigil import`: recordings of other programs as Vigil's frames.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use vigil_evaluation::import::{self, LogDescription};
+use vigil_evaluation::plausible;
+use vigil_robot::Description;
 use vigil_setup::load_robot;
 
 use super::{CommandError, Outcome};
@@ -49,6 +52,31 @@ struct Run {
     name: String,
     frames: usize,
     duration_s: f64,
+    /// Clocks of its files that do not rise everywhere; their rows were put in order.
+    disorder: Vec<Disordered>,
+    /// Rows of which nothing was made, by channel: their stamps repeat those before.
+    repeated_rows: BTreeMap<String, usize>,
+}
+
+#[derive(Debug, Serialize)]
+struct Disordered {
+    file: String,
+    column: String,
+    rows: usize,
+    first_row: usize,
+    back_s: f64,
+}
+
+impl From<&import::Disorder> for Disordered {
+    fn from(found: &import::Disorder) -> Self {
+        Self {
+            file: found.path.display().to_string(),
+            column: found.column.clone(),
+            rows: found.rows,
+            first_row: found.first_row,
+            back_s: found.back_s,
+        }
+    }
 }
 
 /// Writes the frames and says what they are.
@@ -62,6 +90,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         .map_err(|error| at(&args.log, &error))
         .map_err(CommandError::usage)?;
     import::write(&imported, &args.out).map_err(CommandError::failure)?;
+    for warning in warnings(&imported, &robot) {
+        eprintln!("warning: {warning}");
+    }
     let runs = imported.runs.iter().map(|run| Run {
         run: run.id,
         name: run.name.clone(),
@@ -72,6 +103,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             .and_then(|row| row.first())
             .copied()
             .unwrap_or(0.0),
+        disorder: run.disorder.iter().map(Disordered::from).collect(),
+        repeated_rows: run.repeated.iter().cloned().collect(),
     });
     let delays = imported
         .delays_s
@@ -96,6 +129,28 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     };
     printed.map_err(CommandError::failure)?;
     Ok(Outcome::Done)
+}
+
+/// What is doubtful about the frames: columns that mean something else, rows out of order.
+fn warnings(imported: &import::Imported, robot: &Description) -> Vec<String> {
+    let frames = imported.frames(robot);
+    let mut warnings = plausible::warnings(frames.iter().map(|run| (run, f64::INFINITY)), robot);
+    let runs = imported.runs.iter();
+    warnings.extend(runs.flat_map(|run| &run.disorder).map(|found| {
+        let import::Disorder {
+            path,
+            column,
+            rows,
+            first_row,
+            back_s,
+        } = found;
+        format!(
+            "{}: row {first_row}: {column} goes back; {rows} rows do, by up to {back_s:.3} s: they \
+             were put in order",
+            path.display()
+        )
+    }));
+    warnings
 }
 
 /// Problems of the description itself are told with its file.
@@ -126,6 +181,11 @@ fn table(document: &Document) -> String {
             "{:>5} {:>8} {:>10.2}  {}",
             run.run, run.frames, run.duration_s, run.name
         ));
+        for (channel, rows) in &run.repeated_rows {
+            lines.push(format!(
+                "      {channel}: {rows} rows repeat their stamp and count for none"
+            ));
+        }
     }
     lines.join("\n")
 }

@@ -1,5 +1,6 @@
 //! `vigil learn`: learns a robot's model, from labelled runs or healthy ones alone, or shows one.
 
+use std::fmt::Display;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -8,6 +9,7 @@ use serde::Serialize;
 use vigil_evaluation::frames;
 use vigil_evaluation::labels;
 use vigil_evaluation::learning::{self, Options, RESIDUAL_BAR, Report, Residual, View};
+use vigil_evaluation::learning_nominal;
 use vigil_evaluation::split::split;
 use vigil_robot::learned::model::Provenance;
 use vigil_robot::{Description, RobotModel};
@@ -65,11 +67,11 @@ pub struct Args {
 }
 
 #[derive(Debug, Serialize)]
-struct Shown<'a> {
+struct Shown<'a, V> {
     schema_version: u32,
     model: String,
     #[serde(flatten)]
-    view: &'a View,
+    view: &'a V,
 }
 
 #[derive(Debug, Serialize)]
@@ -108,22 +110,26 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 }
 
 fn show(path: &Path, is_json: bool) -> Result<Outcome, CommandError> {
-    let RobotModel::Faults(model) = load_model(path)? else {
-        let refused = format!(
-            "{}: a model of nominal behaviour alone is its own plain text: open the file",
-            path.display()
-        );
-        return Err(CommandError::usage(refused));
-    };
-    let view = View::new(
-        &model,
-        vigil_setup::schema::Detector::default().fault_rate_1_h,
-    );
+    let rate_1_h = vigil_setup::schema::Detector::default().fault_rate_1_h;
+    match load_model(path)? {
+        RobotModel::Faults(model) => print_view(&View::new(&model, rate_1_h), path, is_json),
+        RobotModel::Nominal(model) => {
+            let view = learning_nominal::View::new(&model, rate_1_h);
+            print_view(&view, path, is_json)
+        }
+    }
+}
+
+fn print_view<V: Serialize + Display>(
+    view: &V,
+    path: &Path,
+    is_json: bool,
+) -> Result<Outcome, CommandError> {
     let printed = if is_json {
         output::json(&Shown {
             schema_version: 1,
             model: path.display().to_string(),
-            view: &view,
+            view,
         })
     } else {
         output::line(&view.to_string())

@@ -65,6 +65,7 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
         software_version: env!("CARGO_PKG_VERSION").to_owned(),
         ..model.provenance
     };
+    let model = model.sealed();
     let text = model.to_toml().map_err(CommandError::failure)?;
     super::learn::write_whole(task.out, &text)
         .map_err(|error| CommandError::failure(format!("{}: {error}", task.out.display())))?;

@@ -89,7 +89,7 @@ pub struct Used {
     pub sensors: String,
     /// Form of the detection filter.
     pub detector: String,
-    /// Identification filter.
+    /// Identification filter; `none` on a model of nominal behaviour alone.
     pub identifier: String,
     /// Particles.
     pub particles: u16,
@@ -122,6 +122,13 @@ impl FilterArgs {
             RobotModel::Faults(_) => load_tree(&self.tree).map_err(CommandError::usage)?,
             RobotModel::Nominal(_) => nominal_tree()?,
         };
+        let identifier = match &model {
+            RobotModel::Faults(_) => self.identifier.to_string(),
+            RobotModel::Nominal(_) if self.identifier == IdentifierFilter::default() => {
+                "none".to_owned()
+            }
+            RobotModel::Nominal(_) => return Err(self.names_nothing("--identifier")),
+        };
         let pipeline = self.pipeline(&model, &robot, &tree, &self.sensors, self.identifier)?;
         let runs = frames::read(&self.frames, &robot).map_err(CommandError::usage)?;
         let used = Used {
@@ -129,7 +136,7 @@ impl FilterArgs {
             tree_hash: format!("{:016x}", tree.hash()),
             sensors: self.sensors.clone(),
             detector: self.detector.to_string(),
-            identifier: self.identifier.to_string(),
+            identifier,
             particles: self.particles,
             seed: self.seed,
         };
@@ -143,6 +150,24 @@ impl FilterArgs {
         })
     }
 
+    /// Refuses an option that is about filters that name faults, on a model that knows none.
+    pub fn names_nothing(&self, option: &str) -> CommandError {
+        CommandError::usage(format!(
+            "{option}: {} is a model of nominal behaviour alone: there are no faults for a filter \
+             to name, only fault or no fault; leave it out",
+            self.model.display()
+        ))
+    }
+
+    /// Sets of channels for which `model` has an alarm with the form of detection asked for.
+    pub fn sets(&self, model: &RobotModel) -> Vec<&'static str> {
+        let has = |set: &&str| {
+            let channels = channels(set).into();
+            model.calibration(channels, self.detector.into()).is_ok()
+        };
+        SENSOR_SETS.into_iter().filter(has).collect()
+    }
+
     /// Detector and identifier with the settings given, but for channels and filter.
     pub fn pipeline(
         &self,
@@ -154,10 +179,7 @@ impl FilterArgs {
     ) -> Result<Pipeline, CommandError> {
         let detector = schema::Detector {
             particles: self.particles.into(),
-            sensors: match sensors {
-                "pose" => Sensors::Pose,
-                _ => Sensors::PoseEncoders,
-            },
+            sensors: channels(sensors),
             form: self.detector,
             ..schema::Detector::default()
         };
@@ -185,6 +207,13 @@ impl FilterArgs {
             decision: decision.as_ref(),
         };
         Pipeline::new(&models, &detector, &identifier, self.seed).map_err(|e| refuse(&e))
+    }
+}
+
+fn channels(set: &str) -> Sensors {
+    match set {
+        "pose" => Sensors::Pose,
+        _ => Sensors::PoseEncoders,
     }
 }
 

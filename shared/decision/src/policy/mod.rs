@@ -1,14 +1,54 @@
 //! Policies: from a belief to an action. Definitions: Verma, Fernandez, Simmons (2002), section 2.
+//!
+//! | name | rule |
+//! |---|---|
+//! | `mls` | [`MostLikelyState`]: pi_CO(argmax_s b(s)) |
+//! | `av` | [`ActionVoting`]: argmax_a w(a), w(a) = sum_s b(s) [pi_CO(s) = a] |
+//! | `qmdp` | [`QMdp`]: argmax_a sum_s b(s) Q_CO(s,a) |
+//! | `fib` | [`FastInformed`]: argmax_a b . q_a, q from the fast informed bound |
+//! | `dm-X`, `adm-X` | [`DualControl`]: X while the belief is certain enough, else information |
+//!
+//! pi_CO and Q_CO are those of the fully observable relaxation, [`crate::mdp`].
+//!
+//! **Ties** decide results (a tiger's start belief is one), hence one rule for all: whatever is
+//! within 1e-9 of the best, relative to the best or to 1, is as good as the best, and the lowest
+//! index wins. It holds for pi_CO (relative to the largest value of any state), for the most
+//! likely state, for votes and values, and for the least expected entropy. The margin to the
+//! runner-up is part of every choice, so that a tie is visible.
+//!
+//! A [`Decider`] adds to a policy what a record needs to explain a decision: the votes and both
+//! entropies.
 
+mod decider;
+mod dual;
+mod entropy;
+mod fast_informed;
+mod look_ahead;
 mod most_likely_state;
-mod point_based;
+mod name;
 mod qmdp;
 mod voting;
 
+pub use decider::{Decider, Decision};
+pub use dual::{Dual, DualControl, DualError, Gate, Information};
+pub use entropy::normalised_entropy;
+pub use fast_informed::{FastInformed, informed_values};
+pub use look_ahead::LookAhead;
 pub use most_likely_state::MostLikelyState;
-pub use point_based::PointBased;
+pub use name::{Base, NameError, PolicyName};
 pub use qmdp::QMdp;
 pub use voting::ActionVoting;
+
+/// What an action was chosen for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Control {
+    /// For its worth.
+    Policy,
+    /// To gather information (dual control).
+    Dual,
+    /// For its worth, although the belief is uncertain: gathering information has stalled.
+    Stalled,
+}
 
 /// A chosen action.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,13 +57,18 @@ pub struct Choice {
     pub action: usize,
     /// Its value (or votes) minus the runner-up's; 0 at a tie or with one action.
     pub margin: f64,
+    /// What it was chosen for.
+    pub control: Control,
 }
 
 /// A policy over beliefs. Deciding allocates nothing.
 pub trait Policy {
-    /// Writes the value (or votes) of every action into `values`, and chooses. Ties go to the
-    /// lowest index.
-    fn evaluate(&self, belief: &[f64], values: &mut [f64]) -> Choice;
+    /// Writes the value (or votes) of every action into `values`, and chooses; of two actions the
+    /// one with the larger value is the better in the policy's eyes.
+    fn evaluate(&mut self, belief: &[f64], values: &mut [f64]) -> Choice;
+
+    /// Forgets what it remembers of earlier decisions: a new mission begins.
+    fn reset(&mut self) {}
 }
 
 /// Values within this much of the largest, relative to it (at least to 1), are a tie.
@@ -61,5 +106,6 @@ pub fn choose_among(values: &[f64], allowed: impl Fn(usize) -> bool) -> Choice {
     Choice {
         action,
         margin: if margin.is_finite() { margin } else { 0.0 },
+        control: Control::Policy,
     }
 }

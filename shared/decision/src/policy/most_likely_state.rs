@@ -19,7 +19,7 @@ impl MostLikelyState {
 
 impl Policy for MostLikelyState {
     /// Values are the probability of the most likely state for its action, 0 for the others.
-    fn evaluate(&self, belief: &[f64], values: &mut [f64]) -> Choice {
+    fn evaluate(&mut self, belief: &[f64], values: &mut [f64]) -> Choice {
         values.fill(0.0);
         let state = choose(belief).action;
         if let (Some(value), Some(b)) =

@@ -19,7 +19,7 @@ impl QMdp {
 }
 
 impl Policy for QMdp {
-    fn evaluate(&self, belief: &[f64], values: &mut [f64]) -> Choice {
+    fn evaluate(&mut self, belief: &[f64], values: &mut [f64]) -> Choice {
         for (action, value) in values.iter_mut().enumerate() {
             *value = belief
                 .iter()

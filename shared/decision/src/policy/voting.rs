@@ -18,7 +18,7 @@ impl ActionVoting {
 }
 
 impl Policy for ActionVoting {
-    fn evaluate(&self, belief: &[f64], values: &mut [f64]) -> Choice {
+    fn evaluate(&mut self, belief: &[f64], values: &mut [f64]) -> Choice {
         values.fill(0.0);
         for (state, b) in belief.iter().enumerate() {
             if let Some(vote) = values.get_mut(self.solution.best(state)) {

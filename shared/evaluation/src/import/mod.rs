@@ -1,9 +1,20 @@
 //! Recordings of other programs, turned into Vigil's frames of a described robot.
 //!
 //! A [`LogDescription`] says which columns of which files become which channels, and how. Each
-//! run's channels are put on one clock at a stated rate. Everything is causal: a frame holds
-//! nothing that was measured after it, but for interpolated channels, which wait for the next
-//! sample.
+//! run's channels are put on one clock at a stated rate.
+//!
+//! A frame holds nothing that was measured after it, but for this, which a live publisher does
+//! otherwise:
+//!
+//! - a channel that comes late is moved forward by its delay; live, the others wait as long. An
+//!   estimated delay is a constant of the log, found in the beginning of its first run;
+//! - `interpolate` waits for the next sample;
+//! - with a `device_clock`, a line through all stamps of the run places each row: its offset and
+//!   rate are constants of the run. So is the median difference of clocks that `time_as` adds;
+//! - a run begins and ends where all its measured channels have values;
+//! - rows out of order are put in order ([`Disorder`]).
+//!
+//! All else (`mean`, `hold`, differences, unwrapping, units) looks back only.
 
 mod delay;
 mod description;
@@ -16,6 +27,7 @@ use std::path::{Path, PathBuf};
 
 pub use description::{ChannelSource, Clock, Delay, LogDescription, Method, Source, Unit};
 use resample::Grid;
+pub use series::Disorder;
 use series::Series;
 use vigil_blocks::SensorFrame;
 use vigil_robot::Description;
@@ -115,6 +127,11 @@ pub struct ImportedRun {
     pub name: String,
     /// Frames: time since the first, s, then the values in the order of [`Imported::columns`].
     pub rows: Vec<Vec<f64>>,
+    /// Clocks that do not rise in its files.
+    pub disorder: Vec<Disorder>,
+    /// Channels that are differentiated, with the rows of which nothing was made as their stamp
+    /// repeats or precedes the one before: repeated packets.
+    pub repeated: Vec<(String, usize)>,
 }
 
 /// An imported log.
@@ -167,7 +184,16 @@ pub fn import(
         }
         let grid = Grid::new(log, &columns, &series, path)?;
         let name = path.strip_prefix(folder).unwrap_or(path);
+        let repeated = columns.iter().zip(&series);
+        let repeated = repeated.filter(|(_, series)| series.repeated > 0);
         runs.push(ImportedRun {
+            disorder: tables
+                .into_iter()
+                .flat_map(|table| table.disorder)
+                .collect(),
+            repeated: repeated
+                .map(|(column, series)| (column.clone(), series.repeated))
+                .collect(),
             id: id as u32,
             name: name.display().to_string(),
             rows: grid.rows(log, &columns, &series)?,

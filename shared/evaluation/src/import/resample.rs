@@ -1,6 +1,6 @@
 //! The channels of a run on one clock.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::ImportError;
 use super::description::{ChannelSource, LogDescription, Method};
@@ -11,7 +11,6 @@ const RUN_MIN_S: f64 = 1.0;
 
 /// The common clock of a run.
 pub(super) struct Grid {
-    path: PathBuf,
     start_s: f64,
     period_s: f64,
     count: usize,
@@ -41,7 +40,6 @@ impl Grid {
         }
         let period_s = 1.0 / log.rate_hz;
         Ok(Self {
-            path: path.to_path_buf(),
             start_s,
             period_s,
             count: (length_s / period_s).floor() as usize + 1,
@@ -59,7 +57,7 @@ impl Grid {
             .map(|i| vec![(i as f64 * self.period_s * 1e6).round() * 1e-6])
             .collect();
         for (channel, series) in log.in_order(columns).zip(series) {
-            self.check(log, channel, series)?;
+            check(log, channel, series)?;
             for (i, row) in rows.iter_mut().enumerate() {
                 let t_s = self.start_s + i as f64 * self.period_s;
                 let value = self.value(channel, series, t_s);
@@ -90,25 +88,25 @@ impl Grid {
             }
         }
     }
+}
 
-    fn check(
-        &self,
-        log: &LogDescription,
-        channel: &ChannelSource,
-        series: &Series,
-    ) -> Result<(), ImportError> {
-        if channel.method == Method::Hold {
-            return Ok(());
-        }
-        let mut pairs = series.time_s.windows(2);
-        let Some(at) = pairs.position(|pair| pair[1] - pair[0] > log.gap_max_s) else {
-            return Ok(());
-        };
-        let gap_s = series.time_s[at + 1] - series.time_s[at];
-        let message = format!(
-            "column {}: a gap of {gap_s:.3} s; gap_max_s allows {} s",
-            channel.column, log.gap_max_s
-        );
-        Err(crate::table::wrong_row(&self.path, at as u64 + 2, message).into())
+/// Refuses a pause of a measured channel that is too long.
+fn check(
+    log: &LogDescription,
+    channel: &ChannelSource,
+    series: &Series,
+) -> Result<(), ImportError> {
+    if channel.method == Method::Hold {
+        return Ok(());
     }
+    let mut pairs = series.time_s.windows(2);
+    let Some(at) = pairs.position(|pair| pair[1] - pair[0] > log.gap_max_s) else {
+        return Ok(());
+    };
+    let gap_s = series.time_s[at + 1] - series.time_s[at];
+    let message = format!(
+        "column {}: a gap of {gap_s:.3} s; gap_max_s allows {} s",
+        channel.column, log.gap_max_s
+    );
+    Err(series.wrong(at + 1, message))
 }

@@ -19,7 +19,27 @@ pub(super) struct SourceTable {
     time_s: Vec<f64>,
     /// The device's clock, s.
     device_s: Vec<f64>,
+    /// What was out of order.
+    pub disorder: Vec<Disorder>,
 }
+
+/// Rows of a file whose clock does not rise: they are put in order of time, and told.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Disorder {
+    /// The file.
+    pub path: PathBuf,
+    /// Column of the clock.
+    pub column: String,
+    /// Rows that are earlier than the one before.
+    pub rows: usize,
+    /// The first of them; from 1, the header not counted.
+    pub first_row: usize,
+    /// By how much the worst of them goes back, s.
+    pub back_s: f64,
+}
+
+/// Rows earlier than the one before by more than this are refused, s.
+const BACK_S_MAX: f64 = 1.0;
 
 impl SourceTable {
     fn column(&self, name: &str) -> Option<&Vec<f64>> {
@@ -108,20 +128,27 @@ fn read(log: &LogDescription, source: &Source, run: &Path) -> Result<SourceTable
         values,
         time_s: Vec::new(),
         device_s: Vec::new(),
+        disorder: Vec::new(),
     };
-    out.time_s = clock(&out, &source.time)?;
+    let (time_s, disorder) = clock(&out, &source.time)?;
+    out.disorder.extend(disorder);
     out.device_s = match &source.device_clock {
-        None => out.time_s.clone(),
-        Some(device) => clock(&out, device)?,
+        None => time_s.clone(),
+        Some(device) => {
+            let (device_s, disorder) = clock(&out, device)?;
+            out.disorder.extend(disorder);
+            device_s
+        }
     };
+    out.time_s = time_s;
     if source.device_clock.is_some() {
         out.time_s = steady(&out.device_s, &out.time_s);
     }
     Ok(out)
 }
 
-/// Times of a clock column, s, unwrapped.
-fn clock(table: &SourceTable, clock: &Clock) -> Result<Vec<f64>, ImportError> {
+/// Times of a clock column, s, unwrapped, and what is out of order among them.
+fn clock(table: &SourceTable, clock: &Clock) -> Result<(Vec<f64>, Option<Disorder>), ImportError> {
     let values = table.column(&clock.column).map_or(&[][..], Vec::as_slice);
     let unwrapped = match clock.modulus {
         Some(modulus) => unwrap(values, modulus),
@@ -131,12 +158,25 @@ fn clock(table: &SourceTable, clock: &Clock) -> Result<Vec<f64>, ImportError> {
         .iter()
         .map(|value| value * clock.unit.factor())
         .collect();
-    if let Some(row) = times.windows(2).position(|pair| pair[1] < pair[0] - 1.0) {
-        let (name, back_s) = (&clock.column, times[row] - times[row + 1]);
+    let back_s = times.windows(2).map(|pair| pair[0] - pair[1]);
+    let back: Vec<(usize, f64)> = back_s
+        .enumerate()
+        .filter(|(_, back_s)| *back_s > 0.0)
+        .collect();
+    if let Some((row, back_s)) = back.iter().find(|(_, back_s)| *back_s > BACK_S_MAX) {
+        let name = &clock.column;
         let message = format!("{name} goes back by {back_s:.3} s: time must rise within a run");
         return Err(table.wrong(row + 1, message));
     }
-    Ok(times)
+    let disorder = back.first().map(|(first, _)| Disorder {
+        path: table.path.clone(),
+        column: clock.column.clone(),
+        rows: back.len(),
+        // The pair's second row, counted from 1.
+        first_row: first + 2,
+        back_s: back.iter().map(|(_, back_s)| *back_s).fold(0.0, f64::max),
+    });
+    Ok((times, disorder))
 }
 
 /// The device's clock brought to the other by a line, whose offset and rate are constants of the
@@ -174,6 +214,12 @@ pub(super) struct Series {
     pub time_s: Vec<f64>,
     /// Values in SI.
     pub value: Vec<f64>,
+    /// Rows of the file that they come from; from 1, the header not counted.
+    row: Vec<usize>,
+    /// The file.
+    path: PathBuf,
+    /// Rows of which nothing was made: their stamp repeats or precedes the one before.
+    pub repeated: usize,
 }
 
 impl Series {
@@ -196,6 +242,9 @@ impl Series {
         let mut out = Self {
             time_s: Vec::with_capacity(values.len()),
             value: Vec::with_capacity(values.len()),
+            row: Vec::with_capacity(values.len()),
+            path: table.path.clone(),
+            repeated: 0,
         };
         let mut last: Option<(f64, f64)> = None;
         for (row, (&time_s, value)) in table.time_s.iter().zip(values).enumerate() {
@@ -207,18 +256,29 @@ impl Series {
                 (true, Some((then_s, before))) => Some((value - before) / (device_s - then_s)),
                 (true, None) => None,
             };
-            last = Some((device_s, value));
+            out.repeated += usize::from(result.is_none() && last.is_some());
+            // What comes late has no part in the next difference.
+            if last.is_none_or(|(then_s, _)| device_s >= then_s) {
+                last = Some((device_s, value));
+            }
             let Some(result) = result else { continue };
-            out.insert(time_s, finish(result));
+            out.insert(time_s, finish(result), row + 1);
         }
         Ok(out)
     }
 
     /// Adds a sample; stamps may be a little out of order.
-    fn insert(&mut self, time_s: f64, value: f64) {
+    fn insert(&mut self, time_s: f64, value: f64, row: usize) {
         let at = self.time_s.partition_point(|&other| other <= time_s);
         self.time_s.insert(at, time_s);
         self.value.insert(at, value);
+        self.row.insert(at, row);
+    }
+
+    /// An error about the sample with this index, where it stands in its file.
+    pub fn wrong(&self, at: usize, message: String) -> ImportError {
+        let row = self.row.get(at).copied().unwrap_or(0);
+        crate::table::wrong_row(&self.path, row as u64, message).into()
     }
 
     /// Moves all samples to earlier times, s.

@@ -2,15 +2,14 @@
 
 use vigil_robot::Description;
 use vigil_robot::learned::monitor::{Channels, Monitor};
-use vigil_robot::learned::{Calibration, Form, Model};
+use vigil_robot::learned::{Form, Model};
 
 use super::LearnError;
 use super::segments::{by_run, observations};
 use crate::frames::Run;
 use crate::labels::Label;
+use crate::maxima::{Maxima, WINDOW_S};
 
-/// Windows over which maxima are taken, s.
-const WINDOW_S: f64 = 2.0;
 /// Prior rate under which the log-odds are collected, 1/h.
 const FAULT_RATE_1_H: f64 = 1.0;
 /// Windows needed.
@@ -38,8 +37,8 @@ pub fn fit(
             let rate = FAULT_RATE_1_H;
             let monitor = Monitor::new(model, robot, channels, form, rate);
             let mut maxima = maxima(monitor, &driving, robot, model);
-            let found_s = maxima.len() as f64 * WINDOW_S;
-            let fit = Calibration::fit(channels, form, rate, &mut maxima, WINDOW_S);
+            let found_s = maxima.duration_s();
+            let fit = maxima.tail(channels, form, rate);
             let needed_s = WINDOWS_MIN as f64 * WINDOW_S;
             model
                 .calibration
@@ -55,11 +54,11 @@ fn maxima(
     driving: &[(&Run, f64)],
     robot: &Description,
     model: &Model,
-) -> Vec<f64> {
-    let mut maxima = Vec::new();
+) -> Maxima {
+    let mut maxima = Maxima::new();
     for (run, until_s) in driving {
         monitor.reset();
-        let (mut in_window_s, mut highest) = (0.0, f64::NEG_INFINITY);
+        maxima.begin();
         for observation in observations(run, robot, model) {
             if observation.t_ns as f64 * 1e-9 > *until_s {
                 break;
@@ -69,12 +68,7 @@ fn maxima(
                 monitor.forget_evidence();
                 continue;
             }
-            highest = monitor.report().log_odds.max(highest);
-            in_window_s += observation.dt_s;
-            if in_window_s >= WINDOW_S {
-                maxima.push(highest);
-                (in_window_s, highest) = (0.0, f64::NEG_INFINITY);
-            }
+            maxima.push(monitor.report().log_odds, observation.dt_s);
         }
     }
     maxima

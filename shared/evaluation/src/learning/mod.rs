@@ -18,13 +18,13 @@ mod wheels;
 
 use std::collections::BTreeSet;
 
-use vigil_blocks::fnv1a;
 use vigil_robot::Description;
 use vigil_robot::learned::model::{
     CommandModel, Model, Noise, NominalModel, Provenance, StuckModel, VERSION,
 };
 use vigil_robot::learned::{Curve, EncoderModel, MotionModel, RateModel};
 
+use crate::data_hash::data_hash;
 use crate::frames::Run;
 use crate::labels::Label;
 use crate::plausible::{self, Doubtful};
@@ -149,7 +149,7 @@ pub fn learn(
         .collect();
     let mut model = blank(robot, options);
     model.provenance = Provenance {
-        data_hash: data_hash(&learned),
+        data_hash: data_hash(&learned, f64::INFINITY),
         runs_learned: learned.iter().map(|run| run.id).collect(),
         runs_held_out: runs
             .iter()
@@ -287,25 +287,4 @@ fn blank(robot: &Description, options: &Options) -> Model {
         stuck: Vec::new(),
         calibration: Vec::new(),
     }
-}
-
-/// Hash of what frames hold: ids of the runs, times, poses, commands, wheel rates.
-#[must_use]
-pub fn data_hash(runs: &[&Run]) -> String {
-    let mut hash = fnv1a::BASIS;
-    for run in runs {
-        hash = fnv1a::hash_u64(hash, u64::from(run.id));
-        for frame in &run.frames {
-            hash = fnv1a::hash_u64(hash, frame.header.t_capture_ns);
-            let values = frame
-                .pose
-                .iter()
-                .chain(&frame.command)
-                .chain(&frame.wheel_rate);
-            for value in values {
-                hash = fnv1a::hash_u64(hash, value.to_bits());
-            }
-        }
-    }
-    format!("fnv1a64:{hash:016x}")
 }

@@ -3,29 +3,20 @@
 use std::fmt::{self, Write as _};
 
 use serde::Serialize;
-use vigil_robot::learned::model::{CommandModel, Noise, Provenance};
-use vigil_robot::learned::{Calibration, Curve, EncoderModel, Model, MotionModel, RateModel};
+use vigil_robot::learned::model::{CommandModel, Noise};
+use vigil_robot::learned::{Curve, EncoderModel, Model, MotionModel, RateModel};
+
+use crate::model_view::{Alarm, Source};
 
 /// Radii of the table of heading rates, m.
 const RADII_M: [f64; 10] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0];
-/// Time between false alarms for which thresholds are shown, h.
-const INTERVAL_H: f64 = 24.0;
 
 /// A learned model, readable. `Display` prints it as text.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct View {
-    /// Robot.
-    pub robot: String,
-    /// Wheels, in the order of every per-wheel array.
-    pub wheels: Vec<String>,
-    /// Layout of the file.
-    pub layout_version: u32,
-    /// Hash of the model, as beliefs and reports carry it.
-    pub model_hash: String,
-    /// Whether the file says that a person has changed it.
-    pub edited: bool,
-    /// Where the model comes from.
-    pub provenance: Provenance,
+    /// What it is of, and where it comes from.
+    #[serde(flatten)]
+    pub source: Source,
     /// Interval over which frames are averaged, s.
     pub interval_s: f64,
     /// What was learned from: largest curvature and range of speeds.
@@ -67,16 +58,6 @@ pub struct HeadingRate {
     pub change_percent: Vec<Option<f64>>,
 }
 
-/// Threshold for one set of channels and form of detection.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Alarm {
-    /// What was fitted.
-    #[serde(flatten)]
-    pub calibration: Calibration,
-    /// Log-odds that raise an alarm, for 24 h between false alarms.
-    pub alarm_log_odds_24_h: f64,
-}
-
 impl View {
     /// A view of a model; thresholds for this prior rate of faults.
     #[must_use]
@@ -97,17 +78,16 @@ impl View {
         let rows = turns.iter().flat_map(|&(turn, sign)| {
             RADII_M.map(|radius_m| heading_rate(model, turn, sign, radius_m, speed))
         });
-        let alarm = |calibration: &Calibration| Alarm {
-            calibration: calibration.clone(),
-            alarm_log_odds_24_h: calibration.alarm_log_odds(INTERVAL_H, fault_rate_1_h),
-        };
-        Self {
+        let source = Source {
             robot: model.robot.clone(),
             wheels: model.wheels.clone(),
             layout_version: model.version,
             model_hash: format!("{:016x}", model.hash()),
             edited: model.is_edited(),
             provenance: model.provenance.clone(),
+        };
+        Self {
+            source,
             interval_s: model.interval_s,
             command: model.command,
             noise: model.noise,
@@ -115,7 +95,7 @@ impl View {
             modes,
             heading_rate_speed_m_s: speed,
             heading_rate_change: rows.collect(),
-            alarms: model.calibration.iter().map(alarm).collect(),
+            alarms: Alarm::of(&model.calibration, fault_rate_1_h),
         }
     }
 }
@@ -143,60 +123,17 @@ fn heading_rate(
 
 impl fmt::Display for View {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.write_source(f)?;
+        self.source.write(f, "of every mode and kind")?;
         self.write_ranges(f)?;
         for mode in &self.modes {
-            write_mode(f, mode, &self.wheels)?;
+            write_mode(f, mode, &self.source.wheels)?;
         }
         self.write_heading_rates(f)?;
-        write!(f, "\nalarms, for {INTERVAL_H} h between false alarms")?;
-        for alarm in &self.alarms {
-            let Calibration {
-                sensors,
-                form,
-                exposure_h,
-                ..
-            } = &alarm.calibration;
-            let odds = alarm.alarm_log_odds_24_h;
-            write!(f, "\n  {sensors:<14} {form:<13} at log-odds {odds:6.2}")?;
-            write!(f, ", from {exposure_h:.2} h of nominal driving")?;
-        }
-        Ok(())
+        Alarm::write(&self.alarms, f)
     }
 }
 
 impl View {
-    fn write_source(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let source = &self.provenance;
-        let or_none = |text: &str| if text.is_empty() { "not stated" } else { text }.to_owned();
-        let edited = if self.edited { ", edited by hand" } else { "" };
-        writeln!(
-            f,
-            "robot          {} ({})",
-            self.robot,
-            self.wheels.join(" ")
-        )?;
-        writeln!(f, "file layout    version {}", self.layout_version)?;
-        writeln!(f, "model hash     {}{edited}", self.model_hash)?;
-        writeln!(f, "data hash      {}", source.data_hash)?;
-        writeln!(f, "frames         {}", or_none(&source.frames_file))?;
-        writeln!(f, "labels         {}", or_none(&source.labels_file))?;
-        writeln!(f, "ground         {}", or_none(&source.terrain))?;
-        writeln!(
-            f,
-            "learned by     vigil {}",
-            or_none(&source.software_version)
-        )?;
-        writeln!(f, "seed           {}", source.seed)?;
-        writeln!(
-            f,
-            "left out       {} of every mode and kind",
-            source.test_fraction
-        )?;
-        write_runs(f, "runs learned ", &source.runs_learned)?;
-        write_runs(f, "runs left out", &source.runs_held_out)
-    }
-
     fn write_ranges(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (command, noise) = (&self.command, &self.noise);
         let ([slow, fast], curved) = (command.speed_range_m_s, command.curvature_max_1_m);
@@ -243,7 +180,7 @@ impl View {
             "\nchange of heading rate by a stuck wheel, %, at {speed:.2} m/s"
         )?;
         write!(f, "{:>5} {:>5}", "turn", "R, m")?;
-        for wheel in &self.wheels {
+        for wheel in &self.source.wheels {
             write!(f, " {wheel:>7}")?;
         }
         for row in &self.heading_rate_change {
@@ -300,48 +237,13 @@ fn polynomial(curve: &Curve) -> Result<String, fmt::Error> {
     Ok(text)
 }
 
-/// Run ids as ranges, in lines of about 80 columns.
-fn write_runs(f: &mut fmt::Formatter<'_>, name: &str, runs: &[u32]) -> fmt::Result {
-    write!(f, "{name}  {}:", runs.len())?;
-    let mut column = 20;
-    for range in ranges(runs) {
-        if column + range.len() > 90 {
-            write!(f, "\n              ")?;
-            column = 14;
-        }
-        write!(f, " {range}")?;
-        column += range.len() + 1;
-    }
-    writeln!(f)
-}
-
-/// Rising ids as ranges: `[1, 2, 3, 7]` is `1-3`, `7`.
-fn ranges(runs: &[u32]) -> Vec<String> {
-    let mut sorted = runs.to_vec();
-    sorted.sort_unstable();
-    let mut out: Vec<(u32, u32)> = Vec::new();
-    for run in sorted {
-        match out.last_mut() {
-            Some((_, last)) if last.checked_add(1) == Some(run) => *last = run,
-            _ => out.push((run, run)),
-        }
-    }
-    let text = |(first, last): (u32, u32)| match first == last {
-        true => first.to_string(),
-        false => format!("{first}-{last}"),
-    };
-    out.into_iter().map(text).collect()
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]
-    fn runs_are_shown_as_ranges_and_polynomials_with_signs() {
-        assert_eq!(ranges(&[7, 1, 2, 3, 9, 10]), ["1-3", "7", "9-10"]);
-        assert!(ranges(&[]).is_empty());
+    fn polynomials_are_shown_with_signs() {
         let curve = Curve {
             curvature: [0.2, -0.9, 0.0, 1.0, 0.00004],
             inverse_speed: -0.001,

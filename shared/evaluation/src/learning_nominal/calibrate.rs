@@ -1,24 +1,13 @@
 //! The tail of the detector's nominal log-odds.
 
 use vigil_robot::Description;
+use vigil_robot::learned::Form;
 use vigil_robot::learned::monitor::Channels;
-use vigil_robot::learned::{Calibration, Form};
+use vigil_robot::nominal::channel::FAULT_RATE_1_H;
 use vigil_robot::nominal::{Model, Monitor, Tail};
 
 use super::record::Record;
-
-/// Windows over which maxima are taken, s.
-const WINDOW_S: f64 = 2.0;
-/// Prior rate under which the log-odds are collected, 1/h.
-const FAULT_RATE_1_H: f64 = 1.0;
-/// Slope taken for a tail that a log is too short to show: half of that of a model without error.
-const SLOPE_UNKNOWN: f64 = 0.5;
-
-/// The tail begins where one in so many maxima, and at least so many, lie beyond.
-const TAIL: usize = 20;
-const BEYOND_MIN: usize = 30;
-/// Bounds of a slope.
-const SLOPE: (f64, f64) = (0.2, 1.0);
+use crate::maxima::Maxima;
 
 /// Adds the tail of each channel for each form, then, on these, a calibration for each set of
 /// channels and each form.
@@ -31,8 +20,7 @@ pub(super) fn fit(model: &mut Model, records: &[Record], robot: &Description) {
         for form in Form::ALL {
             let monitor = Monitor::new(&alone, Channels::PoseEncoders, form, FAULT_RATE_1_H);
             let mut maxima = maxima(monitor, records);
-            maxima.sort_by(f64::total_cmp);
-            let found = tail(Channels::PoseEncoders.name(), form.name(), &maxima);
+            let found = maxima.high_tail(Channels::PoseEncoders, form, FAULT_RATE_1_H);
             model.channel[i].tails.push(Tail {
                 form: found.form,
                 level_log_odds: found.level_log_odds,
@@ -48,53 +36,18 @@ pub(super) fn fit(model: &mut Model, records: &[Record], robot: &Description) {
     for channels in sets {
         for form in Form::ALL {
             let monitor = Monitor::new(model, channels, form, FAULT_RATE_1_H);
-            let mut maxima = maxima(monitor, records);
-            maxima.sort_by(f64::total_cmp);
-            let (channels, form) = (channels.name(), form.name());
-            model.calibration.push(tail(channels, form, &maxima));
+            let found = maxima(monitor, records).high_tail(channels, form, FAULT_RATE_1_H);
+            model.calibration.push(found);
         }
-    }
-}
-
-/// The tail of sorted maxima: exponential beyond a high level, where there are enough of them; else
-/// from the highest on, with a slope that is not known.
-fn tail(channels: &str, form: &str, maxima: &[f64]) -> Calibration {
-    let count = maxima.len();
-    let exposure_h = count.max(1) as f64 * WINDOW_S / 3600.0;
-    let beyond = (count / TAIL).max(BEYOND_MIN);
-    let highest = maxima.last().copied().unwrap_or(-10.0);
-    let (level, interval_h, slope) = match count.checked_sub(beyond + 1).and_then(|i| maxima.get(i))
-    {
-        None => (highest, exposure_h, SLOPE_UNKNOWN),
-        Some(&level) => {
-            let above = maxima
-                .iter()
-                .map(|value| value - level)
-                .filter(|&x| x > 0.0);
-            let (sum, found) = above.fold((0.0, 0.0), |(sum, n), x| (sum + x, n + 1.0));
-            let found = f64::max(found, 1.0);
-            let lower = 1.0 - 1.645 / found.sqrt();
-            let slope = (lower / (sum / found).max(1e-3)).clamp(SLOPE.0, SLOPE.1);
-            (level, exposure_h / found, slope)
-        }
-    };
-    Calibration {
-        sensors: channels.to_owned(),
-        form: form.to_owned(),
-        fault_rate_1_h: FAULT_RATE_1_H,
-        level_log_odds: level,
-        interval_at_level_h: interval_h,
-        tail_slope: slope,
-        exposure_h,
     }
 }
 
 /// Highest log-odds of each window of motion.
-fn maxima(mut monitor: Monitor, records: &[Record]) -> Vec<f64> {
-    let mut maxima = Vec::new();
+fn maxima(mut monitor: Monitor, records: &[Record]) -> Maxima {
+    let mut maxima = Maxima::new();
     for record in records {
         monitor.reset();
-        let (mut in_window_s, mut highest) = (0.0, f64::NEG_INFINITY);
+        maxima.begin();
         for history in &record.histories {
             monitor.step(history, false);
             if !monitor.is_ready() {
@@ -104,12 +57,7 @@ fn maxima(mut monitor: Monitor, records: &[Record]) -> Vec<f64> {
             let Some(now) = history.ago(0).filter(|now| now.moving) else {
                 continue;
             };
-            highest = monitor.report().log_odds.max(highest);
-            in_window_s += now.dt_s;
-            if in_window_s >= WINDOW_S {
-                maxima.push(highest);
-                (in_window_s, highest) = (0.0, f64::NEG_INFINITY);
-            }
+            maxima.push(monitor.report().log_odds, now.dt_s);
         }
     }
     maxima

@@ -13,16 +13,19 @@ mod record;
 mod regression;
 mod report;
 mod terms;
+mod view;
 
-use vigil_blocks::fnv1a;
 use vigil_robot::Description;
 use vigil_robot::learned::model::Provenance;
 use vigil_robot::nominal::model::{KIND, VERSION};
 use vigil_robot::nominal::{Channel, Model};
 
+use crate::data_hash::data_hash;
 use crate::frames::Run;
+use crate::plausible::{self, Doubtful};
 use record::Record;
 pub use report::{ChannelError, Report};
+pub use view::View;
 
 /// Logs shorter than this are learned from with a warning and wider deviations, s.
 const LONG_ENOUGH_S: f64 = 600.0;
@@ -35,6 +38,9 @@ pub enum NominalError {
     /// Nothing to learn from.
     #[error("there are no runs to learn from")]
     NoRuns,
+    /// Half of the runs, or more, cannot mean what their columns say: one of them.
+    #[error("{0}")]
+    Doubtful(Doubtful),
     /// The robot hardly moves.
     #[error("the robot moves for {found_s:.1} s, at least {needed_s:.0} s are needed")]
     Still {
@@ -106,6 +112,7 @@ pub fn learn(
     if learned.is_empty() {
         return Err(NominalError::NoRuns);
     }
+    let doubt = doubt(&learned, until_s, robot)?;
     let records = record::all(&learned, until_s, robot);
     let tests = record::all(&left_out, until_s, robot);
     let command = excitation::ranges(&records, robot)?;
@@ -113,6 +120,7 @@ pub fn learn(
     let mut model = Model {
         kind: KIND.to_owned(),
         version: VERSION,
+        hash: String::new(),
         robot: robot.name.clone(),
         wheels: robot
             .wheels
@@ -126,6 +134,7 @@ pub fn learn(
             data_hash: data_hash(&learned, until_s),
             runs_learned: learned.iter().map(|run| run.id).collect(),
             runs_held_out: left_out.iter().map(|run| run.id).collect(),
+            until_s: until_s.is_finite().then_some(until_s),
             ..Provenance::default()
         },
         command,
@@ -133,12 +142,13 @@ pub fn learn(
         calibration: Vec::new(),
     };
     let mut report = Report::new(&model, runs.len() - left_out.len(), left_out.len());
+    report.warnings.extend(doubt);
     let targets = terms::targets(robot);
     if targets.is_empty() {
         return Err(NominalError::NoChannels);
     }
     for (target, terms) in targets {
-        let name = report::name(target, robot);
+        let name = report::name(target, &model.wheels);
         let (train, test): (Vec<Record>, Vec<Record>) = if tests.is_empty() {
             records.iter().map(|record| record.split(BLOCKS)).unzip()
         } else {
@@ -155,7 +165,22 @@ pub fn learn(
     }
     calibrate::fit(&mut model, &records, robot);
     report.finish(&model);
-    Ok((model, report))
+    Ok((model.sealed(), report))
+}
+
+/// What is doubtful about a few of the runs, as on ground that lets a robot slip; where half of
+/// them and more are doubtful, the columns are, and refused.
+fn doubt(runs: &[&Run], until_s: f64, robot: &Description) -> Result<Option<String>, NominalError> {
+    let of = |run: &&Run| plausible::doubt(run, robot, until_s);
+    let doubts: Vec<Doubtful> = runs.iter().filter_map(of).collect();
+    let (found, all) = (doubts.len(), runs.len());
+    match doubts.into_iter().next() {
+        Some(doubt) if 2 * found >= all => Err(NominalError::Doubtful(doubt)),
+        Some(doubt) => Ok(Some(format!(
+            "{found} of {all} runs are doubtful and learned from nevertheless: {doubt}"
+        ))),
+        None => Ok(None),
+    }
 }
 
 /// Fits weights and noise of one channel.
@@ -190,23 +215,4 @@ fn widening(exposure_s: f64, interval_s: f64) -> f64 {
         return 1.0;
     }
     1.0 + 2.0 / (2.0 * exposure_s / interval_s).max(2.0).sqrt()
-}
-
-fn data_hash(runs: &[&Run], until_s: f64) -> String {
-    let mut hash = fnv1a::hash_u64(fnv1a::BASIS, until_s.to_bits());
-    for run in runs {
-        hash = fnv1a::hash_u64(hash, u64::from(run.id));
-        for frame in &run.frames {
-            hash = fnv1a::hash_u64(hash, frame.header.t_capture_ns);
-            let values = frame
-                .pose
-                .iter()
-                .chain(&frame.command)
-                .chain(&frame.wheel_rate);
-            for value in values.chain(&frame.current).chain([&frame.yaw_rate]) {
-                hash = fnv1a::hash_u64(hash, value.to_bits());
-            }
-        }
-    }
-    format!("fnv1a64:{hash:016x}")
 }

@@ -3,13 +3,10 @@
 use std::fmt;
 
 use serde::Serialize;
-use vigil_robot::Description;
 use vigil_robot::nominal::{Channel, Model, Quantity, Target};
 
 use super::LONG_ENOUGH_S;
-
-/// Residual on the part left out, relative to the floor, above which a channel is reported.
-const RATIO_MAX: f64 = 1.1;
+use crate::learning::RESIDUAL_BAR;
 
 /// One channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -78,7 +75,7 @@ impl Report {
     }
 
     pub(super) fn add(&mut self, name: &str, channel: &Channel, widened: f64) {
-        if channel.held_out_ratio > RATIO_MAX {
+        if channel.held_out_ratio > RESIDUAL_BAR {
             self.warnings.push(format!(
                 "{name}: the residual on the part left out is {:.2} times the floor: the \
                  deviations are widened by that",
@@ -112,12 +109,9 @@ impl Report {
     }
 }
 
-/// A channel's name in messages.
-pub(super) fn name(target: Target, robot: &Description) -> String {
-    let wheel = robot
-        .wheels
-        .get(target.wheel)
-        .map_or("?", |wheel| &wheel.name);
+/// A channel's name in messages; `wheels`: their names.
+pub(super) fn name(target: Target, wheels: &[String]) -> String {
+    let wheel = wheels.get(target.wheel).map_or("?", String::as_str);
     match target.quantity {
         Quantity::Forward => "pose, forward".to_owned(),
         Quantity::Lateral => "pose, lateral".to_owned(),
@@ -125,6 +119,16 @@ pub(super) fn name(target: Target, robot: &Description) -> String {
         Quantity::YawRate => "yaw rate".to_owned(),
         Quantity::WheelRate => format!("wheel rate {wheel}"),
         Quantity::Current => format!("current {wheel}"),
+    }
+}
+
+/// Unit of a quantity.
+pub(super) const fn unit(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Forward | Quantity::Lateral => "m per commanded m",
+        Quantity::Turn => "rad per commanded m",
+        Quantity::YawRate | Quantity::WheelRate => "rad/s",
+        Quantity::Current => "A",
     }
 }
 

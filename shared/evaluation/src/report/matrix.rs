@@ -67,9 +67,12 @@ fn table(matrix: &Matrix, taxonomy: &Taxonomy, caption: &str) -> String {
 pub fn section(report: &Report<'_>) -> String {
     let part = |set: &super::SensorSet<'_>| {
         let score = set.score;
+        let head = format!("<h3>{}</h3>\n", escaped(words(set.name)));
+        if !score.identifies {
+            return head + &table(&score.confusion, report.taxonomy, "by label");
+        }
         format!(
-            "<h3>{}</h3>\n{}{}{}",
-            escaped(words(set.name)),
+            "{head}{}{}{}",
             table(&score.confusion, report.taxonomy, "by leaf"),
             table(&score.confusion_by.side, report.taxonomy, "by side"),
             table(&score.confusion_by.class, report.taxonomy, "by type")

@@ -39,6 +39,11 @@ pub struct Report<'a> {
 }
 
 impl Report<'_> {
+    /// False if the model names no faults, so that all of that does not apply.
+    fn identifies(&self) -> bool {
+        self.sets.iter().all(|set| set.score.identifies)
+    }
+
     /// The page.
     ///
     /// # Errors
@@ -47,7 +52,9 @@ impl Report<'_> {
         let mut body = summary::section(self);
         body.push_str(&contest::section(self));
         body.push_str(&matrix::section(self));
-        body.push_str(&curves::calibration(self)?);
+        if self.identifies() {
+            body.push_str(&curves::calibration(self)?);
+        }
         body.push_str(&curves::delays(self)?);
         body.push_str(&curves::trade_off(self)?);
         body.push_str(&belief::section(self)?);

@@ -125,8 +125,8 @@ fn alarm_rows(report: &Report<'_>) -> String {
     let alarms = |score: &Score| {
         let found = &score.false_alarms;
         format!(
-            "{} in {:.2} h without a fault",
-            found.alarms, found.exposure_h
+            "{} in {:.2} h without a fault (and {:.2} h of warm-up)",
+            found.alarms, found.exposure_h, found.warm_up_h
         )
     };
     let nominal = |score: &Score| {
@@ -179,12 +179,14 @@ fn group(report: &Report<'_>, class: &str) -> String {
         class => format!("{class}, {n} runs"),
     };
     let columns = report.sets.len() + 1;
+    let mut rows = detection_rows(report, class);
+    if report.identifies() {
+        rows.push_str(&identification_rows(report, class));
+        rows.push_str(&calibration_rows(report, class));
+    }
     format!(
-        "<tr class=\"group\"><th colspan=\"{columns}\">{}</th></tr>\n{}{}{}",
-        escaped(&heading),
-        detection_rows(report, class),
-        identification_rows(report, class),
-        calibration_rows(report, class)
+        "<tr class=\"group\"><th colspan=\"{columns}\">{}</th></tr>\n{rows}",
+        escaped(&heading)
     )
 }
 
@@ -216,13 +218,24 @@ pub fn section(report: &Report<'_>) -> String {
             "<details><summary>by kind of fault</summary>\n{kinds}</details>\n"
         ));
     }
-    let about = "In brackets: runs, and exact 95 % bounds (Clopper and Pearson; for false alarms \
-                 an hour Garwood). Times count from the onset of the fault; runs that end \
-                 earlier do not count. An abstract node is a wrong leaf, and a right side or type \
-                 if all its leaves are of it.";
+    let names = match report.identifies() {
+        true => {
+            "An abstract node is a wrong leaf, and a right side or type if all its leaves are of \
+             it."
+        }
+        false => {
+            "The model is of nominal behaviour alone: labels say fault or no fault, and leaf, \
+             side, type and calibration do not apply."
+        }
+    };
+    let about = format!(
+        "In brackets: runs, and exact 95 % bounds (Clopper and Pearson; for false alarms an hour \
+         Garwood, over the time in which an alarm was possible). Times count from the onset of \
+         the fault; runs that end earlier do not count. {names}"
+    );
     format!(
         "<header><h1>Vigil: evaluation</h1></header>\n{}",
-        super::page::section("summary", "Figures", about, &inside)
+        super::page::section("summary", "Figures", &about, &inside)
     )
 }
 

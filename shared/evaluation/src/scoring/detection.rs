@@ -41,9 +41,12 @@ pub struct FalseAlarms {
     pub faulty_runs_alarmed_before_onset: usize,
     /// Rises of the alarm without a fault.
     pub alarms: usize,
-    /// Time without a fault, h.
+    /// Time without a fault in which an alarm could rise or stood, h.
     pub exposure_h: f64,
-    /// Alarms over time.
+    /// Time without a fault in which none could rise, as the detector was warming up, h: at the
+    /// beginning of every run. It is no part of the exposure.
+    pub warm_up_h: f64,
+    /// Alarms over the exposure.
     #[serde(flatten)]
     pub rate: Rate,
     /// Ids of the runs with a false alarm.
@@ -68,26 +71,32 @@ impl FalseAlarms {
                 found.run_ids.push(case.label.run);
             }
         }
-        found.exposure_h = exposure_h(cases);
+        (found.exposure_h, found.warm_up_h) = exposure_h(cases);
         found.rate = Rate::of(found.alarms, found.exposure_h);
         found
     }
 }
 
 /// Verdicts without a fault.
-fn healthy(case: &Case) -> impl DoubleEndedIterator<Item = &Verdict> {
+fn healthy(case: &Case) -> impl Iterator<Item = &Verdict> {
     let onset_s = case.label.onset_s.unwrap_or(f64::INFINITY);
     let before = move |verdict: &&Verdict| verdict.t_s < onset_s - TIME_SLACK_S;
     case.verdicts.iter().filter(before)
 }
 
-/// Time without a fault in all runs, h.
-pub(super) fn exposure_h(cases: &[Case]) -> f64 {
-    let of = |case: &Case| {
-        let first = healthy(case).next()?;
-        Some((healthy(case).next_back()?.t_s - first.t_s) / 3600.0)
-    };
-    cases.iter().filter_map(of).fold(0.0, |sum, h| sum + h)
+/// Time without a fault in all runs, h: that in which an alarm was possible, and that in which the
+/// detector was warming up. The time from one verdict to the next counts as the later one does.
+pub(super) fn exposure_h(cases: &[Case]) -> (f64, f64) {
+    let (mut exposure_s, mut warm_up_s) = (0.0, 0.0);
+    for case in cases {
+        for (before, now) in healthy(case).zip(healthy(case).skip(1)) {
+            match now.warming_up {
+                true => warm_up_s += now.t_s - before.t_s,
+                false => exposure_s += now.t_s - before.t_s,
+            }
+        }
+    }
+    (exposure_s / 3600.0, warm_up_s / 3600.0)
 }
 
 /// Verdicts at which the alarm rises.

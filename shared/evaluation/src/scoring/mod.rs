@@ -2,12 +2,16 @@
 //!
 //! Works on rows of verdicts only and knows no filter. Definitions:
 //!
-//! - *false alarm*: an alarm in a nominal run, or before the onset of a fault;
+//! - *false alarm*: an alarm in a nominal run, or before the onset of a fault; their rate is over
+//!   the time in which one was possible, so without the detector's warm-up at the beginning of each
+//!   run (given beside it);
 //! - *detection*: the first rise of the alarm at or after the onset; without one, the fault is
 //!   missed; the delay is counted from the onset;
 //! - *at h seconds*: the last verdict at or before onset + h; runs that end earlier do not count;
 //! - *right leaf*: the reported mode is the true one (`UNKNOWN` if the tree does not know the true
 //!   one); an abstract node is a wrong leaf, and a right side or type if all its leaves are of it;
+//! - a model of nominal behaviour alone names no faults: its verdicts are *fault* (`UNKNOWN`) or
+//!   *no fault* (`ND`), labels count as no more than that, and only detection is scored;
 //! - *isolation*: the time from the onset until the right leaf is named for good, of the runs
 //!   that end with it.
 
@@ -58,6 +62,8 @@ pub struct Verdict {
     pub log_odds: f64,
     /// True while the alarm stands.
     pub alarm: bool,
+    /// True while none can rise: the detector is warming up.
+    pub warming_up: bool,
     /// Reported mode: a node of the fault tree, [`UNKNOWN`] or [`MULTIPLE`].
     pub mode: String,
     /// Its probability.
@@ -101,8 +107,13 @@ impl Case {
     fn classes(&self, taxonomy: &Taxonomy) -> Vec<String> {
         let class = taxonomy.class_or_unmodelled(&self.label.mode);
         let mut classes = vec!["all".to_owned(), class.to_owned()];
-        if !self.label.kind.is_empty() && self.label.kind != class {
-            classes.push(self.label.kind.clone());
+        // Where no fault is modelled, the label's own name is all there is.
+        let kind = match taxonomy.has_faults() {
+            true => &self.label.kind,
+            false => &self.label.mode,
+        };
+        if !kind.is_empty() && kind != class {
+            classes.push(kind.clone());
         }
         classes
     }
@@ -113,6 +124,9 @@ impl Case {
 pub struct Score {
     /// Runs by kind; nominal ones are `nominal`.
     pub runs: BTreeMap<String, usize>,
+    /// False for a model of nominal behaviour alone, which names no faults: identification, the
+    /// confusion of sides and types, and calibration do not apply and are empty.
+    pub identifies: bool,
     /// Alarms without a fault.
     pub false_alarms: FalseAlarms,
     /// Detection by class of fault; `all` is every one.
@@ -151,19 +165,22 @@ pub fn score(cases: &[Case], taxonomy: &Taxonomy, alarm_log_odds: f64) -> Score 
     let detection = classes
         .iter()
         .map(|(class, of)| (class.clone(), Detection::of(of)));
-    let identification = classes
-        .iter()
-        .map(|(class, of)| (class.clone(), Identification::of(of, taxonomy)));
-    let calibration = classes
-        .iter()
-        .map(|(class, of)| (class.clone(), Calibration::of(of, taxonomy)));
+    let identifies = taxonomy.has_faults();
+    let named = || classes.iter().filter(|_| identifies);
+    let identification =
+        named().map(|(class, of)| (class.clone(), Identification::of(of, taxonomy)));
+    let calibration = named().map(|(class, of)| (class.clone(), Calibration::of(of, taxonomy)));
     Score {
         runs,
+        identifies,
         false_alarms: FalseAlarms::of(cases),
         detection: detection.collect(),
         identification: identification.collect(),
         confusion: confusion::leaves(cases),
-        confusion_by: Coarse::of(cases, taxonomy),
+        confusion_by: match identifies {
+            true => Coarse::of(cases, taxonomy),
+            false => Coarse::default(),
+        },
         calibration: calibration.collect(),
         trade_off: TradeOff::of(cases, taxonomy, alarm_log_odds),
     }

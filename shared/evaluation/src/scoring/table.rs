@@ -28,6 +28,14 @@ impl fmt::Display for Score {
         let runs = self.runs.iter().map(|(kind, n)| format!("{n} {kind}"));
         writeln!(f, "runs            {}", runs.collect::<Vec<_>>().join(", "))?;
         self.detection_table(f)?;
+        if !self.identifies {
+            writeln!(
+                f,
+                "\nleaf, side, type and their calibration do not apply: the model is of nominal \
+                 behaviour alone"
+            )?;
+            return self.confusion_table(f);
+        }
         for what in ["leaf", "side", "type", "unknown"] {
             self.identification_table(f, what)?;
         }
@@ -46,7 +54,9 @@ impl Score {
         let faulty = format!("{before} of {}", found.faulty_runs);
         write!(
             f,
-            "false alarms    {alarms} in {exposure_h:.2} h without a fault: "
+            "false alarms    {alarms} in {exposure_h:.2} h without a fault (and {:.2} h of \
+             warm-up): ",
+            found.warm_up_h
         )?;
         writeln!(f, "{nominal} nominal runs, {faulty} runs before the onset")?;
         let rate = &found.rate;

@@ -74,6 +74,12 @@ impl Taxonomy {
         self.nodes.iter().find(|node| node.name == name)
     }
 
+    /// True if it knows any fault; false if only the nominal mode is modelled.
+    #[must_use]
+    pub fn has_faults(&self) -> bool {
+        self.nodes.iter().any(|node| node.is_leaf)
+    }
+
     /// Name of node `i`.
     #[must_use]
     pub fn name(&self, i: usize) -> Option<&str> {

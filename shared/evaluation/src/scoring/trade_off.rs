@@ -5,21 +5,17 @@
 //! the alarm rises and falls as the detector's own does, so that it is armed again after each; at
 //! the configured threshold the curve says what was measured. Above it delays may come out too
 //! long: once its own alarm stands, the detector's pose track follows the measurement, which slows
-//! the growth of the log-odds. Time at rest counts as time in motion here.
+//! the growth of the log-odds. Time at rest counts as time in motion here; while the detector warms
+//! up, no alarm rises at any threshold.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use vigil_robot::Alarm;
 
 use super::detection::{Rate, exposure_h};
 use super::{Case, Spread, TIME_SLACK_S, Taxonomy, Verdict};
 
-/// As the detector: an alarm falls when the log-odds have stayed this far below the threshold ..
-const CLEAR_BELOW: f64 = 8.0;
-/// .. and below these, whatever the threshold ..
-const CLEAR_LOG_ODDS: f64 = -4.0;
-/// .. for this long, s.
-const CLEAR_S: f64 = 1.0;
 /// Thresholds taken from the top of healthy driving, as many from the rest of it, and as many from
 /// driving with a fault.
 const LEVELS: usize = 30;
@@ -80,7 +76,7 @@ pub struct TradeOff {
 
 impl TradeOff {
     pub(super) fn of(cases: &[Case], taxonomy: &Taxonomy, alarm_log_odds: f64) -> Self {
-        let exposure_h = exposure_h(cases);
+        let (exposure_h, _) = exposure_h(cases);
         let point = |threshold| point(cases, taxonomy, exposure_h, threshold);
         Self {
             configured: point(alarm_log_odds),
@@ -91,23 +87,13 @@ impl TradeOff {
 
 /// Times at which the alarm rises at `threshold`, s.
 fn rises_s(verdicts: &[Verdict], threshold: f64) -> Vec<f64> {
-    let clear = (threshold - CLEAR_BELOW).min(CLEAR_LOG_ODDS);
-    let (mut rises_s, mut stands, mut quiet_s) = (Vec::new(), false, 0.0);
+    let (mut rises_s, mut alarm) = (Vec::new(), Alarm::new(threshold));
     let mut last_s = verdicts.first().map_or(0.0, |first| first.t_s);
     for verdict in verdicts {
         let dt_s = verdict.t_s - last_s;
         last_s = verdict.t_s;
-        if !stands {
-            stands = verdict.log_odds > threshold;
-            if stands {
-                rises_s.push(verdict.t_s);
-                quiet_s = 0.0;
-            }
-        } else if verdict.log_odds < clear {
-            quiet_s += dt_s;
-            stands = quiet_s < CLEAR_S - TIME_SLACK_S;
-        } else {
-            quiet_s = 0.0;
+        if !verdict.warming_up && alarm.take(verdict.log_odds, dt_s, true) {
+            rises_s.push(verdict.t_s);
         }
     }
     rises_s
@@ -148,7 +134,7 @@ fn thresholds(cases: &[Case]) -> Vec<f64> {
     for case in cases {
         let onset_s = case.label.onset_s.unwrap_or(f64::INFINITY) - TIME_SLACK_S;
         let (mut highest, mut highest_faulty) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-        for verdict in &case.verdicts {
+        for verdict in case.verdicts.iter().filter(|v| !v.warming_up) {
             let (levels, highest) = match verdict.t_s < onset_s {
                 true => (&mut healthy, &mut highest),
                 false => (&mut faulty, &mut highest_faulty),

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::form::Form;
+use super::model::ModelError;
 use super::monitor::Channels;
 
 /// Tail of the nominal log-odds, from which the alarm threshold follows.
@@ -29,18 +30,56 @@ pub struct Calibration {
     pub exposure_h: f64,
 }
 
-/// Bounds of a threshold: an alarm below even odds would be no alarm.
-const THRESHOLD: (f64, f64) = (0.0, 60.0);
 /// Windows over which maxima are taken are independent; at least so many are needed.
 const MAXIMA_MIN: usize = 30;
+/// A high level is the one that one in so many maxima exceeds, at least [`MAXIMA_MIN`] of them.
+const HIGH: usize = 20;
+/// Slope taken for a tail that a log is too short to show: half of that of a model without error.
+const SLOPE_UNKNOWN: f64 = 0.5;
+/// Bounds of a slope.
+const SLOPE: (f64, f64) = (0.2, 1.0);
+
+/// The calibration of a set of channels and a form of detection among those of a model.
+pub(crate) fn find(
+    all: &[Calibration],
+    channels: Channels,
+    form: Form,
+) -> Result<&Calibration, ModelError> {
+    let (sensors, form) = (channels.name(), form.name());
+    all.iter()
+        .find(|calibration| calibration.sensors == sensors && calibration.form == form)
+        .ok_or_else(|| {
+            let known = all
+                .iter()
+                .map(|c| format!("'{}' and '{}'", c.sensors, c.form));
+            let known = known.collect::<Vec<_>>().join(", ");
+            ModelError::Calibration {
+                sensors,
+                form,
+                known,
+            }
+        })
+}
 
 impl Calibration {
-    /// Log-odds at which to alarm, so that `interval_h` pass on average between false alarms.
+    /// Log-odds at which to alarm, so that `interval_h` pass on average between false alarms. Not
+    /// below 0: an alarm below even odds would be no alarm.
     #[must_use]
     pub fn alarm_log_odds(&self, interval_h: f64, fault_rate_1_h: f64) -> f64 {
         let above = (interval_h / self.interval_at_level_h).ln() / self.tail_slope;
-        let prior = (fault_rate_1_h / self.fault_rate_1_h).ln();
-        (self.level_log_odds + above + prior).clamp(THRESHOLD.0, THRESHOLD.1)
+        (self.level_log_odds + above + self.prior(fault_rate_1_h)).max(0.0)
+    }
+
+    /// Mean time between exceedances of `alarm_log_odds`, h.
+    #[must_use]
+    pub fn interval_h(&self, alarm_log_odds: f64, fault_rate_1_h: f64) -> f64 {
+        let above = alarm_log_odds - self.level_log_odds - self.prior(fault_rate_1_h);
+        self.interval_at_level_h * (self.tail_slope * above).exp()
+    }
+
+    /// What another prior fault rate adds to the log-odds.
+    fn prior(&self, fault_rate_1_h: f64) -> f64 {
+        (fault_rate_1_h / self.fault_rate_1_h).ln()
     }
 
     /// Fits the tail to the maxima of the log-odds over windows of `window_s` of nominal driving:
@@ -57,24 +96,71 @@ impl Calibration {
             return None;
         }
         maxima.sort_by(f64::total_cmp);
-        let level = maxima[maxima.len() / 2];
-        let above: Vec<f64> = maxima
-            .iter()
-            .map(|value| value - level)
-            .filter(|&x| x > 0.0)
-            .collect();
-        let count = above.len().max(1) as f64;
-        let mean = above.iter().sum::<f64>() / count;
-        let lower = 1.0 - 1.645 / count.sqrt();
-        Some(Self {
+        let level = maxima.get(maxima.len() / 2).copied()?;
+        Some(
+            Self::blank(channels, form, fault_rate_1_h, maxima.len(), window_s)
+                .above(level, maxima),
+        )
+    }
+
+    /// Fits the tail beyond a high level, which one in 20 maxima, and at least 30, exceed. With
+    /// fewer the tail begins at the highest one, with a slope that is not known and so taken low.
+    #[must_use]
+    pub fn fit_high(
+        channels: Channels,
+        form: Form,
+        fault_rate_1_h: f64,
+        maxima: &mut [f64],
+        window_s: f64,
+    ) -> Self {
+        maxima.sort_by(f64::total_cmp);
+        let count = maxima.len();
+        let blank = Self::blank(channels, form, fault_rate_1_h, count.max(1), window_s);
+        let beyond = (count / HIGH).max(MAXIMA_MIN);
+        match count.checked_sub(beyond + 1).and_then(|i| maxima.get(i)) {
+            Some(&level) => blank.above(level, maxima),
+            None => Self {
+                level_log_odds: maxima.last().copied().unwrap_or(-10.0),
+                ..blank
+            },
+        }
+    }
+
+    /// Without a level: one exceedance in all windows, of an unknown slope.
+    fn blank(
+        channels: Channels,
+        form: Form,
+        fault_rate_1_h: f64,
+        windows: usize,
+        window_s: f64,
+    ) -> Self {
+        let exposure_h = window_s / 3600.0 * windows as f64;
+        Self {
             sensors: channels.name().to_owned(),
             form: form.name().to_owned(),
             fault_rate_1_h,
+            level_log_odds: 0.0,
+            interval_at_level_h: exposure_h,
+            tail_slope: SLOPE_UNKNOWN,
+            exposure_h,
+        }
+    }
+
+    /// The exponential tail of the maxima above a level, its slope at the lower end of its 90 %
+    /// interval.
+    fn above(self, level: f64, maxima: &[f64]) -> Self {
+        let apart = maxima.iter().map(|value| value - level);
+        let (sum, found) = apart
+            .filter(|&x| x > 0.0)
+            .fold((0.0, 0.0), |(sum, n), x| (sum + x, n + 1.0));
+        let found = f64::max(found, 1.0);
+        let lower = 1.0 - 1.645 / found.sqrt();
+        Self {
             level_log_odds: level,
-            interval_at_level_h: window_s / 3600.0 * maxima.len() as f64 / count,
-            tail_slope: (lower / mean.max(1e-3)).clamp(0.2, 1.0),
-            exposure_h: window_s / 3600.0 * maxima.len() as f64,
-        })
+            interval_at_level_h: self.exposure_h / found,
+            tail_slope: (lower / (sum / found).max(1e-3)).clamp(SLOPE.0, SLOPE.1),
+            ..self
+        }
     }
 }
 
@@ -107,6 +193,38 @@ mod tests {
         let by_hand = fit.level_log_odds + (24.0 / 0.002_f64).ln() / fit.tail_slope;
         assert!((threshold - by_hand).abs() < 0.01);
         assert!((fit.alarm_log_odds(24.0, 2.0) - threshold - 2.0_f64.ln()).abs() < 1e-12);
+        for rate in [1.0, 2.0] {
+            let alarm = fit.alarm_log_odds(1e6, rate);
+            assert!((fit.interval_h(alarm, rate) / 1e6 - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_high_level_is_taken_where_there_are_maxima_enough() {
+        let exponential = |n: u32| -> Vec<f64> {
+            let quantile = |i: u32| -(1.0 - (f64::from(i) + 0.5) / f64::from(n)).ln() / 0.8;
+            (0..n).map(quantile).collect()
+        };
+        let fit = |mut maxima: Vec<f64>| {
+            Calibration::fit_high(Channels::Pose, Form::Constant, 1.0, &mut maxima, 3.6)
+        };
+        let long = fit(exponential(4000));
+        assert!(
+            (long.level_log_odds - 20.0_f64.ln() / 0.8).abs() < 0.01,
+            "{long:?}"
+        );
+        let expected = 0.8 * (1.0 - 1.645 / 200.0_f64.sqrt());
+        assert!((long.tail_slope - expected).abs() < 0.02, "{long:?}");
+        assert!((long.interval_at_level_h - 0.02).abs() < 1e-9, "{long:?}");
+        // Too short for a slope: the highest, seen once in all.
+        let short = exponential(20);
+        let highest = short.last().copied().unwrap();
+        let short = fit(short);
+        assert_eq!((short.level_log_odds, short.tail_slope), (highest, 0.5));
+        assert!(
+            (short.interval_at_level_h - 0.02).abs() < 1e-12,
+            "{short:?}"
+        );
     }
 
     #[test]

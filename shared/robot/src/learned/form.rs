@@ -1,7 +1,7 @@
 //! How a group of channels turns its whitened residuals into evidence for a fault.
 
 use nalgebra::SVector;
-use vigil_inference::ages::Ages;
+use vigil_inference::ages::{self, Ages};
 use vigil_inference::constant::Constant;
 use vigil_inference::windowed::Windowed;
 
@@ -26,12 +26,12 @@ pub enum Form {
 }
 
 impl Form {
-    /// Log-odds that a group of channels cannot exceed for long: an alarm above them might never
-    /// rise.
+    /// Log-odds that a group of channels cannot exceed for long, however long a fault lasts: an
+    /// alarm above them might never rise.
     #[must_use]
     pub fn log_odds_max(self) -> f64 {
         match self {
-            Self::LearnedBias => f64::INFINITY,
+            Self::LearnedBias => ages::LOG_ODDS_MAX,
             Self::Constant | Self::Windowed => -VANISHES.ln(),
         }
     }

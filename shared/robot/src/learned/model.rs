@@ -1,7 +1,8 @@
 //! The model file: written by `vigil learn`, read by detector and identifier.
 
 use serde::{Deserialize, Serialize};
-use vigil_blocks::{WHEELS, fnv1a};
+use vigil_blocks::WHEELS;
+use vigil_inference::departure;
 
 use super::calibration::Calibration;
 use super::form::Form;
@@ -9,11 +10,12 @@ use super::monitor::Channels;
 use super::motion::{Curve, MotionModel};
 pub use super::provenance::Provenance;
 use super::wheels::{EncoderModel, RateModel};
+use crate::alarm::{self, AlarmError};
+pub use crate::model_file::EDITED;
+use crate::model_file::{self, ModelFile};
 
 /// Version of the file's layout.
 pub const VERSION: u32 = 3;
-/// What stands for the hash in a file that a person has changed on purpose.
-pub const EDITED: &str = "edited";
 
 /// Everything learned about one robot on one kind of ground.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -112,10 +114,15 @@ pub enum ModelError {
     Parse(String),
     /// Another layout.
     #[error(
-        "the model has layout version {0}; this program reads version {VERSION}: learn it again \
+        "the model has layout version {found}; this program reads version {read}: learn it again \
          with `vigil learn`"
     )]
-    Version(u32),
+    Version {
+        /// Version of the file.
+        found: u32,
+        /// Version that is read.
+        read: u32,
+    },
     /// The content does not fit the hash that the file carries.
     #[error(
         "the content has the hash {found}, but the file says hash = \"{stored}\": it was changed \
@@ -150,12 +157,14 @@ pub enum ModelError {
         robot_wheels: String,
     },
     /// The model has no calibration for the channels and the form of detection.
-    #[error("the model has no calibration for '{sensors}' and '{form}'; learn it again")]
+    #[error("the model has no calibration for '{sensors}' and '{form}', only for {known}")]
     Calibration {
         /// Channels.
         sensors: &'static str,
         /// Form.
         form: &'static str,
+        /// Channels and forms for which it has one.
+        known: String,
     },
 }
 
@@ -165,19 +174,7 @@ impl Model {
     /// # Errors
     /// [`ModelError`] naming the key, what was found and what is allowed.
     pub fn from_toml(text: &str) -> Result<Self, ModelError> {
-        // The version comes first: what a file of another layout lacks is of no interest.
-        let layout: Layout = toml::from_str(text).map_err(|error| parse_error(text, &error))?;
-        if layout.version != VERSION {
-            return Err(ModelError::Version(layout.version));
-        }
-        let model: Self = toml::from_str(text).map_err(|error| parse_error(text, &error))?;
-        model.check()?;
-        let found = model.content_hash();
-        if model.hash != found && !model.is_edited() {
-            let stored = model.hash;
-            return Err(ModelError::Hash { stored, found });
-        }
-        Ok(model)
+        model_file::read(text)
     }
 
     /// The file's text.
@@ -185,35 +182,25 @@ impl Model {
     /// # Errors
     /// [`ModelError::Parse`] if the model cannot be written.
     pub fn to_toml(&self) -> Result<String, ModelError> {
-        toml::to_string(self).map_err(|error| ModelError::Parse(error.to_string()))
+        model_file::text(self)
     }
 
     /// Hash over the content; equal for equal models.
     #[must_use]
     pub fn hash(&self) -> u64 {
-        let content = Self {
-            hash: String::new(),
-            ..self.clone()
-        };
-        let text = content.to_toml().unwrap_or_default();
-        fnv1a::hash(fnv1a::BASIS, text.as_bytes())
+        model_file::hash(self)
     }
 
     /// The same with the hash that its content has, as [`Self::from_toml`] expects it.
     #[must_use]
-    pub fn sealed(mut self) -> Self {
-        self.hash = self.content_hash();
-        self
+    pub fn sealed(self) -> Self {
+        model_file::sealed(self)
     }
 
     /// True if the file says that a person has changed it.
     #[must_use]
     pub fn is_edited(&self) -> bool {
         self.hash == EDITED
-    }
-
-    fn content_hash(&self) -> String {
-        format!("fnv1a64:{:016x}", self.hash())
     }
 
     /// Checks that the model is of this robot.
@@ -242,11 +229,25 @@ impl Model {
     /// # Errors
     /// [`ModelError::Calibration`].
     pub fn calibration(&self, channels: Channels, form: Form) -> Result<&Calibration, ModelError> {
-        let (sensors, form) = (channels.name(), form.name());
-        self.calibration
-            .iter()
-            .find(|calibration| calibration.sensors == sensors && calibration.form == form)
-            .ok_or(ModelError::Calibration { sensors, form })
+        super::calibration::find(&self.calibration, channels, form)
+    }
+
+    /// Log-odds at which to alarm, so that `interval_h` pass on average between false alarms at a
+    /// prior fault rate of `fault_rate_1_h`.
+    ///
+    /// # Errors
+    /// [`AlarmError`] if there is no calibration, or the log-odds cannot reach the alarm: those of
+    /// the pose end at [`departure::LOG_ODDS_MAX`], whatever the other channels do.
+    pub fn alarm_log_odds(
+        &self,
+        (channels, form): (Channels, Form),
+        interval_h: f64,
+        fault_rate_1_h: f64,
+    ) -> Result<f64, AlarmError> {
+        let calibration = self.calibration(channels, form)?;
+        let reachable = form.log_odds_max().min(departure::LOG_ODDS_MAX);
+        let form = form.name();
+        alarm::threshold(calibration, form, interval_h, fault_rate_1_h, reachable)
     }
 
     /// The model of `wheel` stuck.
@@ -280,6 +281,18 @@ impl Model {
     #[must_use]
     pub fn sample_variance(&self, sd: f64, dt_s: f64) -> f64 {
         sd * sd / (self.noise.reference_rate_hz * dt_s.max(1e-6))
+    }
+}
+
+impl ModelFile for Model {
+    const VERSION: u32 = VERSION;
+
+    fn stored(&self) -> &str {
+        &self.hash
+    }
+
+    fn stored_mut(&mut self) -> &mut String {
+        &mut self.hash
     }
 
     fn check(&self) -> Result<(), ModelError> {
@@ -325,23 +338,6 @@ impl Model {
         }
         self.calibration.iter().try_for_each(check_calibration)
     }
-}
-
-/// What every layout has.
-#[derive(Deserialize)]
-struct Layout {
-    /// Layout of the file.
-    version: u32,
-}
-
-fn parse_error(text: &str, error: &toml::de::Error) -> ModelError {
-    let until = text
-        .as_bytes()
-        .iter()
-        .take(error.span().map_or(0, |s| s.start));
-    let line = 1 + until.filter(|&&byte| byte == b'\n').count();
-    let message = error.message().replace('\n', " ");
-    ModelError::Parse(format!("line {line}: {message}"))
 }
 
 impl Noise {

@@ -3,6 +3,7 @@
 use vigil_blocks::WHEELS;
 use vigil_inference::angle::wrap;
 
+use super::wheels::{rolling_rate, steering_angle};
 use super::{Model, Observation, Reading};
 use crate::Description;
 
@@ -84,8 +85,8 @@ impl NoiseScale {
 /// Samples of a kind after which its noise counts as known.
 const KNOWN: f64 = 100.0;
 /// Difference of commanded and lagged curvature, 1/m, and change of speed, m/s, up to which a drive
-/// counts as steady.
-const STEADY_1_M: f64 = 0.02;
+/// counts as steady: further apart, the motion is not known well enough to tell it from noise.
+const STEADY_1_M: f64 = 0.1;
 const STEADY_M_S: f64 = 1e-3;
 
 /// How noisy the sensors are, from differences between successive observations.
@@ -115,8 +116,8 @@ impl SensorNoise {
         self.pose.count >= PRIOR + KNOWN
     }
 
-    /// Second differences of the pose and first differences of wheel rates and steering angles, at
-    /// constant command: neither a curve nor a fault that persists shows in them.
+    /// Second differences of the pose and first differences of wheel rates and steering angles,
+    /// less what the nominal motion makes of them: neither a curve nor a fault that persists shows.
     pub fn update(&mut self, model: &Model, robot: &Description, now: &Observation) {
         let [before, last] = self.history;
         self.history = [last, Some(*now)];
@@ -134,13 +135,9 @@ impl SensorNoise {
         }
         let has_pose = |o: &&Observation| o.pose_frames == now.pose_frames && o.pose_frames > 0;
         if all.iter().all(has_pose) {
+            let (up, down) = (apart(model, &last, now), apart(model, &before, &last));
             for (i, variance) in now.pose_variance(model, 1.0).into_iter().enumerate() {
-                let (up, down) = (now.pose[i] - last.pose[i], last.pose[i] - before.pose[i]);
-                let bend = if i == 2 {
-                    wrap(wrap(up) - wrap(down))
-                } else {
-                    up - down
-                };
+                let bend = up[i] - down[i];
                 self.pose.push(bend * bend / (6.0 * variance));
             }
         }
@@ -148,28 +145,49 @@ impl SensorNoise {
         if surge < STEADY_M_S {
             let count = robot.wheels.len().min(WHEELS);
             let (rate, angle) = (model.noise.wheel_rate_rad_s, model.noise.steer_rad);
-            let wheels = last.wheels[..count].iter().zip(&now.wheels);
-            push_steps(&mut self.wheels, model, now, rate, wheels);
-            let steered = last.steer[..count].iter().zip(&now.steer);
-            push_steps(&mut self.steer, model, now, angle, steered);
+            let turns = |o: &Observation, i| rolling_rate(robot, i, o.command[0], o.command[1]);
+            let steers = |o: &Observation, i| steering_angle(robot, i, o.command[0]);
+            for i in 0..count {
+                let expected = turns(now, i) - turns(&last, i);
+                let readings = [&last.wheels[i], &now.wheels[i]];
+                push_step(&mut self.wheels, model, now, rate, readings, expected);
+                let expected = steers(now, i) - steers(&last, i);
+                let readings = [&last.steer[i], &now.steer[i]];
+                push_step(&mut self.steer, model, now, angle, readings, expected);
+            }
         }
     }
 }
 
-/// First differences of channels whose samples have the learned standard deviation `sd`.
-fn push_steps<'a>(
+/// Displacement from one measured pose to the next (x, y, yaw), less that of the nominal motion.
+fn apart(model: &Model, last: &Observation, now: &Observation) -> [f64; 3] {
+    let step = now.displacement(model, &model.nominal.motion);
+    let [turn, forward, left] = step.per_metre.map(|per_metre| per_metre * step.travel_m);
+    let (sin, cos) = (last.pose[2] + 0.5 * turn).sin_cos();
+    [
+        now.pose[0] - last.pose[0] - (cos * forward - sin * left),
+        now.pose[1] - last.pose[1] - (sin * forward + cos * left),
+        wrap(wrap(now.pose[2] - last.pose[2]) - turn),
+    ]
+}
+
+/// First difference of a channel whose samples have the learned standard deviation `sd`, of which
+/// `expected` is no noise.
+fn push_step(
     scale: &mut NoiseScale,
     model: &Model,
     now: &Observation,
     sd: f64,
-    pairs: impl Iterator<Item = (&'a Reading, &'a Reading)>,
+    [last_read, now_read]: [&Reading; 2],
+    expected: f64,
 ) {
-    let sample = model.sample_variance(sd, now.frame_s);
-    for (last, now_read) in pairs.filter(|(a, b)| a.plain == b.plain && a.plain > 0) {
-        let step = now_read.mean - last.mean;
-        let variance = now.mean_variance(sample, now_read.plain);
-        scale.push(step * step / (2.0 * variance));
+    if last_read.plain != now_read.plain || now_read.plain == 0 {
+        return;
     }
+    let sample = model.sample_variance(sd, now.frame_s);
+    let step = now_read.mean - last_read.mean - expected;
+    let variance = now.mean_variance(sample, now_read.plain);
+    scale.push(step * step / (2.0 * variance));
 }
 
 #[cfg(test)]

@@ -365,7 +365,11 @@ impl Observer {
         (state.travel_before, state.heading_before) = (travel, heading);
         // An anchor without a pose is still to come.
         state.anchor = state.anchor && sums.pose_frames == 0;
-        state.sums = Sums::default();
+        state.sums = Sums {
+            wheels: sums.wheels.map(|reading| reading.next()),
+            steer: sums.steer.map(|reading| reading.next()),
+            ..Sums::default()
+        };
         // Cumulative sums stay small however long the run.
         if travel.abs() > 1e3 {
             state.travel -= travel;

@@ -12,6 +12,9 @@ pub struct Provenance {
     pub runs_learned: Vec<u32>,
     /// Runs left out, for the test.
     pub runs_held_out: Vec<u32>,
+    /// End of what was learned from in each run, s; absent if runs were learned from whole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub until_s: Option<f64>,
     /// Name of the file with the frames, without its folder.
     pub frames_file: String,
     /// Name of the file with the labels, without its folder.

@@ -14,6 +14,8 @@ pub struct Reading {
     pub repeats: u32,
     /// Samples that are exactly 0, repeats included.
     pub zeros: u32,
+    /// Mean of the last observation that had plain samples, if there was one.
+    pub before: Option<f64>,
 }
 
 impl Reading {
@@ -21,6 +23,22 @@ impl Reading {
     #[must_use]
     pub const fn count(&self) -> u32 {
         self.plain + self.repeats
+    }
+
+    /// An empty reading that follows this one.
+    #[must_use]
+    pub const fn next(&self) -> Self {
+        Self {
+            plain: 0,
+            mean: 0.0,
+            squares: 0.0,
+            repeats: 0,
+            zeros: 0,
+            before: match self.plain {
+                0 => self.before,
+                _ => Some(self.mean),
+            },
+        }
     }
 
     /// Adds a sample, given its predecessor.
@@ -56,9 +74,22 @@ mod tests {
             squares,
             repeats,
             zeros,
+            ..
         } = reading;
         assert_eq!((plain, repeats, zeros, reading.count()), (3, 2, 2, 5));
         assert!((mean - 4.0 / 3.0).abs() < 1e-12);
         assert!((squares - 42.0 / 9.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_next_reading_remembers_the_last_mean() {
+        let mut reading = Reading::default();
+        assert_eq!(reading.next().before, None);
+        reading.push(2.0, None);
+        reading.push(4.0, Some(2.0));
+        let next = reading.next();
+        assert_eq!((next.before, next.count()), (Some(3.0), 0));
+        // An observation without samples passes on what it has.
+        assert_eq!(next.next().before, Some(3.0));
     }
 }

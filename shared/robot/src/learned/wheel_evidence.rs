@@ -7,15 +7,17 @@ use super::wheels::{rolling_rate, steering_angle};
 use super::{EncoderState, Model, Moved, NoiseScales, Observation, RateModel};
 use crate::Description;
 
-/// Ways in which an encoder breaks: zero, frozen, noise, dead (zero plus the sensor's noise).
-pub const BREAKAGES: [EncoderState; 4] = [
+/// Ways in which an encoder breaks: zero, frozen, noise, dead (zero plus the sensor's noise),
+/// wandering (a rate of its own).
+pub const BREAKAGES: [EncoderState; 5] = [
     EncoderState::Zero,
     EncoderState::Frozen,
     EncoderState::Noise,
     EncoderState::Dead,
+    EncoderState::Wanders,
 ];
 /// Prior shares of [`BREAKAGES`].
-pub const BREAKAGE_SHARES: [f64; BREAKAGES.len()] = [0.32, 0.32, 0.32, 0.04];
+pub const BREAKAGE_SHARES: [f64; BREAKAGES.len()] = [0.3, 0.3, 0.3, 0.04, 0.06];
 
 /// Share of healthy wheels' rates in the tail: while all is well, and while another wheel drags.
 const TAIL: f64 = 0.02;

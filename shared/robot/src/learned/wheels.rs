@@ -79,6 +79,9 @@ pub enum EncoderState {
     Noise,
     /// The encoder reports zero plus the sensor's noise.
     Dead,
+    /// A smooth rate of its own: that of the observation before, or nearly so. A scaled or late
+    /// encoder, or a wheel that slips.
+    Wanders,
     /// Anything.
     Any,
 }
@@ -94,6 +97,8 @@ const EXCEPTION: f64 = 0.01;
 const OUTLIER: f64 = 1e-3;
 /// Deviation of a standing wheel's rate from zero, rad/s.
 const STANDING_SD_RAD_S: f64 = 0.02;
+/// Deviation of a wandering rate from one observation to the next, rad/s.
+const WANDER_SD_RAD_S: f64 = 0.05;
 
 impl EncoderModel {
     /// Natural log-probability of `reading` in `state`, for samples whose noise has the standard
@@ -121,6 +126,15 @@ impl EncoderModel {
                 let standing = self.common(reading, 0.0, variance, sample_sd);
                 log_add(standing, OUTLIER.ln() + noise)
             }
+            EncoderState::Wanders => match reading.before {
+                Some(before) => {
+                    let sample = sample_sd * sample_sd / plain.max(1.0);
+                    let variance = WANDER_SD_RAD_S * WANDER_SD_RAD_S + sample;
+                    let smooth = self.common(reading, before, variance, sample_sd);
+                    log_add(smooth, OUTLIER.ln() + noise)
+                }
+                None => noise,
+            },
             EncoderState::Any => {
                 let standing = self.common(reading, 0.0, 0.01, sample_sd);
                 log_add(log_add(standing, noise), repeats * hit + plain * miss) - 3.0_f64.ln()
@@ -201,6 +215,31 @@ mod tests {
                 assert!(score(i) > score(j) + 2.0, "pattern {i}, state {j}");
             }
         }
+    }
+
+    #[test]
+    fn a_smooth_rate_of_its_own_wanders_and_is_neither_noise_nor_turning() {
+        let states = [
+            EncoderState::Wanders,
+            EncoderState::Turning(2.0, 4e-4, 0.02),
+            EncoderState::Noise,
+            EncoderState::Dead,
+        ];
+        let mut sums = [0.0; 4];
+        let mut last = reading(&[1.61]);
+        for value in [1.63, 1.58, 1.57, 1.62, 1.6, 1.66] {
+            let mut next = last.next();
+            next.push(value, None);
+            for (sum, state) in sums.iter_mut().zip(states) {
+                *sum += model().log_likelihood(state, &next, 0.05);
+            }
+            last = next;
+        }
+        assert!(sums[1..].iter().all(|sum| sums[0] > sum + 5.0), "{sums:?}");
+        // Without an observation before there is nothing to be near to.
+        let first = reading(&[1.6]);
+        let of = |state| model().log_likelihood(state, &first, 0.05);
+        assert_eq!(of(EncoderState::Wanders), of(EncoderState::Noise));
     }
 
     #[test]

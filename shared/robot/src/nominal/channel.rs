@@ -4,10 +4,14 @@ use serde::{Deserialize, Serialize};
 use vigil_blocks::COMMANDS;
 
 use super::observation::{History, Observation};
+use crate::learned::Form;
+use crate::learned::monitor::Channels;
 
 /// Rate at which a wheel's sense of turning counts as half decided, rad/s: friction changes its
 /// sign with it.
 const SENSE_RAD_S: f64 = 0.5;
+/// Prior fault rate at which log-odds are collected and tempered, 1/h.
+pub const FAULT_RATE_1_H: f64 = 1.0;
 
 /// What a channel measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -197,7 +201,7 @@ pub struct Channel {
 pub struct Tail {
     /// Form of the detection filter.
     pub form: String,
-    /// Level, natural log-odds at a prior rate of one fault an hour.
+    /// Level, natural log-odds at [`FAULT_RATE_1_H`].
     pub level_log_odds: f64,
     /// Mean time between exceedances of it, h.
     pub interval_h: f64,
@@ -208,6 +212,11 @@ pub struct Tail {
 impl Tail {
     /// The log-odds that a channel without flaw would give for an event as rare. For such a one
     /// they grow as the logarithm of the time between exceedances, at a prior rate of 1/h.
+    ///
+    /// `log_odds` are those at this rate, [`FAULT_RATE_1_H`]. A prior rate of `r` times as much
+    /// raises the odds of a flawless channel by the factor `r` and makes nothing healthy rarer, so
+    /// that the tempered log-odds grow by `ln r`: not by `slope · ln r`, as they would if the raw
+    /// ones grew first.
     #[must_use]
     pub fn tempered(&self, log_odds: f64) -> f64 {
         self.interval_h.ln() + self.slope * (log_odds - self.level_log_odds)
@@ -215,6 +224,25 @@ impl Tail {
 }
 
 impl Channel {
+    /// True if it belongs to a set of channels.
+    #[must_use]
+    pub fn is_among(&self, channels: Channels) -> bool {
+        channels == Channels::PoseEncoders || self.target.quantity.is_pose()
+    }
+
+    /// Its tail for a form of the detection filter.
+    #[must_use]
+    pub fn tail(&self, form: Form) -> Option<&Tail> {
+        self.tails.iter().find(|tail| tail.form == form.name())
+    }
+
+    /// Log-odds at [`FAULT_RATE_1_H`], tempered if a tail is known.
+    #[must_use]
+    pub fn tempered(&self, form: Form, log_odds: f64) -> f64 {
+        self.tail(form)
+            .map_or(log_odds, |tail| tail.tempered(log_odds))
+    }
+
     /// Measured less predicted value, and how much the prediction has changed since the last
     /// observation; none if one of them is not known.
     #[must_use]

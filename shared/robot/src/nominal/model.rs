@@ -1,21 +1,29 @@
 //! The file of a nominal model.
 
 use serde::{Deserialize, Serialize};
-use vigil_blocks::{COMMANDS, WHEELS, fnv1a};
+use vigil_blocks::{COMMANDS, WHEELS};
 
-use super::channel::{Channel, Tail};
+use super::channel::{Channel, FAULT_RATE_1_H, Of, Term};
+use super::observation::DEPTH;
 use crate::Description;
-use crate::learned::model::{ModelError, Provenance, check_calibration};
+use crate::alarm::{self, AlarmError};
+use crate::learned::calibration::find;
+use crate::learned::model::{EDITED, ModelError, Provenance, check_calibration};
 use crate::learned::monitor::Channels;
 use crate::learned::{Calibration, Form};
+use crate::model_file::{self, ModelFile};
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 /// The word by which the file is told from a model with faults.
 pub const KIND: &str = "nominal";
 /// Limits of a file's size.
 const CHANNELS_MAX: usize = 2 * WHEELS + 4;
 const TERMS_MAX: usize = 128;
+/// Largest lag of a term: a prediction is also made for the observation before the newest.
+const LAG_MAX: usize = DEPTH - 2;
+/// Largest order of a polynomial.
+const ORDER_MAX: u32 = 4;
 
 /// What was learned of one axis of the command.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,6 +62,9 @@ pub struct Model {
     pub kind: String,
     /// Layout of the file.
     pub version: u32,
+    /// Hash over everything else in the file, as that of a model with faults: `fnv1a64:` and 16
+    /// digits, or [`EDITED`].
+    pub hash: String,
     /// Name of the robot.
     pub robot: String,
     /// Names of its wheels, in the order of every per-wheel array.
@@ -80,10 +91,7 @@ impl Model {
     /// # Errors
     /// [`ModelError`] naming the key, what was found and what is allowed.
     pub fn from_toml(text: &str) -> Result<Self, ModelError> {
-        let model: Self = toml::from_str(text)
-            .map_err(|error| ModelError::Parse(error.message().replace('\n', " ")))?;
-        model.check()?;
-        Ok(model)
+        model_file::read(text)
     }
 
     /// The file's text.
@@ -91,14 +99,25 @@ impl Model {
     /// # Errors
     /// [`ModelError::Parse`] if the model cannot be written.
     pub fn to_toml(&self) -> Result<String, ModelError> {
-        toml::to_string(self).map_err(|error| ModelError::Parse(error.to_string()))
+        model_file::text(self)
     }
 
-    /// Hash over the file's text; equal for equal models.
+    /// Hash over the content; equal for equal models.
     #[must_use]
     pub fn hash(&self) -> u64 {
-        let text = self.to_toml().unwrap_or_default();
-        fnv1a::hash(fnv1a::BASIS, text.as_bytes())
+        model_file::hash(self)
+    }
+
+    /// The same with the hash that its content has, as [`Self::from_toml`] expects it.
+    #[must_use]
+    pub fn sealed(self) -> Self {
+        model_file::sealed(self)
+    }
+
+    /// True if the file says that a person has changed it.
+    #[must_use]
+    pub fn is_edited(&self) -> bool {
+        self.hash == EDITED
     }
 
     /// Checks that the model is of this robot.
@@ -134,11 +153,33 @@ impl Model {
     /// # Errors
     /// [`ModelError::Calibration`].
     pub fn calibration(&self, channels: Channels, form: Form) -> Result<&Calibration, ModelError> {
-        let (sensors, form) = (channels.name(), form.name());
-        self.calibration
-            .iter()
-            .find(|calibration| calibration.sensors == sensors && calibration.form == form)
-            .ok_or(ModelError::Calibration { sensors, form })
+        find(&self.calibration, channels, form)
+    }
+
+    /// The highest log-odds that a lasting fault keeps some channel at, tempered as the monitor
+    /// does, at a prior fault rate of `fault_rate_1_h`.
+    #[must_use]
+    pub fn log_odds_max(&self, channels: Channels, form: Form, fault_rate_1_h: f64) -> f64 {
+        let used = self.channel.iter().filter(|c| c.is_among(channels));
+        let highest = used.map(|channel| channel.tempered(form, form.log_odds_max()));
+        highest.fold(f64::NEG_INFINITY, f64::max) + (fault_rate_1_h / FAULT_RATE_1_H).ln()
+    }
+
+    /// Log-odds at which to alarm, so that `interval_h` pass on average between false alarms at a
+    /// prior fault rate of `fault_rate_1_h`.
+    ///
+    /// # Errors
+    /// [`AlarmError`] if there is no calibration, or the log-odds cannot reach the alarm.
+    pub fn alarm_log_odds(
+        &self,
+        (channels, form): (Channels, Form),
+        interval_h: f64,
+        fault_rate_1_h: f64,
+    ) -> Result<f64, AlarmError> {
+        let calibration = self.calibration(channels, form)?;
+        let reachable = self.log_odds_max(channels, form, fault_rate_1_h);
+        let form = form.name();
+        alarm::threshold(calibration, form, interval_h, fault_rate_1_h, reachable)
     }
 
     /// Size of each axis of the command; 1 for axes that do not exist.
@@ -150,32 +191,34 @@ impl Model {
         }
         sizes
     }
+}
+
+impl ModelFile for Model {
+    const VERSION: u32 = VERSION;
+
+    fn stored(&self) -> &str {
+        &self.hash
+    }
+
+    fn stored_mut(&mut self) -> &mut String {
+        &mut self.hash
+    }
 
     fn check(&self) -> Result<(), ModelError> {
-        if self.version != VERSION {
-            return Err(ModelError::Version(self.version));
-        }
-        let refuse = |key: String, value: String, allowed| {
-            Err(ModelError::Value {
-                key,
-                value,
-                allowed,
-            })
-        };
         if self.kind != KIND {
-            return refuse("kind".into(), self.kind.clone(), "nominal");
+            return refuse("kind".into(), &self.kind, "nominal");
+        }
+        let count = self.wheels.len();
+        if count == 0 || count > WHEELS {
+            return refuse("wheels".into(), count, "1 to 8 names");
         }
         if !(0.02..=1.0).contains(&self.interval_s) {
-            return refuse(
-                "interval_s".into(),
-                self.interval_s.to_string(),
-                "0.02 to 1",
-            );
+            return refuse("interval_s".into(), self.interval_s, "0.02 to 1");
         }
         let ranges = self
             .command
             .iter()
-            .all(|r| r.min.is_finite() && r.max >= r.min);
+            .all(|r| r.min.is_finite() && r.max.is_finite() && r.max >= r.min);
         if self.command.is_empty() || self.command.len() > COMMANDS || !ranges {
             let found = format!("{} axes", self.command.len());
             return refuse("command".into(), found, "1 to 4 axes, min up to max");
@@ -185,48 +228,93 @@ impl Model {
             return refuse("channel".into(), found, "1 to 20 channels");
         }
         for (i, channel) in self.channel.iter().enumerate() {
-            if let Some(message) = unusable(channel) {
-                return refuse(format!("channel.{i}"), message, "see the model's layout");
-            }
+            check_channel(&format!("channel.{i}"), channel, count, self.command.len())?;
         }
         self.calibration.iter().try_for_each(check_calibration)
     }
 }
 
-/// What makes a channel unusable.
-fn unusable(channel: &Channel) -> Option<String> {
+fn refuse<T>(key: String, value: impl ToString, allowed: &'static str) -> Result<T, ModelError> {
+    Err(ModelError::Value {
+        key,
+        value: value.to_string(),
+        allowed,
+    })
+}
+
+/// Checks the numbers of a channel; `wheels` and `axes`: how many there are.
+fn check_channel(
+    key: &str,
+    channel: &Channel,
+    wheels: usize,
+    axes: usize,
+) -> Result<(), ModelError> {
     let (terms, weights) = (channel.terms.len(), channel.weights.len());
     if terms != weights || terms > TERMS_MAX {
-        return Some(format!("{terms} terms and {weights} weights"));
+        let found = format!("{terms} terms and {weights} weights");
+        return refuse(key.into(), found, "as many weights as terms, at most 128");
     }
-    if channel.target.wheel >= WHEELS {
-        return Some(format!("wheel {}", channel.target.wheel));
+    if channel.target.wheel >= wheels {
+        let (key, found) = (format!("{key}.target.wheel"), channel.target.wheel);
+        return refuse(key, found, "the index of a wheel, from 0");
     }
-    if channel.weights.iter().any(|weight| !weight.is_finite()) {
-        return Some("a weight that is not finite".into());
+    for (i, term) in channel.terms.iter().enumerate() {
+        check_term(&format!("{key}.terms.{i}"), term, wheels, axes)?;
     }
-    let variance = channel.variance;
-    if !(variance[0] > 0.0 && variance.iter().all(|v| v.is_finite() && *v >= 0.0)) {
-        return Some(format!("variance {variance:?}"));
+    let sane = |name: &str, value: f64, from: f64| {
+        let key = format!("{key}.{name}");
+        match value.is_finite() && value >= from {
+            true => Ok(()),
+            false if from > 0.0 => refuse(key, value, "a finite number from 1"),
+            false => refuse(key, value, "a finite number from 0"),
+        }
+    };
+    if let Some(weight) = channel.weights.iter().find(|weight| !weight.is_finite()) {
+        return refuse(format!("{key}.weights"), weight, "finite numbers");
+    }
+    if !channel.variance[0].is_normal() {
+        let found = channel.variance[0];
+        return refuse(format!("{key}.variance"), found, "above 0 at first");
+    }
+    for value in channel.variance {
+        sane("variance", value, 0.0)?;
     }
     if !(channel.correlation > -0.5 && channel.correlation < 1.0) {
-        return Some(format!("correlation {}", channel.correlation));
+        let (key, found) = (format!("{key}.correlation"), channel.correlation);
+        return refuse(key, found, "above -0.5 and below 1");
     }
-    if !(channel.offset_sd.is_finite() && channel.offset_sd >= 0.0) {
-        return Some(format!("offset_sd {}", channel.offset_sd));
-    }
-    if !(channel.scatter.is_finite() && channel.scatter >= 1.0) {
-        return Some(format!("scatter {}", channel.scatter));
-    }
-    let is_sane = |tail: &Tail| {
+    sane("offset_sd", channel.offset_sd, 0.0)?;
+    sane("drift_sd", channel.drift_sd, 0.0)?;
+    sane("scatter", channel.scatter, 1.0)?;
+    for tail in &channel.tails {
         let positive = tail.slope > 0.0 && tail.interval_h > 0.0 && tail.interval_h.is_finite();
-        positive && tail.slope.is_finite() && tail.level_log_odds.is_finite()
-    };
-    if !channel.tails.iter().all(is_sane) {
-        return Some(format!("tails {:?}", channel.tails));
+        if !(positive && tail.slope.is_finite() && tail.level_log_odds.is_finite()) {
+            let key = format!("{key}.tails.{}", tail.form);
+            let found = format!("{tail:?}");
+            return refuse(key, found, "finite numbers, interval and slope above 0");
+        }
     }
-    if !(channel.drift_sd.is_finite() && channel.drift_sd >= 0.0) {
-        return Some(format!("drift_sd {}", channel.drift_sd));
+    Ok(())
+}
+
+/// Checks that a term points at what exists.
+fn check_term(key: &str, term: &Term, wheels: usize, axes: usize) -> Result<(), ModelError> {
+    if term.lag > LAG_MAX {
+        return refuse(format!("{key}.lag"), term.lag, "0 to 3");
     }
-    None
+    let key_index = || format!("{key}.index");
+    let is_axis = term.of == Of::Lagged;
+    if is_axis && term.index >= axes {
+        return refuse(key_index(), term.index, "the index of an axis, from 0");
+    }
+    if !is_axis && term.index >= wheels {
+        return refuse(key_index(), term.index, "the index of a wheel, from 0");
+    }
+    let beyond = term.powers.iter().skip(axes).any(|&power| power > 0);
+    let order: u32 = term.powers.iter().map(|&power| u32::from(power)).sum();
+    if beyond || order > ORDER_MAX {
+        let (key, found) = (format!("{key}.powers"), format!("{:?}", term.powers));
+        return refuse(key, found, "of the command's axes, at most 4 in all");
+    }
+    Ok(())
 }

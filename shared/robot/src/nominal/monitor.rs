@@ -6,6 +6,11 @@
 //! the robot once a turn and has no mean). The channels' odds, each tempered by its [`Tail`], add
 //! up: a fault enters by one of them.
 //!
+//! All this is done at the prior fault rate at which the tails were found
+//! ([`super::channel::FAULT_RATE_1_H`]). Births enter the odds as a factor, so that another rate
+//! adds its logarithm to the log-odds of every channel, after they were tempered. Alarms do not
+//! depend on it, as their threshold moves by as much.
+//!
 //! The noise is that of this very robot, measured on its own log; a rise beyond what its runs have
 //! shown is a symptom and is not explained away.
 
@@ -14,7 +19,7 @@ use vigil_blocks::{CHANNELS, Channel as Slot, WHEELS};
 use vigil_inference::constant::Constant;
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 
-use super::channel::{Channel, Quantity, Tail};
+use super::channel::{Channel, FAULT_RATE_1_H, Quantity, Tail};
 use super::model::Model;
 use super::observation::{History, Observation};
 use super::track::Track;
@@ -54,7 +59,8 @@ pub struct Monitor {
     model: Model,
     sizes: [f64; vigil_blocks::COMMANDS],
     form: Form,
-    fault_rate_1_s: f64,
+    /// What the prior fault rate adds to the log-odds.
+    prior_log_odds: f64,
     watched: Vec<Watched>,
     run_s: f64,
     extrapolated: bool,
@@ -65,24 +71,19 @@ impl Monitor {
     /// A monitor of the channels of `model` that are among `channels`, with a prior fault rate.
     #[must_use]
     pub fn new(model: &Model, channels: Channels, form: Form, fault_rate_1_h: f64) -> Self {
-        let all = channels == Channels::PoseEncoders;
         let used = model.channel.iter();
-        let used = used.filter(|channel| all || channel.target.quantity.is_pose());
+        let used = used.filter(|channel| channel.is_among(channels));
         let watched = used.map(|channel| Watched {
             channel: channel.clone(),
             track: Track::new(channel),
             bias: Evidence::new(form, BIAS),
             scatter: Constant::default(),
-            tail: channel
-                .tails
-                .iter()
-                .find(|tail| tail.form == form.name())
-                .cloned(),
+            tail: channel.tail(form).cloned(),
         });
         let mut monitor = Self {
             sizes: model.sizes(),
             form,
-            fault_rate_1_s: fault_rate_1_h / 3600.0,
+            prior_log_odds: (fault_rate_1_h / FAULT_RATE_1_H).ln(),
             watched: watched.collect(),
             run_s: 0.0,
             extrapolated: false,
@@ -151,7 +152,7 @@ impl Monitor {
         }
         self.run_s += now.dt_s;
         let share = 1.0 / self.watched.len().max(1) as f64;
-        let birth = (self.fault_rate_1_s * now.dt_s * share).clamp(1e-300, 0.1);
+        let birth = FAULT_RATE_1_H / 3600.0 * now.dt_s * share;
         for watched in &mut self.watched {
             let Watched {
                 channel,
@@ -203,7 +204,7 @@ impl Monitor {
                 .tail
                 .as_ref()
                 .map_or(odds, |tail| tail.tempered(odds));
-            channels[slot] = log_add(channels[slot], odds);
+            channels[slot] = log_add(channels[slot], odds + self.prior_log_odds);
         }
         self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);
         self.report.channels = channels.map(|value| value.max(LOG_ODDS_MIN));

@@ -1,6 +1,8 @@
 //! `vigil pomdp`: what can be done with a decision model, one command a module.
 
+mod compare;
 mod convert;
+mod generate;
 mod info;
 mod solve;
 mod track;
@@ -11,7 +13,7 @@ use vigil_decision::Pomdp;
 
 use super::{CommandError, Outcome};
 
-/// Looks at, follows, solves and converts decision models (`.pomdp`, `.pomdpx`).
+/// Looks at, follows, compares and converts decision models (`.pomdp`, `.pomdpx`).
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -20,6 +22,8 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
+    Compare(Box<compare::Args>),
+    Generate(generate::Args),
     Info(info::Args),
     Track(track::Args),
     Convert(convert::Args),
@@ -32,6 +36,8 @@ enum Command {
 /// An input that is refused; an output that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     match &args.command {
+        Command::Compare(args) => compare::run(args),
+        Command::Generate(args) => generate::run(args),
         Command::Info(args) => info::run(args),
         Command::Track(args) => track::run(args),
         Command::Convert(args) => convert::run(args),

@@ -1,0 +1,388 @@
+//! Do the heuristics earn on public models what another implementation says, and what are they
+//! worth on the navigation model, how fast?
+//!
+//! Options: `--episodes N` (default 3000), `--json`. The models are read from `VIGIL_DATA`.
+
+#![allow(missing_docs)]
+
+use std::error::Error;
+use std::hint::black_box;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde_json::{Value, json};
+use vigil_bench::archive::Archive;
+use vigil_bench::options::Options;
+use vigil_bench::quantile;
+use vigil_decision::navigation::{ACTIONS, ENDS, QUIET};
+use vigil_decision::policy::{Base, Dual, PolicyName};
+use vigil_decision::simulation::{
+    Agent, Escalation, Paired, PolicyAgent, Random, Rules, Summary, World, horizon, run,
+};
+use vigil_decision::{Pomdp, Tracker, mdp};
+
+const SEED: u64 = 1;
+const THRESHOLDS: [f64; 3] = [0.2, 0.5, 0.8];
+/// Decisions whose time is measured, of each policy.
+const DECISIONS: usize = 200_000;
+
+const POLICIES: [&str; 10] = [
+    "mls", "av", "qmdp", "fib", "dm-mls", "adm-mls", "dm-av", "adm-av", "dm-qmdp", "adm-qmdp",
+];
+
+/// Model, means of another implementation (3,000 episodes, K = 0.5, horizon where the discount's
+/// power falls below 1e-4), and the largest 95 % half-width of MLS and AV, of ADM, of the rest.
+type Row = (&'static str, [f64; 10], [f64; 3]);
+const REFERENCE: [Row; 13] = [
+    (
+        "tiger.95",
+        [
+            -900.6, -899.2, 19.91, 19.91, 19.91, -75.4, 19.91, -75.4, 19.91, 19.91,
+        ],
+        [6.4, 3.2, 1.0],
+    ),
+    (
+        "tiger.aaai",
+        [
+            -179.6, -180.3, 1.96, 1.96, 1.96, -14.4, 1.96, -14.4, 1.96, 1.96,
+        ],
+        [3.0, 1.3, 0.4],
+    ),
+    (
+        "1d",
+        [
+            1.265, 1.187, 1.265, 1.265, 1.112, 0.977, 1.112, 0.977, 1.112, 0.977,
+        ],
+        [0.016; 3],
+    ),
+    (
+        "1d.noisy",
+        [
+            1.149, 1.237, 1.237, 1.237, 1.069, 1.070, 1.069, 1.070, 1.069, 1.070,
+        ],
+        [0.013; 3],
+    ),
+    (
+        "4x3.95",
+        [
+            1.794, 1.788, 1.910, 1.920, 1.772, 1.772, 1.765, 1.765, 1.772, 1.824,
+        ],
+        [0.035; 3],
+    ),
+    (
+        "cheese.95",
+        [
+            3.398, 3.486, 3.486, 3.486, 3.486, 3.486, 3.486, 3.486, 3.486, 3.486,
+        ],
+        [0.012; 3],
+    ),
+    (
+        "mini-hall2",
+        [
+            0.327, 2.612, 0.327, 0.328, 0.500, 2.672, 2.643, 2.672, 0.500, 2.672,
+        ],
+        [0.021; 3],
+    ),
+    (
+        "network",
+        [
+            41.7, 63.5, 242.5, 245.0, -599.0, -226.0, -599.0, -226.0, -599.0, -226.0,
+        ],
+        [6.1; 3],
+    ),
+    (
+        "paint95-zmdp",
+        [
+            8.81, 8.81, 20.01, 20.01, 8.81, 8.81, 8.81, 8.81, 20.01, 20.01,
+        ],
+        [0.12; 3],
+    ),
+    ("shuttle95-zmdp", [33.02; 10], [0.17; 3]),
+    (
+        "web-ad",
+        [
+            0.801, 0.801, 0.804, 0.804, 0.743, 0.737, 0.743, 0.737, 0.743, 0.737,
+        ],
+        [0.0008; 3],
+    ),
+    (
+        "tiger-grid",
+        [
+            0.942, 0.939, 0.234, 0.233, 0.948, 0.974, 0.935, 0.959, 0.240, 0.411,
+        ],
+        [0.058; 3],
+    ),
+    (
+        "hallway",
+        [
+            0.820, 0.781, 0.334, 0.236, 0.792, 0.852, 0.770, 0.821, 0.466, 0.500,
+        ],
+        [0.019; 3],
+    ),
+];
+
+type Failure = Box<dyn Error>;
+
+fn main() -> Result<(), Failure> {
+    let options = Options::parse(&[("--episodes", 3000.0)])?;
+    let episodes = (options.number("--episodes") as u64).max(500);
+    let data = std::env::var_os("VIGIL_DATA").ok_or("VIGIL_DATA: not set; it holds pomdp/*")?;
+    let navigation = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/navigation.pomdp");
+    let navigation = Pomdp::parse(&std::fs::read_to_string(navigation)?)?;
+    let public = public(&PathBuf::from(data).join("pomdp"), episodes)?;
+    let missions = missions(&navigation, episodes)?;
+    let times = times(&navigation)?;
+    let raw = json!({
+        "episodes": episodes, "seed": SEED, "public": public, "navigation": missions,
+        "decision_times": times,
+    });
+    if options.is_json {
+        println!("{raw:#}");
+        return Ok(());
+    }
+    let mut archive = Archive::new("pomdp-compare")?;
+    say_public(&mut archive, &public, episodes);
+    say_missions(&mut archive, &missions, episodes);
+    say_times(&mut archive, &times);
+    archive.store("pomdp-compare.json", &raw)?;
+    println!("archived in {}", archive.close()?.display());
+    Ok(())
+}
+
+/// Discounted rewards of an agent's missions.
+fn rewards(model: &Pomdp, agent: &mut dyn Agent, ends: bool, episodes: u64) -> Vec<f64> {
+    let is_end = |a: &String| ends && ENDS.contains(&a.as_str());
+    let rules = Rules {
+        steps_max: horizon(model.discount(), 2000),
+        is_end: model.actions().iter().map(is_end).collect(),
+    };
+    let mission = |episode| run(model, agent, &rules, (SEED, episode)).discounted;
+    (0..episodes).map(mission).collect()
+}
+
+/// Every heuristic on every public model, as published: all actions, no guard.
+fn public(folder: &Path, episodes: u64) -> Result<Vec<Value>, Failure> {
+    let mut rows = Vec::new();
+    for (file, means, half_widths) in REFERENCE {
+        let model = Pomdp::parse(&std::fs::read_to_string(
+            folder.join(format!("{file}.pomdp")),
+        )?)?;
+        let solution = mdp::solve(&model)?;
+        for (name, reference) in POLICIES.into_iter().zip(means) {
+            let half_width = half_widths[match name {
+                "mls" | "av" => 0,
+                "adm-mls" | "adm-av" => 1,
+                _ => 2,
+            }];
+            let policy: PolicyName = name.parse()?;
+            let decider = policy.build(&model, &solution, |i| Dual::new(i, 0.5))?;
+            let mut agent = PolicyAgent::new(&model, decider);
+            let found = Summary::of(&mut rewards(&model, &mut agent, false, episodes));
+            let both = found.half_width.hypot(half_width);
+            rows.push(json!({
+                "model": file, "policy": name, "mean": found.mean,
+                "half_width_95": found.half_width, "reference": reference,
+                "reference_half_width_95": half_width,
+                "apart_in_intervals": (found.mean - reference) / both,
+            }));
+        }
+        eprintln!("{file} done");
+    }
+    Ok(rows)
+}
+
+/// The navigation model: missions to the horizon, and such as SH and GU end.
+fn missions(model: &Pomdp, episodes: u64) -> Result<Vec<Value>, Failure> {
+    let solution = mdp::solve(model)?;
+    let ladder = ["MA", "GO", "NP", "RL", "SH", "GU"];
+    let mut rows = Vec::new();
+    for ends in [false, true] {
+        let mut baseline = Vec::new();
+        let mut add = |name: &str, k: Option<f64>, ours: Vec<f64>| {
+            if baseline.is_empty() {
+                baseline.clone_from(&ours);
+            }
+            let paired = Paired::of(&ours, &baseline);
+            let summary = Summary::of(&mut ours.clone());
+            rows.push(json!({
+                "ends": ends, "policy": name, "threshold": k, "mean": summary.mean,
+                "half_width_95": summary.half_width, "median": summary.median,
+                "worst_5_percent": summary.worst_5_percent, "difference": paired.difference,
+                "difference_half_width_95": paired.half_width, "p": paired.p,
+            }));
+        };
+        for patience in 1..=3 {
+            let mut agent = Escalation::new(model, "FP", &ladder, &QUIET, patience)?;
+            let name = format!("escalation-{patience}");
+            add(&name, None, rewards(model, &mut agent, ends, episodes));
+        }
+        let mut random = Random::new(ACTIONS.len());
+        add("random", None, rewards(model, &mut random, ends, episodes));
+        for name in names() {
+            let policy: PolicyName = name.parse()?;
+            let thresholds = if policy.information.is_some() {
+                &THRESHOLDS[..]
+            } else {
+                &THRESHOLDS[..1]
+            };
+            for &k in thresholds {
+                let decider = policy.build(model, &solution, |i| guarded(i, k))?;
+                let mut agent = PolicyAgent::new(model, decider);
+                let k = policy.information.map(|_| k);
+                add(&name, k, rewards(model, &mut agent, ends, episodes));
+            }
+        }
+    }
+    Ok(rows)
+}
+
+fn names() -> impl Iterator<Item = String> {
+    let prefixes = ["", "dm-", "adm-"];
+    prefixes
+        .into_iter()
+        .flat_map(|prefix| Base::ALL.map(|(_, x)| format!("{prefix}{x}")))
+}
+
+/// Dual control as a robot should have it: neither SH nor GU for information, and a guard.
+fn guarded(information: vigil_decision::policy::Information, k: f64) -> Dual {
+    let mut dual = Dual::new(information, k);
+    dual.allowed = Some((0..ACTIONS.len() - ENDS.len()).collect());
+    dual.stall_steps = 5;
+    dual
+}
+
+/// Time of update and decision with its record, on beliefs as missions bring them. With K = 0
+/// and no guard every step looks ahead: the dearest case.
+fn times(model: &Pomdp) -> Result<Vec<Value>, Failure> {
+    let solution = mdp::solve(model)?;
+    let mut rows = Vec::new();
+    for name in names() {
+        let policy: PolicyName = name.parse()?;
+        let unguarded = |information| {
+            let mut dual = guarded(information, 0.0);
+            dual.stall_steps = 0;
+            dual
+        };
+        let mut decider = policy.build(model, &solution, unguarded)?;
+        let mut tracker = Tracker::new(model);
+        let (mut decide_ns, mut both_ns) = (Vec::new(), Vec::new());
+        let mut episode = 0;
+        while decide_ns.len() < DECISIONS {
+            let mut world = World::new(model, SEED, episode);
+            tracker.reset();
+            decider.reset();
+            episode += 1;
+            let mut action = decider.decide(tracker.belief()).action;
+            for _ in 0..100 {
+                let observation = world.step(action).observation;
+                let started = Instant::now();
+                tracker.update(model, action, observation);
+                let updated = Instant::now();
+                let decision = black_box(decider.decide(black_box(tracker.belief())));
+                let ended = Instant::now();
+                decide_ns.push((ended - updated).as_nanos() as f64);
+                both_ns.push((ended - started).as_nanos() as f64);
+                action = decision.action;
+            }
+        }
+        let of = |times: &mut Vec<f64>| [0.5, 0.99, 0.999].map(|q| quantile(times, q));
+        rows.push(json!({
+            "policy": name, "n": decide_ns.len(), "decision_p50_p99_p999_ns": of(&mut decide_ns),
+            "update_and_decision_p50_p99_p999_ns": of(&mut both_ns),
+        }));
+    }
+    Ok(rows)
+}
+
+fn number(row: &Value, key: &str) -> f64 {
+    row[key].as_f64().unwrap_or(f64::NAN)
+}
+
+/// A probability; what has vanished below the smallest double is told as such.
+fn chance(p: f64) -> String {
+    if p < 1e-300 {
+        "< 1e-300".to_owned()
+    } else {
+        format!("{p:.1e}")
+    }
+}
+
+fn say_public(archive: &mut Archive, rows: &[Value], episodes: u64) {
+    archive.say(&format!(
+        "Mean discounted reward on public models, {episodes} episodes, seed {SEED}, K = 0.5, no \
+         guards, horizon where\ndiscount^t < 1e-4; in brackets the distance to another \
+         implementation's mean, in units of the joint 95 %\nhalf-width (within +-1 in 19 of 20 \
+         cells by chance).\n"
+    ));
+    archive.say(&format!("| model | {} |", POLICIES.join(" | ")));
+    archive.say(&format!("|---|{}", "---|".repeat(POLICIES.len())));
+    for row in rows.chunks(POLICIES.len()) {
+        let model = row[0]["model"].as_str().unwrap_or_default();
+        let cells: Vec<String> = row
+            .iter()
+            .map(|cell| {
+                let apart = number(cell, "apart_in_intervals");
+                format!("{:.4} ({apart:+.2})", number(cell, "mean"))
+            })
+            .collect();
+        archive.say(&format!("| {model} | {} |", cells.join(" | ")));
+    }
+    let apart = |row: &&Value| number(row, "apart_in_intervals").abs() <= 1.0;
+    let within = rows.iter().filter(apart).count();
+    archive.say(&format!("\n{within} of {} cells within +-1.\n", rows.len()));
+}
+
+fn say_missions(archive: &mut Archive, rows: &[Value], episodes: u64) {
+    for ends in [false, true] {
+        let what = if ends {
+            "SH and GU end a mission"
+        } else {
+            "to the horizon of 180 steps"
+        };
+        archive.say(&format!(
+            "config/navigation.pomdp, {episodes} missions, {what}; difference: in pairs, to \
+             escalation-1, the best\nof the deterministic baselines.\n"
+        ));
+        archive.say("| policy | K | mean | median | worst 5 % | difference | p |");
+        archive.say("|---|---|---|---|---|---|---|");
+        for row in rows.iter().filter(|row| row["ends"] == ends) {
+            let k = row["threshold"]
+                .as_f64()
+                .map_or_else(|| "-".to_owned(), |k| k.to_string());
+            archive.say(&format!(
+                "| {} | {k} | {:.3} +- {:.3} | {:.3} | {:.3} | {:.3} +- {:.3} | {} |",
+                row["policy"].as_str().unwrap_or_default(),
+                number(row, "mean"),
+                number(row, "half_width_95"),
+                number(row, "median"),
+                number(row, "worst_5_percent"),
+                number(row, "difference"),
+                number(row, "difference_half_width_95"),
+                chance(number(row, "p")),
+            ));
+        }
+        archive.say("");
+    }
+}
+
+fn say_times(archive: &mut Archive, rows: &[Value]) {
+    archive.say(
+        "Time on config/navigation.pomdp, ns (p50, p99, p99.9), two clock readings included. dm-X \
+         and adm-X with\nK = 0 and no guard: every step looks ahead. The tail holds what else ran \
+         on this core (load: machine.json).\n",
+    );
+    archive.say("| policy | decision | update and decision |");
+    archive.say("|---|---|---|");
+    for row in rows {
+        let times = |key: &str| {
+            let of = |i: usize| row[key][i].as_f64().unwrap_or(f64::NAN);
+            format!("{:.0}, {:.0}, {:.0}", of(0), of(1), of(2))
+        };
+        archive.say(&format!(
+            "| {} | {} | {} |",
+            row["policy"].as_str().unwrap_or_default(),
+            times("decision_p50_p99_p999_ns"),
+            times("update_and_decision_p50_p99_p999_ns"),
+        ));
+    }
+}

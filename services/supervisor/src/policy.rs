@@ -1,0 +1,51 @@
+//! The policy that the settings name.
+
+use vigil_decision::mdp::Solution;
+use vigil_decision::policy::{Dual, Gate, Information, PolicyName};
+use vigil_decision::{Decider, Pomdp};
+use vigil_setup::schema;
+
+use crate::mapping::SupervisorError;
+
+/// The decider for `model`, of which `solution` is the fully observable relaxation.
+pub(crate) fn decider(
+    model: &Pomdp,
+    solution: &Solution,
+    settings: &schema::Supervisor,
+) -> Result<Decider, SupervisorError> {
+    let name: PolicyName = settings.policy.parse()?;
+    let allowed = information_actions(model, settings)?;
+    let dual = |information| dual(information, settings, allowed);
+    Ok(name.build(model, solution, dual)?)
+}
+
+fn dual(information: Information, settings: &schema::Supervisor, allowed: Vec<usize>) -> Dual {
+    if settings.as_published {
+        return Dual::as_published(information, settings.threshold);
+    }
+    let mut dual = Dual::new(information, settings.threshold);
+    dual.gate = match settings.gate {
+        None => dual.gate,
+        Some(schema::Gate::State) => Gate::State,
+        Some(schema::Gate::Action) => Gate::Action,
+    };
+    // An empty set is refused: which actions may be taken for information is for the user to say.
+    dual.allowed = Some(allowed);
+    dual.stall_steps = settings.stall_guard_steps;
+    dual
+}
+
+/// Indices of the actions that may be taken for information.
+fn information_actions(
+    model: &Pomdp,
+    settings: &schema::Supervisor,
+) -> Result<Vec<usize>, SupervisorError> {
+    let index = |name: &String| {
+        let found = model.actions().iter().position(|action| action == name);
+        found.ok_or_else(|| SupervisorError::InformationAction {
+            found: name.clone(),
+            allowed: model.actions().join(", "),
+        })
+    };
+    settings.information_actions.iter().map(index).collect()
+}

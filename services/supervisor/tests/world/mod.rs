@@ -1,0 +1,116 @@
+//! A supervisor with the shipped models, told cycle by cycle what the identifier believes.
+
+use std::path::PathBuf;
+
+use vigil_blocks::{Action, Entry, FaultBelief, RecoveryKind};
+use vigil_decision::Pomdp;
+use vigil_inference::FaultTree;
+use vigil_robot::Description;
+use vigil_setup::schema::{self, GraphFile};
+use vigil_supervisor::{Compensation, Inputs, Supervisor};
+
+/// Time between cycles.
+pub const CYCLE_NS: u64 = 10_000_000;
+
+/// The shipped configuration.
+pub fn config() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config")
+}
+
+/// The shipped decision model.
+pub fn model() -> Pomdp {
+    Pomdp::parse(&std::fs::read_to_string(config().join("rover.pomdp")).unwrap()).unwrap()
+}
+
+/// A supervisor and what it is told.
+pub struct World {
+    pub supervisor: Supervisor,
+    pub tree: FaultTree,
+    pub robot: Description,
+    pub t_ns: u64,
+    pub action: Action,
+}
+
+impl World {
+    /// With the shipped configuration.
+    pub fn new() -> Self {
+        Self::with(|_| {})
+    }
+
+    /// With the shipped configuration, changed.
+    pub fn with(change: impl FnOnce(&mut schema::Supervisor)) -> Self {
+        let tree = vigil_setup::load_tree(&config().join("trees/rover.toml")).unwrap();
+        let robot = vigil_setup::load_robot(&config().join("robots/rover.toml")).unwrap();
+        let text = std::fs::read_to_string(config().join("rover.toml")).unwrap();
+        let mut settings = toml::from_str::<GraphFile>(&text).unwrap().supervisor;
+        change(&mut settings);
+        let compensation = (0..6)
+            .map(|wheel| Compensation {
+                wheel,
+                curvature_gain: 1.1,
+                curvature_offset_1_m: wheel as f64,
+            })
+            .collect();
+        let supervisor =
+            Supervisor::new(model(), &tree, &robot, &settings, compensation, 10).unwrap();
+        Self {
+            supervisor,
+            tree,
+            robot,
+            t_ns: 0,
+            action: Action::default(),
+        }
+    }
+
+    /// One cycle in which the identifier believes `p` (by name), having predicted `predicted`.
+    pub fn cycle(&mut self, identifying: bool, p: &[(&str, f64)], predicted: &[(&str, f64)]) {
+        self.t_ns += CYCLE_NS;
+        let mut belief = FaultBelief {
+            identifying: u32::from(identifying),
+            tree_hash: self.tree.hash(),
+            ..Default::default()
+        };
+        belief.header.t_capture_ns = self.t_ns;
+        for (of, list) in [(false, p), (true, predicted)] {
+            for (name, value) in list {
+                let node = self.tree.index(name);
+                match (node, of) {
+                    (Some(i), false) => belief.p[i] = *value,
+                    (Some(i), true) => belief.p_predicted[i] = *value,
+                    (None, false) => belief.p_unknown = *value,
+                    (None, true) => belief.p_unknown_predicted = *value,
+                }
+            }
+        }
+        let inputs = Inputs {
+            diagnosis: Some(&belief),
+            detection: None,
+        };
+        self.supervisor.step(Entry::Frame(inputs), &mut self.action);
+    }
+
+    /// Cycles with a belief that no data changes.
+    pub fn rest(&mut self, cycles: usize, identifying: bool, p: &[(&str, f64)]) {
+        (0..cycles).for_each(|_| self.cycle(identifying, p, p));
+    }
+
+    /// One cycle with an arbitrary diagnosis and no detection.
+    pub fn told(&mut self, diagnosis: &FaultBelief) {
+        let inputs = Inputs {
+            diagnosis: Some(diagnosis),
+            detection: None,
+        };
+        self.supervisor.step(Entry::Frame(inputs), &mut self.action);
+    }
+
+    /// What the robot is to do.
+    pub fn kind(&self) -> RecoveryKind {
+        RecoveryKind::from_wire(self.action.kind).unwrap()
+    }
+
+    /// Belief in a state.
+    pub fn belief(&self, name: &str) -> f64 {
+        let states = model().states().to_vec();
+        self.action.belief[states.iter().position(|s| s == name).unwrap()]
+    }
+}

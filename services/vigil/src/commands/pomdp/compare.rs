@@ -1,0 +1,220 @@
+//! `vigil pomdp compare`: what each policy is worth on a model, mission by mission.
+
+mod contest;
+mod contestant;
+mod table;
+
+use std::path::PathBuf;
+
+use clap::builder::RangedU64ValueParser;
+use clap::{ArgAction, ValueEnum};
+use vigil_decision::policy::{Gate, informed_values};
+use vigil_decision::simulation::{Rules, horizon};
+use vigil_decision::{Pomdp, mdp, navigation};
+
+use super::load;
+use crate::commands::{CommandError, Outcome};
+use crate::output;
+use contest::{Contest, Setting};
+use contestant::{Contestant, Kind, Knowledge};
+
+/// Compare policies on a decision model, over the same random missions.
+///
+/// Every policy meets the same random numbers at the same step of the same mission. Policies: mls,
+/// av, qmdp, fib; dm-X and adm-X of each, which gather information while the entropy (0 to 1) is
+/// above a threshold K; random; escalation-N, which after N firings in a row takes the next rung
+/// of --ladder. Each dm-X and adm-X runs with each threshold.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The model, in Cassandra's format.
+    file: PathBuf,
+    /// Policies, separated by commas.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "mls,av,qmdp,fib,dm-mls,dm-av,dm-qmdp,\
+        adm-mls,adm-av,adm-qmdp,random"
+    )]
+    policies: Vec<String>,
+    /// Thresholds K of dual control, separated by commas, each 0 to 1.
+    #[arg(long, value_delimiter = ',', default_value = "0.5")]
+    thresholds: Vec<f64>,
+    /// Missions of each policy, 2 to 10000000.
+    #[arg(long, default_value_t = 1000, value_parser = count(2))]
+    episodes: u64,
+    /// Seed from which the missions' random numbers start.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// A mission ends when what follows weighs less than 1e-4 by the discount, but after so many
+    /// steps at the latest.
+    #[arg(long, default_value_t = 2000, value_parser = count(1))]
+    steps_max: u64,
+    /// Actions that end a mission. No regret is given then: bounds are for missions without end.
+    #[arg(long, value_delimiter = ',')]
+    ends: Vec<String>,
+    /// Actions that dual control may take for information [default: all that do not end a mission].
+    #[arg(long, value_delimiter = ',')]
+    information_actions: Vec<String>,
+    /// After so many steps for information without falling entropy dual control yields; 0 never.
+    #[arg(long, default_value_t = 0)]
+    stall_guard_steps: u32,
+    /// Whose entropy is compared with K [default: state for dm-X, action for adm-X].
+    #[arg(long)]
+    gate: Option<GateName>,
+    /// Simulate with this model instead; the policies still believe in FILE.
+    #[arg(long, value_name = "OTHER")]
+    model_error: Option<PathBuf>,
+    /// Policy with which the others are compared in pairs [default: the first escalation, else
+    /// the first policy].
+    #[arg(long)]
+    against: Option<String>,
+    /// Upper bound of the value at the start belief [default: the fast informed bound].
+    #[arg(long, allow_negative_numbers = true)]
+    upper: Option<f64>,
+    /// What escalation-N does while nothing fires.
+    #[arg(long, default_value = navigation::ACTIONS[0])]
+    usual: String,
+    /// The rungs of escalation-N.
+    #[arg(long, value_delimiter = ',', default_value = "MA,GO,NP,RL,SH,GU")]
+    ladder: Vec<String>,
+    /// Observations in which nothing fires, for escalation-N.
+    #[arg(long, value_delimiter = ',', default_value = "none,BO,ALT")]
+    quiet: Vec<String>,
+    /// Print one JSON document.
+    #[arg(long, action = ArgAction::SetTrue)]
+    json: bool,
+}
+
+/// Whose entropy is compared with the threshold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum GateName {
+    State,
+    Action,
+}
+
+/// Reads a count of at least `least`.
+fn count(least: u64) -> RangedU64ValueParser<u64> {
+    clap::value_parser!(u64).range(least..=10_000_000)
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Models that cannot be read or do not fit together, options that mean nothing.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let model = load(&args.file)?;
+    let other = args.model_error.as_deref().map(load).transpose()?;
+    if let Some(other) = &other {
+        fits(&model, other)?;
+    }
+    let world = other.as_ref().unwrap_or(&model);
+    let believed = mdp::solve(&model).map_err(CommandError::usage)?;
+    let contestants = Contestant::all(&args.policies, &args.thresholds)?;
+    let against = reference(args, &contestants)?;
+    let rules = Rules {
+        steps_max: horizon(world.discount(), args.steps_max as usize),
+        is_end: among(world, "--ends", &args.ends)?,
+    };
+    let setting = Setting {
+        world,
+        rules: &rules,
+        seed: args.seed,
+        episodes: args.episodes,
+        upper: upper(args, world)?,
+        against,
+    };
+    let knowledge = Knowledge {
+        model: &model,
+        solution: &believed,
+        allowed: information(args, &model, &rules)?,
+        stall_steps: args.stall_guard_steps,
+        gate: args.gate.map(|gate| match gate {
+            GateName::State => Gate::State,
+            GateName::Action => Gate::Action,
+        }),
+        escalation: (&args.usual, &args.ladder, &args.quiet),
+    };
+    let contest = Contest::hold(&setting, &knowledge, &contestants)?;
+    let name = args.file.display().to_string();
+    let printed = if args.json {
+        output::json(&contest.document(&setting, &knowledge, &name))
+    } else {
+        output::line(&table::text(&contest, &setting, &knowledge, &name))
+    };
+    printed.map_err(CommandError::failure)?;
+    Ok(Outcome::Done)
+}
+
+/// The bound that was given, or the fast informed bound at the start belief; none for missions
+/// that actions end.
+fn upper(args: &Args, world: &Pomdp) -> Result<Option<f64>, CommandError> {
+    if !args.ends.is_empty() || args.upper.is_some() {
+        return Ok(args.upper.filter(|_| args.ends.is_empty()));
+    }
+    let solution = mdp::solve(world).map_err(CommandError::usage)?;
+    let at_start = |q: &Vec<f64>| -> f64 { q.iter().zip(world.start()).map(|(q, b)| q * b).sum() };
+    let values = informed_values(world, &solution);
+    Ok(values.iter().map(at_start).reduce(f64::max))
+}
+
+/// Index of the contestant that the others are compared with.
+fn reference(args: &Args, contestants: &[Contestant]) -> Result<usize, CommandError> {
+    let Some(name) = &args.against else {
+        let is_baseline = |c: &Contestant| matches!(c.kind, Kind::Escalation(_));
+        return Ok(contestants.iter().position(is_baseline).unwrap_or(0));
+    };
+    let found = contestants.iter().position(|c| c.label() == *name);
+    let found = found.or_else(|| contestants.iter().position(|c| c.name() == *name));
+    found.ok_or_else(|| {
+        let labels: Vec<String> = contestants.iter().map(Contestant::label).collect();
+        let labels = labels.join(", ");
+        CommandError::usage(format!("--against {name}: allowed are {labels}"))
+    })
+}
+
+/// Actions that dual control may take for information.
+fn information(
+    args: &Args,
+    model: &Pomdp,
+    rules: &Rules,
+) -> Result<Option<Vec<usize>>, CommandError> {
+    let mut is_allowed = among(model, "--information-actions", &args.information_actions)?;
+    if args.information_actions.is_empty() {
+        if args.ends.is_empty() {
+            return Ok(None);
+        }
+        is_allowed = rules.is_end.iter().map(|end| !end).collect();
+    }
+    let allowed = is_allowed
+        .iter()
+        .enumerate()
+        .filter(|(_, allowed)| **allowed);
+    Ok(Some(allowed.map(|(action, _)| action).collect()))
+}
+
+/// For every action of the model, whether `names` holds it.
+fn among(model: &Pomdp, option: &str, names: &[String]) -> Result<Vec<bool>, CommandError> {
+    if let Some(name) = names.iter().find(|name| !model.actions().contains(name)) {
+        let allowed = model.actions().join(", ");
+        return Err(CommandError::usage(format!(
+            "{option}: the model has no action '{name}'; allowed are {allowed}"
+        )));
+    }
+    Ok(model.actions().iter().map(|a| names.contains(a)).collect())
+}
+
+/// The world and the model that is believed in speak of the same things.
+fn fits(model: &Pomdp, other: &Pomdp) -> Result<(), CommandError> {
+    let lists = [
+        ("states", model.states(), other.states()),
+        ("actions", model.actions(), other.actions()),
+        ("observations", model.observations(), other.observations()),
+    ];
+    match lists.iter().find(|(_, ours, theirs)| ours != theirs) {
+        Some((what, ..)) => Err(CommandError::usage(format!(
+            "--model-error: its {what} differ; allowed is a model with the same names in the same \
+             order"
+        ))),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,88 @@
+//! A policy, and what explains its decisions.
+
+use super::dual::vote_entropy;
+use super::{Choice, Control, Policy, normalised_entropy};
+use crate::mdp::Solution;
+use crate::model::Pomdp;
+
+/// A decision and what it rests on; values and votes are [`Decider::values`] and
+/// [`Decider::votes`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decision {
+    /// Index of the action.
+    pub action: usize,
+    /// Its value (or votes) minus the runner-up's; 0 at a tie or with one action.
+    pub margin: f64,
+    /// What the action was chosen for.
+    pub control: Control,
+    /// Entropy of the belief, 0 to 1.
+    pub state_entropy: f64,
+    /// Entropy of the votes, 0 to 1.
+    pub action_entropy: f64,
+}
+
+impl Decision {
+    /// Without what explains it.
+    #[must_use]
+    pub const fn choice(&self) -> Choice {
+        Choice {
+            action: self.action,
+            margin: self.margin,
+            control: self.control,
+        }
+    }
+}
+
+/// Decides by a policy. Preallocated.
+pub struct Decider {
+    policy: Box<dyn Policy>,
+    best: Vec<usize>,
+    values: Vec<f64>,
+    votes: Vec<f64>,
+}
+
+impl Decider {
+    /// Around `policy`, for a model and its fully observable relaxation.
+    #[must_use]
+    pub fn new(policy: Box<dyn Policy>, model: &Pomdp, solution: &Solution) -> Self {
+        let actions = model.actions().len();
+        Self {
+            policy,
+            best: (0..model.states().len())
+                .map(|s| solution.best(s))
+                .collect(),
+            values: vec![0.0; actions],
+            votes: vec![0.0; actions],
+        }
+    }
+
+    /// The action for a belief.
+    pub fn decide(&mut self, belief: &[f64]) -> Decision {
+        let choice = self.policy.evaluate(belief, &mut self.values);
+        Decision {
+            action: choice.action,
+            margin: choice.margin,
+            control: choice.control,
+            state_entropy: normalised_entropy(belief),
+            action_entropy: vote_entropy(belief, &self.best, &mut self.votes),
+        }
+    }
+
+    /// What the policy thinks of every action, as of the last decision: values or votes, the
+    /// larger the better; in a step for information the expected entropies, negative.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// How much of the belief is in states whose best action this is, as of the last decision.
+    #[must_use]
+    pub fn votes(&self) -> &[f64] {
+        &self.votes
+    }
+
+    /// A new mission begins.
+    pub fn reset(&mut self) {
+        self.policy.reset();
+    }
+}

@@ -1,0 +1,196 @@
+//! A nominal model for people to read: text, or the same as one document.
+
+use std::fmt;
+
+use serde::Serialize;
+use vigil_robot::learned::Form;
+use vigil_robot::learned::monitor::Channels;
+use vigil_robot::nominal::{self, Model, Of, Range, Term};
+
+use super::report;
+use crate::model_view::{Alarm, Source};
+
+/// A nominal model, readable. `Display` prints it as text.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct View {
+    /// What it is of, and where it comes from.
+    #[serde(flatten)]
+    pub source: Source,
+    /// Interval over which frames are averaged into one observation, s.
+    pub interval_s: f64,
+    /// Time in motion that was learned from, s.
+    pub exposure_s: f64,
+    /// Factor by which all deviations were widened because the log is short.
+    pub widened: f64,
+    /// Axes of the command, and the ranges learned from.
+    pub command: Vec<Range>,
+    /// Channels.
+    pub channels: Vec<Channel>,
+    /// Alarm thresholds.
+    pub alarms: Vec<Alarm>,
+    /// For each form of the detection filter the highest log-odds that a lasting fault reaches: an
+    /// alarm above them is refused.
+    pub reachable: Vec<Reachable>,
+}
+
+/// The highest log-odds of a form.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Reachable {
+    /// Form of the detection filter.
+    pub form: &'static str,
+    /// The highest log-odds, by all channels.
+    pub log_odds: f64,
+}
+
+/// One channel.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Channel {
+    /// Name.
+    pub name: String,
+    /// Its unit.
+    pub unit: &'static str,
+    /// The prediction in words.
+    pub prediction: String,
+    /// Everything as the file has it.
+    #[serde(flatten)]
+    pub learned: nominal::Channel,
+}
+
+impl View {
+    /// A view of a model; thresholds for this prior rate of faults.
+    #[must_use]
+    pub fn new(model: &Model, fault_rate_1_h: f64) -> Self {
+        let source = Source {
+            robot: model.robot.clone(),
+            wheels: model.wheels.clone(),
+            layout_version: model.version,
+            model_hash: format!("{:016x}", model.hash()),
+            edited: model.is_edited(),
+            provenance: model.provenance.clone(),
+        };
+        let channel = |channel: &nominal::Channel| Channel {
+            name: report::name(channel.target, &model.wheels),
+            unit: report::unit(channel.target.quantity),
+            prediction: prediction(channel, model),
+            learned: channel.clone(),
+        };
+        let reachable = |form: Form| Reachable {
+            form: form.name(),
+            log_odds: model.log_odds_max(Channels::PoseEncoders, form, fault_rate_1_h),
+        };
+        Self {
+            source,
+            interval_s: model.interval_s,
+            exposure_s: model.exposure_s,
+            widened: model.widened,
+            command: model.command.clone(),
+            channels: model.channel.iter().map(channel).collect(),
+            alarms: Alarm::of(&model.calibration, fault_rate_1_h),
+            reachable: Form::ALL.map(reachable).to_vec(),
+        }
+    }
+}
+
+/// Weights and terms of a channel.
+fn prediction(channel: &nominal::Channel, model: &Model) -> String {
+    let terms = channel.terms.iter().zip(&channel.weights);
+    let terms = terms.map(|(term, weight)| match word(term, model) {
+        word if word.is_empty() => format!("{weight:+.4}"),
+        word => format!("{weight:+.4} {word}"),
+    });
+    terms.collect::<Vec<_>>().join(" ")
+}
+
+/// A term in words; empty for the constant.
+fn word(term: &Term, model: &Model) -> String {
+    let axis = |i: usize| {
+        model
+            .command
+            .get(i)
+            .map_or("?", |range| range.name.as_str())
+    };
+    let wheel = model.wheels.get(term.index).map_or("?", String::as_str);
+    let of = match term.of {
+        Of::Constant => return String::new(),
+        Of::Command => {
+            let powers = term
+                .powers
+                .iter()
+                .enumerate()
+                .filter(|(_, power)| **power > 0);
+            let factors = powers.map(|(i, power)| match power {
+                1 => axis(i).to_owned(),
+                power => format!("{}^{power}", axis(i)),
+            });
+            factors.collect::<Vec<_>>().join("*")
+        }
+        Of::Lagged => axis(term.index).to_owned(),
+        Of::Wheel => format!("rate_{wheel}"),
+        Of::WheelSpeed => format!("|rate_{wheel}|"),
+        Of::WheelSense => format!("sense_{wheel}"),
+    };
+    match term.lag {
+        0 => of,
+        lag => format!("{of}[-{lag}]"),
+    }
+}
+
+impl fmt::Display for View {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.source.write(f, "of the runs, of at least six")?;
+        writeln!(
+            f,
+            "\nlearned from   {:.0} s of motion, deviations widened by {:.2}",
+            self.exposure_s, self.widened
+        )?;
+        for Range {
+            name,
+            unit,
+            min,
+            max,
+        } in &self.command
+        {
+            writeln!(f, "learned range  {name} {min:.3} to {max:.3} {unit}")?;
+        }
+        writeln!(
+            f,
+            "\nchannels, each a mean over {} s and predicted by weights of the command (each axis \
+             divided by the\nlargest value learned from) and of wheel rates (rad/s); [-k]: k \
+             observations earlier; sd: at rest, of a\nrun's offset, and of its drift from one \
+             observation to the next",
+            self.interval_s
+        )?;
+        for channel in &self.channels {
+            channel.write(f)?;
+        }
+        Alarm::write(&self.alarms, f)?;
+        write!(
+            f,
+            "\nhighest log-odds of a lasting fault, above which no alarm may lie"
+        )?;
+        for reachable in &self.reachable {
+            let Reachable { form, log_odds } = reachable;
+            write!(f, "\n  {form:<13} {log_odds:6.2}")?;
+        }
+        Ok(())
+    }
+}
+
+impl Channel {
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let learned = &self.learned;
+        writeln!(f, "\n{}, {}", self.name, self.unit)?;
+        writeln!(f, "  = {}", self.prediction)?;
+        writeln!(
+            f,
+            "  sd {:.5}, {:.5}, {:.5}; successive residuals correlated {:+.2}; scatter {:.2}; on \
+             the part left out {:.2} times as much",
+            learned.variance[0].sqrt(),
+            learned.offset_sd,
+            learned.drift_sd,
+            learned.correlation,
+            learned.scatter,
+            learned.held_out_ratio
+        )
+    }
+}

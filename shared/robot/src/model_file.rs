@@ -1,0 +1,85 @@
+//! What every file of a model has: a version of its layout, and a hash over its content.
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use vigil_blocks::fnv1a;
+
+use crate::learned::ModelError;
+
+/// What stands for the hash in a file that a person has changed on purpose.
+pub const EDITED: &str = "edited";
+
+/// A model that is kept in a file.
+pub(crate) trait ModelFile: Clone + Serialize + DeserializeOwned {
+    /// Version of the layout that is read and written.
+    const VERSION: u32;
+
+    /// Hash that the file carries.
+    fn stored(&self) -> &str;
+
+    /// The place of that hash.
+    fn stored_mut(&mut self) -> &mut String;
+
+    /// Checks every value.
+    fn check(&self) -> Result<(), ModelError>;
+}
+
+/// What every layout has.
+#[derive(Deserialize)]
+struct Layout {
+    /// Layout of the file.
+    version: u32,
+}
+
+/// Reads and checks a model.
+pub(crate) fn read<M: ModelFile>(text: &str) -> Result<M, ModelError> {
+    // The version comes first: what a file of another layout lacks is of no interest.
+    let layout: Layout = toml::from_str(text).map_err(|error| parse_error(text, &error))?;
+    if layout.version != M::VERSION {
+        return Err(ModelError::Version {
+            found: layout.version,
+            read: M::VERSION,
+        });
+    }
+    let model: M = toml::from_str(text).map_err(|error| parse_error(text, &error))?;
+    model.check()?;
+    let found = seal(&model);
+    if model.stored() != found && model.stored() != EDITED {
+        let stored = model.stored().to_owned();
+        return Err(ModelError::Hash { stored, found });
+    }
+    Ok(model)
+}
+
+/// The file's text.
+pub(crate) fn text<M: ModelFile>(model: &M) -> Result<String, ModelError> {
+    toml::to_string(model).map_err(|error| ModelError::Parse(error.to_string()))
+}
+
+/// Hash over the content; equal for equal models.
+pub(crate) fn hash<M: ModelFile>(model: &M) -> u64 {
+    let mut content = model.clone();
+    content.stored_mut().clear();
+    let text = text(&content).unwrap_or_default();
+    fnv1a::hash(fnv1a::BASIS, text.as_bytes())
+}
+
+/// The same with the hash that its content has, as [`read`] expects it.
+pub(crate) fn sealed<M: ModelFile>(mut model: M) -> M {
+    *model.stored_mut() = seal(&model);
+    model
+}
+
+fn seal<M: ModelFile>(model: &M) -> String {
+    format!("fnv1a64:{:016x}", hash(model))
+}
+
+fn parse_error(text: &str, error: &toml::de::Error) -> ModelError {
+    let until = text
+        .as_bytes()
+        .iter()
+        .take(error.span().map_or(0, |s| s.start));
+    let line = 1 + until.filter(|&&byte| byte == b'\n').count();
+    let message = error.message().replace('\n', " ");
+    ModelError::Parse(format!("line {line}: {message}"))
+}

@@ -1,0 +1,49 @@
+//! A configuration whose alarm could never rise is refused.
+#![allow(clippy::unwrap_used)]
+
+use std::path::PathBuf;
+
+use vigil_setup::load_graph;
+use vigil_setup::schema::{Form, GraphFile};
+
+fn load(name: &str, change: impl FnOnce(&mut GraphFile)) -> Result<(), String> {
+    let config = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
+    let change = |file: &mut GraphFile| {
+        // One core is enough to read a configuration.
+        for service in [
+            &mut file.services.sensor_sim,
+            &mut file.services.detector,
+            &mut file.services.identifier,
+            &mut file.services.supervisor,
+        ] {
+            service.core = 0;
+        }
+        change(file);
+    };
+    load_graph(&config.join(name), change)
+        .map(|_| ())
+        .map_err(|error| error.to_string())
+}
+
+#[test]
+fn an_alarm_that_could_never_rise_is_refused_with_line_key_and_bound() {
+    assert_eq!(load("kobuki.toml", |_| ()), Ok(()));
+    assert_eq!(
+        load("rover.toml", |file| file.detector.form = Form::Windowed),
+        Ok(())
+    );
+    let message = load("kobuki.toml", |file| file.detector.form = Form::Windowed).unwrap_err();
+    let place = message.split_once("kobuki.toml:").unwrap().1;
+    let (line, rest) = place.split_once(": ").unwrap();
+    assert!(line.parse::<usize>().unwrap() > 20, "{message}");
+    assert!(rest.starts_with("detector.false_alarm_interval_h: at most one false alarm in 24 h"));
+    assert!(
+        rest.contains("'windowed'") && rest.contains("at the highest"),
+        "{message}"
+    );
+    let seldom = |file: &mut GraphFile| {
+        file.detector.form = Form::Windowed;
+        file.detector.false_alarm_interval_h = 5.0;
+    };
+    assert_eq!(load("kobuki.toml", seldom), Ok(()));
+}
