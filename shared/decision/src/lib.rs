@@ -1,8 +1,8 @@
 //! Decisions under uncertainty: POMDP models, their solution, policies, belief tracking.
 //!
 //! A [`Pomdp`] is read from Cassandra's `.pomdp` format or APPL's `.pomdpx`, and written as
-//! `.pomdp`; its fully observable relaxation is solved by [`mdp::solve`]; a [`Policy`] turns a
-//! belief into an action; a [`Tracker`] keeps the belief.
+//! `.pomdp`; [`bounds`] and [`solver`] say what it is worth at best, and find plans; a [`Policy`]
+//! turns a belief into an action; a [`Tracker`] keeps the belief.
 //! Deciding and tracking allocate nothing. No transport, no clock, no files.
 //!
 //! Notation of Verma, Fernandez and Simmons (2002): states S, actions A, observations Z,
@@ -19,6 +19,8 @@ pub mod policy_file;
 mod pomdpx;
 mod reader;
 pub mod simulation;
+pub mod solver;
+mod sparse_beliefs;
 mod weights;
 mod writer;
 
@@ -27,5 +29,7 @@ pub use belief::{Evidence, Tracker};
 pub use bounds::mdp;
 pub use budget::Budget;
 pub use model::{Pomdp, Warning};
-pub use policy::{ActionVoting, Choice, Control, Decider, MostLikelyState, Policy, QMdp};
+pub use policy::{
+    ActionVoting, Choice, Control, Decider, MostLikelyState, PointBased, Policy, QMdp,
+};
 pub use reader::{ParseError, Position};

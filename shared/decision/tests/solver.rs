@@ -34,7 +34,7 @@ impl Dense {
         let weight = |i: usize| {
             let w = self.weights[(at * 7 + i * 3) % self.weights.len()];
             // Many zeros: sparse beliefs, observations that cannot be.
-            f64::from(if w % 3 == 0 { 0 } else { w })
+            f64::from(if w.is_multiple_of(3) { 0 } else { w })
         };
         let row: Vec<f64> = (0..width)
             .map(|i| weight(i) + f64::from(u8::from(i == at % width)))

@@ -30,7 +30,7 @@ impl PointBased {
 
 impl Policy for PointBased {
     /// An action that no vector begins with has the value minus infinity.
-    fn evaluate(&self, belief: &[f64], values: &mut [f64]) -> Choice {
+    fn evaluate(&mut self, belief: &[f64], values: &mut [f64]) -> Choice {
         values.fill(f64::NEG_INFINITY);
         for (action, alpha) in self.vectors.rows() {
             if let Some(value) = values.get_mut(action) {
