@@ -187,7 +187,8 @@ proptest! {
         let own = String::from_utf8(file.write(&model).unwrap()).unwrap();
         if let Ok(read) = PolicyFile::read(damaged(&own).as_bytes(), &model) {
             prop_assert_eq!(read.vectors.states(), 2);
-            prop_assert!(read.vectors.rows().all(|(a, v)| a < 2 && v.iter().all(|v| v.is_finite())));
+            let is_fine = |(a, v): (usize, &[f64])| a < 2 && v.iter().all(|v| v.is_finite());
+            prop_assert!(read.vectors.rows().all(is_fine));
         }
         let _ = appl::read(&damaged(&appl::write(&file.vectors, "m")), &model);
         let _ = alpha::read(&damaged(&alpha::write(&file.vectors)), &model);

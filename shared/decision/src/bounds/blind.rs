@@ -35,7 +35,9 @@ pub fn solve(model: &Pomdp, budget: &mut Budget<'_>) -> Result<ActionValues, Sol
         if short > 0.0 && !(error.is_finite() && error > 0.0) {
             return Err(SolveError::Unbounded(model.discount()));
         }
-        alpha.iter_mut().for_each(|v| *v -= error);
+        if error > 0.0 {
+            alpha.iter_mut().for_each(|v| *v -= error);
+        }
         values.extend(alpha);
     }
     Ok(ActionValues::new(n, values))

@@ -5,8 +5,8 @@
 //! fixed point is an upper bound whenever these mixtures are right. E = corners gives the fast
 //! informed bound, E = beliefs one step from the corners the tighter informed bound.
 
-use super::SolveError;
 use super::linear::{Rows, System, largest};
+use super::{ROUNDING, SolveError};
 use crate::budget::Budget;
 
 /// Largest number of table entries (16 bytes each).
@@ -136,7 +136,7 @@ impl Mixtures {
             mass_max = mass_max.max(mass);
         }
         let contraction = discount * mass_max;
-        let error = excess / (1.0 - contraction);
+        let error = (excess + ROUNDING * largest(&q)) / (1.0 - contraction);
         if !(contraction < 1.0 && error.is_finite()) {
             return Err(SolveError::Unbounded(discount));
         }

@@ -5,8 +5,8 @@
 //! | bound | what it allows the controller | cost |
 //! |---|---|---|
 //! | [`blind`] (lower) | one action for ever | linear in the model |
-//! | [`mdp`] (upper) | to see the state from now on, Q-MDP: after one step | linear in the model |
-//! | [`fib`] (upper) | to see the state, but to act on the observation, for one step | times observations |
+//! | [`mdp`] (upper) | to see the state from now on; Q-MDP: after one step | linear |
+//! | [`fib`] (upper) | as Q-MDP, but its next action follows the observation | times observations |
 //! | [`tib`] (upper) | the same, one step later | about the square |
 //!
 //! All are found by policy iteration, that is by linear systems, so that a discount near 1 costs
@@ -20,6 +20,10 @@ pub mod mdp;
 pub mod tib;
 
 use crate::budget::Stopped;
+
+/// What a backup and its value may lose by rounding, relative to the largest value; upper bounds
+/// are moved up by it, so that a lower and an upper one that are equal in truth never cross.
+const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 /// Q[a][.], one row per action.
 #[derive(Debug, Clone, PartialEq)]
