@@ -4,6 +4,7 @@ mod compare;
 mod convert;
 mod generate;
 mod info;
+mod solve;
 mod track;
 
 use std::path::Path;
@@ -26,6 +27,7 @@ enum Command {
     Info(info::Args),
     Track(track::Args),
     Convert(convert::Args),
+    Solve(solve::Args),
 }
 
 /// Does what the subcommand says.
@@ -39,6 +41,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         Command::Info(args) => info::run(args),
         Command::Track(args) => track::run(args),
         Command::Convert(args) => convert::run(args),
+        Command::Solve(args) => solve::run(args),
     }
 }
 
