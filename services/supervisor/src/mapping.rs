@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use vigil_blocks::{DECISION_ACTIONS, DECISION_STATES, RecoveryKind};
 use vigil_decision::Pomdp;
 use vigil_decision::mdp::SolveError;
-use vigil_decision::policy::{DualError, NameError};
+use vigil_decision::policy::{BuildError, NameError};
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
 use vigil_setup::schema::{Recovery, RecoveryAction};
@@ -61,7 +61,7 @@ pub enum SupervisorError {
     Policy(#[from] NameError),
     /// Dual control cannot be set up.
     #[error("supervisor: {0}")]
-    Dual(#[from] DualError),
+    Build(#[from] BuildError),
     /// An action for information is not in the model.
     #[error(
         "supervisor.information_actions: the decision model has no action '{found}'; allowed are \
