@@ -1,0 +1,186 @@
+//! How the robot follows, stops, looks, passes, backs and plans.
+
+use super::lane::Lane;
+use super::navigator::{Happening, Navigator};
+use super::path::distance;
+use super::task::Task;
+use crate::DriveCommand;
+
+/// Step in which the way ahead is looked at, m.
+const LOOK_STEP_M: f64 = 0.05;
+/// The same where many ways are looked at.
+const SEARCH_STEP_M: f64 = 0.1;
+/// Reach of the bumper, m: what is this near stops the robot, whatever its sensors say.
+const BUMPER_M: f64 = 0.08;
+/// Share of the speed in an opening and in moving away.
+const CAREFUL: f64 = 0.6;
+/// Below this share of the speed the robot stands.
+const CREEP: f64 = 0.05;
+/// Steps of 0.1 m to either side in which an opening is looked for.
+const SIDE_STEPS: i32 = 20;
+/// Free way that an opening must offer beyond what blocks, m.
+const BEYOND_M: f64 = 1.0;
+/// The robot is at its goal within this distance along the path, m.
+const AT_GOAL_M: f64 = 0.1;
+/// Way before the goal on which it slows down, m.
+const SLOW_AT_GOAL_M: f64 = 0.5;
+/// A robot behind its plan makes up this share of the way per second, 1/s, at most `HURRY` of its
+/// speed faster.
+const MAKE_UP_1_S: f64 = 0.5;
+const HURRY: f64 = 0.25;
+/// A robot that moves away stands after this long, s, however far it came.
+const AWAY_MAX_S: f64 = 8.0;
+
+/// The alternative path is joined so far ahead of its nearest point, m.
+const JOIN_M: f64 = 0.5;
+/// From one cycle to the next the robot comes no farther along its path than this, m.
+const SEARCH_M: f64 = 1.0;
+
+impl Navigator {
+    /// Along the path with the plan; slower, and not at all, before what blocks the way.
+    pub(super) fn follow(&mut self, dt_s: f64, scale: f64) -> DriveCommand {
+        let (slow_m, stop_m) = (self.settings.slow_m, self.settings.stop_m);
+        let free_m = self.free_way(slow_m);
+        if free_m < slow_m {
+            self.block_m = Some(self.along_m + free_m);
+        } else if self.block_m.take().is_some() {
+            // The way is free again: the plan goes on from here.
+            self.planned_m = self.along_m;
+        }
+        let length_m = self.path.length_m();
+        let step_m = self.settings.speed_m_s * scale * dt_s;
+        self.planned_m = (self.planned_m + step_m).min(length_m);
+        let left_m = length_m - self.along_m;
+        if left_m <= AT_GOAL_M {
+            if !std::mem::replace(&mut self.at_goal, true) {
+                self.happening = Some(Happening::Goal);
+            }
+            return self.stand();
+        }
+        let room = ((free_m - stop_m) / (slow_m - stop_m)).clamp(0.0, 1.0);
+        let behind_m = self.planned_m - self.along_m;
+        let hurry = 1.0 + (MAKE_UP_1_S * behind_m / self.settings.speed_m_s).clamp(-HURRY, HURRY);
+        let near = (left_m / SLOW_AT_GOAL_M).clamp(0.2, 1.0);
+        self.steer(if room < CREEP { 0.0 } else { room * hurry * near })
+    }
+
+    /// Stands and looks for an opening.
+    pub(super) fn look(&mut self, passed_s: f64) -> DriveCommand {
+        let block_m = self.block_m.unwrap_or(self.along_m).max(self.along_m);
+        if let Some((lane, end_m)) = self.opening(block_m + BEYOND_M) {
+            self.lane = lane;
+            self.planned_m = self.along_m;
+            self.task = Task::Pass { end_m };
+        } else if passed_s >= self.settings.look_s {
+            self.end(false);
+        }
+        self.stand()
+    }
+
+    /// Carefully through the opening, then back to the path.
+    pub(super) fn pass(&mut self, end_m: f64, dt_s: f64, scale: f64) -> DriveCommand {
+        let step_m = CAREFUL * self.settings.speed_m_s * scale * dt_s;
+        self.planned_m = (self.planned_m + step_m).min(end_m);
+        if self.along_m >= end_m {
+            self.block_m = None;
+            self.planned_m = self.along_m;
+            self.lane = self.lane.change(self.along_m, 0.0);
+            self.end(true);
+        }
+        self.steer(CAREFUL)
+    }
+
+    /// Straight back until it has come far enough, or something is there.
+    pub(super) fn back(&mut self, from: [f64; 2], passed_s: f64) -> DriveCommand {
+        let here = [self.pose[0], self.pose[1]];
+        if distance(from, here) >= self.settings.away_m || passed_s >= AWAY_MAX_S {
+            let moved = distance(from, here) >= 0.5 * self.settings.away_m;
+            self.is_anew = true;
+            self.block_m = None;
+            self.end(moved);
+            return self.stand();
+        }
+        self.curvature_1_m = 0.0;
+        DriveCommand {
+            curvature_1_m: 0.0,
+            speed_m_s: -CAREFUL * self.settings.speed_m_s,
+        }
+    }
+
+    /// Takes the alternative path from here, once.
+    pub(super) fn plan_anew(&mut self) {
+        self.troubles.wrong_heading_rad = 0.0;
+        let Some(alternative) = self.alternative.take() else {
+            return self.end(false);
+        };
+        let here = [self.pose[0], self.pose[1]];
+        self.path.join(here, &alternative, JOIN_M);
+        (self.lane, self.block_m) = (Lane::default(), None);
+        (self.along_m, self.planned_m) = (0.0, 0.0);
+        self.end(true);
+    }
+
+    /// Where the robot believes to be along its path: not far from where it was.
+    pub(super) fn find_along(&mut self) {
+        let here = [self.pose[0], self.pose[1]];
+        let (from_m, to_m) = (self.along_m - SEARCH_M, self.along_m + SEARCH_M);
+        self.along_m = self.path.nearest(here, from_m.max(0.0), to_m);
+    }
+
+    /// True if the robot touches something if it goes on.
+    pub(super) fn touches(&self, truth: [f64; 3], is_forward: bool) -> bool {
+        let reach_m = if is_forward { BUMPER_M } else { -BUMPER_M };
+        let (sin, cos) = truth[2].sin_cos();
+        let place = [truth[0] + reach_m * cos, truth[1] + reach_m * sin];
+        !self.map.is_free(place, self.t_s)
+    }
+
+    /// How far the robot could go on its lane, as the range sensor sees it, up to `most_m`.
+    fn free_way(&self, most_m: f64) -> f64 {
+        if self.troubles.is_blind {
+            return most_m;
+        }
+        let is_free = |ahead_m: f64| {
+            let along_m = self.along_m + ahead_m;
+            let [x, y, _] = self.path.beside(along_m, self.lane.at(along_m));
+            let phantom = self.troubles.phantom;
+            self.map.is_free(self.troubles.truly([x, y]), self.t_s)
+                && phantom.is_none_or(|at| !self.map.touches_phantom(at, [x, y]))
+        };
+        // What lies beyond the goal is in nobody's way.
+        let left_m = self.path.length_m() - self.along_m;
+        let steps = (most_m.min(left_m) / LOOK_STEP_M) as u32;
+        let blocked = (0..=steps).find(|step| !is_free(f64::from(*step) * LOOK_STEP_M));
+        blocked.map_or(most_m, |step| f64::from(step) * LOOK_STEP_M)
+    }
+
+    /// The lane nearest to the path on which the way is free up to `end_m`, as a close look tells,
+    /// and where it has passed.
+    fn opening(&self, end_m: f64) -> Option<(Lane, f64)> {
+        let sides = (0..=SIDE_STEPS).flat_map(|side| [side, -side]);
+        sides.into_iter().find_map(|side| {
+            let left_m = f64::from(side) * SEARCH_STEP_M;
+            let lane = self.lane.change(self.along_m, left_m);
+            let end_m = end_m.max(lane.end_m());
+            let steps = ((end_m - self.along_m) / SEARCH_STEP_M).ceil() as u32;
+            let is_free = |step: u32| {
+                let along_m = self.along_m + f64::from(step) * SEARCH_STEP_M;
+                let [x, y, _] = self.path.beside(along_m, lane.at(along_m));
+                self.map.is_free(self.troubles.truly([x, y]), self.t_s)
+            };
+            (0..=steps).all(is_free).then_some((lane, end_m))
+        })
+    }
+
+    /// Along the lane at a share of the speed.
+    fn steer(&mut self, share: f64) -> DriveCommand {
+        let turned_rad = self.troubles.wrong_heading_rad;
+        self.curvature_1_m = self
+            .lane
+            .pursue(&self.path, self.along_m, self.pose, turned_rad);
+        DriveCommand {
+            curvature_1_m: self.curvature_1_m,
+            speed_m_s: share * self.settings.speed_m_s,
+        }
+    }
+}
