@@ -120,7 +120,7 @@ fn filter_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) 
         "supervisor.epoch_ms",
         file.supervisor.epoch_ms,
         1.0,
-        10_000.0,
+        60_000.0,
     );
     range(
         "supervisor.validity_periods",

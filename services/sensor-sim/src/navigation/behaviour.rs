@@ -13,13 +13,13 @@ const SEARCH_STEP_M: f64 = 0.1;
 /// Reach of the bumper, m: what is this near stops the robot, whatever its sensors say.
 const BUMPER_M: f64 = 0.08;
 /// Share of the speed in an opening and in moving away.
-const CAREFUL: f64 = 0.6;
+const CAREFUL: f64 = 0.75;
 /// Below this share of the speed the robot stands.
 const CREEP: f64 = 0.05;
 /// Steps of 0.1 m to either side in which an opening is looked for.
 const SIDE_STEPS: i32 = 20;
 /// Free way that an opening must offer beyond what blocks, m.
-const BEYOND_M: f64 = 1.0;
+const BEYOND_M: f64 = 0.6;
 /// The robot is at its goal within this distance along the path, m.
 const AT_GOAL_M: f64 = 0.1;
 /// Way before the goal on which it slows down, m.

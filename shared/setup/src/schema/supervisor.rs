@@ -32,7 +32,7 @@ pub struct Supervisor {
     /// Dual control as published in 2002: gated on the state's entropy, any action may be taken
     /// for information, no guard. Default false.
     pub as_published: bool,
-    /// Interval between decision epochs, ms, 1 to 10000. A change of the diagnosed mode opens an
+    /// Interval between decision epochs, ms, 1 to 60000. A change of the diagnosed mode opens an
     /// epoch at once. With `symptoms`, the longest epoch: an outcome or a new symptom ends it too.
     pub epoch_ms: f64,
     /// Validity of a published action, as a multiple of the period, 1 to 1000 (at least 20 ms).
