@@ -20,6 +20,8 @@ const CREEP: f64 = 0.05;
 const SIDE_STEPS: i32 = 20;
 /// Free way that an opening must offer beyond what blocks, m.
 const BEYOND_M: f64 = 0.6;
+/// A robot farther from its lane than this, m, is neither at its goal nor past an opening.
+const NEAR_M: f64 = 0.4;
 /// The robot is at its goal within this distance along the path, m.
 const AT_GOAL_M: f64 = 0.1;
 /// Way before the goal on which it slows down, m.
@@ -31,8 +33,10 @@ const HURRY: f64 = 0.25;
 /// A robot that moves away stands after this long, s, however far it came.
 const AWAY_MAX_S: f64 = 8.0;
 
-/// The alternative path is joined so far ahead of its nearest point, m.
-const JOIN_M: f64 = 0.5;
+/// A robot that has not come through an opening after this long, s, has not found one.
+const PASS_MAX_S: f64 = 12.0;
+/// A robot that is off its path comes back to it so far ahead, m.
+const JOIN_M: f64 = 1.5;
 /// From one cycle to the next the robot comes no farther along its path than this, m.
 const SEARCH_M: f64 = 1.0;
 
@@ -40,7 +44,7 @@ impl Navigator {
     /// Along the path with the plan; slower, and not at all, before what blocks the way.
     pub(super) fn follow(&mut self, dt_s: f64, scale: f64) -> DriveCommand {
         let (slow_m, stop_m) = (self.settings.slow_m, self.settings.stop_m);
-        let free_m = self.free_way(slow_m);
+        let free_m = if self.touched { 0.0 } else { self.free_way(slow_m) };
         if free_m < slow_m {
             self.block_m = Some(self.along_m + free_m);
         } else if self.block_m.take().is_some() {
@@ -51,7 +55,8 @@ impl Navigator {
         let step_m = self.settings.speed_m_s * scale * dt_s;
         self.planned_m = (self.planned_m + step_m).min(length_m);
         let left_m = length_m - self.along_m;
-        if left_m <= AT_GOAL_M {
+        let is_near = self.off_path_m() <= NEAR_M;
+        if left_m <= AT_GOAL_M && is_near {
             if !std::mem::replace(&mut self.at_goal, true) {
                 self.happening = Some(Happening::Goal);
             }
@@ -70,7 +75,10 @@ impl Navigator {
         if let Some((lane, end_m)) = self.opening(block_m + BEYOND_M) {
             self.lane = lane;
             self.planned_m = self.along_m;
-            self.task = Task::Pass { end_m };
+            self.task = Task::Pass {
+                end_m,
+                passed_s: 0.0,
+            };
         } else if passed_s >= self.settings.look_s {
             self.end(false);
         }
@@ -78,11 +86,18 @@ impl Navigator {
     }
 
     /// Carefully through the opening, then back to the path.
-    pub(super) fn pass(&mut self, end_m: f64, dt_s: f64, scale: f64) -> DriveCommand {
-        let step_m = CAREFUL * self.settings.speed_m_s * scale * dt_s;
+    pub(super) fn pass(&mut self, end_m: f64, passed_s: f64, dt_s: f64) -> DriveCommand {
+        let step_m = CAREFUL * self.settings.speed_m_s * dt_s;
         self.planned_m = (self.planned_m + step_m).min(end_m);
-        if self.along_m >= end_m {
+        if passed_s >= PASS_MAX_S {
+            self.end(false);
+            return self.stand();
+        }
+        let is_behind = self.along_m >= end_m.min(self.path.length_m() - AT_GOAL_M);
+        if is_behind && self.off_path_m() <= NEAR_M {
             self.block_m = None;
+            // What it drove through was not there.
+            self.troubles.phantom = None;
             self.planned_m = self.along_m;
             self.lane = self.lane.change(self.along_m, 0.0);
             self.end(true);
@@ -107,16 +122,21 @@ impl Navigator {
         }
     }
 
-    /// Takes the alternative path from here, once.
+    /// Plans from here: along the alternative, once, if the way is blocked; along the same path if
+    /// nothing blocks it.
     pub(super) fn plan_anew(&mut self) {
         self.troubles.wrong_heading_rad = 0.0;
-        let Some(alternative) = self.alternative.take() else {
-            return self.end(false);
-        };
-        let here = [self.pose[0], self.pose[1]];
-        self.path.join(here, &alternative, JOIN_M);
-        (self.lane, self.block_m) = (Lane::default(), None);
-        (self.along_m, self.planned_m) = (0.0, 0.0);
+        if self.block_m.take().is_some() {
+            let alternative = self.alternative.as_mut().filter(|_| !self.took_alternative);
+            let Some(alternative) = alternative else {
+                self.block_m = Some(self.along_m);
+                return self.end(false);
+            };
+            std::mem::swap(&mut self.path, alternative);
+            self.took_alternative = true;
+        }
+        self.lane = Lane::default();
+        self.is_anew = true;
         self.end(true);
     }
 
@@ -127,12 +147,30 @@ impl Navigator {
         self.along_m = self.path.nearest(here, from_m.max(0.0), to_m);
     }
 
+    /// How far from its lane the robot believes to be, m.
+    fn off_path_m(&self) -> f64 {
+        let [x, y, _] = self.path.beside(self.along_m, self.lane.at(self.along_m));
+        distance([x, y], [self.pose[0], self.pose[1]])
+    }
+
     /// True if the robot touches something if it goes on.
     pub(super) fn touches(&self, truth: [f64; 3], is_forward: bool) -> bool {
         let reach_m = if is_forward { BUMPER_M } else { -BUMPER_M };
         let (sin, cos) = truth[2].sin_cos();
         let place = [truth[0] + reach_m * cos, truth[1] + reach_m * sin];
         !self.map.is_free(place, self.t_s)
+    }
+
+    /// The plan goes on from here; a robot that is off its path first goes back to it.
+    pub(super) fn begin_anew(&mut self) {
+        let here = [self.pose[0], self.pose[1]];
+        self.along_m = self.path.nearest(here, 0.0, self.path.length_m());
+        if self.off_path_m() > NEAR_M {
+            self.lane = Lane::default();
+            self.path.join(here, self.along_m + JOIN_M);
+            self.along_m = 0.0;
+        }
+        self.planned_m = self.along_m;
     }
 
     /// How far the robot could go on its lane, as the range sensor sees it, up to `most_m`.

@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn the_robot_steers_toward_its_lane() {
-        let path = Path::new(&[[0.0, 0.0], [9.0, 0.0]], 2);
+        let path = Path::new(&[[0.0, 0.0], [9.0, 0.0]]);
         let lane = Lane::default();
         assert_eq!(lane.pursue(&path, 1.0, [1.0, 0.0, 0.0], 0.0), 0.0);
         assert!(lane.pursue(&path, 1.0, [1.0, 0.3, 0.0], 0.0) < -0.5);

@@ -56,6 +56,9 @@ pub struct Navigator {
     symptoms: u32,
     resets: u32,
     pub(super) t_s: f64,
+    pub(super) took_alternative: bool,
+    /// Something is within the bumper's reach.
+    pub(super) touched: bool,
     pub(super) at_goal: bool,
     is_helped: bool,
     /// The plan begins anew where the robot is, with the next pose.
@@ -67,13 +70,12 @@ impl Navigator {
     /// For a checked configuration.
     #[must_use]
     pub fn new(settings: &Navigation) -> Self {
-        let capacity = settings.path.len().max(settings.alternative.len()) + 1;
         let other = &settings.alternative;
         Self {
             map: Map::new(settings),
             troubles: Troubles::new(&settings.trouble),
-            path: Path::new(&settings.path, capacity),
-            alternative: (!other.is_empty()).then(|| Path::new(other, capacity)),
+            path: Path::new(&settings.path),
+            alternative: (other.len() > 1).then(|| Path::new(other)),
             lane: Lane::default(),
             pose: [0.0; 3],
             along_m: 0.0,
@@ -87,6 +89,8 @@ impl Navigator {
             symptoms: 0,
             resets: 0,
             t_s: 0.0,
+            took_alternative: false,
+            touched: false,
             at_goal: false,
             is_helped: false,
             is_anew: false,
@@ -104,6 +108,7 @@ impl Navigator {
         self.t_s += dt_s;
         self.troubles.strike(self.t_s, truth);
         self.find_along();
+        self.touched = self.touches(truth, true);
         if order.decision != self.decision {
             (self.decision, self.kind) = (order.decision, order.kind);
             self.outcome = ActionOutcome::Running;
@@ -114,11 +119,12 @@ impl Navigator {
             }
         }
         let command = self.pursue(dt_s, order.speed_scale);
-        let is_forward = command.speed_m_s >= 0.0;
-        if command.speed_m_s != 0.0 && self.touches(truth, is_forward) {
-            return self.stand();
-        }
-        command
+        let hits = match command.speed_m_s {
+            forward if forward > 0.0 => self.touched,
+            back if back < 0.0 => self.touches(truth, false),
+            _ => false,
+        };
+        if hits { self.stand() } else { command }
     }
 
     /// Writes what the navigation knows into a frame that holds the true pose as measured, and
@@ -128,9 +134,7 @@ impl Navigator {
             frame.pose = self.troubles.believed(frame.pose);
             self.pose = frame.pose;
             if std::mem::take(&mut self.is_anew) {
-                let place = [self.pose[0], self.pose[1]];
-                self.along_m = self.path.nearest(place, 0.0, self.path.length_m());
-                self.planned_m = self.along_m;
+                self.begin_anew();
             }
         }
         frame.planned_pose = match self.task {
@@ -164,9 +168,10 @@ impl Navigator {
                 let passed_s = *passed_s;
                 return self.look(passed_s);
             }
-            Task::Pass { end_m } => {
-                let end_m = *end_m;
-                return self.pass(end_m, dt_s, scale);
+            Task::Pass { end_m, passed_s } => {
+                *passed_s += dt_s;
+                let (end_m, passed_s) = (*end_m, *passed_s);
+                return self.pass(end_m, passed_s, dt_s * scale);
             }
             Task::Back { from, passed_s } => {
                 *passed_s += dt_s;
