@@ -36,7 +36,7 @@ struct Corridor {
     action: Option<Box<Action>>,
     /// What was decided, fired and happened, in words: `FP`, `+EPM`, `GO failed`, `goal`.
     told: Vec<String>,
-    /// Most that the robot's disc has reached into anything, m.
+    /// True poses.
     truth: Vec<[f64; 3]>,
 }
 
@@ -202,14 +202,20 @@ fn a_phantom_is_gone_through() {
 fn a_mislocalised_robot_finds_its_place() {
     let mut corridor = troubled(TroubleKind::Mislocalised, 5.0, [0.3, 0.9, 0.4]);
     corridor.drive(80.0);
-    assert_eq!(corridor.told, Vec::<String>::new());
+    let mut expected = vec!["FP", "+EPM", "GO", "+EPS", "+EPM", "+EPS", "GO failed"];
+    expected.extend(["NP", "NP failed"].repeat(10));
+    expected.extend(["GO", "GO failed"].repeat(3));
+    expected.extend(["SH", "SH done", "FP", "goal"]);
+    assert_eq!(corridor.told, expected);
 }
 
 #[test]
 fn a_wrong_heading_is_corrected() {
     let mut corridor = troubled(TroubleKind::WrongHeading, 5.0, [0.0, 0.0, 1.8]);
     corridor.drive(80.0);
-    assert_eq!(corridor.told, Vec::<String>::new());
+    let expected = ["FP", "+EPM", "GO", "GO failed", "NP", "NP done", "FP"];
+    assert_eq!(corridor.told[..7], expected);
+    assert_eq!(corridor.told.last().unwrap(), "goal");
 }
 
 #[test]
@@ -228,5 +234,28 @@ fn a_blind_robot_touches_and_is_helped() {
         });
     }));
     corridor.drive(80.0);
-    assert_eq!(corridor.told, Vec::<String>::new());
+    let mut expected = vec!["FP", "+EPM", "GO", "+EPS", "GO failed"];
+    expected.extend(["NP", "NP failed"].repeat(3));
+    expected.extend(["GO", "GO failed"].repeat(3));
+    expected.extend(["SH", "SH done", "FP", "goal"]);
+    assert_eq!(corridor.told, expected);
+}
+
+#[test]
+fn a_stuck_wheel_is_a_hardware_problem_by_the_identifiers_word() {
+    let mut corridor = Corridor::new(setup("corridor-people.toml", |file| {
+        file.navigation.as_mut().unwrap().obstacle.clear();
+    }));
+    corridor.drive(5.0);
+    let fault = vigil_robot::Fault {
+        kind: vigil_robot::FaultKind::Stuck,
+        wheel: corridor.setup.robot.wheel_index("RM").unwrap(),
+    };
+    corridor.simulation.world.inject(fault).unwrap();
+    corridor.drive(0.5);
+    assert_eq!(corridor.told, ["FP", "SH"]);
+    let hp = corridor.setup.decision.states().iter().position(|s| s == "HP");
+    assert!(corridor.action.as_ref().unwrap().belief[hp.unwrap()] > 0.9);
+    corridor.drive(30.0);
+    assert_eq!(corridor.told, ["FP", "SH", "SH done", "FP", "goal"]);
 }

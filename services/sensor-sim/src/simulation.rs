@@ -41,6 +41,8 @@ impl Simulation {
         if self.navigator.as_mut().is_some_and(Navigator::helped) {
             // Mending what is broken cannot fail: everything that can be broken can be mended.
             let _ = self.world.change(Change::ClearAll);
+            // Whoever has helped begins a new run: the filters forget what is no longer so.
+            self.world.begin_run();
         }
         command
     }
