@@ -71,7 +71,11 @@ impl Corridor {
         match self.simulation.happening() {
             Some(Happening::Ended(kind, outcome)) => {
                 let name = self.name(kind);
-                let how = if outcome == ActionOutcome::Succeeded { "done" } else { "failed" };
+                let how = if outcome == ActionOutcome::Succeeded {
+                    "done"
+                } else {
+                    "failed"
+                };
                 self.told.push(format!("{name} {how}"));
             }
             Some(Happening::Goal) => self.told.push("goal".to_owned()),
@@ -160,7 +164,17 @@ impl Corridor {
 fn an_obstacle_is_gone_round() {
     let mut corridor = Corridor::new(setup("corridor-obstacle.toml", |_| {}));
     corridor.drive(40.0);
-    let expected = ["FP", "+EPM", "GO", "+EPS", "GO failed", "NP", "NP done", "FP", "goal"];
+    let expected = [
+        "FP",
+        "+EPM",
+        "GO",
+        "+EPS",
+        "GO failed",
+        "NP",
+        "NP done",
+        "FP",
+        "goal",
+    ];
     assert_eq!(corridor.told, expected);
 }
 
@@ -254,7 +268,12 @@ fn a_stuck_wheel_is_a_hardware_problem_by_the_identifiers_word() {
     corridor.simulation.world.inject(fault).unwrap();
     corridor.drive(0.5);
     assert_eq!(corridor.told, ["FP", "SH"]);
-    let hp = corridor.setup.decision.states().iter().position(|s| s == "HP");
+    let hp = corridor
+        .setup
+        .decision
+        .states()
+        .iter()
+        .position(|s| s == "HP");
     assert!(corridor.action.as_ref().unwrap().belief[hp.unwrap()] > 0.9);
     corridor.drive(30.0);
     assert_eq!(corridor.told, ["FP", "SH", "SH done", "FP", "goal"]);

@@ -6,12 +6,14 @@ use crate::harness::{Running, Summary, machine};
 fn story(summary: &Summary) -> Vec<String> {
     let events = summary.json["events"].as_array().unwrap();
     let text = |event: &serde_json::Value, key: &str| event[key].as_str().unwrap().to_owned();
-    let told = events.iter().filter_map(|event| match event["event"].as_str()? {
-        "action" => Some(text(event, "what")),
-        "outcome" => Some(text(event, "what")),
-        "goal" => Some("goal".to_owned()),
-        _ => None,
-    });
+    let told = events
+        .iter()
+        .filter_map(|event| match event["event"].as_str()? {
+            "action" => Some(text(event, "what")),
+            "outcome" => Some(text(event, "what")),
+            "goal" => Some("goal".to_owned()),
+            _ => None,
+        });
     told.collect()
 }
 
@@ -25,11 +27,23 @@ fn a_blocked_corridor_is_tried_and_gone_round_live() {
     let _machine = machine();
     let config = "config/corridor-obstacle.toml".into();
     let summary = Running::start_with(config, "obstacle", &["--duration", "40"]).finish();
-    let expected = ["FP", "GO", "no opening", "NP", "alternative path", "FP", "goal"];
+    let expected = [
+        "FP",
+        "GO",
+        "no opening",
+        "NP",
+        "alternative path",
+        "FP",
+        "goal",
+    ];
     assert_eq!(story(&summary), expected);
     assert_fired(&summary, "EPM");
     assert_eq!(summary.events("alarm"), []);
-    let obeyed: Vec<String> = summary.events("obeys").into_iter().map(|(_, w)| w).collect();
+    let obeyed: Vec<String> = summary
+        .events("obeys")
+        .into_iter()
+        .map(|(_, w)| w)
+        .collect();
     assert_eq!(obeyed, ["FP", "GO", "NP", "FP"]);
 }
 

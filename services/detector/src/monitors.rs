@@ -143,7 +143,10 @@ impl Monitors {
             trace.spin = (at, 0.0);
         }
         trace.spin.1 += turned;
-        self.set(Symptoms::SD, trace.spin.1.abs() >= self.settings.spin_turn_rad);
+        self.set(
+            Symptoms::SD,
+            trace.spin.1.abs() >= self.settings.spin_turn_rad,
+        );
     }
 
     fn take_place(&mut self, trace: &mut Trace, here: Place) {

@@ -73,7 +73,11 @@ fn an_error_in_position_is_of_a_moving_or_a_stopped_robot_and_ends_below_half() 
 /// Round a circle of circumference 4 m, 80 places a round.
 fn round(k: u32) -> [f64; 3] {
     let (radius_m, angle) = (4.0 / TAU, TAU * f64::from(k) / 80.0);
-    [radius_m * angle.sin(), radius_m * (1.0 - angle.cos()), angle]
+    [
+        radius_m * angle.sin(),
+        radius_m * (1.0 - angle.cos()),
+        angle,
+    ]
 }
 
 #[test]
@@ -125,9 +129,17 @@ fn a_jump_of_the_frame_begins_anew_and_half_a_frame_changes_nothing() {
     let mut robot = Watched::new();
     assert_eq!(robot.at([0.0; 3], [0.0; 3]), 0);
     assert_eq!(robot.at([2.0, 0.0, 0.0], [0.0; 3]), Symptoms::EPM);
-    for (valid, x) in [(Valid::POSE, 0.0), (Valid::PLANNED_POSE, 0.0), (!0, f64::NAN)] {
+    for (valid, x) in [
+        (Valid::POSE, 0.0),
+        (Valid::PLANNED_POSE, 0.0),
+        (!0, f64::NAN),
+    ] {
         robot.frame.valid = valid;
-        assert_eq!(robot.at([x, 0.0, 0.0], [0.0; 3]), Symptoms::EPM, "{valid} {x}");
+        assert_eq!(
+            robot.at([x, 0.0, 0.0], [0.0; 3]),
+            Symptoms::EPM,
+            "{valid} {x}"
+        );
     }
     robot.frame.valid = Valid::POSE | Valid::PLANNED_POSE;
     robot.frame.pose_reset_count += 1;

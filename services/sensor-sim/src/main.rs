@@ -59,8 +59,7 @@ fn serve(setup: &Setup, source: Assembled, args: Args) -> Result<(), ServeError>
         Assembled::Simulator(simulation, schedule) => {
             let (allow, period_ns) = (setup.file.control.allow_injection, setup.period_ns());
             serve::source(&plan, |graph| {
-                let source =
-                    SimulatorSource::new(*simulation, schedule, allow, period_ns, graph)?;
+                let source = SimulatorSource::new(*simulation, schedule, allow, period_ns, graph)?;
                 Ok(source.resuming(began_ns))
             })
         }

@@ -170,7 +170,14 @@ mod tests {
     #[test]
     fn driving_kinds_scale_the_speed_and_bend_the_curvature() {
         use RecoveryKind::{Compensate, GoOn, GoThrough, IgnoreEncoder, MoveAway, SlowDown};
-        for kind in [GoOn, SlowDown, Compensate, IgnoreEncoder, GoThrough, MoveAway] {
+        for kind in [
+            GoOn,
+            SlowDown,
+            Compensate,
+            IgnoreEncoder,
+            GoThrough,
+            MoveAway,
+        ] {
             let mut obedience = Obedience::new(&limits());
             let found = obedience.apply(PLANNED, Some(&action(kind)), 1000);
             assert!(

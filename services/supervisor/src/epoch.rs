@@ -37,7 +37,13 @@ impl Epoch {
         limit_ns: u64,
     ) -> bool {
         let symptoms = detection.symptoms & MONITORS;
-        let position = |set: u32| if set & POSITION == 0 { set } else { set | POSITION };
+        let position = |set: u32| {
+            if set & POSITION == 0 {
+                set
+            } else {
+                set | POSITION
+            }
+        };
         let new = symptoms & !position(self.standing);
         self.risen |= new;
         if symptoms & POSITION != 0 && self.risen & POSITION != 0 {

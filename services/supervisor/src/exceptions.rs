@@ -254,7 +254,10 @@ impl Exceptions {
         let decided = self.decided();
         // A stop by rule, and its end, are decisions of their own.
         let stops = |kind| kind == RecoveryKind::Stop;
-        if self.told.is_some_and(|told| stops(told) != stops(decided.kind)) {
+        if self
+            .told
+            .is_some_and(|told| stops(told) != stops(decided.kind))
+        {
             self.ask();
         }
         self.told = Some(decided.kind);

@@ -44,7 +44,11 @@ impl Navigator {
     /// Along the path with the plan; slower, and not at all, before what blocks the way.
     pub(super) fn follow(&mut self, dt_s: f64, scale: f64) -> DriveCommand {
         let (slow_m, stop_m) = (self.settings.slow_m, self.settings.stop_m);
-        let free_m = if self.touched { 0.0 } else { self.free_way(slow_m) };
+        let free_m = if self.touched {
+            0.0
+        } else {
+            self.free_way(slow_m)
+        };
         if free_m < slow_m {
             self.block_m = Some(self.along_m + free_m);
         } else if self.block_m.take().is_some() {
@@ -66,7 +70,11 @@ impl Navigator {
         let behind_m = self.planned_m - self.along_m;
         let hurry = 1.0 + (MAKE_UP_1_S * behind_m / self.settings.speed_m_s).clamp(-HURRY, HURRY);
         let near = (left_m / SLOW_AT_GOAL_M).clamp(0.2, 1.0);
-        self.steer(if room < CREEP { 0.0 } else { room * hurry * near })
+        self.steer(if room < CREEP {
+            0.0
+        } else {
+            room * hurry * near
+        })
     }
 
     /// Stands and looks for an opening.

@@ -36,9 +36,8 @@ impl Map {
     pub(super) fn is_free(&self, place: [f64; 2], t_s: f64) -> bool {
         let wall = |wall: &[f64; 4]| distance_to(wall, place) >= self.body_radius_m;
         let is_there = |o: &&Obstacle| o.from_s <= t_s && o.until_s.is_none_or(|end_s| t_s < end_s);
-        let obstacle = |o: &Obstacle| {
-            distance([o.x_m, o.y_m], place) >= self.body_radius_m + o.radius_m
-        };
+        let obstacle =
+            |o: &Obstacle| distance([o.x_m, o.y_m], place) >= self.body_radius_m + o.radius_m;
         self.walls.iter().all(wall)
             && (self.is_cleared || self.obstacles.iter().filter(is_there).all(obstacle))
     }

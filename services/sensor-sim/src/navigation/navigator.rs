@@ -140,7 +140,9 @@ impl Navigator {
         frame.planned_pose = match self.task {
             // A manoeuvre away from the path is its own plan.
             Task::Back { .. } => self.pose,
-            _ => self.path.beside(self.planned_m, self.lane.at(self.planned_m)),
+            _ => self
+                .path
+                .beside(self.planned_m, self.lane.at(self.planned_m)),
         };
         frame.valid |= Valid::PLANNED_POSE;
         frame.pose_reset_count = self.resets;

@@ -202,7 +202,11 @@ mod tests {
         let [x, y, _] = path.at(path.length_m());
         assert_near(&[x, y], &[4.0, 3.0]);
         let rounded_m = 7.0 - 2.0 + FRAC_PI_2;
-        assert!((path.length_m() - rounded_m).abs() < 2e-3, "{}", path.length_m());
+        assert!(
+            (path.length_m() - rounded_m).abs() < 2e-3,
+            "{}",
+            path.length_m()
+        );
         let [x, y, heading] = path.at(3.0 + 0.5 * FRAC_PI_2);
         let middle = std::f64::consts::FRAC_1_SQRT_2;
         assert!((x - 3.0 - middle).abs() < 5e-3 && (y - 1.0 + middle).abs() < 5e-3);

@@ -31,7 +31,10 @@ pub(super) fn check(
         report("navigation", message);
     }
     if !file.drive.is_empty() {
-        report("drive", "is not driven with [navigation]: leave one out".into());
+        report(
+            "drive",
+            "is not driven with [navigation]: leave one out".into(),
+        );
     }
     if robot.is_some_and(|robot| robot.kinematics != Kinematics::Ackermann6) {
         let message = "the simulator drives robots of kinematics \"ackermann6\" only".to_owned();
@@ -94,7 +97,11 @@ fn paths(navigation: &Navigation, report: &mut impl FnMut(&str, String)) {
             report(&format!("navigation.{key}"), message);
         }
     }
-    if navigation.path.first().is_some_and(|first| *first != [0.0; 2]) {
+    if navigation
+        .path
+        .first()
+        .is_some_and(|first| *first != [0.0; 2])
+    {
         let message = "must begin at [0.0, 0.0], where the robot stands".to_owned();
         report("navigation.path", message);
     }
@@ -104,7 +111,10 @@ fn paths(navigation: &Navigation, report: &mut impl FnMut(&str, String)) {
         let message = format!("{far} is out of range: allowed is up to {COORDINATE_MAX_M} m");
         report("navigation.path", message);
     }
-    for (key, path) in [("path", &navigation.path), ("alternative", &navigation.alternative)] {
+    for (key, path) in [
+        ("path", &navigation.path),
+        ("alternative", &navigation.alternative),
+    ] {
         if path.windows(2).any(|pair| pair[0] == pair[1]) {
             let message = "a point follows upon itself: leave one out".to_owned();
             report(&format!("navigation.{key}"), message);
