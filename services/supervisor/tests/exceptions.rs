@@ -280,7 +280,7 @@ fn what_does_not_fit_is_named() {
     assert!(lacking.contains("no observation 'none'"), "{lacking}");
     let state = message(MODEL, |s| s.hardware_state = Some("HW".into()));
     assert!(state.contains("'HW'") && state.contains("NOM, NNP, HP, RT, PP, WD, LST"));
-    assert!(message(MODEL, |s| drop(s.actions.remove("MA"))).contains("action 'MA'"));
+    assert!(message(MODEL, |s| s.actions.retain(|a, _| a != "MA")).contains("action 'MA'"));
     let twice = "discount: 0.9\nstates: 2\nactions: 1\nobservations: none EPM_LD LD_EPM\n\
                  T: * identity\nO: * uniform\n";
     let same = message(twice, |s| {

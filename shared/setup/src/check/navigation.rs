@@ -107,7 +107,8 @@ fn paths(navigation: &Navigation, report: &mut impl FnMut(&str, String)) {
     }
     let points = navigation.path.iter().chain(&navigation.alternative);
     let numbers = points.flatten().chain(navigation.walls.iter().flatten());
-    if let Some(far) = numbers.into_iter().find(|m| !(m.abs() <= COORDINATE_MAX_M)) {
+    let is_near = |m: &&f64| (-COORDINATE_MAX_M..=COORDINATE_MAX_M).contains(*m);
+    if let Some(far) = numbers.into_iter().find(|m| !is_near(m)) {
         let message = format!("{far} is out of range: allowed is up to {COORDINATE_MAX_M} m");
         report("navigation.path", message);
     }
