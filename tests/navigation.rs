@@ -36,8 +36,6 @@ struct Corridor {
     action: Option<Box<Action>>,
     /// What was decided, fired and happened, in words: `FP`, `+EPM`, `GO failed`, `goal`.
     told: Vec<String>,
-    /// True poses.
-    truth: Vec<[f64; 3]>,
 }
 
 impl Corridor {
@@ -57,7 +55,6 @@ impl Corridor {
             particles: [Box::default(), Box::default()],
             action: None,
             told: Vec::new(),
-            truth: Vec::new(),
             setup,
         }
     }
@@ -67,10 +64,9 @@ impl Corridor {
         self.simulation.step(PERIOD_NS as f64 * 1e-9, action, 0);
         self.simulation.measure(&mut self.frame);
         self.frame.header.t_capture_ns += PERIOD_NS;
-        self.truth.push(self.simulation.world.truth().pose);
         match self.simulation.happening() {
             Some(Happening::Ended(kind, outcome)) => {
-                let name = self.name(kind);
+                let name = Self::name(kind);
                 let how = if outcome == ActionOutcome::Succeeded {
                     "done"
                 } else {
@@ -117,13 +113,12 @@ impl Corridor {
         action.valid_until_ns = u64::MAX;
         if action.decision_seq != before {
             let kind = RecoveryKind::from_wire(action.kind).unwrap();
-            let name = self.name(kind);
+            let name = Self::name(kind);
             self.told.push(name);
         }
     }
 
-    fn name(&self, kind: RecoveryKind) -> String {
-        let _ = &self.setup;
+    fn name(kind: RecoveryKind) -> String {
         let names = [
             (RecoveryKind::GoOn, "FP"),
             (RecoveryKind::NewPath, "NP"),
@@ -137,26 +132,8 @@ impl Corridor {
         found.map_or("?", |(_, name)| name).to_owned()
     }
 
-    /// Drives for so long; prints each event with its time and the belief.
     fn drive(&mut self, seconds: f64) {
-        for k in 0..(seconds * 1e9 / PERIOD_NS as f64) as u32 {
-            let told = self.told.len();
-            self.step();
-            for what in &self.told[told..] {
-                let b: Vec<String> = self.action.as_ref().unwrap().belief[..7]
-                    .iter()
-                    .map(|b| format!("{b:.4}"))
-                    .collect();
-                let [x, y, yaw] = self.truth[self.truth.len() - 1];
-                println!(
-                    "{:7.2} {what:10} at {x:.2} {y:.2} {yaw:.2} planned {:?} p {:.3} {}",
-                    f64::from(k) * 0.01,
-                    self.frame.planned_pose,
-                    self.detection.p_fault,
-                    b.join(" "),
-                );
-            }
-        }
+        (0..(seconds * 1e9 / PERIOD_NS as f64) as u32).for_each(|_| self.step());
     }
 }
 

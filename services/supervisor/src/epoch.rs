@@ -3,10 +3,9 @@
 //! Monitors speak every cycle, and a firing that is fed to the tracker at every cycle would count
 //! many times. An epoch gathers a set: symptoms that rose in it, and those that still stand at its
 //! end. A symptom that stood before and has gone says nothing about the state that the action led
-//! to. It ends when
-//! the robot reports the outcome of the action, when a symptom rises that did not stand, or after
-//! a time. An error in position that goes on while the robot stops or moves off (EPS, EPM) is the
-//! same error, and counts as what it was last.
+//! to. An epoch ends when the robot reports the outcome of the action, when a symptom rises that did
+//! not stand, or after a time. An error in position that goes on while the robot stops or moves off
+//! (EPS, EPM) is the same error, and counts as what it was last.
 
 use vigil_blocks::{ActionOutcome, DetectionBelief, Symptoms};
 
@@ -65,8 +64,7 @@ impl Epoch {
         new != 0 || answers || is_over
     }
 
-    /// The set of an epoch that ends now; the next begins. An outcome is told once for each
-    /// decision: `is_new` says that the next epoch waits for another one.
+    /// The set of an epoch that ends now; the next begins.
     pub(crate) fn take_set(&mut self, t_ns: u64) -> u32 {
         let mut set = self.risen | self.standing | self.outcomes;
         if self.standing & POSITION != 0 {
