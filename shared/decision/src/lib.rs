@@ -9,6 +9,7 @@
 //! T(s,a,s') = p(s'|s,a), Z(a,s',z) = p(z|a,s'), R(s,a), discount gamma.
 
 pub mod belief;
+pub mod learning;
 pub mod mdp;
 pub mod model;
 pub mod navigation;
