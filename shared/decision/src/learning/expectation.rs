@@ -75,13 +75,7 @@ impl Passes {
         Ok(())
     }
 
-    fn backward(
-        &mut self,
-        layout: &Layout,
-        values: &[f64],
-        record: &Record,
-        counts: &mut [f64],
-    ) {
+    fn backward(&mut self, layout: &Layout, values: &[f64], record: &Record, counts: &mut [f64]) {
         let (n, steps) = (layout.states, record.steps());
         self.backward.clear();
         self.backward.resize(n, 1.0);

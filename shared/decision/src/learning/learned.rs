@@ -20,7 +20,8 @@ pub struct Learned {
     pub(super) kappa: Vec<f64>,
     pub(super) theta: Vec<f64>,
     pub(super) counts: Vec<f64>,
-    pub(super) information: Vec<f64>,
+    /// Visits that missions and prior together are worth for each probability.
+    pub(super) worth: Vec<f64>,
 }
 
 /// One row of the learned model.
@@ -58,7 +59,7 @@ pub struct Entry {
     /// row's visits the harder they are to tell.
     pub effective_visits: f64,
     /// The 95 % credible interval: quantiles of Beta(m p, m (1 - p)), p learned, m the effective
-    /// visits and the prior's. Of this number alone: that others are learned too is left out.
+    /// visits and the prior's.
     pub interval: [f64; 2],
 }
 
@@ -80,8 +81,7 @@ impl Learned {
 
     fn entry(&self, at: usize, visits: f64, prior: f64) -> Entry {
         let p = self.theta[at];
-        // What one visit tells of p is 1 / (p (1 - p)).
-        let effective = (self.information[at] * p * (1.0 - p)).min(visits);
+        let effective = (self.worth[at] - prior).clamp(0.0, visits);
         Entry {
             column: self.layout.columns[at] as usize,
             prior: self.hand[at],

@@ -4,6 +4,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 use super::expectation::{Impossible, Passes};
+use super::information::Information;
 use super::layout::Layout;
 use super::learned::Learned;
 use super::record::{Record, RecordError};
@@ -126,7 +127,7 @@ pub fn learn(
         }
     }
     let (_, start, theta) = best.ok_or(LearnError::Empty)?;
-    let (counts, information) = search.information(&theta)?;
+    let (counts, worth) = search.information(&theta)?;
     let model = layout.model(prior, &theta).map_err(LearnError::Model)?;
     Ok(Learned {
         model,
@@ -137,7 +138,7 @@ pub fn learn(
         kappa,
         theta,
         counts,
-        information,
+        worth,
     })
 }
 
@@ -145,7 +146,12 @@ fn checked(prior: &Pomdp, records: &[Record], settings: &Settings) -> Result<(),
     let count = |n: usize| n as f64;
     let ranges = [
         ("prior strength", settings.prior_strength, 0.0, "0 or more"),
-        ("iterations", count(settings.iterations_max), 1.0, "1 or more"),
+        (
+            "iterations",
+            count(settings.iterations_max),
+            1.0,
+            "1 or more",
+        ),
         ("least rise", settings.rise_min, 0.0, "0 or more"),
         ("starts", count(settings.starts), 1.0, "1 or more"),
     ];
@@ -238,34 +244,18 @@ impl<'a> Search<'a> {
         self.counts
     }
 
-    /// Expected counts, and for each probability the information about it: the sum of squares of
-    /// the missions' scores N_i / theta_i - (N - N_i) / (1 - theta_i) about their mean.
+    /// Expected counts of all missions, and what they tell of each probability.
     fn information(&mut self, theta: &[f64]) -> Result<(Vec<f64>, Vec<f64>), LearnError> {
-        let size = theta.len();
-        let (mut total, mut own) = (vec![0.0; size], vec![0.0; size]);
-        let (mut sums, mut squares) = (vec![0.0; size], vec![0.0; size]);
+        let mut information = Information::new(self.layout, theta);
+        let (mut total, mut own) = (vec![0.0; theta.len()], vec![0.0; theta.len()]);
         for (mission, record) in self.records.iter().enumerate() {
             own.fill(0.0);
             let found = self.passes.run(self.layout, theta, record, &mut own);
             found.map_err(|problem| LearnError::Impossible { mission, problem })?;
-            for row in self.layout.rows() {
-                let visits: f64 = own[row.clone()].iter().sum();
-                for at in row {
-                    total[at] += own[at];
-                    if visits > 0.0 && theta[at] > 0.0 && theta[at] < 1.0 {
-                        let rest = (visits - own[at]) / (1.0 - theta[at]);
-                        let score = own[at] / theta[at] - rest;
-                        sums[at] += score;
-                        squares[at] += score * score;
-                    }
-                }
-            }
+            total.iter_mut().zip(&own).for_each(|(sum, n)| *sum += n);
+            information.add(&own);
         }
-        let missions = self.records.len() as f64;
-        for (square, sum) in squares.iter_mut().zip(sums) {
-            *square = (*square - sum * sum / missions).max(0.0);
-        }
-        Ok((total, squares))
+        Ok((total, information.visits(self.kappa)))
     }
 }
 

@@ -22,6 +22,7 @@
 
 pub mod check;
 mod expectation;
+mod information;
 mod layout;
 mod learned;
 mod learner;

@@ -56,7 +56,12 @@ impl Posterior {
     /// # Errors
     /// [`LearnError::Model`].
     pub fn sample(&self, generator: &mut impl Rng) -> Result<Pomdp, LearnError> {
-        let weights: Vec<f64> = self.kappa.iter().zip(&self.counts).map(|(k, n)| k + n).collect();
+        let weights: Vec<f64> = self
+            .kappa
+            .iter()
+            .zip(&self.counts)
+            .map(|(k, n)| k + n)
+            .collect();
         let drawn = sampling::dirichlet(&self.layout, &weights, &self.theta, generator);
         let model = self.layout.model(&self.prior, &drawn);
         model.map_err(LearnError::Model)
