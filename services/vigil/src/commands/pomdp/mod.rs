@@ -4,6 +4,10 @@ mod compare;
 mod convert;
 mod generate;
 mod info;
+mod learn;
+mod missions;
+mod picture;
+mod simulate;
 mod track;
 
 use std::path::Path;
@@ -12,7 +16,7 @@ use vigil_decision::Pomdp;
 
 use super::{CommandError, Outcome};
 
-/// Looks at, follows, compares and converts decision models (`.pomdp`, `.pomdpx`).
+/// Looks at, follows, compares, learns, draws and converts decision models (`.pomdp`, `.pomdpx`).
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -24,6 +28,9 @@ enum Command {
     Compare(Box<compare::Args>),
     Generate(generate::Args),
     Info(info::Args),
+    Learn(learn::Args),
+    Picture(picture::Args),
+    Simulate(simulate::Args),
     Track(track::Args),
     Convert(convert::Args),
 }
@@ -37,6 +44,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         Command::Compare(args) => compare::run(args),
         Command::Generate(args) => generate::run(args),
         Command::Info(args) => info::run(args),
+        Command::Learn(args) => learn::run(args),
+        Command::Picture(args) => picture::run(args),
+        Command::Simulate(args) => simulate::run(args),
         Command::Track(args) => track::run(args),
         Command::Convert(args) => convert::run(args),
     }
