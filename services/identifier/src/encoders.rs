@@ -15,6 +15,10 @@ pub const WANDERS: usize = BREAKAGES.len();
 /// Share of wheels that slip otherwise than learned while another one drags.
 const SLIPS: f64 = 0.05;
 
+/// An observation speaks against a state of one encoder by this much at most (natural logarithm):
+/// the product over all wheels stays a number.
+const AGAINST_MAX: f64 = -80.0;
+
 /// States of an encoder: whole, or broken in one way.
 pub const STATES: usize = 1 + BREAKAGES.len();
 
@@ -39,7 +43,7 @@ impl Likelihoods {
             let logs: [f64; STATES] = std::array::from_fn(|state| log_likelihood(wheel, state));
             let largest = logs.into_iter().fold(f64::NEG_INFINITY, f64::max);
             if largest.is_finite() {
-                out.relative[wheel] = logs.map(|log| (log - largest).exp());
+                out.relative[wheel] = logs.map(|log| (log - largest).max(AGAINST_MAX).exp());
                 out.log_largest[wheel] = largest;
             }
         }
@@ -123,7 +127,7 @@ impl Encoders {
                 *p = joint.map(|joint| joint / total);
             }
         }
-        // Each factor is at least the prior of a state: their product needs one logarithm only.
+        // No factor is too small for their product to need more than one logarithm.
         evidence + product.ln()
     }
 
@@ -186,5 +190,17 @@ mod tests {
         assert!(encoders.p_broken(0, Moved::Nominal) > 0.99);
         // When nothing drags any more, slip is over.
         assert!(encoders.moved(Moved::Nominal).p_broken(0, Moved::Nominal) < 0.01);
+    }
+
+    #[test]
+    fn encoders_that_cannot_break_stay_whole_whatever_they_read() {
+        let impossible = Likelihoods::new(WHEELS, |_, state| if state == 0 { -1e5 } else { 0.0 });
+        let mut encoders = Encoders::healthy(0);
+        for step in 1..=20 {
+            let evidence = encoders.step(&[0.0; WHEELS], 0.0, &impossible, step);
+            let expected = AGAINST_MAX * WHEELS as f64;
+            assert!((evidence - expected).abs() < 1e-6, "{evidence}");
+            assert_eq!(encoders.p_broken(0, Moved::Nominal), 0.0);
+        }
     }
 }

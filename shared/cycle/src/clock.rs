@@ -28,6 +28,22 @@ impl Clock for Monotonic {
     }
 }
 
+/// Processor time that this process has taken, all its threads together, s.
+#[must_use]
+pub fn process_cpu_s() -> f64 {
+    let mut time = libc::timespec {
+        tv_sec: 0,
+        tv_nsec: 0,
+    };
+    // SAFETY: `time` is a valid, writable timespec; CLOCK_PROCESS_CPUTIME_ID always exists on
+    // Linux.
+    #[allow(unsafe_code)]
+    unsafe {
+        libc::clock_gettime(libc::CLOCK_PROCESS_CPUTIME_ID, &raw mut time);
+    }
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}
+
 /// A clock that moves only when told to: the present of the process that is being simulated.
 /// Clones share the time.
 #[derive(Debug, Clone, Default)]

@@ -195,25 +195,72 @@ impl<'a> Search<'a> {
     }
 
     /// Improves `theta` until it hardly rises; returns the objective of the last iteration.
+    ///
+    /// Where states are hard to tell, the iteration creeps. Hence after two steps, r and then r + v,
+    /// a long one is tried: theta + 2 l r + l^2 v, l = |r| / |v| (Varadhan and Roland 2008,
+    /// "SQUAREM"); it counts only if the objective has risen there, too.
     fn climb(
         &mut self,
-        theta: &mut [f64],
+        theta: &mut Vec<f64>,
         settings: &Settings,
         watch: &mut dyn FnMut(usize, f64, f64),
     ) -> Result<f64, LearnError> {
         let steps: usize = self.records.iter().map(Record::steps).sum();
+        let rise_min = settings.rise_min * steps as f64;
         let mut last = f64::NEG_INFINITY;
+        let mut trail: Vec<Vec<f64>> = Vec::new();
         for iteration in 0..settings.iterations_max {
-            let likelihood = self.expect(theta)?;
+            let mut likelihood = self.expect(theta);
+            if trail.len() == 3 {
+                // Here theta is the long step, and the trail's end what it has to beat.
+                let objective = likelihood.as_ref().map(|l| l + log_prior(self.kappa, theta));
+                if objective.map_or(true, |objective| objective < last) {
+                    *theta = trail.pop().unwrap_or_default();
+                    likelihood = self.expect(theta);
+                }
+                trail.clear();
+            }
+            let likelihood = likelihood?;
             let objective = likelihood + log_prior(self.kappa, theta);
             watch(iteration, likelihood, objective);
-            if objective - last <= settings.rise_min * steps as f64 {
+            if objective - last <= rise_min {
                 return Ok(objective);
             }
             last = objective;
+            trail.push(theta.clone());
             self.maximise(theta);
+            if trail.len() == 2 {
+                trail.push(theta.clone());
+                self.leap(&trail, theta);
+            }
         }
         Ok(last)
+    }
+
+    /// The long step along three points of the `trail`, rows kept distributions: no probability
+    /// falls below a tenth of the last point's.
+    fn leap(&self, trail: &[Vec<f64>], theta: &mut [f64]) {
+        let [first, second, third] = trail else {
+            return;
+        };
+        let (mut rr, mut vv) = (0.0, 0.0);
+        for ((a, b), c) in first.iter().zip(second).zip(third) {
+            rr += (b - a).powi(2);
+            vv += (c - b - (b - a)).powi(2);
+        }
+        let length = (rr / vv).sqrt();
+        if !(length > 1.0 && length.is_finite()) {
+            return;
+        }
+        for (index, value) in theta.iter_mut().enumerate() {
+            let (a, b, c) = (first[index], second[index], third[index]);
+            let (r, v) = (b - a, c - b - (b - a));
+            *value = (a + 2.0 * length * r + length * length * v).max(0.1 * c);
+        }
+        for row in self.layout.rows() {
+            let sum: f64 = theta[row.clone()].iter().sum();
+            theta[row].iter_mut().for_each(|value| *value /= sum);
+        }
     }
 
     /// Expected counts of all missions; returns the log-likelihood.

@@ -5,6 +5,7 @@
 //! | `mls` | [`MostLikelyState`]: pi_CO(argmax_s b(s)) |
 //! | `av` | [`ActionVoting`]: argmax_a w(a), w(a) = sum_s b(s) [pi_CO(s) = a] |
 //! | `qmdp` | [`QMdp`]: argmax_a sum_s b(s) Q_CO(s,a) |
+//! | `point-based` | [`PointBased`]: the action of argmax_alpha alpha . b, solved beforehand |
 //! | `fib` | [`FastInformed`]: argmax_a b . q_a, q from the fast informed bound |
 //! | `dm-X`, `adm-X` | [`DualControl`]: X while the belief is certain enough, else information |
 //!
@@ -26,6 +27,7 @@ mod fast_informed;
 mod look_ahead;
 mod most_likely_state;
 mod name;
+mod point_based;
 mod qmdp;
 mod voting;
 
@@ -36,6 +38,7 @@ pub use fast_informed::{FastInformed, informed_values};
 pub use look_ahead::LookAhead;
 pub use most_likely_state::MostLikelyState;
 pub use name::{Base, NameError, PolicyName};
+pub use point_based::PointBased;
 pub use qmdp::QMdp;
 pub use voting::ActionVoting;
 

@@ -178,7 +178,9 @@ impl Monitor {
     /// nothing of it for long.
     #[must_use]
     pub fn is_ready(&self) -> bool {
-        self.run_s >= READY_S && (self.noise.is_known() || self.run_s >= READY_LATEST_S)
+        let use_wheels = self.channels == Channels::PoseEncoders;
+        let is_known = self.noise.is_known(use_wheels);
+        self.run_s >= READY_S && (is_known || self.run_s >= READY_LATEST_S)
     }
 
     /// How noisy the sensors are.

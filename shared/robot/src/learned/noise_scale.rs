@@ -110,10 +110,12 @@ impl SensorNoise {
         }
     }
 
-    /// True once the pose's noise has been seen often enough; the other sensors are seen with it.
+    /// True once the noise of the pose, and of the wheels if they are used, has been seen often
+    /// enough. The steering is seen with the wheels.
     #[must_use]
-    pub fn is_known(&self) -> bool {
-        self.pose.count >= PRIOR + KNOWN
+    pub fn is_known(&self, use_wheels: bool) -> bool {
+        let is_known = |scale: &NoiseScale| scale.count >= PRIOR + KNOWN;
+        is_known(&self.pose) && (!use_wheels || is_known(&self.wheels))
     }
 
     /// Second differences of the pose and first differences of wheel rates and steering angles,

@@ -6,8 +6,9 @@ mod generate;
 mod info;
 mod learn;
 mod missions;
-mod picture;
+//PIC mod picture;
 mod simulate;
+mod solve;
 mod track;
 
 use std::path::Path;
@@ -29,10 +30,11 @@ enum Command {
     Generate(generate::Args),
     Info(info::Args),
     Learn(learn::Args),
-    Picture(picture::Args),
+    //PIC Picture(picture::Args),
     Simulate(simulate::Args),
     Track(track::Args),
     Convert(convert::Args),
+    Solve(solve::Args),
 }
 
 /// Does what the subcommand says.
@@ -45,10 +47,11 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         Command::Generate(args) => generate::run(args),
         Command::Info(args) => info::run(args),
         Command::Learn(args) => learn::run(args),
-        Command::Picture(args) => picture::run(args),
+        //PIC Command::Picture(args) => picture::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Track(args) => track::run(args),
         Command::Convert(args) => convert::run(args),
+        Command::Solve(args) => solve::run(args),
     }
 }
 

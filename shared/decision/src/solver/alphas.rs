@@ -1,0 +1,131 @@
+//! The lower bound: vectors over states, each the value of a plan.
+//!
+//! A vector knows its action and, for each observation, the vector whose plan goes on: together
+//! they are a controller, whose value the vectors never exceed.
+
+use crate::bounds::ActionValues;
+use crate::sparse_beliefs::BeliefId;
+
+/// Index of a vector.
+pub(super) type AlphaId = u32;
+
+/// All vectors that were ever made; some of them are looked at when beliefs are valued.
+#[derive(Debug, Clone)]
+pub(super) struct Alphas {
+    states: usize,
+    observations: usize,
+    values: Vec<f64>,
+    actions: Vec<u32>,
+    successors: Vec<AlphaId>,
+    /// The belief at which each was made; none for the blind policies.
+    origins: Vec<Option<BeliefId>>,
+    /// Those that are looked at, by the instant of their last change.
+    active: Vec<(u32, AlphaId)>,
+    stamp: u32,
+}
+
+impl Alphas {
+    /// Begins with the blind policies.
+    pub(super) fn new(blind: &ActionValues, states: usize, observations: usize) -> Self {
+        let mut alphas = Self {
+            states,
+            observations,
+            values: Vec::new(),
+            actions: Vec::new(),
+            successors: Vec::new(),
+            origins: Vec::new(),
+            active: Vec::new(),
+            stamp: 0,
+        };
+        for (action, row) in blind.rows().enumerate() {
+            let itself = vec![action as AlphaId; observations];
+            alphas.push(None, action, row, &itself);
+        }
+        alphas
+    }
+
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.actions.len()
+    }
+
+    /// How many are looked at.
+    pub(super) fn active_count(&self) -> usize {
+        self.active.len()
+    }
+
+    /// Instant of the last change.
+    pub(super) fn stamp(&self) -> u32 {
+        self.stamp
+    }
+
+    pub(super) fn of(&self, id: AlphaId) -> &[f64] {
+        &self.values[id as usize * self.states..][..self.states]
+    }
+
+    /// The belief at which a vector was made; none for a blind policy.
+    pub(super) fn origin(&self, id: AlphaId) -> Option<BeliefId> {
+        self.origins[id as usize]
+    }
+
+    pub(super) fn action(&self, id: AlphaId) -> usize {
+        self.actions[id as usize] as usize
+    }
+
+    /// For each observation, the vector that goes on.
+    pub(super) fn successors(&self, id: AlphaId) -> &[AlphaId] {
+        &self.successors[id as usize * self.observations..][..self.observations]
+    }
+
+    pub(super) fn value(&self, id: AlphaId, belief: &[(u32, f64)]) -> f64 {
+        let alpha = self.of(id);
+        belief.iter().map(|(s, b)| b * alpha[*s as usize]).sum()
+    }
+
+    pub(super) fn push(
+        &mut self,
+        origin: Option<BeliefId>,
+        action: usize,
+        values: &[f64],
+        successors: &[AlphaId],
+    ) -> AlphaId {
+        let id = self.len() as AlphaId;
+        self.origins.push(origin);
+        self.actions.push(action as u32);
+        self.values.extend_from_slice(values);
+        self.successors.extend_from_slice(successors);
+        self.stamp += 1;
+        self.active.push((self.stamp, id));
+        id
+    }
+
+    /// The best vector at a belief among those newer than `seen`, if it beats `best`; and the
+    /// number of vectors looked at.
+    pub(super) fn best_since(
+        &self,
+        seen: u32,
+        belief: &[(u32, f64)],
+        mut best: (AlphaId, f64),
+    ) -> ((AlphaId, f64), usize) {
+        let newer = self.active.iter().rev();
+        let mut looked_at = 0;
+        for (_, id) in newer.take_while(|(stamp, _)| *stamp > seen) {
+            looked_at += 1;
+            let value = self.value(*id, belief);
+            if value > best.1 {
+                best = (*id, value);
+            }
+        }
+        (best, looked_at)
+    }
+
+    /// Goes on looking only at those that `keep` says.
+    pub(super) fn retain(&mut self, keep: impl Fn(AlphaId) -> bool) {
+        self.active.retain(|(_, id)| keep(*id));
+    }
+
+    /// Those that are looked at.
+    pub(super) fn active(&self) -> impl Iterator<Item = AlphaId> {
+        self.active.iter().map(|(_, id)| *id)
+    }
+}

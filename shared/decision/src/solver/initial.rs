@@ -1,0 +1,115 @@
+//! The bounds that a search begins with.
+
+use super::{Bracket, Found};
+use crate::alpha_vectors::AlphaVectors;
+use crate::bounds::tib::{self, Tib};
+use crate::bounds::{ActionValues, SolveError, blind, fib};
+use crate::budget::Budget;
+use crate::model::Pomdp;
+use crate::sparse_beliefs::MERGED;
+
+/// The reader lets row sums of T and of Z be off by this much each, with a warning ...
+const ROWS_WARNED: f64 = 1e-5;
+/// ... and by this much without.
+const ROWS_SILENT: f64 = 1e-9;
+
+/// What the budget allowed.
+#[derive(Debug)]
+pub(super) struct Initial {
+    pub blind: Option<ActionValues>,
+    pub fast: Option<ActionValues>,
+    pub tighter: Option<Tib>,
+}
+
+impl Initial {
+    pub(super) fn new(model: &Pomdp, budget: &mut Budget<'_>) -> Result<Self, SolveError> {
+        let blind = in_time(blind::solve(model, budget))?;
+        let fast = in_time(fib::solve(model, budget))?;
+        let tighter = match &fast {
+            None => None,
+            Some(fast) => match tib::solve_from(model, fast, budget) {
+                // Too large for it: the fast informed bound must do.
+                Err(SolveError::Entries(_)) => None,
+                found => in_time(found)?,
+            },
+        };
+        Ok(Self {
+            blind,
+            fast,
+            tighter,
+        })
+    }
+
+    /// Narrows the bracket to these bounds.
+    pub(super) fn narrow(&self, model: &Pomdp, found: &mut Found) {
+        let actions = model.actions().len();
+        if let Some(blind) = &self.blind {
+            found.bracket.lower = found.bracket.lower.max(blind.value(model.start()));
+            let rows = blind.rows().enumerate();
+            found.vectors = AlphaVectors::new(model.states().len(), actions, rows).ok();
+        }
+        if let Some(fast) = &self.fast {
+            found.bracket.upper = found.bracket.upper.min(fast.value(model.start()));
+        }
+    }
+
+    /// Upper bounds where the state is certain.
+    pub(super) fn corners(&self, states: usize) -> Vec<f64> {
+        let corner = |s: usize| {
+            let fast = self.fast.iter().flat_map(ActionValues::rows).map(|q| q[s]);
+            let fast = fast.fold(f64::NEG_INFINITY, f64::max);
+            let tighter = self
+                .tighter
+                .iter()
+                .map(|tib| tib.value_sparse(&[(s as u32, 1.0)]));
+            tighter.fold(fast, f64::min)
+        };
+        (0..states).map(corner).collect()
+    }
+
+    /// What rounding, and the merging of beliefs that differ by no more, may amount to.
+    pub(super) fn rounding(&self, model: &Pomdp) -> f64 {
+        let bounds = self.blind.iter().chain(&self.fast);
+        let values = bounds.flat_map(ActionValues::rows).flatten();
+        let largest = values.fold(0.0_f64, |m, v| m.max(v.abs()));
+        MERGED * largest / (1.0 - model.discount())
+    }
+}
+
+fn in_time<T>(found: Result<T, SolveError>) -> Result<Option<T>, SolveError> {
+    match found {
+        Ok(found) => Ok(Some(found)),
+        Err(SolveError::Stopped) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// The least and the largest reward for ever.
+pub(super) fn trivial(model: &Pomdp) -> Bracket {
+    let states = 0..model.states().len();
+    let rewards = states.flat_map(|s| (0..model.actions().len()).map(move |a| model.reward(s, a)));
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    for reward in rewards {
+        least = least.min(reward);
+        most = most.max(reward);
+    }
+    let off = if model.warnings().is_empty() {
+        ROWS_SILENT
+    } else {
+        ROWS_WARNED
+    };
+    // Mass that is gained or lost in a step, whichever makes the bracket wider.
+    let for_ever = |reward: f64, outward: f64| {
+        let sign = outward * reward.signum();
+        let discount = model.discount() * (1.0 + sign * 2.1 * off);
+        if discount < 1.0 {
+            reward / (1.0 - discount)
+        } else {
+            outward * f64::INFINITY
+        }
+    };
+    Bracket {
+        lower: for_ever(least, -1.0),
+        upper: for_ever(most, 1.0),
+    }
+}

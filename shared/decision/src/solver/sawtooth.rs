@@ -1,0 +1,177 @@
+//! The upper bound between points.
+//!
+//! V* is convex: for a point (b_i, v_i) and c = min_s b(s)/b_i(s), the belief b is c b_i and a
+//! rest, so that V*(b) <= c v_i + U(rest) for any upper bound U. The usual sawtooth takes for U
+//! the plane through the corners; here it is the lower of that and the fast informed bound.
+
+use crate::bounds::ActionValues;
+use crate::sparse_beliefs::{BeliefId, SparseBeliefs};
+
+/// A belief whose upper bound was improved.
+#[derive(Debug, Clone, Copy)]
+struct Point {
+    stamp: u32,
+    belief: BeliefId,
+    value: f64,
+    /// Value of the plane through the corners.
+    plane: f64,
+    /// Place of its mask and of its values under the vectors of the base.
+    slot: u32,
+}
+
+/// The points, by the instant of their last change.
+#[derive(Debug, Clone)]
+pub(super) struct Sawtooth {
+    base: ActionValues,
+    corners: Vec<f64>,
+    points: Vec<Point>,
+    /// Words of a mask of states.
+    words: usize,
+    masks: Vec<u64>,
+    /// b_i·q_a of every slot.
+    based: Vec<f64>,
+    slots: u32,
+    stamp: u32,
+    /// The belief that is being valued, and its mask.
+    dense: Vec<f64>,
+    mask: Vec<u64>,
+}
+
+/// A belief to be valued.
+pub(super) struct Query<'a> {
+    pub entries: &'a [(u32, f64)],
+    /// Value that is known already.
+    pub value: f64,
+    /// Only points newer than this are looked at.
+    pub seen: u32,
+}
+
+impl Sawtooth {
+    /// `corners` are upper bounds where the state is certain.
+    pub(super) fn new(base: ActionValues, corners: Vec<f64>) -> Self {
+        let states = corners.len();
+        Self {
+            base,
+            corners,
+            points: Vec::new(),
+            words: states.div_ceil(64),
+            masks: Vec::new(),
+            based: Vec::new(),
+            slots: 0,
+            stamp: 0,
+            dense: vec![0.0; states],
+            mask: vec![0; states.div_ceil(64)],
+        }
+    }
+
+    pub(super) fn stamp(&self) -> u32 {
+        self.stamp
+    }
+
+    pub(super) fn point_count(&self) -> usize {
+        self.points.len()
+    }
+
+    /// The lower of the fast informed bound and the plane through the corners.
+    pub(super) fn base_value(&self, belief: &[(u32, f64)]) -> f64 {
+        let dot = |q: &[f64]| -> f64 { belief.iter().map(|(s, b)| b * q[*s as usize]).sum() };
+        let fast = self.base.rows().map(dot).fold(f64::NEG_INFINITY, f64::max);
+        fast.min(dot(&self.corners))
+    }
+
+    /// Stores or lowers the value of a point.
+    pub(super) fn put(&mut self, beliefs: &SparseBeliefs, belief: BeliefId, value: f64) {
+        self.stamp += 1;
+        let entries = beliefs.of(belief);
+        let known = self.points.iter().rposition(|p| p.belief == belief);
+        let slot = match known {
+            Some(at) => self.points.remove(at).slot,
+            None => {
+                let first = self.masks.len();
+                self.masks.resize(first + self.words, 0);
+                for (s, _) in entries {
+                    self.masks[first + *s as usize / 64] |= 1 << (s % 64);
+                }
+                for q in self.base.rows() {
+                    let terms = entries.iter();
+                    self.based
+                        .push(terms.map(|(s, b)| b * q[*s as usize]).sum());
+                }
+                self.slots += 1;
+                self.slots - 1
+            }
+        };
+        let plane = entries.iter().map(|(s, b)| b * self.corners[*s as usize]);
+        self.points.push(Point {
+            stamp: self.stamp,
+            belief,
+            value,
+            plane: plane.sum(),
+            slot,
+        });
+    }
+
+    /// The bound at a belief, at most the value it comes with; and the work done.
+    pub(super) fn value(&mut self, beliefs: &SparseBeliefs, query: &Query<'_>) -> (f64, usize) {
+        let actions = self.base.rows().len();
+        self.mask.fill(0);
+        for (s, b) in query.entries {
+            self.dense[*s as usize] = *b;
+            self.mask[*s as usize / 64] |= 1 << (s % 64);
+        }
+        let dot = |q: &[f64]| -> f64 {
+            let terms = query.entries.iter();
+            terms.map(|(s, b)| b * q[*s as usize]).sum()
+        };
+        let at: Vec<f64> = self.base.rows().map(dot).collect();
+        let fast = at.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let strongest = at.iter().position(|v| *v == fast).unwrap_or(0);
+        let plane = dot(&self.corners);
+        let (mut best, mut work) = (query.value.min(fast).min(plane), at.len());
+        let newer = self.points.iter().rev();
+        for point in newer.take_while(|point| point.stamp > query.seen) {
+            work += 2;
+            let slot = point.slot as usize;
+            let masks = self.masks[slot * self.words..][..self.words].iter();
+            if masks.zip(&self.mask).any(|(m, q)| m & !q != 0) {
+                continue;
+            }
+            let based = &self.based[slot * actions..][..actions];
+            // However large c is, the value is at least the larger of two lines in c.
+            let fall_fast = based[strongest] - point.value;
+            let fall_plane = point.plane - point.value;
+            let mut c = 1.0_f64;
+            let mut hopeless = false;
+            for (s, b) in beliefs.of(point.belief) {
+                c = c.min(self.dense[*s as usize] / b);
+                work += 1;
+                let floor = (fast - c * fall_fast).min(plane - c * fall_plane);
+                if floor >= best {
+                    hopeless = true;
+                    break;
+                }
+            }
+            if hopeless {
+                continue;
+            }
+            let rest = at.iter().zip(based).map(|(b, p)| b - c * p);
+            let rest = rest.fold(f64::NEG_INFINITY, f64::max);
+            let value = c * point.value + rest.min(plane - c * point.plane);
+            best = best.min(value);
+        }
+        for (s, _) in query.entries {
+            self.dense[*s as usize] = 0.0;
+        }
+        (best, work)
+    }
+
+    /// Takes out points that the others make superfluous.
+    pub(super) fn retain(&mut self, keep: impl Fn(BeliefId, f64) -> bool) {
+        self.points.retain(|p| keep(p.belief, p.value));
+    }
+
+    /// Beliefs of the points.
+    pub(super) fn beliefs(&self) -> impl Iterator<Item = BeliefId> {
+        self.points.iter().map(|p| p.belief)
+    }
+}
