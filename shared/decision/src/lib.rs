@@ -17,6 +17,7 @@ pub mod model;
 pub mod navigation;
 pub mod policy;
 pub mod policy_file;
+pub mod policy_graph;
 mod pomdpx;
 mod reader;
 pub mod simulation;

@@ -28,12 +28,12 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// K = 50, 200 iterations, 1e-7 nats, one start.
+    /// K = 50, 1000 iterations, 1e-9 nats, one start.
     fn default() -> Self {
         Self {
             prior_strength: 50.0,
-            iterations_max: 200,
-            rise_min: 1e-7,
+            iterations_max: 1000,
+            rise_min: 1e-9,
             starts: 1,
             seed: 1,
         }
@@ -213,7 +213,9 @@ impl<'a> Search<'a> {
             let mut likelihood = self.expect(theta);
             if trail.len() == 3 {
                 // Here theta is the long step, and the trail's end what it has to beat.
-                let objective = likelihood.as_ref().map(|l| l + log_prior(self.kappa, theta));
+                let objective = likelihood
+                    .as_ref()
+                    .map(|l| l + log_prior(self.kappa, theta));
                 if objective.map_or(true, |objective| objective < last) {
                     *theta = trail.pop().unwrap_or_default();
                     likelihood = self.expect(theta);

@@ -193,7 +193,11 @@ fn information(
 }
 
 /// For every action of the model, whether `names` holds it.
-pub(super) fn among(model: &Pomdp, option: &str, names: &[String]) -> Result<Vec<bool>, CommandError> {
+pub(super) fn among(
+    model: &Pomdp,
+    option: &str,
+    names: &[String],
+) -> Result<Vec<bool>, CommandError> {
     if let Some(name) = names.iter().find(|name| !model.actions().contains(name)) {
         let allowed = model.actions().join(", ");
         return Err(CommandError::usage(format!(

@@ -87,7 +87,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let learned = learned
         .map_err(|error| CommandError::usage(format!("{}: {error}", args.missions.display())))?;
     let predicted = worth(args, &learned.model, &learned.model)?;
-    let measured = world.as_ref().map(|world| worth(args, &learned.model, world));
+    let measured = world
+        .as_ref()
+        .map(|world| worth(args, &learned.model, world));
     let measured = measured.transpose()?;
     let logged = check::follow(&learned.model, &flown.records);
     let checks = [

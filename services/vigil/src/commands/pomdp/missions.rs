@@ -81,7 +81,9 @@ pub fn read(path: &Path, model: &Pomdp) -> Result<Missions, CommandError> {
         text.clear();
         number += 1;
         let mut limited = reader.by_ref().take(LINE_BYTES_MAX);
-        let bytes = limited.read_line(&mut text).map_err(|e| wrong(number, &e))?;
+        let bytes = limited
+            .read_line(&mut text)
+            .map_err(|e| wrong(number, &e))?;
         if bytes as u64 == LINE_BYTES_MAX {
             let problem = format!("a line of {LINE_BYTES_MAX} bytes or more");
             return Err(wrong(number, &problem));

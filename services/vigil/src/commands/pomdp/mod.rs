@@ -6,7 +6,7 @@ mod generate;
 mod info;
 mod learn;
 mod missions;
-//PIC mod picture;
+mod picture;
 mod simulate;
 mod solve;
 mod track;
@@ -30,7 +30,7 @@ enum Command {
     Generate(generate::Args),
     Info(info::Args),
     Learn(learn::Args),
-    //PIC Picture(picture::Args),
+    Picture(picture::Args),
     Simulate(simulate::Args),
     Track(track::Args),
     Convert(convert::Args),
@@ -47,7 +47,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         Command::Generate(args) => generate::run(args),
         Command::Info(args) => info::run(args),
         Command::Learn(args) => learn::run(args),
-        //PIC Command::Picture(args) => picture::run(args),
+        Command::Picture(args) => picture::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Track(args) => track::run(args),
         Command::Convert(args) => convert::run(args),

@@ -78,9 +78,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         escalation: (&args.usual, &args.ladder, &args.quiet),
     };
     let mut agent = contestant.build(&knowledge)?;
-    let failed = |error: std::io::Error| {
-        CommandError::failure(format!("{}: {error}", args.out.display()))
-    };
+    let failed =
+        |error: std::io::Error| CommandError::failure(format!("{}: {error}", args.out.display()));
     let mut out = BufWriter::new(File::create(&args.out).map_err(failed)?);
     missions::write_head(&mut out, contestant.label()).map_err(failed)?;
     let progress = Progress::new("missions", args.episodes as usize);

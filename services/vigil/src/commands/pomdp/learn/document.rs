@@ -155,7 +155,11 @@ impl Document {
                 .map_or_else(String::new, |policy| format!(" (flown by {policy})")),
             self.prior_strength,
         );
-        let own: Vec<&Iteration> = self.iterations.iter().filter(|i| i.start == self.start).collect();
+        let own: Vec<&Iteration> = self
+            .iterations
+            .iter()
+            .filter(|i| i.start == self.start)
+            .collect();
         for (index, iteration) in own.iter().enumerate() {
             let n = iteration.iteration;
             if n < 5 || n % 10 == 0 || index + 1 == own.len() {
@@ -172,7 +176,10 @@ impl Document {
     }
 
     fn checks(&self) -> String {
-        let mut text = format!("\ndiscounted reward of a mission, {} simulated\n", self.episodes);
+        let mut text = format!(
+            "\ndiscounted reward of a mission, {} simulated\n",
+            self.episodes
+        );
         let mut put = |what: &str, mean: &Option<&Mean>| {
             if let Some(mean) = mean {
                 let (mean, half) = (mean.mean, mean.half_width_95);
@@ -180,10 +187,22 @@ impl Document {
             }
         };
         let policy = &self.policy;
-        put(&format!("{policy}, predicted by the learned model"), &Some(&self.predicted));
-        put(&format!("{policy}, measured in the world"), &self.measured.as_ref());
-        put("recorded missions, predicted step by step", &self.logged_predicted.as_ref());
-        put("recorded missions, measured", &self.logged_measured.as_ref());
+        put(
+            &format!("{policy}, predicted by the learned model"),
+            &Some(&self.predicted),
+        );
+        put(
+            &format!("{policy}, measured in the world"),
+            &self.measured.as_ref(),
+        );
+        put(
+            "recorded missions, predicted step by step",
+            &self.logged_predicted.as_ref(),
+        );
+        put(
+            "recorded missions, measured",
+            &self.logged_measured.as_ref(),
+        );
         if self.logged_measured.is_none() && self.measured.is_none() {
             text.push_str("not checked: the missions hold no rewards, and no --world was given\n");
         }
@@ -199,7 +218,10 @@ impl Document {
 impl Row {
     fn line(&self) -> String {
         let change = |entry: &&Entry| (entry.learned - entry.prior).abs();
-        let most = self.entries.iter().max_by(|a, b| change(a).total_cmp(&change(b)));
+        let most = self
+            .entries
+            .iter()
+            .max_by(|a, b| change(a).total_cmp(&change(b)));
         let (action, state) = (self.action.as_deref(), self.state.as_deref());
         let mut line = format!(
             "  {:<5} {:<8} {:<8} {:>12.1} {:>5.1} %",
