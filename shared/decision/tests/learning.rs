@@ -271,7 +271,7 @@ fn rare_faults_keep_their_pseudo_counts() {
     let found = learned(&prior, &records, &settings(50.0, 100));
     let row = found.model.successors(0, 0);
     let kept = row.iter().find(|e| e.0 == 2).unwrap().1;
-    assert!((1e-9..1e-6).contains(&kept), "{kept}");
+    assert!((1e-9..1e-3).contains(&kept), "{kept}");
 }
 
 #[test]
