@@ -1,10 +1,10 @@
 //! How well missions determine the numbers that were learned from them.
 //!
 //! Expected counts say how often a row was visited, not how surely: where states are hard to tell,
-//! a visit is worth less, and what one number is uncertain by, others are too. Each mission's score,
-//! s_i = N_i - N theta_i in the logarithms of the probabilities, says what it would change; the sum
-//! of s s' over missions estimates the information in all of them (Berndt, Hall, Hall, Hausman
-//! 1974), to which the prior adds K (diag theta - theta theta') for each row. Its inverse is the
+//! a visit is worth less, and what one number is uncertain by, others are too. Each mission's
+//! score, s_i = N_i - N theta_i in the logarithms of the probabilities, says what it would change;
+//! the sum of s s' over missions estimates the information in all of them (Berndt, Hall, Hall,
+//! Hausman 1974), to which the prior adds K (diag theta - theta theta') for each row. Its inverse is the
 //! covariance of the logarithms, and J C J with J = diag theta - theta theta' that of theta. Beyond
 //! a size only the diagonal is taken: uncertainty is then shared by none and comes out too small.
 

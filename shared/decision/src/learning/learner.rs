@@ -196,8 +196,8 @@ impl<'a> Search<'a> {
 
     /// Improves `theta` until it hardly rises; returns the objective of the last iteration.
     ///
-    /// Where states are hard to tell, the iteration creeps. Hence after two steps, r and then r + v,
-    /// a long one is tried: theta + 2 l r + l^2 v, l = |r| / |v| (Varadhan and Roland 2008,
+    /// Where states are hard to tell, the iteration creeps. Hence after two steps, r and then
+    /// r + v, a long one is tried: theta + 2 l r + l^2 v, l = |r| / |v| (Varadhan and Roland 2008,
     /// "SQUAREM"); it counts only if the objective has risen there, too.
     fn climb(
         &mut self,
@@ -210,7 +210,7 @@ impl<'a> Search<'a> {
         let mut last = f64::NEG_INFINITY;
         let mut trail: Vec<Vec<f64>> = Vec::new();
         for iteration in 0..settings.iterations_max {
-            let mut likelihood = self.expect(theta);
+            let mut likelihood = self.count(theta);
             if trail.len() == 3 {
                 // Here theta is the long step, and the trail's end what it has to beat.
                 let objective = likelihood
@@ -218,7 +218,7 @@ impl<'a> Search<'a> {
                     .map(|l| l + log_prior(self.kappa, theta));
                 if objective.map_or(true, |objective| objective < last) {
                     *theta = trail.pop().unwrap_or_default();
-                    likelihood = self.expect(theta);
+                    likelihood = self.count(theta);
                 }
                 trail.clear();
             }
@@ -266,7 +266,7 @@ impl<'a> Search<'a> {
     }
 
     /// Expected counts of all missions; returns the log-likelihood.
-    pub(super) fn expect(&mut self, theta: &[f64]) -> Result<f64, LearnError> {
+    pub(super) fn count(&mut self, theta: &[f64]) -> Result<f64, LearnError> {
         self.counts.fill(0.0);
         let mut sum = 0.0;
         for (mission, record) in self.records.iter().enumerate() {
@@ -288,7 +288,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The expected counts as of the last [`Self::expect`].
+    /// The expected counts as of the last [`Self::count`].
     pub(super) fn into_counts(self) -> Vec<f64> {
         self.counts
     }

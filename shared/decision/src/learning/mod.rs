@@ -9,16 +9,16 @@
 //!
 //! **The prior** is a model made by hand, worth K visits of each row: kappa = K theta_hand. It
 //! keeps the names of the states in their places, keeps rare faults from dying out, and stands for
-//! whatever the missions do not show. What it rules out (a 0) stays ruled out; a row that no mission
-//! visits stays as it is. What rises from iteration to iteration is sum ln c + sum kappa ln theta;
-//! with K = 0 that is the likelihood itself.
+//! whatever the missions do not show. What it rules out (a 0) stays ruled out; a row that no
+//! mission visits stays as it is. What rises from iteration to iteration is
+//! sum ln c + sum kappa ln theta; with K = 0 that is the likelihood itself.
 //!
 //! **States** may be told with a mission, all or some ([`Record::labels`]); then they are facts.
 //!
-//! [`learn`] does this, from several starts if wished, and [`Learned`] says of each row what is data
-//! and what is prior, with credible intervals. [`check`] compares what a model predicts with what
-//! was measured, and refuses one that is off by more than a fifth. [`Posterior`] learns on the way,
-//! mission by mission.
+//! [`learn`] does this, from several starts if wished, and [`Learned`] says of each row what is
+//! data and what is prior, with credible intervals. [`check`] compares what a model predicts with
+//! what was measured, and refuses one that is off by more than a fifth. [`Posterior`] learns on the
+//! way, mission by mission.
 
 pub mod check;
 mod expectation;

@@ -95,7 +95,7 @@ impl Posterior {
         let mut theta = self.theta.clone();
         let mut search = Search::new(&self.layout, &self.kappa, &self.records);
         for _ in 0..sweeps.max(1) {
-            if let Err(error) = search.expect(&theta) {
+            if let Err(error) = search.count(&theta) {
                 self.records.pop();
                 return Err(error);
             }

@@ -8,7 +8,7 @@
 //! (Each mission is on a line of its own.) Names are the model's, indices in quotation marks will
 //! do. `observations[t]` follows `actions[t]`. `rewards` may be missing where they were not
 //! measured; `states`, one more than actions, where no state is known, and single ones be null.
-//! `policy` says by which rule the missions were flown; it may be missing, and nothing depends on it.
+//! `policy` says by which rule the missions were flown; it may be missing: nothing depends on it.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};

@@ -39,10 +39,10 @@ pub struct Args {
     #[arg(long, default_value = "fib")]
     policy: String,
     /// Nodes of a graph at most, 1 to 60.
-    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u64).range(1..=60))]
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=60))]
     nodes: u64,
     /// Beliefs share a node of a graph if the sum of their differences is at most this, 0 to 2.
-    #[arg(long, default_value_t = 0.05)]
+    #[arg(long, default_value_t = 0.25)]
     tolerance: f64,
     /// Where to write the drawing.
     #[arg(long)]

@@ -144,8 +144,8 @@ impl Document {
     /// To read.
     pub fn text(&self) -> String {
         let mut text = format!(
-            "{}: learned from {} missions, {} steps, of {}{}; prior: {} visits a row\n\nlog-likelihood, \
-             nats (what rises: with the prior)\n",
+            "{}: learned from {} missions, {} steps, of {}{}; prior: {} visits a row\n\n\
+             log-likelihood, nats (what rises: with the prior)\n",
             self.file,
             self.missions,
             self.steps,

@@ -9,14 +9,12 @@ use super::canvas::{Anchor, Canvas, INK, Point, colour, drawing};
 
 /// Half the width and height of a node, and from node to node.
 const HALF: Point = (72.0, 30.0);
-const APART: Point = (220.0, 170.0);
+const APART: Point = (250.0, 190.0);
 const MARGIN: Point = (120.0, 110.0);
 /// States below this are not named in a node.
 const STATE_MIN: f64 = 0.05;
-/// Edges less probable than this are drawn without names.
-const NAMED_MIN: f64 = 0.02;
-/// Observations named at an edge.
-const NAMES: usize = 2;
+/// Edges less probable than this are left out of the drawing.
+const SHOWN_MIN: f64 = 0.1;
 
 /// `NOM .94, RT .03`: the most probable states.
 fn states(model: &Pomdp, node: &Node) -> String {
@@ -29,19 +27,16 @@ fn states(model: &Pomdp, node: &Node) -> String {
     words.join(", ")
 }
 
-/// `none +3: 0.94`.
+/// `none +3: 0.94`, or `any` for an edge that is taken in any case.
 fn label(model: &Pomdp, edge: &Edge) -> String {
-    let named = edge.observations.iter().take(NAMES);
-    let names: Vec<&str> = named
-        .map(|(z, _)| model.observations()[*z].as_str())
-        .collect();
-    let rest = edge.observations.len().saturating_sub(NAMES);
-    let more = if rest > 0 {
-        format!(" +{rest}")
-    } else {
-        String::new()
-    };
-    format!("{}{more}: {:.2}", names.join(", "), edge.probability())
+    let probability = edge.probability();
+    let first = edge.observations.first();
+    let name = first.map_or("", |(z, _)| model.observations()[*z].as_str());
+    match edge.observations.len() {
+        1 => format!("{name}: {probability:.2}"),
+        _ if probability > 1.0 - 1e-9 => "any: 1.00".to_owned(),
+        n => format!("{name} +{}: {probability:.2}", n - 1),
+    }
 }
 
 /// For Graphviz.
@@ -63,49 +58,51 @@ pub fn dot(model: &Pomdp, graph: &PolicyGraph) -> String {
     text
 }
 
-/// Rows of nodes by their distance from the start; each below those that lead to it.
-fn layers(graph: &PolicyGraph) -> Vec<Vec<usize>> {
-    let mut depth: Vec<Option<usize>> = vec![None; graph.nodes.len()];
-    let mut layers: Vec<Vec<usize>> = vec![vec![0]];
-    if let Some(first) = depth.first_mut() {
-        *first = Some(0);
-    }
-    while let Some(last) = layers.last().filter(|last| !last.is_empty()) {
-        let mut next: Vec<usize> = Vec::new();
-        for &from in last {
-            for edge in graph.edges.iter().filter(|edge| edge.from == from) {
-                if depth[edge.to].is_none() {
-                    depth[edge.to] = Some(layers.len());
-                    next.push(edge.to);
-                }
-            }
+/// For each node but the start the edge by which it is reached first: from an earlier node, and
+/// the most probable of such.
+fn entries(graph: &PolicyGraph) -> Vec<Option<usize>> {
+    let entry = |node: usize| {
+        let edges = graph.edges.iter().enumerate();
+        let into = edges.filter(|(_, e)| e.to == node && e.from < node && !e.is_folded);
+        let weight = |e: &Edge| graph.nodes[e.from].weight * e.probability();
+        let best = into.max_by(|a, b| weight(a.1).total_cmp(&weight(b.1)));
+        best.map(|(index, _)| index)
+    };
+    (0..graph.nodes.len()).map(entry).collect()
+}
+
+/// Rows of nodes by their distance from the start, each below those that lead to it.
+fn layers(graph: &PolicyGraph, entries: &[Option<usize>]) -> Vec<Vec<usize>> {
+    let mut depth = vec![0; graph.nodes.len()];
+    let mut layers: Vec<Vec<usize>> = Vec::new();
+    for (node, entry) in entries.iter().enumerate() {
+        if let Some(edge) = entry.and_then(|index| graph.edges.get(index)) {
+            depth[node] = depth[edge.from] + 1;
         }
-        layers.push(next);
+        layers.resize(layers.len().max(depth[node] + 1), Vec::new());
+        layers[depth[node]].push(node);
     }
-    layers.pop();
     layers
 }
 
-/// Draws it.
+/// Draws it. An edge is shown if it is probable, or if a node is reached by it first.
 pub fn draw(model: &Pomdp, graph: &PolicyGraph, title: &str) -> Result<String, String> {
-    let layers = layers(graph);
+    let entries = entries(graph);
+    let layers = layers(graph, &entries);
     let widest = layers.iter().map(Vec::len).max().unwrap_or(1).max(3);
     let width = 2.0 * MARGIN.0 + APART.0 * (widest - 1) as f64;
-    let height = 2.0 * MARGIN.1 + APART.1 * layers.len().saturating_sub(1) as f64 + 40.0;
+    let height = 2.0 * MARGIN.1 + APART.1 * layers.len().saturating_sub(1) as f64 + 60.0;
     let mut places = vec![(0.0, 0.0); graph.nodes.len()];
     for (row, layer) in layers.iter().enumerate() {
         let span = APART.0 * (layer.len() - 1) as f64;
         for (column, &node) in layer.iter().enumerate() {
             let x = 0.5 * (width - span) + APART.0 * column as f64;
-            // Nodes of a row stand higher and lower in turn, so that edges along it can be seen.
-            let shift = if layer.len() > 2 && column % 2 == 1 {
-                34.0
-            } else {
-                0.0
-            };
-            places[node] = (x, MARGIN.1 + APART.1 * row as f64 + shift);
+            places[node] = (x, MARGIN.1 + APART.1 * row as f64);
         }
     }
+    let edges = graph.edges.iter().enumerate();
+    let shown = edges.filter(|(i, e)| e.probability() >= SHOWN_MIN || entries.contains(&Some(*i)));
+    let shown: Vec<&Edge> = shown.map(|(_, edge)| edge).collect();
     drawing((width as u32, height as u32), |canvas| {
         canvas.text(
             &format!("Policy graph, {title}"),
@@ -113,7 +110,7 @@ pub fn draw(model: &Pomdp, graph: &PolicyGraph, title: &str) -> Result<String, S
             20,
             Anchor::Left,
         );
-        for edge in &graph.edges {
+        for edge in &shown {
             connect(canvas, edge, &places);
         }
         for (index, (node, &(x, y))) in graph.nodes.iter().zip(&places).enumerate() {
@@ -133,16 +130,20 @@ pub fn draw(model: &Pomdp, graph: &PolicyGraph, title: &str) -> Result<String, S
             );
             canvas.text(&states(model, node), (x, y + 12.0), 13, Anchor::Middle);
         }
-        for edge in graph.edges.iter().filter(|e| e.probability() >= NAMED_MIN) {
-            let at = middle(edge, &places);
-            canvas.text(&label(model, edge), at, 13, Anchor::Middle);
+        let mut taken: Vec<(Point, Point)> = places.iter().map(|p| (*p, HALF)).collect();
+        for edge in &shown {
+            let words = label(model, edge);
+            let place = label_place(&curve(edge, &places), words.len(), &taken);
+            canvas.text(&words, place.0, 13, Anchor::Middle);
+            taken.push(place);
         }
-        let folded = 100.0 * graph.folded_max();
-        let note = format!(
-            "box: action and most probable states, double: start; broken line: nearest of the \
-             nodes shown, {folded:.1} % at most"
-        );
-        canvas.text(&note, (20.0, height - 18.0), 14, Anchor::Left);
+        let notes = [
+            "box: action, most probable states; double: start; broken: to the nearest box",
+            "edges below 10 % are left out, but for the first into each box; .dot has all",
+        ];
+        for (note, up) in notes.into_iter().zip([36.0, 16.0]) {
+            canvas.text(note, (20.0, height - up), 14, Anchor::Left);
+        }
     })
 }
 
@@ -192,13 +193,28 @@ fn curve(edge: &Edge, places: &[Point]) -> Vec<Point> {
         .collect()
 }
 
-fn middle(edge: &Edge, places: &[Point]) -> Point {
-    let points = curve(edge, places);
-    // Nearer to the start, where edges of one node are apart.
-    let at = points.get(points.len() * 2 / 5);
-    let (x, y) = at.copied().unwrap_or_default();
-    let side = if edge.from == edge.to { 14.0 } else { 0.0 };
-    (x + side, y - 9.0)
+/// Shares of an edge's way at which its label may stand, the preferred first.
+const LABEL_AT: [f64; 7] = [0.6, 0.5, 0.7, 0.4, 0.3, 0.8, 0.2];
+/// Half the width of a letter, and half the height of a label, with some room.
+const LETTER: Point = (3.4, 8.0);
+
+/// A place for a label of an edge where it covers none of `taken` (middles and half sizes); the
+/// preferred one if there is none.
+fn label_place(points: &[Point], letters: usize, taken: &[(Point, Point)]) -> (Point, Point) {
+    let half = (LETTER.0 * letters as f64, LETTER.1);
+    let at = |share: f64| {
+        let index = (points.len() as f64 * share) as usize;
+        points.get(index).copied().unwrap_or_default()
+    };
+    let is_free = |place: &Point| {
+        let covers = |(other, size): &(Point, Point)| {
+            (place.0 - other.0).abs() < half.0 + size.0
+                && (place.1 - other.1).abs() < half.1 + size.1
+        };
+        !taken.iter().any(covers)
+    };
+    let free = LABEL_AT.into_iter().map(at).find(is_free);
+    (free.unwrap_or_else(|| at(LABEL_AT[0])), half)
 }
 
 fn connect(canvas: &mut Canvas<'_>, edge: &Edge, places: &[Point]) {

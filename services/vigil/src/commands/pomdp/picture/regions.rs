@@ -11,13 +11,15 @@ const LEFT: f64 = 60.0;
 
 /// Draws the regions. Beliefs between cells' middles are not looked at.
 pub fn draw(model: &Pomdp, decider: &mut Decider, title: &str) -> Result<String, String> {
-    match model.states().len() {
+    let svg = match model.states().len() {
         2 => line(model, decider, title),
         3 => triangle(model, decider, title),
         n => Err(format!(
             "--regions: a model of {n} states; allowed are 2 and 3"
         )),
-    }
+    };
+    // Without smoothing: cells meet without a seam.
+    svg.map(|svg| svg.replacen("<svg ", "<svg shape-rendering=\"crispEdges\" ", 1))
 }
 
 /// The action; a policy that remembers is asked as at the beginning of a mission.
