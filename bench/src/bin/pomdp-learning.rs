@@ -54,9 +54,9 @@ fn say_offline(archive: &mut Archive, offline: &Value) {
     archive.say(&format!(
         "{} missions of config/navigation.pomdp under escalation-1 (mean reward {}), no state \
          told. Learned\nfrom a hasty model (everything three times as often, remedies and symptoms \
-         rough guesses), K = {}: {} iterations,\nlog-likelihood {first:.0} -> {last:.0} nats (true model \
-         {:.0}). Predicted: the model's policy ({}) in the model\nitself; measured: in the true \
-         one; other missions than those recorded. Mean discounted reward, 95 %.\n",
+         rough guesses), K = {}: {}\niterations, log-likelihood {first:.0} -> {last:.0} nats (true \
+         model {:.0}). Predicted: the model's policy ({})\nin the model itself; measured: in the \
+         true one; other missions than those recorded. Mean discounted\nreward, 95 %.\n",
         offline["missions"],
         mean(&offline["escalation"]),
         offline["prior_strength"],
@@ -107,9 +107,9 @@ fn say_offline(archive: &mut Archive, offline: &Value) {
 fn say_online(archive: &mut Archive, online: &Value) {
     archive.say(&format!(
         "\nPosterior sampling: {} learners of {} missions each, from a prior (each row worth {} \
-         visits) that expects\nhelp from the wrong actions. Policy {}. After each mission all \
-         counts are taken anew. True model's policy {:.3},\nprior's {:.3}, escalation-1 {:.3}; each point: \
-         the mean model's policy on {} missions, mean and 95 % over learners.\n",
+         visits) that\nexpects help from the wrong actions. Policy {}. After each mission all \
+         counts are taken anew. True\nmodel's policy {:.3}, prior's {:.3}, escalation-1 {:.3}; \
+         each point: the mean model's policy on {} missions,\nmean and 95 % over learners.\n",
         online["learners"],
         online["missions"],
         online["prior_strength"],

@@ -285,8 +285,8 @@ fn of_several_starts_the_best_one_counts() {
     };
     let several = learned(&model, &records, &four);
     let last = |of: &Learned, start| {
-        let own = of.iterations.iter().filter(|i| i.start == start);
-        own.last().copied().unwrap().objective
+        let mut own = of.iterations.iter().filter(|i| i.start == start);
+        own.next_back().copied().unwrap().objective
     };
     assert_eq!(last(&one, 0), last(&several, 0));
     let best = (0..4).map(|s| last(&several, s)).fold(f64::MIN, f64::max);

@@ -4,9 +4,10 @@
 //! a visit is worth less, and what one number is uncertain by, others are too. Each mission's
 //! score, s_i = N_i - N theta_i in the logarithms of the probabilities, says what it would change;
 //! the sum of s s' over missions estimates the information in all of them (Berndt, Hall, Hall,
-//! Hausman 1974), to which the prior adds K (diag theta - theta theta') for each row. Its inverse is the
-//! covariance of the logarithms, and J C J with J = diag theta - theta theta' that of theta. Beyond
-//! a size only the diagonal is taken: uncertainty is then shared by none and comes out too small.
+//! Hausman 1974), to which the prior adds K (diag theta - theta theta') for each row. Its inverse
+//! is the covariance of the logarithms, and J C J with J = diag theta - theta theta' that of theta.
+//! Beyond a size only the diagonal is taken: uncertainty is then shared by none, and comes out too
+//! small.
 
 use nalgebra::DMatrix;
 

@@ -204,7 +204,8 @@ fn label_place(points: &[Point], letters: usize, taken: &[(Point, Point)]) -> (P
     let half = (LETTER.0 * letters as f64, LETTER.1);
     let at = |share: f64| {
         let index = (points.len() as f64 * share) as usize;
-        points.get(index).copied().unwrap_or_default()
+        let (x, y) = points.get(index).copied().unwrap_or_default();
+        (x, y - LETTER.1)
     };
     let is_free = |place: &Point| {
         let covers = |(other, size): &(Point, Point)| {
