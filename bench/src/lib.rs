@@ -12,6 +12,7 @@ pub mod matched;
 pub mod naive;
 pub mod noncentrality;
 pub mod options;
+pub mod pomdp_learning;
 pub mod rare;
 pub mod real;
 pub mod recorded;

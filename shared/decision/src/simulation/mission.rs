@@ -46,12 +46,34 @@ pub fn horizon(discount: f64, cap: usize) -> usize {
     }
 }
 
-/// Mission `episode` of an agent in a world that follows `model`.
-pub fn run(
+/// One step of a mission, with the states that no agent sees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// The state in which the action was taken.
+    pub before: usize,
+    /// What the agent did.
+    pub action: usize,
+    /// The state that was reached.
+    pub after: usize,
+    /// What was observed there.
+    pub observation: usize,
+    /// The reward.
+    pub reward: f64,
+}
+
+/// Mission `episode` of an agent in a world that follows `model`; `numbers` are its seed and
+/// episode.
+pub fn run(model: &Pomdp, agent: &mut dyn Agent, rules: &Rules, numbers: (u64, u64)) -> Mission {
+    run_watched(model, agent, rules, numbers, &mut |_| ())
+}
+
+/// As [`run`]; `watch` is shown every step.
+pub fn run_watched(
     model: &Pomdp,
     agent: &mut dyn Agent,
     rules: &Rules,
     (seed, episode): (u64, u64),
+    watch: &mut dyn FnMut(Seen),
 ) -> Mission {
     let mut world = World::new(model, seed, episode);
     let mut mission = Mission::default();
@@ -59,7 +81,15 @@ pub fn run(
     agent.begin();
     while mission.steps < rules.steps_max && !mission.is_ended {
         let act = agent.decide(world.chance());
+        let before = world.state();
         let event = world.step(act.action);
+        watch(Seen {
+            before,
+            action: act.action,
+            after: world.state(),
+            observation: event.observation,
+            reward: event.reward,
+        });
         mission.discounted += weight * event.reward;
         mission.undiscounted += event.reward;
         weight *= model.discount();

@@ -18,7 +18,7 @@ mod world;
 
 pub use agent::{Act, Agent, PolicyAgent, Random};
 pub use escalation::{Escalation, EscalationError};
-pub use mission::{Mission, Rules, horizon, run};
+pub use mission::{Mission, Rules, Seen, horizon, run, run_watched};
 pub use statistics::{Paired, Summary};
 pub use stream::Stream;
 pub use world::{Event, World};

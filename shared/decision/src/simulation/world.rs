@@ -17,7 +17,7 @@ pub struct World<'m> {
 pub struct Event {
     /// The observation.
     pub observation: usize,
-    /// The reward: R(s,a), which is what the model expects of the step.
+    /// The reward of what happened: R(s,a,s',z). Its mean is R(s,a).
     pub reward: f64,
 }
 
@@ -51,13 +51,16 @@ impl<'m> World<'m> {
 
     /// The action is taken.
     pub fn step(&mut self, action: usize) -> Event {
-        let reward = self.model.reward(self.state, action);
-        let successors = self.model.successors(self.state, action).iter().copied();
+        let before = self.state;
+        let successors = self.model.successors(before, action).iter().copied();
         self.state = drawn(successors, self.draw.state);
         let observations = 0..self.model.observations().len();
         let likelihoods = observations.map(|z| (z, self.model.likelihood(action, z)[self.state]));
         let observation = drawn(likelihoods, self.draw.observation);
         self.draw = self.stream.draw();
+        let reward = self
+            .model
+            .reward_of(before, action, self.state, observation);
         Event {
             observation,
             reward,

@@ -1,7 +1,7 @@
 //! `vigil pomdp compare`: what each policy is worth on a model, mission by mission.
 
 mod contest;
-mod contestant;
+pub(super) mod contestant;
 mod table;
 
 use std::path::PathBuf;
@@ -94,7 +94,7 @@ enum GateName {
 }
 
 /// Reads a count of at least `least`.
-fn count(least: u64) -> RangedU64ValueParser<u64> {
+pub(super) fn count(least: u64) -> RangedU64ValueParser<u64> {
     clap::value_parser!(u64).range(least..=10_000_000)
 }
 
@@ -106,7 +106,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let model = load(&args.file)?;
     let other = args.model_error.as_deref().map(load).transpose()?;
     if let Some(other) = &other {
-        fits(&model, other)?;
+        fits("--model-error", &model, other)?;
     }
     let world = other.as_ref().unwrap_or(&model);
     let believed = mdp::solve(&model).map_err(CommandError::usage)?;
@@ -193,7 +193,11 @@ fn information(
 }
 
 /// For every action of the model, whether `names` holds it.
-fn among(model: &Pomdp, option: &str, names: &[String]) -> Result<Vec<bool>, CommandError> {
+pub(super) fn among(
+    model: &Pomdp,
+    option: &str,
+    names: &[String],
+) -> Result<Vec<bool>, CommandError> {
     if let Some(name) = names.iter().find(|name| !model.actions().contains(name)) {
         let allowed = model.actions().join(", ");
         return Err(CommandError::usage(format!(
@@ -204,7 +208,7 @@ fn among(model: &Pomdp, option: &str, names: &[String]) -> Result<Vec<bool>, Com
 }
 
 /// The world and the model that is believed in speak of the same things.
-fn fits(model: &Pomdp, other: &Pomdp) -> Result<(), CommandError> {
+pub(super) fn fits(option: &str, model: &Pomdp, other: &Pomdp) -> Result<(), CommandError> {
     let lists = [
         ("states", model.states(), other.states()),
         ("actions", model.actions(), other.actions()),
@@ -212,7 +216,7 @@ fn fits(model: &Pomdp, other: &Pomdp) -> Result<(), CommandError> {
     ];
     match lists.iter().find(|(_, ours, theirs)| ours != theirs) {
         Some((what, ..)) => Err(CommandError::usage(format!(
-            "--model-error: its {what} differ; allowed is a model with the same names in the same \
+            "{option}: its {what} differ; allowed is a model with the same names in the same \
              order"
         ))),
         None => Ok(()),

@@ -4,6 +4,10 @@ mod compare;
 mod convert;
 mod generate;
 mod info;
+mod learn;
+mod missions;
+mod picture;
+mod simulate;
 mod solve;
 mod track;
 
@@ -13,7 +17,7 @@ use vigil_decision::Pomdp;
 
 use super::{CommandError, Outcome};
 
-/// Looks at, follows, compares and converts decision models (`.pomdp`, `.pomdpx`).
+/// Looks at, follows, compares, learns, draws and converts decision models (`.pomdp`, `.pomdpx`).
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -25,6 +29,9 @@ enum Command {
     Compare(Box<compare::Args>),
     Generate(generate::Args),
     Info(info::Args),
+    Learn(learn::Args),
+    Picture(picture::Args),
+    Simulate(simulate::Args),
     Track(track::Args),
     Convert(convert::Args),
     Solve(solve::Args),
@@ -39,6 +46,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         Command::Compare(args) => compare::run(args),
         Command::Generate(args) => generate::run(args),
         Command::Info(args) => info::run(args),
+        Command::Learn(args) => learn::run(args),
+        Command::Picture(args) => picture::run(args),
+        Command::Simulate(args) => simulate::run(args),
         Command::Track(args) => track::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Solve(args) => solve::run(args),

@@ -69,7 +69,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 }
 
 /// Indices of actions and observations.
-fn pairs(model: &Pomdp, text: &str) -> Result<Vec<(usize, usize)>, String> {
+pub(super) fn pairs(model: &Pomdp, text: &str) -> Result<Vec<(usize, usize)>, String> {
     let steps = text
         .split(',')
         .map(str::trim)

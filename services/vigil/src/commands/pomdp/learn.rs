@@ -1,0 +1,151 @@
+//! `vigil pomdp learn`: a model's probabilities from recorded missions.
+
+mod document;
+
+use std::fs;
+use std::path::PathBuf;
+
+use vigil_decision::learning::{Record, Settings, check, learn};
+use vigil_decision::policy::{Dual, PolicyName};
+use vigil_decision::simulation::{PolicyAgent, Rules, Summary, horizon, run as fly};
+use vigil_decision::{Pomdp, mdp};
+
+use super::compare::{count, fits};
+use super::{load, missions};
+use crate::commands::{CommandError, Outcome};
+use crate::output;
+use document::{Document, Mean};
+
+/// Learn a model's probabilities from recorded missions (JSON lines, see `vigil pomdp simulate`).
+///
+/// FILE is the model made by hand: it gives names, rewards, what is impossible, and counts as
+/// --prior-strength visits of every row of T and Z. The learned model is written only if what it
+/// predicts is within 20 % of what was measured: the rewards of the missions, if they are recorded,
+/// and those of its policy in --world, if one is given. Otherwise exit code 1, and no file.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The model made by hand (.pomdp or .pomdpx).
+    file: PathBuf,
+    /// The missions.
+    #[arg(long)]
+    missions: PathBuf,
+    /// Where to write the learned model.
+    #[arg(long)]
+    out: PathBuf,
+    /// Visits that each row of the model made by hand counts as; 0 learns from the missions alone.
+    #[arg(long, default_value_t = 50.0)]
+    prior_strength: f64,
+    /// Iterations at most, of each start.
+    #[arg(long, default_value_t = 200, value_parser = count(1))]
+    iterations: u64,
+    /// Starts: the first is FILE, others are drawn around it; the best one counts.
+    #[arg(long, default_value_t = 1, value_parser = count(1))]
+    starts: u64,
+    /// Seed of drawn starts and simulated missions.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Policy whose worth is predicted: mls, av, qmdp or fib.
+    #[arg(long, default_value = "fib")]
+    policy: String,
+    /// Simulated missions for the prediction.
+    #[arg(long, default_value_t = 1000, value_parser = count(2))]
+    episodes: u64,
+    /// A model that stands for the world: the learned model's policy is measured in it.
+    #[arg(long, value_name = "OTHER")]
+    world: Option<PathBuf>,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Files and options that are refused; a model that may not be deployed (exit code 1).
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let prior = load(&args.file)?;
+    let world = args.world.as_deref().map(load).transpose()?;
+    if let Some(world) = &world {
+        fits("--world", &prior, world)?;
+    }
+    let flown = missions::read(&args.missions, &prior)?;
+    let settings = Settings {
+        prior_strength: args.prior_strength,
+        iterations_max: args.iterations as usize,
+        starts: args.starts as usize,
+        seed: args.seed,
+        ..Settings::default()
+    };
+    let total = settings.starts * settings.iterations_max;
+    let progress = output::Progress::new("iterations, at most:", total);
+    let mut done = 0;
+    let learned = learn(&prior, &flown.records, &settings, &mut |_| {
+        done += 1;
+        progress.show(done);
+    });
+    drop(progress);
+    let learned = learned
+        .map_err(|error| CommandError::usage(format!("{}: {error}", args.missions.display())))?;
+    let predicted = worth(args, &learned.model, &learned.model)?;
+    let measured = world
+        .as_ref()
+        .map(|world| worth(args, &learned.model, world));
+    let measured = measured.transpose()?;
+    let logged = check::follow(&learned.model, &flown.records);
+    let checks = [
+        logged.map(|l| check::within(l.predicted.mean, l.measured.mean)),
+        measured.map(|measured| check::within(predicted.mean, measured.mean)),
+    ];
+    let refusal = checks.into_iter().flatten().find_map(Result::err);
+    let document = Document {
+        schema_version: 1,
+        file: args.file.display().to_string(),
+        missions_file: args.missions.display().to_string(),
+        missions: flown.records.len(),
+        steps: flown.records.iter().map(Record::steps).sum(),
+        flown_by: flown.policy,
+        prior_strength: args.prior_strength,
+        start: learned.start,
+        iterations: document::iterations(&learned),
+        rows: document::rows(&learned),
+        policy: args.policy.clone(),
+        episodes: args.episodes,
+        predicted: Mean::of(predicted),
+        measured: measured.map(Mean::of),
+        logged_predicted: logged.map(|l| Mean::of(l.predicted)),
+        logged_measured: logged.map(|l| Mean::of(l.measured)),
+        refused: refusal.map(|refusal| refusal.to_string()),
+        hash: format!("{:016x}", learned.model.hash()),
+    };
+    let printed = if args.json {
+        output::json(&document)
+    } else {
+        output::line(&document.text())
+    };
+    printed.map_err(CommandError::failure)?;
+    if let Some(refusal) = refusal {
+        return Err(CommandError::failure(refusal));
+    }
+    let written = fs::write(&args.out, learned.model.to_cassandra());
+    written.map_err(|e| CommandError::failure(format!("{}: {e}", args.out.display())))?;
+    Ok(Outcome::Done)
+}
+
+/// What the policy of `model` earns in `world`, discounted.
+fn worth(args: &Args, model: &Pomdp, world: &Pomdp) -> Result<Summary, CommandError> {
+    let solution = mdp::solve(model).map_err(CommandError::usage)?;
+    let name: PolicyName = args.policy.parse().map_err(CommandError::usage)?;
+    if name.information.is_some() {
+        let message = format!("--policy {name}: allowed are mls, av, qmdp, fib");
+        return Err(CommandError::usage(message));
+    }
+    let decider = name.build(model, &solution, |information| Dual::new(information, 1.0));
+    let mut agent = PolicyAgent::new(model, decider.map_err(CommandError::usage)?);
+    let rules = Rules {
+        steps_max: horizon(world.discount(), 2000),
+        is_end: vec![false; world.actions().len()],
+    };
+    let one = |mission| fly(world, &mut agent, &rules, (args.seed, mission)).discounted;
+    let mut rewards: Vec<f64> = (0..args.episodes).map(one).collect();
+    Ok(Summary::of(&mut rewards))
+}

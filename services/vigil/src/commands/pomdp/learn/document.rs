@@ -1,0 +1,244 @@
+//! What was learned, for people and for programs.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+use vigil_decision::learning::{self, Learned, LearnedRow, Table};
+use vigil_decision::simulation::Summary;
+
+/// What the command prints.
+#[derive(Debug, Serialize)]
+pub struct Document {
+    /// Of this document.
+    pub schema_version: u32,
+    /// Model made by hand.
+    pub file: String,
+    /// Recorded missions.
+    pub missions_file: String,
+    /// Their number.
+    pub missions: usize,
+    /// All their steps.
+    pub steps: usize,
+    /// Rule by which they were flown, as their file says.
+    pub flown_by: Option<String>,
+    /// Visits that each row of the model made by hand counts as.
+    pub prior_strength: f64,
+    /// The start whose model was taken, from 0.
+    pub start: usize,
+    /// Every iteration of every start.
+    pub iterations: Vec<Iteration>,
+    /// The start belief and every row of T and Z.
+    pub rows: Vec<Row>,
+    /// Policy of the learned model.
+    pub policy: String,
+    /// Simulated missions.
+    pub episodes: u64,
+    /// Its worth by the learned model.
+    pub predicted: Mean,
+    /// Its worth in the world that was given.
+    pub measured: Option<Mean>,
+    /// What the learned model expects of the recorded missions.
+    pub logged_predicted: Option<Mean>,
+    /// What they brought.
+    pub logged_measured: Option<Mean>,
+    /// Why the model is not to be deployed.
+    pub refused: Option<String>,
+    /// Hash of the learned model.
+    pub hash: String,
+}
+
+/// Discounted reward of a mission.
+#[derive(Debug, Serialize)]
+pub struct Mean {
+    mean: f64,
+    half_width_95: f64,
+}
+
+impl Mean {
+    /// Of a summary.
+    pub const fn of(summary: Summary) -> Self {
+        Self {
+            mean: summary.mean,
+            half_width_95: summary.half_width,
+        }
+    }
+}
+
+/// Where an iteration began.
+#[derive(Debug, Serialize)]
+pub struct Iteration {
+    start: usize,
+    iteration: usize,
+    log_likelihood: f64,
+    objective: f64,
+}
+
+/// A learned row.
+#[derive(Debug, Serialize)]
+pub struct Row {
+    /// `start`, `T` or `O`.
+    table: &'static str,
+    action: Option<String>,
+    state: Option<String>,
+    visits: f64,
+    prior: f64,
+    data_share: f64,
+    entries: Vec<Entry>,
+}
+
+/// A learned probability.
+#[derive(Debug, Serialize)]
+struct Entry {
+    name: String,
+    prior: f64,
+    learned: f64,
+    low_95: f64,
+    high_95: f64,
+    effective_visits: f64,
+}
+
+/// All iterations.
+pub fn iterations(learned: &Learned) -> Vec<Iteration> {
+    let of = |i: &learning::Iteration| Iteration {
+        start: i.start,
+        iteration: i.iteration,
+        log_likelihood: i.log_likelihood,
+        objective: i.objective,
+    };
+    learned.iterations.iter().map(of).collect()
+}
+
+/// All rows.
+pub fn rows(learned: &Learned) -> Vec<Row> {
+    let model = &learned.model;
+    let of = |row: LearnedRow| {
+        let (table, columns) = match row.row.table {
+            Table::Start => ("start", model.states()),
+            Table::Transition => ("T", model.states()),
+            Table::Observation => ("O", model.observations()),
+        };
+        let named = row.row.table != Table::Start;
+        let name = |names: &[String], index: usize| names.get(index).cloned();
+        let entries = row.entries.iter().map(|entry| Entry {
+            name: name(columns, entry.column).unwrap_or_default(),
+            prior: entry.prior,
+            learned: entry.learned,
+            low_95: entry.interval[0],
+            high_95: entry.interval[1],
+            effective_visits: entry.effective_visits,
+        });
+        Row {
+            table,
+            action: name(model.actions(), row.row.action).filter(|_| named),
+            state: name(model.states(), row.row.state).filter(|_| named),
+            visits: row.visits,
+            prior: row.prior,
+            data_share: row.data_share(),
+            entries: entries.collect(),
+        }
+    };
+    learned.rows().map(of).collect()
+}
+
+impl Document {
+    /// To read.
+    pub fn text(&self) -> String {
+        let mut text = format!(
+            "{}: learned from {} missions, {} steps, of {}{}; prior: {} visits a row\n\n\
+             log-likelihood, nats (what rises: with the prior)\n",
+            self.file,
+            self.missions,
+            self.steps,
+            self.missions_file,
+            self.flown_by
+                .as_ref()
+                .map_or_else(String::new, |policy| format!(" (flown by {policy})")),
+            self.prior_strength,
+        );
+        let own: Vec<&Iteration> = self
+            .iterations
+            .iter()
+            .filter(|i| i.start == self.start)
+            .collect();
+        for (index, iteration) in own.iter().enumerate() {
+            let n = iteration.iteration;
+            if n < 5 || n % 10 == 0 || index + 1 == own.len() {
+                let (likelihood, objective) = (iteration.log_likelihood, iteration.objective);
+                let _ = writeln!(text, "{n:>6} {likelihood:>18.3} {objective:>18.3}");
+            }
+        }
+        text.push_str("\nrow: visits in the missions, share of data; its most changed number\n");
+        for row in &self.rows {
+            text.push_str(&row.line());
+        }
+        text.push_str(&self.checks());
+        text
+    }
+
+    fn checks(&self) -> String {
+        let mut text = format!(
+            "\ndiscounted reward of a mission, {} simulated\n",
+            self.episodes
+        );
+        let mut put = |what: &str, mean: &Option<&Mean>| {
+            if let Some(mean) = mean {
+                let (mean, half) = (mean.mean, mean.half_width_95);
+                let _ = writeln!(text, "  {what:<58} {mean:.4} +- {half:.4}");
+            }
+        };
+        let policy = &self.policy;
+        put(
+            &format!("{policy}, predicted by the learned model"),
+            &Some(&self.predicted),
+        );
+        put(
+            &format!("{policy}, measured in the world"),
+            &self.measured.as_ref(),
+        );
+        put(
+            "recorded missions, predicted step by step",
+            &self.logged_predicted.as_ref(),
+        );
+        put(
+            "recorded missions, measured",
+            &self.logged_measured.as_ref(),
+        );
+        if self.logged_measured.is_none() && self.measured.is_none() {
+            text.push_str("not checked: the missions hold no rewards, and no --world was given\n");
+        }
+        if self.refused.is_some() {
+            text.push_str("not written: see below");
+        } else {
+            let _ = write!(text, "model {}", self.hash);
+        }
+        text
+    }
+}
+
+impl Row {
+    fn line(&self) -> String {
+        let change = |entry: &&Entry| (entry.learned - entry.prior).abs();
+        let most = self
+            .entries
+            .iter()
+            .max_by(|a, b| change(a).total_cmp(&change(b)));
+        let (action, state) = (self.action.as_deref(), self.state.as_deref());
+        let mut line = format!(
+            "  {:<5} {:<8} {:<8} {:>12.1} {:>5.1} %",
+            self.table,
+            action.unwrap_or_default(),
+            state.unwrap_or_default(),
+            self.visits,
+            100.0 * self.data_share,
+        );
+        if let Some(entry) = most {
+            let _ = write!(
+                line,
+                "   {:<10} {:.4} -> {:.4} [{:.4}, {:.4}]",
+                entry.name, entry.prior, entry.learned, entry.low_95, entry.high_95
+            );
+        }
+        line.push('\n');
+        line
+    }
+}
