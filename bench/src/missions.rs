@@ -28,15 +28,15 @@ pub use course::Course;
 pub use drive::{Mission, drive};
 pub use escalation::{Escalation, Explanation, Seen, Told};
 pub use plan::{Fault, Kind, Plan};
-pub use report::{document, picture, say};
+pub use report::{document, lines, lost_against, picture, say};
 pub use score::{MEASURES, Measure, Obeyed, Pay, Score, Truth};
 
 use std::error::Error;
 use std::path::Path;
 
 use vigil_blocks::RecoveryKind;
-use vigil_decision::mdp::{self, Solution};
 use vigil_decision::Pomdp;
+use vigil_decision::mdp::{self, Solution};
 use vigil_robot::Injection;
 use vigil_robot::injection::Change;
 use vigil_setup::schema::Recovery;
@@ -49,14 +49,14 @@ pub const HELP_S: f64 = 30.0;
 
 /// The graph as it ships, and what is needed to judge missions.
 #[derive(Debug, Clone)]
-pub struct Stage {
+pub struct Shipped {
     /// The configuration.
     pub setup: Setup,
     /// The decision model's fully observable relaxation: what to do about a state that is known.
     pub solution: Solution,
 }
 
-impl Stage {
+impl Shipped {
     /// Reads `config/rover.toml` below `root`; frames come `rate_hz` times a second.
     ///
     /// # Errors
@@ -82,7 +82,9 @@ impl Stage {
     #[must_use]
     pub fn action(&self, kind: RecoveryKind) -> Option<usize> {
         let actions = 0..self.model().actions().len();
-        actions.into_iter().find(|action| self.kind(*action) == kind)
+        actions
+            .into_iter()
+            .find(|action| self.kind(*action) == kind)
     }
 
     /// Kind of an action.

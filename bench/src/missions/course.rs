@@ -47,12 +47,16 @@ impl Course {
     /// m. Beyond the ends of that stretch, from its ends; infinite of a course without points.
     #[must_use]
     pub fn off_m(&self, at: [f64; 2], from_m: f64, to_m: f64) -> f64 {
-        let first = self.points.partition_point(|(_, along_m)| *along_m < from_m);
+        let first = self
+            .points
+            .partition_point(|(_, along_m)| *along_m < from_m);
         let after = self.points.partition_point(|(_, along_m)| *along_m <= to_m);
         // One point more at either side, so that the stretch is covered, and never none.
         let stretch = first.saturating_sub(1)..(after + 1).min(self.points.len());
         let points = self.points.get(stretch).unwrap_or_default();
-        let alone = points.first().map_or(f64::INFINITY, |(p, _)| distance(*p, at));
+        let alone = points
+            .first()
+            .map_or(f64::INFINITY, |(p, _)| distance(*p, at));
         points
             .windows(2)
             .map(|pair| off_segment(pair[0].0, pair[1].0, at))
@@ -119,7 +123,10 @@ mod tests {
         let course = straight();
         // A path may cross itself: what is near elsewhere does not count.
         let found = course.off_m([1.0, 0.0], 4.0, 6.0);
-        assert!((found - 3.0).abs() < 2.0 * SPACING_M && found <= 3.0, "{found}");
+        assert!(
+            (found - 3.0).abs() < 2.0 * SPACING_M && found <= 3.0,
+            "{found}"
+        );
         assert!((course.off_m([12.0, 0.0], 30.0, 40.0) - 2.0).abs() < 1e-12);
         assert_eq!(Course::new([]).off_m([0.0, 0.0], 0.0, 1.0), f64::INFINITY);
         assert_eq!(Course::new([[1.0, 1.0]]).off_m([1.0, 3.0], 0.0, 1.0), 2.0);
@@ -127,7 +134,9 @@ mod tests {
 
     #[test]
     fn standing_still_adds_nothing() {
-        let path = [[0.0, 0.0]; 50].into_iter().chain([[0.03, 0.0], [0.03, 0.0]]);
+        let path = [[0.0, 0.0]; 50]
+            .into_iter()
+            .chain([[0.03, 0.0], [0.03, 0.0]]);
         let course = Course::new(path);
         assert_eq!(course.goal(), Some([0.03, 0.0]));
         assert!(course.points.len() == 2);

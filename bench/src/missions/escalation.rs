@@ -55,8 +55,14 @@ pub struct Told {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
     Driving,
-    Looking { for_s: f64 },
-    Remedying { what: Explanation, for_s: f64, doubt_s: f64 },
+    Looking {
+        for_s: f64,
+    },
+    Remedying {
+        what: Explanation,
+        for_s: f64,
+        doubt_s: f64,
+    },
     Waiting,
 }
 
@@ -173,7 +179,11 @@ mod tests {
 
     #[test]
     fn a_clear_diagnosis_is_remedied_after_one_stop() {
-        let said = answers(&[(false, Nominal, 9), (true, Unknown, 1), (true, Stuck(4), 50)]);
+        let said = answers(&[
+            (false, Nominal, 9),
+            (true, Unknown, 1),
+            (true, Stuck(4), 50),
+        ]);
         assert_eq!(said, [(GoOn, None), (Stop, None), (Compensate, Some(4))]);
         let said = answers(&[(true, Encoder(2), 50)]);
         assert_eq!(said, [(Stop, None), (IgnoreEncoder, Some(2))]);
@@ -181,7 +191,11 @@ mod tests {
 
     #[test]
     fn what_nothing_explains_ends_with_a_call_for_help() {
-        let said = answers(&[(true, Unknown, 11), (true, Unknown, 30), (true, Stuck(1), 90)]);
+        let said = answers(&[
+            (true, Unknown, 11),
+            (true, Unknown, 30),
+            (true, Stuck(1), 90),
+        ]);
         assert_eq!(said, [(Stop, None), (SlowDown, None), (CallForHelp, None)]);
     }
 
@@ -204,6 +218,9 @@ mod tests {
         let said = answers(&[(true, Stuck(0), 20), (false, Nominal, 12)]);
         assert_eq!(said, [(Stop, None), (Compensate, Some(0)), (GoOn, None)]);
         // Nothing wrong though the alarm stands: as planned.
-        assert_eq!(answers(&[(true, Nominal, 30)]), [(Stop, None), (GoOn, None)]);
+        assert_eq!(
+            answers(&[(true, Nominal, 30)]),
+            [(Stop, None), (GoOn, None)]
+        );
     }
 }

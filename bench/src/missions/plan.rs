@@ -167,7 +167,11 @@ fn fault(rng: &mut Pcg64Mcg, kind: Kind, onset_s: f64) -> Option<Fault> {
     let wheel = WHEELS[rng.random_range(0..WHEELS.len())];
     let (spec, state, wheel) = match kind {
         Kind::Healthy => return None,
-        Kind::Stuck => (format!("stuck:{wheel}"), format!("{wheel}_STUCK"), Some(wheel)),
+        Kind::Stuck => (
+            format!("stuck:{wheel}"),
+            format!("{wheel}_STUCK"),
+            Some(wheel),
+        ),
         Kind::Encoder => {
             let how = BROKEN[rng.random_range(0..BROKEN.len())];
             let spec = format!("encoder:{wheel}:{how}");
@@ -193,20 +197,24 @@ fn fault(rng: &mut Pcg64Mcg, kind: Kind, onset_s: f64) -> Option<Fault> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::missions::Stage;
+    use crate::missions::Shipped;
 
     #[test]
     fn missions_are_as_stated_and_every_fault_is_understood() {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        let stage = Stage::read(&root, 100.0).unwrap();
+        let shipped = Shipped::read(&root, 100.0).unwrap();
         let plans: Vec<Plan> = (0..2000).map(Plan::new).collect();
         for plan in &plans {
-            let length_m: f64 = plan.segments.iter().map(|s| s.duration_s * s.speed_m_s).sum();
+            let length_m: f64 = plan
+                .segments
+                .iter()
+                .map(|s| s.duration_s * s.speed_m_s)
+                .sum();
             assert!((length_m - LENGTH_M).abs() < 1e-9);
             assert_eq!(plan.fault.is_none(), plan.kind == Kind::Healthy);
             if let Some(fault) = &plan.fault {
-                stage.change(&fault.spec).unwrap();
-                assert!(stage.model().states().contains(&fault.state), "{fault:?}");
+                shipped.change(&fault.spec).unwrap();
+                assert!(shipped.model().states().contains(&fault.state), "{fault:?}");
                 let share = fault.onset_s / plan.duration_s();
                 assert!(ONSET.contains(&share));
             }
