@@ -174,7 +174,7 @@ fn leaves(shipped: &Shipped) -> Vec<(usize, Explanation)> {
         };
         Some((node, explanation))
     };
-    tree.leaves().into_iter().filter_map(meaning).collect()
+    tree.leaves().filter_map(meaning).collect()
 }
 
 /// Ties go to nominal, then to the leaf that comes first.
