@@ -50,12 +50,13 @@ pub fn lines(missions: &[Mission]) -> String {
 pub fn say(archive: &mut Archive, missions: &[Mission], rate_hz: f64) {
     let shares = Kind::SHARES.map(|(kind, percent)| format!("{} {percent} %", kind.name()));
     archive.say(&format!(
-        "{} missions of 20 m at {rate_hz} Hz, paths, soils, faults and noise drawn from seeds; every \
-         commander drives each of them in the same world. What breaks: {}; onset at 10 to 80 % of \
-         the planned time. At most {LIMIT_S:.0} s; help comes {HELP_S:.0} s after it was called, \
-         mends everything, and the mission goes on. The path is driven open loop: nobody steers \
-         back to a path that was left. Reward: `config/rover.pomdp`, per epoch of 0.1 s by the true \
-         state and the action; a remedy for the wrong wheel pays no more than going on.\n",
+        "{} missions of 20 m at {rate_hz} Hz, paths, soils, faults and noise drawn from seeds; \
+         every commander drives each of them in the same world. What breaks: {}; onset at 10 to \
+         80 % of the planned time. At most {LIMIT_S:.0} s; help comes {HELP_S:.0} s after it was \
+         called, mends everything, and the mission goes on. The path is driven open loop: nobody \
+         steers back to a path that was left. Reward: `config/rover.pomdp`, per epoch of 0.1 s by \
+         the true state and the action; a remedy for the wrong wheel pays no more than going \
+         on.\n",
         missions.len(),
         shares.join(", "),
     ));
