@@ -3,9 +3,9 @@
 //! Monitors speak every cycle, and a firing that is fed to the tracker at every cycle would count
 //! many times. An epoch gathers a set: symptoms that rose in it, and those that still stand at its
 //! end. A symptom that stood before and has gone says nothing about the state that the action led
-//! to. An epoch ends when the robot reports the outcome of the action, when a symptom rises that did
-//! not stand, or after a time. An error in position that goes on while the robot stops or moves off
-//! (EPS, EPM) is the same error, and counts as what it was last.
+//! to. An epoch ends when the robot reports the outcome of the action, when a symptom rises that
+//! did not stand, or after a time. An error in position that goes on while the robot stops or
+//! moves off (EPS, EPM) is the same error, and counts as what it was last.
 
 use vigil_blocks::{ActionOutcome, DetectionBelief, Symptoms};
 
