@@ -39,7 +39,6 @@ use vigil_decision::Pomdp;
 use vigil_decision::mdp::{self, Solution};
 use vigil_robot::Injection;
 use vigil_robot::injection::Change;
-use vigil_setup::schema::Recovery;
 use vigil_setup::{GraphArgs, Setup};
 
 /// Longest mission, s.
@@ -92,15 +91,8 @@ impl Shipped {
     pub fn kind(&self, action: usize) -> RecoveryKind {
         let name = self.model().actions().get(action);
         let settings = &self.setup.file.supervisor.actions;
-        match name.and_then(|name| settings.get(name)).map(|a| a.kind) {
-            None => RecoveryKind::None,
-            Some(Recovery::GoOn) => RecoveryKind::GoOn,
-            Some(Recovery::SlowDown) => RecoveryKind::SlowDown,
-            Some(Recovery::Stop) => RecoveryKind::Stop,
-            Some(Recovery::Compensate) => RecoveryKind::Compensate,
-            Some(Recovery::IgnoreEncoder) => RecoveryKind::IgnoreEncoder,
-            Some(Recovery::CallForHelp) => RecoveryKind::CallForHelp,
-        }
+        let recovery = name.and_then(|name| settings.get(name));
+        recovery.map_or(RecoveryKind::None, |action| action.kind.into())
     }
 
     /// Share of the planned speed under an action; what moves drives at full speed by default.

@@ -8,7 +8,7 @@ use vigil_decision::mdp::SolveError;
 use vigil_decision::policy::{BuildError, NameError};
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
-use vigil_setup::schema::{Recovery, RecoveryAction};
+use vigil_setup::schema::RecoveryAction;
 
 /// Name of the decision model's state for deviations that no fault model explains.
 const UNKNOWN: &str = "UNKNOWN";
@@ -198,19 +198,7 @@ pub(crate) fn actions(
             let action = settings
                 .get(name)
                 .ok_or_else(|| SupervisorError::NoAction(name.clone()))?;
-            let kind = match action.kind {
-                Recovery::GoOn => RecoveryKind::GoOn,
-                Recovery::SlowDown => RecoveryKind::SlowDown,
-                Recovery::Stop => RecoveryKind::Stop,
-                Recovery::Compensate => RecoveryKind::Compensate,
-                Recovery::IgnoreEncoder => RecoveryKind::IgnoreEncoder,
-                Recovery::CallForHelp => RecoveryKind::CallForHelp,
-                Recovery::NewPath => RecoveryKind::NewPath,
-                Recovery::Relocalise => RecoveryKind::Relocalise,
-                Recovery::GoThrough => RecoveryKind::GoThrough,
-                Recovery::MoveAway => RecoveryKind::MoveAway,
-                Recovery::GiveUp => RecoveryKind::GiveUp,
-            };
+            let kind = RecoveryKind::from(action.kind);
             let stands = matches!(
                 kind,
                 RecoveryKind::Stop

@@ -1,6 +1,7 @@
 //! `[supervisor]`: the decision system.
 
 use std::collections::BTreeMap;
+use vigil_blocks::RecoveryKind;
 
 use serde::Deserialize;
 
@@ -116,4 +117,22 @@ pub enum Recovery {
     MoveAway,
     /// Give this task up.
     GiveUp,
+}
+
+impl From<Recovery> for RecoveryKind {
+    fn from(recovery: Recovery) -> Self {
+        match recovery {
+            Recovery::GoOn => Self::GoOn,
+            Recovery::SlowDown => Self::SlowDown,
+            Recovery::Stop => Self::Stop,
+            Recovery::Compensate => Self::Compensate,
+            Recovery::IgnoreEncoder => Self::IgnoreEncoder,
+            Recovery::CallForHelp => Self::CallForHelp,
+            Recovery::NewPath => Self::NewPath,
+            Recovery::Relocalise => Self::Relocalise,
+            Recovery::GoThrough => Self::GoThrough,
+            Recovery::MoveAway => Self::MoveAway,
+            Recovery::GiveUp => Self::GiveUp,
+        }
+    }
 }
