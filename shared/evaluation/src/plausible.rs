@@ -239,7 +239,8 @@ pub fn warnings<'a>(
         Some(first) => vec![
             first.to_string(),
             format!(
-                "{found} of {all} runs that can be judged begin like this: unless all are faulty, verdicts are wrong"
+                "{found} of {all} runs that can be judged begin like this: unless all are faulty, \
+                 verdicts are wrong"
             ),
         ],
     }
