@@ -51,9 +51,9 @@ fn cycle_parts(setup: &Setup, graph: &Graph, name: ServiceName) -> (DeadlineMoni
 fn simulator(setup: &Setup, graph: &Graph) -> SimulatorSource {
     let inject = ["stuck:RM@3".to_owned()];
     match vigil_sensor_sim::assemble(setup, &inject).unwrap() {
-        Assembled::Simulator(world, obedience, schedule) => {
+        Assembled::Simulator(simulation, schedule) => {
             let period_ns = setup.period_ns();
-            SimulatorSource::new(*world, obedience, schedule, true, period_ns, graph).unwrap()
+            SimulatorSource::new(*simulation, schedule, true, period_ns, graph).unwrap()
         }
         Assembled::Playback(_) => unreachable!("the default graph simulates"),
     }

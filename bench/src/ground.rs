@@ -149,9 +149,9 @@ pub fn drive(rover: &Rover, taxonomy: &Taxonomy, job: &Job) -> Result<Vec<Run>, 
         ..Simulator::default()
     };
     let onset_s = rng.random_range(3.0..5.0);
-    let change = match &job.fault {
-        None => None,
-        Some((spec, _)) => Some((Injection::parse_change(spec, &rover.robot)?, onset_s)),
+    let changes = match &job.fault {
+        None => Vec::new(),
+        Some((spec, _)) => vec![(Injection::parse_change(spec, &rover.robot)?, onset_s)],
     };
     let conditions = Conditions {
         simulator,
@@ -176,7 +176,7 @@ pub fn drive(rover: &Rover, taxonomy: &Taxonomy, job: &Job) -> Result<Vec<Run>, 
         .zip(JUDGED_S)
         .for_each(|(due, after)| *due += after);
     let duration_s = onset_s + JUDGED_S[2] + 2.0 / RATE_HZ;
-    conditions.drive(rover, duration_s, change, |t_s, frame| {
+    conditions.drive(rover, duration_s, &changes, |t_s, frame| {
         for (chain, run) in &mut chains {
             let alarm = chain.take(frame);
             let Some((_, truth)) = &job.fault else {
@@ -201,7 +201,7 @@ pub fn drive(rover: &Rover, taxonomy: &Taxonomy, job: &Job) -> Result<Vec<Run>, 
 impl Run {
     /// Head of [`Self::line`].
     pub const HEAD: &'static str = "stiffer,fault,radius_m,speed_m_s,seed,sensors,false_alarm,\
-        delay_s,mode_2s,p,mode_5s,p,mode_10s,p";
+        delay_s,mode_2s,p_2s,mode_5s,p_5s,mode_10s,p_10s";
 
     /// The run as a line of CSV.
     #[must_use]

@@ -9,6 +9,7 @@ pub mod filters;
 pub mod ground;
 pub mod machine;
 pub mod matched;
+pub mod missions;
 pub mod naive;
 pub mod noncentrality;
 pub mod options;

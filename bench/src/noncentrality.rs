@@ -5,10 +5,11 @@
 //! whitened by their covariance, is the mean shift of an otherwise white sequence. The squares of
 //! that shift add up to the noncentrality: twice the log-likelihood ratio that a detector can have
 //! on average, at most. The track is put onto its first pose and never anchored again. Wheel
-//! rates and steering angles add the squares of their differences over the variance of a reading.
+//! rates and steering angles add theirs; what a healthy wheel is off by is a constant of the run,
+//! of which the readings before the onset have told most.
 
 use nalgebra::Matrix3;
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::{SensorFrame, Valid, WHEELS};
 use vigil_inference::track::Track;
 use vigil_robot::learned::{Observation, Observer};
 
@@ -82,7 +83,7 @@ impl<'a> Follower<'a> {
 /// the frames `from..to` of two runs of the same world.
 #[must_use]
 pub fn between(healthy: &Follower<'_>, faulty: &Follower<'_>, from: usize, to: usize) -> [f64; 2] {
-    let (mut pose, mut wheels) = (0.0, 0.0);
+    let mut pose = 0.0;
     let pairs = healthy.steps.iter().zip(&faulty.steps);
     for (a, b) in pairs.take(to).skip(from) {
         if let (Some((a, spread)), Some((b, _))) = (a.innovation, b.innovation) {
@@ -91,31 +92,71 @@ pub fn between(healthy: &Follower<'_>, faulty: &Follower<'_>, from: usize, to: u
             let inverse = spread.try_inverse().unwrap_or_else(Matrix3::zeros);
             pose += (apart.transpose() * inverse * apart)[0];
         }
-        wheels += readings(healthy.rover, a, b);
     }
-    [pose, pose + wheels]
+    [pose, pose + readings(healthy, faulty, from, to)]
 }
 
-/// Squares of the differences of wheel rates and steering angles over their variances.
-fn readings(rover: &Rover, healthy: &Step, faulty: &Step) -> f64 {
-    let (model, robot) = (&rover.model, &rover.robot);
-    let sample = |sd: f64| model.sample_variance(sd, model.interval_s);
-    let mut sum = 0.0;
-    for i in 0..robot.wheels.len() {
-        let (a, b) = (&healthy.frame, &faulty.frame);
-        if a.has(Valid::wheel_rate(i)) && b.has(Valid::wheel_rate(i)) {
-            let rate = a.wheel_rate[i];
-            let (_, process) = model.nominal.rates[i].rate(rate, healthy.curvature);
-            let apart = b.wheel_rate[i] - rate;
-            sum += apart * apart / (process + sample(model.noise.wheel_rate_rad_s));
+/// A channel whose healthy readings are off by a constant of the run, and white noise besides.
+#[derive(Debug, Clone, Copy, Default)]
+struct Shift {
+    /// Sum of the squares of the differences over the noise's variance.
+    squares: f64,
+    /// Sum of the differences over the noise's variance.
+    sum: f64,
+    /// Variance of the constant.
+    offset: f64,
+    /// Readings of the run so far, each over the noise's variance.
+    known: f64,
+}
+
+impl Shift {
+    fn add(&mut self, apart: f64, offset: f64, noise: f64) {
+        self.squares += apart * apart / noise;
+        self.sum += apart / noise;
+        self.offset = offset;
+    }
+
+    /// `d' (S + v 11')^-1 d` over the whole run, of which only the end differs: readings before the
+    /// onset have told most of the constant.
+    fn noncentrality(&self) -> f64 {
+        if self.offset <= 0.0 {
+            return self.squares;
         }
-        if a.has(Valid::steer(i)) && b.has(Valid::steer(i)) {
-            let process = model.nominal.steer_sd_rad * model.nominal.steer_sd_rad;
-            let apart = b.steer[i] - a.steer[i];
-            sum += apart * apart / (process + sample(model.noise.steer_rad));
+        self.squares - self.sum * self.sum / (1.0 / self.offset + self.known)
+    }
+}
+
+/// What wheel rates and steering angles say from frame `from` up to `to`.
+fn readings(healthy: &Follower<'_>, faulty: &Follower<'_>, from: usize, to: usize) -> f64 {
+    let (model, robot) = (&healthy.rover.model, &healthy.rover.robot);
+    let noise = |sd: f64| model.sample_variance(sd, model.interval_s);
+    let (rate_noise, steer_noise) = (
+        noise(model.noise.wheel_rate_rad_s),
+        noise(model.noise.steer_rad),
+    );
+    let mut rates = [Shift::default(); WHEELS];
+    let mut angles = [Shift::default(); WHEELS];
+    for (k, (a, b)) in healthy.steps.iter().zip(&faulty.steps).take(to).enumerate() {
+        for i in 0..robot.wheels.len().min(WHEELS) {
+            let has = |bit| a.frame.has(bit) && b.frame.has(bit);
+            if has(Valid::wheel_rate(i)) {
+                rates[i].known += 1.0 / rate_noise;
+                let rate = a.frame.wheel_rate[i];
+                let (_, offset) = model.nominal.rates[i].rate(rate, a.curvature);
+                if k >= from {
+                    rates[i].add(b.frame.wheel_rate[i] - rate, offset, rate_noise);
+                }
+            }
+            if has(Valid::steer(i)) {
+                angles[i].known += 1.0 / steer_noise;
+                let offset = model.nominal.steer_sd_rad * model.nominal.steer_sd_rad;
+                if k >= from {
+                    angles[i].add(b.frame.steer[i] - a.frame.steer[i], offset, steer_noise);
+                }
+            }
         }
     }
-    sum
+    rates.iter().chain(&angles).map(Shift::noncentrality).sum()
 }
 
 #[cfg(test)]
@@ -123,6 +164,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::simulated::{Conditions, constant};
+    use nalgebra::{DMatrix, DVector};
     use std::path::Path;
     use vigil_robot::Injection;
     use vigil_setup::schema::Simulator;
@@ -140,13 +182,13 @@ mod tests {
             rate_hz: 20.0,
             seed: 3,
         };
-        let follow = |change| {
+        let follow = |changes: &[_]| {
             let mut follower = Follower::new(rover);
             let take = |_, frame: &SensorFrame| follower.take(frame);
-            conditions.drive(rover, 6.0, change, take).unwrap();
+            conditions.drive(rover, 6.0, changes, take).unwrap();
             follower
         };
-        between(&follow(None), &follow(Some((change, ONSET_S))), 80, 120)
+        between(&follow(&[]), &follow(&[(change, ONSET_S)]), 80, 120)
     }
 
     #[test]
@@ -157,10 +199,14 @@ mod tests {
         // 40 readings of one encoder, each off by a tenth of about 2.5 rad/s.
         let model = &rover.model;
         let [pose, all] = found(&rover, "encoder-scale:LM:1.1");
-        let (_, process) = model.nominal.rates[1].rate(2.49, 0.0);
-        let variance = process + model.sample_variance(model.noise.wheel_rate_rad_s, 0.05);
         assert_eq!(pose, 0.0);
-        let expected = 40.0 * 0.249 * 0.249 / variance;
+        // Covariance of all 120 readings of the run: white noise, and one constant.
+        let (_, offset) = model.nominal.rates[1].rate(2.49, 0.0);
+        let noise = model.sample_variance(model.noise.wheel_rate_rad_s, 0.05);
+        let covariance = DMatrix::from_element(120, 120, offset)
+            + DMatrix::from_diagonal_element(120, 120, noise);
+        let shift = DVector::from_fn(120, |k, _| if k < 80 { 0.0 } else { 0.249 });
+        let expected = shift.dot(&covariance.lu().solve(&shift).unwrap());
         assert!((all / expected - 1.0).abs() < 0.02, "{all} {expected}");
         // A late pose: one jump of 0.06 m, which the track follows slowly. No innovation exceeds
         // it, and each has at least the sensor's variance.

@@ -53,14 +53,14 @@ pub fn run_cell(
         rate_hz,
         seed,
     };
-    let follow = |change| {
+    let follow = |changes: &[(vigil_robot::injection::Change, f64)]| {
         let mut follower = Follower::new(rover);
         let silent = conditions(0.0, FOLLOW_HZ);
         let take = |_, frame: &_| follower.take(frame);
-        silent.drive(rover, onset_s + WINDOW_S, change, take)?;
+        silent.drive(rover, onset_s + WINDOW_S, changes, take)?;
         Ok::<_, Box<dyn Error>>(follower)
     };
-    let (healthy, faulty) = (follow(None)?, follow(Some((change, onset_s)))?);
+    let (healthy, faulty) = (follow(&[])?, follow(&[(change, onset_s)])?);
     let first = (onset_s * FOLLOW_HZ).ceil() as usize;
     let last = first + (WINDOW_S * FOLLOW_HZ) as usize;
     let noncentrality = noncentrality::between(&healthy, &faulty, first, last);
@@ -72,7 +72,7 @@ pub fn run_cell(
     }
     let duration_s = onset_s + JUDGED_S[2] + 2.0 / rate_hz;
     let conditions = conditions(1.0, rate_hz);
-    let world = conditions.drive(rover, duration_s, Some((change, onset_s)), |t_s, frame| {
+    let world = conditions.drive(rover, duration_s, &[(change, onset_s)], |t_s, frame| {
         for (chain, run) in &mut chains {
             let alarm = chain.take(frame);
             run.take(t_s, alarm, || chain.said());

@@ -115,7 +115,7 @@ const BAD: [(&str, &str, &str, &[&str]); 13] = [
         "rover.pomdp",
         "states: ND ",
         "states: FINE ",
-        &["rover.pomdp:", "found 'ND'"],
+        &["rover.pomdp:", "'ND', wanted is a state"],
     ),
     (
         "rover.toml",

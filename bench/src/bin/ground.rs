@@ -1,7 +1,7 @@
 //! Does a model that was learned on one soil fail honestly on stiffer ones?
 //!
-//! `--seeds N` worlds per cell (2), the first of them `--first-seed S` (1; tuning takes others than
-//! what is archived); `--json`: the document only, nothing is archived.
+//! `--seeds N` worlds per cell (2), the first of them `--first-seed S` (1; tuning takes 100000
+//! or more, and so no run that is archived); `--json`: the document only, nothing is archived.
 
 use std::error::Error;
 use std::path::Path;

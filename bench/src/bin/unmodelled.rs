@@ -1,7 +1,7 @@
 //! Is what no model contains detected, and called unknown? And what does nominal driving raise?
 //!
-//! `--seeds N` worlds per cell (2), the first of them `--first-seed S` (1; tuning takes others than
-//! what is archived), `--hours H` of nominal driving (24), `--json`: the document
+//! `--seeds N` worlds per cell (2), the first of them `--first-seed S` (1; tuning takes 100000
+//! or more, and so no run that is archived), `--hours H` of nominal driving (24), `--json`: the document
 //! only, nothing is archived.
 
 use std::error::Error;

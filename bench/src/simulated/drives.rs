@@ -42,8 +42,8 @@ pub struct Conditions {
 }
 
 impl Conditions {
-    /// Drives for `duration_s`, giving each frame with its time to `take`; `change` happens at
-    /// `onset_s`. Times count from the first frame.
+    /// Drives for `duration_s`, giving each frame with its time to `take`; each of
+    /// `changes`, in the order of their times, s, happens then. Times count from the first frame.
     ///
     /// # Errors
     /// [`WorldError`] if a setting or the change is impossible.
@@ -51,20 +51,19 @@ impl Conditions {
         &self,
         rover: &Rover,
         duration_s: f64,
-        change: Option<(Change, f64)>,
+        changes: &[(Change, f64)],
         mut take: impl FnMut(f64, &SensorFrame),
     ) -> Result<World, WorldError> {
         let (rate_hz, seed) = (self.rate_hz, self.seed);
         let mut world = World::new(&rover.robot, &self.simulator, &self.drive, rate_hz, seed)?;
-        let mut pending = change;
+        let mut pending = changes.iter().peekable();
         let mut frame = SensorFrame::default();
         let frames = (duration_s * rate_hz).round() as u64;
         let period_ns = (1e9 / rate_hz).round() as u64;
         for k in 0..frames {
             let t_s = k as f64 / rate_hz;
-            if let Some((change, _)) = pending.filter(|(_, at_s)| *at_s <= t_s) {
-                world.change(change)?;
-                pending = None;
+            while let Some((change, _)) = pending.next_if(|(_, at_s)| *at_s <= t_s) {
+                world.change(*change)?;
             }
             let command = EffectiveCommand::as_planned(world.planned());
             world.step(1.0 / rate_hz, command);

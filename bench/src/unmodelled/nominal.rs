@@ -87,7 +87,7 @@ pub fn drive_nominal(rover: &Rover, seed: u64) -> Result<Nominal, Box<dyn Error>
     for (sensors, _) in SENSOR_SETS {
         chains.push((Chain::new(rover, sensors, seed)?, false));
     }
-    conditions.drive(rover, RUN_S, None, |t_s, frame| {
+    conditions.drive(rover, RUN_S, &[], |t_s, frame| {
         for ((chain, stands), alarms) in chains.iter_mut().zip(&mut alarms) {
             let alarm = chain.take(frame);
             if alarm && !*stands {

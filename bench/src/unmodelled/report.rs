@@ -135,7 +135,8 @@ pub struct Band {
     /// Detected within 2 s.
     pub detected: Share,
     /// Mean probability with which a test could detect them that is told the fault's every effect
-    /// and its onset, and looks once in 2 s: no detector at this rate of false alarms sees more.
+    /// and its onset, and looks once in 2 s. As far as a fault shifts means by what its
+    /// noncentrality says, no detector with one false alarm in 24 h sees more.
     pub p_clairvoyant: f64,
 }
 

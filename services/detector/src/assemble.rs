@@ -11,10 +11,11 @@ use crate::{Detector, DetectorError};
 /// [`DetectorError`] if model, robot and settings do not fit together.
 pub fn assemble(setup: &Setup) -> Result<Detector, DetectorError> {
     let file = &setup.file;
-    match &setup.model {
+    let detector = match &setup.model {
         RobotModel::Faults(model) => {
             Detector::new(model, &setup.robot, &file.detector, file.graph.seed)
         }
         RobotModel::Nominal(model) => Detector::nominal(model, &setup.robot, &file.detector),
-    }
+    }?;
+    Ok(detector.with_monitors(file.monitors.as_ref()))
 }

@@ -11,9 +11,10 @@ use vigil_robot::{Alarm, AlarmError, Description};
 use vigil_setup::schema;
 
 use crate::cloud::Cloud;
+use crate::monitors::Monitors;
 use crate::watch::{Observed, Watch};
 
-/// Pose log-odds beyond which the detector reports an error in position.
+/// Without monitors, pose log-odds beyond which the detector reports an error in position.
 const SYMPTOM_LOG_ODDS: f64 = 0.0;
 
 /// Why a detector was refused.
@@ -57,6 +58,10 @@ pub struct Detector {
     invalid_count: u32,
     symptoms: u32,
     external: u32,
+    /// In a graph with a planned path: these say what the symptoms are, not the pose's log-odds.
+    monitors: Option<Monitors>,
+    /// Last action that the robot obeyed, and its outcome, as the frame says it.
+    obeyed: (u64, u32),
 }
 
 impl Detector {
@@ -133,7 +138,23 @@ impl Detector {
             invalid_count: 0,
             symptoms: 0,
             external: 0,
+            monitors: None,
+            obeyed: (0, 0),
         })
+    }
+
+    /// The same detector with monitors of the pose against the planned pose, whose symptoms take
+    /// the place of its own; with `None`, as it was.
+    #[must_use]
+    pub fn with_monitors(mut self, settings: Option<&schema::Monitors>) -> Self {
+        self.monitors = settings.map(Monitors::new);
+        self
+    }
+
+    /// True with monitors of the planned pose.
+    #[must_use]
+    pub const fn is_monitoring(&self) -> bool {
+        self.monitors.is_some()
     }
 
     /// Log-odds at which the alarm rises.
@@ -179,6 +200,9 @@ impl Detector {
         self.armed = false;
         self.alarm.reset();
         (self.alarm_t_ns, self.symptoms) = (0, 0);
+        if let Some(monitors) = &mut self.monitors {
+            monitors.reset();
+        }
     }
 
     fn take(&mut self, frame: &SensorFrame) {
@@ -194,8 +218,13 @@ impl Detector {
         }
         self.t_last_ns = frame.header.t_capture_ns;
         self.run_id = frame.run_id;
+        self.obeyed = (frame.action_seq, frame.action_outcome);
         if intake.complete {
             self.observe();
+        }
+        if let Some(monitors) = &mut self.monitors {
+            monitors.observe(frame);
+            self.symptoms = monitors.symptoms();
         }
     }
 
@@ -260,6 +289,7 @@ impl Detector {
         belief.alarm = u32::from(self.alarm.stands());
         belief.alarm_count = self.alarm_count;
         belief.symptoms = self.symptoms | self.external;
+        (belief.action_seq, belief.action_outcome) = self.obeyed;
         belief.invalid_count = self.invalid_count;
         belief.degenerate_count = report.degenerate_count;
         belief.particle_count = self.watch.cloud().map_or(0, Cloud::len) as u32;

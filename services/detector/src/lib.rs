@@ -5,9 +5,11 @@
 mod assemble;
 mod cloud;
 mod detector;
+mod monitors;
 mod watch;
 pub mod wiring;
 
 pub use assemble::assemble;
 pub use detector::{Detector, DetectorError};
+pub use monitors::Monitors;
 pub use wiring::DetectorStage;

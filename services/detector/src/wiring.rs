@@ -16,6 +16,8 @@ pub struct DetectorStage {
     alarm: bool,
     alarm_told: bool,
     p_fault: f64,
+    symptoms: u32,
+    symptoms_told: u32,
 }
 
 impl DetectorStage {
@@ -32,6 +34,8 @@ impl DetectorStage {
             alarm: false,
             alarm_told: false,
             p_fault: 0.0,
+            symptoms: 0,
+            symptoms_told: 0,
         })
     }
 }
@@ -62,6 +66,7 @@ impl Stage for DetectorStage {
         let belief = self.belief.block();
         belief.cause = cause;
         (self.alarm, self.p_fault) = (belief.alarm != 0, belief.p_fault);
+        self.symptoms = belief.symptoms;
         self.particles.block().cause = cause;
         // Particles first: they are there when the belief wakes the identifier.
         self.particles.send(stamp, clock)?;
@@ -69,6 +74,10 @@ impl Stage for DetectorStage {
     }
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        if self.detector.is_monitoring() && self.symptoms != self.symptoms_told {
+            health.event(now_ns, EventKind::Symptoms, self.symptoms, 0.0, 0);
+            self.symptoms_told = self.symptoms;
+        }
         if self.alarm != self.alarm_told {
             let kind = if self.alarm {
                 EventKind::Alarm

@@ -86,7 +86,7 @@ fn mode(leaves: &Leaves, moved: Moved, encoders: &Encoders, rng: &mut Pcg64Mcg) 
             nodes |= 1 << leaf;
         }
         if let Some(leaf) = leaves.encoder[wheel] {
-            let broken = rng.random::<f64>() < encoders.p_broken(wheel, moved);
+            let broken = rng.random::<f64>() < encoders.p_broken(wheel);
             nodes |= u64::from(broken) << leaf;
         }
     }

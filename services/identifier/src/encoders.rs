@@ -5,22 +5,23 @@
 
 use vigil_blocks::WHEELS;
 use vigil_robot::learned::Moved;
-use vigil_robot::learned::wheel_evidence::{BREAKAGE_SHARES, BREAKAGES};
+use vigil_robot::learned::wheel_evidence::{ANYTHING, BREAKAGE_SHARES, BREAKAGES};
 
-/// Share of wheels that do anything, in the unknown; what those do: most slip, or are driven.
-const ANYTHING: f64 = 0.3;
-const ANYTHING_SHARES: [f64; BREAKAGES.len()] = [0.05, 0.05, 0.1, 0.1, 0.7];
-/// The breakage that is also what a slipping wheel reads: the last one.
-pub const WANDERS: usize = BREAKAGES.len();
+/// State of a whole encoder whose wheel turns at a rate of its own: it slips otherwise than learned
+/// beside a wheel that drags; or whatever it does, in the unknown. The states before it are whole,
+/// and the breakages.
+pub const OWN_RATE: usize = 1 + BREAKAGES.len();
 /// Share of wheels that slip otherwise than learned while another one drags.
 const SLIPS: f64 = 0.05;
+/// Share of wheels at a rate of their own among those that do anything, in the unknown.
+const ANYTHING_OWN_RATE: f64 = 0.7;
 
 /// An observation speaks against a state of one encoder by this much at most (natural logarithm):
 /// the product over all wheels stays a number.
 const AGAINST_MAX: f64 = -80.0;
 
-/// States of an encoder: whole, or broken in one way.
-pub const STATES: usize = 1 + BREAKAGES.len();
+/// States of an encoder: whole, broken in one way, whole on a wheel with a rate of its own.
+pub const STATES: usize = 2 + BREAKAGES.len();
 
 /// Log-likelihoods of one observation's readings in each state, prepared for many hypotheses.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,9 +76,10 @@ impl Encoders {
     #[must_use]
     pub fn unsure(t_ns: u64) -> Self {
         let mut p = [1.0 - ANYTHING; STATES];
-        for (p, share) in p[1..].iter_mut().zip(ANYTHING_SHARES) {
-            *p = ANYTHING * share;
+        for (p, share) in p[1..OWN_RATE].iter_mut().zip(BREAKAGE_SHARES) {
+            *p = ANYTHING * (1.0 - ANYTHING_OWN_RATE) * share;
         }
+        p[OWN_RATE] = ANYTHING * ANYTHING_OWN_RATE;
         Self {
             p: [p; WHEELS],
             onset: [t_ns; WHEELS],
@@ -89,9 +91,9 @@ impl Encoders {
     #[must_use]
     pub fn moved(mut self, moved: Moved) -> Self {
         for (wheel, p) in self.p.iter_mut().enumerate() {
-            let whole = p[0] + p[WANDERS];
+            let whole = p[0] + p[OWN_RATE];
             let slips = if slips(moved, wheel) { SLIPS } else { 0.0 };
-            (p[0], p[WANDERS]) = (whole * (1.0 - slips), whole * slips);
+            (p[0], p[OWN_RATE]) = (whole * (1.0 - slips), whole * slips);
         }
         self
     }
@@ -109,13 +111,13 @@ impl Encoders {
         let wheels = births.iter().enumerate().take(likelihoods.wheels);
         for (wheel, &birth) in wheels {
             let p = &mut self.p[wheel];
-            let (whole, broken) = (p[0], p[1..].iter().sum::<f64>());
+            let (whole, broken) = (p[0], p[1..OWN_RATE].iter().sum::<f64>());
             // The onset is that of the mass that came last in quantity.
             if whole * birth > broken {
                 self.onset[wheel] = t_ns;
             }
             p[0] = whole * (1.0 - birth) + broken * death;
-            for (p, share) in p[1..].iter_mut().zip(BREAKAGE_SHARES) {
+            for (p, share) in p[1..OWN_RATE].iter_mut().zip(BREAKAGE_SHARES) {
                 *p = *p * (1.0 - death) + whole * birth * share;
             }
             let joint: [f64; STATES] =
@@ -131,12 +133,10 @@ impl Encoders {
         evidence + product.ln()
     }
 
-    /// Probability that this wheel's encoder is broken, if the robot is moved so. One that wanders
-    /// is not, if another wheel drags: its wheel slips.
+    /// Probability that this wheel's encoder is broken.
     #[must_use]
-    pub fn p_broken(&self, wheel: usize, moved: Moved) -> f64 {
-        let states = if slips(moved, wheel) { WANDERS } else { STATES };
-        self.p[wheel][1..states].iter().sum::<f64>().min(1.0)
+    pub fn p_broken(&self, wheel: usize) -> f64 {
+        self.p[wheel][1..OWN_RATE].iter().sum::<f64>().min(1.0)
     }
 
     /// Onset of this wheel's broken encoder, if it is broken.
@@ -167,29 +167,34 @@ mod tests {
             let evidence = encoders.step(&births, death, &likelihoods, step);
             assert!((evidence - (a + b).ln()).abs() < 1e-12);
             (whole, broken) = (a / (a + b), b / (a + b));
-            assert!((encoders.p_broken(0, Moved::Nominal) - broken).abs() < 1e-12);
+            assert!((encoders.p_broken(0) - broken).abs() < 1e-12);
         }
         assert_eq!(encoders.onset(0), 1);
-        assert_eq!(encoders.p_broken(1, Moved::Nominal), 0.0);
+        assert_eq!(encoders.p_broken(1), 0.0);
     }
 
     #[test]
-    fn what_wanders_is_slip_beside_a_dragging_wheel_and_a_broken_encoder_otherwise() {
-        let wanders = Likelihoods::new(2, |_, state| if state == WANDERS { 0.0 } else { -2.0 });
+    fn a_rate_of_its_own_is_slip_beside_a_dragging_wheel_and_a_broken_encoder_stays_broken() {
+        let own_rate = Likelihoods::new(2, |_, state| if state == OWN_RATE { 0.0 } else { -2.0 });
         let births = [1e-4; WHEELS];
         let dragging = Moved::Stuck(0b10);
         let mut encoders = Encoders::healthy(0).moved(dragging);
         for step in 1..=10 {
-            encoders.step(&births, 0.0, &wanders, step);
+            encoders.step(&births, 0.0, &own_rate, step);
         }
-        assert!(encoders.p_broken(0, dragging) < 0.01);
-        assert!(
-            encoders.p_broken(1, dragging) > 0.99,
-            "it stands, and does not slip"
-        );
-        assert!(encoders.p_broken(0, Moved::Nominal) > 0.99);
+        assert!(encoders.p_broken(0) < 0.01 && encoders.p[0][OWN_RATE] > 0.99);
+        assert_eq!(encoders.p[1][OWN_RATE], 0.0, "it stands, and does not slip");
         // When nothing drags any more, slip is over.
-        assert!(encoders.moved(Moved::Nominal).p_broken(0, Moved::Nominal) < 0.01);
+        let after = encoders.moved(Moved::Nominal);
+        assert_eq!(after.p[0][OWN_RATE], 0.0);
+        assert!(after.p_broken(0) < 0.01);
+        // A broken encoder is one also when a wheel begins to drag.
+        let noise = Likelihoods::new(1, |_, state| if state == 3 { 0.0 } else { -2.0 });
+        let mut encoders = Encoders::healthy(0);
+        for step in 1..=20 {
+            encoders.step(&births, 0.0, &noise, step);
+        }
+        assert!(encoders.moved(dragging).p_broken(0) > 0.99);
     }
 
     #[test]
@@ -200,7 +205,7 @@ mod tests {
             let evidence = encoders.step(&[0.0; WHEELS], 0.0, &impossible, step);
             let expected = AGAINST_MAX * WHEELS as f64;
             assert!((evidence - expected).abs() < 1e-6, "{evidence}");
-            assert_eq!(encoders.p_broken(0, Moved::Nominal), 0.0);
+            assert_eq!(encoders.p_broken(0), 0.0);
         }
     }
 }

@@ -18,7 +18,7 @@ use vigil_robot::learned::{
     FaultRates, Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
 };
 
-use crate::encoders::{Encoders, Likelihoods, WANDERS};
+use crate::encoders::{Encoders, Likelihoods, OWN_RATE};
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
 use crate::sets::Sets;
@@ -244,8 +244,7 @@ impl Exact {
             match (state, moved) {
                 (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
                 (0, _) => evidence.whole(&self.model, observation, moved, is_new, wheel),
-                // A scaled or late encoder of a wheel that stands reads zero.
-                (WANDERS, _) if moved.is_stuck(wheel) => evidence.standing[wheel],
+                (OWN_RATE, _) => evidence.own_rate[wheel],
                 (broken, _) => evidence.broken[wheel][broken - 1],
             }
         })
@@ -256,9 +255,8 @@ impl Exact {
         self.sets.clear();
         for hypothesis in self.bank.hypotheses() {
             let (p, encoders) = (hypothesis.log_weight.exp(), &hypothesis.state.encoders);
-            let moved = self.modes[hypothesis.mode].moved;
             self.sets
-                .add(hypothesis.mode, p, |wheel| encoders.p_broken(wheel, moved));
+                .add(hypothesis.mode, p, |wheel| encoders.p_broken(wheel));
         }
         self.sets.posterior(&self.leaves, out);
     }
@@ -283,10 +281,7 @@ impl Exact {
         if let Some(wheel) = wheel(&self.leaves.encoder) {
             let known = self.bank.hypotheses().iter();
             let known = known.filter(|h| !self.modes[h.mode].moved.is_unknown());
-            let p = |h: &Hypothesis<State>| {
-                let p_broken = h.state.encoders.p_broken(wheel, self.modes[h.mode].moved);
-                h.log_weight + p_broken.ln()
-            };
+            let p = |h: &Hypothesis<State>| h.log_weight + h.state.encoders.p_broken(wheel).ln();
             let best = known.max_by(|a, b| p(a).total_cmp(&p(b)));
             return best.map_or(0, |best| best.state.encoders.onset(wheel));
         }

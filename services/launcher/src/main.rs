@@ -17,6 +17,7 @@ mod observer;
 mod plan;
 mod summary;
 mod timeline;
+mod words;
 
 use std::io::Write;
 use std::process::ExitCode;

@@ -8,6 +8,7 @@ use vigil_cycle::topic::ServiceName;
 use vigil_robot::injection::{Change, Wire};
 
 use crate::plan::Plan;
+use crate::words;
 
 /// An event in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -270,6 +271,8 @@ impl Namer {
                 None => "?".into(),
             },
             EventKind::Run => event.value.to_string(),
+            EventKind::Symptoms => words::symptoms(event.what),
+            EventKind::Outcome => words::outcome(event),
             _ => String::new(),
         }
     }
@@ -306,5 +309,8 @@ const fn kind_name(kind: EventKind) -> &'static str {
         EventKind::EndOfRecording => "end-of-recording",
         EventKind::Obeys => "obeys",
         EventKind::Reason => "reason",
+        EventKind::Symptoms => "symptoms",
+        EventKind::Outcome => "outcome",
+        EventKind::Goal => "goal",
     }
 }

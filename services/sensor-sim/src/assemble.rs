@@ -8,12 +8,12 @@ use vigil_robot::Injection;
 use vigil_setup::Setup;
 use vigil_setup::schema::Source;
 
-use crate::{Obedience, Playback, Schedule, World};
+use crate::{Navigator, Obedience, Playback, Schedule, Simulation, World};
 
 /// What is to be the source of the graph.
 pub enum Assembled {
-    /// The simulated rover, what it makes of actions, and what is to break when.
-    Simulator(Box<World>, Obedience, Schedule),
+    /// The simulated rover, and what is to break when.
+    Simulator(Box<Simulation>, Schedule),
     /// Recorded frames.
     Playback(Playback),
 }
@@ -31,7 +31,9 @@ pub fn assemble(setup: &Setup, injections: &[String]) -> Result<Assembled, Box<d
             let world = World::new(&setup.robot, &file.simulator, &file.drive, rate_hz, seed)
                 .map_err(|e| format!("{path}: simulator: {e}"))?;
             let obedience = Obedience::new(&setup.robot.limits);
-            Assembled::Simulator(Box::new(world), obedience, schedule)
+            let navigator = file.navigation.as_ref().map(Navigator::new);
+            let simulation = Simulation::new(world, obedience, navigator);
+            Assembled::Simulator(Box::new(simulation), schedule)
         }
         Source::Playback => Assembled::Playback(playback(setup)?),
         Source::External => {

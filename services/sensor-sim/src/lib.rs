@@ -2,6 +2,8 @@
 //!
 //! - [`World`]: the rover on its soil, its sensors, and the faults and disturbances of both;
 //! - [`Obedience`]: what the rover makes of the supervisor's actions;
+//! - [`Navigator`]: the way that the rover finds in a corridor, around or through what blocks it;
+//! - [`Simulation`]: these together;
 //! - [`Playback`]: recorded frames, one run after the other;
 //! - [`Schedule`]: injections that are due at given times.
 //!
@@ -14,11 +16,13 @@ mod disturbed;
 mod drive;
 mod encoders;
 mod history;
+mod navigation;
 mod noise;
 mod obedience;
 mod playback;
 mod pose_sensor;
 mod schedule;
+mod simulation;
 mod soil;
 mod wiring;
 mod world;
@@ -27,8 +31,10 @@ pub use assemble::{Assembled, assemble};
 pub use check::WorldError;
 pub use drive::{ACCELERATION_MAX_M_S2, CURVATURE_RATE_MAX_1_M_S, DriveCommand};
 pub use encoders::{NOISE_MAX_RAD_S, NOISE_MIN_RAD_S};
+pub use navigation::{Happening, Navigator, Order};
 pub use obedience::{EffectiveCommand, Obedience};
 pub use playback::{Playback, PlaybackError};
 pub use schedule::Schedule;
+pub use simulation::Simulation;
 pub use wiring::{PlaybackSource, SimulatorSource};
 pub use world::{CURRENT_PER_TORQUE_A_N_M, Truth, World};

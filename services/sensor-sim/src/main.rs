@@ -56,11 +56,10 @@ fn serve(setup: &Setup, source: Assembled, args: Args) -> Result<(), ServeError>
     let plan = setup.plan(ServiceName::SensorSim, args.service.report);
     let began_ns = args.began_ns;
     match source {
-        Assembled::Simulator(world, obedience, schedule) => {
+        Assembled::Simulator(simulation, schedule) => {
             let (allow, period_ns) = (setup.file.control.allow_injection, setup.period_ns());
             serve::source(&plan, |graph| {
-                let source =
-                    SimulatorSource::new(*world, obedience, schedule, allow, period_ns, graph)?;
+                let source = SimulatorSource::new(*simulation, schedule, allow, period_ns, graph)?;
                 Ok(source.resuming(began_ns))
             })
         }

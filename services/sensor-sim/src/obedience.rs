@@ -90,6 +90,11 @@ impl Obedience {
     }
 }
 
+/// True if the rover obeys `action` at `now_ns`.
+pub(crate) fn is_valid(action: &Action, now_ns: u64) -> bool {
+    obey(DriveCommand::default(), Some(action), now_ns).is_ok()
+}
+
 /// Decision and, unless it says stop, the command and its share of the planned speed.
 type Obeyed = (u64, Option<(DriveCommand, f64)>);
 
@@ -109,8 +114,14 @@ fn obey(planned: DriveCommand, action: Option<&Action>, now_ns: u64) -> Result<O
     }
     match kind {
         RecoveryKind::None => Err(Refusal::Nothing),
-        RecoveryKind::Stop | RecoveryKind::CallForHelp => Ok((action.decision_seq, None)),
+        RecoveryKind::Stop
+        | RecoveryKind::CallForHelp
+        | RecoveryKind::NewPath
+        | RecoveryKind::Relocalise
+        | RecoveryKind::GiveUp => Ok((action.decision_seq, None)),
         RecoveryKind::GoOn
+        | RecoveryKind::GoThrough
+        | RecoveryKind::MoveAway
         | RecoveryKind::SlowDown
         | RecoveryKind::Compensate
         | RecoveryKind::IgnoreEncoder => {
@@ -158,8 +169,15 @@ mod tests {
 
     #[test]
     fn driving_kinds_scale_the_speed_and_bend_the_curvature() {
-        use RecoveryKind::{Compensate, GoOn, IgnoreEncoder, SlowDown};
-        for kind in [GoOn, SlowDown, Compensate, IgnoreEncoder] {
+        use RecoveryKind::{Compensate, GoOn, GoThrough, IgnoreEncoder, MoveAway, SlowDown};
+        for kind in [
+            GoOn,
+            SlowDown,
+            Compensate,
+            IgnoreEncoder,
+            GoThrough,
+            MoveAway,
+        ] {
             let mut obedience = Obedience::new(&limits());
             let found = obedience.apply(PLANNED, Some(&action(kind)), 1000);
             assert!(
@@ -175,8 +193,9 @@ mod tests {
     }
 
     #[test]
-    fn stop_and_call_for_help_stop_without_being_a_safe_stop() {
-        for kind in [RecoveryKind::Stop, RecoveryKind::CallForHelp] {
+    fn what_is_done_standing_stops_without_being_a_safe_stop() {
+        use RecoveryKind::{CallForHelp, GiveUp, NewPath, Relocalise, Stop};
+        for kind in [Stop, CallForHelp, NewPath, Relocalise, GiveUp] {
             let mut obedience = Obedience::new(&limits());
             let found = obedience.apply(PLANNED, Some(&action(kind)), 0);
             assert_eq!((found.target.speed_m_s, found.progress), (0.0, 0.0));

@@ -318,6 +318,11 @@ impl World {
         self.run_id = run_id;
     }
 
+    /// Another run begins: every filter is reset.
+    pub const fn begin_run(&mut self) {
+        self.run_id = self.run_id.wrapping_add(1);
+    }
+
     /// Equilibria that were not found (where forces from outside exceed the soil's strength there
     /// is none); the last one was kept.
     #[must_use]

@@ -7,8 +7,8 @@ use vigil_blocks::{Action, RecoveryKind, SensorFrame};
 use vigil_cycle::allocation::{CountingAllocator, allocations};
 use vigil_robot::injection::Change;
 use vigil_robot::{Fault, FaultKind};
-use vigil_sensor_sim::{Obedience, Schedule, World};
-use vigil_setup::schema::{DriveSegment, Simulator};
+use vigil_sensor_sim::{Navigator, Obedience, Schedule, Simulation, World};
+use vigil_setup::schema::{DriveSegment, GraphFile, Simulator};
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
@@ -69,4 +69,38 @@ fn steady_cycles_with_faults_and_actions_allocate_nothing() {
     // The counter counts.
     drop(vec![1_u8]);
     assert!(allocations() > before);
+}
+
+#[test]
+fn a_robot_on_its_path_allocates_nothing_whatever_it_is_told() {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config");
+    let robot = vigil_setup::load_robot(&config.join("robots/rover.toml")).unwrap();
+    let text = std::fs::read_to_string(config.join("corridor-obstacle.toml")).unwrap();
+    let file: GraphFile = toml::from_str(&text).unwrap();
+    let world = World::new(&robot, &file.simulator, &[], 100.0, 1).unwrap();
+    let navigator = Navigator::new(file.navigation.as_ref().unwrap());
+    let obedience = Obedience::new(&robot.limits);
+    let mut simulation = Simulation::new(world, obedience, Some(navigator));
+    let mut action = Action {
+        valid_until_ns: u64::MAX,
+        speed_scale: 1.0,
+        curvature_gain: 1.0,
+        ..Action::default()
+    };
+    let mut frame = SensorFrame::default();
+    let mut happenings = 0;
+    let before = allocations();
+    // Every kind, five times, each for four seconds; following for longer.
+    for turn in 0..55_u32 {
+        action.decision_seq += 1;
+        action.kind = 1 + turn % 11;
+        let cycles = if action.kind == 1 { 1000 } else { 400 };
+        for _ in 0..cycles {
+            simulation.step(0.01, Some(&action), 0);
+            simulation.measure(&mut frame);
+            happenings += u32::from(simulation.happening().is_some());
+        }
+    }
+    assert_eq!(allocations() - before, 0);
+    assert!(happenings > 20, "{happenings}");
 }

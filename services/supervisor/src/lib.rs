@@ -4,11 +4,18 @@
 //! at its ports.
 
 mod assemble;
+mod epoch;
 mod evidence;
+mod exceptions;
+mod hardware;
+mod leaves;
 mod mapping;
+mod observations;
 mod policy;
 mod restraint;
+mod silence;
 mod supervisor;
+mod told;
 mod wiring;
 
 pub use assemble::{assemble, validity_ns};

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use vigil_blocks::{DECISION_ACTIONS, DECISION_STATES, RecoveryKind};
 use vigil_decision::Pomdp;
 use vigil_decision::mdp::SolveError;
-use vigil_decision::policy::{DualError, NameError};
+use vigil_decision::policy::{BuildError, NameError};
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
-use vigil_setup::schema::{Recovery, RecoveryAction};
+use vigil_setup::schema::RecoveryAction;
 
 /// Name of the decision model's state for deviations that no fault model explains.
 const UNKNOWN: &str = "UNKNOWN";
@@ -56,12 +56,38 @@ pub enum SupervisorError {
          such wheel needs a finite curvature gain and offset"
     )]
     NoCompensation(usize, String),
+    /// An observation is no set of symptoms and outcomes.
+    #[error(
+        "observation '{0}' of the decision model is no set of symptoms; allowed are 'none', and \
+         EPS, EPM, LD, SD, BO, ALT, NNA, each at most once, joined by '_'"
+    )]
+    NoSet(String),
+    /// Two observations are the same set.
+    #[error("observations '{0}' and '{1}' of the decision model are the same set of symptoms")]
+    SameSet(String, String),
+    /// A symptom alone, or silence, has no observation.
+    #[error(
+        "the decision model has no observation '{0}'; with supervisor.evidence = \"symptoms\" it \
+         needs none, EPS, EPM, LD, SD, BO, ALT and NNA, and those of their sets that can occur"
+    )]
+    NoObservation(&'static str),
+    /// The state for hardware faults is not in the model.
+    #[error(
+        "supervisor.hardware_state: the decision model has no state '{found}'; allowed are \
+         {allowed}"
+    )]
+    HardwareState {
+        /// Name that was given.
+        found: String,
+        /// Names of the model's states.
+        allowed: String,
+    },
     /// The policy is not known.
     #[error("supervisor.policy: {0}")]
     Policy(#[from] NameError),
     /// Dual control cannot be set up.
     #[error("supervisor: {0}")]
-    Dual(#[from] DualError),
+    Build(#[from] BuildError),
     /// An action for information is not in the model.
     #[error(
         "supervisor.information_actions: the decision model has no action '{found}'; allowed are \
@@ -89,16 +115,22 @@ pub(crate) struct StateMeaning {
     pub stuck: bool,
 }
 
+/// Checks that a block can carry the model's belief and values.
+pub(crate) fn check_size(model: &Pomdp) -> Result<(), SupervisorError> {
+    let (states, actions) = (model.states().len(), model.actions().len());
+    if states > DECISION_STATES || actions > DECISION_ACTIONS {
+        return Err(SupervisorError::Size { states, actions });
+    }
+    Ok(())
+}
+
 /// Meaning of every state, in the model's order.
 pub(crate) fn states(
     model: &Pomdp,
     tree: &FaultTree,
     robot: &Description,
 ) -> Result<Vec<StateMeaning>, SupervisorError> {
-    let (states, actions) = (model.states().len(), model.actions().len());
-    if states > DECISION_STATES || actions > DECISION_ACTIONS {
-        return Err(SupervisorError::Size { states, actions });
-    }
+    check_size(model)?;
     let names = std::iter::once(0)
         .chain(tree.leaves())
         .map(|i| tree.nodes()[i].name.as_str());
@@ -166,15 +198,15 @@ pub(crate) fn actions(
             let action = settings
                 .get(name)
                 .ok_or_else(|| SupervisorError::NoAction(name.clone()))?;
-            let kind = match action.kind {
-                Recovery::GoOn => RecoveryKind::GoOn,
-                Recovery::SlowDown => RecoveryKind::SlowDown,
-                Recovery::Stop => RecoveryKind::Stop,
-                Recovery::Compensate => RecoveryKind::Compensate,
-                Recovery::IgnoreEncoder => RecoveryKind::IgnoreEncoder,
-                Recovery::CallForHelp => RecoveryKind::CallForHelp,
-            };
-            let stands = matches!(kind, RecoveryKind::Stop | RecoveryKind::CallForHelp);
+            let kind = RecoveryKind::from(action.kind);
+            let stands = matches!(
+                kind,
+                RecoveryKind::Stop
+                    | RecoveryKind::CallForHelp
+                    | RecoveryKind::NewPath
+                    | RecoveryKind::Relocalise
+                    | RecoveryKind::GiveUp
+            );
             let speed_scale = action.speed_scale.unwrap_or(if stands { 0.0 } else { 1.0 });
             Ok(ActionMeaning { kind, speed_scale })
         })

@@ -4,6 +4,8 @@
 //!   [`HOLD_EPOCHS`] epochs in a row. A more cautious one is taken at once.
 //! - Help is called for only when that has been best for [`HELP_EPOCHS`] epochs in a row; until
 //!   then the best of the other actions is taken.
+//! - A call for help stands until the filters are reset by whoever has helped. A robot that brakes
+//!   and then stands looks healthy, whatever is wrong with it: what pulls at it pulls no more.
 
 use vigil_blocks::RecoveryKind;
 use vigil_decision::policy::choose_among;
@@ -23,6 +25,8 @@ pub(crate) struct Restraint {
     candidate: usize,
     epochs: u32,
     help_epochs: u32,
+    /// The action that calls for help, once it has been taken.
+    called: Option<usize>,
 }
 
 impl Restraint {
@@ -31,6 +35,7 @@ impl Restraint {
             candidate: usize::MAX,
             epochs: 0,
             help_epochs: 0,
+            called: None,
         }
     }
 
@@ -50,6 +55,13 @@ impl Restraint {
                 .get(action)
                 .is_some_and(|m| m.kind == RecoveryKind::CallForHelp)
         };
+        if let Some(called) = self.called.filter(|called| *called != best.action) {
+            return Choice {
+                action: called,
+                margin: 0.0,
+                control: Control::Policy,
+            };
+        }
         let mut choice = best;
         if is_help(best.action) {
             self.help_epochs = self.help_epochs.saturating_add(u32::from(timed));
@@ -64,7 +76,11 @@ impl Restraint {
         } else {
             self.help_epochs = 0;
         }
-        self.hold(current, choice, meanings, timed)
+        let choice = self.hold(current, choice, meanings, timed);
+        if self.called.is_none() && self.help_epochs >= HELP_EPOCHS && is_help(choice.action) {
+            self.called = Some(choice.action);
+        }
+        choice
     }
 
     fn hold(

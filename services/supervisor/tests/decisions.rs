@@ -119,6 +119,30 @@ fn help_is_called_only_when_the_unknown_lasts() {
 }
 
 #[test]
+fn a_call_for_help_stands_until_whoever_has_helped_resets_the_filters() {
+    let mut world = World::new();
+    let unknown = [("UNKNOWN", 0.99), ("ND", 0.01)];
+    let nominal = [("ND", 0.9999), ("UNKNOWN", 0.0001)];
+    world.rest(400, true, &unknown);
+    assert_eq!(world.kind(), RecoveryKind::CallForHelp);
+    // The robot brakes and stands, and so looks healthy: the identifier believes it.
+    world.rest(1000, false, &nominal);
+    assert!(world.belief("ND") > 0.99);
+    assert_eq!(world.kind(), RecoveryKind::CallForHelp);
+    assert_eq!(world.action.margin, 0.0);
+    // Blind for a while: it stops, and then still waits for help.
+    world
+        .supervisor
+        .step(Entry::Missed(1000), &mut world.action);
+    assert_eq!(world.kind(), RecoveryKind::Stop);
+    world.rest(1000, false, &nominal);
+    assert_eq!(world.kind(), RecoveryKind::CallForHelp);
+    world.supervisor.step(Entry::Reset, &mut world.action);
+    world.rest(100, false, &nominal);
+    assert_eq!(world.kind(), RecoveryKind::GoOn);
+}
+
+#[test]
 fn evidence_that_was_lost_on_the_way_is_made_good_within_an_epoch() {
     let mut world = World::new();
     let before = [("RM_STUCK", 0.6), ("RF_STUCK", 0.4)];

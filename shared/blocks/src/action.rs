@@ -78,6 +78,16 @@ pub enum RecoveryKind {
     IgnoreEncoder = 5,
     /// Stop and call for help.
     CallForHelp = 6,
+    /// Stand, and ask the planner for another path to the goal.
+    NewPath = 7,
+    /// Stand, and find the own place anew.
+    Relocalise = 8,
+    /// Look closely for an opening past what blocks the way, and go through it.
+    GoThrough = 9,
+    /// Move away from the present place.
+    MoveAway = 10,
+    /// Stop for good: this task is given up.
+    GiveUp = 11,
 }
 
 impl RecoveryKind {
@@ -92,6 +102,11 @@ impl RecoveryKind {
             4 => Self::Compensate,
             5 => Self::IgnoreEncoder,
             6 => Self::CallForHelp,
+            7 => Self::NewPath,
+            8 => Self::Relocalise,
+            9 => Self::GoThrough,
+            10 => Self::MoveAway,
+            11 => Self::GiveUp,
             _ => return None,
         })
     }

@@ -37,7 +37,7 @@ impl Channel {
 
 block! {
     /// Written by the detector every cycle.
-    pub struct DetectionBelief, size 432 {
+    pub struct DetectionBelief, size 448 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -62,6 +62,8 @@ block! {
         pub noise_scale_steer: f64,
         /// Log-odds of a fault seen by each channel alone (see [`Channel`]).
         pub channel_log_odds: [f64; CHANNELS],
+        /// `decision_seq` of the last action that the robot obeyed, as the frame says it.
+        pub action_seq: u64,
         /// Capture time of the frame that raised the present alarm, ns; 0 without alarm.
         pub alarm_t_capture_ns: u64,
         /// 1 while the alarm stands.
@@ -76,5 +78,9 @@ block! {
         pub degenerate_count: u32,
         /// Particles in use.
         pub particle_count: u32,
+        /// Outcome of that action, as the frame says it: an [`crate::ActionOutcome`].
+        pub action_outcome: u32,
+        /// Reserved, zero.
+        pub reserved: u32,
     }
 }

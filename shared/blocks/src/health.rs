@@ -66,6 +66,13 @@ pub enum EventKind {
     /// Why the last diagnosis and not the next best. `what`: the channel that speaks most for it;
     /// `p`: its evidence, nat; `value`: the next best mode.
     Reason = 17,
+    /// The set of symptoms changed. `what`: bits of [`crate::Symptoms`].
+    Symptoms = 18,
+    /// A recovery action ended. `what`: its [`crate::RecoveryKind`]; `value`: an
+    /// [`crate::ActionOutcome`].
+    Outcome = 19,
+    /// The robot is at the goal of its path.
+    Goal = 20,
 }
 
 impl EventKind {
@@ -90,6 +97,9 @@ impl EventKind {
             15 => Self::EndOfRecording,
             16 => Self::Obeys,
             17 => Self::Reason,
+            18 => Self::Symptoms,
+            19 => Self::Outcome,
+            20 => Self::Goal,
             _ => return None,
         })
     }

@@ -120,6 +120,20 @@ pub enum ActionOutcome {
     Failed = 3,
 }
 
+impl ActionOutcome {
+    /// The outcome behind a block's value, if this version knows it.
+    #[must_use]
+    pub const fn from_wire(value: u32) -> Option<Self> {
+        Some(match value {
+            0 => Self::None,
+            1 => Self::Running,
+            2 => Self::Succeeded,
+            3 => Self::Failed,
+            _ => return None,
+        })
+    }
+}
+
 impl SensorFrame {
     /// True if every bit of `mask` is set in `valid`.
     #[must_use]

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use vigil_decision::mdp::{self, Solution};
 use vigil_decision::policy::{
     ActionVoting, Base, Decider, Dual, DualControl, DualError, Gate, Information, LookAhead,
-    PolicyName, informed_values, normalised_entropy,
+    PolicyName, normalised_entropy,
 };
 use vigil_decision::{Choice, Control, Policy, Pomdp};
 
@@ -300,15 +300,7 @@ fn the_informed_policy_has_the_values_of_its_bound() {
     for of in [solved(TIGER), navigation()] {
         let (model, solution) = &of;
         let expected = fast_informed_bound(model);
-        for (got, want) in informed_values(model, solution).iter().zip(&expected) {
-            for (got, want) in got.iter().zip(want) {
-                assert!(
-                    (got - want).abs() < 1e-9 * want.abs().max(1.0),
-                    "{got} {want}"
-                );
-            }
-        }
-        let mut policy = Base::FastInformed.build(model, solution);
+        let mut policy = Base::FastInformed.build(model, solution).unwrap();
         let mut values = vec![0.0; model.actions().len()];
         policy.evaluate(model.start(), &mut values);
         for (value, q) in values.iter().zip(&expected) {
@@ -321,6 +313,7 @@ fn the_informed_policy_has_the_values_of_its_bound() {
     let (model, solution) = solved(TIGER);
     Base::FastInformed
         .build(&model, &solution)
+        .unwrap()
         .evaluate(&[0.5, 0.5], &mut values);
     assert!((values[0] - 87.179_487_18).abs() < 1e-8, "{values:?}");
 }

@@ -29,7 +29,7 @@ fn rules(model: &Pomdp) -> Rules {
 fn agent(model: &Pomdp) -> PolicyAgent<'_> {
     let solution = mdp::solve(model).unwrap();
     let policy = Base::QMdp.build(model, &solution);
-    PolicyAgent::new(model, Decider::new(policy, model, &solution))
+    PolicyAgent::new(model, Decider::new(policy.unwrap(), model, &solution))
 }
 
 #[test]

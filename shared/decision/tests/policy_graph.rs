@@ -29,7 +29,7 @@ fn graph(nodes_max: usize) -> (Pomdp, PolicyGraph) {
     let model = Pomdp::parse(TIGER).unwrap();
     let solution = mdp::solve(&model).unwrap();
     let policy = Base::QMdp.build(&model, &solution);
-    let mut decider = Decider::new(policy, &model, &solution);
+    let mut decider = Decider::new(policy.unwrap(), &model, &solution);
     let limits = Limits {
         nodes_max,
         tolerance: 1e-9,

@@ -3,11 +3,13 @@
 use std::path::Path;
 
 use vigil_blocks::WHEELS;
-use vigil_decision::policy::PolicyName;
 use vigil_robot::description::Kinematics;
 use vigil_robot::{AlarmError, Description, RobotModel};
 
-use crate::schema::{GraphFile, Service, Source, Supervisor};
+use crate::schema::{GraphFile, Service, Source};
+
+mod navigation;
+mod supervisor;
 
 /// Largest length of a graph's name: it is part of shared-memory and socket names.
 const NAME_LENGTH_MAX: usize = 24;
@@ -58,33 +60,8 @@ pub(crate) fn graph(
     services(file, &mut report);
     sensor(file, path, &mut report);
     drive(file, robot, &mut report);
-    policy(&file.supervisor, &mut report);
-}
-
-/// Name of the policy, and what its dual control needs.
-fn policy(settings: &Supervisor, report: &mut impl FnMut(&str, String)) {
-    let is_dual = match settings.policy.parse::<PolicyName>() {
-        Ok(name) => name.information.is_some(),
-        Err(error) => return report("supervisor.policy", error.to_string()),
-    };
-    let key = "supervisor.information_actions";
-    let named = &settings.information_actions;
-    if settings.as_published && (!named.is_empty() || settings.gate.is_some()) {
-        let message = "with as_published neither information_actions nor gate has a meaning";
-        report("supervisor.as_published", message.to_owned());
-    } else if is_dual && named.is_empty() && !settings.as_published {
-        let message = format!(
-            "is required by {}: one or more actions of the decision model that do not end or \
-             interrupt the task",
-            settings.policy
-        );
-        report(key, message);
-    }
-    for (i, name) in named.iter().enumerate() {
-        if named[..i].contains(name) {
-            report(key, format!("'{name}' appears twice"));
-        }
-    }
+    navigation::check(file, robot, &mut report);
+    supervisor::check(file, &mut report);
 }
 
 fn simulator_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
@@ -143,7 +120,7 @@ fn filter_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) 
         "supervisor.epoch_ms",
         file.supervisor.epoch_ms,
         1.0,
-        10_000.0,
+        60_000.0,
     );
     range(
         "supervisor.validity_periods",
@@ -250,10 +227,11 @@ fn sensor(file: &GraphFile, path: &Path, report: &mut impl FnMut(&str, String)) 
 }
 
 fn drive(file: &GraphFile, robot: Option<&Description>, report: &mut impl FnMut(&str, String)) {
-    if file.sensor.source == Source::Simulator && file.drive.is_empty() {
+    let needs_drive = file.sensor.source == Source::Simulator && file.navigation.is_none();
+    if needs_drive && file.drive.is_empty() {
         report(
             "drive",
-            "at least one [[drive]] segment is required by the simulator".into(),
+            "at least one [[drive]] segment, or [navigation], is required by the simulator".into(),
         );
     }
     let Some(robot) = robot else { return };

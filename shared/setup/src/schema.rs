@@ -4,13 +4,18 @@
 //! tree, the learned model and the decision model, each a file of its own. Paths are relative to
 //! the graph file. Keys end in their unit. Unknown keys are errors.
 
-use std::collections::BTreeMap;
 use std::fmt;
 
 use clap::ValueEnum;
 use serde::Deserialize;
 use vigil_robot::learned;
 use vigil_robot::learned::monitor::Channels;
+
+mod navigation;
+mod supervisor;
+
+pub use navigation::{Monitors, Navigation, Obstacle, Trouble, TroubleKind};
+pub use supervisor::{Evidence, Gate, Recovery, RecoveryAction, Supervisor};
 
 /// A whole graph file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -34,6 +39,11 @@ pub struct GraphFile {
     /// The simulated world.
     #[serde(default)]
     pub simulator: Simulator,
+    /// A corridor with a planned path, in place of `drive`; for the simulator. Default: none.
+    pub navigation: Option<Navigation>,
+    /// Monitors of the pose against the planned pose. Default: none; symptoms of the detector's own
+    /// are then those of its pose track.
+    pub monitors: Option<Monitors>,
     /// The detection filter.
     #[serde(default)]
     pub detector: Detector,
@@ -345,91 +355,6 @@ impl Default for Identifier {
             p_unknown: 0.01,
         }
     }
-}
-
-/// The decision system.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Supervisor {
-    /// Policy: `qmdp`, `mls` (the best action of the most likely state), `av` (action voting),
-    /// `fib` (fast informed bound), or one of these with dual control, which gathers information
-    /// while the belief is too uncertain: `dm-X` about the state, `adm-X` about the best action.
-    pub policy: String,
-    /// Dual control: information is gathered above this entropy, 0 (certain) to 1; 1 never.
-    pub threshold: f64,
-    /// Dual control: whose entropy the threshold is for, `state` or `action`; default `state` for
-    /// `dm-X`, `action` for `adm-X`.
-    pub gate: Option<Gate>,
-    /// Dual control: actions of the decision model that may be taken for information. Required by
-    /// `dm-X` and `adm-X`: a restart or a call for help must not be made merely to know more.
-    pub information_actions: Vec<String>,
-    /// Dual control: after so many steps for information in a row without falling entropy, X acts
-    /// until it has fallen, 0 to 1000; 0 never.
-    pub stall_guard_steps: u32,
-    /// Dual control as published in 2002: gated on the state's entropy, any action may be taken
-    /// for information, no guard. Default false.
-    pub as_published: bool,
-    /// Interval between decision epochs, ms, 1 to 10000. A change of the diagnosed mode opens an
-    /// epoch at once.
-    pub epoch_ms: f64,
-    /// Validity of a published action, as a multiple of the period, 1 to 1000 (at least 20 ms).
-    pub validity_periods: f64,
-    /// What each action of the decision model makes the robot do, by the action's name.
-    pub actions: BTreeMap<String, RecoveryAction>,
-}
-
-impl Default for Supervisor {
-    fn default() -> Self {
-        Self {
-            policy: "qmdp".into(),
-            threshold: 0.5,
-            gate: None,
-            information_actions: Vec::new(),
-            stall_guard_steps: 5,
-            as_published: false,
-            epoch_ms: 100.0,
-            validity_periods: 10.0,
-            actions: BTreeMap::new(),
-        }
-    }
-}
-
-/// Whose entropy decides whether information is gathered.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Gate {
-    /// That of the belief over states.
-    State,
-    /// That of the states' votes for their best actions.
-    Action,
-}
-
-/// What an action makes the robot do.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RecoveryAction {
-    /// Kind of the recovery.
-    pub kind: Recovery,
-    /// Factor on the commanded speed, 0 to 1; default 1 (0 for `stop`, `call_for_help`).
-    pub speed_scale: Option<f64>,
-}
-
-/// Kind of a recovery action; see `vigil_blocks::RecoveryKind`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Recovery {
-    /// Drive as planned.
-    GoOn,
-    /// Drive as planned, slower.
-    SlowDown,
-    /// Stop.
-    Stop,
-    /// Counter-steer by the learned yaw offset of the stuck wheel.
-    Compensate,
-    /// Drive on without trusting one wheel's encoder.
-    IgnoreEncoder,
-    /// Stop and call for help.
-    CallForHelp,
 }
 
 /// Control commands at run time.

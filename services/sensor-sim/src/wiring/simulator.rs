@@ -10,15 +10,15 @@ use vigil_robot::injection::{Change, Wire};
 
 use super::actions::Actions;
 use super::peers::Peers;
-use crate::{Obedience, Schedule, World};
+use crate::{Happening, Schedule, Simulation};
 
 /// Changes that may wait to be told in one cycle.
 const CHANGES_MAX: usize = 16;
 
 /// Simulates, measures, obeys.
 pub struct SimulatorSource {
-    world: World,
-    obedience: Obedience,
+    simulation: Simulation,
+    happening: Option<Happening>,
     schedule: Schedule,
     allow_injection: bool,
     peers: Peers,
@@ -43,18 +43,17 @@ impl SimulatorSource {
     /// # Errors
     /// The transport's.
     pub fn new(
-        mut world: World,
-        obedience: Obedience,
+        mut simulation: Simulation,
         schedule: Schedule,
         allow_injection: bool,
         period_ns: u64,
         graph: &Graph,
     ) -> Result<Self, PortError> {
         let frames = graph.sender(Topic::Sensor)?;
-        world.set_run_id(frames.epoch());
+        simulation.world.set_run_id(frames.epoch());
         Ok(Self {
-            world,
-            obedience,
+            simulation,
+            happening: None,
             schedule,
             allow_injection,
             peers: Peers::new(graph)?,
@@ -84,7 +83,7 @@ impl SimulatorSource {
 
     /// Makes a change; true if the simulated rover can be changed so.
     fn change(&mut self, change: Change, at_ns: u64) -> bool {
-        let done = self.world.change(change).is_ok();
+        let done = self.simulation.change(change).is_ok();
         if done && self.changes.len() < CHANGES_MAX {
             self.changes.push((at_ns, change));
         }
@@ -142,18 +141,16 @@ impl Source for SimulatorSource {
         }
         self.actions.take(t_schedule_ns, self.frames.epoch());
         self.take_due_injections(t_schedule_ns);
-        let planned = self.world.planned();
-        let command = self
-            .obedience
-            .apply(planned, self.actions.newest(), clock.now_ns());
+        let last_ns = self.last_ns.replace(t_schedule_ns);
+        let passed_ns = last_ns.map_or(self.period_ns, |last_ns| t_schedule_ns - last_ns);
+        let (dt_s, action) = (passed_ns as f64 * 1e-9, self.actions.newest());
+        let command = self.simulation.step(dt_s, action, clock.now_ns());
         self.refusal = command.refusal;
         if let (None, Some(action)) = (command.refusal, self.actions.newest()) {
             self.obeyed = (action.header.epoch, command.action_seq);
         }
-        let last_ns = self.last_ns.replace(t_schedule_ns);
-        let passed_ns = last_ns.map_or(self.period_ns, |last_ns| t_schedule_ns - last_ns);
-        self.world.step(passed_ns as f64 * 1e-9, command);
-        self.world.measure(self.frames.block());
+        self.simulation.measure(self.frames.block());
+        self.happening = self.simulation.happening().or(self.happening);
         let stamp = Stamp {
             t_schedule_ns,
             t_capture_ns: t_schedule_ns,
@@ -174,6 +171,13 @@ impl Source for SimulatorSource {
             let (what, wheel) = (action.action, u64::from(action.wheel));
             health.event(now_ns, EventKind::Obeys, what, 0.0, wheel);
             self.obeyed_told = self.obeyed;
+        }
+        match self.happening.take() {
+            Some(Happening::Ended(kind, outcome)) => {
+                health.event(now_ns, EventKind::Outcome, kind as u32, 0.0, outcome as u64);
+            }
+            Some(Happening::Goal) => health.event(now_ns, EventKind::Goal, 0, 0.0, 0),
+            None => {}
         }
         self.take_control(health, now_ns);
         for (at_ns, change) in self.changes.drain(..) {

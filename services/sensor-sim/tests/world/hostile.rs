@@ -67,7 +67,7 @@ proptest! {
             let finite = [action.speed_scale, action.curvature_gain, action.curvature_offset]
                 .iter()
                 .all(|value| value.is_finite());
-            if expired || !finite || !(1..=6).contains(&action.kind) {
+            if expired || !finite || !(1..=11).contains(&action.kind) {
                 prop_assert!(command.refusal.is_some() && target.speed_m_s == 0.0);
             }
             world.step(0.01, command);

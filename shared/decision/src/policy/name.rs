@@ -5,8 +5,10 @@ use std::str::FromStr;
 
 use super::{
     ActionVoting, Decider, Dual, DualControl, DualError, FastInformed, Information,
-    MostLikelyState, Policy, QMdp, informed_values,
+    MostLikelyState, Policy, QMdp,
 };
+use crate::bounds::{SolveError, fib};
+use crate::budget::Budget;
 use crate::mdp::Solution;
 use crate::model::Pomdp;
 
@@ -33,14 +35,19 @@ impl Base {
     ];
 
     /// The policy for a model, of which `solution` is the fully observable relaxation.
-    #[must_use]
-    pub fn build(self, model: &Pomdp, solution: &Solution) -> Box<dyn Policy> {
-        match self {
+    ///
+    /// # Errors
+    /// [`SolveError`] if its values cannot be found.
+    pub fn build(self, model: &Pomdp, solution: &Solution) -> Result<Box<dyn Policy>, SolveError> {
+        Ok(match self {
             Self::MostLikelyState => Box::new(MostLikelyState::new(solution.clone())),
             Self::ActionVoting => Box::new(ActionVoting::new(solution.clone())),
             Self::QMdp => Box::new(QMdp::new(solution.clone())),
-            Self::FastInformed => Box::new(FastInformed::new(informed_values(model, solution))),
-        }
+            Self::FastInformed => {
+                let q = fib::solve_from(model, solution, &mut Budget::new(&mut || false))?;
+                Box::new(FastInformed::new(q))
+            }
+        })
     }
 }
 
@@ -58,19 +65,30 @@ pub struct PolicyName {
 #[error("policy '{0}' is not known: allowed are mls, av, qmdp, fib, and dm-X and adm-X of each")]
 pub struct NameError(pub String);
 
+/// Why a policy cannot be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BuildError {
+    /// The settings of dual control are refused.
+    #[error(transparent)]
+    Dual(#[from] DualError),
+    /// Its values cannot be found.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+}
+
 impl PolicyName {
     /// The decider for a model, of which `solution` is the fully observable relaxation; `settings`
     /// are those of dual control, which a policy without it does not need.
     ///
     /// # Errors
-    /// [`DualError`] if the settings are refused.
+    /// [`BuildError`].
     pub fn build(
         self,
         model: &Pomdp,
         solution: &Solution,
         settings: impl FnOnce(Information) -> Dual,
-    ) -> Result<Decider, DualError> {
-        let mut policy = self.base.build(model, solution);
+    ) -> Result<Decider, BuildError> {
+        let mut policy = self.base.build(model, solution)?;
         if let Some(information) = self.information {
             let settings = settings(information);
             policy = Box::new(DualControl::new(policy, model, solution, settings)?);

@@ -173,7 +173,8 @@ pub fn learn(
 fn doubt(runs: &[&Run], until_s: f64, robot: &Description) -> Result<Option<String>, NominalError> {
     let of = |run: &&Run| plausible::doubt(run, robot, until_s);
     let doubts: Vec<Doubtful> = runs.iter().filter_map(of).collect();
-    let (found, all) = (doubts.len(), runs.len());
+    let judged = |run: &&&Run| plausible::is_judged(run, robot, until_s);
+    let (found, all) = (doubts.len(), runs.iter().filter(judged).count());
     match doubts.into_iter().next() {
         Some(doubt) if 2 * found >= all => Err(NominalError::Doubtful(doubt)),
         Some(doubt) => Ok(Some(format!(

@@ -15,6 +15,7 @@
 //! | [`monitor`] | the detection filter over observations |
 
 pub mod calibration;
+mod compensation;
 mod faults;
 pub mod form;
 pub mod model;

@@ -5,6 +5,7 @@ use vigil_blocks::WHEELS;
 use vigil_inference::departure;
 
 use super::calibration::Calibration;
+use super::compensation;
 use super::form::Form;
 use super::monitor::Channels;
 use super::motion::{Curve, MotionModel};
@@ -258,22 +259,14 @@ impl Model {
     }
 
     /// Gain and offset (1/m) such that a robot with `wheel` stuck, commanded the curvature
-    /// `gain·κ + offset`, drives the curvature κ. The driven curvature `yaw(κ')/forward(κ')` is
-    /// linearised about κ' = 0. (1, 0) if the model does not know the wheel.
+    /// `gain·κ + offset`, drives the curvature κ, nearly so for |κ| up to 0.5 /m. (1, 0) if the
+    /// model does not know the wheel, or such curvatures cannot be driven with it.
     #[must_use]
     pub fn compensation(&self, wheel: usize) -> (f64, f64) {
-        let Some(stuck) = self.stuck(wheel) else {
-            return (1.0, 0.0);
-        };
-        let (yaw, forward) = (stuck.motion.yaw.curvature, stuck.motion.forward.curvature);
-        let at_zero = yaw[0] / forward[0];
-        let slope = (yaw[1] - at_zero * forward[1]) / forward[0];
-        let (gain, offset) = (1.0 / slope, -at_zero / slope);
-        if gain.is_finite() && offset.is_finite() {
-            (gain, offset)
-        } else {
-            (1.0, 0.0)
-        }
+        let line = self
+            .stuck(wheel)
+            .map(|stuck| compensation::line(&stuck.motion));
+        line.flatten().unwrap_or((1.0, 0.0))
     }
 
     /// Variance of one sample of a channel with standard deviation `sd` at the reference rate,

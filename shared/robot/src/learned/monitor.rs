@@ -42,7 +42,7 @@ const REPEATS_LOG_ODDS_MAX: f64 = 40.0;
 const FOLLOWING: f64 = 0.1;
 /// Residuals beyond this many deviations mean a lost track.
 const LOST: f64 = 10.0;
-/// Time after which evidence counts, s: once the noise is known, and at the latest.
+/// Time in motion after which evidence counts, s: once the noise is known, and at the latest.
 const READY_S: f64 = 1.0;
 const READY_LATEST_S: f64 = 5.0;
 /// Observations in a row without usable weights after which the pose starts anew.
@@ -86,7 +86,7 @@ pub struct Monitor {
     repeats: [f64; WHEELS],
     any: Constant,
     noise: SensorNoise,
-    run_s: f64,
+    moved_s: f64,
     report: Report,
 }
 
@@ -129,7 +129,7 @@ impl Monitor {
             repeats: [0.0; WHEELS],
             any: Constant::default(),
             noise: SensorNoise::default(),
-            run_s: 0.0,
+            moved_s: 0.0,
             report: Report {
                 log_odds: f64::NEG_INFINITY,
                 channels: [f64::NEG_INFINITY; CHANNELS],
@@ -146,7 +146,7 @@ impl Monitor {
         self.tracking = false;
         self.coasted = 0;
         self.noise = SensorNoise::default();
-        self.run_s = 0.0;
+        self.moved_s = 0.0;
         self.report.evidence = 0.0;
         self.forget_evidence();
     }
@@ -180,7 +180,7 @@ impl Monitor {
     pub fn is_ready(&self) -> bool {
         let use_wheels = self.channels == Channels::PoseEncoders;
         let is_known = self.noise.is_known(use_wheels);
-        self.run_s >= READY_S && (is_known || self.run_s >= READY_LATEST_S)
+        self.moved_s >= READY_S && (is_known || self.moved_s >= READY_LATEST_S)
     }
 
     /// How noisy the sensors are.
@@ -198,7 +198,10 @@ impl Monitor {
     /// that the return of a robot to its nominal mode is seen after a fault has led it away.
     pub fn step(&mut self, observation: &Observation, following: bool) {
         self.report.evidence = 0.0;
-        self.run_s += observation.dt_s;
+        if observation.moving {
+            // A robot at rest shows nothing of its noise.
+            self.moved_s += observation.dt_s;
+        }
         self.noise.update(&self.model, &self.robot, observation);
         self.step_pose(observation, following);
         if observation.moving && self.channels == Channels::PoseEncoders {

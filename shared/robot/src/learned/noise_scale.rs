@@ -135,12 +135,12 @@ impl SensorNoise {
         if !steady || now.anchor || last.anchor {
             return;
         }
-        let has_pose = |o: &&Observation| o.pose_frames == now.pose_frames && o.pose_frames > 0;
-        if all.iter().all(has_pose) {
+        if all.iter().all(|o| o.pose_frames > 0) {
             let (up, down) = (apart(model, &last, now), apart(model, &before, &last));
-            for (i, variance) in now.pose_variance(model, 1.0).into_iter().enumerate() {
+            let [a, b, c] = all.map(|o| o.pose_variance(model, 1.0));
+            for i in 0..a.len() {
                 let bend = up[i] - down[i];
-                self.pose.push(bend * bend / (6.0 * variance));
+                self.pose.push(bend * bend / (a[i] + 4.0 * b[i] + c[i]));
             }
         }
         let surge = (now.command[1] - last.command[1]).abs();

@@ -14,8 +14,8 @@ pub struct Reading {
     pub repeats: u32,
     /// Samples that are exactly 0, repeats included.
     pub zeros: u32,
-    /// Mean of the last observation that had plain samples, if there was one.
-    pub before: Option<f64>,
+    /// Mean of the plain samples of the observation before, and how many, if there were any.
+    pub before: Option<(f64, u32)>,
 }
 
 impl Reading {
@@ -35,8 +35,8 @@ impl Reading {
             repeats: 0,
             zeros: 0,
             before: match self.plain {
-                0 => self.before,
-                _ => Some(self.mean),
+                0 => None,
+                plain => Some((self.mean, plain)),
             },
         }
     }
@@ -88,8 +88,8 @@ mod tests {
         reading.push(2.0, None);
         reading.push(4.0, Some(2.0));
         let next = reading.next();
-        assert_eq!((next.before, next.count()), (Some(3.0), 0));
-        // An observation without samples passes on what it has.
-        assert_eq!(next.next().before, Some(3.0));
+        assert_eq!((next.before, next.count()), (Some((3.0, 2)), 0));
+        // What is older than an observation says nothing.
+        assert_eq!(next.next().before, None);
     }
 }

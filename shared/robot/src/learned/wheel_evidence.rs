@@ -7,23 +7,21 @@ use super::wheels::{rolling_rate, steering_angle};
 use super::{EncoderState, Model, Moved, NoiseScales, Observation, RateModel};
 use crate::Description;
 
-/// Ways in which an encoder breaks: zero, frozen, noise, dead (zero plus the sensor's noise),
-/// wandering (a rate of its own).
-pub const BREAKAGES: [EncoderState; 5] = [
+/// Ways in which an encoder breaks: zero, frozen, noise, dead (zero plus the sensor's noise).
+pub const BREAKAGES: [EncoderState; 4] = [
     EncoderState::Zero,
     EncoderState::Frozen,
     EncoderState::Noise,
     EncoderState::Dead,
-    EncoderState::Wanders,
 ];
 /// Prior shares of [`BREAKAGES`].
-pub const BREAKAGE_SHARES: [f64; BREAKAGES.len()] = [0.3, 0.3, 0.3, 0.04, 0.06];
+pub const BREAKAGE_SHARES: [f64; BREAKAGES.len()] = [0.32, 0.32, 0.32, 0.04];
 
 /// Share of healthy wheels' rates in the tail: while all is well, and while another wheel drags.
 const TAIL: f64 = 0.02;
 const TAIL_DRAGGED: f64 = 0.1;
 /// Share of wheels that do anything, in the unknown.
-const ANYTHING: f64 = 0.2;
+pub const ANYTHING: f64 = 0.2;
 /// Standard deviation of a steering angle that does anything, rad.
 const STEER_ANY_RAD: f64 = 0.3;
 /// Variance of a standing wheel's rate, (rad/s)².
@@ -36,6 +34,8 @@ pub struct WheelEvidence {
     pub healthy: [f64; WHEELS],
     /// Its encoder is broken in each of [`BREAKAGES`].
     pub broken: [[f64; BREAKAGES.len()]; WHEELS],
+    /// It turns, or is said to turn, at a rate of its own.
+    pub own_rate: [f64; WHEELS],
     /// It stands.
     pub standing: [f64; WHEELS],
     /// It does anything.
@@ -61,6 +61,7 @@ impl WheelEvidence {
         let mut evidence = Self {
             healthy: [0.0; WHEELS],
             broken: [[0.0; BREAKAGES.len()]; WHEELS],
+            own_rate: [0.0; WHEELS],
             standing: [0.0; WHEELS],
             any: [0.0; WHEELS],
             steering: steering(model, robot, observation, noise.steer),
@@ -80,6 +81,7 @@ impl WheelEvidence {
             let (mean, variance) = model.nominal.rates[i].rate(rate, command[0]);
             evidence.healthy[i] = read(EncoderState::Turning(mean, variance + behind, TAIL));
             evidence.standing[i] = read(EncoderState::Turning(0.0, STANDING_VARIANCE, TAIL));
+            evidence.own_rate[i] = read(EncoderState::OwnRate);
             evidence.any[i] = read(EncoderState::Any);
             evidence.broken[i] = BREAKAGES.map(read);
         }

@@ -79,9 +79,9 @@ pub enum EncoderState {
     Noise,
     /// The encoder reports zero plus the sensor's noise.
     Dead,
-    /// A smooth rate of its own: that of the observation before, or nearly so. A scaled or late
-    /// encoder, or a wheel that slips.
-    Wanders,
+    /// A smooth rate of its own: that of the observation before, or nearly so. A wheel that slips
+    /// or is driven, a scaled or late encoder.
+    OwnRate,
     /// Anything.
     Any,
 }
@@ -97,8 +97,8 @@ const EXCEPTION: f64 = 0.01;
 const OUTLIER: f64 = 1e-3;
 /// Deviation of a standing wheel's rate from zero, rad/s.
 const STANDING_SD_RAD_S: f64 = 0.02;
-/// Deviation of a wandering rate from one observation to the next, rad/s.
-const WANDER_SD_RAD_S: f64 = 0.05;
+/// Deviation of a rate of its own from one observation to the next, rad/s.
+const OWN_RATE_SD_RAD_S: f64 = 0.05;
 
 impl EncoderModel {
     /// Natural log-probability of `reading` in `state`, for samples whose noise has the standard
@@ -126,10 +126,10 @@ impl EncoderModel {
                 let standing = self.common(reading, 0.0, variance, sample_sd);
                 log_add(standing, OUTLIER.ln() + noise)
             }
-            EncoderState::Wanders => match reading.before {
-                Some(before) => {
-                    let sample = sample_sd * sample_sd / plain.max(1.0);
-                    let variance = WANDER_SD_RAD_S * WANDER_SD_RAD_S + sample;
+            EncoderState::OwnRate => match reading.before {
+                Some((before, count)) => {
+                    let sample = sample_sd * sample_sd / f64::from(count);
+                    let variance = OWN_RATE_SD_RAD_S * OWN_RATE_SD_RAD_S + sample;
                     let smooth = self.common(reading, before, variance, sample_sd);
                     log_add(smooth, OUTLIER.ln() + noise)
                 }
@@ -218,9 +218,9 @@ mod tests {
     }
 
     #[test]
-    fn a_smooth_rate_of_its_own_wanders_and_is_neither_noise_nor_turning() {
+    fn a_smooth_rate_of_its_own_is_neither_noise_nor_turning_as_commanded() {
         let states = [
-            EncoderState::Wanders,
+            EncoderState::OwnRate,
             EncoderState::Turning(2.0, 4e-4, 0.02),
             EncoderState::Noise,
             EncoderState::Dead,
@@ -239,7 +239,7 @@ mod tests {
         // Without an observation before there is nothing to be near to.
         let first = reading(&[1.6]);
         let of = |state| model().log_likelihood(state, &first, 0.05);
-        assert_eq!(of(EncoderState::Wanders), of(EncoderState::Noise));
+        assert_eq!(of(EncoderState::OwnRate), of(EncoderState::Noise));
     }
 
     #[test]

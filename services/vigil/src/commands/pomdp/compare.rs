@@ -8,9 +8,10 @@ use std::path::PathBuf;
 
 use clap::builder::RangedU64ValueParser;
 use clap::{ArgAction, ValueEnum};
-use vigil_decision::policy::{Gate, informed_values};
+use vigil_decision::bounds::fib;
+use vigil_decision::policy::Gate;
 use vigil_decision::simulation::{Rules, horizon};
-use vigil_decision::{Pomdp, mdp, navigation};
+use vigil_decision::{Budget, Pomdp, mdp, navigation};
 
 use super::load;
 use crate::commands::{CommandError, Outcome};
@@ -151,10 +152,9 @@ fn upper(args: &Args, world: &Pomdp) -> Result<Option<f64>, CommandError> {
     if !args.ends.is_empty() || args.upper.is_some() {
         return Ok(args.upper.filter(|_| args.ends.is_empty()));
     }
-    let solution = mdp::solve(world).map_err(CommandError::usage)?;
-    let at_start = |q: &Vec<f64>| -> f64 { q.iter().zip(world.start()).map(|(q, b)| q * b).sum() };
-    let values = informed_values(world, &solution);
-    Ok(values.iter().map(at_start).reduce(f64::max))
+    let bound = fib::solve(world, &mut Budget::new(&mut || false));
+    let bound = bound.map_err(CommandError::usage)?;
+    Ok(Some(bound.value(world.start())))
 }
 
 /// Index of the contestant that the others are compared with.

@@ -1,0 +1,79 @@
+//! What is Vigil worth? Missions with random faults: with it, without, and with plainer rules.
+//!
+//! `--missions N` (1000), the first of seed `--first-seed S` (1; tuning takes others than what is
+//! archived), `--rate HZ` (100); `--json`: the document only, nothing is archived. Exit: 1 if Vigil
+//! does not win on the mission reward against going on and against the escalation.
+
+use std::error::Error;
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use serde_json::json;
+use vigil_bench::archive::Archive;
+use vigil_bench::machine;
+use vigil_bench::matched::in_parallel;
+use vigil_bench::missions::{self, Mission, Plan, Shipped};
+use vigil_bench::options::Options;
+
+/// Missions between two lines of progress.
+const PROGRESS: usize = 25;
+
+fn main() -> ExitCode {
+    vigil_bench::ended("missions", run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
+    if cfg!(debug_assertions) {
+        return Err("a debug build takes hours: use scripts/bench".into());
+    }
+    let known = [
+        ("--missions", 1000.0),
+        ("--first-seed", 1.0),
+        ("--rate", 100.0),
+    ];
+    let options = Options::parse(&known)?;
+    let [count, first] = ["--missions", "--first-seed"].map(|key| options.number(key) as u64);
+    let rate_hz = options.number("--rate");
+    let shipped = Shipped::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."), rate_hz)?;
+    let plans: Vec<Plan> = (first..first + count).map(Plan::new).collect();
+    let (began, done) = (Instant::now(), AtomicUsize::new(0));
+    let drive = |plan: &Plan| {
+        let mission = missions::drive(&shipped, plan.clone()).map_err(|e| e.to_string());
+        let so_far = done.fetch_add(1, Ordering::Relaxed) + 1;
+        if so_far % PROGRESS == 0 {
+            let passed_s = began.elapsed().as_secs_f64();
+            eprintln!("{so_far} of {count} missions in {passed_s:.0} s");
+        }
+        mission
+    };
+    let driven: Result<Vec<Mission>, String> = in_parallel(&plans, drive).into_iter().collect();
+    let driven = driven?;
+    let wall_s = began.elapsed().as_secs_f64();
+    let mut document = missions::document(&driven);
+    document["machine"] = machine::facts();
+    document["wall_s"] = json!(wall_s);
+    document["rate_hz"] = json!(rate_hz);
+    if options.is_json {
+        println!("{document:#}");
+        return won(&driven);
+    }
+    let mut archive = Archive::new("missions")?;
+    archive.store("missions.json", &document)?;
+    archive.store_text("missions.csv", &missions::lines(&driven))?;
+    if let Some(svg) = missions::picture(&shipped, &plans)? {
+        archive.store_text("paths.svg", &svg)?;
+    }
+    missions::say(&mut archive, &driven, rate_hz);
+    archive.say(&format!("\nWall time {wall_s:.0} s."));
+    println!("archived in {}", archive.close()?.display());
+    won(&driven)
+}
+
+fn won(driven: &[Mission]) -> Result<(), Box<dyn Error>> {
+    match missions::lost_against(driven).as_slice() {
+        [] => Ok(()),
+        lost => Err(format!("Vigil does not win on the mission reward against: {lost:?}").into()),
+    }
+}

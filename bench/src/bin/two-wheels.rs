@@ -1,0 +1,163 @@
+//! Are two stuck wheels named, both and no other?
+//!
+//! Every pair of wheels in every turn, at once and one 2 s after the other, on the soil learned from,
+//! with encoders. `--seeds N` worlds per cell (1), the first of them `--first-seed S` (1; tuning takes
+//! 100000 or more, and so no run that is archived); `--json`: the document only, nothing is archived.
+
+use std::error::Error;
+use std::path::Path;
+use std::process::ExitCode;
+
+use serde_json::json;
+use vigil_bench::archive::Archive;
+use vigil_bench::machine;
+use vigil_bench::matched::in_parallel;
+use vigil_bench::options::Options;
+use vigil_bench::shares::Share;
+use vigil_bench::simulated::{Chain, Conditions, Rover, constant};
+use vigil_robot::Injection;
+use vigil_setup::schema::{Sensors, Simulator};
+
+const RADII_M: [f64; 7] = [1.0, -1.0, 2.0, -2.0, 6.0, -6.0, 1e3];
+const SPEEDS_M_S: [f64; 3] = [0.1, 0.2, 0.3];
+/// Time from the first stuck wheel to the second, s.
+const APART_S: [f64; 2] = [0.0, 2.0];
+const ONSET_S: f64 = 4.0;
+/// Times after the second onset at which the set is judged, s.
+const JUDGED_S: [f64; 2] = [2.0, 5.0];
+const RATE_HZ: f64 = 20.0;
+
+/// One run, and what was said of it.
+#[derive(Debug, Clone)]
+struct Run {
+    wheels: [usize; 2],
+    apart_s: f64,
+    radius_m: f64,
+    speed_m_s: f64,
+    seed: u64,
+    said: [String; JUDGED_S.len()],
+}
+
+fn main() -> ExitCode {
+    vigil_bench::ended("two-wheels", run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
+    if cfg!(debug_assertions) {
+        return Err("a debug build takes hours: use scripts/bench".into());
+    }
+    let options = Options::parse(&[("--seeds", 1.0), ("--first-seed", 1.0)])?;
+    let [seeds, first_seed] = ["--seeds", "--first-seed"].map(|key| options.number(key) as u64);
+    let rover = Rover::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))?;
+    let jobs = jobs(&rover, seeds, first_seed);
+    let drive = |job: &Run| drive(&rover, job.clone()).map_err(|error| error.to_string());
+    let runs: Result<Vec<Run>, String> = in_parallel(&jobs, drive).into_iter().collect();
+    let runs = runs?;
+    let named = |apart_s: f64, at: usize| {
+        let own = runs.iter().filter(|run| run.apart_s == apart_s);
+        Share::of(own, |run| run.said[at] == expected(&rover, run.wheels))
+    };
+    let shares = APART_S.map(|apart_s| [0, 1].map(|at| named(apart_s, at)));
+    let rows = APART_S.iter().zip(&shares).map(|(apart_s, shares)| {
+        json!({ "apart_s": apart_s, "judged_s": JUDGED_S, "named": shares.each_ref().map(Share::json) })
+    });
+    let document = json!({ "machine": machine::facts(), "runs": rows.collect::<Vec<_>>() });
+    if options.is_json {
+        println!("{document:#}");
+        return Ok(());
+    }
+    let mut archive = Archive::new("two-wheels")?;
+    archive.store("two-wheels.json", &document)?;
+    let lines: Vec<String> = runs.iter().map(|run| line(&rover, run)).collect();
+    let head = "wheels,apart_s,radius_m,speed_m_s,seed,set_2s,set_5s";
+    archive.store_text("runs.csv", &format!("{head}\n{}\n", lines.join("\n")))?;
+    archive.say(
+        "Two stuck wheels of the simulated rover, 20 Hz, with encoders: named, both and no other, \
+         2 s and 5 s after the second.\n",
+    );
+    for (apart_s, [soon, late]) in APART_S.iter().zip(&shares) {
+        archive.say(&format!(
+            "- {apart_s} s apart: {}; {}",
+            soon.long(),
+            late.long()
+        ));
+    }
+    println!("archived in {}", archive.close()?.display());
+    Ok(())
+}
+
+fn jobs(rover: &Rover, seeds: u64, first_seed: u64) -> Vec<Run> {
+    let mut jobs = Vec::new();
+    let count = rover.robot.wheels.len();
+    for a in 0..count {
+        for b in (0..count).filter(|b| *b != a) {
+            for (r, radius_m) in RADII_M.into_iter().enumerate() {
+                for apart_s in APART_S {
+                    // At once there is no first and second.
+                    if apart_s == 0.0 && b < a {
+                        continue;
+                    }
+                    for _ in 0..seeds {
+                        jobs.push(Run {
+                            wheels: [a, b],
+                            apart_s,
+                            radius_m,
+                            speed_m_s: SPEEDS_M_S[(a + b + r) % SPEEDS_M_S.len()],
+                            seed: first_seed + jobs.len() as u64,
+                            said: Default::default(),
+                        });
+                    }
+                }
+            }
+        }
+    }
+    jobs
+}
+
+fn drive(rover: &Rover, mut job: Run) -> Result<Run, Box<dyn Error>> {
+    let mut changes = Vec::new();
+    for (wheel, at_s) in job.wheels.into_iter().zip([ONSET_S, ONSET_S + job.apart_s]) {
+        let name = &rover.robot.wheels[wheel].name;
+        let change = Injection::parse_change(&format!("stuck:{name}"), &rover.robot)?;
+        changes.push((change, at_s));
+    }
+    let conditions = Conditions {
+        simulator: Simulator::default(),
+        drive: constant(1.0 / job.radius_m, job.speed_m_s),
+        rate_hz: RATE_HZ,
+        seed: job.seed,
+    };
+    let mut chain = Chain::new(rover, Sensors::PoseEncoders, job.seed)?;
+    let due_s = JUDGED_S.map(|after_s| ONSET_S + job.apart_s + after_s);
+    let duration_s = due_s[1] + 2.0 / RATE_HZ;
+    conditions.drive(rover, duration_s, &changes, |t_s, frame| {
+        chain.take(frame);
+        for (said, due_s) in job.said.iter_mut().zip(due_s) {
+            if said.is_empty() && t_s >= due_s {
+                *said = chain.said().fault_set;
+            }
+        }
+    })?;
+    Ok(job)
+}
+
+/// The set of these stuck wheels, as a diagnosis names it: in the order of the tree's leaves, which
+/// is that of the robot's wheels.
+fn expected(rover: &Rover, mut wheels: [usize; 2]) -> String {
+    wheels.sort_unstable();
+    let names = wheels.map(|wheel| format!("{}_STUCK", rover.robot.wheels[wheel].name));
+    names.join("+")
+}
+
+fn line(rover: &Rover, run: &Run) -> String {
+    let wheels = run.wheels.map(|w| rover.robot.wheels[w].name.as_str());
+    format!(
+        "{},{},{},{},{},{}",
+        wheels.join("+"),
+        run.apart_s,
+        run.radius_m,
+        run.speed_m_s,
+        run.seed,
+        run.said.join(",")
+    )
+}

@@ -1,0 +1,226 @@
+//! The baseline to beat: deterministic rules over the same detector and identifier.
+//!
+//! 1. Drive as planned while there is no alarm.
+//! 2. At an alarm, stop, and look for [`LOOK_S`].
+//! 3. Then do what the most probable explanation asks for: counter-steer against a stuck wheel,
+//!    ignore a broken encoder, creep if nothing known explains it, go on if nothing is wrong.
+//! 4. If for [`DOUBT_S`] another explanation is the most probable, begin again at 2; for the
+//!    [`TRIALS_MAX`]th time, or after [`CREEP_S`] of creeping without an explanation, call for help
+//!    and wait.
+//! 5. If the alarm has gone and nothing is wrong for [`DOUBT_S`], drive as planned.
+
+use vigil_blocks::RecoveryKind;
+
+/// Time to look before a remedy, s: the identifier knows after 0.1 s in the median, and a rover
+/// takes half a second to come to rest.
+pub const LOOK_S: f64 = 1.0;
+/// Time for which another explanation must be the most probable before it counts, s.
+pub const DOUBT_S: f64 = 1.0;
+/// Time of creeping without any explanation, s: as long as the supervisor restrains itself.
+pub const CREEP_S: f64 = 2.0;
+/// Stops before help is called for.
+pub const TRIALS_MAX: u32 = 3;
+
+/// Most probable explanation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Explanation {
+    /// Nothing is wrong.
+    Nominal,
+    /// This wheel is stuck.
+    Stuck(usize),
+    /// This wheel's encoder is broken.
+    Encoder(usize),
+    /// None that is known.
+    Unknown,
+}
+
+/// What the rules see in one cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// The detector's alarm.
+    pub alarm: bool,
+    /// The identifier's most probable explanation.
+    pub explanation: Explanation,
+}
+
+/// What the rules say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Told {
+    /// Kind of action.
+    pub kind: RecoveryKind,
+    /// The wheel it is about.
+    pub wheel: Option<usize>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Phase {
+    Driving,
+    Looking {
+        for_s: f64,
+    },
+    Remedying {
+        what: Explanation,
+        for_s: f64,
+        doubt_s: f64,
+    },
+    Waiting,
+}
+
+/// The rules, one cycle at a time.
+#[derive(Debug, Clone)]
+pub struct Escalation {
+    phase: Phase,
+    trials: u32,
+}
+
+impl Default for Escalation {
+    fn default() -> Self {
+        Self {
+            phase: Phase::Driving,
+            trials: 0,
+        }
+    }
+}
+
+impl Escalation {
+    /// The rules' answer to what is seen, `dt_s` after the last cycle.
+    pub fn answer(&mut self, seen: Seen, dt_s: f64) -> Told {
+        self.phase = match self.phase {
+            Phase::Driving if seen.alarm => self.stop(),
+            Phase::Looking { for_s } if for_s + dt_s < LOOK_S => Phase::Looking {
+                for_s: for_s + dt_s,
+            },
+            Phase::Looking { .. } => Phase::Remedying {
+                what: seen.explanation,
+                for_s: 0.0,
+                doubt_s: 0.0,
+            },
+            Phase::Remedying {
+                what,
+                for_s,
+                doubt_s,
+            } => self.remedy(seen, (what, for_s + dt_s, doubt_s), dt_s),
+            Phase::Driving | Phase::Waiting => self.phase,
+        };
+        self.told()
+    }
+
+    fn stop(&mut self) -> Phase {
+        self.trials += 1;
+        match self.trials >= TRIALS_MAX {
+            true => Phase::Waiting,
+            false => Phase::Looking { for_s: 0.0 },
+        }
+    }
+
+    fn remedy(
+        &mut self,
+        seen: Seen,
+        (what, for_s, doubt_s): (Explanation, f64, f64),
+        dt_s: f64,
+    ) -> Phase {
+        let well = !seen.alarm && seen.explanation == Explanation::Nominal;
+        let doubt_s = match well || seen.explanation != what {
+            true => doubt_s + dt_s,
+            false => 0.0,
+        };
+        if doubt_s >= DOUBT_S {
+            return match well {
+                true => Phase::Driving,
+                false => self.stop(),
+            };
+        }
+        if what == Explanation::Unknown && for_s >= CREEP_S {
+            return Phase::Waiting;
+        }
+        Phase::Remedying {
+            what,
+            for_s,
+            doubt_s,
+        }
+    }
+
+    const fn told(&self) -> Told {
+        let (kind, wheel) = match self.phase {
+            Phase::Driving => (RecoveryKind::GoOn, None),
+            Phase::Looking { .. } => (RecoveryKind::Stop, None),
+            Phase::Waiting => (RecoveryKind::CallForHelp, None),
+            Phase::Remedying { what, .. } => match what {
+                Explanation::Nominal => (RecoveryKind::GoOn, None),
+                Explanation::Stuck(wheel) => (RecoveryKind::Compensate, Some(wheel)),
+                Explanation::Encoder(wheel) => (RecoveryKind::IgnoreEncoder, Some(wheel)),
+                Explanation::Unknown => (RecoveryKind::SlowDown, None),
+            },
+        };
+        Told { kind, wheel }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Explanation::{Encoder, Nominal, Stuck, Unknown};
+    use RecoveryKind::{CallForHelp, Compensate, GoOn, IgnoreEncoder, SlowDown, Stop};
+
+    /// What the rules say, without repetition, when each sight lasts so many tenths of a second.
+    fn answers(sights: &[(bool, Explanation, u32)]) -> Vec<(RecoveryKind, Option<usize>)> {
+        let mut rules = Escalation::default();
+        let mut said = Vec::new();
+        for &(alarm, explanation, tenths) in sights {
+            for _ in 0..tenths {
+                let told = rules.answer(Seen { alarm, explanation }, 0.1);
+                if said.last() != Some(&(told.kind, told.wheel)) {
+                    said.push((told.kind, told.wheel));
+                }
+            }
+        }
+        said
+    }
+
+    #[test]
+    fn a_clear_diagnosis_is_remedied_after_one_stop() {
+        let said = answers(&[
+            (false, Nominal, 9),
+            (true, Unknown, 1),
+            (true, Stuck(4), 50),
+        ]);
+        assert_eq!(said, [(GoOn, None), (Stop, None), (Compensate, Some(4))]);
+        let said = answers(&[(true, Encoder(2), 50)]);
+        assert_eq!(said, [(Stop, None), (IgnoreEncoder, Some(2))]);
+    }
+
+    #[test]
+    fn what_nothing_explains_ends_with_a_call_for_help() {
+        let said = answers(&[
+            (true, Unknown, 11),
+            (true, Unknown, 30),
+            (true, Stuck(1), 90),
+        ]);
+        assert_eq!(said, [(Stop, None), (SlowDown, None), (CallForHelp, None)]);
+    }
+
+    #[test]
+    fn doubts_lead_to_another_look_and_then_to_help() {
+        let said = answers(&[
+            (true, Stuck(0), 15),
+            (true, Stuck(1), 9),
+            (true, Stuck(0), 5),
+            (true, Stuck(1), 40),
+            (true, Stuck(0), 40),
+        ]);
+        let first = [(Stop, None), (Compensate, Some(0)), (Stop, None)];
+        let then = [(Compensate, Some(1)), (CallForHelp, None)];
+        assert_eq!(said, [&first[..], &then[..]].concat());
+    }
+
+    #[test]
+    fn a_false_alarm_that_goes_ends_in_driving() {
+        let said = answers(&[(true, Stuck(0), 20), (false, Nominal, 12)]);
+        assert_eq!(said, [(Stop, None), (Compensate, Some(0)), (GoOn, None)]);
+        // Nothing wrong though the alarm stands: as planned.
+        assert_eq!(
+            answers(&[(true, Nominal, 30)]),
+            [(Stop, None), (GoOn, None)]
+        );
+    }
+}

@@ -1,0 +1,382 @@
+//! What a mission brought.
+
+use vigil_blocks::{Action, RecoveryKind};
+
+use super::Shipped;
+use super::course::{Course, distance};
+
+/// The path is looked for from so far behind the planned place to so far ahead of it, m: a rover
+/// that drags a wheel falls behind by a tenth of what it drives.
+const BEHIND_M: f64 = 6.0;
+const AHEAD_M: f64 = 2.0;
+
+/// The true state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Truth {
+    /// Index in the decision model.
+    pub state: usize,
+    /// The broken wheel, if the state is about one.
+    pub wheel: Option<usize>,
+    /// Wheels that are dragged.
+    pub dragged: usize,
+}
+
+/// What the rover obeys.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Obeyed {
+    /// Index in the decision model.
+    pub action: usize,
+    /// Its kind.
+    pub kind: RecoveryKind,
+    /// The wheel that it is about.
+    pub wheel: Option<usize>,
+}
+
+impl Obeyed {
+    /// What an action block says.
+    #[must_use]
+    pub fn new(action: &Action) -> Self {
+        Self {
+            action: action.action as usize,
+            kind: RecoveryKind::from_wire(action.kind).unwrap_or(RecoveryKind::None),
+            wheel: (action.wheel != u32::MAX).then_some(action.wheel as usize),
+        }
+    }
+
+    /// True if the rover stands under it.
+    #[must_use]
+    pub const fn stands(&self) -> bool {
+        matches!(
+            self.kind,
+            RecoveryKind::None | RecoveryKind::Stop | RecoveryKind::CallForHelp
+        )
+    }
+}
+
+/// What the decision model pays.
+#[derive(Debug, Clone, Copy)]
+pub struct Pay<'a> {
+    shipped: &'a Shipped,
+    go_on: Option<usize>,
+    epoch_s: f64,
+}
+
+impl<'a> Pay<'a> {
+    /// As the shipped model states it, per epoch of the shipped supervisor.
+    #[must_use]
+    pub fn new(shipped: &'a Shipped) -> Self {
+        Self {
+            shipped,
+            go_on: shipped.action(RecoveryKind::GoOn),
+            epoch_s: shipped.setup.file.supervisor.epoch_ms * 1e-3,
+        }
+    }
+
+    /// Reward of `dt_s` under an action, in epochs' rewards. A remedy for another wheel than the
+    /// broken one is worth no more than going on.
+    #[must_use]
+    pub fn reward(&self, truth: Truth, obeyed: Obeyed, dt_s: f64) -> f64 {
+        let model = self.shipped.model();
+        let stated = model.reward(truth.state, obeyed.action);
+        let is_wrong = |(at, broken): (usize, usize)| at != broken;
+        let wheels = obeyed.wheel.zip(truth.wheel);
+        let reward = match (wheels.is_some_and(is_wrong), self.go_on) {
+            (true, Some(go_on)) => stated.min(model.reward(truth.state, go_on)),
+            _ => stated,
+        };
+        reward * dt_s / self.epoch_s
+    }
+}
+
+/// What adds up while a mission is driven.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tally {
+    reward: f64,
+    dragged_m: f64,
+    unnecessary_stops: u32,
+    unnecessary_s: f64,
+    calls: u32,
+    stood: bool,
+    called: bool,
+    time_s: f64,
+}
+
+/// A step of a drive.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step {
+    pub truth: Truth,
+    pub obeyed: Obeyed,
+    /// True if standing is the best that can be done in this state.
+    pub may_stand: bool,
+    /// Way of the body, m.
+    pub moved_m: f64,
+    pub dt_s: f64,
+}
+
+impl Tally {
+    pub(super) fn add(&mut self, pay: &Pay<'_>, step: &Step) {
+        let Step { truth, obeyed, .. } = *step;
+        self.time_s += step.dt_s;
+        self.reward += pay.reward(truth, obeyed, step.dt_s);
+        self.dragged_m += step.moved_m * truth.dragged as f64;
+        let stands = obeyed.stands();
+        if stands && !step.may_stand {
+            self.unnecessary_stops += u32::from(!self.stood);
+            self.unnecessary_s += step.dt_s;
+        }
+        let calls = obeyed.kind == RecoveryKind::CallForHelp;
+        self.calls += u32::from(calls && !self.called);
+        (self.stood, self.called) = (stands, calls);
+    }
+}
+
+/// Where the rover was.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    /// True position, m.
+    pub at: [f64; 2],
+    /// Place of the plan along its path, m.
+    pub planned_m: f64,
+}
+
+/// A mission of one commander, measured.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Score {
+    /// Reward of the decision model, summed over the epochs.
+    pub reward: f64,
+    /// From the end of the plan, at the end, m.
+    pub to_goal_m: f64,
+    /// Root mean square of the distance off the path, per metre driven, m.
+    pub path_rms_m: f64,
+    /// Greatest distance off the path, m.
+    pub path_max_m: f64,
+    /// Metres with a stuck wheel.
+    pub dragged_m: f64,
+    /// Times the rover stopped though it could have driven on.
+    pub unnecessary_stops: f64,
+    /// Time it so stood, s.
+    pub unnecessary_s: f64,
+    /// Calls for help.
+    pub calls: f64,
+    /// Time, s.
+    pub time_s: f64,
+    /// 1 if the plan was driven to its end.
+    pub done: f64,
+}
+
+impl Score {
+    pub(super) fn new(tally: &Tally, places: &[Place], course: &Course, done: bool) -> Self {
+        let (mut squares, mut way_m, mut max_m) = (0.0, 0.0, 0.0_f64);
+        let mut last = None;
+        for place in places {
+            let (from_m, to_m) = (place.planned_m - BEHIND_M, place.planned_m + AHEAD_M);
+            let off_m = course.off_m(place.at, from_m, to_m);
+            let step_m = last.map_or(0.0, |last| distance(last, place.at));
+            last = Some(place.at);
+            squares += off_m * off_m * step_m;
+            way_m += step_m;
+            max_m = max_m.max(off_m);
+        }
+        let end = places.last().map(|place| place.at);
+        let to_goal_m = end
+            .zip(course.goal())
+            .map_or(f64::NAN, |(a, b)| distance(a, b));
+        Self {
+            reward: tally.reward,
+            to_goal_m,
+            path_rms_m: if way_m > 0.0 {
+                (squares / way_m).sqrt()
+            } else {
+                0.0
+            },
+            path_max_m: max_m,
+            dragged_m: tally.dragged_m,
+            unnecessary_stops: f64::from(tally.unnecessary_stops),
+            unnecessary_s: tally.unnecessary_s,
+            calls: f64::from(tally.calls),
+            time_s: tally.time_s,
+            done: f64::from(u8::from(done)),
+        }
+    }
+}
+
+/// A figure of a mission.
+#[derive(Debug, Clone, Copy)]
+pub struct Measure {
+    /// Name with unit, as in raw data.
+    pub key: &'static str,
+    /// In words, with unit.
+    pub name: &'static str,
+    /// Its value.
+    pub of: fn(&Score) -> f64,
+    /// Decimals shown.
+    pub decimals: usize,
+}
+
+const fn measure(
+    key: &'static str,
+    name: &'static str,
+    of: fn(&Score) -> f64,
+    decimals: usize,
+) -> Measure {
+    Measure {
+        key,
+        name,
+        of,
+        decimals,
+    }
+}
+
+/// What is reported of a mission; the reward first.
+pub const MEASURES: [Measure; 10] = [
+    measure("reward", "mission reward", |s| s.reward, 0),
+    measure("to_goal_m", "to the goal, m", |s| s.to_goal_m, 2),
+    measure("path_rms_m", "off the path, rms m", |s| s.path_rms_m, 2),
+    measure("path_max_m", "off the path, max m", |s| s.path_max_m, 2),
+    measure("dragged_m", "wheel dragged, m", |s| s.dragged_m, 2),
+    measure(
+        "unnecessary_stops",
+        "unnecessary stops",
+        |s| s.unnecessary_stops,
+        3,
+    ),
+    measure("unnecessary_s", "so stood, s", |s| s.unnecessary_s, 2),
+    measure("calls", "calls for help", |s| s.calls, 3),
+    measure("time_s", "time, s", |s| s.time_s, 1),
+    measure("done", "driven to the end", |s| s.done, 3),
+];
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn shipped() -> Shipped {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        Shipped::read(&root, 100.0).unwrap()
+    }
+
+    fn truth(shipped: &Shipped, name: &str, wheel: Option<usize>) -> Truth {
+        let state = shipped
+            .model()
+            .states()
+            .iter()
+            .position(|s| s == name)
+            .unwrap();
+        let dragged = usize::from(name.ends_with("STUCK"));
+        Truth {
+            state,
+            wheel,
+            dragged,
+        }
+    }
+
+    fn obeyed(shipped: &Shipped, kind: RecoveryKind, wheel: Option<usize>) -> Obeyed {
+        let action = shipped.action(kind).unwrap();
+        Obeyed {
+            action,
+            kind,
+            wheel,
+        }
+    }
+
+    #[test]
+    fn rewards_are_those_of_the_model_per_epoch() {
+        use RecoveryKind::{CallForHelp, Compensate, GoOn, IgnoreEncoder, SlowDown, Stop};
+        let shipped = shipped();
+        let pay = Pay::new(&shipped);
+        let cases = [
+            ("ND", None, GoOn, None, 1.0),
+            ("ND", None, Compensate, Some(3), -2.0),
+            ("RM_STUCK", Some(4), GoOn, None, -4.0),
+            ("RM_STUCK", Some(4), Compensate, Some(4), 0.5),
+            // The wrong wheel: as going on.
+            ("RM_STUCK", Some(4), Compensate, Some(1), -4.0),
+            ("LF_ENC", Some(0), IgnoreEncoder, Some(0), 0.95),
+            ("LF_ENC", Some(0), IgnoreEncoder, Some(5), -1.0),
+            ("LF_ENC", Some(0), Compensate, Some(5), -2.0),
+            ("LF_ENC", Some(0), SlowDown, None, -0.3),
+            ("UNKNOWN", None, Stop, None, -1.2),
+            ("UNKNOWN", None, CallForHelp, None, -0.5),
+        ];
+        for (state, wheel, kind, about, per_epoch) in cases {
+            let truth = truth(&shipped, state, wheel);
+            let obeyed = obeyed(&shipped, kind, about);
+            // An epoch is 0.1 s.
+            let found = pay.reward(truth, obeyed, 0.025);
+            assert!(
+                (found - per_epoch / 4.0).abs() < 1e-12,
+                "{state} {kind:?}: {found}"
+            );
+        }
+        assert!(shipped.may_stand(truth(&shipped, "UNKNOWN", None).state));
+        for driving in ["ND", "LF_STUCK", "RR_ENC"] {
+            assert!(!shipped.may_stand(truth(&shipped, driving, None).state));
+        }
+    }
+
+    #[test]
+    fn sums_over_a_mission_are_exact() {
+        use RecoveryKind::{CallForHelp, Compensate, GoOn, Stop};
+        let shipped = shipped();
+        let pay = Pay::new(&shipped);
+        let mut tally = Tally::default();
+        let healthy = truth(&shipped, "ND", None);
+        let stuck = truth(&shipped, "LM_STUCK", Some(1));
+        let unknown = truth(&shipped, "UNKNOWN", None);
+        let script = [
+            (healthy, GoOn, None, 1.0),
+            (healthy, Stop, None, 0.0),
+            (stuck, Stop, None, 0.0),
+            (stuck, Compensate, Some(1), 1.0),
+            (stuck, CallForHelp, None, 0.0),
+            (unknown, GoOn, None, 1.0),
+            (unknown, CallForHelp, None, 0.0),
+        ];
+        // Each for 2 s of 0.1 m/s in steps of 20 ms, if it moves.
+        for (truth, kind, about, moves) in script {
+            let step = Step {
+                truth,
+                obeyed: obeyed(&shipped, kind, about),
+                may_stand: shipped.may_stand(truth.state),
+                moved_m: 0.002 * moves,
+                dt_s: 0.02,
+            };
+            (0..100).for_each(|_| tally.add(&pay, &step));
+        }
+        let course = Course::new([[0.0, 0.0], [1.0, 0.0]]);
+        let score = Score::new(&tally, &[], &course, true);
+        let reward = 20.0 * (1.0 - 1.2 - 1.2 + 0.5 - 6.0 - 6.0 - 0.5);
+        assert!((score.reward - reward).abs() < 1e-9, "{}", score.reward);
+        assert!((score.dragged_m - 0.2).abs() < 1e-9);
+        // One stop, healthy and on with a wheel stuck; one call with a named fault. The last call
+        // is the best that can be done.
+        assert_eq!((score.unnecessary_stops, score.calls), (2.0, 2.0));
+        assert!((score.unnecessary_s - 6.0).abs() < 1e-9);
+        assert!((score.time_s - 14.0).abs() < 1e-9 && score.done == 1.0);
+    }
+
+    #[test]
+    fn path_error_is_per_metre_driven() {
+        let tally = Tally::default();
+        let course = Course::new((0..=1000).map(|k| [f64::from(k) * 0.01, 0.0]));
+        let place = |x: f64, y: f64| Place {
+            at: [x, y],
+            planned_m: x,
+        };
+        // 2 m on the path, then 2 m beside it by 0.3 m, standing there for long.
+        let mut places = vec![place(0.0, 0.0), place(2.0, 0.0), place(2.0, 0.3)];
+        places.push(place(4.0, 0.3));
+        places.extend([place(4.0, 0.3); 500]);
+        let score = Score::new(&tally, &places, &course, false);
+        let expected = (0.09 * (0.3 + 2.0) / 4.3_f64).sqrt();
+        assert!(
+            (score.path_rms_m - expected).abs() < 1e-12,
+            "{}",
+            score.path_rms_m
+        );
+        assert!((score.path_max_m - 0.3).abs() < 1e-12);
+        assert!((score.to_goal_m - 6.0_f64.hypot(0.3)).abs() < 1e-12);
+        assert_eq!(score.done, 0.0);
+    }
+}

@@ -1,0 +1,45 @@
+//! Words for what happens to a robot on its path.
+
+use vigil_blocks::{ActionOutcome, Event, RecoveryKind, Symptoms};
+
+/// Symptoms, joined by `_` as in the decision model; `none` for the empty set.
+pub fn symptoms(set: u32) -> String {
+    let names = [
+        ("EPS", Symptoms::EPS),
+        ("EPM", Symptoms::EPM),
+        ("LD", Symptoms::LD),
+        ("SD", Symptoms::SD),
+        ("BO", Symptoms::BO),
+        ("ALT", Symptoms::ALT),
+        ("NNA", Symptoms::NNA),
+    ];
+    let present = names.iter().filter(|(_, bit)| set & bit != 0);
+    let present: Vec<&str> = present.map(|(name, _)| *name).collect();
+    if present.is_empty() {
+        "none".into()
+    } else {
+        present.join("_")
+    }
+}
+
+/// How a recovery action ended.
+pub fn outcome(event: &Event) -> String {
+    use RecoveryKind as K;
+    let outcome = u32::try_from(event.value).ok();
+    let succeeded = outcome == Some(ActionOutcome::Succeeded as u32);
+    let words = match (K::from_wire(event.what), succeeded) {
+        (Some(K::GoThrough), true) => "blockage overtaken",
+        (Some(K::GoThrough), false) => "no opening",
+        (Some(K::NewPath), true) => "alternative path",
+        (Some(K::NewPath), false) => "no alternative",
+        (Some(K::Relocalise), true) => "place found",
+        (Some(K::MoveAway), true) => "moved away",
+        (Some(K::MoveAway), false) => "could not move away",
+        (Some(K::CallForHelp), true) => "help came",
+        (Some(K::GiveUp), true) => "task given up",
+        (Some(K::Stop), true) => "stopped",
+        (_, true) => "done",
+        (_, false) => "failed",
+    };
+    words.into()
+}

@@ -1,0 +1,56 @@
+//! What the robot is about.
+
+use vigil_blocks::{RecoveryKind, Symptoms};
+
+/// A task, and what is left of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Task {
+    /// Stand.
+    Stand,
+    /// Follow the path.
+    Follow,
+    /// Look for an opening; how long it has looked, s.
+    Look { passed_s: f64 },
+    /// Go through the opening, up to a distance along the path, m; for how long, s.
+    Pass { end_m: f64, passed_s: f64 },
+    /// Think about another path, s.
+    Plan { passed_s: f64 },
+    /// Find the own place, s.
+    Locate { passed_s: f64 },
+    /// Move away from where it began, x and y in m.
+    Back { from: [f64; 2], passed_s: f64 },
+    /// Wait for help, s.
+    Wait { passed_s: f64 },
+}
+
+impl Task {
+    /// What an order begins, for a robot that believes to be at `place`.
+    pub(super) const fn begin(kind: RecoveryKind, place: [f64; 2]) -> Self {
+        let passed_s = 0.0;
+        match kind {
+            RecoveryKind::None | RecoveryKind::Stop | RecoveryKind::GiveUp => Self::Stand,
+            RecoveryKind::GoOn
+            | RecoveryKind::SlowDown
+            | RecoveryKind::Compensate
+            | RecoveryKind::IgnoreEncoder => Self::Follow,
+            RecoveryKind::CallForHelp => Self::Wait { passed_s },
+            RecoveryKind::NewPath => Self::Plan { passed_s },
+            RecoveryKind::Relocalise => Self::Locate { passed_s },
+            RecoveryKind::GoThrough => Self::Look { passed_s },
+            RecoveryKind::MoveAway => Self::Back {
+                from: place,
+                passed_s,
+            },
+        }
+    }
+}
+
+/// What the outcome of an order says: a basic observation of the paper's, or 0.
+pub(super) const fn said(kind: RecoveryKind, succeeded: bool) -> u32 {
+    match (kind, succeeded) {
+        (RecoveryKind::GoThrough, true) => Symptoms::BO,
+        (RecoveryKind::NewPath, true) => Symptoms::ALT,
+        (RecoveryKind::NewPath, false) => Symptoms::NNA,
+        _ => 0,
+    }
+}

@@ -1,0 +1,328 @@
+//! The robot on its path: each order, what comes of it, and that nothing is driven through.
+
+use vigil_blocks::{Action, ActionOutcome, RecoveryKind, SensorFrame, Symptoms};
+use vigil_sensor_sim::{Happening, Navigator, Obedience, Simulation, World};
+use vigil_setup::schema::{Navigation, Obstacle, Trouble, TroubleKind};
+
+use crate::rover::{even_soil, robot};
+
+/// A straight corridor of 8 m, 2.4 m wide, changed.
+fn corridor(change: impl FnOnce(&mut Navigation)) -> Navigation {
+    let text = "path = [[0.0, 0.0], [8.0, 0.0]]\n\
+                walls = [[-1.0, -1.2, 10.0, -1.2], [-1.0, 1.2, 10.0, 1.2]]\n";
+    let mut navigation = toml::from_str(text).unwrap();
+    change(&mut navigation);
+    navigation
+}
+
+fn obstacle(x_m: f64, y_m: f64, radius_m: f64) -> Obstacle {
+    Obstacle {
+        x_m,
+        y_m,
+        radius_m,
+        from_s: 0.0,
+        until_s: None,
+    }
+}
+
+fn trouble(kind: TroubleKind, at_s: f64, [x_m, y_m, yaw_rad]: [f64; 3]) -> Trouble {
+    Trouble {
+        kind,
+        at_s,
+        x_m,
+        y_m,
+        yaw_rad,
+    }
+}
+
+/// A robot that is told what to do.
+struct Robot {
+    simulation: Simulation,
+    settings: Navigation,
+    action: Action,
+    frame: SensorFrame,
+}
+
+impl Robot {
+    fn new(settings: Navigation) -> Self {
+        let world = World::new(&robot(), &even_soil(), &[], 100.0, 1).unwrap();
+        let navigator = Navigator::new(&settings);
+        let obedience = Obedience::new(&robot().limits);
+        Self {
+            simulation: Simulation::new(world, obedience, Some(navigator)),
+            settings,
+            action: Action {
+                speed_scale: 1.0,
+                curvature_gain: 1.0,
+                valid_until_ns: u64::MAX,
+                ..Action::default()
+            },
+            frame: SensorFrame::default(),
+        }
+    }
+
+    /// Does this for at most `seconds`; what happened first, and when. Nothing is ever touched.
+    fn told(&mut self, kind: RecoveryKind, seconds: f64) -> Option<(Happening, f64)> {
+        self.action.kind = kind as u32;
+        self.action.decision_seq += 1;
+        for k in 1..=(seconds * 100.0) as u32 {
+            self.simulation.step(0.01, Some(&self.action), 0);
+            self.simulation.measure(&mut self.frame);
+            let [x, y, _] = self.place();
+            for o in self
+                .settings
+                .obstacle
+                .iter()
+                .filter(|o| o.until_s.is_none())
+            {
+                let apart_m = (x - o.x_m).hypot(y - o.y_m) - o.radius_m;
+                let body_m = self.settings.body_radius_m;
+                assert!(
+                    apart_m > body_m - 0.02,
+                    "touches at {x:.2} {y:.2}: {apart_m:.3}"
+                );
+            }
+            if let Some(happening) = self.simulation.happening() {
+                return Some((happening, f64::from(k) * 0.01));
+            }
+        }
+        None
+    }
+
+    fn place(&self) -> [f64; 3] {
+        self.simulation.world.truth().pose
+    }
+
+    /// Distance of measured and planned pose.
+    fn off_plan_m(&self) -> f64 {
+        let [x, y, _] = self.frame.pose;
+        let [planned_x, planned_y, _] = self.frame.planned_pose;
+        (x - planned_x).hypot(y - planned_y)
+    }
+
+    fn outcome(&self) -> (Option<ActionOutcome>, u32) {
+        let outcome = ActionOutcome::from_wire(self.frame.action_outcome);
+        (outcome, self.frame.symptoms)
+    }
+}
+
+const fn ended(kind: RecoveryKind, outcome: ActionOutcome) -> Happening {
+    Happening::Ended(kind, outcome)
+}
+
+use ActionOutcome::{Failed, Succeeded};
+use RecoveryKind::{CallForHelp, GiveUp, GoOn, GoThrough, MoveAway, NewPath, Relocalise, Stop};
+
+#[test]
+fn a_free_path_is_followed_with_the_plan_to_the_goal() {
+    let mut robot = Robot::new(corridor(|_| {}));
+    let (happening, t_s) = robot.told(GoOn, 60.0).unwrap();
+    assert_eq!(happening, Happening::Goal);
+    // 8 m at 0.25 m/s, and what slowing down at the goal takes.
+    assert!((32.0..40.0).contains(&t_s), "{t_s}");
+    assert!(robot.off_plan_m() < 0.2 && robot.place()[1].abs() < 0.05);
+    assert_eq!(robot.told(GoOn, 5.0), None);
+    assert!((robot.place()[0] - 7.9).abs() < 0.05, "it stays there");
+}
+
+#[test]
+fn the_robot_slows_down_and_stops_before_what_blocks_it_and_falls_behind_its_plan() {
+    let mut robot = Robot::new(corridor(|c| c.obstacle.push(obstacle(5.0, 0.0, 0.8))));
+    assert_eq!(robot.told(GoOn, 60.0), None);
+    // Contact at 3.75 m; it stands 0.8 m before, creeping no nearer than that.
+    let [x, y, _] = robot.place();
+    assert!((2.9..=3.05).contains(&x) && y.abs() < 0.05, "{x} {y}");
+    assert!(robot.off_plan_m() > 4.0);
+    // On each side the gap is 0.4 m wide.
+    let (happening, t_s) = robot.told(GoThrough, 20.0).unwrap();
+    assert_eq!(happening, ended(GoThrough, Failed));
+    assert!((t_s - robot.settings.look_s).abs() < 0.02);
+    assert_eq!(robot.outcome(), (Some(Failed), 0));
+    // The only path is blocked.
+    let (happening, t_s) = robot.told(NewPath, 20.0).unwrap();
+    assert_eq!(happening, ended(NewPath, Failed));
+    assert!((t_s - robot.settings.think_s).abs() < 0.02);
+    assert_eq!(robot.outcome(), (Some(Failed), Symptoms::NNA));
+}
+
+#[test]
+fn an_opening_beside_the_path_is_gone_through_and_the_path_taken_up_again() {
+    let mut robot = Robot::new(corridor(|c| {
+        c.obstacle.push(obstacle(6.0, -0.9, 0.6));
+        (c.stop_m, c.slow_m) = (1.5, 3.0);
+    }));
+    assert_eq!(robot.told(GoOn, 40.0), None);
+    let (happening, _) = robot.told(GoThrough, 40.0).unwrap();
+    assert_eq!(happening, ended(GoThrough, Succeeded));
+    assert_eq!(robot.outcome(), (Some(Succeeded), Symptoms::BO));
+    assert!(robot.place()[1] > 0.1, "to the left of it");
+    assert!(robot.off_plan_m() < 0.3, "the plan goes on from here");
+    assert_eq!(robot.told(GoOn, 40.0).unwrap().0, Happening::Goal);
+    assert!(robot.place()[1].abs() < 0.2);
+}
+
+#[test]
+fn people_leave_and_the_way_is_free() {
+    let mut robot = Robot::new(corridor(|c| {
+        c.obstacle.push(Obstacle {
+            until_s: Some(25.0),
+            ..obstacle(4.0, 0.0, 1.0)
+        });
+    }));
+    assert_eq!(robot.told(GoOn, 22.0), None);
+    let (happening, t_s) = robot.told(GoThrough, 40.0).unwrap();
+    assert_eq!(happening, ended(GoThrough, Succeeded));
+    assert!(t_s > 3.0, "not before they have left");
+    // Or it waits: the plan then goes on from where it is.
+    let mut waits = Robot::new(robot.settings.clone());
+    assert_eq!(waits.told(GoOn, 24.5), None);
+    assert!(waits.off_plan_m() > 2.0);
+    assert_eq!(waits.told(GoOn, 1.5), None);
+    assert!(waits.off_plan_m() < 0.5);
+    assert_eq!(waits.told(GoOn, 60.0).unwrap().0, Happening::Goal);
+}
+
+#[test]
+fn the_alternative_is_taken_once() {
+    let mut robot = Robot::new(corridor(|c| {
+        c.walls.clear();
+        c.alternative = vec![[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [8.0, 3.0], [8.0, 0.0]];
+        c.obstacle.push(obstacle(6.0, 0.0, 1.0));
+        (c.stop_m, c.slow_m) = (2.0, 3.5);
+    }));
+    assert_eq!(robot.told(GoOn, 15.0), None);
+    let (happening, _) = robot.told(NewPath, 5.0).unwrap();
+    assert_eq!(happening, ended(NewPath, Succeeded));
+    assert_eq!(robot.outcome(), (Some(Succeeded), Symptoms::ALT));
+    assert!(robot.off_plan_m() < 0.2);
+    assert_eq!(robot.told(GoOn, 120.0).unwrap().0, Happening::Goal);
+}
+
+#[test]
+fn moving_away_backs_and_stops_at_what_is_behind() {
+    let mut robot = Robot::new(corridor(|_| {}));
+    robot.told(GoOn, 10.0);
+    let before = robot.place()[0];
+    let (happening, _) = robot.told(MoveAway, 20.0).unwrap();
+    assert_eq!(happening, ended(MoveAway, Succeeded));
+    let back_m = before - robot.place()[0];
+    assert!((0.5..0.75).contains(&back_m), "{back_m}");
+    assert!(robot.off_plan_m() < 0.1, "the plan goes on from there");
+    // A wall just behind the start.
+    let mut robot = Robot::new(corridor(|c| c.walls.push([-0.6, -1.2, -0.6, 1.2])));
+    let (happening, _) = robot.told(MoveAway, 20.0).unwrap();
+    assert_eq!(happening, ended(MoveAway, Failed));
+    assert!(robot.place()[0] > -0.15, "{:?}", robot.place());
+}
+
+#[test]
+fn a_jump_of_the_believed_pose_lasts_until_the_robot_finds_its_place() {
+    let jump = [0.4, -0.3, 0.2];
+    let mut robot = Robot::new(corridor(|c| {
+        c.trouble
+            .push(trouble(TroubleKind::Mislocalised, 5.0, jump));
+    }));
+    robot.told(GoOn, 4.9);
+    assert!(robot.off_plan_m() < 0.2);
+    robot.told(GoOn, 0.2);
+    let [x, y, yaw] = robot.place();
+    let seen = robot.frame.pose;
+    let off = [
+        seen[0] - x - jump[0],
+        seen[1] - y - jump[1],
+        seen[2] - yaw - jump[2],
+    ];
+    assert!(off.iter().all(|off| off.abs() < 0.05), "{off:?}");
+    assert_eq!(robot.frame.pose_reset_count, 0);
+    let (happening, _) = robot.told(Relocalise, 5.0).unwrap();
+    assert_eq!(happening, ended(Relocalise, Succeeded));
+    assert_eq!(robot.frame.pose_reset_count, 1);
+    let ([x, y, _], seen) = (robot.place(), robot.frame.pose);
+    assert!((seen[0] - x).hypot(seen[1] - y) < 0.05);
+    assert!(robot.off_plan_m() < 0.3);
+    // Who knows the place finds no other.
+    robot.told(Relocalise, 5.0);
+    assert_eq!(robot.frame.pose_reset_count, 1);
+}
+
+#[test]
+fn a_phantom_stops_the_robot_and_a_blind_one_stops_at_touch() {
+    let phantom = trouble(TroubleKind::Phantom, 0.0, [4.0, 0.0, 0.0]);
+    let mut robot = Robot::new(corridor(|c| c.trouble.push(phantom)));
+    assert_eq!(robot.told(GoOn, 40.0), None);
+    assert!(robot.place()[0] < 2.4);
+    let (happening, _) = robot.told(GoThrough, 40.0).unwrap();
+    assert_eq!(happening, ended(GoThrough, Succeeded));
+    assert_eq!(robot.told(GoOn, 40.0).unwrap().0, Happening::Goal);
+
+    let blind = trouble(TroubleKind::Blind, 0.0, [0.0; 3]);
+    let mut robot = Robot::new(corridor(|c| {
+        c.trouble.push(blind);
+        c.obstacle.push(obstacle(5.0, 0.0, 0.8));
+    }));
+    assert_eq!(robot.told(GoOn, 40.0), None);
+    assert!((robot.place()[0] - 3.75).abs() < 0.1, "{:?}", robot.place());
+}
+
+#[test]
+fn a_wrong_heading_leads_off_the_path_until_it_is_planned_anew() {
+    let wrong = trouble(TroubleKind::WrongHeading, 3.0, [0.0, 0.0, 1.2]);
+    let mut robot = Robot::new(corridor(|c| {
+        c.walls.clear();
+        c.trouble.push(wrong);
+    }));
+    assert_eq!(robot.told(GoOn, 20.0), None);
+    assert!(robot.place()[1] > 0.5, "{:?}", robot.place());
+    assert_eq!(
+        robot.told(NewPath, 5.0).unwrap().0,
+        ended(NewPath, Succeeded)
+    );
+    assert!(robot.off_plan_m() < 0.2);
+    assert_eq!(robot.told(GoOn, 60.0).unwrap().0, Happening::Goal);
+}
+
+#[test]
+fn help_clears_the_way_and_begins_a_new_run() {
+    let mut robot = Robot::new(corridor(|c| c.obstacle.push(obstacle(5.0, 0.0, 1.2))));
+    assert_eq!(robot.told(GoOn, 30.0), None);
+    let run = robot.frame.run_id;
+    let (happening, t_s) = robot.told(CallForHelp, 30.0).unwrap();
+    assert_eq!(happening, ended(CallForHelp, Succeeded));
+    assert!((t_s - robot.settings.help_s).abs() < 0.02);
+    assert_ne!(robot.frame.run_id, run);
+    robot.settings.obstacle.clear();
+    assert_eq!(robot.told(GoOn, 60.0).unwrap().0, Happening::Goal);
+}
+
+#[test]
+fn giving_up_and_stopping_stand_and_are_done_at_once() {
+    for kind in [Stop, GiveUp] {
+        let mut robot = Robot::new(corridor(|_| {}));
+        robot.told(GoOn, 5.0);
+        assert_eq!(
+            robot.told(kind, 1.0).unwrap(),
+            (ended(kind, Succeeded), 0.01)
+        );
+        let before = robot.place()[0];
+        assert_eq!(robot.told(GoOn, 0.01), None);
+        assert!(robot.place()[0] - before < 0.01);
+    }
+}
+
+#[test]
+fn without_an_action_the_robot_stands_and_its_time_does_too() {
+    let mut robot = Robot::new(corridor(|c| {
+        c.trouble
+            .push(trouble(TroubleKind::Mislocalised, 0.5, [1.0, 0.0, 0.0]));
+    }));
+    for _ in 0..500 {
+        robot.simulation.step(0.01, None, 0);
+        robot.simulation.measure(&mut robot.frame);
+    }
+    assert_eq!(
+        (robot.place(), robot.frame.planned_pose),
+        ([0.0; 3], [0.0; 3])
+    );
+    assert!(robot.frame.pose[0].abs() < 0.1);
+    assert_eq!(robot.frame.safe_stop, 1);
+}

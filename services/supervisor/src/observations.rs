@@ -1,0 +1,61 @@
+//! From a set of symptoms and outcomes to an observation of the decision model, by name.
+
+use vigil_blocks::Symptoms;
+use vigil_decision::Pomdp;
+
+use crate::mapping::SupervisorError;
+
+/// Basic observations in the order of their bits; a set's name joins them by `_`, in any order.
+const BASIC: [(&str, u32); 7] = [
+    ("EPS", Symptoms::EPS),
+    ("EPM", Symptoms::EPM),
+    ("LD", Symptoms::LD),
+    ("SD", Symptoms::SD),
+    ("BO", Symptoms::BO),
+    ("ALT", Symptoms::ALT),
+    ("NNA", Symptoms::NNA),
+];
+/// Name of the empty set.
+const NONE: &str = "none";
+
+/// The observation for each set.
+#[derive(Debug, Clone)]
+pub(crate) struct Observations {
+    index: [Option<usize>; Symptoms::ALL as usize + 1],
+}
+
+impl Observations {
+    /// Of a model all of whose observations are sets.
+    pub(crate) fn new(model: &Pomdp) -> Result<Self, SupervisorError> {
+        let mut index = [None; Symptoms::ALL as usize + 1];
+        for (z, name) in model.observations().iter().enumerate() {
+            let set = set_of(name).ok_or_else(|| SupervisorError::NoSet(name.clone()))?;
+            if let Some(twice) = index[set as usize].replace(z) {
+                let other = model.observations()[twice].clone();
+                return Err(SupervisorError::SameSet(name.clone(), other));
+            }
+        }
+        for (basic, bit) in [(NONE, 0)].iter().chain(&BASIC) {
+            if index[*bit as usize].is_none() {
+                return Err(SupervisorError::NoObservation(basic));
+            }
+        }
+        Ok(Self { index })
+    }
+
+    /// The model's observation; `None` if the model has none for this set.
+    pub(crate) fn of(&self, set: u32) -> Option<usize> {
+        self.index.get(set as usize).copied().flatten()
+    }
+}
+
+/// Bits of a set by its name.
+fn set_of(name: &str) -> Option<u32> {
+    if name == NONE {
+        return Some(0);
+    }
+    name.split('_').try_fold(0, |set, part| {
+        let bit = BASIC.iter().find(|(basic, _)| *basic == part)?.1;
+        (set & bit == 0).then_some(set | bit)
+    })
+}

@@ -1,0 +1,63 @@
+//! Rules of `[supervisor]`.
+
+use vigil_decision::policy::PolicyName;
+
+use crate::schema::{Evidence, GraphFile, Recovery, Source, Supervisor};
+
+/// Policy, evidence, and actions that only a robot with a path can take.
+pub(super) fn check(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
+    let settings = &file.supervisor;
+    policy(settings, report);
+    let simulates = file.sensor.source == Source::Simulator;
+    if settings.evidence == Evidence::Faults && settings.hardware_state.is_some() {
+        let message = "has a meaning only with supervisor.evidence = \"symptoms\"";
+        report("supervisor.hardware_state", message.to_owned());
+    }
+    if settings.evidence == Evidence::Symptoms && simulates && file.monitors.is_none() {
+        let message = "\"symptoms\" requires [monitors]: the simulator reports none of its own";
+        report("supervisor.evidence", message.to_owned());
+    }
+    if simulates && file.navigation.is_none() {
+        for (name, action) in &settings.actions {
+            if needs_path(action.kind) {
+                let key = format!("supervisor.actions.{name}.kind");
+                let message = "the simulator can do this only with a path: [navigation]";
+                report(&key, message.to_owned());
+            }
+        }
+    }
+}
+
+const fn needs_path(kind: Recovery) -> bool {
+    use Recovery as R;
+    matches!(
+        kind,
+        R::NewPath | R::Relocalise | R::GoThrough | R::MoveAway | R::GiveUp
+    )
+}
+
+/// Name of the policy, and what its dual control needs.
+fn policy(settings: &Supervisor, report: &mut impl FnMut(&str, String)) {
+    let is_dual = match settings.policy.parse::<PolicyName>() {
+        Ok(name) => name.information.is_some(),
+        Err(error) => return report("supervisor.policy", error.to_string()),
+    };
+    let key = "supervisor.information_actions";
+    let named = &settings.information_actions;
+    if settings.as_published && (!named.is_empty() || settings.gate.is_some()) {
+        let message = "with as_published neither information_actions nor gate has a meaning";
+        report("supervisor.as_published", message.to_owned());
+    } else if is_dual && named.is_empty() && !settings.as_published {
+        let message = format!(
+            "is required by {}: one or more actions of the decision model that do not end or \
+             interrupt the task",
+            settings.policy
+        );
+        report(key, message);
+    }
+    for (i, name) in named.iter().enumerate() {
+        if named[..i].contains(name) {
+            report(key, format!("'{name}' appears twice"));
+        }
+    }
+}

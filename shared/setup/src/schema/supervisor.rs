@@ -1,0 +1,138 @@
+//! `[supervisor]`: the decision system.
+
+use std::collections::BTreeMap;
+use vigil_blocks::RecoveryKind;
+
+use serde::Deserialize;
+
+/// The decision system.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Supervisor {
+    /// What the decision model's states are told by: `faults`, if they are the leaves of the fault
+    /// tree; `symptoms`, if its observations are sets of symptoms and outcomes (`EPM_LD`, `none`).
+    pub evidence: Evidence,
+    /// With `symptoms`: the state that means a hardware fault; the identifier's belief in any fault
+    /// of its tree is soft evidence for it. Default: none, the identifier is then not heard.
+    pub hardware_state: Option<String>,
+    /// Policy: `qmdp`, `mls` (the best action of the most likely state), `av` (action voting),
+    /// `fib` (fast informed bound), or one of these with dual control, which gathers information
+    /// while the belief is too uncertain: `dm-X` about the state, `adm-X` about the best action.
+    pub policy: String,
+    /// Dual control: information is gathered above this entropy, 0 (certain) to 1; 1 never.
+    pub threshold: f64,
+    /// Dual control: whose entropy the threshold is for, `state` or `action`; default `state` for
+    /// `dm-X`, `action` for `adm-X`.
+    pub gate: Option<Gate>,
+    /// Dual control: actions of the decision model that may be taken for information. Required by
+    /// `dm-X` and `adm-X`: a restart or a call for help must not be made merely to know more.
+    pub information_actions: Vec<String>,
+    /// Dual control: after so many steps for information in a row without falling entropy, X acts
+    /// until it has fallen, 0 to 1000; 0 never.
+    pub stall_guard_steps: u32,
+    /// Dual control as published in 2002: gated on the state's entropy, any action may be taken
+    /// for information, no guard. Default false.
+    pub as_published: bool,
+    /// Interval between decision epochs, ms, 1 to 60000. A change of the diagnosed mode opens an
+    /// epoch at once. With `symptoms`, the longest epoch: an outcome or a new symptom ends it too.
+    pub epoch_ms: f64,
+    /// Validity of a published action, as a multiple of the period, 1 to 1000 (at least 20 ms).
+    pub validity_periods: f64,
+    /// What each action of the decision model makes the robot do, by the action's name.
+    pub actions: BTreeMap<String, RecoveryAction>,
+}
+
+impl Default for Supervisor {
+    fn default() -> Self {
+        Self {
+            evidence: Evidence::Faults,
+            hardware_state: None,
+            policy: "qmdp".into(),
+            threshold: 0.5,
+            gate: None,
+            information_actions: Vec::new(),
+            stall_guard_steps: 5,
+            as_published: false,
+            epoch_ms: 100.0,
+            validity_periods: 10.0,
+            actions: BTreeMap::new(),
+        }
+    }
+}
+
+/// What the decision model's states are told by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Evidence {
+    /// The identifier's belief over the leaves of the fault tree.
+    Faults,
+    /// Symptoms and outcomes of actions.
+    Symptoms,
+}
+
+/// Whose entropy decides whether information is gathered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Gate {
+    /// That of the belief over states.
+    State,
+    /// That of the states' votes for their best actions.
+    Action,
+}
+
+/// What an action makes the robot do.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecoveryAction {
+    /// Kind of the recovery.
+    pub kind: Recovery,
+    /// Factor on the commanded speed, 0 to 1; default 1 (0 for what is done
+    /// standing: `stop`, `call_for_help`, `new_path`, `relocalise`, `give_up`).
+    pub speed_scale: Option<f64>,
+}
+
+/// Kind of a recovery action; see `vigil_blocks::RecoveryKind`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Recovery {
+    /// Drive as planned.
+    GoOn,
+    /// Drive as planned, slower.
+    SlowDown,
+    /// Stop.
+    Stop,
+    /// Counter-steer by the learned yaw offset of the stuck wheel.
+    Compensate,
+    /// Drive on without trusting one wheel's encoder.
+    IgnoreEncoder,
+    /// Stop and call for help.
+    CallForHelp,
+    /// Ask the planner for another path.
+    NewPath,
+    /// Find the own place anew.
+    Relocalise,
+    /// Look for an opening and go through it.
+    GoThrough,
+    /// Move away from the present place.
+    MoveAway,
+    /// Give this task up.
+    GiveUp,
+}
+
+impl From<Recovery> for RecoveryKind {
+    fn from(recovery: Recovery) -> Self {
+        match recovery {
+            Recovery::GoOn => Self::GoOn,
+            Recovery::SlowDown => Self::SlowDown,
+            Recovery::Stop => Self::Stop,
+            Recovery::Compensate => Self::Compensate,
+            Recovery::IgnoreEncoder => Self::IgnoreEncoder,
+            Recovery::CallForHelp => Self::CallForHelp,
+            Recovery::NewPath => Self::NewPath,
+            Recovery::Relocalise => Self::Relocalise,
+            Recovery::GoThrough => Self::GoThrough,
+            Recovery::MoveAway => Self::MoveAway,
+            Recovery::GiveUp => Self::GiveUp,
+        }
+    }
+}

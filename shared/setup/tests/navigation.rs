@@ -1,0 +1,122 @@
+//! Corridors, monitors and what the supervisor needs for them: what does not fit is named.
+#![allow(clippy::unwrap_used)]
+
+use std::path::PathBuf;
+
+use vigil_setup::load_graph;
+use vigil_setup::schema::{Evidence, GraphFile, Monitors, Source};
+
+fn load(name: &str, change: impl FnOnce(&mut GraphFile)) -> Result<(), String> {
+    let config = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
+    let change = |file: &mut GraphFile| {
+        // One core is enough to read a configuration.
+        for service in [
+            &mut file.services.sensor_sim,
+            &mut file.services.detector,
+            &mut file.services.identifier,
+            &mut file.services.supervisor,
+        ] {
+            service.core = 0;
+        }
+        change(file);
+    };
+    load_graph(&config.join(name), change)
+        .map(|_| ())
+        .map_err(|error| error.to_string())
+}
+
+#[test]
+fn the_shipped_corridors_are_sound() {
+    for name in ["corridor-obstacle.toml", "corridor-people.toml"] {
+        assert_eq!(load(name, |_| ()), Ok(()));
+    }
+}
+
+#[test]
+fn a_corridor_that_cannot_be_is_refused_by_key() {
+    let refused = |change: fn(&mut GraphFile), key: &str, what: &str| {
+        let message = load("corridor-people.toml", change).unwrap_err();
+        assert!(message.contains(&format!(": {key}: ")), "{key}: {message}");
+        assert!(message.contains(what), "{what}: {message}");
+    };
+    macro_rules! with {
+        ($($change:tt)*) => {
+            |file: &mut GraphFile| file.navigation.as_mut().unwrap().$($change)*
+        };
+    }
+    refused(
+        with!(path.truncate(1)),
+        "navigation.path",
+        "1 entries: allowed are 2 to 256",
+    );
+    refused(
+        with!(path[0][1] = 0.1),
+        "navigation.path",
+        "must begin at [0.0, 0.0]",
+    );
+    refused(
+        with!(path[1][0] = f64::NAN),
+        "navigation.path",
+        "up to 1000 m",
+    );
+    refused(
+        with!(path.push([7.0, 0.0])),
+        "navigation.path",
+        "follows upon itself",
+    );
+    refused(
+        with!(speed_m_s = 0.6),
+        "navigation.speed_m_s",
+        "0.01 to 0.5",
+    );
+    refused(
+        with!(slow_m = 0.9),
+        "navigation.slow_m",
+        "allowed is 1 to 20",
+    );
+    refused(with!(look_s = 0.0), "navigation.look_s", "0.1 to 60");
+    refused(
+        with!(obstacle[1].radius_m = -1.0),
+        "navigation.obstacle.1.radius_m",
+        "0.01 to 20",
+    );
+    refused(
+        with!(obstacle[2].from_s = 20.0),
+        "navigation.obstacle.2.until_s",
+        "14 is out of range: allowed is 20 to",
+    );
+    let drives = |file: &mut GraphFile| {
+        file.drive.push(vigil_setup::schema::DriveSegment {
+            duration_s: 1.0,
+            curvature_1_m: 0.0,
+            speed_m_s: 0.1,
+        });
+    };
+    refused(drives, "drive", "leave one out");
+    let external = |file: &mut GraphFile| file.sensor.source = Source::External;
+    refused(external, "navigation", "sensor.source");
+    let spins = |file: &mut GraphFile| file.monitors.as_mut().unwrap().loop_travel_m = 0.5;
+    refused(spins, "monitors.loop_travel_m", "0.6 to 30");
+}
+
+#[test]
+fn evidence_and_actions_that_nothing_gives_are_refused() {
+    let name = "corridor-people.toml";
+    let message = load(name, |file| file.monitors = None).unwrap_err();
+    assert!(message.contains("supervisor.evidence: ") && message.contains("[monitors]"));
+    let message = load(name, |file| file.supervisor.evidence = Evidence::Faults).unwrap_err();
+    assert!(message.contains("supervisor.hardware_state: "), "{message}");
+    let message = load(name, |file| file.navigation = None).unwrap_err();
+    assert!(message.contains("drive: ") && message.contains("supervisor.actions.NP.kind: "));
+    // A robot outside reports symptoms of its own and finds its own paths.
+    let external = |file: &mut GraphFile| {
+        (file.navigation, file.monitors) = (None, None);
+        file.sensor.source = Source::External;
+    };
+    assert_eq!(load(name, external), Ok(()));
+    assert_eq!(
+        load("rover.toml", |file| file.monitors =
+            Some(Monitors::default())),
+        Ok(())
+    );
+}

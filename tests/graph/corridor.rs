@@ -1,0 +1,59 @@
+//! The paper's two stories through the four processes.
+
+use crate::harness::{Running, Summary, machine};
+
+/// Decisions, symptoms, outcomes and the goal, in order, from the first decision on.
+fn story(summary: &Summary) -> Vec<String> {
+    let events = summary.json["events"].as_array().unwrap();
+    let text = |event: &serde_json::Value, key: &str| event[key].as_str().unwrap().to_owned();
+    let told = events
+        .iter()
+        .filter_map(|event| match event["event"].as_str()? {
+            "action" => Some(text(event, "what")),
+            "outcome" => Some(text(event, "what")),
+            "goal" => Some("goal".to_owned()),
+            _ => None,
+        });
+    told.collect()
+}
+
+fn assert_fired(summary: &Summary, first: &str) {
+    let fired = summary.events("symptoms");
+    assert_eq!(fired[0].1, first, "{fired:?}");
+}
+
+#[test]
+fn a_blocked_corridor_is_tried_and_gone_round_live() {
+    let _machine = machine();
+    let config = "config/corridor-obstacle.toml".into();
+    let summary = Running::start_with(config, "obstacle", &["--duration", "40"]).finish();
+    let expected = [
+        "FP",
+        "GO",
+        "no opening",
+        "NP",
+        "alternative path",
+        "FP",
+        "goal",
+    ];
+    assert_eq!(story(&summary), expected);
+    assert_fired(&summary, "EPM");
+    assert_eq!(summary.events("alarm"), []);
+    let obeyed: Vec<String> = summary
+        .events("obeys")
+        .into_iter()
+        .map(|(_, w)| w)
+        .collect();
+    assert_eq!(obeyed, ["FP", "GO", "NP", "FP"]);
+}
+
+#[test]
+fn people_in_a_corridor_are_waited_for_and_passed_live() {
+    let _machine = machine();
+    let config = "config/corridor-people.toml".into();
+    let summary = Running::start_with(config, "people", &["--duration", "40"]).finish();
+    let expected = ["FP", "GO", "blockage overtaken", "FP", "goal"];
+    assert_eq!(story(&summary), expected);
+    assert_fired(&summary, "EPM");
+    assert_eq!(summary.events("alarm"), []);
+}

@@ -1,0 +1,257 @@
+//! The corridor world, its watchers and the supervisor in one thread: what is done, in order.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use std::path::PathBuf;
+
+use vigil_blocks::{
+    Action, ActionOutcome, DetectionBelief, Entry, FaultBelief, ParticleBlock, RecoveryKind,
+    SensorFrame, Symptoms,
+};
+use vigil_detector::Detector;
+use vigil_identifier::{Diagnoser, Input};
+use vigil_sensor_sim::{Assembled, Happening, Simulation};
+use vigil_setup::schema::{GraphFile, Trouble, TroubleKind};
+use vigil_setup::{Setup, load_graph};
+use vigil_supervisor::{Inputs, Supervisor};
+
+const PERIOD_NS: u64 = 10_000_000;
+
+/// A shipped graph, changed.
+fn setup(name: &str, change: impl FnOnce(&mut GraphFile)) -> Setup {
+    let config = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../config");
+    load_graph(&config.join(name), change).unwrap()
+}
+
+/// Four services in one thread.
+struct Corridor {
+    setup: Setup,
+    simulation: Simulation,
+    detector: Detector,
+    identifier: Diagnoser,
+    supervisor: Supervisor,
+    frame: SensorFrame,
+    detection: Box<DetectionBelief>,
+    diagnosis: Box<FaultBelief>,
+    particles: [Box<ParticleBlock>; 2],
+    action: Option<Box<Action>>,
+    /// What was decided, fired and happened, in words: `FP`, `+EPM`, `GO failed`, `goal`.
+    told: Vec<String>,
+}
+
+impl Corridor {
+    fn new(setup: Setup) -> Self {
+        let Assembled::Simulator(simulation, _) = vigil_sensor_sim::assemble(&setup, &[]).unwrap()
+        else {
+            unreachable!("a corridor is simulated");
+        };
+        Self {
+            simulation: *simulation,
+            detector: vigil_detector::assemble(&setup).unwrap(),
+            identifier: vigil_identifier::assemble(&setup).unwrap(),
+            supervisor: vigil_supervisor::assemble(&setup).unwrap(),
+            frame: SensorFrame::default(),
+            detection: Box::default(),
+            diagnosis: Box::default(),
+            particles: [Box::default(), Box::default()],
+            action: None,
+            told: Vec::new(),
+            setup,
+        }
+    }
+
+    fn step(&mut self) {
+        let action = self.action.as_deref();
+        self.simulation.step(PERIOD_NS as f64 * 1e-9, action, 0);
+        self.simulation.measure(&mut self.frame);
+        self.frame.header.t_capture_ns += PERIOD_NS;
+        match self.simulation.happening() {
+            Some(Happening::Ended(kind, outcome)) => {
+                let name = Self::name(kind);
+                let how = if outcome == ActionOutcome::Succeeded {
+                    "done"
+                } else {
+                    "failed"
+                };
+                self.told.push(format!("{name} {how}"));
+            }
+            Some(Happening::Goal) => self.told.push("goal".to_owned()),
+            None => {}
+        }
+        let fired = self.detection.symptoms;
+        let [detected, drawn] = &mut self.particles;
+        let entry = Entry::Frame(&self.frame);
+        self.detector.step(entry, &mut self.detection, detected);
+        for (name, bit) in [
+            ("EPS", Symptoms::EPS),
+            ("EPM", Symptoms::EPM),
+            ("LD", Symptoms::LD),
+            ("SD", Symptoms::SD),
+        ] {
+            if self.detection.symptoms & !fired & bit != 0 {
+                self.told.push(format!("+{name}"));
+            }
+        }
+        let input = Input {
+            frame: &self.frame,
+            detection: Some((&*self.detection, &**detected)),
+        };
+        self.identifier
+            .step(Entry::Frame(input), &mut self.diagnosis, drawn);
+        self.diagnosis.header.t_capture_ns = self.frame.header.t_capture_ns;
+        self.detection.header.t_capture_ns = self.frame.header.t_capture_ns;
+        self.decide();
+    }
+
+    fn decide(&mut self) {
+        let inputs = Inputs {
+            diagnosis: Some(&self.diagnosis),
+            detection: Some(&self.detection),
+        };
+        let action = self.action.get_or_insert_default();
+        let before = action.decision_seq;
+        self.supervisor.step(Entry::Frame(inputs), action);
+        action.valid_until_ns = u64::MAX;
+        if action.decision_seq != before {
+            let kind = RecoveryKind::from_wire(action.kind).unwrap();
+            let name = Self::name(kind);
+            self.told.push(name);
+        }
+    }
+
+    fn name(kind: RecoveryKind) -> String {
+        let names = [
+            (RecoveryKind::GoOn, "FP"),
+            (RecoveryKind::NewPath, "NP"),
+            (RecoveryKind::Relocalise, "RL"),
+            (RecoveryKind::GoThrough, "GO"),
+            (RecoveryKind::MoveAway, "MA"),
+            (RecoveryKind::CallForHelp, "SH"),
+            (RecoveryKind::GiveUp, "GU"),
+        ];
+        let found = names.iter().find(|(of, _)| *of == kind);
+        found.map_or("?", |(_, name)| name).to_owned()
+    }
+
+    fn drive(&mut self, seconds: f64) {
+        (0..(seconds * 1e9 / PERIOD_NS as f64) as u32).for_each(|_| self.step());
+    }
+}
+
+#[test]
+fn an_obstacle_is_gone_round() {
+    let mut corridor = Corridor::new(setup("corridor-obstacle.toml", |_| {}));
+    corridor.drive(40.0);
+    let expected = [
+        "FP",
+        "+EPM",
+        "GO",
+        "+EPS",
+        "GO failed",
+        "NP",
+        "NP done",
+        "FP",
+        "goal",
+    ];
+    assert_eq!(corridor.told, expected);
+}
+
+#[test]
+fn people_are_waited_for_and_passed() {
+    let mut corridor = Corridor::new(setup("corridor-people.toml", |_| {}));
+    corridor.drive(40.0);
+    let expected = ["FP", "+EPM", "GO", "+EPS", "GO done", "FP", "goal"];
+    assert_eq!(corridor.told, expected);
+}
+
+/// The people's corridor without people, and with this trouble.
+fn troubled(kind: TroubleKind, at_s: f64, place: [f64; 3]) -> Corridor {
+    Corridor::new(setup("corridor-people.toml", |file| {
+        let navigation = file.navigation.as_mut().unwrap();
+        navigation.obstacle.clear();
+        if kind == TroubleKind::WrongHeading {
+            navigation.walls.clear();
+        }
+        navigation.trouble.push(Trouble {
+            kind,
+            at_s,
+            x_m: place[0],
+            y_m: place[1],
+            yaw_rad: place[2],
+        });
+    }))
+}
+
+#[test]
+fn a_phantom_is_gone_through() {
+    let mut corridor = troubled(TroubleKind::Phantom, 0.0, [4.5, 0.0, 0.0]);
+    corridor.drive(40.0);
+    let expected = ["FP", "+EPM", "GO", "GO done", "FP", "goal"];
+    assert_eq!(corridor.told, expected);
+}
+
+#[test]
+fn a_mislocalised_robot_finds_its_place() {
+    let mut corridor = troubled(TroubleKind::Mislocalised, 5.0, [0.3, 0.9, 0.4]);
+    corridor.drive(80.0);
+    let mut expected = vec!["FP", "+EPM", "GO", "+EPS", "+EPM", "+EPS", "GO failed"];
+    expected.extend(["NP", "NP failed"].repeat(10));
+    expected.extend(["GO", "GO failed"].repeat(3));
+    expected.extend(["SH", "SH done", "FP", "goal"]);
+    assert_eq!(corridor.told, expected);
+}
+
+#[test]
+fn a_wrong_heading_is_corrected() {
+    let mut corridor = troubled(TroubleKind::WrongHeading, 5.0, [0.0, 0.0, 1.8]);
+    corridor.drive(80.0);
+    let expected = ["FP", "+EPM", "GO", "GO failed", "NP", "NP done", "FP"];
+    assert_eq!(corridor.told[..7], expected);
+    assert_eq!(corridor.told.last().unwrap(), "goal");
+}
+
+#[test]
+fn a_blind_robot_touches_and_is_helped() {
+    let mut corridor = Corridor::new(setup("corridor-people.toml", |file| {
+        let navigation = file.navigation.as_mut().unwrap();
+        for obstacle in &mut navigation.obstacle {
+            obstacle.until_s = None;
+        }
+        navigation.trouble.push(Trouble {
+            kind: TroubleKind::Blind,
+            at_s: 1.0,
+            x_m: 0.0,
+            y_m: 0.0,
+            yaw_rad: 0.0,
+        });
+    }));
+    corridor.drive(80.0);
+    let mut expected = vec!["FP", "+EPM", "GO", "+EPS", "GO failed"];
+    expected.extend(["NP", "NP failed"].repeat(3));
+    expected.extend(["GO", "GO failed"].repeat(3));
+    expected.extend(["SH", "SH done", "FP", "goal"]);
+    assert_eq!(corridor.told, expected);
+}
+
+#[test]
+fn a_stuck_wheel_is_a_hardware_problem_by_the_identifiers_word() {
+    let mut corridor = Corridor::new(setup("corridor-people.toml", |file| {
+        file.navigation.as_mut().unwrap().obstacle.clear();
+    }));
+    corridor.drive(5.0);
+    let fault = vigil_robot::Fault {
+        kind: vigil_robot::FaultKind::Stuck,
+        wheel: corridor.setup.robot.wheel_index("RM").unwrap(),
+    };
+    corridor.simulation.world.inject(fault).unwrap();
+    corridor.drive(0.5);
+    assert_eq!(corridor.told, ["FP", "SH"]);
+    let hp = corridor
+        .setup
+        .decision
+        .states()
+        .iter()
+        .position(|s| s == "HP");
+    assert!(corridor.action.as_ref().unwrap().belief[hp.unwrap()] > 0.9);
+    corridor.drive(30.0);
+    assert_eq!(corridor.told, ["FP", "SH", "SH done", "FP", "goal"]);
+}
