@@ -1,8 +1,9 @@
 //! Are two stuck wheels named, both and no other?
 //!
-//! Every pair of wheels in every turn, at once and one 2 s after the other, on the soil learned from,
-//! with encoders. `--seeds N` worlds per cell (1), the first of them `--first-seed S` (1; tuning takes
-//! 100000 or more, and so no run that is archived); `--json`: the document only, nothing is archived.
+//! Every pair of wheels in every turn, at once and one 2 s after the other, on the soil learned
+//! from, with encoders. `--seeds N` worlds per cell (1), the first of them `--first-seed S` (1;
+//! tuning takes 100000 or more, and so no run that is archived); `--json`: the document only,
+//! nothing is archived.
 
 use std::error::Error;
 use std::path::Path;
@@ -59,7 +60,8 @@ fn run() -> Result<(), Box<dyn Error>> {
     };
     let shares = APART_S.map(|apart_s| [0, 1].map(|at| named(apart_s, at)));
     let rows = APART_S.iter().zip(&shares).map(|(apart_s, shares)| {
-        json!({ "apart_s": apart_s, "judged_s": JUDGED_S, "named": shares.each_ref().map(Share::json) })
+        let named = shares.each_ref().map(Share::json);
+        json!({ "apart_s": apart_s, "judged_s": JUDGED_S, "named": named })
     });
     let document = json!({ "machine": machine::facts(), "runs": rows.collect::<Vec<_>>() });
     if options.is_json {

@@ -1,8 +1,8 @@
 //! Is what no model contains detected, and called unknown? And what does nominal driving raise?
 //!
-//! `--seeds N` worlds per cell (2), the first of them `--first-seed S` (1; tuning takes 100000
-//! or more, and so no run that is archived), `--hours H` of nominal driving (24), `--json`: the document
-//! only, nothing is archived.
+//! `--seeds N` worlds per cell (2), the first of them `--first-seed S` (1; tuning takes
+//! 10000000 or more, and so no run that is archived), `--hours H` of nominal driving (24),
+//! `--json`: the document only, nothing is archived.
 
 use std::error::Error;
 use std::path::Path;

@@ -113,7 +113,8 @@ impl Run {
 
     /// Head of [`Self::line`].
     pub const HEAD: &'static str = "spec,curvature_1_m,speed_m_s,sensors,rate_hz,seed,onset_s,\
-        noncentrality,alarmed_before,delay_s,mode_2s_after_alarm,p_2s,mode_5s,p_5s,mode_10s,p_10s,unsolved";
+        noncentrality,alarmed_before,delay_s,mode_2s_after_alarm,p_2s,mode_5s,p_5s,mode_10s,\
+        p_10s,unsolved";
 
     /// The run as a line of CSV.
     #[must_use]

@@ -4,15 +4,11 @@
 //! encoders costs no more than one.
 
 use vigil_blocks::WHEELS;
-use vigil_robot::learned::Moved;
 use vigil_robot::learned::wheel_evidence::{ANYTHING, BREAKAGE_SHARES, BREAKAGES};
 
-/// State of a whole encoder whose wheel turns at a rate of its own: it slips otherwise than learned
-/// beside a wheel that drags; or whatever it does, in the unknown. The states before it are whole,
-/// and the breakages.
+/// State of a whole encoder whose wheel turns at a rate of its own, in the unknown. The states
+/// before it are whole, and the breakages.
 pub const OWN_RATE: usize = 1 + BREAKAGES.len();
-/// Share of wheels that slip otherwise than learned while another one drags.
-const SLIPS: f64 = 0.05;
 /// Share of wheels at a rate of their own among those that do anything, in the unknown.
 const ANYTHING_OWN_RATE: f64 = 0.7;
 
@@ -86,18 +82,6 @@ impl Encoders {
         }
     }
 
-    /// The robot is moved otherwise from now on: a wheel slips if another one drags, and not if
-    /// none does.
-    #[must_use]
-    pub fn moved(mut self, moved: Moved) -> Self {
-        for (wheel, p) in self.p.iter_mut().enumerate() {
-            let whole = p[0] + p[OWN_RATE];
-            let slips = if slips(moved, wheel) { SLIPS } else { 0.0 };
-            (p[0], p[OWN_RATE]) = (whole * (1.0 - slips), whole * slips);
-        }
-        self
-    }
-
     /// One observation: encoder w breaks with the probability `births[w]`, recovers with `death`.
     /// Returns the log-evidence of all readings.
     pub fn step(
@@ -146,11 +130,6 @@ impl Encoders {
     }
 }
 
-/// True if `wheel` may slip otherwise than learned: another one drags, and it turns.
-const fn slips(moved: Moved, wheel: usize) -> bool {
-    moved.stuck() != 0 && !moved.is_stuck(wheel)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -174,27 +153,24 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_of_its_own_is_slip_beside_a_dragging_wheel_and_a_broken_encoder_stays_broken() {
-        let own_rate = Likelihoods::new(2, |_, state| if state == OWN_RATE { 0.0 } else { -2.0 });
+    fn a_wheel_has_a_rate_of_its_own_in_the_unknown_only() {
+        let own_rate = Likelihoods::new(1, |_, state| if state == OWN_RATE { 0.0 } else { -2.0 });
         let births = [1e-4; WHEELS];
-        let dragging = Moved::Stuck(0b10);
-        let mut encoders = Encoders::healthy(0).moved(dragging);
+        let mut known = Encoders::healthy(0);
+        let mut unknown = Encoders::unsure(0);
+        let (mut for_known, mut for_unknown) = (0.0, 0.0);
         for step in 1..=10 {
-            encoders.step(&births, 0.0, &own_rate, step);
+            for_known += known.step(&births, 0.0, &own_rate, step);
+            for_unknown += unknown.step(&births, 0.0, &own_rate, step);
         }
-        assert!(encoders.p_broken(0) < 0.01 && encoders.p[0][OWN_RATE] > 0.99);
-        assert_eq!(encoders.p[1][OWN_RATE], 0.0, "it stands, and does not slip");
-        // When nothing drags any more, slip is over.
-        let after = encoders.moved(Moved::Nominal);
-        assert_eq!(after.p[0][OWN_RATE], 0.0);
-        assert!(after.p_broken(0) < 0.01);
-        // A broken encoder is one also when a wheel begins to drag.
-        let noise = Likelihoods::new(1, |_, state| if state == 3 { 0.0 } else { -2.0 });
-        let mut encoders = Encoders::healthy(0);
-        for step in 1..=20 {
-            encoders.step(&births, 0.0, &noise, step);
-        }
-        assert!(encoders.moved(dragging).p_broken(0) > 0.99);
+        assert_eq!(known.p[0][OWN_RATE], 0.0);
+        assert!(unknown.p[0][OWN_RATE] > 0.99);
+        // Two nats a step, less the prior of such a wheel.
+        let gain: f64 = for_unknown - for_known;
+        assert!(
+            (gain - (20.0 + (ANYTHING * ANYTHING_OWN_RATE).ln())).abs() < 0.1,
+            "{gain}"
+        );
     }
 
     #[test]

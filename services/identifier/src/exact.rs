@@ -193,8 +193,7 @@ impl Exact {
                 state.track.diffuse(self.modes[mode].jump);
                 state.encoders = match (before, after) {
                     (_, Moved::UnknownAny) => Encoders::unsure(t_ns),
-                    (Moved::UnknownAny, _) => Encoders::healthy(t_ns).moved(after),
-                    _ if before.stuck() != after.stuck() => state.encoders.moved(after),
+                    (Moved::UnknownAny, _) => Encoders::healthy(t_ns),
                     _ => state.encoders,
                 };
                 self.bank.add(Hypothesis {
