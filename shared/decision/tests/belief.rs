@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-use std::path::PathBuf;
+mod public;
 
 use vigil_decision::{Evidence, Pomdp, Tracker};
 
@@ -53,14 +53,11 @@ fn dense(model: &Pomdp, belief: &[f64], action: usize, z: usize) -> (Vec<f64>, f
 
 #[test]
 fn updates_agree_with_a_dense_reference_on_every_public_file() {
-    let Some(data) = std::env::var_os("VIGIL_DATA") else {
-        eprintln!("SKIPPED: VIGIL_DATA is not set; public POMDP files are not read");
+    let Some(folder) = public::folder() else {
         return;
     };
     let mut files = 0;
-    for entry in std::fs::read_dir(PathBuf::from(data).join("pomdp")).unwrap() {
-        let path = entry.unwrap().path();
-        let model = Pomdp::parse(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    for (path, model) in public::all(&folder) {
         files += 1;
         let steps = if model.states().len() > 100 { 100 } else { 400 };
         let mut numbers = Numbers(files);

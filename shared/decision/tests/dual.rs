@@ -2,23 +2,16 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+mod public;
+
 use proptest::prelude::*;
+use public::TIGER;
 use vigil_decision::mdp::{self, Solution};
 use vigil_decision::policy::{
     ActionVoting, Base, Decider, Dual, DualControl, DualError, Gate, Information, LookAhead,
     PolicyName, normalised_entropy,
 };
 use vigil_decision::{Choice, Control, Policy, Pomdp};
-
-const TIGER: &str = "
-discount: 0.95 values: reward states: left right
-actions: listen open-left open-right observations: hear-left hear-right
-T: listen identity T: open-left uniform T: open-right uniform
-O: listen 0.85 0.15 0.15 0.85 O: open-left uniform O: open-right uniform
-R: listen : * : * : * -1
-R: open-left : left : * : * -100 R: open-left : right : * : * 10
-R: open-right : left : * : * 10 R: open-right : right : * : * -100
-";
 
 /// Four faults, of which the first two have one remedy; `look` shows a little, `restart` makes the
 /// state certain at a price, and none of the rest shows anything.

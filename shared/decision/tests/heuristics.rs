@@ -2,66 +2,34 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use std::path::PathBuf;
+mod public;
 
+use public::heuristics::{HEURISTICS, POLICIES, half_width};
+use vigil_decision::mdp;
 use vigil_decision::policy::{Dual, PolicyName};
 use vigil_decision::simulation::{PolicyAgent, Rules, Summary, horizon, run};
-use vigil_decision::{Pomdp, mdp};
 
 const EPISODES: u64 = 500;
 
-const POLICIES: [&str; 10] = [
-    "mls", "av", "qmdp", "fib", "dm-mls", "adm-mls", "dm-av", "adm-av", "dm-qmdp", "adm-qmdp",
-];
-
-/// Model, mean of each policy with K = 0.5, largest 95 % half-width of MLS and AV, of ADM, of the
-/// rest: another implementation, 3,000 episodes, to where the discount's power is below 1e-4.
-type Row = (&'static str, [f64; 10], [f64; 3]);
-const REFERENCE: [Row; 3] = [
-    (
-        "tiger.95",
-        [
-            -900.6, -899.2, 19.91, 19.91, 19.91, -75.4, 19.91, -75.4, 19.91, 19.91,
-        ],
-        [6.4, 3.2, 1.0],
-    ),
-    (
-        "tiger.aaai",
-        [
-            -179.6, -180.3, 1.96, 1.96, 1.96, -14.4, 1.96, -14.4, 1.96, 1.96,
-        ],
-        [3.0, 1.3, 0.4],
-    ),
-    (
-        "hallway",
-        [
-            0.820, 0.781, 0.334, 0.236, 0.792, 0.852, 0.770, 0.821, 0.466, 0.500,
-        ],
-        [0.019; 3],
-    ),
-];
+/// Those that take little time.
+const FILES: [&str; 3] = ["tiger.95", "tiger.aaai", "hallway"];
 
 #[test]
 fn heuristics_earn_on_public_models_what_another_implementation_says() {
-    let Some(data) = std::env::var_os("VIGIL_DATA") else {
-        eprintln!("SKIPPED: VIGIL_DATA is not set; public POMDP files are not read");
+    let Some(folder) = public::folder() else {
         return;
     };
     let (mut outside, mut cells) = (0, 0);
-    for (file, means, half_widths) in REFERENCE {
-        let path = PathBuf::from(&data).join(format!("pomdp/{file}.pomdp"));
-        let model = Pomdp::parse(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let rows = HEURISTICS.into_iter();
+    for (file, means, half_widths) in rows.filter(|(file, ..)| FILES.contains(file)) {
+        let model = public::read(&folder, file);
         let solution = mdp::solve(&model).unwrap();
         let rules = Rules {
             steps_max: horizon(model.discount(), 1000),
             is_end: Vec::new(),
         };
         for (name, mean) in POLICIES.into_iter().zip(means) {
-            let half_width = half_widths[match name {
-                "mls" | "av" => 0,
-                "adm-mls" | "adm-av" => 1,
-                _ => 2,
-            }];
+            let half_width = half_width(name, half_widths);
             let policy: PolicyName = name.parse().unwrap();
             let decider = policy.build(&model, &solution, |i| Dual::new(i, 0.5));
             let mut agent = PolicyAgent::new(&model, decider.unwrap());

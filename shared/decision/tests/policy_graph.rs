@@ -2,28 +2,12 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+mod public;
+
+use public::TIGER;
 use vigil_decision::policy::{Base, Decider};
 use vigil_decision::policy_graph::{Limits, PolicyGraph};
 use vigil_decision::{Pomdp, Tracker, mdp};
-
-/// Listening is right 17 in 20 times; a door opened puts the tiger behind either.
-const TIGER: &str = "
-discount: 0.95 values: reward states: left right
-actions: listen open-left open-right observations: hear-left hear-right
-T: listen identity
-T: open-left uniform
-T: open-right uniform
-O: listen
-0.85 0.15
-0.15 0.85
-O: open-left uniform
-O: open-right uniform
-R: listen : * : * : * -1
-R: open-left : left : * : * -100
-R: open-left : right : * : * 10
-R: open-right : left : * : * 10
-R: open-right : right : * : * -100
-";
 
 fn graph(nodes_max: usize) -> (Pomdp, PolicyGraph) {
     let model = Pomdp::parse(TIGER).unwrap();

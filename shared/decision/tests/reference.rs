@@ -2,32 +2,12 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use std::path::PathBuf;
+mod public;
 
+use public::TIGER;
+use public::bounds::BOUNDS;
 use vigil_decision::policy::{choose, choose_among};
 use vigil_decision::{ActionVoting, Evidence, MostLikelyState, Policy, Pomdp, QMdp, Tracker, mdp};
-
-/// The tiger behind one of two doors, written from its published description.
-const TIGER: &str = "
-discount: 0.95  # per step
-values: reward
-states: left right
-actions: listen open-left open-right
-observations: hear-left hear-right
-T: listen identity
-T: open-left uniform
-T: open-right uniform
-O: listen
-0.85 0.15
-0.15 0.85
-O: open-left uniform
-O: open-right uniform
-R: listen : * : * : * -1
-R: open-left : left : * : * -100
-R: open-left : right : * : * 10
-R: open-right : left : * : * 10
-R: open-right : right : * : * -100
-";
 
 #[test]
 fn tiger_beliefs_are_exact() {
@@ -203,37 +183,13 @@ fn errors_name_line_column_and_what_is_allowed() {
     }
 }
 
-/// (file, Q-MDP bound and MDP bound at the start belief), from independent policy iteration.
-const REFERENCE: [(&str, f64, f64); 16] = [
-    ("1d", 1.645160907, 1.77419314),
-    ("1d.noisy", 1.574792237, 1.716450418),
-    ("4x3.95", 2.333007176, 2.481436388),
-    ("cheese.95", 3.789942296, 3.936065404),
-    ("mini-hall2", 3.667862455, 3.860907153),
-    ("network", 430.423085, 452.0047455),
-    ("paint95-zmdp", 25.23188406, 25.50724638),
-    ("shuttle95-zmdp", 32.88972469, 32.88972469),
-    ("tiger.95", 189.0, 200.0),
-    ("tiger.aaai", 29.0, 40.0),
-    ("tiger-grid", 2.981835992, 2.981835992),
-    ("hallway", 1.4589848, 1.535773008),
-    ("web-ad", 0.8305732484, 0.8305732484),
-    ("machine", 661.8560507, 661.8560507),
-    ("bridge-repair", -22484339.7, -22484314.05),
-    ("cheng.D3-5", 905818.2026, 905820.1449),
-];
-
 #[test]
 fn public_models_have_their_reference_values() {
-    let Some(data) = std::env::var_os("VIGIL_DATA") else {
-        eprintln!("SKIPPED: VIGIL_DATA is not set; public POMDP files are not read");
+    let Some(folder) = public::folder() else {
         return;
     };
-    for (name, qmdp, v_mdp) in REFERENCE {
-        let path = PathBuf::from(&data)
-            .join("pomdp")
-            .join(format!("{name}.pomdp"));
-        let model = Pomdp::parse(&std::fs::read_to_string(path).unwrap()).unwrap();
+    for (name, [.., qmdp, v_mdp]) in BOUNDS {
+        let model = public::read(&folder, name);
         let solution = mdp::solve(&model).unwrap();
         let b0 = model.start();
         let got_mdp: f64 = b0

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use std::path::PathBuf;
+mod public;
 
 use proptest::prelude::*;
 use vigil_decision::Pomdp;
@@ -36,14 +36,11 @@ fn assert_same(one: &Pomdp, other: &Pomdp) {
 
 #[test]
 fn public_files_survive_reading_and_writing() {
-    let Some(data) = std::env::var_os("VIGIL_DATA") else {
-        eprintln!("SKIPPED: VIGIL_DATA is not set; public POMDP files are not read");
+    let Some(folder) = public::folder() else {
         return;
     };
     let mut files = 0;
-    for entry in std::fs::read_dir(PathBuf::from(data).join("pomdp")).unwrap() {
-        let path = entry.unwrap().path();
-        let model = Pomdp::parse(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    for (_, model) in public::all(&folder) {
         let text = model.to_cassandra();
         assert_same(&model, &Pomdp::parse(&text).unwrap());
         // What was written once is written the same again.

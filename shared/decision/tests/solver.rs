@@ -2,21 +2,17 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+mod public;
+
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use proptest::prelude::*;
+use public::TIGER;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vigil_decision::bounds::{blind, fib, tib};
 use vigil_decision::solver::{Ended, Found, Options, Progress, solve};
 use vigil_decision::{Budget, Evidence, PointBased, Policy, Pomdp, Tracker};
-
-const TIGER: &str = "discount: 0.95\nstates: left right\nactions: listen open-left open-right\n\
-    observations: hear-left hear-right\nT: * uniform\nT: listen identity\nO: * uniform\n\
-    O: listen\n0.85 0.15\n0.15 0.85\nR: listen : * : * : * -1\n\
-    R: open-left : left : * : * -100\nR: open-left : right : * : * 10\n\
-    R: open-right : left : * : * 10\nR: open-right : right : * : * -100\n";
 
 /// A dense model from weights; `order` permutes its states.
 #[derive(Debug, Clone)]
@@ -322,26 +318,19 @@ const NARROWED: [(&str, usize, f64); 7] = [
     ("machine", 20_000, 600.0),
 ];
 
-fn read(data: &std::ffi::OsStr, name: &str) -> Pomdp {
-    let folder = PathBuf::from(data).join("pomdp");
-    let text = std::fs::read_to_string(folder.join(format!("{name}.pomdp"))).unwrap();
-    Pomdp::parse(&text).unwrap()
-}
-
 #[test]
 fn public_models_are_solved_or_narrowed() {
-    let Some(data) = std::env::var_os("VIGIL_DATA") else {
-        eprintln!("SKIPPED: VIGIL_DATA is not set; public POMDP files are not read");
+    let Some(folder) = public::folder() else {
         return;
     };
     for (name, precision, questions) in SOLVED {
-        let model = read(&data, name);
+        let model = public::read(&folder, name);
         let (found, course) = solved(&model, precision, questions);
         assert_eq!(found.ended, Ended::Precision, "{name}: {:?}", found.bracket);
         demand_order(name, &model, &found, &course);
     }
     for (name, questions, gap) in NARROWED {
-        let model = read(&data, name);
+        let model = public::read(&folder, name);
         let (found, course) = solved(&model, 0.0, questions);
         assert!(found.bracket.gap() <= gap, "{name}: {:?}", found.bracket);
         demand_order(name, &model, &found, &course);
