@@ -81,12 +81,7 @@ impl Corridor {
         let [detected, drawn] = &mut self.particles;
         let entry = Entry::Frame(&self.frame);
         self.detector.step(entry, &mut self.detection, detected);
-        for (name, bit) in [
-            ("EPS", Symptoms::EPS),
-            ("EPM", Symptoms::EPM),
-            ("LD", Symptoms::LD),
-            ("SD", Symptoms::SD),
-        ] {
+        for (name, bit) in Symptoms::NAMED {
             if self.detection.symptoms & !fired & bit != 0 {
                 self.told.push(format!("+{name}"));
             }

@@ -53,13 +53,7 @@ const METHODS: [Method; 5] = [
 ];
 
 fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("pomdp-bounds: {error}");
-            ExitCode::from(1)
-        }
-    }
+    vigil_bench::ended("pomdp-bounds", run())
 }
 
 fn run() -> Result<(), Box<dyn Error>> {

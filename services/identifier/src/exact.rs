@@ -243,7 +243,8 @@ impl Exact {
             match (state, moved) {
                 (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
                 (0, _) => evidence.whole(&self.model, observation, moved, is_new, wheel),
-                (OWN_RATE, _) => evidence.own_rate[wheel],
+                (OWN_RATE, Moved::UnknownAny) => evidence.own_rate[wheel],
+                (OWN_RATE, _) => f64::NEG_INFINITY,
                 (broken, _) => evidence.broken[wheel][broken - 1],
             }
         })

@@ -4,16 +4,7 @@ use vigil_blocks::{ActionOutcome, Event, RecoveryKind, Symptoms};
 
 /// Symptoms, joined by `_` as in the decision model; `none` for the empty set.
 pub fn symptoms(set: u32) -> String {
-    let names = [
-        ("EPS", Symptoms::EPS),
-        ("EPM", Symptoms::EPM),
-        ("LD", Symptoms::LD),
-        ("SD", Symptoms::SD),
-        ("BO", Symptoms::BO),
-        ("ALT", Symptoms::ALT),
-        ("NNA", Symptoms::NNA),
-    ];
-    let present = names.iter().filter(|(_, bit)| set & bit != 0);
+    let present = Symptoms::NAMED.iter().filter(|(_, bit)| set & bit != 0);
     let present: Vec<&str> = present.map(|(name, _)| *name).collect();
     if present.is_empty() {
         "none".into()

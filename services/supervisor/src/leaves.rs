@@ -91,12 +91,7 @@ impl Leaves {
         Ok(supervisor)
     }
 
-    /// Takes one journal entry and writes the decision. On misses belief and decision stand (what
-    /// a late diagnosis says is folded in when it comes), until no stage is heard any more. Input
-    /// that is not a probability, or of another fault tree, is counted in `impossible_count` and
-    /// refused; a refused diagnosis counts as missed. Every field of `action` is written but the
-    /// header's epoch, sequence number and times, the cause and `valid_until_ns`: those belong to
-    /// the ports. Allocates nothing, never panics; no field is ever NaN.
+    /// See [`crate::Supervisor::step`].
     pub(crate) fn step(&mut self, entry: Entry<Inputs<'_>>, action: &mut Action) {
         match entry {
             Entry::Frame(inputs) => self.take(inputs),

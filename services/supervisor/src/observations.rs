@@ -5,16 +5,6 @@ use vigil_decision::Pomdp;
 
 use crate::mapping::SupervisorError;
 
-/// Basic observations in the order of their bits; a set's name joins them by `_`, in any order.
-const BASIC: [(&str, u32); 7] = [
-    ("EPS", Symptoms::EPS),
-    ("EPM", Symptoms::EPM),
-    ("LD", Symptoms::LD),
-    ("SD", Symptoms::SD),
-    ("BO", Symptoms::BO),
-    ("ALT", Symptoms::ALT),
-    ("NNA", Symptoms::NNA),
-];
 /// Name of the empty set.
 const NONE: &str = "none";
 
@@ -35,7 +25,7 @@ impl Observations {
                 return Err(SupervisorError::SameSet(name.clone(), other));
             }
         }
-        for (basic, bit) in [(NONE, 0)].iter().chain(&BASIC) {
+        for (basic, bit) in [(NONE, 0)].iter().chain(&Symptoms::NAMED) {
             if index[*bit as usize].is_none() {
                 return Err(SupervisorError::NoObservation(basic));
             }
@@ -49,13 +39,13 @@ impl Observations {
     }
 }
 
-/// Bits of a set by its name.
+/// Bits of a set by its name: its symptoms, joined by `_` in any order.
 fn set_of(name: &str) -> Option<u32> {
     if name == NONE {
         return Some(0);
     }
     name.split('_').try_fold(0, |set, part| {
-        let bit = BASIC.iter().find(|(basic, _)| *basic == part)?.1;
+        let (_, bit) = Symptoms::NAMED.iter().find(|(basic, _)| *basic == part)?;
         (set & bit == 0).then_some(set | bit)
     })
 }

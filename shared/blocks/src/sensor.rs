@@ -104,6 +104,16 @@ impl Symptoms {
     pub const NNA: u32 = 64;
     /// All bits that have a meaning.
     pub const ALL: u32 = 127;
+    /// Their names, in the order of the bits.
+    pub const NAMED: [(&str, u32); 7] = [
+        ("EPS", Self::EPS),
+        ("EPM", Self::EPM),
+        ("LD", Self::LD),
+        ("SD", Self::SD),
+        ("BO", Self::BO),
+        ("ALT", Self::ALT),
+        ("NNA", Self::NNA),
+    ];
 }
 
 /// Outcome of the last action, as the robot reports it.

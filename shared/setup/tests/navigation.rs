@@ -1,29 +1,10 @@
 //! Corridors, monitors and what the supervisor needs for them: what does not fit is named.
 #![allow(clippy::unwrap_used)]
 
-use std::path::PathBuf;
+mod shipped;
 
-use vigil_setup::load_graph;
+use shipped::load;
 use vigil_setup::schema::{Evidence, GraphFile, Monitors, Source};
-
-fn load(name: &str, change: impl FnOnce(&mut GraphFile)) -> Result<(), String> {
-    let config = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
-    let change = |file: &mut GraphFile| {
-        // One core is enough to read a configuration.
-        for service in [
-            &mut file.services.sensor_sim,
-            &mut file.services.detector,
-            &mut file.services.identifier,
-            &mut file.services.supervisor,
-        ] {
-            service.core = 0;
-        }
-        change(file);
-    };
-    load_graph(&config.join(name), change)
-        .map(|_| ())
-        .map_err(|error| error.to_string())
-}
 
 #[test]
 fn the_shipped_corridors_are_sound() {
