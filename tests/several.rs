@@ -133,6 +133,35 @@ fn two_faults_at_once_are_both_named() {
 }
 
 #[test]
+fn two_wheels_that_stick_at_once_are_both_named() {
+    const TRIALS: usize = 15;
+    let pairs: Vec<[usize; 2]> = (0..6)
+        .flat_map(|a| (a + 1..6).map(move |b| [a, b]))
+        .collect();
+    assert_eq!(pairs.len(), TRIALS);
+    let mut wrong = Vec::new();
+    for (trial, wheels) in pairs.into_iter().enumerate() {
+        let mut watched = Watched::new(200 + trial as u64);
+        let faults = wheels.map(|wheel| Fault {
+            kind: FaultKind::Stuck,
+            wheel,
+        });
+        watched.drive(3.0);
+        for fault in faults {
+            watched.world.inject(fault).unwrap();
+        }
+        watched.drive(3.0);
+        let leaves = faults.map(|fault| 1_u64 << watched.leaf(fault));
+        let belief = &watched.diagnosis;
+        if belief.sets[0].leaves != leaves[0] | leaves[1] {
+            let found = (belief.mode, belief.sets[0], belief.p_unknown);
+            wrong.push(format!("{faults:?}: {found:?}"));
+        }
+    }
+    assert!(wrong.len() <= 1, "{}", wrong.join("\n"));
+}
+
+#[test]
 fn a_wheel_that_sticks_frees_itself_and_sticks_again_is_followed() {
     let mut watched = Watched::new(7);
     let fault = Fault {

@@ -22,6 +22,7 @@ pub const STATES: usize = 2 + BREAKAGES.len();
 /// Log-likelihoods of one observation's readings in each state, prepared for many hypotheses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Likelihoods {
+    logs: [[f64; STATES]; WHEELS],
     /// Relative to the largest of a wheel, which is 1.
     relative: [[f64; STATES]; WHEELS],
     log_largest: [f64; WHEELS],
@@ -32,19 +33,31 @@ impl Likelihoods {
     /// Of the first `wheels` wheels: `log_likelihood(wheel, state)`.
     pub fn new(wheels: usize, log_likelihood: impl Fn(usize, usize) -> f64) -> Self {
         let mut out = Self {
+            logs: [[0.0; STATES]; WHEELS],
             relative: [[1.0; STATES]; WHEELS],
             log_largest: [0.0; WHEELS],
             wheels: wheels.min(WHEELS),
         };
         for wheel in 0..out.wheels {
-            let logs: [f64; STATES] = std::array::from_fn(|state| log_likelihood(wheel, state));
-            let largest = logs.into_iter().fold(f64::NEG_INFINITY, f64::max);
-            if largest.is_finite() {
-                out.relative[wheel] = logs.map(|log| (log - largest).max(AGAINST_MAX).exp());
-                out.log_largest[wheel] = largest;
-            }
+            out.logs[wheel] = std::array::from_fn(|state| log_likelihood(wheel, state));
+            out.scale(wheel);
         }
         out
+    }
+
+    /// Another log-likelihood of a whole encoder.
+    pub fn replace_whole(&mut self, wheel: usize, log_likelihood: f64) {
+        self.logs[wheel][0] = log_likelihood;
+        self.scale(wheel);
+    }
+
+    fn scale(&mut self, wheel: usize) {
+        let logs = self.logs[wheel];
+        let largest = logs.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        if largest.is_finite() {
+            self.relative[wheel] = logs.map(|log| (log - largest).max(AGAINST_MAX).exp());
+            self.log_largest[wheel] = largest;
+        }
     }
 }
 
@@ -80,6 +93,14 @@ impl Encoders {
             p: [p; WHEELS],
             onset: [t_ns; WHEELS],
         }
+    }
+
+    /// Takes one encoder to be whole at `t_ns`, whatever it seemed: what it reads has found another
+    /// explanation, that its wheel stands.
+    pub fn suppose_whole(&mut self, wheel: usize, t_ns: u64) {
+        self.p[wheel] = [0.0; STATES];
+        self.p[wheel][0] = 1.0;
+        self.onset[wheel] = t_ns;
     }
 
     /// One observation: encoder w breaks with the probability `births[w]`, recovers with `death`.

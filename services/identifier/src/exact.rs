@@ -14,6 +14,7 @@ use vigil_blocks::WHEELS;
 use vigil_inference::bank::{Bank, Hypothesis};
 use vigil_inference::track::Track;
 use vigil_robot::Description;
+use vigil_robot::learned::wheel_evidence::Dragged;
 use vigil_robot::learned::{
     FaultRates, Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
 };
@@ -21,6 +22,7 @@ use vigil_robot::learned::{
 use crate::encoders::{Encoders, Likelihoods, OWN_RATE};
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
+use crate::rate_offsets::RateOffsets;
 use crate::sets::Sets;
 
 /// Index of the nominal motion among the modes.
@@ -46,6 +48,8 @@ pub struct State {
     pub track: Track,
     /// Encoders; in the unknown, encoders or wheels.
     pub encoders: Encoders,
+    /// With two stuck wheels: what the other wheels' rates are off by.
+    pub offsets: RateOffsets,
 }
 
 /// The filter.
@@ -75,7 +79,7 @@ impl Exact {
         rates: FaultRates,
     ) -> Self {
         // A pose alone cannot tell two stuck wheels from one on another soil.
-        let modes = motion_modes(model, leaves.stuck_wheels(), true, use_wheels);
+        let modes = motion_modes(model, robot, leaves.stuck_wheels(), true, use_wheels);
         let is_leaf = leaves.encoder.map(|leaf| leaf.is_some());
         let capacities: Vec<usize> = modes
             .iter()
@@ -104,6 +108,7 @@ impl Exact {
         let state = State {
             track,
             encoders: Encoders::healthy(t_ns),
+            offsets: RateOffsets::default(),
         };
         self.bank.restart(NOMINAL, t_ns, state);
     }
@@ -170,7 +175,6 @@ impl Exact {
     /// New hypotheses: one fault more, one less, or another one, from the most probable hypothesis
     /// without a fault, the most probable one with a fault, and that with one stuck wheel.
     fn spawn(&mut self, observation: &Observation) {
-        let (t_ns, dt_s) = (observation.t_first_ns, observation.dt_s);
         let modes = &self.modes;
         let best = |wanted: &dyn Fn(usize) -> bool| self.bank.best(wanted).copied();
         let sources = [
@@ -180,29 +184,60 @@ impl Exact {
         ];
         for from in sources.into_iter().flatten() {
             for mode in 0..self.modes.len() {
-                let (before, after) = (self.modes[from.mode].moved, self.modes[mode].moved);
-                let rate_1_s = self.rates.rate_1_s(before, after) * self.modes[mode].share;
-                let log_weight = from.log_weight + (rate_1_s * dt_s).ln();
+                let log_weight = from.log_weight + self.p_change(&from, mode, observation).ln();
                 if log_weight <= FLOOR || log_weight.is_nan() {
                     continue;
                 }
-                let mut state = from.state;
-                let (curvature, speed) = (observation.curvature, observation.speed);
-                let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
-                state.track = state.track.fork(&noise);
-                state.track.diffuse(self.modes[mode].jump);
-                state.encoders = match (before, after) {
-                    (_, Moved::UnknownAny) => Encoders::unsure(t_ns),
-                    (Moved::UnknownAny, _) => Encoders::healthy(t_ns),
-                    _ => state.encoders,
-                };
                 self.bank.add(Hypothesis {
                     mode,
-                    onset: t_ns,
+                    onset: observation.t_first_ns,
                     log_weight,
-                    state,
+                    state: self.changed(&from, mode, observation),
                 });
             }
+        }
+    }
+
+    /// Probability that one observation changes `from` to another mode. An encoder that broke a
+    /// moment ago may as well be a second wheel that stuck then: both are equally likely before
+    /// the motion tells.
+    fn p_change(&self, from: &Hypothesis<State>, mode: usize, observation: &Observation) -> f64 {
+        let (before, after) = (self.modes[from.mode].moved, self.modes[mode].moved);
+        let p = self.rates.rate_1_s(before, after) * observation.dt_s;
+        let encoders = &from.state.encoders;
+        let instead = match newly_stuck(before, after) {
+            Some(wheel)
+                if p > 0.0
+                    && before.stuck() & after.stuck() != 0
+                    && is_new(observation.t_first_ns, encoders.onset(wheel)) =>
+            {
+                encoders.p_broken(wheel)
+            }
+            _ => 0.0,
+        };
+        (p + instead) * self.modes[mode].share
+    }
+
+    /// What becomes of a hypothesis when its mode changes.
+    fn changed(&self, from: &Hypothesis<State>, mode: usize, observation: &Observation) -> State {
+        let (before, after) = (self.modes[from.mode].moved, self.modes[mode].moved);
+        let (curvature, speed) = (observation.curvature, observation.speed);
+        let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
+        let mut track = from.state.track.fork(&noise);
+        track.diffuse(self.modes[mode].jump);
+        let t_ns = observation.t_first_ns;
+        let mut encoders = match (before, after) {
+            (_, Moved::UnknownAny) => Encoders::unsure(t_ns),
+            (Moved::UnknownAny, _) => Encoders::healthy(t_ns),
+            _ => from.state.encoders,
+        };
+        if let Some(wheel) = newly_stuck(before, after) {
+            encoders.suppose_whole(wheel, t_ns);
+        }
+        State {
+            track,
+            encoders,
+            offsets: RateOffsets::default(),
         }
     }
 
@@ -215,6 +250,7 @@ impl Exact {
         for mode in 0..self.modes.len() {
             let both =
                 [false, true].map(|is_new| self.wheels_in(mode, observation, &evidence, is_new));
+            let dragged = self.dragged_in(mode, observation, &evidence);
             let steering = match self.modes[mode].moved {
                 Moved::UnknownAny => evidence.steering,
                 _ => 0.0,
@@ -222,12 +258,44 @@ impl Exact {
             let all = self.bank.hypotheses_mut().iter_mut();
             for hypothesis in all.filter(|hypothesis| hypothesis.mode == mode) {
                 let is_new = is_new(observation.t_ns, hypothesis.onset);
-                let encoders = &mut hypothesis.state.encoders;
-                hypothesis.log_weight += steering;
-                hypothesis.log_weight +=
-                    encoders.step(&births, death, &both[usize::from(is_new)], first_ns);
+                let State {
+                    encoders, offsets, ..
+                } = &mut hypothesis.state;
+                let mut likelihoods = both[usize::from(is_new)];
+                let dragged = dragged.iter().flatten().filter(|_| !is_new);
+                for (wheel, dragged) in dragged.clone() {
+                    let about = offsets.expected(*wheel, dragged);
+                    let log = evidence.turning(&self.model, observation, *wheel, about);
+                    likelihoods.replace_whole(*wheel, log);
+                }
+                let gained = encoders.step(&births, death, &likelihoods, first_ns);
+                hypothesis.log_weight += steering + gained;
+                for (wheel, dragged) in dragged {
+                    let reading = &observation.wheels[*wheel];
+                    if reading.plain > 0 && encoders.p_broken(*wheel) < 0.5 {
+                        let noise = evidence.sample_variance(reading.plain);
+                        offsets.update(*wheel, dragged, reading.mean, noise);
+                    }
+                }
             }
         }
+    }
+
+    /// The wheels that turn in a mode with two stuck wheels, and how; none in another mode.
+    fn dragged_in(
+        &self,
+        mode: usize,
+        observation: &Observation,
+        evidence: &WheelEvidence,
+    ) -> [Option<(usize, Dragged)>; WHEELS] {
+        let stuck = self.modes[mode].moved.stuck();
+        std::array::from_fn(|wheel| {
+            let turns = wheel < self.robot.wheels.len() && stuck >> wheel & 1 == 0;
+            (turns && stuck.count_ones() > 1).then(|| {
+                let dragged = evidence.dragged(&self.model, observation, stuck, wheel);
+                (wheel, dragged)
+            })
+        })
     }
 
     /// What the wheels say in one motion mode, in general or at its onset.
@@ -287,6 +355,12 @@ impl Exact {
         }
         0
     }
+}
+
+/// The wheel that sticks besides those that do.
+fn newly_stuck(before: Moved, after: Moved) -> Option<usize> {
+    let new = after.stuck() & !before.stuck();
+    (new != 0).then(|| new.trailing_zeros() as usize)
 }
 
 /// True while a stuck wheel's encoder may read anything, and the others may still turn as before.

@@ -11,6 +11,7 @@ mod generic;
 mod identifier;
 mod modes;
 mod posterior;
+mod rate_offsets;
 mod reasons;
 mod risk;
 mod sets;

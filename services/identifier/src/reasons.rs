@@ -57,7 +57,7 @@ impl Reasons {
         Self {
             model: model.clone(),
             robot: robot.clone(),
-            modes: motion_modes(model, leaves.stuck_wheels(), false, true),
+            modes: motion_modes(model, robot, leaves.stuck_wheels(), false, true),
             use_wheels,
             followed: None,
             onset_ns: 0,

@@ -42,9 +42,9 @@ fn broken_models_are_refused_by_key() {
     let text = read("models/rover.toml");
     let cases = [
         (
-            "version = 3",
+            "version = 4",
             "version = 2",
-            "layout version 2; this program reads version 3: learn it again",
+            "layout version 2; this program reads version 4: learn it again",
         ),
         (
             "interval_s = 0.05",

@@ -8,10 +8,10 @@ use vigil_robot::learned::{Curve, MotionModel, RateModel};
 #[must_use]
 pub fn stuck(known: &StuckModel, name: &str, mirror: &[usize]) -> StuckModel {
     let rate = |&opposite: &usize| {
-        let RateModel { ratio, ratio_sd } = known.rates[opposite];
+        let [constant, linear, square] = known.rates[opposite].droop_rad_s;
         RateModel {
-            ratio: [ratio[0], -ratio[1], ratio[2]],
-            ratio_sd,
+            droop_rad_s: [constant, -linear, square],
+            ..known.rates[opposite]
         }
     };
     StuckModel {

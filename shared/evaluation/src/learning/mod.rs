@@ -242,8 +242,9 @@ fn blank(robot: &Description, options: &Options) -> Model {
     };
     let rates = vec![
         RateModel {
-            ratio: [1.0, 0.0, 0.0],
-            ratio_sd: 0.01
+            ratio: 1.0,
+            droop_rad_s: [0.0; 3],
+            rate_sd_rad_s: 0.02
         };
         robot.wheels.len()
     ];

@@ -217,9 +217,10 @@ fn write_mode(f: &mut fmt::Formatter<'_>, mode: &Mode, wheels: &[String]) -> fmt
         "  varying over {:.2} m, yaw and forward correlated {:+.2}",
         motion.deviation_length_m, motion.correlation
     )?;
-    write!(f, "  wheel rates over rolling:")?;
+    write!(f, "  wheel rates over rolling, less droop (rad/s):")?;
     for (name, rate) in wheels.iter().zip(&mode.rates) {
-        write!(f, " {name} {:.3}+-{:.3}", rate.ratio[0], rate.ratio_sd)?;
+        let (droop, sd) = (rate.droop_rad_s[0], rate.rate_sd_rad_s);
+        write!(f, " {name} {:.3} {droop:.3}+-{sd:.3}", rate.ratio)?;
     }
     writeln!(f)
 }

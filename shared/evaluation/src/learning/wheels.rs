@@ -1,8 +1,8 @@
-//! Wheel rates relative to rolling without slip.
+//! Wheel rates beside rolling without slip.
 
 use vigil_robot::Description;
-use vigil_robot::learned::RateModel;
 use vigil_robot::learned::wheels::rolling_rate;
+use vigil_robot::learned::{Observation, RateModel};
 
 use super::LearnError;
 use super::least_squares::LeastSquares;
@@ -10,11 +10,16 @@ use super::segments::Segment;
 
 /// Observations averaged before the fit.
 const WINDOW: usize = 20;
-/// A ratio is never known better than this.
-const RATIO_SD_MIN: f64 = 0.004;
+/// Slower wheels carry less than their load at speed and say nothing of it, rad/s.
+const ROLLING_MIN_RAD_S: f64 = 0.2;
+/// A rate is never known better than this, rad/s.
+const RATE_SD_MIN_RAD_S: f64 = 0.008;
+/// How far from 1 a ratio is expected to be: this decides when all runs have one speed, as ratio and
+/// droop are then the same.
+const RATIO_SD: f64 = 0.02;
 
-/// Fits the ratio of every wheel's rate as a quadratic in the curvature. A wheel without readings
-/// rolls.
+/// Fits every wheel's rate: a ratio to rolling, and a droop that is a quadratic in the curvature. A
+/// wheel without readings rolls.
 ///
 /// # Errors
 /// [`LearnError::Singular`].
@@ -34,24 +39,23 @@ fn fit_wheel(
     mode: &str,
     wheel: usize,
 ) -> Result<RateModel, LearnError> {
-    let mut fit = LeastSquares::<3>::default();
-    let windows: Vec<(f64, f64, f64)> = segments
+    let windows: Vec<Window> = segments
         .iter()
         .flat_map(|segment| segment.chunks(WINDOW))
-        .filter_map(|chunk| ratio(robot, chunk, wheel))
+        .filter_map(|chunk| Window::new(robot, chunk, wheel))
         .collect();
     if windows.is_empty() {
         return Ok(RateModel {
-            ratio: [1.0, 0.0, 0.0],
-            ratio_sd: 0.05,
+            ratio: 1.0,
+            droop_rad_s: [0.0; 3],
+            rate_sd_rad_s: 0.1,
         });
     }
-    for (curvature, ratio, variance) in &windows {
-        fit.push(
-            [1.0, *curvature, curvature * curvature],
-            *ratio,
-            1.0 / (variance + 1e-6),
-        );
+    let mut fit = LeastSquares::<4>::default();
+    fit.push([1.0, 0.0, 0.0, 0.0], 1.0, 1.0 / (RATIO_SD * RATIO_SD));
+    for window in &windows {
+        let floor = RATE_SD_MIN_RAD_S * RATE_SD_MIN_RAD_S;
+        fit.push(window.basis(), window.rate, 1.0 / (window.variance + floor));
     }
     let singular = || LearnError::Singular {
         mode: mode.to_owned(),
@@ -59,50 +63,61 @@ fn fit_wheel(
     };
     let terms = fit.solve().ok_or_else(singular)?;
     let (mut sum, mut noise) = (0.0, 0.0);
-    for (curvature, ratio, variance) in &windows {
-        let expected = terms[0] + curvature * (terms[1] + curvature * terms[2]);
-        sum += (ratio - expected) * (ratio - expected);
-        noise += variance;
+    for window in &windows {
+        let basis = window.basis();
+        let expected: f64 = basis.iter().zip(terms).map(|(basis, c)| basis * c).sum();
+        sum += (window.rate - expected) * (window.rate - expected);
+        noise += window.variance;
     }
     let variance = (sum - noise) / windows.len() as f64;
     Ok(RateModel {
-        ratio: terms,
-        ratio_sd: variance.max(0.0).sqrt().max(RATIO_SD_MIN),
+        ratio: terms[0],
+        droop_rad_s: [terms[1], terms[2], terms[3]],
+        rate_sd_rad_s: variance.max(0.0).sqrt().max(RATE_SD_MIN_RAD_S),
     })
 }
 
-/// Curvature, ratio of the rates, and the ratio's variance by sensor noise, over one window. The
-/// noise is that of differences in the window, so that this needs no model.
-fn ratio(
-    robot: &Description,
-    chunk: &[vigil_robot::learned::Observation],
-    wheel: usize,
-) -> Option<(f64, f64, f64)> {
-    let used: Vec<_> = chunk
-        .iter()
-        .filter(|o| o.moving && o.wheels[wheel].plain > 0)
-        .collect();
-    if used.len() < WINDOW / 2 {
-        return None;
+/// Means over successive observations.
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    curvature: f64,
+    /// Rate of rolling without slip, and as read, rad/s.
+    rolling: f64,
+    rate: f64,
+    /// Variance of the rate by the sensor's noise: that of differences in the window, so that this
+    /// needs no model.
+    variance: f64,
+}
+
+impl Window {
+    fn new(robot: &Description, chunk: &[Observation], wheel: usize) -> Option<Self> {
+        let used: Vec<_> = chunk
+            .iter()
+            .filter(|o| o.moving && o.wheels[wheel].plain > 0)
+            .collect();
+        if used.len() < WINDOW / 2 {
+            return None;
+        }
+        let count = used.len() as f64;
+        let mean = |of: &dyn Fn(&Observation) -> f64| {
+            used.iter().map(|observation| of(observation)).sum::<f64>() / count
+        };
+        let steps = used
+            .windows(2)
+            .map(|two| two[1].wheels[wheel].mean - two[0].wheels[wheel].mean);
+        let noise = steps.map(|step| step * step).sum::<f64>() / (2.0 * (count - 1.0));
+        let rolling = mean(&|o| rolling_rate(robot, wheel, o.command[0], o.command[1]));
+        (rolling.abs() >= ROLLING_MIN_RAD_S).then(|| Self {
+            curvature: mean(&|o| o.command[0]),
+            rolling,
+            rate: mean(&|o| o.wheels[wheel].mean),
+            variance: noise / count,
+        })
     }
-    let count = used.len() as f64;
-    let curvature = used.iter().map(|o| o.command[0]).sum::<f64>() / count;
-    let rolling = used
-        .iter()
-        .map(|o| rolling_rate(robot, wheel, o.command[0], o.command[1]))
-        .sum::<f64>();
-    let rate = used.iter().map(|o| o.wheels[wheel].mean).sum::<f64>();
-    let steps = used
-        .windows(2)
-        .map(|two| two[1].wheels[wheel].mean - two[0].wheels[wheel].mean);
-    let noise = steps.map(|step| step * step).sum::<f64>() / (2.0 * (count - 1.0));
-    let rolling = rolling / count;
-    if rolling.abs() < 0.05 {
-        return None;
+
+    /// What ratio and droop count for.
+    fn basis(&self) -> [f64; 4] {
+        let (k, against) = (self.curvature, -self.rolling.signum());
+        [self.rolling, against, against * k, against * k * k]
     }
-    Some((
-        curvature,
-        rate / count / rolling,
-        noise / count / (rolling * rolling),
-    ))
 }

@@ -16,7 +16,7 @@ pub use crate::model_file::EDITED;
 use crate::model_file::{self, ModelFile};
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 
 /// Everything learned about one robot on one kind of ground.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -429,10 +429,12 @@ fn check_rates(key: &str, rates: &[RateModel], count: usize) -> Result<(), Model
         return refuse(&format!("{key}.rates"), rates.len(), "one entry per wheel");
     }
     for rate in rates {
-        for value in rate.ratio {
-            check_range(&format!("{key}.ratio"), value, -10.0, 10.0)?;
+        check_range(&format!("{key}.ratio"), rate.ratio, -10.0, 10.0)?;
+        for value in rate.droop_rad_s {
+            check_range(&format!("{key}.droop_rad_s"), value, -100.0, 100.0)?;
         }
-        check_range(&format!("{key}.ratio_sd"), rate.ratio_sd, 0.0, 10.0)?;
+        let sd = rate.rate_sd_rad_s;
+        check_range(&format!("{key}.rate_sd_rad_s"), sd, 0.0, 100.0)?;
     }
     Ok(())
 }

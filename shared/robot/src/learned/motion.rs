@@ -6,9 +6,6 @@ use vigil_inference::track::MotionNoise;
 
 /// Speed about which the effect of speed is expressed, m/s.
 const SPEED_REFERENCE_M_S: f64 = 0.2;
-/// Speeds below this one count as this one where a speed divides, m/s.
-const SPEED_FLOOR_M_S: f64 = 0.05;
-
 /// `Σ c_i κ^i + d (1/|v| - 5 s/m)`: the paper's 4th-order polynomial in the signed curvature (the
 /// radius would have a pole straight ahead), plus the effect of speed on friction.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -23,12 +20,23 @@ pub struct Curve {
 impl Curve {
     /// Number of terms.
     pub const TERMS: usize = 6;
+    /// Speeds below this one count as this one where a speed divides, m/s.
+    pub const SPEED_FLOOR_M_S: f64 = 0.05;
+
+    /// `by_m_s / |v|`: what changes the speed by the same at every speed, per commanded metre.
+    #[must_use]
+    pub const fn of_inverse_speed(by_m_s: f64) -> Self {
+        Self {
+            curvature: [by_m_s / SPEED_REFERENCE_M_S, 0.0, 0.0, 0.0, 0.0],
+            inverse_speed: by_m_s,
+        }
+    }
 
     /// The terms at a curvature (1/m) and speed (m/s).
     #[must_use]
     pub fn basis(curvature: f64, speed: f64) -> [f64; Self::TERMS] {
         let k = curvature;
-        let slow = 1.0 / speed.abs().max(SPEED_FLOOR_M_S) - 1.0 / SPEED_REFERENCE_M_S;
+        let slow = 1.0 / speed.abs().max(Self::SPEED_FLOOR_M_S) - 1.0 / SPEED_REFERENCE_M_S;
         [1.0, k, k * k, k * k * k, k * k * k * k, slow]
     }
 

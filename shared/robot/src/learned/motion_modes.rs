@@ -5,6 +5,7 @@ use vigil_blocks::WHEELS;
 use vigil_inference::track::MotionNoise;
 
 use super::{Curve, Model, MotionModel};
+use crate::Description;
 
 /// The unknown: standard deviation of its constant deviation per metre (yaw, forward, lateral).
 const UNKNOWN_SD: [f64; 3] = [0.25, 0.2, 0.12];
@@ -20,9 +21,15 @@ const OTHER_GROUNDS: [(f64, f64, f64); 3] =
     [(0.08, 0.3, 0.12), (0.08, 0.65, 0.2), (0.04, 1.5, 0.35)];
 /// Deviation of such an effect from one that is changed as a whole: yaw, forward, lateral.
 const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
-/// Two stuck wheels, whose effects are added, as nothing was learned of both together: deviation
-/// from the sum, relative to each effect.
-const BOTH: f64 = 0.3;
+/// Two stuck wheels, of which nothing was learned together: their effects add up, and are more than
+/// their sum, as fewer wheels drive against more drag. Two that turn the robot the same way are on
+/// one side, where one wheel is left to drive; of two that turn it against each other each keeps
+/// its own turn. Factors of yaw, forward and lateral motion, in the middle of what the equilibrium
+/// of forces ([`crate::slip`]) gives for any two wheels in turns from 1 m on.
+const SAME_SIDE: [f64; 3] = [1.8, 1.8, 1.0];
+const EITHER_SIDE: [f64; 3] = [1.0, 1.4, 1.0];
+/// Deviation of each of the two effects from that.
+const BOTH_SD: f64 = 0.6;
 
 /// What moves the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,8 +81,8 @@ pub struct MotionMode {
     /// Factor by which the ground changes the learned effect, and the factor's deviation; (1, 0) on
     /// ground like that learned from.
     pub ground: (f64, f64),
-    /// Forward motion per metre that no ground changes.
-    pub kept: f64,
+    /// Change of forward speed that no ground changes, m/s.
+    pub kept_m_s: f64,
     /// Variance of a jump of the pose (x, y, yaw) at the onset.
     pub jump: [f64; 3],
 }
@@ -85,15 +92,29 @@ impl MotionMode {
     /// also lies along the effect itself, as far as the ground is not known.
     #[must_use]
     pub fn noise_at(&self, model: &Model, curvature: f64, speed: f64) -> MotionNoise {
+        let limit = model.command.curvature_max_1_m;
+        let at = |motion: &MotionModel| Vector3::from(motion.per_metre(curvature, speed, limit));
+        let stuck = self.moved.stuck();
+        if stuck.count_ones() > 1 {
+            let wheels = (0..WHEELS).filter(|w| stuck >> w & 1 == 1);
+            let effects = wheels.filter_map(|w| model.stuck(w));
+            let along = effects.fold(Matrix3::zeros(), |sum, stuck| {
+                let effect = (at(&stuck.motion) - at(&model.nominal.motion)) * BOTH_SD;
+                sum + effect * effect.transpose()
+            });
+            return MotionNoise {
+                offset: self.noise.offset + along,
+                ..self.noise
+            };
+        }
         let (factor, sd) = self.ground;
         if sd <= 0.0 {
             return self.noise;
         }
-        let limit = model.command.curvature_max_1_m;
-        let at = |motion: &MotionModel| Vector3::from(motion.per_metre(curvature, speed, limit));
         let effect = at(&self.motion) - at(&model.nominal.motion);
         let shape = effect.component_mul(&Vector3::from(SHAPE));
-        let along = (effect - Vector3::new(0.0, self.kept, 0.0)) * (sd / factor);
+        let kept = self.kept_m_s / speed.abs().max(Curve::SPEED_FLOOR_M_S);
+        let along = (effect - Vector3::new(0.0, kept, 0.0)) * (sd / factor);
         MotionNoise {
             offset: self.noise.offset
                 + along * along.transpose()
@@ -138,7 +159,13 @@ impl FaultRates {
 /// single wheels, pairs if `pairs`, and both kinds of unknown; if `rare`, single wheels on other
 /// ground and a jump of the pose too.
 #[must_use]
-pub fn motion_modes(model: &Model, stuck: u32, rare: bool, pairs: bool) -> Vec<MotionMode> {
+pub fn motion_modes(
+    model: &Model,
+    robot: &Description,
+    stuck: u32,
+    rare: bool,
+    pairs: bool,
+) -> Vec<MotionMode> {
     let grounds = match rare {
         true => OTHER_GROUNDS.as_slice(),
         false => &[],
@@ -151,7 +178,7 @@ pub fn motion_modes(model: &Model, stuck: u32, rare: bool, pairs: bool) -> Vec<M
         motion: nominal,
         noise: nominal.noise(),
         ground: (1.0, 0.0),
-        kept: 0.0,
+        kept_m_s: 0.0,
         jump: [0.0; 3],
     }];
     let known = |w: usize| stuck >> w & 1 == 1 && model.stuck(w).is_some();
@@ -163,7 +190,7 @@ pub fn motion_modes(model: &Model, stuck: u32, rare: bool, pairs: bool) -> Vec<M
     for &(share, factor, sd) in grounds {
         modes.extend(wheels().map(|w| MotionMode {
             share,
-            ..on_other_ground(model, w, (factor, sd))
+            ..on_other_ground(model, robot, w, (factor, sd))
         }));
     }
     if pairs {
@@ -176,7 +203,7 @@ pub fn motion_modes(model: &Model, stuck: u32, rare: bool, pairs: bool) -> Vec<M
         motion: nominal,
         noise: unknown_noise(model),
         ground: (1.0, 0.0),
-        kept: 0.0,
+        kept_m_s: 0.0,
         jump: [0.0; 3],
     };
     modes.push(MotionMode {
@@ -211,31 +238,30 @@ pub fn unknown_noise(model: &Model) -> MotionNoise {
     }
 }
 
-/// Wheels stuck. The effects of several add up.
+/// Wheels stuck: one as learned, two as said at [`SAME_SIDE`].
 fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
     let nominal = &model.nominal.motion;
-    let of_both = if wheels.len() > 1 { BOTH } else { 0.0 };
+    let turn = |w: usize| {
+        let stuck = model.stuck(w).map_or(0.0, |s| s.motion.yaw.curvature[0]);
+        stuck - nominal.yaw.curvature[0]
+    };
+    let factors = match wheels {
+        &[a, b] if turn(a) * turn(b) > 0.0 => SAME_SIDE,
+        [_, _] => EITHER_SIDE,
+        _ => [1.0; 3],
+    };
     let mut motion = *nominal;
     let mut noise: Option<MotionNoise> = None;
     for stuck in wheels.iter().filter_map(|&w| model.stuck(w)) {
-        motion.yaw = plus(&motion.yaw, &stuck.motion.yaw, &nominal.yaw);
-        motion.forward = plus(&motion.forward, &stuck.motion.forward, &nominal.forward);
-        motion.lateral = plus(&motion.lateral, &stuck.motion.lateral, &nominal.lateral);
-        let at_zero = |curve: &Curve| curve.curvature[0];
-        let effect = Vector3::new(
-            at_zero(&stuck.motion.yaw) - at_zero(&nominal.yaw),
-            at_zero(&stuck.motion.forward) - at_zero(&nominal.forward),
-            0.0,
-        );
+        let ([yaw, forward, lateral], with) = (factors, &stuck.motion);
+        motion.yaw = plus(&motion.yaw, &with.yaw, &nominal.yaw, yaw);
+        motion.forward = plus(&motion.forward, &with.forward, &nominal.forward, forward);
+        motion.lateral = plus(&motion.lateral, &with.lateral, &nominal.lateral, lateral);
         let own = stuck.motion.noise();
-        let along = effect * effect.transpose() * (of_both * of_both);
         noise = Some(match noise {
-            None => MotionNoise {
-                offset: own.offset + along,
-                ..own
-            },
+            None => own,
             Some(sum) => MotionNoise {
-                offset: sum.offset + own.offset + along,
+                offset: sum.offset + own.offset,
                 deviation: sum.deviation + own.deviation,
                 length_m: sum.length_m.max(own.length_m),
                 white: sum.white + own.white,
@@ -248,7 +274,7 @@ fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
         motion,
         noise: noise.unwrap_or_else(|| nominal.noise()),
         ground: (1.0, 0.0),
-        kept: 0.0,
+        kept_m_s: 0.0,
         jump: [0.0; 3],
     }
 }
@@ -256,23 +282,28 @@ fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
 /// A wheel stuck on ground that changes its effect by one unknown factor: it is the shear of the
 /// soil under the driven wheels that lets a dragged one slow and turn the robot. That the motors
 /// turn slower under the load does not depend on the ground.
-fn on_other_ground(model: &Model, wheel: usize, ground: (f64, f64)) -> MotionMode {
+fn on_other_ground(
+    model: &Model,
+    robot: &Description,
+    wheel: usize,
+    ground: (f64, f64),
+) -> MotionMode {
     let nominal = &model.nominal.motion;
     let mode = stuck_mode(model, &[wheel]);
     let (factor, sd) = ground;
-    let kept = droop(model, wheel);
-    let scaled = |stuck: &Curve, nominal: &Curve, kept: f64| {
+    let kept_m_s = yielding_m_s(model, robot, wheel);
+    let scaled = |stuck: &Curve, nominal: &Curve, kept_m_s: f64| {
         let (stuck, nominal) = (stuck.terms(), nominal.terms());
-        let mut terms: [f64; Curve::TERMS] =
-            std::array::from_fn(|i| nominal[i] + factor * (stuck[i] - nominal[i]));
-        terms[0] += (1.0 - factor) * kept;
-        Curve::from_terms(terms)
+        let kept = Curve::of_inverse_speed(kept_m_s).terms();
+        Curve::from_terms(std::array::from_fn(|i| {
+            nominal[i] + factor * (stuck[i] - nominal[i]) + (1.0 - factor) * kept[i]
+        }))
     };
     let (square, healthy) = (factor * factor + sd * sd, nominal.noise());
     MotionMode {
         motion: MotionModel {
             yaw: scaled(&mode.motion.yaw, &nominal.yaw, 0.0),
-            forward: scaled(&mode.motion.forward, &nominal.forward, kept),
+            forward: scaled(&mode.motion.forward, &nominal.forward, kept_m_s),
             lateral: scaled(&mode.motion.lateral, &nominal.lateral, 0.0),
             ..mode.motion
         },
@@ -282,32 +313,40 @@ fn on_other_ground(model: &Model, wheel: usize, ground: (f64, f64)) -> MotionMod
             ..mode.noise
         },
         ground,
-        kept,
+        kept_m_s,
         ..mode
     }
 }
 
-/// Change of the rates of the wheels that turn while `wheel` is stuck, straight ahead, relative to
-/// rolling.
-fn droop(model: &Model, wheel: usize) -> f64 {
+/// Change of forward speed, m/s, by the motors that yield while `wheel` drags: mean over the wheels
+/// that turn, straight ahead.
+fn yielding_m_s(model: &Model, robot: &Description, wheel: usize) -> f64 {
     let Some(stuck) = model.stuck(wheel) else {
         return 0.0;
     };
     let pairs = stuck.rates.iter().zip(&model.nominal.rates).enumerate();
     let turning = pairs.filter(|(other, _)| *other != wheel);
     let (count, sum) = turning.fold((0.0, 0.0), |(count, sum), (_, (with, healthy))| {
-        (count + 1.0, sum + with.ratio[0] - healthy.ratio[0])
+        (
+            count + 1.0,
+            sum + healthy.droop_rad_s[0] - with.droop_rad_s[0],
+        )
     });
-    if count > 0.0 { sum / count } else { 0.0 }
+    if count > 0.0 {
+        sum / count * robot.wheel_radius_m
+    } else {
+        0.0
+    }
 }
 
-/// `base + stuck - nominal`; exactly `stuck` if `base` is the nominal curve.
-fn plus(base: &Curve, stuck: &Curve, nominal: &Curve) -> Curve {
-    if base == nominal {
+/// `base + factor (stuck - nominal)`; exactly `stuck` if that is all there is.
+fn plus(base: &Curve, stuck: &Curve, nominal: &Curve, factor: f64) -> Curve {
+    if base == nominal && factor == 1.0 {
         return *stuck;
     }
     let (base, stuck, nominal) = (base.terms(), stuck.terms(), nominal.terms());
-    Curve::from_terms(std::array::from_fn(|i| base[i] + stuck[i] - nominal[i]))
+    let terms = std::array::from_fn(|i| base[i] + factor * (stuck[i] - nominal[i]));
+    Curve::from_terms(terms)
 }
 
 #[cfg(test)]

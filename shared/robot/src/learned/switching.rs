@@ -107,7 +107,7 @@ impl Switching {
         encoders: u32,
         rates: &FaultRates,
     ) -> Self {
-        let motions = motion_modes(model, stuck, false, false);
+        let motions = motion_modes(model, robot, stuck, false, false);
         let with = |motion: &MotionMode, broken| {
             let noise = &motion.noise;
             let coloured = noise.deviation * (2.0 * noise.length_m);

@@ -20,6 +20,9 @@ pub const BREAKAGE_SHARES: [f64; BREAKAGES.len()] = [0.32, 0.32, 0.32, 0.04];
 /// Share of healthy wheels' rates in the tail: while all is well, and while another wheel drags.
 const TAIL: f64 = 0.02;
 const TAIL_DRAGGED: f64 = 0.1;
+/// Two dragging wheels change the rates of the others by more than the sum of what each does: by
+/// this factor, give or take the second of it.
+const TOGETHER: (f64, f64) = (1.4, 0.4);
 /// Share of wheels that do anything, in the unknown.
 pub const ANYTHING: f64 = 0.2;
 /// Standard deviation of a steering angle that does anything, rad.
@@ -45,6 +48,17 @@ pub struct WheelEvidence {
     /// Rate by rolling, and its variance by the lag of the body.
     rolling: [(f64, f64); WHEELS],
     sample_sd: f64,
+}
+
+/// How a wheel turns while others drag.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dragged {
+    /// Expected rate, rad/s.
+    pub rate: f64,
+    /// Variance about it from one observation to the next, (rad/s)².
+    pub variance: f64,
+    /// Variance of what is constant in a run, (rad/s)²: nothing was learned of two dragging wheels.
+    pub offset_variance: f64,
 }
 
 impl WheelEvidence {
@@ -108,6 +122,8 @@ impl WheelEvidence {
             _ if moved.is_stuck(i) => either(self.standing[i], self.any[i]),
             Moved::Stuck(stuck) => {
                 let dragged = self.dragged(model, observation, stuck, i);
+                let about = (dragged.rate, dragged.variance + dragged.offset_variance);
+                let dragged = self.turning(model, observation, i, about);
                 either(dragged, self.healthy[i])
             }
             Moved::UnknownAny => self.unsure(i),
@@ -115,22 +131,55 @@ impl WheelEvidence {
         }
     }
 
-    /// Wheel `i` turns while the wheels `stuck` (bits, not i) drag. Effects of several add up.
-    fn dragged(&self, model: &Model, observation: &Observation, stuck: u32, i: usize) -> f64 {
+    /// How wheel `i` turns while the wheels `stuck` (bits, not i) drag.
+    #[must_use]
+    pub fn dragged(
+        &self,
+        model: &Model,
+        observation: &Observation,
+        stuck: u32,
+        i: usize,
+    ) -> Dragged {
         let (rolling, behind) = self.rolling[i];
         let curvature = observation.command[0];
         let rate = |rates: &[RateModel]| rates[i].rate(rolling, curvature);
         let (nominal, _) = rate(&model.nominal.rates);
-        let (mut mean, mut variance) = (nominal, behind);
+        let (mut change, mut variance) = (0.0, behind);
         let dragging = (0..WHEELS).filter(|&w| stuck >> w & 1 == 1);
         for stuck in dragging.filter_map(|w| model.stuck(w)) {
             let (with, its) = rate(&stuck.rates);
-            mean += with - nominal;
+            change += with - nominal;
             variance += its;
         }
-        let state = EncoderState::Turning(mean, variance, TAIL_DRAGGED);
+        let (factor, sd) = match stuck.count_ones() {
+            0 | 1 => (1.0, 0.0),
+            _ => TOGETHER,
+        };
+        Dragged {
+            rate: nominal + factor * change,
+            variance,
+            offset_variance: (sd * factor * change).powi(2),
+        }
+    }
+
+    /// Wheel `i` turns at about this rate while others drag.
+    #[must_use]
+    pub fn turning(
+        &self,
+        model: &Model,
+        observation: &Observation,
+        i: usize,
+        (rate, variance): (f64, f64),
+    ) -> f64 {
+        let state = EncoderState::Turning(rate, variance, TAIL_DRAGGED);
         let reading = &observation.wheels[i];
         model.encoder.log_likelihood(state, reading, self.sample_sd)
+    }
+
+    /// Variance of the mean of `plain` samples by the sensor's noise, (rad/s)².
+    #[must_use]
+    pub fn sample_variance(&self, plain: u32) -> f64 {
+        self.sample_sd * self.sample_sd / f64::from(plain.max(1))
     }
 
     /// Wheel `i` may do anything or turn as it should, as in the unknown.

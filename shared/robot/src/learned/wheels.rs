@@ -25,28 +25,35 @@ pub fn steering_angle(robot: &Description, wheel: usize, curvature: f64) -> f64 
     }
 }
 
-/// Rate of one wheel relative to rolling without slip.
+/// Rate of one wheel beside rolling without slip.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RateModel {
-    /// Ratio to [`rolling_rate`] as a polynomial of the curvature, κ^0 to κ^2.
-    pub ratio: [f64; 3],
-    /// Standard deviation of the ratio.
-    pub ratio_sd: f64,
+    /// Ratio to [`rolling_rate`].
+    pub ratio: f64,
+    /// How far the rate stays behind that at any speed, rad/s, as a polynomial of the curvature, κ^0
+    /// to κ^2: a motor under proportional control yields by its load over its gain.
+    pub droop_rad_s: [f64; 3],
+    /// Standard deviation of the rate, rad/s.
+    pub rate_sd_rad_s: f64,
 }
 
 impl RateModel {
     /// Expected rate and its variance for a wheel that would roll at `rolling` rad/s.
     #[must_use]
     pub fn rate(&self, rolling: f64, curvature: f64) -> (f64, f64) {
-        let ratio = self.ratio[0] + curvature * (self.ratio[1] + curvature * self.ratio[2]);
-        let sd = self.ratio_sd * rolling;
+        let [constant, linear, square] = self.droop_rad_s;
+        let droop = constant + curvature * (linear + curvature * square);
+        let against = (rolling / CREEPING_RAD_S).clamp(-1.0, 1.0);
         (
-            ratio * rolling,
-            sd * sd + RATE_FLOOR_RAD_S * RATE_FLOOR_RAD_S,
+            self.ratio * rolling - against * droop,
+            self.rate_sd_rad_s * self.rate_sd_rad_s + RATE_FLOOR_RAD_S * RATE_FLOOR_RAD_S,
         )
     }
 }
+
+/// Below this rate a wheel carries less than its load at speed, rad/s.
+const CREEPING_RAD_S: f64 = 0.2;
 
 /// Deviation of a healthy wheel that no model explains, rad/s.
 const RATE_FLOOR_RAD_S: f64 = 0.01;

@@ -1,0 +1,57 @@
+//! Two stuck wheels, of which nothing was learned, against the equilibrium of forces.
+#![allow(clippy::unwrap_used)]
+
+use std::path::PathBuf;
+
+use vigil_robot::Description;
+use vigil_robot::learned::{Model, Moved, motion_modes};
+use vigil_robot::slip::{Condition, Situation, SlipModel, Soil};
+
+fn read(name: &str) -> String {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
+    std::fs::read_to_string(root.join(name)).unwrap()
+}
+
+#[test]
+fn the_motion_of_every_pair_lies_within_what_its_mode_expects() {
+    const SPEED_M_S: f64 = 0.2;
+    let robot: Description = toml::from_str(&read("robots/rover.toml")).unwrap();
+    let model = Model::from_toml(&read("models/rover.toml")).unwrap();
+    let slip = SlipModel::new(&robot).unwrap();
+    let modes = motion_modes(&model, &robot, 0b11_1111, false, true);
+    let pairs = modes.iter().filter(|mode| match mode.moved {
+        Moved::Stuck(wheels) => wheels.count_ones() == 2,
+        _ => false,
+    });
+    let (mut count, mut far) = (0, Vec::new());
+    for mode in pairs {
+        let stuck = std::array::from_fn(|wheel| mode.moved.is_stuck(wheel));
+        for curvature in [-1.0, -0.5, -1.0 / 6.0, 0.0, 1.0 / 6.0, 0.5, 1.0] {
+            let situation = Situation {
+                curvature_1_m: curvature,
+                speed_m_s: SPEED_M_S,
+                stuck,
+                soil: Soil::default(),
+                condition: Condition::default(),
+            };
+            let [forward, _, yaw] = slip.solve(&situation, None).unwrap().velocity;
+            let expected = mode.motion.per_metre(curvature, SPEED_M_S, 1.0);
+            let noise = mode.noise_at(&model, curvature, SPEED_M_S).offset;
+            let apart = [
+                yaw / SPEED_M_S - expected[0],
+                forward / SPEED_M_S - expected[1],
+            ];
+            for (axis, apart) in apart.into_iter().enumerate() {
+                count += 1;
+                let sd = noise[(axis, axis)].sqrt();
+                if apart.abs() > 2.0 * sd {
+                    far.push((mode.moved, curvature, axis, apart / sd));
+                }
+            }
+        }
+    }
+    // Beyond two deviations in a tenth at most: in turns of 1 m over a wheel on the outer side.
+    assert_eq!(count, 15 * 7 * 2);
+    assert!(far.len() * 10 <= count, "{far:?}");
+    assert!(far.iter().all(|(.., far)| far.abs() < 4.0), "{far:?}");
+}
