@@ -173,7 +173,7 @@ fn settings_that_do_not_fit_the_model_are_named() {
         settings.actions.get_mut("compensate").unwrap().kind =
             vigil_setup::schema::Recovery::SlowDown;
         let model = Pomdp::parse(&source).unwrap();
-        let built = Supervisor::new(model, &tree, &robot, &settings, Vec::new(), 10);
+        let built = Supervisor::new(model, None, &tree, &robot, &settings, Vec::new(), 10);
         built.err().unwrap().to_string()
     };
     let wrong = message(&|s| s.information_actions = vec!["look".into()]);
