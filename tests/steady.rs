@@ -43,7 +43,8 @@ fn setup(is_solved: bool) -> Setup {
             precision: 0.15,
             ..Options::default()
         };
-        let budget = &mut Budget::new(&mut || false);
+        let mut never = || false;
+        let budget = &mut Budget::new(&mut never);
         let found = solve(model, &options, budget, &mut |_| ()).unwrap();
         setup.policy = Some(PointBased::new(model, &found.vectors.unwrap()).unwrap());
         setup.file.supervisor.policy = "point-based".to_owned();

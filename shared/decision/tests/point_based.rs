@@ -62,8 +62,7 @@ fn beliefs(states: usize) -> impl Iterator<Item = Vec<f64>> {
 }
 
 #[test]
-fn values_are_what_one_step_of_planning_gives_where_the_state_is_certain_and_at_most_that_elsewhere()
- {
+fn values_are_those_of_one_step_of_planning_if_the_state_is_certain_else_at_most() {
     for (model, precision) in [(TIGER, 1e-3), (NAVIGATION, 0.3), (ROVER, 0.3)] {
         let model = Pomdp::parse(model).unwrap();
         let (states, actions) = (model.states().len(), model.actions().len());

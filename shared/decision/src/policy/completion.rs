@@ -1,10 +1,10 @@
 //! Vectors for the actions that no plan, or no good one, begins with.
 //!
 //! One step of dynamic programming at a belief: alpha_a(s) = R(s,a) + gamma sum_o sum_s' T(s,a,s')
-//! Z(a,s',o) alpha_o(s'), where alpha_o is the vector that is best if o is observed. Where the state
-//! is certain that is the value of taking `a` and then following the plans; elsewhere it is less,
-//! but earned for certain. All vectors that go on to others stay below what one step of planning
-//! gives, so that a policy which follows them earns at least what they say.
+//! Z(a,s',o) alpha_o(s'), where alpha_o is the vector that is best if o is observed. Where the
+//! state is certain that is the value of taking `a` and then following the plans; elsewhere it is
+//! less, but earned for certain. All vectors that go on to others stay below what one step of
+//! planning gives, so that a policy which follows them earns at least what they say.
 
 use crate::alpha_vectors::{AlphaVectors, VectorError};
 use crate::model::Pomdp;

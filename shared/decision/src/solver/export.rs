@@ -9,10 +9,10 @@ use crate::sparse_beliefs::BeliefId;
 const COMPARISONS_MAX: usize = 5_000_000;
 
 impl Tree<'_> {
-    /// The vectors that a policy needs: those that are looked at, and the plan from `root` with all
-    /// that it goes on to, so that the policy keeps what the lower bound promises. Where a plan goes
-    /// on to a vector that another one beats in every state, that one does instead; what is beaten
-    /// so is left out. An action that is never the best may be without a vector.
+    /// The vectors that a policy needs: those that are looked at, and the plan from `root` with
+    /// all that it goes on to, so that the policy keeps what the lower bound promises. Where a
+    /// plan goes on to a vector that another one beats in every state, that one does instead; what
+    /// is beaten so is left out. An action that is never the best may be without a vector.
     pub(super) fn vectors(&self, root: BeliefId) -> Result<AlphaVectors, VectorError> {
         let actions = self.model.actions().len();
         let mut needed: Vec<AlphaId> = self.alphas.active().collect();

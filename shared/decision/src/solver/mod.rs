@@ -11,7 +11,9 @@
 //! - from time to time the best plan is tied into a controller and valued exactly (`controller`),
 //!   and the expanded beliefs are valued together (`grid`), so that a discount near 1 does not
 //!   slow either bound down;
-//! - where walks go round in circles, the edge of the graph is expanded instead (`frontier`).
+//! - rounds at the edge of the graph (`frontier`) take turns with walks, whichever have brought
+//!   more for their work of late (`search`): walks follow the most probable observation again and
+//!   again where most of the value lies in a state of rest that something rare disturbs.
 //!
 //! The same model and precision give the same vectors, unless time or memory ended the search.
 
