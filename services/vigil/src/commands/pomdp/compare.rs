@@ -25,7 +25,8 @@ use contestant::{Contestant, Kind, Knowledge};
 /// Every policy meets the same random numbers at the same step of the same mission. Policies: mls,
 /// av, qmdp, fib; dm-X and adm-X of each, which gather information while the entropy (0 to 1) is
 /// above a threshold K; point-based, solved beforehand, with --policy-file; random; escalation-N,
-/// which after N firings in a row takes the next rung of --ladder. Each dm-X and adm-X runs with each threshold.
+/// which after N firings in a row takes the next rung of --ladder. Each dm-X and adm-X runs with
+/// each threshold.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model, in Cassandra's format.
