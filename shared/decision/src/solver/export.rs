@@ -5,8 +5,10 @@ use super::tree::Tree;
 use crate::alpha_vectors::{AlphaVectors, VectorError};
 use crate::sparse_beliefs::BeliefId;
 
-/// Comparisons of vectors, at most, each time that vectors are compared; some 20 ms.
+/// Comparisons of vectors, at most; some 20 ms.
 const COMPARISONS_MAX: usize = 5_000_000;
+/// Comparisons of all that are needed with each other, at most; some 20 ms.
+const UNBEATEN_MAX: usize = 2_000_000;
 
 impl Tree<'_> {
     /// The vectors that a policy needs: those that are looked at, and the plan from `root` with
@@ -52,14 +54,15 @@ impl Tree<'_> {
     }
 
     /// Takes out what another one beats in every state; of equal ones the first stays.
-    fn unbeaten(&self, mut ids: Vec<AlphaId>) -> Vec<AlphaId> {
+    fn unbeaten(&self, ids: Vec<AlphaId>) -> Vec<AlphaId> {
         // What beats another has the larger sum.
-        let sum = |id: &AlphaId| self.alphas.of(*id).iter().sum::<f64>();
-        ids.sort_by(|a, b| sum(b).total_cmp(&sum(a)).then(a.cmp(b)));
-        let mut kept: Vec<AlphaId> = Vec::with_capacity(ids.len());
+        let sum = |id: AlphaId| (self.alphas.of(id).iter().sum::<f64>(), id);
+        let mut by_sum: Vec<(f64, AlphaId)> = ids.into_iter().map(sum).collect();
+        by_sum.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut kept: Vec<AlphaId> = Vec::with_capacity(by_sum.len());
         let mut comparisons = 0;
-        for id in ids {
-            let is_compared = comparisons < COMPARISONS_MAX;
+        for (_, id) in by_sum {
+            let is_compared = comparisons < UNBEATEN_MAX;
             let beats = |one: &AlphaId| is_compared && self.beats(*one, id);
             let better = kept.iter().position(beats);
             comparisons += better.unwrap_or(kept.len());

@@ -11,9 +11,9 @@
 //! - from time to time the best plan is tied into a controller and valued exactly (`controller`),
 //!   and the expanded beliefs are valued together (`grid`), so that a discount near 1 does not
 //!   slow either bound down;
-//! - rounds at the edge of the graph (`frontier`) take turns with walks, whichever have brought
-//!   more for their work of late (`search`): walks follow the most probable observation again and
-//!   again where most of the value lies in a state of rest that something rare disturbs.
+//! - rounds at the edge of the graph (`frontier`) have a share of the work, and all of it where
+//!   walks go round in circles: a walk follows the most probable observation again and again, even
+//!   where what is worth knowing is rare.
 //!
 //! The same model and precision give the same vectors, unless time or memory ended the search.
 

@@ -9,10 +9,8 @@ use crate::sparse_beliefs::BeliefId;
 const TARGET_SHARE: f64 = 0.5;
 /// A walk that expands nothing and narrows the gap by less than this share goes in circles.
 const STUCK_SHARE: f64 = 1e-4;
-/// Of two kinds of rounds each has at least this share of the work.
-const SHARE_MIN: f64 = 0.2;
-/// What an earlier round brought counts this much less than what the next brings.
-const KEPT_SHARE: f64 = 0.7;
+/// Rounds at the edge of the graph have this share of the work, at least.
+const EDGE_SHARE: f64 = 0.35;
 /// What is done now and then pays if it narrows the gap by this share.
 const PAYS_SHARE: f64 = 0.01;
 /// Pauses of what is done now and then, in multiples of what it costs.
@@ -32,9 +30,8 @@ pub(super) struct Search<'m> {
     pub progress: Progress,
     controller: Rhythm,
     grid: Rhythm,
-    /// Walks, and rounds at the edge of the graph.
-    walks: Pace,
-    edge: Pace,
+    /// Elementary operations of rounds at the edge of the graph.
+    edge_work: u64,
     /// Numbers of vectors and of points at which pruning is due.
     alphas_due: usize,
     points_due: usize,
@@ -66,34 +63,6 @@ impl Rhythm {
     }
 }
 
-/// What one kind of round has brought of late, and for which work.
-#[derive(Debug, Clone, Copy, Default)]
-struct Pace {
-    /// Sum of the shares by which the gap became narrower, and of the work: what is older counts
-    /// less.
-    gain: f64,
-    work: f64,
-    /// All its work.
-    total: u64,
-}
-
-impl Pace {
-    fn done(&mut self, work: u64, gain: f64) {
-        self.gain = KEPT_SHARE * self.gain + gain.max(0.0);
-        self.work = KEPT_SHARE * self.work + work as f64;
-        self.total += work;
-    }
-
-    /// True if this kind of round is next, rather than the `other`: that which brings more for its
-    /// work, but none has less than a certain share of it.
-    fn is_next(&self, other: &Self) -> bool {
-        let all = (self.total + other.total) as f64;
-        let is_short = |one: &Self| (one.total as f64) < SHARE_MIN * all;
-        let is_quicker = self.gain * other.work >= other.gain * self.work;
-        is_short(self) || (is_quicker && !is_short(other))
-    }
-}
-
 impl<'m> Search<'m> {
     pub(super) fn new(mut tree: Tree<'m>, budget: &mut Budget<'_>) -> Result<Self, Stopped> {
         let start = tree.model.start().iter().enumerate();
@@ -108,8 +77,7 @@ impl<'m> Search<'m> {
             progress: Progress::default(),
             controller: Rhythm::new(),
             grid: Rhythm::new(),
-            walks: Pace::default(),
-            edge: Pace::default(),
+            edge_work: 0,
             alphas_due: ALPHAS_MIN,
             points_due: POINTS_MIN,
         };
@@ -145,9 +113,11 @@ impl<'m> Search<'m> {
     fn round(&mut self, options: &Options, budget: &mut Budget<'_>) -> Result<(), Stopped> {
         let before = (self.tree.children.len(), self.progress.bracket.gap());
         let began = budget.spent();
-        let at_edge = self.tree.is_thorough || self.edge.is_next(&self.walks);
-        if at_edge {
+        // A walk follows what is most probable; what is rare is met at the edge.
+        let is_edge_due = (self.edge_work as f64) < EDGE_SHARE * began as f64;
+        if self.tree.is_thorough || (is_edge_due && self.progress.rounds > 0) {
             self.tree.advance_frontier(self.root, budget)?;
+            self.edge_work += budget.spent() - began;
         } else {
             let target = options.precision.max(TARGET_SHARE * before.1);
             self.tree.walk(self.root, target, budget)?;
@@ -155,14 +125,7 @@ impl<'m> Search<'m> {
         self.now_and_then(budget)?;
         self.progress.rounds += 1;
         self.note(budget)?;
-        let gap = self.progress.bracket.gap();
-        let pace = if at_edge {
-            &mut self.edge
-        } else {
-            &mut self.walks
-        };
-        pace.done(budget.spent() - began, (before.1 - gap) / before.1);
-        let is_narrower = gap <= (1.0 - STUCK_SHARE) * before.1;
+        let is_narrower = self.progress.bracket.gap() <= (1.0 - STUCK_SHARE) * before.1;
         self.tree.is_thorough = self.tree.children.len() == before.0 && !is_narrower;
         Ok(())
     }
