@@ -12,6 +12,8 @@ use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
     DeadlineMonitor, Graph, HealthBoard, SourceCycle, Stage, StageCycle, Topic, VirtualClock,
 };
+use vigil_decision::solver::{Options, solve};
+use vigil_decision::{Budget, PointBased};
 use vigil_detector::DetectorStage;
 use vigil_identifier::IdentifierStage;
 use vigil_sensor_sim::{Assembled, SimulatorSource};
@@ -27,13 +29,27 @@ const CYCLES: u64 = 1200;
 /// A sensor frame is held back in this cycle: the deadlines pass.
 const SILENT: u64 = 900;
 
-fn setup() -> Setup {
+/// The default graph; by a policy that was solved beforehand, if so wished.
+fn setup(is_solved: bool) -> Setup {
     let config = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../config/rover.toml");
     let args = GraphArgs {
         config,
         ..GraphArgs::default()
     };
-    args.load().unwrap()
+    let mut setup = args.load().unwrap();
+    if is_solved {
+        let model = &setup.decision;
+        let options = Options {
+            precision: 0.15,
+            ..Options::default()
+        };
+        let mut never = || false;
+        let budget = &mut Budget::new(&mut never);
+        let found = solve(model, &options, budget, &mut |_| ()).unwrap();
+        setup.policy = Some(PointBased::new(model, &found.vectors.unwrap()).unwrap());
+        setup.file.supervisor.policy = "point-based".to_owned();
+    }
+    setup
 }
 
 fn cycle_parts(setup: &Setup, graph: &Graph, name: ServiceName) -> (DeadlineMonitor, HealthBoard) {
@@ -68,29 +84,37 @@ fn turn(cycle: &mut StageCycle, stage: &mut impl Stage, clock: &VirtualClock) ->
 
 #[test]
 fn steady_cycles_of_every_service_allocate_nothing() {
+    demand_steady(&setup(false));
+}
+
+#[test]
+fn nor_do_they_with_a_policy_that_was_solved_beforehand() {
+    demand_steady(&setup(true));
+}
+
+fn demand_steady(setup: &Setup) {
     use ServiceName::{Detector, Identifier, SensorSim, Supervisor};
-    let setup = setup();
     let period_ns = setup.period_ns();
     let clock = VirtualClock::default();
     let graph = Graph::InProcess(Bus::new(clock.clone()));
-    let parts = |name| cycle_parts(&setup, &graph, name);
+    let parts = |name| cycle_parts(setup, &graph, name);
     let stage = |name| {
         let (monitor, board) = parts(name);
         StageCycle::new(monitor, board).unwrap()
     };
-    let mut sensor = simulator(&setup, &graph);
+    let mut sensor = simulator(setup, &graph);
     let (monitor, board) = parts(SensorSim);
     let mut source = SourceCycle::new(monitor, board, period_ns).unwrap();
-    let detector = vigil_detector::assemble(&setup).unwrap();
+    let detector = vigil_detector::assemble(setup).unwrap();
     let mut detector = (
         stage(Detector),
         DetectorStage::new(detector, &graph).unwrap(),
     );
-    let identifier = vigil_identifier::assemble(&setup).unwrap();
+    let identifier = vigil_identifier::assemble(setup).unwrap();
     let identifier = IdentifierStage::new(identifier, &graph, period_ns).unwrap();
     let mut identifier = (stage(Identifier), identifier);
-    let supervisor = vigil_supervisor::assemble(&setup).unwrap();
-    let validity_ns = vigil_supervisor::validity_ns(&setup);
+    let supervisor = vigil_supervisor::assemble(setup).unwrap();
+    let validity_ns = vigil_supervisor::validity_ns(setup);
     let supervisor = SupervisorStage::new(supervisor, &graph, period_ns, validity_ns).unwrap();
     let mut supervisor = (stage(Supervisor), supervisor);
     clock.set(period_ns);

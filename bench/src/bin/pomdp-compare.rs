@@ -20,14 +20,17 @@ use vigil_bench::archive::Archive;
 use vigil_bench::options::Options;
 use vigil_bench::quantile;
 use vigil_decision::navigation::{ACTIONS, ENDS, QUIET};
-use vigil_decision::policy::{Base, Dual, PolicyName};
+use vigil_decision::policy::{Base, Dual, PolicyKind, PolicyName};
 use vigil_decision::simulation::{
     Agent, Escalation, Paired, PolicyAgent, Random, Rules, Summary, World, horizon, run,
 };
-use vigil_decision::{Pomdp, Tracker, mdp};
+use vigil_decision::solver::{self, Found};
+use vigil_decision::{Budget, PointBased, Pomdp, Tracker, mdp};
 
 const SEED: u64 = 1;
 const THRESHOLDS: [f64; 3] = [0.2, 0.5, 0.8];
+/// Gap at which the point-based policy's solution ends: 1 % of the value.
+const PRECISION: f64 = 0.15;
 /// Decisions whose time is measured, of each policy.
 const DECISIONS: usize = 200_000;
 
@@ -40,10 +43,15 @@ fn main() -> Result<(), Failure> {
     let navigation = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/navigation.pomdp");
     let navigation = Pomdp::parse(&std::fs::read_to_string(navigation)?)?;
     let public = public(&PathBuf::from(data).join("pomdp"), episodes)?;
-    let missions = missions(&navigation, episodes)?;
-    let times = times(&navigation)?;
+    let found = solved(&navigation)?;
+    let vectors = found.vectors.as_ref().ok_or("no vectors")?;
+    let policy = PointBased::new(&navigation, vectors)?;
+    let missions = missions(&navigation, &policy, episodes)?;
+    let times = times(&navigation, &policy)?;
     let raw = json!({
         "episodes": episodes, "seed": SEED, "public": public, "navigation": missions,
+        "point_based": {"lower": found.bracket.lower, "upper": found.bracket.upper,
+            "vectors": vectors.len(), "products": policy.products()},
         "decision_times": times,
     });
     if options.is_json {
@@ -52,6 +60,14 @@ fn main() -> Result<(), Failure> {
     }
     let mut archive = Archive::new("pomdp-compare")?;
     say_public(&mut archive, &public, episodes);
+    archive.say(&format!(
+        "point-based: solved to a gap of {PRECISION}: {:.4} to {:.4} at the start belief, \
+         {} vectors; {}\nmultiplications a decision.\n",
+        found.bracket.lower,
+        found.bracket.upper,
+        vectors.len(),
+        policy.products()
+    ));
     say_missions(&mut archive, &missions, episodes);
     say_times(&mut archive, &times);
     archive.store("pomdp-compare.json", &raw)?;
@@ -97,8 +113,19 @@ fn public(folder: &Path, episodes: u64) -> Result<Vec<Value>, Failure> {
     Ok(rows)
 }
 
+/// The navigation model, solved until the bounds are [`PRECISION`] apart.
+fn solved(model: &Pomdp) -> Result<Found, Failure> {
+    let options = solver::Options {
+        precision: PRECISION,
+        ..solver::Options::default()
+    };
+    let mut never = || false;
+    let budget = &mut Budget::new(&mut never);
+    Ok(solver::solve(model, &options, budget, &mut |_| ())?)
+}
+
 /// The navigation model: missions to the horizon, and such as SH and GU end.
-fn missions(model: &Pomdp, episodes: u64) -> Result<Vec<Value>, Failure> {
+fn missions(model: &Pomdp, solved: &PointBased, episodes: u64) -> Result<Vec<Value>, Failure> {
     let solution = mdp::solve(model)?;
     let ladder = ["MA", "GO", "NP", "RL", "SH", "GU"];
     let mut rows = Vec::new();
@@ -125,16 +152,16 @@ fn missions(model: &Pomdp, episodes: u64) -> Result<Vec<Value>, Failure> {
         let mut random = Random::new(ACTIONS.len());
         add("random", None, rewards(model, &mut random, ends, episodes));
         for name in names() {
-            let policy: PolicyName = name.parse()?;
-            let thresholds = if policy.information.is_some() {
+            let policy: PolicyKind = name.parse()?;
+            let thresholds = if policy.is_dual() {
                 &THRESHOLDS[..]
             } else {
                 &THRESHOLDS[..1]
             };
             for &k in thresholds {
-                let decider = policy.build(model, &solution, |i| guarded(i, k))?;
+                let decider = policy.build(model, &solution, |i| guarded(i, k), Some(solved))?;
                 let mut agent = PolicyAgent::new(model, decider);
-                let k = policy.information.map(|_| k);
+                let k = policy.is_dual().then_some(k);
                 add(&name, k, rewards(model, &mut agent, ends, episodes));
             }
         }
@@ -147,6 +174,7 @@ fn names() -> impl Iterator<Item = String> {
     prefixes
         .into_iter()
         .flat_map(|prefix| Base::ALL.map(|(_, x)| format!("{prefix}{x}")))
+        .chain(["point-based".to_owned()])
 }
 
 /// Dual control as a robot should have it: neither SH nor GU for information, and a guard.
@@ -159,17 +187,17 @@ fn guarded(information: vigil_decision::policy::Information, k: f64) -> Dual {
 
 /// Time of update and decision with its record, on beliefs as missions bring them. With K = 0
 /// and no guard every step looks ahead: the dearest case.
-fn times(model: &Pomdp) -> Result<Vec<Value>, Failure> {
+fn times(model: &Pomdp, solved: &PointBased) -> Result<Vec<Value>, Failure> {
     let solution = mdp::solve(model)?;
     let mut rows = Vec::new();
     for name in names() {
-        let policy: PolicyName = name.parse()?;
+        let policy: PolicyKind = name.parse()?;
         let unguarded = |information| {
             let mut dual = guarded(information, 0.0);
             dual.stall_steps = 0;
             dual
         };
-        let mut decider = policy.build(model, &solution, unguarded)?;
+        let mut decider = policy.build(model, &solution, unguarded, Some(solved))?;
         let mut tracker = Tracker::new(model);
         let (mut decide_ns, mut both_ns) = (Vec::new(), Vec::new());
         let mut episode = 0;

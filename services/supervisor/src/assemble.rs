@@ -27,6 +27,7 @@ pub fn assemble(setup: &Setup) -> Result<Supervisor, SupervisorError> {
         .collect();
     Supervisor::new(
         setup.decision.clone(),
+        setup.policy.as_ref(),
         &setup.tree,
         &setup.robot,
         &setup.file.supervisor,

@@ -1,7 +1,7 @@
 //! Decisions about exceptions of the navigation: states are told by symptoms and outcomes.
 
 use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
-use vigil_decision::{Choice, Control, Decider, Evidence, Pomdp, Tracker, mdp};
+use vigil_decision::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
 use vigil_inference::FaultTree;
 use vigil_setup::schema;
 
@@ -45,6 +45,7 @@ impl Exceptions {
     /// [`SupervisorError`] naming what does not fit.
     pub(crate) fn new(
         model: Pomdp,
+        solved: Option<&PointBased>,
         tree: &FaultTree,
         settings: &schema::Supervisor,
         blind_after_misses: u32,
@@ -52,7 +53,7 @@ impl Exceptions {
         mapping::check_size(&model)?;
         let actions = mapping::actions(&model, &settings.actions)?;
         let solution = mdp::solve(&model)?;
-        let decider = policy::decider(&model, &solution, settings)?;
+        let decider = policy::decider(&model, &solution, solved, settings)?;
         let state = settings.hardware_state.as_ref().map(|name| {
             let index = model.states().iter().position(|state| state == name);
             index.ok_or_else(|| SupervisorError::HardwareState {
@@ -274,6 +275,6 @@ impl Exceptions {
             meanings: &self.actions,
             control_mode: self.control_mode,
         };
-        told.write(&self.model, &self.tracker, self.decider.values(), action);
+        told.write(&self.model, &self.tracker, &self.decider, action);
     }
 }

@@ -1,7 +1,7 @@
 //! Decisions about the leaves of the fault tree: states are told by the identifier.
 
 use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
-use vigil_decision::{Choice, Control, Decider, Evidence, Pomdp, Tracker, mdp};
+use vigil_decision::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
 use vigil_setup::schema;
@@ -49,6 +49,7 @@ impl Leaves {
     /// [`SupervisorError`] naming what does not fit.
     pub(crate) fn new(
         model: Pomdp,
+        solved: Option<&PointBased>,
         tree: &FaultTree,
         robot: &Description,
         settings: &schema::Supervisor,
@@ -59,7 +60,7 @@ impl Leaves {
         let actions = mapping::actions(&model, &settings.actions)?;
         mapping::check_compensation(&model, &states, &actions, &compensation)?;
         let solution = mdp::solve(&model)?;
-        let decider = policy::decider(&model, &solution, settings)?;
+        let decider = policy::decider(&model, &solution, solved, settings)?;
         let mut supervisor = Self {
             decider,
             tree_hash: tree.hash(),
@@ -290,6 +291,6 @@ impl Leaves {
             meanings: &self.actions,
             control_mode: self.control_mode,
         };
-        told.write(&self.model, &self.tracker, self.decider.values(), action);
+        told.write(&self.model, &self.tracker, &self.decider, action);
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use vigil_blocks::{DECISION_ACTIONS, DECISION_STATES, RecoveryKind};
 use vigil_decision::Pomdp;
 use vigil_decision::mdp::SolveError;
-use vigil_decision::policy::{BuildError, NameError};
+use vigil_decision::policy::{BuildError, KindError};
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
 use vigil_setup::schema::RecoveryAction;
@@ -84,7 +84,7 @@ pub enum SupervisorError {
     },
     /// The policy is not known.
     #[error("supervisor.policy: {0}")]
-    Policy(#[from] NameError),
+    Policy(#[from] KindError),
     /// Dual control cannot be set up.
     #[error("supervisor: {0}")]
     Build(#[from] BuildError),

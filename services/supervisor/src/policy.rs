@@ -1,22 +1,24 @@
 //! The policy that the settings name.
 
 use vigil_decision::mdp::Solution;
-use vigil_decision::policy::{Dual, Gate, Information, PolicyName};
-use vigil_decision::{Decider, Pomdp};
+use vigil_decision::policy::{Dual, Gate, Information, PolicyKind};
+use vigil_decision::{Decider, PointBased, Pomdp};
 use vigil_setup::schema;
 
 use crate::mapping::SupervisorError;
 
-/// The decider for `model`, of which `solution` is the fully observable relaxation.
+/// The decider for `model`, of which `solution` is the fully observable relaxation and `solved` the
+/// policy that was solved beforehand, if any.
 pub(crate) fn decider(
     model: &Pomdp,
     solution: &Solution,
+    solved: Option<&PointBased>,
     settings: &schema::Supervisor,
 ) -> Result<Decider, SupervisorError> {
-    let name: PolicyName = settings.policy.parse()?;
+    let kind: PolicyKind = settings.policy.parse()?;
     let allowed = information_actions(model, settings)?;
     let dual = |information| dual(information, settings, allowed);
-    Ok(name.build(model, solution, dual)?)
+    Ok(kind.build(model, solution, dual, solved)?)
 }
 
 fn dual(information: Information, settings: &schema::Supervisor, allowed: Vec<usize>) -> Dual {

@@ -1,7 +1,7 @@
 //! One decision cycle.
 
 use vigil_blocks::{Action, DetectionBelief, Entry, FaultBelief};
-use vigil_decision::Pomdp;
+use vigil_decision::{PointBased, Pomdp};
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
 use vigil_setup::schema;
@@ -34,7 +34,8 @@ enum Of {
 
 impl Supervisor {
     /// Builds a supervisor for a decision model: with `settings.evidence` of faults, its states
-    /// are the leaves of `tree`; of symptoms, its observations are sets of them. After
+    /// are the leaves of `tree`; of symptoms, its observations are sets of them. `solved` is what
+    /// the policy `point-based` decides by, the others do without. After
     /// `blind_after_misses` misses in a row without any detection no belief is usable, and the
     /// robot stops.
     ///
@@ -42,6 +43,7 @@ impl Supervisor {
     /// [`SupervisorError`] naming what does not fit.
     pub fn new(
         model: Pomdp,
+        solved: Option<&PointBased>,
         tree: &FaultTree,
         robot: &Description,
         settings: &schema::Supervisor,
@@ -51,6 +53,7 @@ impl Supervisor {
         let of = match settings.evidence {
             schema::Evidence::Faults => Of::Leaves(Box::new(Leaves::new(
                 model,
+                solved,
                 tree,
                 robot,
                 settings,
@@ -59,6 +62,7 @@ impl Supervisor {
             )?)),
             schema::Evidence::Symptoms => Of::Exceptions(Box::new(Exceptions::new(
                 model,
+                solved,
                 tree,
                 settings,
                 blind_after_misses,

@@ -1,7 +1,10 @@
 //! What the robot is told.
 
-use vigil_blocks::{Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind};
-use vigil_decision::{Choice, Control, Pomdp, Tracker};
+use vigil_blocks::{
+    Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, ValueKind,
+};
+use vigil_decision::policy::Measure;
+use vigil_decision::{Choice, Control, Decider, Pomdp, Tracker};
 
 use crate::mapping::ActionMeaning;
 
@@ -39,9 +42,10 @@ impl Told<'_> {
         &self,
         model: &Pomdp,
         tracker: &Tracker,
-        values: &[f64],
+        decider: &Decider,
         action: &mut Action,
     ) {
+        let values = decider.values();
         let decided = self.decided;
         let meaning = self.meanings.get(decided.action).copied();
         let stops = decided.kind == RecoveryKind::Stop;
@@ -52,6 +56,12 @@ impl Told<'_> {
         action.belief[..belief.len()].copy_from_slice(belief);
         action.value[..values.len()].copy_from_slice(values);
         action.entropy = tracker.entropy();
+        action.action_entropy = decider.action_entropy();
+        action.value_kind = match decider.measure() {
+            Measure::Value => ValueKind::Value,
+            Measure::Votes => ValueKind::Votes,
+            Measure::Entropy => ValueKind::Entropy,
+        } as u32;
         action.margin = self.choice.margin;
         action.speed_scale = meaning.map_or(0.0, |m| if stops { 0.0 } else { m.speed_scale });
         action.action = decided.action as u32;
@@ -60,7 +70,7 @@ impl Told<'_> {
         action.control_mode = self.control_mode() as u32;
         action.state_count = belief.len() as u32;
         action.action_count = values.len() as u32;
-        action.reserved = [0; 4];
+        (action.reserved_word, action.reserved) = (0, [0; 2]);
     }
 
     /// Gathering information is a way to use a belief with fresh evidence, and no other.

@@ -205,10 +205,18 @@ fn what_does_not_fit_is_named() {
         .collect();
     let message = |source: &str, settings: &_, compensation: &[Compensation]| {
         let model = Pomdp::parse(source).unwrap();
-        Supervisor::new(model, &tree, &robot, settings, compensation.to_vec(), 10)
-            .err()
-            .unwrap()
-            .to_string()
+        Supervisor::new(
+            model,
+            None,
+            &tree,
+            &robot,
+            settings,
+            compensation.to_vec(),
+            10,
+        )
+        .err()
+        .unwrap()
+        .to_string()
     };
     let missing = message(&source.replace("LR_ENC", "XX_ENC"), &settings, &all);
     assert!(missing.contains("no state 'LR_ENC'"), "{missing}");

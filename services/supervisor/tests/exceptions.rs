@@ -31,7 +31,8 @@ fn build(model: &str, settings: &Settings) -> Result<Supervisor, String> {
     let config = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
     let robot = vigil_setup::load_robot(&config.join("robots/rover.toml")).unwrap();
     let model = Pomdp::parse(model).unwrap();
-    Supervisor::new(model, &tree(), &robot, settings, Vec::new(), 10).map_err(|e| e.to_string())
+    Supervisor::new(model, None, &tree(), &robot, settings, Vec::new(), 10)
+        .map_err(|e| e.to_string())
 }
 
 /// A supervisor, and what it is told.

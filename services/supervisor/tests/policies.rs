@@ -4,7 +4,7 @@
 
 mod world;
 
-use vigil_blocks::{ControlMode, DetectionBelief, Entry, RecoveryKind};
+use vigil_blocks::{ControlMode, DetectionBelief, Entry, RecoveryKind, ValueKind};
 use vigil_cycle::allocation::{CountingAllocator, allocations};
 use vigil_decision::policy::{Base, Dual, PolicyName, normalised_entropy};
 use vigil_decision::{Pomdp, mdp};
@@ -57,6 +57,13 @@ fn the_default_policy_publishes_the_values_of_q_mdp_to_the_bit() {
             );
         }
         assert_eq!(world.action.control_mode, ControlMode::Policy as u32);
+        assert_eq!(world.action.value_kind, ValueKind::Value as u32);
+        let mut votes = vec![0.0; model.actions().len()];
+        for (s, b) in belief.iter().enumerate() {
+            votes[solution.best(s)] += b;
+        }
+        let doubt = normalised_entropy(&votes);
+        assert!((world.action.action_entropy - doubt).abs() < 1e-12);
         assert_eq!(
             world.action.entropy.to_bits(),
             normalised_entropy(belief).to_bits()
@@ -72,6 +79,9 @@ fn every_policy_goes_on_when_nominal_and_compensates_a_certain_fault() {
         assert_eq!(world.kind(), RecoveryKind::GoOn, "{name}");
         world.rest(1, true, &[("RM_STUCK", 0.999), ("ND", 0.001)]);
         assert_eq!(world.kind(), RecoveryKind::Compensate, "{name}");
+        let counts = name.ends_with("av") || name.ends_with("mls");
+        let kind = [ValueKind::Value, ValueKind::Votes][usize::from(counts)];
+        assert_eq!(world.action.value_kind, kind as u32, "{name}");
         assert_eq!(
             world.action.control_mode,
             ControlMode::Policy as u32,
@@ -94,6 +104,7 @@ fn in_doubt_dual_control_gathers_information_and_says_so() {
             .iter()
             .all(|v| (-1.0..=0.0).contains(v))
     );
+    assert_eq!(world.action.value_kind, ValueKind::Entropy as u32);
     // Between epochs it stands.
     world.cycle(true, &EVEN, &EVEN);
     assert_eq!(world.action.control_mode, ControlMode::Dual as u32);
@@ -173,7 +184,7 @@ fn settings_that_do_not_fit_the_model_are_named() {
         settings.actions.get_mut("compensate").unwrap().kind =
             vigil_setup::schema::Recovery::SlowDown;
         let model = Pomdp::parse(&source).unwrap();
-        let built = Supervisor::new(model, &tree, &robot, &settings, Vec::new(), 10);
+        let built = Supervisor::new(model, None, &tree, &robot, &settings, Vec::new(), 10);
         built.err().unwrap().to_string()
     };
     let wrong = message(&|s| s.information_actions = vec!["look".into()]);

@@ -23,6 +23,14 @@ fn text(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
+/// As [`text`], for commands that tell how far they are.
+fn text_and_progress(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{errors}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
 fn compare(options: &[&str]) -> Value {
     let all = [&["pomdp", "compare", MODEL, "--json"], options].concat();
     serde_json::from_str(&text(&all)).unwrap()
@@ -207,9 +215,70 @@ fn the_shipped_model_is_what_the_command_generates() {
 }
 
 #[test]
+fn a_solved_policy_takes_part_and_is_recorded() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let policy = path("policy.json");
+    text_and_progress(&[
+        "pomdp",
+        "solve",
+        MODEL,
+        "--precision",
+        "0.3",
+        "--out",
+        &policy,
+    ]);
+    let options = [
+        "--policies",
+        "escalation-1,mls,point-based",
+        "--policy-file",
+        &policy,
+        "--episodes",
+        "300",
+    ];
+    let document = compare(&options);
+    let rows = document["rows"].as_array().unwrap();
+    let row = |name: &str| rows.iter().find(|row| row["policy"] == name).unwrap();
+    let mean = |name: &str| row(name)["mean"].as_f64().unwrap();
+    assert!(mean("point-based") > mean("escalation-1"));
+    assert!(row("point-based")["difference_p"].as_f64().unwrap() < 1e-3);
+    let missions = path("missions.jsonl");
+    let simulate = ["pomdp", "simulate", MODEL, "--policy", "point-based"];
+    let given = [
+        "--policy-file",
+        &policy,
+        "--episodes",
+        "5",
+        "--out",
+        &missions,
+    ];
+    text_and_progress(&[&simulate[..], &given].concat());
+    let recorded = fs::read_to_string(&missions).unwrap();
+    assert_eq!(recorded.lines().count(), 6);
+    assert!(
+        recorded.starts_with("{\"format\":\"vigil-missions\",\"version\":1,\"policy\":\"point")
+    );
+    let other = ["simulate", "config/rover.pomdp", "--policy", "point-based"];
+    let message = refused(&[&other[..], &given].concat());
+    assert!(message.contains("solved for the model"), "{message}");
+}
+
+#[test]
 fn options_that_mean_nothing_are_refused_with_what_is_allowed() {
     let with = |options: &[&str]| refused(&[&["compare", MODEL], options].concat());
-    let cases: [(&[&str], &str); 10] = [
+    let cases: [(&[&str], &str); 13] = [
+        (
+            &["--policies", "point-based"],
+            "point-based: requires --policy-file",
+        ),
+        (
+            &["--policy-file", "config/rover.toml"],
+            "--policy-file: has a meaning only with the policy point-based",
+        ),
+        (
+            &["--policies", "point-based", "--policy-file", "config/none"],
+            "--policy-file config/none: No such file",
+        ),
         (
             &["--policies", "luck"],
             "'luck' is not known: allowed are mls, av, qmdp, fib",

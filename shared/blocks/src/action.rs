@@ -25,10 +25,14 @@ block! {
         pub model_hash: u64,
         /// Belief over the decision model's states.
         pub belief: [f64; DECISION_STATES],
-        /// Value (or votes) of each action under the policy.
+        /// What the policy thinks of each action, the larger the better; `value_kind` says what it
+        /// is. Finite.
         pub value: [f64; DECISION_ACTIONS],
         /// Entropy of the belief, normalised to 0..1.
         pub entropy: f64,
+        /// Entropy of the states' votes for their best actions, normalised to 0..1: doubt about
+        /// what to do.
+        pub action_entropy: f64,
         /// Value of the chosen action minus the runner-up's.
         pub margin: f64,
         /// Natural logarithm of the probability of the last evidence under the belief.
@@ -55,8 +59,12 @@ block! {
         pub impossible_count: u32,
         /// Bit 0: identifier lost; bit 1: detector lost.
         pub lost_stages: u32,
+        /// What `value` is: a [`ValueKind`].
+        pub value_kind: u32,
         /// Reserved, zero.
-        pub reserved: [u64; 4],
+        pub reserved_word: u32,
+        /// Reserved, zero.
+        pub reserved: [u64; 2],
     }
 }
 
@@ -141,6 +149,18 @@ impl Refusal {
             _ => return None,
         })
     }
+}
+
+/// What the values of actions are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum ValueKind {
+    /// Discounted reward to come under the policy.
+    Value = 1,
+    /// How much of the belief speaks for the action, 0 to 1.
+    Votes = 2,
+    /// The entropy to expect after the action, 0 to 1, negative: a step for information.
+    Entropy = 3,
 }
 
 /// How an action was chosen.

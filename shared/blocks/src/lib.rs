@@ -28,7 +28,9 @@ mod journal;
 mod particles;
 mod sensor;
 
-pub use action::{Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, Refusal};
+pub use action::{
+    Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, Refusal, ValueKind,
+};
 pub use block::{Block, fnv1a};
 pub use control::{Control, ControlCommand};
 pub use detection::{CHANNELS, Channel, DetectionBelief};

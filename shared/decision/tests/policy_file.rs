@@ -141,7 +141,8 @@ fn files_of_other_programs_are_read() {
 #[test]
 fn the_policy_begins_the_best_plan() {
     let vectors = [(0, [10.0, 0.0]), (1, [0.0, 10.0]), (0, [6.0, 6.0])];
-    let policy = &mut PointBased::new(AlphaVectors::new(2, 2, vectors).unwrap());
+    let vectors = AlphaVectors::new(2, 2, vectors).unwrap();
+    let policy = &mut PointBased::new(&model(), &vectors).unwrap();
     let mut values = [0.0; 2];
     let choice = policy.evaluate(&[0.5, 0.5], &mut values);
     assert_eq!((choice.action, values), (0, [6.0, 5.0]));

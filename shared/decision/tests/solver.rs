@@ -177,8 +177,9 @@ fn tiger_is_solved() {
 fn a_simulated_policy_earns_the_lower_bound() {
     let model = Pomdp::parse(TIGER).unwrap();
     let (found, _) = solved(&model, 0.1, usize::MAX);
-    let policy = &mut PointBased::new(found.vectors.clone().unwrap());
-    assert!((policy.vectors().value(model.start()) - found.bracket.lower).abs() < 1e-6);
+    let vectors = found.vectors.clone().unwrap();
+    let policy = &mut PointBased::new(&model, &vectors).unwrap();
+    assert!((vectors.value(model.start()) - found.bracket.lower).abs() < 1e-6);
     let mut rng = Pcg64Mcg::seed_from_u64(5);
     let earned: Vec<f64> = (0..2000)
         .map(|_| {

@@ -11,6 +11,7 @@ mod load;
 mod locate;
 mod place;
 pub mod schema;
+mod solved;
 
 pub use args::{GraphArgs, ServiceArgs};
 pub use load::{

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use vigil_blocks::fnv1a;
-use vigil_decision::Pomdp;
+use vigil_decision::{PointBased, Pomdp};
 use vigil_inference::FaultTree;
 use vigil_inference::tree::Node;
 use vigil_robot::learned::ModelError;
@@ -14,6 +14,7 @@ use vigil_robot::{Description, RobotModel};
 use crate::check;
 use crate::locate::{line_of_byte, line_of_key};
 use crate::schema::{GraphFile, TreeFile};
+use crate::solved;
 
 /// A checked configuration.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +37,8 @@ pub struct Setup {
     pub decision: Pomdp,
     /// Where it was read from.
     pub decision_path: PathBuf,
+    /// The policy that was solved beforehand, if `supervisor.policy` is that one.
+    pub policy: Option<PointBased>,
     /// Hash of the effective configuration and every file it names.
     pub hash: u64,
 }
@@ -107,23 +110,21 @@ pub fn load_graph(path: &Path, change: impl FnOnce(&mut GraphFile)) -> Result<Se
     let tree = keep(load_tree(&tree_path), &mut problems);
     let model = keep(load_model(&model_path, robot.as_ref()), &mut problems);
     let decision = keep(load_decision(&decision_path), &mut problems);
+    let at = |key: &str, message| at_key(&path, &text, key, message);
     check::graph(&file, robot.as_ref(), &path, |key, message| {
-        problems.push(Problem {
-            file: path.clone(),
-            line: line_of_key(&text, key),
-            key: key.to_owned(),
-            message,
-        });
+        problems.push(at(key, message));
     });
     if let Some(model) = model.as_ref().filter(|_| problems.is_empty()) {
-        check::alarm(&file, model, |key, message| {
-            problems.push(Problem {
-                file: path.clone(),
-                line: line_of_key(&text, key),
-                key: key.to_owned(),
-                message,
-            });
-        });
+        check::alarm(&file, model, |key, message| problems.push(at(key, message)));
+    }
+    let mut solved = None;
+    if let (Some(name), Some(decision)) = (&file.supervisor.policy_file, &decision)
+        && problems.is_empty()
+    {
+        match solved::load(&resolve(&path, name), decision) {
+            Ok(loaded) => solved = Some(loaded),
+            Err(message) => problems.push(at("supervisor.policy_file", message)),
+        }
     }
     let (Some(robot), Some(tree), Some(model), Some(decision), true) =
         (robot, tree, model, decision, problems.is_empty())
@@ -131,8 +132,10 @@ pub fn load_graph(path: &Path, change: impl FnOnce(&mut GraphFile)) -> Result<Se
         return Err(SetupError { problems });
     };
     let text = format!("{file:?}{robot:?}");
+    let (policy, policy_hash) = solved.unzip();
     let hash = [tree.hash(), model.hash(), decision.hash()]
         .into_iter()
+        .chain(policy_hash)
         .fold(fnv1a::hash(fnv1a::BASIS, text.as_bytes()), fnv1a::hash_u64);
     Ok(Setup {
         file,
@@ -144,8 +147,19 @@ pub fn load_graph(path: &Path, change: impl FnOnce(&mut GraphFile)) -> Result<Se
         model_path,
         decision,
         decision_path,
+        policy,
         hash,
     })
+}
+
+/// A problem of the value at `key` of the file `text`.
+fn at_key(path: &Path, text: &str, key: &str, message: String) -> Problem {
+    Problem {
+        file: path.to_path_buf(),
+        line: line_of_key(text, key),
+        key: key.to_owned(),
+        message,
+    }
 }
 
 /// The value, or its problems among `problems`.
@@ -161,12 +175,7 @@ pub fn load_robot(path: &Path) -> Result<Description, SetupError> {
     let (robot, text) = parse::<Description>(path)?;
     let mut problems = Vec::new();
     check::robot(&robot, |key, message| {
-        problems.push(Problem {
-            file: path.to_path_buf(),
-            line: line_of_key(&text, key),
-            key: key.to_owned(),
-            message,
-        });
+        problems.push(at_key(path, &text, key, message))
     });
     if problems.is_empty() {
         Ok(robot)
@@ -181,12 +190,7 @@ pub fn load_robot(path: &Path) -> Result<Description, SetupError> {
 /// The first problem found.
 pub fn load_tree(path: &Path) -> Result<FaultTree, SetupError> {
     let (file, text) = parse::<TreeFile>(path)?;
-    let problem = |key: &str, message: String| Problem {
-        file: path.to_path_buf(),
-        line: line_of_key(&text, key),
-        key: key.to_owned(),
-        message,
-    };
+    let problem = |key: &str, message| at_key(path, &text, key, message);
     let mut nodes = Vec::with_capacity(file.node.len());
     for (i, node) in file.node.iter().enumerate() {
         let parent = match &node.parent {

@@ -52,7 +52,7 @@ impl World {
             })
             .collect();
         let supervisor =
-            Supervisor::new(model(), &tree, &robot, &settings, compensation, 10).unwrap();
+            Supervisor::new(model(), None, &tree, &robot, &settings, compensation, 10).unwrap();
         Self {
             supervisor,
             tree,

@@ -1,7 +1,7 @@
 //! A policy, and what explains its decisions.
 
 use super::dual::vote_entropy;
-use super::{Choice, Control, Policy, normalised_entropy};
+use super::{Choice, Control, Measure, Policy, normalised_entropy};
 use crate::mdp::Solution;
 use crate::model::Pomdp;
 
@@ -19,6 +19,8 @@ pub struct Decision {
     pub state_entropy: f64,
     /// Entropy of the votes, 0 to 1.
     pub action_entropy: f64,
+    /// What the values are.
+    pub measure: Measure,
 }
 
 impl Decision {
@@ -39,6 +41,8 @@ pub struct Decider {
     best: Vec<usize>,
     values: Vec<f64>,
     votes: Vec<f64>,
+    action_entropy: f64,
+    measure: Measure,
 }
 
 impl Decider {
@@ -53,18 +57,26 @@ impl Decider {
                 .collect(),
             values: vec![0.0; actions],
             votes: vec![0.0; actions],
+            action_entropy: 0.0,
+            measure: Measure::Value,
         }
     }
 
     /// The action for a belief.
     pub fn decide(&mut self, belief: &[f64]) -> Decision {
         let choice = self.policy.evaluate(belief, &mut self.values);
+        self.action_entropy = vote_entropy(belief, &self.best, &mut self.votes);
+        self.measure = match choice.control {
+            Control::Dual => Measure::Entropy,
+            Control::Policy | Control::Stalled => self.policy.measure(),
+        };
         Decision {
             action: choice.action,
             margin: choice.margin,
             control: choice.control,
             state_entropy: normalised_entropy(belief),
-            action_entropy: vote_entropy(belief, &self.best, &mut self.votes),
+            action_entropy: self.action_entropy,
+            measure: self.measure,
         }
     }
 
@@ -73,6 +85,18 @@ impl Decider {
     #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values
+    }
+
+    /// What [`Self::values`] are.
+    #[must_use]
+    pub const fn measure(&self) -> Measure {
+        self.measure
+    }
+
+    /// Entropy of the votes, 0 to 1, as of the last decision.
+    #[must_use]
+    pub const fn action_entropy(&self) -> f64 {
+        self.action_entropy
     }
 
     /// How much of the belief is in states whose best action this is, as of the last decision.

@@ -10,7 +10,7 @@
 //! comes from a declared set of actions. And where no action of the set lowers the entropy, X acts.
 
 use super::entropy::{normalised, normalised_entropy};
-use super::{Choice, Control, LookAhead, Policy, choose_among};
+use super::{Choice, Control, LookAhead, Measure, Policy, choose_among};
 use crate::mdp::Solution;
 use crate::model::Pomdp;
 
@@ -202,6 +202,10 @@ impl Policy for DualControl {
             control: Control::Dual,
             ..choose_among(values, is_allowed)
         }
+    }
+
+    fn measure(&self) -> Measure {
+        self.policy.measure()
     }
 
     fn reset(&mut self) {

@@ -20,6 +20,7 @@
 //! A [`Decider`] adds to a policy what a record needs to explain a decision: the votes and both
 //! entropies.
 
+mod completion;
 mod decider;
 mod dual;
 mod entropy;
@@ -37,7 +38,7 @@ pub use entropy::normalised_entropy;
 pub use fast_informed::FastInformed;
 pub use look_ahead::LookAhead;
 pub use most_likely_state::MostLikelyState;
-pub use name::{Base, BuildError, NameError, PolicyName};
+pub use name::{Base, BuildError, KindError, NameError, PolicyKind, PolicyName};
 pub use point_based::PointBased;
 pub use qmdp::QMdp;
 pub use voting::ActionVoting;
@@ -64,11 +65,27 @@ pub struct Choice {
     pub control: Control,
 }
 
+/// What the numbers are that a policy writes for the actions; of all the larger is the better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// Discounted reward to come: what the policy expects, or earns for certain.
+    Value,
+    /// How much of the belief speaks for the action, 0 to 1.
+    Votes,
+    /// The entropy to expect after the action, 0 to 1, negative.
+    Entropy,
+}
+
 /// A policy over beliefs. Deciding allocates nothing.
 pub trait Policy {
     /// Writes the value (or votes) of every action into `values`, and chooses; of two actions the
     /// one with the larger value is the better in the policy's eyes.
     fn evaluate(&mut self, belief: &[f64], values: &mut [f64]) -> Choice;
+
+    /// What the values are, in a step that is not for information.
+    fn measure(&self) -> Measure {
+        Measure::Value
+    }
 
     /// Forgets what it remembers of earlier decisions: a new mission begins.
     fn reset(&mut self) {}

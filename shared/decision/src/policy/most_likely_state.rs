@@ -1,6 +1,6 @@
 //! MLS: the best action of the most likely state.
 
-use super::{Choice, Policy, choose};
+use super::{Choice, Measure, Policy, choose};
 use crate::mdp::Solution;
 
 /// pi_CO(argmax_s b(s)); ignores all other states.
@@ -28,5 +28,9 @@ impl Policy for MostLikelyState {
             *value = *b;
         }
         choose(values)
+    }
+
+    fn measure(&self) -> Measure {
+        Measure::Votes
     }
 }

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use super::{
     ActionVoting, Decider, Dual, DualControl, DualError, FastInformed, Information,
-    MostLikelyState, Policy, QMdp,
+    MostLikelyState, PointBased, Policy, QMdp,
 };
 use crate::bounds::{SolveError, fib};
 use crate::budget::Budget;
@@ -74,6 +74,74 @@ pub enum BuildError {
     /// Its values cannot be found.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// No solved policy is at hand.
+    #[error("{POINT_BASED} needs a policy that was solved beforehand, in a file")]
+    Unsolved,
+}
+
+/// The name of a policy that was solved beforehand.
+const POINT_BASED: &str = "point-based";
+
+/// Any policy by name: a heuristic, which follows from the model, or one solved beforehand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PolicyKind {
+    /// `X`, `dm-X` or `adm-X`.
+    Heuristic(PolicyName),
+    /// `point-based`.
+    PointBased,
+}
+
+/// A name that no policy has, solved ones included.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}, and {POINT_BASED}")]
+pub struct KindError(NameError);
+
+impl PolicyKind {
+    /// The decider for a model: as [`PolicyName::build`], or around `solved`.
+    ///
+    /// # Errors
+    /// [`BuildError`].
+    pub fn build(
+        self,
+        model: &Pomdp,
+        solution: &Solution,
+        settings: impl FnOnce(Information) -> Dual,
+        solved: Option<&PointBased>,
+    ) -> Result<Decider, BuildError> {
+        match self {
+            Self::Heuristic(name) => name.build(model, solution, settings),
+            Self::PointBased => {
+                let policy = solved.ok_or(BuildError::Unsolved)?.clone();
+                Ok(Decider::new(Box::new(policy), model, solution))
+            }
+        }
+    }
+
+    /// True if it gathers information by dual control.
+    #[must_use]
+    pub const fn is_dual(self) -> bool {
+        matches!(self, Self::Heuristic(name) if name.information.is_some())
+    }
+}
+
+impl FromStr for PolicyKind {
+    type Err = KindError;
+
+    fn from_str(name: &str) -> Result<Self, KindError> {
+        if name == POINT_BASED {
+            return Ok(Self::PointBased);
+        }
+        name.parse().map(Self::Heuristic).map_err(KindError)
+    }
+}
+
+impl fmt::Display for PolicyKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Heuristic(name) => name.fmt(f),
+            Self::PointBased => f.write_str(POINT_BASED),
+        }
+    }
 }
 
 impl PolicyName {

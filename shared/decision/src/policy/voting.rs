@@ -1,6 +1,6 @@
 //! Action voting: every state votes for its best action, with its probability.
 
-use super::{Choice, Policy, choose};
+use super::{Choice, Measure, Policy, choose};
 use crate::mdp::Solution;
 
 /// argmax_a w(a), w(a) = sum_s b(s) [pi_CO(s) = a].
@@ -26,5 +26,9 @@ impl Policy for ActionVoting {
             }
         }
         choose(values)
+    }
+
+    fn measure(&self) -> Measure {
+        Measure::Votes
     }
 }

@@ -7,16 +7,17 @@ use crate::sparse_beliefs::BeliefId;
 
 /// Comparisons of vectors, at most; some 20 ms.
 const COMPARISONS_MAX: usize = 5_000_000;
+/// Comparisons of all that are needed with each other, at most; some 20 ms.
+const UNBEATEN_MAX: usize = 2_000_000;
 
 impl Tree<'_> {
-    /// The vectors that a policy needs: those that are looked at; the plan from `root` with all
-    /// that it goes on to, so that the policy keeps what the lower bound promises; and the blind
-    /// policies, so that every action has a value. Where a plan goes on to a vector that another
-    /// one beats in every state, that one does instead.
+    /// The vectors that a policy needs: those that are looked at, and the plan from `root` with
+    /// all that it goes on to, so that the policy keeps what the lower bound promises. Where a
+    /// plan goes on to a vector that another one beats in every state, that one does instead; what
+    /// is beaten so is left out. An action that is never the best may be without a vector.
     pub(super) fn vectors(&self, root: BeliefId) -> Result<AlphaVectors, VectorError> {
         let actions = self.model.actions().len();
         let mut needed: Vec<AlphaId> = self.alphas.active().collect();
-        needed.extend(0..actions as AlphaId);
         // Settled: it is known what stands for it. Closed: so is all that its plan goes on to.
         let mut is_settled = vec![false; self.alphas.len()];
         let mut is_closed = is_settled.clone();
@@ -45,10 +46,34 @@ impl Tree<'_> {
         }
         needed.sort_unstable();
         needed.dedup();
+        let needed = self.unbeaten(needed);
         let rows = needed
             .iter()
             .map(|id| (self.alphas.action(*id), self.alphas.of(*id)));
         AlphaVectors::new(self.model.states().len(), actions, rows)
+    }
+
+    /// Takes out what another one beats in every state; of equal ones the first stays.
+    fn unbeaten(&self, ids: Vec<AlphaId>) -> Vec<AlphaId> {
+        // What beats another has the larger sum.
+        let sum = |id: AlphaId| (self.alphas.of(id).iter().sum::<f64>(), id);
+        let mut by_sum: Vec<(f64, AlphaId)> = ids.into_iter().map(sum).collect();
+        by_sum.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut kept: Vec<AlphaId> = Vec::with_capacity(by_sum.len());
+        let mut comparisons = 0;
+        for (_, id) in by_sum {
+            let is_compared = comparisons < UNBEATEN_MAX;
+            let beats = |one: &AlphaId| is_compared && self.beats(*one, id);
+            let better = kept.iter().position(beats);
+            comparisons += better.unwrap_or(kept.len());
+            match better {
+                // What beats one is likely to beat the next.
+                Some(at) => kept.swap(at / 2, at),
+                None => kept.push(id),
+            }
+        }
+        kept.sort_unstable();
+        kept
     }
 
     fn beats(&self, one: AlphaId, other: AlphaId) -> bool {

@@ -1,8 +1,9 @@
-//! Where trials go round in circles: the unexpanded beliefs that matter most, all over the graph.
+//! The unexpanded beliefs that matter most, all over the graph.
 //!
-//! Near a discount of 1 a trial follows the most probable observation round and round. Here the
-//! beliefs that the most promising actions reach are gone through by their probability, and those
-//! at the edge with the largest share in the gap are expanded.
+//! Near a discount of 1, or where something rare disturbs a state of rest, a walk follows the most
+//! probable observation round and round. Here the beliefs that the most promising actions reach are
+//! gone through by their probability, and those at the edge with the largest share in the gap are
+//! expanded.
 
 use std::collections::HashMap;
 

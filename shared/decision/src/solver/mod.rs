@@ -11,7 +11,9 @@
 //! - from time to time the best plan is tied into a controller and valued exactly (`controller`),
 //!   and the expanded beliefs are valued together (`grid`), so that a discount near 1 does not
 //!   slow either bound down;
-//! - where walks go round in circles, the edge of the graph is expanded instead (`frontier`).
+//! - rounds at the edge of the graph (`frontier`) have a share of the work, and all of it where
+//!   walks go round in circles: a walk follows the most probable observation again and again, even
+//!   where what is worth knowing is rare.
 //!
 //! The same model and precision give the same vectors, unless time or memory ended the search.
 

@@ -9,6 +9,8 @@ use crate::sparse_beliefs::BeliefId;
 const TARGET_SHARE: f64 = 0.5;
 /// A walk that expands nothing and narrows the gap by less than this share goes in circles.
 const STUCK_SHARE: f64 = 1e-4;
+/// Rounds at the edge of the graph have this share of the work, at least.
+const EDGE_SHARE: f64 = 0.35;
 /// What is done now and then pays if it narrows the gap by this share.
 const PAYS_SHARE: f64 = 0.01;
 /// Pauses of what is done now and then, in multiples of what it costs.
@@ -28,6 +30,8 @@ pub(super) struct Search<'m> {
     pub progress: Progress,
     controller: Rhythm,
     grid: Rhythm,
+    /// Elementary operations of rounds at the edge of the graph.
+    edge_work: u64,
     /// Numbers of vectors and of points at which pruning is due.
     alphas_due: usize,
     points_due: usize,
@@ -73,6 +77,7 @@ impl<'m> Search<'m> {
             progress: Progress::default(),
             controller: Rhythm::new(),
             grid: Rhythm::new(),
+            edge_work: 0,
             alphas_due: ALPHAS_MIN,
             points_due: POINTS_MIN,
         };
@@ -107,8 +112,12 @@ impl<'m> Search<'m> {
 
     fn round(&mut self, options: &Options, budget: &mut Budget<'_>) -> Result<(), Stopped> {
         let before = (self.tree.children.len(), self.progress.bracket.gap());
-        if self.tree.is_thorough {
+        let began = budget.spent();
+        // A walk follows what is most probable; what is rare is met at the edge.
+        let is_edge_due = (self.edge_work as f64) < EDGE_SHARE * began as f64;
+        if self.tree.is_thorough || (is_edge_due && self.progress.rounds > 0) {
             self.tree.advance_frontier(self.root, budget)?;
+            self.edge_work += budget.spent() - began;
         } else {
             let target = options.precision.max(TARGET_SHARE * before.1);
             self.tree.walk(self.root, target, budget)?;

@@ -1,6 +1,6 @@
 //! Rules of `[supervisor]`.
 
-use vigil_decision::policy::PolicyName;
+use vigil_decision::policy::PolicyKind;
 
 use crate::schema::{Evidence, GraphFile, Recovery, Source, Supervisor};
 
@@ -38,10 +38,23 @@ const fn needs_path(kind: Recovery) -> bool {
 
 /// Name of the policy, and what its dual control needs.
 fn policy(settings: &Supervisor, report: &mut impl FnMut(&str, String)) {
-    let is_dual = match settings.policy.parse::<PolicyName>() {
-        Ok(name) => name.information.is_some(),
+    let kind = match settings.policy.parse::<PolicyKind>() {
+        Ok(kind) => kind,
         Err(error) => return report("supervisor.policy", error.to_string()),
     };
+    match (kind, &settings.policy_file) {
+        (PolicyKind::PointBased, None) => {
+            let message = "point-based requires supervisor.policy_file: what `vigil pomdp solve \
+                           MODEL --out FILE` has written";
+            report("supervisor.policy", message.to_owned());
+        }
+        (PolicyKind::Heuristic(_), Some(_)) => {
+            let message = "has a meaning only with supervisor.policy = \"point-based\"";
+            report("supervisor.policy_file", message.to_owned());
+        }
+        _ => {}
+    }
+    let is_dual = kind.is_dual();
     let key = "supervisor.information_actions";
     let named = &settings.information_actions;
     if settings.as_published && (!named.is_empty() || settings.gate.is_some()) {

@@ -18,7 +18,11 @@ pub struct Supervisor {
     /// Policy: `qmdp`, `mls` (the best action of the most likely state), `av` (action voting),
     /// `fib` (fast informed bound), or one of these with dual control, which gathers information
     /// while the belief is too uncertain: `dm-X` about the state, `adm-X` about the best action.
+    /// Or `point-based`, solved beforehand: see `policy_file`.
     pub policy: String,
+    /// With `point-based`, and only then: file that `vigil pomdp solve MODEL --out FILE` has
+    /// written for the decision model; relative to the graph file.
+    pub policy_file: Option<String>,
     /// Dual control: information is gathered above this entropy, 0 (certain) to 1; 1 never.
     pub threshold: f64,
     /// Dual control: whose entropy the threshold is for, `state` or `action`; default `state` for
@@ -48,6 +52,7 @@ impl Default for Supervisor {
             evidence: Evidence::Faults,
             hardware_state: None,
             policy: "qmdp".into(),
+            policy_file: None,
             threshold: 0.5,
             gate: None,
             information_actions: Vec::new(),

@@ -4,16 +4,17 @@ mod contest;
 pub(super) mod contestant;
 mod table;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::builder::RangedU64ValueParser;
 use clap::{ArgAction, ValueEnum};
 use vigil_decision::bounds::fib;
-use vigil_decision::policy::Gate;
+use vigil_decision::policy::{Gate, PolicyKind};
 use vigil_decision::simulation::{Rules, horizon};
-use vigil_decision::{Budget, Pomdp, mdp, navigation};
+use vigil_decision::{Budget, PointBased, Pomdp, mdp};
 
-use super::load;
+use super::escalation::EscalationArgs;
+use super::{load, solved};
 use crate::commands::{CommandError, Outcome};
 use crate::output;
 use contest::{Contest, Setting};
@@ -23,8 +24,9 @@ use contestant::{Contestant, Kind, Knowledge};
 ///
 /// Every policy meets the same random numbers at the same step of the same mission. Policies: mls,
 /// av, qmdp, fib; dm-X and adm-X of each, which gather information while the entropy (0 to 1) is
-/// above a threshold K; random; escalation-N, which after N firings in a row takes the next rung
-/// of --ladder. Each dm-X and adm-X runs with each threshold.
+/// above a threshold K; point-based, solved beforehand, with --policy-file; random; escalation-N,
+/// which after N firings in a row takes the next rung of --ladder. Each dm-X and adm-X runs with
+/// each threshold.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model, in Cassandra's format.
@@ -72,15 +74,11 @@ pub struct Args {
     /// Upper bound of the value at the start belief [default: the fast informed bound].
     #[arg(long, allow_negative_numbers = true)]
     upper: Option<f64>,
-    /// What escalation-N does while nothing fires.
-    #[arg(long, default_value = navigation::ACTIONS[0])]
-    usual: String,
-    /// The rungs of escalation-N.
-    #[arg(long, value_delimiter = ',', default_value = "MA,GO,NP,RL,SH,GU")]
-    ladder: Vec<String>,
-    /// Observations in which nothing fires, for escalation-N.
-    #[arg(long, value_delimiter = ',', default_value = "none,BO,ALT")]
-    quiet: Vec<String>,
+    /// File of the policy point-based, as `vigil pomdp solve FILE --out POLICY` writes it.
+    #[arg(long, value_name = "POLICY")]
+    policy_file: Option<PathBuf>,
+    #[command(flatten)]
+    escalation: EscalationArgs,
     /// Print one JSON document.
     #[arg(long, action = ArgAction::SetTrue)]
     json: bool,
@@ -133,7 +131,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             GateName::State => Gate::State,
             GateName::Action => Gate::Action,
         }),
-        escalation: (&args.usual, &args.ladder, &args.quiet),
+        escalation: &args.escalation,
+        solved: solved_by(&model, args.policy_file.as_deref(), &contestants)?,
     };
     let contest = Contest::hold(&setting, &knowledge, &contestants)?;
     let name = args.file.display().to_string();
@@ -155,6 +154,28 @@ fn upper(args: &Args, world: &Pomdp) -> Result<Option<f64>, CommandError> {
     let bound = fib::solve(world, &mut Budget::new(&mut || false));
     let bound = bound.map_err(CommandError::usage)?;
     Ok(Some(bound.value(world.start())))
+}
+
+/// The policy in `file`, if one of `contestants` is decided by it.
+///
+/// # Errors
+/// A file without that policy, that policy without a file, a file that is refused.
+pub(super) fn solved_by(
+    model: &Pomdp,
+    file: Option<&Path>,
+    contestants: &[Contestant],
+) -> Result<Option<PointBased>, CommandError> {
+    let is_solved = |c: &Contestant| c.kind == Kind::Policy(PolicyKind::PointBased);
+    match (file, contestants.iter().any(is_solved)) {
+        (Some(file), true) => solved::load(model, "--policy-file", file).map(Some),
+        (None, false) => Ok(None),
+        (Some(_), false) => Err(CommandError::usage(
+            "--policy-file: has a meaning only with the policy point-based",
+        )),
+        (None, true) => Err(CommandError::usage(
+            "policy point-based: requires --policy-file",
+        )),
+    }
 }
 
 /// Index of the contestant that the others are compared with.

@@ -2,6 +2,7 @@
 
 mod compare;
 mod convert;
+mod escalation;
 mod generate;
 mod info;
 mod learn;
@@ -9,6 +10,7 @@ mod missions;
 mod picture;
 mod simulate;
 mod solve;
+mod solved;
 mod track;
 
 use std::path::Path;

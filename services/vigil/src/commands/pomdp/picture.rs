@@ -8,12 +8,11 @@ mod regions;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use vigil_decision::policy::{Decider, Dual, PointBased, Policy, PolicyName};
-use vigil_decision::policy_file::{PolicyFile, alpha, appl};
+use vigil_decision::policy::{Decider, Dual, Policy, PolicyName};
 use vigil_decision::policy_graph::{Limits, PolicyGraph};
 use vigil_decision::{Pomdp, mdp};
 
-use super::{load, track};
+use super::{load, solved, track};
 use crate::commands::{CommandError, Outcome};
 
 /// Draw a model's policy or belief as an SVG.
@@ -113,23 +112,12 @@ fn decider(model: &Pomdp, word: &str) -> Result<Decider, CommandError> {
         let decider = name.build(model, &solution, |information| Dual::new(information, 0.5));
         return decider.map_err(CommandError::usage);
     }
-    let wrong = |problem: &dyn std::fmt::Display| {
-        CommandError::usage(format!("--policy {word}: {problem}"))
-    };
-    let bytes = fs::read(word).map_err(|error| {
-        let known = "allowed are mls, av, qmdp, fib, dm-X, adm-X, or a file of `vigil pomdp solve`";
-        wrong(&format!("{error}; {known}"))
-    })?;
-    let text = String::from_utf8_lossy(&bytes);
-    let vectors = if text.trim_start().starts_with('<') {
-        appl::read(&text, model).map_err(|e| wrong(&e))?
-    } else if text.trim_start().starts_with('{') {
-        PolicyFile::read(&bytes, model)
-            .map_err(|e| wrong(&e))?
-            .vectors
-    } else {
-        alpha::read(&text, model).map_err(|e| wrong(&e))?
-    };
-    let policy: Box<dyn Policy> = Box::new(PointBased::new(vectors));
+    if !Path::new(word).exists() {
+        let known = "mls, av, qmdp, fib, dm-X, adm-X, or a file of `vigil pomdp solve`";
+        let message =
+            format!("--policy {word}: no such policy and no such file; allowed are {known}");
+        return Err(CommandError::usage(message));
+    }
+    let policy: Box<dyn Policy> = Box::new(solved::load(model, "--policy", Path::new(word))?);
     Ok(Decider::new(policy, model, &solution))
 }

@@ -5,11 +5,12 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use vigil_decision::learning::Record;
+use vigil_decision::mdp;
 use vigil_decision::simulation::{Rules, horizon};
-use vigil_decision::{mdp, navigation};
 
 use super::compare::contestant::{Contestant, Knowledge};
-use super::compare::{among, count};
+use super::compare::{among, count, solved_by};
+use super::escalation::EscalationArgs;
 use super::{load, missions};
 use crate::commands::{CommandError, Outcome};
 use crate::output::Progress;
@@ -43,15 +44,11 @@ pub struct Args {
     /// Where to write.
     #[arg(long)]
     out: PathBuf,
-    /// What escalation-N does while nothing fires.
-    #[arg(long, default_value = navigation::ACTIONS[0])]
-    usual: String,
-    /// The rungs of escalation-N.
-    #[arg(long, value_delimiter = ',', default_value = "MA,GO,NP,RL,SH,GU")]
-    ladder: Vec<String>,
-    /// Observations in which nothing fires, for escalation-N.
-    #[arg(long, value_delimiter = ',', default_value = "none,BO,ALT")]
-    quiet: Vec<String>,
+    /// File of the policy point-based, as `vigil pomdp solve FILE --out POLICY` writes it.
+    #[arg(long, value_name = "POLICY")]
+    policy_file: Option<PathBuf>,
+    #[command(flatten)]
+    escalation: EscalationArgs,
 }
 
 /// Runs the command.
@@ -75,7 +72,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         allowed: Some(ends.filter(|(_, end)| !**end).map(|(a, _)| a).collect()),
         stall_steps: 0,
         gate: None,
-        escalation: (&args.usual, &args.ladder, &args.quiet),
+        escalation: &args.escalation,
+        solved: solved_by(&model, args.policy_file.as_deref(), &contestants)?,
     };
     let mut agent = contestant.build(&knowledge)?;
     let failed =

@@ -51,8 +51,9 @@ pub struct Args {
         allow_negative_numbers = true
     )]
     precision: f64,
-    /// Where to write the policy: Vigil's own format; that of APPL if the name ends in .policy,
-    /// of pomdp-solve if in .alpha.
+    /// Where to write the policy: Vigil's own format, which supervisor.policy_file takes (a coarse
+    /// --precision makes fewer vectors and quicker decisions); that of APPL if the name ends in
+    /// .policy, of pomdp-solve if in .alpha.
     #[arg(long, value_name = "POLICY")]
     out: Option<PathBuf>,
     /// Print one JSON document.

@@ -1,11 +1,12 @@
 //! Who takes part.
 
-use vigil_decision::Pomdp;
 use vigil_decision::mdp::Solution;
-use vigil_decision::policy::{Dual, Gate, Information, PolicyName};
-use vigil_decision::simulation::{Agent, Escalation, PolicyAgent, Random};
+use vigil_decision::policy::{Dual, Gate, Information, PolicyKind};
+use vigil_decision::simulation::{Agent, PolicyAgent, Random};
+use vigil_decision::{PointBased, Pomdp};
 
 use crate::commands::CommandError;
+use crate::commands::pomdp::escalation::EscalationArgs;
 
 /// Firings per rung of plain `escalation`.
 const PATIENCE: usize = 2;
@@ -23,7 +24,7 @@ pub struct Contestant {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     /// A policy over beliefs.
-    Policy(PolicyName),
+    Policy(PolicyKind),
     /// The deterministic baseline, with its firings per rung.
     Escalation(usize),
     /// Any action.
@@ -42,8 +43,10 @@ pub struct Knowledge<'a> {
     pub stall_steps: u32,
     /// Gate of dual control, if not the usual one.
     pub gate: Option<Gate>,
-    /// Usual action, ladder and quiet observations of the escalation.
-    pub escalation: (&'a str, &'a [String], &'a [String]),
+    /// What the escalation does.
+    pub escalation: &'a EscalationArgs,
+    /// What point-based decides by.
+    pub solved: Option<PointBased>,
 }
 
 impl Knowledge<'_> {
@@ -71,7 +74,7 @@ impl Contestant {
         for name in names {
             let kind = Kind::parse(name.trim())?;
             let with = |threshold| Self { kind, threshold };
-            let dual = matches!(kind, Kind::Policy(policy) if policy.information.is_some());
+            let dual = matches!(kind, Kind::Policy(policy) if policy.is_dual());
             let several = if dual {
                 thresholds.iter().map(|k| with(Some(*k))).collect()
             } else {
@@ -111,17 +114,11 @@ impl Contestant {
     pub fn build<'a>(&self, of: &Knowledge<'a>) -> Result<Box<dyn Agent + 'a>, CommandError> {
         Ok(match self.kind {
             Kind::Random => Box::new(Random::new(of.model.actions().len())),
-            Kind::Escalation(patience) => {
-                let (usual, ladder, quiet) = of.escalation;
-                let ladder: Vec<&str> = ladder.iter().map(String::as_str).collect();
-                let quiet: Vec<&str> = quiet.iter().map(String::as_str).collect();
-                let built = Escalation::new(of.model, usual, &ladder, &quiet, patience);
-                Box::new(built.map_err(CommandError::usage)?)
-            }
+            Kind::Escalation(patience) => Box::new(of.escalation.build(of.model, patience)?),
             Kind::Policy(name) => {
                 let threshold = self.threshold.unwrap_or(1.0);
                 let dual = |information| dual(information, threshold, of);
-                let decider = name.build(of.model, of.solution, dual);
+                let decider = name.build(of.model, of.solution, dual, of.solved.as_ref());
                 let decider = decider.map_err(CommandError::usage)?;
                 Box::new(PolicyAgent::new(of.model, decider))
             }

@@ -1,0 +1,30 @@
+//! Policies in files.
+
+use std::fs;
+use std::path::Path;
+
+use vigil_decision::policy_file::{PolicyFile, alpha, appl};
+use vigil_decision::{PointBased, Pomdp};
+
+use crate::commands::CommandError;
+
+/// The policy of `model` in a file of any format that `vigil pomdp solve` writes; `option` gave it.
+///
+/// # Errors
+/// The option, the file, what was found and what is allowed.
+pub fn load(model: &Pomdp, option: &str, path: &Path) -> Result<PointBased, CommandError> {
+    let wrong = |problem: &dyn std::fmt::Display| {
+        CommandError::usage(format!("{option} {}: {problem}", path.display()))
+    };
+    let bytes = fs::read(path).map_err(|error| wrong(&error))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let vectors = if text.trim_start().starts_with('<') {
+        appl::read(&text, model).map_err(|e| wrong(&e))?
+    } else if text.trim_start().starts_with('{') {
+        let file = PolicyFile::read(&bytes, model).map_err(|e| wrong(&e))?;
+        file.vectors
+    } else {
+        alpha::read(&text, model).map_err(|e| wrong(&e))?
+    };
+    PointBased::new(model, &vectors).map_err(|e| wrong(&e))
+}
