@@ -7,7 +7,7 @@ use std::error::Error;
 
 use serde_json::json;
 use vigil_bench::archive::Archive;
-use vigil_bench::real;
+use vigil_bench::real::{self, changes};
 
 /// What the figures mean.
 const NOTES: [&str; 5] = [
@@ -38,7 +38,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     for line in robotino.lines() {
         archive.say(&line);
     }
+    for line in changes::lines(&robotino) {
+        archive.say(&line);
+    }
     archive.store("robotino.json", &json!(robotino))?;
+    archive.store_text("robotino-changes.csv", &changes::csv(&robotino))?;
     for line in NOTES {
         archive.say(line);
     }
