@@ -1,7 +1,11 @@
 //! What became of each change of ground: the border, the wheels, the alarm, and what there was to
 //! be seen.
 
-use super::robotino::{Change, JUMP_SD, Robotino, WITHIN_S};
+use super::robotino::{Change, INTERVALS_H, JUMP_SD, Robotino, WITHIN_S};
+use super::seen::Seen;
+
+/// The monitor's warm-up, s.
+const READY_S: f64 = 1.5;
 
 impl Change {
     /// The last crossing of the border up to a time, s.
@@ -18,6 +22,12 @@ impl Change {
     fn scored(&self) -> bool {
         self.z.abs() > JUMP_SD
     }
+}
+
+fn median(all: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut all: Vec<f64> = all.collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied()
 }
 
 fn cell(value: Option<f64>, digits: usize) -> String {
@@ -44,8 +54,8 @@ pub fn csv(robotino: &Robotino) -> String {
             crossings.collect::<Vec<_>>().join(" "),
             cell(seen.map(|s| s.own_change_t_s), 2),
             cell(seen.map(|s| s.own_log_ratio), 1),
-            cell(seen.map(|s| s.of_step), 1),
-            cell(seen.map(|s| s.first_second), 1),
+            cell(seen.and_then(|s| s.of_step), 1),
+            cell(seen.and_then(|s| s.first_second), 1),
             cell(seen.map(|s| s.difference), 1),
         ];
         out.push_str(&cells.join(","));
@@ -75,6 +85,7 @@ pub fn lines(robotino: &Robotino) -> Vec<String> {
         ));
     }
     out.extend(crossings(&robotino.changes));
+    out.extend(intervals(robotino));
     out.extend(own(&robotino.changes));
     out.extend(clairvoyant(robotino));
     out
@@ -88,8 +99,12 @@ fn crossings(changes: &[Change]) -> Vec<String> {
     let early = |c: &&Change| c.scored() && c.late_s(c.change_t_s).is_some_and(|l| l < -WITHIN_S);
     let since = |c: &Change| Some(c.alarm_t_s? - c.crossing_before(c.alarm_t_s?)?);
     let after = changes.iter().filter(early).map(|c| cell(since(c), 1));
-    let scored = changes.iter().filter(|c| c.scored());
-    let by = scored.filter(|c| {
+    let scored = || changes.iter().filter(|c| c.scored());
+    let long_before = scored().filter(|c| {
+        let first = c.crossings_t_s.iter().find(|&&t_s| t_s > READY_S);
+        first.is_some_and(|&t_s| c.change_t_s - t_s > 2.0 * WITHIN_S)
+    });
+    let by = scored().filter(|c| {
         let by = c
             .late_s(c.change_t_s)
             .is_some_and(|late_s| late_s <= WITHIN_S);
@@ -110,7 +125,47 @@ fn crossings(changes: &[Change]) -> Vec<String> {
             by.count(),
             after.collect::<Vec<_>>().join(", ")
         ),
+        format!(
+            "scored runs whose first wheel crosses more than {:.0} s before the change, so that an \
+             alarm within {WITHIN_S} s of that wheel comes too early for the {WITHIN_S} s on \
+             either side: {}; alarm less the last \
+             crossing before it, median: {} s",
+            2.0 * WITHIN_S,
+            long_before.count(),
+            cell(median(scored().filter_map(since)), 2)
+        ),
     ]
+}
+
+/// What other times between false alarms give.
+fn intervals(robotino: &Robotino) -> Vec<String> {
+    let mut out = vec![
+        "\n| between false alarms, h | one ground, held out: alarm | learned from: alarm | within \
+         1 s | earlier | later | never | in all by 1 s after it | not scored: alarm |"
+            .to_owned(),
+        "|---|---|---|---|---|---|---|---|---|".to_owned(),
+    ];
+    for (i, (interval_h, single)) in INTERVALS_H.iter().zip(robotino.at_intervals).enumerate() {
+        let changes = || robotino.changes.iter();
+        let late = changes().filter(|c| c.scored());
+        let late: Vec<Option<f64>> = late
+            .map(|c| c.alarms_t_s[i].map(|t_s| t_s - c.change_t_s))
+            .collect();
+        let count = |is_in: fn(f64) -> bool| late.iter().flatten().filter(|l| is_in(**l)).count();
+        let others = changes().filter(|c| !c.scored() && c.alarms_t_s[i].is_some());
+        out.push(format!(
+            "| {interval_h} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            single.0,
+            single.1,
+            count(|l| l.abs() <= WITHIN_S),
+            count(|l| l < -WITHIN_S),
+            count(|l| l > WITHIN_S),
+            late.iter().filter(|l| l.is_none()).count(),
+            count(|l| l <= WITHIN_S),
+            others.count()
+        ));
+    }
+    out
 }
 
 /// Alarms against the step that the residuals themselves show.
@@ -119,10 +174,7 @@ fn own(changes: &[Change]) -> Vec<String> {
         let scored = changes.iter().filter(|c| c.scored());
         scored.filter_map(|c| Some((c, c.seen?)))
     };
-    let apart = scored().map(|(c, seen)| (seen.own_change_t_s - c.change_t_s).abs());
-    let mut apart: Vec<f64> = apart.collect();
-    apart.sort_by(f64::total_cmp);
-    let at = |part: f64| apart.get((part * apart.len() as f64) as usize).copied();
+    let apart = || scored().map(|(c, seen)| (seen.own_change_t_s - c.change_t_s).abs());
     let late = || scored().filter_map(|(c, seen)| c.late_s(seen.own_change_t_s));
     let missed = || {
         scored().filter(|(c, _)| {
@@ -135,11 +187,11 @@ fn own(changes: &[Change]) -> Vec<String> {
         late.is_some_and(|late| late.abs() <= WITHIN_S)
     });
     vec![format!(
-        "\nthe step that the residuals show by themselves lies {} s (median; nine in ten: {} s) \
-         from the given change; alarms within {WITHIN_S} s of it: {}, by {WITHIN_S} s after it: {}; \
+        "\nthe step that the residuals show by themselves lies {} s (median) \
+         from the given change, within {WITHIN_S} s of it in {}; alarms within {WITHIN_S} s of it: {}, by {WITHIN_S} s after it: {}; \
          of the {} that are not within {WITHIN_S} s of the given one: {}",
-        cell(at(0.5), 2),
-        cell(at(0.9), 2),
+        cell(median(apart()), 2),
+        apart().filter(|apart| *apart <= WITHIN_S).count(),
         late().filter(|late| late.abs() <= WITHIN_S).count(),
         late().filter(|late| *late <= WITHIN_S).count(),
         missed().count(),
@@ -157,9 +209,9 @@ fn clairvoyant(robotino: &Robotino) -> Vec<String> {
             robotino.usual_difference, robotino.needed
         ),
         "| runs scored | n | step, median | first second, median | difference, median | below \
-         what one in 20 shows | below what the alarm needs |"
+         what one in 20 shows |"
             .to_owned(),
-        "|---|---|---|---|---|---|---|".to_owned(),
+        "|---|---|---|---|---|---|".to_owned(),
     ];
     let late = |c: &Change| c.late_s(c.change_t_s);
     let groups: [(&str, fn(f64) -> bool); 3] = [
@@ -173,20 +225,15 @@ fn clairvoyant(robotino: &Robotino) -> Vec<String> {
         let inside = robotino.changes.iter().filter(|c| c.scored());
         let inside = inside.filter(|c| is_in(late(c).unwrap_or(f64::INFINITY)));
         let seen: Vec<_> = inside.filter_map(|c| c.seen).collect();
-        let median = |of: fn(&super::seen::Seen) -> f64| {
-            let mut all: Vec<f64> = seen.iter().map(of).collect();
-            all.sort_by(f64::total_cmp);
-            cell(all.get(all.len() / 2).copied(), 0)
-        };
+        let middle = |of: fn(&Seen) -> Option<f64>| cell(median(seen.iter().filter_map(of)), 0);
         let below = |than: f64| seen.iter().filter(|s| s.difference < than).count();
         out.push(format!(
-            "| {name} | {} | {} | {} | {} | {} | {} |",
+            "| {name} | {} | {} | {} | {} | {} |",
             seen.len(),
-            median(|s| s.of_step),
-            median(|s| s.first_second),
-            median(|s| s.difference),
-            below(robotino.usual_difference),
-            below(robotino.needed)
+            middle(|s| s.of_step),
+            middle(|s| s.first_second),
+            middle(|s| Some(s.difference)),
+            below(robotino.usual_difference)
         ));
     }
     out.push(
@@ -201,14 +248,14 @@ fn clairvoyant(robotino: &Robotino) -> Vec<String> {
         }
         let crossings = change.crossings_t_s.iter().map(|t_s| format!("{t_s:.2}"));
         out.push(format!(
-            "| {} | {:.2} | {:.2} | {} | {} | {:.0} | {:.0} | {:.0} |",
+            "| {} | {:.2} | {:.2} | {} | {} | {} | {} | {:.0} |",
             change.file.trim_start_matches("two_surface_types/"),
             change.change_t_s,
             seen.own_change_t_s,
             crossings.collect::<Vec<_>>().join(", "),
             cell(change.alarm_t_s, 2),
-            seen.of_step,
-            seen.first_second,
+            cell(seen.of_step, 0),
+            cell(seen.first_second, 0),
             seen.difference
         ));
     }

@@ -25,6 +25,8 @@ const SEED: u64 = 1;
 pub const JUMP_SD: f64 = 2.0;
 /// An alarm so close to the change, s, has found it.
 pub const WITHIN_S: f64 = 1.0;
+/// Mean times between false alarms at which alarms are counted besides, h.
+pub const INTERVALS_H: [f64; 4] = [24.0, 4.0, 1.0, 0.25];
 /// As the monitor has it: motion before residuals count, and steady commands before those of a
 /// pose do, s.
 const MOVING_S: f64 = 0.5;
@@ -51,6 +53,8 @@ pub struct Change {
     pub alarm_t_s: Option<f64>,
     /// Commanded speed, m/s.
     pub speed_m_s: f64,
+    /// First alarm at each of [`INTERVALS_H`], s.
+    pub alarms_t_s: [Option<f64>; INTERVALS_H.len()],
     /// When wheels cross the border, s.
     pub crossings_t_s: Vec<f64>,
     /// What could be seen of the change.
@@ -72,6 +76,8 @@ pub struct Robotino {
     pub usual_difference: f64,
     /// The same that all channels together need to alarm within a second.
     pub needed: f64,
+    /// Runs on one ground with an alarm at each of [`INTERVALS_H`]: held out, learned from.
+    pub at_intervals: [(usize, usize); INTERVALS_H.len()],
     /// Runs held out, and those of them with an alarm.
     pub held_out: (usize, usize),
     /// Runs learned from, and those of them with an alarm.
@@ -118,9 +124,18 @@ pub fn measure() -> Result<Robotino, Box<dyn Error>> {
         let alarms: Vec<bool> = alarms.map(|t| t.is_some()).collect();
         (alarms.len(), alarms.iter().filter(|&&alarm| alarm).count())
     };
+    let mut at_each = [(0, 0); INTERVALS_H.len()];
+    for run in &single {
+        let is_held_out = held_out.contains(&run.id);
+        for (count, alarm) in at_each.iter_mut().zip(at_intervals(&model, &log, run)) {
+            count.0 += usize::from(is_held_out && alarm.is_some());
+            count.1 += usize::from(!is_held_out && alarm.is_some());
+        }
+    }
     let (borders, changes) = changes(&model, &log, alarm)?;
     Ok(Robotino {
         borders,
+        at_intervals: at_each,
         usual_difference: usual_difference(&model, &log, &single),
         needed: needed(&model, alarm),
         held_out: count(true),
@@ -157,6 +172,7 @@ fn changes(model: &Model, log: &Log, alarm: f64) -> Result<Watched, Box<dyn Erro
             z: z.parse()?,
             alarm_t_s: first_alarm(model, log, run, alarm),
             speed_m_s: speed.parse()?,
+            alarms_t_s: at_intervals(model, log, run),
             crossings_t_s: Vec::new(),
             seen: seen::seen(&observed, change_t_s),
         });
@@ -173,6 +189,16 @@ fn changes(model: &Model, log: &Log, alarm: f64) -> Result<Watched, Box<dyn Erro
     }
     out.sort_by(|a, b| b.z.abs().total_cmp(&a.z.abs()));
     Ok((borders, out))
+}
+
+/// First alarms of a run at each of [`INTERVALS_H`].
+fn at_intervals(model: &Model, log: &Log, run: &Run) -> [Option<f64>; INTERVALS_H.len()] {
+    let found = model.calibration(Channels::PoseEncoders, Form::LearnedBias);
+    INTERVALS_H.map(|interval_h| {
+        let alarm = found.as_ref().ok()?;
+        let alarm = alarm.alarm_log_odds(interval_h, FAULT_RATE_1_H);
+        first_alarm(model, log, run, alarm)
+    })
 }
 
 /// Residuals of a run, from where the monitor has settled on.

@@ -35,12 +35,12 @@ pub struct Observed {
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Seen {
     /// Noncentrality that a sudden step of the size that is there 1 to 3 s after the change would
-    /// gather in its first second; what noise alone adds is taken off.
-    pub of_step: f64,
+    /// gather in its first second; what noise alone adds is taken off. None near the end of a run.
+    pub of_step: Option<f64>,
     /// What the first second holds in that direction: the square of the matched filter's
     /// signal-to-noise ratio. Size and direction come from 1 to 3 s after the change, so that the
-    /// noise of this second is in neither.
-    pub first_second: f64,
+    /// noise of this second is in neither. None near the end of a run.
+    pub first_second: Option<f64>,
     /// Squares of the difference of means that the first second shows, over their variance.
     pub difference: f64,
     /// The step that the residuals themselves show, over the whole run, s.
@@ -59,42 +59,47 @@ fn between(all: &[Observed], from_s: f64, to_s: f64) -> Vec<&Observed> {
     all.iter().filter(inside).collect()
 }
 
-/// What is seen of a change at `change_t_s`; none if there is too little on either side.
+/// What is seen of a change at `change_t_s`; none if nothing was observed in the second after it.
 #[must_use]
 pub fn seen(all: &[Observed], change_t_s: f64) -> Option<Seen> {
     let before = between(all, change_t_s - AROUND_S, change_t_s);
     let first = between(all, change_t_s, change_t_s + FIRST_S);
     let later = between(all, change_t_s + FIRST_S, change_t_s + AROUND_S);
-    if before.len() < 2 || first.is_empty() || later.len() < 2 {
-        return None;
-    }
-    let (b, f, l) = (before.len() as f64, first.len() as f64, later.len() as f64);
-    let (mut size, mut along, mut length, mut bias) = (0.0, 0.0, 0.0, 0.0);
-    for channel in 0..all.first()?.whitened.len() {
-        let (was, is) = (mean(&before, channel), mean(&later, channel));
-        let about = |of: &[&Observed], mean: f64| {
-            let apart = of.iter().map(|o| (o.whitened[channel] - mean).powi(2));
-            apart.sum::<f64>()
-        };
-        let scatter = (about(&before, was) + about(&later, is)) / (b + l - 2.0);
-        let variance = scatter.max(DEVIATION_MIN * DEVIATION_MIN);
-        let shift = (is - was) / variance.sqrt();
-        size += shift * shift;
-        bias += 1.0 / b + 1.0 / l;
-        along += shift * (mean(&first, channel) - was) / variance.sqrt();
-        length += shift * shift;
-    }
-    let matched = along.max(0.0) / length.max(1e-12).sqrt();
-    let (own_change_t_s, own_log_ratio) = step(all)?;
     let end_s = first.last()?.t_s;
     let found = differences(all).into_iter().find(|(t_s, _)| *t_s >= end_s);
+    let (own_change_t_s, own_log_ratio) = step(all)?;
+    let known = gathered(&before, &first, &later);
     Some(Seen {
-        of_step: f * (size - bias).max(0.0),
-        first_second: f * matched * matched,
+        of_step: known.map(|(of_step, _)| of_step),
+        first_second: known.map(|(_, first_second)| first_second),
         difference: found.map_or(0.0, |(_, difference)| difference),
         own_change_t_s,
         own_log_ratio,
     })
+}
+
+/// [`Seen::of_step`] and [`Seen::first_second`].
+fn gathered(before: &[&Observed], first: &[&Observed], later: &[&Observed]) -> Option<(f64, f64)> {
+    if before.len() < 2 || later.len() < 2 {
+        return None;
+    }
+    let (b, f, l) = (before.len() as f64, first.len() as f64, later.len() as f64);
+    let (mut size, mut along, mut bias) = (0.0, 0.0, 0.0);
+    for channel in 0..first.first()?.whitened.len() {
+        let (was, is) = (mean(before, channel), mean(later, channel));
+        let about = |of: &[&Observed], mean: f64| {
+            let apart = of.iter().map(|o| (o.whitened[channel] - mean).powi(2));
+            apart.sum::<f64>()
+        };
+        let scatter = (about(before, was) + about(later, is)) / (b + l - 2.0);
+        let variance = scatter.max(DEVIATION_MIN * DEVIATION_MIN);
+        let shift = (is - was) / variance.sqrt();
+        size += shift * shift;
+        bias += 1.0 / b + 1.0 / l;
+        along += shift * (mean(first, channel) - was) / variance.sqrt();
+    }
+    let matched = along.max(0.0) / f64::max(size, 1e-12).sqrt();
+    Some((f * f64::max(size - bias, 0.0), f * matched * matched))
 }
 
 /// The step that divides a run best: its time, s, and the log-likelihood ratio, each channel with
@@ -163,8 +168,8 @@ mod tests {
         let (mut of_step, mut first, mut own) = (0.0, 0.0, 0);
         for seed in 0..200 {
             let seen = seen(&run(seed, 3.0), 6.0).unwrap();
-            of_step += seen.of_step / 200.0;
-            first += seen.first_second / 200.0;
+            of_step += seen.of_step.unwrap() / 200.0;
+            first += seen.first_second.unwrap() / 200.0;
             own += u32::from((seen.own_change_t_s - 6.0).abs() < 0.3);
         }
         // Four observations of two channels, each off by 3: 72. Dividing by an estimated variance
@@ -180,7 +185,7 @@ mod tests {
         let (mut of_step, mut difference) = (0.0, 0.0);
         for seed in 0..200 {
             let all = run(1000 + seed, 0.0);
-            of_step += seen(&all, 6.0).unwrap().of_step / 200.0;
+            of_step += seen(&all, 6.0).unwrap().of_step.unwrap() / 200.0;
             let found = differences(&all);
             let sum: f64 = found.iter().map(|(_, difference)| difference).sum();
             difference += sum / found.len() as f64 / 200.0;

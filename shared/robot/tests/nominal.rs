@@ -266,3 +266,56 @@ fn an_alarm_above_the_tempered_bound_of_a_form_is_refused_with_the_bound() {
         );
     }
 }
+
+/// Frames of a robot as the shipped model predicts it, each channel of which is a little off from
+/// 20 s on, by a part of its deviation.
+fn all_a_little_off(model: &Model, robot: &Description, part: f64) -> Vec<f64> {
+    let mut monitor = Monitor::new(model, Channels::PoseEncoders, Form::LearnedBias, 1.0);
+    let mut observer = Observer::new(robot);
+    let mut out = Vec::new();
+    for mut frame in frames() {
+        let off = f64::from(u8::from(frame.header.t_capture_ns >= 20_000_000_000)) * part;
+        frame.yaw_rate += 0.01 * off;
+        for wheel in 0..2 {
+            frame.wheel_rate[wheel] += 0.4 * off;
+            frame.current[wheel] = 0.05 + 0.0035 * off;
+            frame.valid |= Valid::current(wheel);
+        }
+        if observer.push(&frame).complete {
+            monitor.step(observer.history(), false);
+            out.push(monitor.report().log_odds);
+        }
+    }
+    out
+}
+
+#[test]
+fn all_channels_together_add_to_what_each_says() {
+    let robot: Description = toml::from_str(&config("robots/kobuki.toml")).unwrap();
+    let with = Model::from_toml(&shipped()).unwrap();
+    assert_eq!(with.joint.len(), 1);
+    let mut without = with.clone();
+    without.joint.clear();
+    let (with, without) = (
+        all_a_little_off(&with, &robot, 1.5),
+        all_a_little_off(&without, &robot, 1.5),
+    );
+    assert_eq!(with.len(), without.len());
+    assert!(with.iter().zip(&without).all(|(a, b)| a >= b));
+    let last = with.len() - 1;
+    assert!(
+        with[last] > without[last] + 1.0,
+        "{} {}",
+        with[last],
+        without[last]
+    );
+}
+
+#[test]
+fn a_joint_tail_without_sense_is_refused_by_name() {
+    let mut model = Model::from_toml(&shipped()).unwrap();
+    model.joint[0].tail.slope = 0.0;
+    let text = model.sealed().to_toml().unwrap();
+    let message = Model::from_toml(&text).unwrap_err().to_string();
+    assert!(message.starts_with("joint.learned-bias"), "{message}");
+}
