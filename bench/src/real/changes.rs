@@ -10,8 +10,8 @@ const READY_S: f64 = 1.5;
 impl Change {
     /// The last crossing of the border up to a time, s.
     fn crossing_before(&self, t_s: f64) -> Option<f64> {
-        let before = self.crossings_t_s.iter().copied();
-        before.filter(|&crossing| crossing <= t_s).next_back()
+        let mut all = self.crossings_t_s.iter().copied();
+        all.rfind(|&crossing| crossing <= t_s)
     }
 
     /// Alarm less a time; none without an alarm.
@@ -199,6 +199,9 @@ fn own(changes: &[Change]) -> Vec<String> {
     )]
 }
 
+/// A class of alarms by how late they are, s.
+type Lateness = fn(f64) -> bool;
+
 /// What could be seen within the first second.
 fn clairvoyant(robotino: &Robotino) -> Vec<String> {
     let mut out = vec![
@@ -214,7 +217,7 @@ fn clairvoyant(robotino: &Robotino) -> Vec<String> {
         "|---|---|---|---|---|---|".to_owned(),
     ];
     let late = |c: &Change| c.late_s(c.change_t_s);
-    let groups: [(&str, fn(f64) -> bool); 3] = [
+    let groups: [(&str, Lateness); 3] = [
         ("noticed by 1 s after it, not earlier", |l| {
             l.abs() <= WITHIN_S
         }),

@@ -267,48 +267,56 @@ fn an_alarm_above_the_tempered_bound_of_a_form_is_refused_with_the_bound() {
     }
 }
 
-/// Frames of a robot as the shipped model predicts it, each channel of which is a little off from
-/// 20 s on, by a part of its deviation.
-fn all_a_little_off(model: &Model, robot: &Description, part: f64) -> Vec<f64> {
-    let mut monitor = Monitor::new(model, Channels::PoseEncoders, Form::LearnedBias, 1.0);
+/// After each observation of [`frames`]: log-odds as reported, and those of all channels together.
+fn with_joint(model: &Model, robot: &Description, rate_1_h: f64) -> Vec<(f64, f64)> {
+    let channels = Channels::PoseEncoders;
+    let mut monitor = Monitor::new(model, channels, Form::LearnedBias, rate_1_h);
     let mut observer = Observer::new(robot);
     let mut out = Vec::new();
     for mut frame in frames() {
-        let off = f64::from(u8::from(frame.header.t_capture_ns >= 20_000_000_000)) * part;
-        frame.yaw_rate += 0.01 * off;
         for wheel in 0..2 {
-            frame.wheel_rate[wheel] += 0.4 * off;
-            frame.current[wheel] = 0.05 + 0.0035 * off;
+            frame.current[wheel] = 0.05;
             frame.valid |= Valid::current(wheel);
         }
         if observer.push(&frame).complete {
             monitor.step(observer.history(), false);
-            out.push(monitor.report().log_odds);
+            let joint = monitor.joint_log_odds().unwrap();
+            out.push((monitor.report().log_odds, joint));
         }
     }
+    monitor.forget_evidence();
+    assert!(monitor.joint_log_odds().unwrap() <= -700.0);
     out
 }
 
 #[test]
 fn all_channels_together_add_to_what_each_says() {
     let robot: Description = toml::from_str(&config("robots/kobuki.toml")).unwrap();
-    let with = Model::from_toml(&shipped()).unwrap();
+    let mut with = Model::from_toml(&shipped()).unwrap();
     assert_eq!(with.joint.len(), 1);
     let mut without = with.clone();
     without.joint.clear();
-    let (with, without) = (
-        all_a_little_off(&with, &robot, 1.5),
-        all_a_little_off(&without, &robot, 1.5),
+    // A tail by which the joint log-odds weigh more than those of each channel.
+    let tail = &mut with.joint[0].tail;
+    (tail.level_log_odds, tail.interval_h, tail.slope) = (-2.0, 3.0, 0.9);
+    let tail = tail.clone();
+    let rate_1_h = 2.0_f64;
+    let (together, each) = (
+        with_joint(&with, &robot, rate_1_h),
+        with_joint(&without, &robot, rate_1_h),
     );
-    assert_eq!(with.len(), without.len());
-    assert!(with.iter().zip(&without).all(|(a, b)| a >= b));
-    let last = with.len() - 1;
-    assert!(
-        with[last] > without[last] + 1.0,
-        "{} {}",
-        with[last],
-        without[last]
-    );
+    assert_eq!(together.len(), each.len());
+    let mut most = 0.0_f64;
+    for (&(all, joint), &(alone, same)) in together.iter().zip(&each) {
+        assert_eq!(joint, same);
+        let expected = log_add(alone, tail.tempered(joint) + rate_1_h.ln());
+        assert!(
+            (all - expected.max(-700.0)).abs() < 1e-9,
+            "{all} {expected}"
+        );
+        most = most.max(all - alone);
+    }
+    assert!(most > 1.0, "{most}");
 }
 
 #[test]
