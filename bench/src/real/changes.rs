@@ -188,7 +188,8 @@ fn own(changes: &[Change]) -> Vec<String> {
     });
     vec![format!(
         "\nthe step that the residuals show by themselves lies {} s (median) \
-         from the given change, within {WITHIN_S} s of it in {}; alarms within {WITHIN_S} s of it: {}, by {WITHIN_S} s after it: {}; \
+         from the given change, within {WITHIN_S} s of it in {}; alarms within \
+         {WITHIN_S} s of it: {}, by {WITHIN_S} s after it: {}; \
          of the {} that are not within {WITHIN_S} s of the given one: {}",
         cell(median(apart()), 2),
         apart().filter(|apart| *apart <= WITHIN_S).count(),
