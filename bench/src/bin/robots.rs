@@ -22,11 +22,11 @@ const NOTES: [&str; 6] = [
      straight line a folder, and serves to judge alarms, not to raise them. Step: noncentrality \
      that a step of the size seen 1 to 3 s after the change would gather in its first second; \
      first second: what was there of it, along that direction; both by the run's own noise. \
-     Difference: \
-     squares of the difference between the mean of that second and that before, by the \
-     model's noise, 9 for no change: what a test may look at that knows neither size nor direction.",
-    "\nWhy runs are missed: their first second holds more than all but one in 20 runs on one ground \
-     ever show, and half or less of what 24 h between false alarms need: without a fault the \
+     Difference: squares of the difference between the mean of that second and that before, by \
+     the model's noise, 9 for no change: what a test looks at that knows neither size nor \
+     direction.",
+    "\nWhy runs are missed: their first second holds more than all but one in 20 runs on one \
+     ground ever show, and half or less of what 24 h between false alarms need: without a fault the \
      evidence of all channels together has a tail that falls at least five times more slowly than \
      that of a model without error (its slope stands at the lower bound, 0.2, and so do those of \
      three channels): a ground is not the same everywhere. One run on one ground alarms, of 576.",
