@@ -26,10 +26,11 @@ const NOTES: [&str; 6] = [
      the model's noise, 9 for no change: what a test looks at that knows neither size nor \
      direction.",
     "\nWhy runs are missed: their first second holds more than all but one in 20 runs on one \
-     ground ever show, and half or less of what 24 h between false alarms need: without a fault the \
-     evidence of all channels together has a tail that falls at least five times more slowly than \
-     that of a model without error (its slope stands at the lower bound, 0.2, and so do those of \
-     three channels): a ground is not the same everywhere. One run on one ground alarms, of 576.",
+     ground ever show, and half or less of what 24 h between false alarms need: without a fault \
+     the evidence of all channels together has a tail that falls at least five times more slowly \
+     than that of a model without error (its slope stands at the lower bound, 0.2, and so do \
+     those of three channels): a ground is not the same everywhere. One run on one ground alarms, \
+     of 576.",
     "\nWhat else was tried on Robotino, alarms within 1 s (and by 1 s after the change), of 46. \
      Each channel for itself: 33 (37), with observations of 0.125 s 26 (28), of 0.5 s 20 (23), \
      without wheel rates 35 (39), with wheel rates from the ticks instead of the log's own \
