@@ -139,6 +139,7 @@ pub fn learn(
         },
         command,
         channel: Vec::new(),
+        joint: Vec::new(),
         calibration: Vec::new(),
     };
     let mut report = Report::new(&model, runs.len() - left_out.len(), left_out.len());
