@@ -19,8 +19,8 @@ const UNKNOWN_LENGTH_M: f64 = 0.2;
 /// the factor's mean and deviation.
 const OTHER_GROUNDS: [(f64, f64, f64); 3] =
     [(0.08, 0.3, 0.12), (0.08, 0.65, 0.2), (0.04, 1.5, 0.35)];
-/// By the pose alone, a wheel stuck on other ground looks like one that is dragged at, has sunk in or
-/// lost its tyre: how probable these are, given either.
+/// By the pose alone, a wheel stuck on other ground looks like one that is dragged at, has sunk in
+/// or lost its tyre: how probable these are, given either.
 const DRAGGED_AT: f64 = 0.25;
 /// Deviation of such an effect from one that is changed as a whole: yaw, forward, lateral.
 const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
@@ -161,8 +161,8 @@ impl FaultRates {
 }
 
 /// The ways in which a robot may move whose wheels `stuck` (bits) may stick: nominal first, then
-/// single wheels, pairs if the wheels' rates are `read`, and both kinds of unknown; if `rare`, single
-/// wheels on other ground and a jump of the pose too.
+/// single wheels, pairs if the wheels' rates are `read`, and both kinds of unknown; if `rare`,
+/// single wheels on other ground and a jump of the pose too.
 #[must_use]
 pub fn motion_modes(
     model: &Model,
