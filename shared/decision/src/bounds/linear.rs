@@ -125,6 +125,9 @@ impl System<'_> {
     fn dense(&self, budget: &mut Budget<'_>) -> Result<Vec<f64>, SolveError> {
         let unbounded = SolveError::Unbounded(self.discount);
         let n = self.right.len();
+        if n == 0 {
+            return Ok(Vec::new());
+        }
         let mut matrix = DMatrix::<f64>::identity(n, n);
         for i in 0..n {
             for (column, w) in self.rows.row(i) {
@@ -267,6 +270,23 @@ mod tests {
             }
             assert!(largest(&system.residual(&dense)) < 1e-9 * largest(&dense));
         }
+    }
+
+    #[test]
+    fn no_equation_has_no_solution_to_find() {
+        let rows = Rows::default();
+        let system = System {
+            rows: &rows,
+            right: &[],
+            discount: 0.5,
+        };
+        let mut never = || false;
+        let mut budget = Budget::new(&mut never);
+        assert_eq!(system.solve(Vec::new(), &mut budget), Ok(Vec::new()));
+        assert_eq!(
+            system.solve_roughly(Vec::new(), &mut budget),
+            Ok(Vec::new())
+        );
     }
 
     #[test]
