@@ -55,6 +55,12 @@ impl Rows {
         terms.map(|(column, w)| w * x[*column as usize]).sum()
     }
 
+    /// Most entries of a row.
+    pub(super) fn longest(&self) -> usize {
+        let rows = 0..self.ends.len();
+        rows.map(|row| self.row(row).len()).fold(0, usize::max)
+    }
+
     /// Largest sum of a row: 1 but for the tolerance of the reader.
     pub(super) fn sum_max(&self) -> f64 {
         (0..self.ends.len())
