@@ -31,6 +31,8 @@ const SEED: u64 = 1;
 const THRESHOLDS: [f64; 3] = [0.2, 0.5, 0.8];
 /// Gap at which the point-based policy's solution ends: 1 % of the value.
 const PRECISION: f64 = 0.15;
+/// Work for the upper bound that regret is measured from, in questions of some 20 us to its budget.
+const BOUND_QUESTIONS: usize = 1_000_000;
 /// Decisions whose time is measured, of each policy.
 const DECISIONS: usize = 200_000;
 
@@ -46,12 +48,14 @@ fn main() -> Result<(), Failure> {
     let found = solved(&navigation)?;
     let vectors = found.vectors.as_ref().ok_or("no vectors")?;
     let policy = PointBased::new(&navigation, vectors)?;
-    let missions = missions(&navigation, &policy, episodes)?;
+    let upper = upper(&navigation)?.min(found.bracket.upper);
+    let missions = missions(&navigation, &policy, upper, episodes)?;
     let times = times(&navigation, &policy)?;
     let raw = json!({
         "episodes": episodes, "seed": SEED, "public": public, "navigation": missions,
         "point_based": {"lower": found.bracket.lower, "upper": found.bracket.upper,
             "vectors": vectors.len(), "products": policy.products()},
+        "upper": upper,
         "decision_times": times,
     });
     if options.is_json {
@@ -68,7 +72,7 @@ fn main() -> Result<(), Failure> {
         vectors.len(),
         policy.products()
     ));
-    say_missions(&mut archive, &missions, episodes);
+    say_missions(&mut archive, &missions, upper, episodes);
     say_times(&mut archive, &times);
     archive.store("pomdp-compare.json", &raw)?;
     println!("archived in {}", archive.close()?.display());
@@ -124,8 +128,31 @@ fn solved(model: &Pomdp) -> Result<Found, Failure> {
     Ok(solver::solve(model, &options, budget, &mut |_| ())?)
 }
 
-/// The navigation model: missions to the horizon, and such as SH and GU end.
-fn missions(model: &Pomdp, solved: &PointBased, episodes: u64) -> Result<Vec<Value>, Failure> {
+/// The lowest upper bound of the value at the start belief that some work finds.
+fn upper(model: &Pomdp) -> Result<f64, Failure> {
+    let options = solver::Options {
+        precision: 0.0,
+        ..solver::Options::default()
+    };
+    let mut left = BOUND_QUESTIONS;
+    let mut stop = || {
+        left = left.saturating_sub(1);
+        left == 0
+    };
+    let budget = &mut Budget::new(&mut stop);
+    Ok(solver::solve(model, &options, budget, &mut |_| ())?
+        .bracket
+        .upper)
+}
+
+/// The navigation model: missions to the horizon, with their regret to the bound `upper`, and such
+/// as SH and GU end, for which there is no bound.
+fn missions(
+    model: &Pomdp,
+    solved: &PointBased,
+    upper: f64,
+    episodes: u64,
+) -> Result<Vec<Value>, Failure> {
     let solution = mdp::solve(model)?;
     let ladder = ["MA", "GO", "NP", "RL", "SH", "GU"];
     let mut rows = Vec::new();
@@ -140,7 +167,9 @@ fn missions(model: &Pomdp, solved: &PointBased, episodes: u64) -> Result<Vec<Val
             rows.push(json!({
                 "ends": ends, "policy": name, "threshold": k, "mean": summary.mean,
                 "half_width_95": summary.half_width, "median": summary.median,
-                "worst_5_percent": summary.worst_5_percent, "difference": paired.difference,
+                "worst_5_percent": summary.worst_5_percent,
+                "regret": (!ends).then_some(upper - summary.mean),
+                "difference": paired.difference,
                 "difference_half_width_95": paired.half_width, "p": paired.p,
             }));
         };
@@ -266,7 +295,7 @@ fn say_public(archive: &mut Archive, rows: &[Value], episodes: u64) {
     archive.say(&format!("\n{within} of {} cells within +-1.\n", rows.len()));
 }
 
-fn say_missions(archive: &mut Archive, rows: &[Value], episodes: u64) {
+fn say_missions(archive: &mut Archive, rows: &[Value], upper: f64, episodes: u64) {
     for ends in [false, true] {
         let what = if ends {
             "SH and GU end a mission"
@@ -277,14 +306,22 @@ fn say_missions(archive: &mut Archive, rows: &[Value], episodes: u64) {
             "config/navigation.pomdp, {episodes} missions, {what}; difference: in pairs, to \
              escalation-1, the best\nof the deterministic baselines.\n"
         ));
-        archive.say("| policy | K | mean | median | worst 5 % | difference | p |");
-        archive.say("|---|---|---|---|---|---|---|");
+        if !ends {
+            archive.say(&format!(
+                "Regret: to the upper bound {upper:.4} that a longer search finds (no policy can \
+                 earn more), +- as the mean.\n"
+            ));
+        }
+        archive.say("| policy | K | mean | median | worst 5 % | regret | difference | p |");
+        archive.say("|---|---|---|---|---|---|---|---|");
         for row in rows.iter().filter(|row| row["ends"] == ends) {
             let k = row["threshold"]
                 .as_f64()
                 .map_or_else(|| "-".to_owned(), |k| k.to_string());
+            let regret = row["regret"].as_f64();
+            let regret = regret.map_or_else(|| "-".to_owned(), |regret| format!("{regret:.3}"));
             archive.say(&format!(
-                "| {} | {k} | {:.3} +- {:.3} | {:.3} | {:.3} | {:.3} +- {:.3} | {} |",
+                "| {} | {k} | {:.3} +- {:.3} | {:.3} | {:.3} | {regret} | {:.3} +- {:.3} | {} |",
                 row["policy"].as_str().unwrap_or_default(),
                 number(row, "mean"),
                 number(row, "half_width_95"),

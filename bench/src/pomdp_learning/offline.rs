@@ -60,7 +60,8 @@ pub fn measure(models: &Models, missions: u64, strength: f64) -> Result<Value, F
         let (predicted, measured) = (earns(model, model)?, earns(truth, model)?);
         let means = [&predicted, &measured].map(|v| Summary::of(&mut v.to_vec()).mean);
         let better = Paired::of(&measured, &baseline);
-        let verdict = check::within(means[0], means[1]);
+        let half_width = Paired::of(&predicted, &measured).half_width;
+        let verdict = check::within(means[0], means[1], half_width);
         let logged = check::follow(model, &records);
         Ok(json!({
             "model": name,
@@ -108,7 +109,7 @@ fn likelihood(model: &Pomdp, records: &[Record], settings: &Settings) -> Result<
         .map_or(f64::NAN, |i| i.log_likelihood))
 }
 
-/// How many true probabilities lie in their intervals, by how much of the row is data.
+/// How many true probabilities lie in their credible intervals, by how much of the row is data.
 fn intervals(truth: &Pomdp, learned: &Learned) -> Value {
     let bins = [(0.0, 0.1), (0.1, 0.9), (0.9, 1.1)];
     let of = |&(low, high): &(f64, f64)| {

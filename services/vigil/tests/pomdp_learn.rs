@@ -163,7 +163,14 @@ fn a_model_that_predicts_wrongly_is_refused_and_not_written() {
     let json = run(&[&stubborn[..], &["--json"]].concat());
     let document: Value = serde_json::from_slice(&json.stdout).unwrap();
     assert_eq!(document["refused"].as_str().unwrap(), message.trim_end());
-    // Without rewards there is nothing to check by, and it says so.
+    // What was there before stays, and is not taken for the new one.
+    fs::write(&out, "older").unwrap();
+    let message = refused(&stubborn, 1);
+    let last = message.lines().last().unwrap();
+    assert_eq!(last, format!("{out} is older and was left as it was"));
+    assert_eq!(fs::read_to_string(&out).unwrap(), "older");
+    fs::remove_file(&out).unwrap();
+    // Without rewards there is nothing to check by.
     let text = fs::read_to_string(&log).unwrap();
     let mut lines: Vec<Value> = text
         .lines()
@@ -174,7 +181,7 @@ fn a_model_that_predicts_wrongly_is_refused_and_not_written() {
     }
     let lines: Vec<String> = lines.iter().map(Value::to_string).collect();
     let silent = folder.write("silent.jsonl", &lines.join("\n"));
-    let told = done(&[
+    let learn = [
         "pomdp",
         "learn",
         &truth,
@@ -182,8 +189,63 @@ fn a_model_that_predicts_wrongly_is_refused_and_not_written() {
         &silent,
         "--out",
         &out,
-    ]);
+    ];
+    let message = refused(&learn, 1);
+    assert!(message.contains("nothing to check the model by") && !Path::new(&out).exists());
+    let told = done(&[&learn[..], &["--unchecked"]].concat());
     assert!(told.contains("not checked: ") && Path::new(&out).exists());
+}
+
+#[test]
+fn chance_does_not_count_against_a_model_and_a_weak_check_is_called_so() {
+    let folder = Folder::new();
+    // Luck decides: a mission brings about 10 or about -10, nothing on average.
+    let coin = "discount: 0.9 values: reward states: win lose actions: go observations: none
+        T: go identity O: * uniform R: go : win : * : * 1 R: go : lose : * : * -1";
+    let coin = folder.write("coin.pomdp", coin);
+    let (log, out) = (folder.path("missions.jsonl"), folder.path("learned.pomdp"));
+    let simulate = [
+        "pomdp", "simulate", &coin, "--policy", "random", "--out", &log,
+    ];
+    let learn = ["pomdp", "learn", &coin, "--missions", &log, "--out", &out];
+    for seed in ["1", "2", "3", "4", "5"] {
+        done(&[&simulate[..], &["--episodes", "15", "--seed", seed]].concat());
+        let json = done(&[&learn[..], &["--json", "--policy", "qmdp"]].concat());
+        let document: Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(document["is_weakly_checked"], true);
+        let mean = |key: &str| document[key]["mean"].as_f64().unwrap();
+        let (predicted, measured) = (mean("logged_predicted"), mean("logged_measured"));
+        assert!(
+            (predicted - measured).abs() > 0.2 * measured.abs(),
+            "{json}"
+        );
+        assert!(Path::new(&out).exists());
+    }
+    assert!(done(&learn).contains("a weak check"));
+}
+
+#[test]
+fn what_is_simulated_and_compared_with_the_same_seed_shares_no_chance() {
+    let folder = Folder::new();
+    let log = folder.path("missions.jsonl");
+    let options = ["--episodes", "2", "--seed", "4"];
+    let simulate = [
+        "pomdp", "simulate", MODEL, "--policy", "random", "--out", &log,
+    ];
+    done(&[&simulate[..], &options].concat());
+    let text = fs::read_to_string(&log).unwrap();
+    let discounted = |line: &str| -> f64 {
+        let mission: Value = serde_json::from_str(line).unwrap();
+        let rewards = mission["rewards"].as_array().unwrap().iter().rev();
+        rewards.fold(0.0, |sum, r| r.as_f64().unwrap() + 0.95 * sum)
+    };
+    let simulated = text.lines().skip(1).map(discounted).sum::<f64>() / 2.0;
+    let compare = ["pomdp", "compare", MODEL, "--policies", "random", "--json"];
+    let json = done(&[&compare[..], &options].concat());
+    let document: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(document["discount"], 0.95);
+    let compared = document["rows"][0]["mean"].as_f64().unwrap();
+    assert!(simulated.is_finite() && (simulated - compared).abs() > 1e-6);
 }
 
 #[test]
@@ -271,10 +333,14 @@ fn policies_and_beliefs_are_drawn() {
     done(&[
         "pomdp", "solve", &lamp, "--method", "sarsop", "--out", &policy,
     ]);
-    drawn(
-        &folder,
-        "point.svg",
-        &[&lamp, "--graph", "--policy", &policy],
+    let point = folder.path("point.svg");
+    let picture = ["pomdp", "picture", &lamp, "--graph", "--policy", &policy];
+    let output = run(&[&picture[..], &["--out", &point]].concat());
+    let warning = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && Path::new(&point).exists());
+    assert!(
+        warning.contains("warning: this format does not say which model"),
+        "{warning}"
     );
     let out = folder.path("no.svg");
     let message = refused(&["pomdp", "picture", MODEL, "--regions", "--out", &out], 2);

@@ -378,6 +378,26 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
 
     #[test]
+    fn the_model_is_as_likely_as_the_last_iteration_whenever_that_comes(
+        truth in any_model(), prior in any_model(), seed in 0_u64..1000,
+    ) {
+        let mut records = missions(&truth, seed, 10, 20, false);
+        // What the prior rules out.
+        let one = |r: &Record| learn(&prior, std::slice::from_ref(r), &settings(0.0, 1), &mut |_| ());
+        records.retain(|record| one(record).is_ok());
+        for iterations in 1..12 {
+            if records.is_empty() {
+                break;
+            }
+            let found = learned(&prior, &records, &settings(0.0, iterations));
+            let again = learned(&found.model, &records, &settings(0.0, 1));
+            let last = found.iterations.last().unwrap().log_likelihood;
+            let model = again.iterations[0].log_likelihood;
+            prop_assert!(model >= last - 1e-9 * last.abs().max(1.0), "{iterations}: {last} {model}");
+        }
+    }
+
+    #[test]
     fn the_objective_never_falls_nor_the_likelihood_without_prior(
         model in any_model(), seed in 0_u64..1000, steps in 1_usize..25,
         strength in prop_oneof![Just(0.0), 0.1..40.0_f64], labelled: bool,

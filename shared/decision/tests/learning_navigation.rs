@@ -70,8 +70,8 @@ fn a_learned_model_predicts_better_than_the_one_by_hand_and_beats_the_escalation
     assert!((by_hand - best).abs() > 0.2 * best, "{by_hand} {best}");
     assert!(measured > 0.95 * best, "{measured} {best}");
     assert!(measured > mean(&truth, &mut escalation, missions));
-    assert!(check::within(predicted, measured).is_ok());
-    assert!(check::within(by_hand, mean(&truth, &mut agent(&hand), missions)).is_err());
+    assert!(check::within(predicted, measured, 0.0).is_ok());
+    assert!(check::within(by_hand, mean(&truth, &mut agent(&hand), missions), 1.0).is_err());
     let logged = |model| check::follow(model, &records).unwrap();
     let off = |model| (logged(model).predicted.mean - logged(model).measured.mean).abs();
     assert!(off(&learned) < 0.3 * off(&hand));

@@ -40,10 +40,11 @@ fn a_true_model_predicts_what_is_measured_and_a_wrong_one_is_refused() {
     let followed = check::follow(&truth, &records).unwrap();
     assert_eq!(followed.missions, 4000);
     let (predicted, measured) = (followed.predicted, followed.measured);
-    let error = check::within(predicted.mean, measured.mean).unwrap();
+    let error = followed.check().unwrap();
+    assert!(!error.is_weak);
     assert!(
         (predicted.mean - measured.mean).abs() < measured.half_width + predicted.half_width,
-        "{error}"
+        "{error:?}"
     );
     // Predictions vary less than what happens.
     assert!(predicted.half_width < 0.7 * measured.half_width);
@@ -53,7 +54,7 @@ fn a_true_model_predicts_what_is_measured_and_a_wrong_one_is_refused() {
         .replace("0.1 0.9\nR", "0.7 0.3\nR");
     let wrong = Pomdp::parse(&wrong).unwrap();
     let followed = check::follow(&wrong, &records).unwrap();
-    let refusal = check::within(followed.predicted.mean, followed.measured.mean).unwrap_err();
+    let refusal = followed.check().unwrap_err();
     assert!(refusal.error > check::ERROR_MAX && refusal.predicted > refusal.measured);
     assert!(refusal.to_string().starts_with("not to be deployed: "));
     let silent = Record {
@@ -65,11 +66,24 @@ fn a_true_model_predicts_what_is_measured_and_a_wrong_one_is_refused() {
 
 #[test]
 fn a_fifth_is_allowed_and_no_more() {
-    assert_eq!(check::within(12.0, 10.0).ok(), Some(0.2));
-    assert!(check::within(12.1, 10.0).is_err() && check::within(-8.1, -10.0).is_ok());
-    assert!(check::within(10.0, -10.0).is_err() && check::within(0.1, 0.0).is_err());
-    assert_eq!(check::within(0.0, 0.0).ok(), Some(0.0));
-    assert!(check::within(f64::NAN, 1.0).is_err() && check::within(1.0, f64::NAN).is_err());
+    let error = |predicted, measured| check::within(predicted, measured, 0.0).map(|a| a.error);
+    assert_eq!(error(12.0, 10.0).ok(), Some(0.2));
+    assert!(error(12.1, 10.0).is_err() && error(-8.1, -10.0).is_ok());
+    assert!(error(10.0, -10.0).is_err() && error(0.1, 0.0).is_err());
+    assert_eq!(error(0.0, 0.0).ok(), Some(0.0));
+    assert!(error(f64::NAN, 1.0).is_err() && error(1.0, f64::NAN).is_err());
+    // What chance may do does not count against the model, but it is told.
+    let found = check::within(0.059, 0.175, 0.333).unwrap();
+    assert!(found.is_weak && (found.error - 0.663).abs() < 1e-3);
+    assert!(!check::within(12.9, 10.0, 1.0).unwrap().is_weak);
+    let message = check::within(13.1, 10.0, 1.0).unwrap_err().to_string();
+    assert!(
+        message.ends_with(
+            "allowed are 20 % and the 1.000000 by which chance may set them apart (95 %)"
+        )
+    );
+    // One mission tells nothing.
+    assert!(check::within(1.0, 1.0, f64::NAN).is_err());
 }
 
 #[test]

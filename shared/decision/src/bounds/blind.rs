@@ -1,7 +1,7 @@
 //! The blind policies: one action for ever, whatever is observed. A lower bound at every belief.
 
-use super::linear::{Rows, System};
-use super::{ActionValues, SolveError};
+use super::linear::{Rows, System, largest};
+use super::{ActionValues, SolveError, contraction, rounding};
 use crate::budget::Budget;
 use crate::model::Pomdp;
 
@@ -31,13 +31,12 @@ pub fn solve(model: &Pomdp, budget: &mut Budget<'_>) -> Result<ActionValues, Sol
         // A vector that falls short of its own backup by no more than this lies below its value.
         let residual = system.residual(&alpha);
         let short = residual.into_iter().fold(0.0_f64, |m, r| m.max(-r));
-        let error = short / (1.0 - model.discount() * rows.sum_max());
-        if short > 0.0 && !(error.is_finite() && error > 0.0) {
+        let short = short + rounding(rows.longest()) * largest(&alpha);
+        let error = short / (1.0 - contraction(model.discount(), rows.sum_max())?);
+        if !error.is_finite() {
             return Err(SolveError::Unbounded(model.discount()));
         }
-        if error > 0.0 {
-            alpha.iter_mut().for_each(|v| *v -= error);
-        }
+        alpha.iter_mut().for_each(|v| *v -= error);
         values.extend(alpha);
     }
     Ok(ActionValues::new(n, values))

@@ -6,7 +6,7 @@
 //! informed bound, E = beliefs one step from the corners the tighter informed bound.
 
 use super::linear::{Rows, System, largest};
-use super::{ROUNDING, SolveError};
+use super::{SolveError, contraction, rounding};
 use crate::budget::Budget;
 
 /// Largest number of table entries (16 bytes each).
@@ -124,20 +124,22 @@ impl Mixtures {
         discount: f64,
         budget: &mut Budget<'_>,
     ) -> Result<Vec<f64>, SolveError> {
-        let (mut excess, mut mass_max) = (0.0_f64, 0.0_f64);
+        let (mut excess, mut mass_max, mut longest) = (0.0_f64, 0.0_f64, 0);
         for pair in 0..self.rewards.len() {
-            let (mut next, mut mass) = (0.0, 0.0);
+            let (mut next, mut mass, mut terms) = (0.0, 0.0, 0);
             for row in self.rows_of(pair) {
                 budget.spend(self.rows.row(row).len() * self.actions)?;
                 next += self.best(row, held[row], &q, 0.0).1;
                 mass += self.rows.row(row).iter().map(|(_, w)| w).sum::<f64>();
+                terms += self.rows.row(row).len();
             }
             excess = excess.max(self.rewards[pair] + discount * next - q[pair]);
             mass_max = mass_max.max(mass);
+            longest = longest.max(terms);
         }
-        let contraction = discount * mass_max;
-        let error = (excess + ROUNDING * largest(&q)) / (1.0 - contraction);
-        if !(contraction < 1.0 && error.is_finite()) {
+        let excess = excess + rounding(longest) * largest(&q);
+        let error = excess / (1.0 - contraction(discount, mass_max)?);
+        if !error.is_finite() {
             return Err(SolveError::Unbounded(discount));
         }
         q.iter_mut().for_each(|q| *q += error);

@@ -55,6 +55,12 @@ impl Rows {
         terms.map(|(column, w)| w * x[*column as usize]).sum()
     }
 
+    /// Most entries of a row.
+    pub(super) fn longest(&self) -> usize {
+        let rows = 0..self.ends.len();
+        rows.map(|row| self.row(row).len()).fold(0, usize::max)
+    }
+
     /// Largest sum of a row: 1 but for the tolerance of the reader.
     pub(super) fn sum_max(&self) -> f64 {
         (0..self.ends.len())
@@ -125,6 +131,9 @@ impl System<'_> {
     fn dense(&self, budget: &mut Budget<'_>) -> Result<Vec<f64>, SolveError> {
         let unbounded = SolveError::Unbounded(self.discount);
         let n = self.right.len();
+        if n == 0 {
+            return Ok(Vec::new());
+        }
         let mut matrix = DMatrix::<f64>::identity(n, n);
         for i in 0..n {
             for (column, w) in self.rows.row(i) {
@@ -267,6 +276,23 @@ mod tests {
             }
             assert!(largest(&system.residual(&dense)) < 1e-9 * largest(&dense));
         }
+    }
+
+    #[test]
+    fn no_equation_has_no_solution_to_find() {
+        let rows = Rows::default();
+        let system = System {
+            rows: &rows,
+            right: &[],
+            discount: 0.5,
+        };
+        let mut never = || false;
+        let mut budget = Budget::new(&mut never);
+        assert_eq!(system.solve(Vec::new(), &mut budget), Ok(Vec::new()));
+        assert_eq!(
+            system.solve_roughly(Vec::new(), &mut budget),
+            Ok(Vec::new())
+        );
     }
 
     #[test]

@@ -4,7 +4,8 @@
 //! discount near 1; policy iteration is exact in a few rounds.
 
 pub use super::SolveError;
-use super::linear::{Rows, System};
+use super::linear::{Rows, System, largest};
+use super::{contraction, rounding};
 use crate::budget::Budget;
 use crate::model::Pomdp;
 
@@ -22,6 +23,7 @@ pub struct Solution {
     /// Q[a][s].
     q: Vec<f64>,
     policy: Vec<usize>,
+    error: f64,
 }
 
 impl Solution {
@@ -44,10 +46,18 @@ impl Solution {
         self.policy[state]
     }
 
+    /// What the true values may exceed these by: they are at most [`Self::q`] and [`Self::value`]
+    /// plus this.
+    #[must_use]
+    pub const fn error(&self) -> f64 {
+        self.error
+    }
+
     /// V_CO(s) = max_a Q_CO(s,a).
     #[must_use]
     pub fn value(&self, state: usize) -> f64 {
-        self.q(state, self.policy[state])
+        let of_state = self.q.iter().skip(state).step_by(self.states);
+        of_state.copied().fold(f64::NEG_INFINITY, f64::max)
     }
 }
 
@@ -65,6 +75,8 @@ pub fn solve(model: &Pomdp) -> Result<Solution, SolveError> {
 /// [`SolveError`].
 pub fn solve_within(model: &Pomdp, budget: &mut Budget<'_>) -> Result<Solution, SolveError> {
     let n = model.states().len();
+    let (mass_max, longest) = rows(model);
+    let factor = contraction(model.discount(), mass_max)?;
     let mut value = vec![0.0; n];
     let sweep = (0..model.actions().len())
         .flat_map(|a| (0..n).map(move |s| model.successors(s, a).len()))
@@ -101,11 +113,28 @@ pub fn solve_within(model: &Pomdp, budget: &mut Budget<'_>) -> Result<Solution, 
     if q.iter().any(|q| !q.is_finite()) {
         return Err(SolveError::Unbounded(model.discount()));
     }
+    // One backup more, V + excess / (1 - factor) is above its own backup.
+    let excess = (0..n).fold(0.0_f64, |most, s| {
+        let best = best(model, &value, s);
+        most.max(q[best * n + s] - value[s])
+    });
+    let excess = excess + rounding(longest) * largest(&q);
     let policy = (0..n).map(|s| lowest_best(&q, n, s)).collect();
     Ok(Solution {
         states: n,
         q,
         policy,
+        error: excess / (1.0 - factor),
+    })
+}
+
+/// Largest sum of a row of T, and most entries of one.
+fn rows(model: &Pomdp) -> (f64, usize) {
+    let rows = (0..model.actions().len())
+        .flat_map(|a| (0..model.states().len()).map(move |s| model.successors(s, a)));
+    rows.fold((0.0, 0), |(sum_max, longest), row| {
+        let sum: f64 = row.iter().map(|(_, p)| p).sum();
+        (f64::max(sum_max, sum), usize::max(longest, row.len()))
     })
 }
 

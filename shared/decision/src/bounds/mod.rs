@@ -10,7 +10,8 @@
 //! | [`tib`] (upper) | the same, one step later | about the square |
 //!
 //! All are found by policy iteration, that is by linear systems, so that a discount near 1 costs
-//! nothing. Upper bounds are published with what is left of their error added.
+//! nothing. What is left of their error is accounted for: added to upper bounds, taken from lower
+//! ones; of [`mdp`], whose values serve policies as they are, [`mdp::Solution::error`] says it.
 
 pub mod blind;
 pub mod fib;
@@ -21,9 +22,26 @@ pub mod tib;
 
 use crate::budget::Stopped;
 
-/// What a backup and its value may lose by rounding, relative to the largest value; upper bounds
-/// are moved up by it, so that a lower and an upper one that are equal in truth never cross.
-const ROUNDING: f64 = 32.0 * f64::EPSILON;
+/// What a backup over so many `terms` may lose by rounding, relative to the largest value; upper
+/// bounds are moved up by it and lower ones down, so that such as are equal in truth never cross.
+fn rounding(terms: usize) -> f64 {
+    (32.0 + terms as f64) * f64::EPSILON
+}
+
+/// The factor by which errors shrink with every step: discount times the largest sum of a row.
+///
+/// # Errors
+/// [`SolveError::Unbounded`] if that is no less than 1, or no number.
+fn contraction(discount: f64, mass_max: f64) -> Result<f64, SolveError> {
+    let factor = discount * mass_max;
+    if factor < 1.0 {
+        Ok(factor)
+    } else if discount < 1.0 && mass_max.is_finite() {
+        Err(SolveError::Mass(discount, mass_max))
+    } else {
+        Err(SolveError::Unbounded(discount))
+    }
+}
 
 /// Q[a][.], one row per action.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,13 +78,18 @@ impl ActionValues {
 /// Why a model could not be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SolveError {
-    /// The values are unbounded, or the equations singular: a discount of 1 without an end, or
-    /// rewards too large for a double.
+    /// The values are unbounded: a discount of 1, or rewards too large for a double.
     #[error(
-        "the values are not bounded with discount {0}: allowed is a discount below 1, or policies \
-         that come to an end, and rewards whose sums are finite"
+        "the values are not bounded with discount {0}: allowed is a discount below 1 (also where \
+         missions come to an end), and rewards whose sums are finite"
     )]
     Unbounded(f64),
+    /// The discount, and the sum of a row that grows faster than it shrinks.
+    #[error(
+        "with discount {0} the values are not bounded, as a row of T, or of T and O together, sums \
+         to {1}; allowed are sums below {max:.9}", max = 1.0 / .0
+    )]
+    Mass(f64, f64),
     /// A linear system that iteration does not solve, too large for a dense solve.
     #[error(
         "iteration does not solve {0} equations; a dense solve is allowed up to {max}",

@@ -180,12 +180,13 @@ pub fn solve_from(
     budget: &mut Budget<'_>,
 ) -> Result<Tib, SolveError> {
     let steps = Steps::new(model, budget)?;
-    let entries = steps.entries();
+    let (n, actions) = (model.states().len(), model.actions().len());
+    let values = steps.to.len().saturating_mul(actions);
+    let entries = steps.entries().max(values);
     if entries > ENTRIES_MAX {
         return Err(SolveError::Entries(entries));
     }
     let mixtures = steps.mixtures(model, budget)?;
-    let (n, actions) = (model.states().len(), model.actions().len());
     let ids = 0..steps.beliefs.len() as BeliefId;
     let guess = ids
         .flat_map(|id| (0..actions).map(move |a| (id, a)))

@@ -194,11 +194,13 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Improves `theta` until it hardly rises; returns the objective of the last iteration.
+    /// Improves `theta` until it hardly rises; returns the objective of the last iteration, which
+    /// that of `theta` is not below.
     ///
     /// Where states are hard to tell, the iteration creeps. Hence after two steps, r and then
     /// r + v, a long one is tried: theta + 2 l r + l^2 v, l = |r| / |v| (Varadhan and Roland 2008,
-    /// "SQUAREM"); it counts only if the objective has risen there, too.
+    /// "SQUAREM"); it counts only if the objective has risen there, too. Hence the last iteration
+    /// ends in a plain step: nothing would look at a long one any more.
     fn climb(
         &mut self,
         theta: &mut Vec<f64>,
@@ -231,7 +233,7 @@ impl<'a> Search<'a> {
             last = objective;
             trail.push(theta.clone());
             self.maximise(theta);
-            if trail.len() == 2 {
+            if trail.len() == 2 && iteration + 1 < settings.iterations_max {
                 trail.push(theta.clone());
                 self.leap(&trail, theta);
             }

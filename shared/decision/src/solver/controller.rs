@@ -59,6 +59,10 @@ impl Tree<'_> {
         budget: &mut Budget<'_>,
     ) -> Result<(), Stopped> {
         let controller = self.controller(root, budget)?;
+        // The root alone may be too large, or its best plan not looked into yet.
+        if controller.parts.is_empty() {
+            return Ok(());
+        }
         let values = match self.controller_values(&controller, budget) {
             Ok(values) => values,
             Err(SolveError::Stopped) => return Err(Stopped),

@@ -121,7 +121,7 @@ pub fn bound(
     let found = match method {
         Method::Blind => blind_answer(model, budget).map(|found| answer = found),
         Method::Mdp | Method::QMdp => mdp::solve_within(model, budget).map(|solution| {
-            answer.upper = Some(if method == Method::Mdp {
+            let value: f64 = if method == Method::Mdp {
                 let terms = model.start().iter().enumerate();
                 terms.map(|(s, b)| b * solution.value(s)).sum()
             } else {
@@ -131,7 +131,8 @@ pub fn bound(
                 };
                 let actions = 0..model.actions().len();
                 actions.map(q).fold(f64::NEG_INFINITY, f64::max)
-            });
+            };
+            answer.upper = Some(value + solution.error());
         }),
         Method::Fib => {
             fib::solve(model, budget).map(|fast| answer.upper = Some(fast.value(model.start())))

@@ -72,6 +72,11 @@ impl Sawtooth {
         self.points.len()
     }
 
+    /// Bytes that the points hold, about.
+    pub(super) fn bytes(&self) -> usize {
+        8 * (self.masks.len() + self.based.len()) + size_of::<Point>() * self.points.len()
+    }
+
     /// The lower of the fast informed bound and the plane through the corners.
     pub(super) fn base_value(&self, belief: &[(u32, f64)]) -> f64 {
         let dot = |q: &[f64]| -> f64 { belief.iter().map(|(s, b)| b * q[*s as usize]).sum() };

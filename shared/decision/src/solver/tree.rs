@@ -85,6 +85,7 @@ impl<'m> Tree<'m> {
             + size_of::<Branch>() * self.branches.len()
             + size_of::<Child>() * self.children.len()
             + alpha * self.alphas.len()
+            + self.sawtooth.bytes()
     }
 
     /// The node of a belief; a new one is valued.

@@ -5,13 +5,14 @@ mod document;
 use std::fs;
 use std::path::PathBuf;
 
+use vigil_decision::learning::check::{Agreement, Refusal};
 use vigil_decision::learning::{Record, Settings, check, learn};
 use vigil_decision::policy::{Dual, PolicyName};
-use vigil_decision::simulation::{PolicyAgent, Rules, Summary, horizon, run as fly};
+use vigil_decision::simulation::{Paired, PolicyAgent, Rules, Summary, horizon, run as fly};
 use vigil_decision::{Pomdp, mdp};
 
 use super::compare::{count, fits};
-use super::{load, missions};
+use super::{load, missions, seed};
 use crate::commands::{CommandError, Outcome};
 use crate::output;
 use document::{Document, Mean};
@@ -21,7 +22,8 @@ use document::{Document, Mean};
 /// FILE is the model made by hand: it gives names, rewards, what is impossible, and counts as
 /// --prior-strength visits of every row of T and Z. The learned model is written only if what it
 /// predicts is within 20 % of what was measured: the rewards of the missions, if they are recorded,
-/// and those of its policy in --world, if one is given. Otherwise exit code 1, and no file.
+/// and those of its policy in --world, if one is given; what chance may do to the two (95 %) is
+/// allowed besides. Otherwise exit code 1, and no file; one that was there before is left as it was.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model made by hand (.pomdp or .pomdpx).
@@ -41,7 +43,11 @@ pub struct Args {
     /// Starts: the first is FILE, others are drawn around it; the best one counts.
     #[arg(long, default_value_t = 1, value_parser = count(1))]
     starts: u64,
-    /// Seed of drawn starts and simulated missions.
+    /// Write the model though there is nothing to check it by: missions without rewards, no --world.
+    #[arg(long)]
+    unchecked: bool,
+    /// Seed of drawn starts and simulated missions; with the same seed the random numbers of other
+    /// commands are others.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Policy whose worth is predicted: mls, av, qmdp or fib.
@@ -73,7 +79,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         prior_strength: args.prior_strength,
         iterations_max: args.iterations as usize,
         starts: args.starts as usize,
-        seed: args.seed,
+        seed: seed::of("learn", args.seed),
         ..Settings::default()
     };
     let total = settings.starts * settings.iterations_max;
@@ -86,19 +92,27 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     drop(progress);
     let learned = learned
         .map_err(|error| CommandError::usage(format!("{}: {error}", args.missions.display())))?;
-    let predicted = worth(args, &learned.model, &learned.model)?;
+    let mut predicted = worth(args, &learned.model, &learned.model)?;
     let measured = world
         .as_ref()
         .map(|world| worth(args, &learned.model, world));
-    let measured = measured.transpose()?;
+    let mut measured = measured.transpose()?;
     let logged = check::follow(&learned.model, &flown.records);
+    let half_width = measured
+        .as_ref()
+        .map(|m| Paired::of(&predicted, m).half_width);
+    let predicted = Summary::of(&mut predicted);
+    let measured = measured.as_mut().map(|m| Summary::of(m));
+    let in_world = measured.zip(half_width);
     let checks = [
-        logged.map(|l| check::within(l.predicted.mean, l.measured.mean)),
-        measured.map(|measured| check::within(predicted.mean, measured.mean)),
+        logged.map(|logged| logged.check()),
+        in_world.map(|(m, half_width)| check::within(predicted.mean, m.mean, half_width)),
     ];
-    let refusal = checks.into_iter().flatten().find_map(Result::err);
+    let checks: Vec<_> = checks.into_iter().flatten().collect();
+    let refusal = refusal(args, &checks);
+    let is_weak = |check: &Result<Agreement, _>| check.is_ok_and(|agreement| agreement.is_weak);
     let document = Document {
-        schema_version: 1,
+        schema_version: 2,
         file: args.file.display().to_string(),
         missions_file: args.missions.display().to_string(),
         missions: flown.records.len(),
@@ -114,7 +128,10 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         measured: measured.map(Mean::of),
         logged_predicted: logged.map(|l| Mean::of(l.predicted)),
         logged_measured: logged.map(|l| Mean::of(l.measured)),
-        refused: refusal.map(|refusal| refusal.to_string()),
+        is_checked: !checks.is_empty(),
+        is_weakly_checked: checks.iter().any(is_weak),
+        is_older_out_left: refusal.is_some() && args.out.exists(),
+        refused: refusal.clone(),
         hash: format!("{:016x}", learned.model.hash()),
     };
     let printed = if args.json {
@@ -123,7 +140,11 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         output::line(&document.text())
     };
     printed.map_err(CommandError::failure)?;
-    if let Some(refusal) = refusal {
+    if let Some(mut refusal) = refusal {
+        if document.is_older_out_left {
+            let out = args.out.display();
+            refusal = format!("{refusal}\n{out} is older and was left as it was");
+        }
         return Err(CommandError::failure(refusal));
     }
     let written = fs::write(&args.out, learned.model.to_cassandra());
@@ -131,8 +152,19 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     Ok(Outcome::Done)
 }
 
-/// What the policy of `model` earns in `world`, discounted.
-fn worth(args: &Args, model: &Pomdp, world: &Pomdp) -> Result<Summary, CommandError> {
+/// Why the model is not to be written.
+fn refusal(args: &Args, checks: &[Result<Agreement, Refusal>]) -> Option<String> {
+    if checks.is_empty() && !args.unchecked {
+        let message = "not to be deployed: there is nothing to check the model by, as the missions \
+                       hold no rewards and no --world is given; allowed with --unchecked";
+        return Some(message.to_owned());
+    }
+    let refusal = checks.iter().find_map(|check| check.err());
+    refusal.map(|refusal| refusal.to_string())
+}
+
+/// What the policy of `model` earns in `world`, discounted, mission by mission.
+fn worth(args: &Args, model: &Pomdp, world: &Pomdp) -> Result<Vec<f64>, CommandError> {
     let solution = mdp::solve(model).map_err(CommandError::usage)?;
     let name: PolicyName = args.policy.parse().map_err(CommandError::usage)?;
     if name.information.is_some() {
@@ -145,7 +177,7 @@ fn worth(args: &Args, model: &Pomdp, world: &Pomdp) -> Result<Summary, CommandEr
         steps_max: horizon(world.discount(), 2000),
         is_end: vec![false; world.actions().len()],
     };
-    let one = |mission| fly(world, &mut agent, &rules, (args.seed, mission)).discounted;
-    let mut rewards: Vec<f64> = (0..args.episodes).map(one).collect();
-    Ok(Summary::of(&mut rewards))
+    let seed = seed::of("learn", args.seed);
+    let one = |mission| fly(world, &mut agent, &rules, (seed, mission)).discounted;
+    Ok((0..args.episodes).map(one).collect())
 }

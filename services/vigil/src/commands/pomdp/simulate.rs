@@ -11,7 +11,7 @@ use vigil_decision::simulation::{Rules, horizon};
 use super::compare::contestant::{Contestant, Knowledge};
 use super::compare::{among, count, solved_by};
 use super::escalation::EscalationArgs;
-use super::{load, missions};
+use super::{load, missions, seed};
 use crate::commands::{CommandError, Outcome};
 use crate::output::Progress;
 
@@ -29,7 +29,8 @@ pub struct Args {
     /// Missions, 1 to 10000000.
     #[arg(long, default_value_t = 1000, value_parser = count(1))]
     episodes: u64,
-    /// Seed from which the missions' random numbers start.
+    /// Seed from which the missions' random numbers start; with the same seed those of other
+    /// commands are others.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Steps of a mission at most; it ends before when what follows weighs less than 1e-4.
@@ -81,8 +82,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut out = BufWriter::new(File::create(&args.out).map_err(failed)?);
     missions::write_head(&mut out, contestant.label()).map_err(failed)?;
     let progress = Progress::new("missions", args.episodes as usize);
+    let seed = seed::of("simulate", args.seed);
     for episode in 0..args.episodes {
-        let numbers = (args.seed, episode);
+        let numbers = (seed, episode);
         let (record, _) = Record::simulated(&model, &mut *agent, &rules, numbers, args.states);
         missions::write(&mut out, &model, &record).map_err(failed)?;
         if episode % 64 == 0 {

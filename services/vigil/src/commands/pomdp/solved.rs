@@ -19,12 +19,23 @@ pub fn load(model: &Pomdp, option: &str, path: &Path) -> Result<PointBased, Comm
     let bytes = fs::read(path).map_err(|error| wrong(&error))?;
     let text = String::from_utf8_lossy(&bytes);
     let vectors = if text.trim_start().starts_with('<') {
+        warn_of_nameless(option, path);
         appl::read(&text, model).map_err(|e| wrong(&e))?
     } else if text.trim_start().starts_with('{') {
         let file = PolicyFile::read(&bytes, model).map_err(|e| wrong(&e))?;
         file.vectors
     } else {
+        warn_of_nameless(option, path);
         alpha::read(&text, model).map_err(|e| wrong(&e))?
     };
     PointBased::new(model, &vectors).map_err(|e| wrong(&e))
+}
+
+/// Other programs' formats say how many states and actions a model has, not which model it is.
+fn warn_of_nameless(option: &str, path: &Path) {
+    eprintln!(
+        "{option} {}: warning: this format does not say which model the policy was solved for, \
+         and it cannot be checked that it was this one; Vigil's own format says it",
+        path.display()
+    );
 }

@@ -7,8 +7,10 @@ use serde_json::{Value, json};
 use vigil_decision::Pomdp;
 use vigil_decision::simulation::{Act, Agent, Mission, Paired, Rules, Summary, run};
 
+use super::bound::Upper;
 use super::contestant::{Contestant, Knowledge};
 use crate::commands::CommandError;
+use crate::commands::pomdp::seed;
 use crate::output::Progress;
 
 /// Where and how long.
@@ -22,7 +24,7 @@ pub struct Setting<'a> {
     /// Their number.
     pub episodes: u64,
     /// Upper bound of the value at the start belief.
-    pub upper: Option<f64>,
+    pub upper: Option<Upper>,
     /// Index of the contestant that the others are compared with.
     pub against: usize,
 }
@@ -89,6 +91,7 @@ impl Contest {
     ) -> Result<Self, CommandError> {
         // Refusals come before the first mission.
         let agents: Result<Vec<_>, _> = contestants.iter().map(|c| c.build(knowledge)).collect();
+        let seed = seed::of("compare", setting.seed);
         let total = contestants.len() * setting.episodes as usize;
         let progress = Progress::new("missions", total);
         let (mut rows, mut rewards) = (Vec::new(), Vec::new());
@@ -99,7 +102,7 @@ impl Contest {
             };
             let mut missions = Vec::with_capacity(setting.episodes as usize);
             for episode in 0..setting.episodes {
-                let numbers = (setting.seed, episode);
+                let numbers = (seed, episode);
                 missions.push(run(setting.world, &mut agent, setting.rules, numbers));
                 let done = rows.len() * setting.episodes as usize + missions.len();
                 if missions.len() % 64 == 0 {
@@ -134,7 +137,8 @@ impl Contest {
             "ends": ends,
             "information_actions": of.information_actions(),
             "stall_guard_steps": of.stall_steps,
-            "upper": setting.upper,
+            "upper": setting.upper.as_ref().map(|upper| upper.value),
+            "upper_from": setting.upper.as_ref().map(|upper| upper.from),
             "against": {"policy": against.policy, "threshold": against.threshold},
             "rows": self.rows,
         })
@@ -189,7 +193,7 @@ fn row(
         half_width_95: discounted.half_width,
         median: discounted.median,
         worst_5_percent: discounted.worst_5_percent,
-        regret: setting.upper.map(|upper| upper - discounted.mean),
+        regret: (setting.upper.as_ref()).map(|upper| upper.value - discounted.mean),
         undiscounted_mean: undiscounted.mean,
         undiscounted_half_width_95: undiscounted.half_width,
         steps_mean: steps / missions.len() as f64,

@@ -15,9 +15,9 @@ pub fn text(contest: &Contest, setting: &Setting<'_>, of: &Knowledge<'_>, file: 
         setting.seed,
         discount.powi(steps as i32),
     );
-    let bound = setting.upper.map_or_else(
+    let bound = setting.upper.as_ref().map_or_else(
         || "no upper bound: actions end missions".to_owned(),
-        |upper| format!("upper bound {upper:.6}"),
+        |upper| format!("upper bound {:.6} ({})", upper.value, upper.from),
     );
     let against = &contest.rows[setting.against];
     let k = against

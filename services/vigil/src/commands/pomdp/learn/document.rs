@@ -41,6 +41,12 @@ pub struct Document {
     pub logged_predicted: Option<Mean>,
     /// What they brought.
     pub logged_measured: Option<Mean>,
+    /// Whether there was anything to check by: rewards of missions, or a world.
+    pub is_checked: bool,
+    /// Whether chance alone may set prediction and measurement apart by more than is allowed.
+    pub is_weakly_checked: bool,
+    /// Whether the file to be written is there all the same: from before.
+    pub is_older_out_left: bool,
     /// Why the model is not to be deployed.
     pub refused: Option<String>,
     /// Hash of the learned model.
@@ -92,8 +98,9 @@ struct Entry {
     name: String,
     prior: f64,
     learned: f64,
-    low_95: f64,
-    high_95: f64,
+    /// 95 % of the worlds that the prior expects lie between these; fewer if the prior is off.
+    credible_low: f64,
+    credible_high: f64,
     effective_visits: f64,
 }
 
@@ -123,8 +130,8 @@ pub fn rows(learned: &Learned) -> Vec<Row> {
             name: name(columns, entry.column).unwrap_or_default(),
             prior: entry.prior,
             learned: entry.learned,
-            low_95: entry.interval[0],
-            high_95: entry.interval[1],
+            credible_low: entry.interval[0],
+            credible_high: entry.interval[1],
             effective_visits: entry.effective_visits,
         });
         Row {
@@ -167,7 +174,11 @@ impl Document {
                 let _ = writeln!(text, "{n:>6} {likelihood:>18.3} {objective:>18.3}");
             }
         }
-        text.push_str("\nrow: visits in the missions, share of data; its most changed number\n");
+        text.push_str(
+            "\nrow: visits in the missions, share of data; its most changed number, in brackets \
+             what is credible\n(95 % of the worlds that the prior expects; a prior that is off \
+             pulls numbers along)\n",
+        );
         for row in &self.rows {
             text.push_str(&row.line());
         }
@@ -203,7 +214,13 @@ impl Document {
             "recorded missions, measured",
             &self.logged_measured.as_ref(),
         );
-        if self.logged_measured.is_none() && self.measured.is_none() {
+        if self.is_weakly_checked {
+            text.push_str(
+                "a weak check: chance alone may set the two apart by more than 20 %; more \
+                 missions tell more\n",
+            );
+        }
+        if !self.is_checked {
             text.push_str("not checked: the missions hold no rewards, and no --world was given\n");
         }
         if self.refused.is_some() {
@@ -235,7 +252,7 @@ impl Row {
             let _ = write!(
                 line,
                 "   {:<10} {:.4} -> {:.4} [{:.4}, {:.4}]",
-                entry.name, entry.prior, entry.learned, entry.low_95, entry.high_95
+                entry.name, entry.prior, entry.learned, entry.credible_low, entry.credible_high
             );
         }
         line.push('\n');
