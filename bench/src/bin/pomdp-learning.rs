@@ -89,9 +89,9 @@ fn say_offline(archive: &mut Archive, offline: &Value) {
         ));
     }
     archive.say(
-        "\nTrue probabilities within their credible intervals, by the rows' share of data. They are \
-         for 95 % of the\nworlds that the prior expects; this prior is off on purpose, and pulls \
-         learned numbers along:\n",
+        "\nTrue probabilities within their credible intervals, by the rows' share of data. They \
+         are for 95 % of the\nworlds that the prior expects; this prior is off on purpose, and \
+         pulls learned numbers along:\n",
     );
     archive.say("| share from | rows | numbers | inside | largest error |\n|---|---|---|---|---|");
     for bin in offline["intervals"].as_array().into_iter().flatten() {

@@ -329,19 +329,7 @@ fn policies_and_beliefs_are_drawn() {
     );
     // Cells, the start's mark, a legend of three actions.
     assert_eq!(areas(&triangle), 120 * 120 + 1 + 3);
-    let policy = folder.path("lamp.policy");
-    done(&[
-        "pomdp", "solve", &lamp, "--method", "sarsop", "--out", &policy,
-    ]);
-    let point = folder.path("point.svg");
-    let picture = ["pomdp", "picture", &lamp, "--graph", "--policy", &policy];
-    let output = run(&[&picture[..], &["--out", &point]].concat());
-    let warning = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success() && Path::new(&point).exists());
-    assert!(
-        warning.contains("warning: this format does not say which model"),
-        "{warning}"
-    );
+    solved_ones_are_drawn(&folder, &lamp);
     let out = folder.path("no.svg");
     let message = refused(&["pomdp", "picture", MODEL, "--regions", "--out", &out], 2);
     assert_eq!(
@@ -357,4 +345,21 @@ fn policies_and_beliefs_are_drawn() {
     assert!(message.contains("allowed are mls, av"), "{message}");
     refused(&["pomdp", "picture", MODEL, "--out", &out], 2);
     assert!(!Path::new(&out).exists());
+}
+
+/// By a policy of a format that does not name its model: with a warning.
+fn solved_ones_are_drawn(folder: &Folder, lamp: &str) {
+    let policy = folder.path("lamp.policy");
+    done(&[
+        "pomdp", "solve", lamp, "--method", "sarsop", "--out", &policy,
+    ]);
+    let point = folder.path("point.svg");
+    let picture = ["pomdp", "picture", lamp, "--graph", "--policy", &policy];
+    let output = run(&[&picture[..], &["--out", &point]].concat());
+    let warning = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && Path::new(&point).exists());
+    assert!(
+        warning.contains("warning: this format does not say which model"),
+        "{warning}"
+    );
 }

@@ -38,8 +38,8 @@ pub struct Agreement {
 }
 
 /// Refuses a prediction that is off by more than [`ERROR_MAX`] of what was measured whatever
-/// chance did: |predicted - measured| > 0.2 |measured| + `half_width`, the last one that of the 95 %
-/// interval of their difference.
+/// chance did: |predicted - measured| > 0.2 |measured| + `half_width`, the last one that of the
+/// 95 % interval of their difference.
 ///
 /// # Errors
 /// [`Refusal`], also if one of the numbers is not finite.

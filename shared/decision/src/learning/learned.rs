@@ -59,8 +59,8 @@ pub struct Entry {
     /// row's visits the harder they are to tell.
     pub effective_visits: f64,
     /// The 95 % credible interval: quantiles of Beta(m p, m (1 - p)), p learned, m the effective
-    /// visits and the prior's. Credible is not certain: of worlds that the prior expects it holds 95
-    /// in 100; a prior that is off pulls learned numbers along, and it holds fewer.
+    /// visits and the prior's. Credible is not certain: of worlds that the prior expects it holds
+    /// 95 in 100; a prior that is off pulls learned numbers along, and it holds fewer.
     pub interval: [f64; 2],
 }
 

@@ -5,8 +5,8 @@ mod document;
 use std::fs;
 use std::path::PathBuf;
 
-use vigil_decision::learning::check::{Agreement, Refusal};
-use vigil_decision::learning::{Record, Settings, check, learn};
+use vigil_decision::learning::check::{Agreement, Followed, Refusal};
+use vigil_decision::learning::{Learned, Record, Settings, check, learn};
 use vigil_decision::policy::{Dual, PolicyName};
 use vigil_decision::simulation::{Paired, PolicyAgent, Rules, Summary, horizon, run as fly};
 use vigil_decision::{Pomdp, mdp};
@@ -23,7 +23,7 @@ use document::{Document, Mean};
 /// --prior-strength visits of every row of T and Z. The learned model is written only if what it
 /// predicts is within 20 % of what was measured: the rewards of the missions, if they are recorded,
 /// and those of its policy in --world, if one is given; what chance may do to the two (95 %) is
-/// allowed besides. Otherwise exit code 1, and no file; one that was there before is left as it was.
+/// allowed besides. Otherwise exit code 1, and no file; one that was there is left as it was.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model made by hand (.pomdp or .pomdpx).
@@ -43,7 +43,7 @@ pub struct Args {
     /// Starts: the first is FILE, others are drawn around it; the best one counts.
     #[arg(long, default_value_t = 1, value_parser = count(1))]
     starts: u64,
-    /// Write the model though there is nothing to check it by: missions without rewards, no --world.
+    /// Write the model though there is nothing to check it by: no rewards, and no --world.
     #[arg(long)]
     unchecked: bool,
     /// Seed of drawn starts and simulated missions; with the same seed the random numbers of other
@@ -75,40 +75,13 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         fits("--world", &prior, world)?;
     }
     let flown = missions::read(&args.missions, &prior)?;
-    let settings = Settings {
-        prior_strength: args.prior_strength,
-        iterations_max: args.iterations as usize,
-        starts: args.starts as usize,
-        seed: seed::of("learn", args.seed),
-        ..Settings::default()
-    };
-    let total = settings.starts * settings.iterations_max;
-    let progress = output::Progress::new("iterations, at most:", total);
-    let mut done = 0;
-    let learned = learn(&prior, &flown.records, &settings, &mut |_| {
-        done += 1;
-        progress.show(done);
-    });
-    drop(progress);
-    let learned = learned
-        .map_err(|error| CommandError::usage(format!("{}: {error}", args.missions.display())))?;
-    let mut predicted = worth(args, &learned.model, &learned.model)?;
-    let measured = world
-        .as_ref()
-        .map(|world| worth(args, &learned.model, world));
-    let mut measured = measured.transpose()?;
-    let logged = check::follow(&learned.model, &flown.records);
-    let half_width = measured
-        .as_ref()
-        .map(|m| Paired::of(&predicted, m).half_width);
-    let predicted = Summary::of(&mut predicted);
-    let measured = measured.as_mut().map(|m| Summary::of(m));
-    let in_world = measured.zip(half_width);
-    let checks = [
-        logged.map(|logged| logged.check()),
-        in_world.map(|(m, half_width)| check::within(predicted.mean, m.mean, half_width)),
-    ];
-    let checks: Vec<_> = checks.into_iter().flatten().collect();
+    let learned = learned(args, &prior, &flown.records)?;
+    let Worths {
+        predicted,
+        measured,
+        logged,
+        checks,
+    } = worths(args, &learned.model, world.as_ref(), &flown.records)?;
     let refusal = refusal(args, &checks);
     let is_weak = |check: &Result<Agreement, _>| check.is_ok_and(|agreement| agreement.is_weak);
     let document = Document {
@@ -150,6 +123,64 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let written = fs::write(&args.out, learned.model.to_cassandra());
     written.map_err(|e| CommandError::failure(format!("{}: {e}", args.out.display())))?;
     Ok(Outcome::Done)
+}
+
+/// Learns, counting on standard error.
+fn learned(args: &Args, prior: &Pomdp, records: &[Record]) -> Result<Learned, CommandError> {
+    let settings = Settings {
+        prior_strength: args.prior_strength,
+        iterations_max: args.iterations as usize,
+        starts: args.starts as usize,
+        seed: seed::of("learn", args.seed),
+        ..Settings::default()
+    };
+    let total = settings.starts * settings.iterations_max;
+    let progress = output::Progress::new("iterations, at most:", total);
+    let mut done = 0;
+    let learned = learn(prior, records, &settings, &mut |_| {
+        done += 1;
+        progress.show(done);
+    });
+    drop(progress);
+    learned.map_err(|error| CommandError::usage(format!("{}: {error}", args.missions.display())))
+}
+
+/// What the model predicts and what was measured, discounted rewards of missions.
+struct Worths {
+    /// Its policy by itself.
+    predicted: Summary,
+    /// Its policy in the world.
+    measured: Option<Summary>,
+    /// The recorded missions.
+    logged: Option<Followed>,
+    /// Whether predictions and measurements agree.
+    checks: Vec<Result<Agreement, Refusal>>,
+}
+
+fn worths(
+    args: &Args,
+    model: &Pomdp,
+    world: Option<&Pomdp>,
+    records: &[Record],
+) -> Result<Worths, CommandError> {
+    let mut predicted = worth(args, model, model)?;
+    let measured = world.map(|world| worth(args, model, world)).transpose()?;
+    let half_width = |m: &Vec<f64>| Paired::of(&predicted, m).half_width;
+    let half_width = measured.as_ref().map(half_width);
+    let predicted = Summary::of(&mut predicted);
+    let measured = measured.map(|mut measured| Summary::of(&mut measured));
+    let logged = check::follow(model, records);
+    let in_world = measured.zip(half_width);
+    let checks = [
+        logged.map(|logged| logged.check()),
+        in_world.map(|(m, half_width)| check::within(predicted.mean, m.mean, half_width)),
+    ];
+    Ok(Worths {
+        predicted,
+        measured,
+        logged,
+        checks: checks.into_iter().flatten().collect(),
+    })
 }
 
 /// Why the model is not to be written.
