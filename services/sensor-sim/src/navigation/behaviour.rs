@@ -1,5 +1,7 @@
 //! How the robot follows, stops, looks, passes, backs and plans.
 
+use vigil_setup::schema::Navigation;
+
 use super::lane::Lane;
 use super::navigator::{Happening, Navigator};
 use super::path::distance;
@@ -30,11 +32,6 @@ const SLOW_AT_GOAL_M: f64 = 0.5;
 /// speed faster.
 const MAKE_UP_1_S: f64 = 0.5;
 const HURRY: f64 = 0.25;
-/// A robot that moves away stands after this long, s, however far it came.
-const AWAY_MAX_S: f64 = 8.0;
-
-/// A robot that has not come through an opening after this long, s, has not found one.
-const PASS_MAX_S: f64 = 12.0;
 /// A robot that is off its path comes back to it so far ahead, m.
 const JOIN_M: f64 = 1.5;
 /// From one cycle to the next the robot comes no farther along its path than this, m.
@@ -97,7 +94,7 @@ impl Navigator {
     pub(super) fn pass(&mut self, end_m: f64, passed_s: f64, dt_s: f64) -> DriveCommand {
         let step_m = CAREFUL * self.settings.speed_m_s * dt_s;
         self.planned_m = (self.planned_m + step_m).min(end_m);
-        if passed_s >= PASS_MAX_S {
+        if passed_s >= Navigation::PASS_MAX_S {
             self.end(false);
             return self.stand();
         }
@@ -116,7 +113,7 @@ impl Navigator {
     /// Straight back until it has come far enough, or something is there.
     pub(super) fn back(&mut self, from: [f64; 2], passed_s: f64) -> DriveCommand {
         let here = [self.pose[0], self.pose[1]];
-        if distance(from, here) >= self.settings.away_m || passed_s >= AWAY_MAX_S {
+        if distance(from, here) >= self.settings.away_m || passed_s >= Navigation::AWAY_MAX_S {
             let moved = distance(from, here) >= 0.5 * self.settings.away_m;
             self.is_anew = true;
             self.block_m = None;
