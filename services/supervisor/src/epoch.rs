@@ -77,13 +77,21 @@ impl Epoch {
         let t_ns = detection.header.t_capture_ns;
         let began_ns = *self.began_ns.get_or_insert(t_ns);
         let runs = limits.has_end && outcome(ActionOutcome::Running);
-        let limit_ns = if runs { limits.running_ns } else { limits.epoch_ns };
+        let limit_ns = if runs {
+            limits.running_ns
+        } else {
+            limits.epoch_ns
+        };
         // A jump back of the time begins a new epoch.
         let passed_ns = t_ns.checked_sub(began_ns).unwrap_or(u64::MAX);
         if limit_ns.is_some_and(|limit_ns| passed_ns >= limit_ns) {
             return Some(if runs { End::Failed } else { End::Done });
         }
-        is_new.then_some(if limits.has_end { End::Unfinished } else { End::Done })
+        is_new.then_some(if limits.has_end {
+            End::Unfinished
+        } else {
+            End::Done
+        })
     }
 
     /// True if a symptom rises.

@@ -166,7 +166,10 @@ impl Exceptions {
             self.control_mode = ControlMode::Fallback;
             self.take_alarm(detection);
         }
-        let Some(end) = self.epoch.take(detection, self.decision_seq, &self.limits()) else {
+        let Some(end) = self
+            .epoch
+            .take(detection, self.decision_seq, &self.limits())
+        else {
             return;
         };
         let set = self.epoch.take_set(detection.header.t_capture_ns, end);
@@ -357,7 +360,9 @@ impl Exceptions {
 const fn has_end(kind: RecoveryKind) -> bool {
     use RecoveryKind as R;
     match kind {
-        R::NewPath | R::Relocalise | R::GoThrough | R::MoveAway | R::CallForHelp | R::GiveUp => true,
+        R::NewPath | R::Relocalise | R::GoThrough | R::MoveAway | R::CallForHelp | R::GiveUp => {
+            true
+        }
         R::None | R::GoOn | R::SlowDown | R::Stop | R::Compensate | R::IgnoreEncoder => false,
     }
 }

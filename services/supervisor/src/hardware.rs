@@ -113,8 +113,7 @@ impl Hardware {
             return true;
         }
         if self.identifies {
-            let predicted =
-                Explained::new(diagnosis.p_predicted[0], diagnosis.p_unknown_predicted);
+            let predicted = Explained::new(diagnosis.p_predicted[0], diagnosis.p_unknown_predicted);
             let ratios = [
                 p.any() / predicted.any(),
                 (1.0 - p.modelled) / (1.0 - predicted.modelled),

@@ -1,7 +1,10 @@
 //! Decisions about the leaves of the fault tree: states are told by the identifier.
 
 use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
-use vigil_decision::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
+use vigil_decision::policy::Measure;
+use vigil_decision::{
+    Choice, Control, Decider, Evidence, PointBased, Policy, Pomdp, QMdp, Tracker, mdp,
+};
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
 use vigil_setup::schema;
@@ -18,6 +21,9 @@ use crate::told::{Decided, Told};
 pub(crate) struct Leaves {
     model: Pomdp,
     decider: Decider,
+    /// What actions are worth where the decider does not say.
+    worth: QMdp,
+    worths: Vec<f64>,
     tree_hash: u64,
     tracker: Tracker,
     states: Vec<StateMeaning>,
@@ -63,6 +69,8 @@ impl Leaves {
         let decider = policy::decider(&model, &solution, solved, settings)?;
         let mut supervisor = Self {
             decider,
+            worth: QMdp::new(solution),
+            worths: vec![0.0; actions.len()],
             tree_hash: tree.hash(),
             tracker: Tracker::new(&model),
             silence: Silence::new(blind_after_misses),
@@ -223,7 +231,12 @@ impl Leaves {
 
     fn decide(&mut self, timed: bool) {
         let best = self.decider.decide(self.tracker.belief()).choice();
-        let values = self.decider.values();
+        let values = if self.decider.measure() == Measure::Value {
+            self.decider.values()
+        } else {
+            self.worth.evaluate(self.tracker.belief(), &mut self.worths);
+            &self.worths
+        };
         let current = self.decided.map(|decided| decided.action);
         self.choice = self
             .restraint

@@ -119,6 +119,25 @@ fn help_is_called_only_when_the_unknown_lasts() {
 }
 
 #[test]
+fn until_help_is_called_every_policy_takes_the_best_of_the_rest() {
+    let unknown = [("UNKNOWN", 0.99), ("ND", 0.01)];
+    for policy in ["mls", "av", "qmdp", "fib", "dm-mls"] {
+        let mut world = World::with(|settings| {
+            settings.policy = policy.into();
+            if policy == "dm-mls" {
+                settings.information_actions = vec!["slow_down".into()];
+            }
+        });
+        for _ in 0..150 {
+            world.cycle(true, &unknown, &unknown);
+            assert_eq!(world.kind(), RecoveryKind::SlowDown, "{policy}");
+        }
+        world.rest(100, true, &unknown);
+        assert_eq!(world.kind(), RecoveryKind::CallForHelp, "{policy}");
+    }
+}
+
+#[test]
 fn two_stuck_wheels_are_not_compensated_as_if_they_were_one() {
     let mut world = World::new();
     world.rest(100, false, &[("ND", 0.9999), ("UNKNOWN", 0.0001)]);

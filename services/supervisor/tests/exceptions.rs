@@ -1,136 +1,19 @@
-//! The navigation model behind the supervisor: epochs, evidence, and what does not fit.
+//! The navigation model behind the supervisor: epochs, and what does not fit.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use vigil_blocks::{
-    Action, ActionOutcome, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind, Symptoms,
-};
+mod told;
+
+use told::{CYCLE_NS, FP, MODEL, Told, assert_near, build, settings, tracked};
+use vigil_blocks::{ActionOutcome, Entry, RecoveryKind, Symptoms};
 use vigil_cycle::allocation::{CountingAllocator, allocations};
 use vigil_decision::{Pomdp, Tracker};
-use vigil_inference::FaultTree;
-use vigil_setup::schema::{GraphFile, Supervisor as Settings};
-use vigil_supervisor::{Inputs, Supervisor};
+use vigil_setup::schema::Supervisor as Settings;
+use vigil_supervisor::Inputs;
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-const CYCLE_NS: u64 = 10_000_000;
-const MODEL: &str = include_str!("../../../config/navigation.pomdp");
-const GRAPH: &str = include_str!("../../../config/corridor-obstacle.toml");
-
-fn settings() -> Settings {
-    toml::from_str::<GraphFile>(GRAPH).unwrap().supervisor
-}
-
-fn tree() -> FaultTree {
-    let config = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
-    vigil_setup::load_tree(&config.join("trees/rover.toml")).unwrap()
-}
-
-fn build(model: &str, settings: &Settings) -> Result<Supervisor, String> {
-    let config = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
-    let robot = vigil_setup::load_robot(&config.join("robots/rover.toml")).unwrap();
-    let model = Pomdp::parse(model).unwrap();
-    Supervisor::new(model, None, &tree(), &robot, settings, Vec::new(), 10)
-        .map_err(|e| e.to_string())
-}
-
-/// A supervisor, and what it is told.
-struct Told {
-    supervisor: Supervisor,
-    action: Action,
-    detection: DetectionBelief,
-    diagnosis: FaultBelief,
-}
-
-impl Told {
-    fn new() -> Self {
-        Self::of(MODEL)
-    }
-
-    fn of(model: &str) -> Self {
-        let mut diagnosis = FaultBelief {
-            tree_hash: tree().hash(),
-            ..FaultBelief::default()
-        };
-        (diagnosis.p[0], diagnosis.p_predicted[0]) = (1.0, 1.0);
-        Self {
-            supervisor: build(model, &settings()).unwrap(),
-            action: Action::default(),
-            detection: DetectionBelief::default(),
-            diagnosis,
-        }
-    }
-
-    /// One cycle with these symptoms.
-    fn cycle(&mut self, symptoms: u32) {
-        self.detection.symptoms = symptoms;
-        self.detection.header.t_capture_ns += CYCLE_NS;
-        self.diagnosis.header.t_capture_ns += CYCLE_NS;
-        let inputs = Inputs {
-            diagnosis: Some(&self.diagnosis),
-            detection: Some(&self.detection),
-        };
-        self.supervisor.step(Entry::Frame(inputs), &mut self.action);
-    }
-
-    fn rest(&mut self, seconds: f64, symptoms: u32) {
-        (0..(seconds * 100.0) as u32).for_each(|_| self.cycle(symptoms));
-    }
-
-    /// The robot reports how the present decision ended.
-    fn ended(&mut self, outcome: ActionOutcome, symptoms: u32) {
-        self.detection.action_seq = self.action.decision_seq;
-        self.detection.action_outcome = outcome as u32;
-        self.cycle(symptoms);
-    }
-
-    /// The identifier's probability of a fault, and what it predicted.
-    fn identify(&mut self, p: f64, predicted: f64) {
-        self.diagnosis.identifying = 1;
-        self.diagnosis.p[0] = 1.0 - p;
-        self.diagnosis.p_predicted[0] = 1.0 - predicted;
-    }
-
-    /// The same of something that no fault of the tree explains.
-    fn unknown(&mut self, p: f64, predicted: f64) {
-        self.identify(p, predicted);
-        self.diagnosis.p_unknown = p;
-        self.diagnosis.p_unknown_predicted = predicted;
-    }
-
-    fn kind(&self) -> RecoveryKind {
-        RecoveryKind::from_wire(self.action.kind).unwrap()
-    }
-
-    fn hp(&self) -> f64 {
-        self.action.belief[2]
-    }
-
-    fn lst(&self) -> f64 {
-        self.action.belief[6]
-    }
-}
-
-/// The belief after these steps, by the tracker alone.
-fn tracked(steps: &[(usize, &str)]) -> Vec<f64> {
-    let model = Pomdp::parse(MODEL).unwrap();
-    let mut tracker = Tracker::new(&model);
-    for (action, name) in steps {
-        let z = model.observations().iter().position(|z| z == name);
-        tracker.update(&model, *action, z.unwrap());
-    }
-    tracker.belief().to_vec()
-}
-
-/// Soft evidence of 1 for every state may round.
-fn assert_near(told: &Told, expected: &[f64]) {
-    for (found, expected) in told.action.belief.iter().zip(expected) {
-        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
-    }
-}
-
-const FP: usize = 0;
 const NP: usize = 1;
 const GO: usize = 3;
 
@@ -203,74 +86,13 @@ fn an_impossible_set_is_counted_and_the_belief_restored() {
 }
 
 #[test]
-fn the_identifiers_evidence_counts_once() {
-    let mut told = Told::new();
-    told.rest(1.0, 0);
-    told.identify(0.5, 0.5);
-    told.cycle(0);
-    assert!(
-        (told.hp() - 0.5).abs() < 1e-9,
-        "it begins to identify: taken over"
-    );
-    let (believed, action) = (told.action.belief, told.action.action as usize);
-    // Data 3 to 1 in favour of a fault in one cycle, then a posterior that no data changes.
-    told.identify(0.75, 0.5);
-    told.cycle(0);
-    told.identify(0.75, 0.75);
-    told.rest(5.0, 0);
-    assert_eq!(told.action.belief, believed, "the epoch has not ended");
-    told.cycle(Symptoms::EPS);
-    let model = Pomdp::parse(MODEL).unwrap();
-    let mut tracker = Tracker::new(&model);
-    tracker.anchor(&believed[..7]);
-    let eps = model.observations().iter().position(|z| z == "EPS");
-    tracker.update(&model, action, eps.unwrap());
-    tracker.weigh(&[1.0, 1.0, 3.0, 1.0, 1.0, 1.0, 1.0]);
-    assert!(
-        tracker.belief()[2] > 0.7,
-        "not so far below the identifier's as to be taken over"
-    );
-    assert_near(&told, tracker.belief());
-}
-
-#[test]
-fn hardware_is_called_help_for_at_once_and_the_call_stands_until_a_new_run() {
-    let mut told = Told::new();
-    told.rest(1.0, 0);
-    told.identify(0.99, 0.9);
-    told.cycle(0);
-    assert_eq!(told.kind(), RecoveryKind::CallForHelp);
-    assert!((told.hp() - 0.99).abs() < 1e-9);
-    let called = told.action.decision_seq;
-    // Help takes its time, and waiting for it mends nothing.
-    told.identify(0.99, 0.99);
-    (told.detection.action_seq, told.detection.action_outcome) =
-        (called, ActionOutcome::Running as u32);
-    told.rest(100.0, 0);
-    assert!(told.hp() > 0.98, "{}", told.hp());
-    // It has come; the model expects it to mend nine times in ten; the identifier still sees it.
-    told.ended(ActionOutcome::Succeeded, 0);
-    assert!(told.hp() > 0.94);
-    // It returns to watching: a robot that stands looks healthy.
-    (told.diagnosis.identifying, told.diagnosis.p[0]) = (0, 1.0);
-    told.cycle(0);
-    assert!(told.hp() < 0.01);
-    told.rest(100.0, Symptoms::EPS);
-    assert_eq!(told.kind(), RecoveryKind::CallForHelp);
-    assert_eq!((told.action.decision_seq, told.action.margin), (called, 0.0));
-    // Whoever has helped begins a new run.
-    (told.diagnosis.run_id, told.detection.run_id) = (1, 1);
-    told.cycle(0);
-    assert_eq!(told.kind(), RecoveryKind::GoOn);
-}
-
-#[test]
 fn a_task_given_up_stays_given_up_until_a_reset() {
     let mut told = Told::of(&MODEL.replace("R: SH : * : * : * -10", "R: SH : * : * : * -900"));
     told.rest(1.0, 0);
     told.identify(0.99, 0.9);
     told.cycle(0);
     assert_eq!(told.kind(), RecoveryKind::GiveUp);
+    assert!(told.hp() > 0.9);
     (told.diagnosis.identifying, told.diagnosis.p[0]) = (0, 1.0);
     told.ended(ActionOutcome::Succeeded, 0);
     told.rest(60.0, 0);
@@ -325,7 +147,11 @@ fn what_the_robot_says_it_could_not_do_mends_nothing() {
         (told.diagnosis.identifying, told.diagnosis.p_unknown) = (0, 0.0);
         told.diagnosis.p[0] = 1.0;
         told.cycle(0);
-        assert_eq!(told.kind(), RecoveryKind::Relocalise, "what jumped has jumped");
+        assert_eq!(
+            told.kind(),
+            RecoveryKind::Relocalise,
+            "what jumped has jumped"
+        );
         let before = told.lst();
         assert!(before > 0.9);
         told.ended(outcome, Symptoms::EPS);
@@ -335,71 +161,6 @@ fn what_the_robot_says_it_could_not_do_mends_nothing() {
     assert!(after > 0.95 * before, "{before} {after}");
     let (_, after) = lost(ActionOutcome::Succeeded);
     assert!(after < 0.9, "{after}");
-}
-
-#[test]
-fn what_is_unknown_is_a_fault_that_nobody_has_modelled_or_a_place_that_is_lost() {
-    // The place is looked for; if that does not explain it, help is called for.
-    let mut told = Told::new();
-    told.rest(1.0, 0);
-    told.unknown(0.999, 0.9);
-    told.cycle(0);
-    assert_eq!(told.kind(), RecoveryKind::Relocalise);
-    assert!((told.hp() + told.lst() - 0.999).abs() < 1e-6);
-    assert!(told.lst() > told.hp(), "losing the way is the more frequent");
-    told.unknown(0.999, 0.999);
-    for _ in 0..2 {
-        told.rest(1.0, 0);
-        told.ended(ActionOutcome::Succeeded, 0);
-    }
-    assert_eq!(told.kind(), RecoveryKind::CallForHelp);
-    assert!(told.hp() > 0.8, "{}", told.hp());
-    // Where no state means a lost robot, it is the hardware's.
-    let mut alone = settings();
-    alone.lost_state = None;
-    let mut told = Told::new();
-    told.supervisor = build(MODEL, &alone).unwrap();
-    told.rest(1.0, 0);
-    told.unknown(0.999, 0.9);
-    told.cycle(0);
-    assert_eq!(told.kind(), RecoveryKind::CallForHelp);
-    assert!((told.hp() - 0.999).abs() < 1e-9);
-}
-
-#[test]
-fn without_the_identifier_the_detectors_alarm_is_heard() {
-    let mut told = Told::new();
-    told.rest(1.0, 0);
-    told.detection.p_fault = 0.3;
-    let mut cycle = |told: &mut Told| {
-        told.detection.header.t_capture_ns += CYCLE_NS;
-        told.supervisor.step(Entry::Missed(1), &mut told.action);
-        let inputs = Inputs {
-            diagnosis: None,
-            detection: Some(&told.detection),
-        };
-        told.supervisor.step(Entry::Frame(inputs), &mut told.action);
-    };
-    (0..20).for_each(|_| cycle(&mut told));
-    assert_eq!(told.action.control_mode, ControlMode::Fallback as u32);
-    assert_eq!(told.kind(), RecoveryKind::GoOn, "no alarm");
-    (told.detection.alarm, told.detection.p_fault) = (1, 0.99);
-    cycle(&mut told);
-    assert_eq!(told.kind(), RecoveryKind::Relocalise);
-    assert!((told.hp() + told.lst() - 0.99).abs() < 1e-6);
-    let believed = told.action.belief;
-    let bad = told.action.impossible_count;
-    told.detection.p_fault = f64::NAN;
-    cycle(&mut told);
-    assert_eq!(told.action.belief, believed);
-    assert_eq!(told.action.impossible_count, bad + 1);
-    // What was hardware stays hardware.
-    let mut told = Told::new();
-    told.identify(0.99, 0.9);
-    told.rest(1.0, 0);
-    (told.detection.alarm, told.detection.p_fault) = (1, 0.99);
-    (0..20).for_each(|_| cycle(&mut told));
-    assert!(told.hp() > 0.94, "{}", told.hp());
 }
 
 #[test]
@@ -418,28 +179,18 @@ fn symptoms_that_cease_while_diagnoses_come_are_missed() {
             3..10 => (2, RecoveryKind::GoOn),
             _ => (2, RecoveryKind::Stop),
         };
-        assert_eq!((told.action.lost_stages, told.kind()), (lost, kind), "{cycle}");
+        assert_eq!(
+            (told.action.lost_stages, told.kind()),
+            (lost, kind),
+            "{cycle}"
+        );
     }
     told.detection.header.t_capture_ns = told.diagnosis.header.t_capture_ns;
     told.cycle(0);
-    assert_eq!((told.action.lost_stages, told.kind()), (0, RecoveryKind::GoOn));
-}
-
-#[test]
-fn a_watching_identifier_says_nothing_and_one_of_another_tree_is_refused() {
-    let mut told = Told::new();
-    told.diagnosis.p[0] = 0.2;
-    told.diagnosis.p_unknown = 0.8;
-    told.rest(20.0, 0);
-    assert_near(&told, &tracked(&[(FP, "none")]));
-    told.diagnosis.tree_hash ^= 1;
-    told.rest(0.05, 0);
-    assert_eq!(told.action.impossible_count, 5);
-    assert_eq!(told.action.lost_stages, 1);
-    assert_eq!(told.action.control_mode, ControlMode::Fallback as u32);
-    // Symptoms are heard all the same.
-    told.cycle(Symptoms::EPM);
-    assert_eq!(told.kind(), RecoveryKind::GoThrough);
+    assert_eq!(
+        (told.action.lost_stages, told.kind()),
+        (0, RecoveryKind::GoOn)
+    );
 }
 
 #[test]

@@ -170,10 +170,14 @@ impl Navigator {
                 let passed_s = *passed_s;
                 return self.look(passed_s);
             }
-            Task::Pass { end_m, passed_s } => {
+            Task::Pass {
+                end_m,
+                passed_s,
+                is_phantom,
+            } => {
                 *passed_s += dt_s;
-                let (end_m, passed_s) = (*end_m, *passed_s);
-                return self.pass(end_m, passed_s, dt_s * scale);
+                let (opening, passed_s) = ((*end_m, *is_phantom), *passed_s);
+                return self.pass(opening, passed_s, dt_s * scale);
             }
             Task::Back { from, passed_s } => {
                 *passed_s += dt_s;
@@ -210,6 +214,8 @@ impl Navigator {
     fn find_place(&mut self) {
         if self.troubles.find_place() {
             self.resets = self.resets.wrapping_add(1);
+            // What blocked was seen from elsewhere.
+            self.block_m = None;
         }
         self.is_anew = true;
     }
