@@ -1,6 +1,7 @@
 //! Decisions about exceptions of the navigation: states are told by symptoms and outcomes.
 
 use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
+use vigil_decision::policy::choose_among;
 use vigil_decision::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
 use vigil_inference::FaultTree;
 use vigil_setup::schema;
@@ -9,7 +10,7 @@ use crate::epoch::{End, Epoch, Limits};
 use crate::hardware::Hardware;
 use crate::mapping::{self, ActionMeaning, SupervisorError};
 use crate::observations::Observations;
-use crate::policy;
+use crate::policy::{self, Worth};
 use crate::silence::Silence;
 use crate::supervisor::Inputs;
 use crate::told::{Decided, Told};
@@ -29,6 +30,7 @@ use crate::told::{Decided, Told};
 pub(crate) struct Exceptions {
     model: Pomdp,
     decider: Decider,
+    worth: Worth,
     tracker: Tracker,
     observations: Observations,
     actions: Vec<ActionMeaning>,
@@ -69,6 +71,7 @@ impl Exceptions {
             .map(|state| Hardware::new(&model, state, lost, tree.hash()));
         let mut exceptions = Self {
             decider,
+            worth: Worth::new(solution, actions.len()),
             tracker: Tracker::new(&model),
             observations: Observations::new(&model)?,
             actions,
@@ -294,7 +297,14 @@ impl Exceptions {
     }
 
     fn choose(&mut self) {
-        let best = self.decider.decide(self.tracker.belief()).choice();
+        let belief = self.tracker.belief();
+        let mut best = self.decider.decide(belief).choice();
+        if let Some(hardware) = &self.hardware
+            && !hardware.allows(best.action)
+        {
+            let values = self.worth.of(&self.decider, belief);
+            best = choose_among(values, |action| hardware.allows(action));
+        }
         self.choice = match self.held {
             Some(held) if held != best.action => Choice {
                 action: held,

@@ -19,6 +19,10 @@
 //! over. Probabilities that the identifier holds against a tracked belief that expects them to have
 //! been mended are taken over too: clearing needs evidence.
 //!
+//! While the identifier says that something is wrong, only what may mend hardware or find a lost
+//! robot's place is done: no look at what blocks the way changes what the identifier sees, and a
+//! policy that expects to know more after any step (Q-MDP does) would look for ever.
+//!
 //! Without the identifier, an alarm of the detector is something unknown, with its probability.
 
 use vigil_blocks::{DetectionBelief, FaultBelief};
@@ -32,6 +36,10 @@ const LOG_EPOCH_MAX: f64 = 300.0;
 const DRIFT_MAX: f64 = 0.05;
 /// A probability may exceed 1 by this much, for rounding.
 const P_TOLERANCE: f64 = 1e-6;
+/// Something is wrong above this probability.
+const WRONG_MIN: f64 = 0.5;
+/// An action mends a state if it leads out of it by this much more than the least that any does.
+const MENDS_MIN: f64 = 1e-6;
 /// Nothing is ever certain.
 const P_MAX: f64 = 1.0 - 1e-6;
 
@@ -71,11 +79,30 @@ pub(crate) struct Hardware {
     before: Option<Context>,
     p: Explained,
     identifies: bool,
+    /// For each action, whether it mends one of the two states.
+    mends: Vec<bool>,
 }
 
 impl Hardware {
     pub(crate) fn new(model: &Pomdp, state: usize, lost: Option<usize>, tree_hash: u64) -> Self {
+        let leaves = |state: usize, action: usize| -> f64 {
+            let elsewhere = model.successors(state, action).iter();
+            elsewhere
+                .filter(|(to, _)| *to != state)
+                .map(|(_, p)| p)
+                .sum()
+        };
+        let actions = 0..model.actions().len();
+        let least = |state| {
+            actions
+                .clone()
+                .map(|a| leaves(state, a))
+                .fold(1.0, f64::min)
+        };
+        let mends = |state: usize, action| leaves(state, action) > least(state) + MENDS_MIN;
+        let either = |action| mends(state, action) || lost.is_some_and(|s| mends(s, action));
         Self {
+            mends: actions.clone().map(either).collect(),
             state,
             lost,
             p_start: model.start().get(state).copied().unwrap_or(0.0),
@@ -195,6 +222,12 @@ impl Hardware {
                 (1.0 - p) * (extra + nothing * b / others) / (lost + nothing)
             };
         }
+    }
+
+    /// True if an action may be taken now.
+    pub(crate) fn allows(&self, action: usize) -> bool {
+        let is_wrong = self.identifies && self.p.any() > WRONG_MIN;
+        !is_wrong || self.mends.get(action).copied().unwrap_or(false) || !self.mends.contains(&true)
     }
 
     /// The hardware's share of what is believed of both states; `None` if neither is.

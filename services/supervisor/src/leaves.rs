@@ -1,17 +1,14 @@
 //! Decisions about the leaves of the fault tree: states are told by the identifier.
 
 use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
-use vigil_decision::policy::Measure;
-use vigil_decision::{
-    Choice, Control, Decider, Evidence, PointBased, Policy, Pomdp, QMdp, Tracker, mdp,
-};
+use vigil_decision::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
 use vigil_setup::schema;
 
 use crate::evidence::{self, Effect, Gathered};
 use crate::mapping::{self, ActionMeaning, Compensation, StateMeaning, SupervisorError};
-use crate::policy;
+use crate::policy::{self, Worth};
 use crate::restraint::Restraint;
 use crate::silence::Silence;
 use crate::supervisor::Inputs;
@@ -21,9 +18,7 @@ use crate::told::{Decided, Told};
 pub(crate) struct Leaves {
     model: Pomdp,
     decider: Decider,
-    /// What actions are worth where the decider does not say.
-    worth: QMdp,
-    worths: Vec<f64>,
+    worth: Worth,
     tree_hash: u64,
     tracker: Tracker,
     states: Vec<StateMeaning>,
@@ -69,8 +64,7 @@ impl Leaves {
         let decider = policy::decider(&model, &solution, solved, settings)?;
         let mut supervisor = Self {
             decider,
-            worth: QMdp::new(solution),
-            worths: vec![0.0; actions.len()],
+            worth: Worth::new(solution, actions.len()),
             tree_hash: tree.hash(),
             tracker: Tracker::new(&model),
             silence: Silence::new(blind_after_misses),
@@ -231,12 +225,7 @@ impl Leaves {
 
     fn decide(&mut self, timed: bool) {
         let best = self.decider.decide(self.tracker.belief()).choice();
-        let values = if self.decider.measure() == Measure::Value {
-            self.decider.values()
-        } else {
-            self.worth.evaluate(self.tracker.belief(), &mut self.worths);
-            &self.worths
-        };
+        let values = self.worth.of(&self.decider, self.tracker.belief());
         let current = self.decided.map(|decided| decided.action);
         self.choice = self
             .restraint

@@ -61,6 +61,8 @@ pub struct Navigator {
     pub(super) touched: bool,
     pub(super) at_goal: bool,
     is_helped: bool,
+    /// The robot has found itself elsewhere.
+    is_found: bool,
     /// The plan begins anew where the robot is, with the next pose.
     pub(super) is_anew: bool,
     pub(super) happening: Option<Happening>,
@@ -93,6 +95,7 @@ impl Navigator {
             touched: false,
             at_goal: false,
             is_helped: false,
+            is_found: false,
             is_anew: false,
             happening: None,
             settings: settings.clone(),
@@ -160,6 +163,11 @@ impl Navigator {
         std::mem::take(&mut self.is_helped)
     }
 
+    /// True once, when the robot has found itself elsewhere than it believed to be.
+    pub fn found(&mut self) -> bool {
+        std::mem::take(&mut self.is_found)
+    }
+
     fn pursue(&mut self, dt_s: f64, scale: f64) -> DriveCommand {
         let (think_s, help_s) = (self.settings.think_s, self.settings.help_s);
         match &mut self.task {
@@ -214,6 +222,7 @@ impl Navigator {
     fn find_place(&mut self) {
         if self.troubles.find_place() {
             self.resets = self.resets.wrapping_add(1);
+            self.is_found = true;
             // What blocked was seen from elsewhere.
             self.block_m = None;
         }
