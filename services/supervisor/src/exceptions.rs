@@ -21,9 +21,9 @@ use crate::told::{Decided, Told};
 /// soft evidence. An action that is not done mends nothing: where the robot says that it failed,
 /// where it takes longer than any may, and where a symptom rises before its end, the step is one of
 /// following the path. Only of what reports its outcome as an observation (GO, NP) the failure is a
-/// step of its own: the model knows what it says that no outcome came. A set that is impossible after the action, or of which the model has no
-/// observation, is counted, and the belief becomes the prediction with 0.01 of the start belief
-/// mixed in.
+/// step of its own: the model knows what it says that no outcome came. A set that is impossible
+/// after the action, or of which the model has no observation, is counted, and the belief becomes
+/// the prediction with 0.01 of the start belief mixed in.
 ///
 /// A call for help, or a task given up, stands until a new run or a reset, whatever is believed
 /// meanwhile: a robot that stands looks healthy.
@@ -226,8 +226,22 @@ impl Exceptions {
         self.actions.iter().position(follows).unwrap_or(action)
     }
 
+    /// What the end of an action says about the unknown.
+    fn remember(&mut self, set: u32, end: End) {
+        let kind = self.kind(self.choice.action);
+        let Some(hardware) = &mut self.hardware else {
+            return;
+        };
+        match kind {
+            RecoveryKind::Relocalise if end != End::Unfinished => hardware.sought(),
+            RecoveryKind::GoOn if set == 0 => hardware.quiet(),
+            _ => {}
+        }
+    }
+
     /// One step of the model.
     fn track(&mut self, set: u32, end: End) {
+        self.remember(set, end);
         let action = self.step_of(end);
         let evidence = match self.observations.of(set) {
             Some(z) => self.tracker.update(&self.model, action, z),

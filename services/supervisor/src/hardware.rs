@@ -19,9 +19,13 @@
 //! over. Probabilities that the identifier holds against a tracked belief that expects them to have
 //! been mended are taken over too: clearing needs evidence.
 //!
+//! A robot that has sought its place, and found it or not, has done what it can about a lost place:
+//! what is unknown then is the hardware's, until an epoch of following the path was quiet and the
+//! identifier saw nothing. (A robot that finds itself elsewhere begins a new run.)
+//!
 //! While the identifier says that something is wrong, only what may mend hardware or find a lost
-//! robot's place is done: no look at what blocks the way changes what the identifier sees, and a
-//! policy that expects to know more after any step (Q-MDP does) would look for ever.
+//! robot's place, once, is done: no look at what blocks the way changes what the identifier sees,
+//! and a policy that expects to know more after any step (Q-MDP does) would look for ever.
 //!
 //! Without the identifier, an alarm of the detector is something unknown, with its probability.
 
@@ -79,8 +83,10 @@ pub(crate) struct Hardware {
     before: Option<Context>,
     p: Explained,
     identifies: bool,
-    /// For each action, whether it mends one of the two states.
-    mends: Vec<bool>,
+    /// The robot has sought its place.
+    has_sought: bool,
+    /// For each action, whether it mends the hardware, and whether it finds a lost robot's place.
+    mends: Vec<[bool; 2]>,
 }
 
 impl Hardware {
@@ -100,9 +106,9 @@ impl Hardware {
                 .fold(1.0, f64::min)
         };
         let mends = |state: usize, action| leaves(state, action) > least(state) + MENDS_MIN;
-        let either = |action| mends(state, action) || lost.is_some_and(|s| mends(s, action));
+        let both = |action| [Some(state), lost].map(|s| s.is_some_and(|s| mends(s, action)));
         Self {
-            mends: actions.clone().map(either).collect(),
+            mends: actions.clone().map(both).collect(),
             state,
             lost,
             p_start: model.start().get(state).copied().unwrap_or(0.0),
@@ -111,6 +117,7 @@ impl Hardware {
             before: None,
             p: Explained::default(),
             identifies: false,
+            has_sought: false,
         }
     }
 
@@ -195,8 +202,9 @@ impl Hardware {
         let of = |state: usize| belief.get(state).copied().unwrap_or(0.0);
         let hardware = of(self.state);
         let either = hardware + self.lost.map_or(0.0, of);
+        let explained = if self.has_sought { hardware } else { either };
         self.identifies
-            && (hardware < self.p.modelled - DRIFT_MAX || either < self.p.any() - DRIFT_MAX)
+            && (hardware < self.p.modelled - DRIFT_MAX || explained < self.p.any() - DRIFT_MAX)
     }
 
     /// Writes `belief` with the identifier's probabilities of the states into `weights`.
@@ -224,14 +232,30 @@ impl Hardware {
         }
     }
 
+    /// The robot has sought its place.
+    pub(crate) const fn sought(&mut self) {
+        self.has_sought = true;
+    }
+
+    /// An epoch of following the path was quiet.
+    pub(crate) const fn quiet(&mut self) {
+        self.has_sought &= self.identifies;
+    }
+
     /// True if an action may be taken now.
     pub(crate) fn allows(&self, action: usize) -> bool {
+        let may_mend = |[hardware, place]: &[bool; 2]| *hardware || (*place && !self.has_sought);
         let is_wrong = self.identifies && self.p.any() > WRONG_MIN;
-        !is_wrong || self.mends.get(action).copied().unwrap_or(false) || !self.mends.contains(&true)
+        !is_wrong
+            || self.mends.get(action).is_some_and(may_mend)
+            || !self.mends.iter().any(may_mend)
     }
 
     /// The hardware's share of what is believed of both states; `None` if neither is.
     fn share(&self, belief: &[f64]) -> Option<f64> {
+        if self.has_sought {
+            return Some(1.0);
+        }
         let of = |state: usize| belief.get(state).copied().unwrap_or(0.0);
         let (hardware, lost) = (of(self.state), self.lost.map_or(0.0, of));
         let both = hardware + lost;
@@ -248,6 +272,7 @@ impl Hardware {
     pub(crate) fn reset(&mut self) {
         self.forget();
         (self.identifies, self.p) = (false, Explained::default());
+        self.has_sought = false;
     }
 
     const fn clear(&mut self) {

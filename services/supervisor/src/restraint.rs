@@ -41,8 +41,9 @@ impl Restraint {
     }
 
     /// The action to take. `current` is the present action, `best` the policy's choice, `values`
-    /// every action's value (no votes, no entropies), `timed` is true once per epoch. The margin is to the best of the
-    /// other actions that are allowed; 0 where the present action is held against a better one.
+    /// every action's value (no votes, no entropies), `timed` is true once per epoch. The margin is
+    /// to the best of the other actions that are allowed; 0 where the present action is held
+    /// against a better one.
     pub(crate) fn decide(
         &mut self,
         current: Option<usize>,

@@ -146,8 +146,7 @@ fn what_the_robot_says_it_could_not_do_mends_nothing() {
         told.cycle(0);
         assert_eq!(told.kind(), RecoveryKind::Relocalise);
         // The identifier has no more to say.
-        (told.diagnosis.identifying, told.diagnosis.p_unknown) = (0, 0.0);
-        told.diagnosis.p[0] = 1.0;
+        told.nothing();
         told.cycle(0);
         assert_eq!(
             told.kind(),

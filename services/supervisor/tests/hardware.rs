@@ -89,13 +89,11 @@ fn what_is_unknown_is_a_fault_that_nobody_has_modelled_or_a_place_that_is_lost()
         "losing the way is the more frequent"
     );
     told.unknown(0.999, 0.999);
-    for _ in 0..2 {
-        told.ended(ActionOutcome::Succeeded, 0);
-        assert_eq!(told.kind(), RecoveryKind::Relocalise);
-    }
+    told.rest(1.0, 0);
+    assert_eq!(told.kind(), RecoveryKind::Relocalise);
     told.ended(ActionOutcome::Succeeded, 0);
     assert_eq!(told.kind(), RecoveryKind::CallForHelp);
-    assert!(told.hp() > 0.8, "{}", told.hp());
+    assert!(told.hp() > 0.99, "{}", told.hp());
     // Where no state means a lost robot, it is the hardware's.
     let mut alone = settings();
     alone.lost_state = None;
@@ -106,6 +104,55 @@ fn what_is_unknown_is_a_fault_that_nobody_has_modelled_or_a_place_that_is_lost()
     told.cycle(0);
     assert_eq!(told.kind(), RecoveryKind::CallForHelp);
     assert!((told.hp() - 0.999).abs() < 1e-9);
+}
+
+#[test]
+fn what_comes_back_after_the_place_was_sought_is_hardware_until_it_was_quiet() {
+    for (seconds, kind) in [
+        (5.0, RecoveryKind::CallForHelp),
+        (40.0, RecoveryKind::Relocalise),
+    ] {
+        for outcome in [ActionOutcome::Succeeded, ActionOutcome::Failed] {
+            let mut told = Told::new();
+            told.unknown(0.999, 0.9);
+            told.cycle(0);
+            assert_eq!(told.kind(), RecoveryKind::Relocalise);
+            // A robot that stands looks healthy; when it drives on, there it is again.
+            told.nothing();
+            told.cycle(0);
+            told.ended(outcome, 0);
+            if outcome == ActionOutcome::Failed {
+                told.ended(ActionOutcome::Succeeded, 0);
+            }
+            assert_eq!(told.kind(), RecoveryKind::GoOn);
+            told.rest(seconds, 0);
+            told.unknown(0.999, 0.9);
+            told.cycle(0);
+            assert_eq!(told.kind(), kind, "{seconds} {outcome:?}");
+        }
+    }
+}
+
+#[test]
+fn while_something_is_wrong_only_what_may_mend_it_is_done() {
+    // The path is blocked, and nobody knows what is wrong with the robot besides.
+    for policy in ["qmdp", "mls", "av", "fib"] {
+        let mut settings = settings();
+        settings.policy = policy.into();
+        let mut told = Told::new();
+        told.supervisor = build(MODEL, &settings).unwrap();
+        told.rest(1.0, 0);
+        told.cycle(Symptoms::EPM);
+        assert_eq!(told.kind(), RecoveryKind::GoThrough, "{policy}");
+        told.unknown(0.7, 0.69);
+        for _ in 0..6 {
+            told.cycle(Symptoms::EPM);
+            let mends = [RecoveryKind::Relocalise, RecoveryKind::CallForHelp];
+            assert!(mends.contains(&told.kind()), "{policy}: {:?}", told.kind());
+            told.ended(ActionOutcome::Succeeded, Symptoms::EPM);
+        }
+        assert_eq!(told.kind(), RecoveryKind::CallForHelp, "{policy}");
+    }
 }
 
 #[test]

@@ -93,6 +93,12 @@ impl Told {
         self.diagnosis.p_unknown_predicted = predicted;
     }
 
+    /// It watches.
+    pub fn nothing(&mut self) {
+        self.unknown(0.0, 0.0);
+        self.diagnosis.identifying = 0;
+    }
+
     pub fn kind(&self) -> RecoveryKind {
         RecoveryKind::from_wire(self.action.kind).unwrap()
     }

@@ -56,7 +56,8 @@ fn durations(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
     let longest_s = file.navigation.as_ref().map(Navigation::longest_action_s);
     if let Some(longest_s) = longest_s.filter(|longest_s| settings.action_max_s < *longest_s) {
         let message = format!(
-            "{} is too short: with these durations of [navigation] an action may run for {longest_s}",
+            "{} is too short: with these durations of [navigation] an action may run for \
+             {longest_s}",
             settings.action_max_s
         );
         report("supervisor.action_max_s", message);
