@@ -231,6 +231,22 @@ fn a_mislocalised_robot_finds_its_place() {
     }
 }
 
+/// Before a wall and without a loop it looks like any robot whose way is blocked: a person knows.
+#[test]
+fn by_symptoms_alone_a_lost_robot_that_does_not_loop_calls_for_help() {
+    let place = [0.3, 0.9, 0.4];
+    let mut corridor = troubled(TroubleKind::Mislocalised, 5.0, place);
+    let settings = &mut corridor.setup.file.supervisor;
+    (settings.hardware_state, settings.lost_state) = (None, None);
+    corridor.supervisor = vigil_supervisor::assemble(&corridor.setup).unwrap();
+    corridor.drive(80.0);
+    let mut expected = vec!["FP", "+EPM", "GO", "+EPS", "+EPM", "+EPS", "GO failed"];
+    expected.extend(["NP", "NP failed"].repeat(3));
+    expected.extend(["GO", "GO failed"].repeat(3));
+    expected.extend(["SH", "SH done", "FP", "goal"]);
+    assert_eq!(corridor.told, expected);
+}
+
 #[test]
 fn a_wrong_heading_is_corrected() {
     for yaw_rad in [1.8, 0.8, -0.8] {
