@@ -148,3 +148,76 @@ fn a_jump_of_the_frame_begins_anew_and_half_a_frame_changes_nothing() {
     robot.monitors.reset();
     assert_eq!(robot.monitors.symptoms(), 0);
 }
+
+#[test]
+fn without_a_plan_for_long_the_robot_is_not_where_it_should_be() {
+    let mut robot = Watched::new();
+    let whole = robot.frame.valid;
+    // A planner that has never spoken says nothing.
+    robot.frame.valid = Valid::POSE;
+    assert!((0..50).all(|_| robot.at([0.0; 3], [0.0; 3]) == 0));
+    robot.frame.valid = whole;
+    assert_eq!(robot.at([0.0; 3], [0.0; 3]), 0);
+    // It dies. The robot goes on, then stops.
+    robot.frame.valid = Valid::POSE;
+    let fired: Vec<u32> = (1..=12)
+        .map(|k| robot.at([0.05 * f64::from(k), 0.0, 0.0], [0.0; 3]))
+        .collect();
+    assert_eq!(fired[..9], [0; 9]);
+    assert_eq!(fired[9..], [Symptoms::EPM; 3]);
+    let stopped = (1..=40).find(|_| robot.at([0.6, 0.0, 0.0], [0.0; 3]) == Symptoms::EPS);
+    assert!(stopped.is_some_and(|k| k > 15), "{stopped:?}");
+    // Without a pose nothing can be said.
+    robot.frame.valid = Valid::PLANNED_POSE;
+    assert_eq!(robot.at([0.6, 0.0, 0.0], [0.0; 3]), 0);
+    // Both are back: everything begins anew.
+    robot.frame.valid = whole;
+    assert_eq!(robot.at([0.6, 0.0, 0.0], [0.3, 0.0, 0.0]), 0);
+    assert_eq!(robot.at([0.6, 0.0, 0.0], [0.0; 3]), Symptoms::EPM);
+}
+
+#[test]
+fn an_error_in_position_does_not_outlive_the_pose() {
+    let mut robot = Watched::new();
+    robot.at([0.0; 3], [0.0; 3]);
+    assert_eq!(robot.at([2.0, 0.0, 0.0], [0.0; 3]), Symptoms::EPM);
+    robot.frame.valid = Valid::PLANNED_POSE;
+    let fired: Vec<u32> = (0..11)
+        .map(|_| robot.at([2.0, 0.0, 0.0], [0.0; 3]))
+        .collect();
+    assert_eq!(fired[..9], [Symptoms::EPM; 9]);
+    assert_eq!(fired[9..], [0; 2]);
+}
+
+#[test]
+fn a_loop_and_a_spin_end_when_the_robot_stands() {
+    let mut robot = Watched::new();
+    for k in 0..=80 {
+        robot.at(round(k), [0.05 * f64::from(k), 0.0, 0.0]);
+    }
+    let planned = [4.0, 0.0, 0.0];
+    let fires = |robot: &mut Watched, pose, symptom| {
+        let fired: Vec<bool> = (0..150)
+            .map(|_| robot.at(pose, planned) & symptom != 0)
+            .collect();
+        assert!(fired[..90].iter().all(|fires| *fires));
+        assert!(fired[100..].iter().all(|fires| !fires));
+    };
+    fires(&mut robot, round(80), Symptoms::LD);
+    // On the spot, once round; then it stands; then once round again.
+    let mut robot = Watched::new();
+    let spin = |robot: &mut Watched| {
+        (1..=64)
+            .map(|k| robot.at([4.0, 0.0, wrapped(0.1 * f64::from(k))], planned))
+            .last()
+    };
+    for _ in 0..2 {
+        robot.at([4.0, 0.0, 0.0], planned);
+        assert_eq!(spin(&mut robot), Some(Symptoms::SD));
+        fires(&mut robot, [4.0, 0.0, wrapped(6.4)], Symptoms::SD);
+    }
+}
+
+fn wrapped(yaw_rad: f64) -> f64 {
+    (yaw_rad + PI).rem_euclid(TAU) - PI
+}

@@ -38,10 +38,15 @@ impl Simulation {
         };
         let command = self.obedience.apply(planned, action, now_ns);
         self.world.step(dt_s, command);
-        if self.navigator.as_mut().is_some_and(Navigator::helped) {
+        let helped = self.navigator.as_mut().is_some_and(Navigator::helped);
+        if helped {
             // Mending what is broken cannot fail: everything that can be broken can be mended.
             let _ = self.world.change(Change::ClearAll);
-            // Whoever has helped begins a new run: the filters forget what is no longer so.
+        }
+        // Whoever has helped begins a new run, and so does a robot that finds itself elsewhere: the
+        // filters forget what is no longer so, or never was.
+        let found = self.navigator.as_mut().is_some_and(Navigator::found);
+        if helped || found {
             self.world.begin_run();
         }
         command

@@ -12,8 +12,16 @@
 //! reason it is taken over when the tracked belief has drifted from it: products lose what lost
 //! diagnoses carried, and a fault that the decision model expects to mend must not fade while the
 //! robot stands still and shows nothing. Clearing needs evidence, and the identifier has it.
+//!
+//! States exclude each other, faults do not: what is taken over goes by the identifier's exact
+//! sets of faults. A set of one stuck wheel, whatever encoders are broken with it, is the state of
+//! that wheel: to counter-steer for it is right then. A set of encoders is shared among them. A set
+//! of two or more stuck wheels is UNKNOWN: the yaw of one wheel alone is not what the robot does,
+//! and counter-steering for it would lead off the path. What the sets that are reported leave of a
+//! leaf's probability counts for the leaf. Quotients are of single leaves, and the drift from the
+//! sets, which is looked at in each epoch, bounds what they may say about several.
 
-use vigil_blocks::{DECISION_STATES, FaultBelief};
+use vigil_blocks::{DECISION_STATES, FaultBelief, FaultSet};
 
 use crate::mapping::StateMeaning;
 
@@ -121,10 +129,39 @@ pub(crate) fn weights(diagnosis: &FaultBelief, states: &[StateMeaning], weights:
     for (weight, meaning) in weights.iter_mut().zip(states) {
         *weight = probabilities(diagnosis, *meaning).0;
     }
+    for set in reported(diagnosis).filter(|set| set.leaves.count_ones() > 1) {
+        divide(set, states, weights);
+    }
+}
+
+/// The sets in use.
+fn reported(diagnosis: &FaultBelief) -> impl Iterator<Item = &FaultSet> {
+    diagnosis.sets.iter().take(diagnosis.set_count as usize)
+}
+
+/// Takes the probability of a set of several faults from its leaves, and gives it to the one state
+/// that it is.
+fn divide(set: &FaultSet, states: &[StateMeaning], weights: &mut [f64]) {
+    let is_in = |meaning: &StateMeaning| {
+        let bit = meaning.node.and_then(|node| 1_u64.checked_shl(node as u32));
+        bit.is_some_and(|bit| set.leaves & bit != 0)
+    };
+    let stuck = states.iter().filter(|m| is_in(m) && m.stuck).count();
+    let share = match stuck {
+        0 => set.p / f64::from(set.leaves.count_ones()),
+        _ => 0.0,
+    };
+    for (weight, meaning) in weights.iter_mut().zip(states) {
+        if is_in(meaning) && !(stuck == 1 && meaning.stuck) {
+            *weight = (*weight - set.p).max(0.0) + share;
+        } else if stuck > 1 && meaning.node.is_none() {
+            *weight += set.p;
+        }
+    }
 }
 
 /// True if a diagnosis speaks of the tree with `tree_hash` and gives every state a probability,
-/// and some state more than 0.
+/// and some state more than 0; and if its sets have probabilities.
 pub(crate) fn is_sound(diagnosis: &FaultBelief, states: &[StateMeaning], tree_hash: u64) -> bool {
     let mut sum = 0.0;
     for meaning in states {
@@ -137,7 +174,8 @@ pub(crate) fn is_sound(diagnosis: &FaultBelief, states: &[StateMeaning], tree_ha
         }
         sum += p;
     }
-    sum > 0.0 && diagnosis.tree_hash == tree_hash
+    let sets = reported(diagnosis).all(|set| (0.0..=1.0 + P_TOLERANCE).contains(&set.p));
+    sets && sum > 0.0 && diagnosis.tree_hash == tree_hash
 }
 
 /// True if `belief` is too far from the identifier's, given as `weights` that need not sum to 1.

@@ -1,15 +1,35 @@
-//! What the identifier says about one state of the decision model: that of hardware faults.
+//! What the identifier says about two states of the decision model: that of hardware faults, and
+//! that of a robot that is lost.
 //!
-//! The state's likelihood is the identifier's probability of any fault of its tree, divided by what
-//! it predicted before the cycle's data; that of every other state is the same of the complement.
+//! The identifier explains what it sees in one of three ways: nothing is wrong, a fault of its
+//! tree, or something unknown. A state's likelihood is the identifier's probability of the
+//! explanations that fit it, divided by what it predicted for them before the cycle's data:
+//!
+//! - hardware: a fault of the tree, or unknown. Something is wrong, and a fault that nobody has
+//!   modelled is a fault;
+//! - lost: nothing, or unknown. A pose that jumps moves as no model of the robot does; a robot
+//!   that lost its way little by little moves as any;
+//! - every other state: nothing.
+//!
 //! Quotients are summed, as logarithms, over an epoch. While the identifier watches, it says
 //! nothing about faults, and there is no evidence. When it begins to identify, returns to watching
-//! or names another mode, quotients mean little and its probability is taken over; the model's
-//! start belief in the state is the least that is taken over. A posterior that the identifier
-//! holds against a tracked belief that expects a fault to have been mended is taken over too:
-//! clearing needs evidence.
+//! or names another mode, quotients mean little and its probabilities are taken over: of a fault of
+//! the tree by the hardware state, of unknown by both, as they were believed before, of nothing by
+//! all but hardware. The model's start belief in the hardware state is the least that is taken
+//! over. Probabilities that the identifier holds against a tracked belief that expects them to have
+//! been mended are taken over too: clearing needs evidence.
+//!
+//! A robot that has sought its place, and found it or not, has done what it can about a lost place:
+//! what is unknown then is the hardware's, until an epoch of following the path was quiet and the
+//! identifier saw nothing. (A robot that finds itself elsewhere begins a new run.)
+//!
+//! While the identifier says that something is wrong, only what may mend hardware or find a lost
+//! robot's place, once, is done: no look at what blocks the way changes what the identifier sees,
+//! and a policy that expects to know more after any step (Q-MDP does) would look for ever.
+//!
+//! Without the identifier, an alarm of the detector is something unknown, with its probability.
 
-use vigil_blocks::FaultBelief;
+use vigil_blocks::{DetectionBelief, FaultBelief};
 use vigil_decision::Pomdp;
 
 /// One cycle can change the odds by this factor at most, as a logarithm.
@@ -20,32 +40,84 @@ const LOG_EPOCH_MAX: f64 = 300.0;
 const DRIFT_MAX: f64 = 0.05;
 /// A probability may exceed 1 by this much, for rounding.
 const P_TOLERANCE: f64 = 1e-6;
+/// Something is wrong above this probability.
+const WRONG_MIN: f64 = 0.5;
+/// An action mends a state if it leads out of it by this much more than the least that any does.
+const MENDS_MIN: f64 = 1e-6;
 /// Nothing is ever certain.
 const P_MAX: f64 = 1.0 - 1e-6;
 
-/// The state, and the evidence of the present epoch.
+/// Probabilities of the explanations; what is left is that nothing is wrong.
+#[derive(Debug, Clone, Copy, Default)]
+struct Explained {
+    modelled: f64,
+    unknown: f64,
+}
+
+impl Explained {
+    fn new(p_nominal: f64, p_unknown: f64) -> Self {
+        let unknown = p_unknown.clamp(0.0, 1.0);
+        Self {
+            modelled: (1.0 - p_nominal - unknown).clamp(0.0, 1.0),
+            unknown,
+        }
+    }
+
+    fn any(self) -> f64 {
+        (self.modelled + self.unknown).min(1.0)
+    }
+}
+
+/// Whose words, of which start, in which mode: quotients are good while this stays.
+type Context = (bool, u64, u32, u32);
+
+/// The states, and the evidence of the present epoch.
 #[derive(Debug, Clone)]
 pub(crate) struct Hardware {
     state: usize,
+    lost: Option<usize>,
     p_start: f64,
     tree_hash: u64,
-    /// Sums of logarithms: of the state, of the others.
-    log: [f64; 2],
-    before: Option<(u64, u32, u32)>,
-    p: f64,
+    /// Sums of logarithms: of the hardware state, of the lost robot's, of the others.
+    log: [f64; 3],
+    before: Option<Context>,
+    p: Explained,
     identifies: bool,
+    /// The robot has sought its place.
+    has_sought: bool,
+    /// For each action, whether it mends the hardware, and whether it finds a lost robot's place.
+    mends: Vec<[bool; 2]>,
 }
 
 impl Hardware {
-    pub(crate) fn new(model: &Pomdp, state: usize, tree_hash: u64) -> Self {
+    pub(crate) fn new(model: &Pomdp, state: usize, lost: Option<usize>, tree_hash: u64) -> Self {
+        let leaves = |state: usize, action: usize| -> f64 {
+            let elsewhere = model.successors(state, action).iter();
+            elsewhere
+                .filter(|(to, _)| *to != state)
+                .map(|(_, p)| p)
+                .sum()
+        };
+        let actions = 0..model.actions().len();
+        let least = |state| {
+            actions
+                .clone()
+                .map(|a| leaves(state, a))
+                .fold(1.0, f64::min)
+        };
+        let mends = |state: usize, action| leaves(state, action) > least(state) + MENDS_MIN;
+        let both = |action| [Some(state), lost].map(|s| s.is_some_and(|s| mends(s, action)));
         Self {
+            mends: actions.clone().map(both).collect(),
             state,
+            lost,
             p_start: model.start().get(state).copied().unwrap_or(0.0),
             tree_hash,
-            log: [0.0; 2],
+            log: [0.0; 3],
             before: None,
-            p: 0.0,
+            p: Explained::default(),
             identifies: false,
+            has_sought: false,
         }
     }
 
@@ -61,25 +133,26 @@ impl Hardware {
         p.iter().all(is_probability) && diagnosis.tree_hash == self.tree_hash
     }
 
-    /// Takes a diagnosis; true if the identifier's probability is to be taken over.
+    /// Takes a diagnosis; true if the identifier's probabilities are to be taken over.
     pub(crate) fn add(&mut self, diagnosis: &FaultBelief) -> bool {
-        let FaultBelief {
-            identifying,
-            mode_change_count,
-            ..
-        } = *diagnosis;
-        let now = (diagnosis.header.epoch, identifying, mode_change_count);
-        let before = self.before.replace(now);
-        let p = faulty(diagnosis.p[0], diagnosis.p_unknown);
-        let predicted = faulty(diagnosis.p_predicted[0], diagnosis.p_unknown_predicted);
-        (self.p, self.identifies) = (p, identifying != 0);
-        if before != Some(now) {
-            self.clear();
-            let identified = before.is_some_and(|(_, identified, _)| identified != 0);
-            return self.identifies || identified;
+        let identifies = diagnosis.identifying != 0;
+        let now = (
+            true,
+            diagnosis.header.epoch,
+            diagnosis.identifying,
+            diagnosis.mode_change_count,
+        );
+        let p = Explained::new(diagnosis.p[0], diagnosis.p_unknown);
+        if self.enter(now, identifies, p) {
+            return true;
         }
         if self.identifies {
-            let ratios = [p / predicted, (1.0 - p) / (1.0 - predicted)];
+            let predicted = Explained::new(diagnosis.p_predicted[0], diagnosis.p_unknown_predicted);
+            let ratios = [
+                p.any() / predicted.any(),
+                (1.0 - p.modelled) / (1.0 - predicted.modelled),
+                (1.0 - p.any()) / (1.0 - predicted.any()),
+            ];
             for (sum, ratio) in self.log.iter_mut().zip(ratios) {
                 *sum = (*sum + log(ratio)).clamp(-LOG_EPOCH_MAX, LOG_EPOCH_MAX);
             }
@@ -87,26 +160,61 @@ impl Hardware {
         false
     }
 
+    /// Takes a detection in the identifier's place; true if its probability is to be taken over.
+    pub(crate) fn add_alarm(&mut self, detection: &DetectionBelief) -> bool {
+        let DetectionBelief { alarm, p_fault, .. } = *detection;
+        let now = (false, detection.header.epoch, alarm, detection.alarm_count);
+        let p = Explained::new(1.0 - p_fault, p_fault);
+        self.enter(now, alarm != 0, p)
+    }
+
+    /// True if the context has changed and what is said now, or was said before, is a fault.
+    fn enter(&mut self, now: Context, identifies: bool, p: Explained) -> bool {
+        let before = self.before.replace(now);
+        let identified = std::mem::replace(&mut self.identifies, identifies);
+        self.p = match identifies {
+            true => p,
+            false => Explained::default(),
+        };
+        let is_new = before != Some(now);
+        if is_new {
+            self.clear();
+        }
+        is_new && (identifies || identified)
+    }
+
     /// Writes the likelihood of every state, the larger being 1, and begins anew.
     pub(crate) fn take(&mut self, likelihood: &mut [f64]) {
-        let [state, others] = self.log;
-        let max = state.max(others);
+        let [state, lost, others] = self.log;
+        let lost = self.lost.map(|index| (index, lost));
+        let max = lost.map_or(state, |(_, lost)| state.max(lost)).max(others);
         likelihood.fill((others - max).exp());
-        if let Some(l) = likelihood.get_mut(self.state) {
-            *l = (state - max).exp();
+        for (index, log) in lost.into_iter().chain([(self.state, state)]) {
+            if let Some(l) = likelihood.get_mut(index) {
+                *l = (log - max).exp();
+            }
         }
         self.clear();
     }
 
     /// True if `belief` expects a fault to be mended that the identifier still sees.
     pub(crate) fn has_drifted(&self, belief: &[f64]) -> bool {
-        let tracked = belief.get(self.state).copied().unwrap_or(0.0);
-        self.identifies && tracked < self.p - DRIFT_MAX
+        let of = |state: usize| belief.get(state).copied().unwrap_or(0.0);
+        let hardware = of(self.state);
+        let either = hardware + self.lost.map_or(0.0, of);
+        let explained = if self.has_sought { hardware } else { either };
+        self.identifies
+            && (hardware < self.p.modelled - DRIFT_MAX || explained < self.p.any() - DRIFT_MAX)
     }
 
-    /// Writes `belief` with the identifier's probability of the state into `weights`.
+    /// Writes `belief` with the identifier's probabilities of the states into `weights`.
     pub(crate) fn anchored(&self, belief: &[f64], start: &[f64], weights: &mut [f64]) {
-        let p = self.p.clamp(self.p_start, P_MAX);
+        let Explained { modelled, unknown } = self.p;
+        let share = [belief, start].into_iter().find_map(|of| self.share(of));
+        let share = share.unwrap_or(1.0);
+        let p = (modelled + unknown * share).clamp(self.p_start, P_MAX);
+        let lost = unknown * (1.0 - share);
+        let nothing = (1.0 - modelled - unknown).max(1.0 - P_MAX);
         let rest = |of: &[f64]| -> f64 {
             let others = of.iter().enumerate().filter(|(s, _)| *s != self.state);
             others.map(|(_, b)| b).sum()
@@ -115,29 +223,61 @@ impl Hardware {
         let of = if rest(belief) > 0.0 { belief } else { start };
         let others = rest(of);
         for (s, (weight, b)) in weights.iter_mut().zip(of).enumerate() {
+            let extra = if self.lost == Some(s) { lost } else { 0.0 };
             *weight = if s == self.state {
                 p
             } else {
-                (1.0 - p) * b / others
+                (1.0 - p) * (extra + nothing * b / others) / (lost + nothing)
             };
         }
     }
 
-    /// The next diagnosis begins anew.
+    /// The robot has sought its place.
+    pub(crate) const fn sought(&mut self) {
+        self.has_sought = true;
+    }
+
+    /// An epoch of following the path was quiet.
+    pub(crate) const fn quiet(&mut self) {
+        self.has_sought &= self.identifies;
+    }
+
+    /// True if an action may be taken now.
+    pub(crate) fn allows(&self, action: usize) -> bool {
+        let may_mend = |[hardware, place]: &[bool; 2]| *hardware || (*place && !self.has_sought);
+        let is_wrong = self.identifies && self.p.any() > WRONG_MIN;
+        !is_wrong
+            || self.mends.get(action).is_some_and(may_mend)
+            || !self.mends.iter().any(may_mend)
+    }
+
+    /// The hardware's share of what is believed of both states; `None` if neither is.
+    fn share(&self, belief: &[f64]) -> Option<f64> {
+        if self.has_sought {
+            return Some(1.0);
+        }
+        let of = |state: usize| belief.get(state).copied().unwrap_or(0.0);
+        let (hardware, lost) = (of(self.state), self.lost.map_or(0.0, of));
+        let both = hardware + lost;
+        (both > 0.0).then(|| hardware / both)
+    }
+
+    /// Diagnoses were lost: the next is taken over, if it or the last speaks of a fault.
     pub(crate) const fn forget(&mut self) {
         self.before = None;
-        self.identifies = false;
         self.clear();
     }
 
-    const fn clear(&mut self) {
-        self.log = [0.0; 2];
+    /// Nothing has been said.
+    pub(crate) fn reset(&mut self) {
+        self.forget();
+        (self.identifies, self.p) = (false, Explained::default());
+        self.has_sought = false;
     }
-}
 
-/// Probability of any fault of the tree.
-fn faulty(p_nominal: f64, p_unknown: f64) -> f64 {
-    (1.0 - p_nominal - p_unknown).clamp(0.0, 1.0)
+    const fn clear(&mut self) {
+        self.log = [0.0; 3];
+    }
 }
 
 /// Bounded; no evidence where the quotient has no meaning.

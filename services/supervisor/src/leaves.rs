@@ -8,7 +8,7 @@ use vigil_setup::schema;
 
 use crate::evidence::{self, Effect, Gathered};
 use crate::mapping::{self, ActionMeaning, Compensation, StateMeaning, SupervisorError};
-use crate::policy;
+use crate::policy::{self, Worth};
 use crate::restraint::Restraint;
 use crate::silence::Silence;
 use crate::supervisor::Inputs;
@@ -18,6 +18,7 @@ use crate::told::{Decided, Told};
 pub(crate) struct Leaves {
     model: Pomdp,
     decider: Decider,
+    worth: Worth,
     tree_hash: u64,
     tracker: Tracker,
     states: Vec<StateMeaning>,
@@ -63,6 +64,7 @@ impl Leaves {
         let decider = policy::decider(&model, &solution, solved, settings)?;
         let mut supervisor = Self {
             decider,
+            worth: Worth::new(solution, actions.len()),
             tree_hash: tree.hash(),
             tracker: Tracker::new(&model),
             silence: Silence::new(blind_after_misses),
@@ -223,7 +225,7 @@ impl Leaves {
 
     fn decide(&mut self, timed: bool) {
         let best = self.decider.decide(self.tracker.belief()).choice();
-        let values = self.decider.values();
+        let values = self.worth.of(&self.decider, self.tracker.belief());
         let current = self.decided.map(|decided| decided.action);
         self.choice = self
             .restraint

@@ -71,12 +71,11 @@ pub enum SupervisorError {
          needs none, EPS, EPM, LD, SD, BO, ALT and NNA, and those of their sets that can occur"
     )]
     NoObservation(&'static str),
-    /// The state for hardware faults is not in the model.
-    #[error(
-        "supervisor.hardware_state: the decision model has no state '{found}'; allowed are \
-         {allowed}"
-    )]
-    HardwareState {
+    /// A state that the settings name is not in the model.
+    #[error("supervisor.{key}: the decision model has no state '{found}'; allowed are {allowed}")]
+    NamedState {
+        /// Key that names it.
+        key: &'static str,
         /// Name that was given.
         found: String,
         /// Names of the model's states.
@@ -102,6 +101,23 @@ pub enum SupervisorError {
     /// The model has no solution.
     #[error("decision model: {0}")]
     Solve(#[from] SolveError),
+}
+
+/// Index of a state that the settings name, if they do.
+pub(crate) fn state(
+    model: &Pomdp,
+    key: &'static str,
+    name: Option<&str>,
+) -> Result<Option<usize>, SupervisorError> {
+    let index = |name: &str| {
+        let found = model.states().iter().position(|state| state == name);
+        found.ok_or_else(|| SupervisorError::NamedState {
+            key,
+            found: name.to_owned(),
+            allowed: model.states().join(", "),
+        })
+    };
+    name.map(index).transpose()
 }
 
 /// Which node of the fault tree, and which wheel, a state of the decision model stands for.

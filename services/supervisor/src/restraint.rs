@@ -3,7 +3,8 @@
 //! - An action that lets the robot move faster than the present one must be best for
 //!   [`HOLD_EPOCHS`] epochs in a row. A more cautious one is taken at once.
 //! - Help is called for only when that has been best for [`HELP_EPOCHS`] epochs in a row; until
-//!   then the best of the other actions is taken.
+//!   then the best of the other actions is taken, by what they are worth: votes and entropies rank
+//!   only the best.
 //! - A call for help stands until the filters are reset by whoever has helped. A robot that brakes
 //!   and then stands looks healthy, whatever is wrong with it: what pulls at it pulls no more.
 
@@ -40,8 +41,9 @@ impl Restraint {
     }
 
     /// The action to take. `current` is the present action, `best` the policy's choice, `values`
-    /// every action's value, `timed` is true once per epoch. The margin is to the best of the
-    /// other actions that are allowed; 0 where the present action is held against a better one.
+    /// every action's value (no votes, no entropies), `timed` is true once per epoch. The margin is
+    /// to the best of the other actions that are allowed; 0 where the present action is held
+    /// against a better one.
     pub(crate) fn decide(
         &mut self,
         current: Option<usize>,

@@ -37,6 +37,13 @@ impl Silence {
         self.misses_without_detection = 0;
     }
 
+    /// The detector is not heard with a diagnosis; true if no word of symptoms has come for so long
+    /// that no belief in exceptions is usable any more.
+    pub(crate) const fn no_detection(&mut self) -> bool {
+        self.misses_without_detection = self.misses_without_detection.saturating_add(1);
+        self.misses_without_detection >= self.blind_after_misses
+    }
+
     /// The identifier is heard; true if it was lost.
     pub(crate) const fn diagnosis(&mut self) -> bool {
         let was_lost = self.identifier_is_lost();

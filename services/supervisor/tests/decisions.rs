@@ -119,6 +119,75 @@ fn help_is_called_only_when_the_unknown_lasts() {
 }
 
 #[test]
+fn until_help_is_called_every_policy_takes_the_best_of_the_rest() {
+    let unknown = [("UNKNOWN", 0.99), ("ND", 0.01)];
+    for policy in ["mls", "av", "qmdp", "fib", "dm-mls"] {
+        let mut world = World::with(|settings| {
+            settings.policy = policy.into();
+            if policy == "dm-mls" {
+                settings.information_actions = vec!["slow_down".into()];
+            }
+        });
+        for _ in 0..150 {
+            world.cycle(true, &unknown, &unknown);
+            assert_eq!(world.kind(), RecoveryKind::SlowDown, "{policy}");
+        }
+        world.rest(100, true, &unknown);
+        assert_eq!(world.kind(), RecoveryKind::CallForHelp, "{policy}");
+    }
+}
+
+#[test]
+fn two_stuck_wheels_are_not_compensated_as_if_they_were_one() {
+    let mut world = World::new();
+    world.rest(100, false, &[("ND", 0.9999), ("UNKNOWN", 0.0001)]);
+    let one = [(&["LF_STUCK"][..], 0.98)];
+    for _ in 0..30 {
+        let diagnosis = world.of_sets(&one);
+        world.told(&diagnosis);
+    }
+    assert_eq!(world.kind(), RecoveryKind::Compensate);
+    // The right front wheel sticks too: no turn is left to counter-steer for.
+    let both = [
+        (&["LF_STUCK", "RF_STUCK"][..], 0.95),
+        (&["LF_STUCK"][..], 0.05),
+    ];
+    for cycle in 0..400 {
+        let mut diagnosis = world.of_sets(&both);
+        diagnosis.mode_change_count = 1;
+        world.told(&diagnosis);
+        let expected = match cycle {
+            0..150 => RecoveryKind::SlowDown,
+            250.. => RecoveryKind::CallForHelp,
+            _ => world.kind(),
+        };
+        assert_eq!(world.kind(), expected, "{cycle}");
+    }
+    assert!((world.belief("UNKNOWN") - 0.95).abs() < 0.051);
+    assert!(world.belief("RF_STUCK") < 0.01);
+}
+
+#[test]
+fn a_stuck_wheel_with_broken_encoders_is_compensated() {
+    let mut world = World::new();
+    let set = [
+        (&["LF_STUCK", "RM_ENC", "RR_ENC"][..], 0.9),
+        (&["RM_ENC", "RR_ENC"][..], 0.1),
+    ];
+    for _ in 0..100 {
+        let diagnosis = world.of_sets(&set);
+        world.told(&diagnosis);
+        assert_eq!(world.kind(), RecoveryKind::Compensate);
+    }
+    let wheel = world.robot.wheel_index("LF").unwrap();
+    assert_eq!(world.action.wheel as usize, wheel);
+    let shares = ["LF_STUCK", "RM_ENC", "RR_ENC"].map(|state| world.belief(state));
+    for (found, expected) in shares.iter().zip([0.9, 0.05, 0.05]) {
+        assert!((found - expected).abs() < 0.01, "{shares:?}");
+    }
+}
+
+#[test]
 fn a_call_for_help_stands_until_whoever_has_helped_resets_the_filters() {
     let mut world = World::new();
     let unknown = [("UNKNOWN", 0.99), ("ND", 0.01)];
@@ -318,6 +387,10 @@ proptest! {
             belief.p = std::array::from_fn(|i| values[i % 4]);
             belief.p_predicted = std::array::from_fn(|i| values[(i + 1) % 4]);
             belief.header.t_capture_ns = t_ns;
+            belief.set_count = missed * 3;
+            for (i, set) in belief.sets.iter_mut().enumerate() {
+                (set.leaves, set.p) = (t_ns.rotate_left(9 * i as u32), values[i % 4]);
+            }
             (belief.identifying, belief.mode_change_count) = (u32::from(bits & 1), missed);
             let detection = DetectionBelief { p_fault: values[0], ..Default::default() };
             let inputs = Inputs {

@@ -123,6 +123,12 @@ fn filter_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) 
         60_000.0,
     );
     range(
+        "supervisor.action_max_s",
+        file.supervisor.action_max_s,
+        1.0,
+        3600.0,
+    );
+    range(
         "supervisor.validity_periods",
         file.supervisor.validity_periods,
         1.0,

@@ -101,3 +101,32 @@ fn evidence_and_actions_that_nothing_gives_are_refused() {
         Ok(())
     );
 }
+
+#[test]
+fn epochs_fit_what_a_robot_does_in_them() {
+    let name = "corridor-people.toml";
+    let message = load(name, |file| file.supervisor.epoch_ms = 100.0).unwrap_err();
+    assert!(
+        message.contains("supervisor.epoch_ms: 100 is out of range"),
+        "{message}"
+    );
+    assert!(message.contains("1000 to 60000"), "{message}");
+    let left_out = |file: &mut GraphFile| {
+        file.supervisor.epoch_ms = vigil_setup::schema::Supervisor::default().epoch_ms;
+    };
+    assert!(load(name, left_out).is_err(), "the default is for faults");
+    // Looking takes 6 s, going through 12.
+    let limited = |action_max_s| load(name, |file| file.supervisor.action_max_s = action_max_s);
+    let message = limited(17.0).unwrap_err();
+    assert!(
+        message.contains("supervisor.action_max_s: 17 is too short"),
+        "{message}"
+    );
+    assert!(message.contains("may run for 18"), "{message}");
+    assert_eq!(limited(18.0), Ok(()));
+    // Waiting for help has no limit.
+    let waits = |file: &mut GraphFile| file.navigation.as_mut().unwrap().help_s = 600.0;
+    assert_eq!(load(name, waits), Ok(()));
+    let message = load(name, |file| file.supervisor.hardware_state = None).unwrap_err();
+    assert!(message.contains("supervisor.lost_state: "), "{message}");
+}

@@ -1,5 +1,7 @@
 //! How the robot follows, stops, looks, passes, backs and plans.
 
+use vigil_setup::schema::Navigation;
+
 use super::lane::Lane;
 use super::navigator::{Happening, Navigator};
 use super::path::distance;
@@ -30,11 +32,6 @@ const SLOW_AT_GOAL_M: f64 = 0.5;
 /// speed faster.
 const MAKE_UP_1_S: f64 = 0.5;
 const HURRY: f64 = 0.25;
-/// A robot that moves away stands after this long, s, however far it came.
-const AWAY_MAX_S: f64 = 8.0;
-
-/// A robot that has not come through an opening after this long, s, has not found one.
-const PASS_MAX_S: f64 = 12.0;
 /// A robot that is off its path comes back to it so far ahead, m.
 const JOIN_M: f64 = 1.5;
 /// From one cycle to the next the robot comes no farther along its path than this, m.
@@ -79,13 +76,19 @@ impl Navigator {
 
     /// Stands and looks for an opening.
     pub(super) fn look(&mut self, passed_s: f64) -> DriveCommand {
-        let block_m = self.block_m.unwrap_or(self.along_m).max(self.along_m);
-        if let Some((lane, end_m)) = self.opening(block_m + BEYOND_M) {
+        // Where nothing is known to block, an opening is as long as the way that the robot sees.
+        let seen_m = self.along_m + self.settings.slow_m;
+        let block_m = self.block_m.unwrap_or(seen_m).max(self.along_m);
+        // What lies beyond the goal is in nobody's way.
+        let end_m = (block_m + BEYOND_M).min(self.path.length_m());
+        if let Some((lane, end_m)) = self.opening(end_m) {
+            let is_phantom = self.sees_phantom(end_m);
             self.lane = lane;
             self.planned_m = self.along_m;
             self.task = Task::Pass {
                 end_m,
                 passed_s: 0.0,
+                is_phantom,
             };
         } else if passed_s >= self.settings.look_s {
             self.end(false);
@@ -93,19 +96,26 @@ impl Navigator {
         self.stand()
     }
 
-    /// Carefully through the opening, then back to the path.
-    pub(super) fn pass(&mut self, end_m: f64, passed_s: f64, dt_s: f64) -> DriveCommand {
+    /// Carefully through the opening, then back to the path; `is_phantom` if what blocked was none.
+    pub(super) fn pass(
+        &mut self,
+        (end_m, is_phantom): (f64, bool),
+        passed_s: f64,
+        dt_s: f64,
+    ) -> DriveCommand {
         let step_m = CAREFUL * self.settings.speed_m_s * dt_s;
         self.planned_m = (self.planned_m + step_m).min(end_m);
-        if passed_s >= PASS_MAX_S {
+        if passed_s >= Navigation::PASS_MAX_S {
             self.end(false);
             return self.stand();
         }
         let is_behind = self.along_m >= end_m.min(self.path.length_m() - AT_GOAL_M);
         if is_behind && self.off_path_m() <= NEAR_M {
             self.block_m = None;
-            // What it drove through was not there.
-            self.troubles.phantom = None;
+            if is_phantom {
+                // What it drove past was not there.
+                self.troubles.phantom = None;
+            }
             self.planned_m = self.along_m;
             self.lane = self.lane.change(self.along_m, 0.0);
             self.end(true);
@@ -116,10 +126,9 @@ impl Navigator {
     /// Straight back until it has come far enough, or something is there.
     pub(super) fn back(&mut self, from: [f64; 2], passed_s: f64) -> DriveCommand {
         let here = [self.pose[0], self.pose[1]];
-        if distance(from, here) >= self.settings.away_m || passed_s >= AWAY_MAX_S {
+        if distance(from, here) >= self.settings.away_m || passed_s >= Navigation::AWAY_MAX_S {
             let moved = distance(from, here) >= 0.5 * self.settings.away_m;
             self.is_anew = true;
-            self.block_m = None;
             self.end(moved);
             return self.stand();
         }
@@ -134,14 +143,15 @@ impl Navigator {
     /// nothing blocks it.
     pub(super) fn plan_anew(&mut self) {
         self.troubles.wrong_heading_rad = 0.0;
-        if self.block_m.take().is_some() {
+        let slow_m = self.settings.slow_m;
+        if self.block_m.is_some() || self.free_way(slow_m) < slow_m {
             let alternative = self.alternative.as_mut().filter(|_| !self.took_alternative);
             let Some(alternative) = alternative else {
-                self.block_m = Some(self.along_m);
                 return self.end(false);
             };
             std::mem::swap(&mut self.path, alternative);
             self.took_alternative = true;
+            self.block_m = None;
         }
         self.lane = Lane::default();
         self.is_anew = true;
@@ -175,8 +185,12 @@ impl Navigator {
         self.along_m = self.path.nearest(here, 0.0, self.path.length_m());
         if self.off_path_m() > NEAR_M {
             self.lane = Lane::default();
+            let length_m = self.path.length_m();
             self.path.join(here, self.along_m + JOIN_M);
             self.along_m = 0.0;
+            // What blocks is as far from the goal as it was.
+            let longer_m = self.path.length_m() - length_m;
+            self.block_m = self.block_m.map(|block_m| block_m + longer_m);
         }
         self.planned_m = self.along_m;
     }
@@ -189,15 +203,29 @@ impl Navigator {
         let is_free = |ahead_m: f64| {
             let along_m = self.along_m + ahead_m;
             let [x, y, _] = self.path.beside(along_m, self.lane.at(along_m));
-            let phantom = self.troubles.phantom;
-            self.map.is_free(self.troubles.truly([x, y]), self.t_s)
-                && phantom.is_none_or(|at| !self.map.touches_phantom(at, [x, y]))
+            self.map.is_free(self.troubles.truly([x, y]), self.t_s) && !self.is_phantom([x, y])
         };
         // What lies beyond the goal is in nobody's way.
         let left_m = self.path.length_m() - self.along_m;
         let steps = (most_m.min(left_m) / LOOK_STEP_M) as u32;
         let blocked = (0..=steps).find(|step| !is_free(f64::from(*step) * LOOK_STEP_M));
         blocked.map_or(most_m, |step| f64::from(step) * LOOK_STEP_M)
+    }
+
+    /// True if the range sensor sees the robot touch a phantom at `place`.
+    fn is_phantom(&self, place: [f64; 2]) -> bool {
+        let phantom = self.troubles.phantom;
+        phantom.is_some_and(|at| self.map.touches_phantom(at, place))
+    }
+
+    /// True if a phantom is on the robot's lane up to `end_m`.
+    fn sees_phantom(&self, end_m: f64) -> bool {
+        let steps = ((end_m - self.along_m) / SEARCH_STEP_M).ceil() as u32;
+        (0..=steps).any(|step| {
+            let along_m = self.along_m + f64::from(step) * SEARCH_STEP_M;
+            let [x, y, _] = self.path.beside(along_m, self.lane.at(along_m));
+            self.is_phantom([x, y])
+        })
     }
 
     /// The lane nearest to the path on which the way is free up to `end_m`, as a close look tells,

@@ -61,6 +61,8 @@ pub struct Navigator {
     pub(super) touched: bool,
     pub(super) at_goal: bool,
     is_helped: bool,
+    /// The robot has found itself elsewhere.
+    is_found: bool,
     /// The plan begins anew where the robot is, with the next pose.
     pub(super) is_anew: bool,
     pub(super) happening: Option<Happening>,
@@ -93,6 +95,7 @@ impl Navigator {
             touched: false,
             at_goal: false,
             is_helped: false,
+            is_found: false,
             is_anew: false,
             happening: None,
             settings: settings.clone(),
@@ -160,6 +163,11 @@ impl Navigator {
         std::mem::take(&mut self.is_helped)
     }
 
+    /// True once, when the robot has found itself elsewhere than it believed to be.
+    pub fn found(&mut self) -> bool {
+        std::mem::take(&mut self.is_found)
+    }
+
     fn pursue(&mut self, dt_s: f64, scale: f64) -> DriveCommand {
         let (think_s, help_s) = (self.settings.think_s, self.settings.help_s);
         match &mut self.task {
@@ -170,10 +178,14 @@ impl Navigator {
                 let passed_s = *passed_s;
                 return self.look(passed_s);
             }
-            Task::Pass { end_m, passed_s } => {
+            Task::Pass {
+                end_m,
+                passed_s,
+                is_phantom,
+            } => {
                 *passed_s += dt_s;
-                let (end_m, passed_s) = (*end_m, *passed_s);
-                return self.pass(end_m, passed_s, dt_s * scale);
+                let (opening, passed_s) = ((*end_m, *is_phantom), *passed_s);
+                return self.pass(opening, passed_s, dt_s * scale);
             }
             Task::Back { from, passed_s } => {
                 *passed_s += dt_s;
@@ -210,6 +222,9 @@ impl Navigator {
     fn find_place(&mut self) {
         if self.troubles.find_place() {
             self.resets = self.resets.wrapping_add(1);
+            self.is_found = true;
+            // What blocked was seen from elsewhere.
+            self.block_m = None;
         }
         self.is_anew = true;
     }

@@ -11,8 +11,13 @@ pub(super) enum Task {
     Follow,
     /// Look for an opening; how long it has looked, s.
     Look { passed_s: f64 },
-    /// Go through the opening, up to a distance along the path, m; for how long, s.
-    Pass { end_m: f64, passed_s: f64 },
+    /// Go through the opening, up to a distance along the path, m; for how long, s; and whether
+    /// what blocked it was a phantom.
+    Pass {
+        end_m: f64,
+        passed_s: f64,
+        is_phantom: bool,
+    },
     /// Think about another path, s.
     Plan { passed_s: f64 },
     /// Find the own place, s.

@@ -183,6 +183,42 @@ fn people_leave_and_the_way_is_free() {
 }
 
 #[test]
+fn what_blocks_is_not_forgotten_by_what_did_not_help() {
+    let mut robot = Robot::new(corridor(|c| {
+        c.obstacle.push(obstacle(6.0, 0.0, 1.0));
+        (c.stop_m, c.slow_m) = (1.5, 3.0);
+    }));
+    assert_eq!(robot.told(GoOn, 60.0), None);
+    // Whatever was tried before: there is no opening, and no other path.
+    for before in [NewPath, MoveAway, Relocalise] {
+        robot.told(before, 20.0).unwrap();
+        for kind in [GoThrough, NewPath] {
+            let (happening, _) = robot.told(kind, 40.0).unwrap();
+            assert_eq!(happening, ended(kind, Failed), "after {before:?}");
+        }
+    }
+}
+
+#[test]
+fn an_opening_past_an_obstacle_does_not_clear_a_phantom_elsewhere() {
+    let mut robot = Robot::new(corridor(|c| {
+        c.obstacle.push(obstacle(3.5, -0.9, 0.5));
+        c.trouble
+            .push(trouble(TroubleKind::Phantom, 0.0, [7.5, 0.0, 0.0]));
+    }));
+    assert_eq!(robot.told(GoOn, 30.0), None);
+    let (happening, _) = robot.told(GoThrough, 40.0).unwrap();
+    assert_eq!(happening, ended(GoThrough, Succeeded));
+    let past_m = robot.place()[0];
+    assert_eq!(robot.told(GoOn, 40.0), None, "the phantom still stops it");
+    assert!(
+        (past_m..6.6).contains(&robot.place()[0]),
+        "{:?}",
+        robot.place()
+    );
+}
+
+#[test]
 fn the_alternative_is_taken_once() {
     let mut robot = Robot::new(corridor(|c| {
         c.walls.clear();

@@ -94,6 +94,28 @@ impl World {
         (0..cycles).for_each(|_| self.cycle(identifying, p, p));
     }
 
+    /// A diagnosis of these exact sets of faults, and of nothing else.
+    pub fn of_sets(&mut self, sets: &[(&[&str], f64)]) -> FaultBelief {
+        self.t_ns += CYCLE_NS;
+        let mut belief = FaultBelief {
+            identifying: 1,
+            tree_hash: self.tree.hash(),
+            set_count: sets.len() as u32,
+            ..Default::default()
+        };
+        belief.header.t_capture_ns = self.t_ns;
+        for (set, (leaves, p)) in belief.sets.iter_mut().zip(sets) {
+            set.p = *p;
+            for leaf in *leaves {
+                let node = self.tree.index(leaf).unwrap();
+                set.leaves |= 1 << node;
+                belief.p[node] += p;
+            }
+        }
+        belief.p_predicted = belief.p;
+        belief
+    }
+
     /// One cycle with an arbitrary diagnosis and no detection.
     pub fn told(&mut self, diagnosis: &FaultBelief) {
         let inputs = Inputs {

@@ -2,7 +2,10 @@
 
 use vigil_decision::policy::PolicyKind;
 
-use crate::schema::{Evidence, GraphFile, Recovery, Source, Supervisor};
+use crate::schema::{Evidence, GraphFile, Navigation, Recovery, Source, Supervisor};
+
+/// With symptoms, the shortest epoch, ms.
+const EPOCH_MIN_MS: f64 = 1000.0;
 
 /// Policy, evidence, and actions that only a robot with a path can take.
 pub(super) fn check(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
@@ -12,6 +15,17 @@ pub(super) fn check(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
     if settings.evidence == Evidence::Faults && settings.hardware_state.is_some() {
         let message = "has a meaning only with supervisor.evidence = \"symptoms\"";
         report("supervisor.hardware_state", message.to_owned());
+    }
+    if settings.lost_state.is_some() && settings.hardware_state.is_none() {
+        let message = "has a meaning only with supervisor.hardware_state";
+        report("supervisor.lost_state", message.to_owned());
+    }
+    if settings.lost_state.is_some() && settings.lost_state == settings.hardware_state {
+        let message = "must be another state than supervisor.hardware_state";
+        report("supervisor.lost_state", message.to_owned());
+    }
+    if settings.evidence == Evidence::Symptoms {
+        durations(file, report);
     }
     if settings.evidence == Evidence::Symptoms && simulates && file.monitors.is_none() {
         let message = "\"symptoms\" requires [monitors]: the simulator reports none of its own";
@@ -25,6 +39,28 @@ pub(super) fn check(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
                 report(&key, message.to_owned());
             }
         }
+    }
+}
+
+/// Epochs in which a robot can do something, and a limit that no action of the simulator reaches.
+fn durations(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
+    let settings = &file.supervisor;
+    if settings.epoch_ms < EPOCH_MIN_MS {
+        let message = format!(
+            "{} is out of range: with supervisor.evidence = \"symptoms\" allowed is \
+             {EPOCH_MIN_MS} to 60000; a robot does nothing about an exception in less",
+            settings.epoch_ms
+        );
+        report("supervisor.epoch_ms", message);
+    }
+    let longest_s = file.navigation.as_ref().map(Navigation::longest_action_s);
+    if let Some(longest_s) = longest_s.filter(|longest_s| settings.action_max_s < *longest_s) {
+        let message = format!(
+            "{} is too short: with these durations of [navigation] an action may run for \
+             {longest_s}",
+            settings.action_max_s
+        );
+        report("supervisor.action_max_s", message);
     }
 }
 

@@ -49,6 +49,20 @@ pub struct Navigation {
     pub away_m: f64,
 }
 
+impl Navigation {
+    /// A robot that has not come through an opening after this long, s, has not found one.
+    pub const PASS_MAX_S: f64 = 12.0;
+    /// A robot that moves away stands after this long, s, however far it came.
+    pub const AWAY_MAX_S: f64 = 8.0;
+
+    /// The longest that an action but waiting for help may run, s.
+    #[must_use]
+    pub const fn longest_action_s(&self) -> f64 {
+        let through_s = self.look_s + Self::PASS_MAX_S;
+        through_s.max(self.think_s).max(Self::AWAY_MAX_S)
+    }
+}
+
 /// A disc in the way.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]

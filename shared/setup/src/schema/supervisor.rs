@@ -15,6 +15,10 @@ pub struct Supervisor {
     /// With `symptoms`: the state that means a hardware fault; the identifier's belief in any fault
     /// of its tree is soft evidence for it. Default: none, the identifier is then not heard.
     pub hardware_state: Option<String>,
+    /// With `hardware_state`: the state of a robot that is lost. What the identifier calls unknown
+    /// is a fault that nobody has modelled, or a pose that jumped: soft evidence for both states.
+    /// Default: none, the unknown is then a hardware fault.
+    pub lost_state: Option<String>,
     /// Policy: `qmdp`, `mls` (the best action of the most likely state), `av` (action voting),
     /// `fib` (fast informed bound), or one of these with dual control, which gathers information
     /// while the belief is too uncertain: `dm-X` about the state, `adm-X` about the best action.
@@ -38,8 +42,13 @@ pub struct Supervisor {
     /// for information, no guard. Default false.
     pub as_published: bool,
     /// Interval between decision epochs, ms, 1 to 60000. A change of the diagnosed mode opens an
-    /// epoch at once. With `symptoms`, the longest epoch: an outcome or a new symptom ends it too.
+    /// epoch at once. With `symptoms`, the longest epoch, from 1000: an outcome or a new symptom
+    /// ends it too; an action that the robot says is running has until `action_max_s`.
     pub epoch_ms: f64,
+    /// With `symptoms`: an action that the robot says is running counts as failed after so long, s,
+    /// 1 to 3600, and no less than the longest that `[navigation]` allows. Waiting for help has no
+    /// limit.
+    pub action_max_s: f64,
     /// Validity of a published action, as a multiple of the period, 1 to 1000 (at least 20 ms).
     pub validity_periods: f64,
     /// What each action of the decision model makes the robot do, by the action's name.
@@ -51,6 +60,7 @@ impl Default for Supervisor {
         Self {
             evidence: Evidence::Faults,
             hardware_state: None,
+            lost_state: None,
             policy: "qmdp".into(),
             policy_file: None,
             threshold: 0.5,
@@ -59,6 +69,7 @@ impl Default for Supervisor {
             stall_guard_steps: 5,
             as_published: false,
             epoch_ms: 100.0,
+            action_max_s: 60.0,
             validity_periods: 10.0,
             actions: BTreeMap::new(),
         }
