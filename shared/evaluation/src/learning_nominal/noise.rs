@@ -3,11 +3,11 @@
 use vigil_inference::logspace::log_normal;
 use vigil_robot::nominal::{Channel, History, Model, Residual, Track};
 
-use super::record::Record;
+use super::record::Part;
 
 /// Motion before an observation counts, s, and how long the command must be steady for a pose.
-const MOVING_S: f64 = 0.5;
-const SETTLED_S: f64 = 1.0;
+pub(super) const MOVING_S: f64 = 0.5;
+pub(super) const SETTLED_S: f64 = 1.0;
 /// Part of the runs whose scatter counts as usual, and the largest scatter.
 const USUAL: f64 = 0.95;
 const SCATTER_MAX: f64 = 10.0;
@@ -39,7 +39,7 @@ pub(super) fn counts(history: &History, channel: &Channel) -> bool {
 }
 
 /// Residuals, and whether each follows the one before.
-fn residuals(channel: &Channel, record: &[History], model: &Model) -> Vec<(Residual, bool)> {
+fn residuals(channel: &Channel, record: &[&History], model: &Model) -> Vec<(Residual, bool)> {
     let (mut out, mut follows) = (Vec::new(), false);
     for history in record {
         let residual = channel.residual(history, &model.sizes());
@@ -54,9 +54,9 @@ fn residuals(channel: &Channel, record: &[History], model: &Model) -> Vec<(Resid
 }
 
 /// Fits variance, correlation, offset and drift.
-pub(super) fn fit(channel: &mut Channel, records: &[Record], model: &Model) {
+pub(super) fn fit(channel: &mut Channel, records: &[Part<'_>], model: &Model) {
     let several = records.len() > 1;
-    let of = |record: &Record| residuals(channel, &record.histories, model);
+    let of = |record: &Part<'_>| residuals(channel, &record.histories, model);
     let whole: Vec<Vec<(Residual, bool)>> = records.iter().map(of).collect();
     let length = if several { usize::MAX } else { PIECE };
     let pieces = whole.iter().flat_map(|record| record.chunks(length));
@@ -211,10 +211,10 @@ fn innovations<'a>(
     })
 }
 
-fn usual_size(channel: &Channel, records: &[Record]) -> f64 {
+fn usual_size(channel: &Channel, records: &[Part<'_>]) -> f64 {
     let newest = records
         .iter()
-        .flat_map(|r| &r.histories)
+        .flat_map(|part| &part.histories)
         .filter_map(|h| h.ago(0));
     let values = newest.filter_map(|now| channel.target.value(now));
     mean(values.map(|value| value * value)).sqrt()
@@ -222,7 +222,7 @@ fn usual_size(channel: &Channel, records: &[Record]) -> f64 {
 
 /// Root mean square of the whitened residuals of other records: 1 if the model holds there, or if
 /// there is nothing to tell.
-pub(super) fn whitened_rms(channel: &Channel, records: &[Record], model: &Model) -> f64 {
+pub(super) fn whitened_rms(channel: &Channel, records: &[Part<'_>], model: &Model) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for record in records {
         let mut track = Track::new(channel);

@@ -3,9 +3,11 @@
 use std::fmt;
 
 use serde::Serialize;
-use vigil_robot::nominal::{Channel, Model, Quantity, Target};
+use vigil_robot::Description;
+use vigil_robot::nominal::{Channel, Model, Quantity, Target, Term};
 
 use super::LONG_ENOUGH_S;
+use super::view::word;
 use crate::learning::RESIDUAL_BAR;
 
 /// One channel.
@@ -64,6 +66,13 @@ impl Report {
                     range.name, range.min, range.max, range.unit
                 ));
             }
+            for [from, to] in &range.gaps {
+                warnings.push(format!(
+                    "{} was not driven between {from:.3} and {to:.3} {}: commands there widen the \
+                     deviations",
+                    range.name, range.unit
+                ));
+            }
         }
         Self {
             runs_learned,
@@ -71,6 +80,35 @@ impl Report {
             exposure_s: model.exposure_s,
             channels: Vec::new(),
             warnings,
+        }
+    }
+
+    /// Tells which products of powers of the command are left out: of all channels, and of those of
+    /// the pose.
+    pub(super) fn untold(
+        &mut self,
+        [all, pose]: &[Vec<Term>; 2],
+        model: &Model,
+        robot: &Description,
+    ) {
+        let measured = &robot.measured;
+        let others = measured.wheel_rates || measured.yaw_rate || measured.currents;
+        let mut tell = |of: &str, terms: &[Term]| {
+            let words: Vec<String> = terms.iter().map(|term| word(term, model)).collect();
+            if !words.is_empty() {
+                self.warnings.push(format!(
+                    "{of}predicted without {}: the commands driven do not tell it from lower \
+                     powers; an order needs one more value of an axis than it counts, spread over \
+                     its range",
+                    words.join(", ")
+                ));
+            }
+        };
+        if others {
+            tell("", all);
+        }
+        if measured.pose && !(others && all == pose) {
+            tell("pose: ", pose);
         }
     }
 
