@@ -225,6 +225,7 @@ fn fit(
         correlation: 0.0,
         offset_sd: 0.0,
         drift_sd: 0.0,
+        rest_sd: 0.0,
         scatter: 1.0,
         held_out_ratio: 1.0,
         tails: Vec::new(),

@@ -1,6 +1,7 @@
 //! What is left of a channel: its variance by speed, its colour, its scatter from run to run.
 
 use vigil_inference::logspace::log_normal;
+use vigil_robot::nominal::channel::REST_S;
 use vigil_robot::nominal::{Channel, History, Model, Residual, Track};
 
 use super::record::Part;
@@ -24,6 +25,11 @@ const PIECE_MIN: usize = 4;
 /// Smallest deviation, relative to the channel's usual size: a channel that follows its prediction
 /// exactly would else see a fault in every rounding.
 const FLOOR: f64 = 1e-3;
+
+/// The fastest motion in the log at rest counts as so many deviations.
+const REST_SDS: f64 = 3.0;
+/// Least deviation of a velocity at rest, m/s or rad/s.
+const REST_SD_MIN: f64 = 1e-3;
 
 /// Drifts tried, per observation, relative to the residual's deviation.
 const DRIFTS: [f64; 7] = [0.0, 0.01, 0.02, 0.04, 0.07, 0.12, 0.2];
@@ -96,6 +102,23 @@ pub(super) fn fit(channel: &mut Channel, records: &[Part<'_>], model: &Model) {
     let limit = channel.offset_sd * (model.interval_s / DRIFT_S).sqrt();
     channel.drift_sd = drift(channel, &whole).min(limit);
     channel.scatter = scatter(channel, &whole, length);
+    channel.rest_sd = rest_sd(channel, records, &whole);
+}
+
+/// Deviation of the velocity that a pose shows at rest: that of its residuals in motion, which have
+/// the sensor's noise and the ground's, or what the log's own rests ask for.
+fn rest_sd(channel: &Channel, records: &[Part<'_>], residuals: &[Vec<(Residual, bool)>]) -> f64 {
+    if !channel.target.quantity.is_pose() {
+        return 0.0;
+    }
+    // The second of the basis is the square of the commanded speed.
+    let squares = residuals.iter().flatten();
+    let in_motion = mean(squares.map(|(r, _)| r.apart * r.apart * r.basis[1])).sqrt();
+    let newest = records.iter().flat_map(|part| &part.histories);
+    let rests = newest.filter_map(|h| h.ago(0).filter(|now| now.rest_s >= REST_S)?.drift);
+    let sizes = rests.filter_map(|drift| Some(channel.target.quantity.of_pose(drift)?.abs()));
+    let largest = sizes.fold(0.0, f64::max);
+    in_motion.max(largest / REST_SDS).max(REST_SD_MIN)
 }
 
 /// Mean square of the whitened residuals in the noisiest usual run, or piece of one: no run's noise

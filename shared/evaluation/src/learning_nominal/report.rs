@@ -10,6 +10,9 @@ use super::LONG_ENOUGH_S;
 use super::view::word;
 use crate::learning::RESIDUAL_BAR;
 
+/// Deviation of a pose's velocity at rest from which it is told, m/s or rad/s.
+const RESTLESS_M_S: f64 = 0.1;
+
 /// One channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelError {
@@ -66,11 +69,14 @@ impl Report {
                     range.name, range.min, range.max, range.unit
                 ));
             }
-            for [from, to] in &range.gaps {
+            let between = |[from, to]: &[f64; 2]| format!("{from:.3} and {to:.3}");
+            let gaps: Vec<String> = range.gaps.iter().map(between).collect();
+            if !gaps.is_empty() {
                 warnings.push(format!(
-                    "{} was not driven between {from:.3} and {to:.3} {}: commands there widen the \
-                     deviations",
-                    range.name, range.unit
+                    "{} was not driven between {} {}: commands there widen the deviations",
+                    range.name,
+                    gaps.join(", "),
+                    range.unit
                 ));
             }
         }
@@ -118,6 +124,13 @@ impl Report {
                 "{name}: the residual on the part left out is {:.2} times the floor: the \
                  deviations are widened by that",
                 channel.held_out_ratio
+            ));
+        }
+        if channel.rest_sd > RESTLESS_M_S {
+            self.warnings.push(format!(
+                "{name}: the log has motion of this kind without a command: a robot that runs away \
+                 is noticed from about {:.2} m/s or rad/s only",
+                3.0 * channel.rest_sd
             ));
         }
         self.channels.push(ChannelError {

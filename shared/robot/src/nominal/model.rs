@@ -304,6 +304,7 @@ fn check_channel(
     }
     sane("offset_sd", channel.offset_sd, 0.0)?;
     sane("drift_sd", channel.drift_sd, 0.0)?;
+    sane("rest_sd", channel.rest_sd, 0.0)?;
     sane("scatter", channel.scatter, 1.0)?;
     for tail in &channel.tails {
         let positive = tail.slope > 0.0 && tail.interval_h > 0.0 && tail.interval_h.is_finite();
