@@ -1,7 +1,10 @@
 //! Logs of real robots: unpacked, imported, learned from.
 
+pub mod border;
+pub mod changes;
 pub mod kobuki;
 pub mod robotino;
+pub mod seen;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};

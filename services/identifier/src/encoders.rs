@@ -9,6 +9,8 @@ use vigil_robot::learned::wheel_evidence::{ANYTHING, BREAKAGE_SHARES, BREAKAGES}
 /// State of a whole encoder whose wheel turns at a rate of its own, in the unknown. The states
 /// before it are whole, and the breakages.
 pub const OWN_RATE: usize = 1 + BREAKAGES.len();
+/// State of a dead encoder, the last of the breakages.
+const DEAD: usize = BREAKAGES.len();
 /// Share of wheels at a rate of their own among those that do anything, in the unknown.
 const ANYTHING_OWN_RATE: f64 = 0.7;
 
@@ -142,6 +144,12 @@ impl Encoders {
     #[must_use]
     pub fn p_broken(&self, wheel: usize) -> f64 {
         self.p[wheel][1..OWN_RATE].iter().sum::<f64>().min(1.0)
+    }
+
+    /// Probability that this wheel's encoder is dead: that it reads what a standing wheel's does.
+    #[must_use]
+    pub const fn p_dead(&self, wheel: usize) -> f64 {
+        self.p[wheel][DEAD]
     }
 
     /// Onset of this wheel's broken encoder, if it is broken.

@@ -35,6 +35,9 @@ const PER_RARE: usize = 8;
 const FLOOR: f64 = -30.0;
 /// So long after a supposed onset, ns, wheels may still read as before.
 const ONSET_BLUR_NS: u64 = 150_000_000;
+/// An encoder that broke this short before its wheel is supposed to have stuck may never have been
+/// broken, s: a stuck wheel's reads the same, and the motion tells within about this time.
+const EXPLAINED_S: f64 = 2.0;
 /// Prior rate of faults while something is suspected, 1/s of motion. An alarm has been raised:
 /// the rate over a robot's life would make the filter slow without making it more often right.
 pub const BIRTH_1_S: f64 = 0.01;
@@ -198,20 +201,22 @@ impl Exact {
         }
     }
 
-    /// Probability that one observation changes `from` to another mode. An encoder that broke a
-    /// moment ago may as well be a second wheel that stuck then: both are equally likely before
-    /// the motion tells.
+    /// Probability that one observation changes `from` to another mode. An encoder that died in the
+    /// last observation may as well be a second wheel that stuck then: both are about equally
+    /// likely before the motion tells.
     fn p_change(&self, from: &Hypothesis<State>, mode: usize, observation: &Observation) -> f64 {
         let (before, after) = (self.modes[from.mode].moved, self.modes[mode].moved);
         let p = self.rates.rate_1_s(before, after) * observation.dt_s;
         let encoders = &from.state.encoders;
         let instead = match newly_stuck(before, after) {
-            Some(wheel)
-                if p > 0.0
-                    && before.stuck() & after.stuck() != 0
-                    && is_new(observation.t_first_ns, encoders.onset(wheel)) =>
-            {
-                encoders.p_broken(wheel)
+            Some(wheel) if p > 0.0 && before.stuck() & after.stuck() != 0 => {
+                let age_s = age_s(observation.t_first_ns, encoders.onset(wheel));
+                let was_last = age_s > 0.0 && age_s < 1.5 * observation.dt_s;
+                if was_last {
+                    encoders.p_dead(wheel)
+                } else {
+                    0.0
+                }
             }
             _ => 0.0,
         };
@@ -231,7 +236,8 @@ impl Exact {
             (Moved::UnknownAny, _) => Encoders::healthy(t_ns),
             _ => from.state.encoders,
         };
-        if let Some(wheel) = newly_stuck(before, after) {
+        let sticks = newly_stuck(before, after);
+        if let Some(wheel) = sticks.filter(|&w| age_s(t_ns, encoders.onset(w)) < EXPLAINED_S) {
             encoders.suppose_whole(wheel, t_ns);
         }
         State {
@@ -355,6 +361,11 @@ impl Exact {
         }
         0
     }
+}
+
+/// Time since an onset, s.
+fn age_s(t_ns: u64, onset_ns: u64) -> f64 {
+    t_ns.saturating_sub(onset_ns) as f64 * 1e-9
 }
 
 /// The wheel that sticks besides those that do.

@@ -27,6 +27,8 @@ const CATCH_UP_S: f64 = 0.1;
 const CATCH_UP_MIN: usize = 2;
 /// Observations since which the reasons of a diagnosis are looked for, at most.
 const REASONS_MAX: usize = 20;
+/// Probability that something unknown is wrong while sensors are silent or the robot runs away.
+const TROUBLE: f64 = 1.0 - 1e-6;
 /// Probability of the nominal mode at which an identification ends, once the alarm has fallen.
 const RECOVERED: f64 = 0.95;
 
@@ -79,6 +81,9 @@ pub struct Identifier {
     engine: Engine,
     observer: Observer,
     p_unknown: f64,
+    use_wheels: bool,
+    /// Sensors are silent, or the robot moves though it should stand: nothing can be identified.
+    in_trouble: bool,
     particles: usize,
     budget: usize,
     drawn: Box<ParticleBlock>,
@@ -143,6 +148,8 @@ impl Identifier {
             leaves,
             observer: Observer::new(model, robot),
             p_unknown: settings.p_unknown,
+            use_wheels,
+            in_trouble: false,
             particles: settings.particles,
             budget: settings.particles,
             drawn: Box::default(),
@@ -194,6 +201,7 @@ impl Identifier {
         self.ring.clear();
         self.drawn.count = 0;
         self.phase = Phase::Watching;
+        self.in_trouble = false;
         self.detection = Detection::default();
         self.posterior = Posterior::nominal();
         self.predicted = self.posterior;
@@ -223,7 +231,14 @@ impl Identifier {
             };
         }
         if intake.complete {
+            self.in_trouble = self.observer.observation().troubles.any(self.use_wheels);
             self.keep(input);
+        }
+        if self.in_trouble {
+            self.phase = Phase::Watching;
+            self.posterior = Posterior::watching(TROUBLE);
+            self.reasons.clear();
+            return;
         }
         match self.phase {
             Phase::Watching if self.detection.alarm => self.begin(),
@@ -332,7 +347,9 @@ impl Identifier {
             return;
         };
         let (posterior, leaves) = (&self.posterior, &self.leaves);
-        self.reasons.begin(posterior, leaves, pose, onset_ns);
+        let observation = &self.ring[start].observation;
+        let drive = (observation.curvature, observation.speed);
+        self.reasons.begin(posterior, leaves, pose, drive, onset_ns);
         self.follow(start + 1, end);
     }
 
@@ -360,6 +377,7 @@ impl Identifier {
         belief.p_unknown_predicted = self.predicted.unknown;
         belief.run_id = self.run_id;
         let (mode, p_mode) = match self.phase {
+            _ if self.in_trouble => self.posterior.mode(&self.leaves),
             Phase::Watching => (0, self.posterior.nodes[0]),
             Phase::Identifying(_) if self.is_catching_up() => (self.mode, belief.p[0]),
             Phase::Identifying(_) => self.posterior.mode(&self.leaves),
@@ -377,7 +395,7 @@ impl Identifier {
             0
         };
         belief.onset_t_capture_ns = self.onset();
-        belief.identifying = u32::from(self.phase != Phase::Watching);
+        belief.identifying = u32::from(self.phase != Phase::Watching || self.in_trouble);
         belief.runner_up = self.reasons.runner_up();
         belief.channel_evidence = self.reasons.channel_evidence();
         belief.degenerate_count = self.engine.degenerate_count();

@@ -1,34 +1,44 @@
-//! What the turning wheels' rates are off by while two wheels drag: constant in a run, and learned.
+//! By how much more than expected two dragging wheels change the others' rates: learned on the way.
 //!
 //! Nothing was learned of two wheels together, so that the expected rates are wrong by more than
-//! noise, and always by the same. Taken as noise it would count again in every observation, and a
-//! true pair would lose to a dead encoder with time.
+//! noise, and always alike. Taken as noise it would count again in every observation, and a true
+//! pair would lose to a dead encoder with time.
 
 use vigil_blocks::WHEELS;
-use vigil_robot::learned::wheel_evidence::Dragged;
+use vigil_robot::learned::wheel_evidence::{Dragged, TOGETHER_SD};
 
 /// A reading this many standard deviations off says nothing about the offset.
 const FAR_SD: f64 = 4.0;
 
-/// Gaussian beliefs about the offsets, one per wheel, rad/s; a scalar Kalman filter each.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// Deviation by which the offset drifts from one observation to the next: the ground changes.
+const DRIFT_SD: f64 = 0.01;
+
+/// Gaussian beliefs about the offsets relative to the expected change, one per wheel: a scalar
+/// Kalman filter each. Relative, as the change follows the command.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RateOffsets {
     mean: [f64; WHEELS],
-    /// Of the readings taken, (s/rad)²; the prior comes with [`Dragged`] and follows the command.
-    information: [f64; WHEELS],
+    variance: [f64; WHEELS],
+}
+
+impl Default for RateOffsets {
+    fn default() -> Self {
+        Self {
+            mean: [0.0; WHEELS],
+            variance: [TOGETHER_SD * TOGETHER_SD; WHEELS],
+        }
+    }
 }
 
 impl RateOffsets {
     /// Rate (rad/s) and variance at which a wheel is expected, the offset included.
     #[must_use]
     pub fn expected(&self, wheel: usize, dragged: &Dragged) -> (f64, f64) {
-        let variance = self.variance(wheel, dragged);
-        (dragged.rate + self.mean[wheel], dragged.variance + variance)
-    }
-
-    fn variance(&self, wheel: usize, dragged: &Dragged) -> f64 {
-        let prior = dragged.offset_variance;
-        prior / (1.0 + prior * self.information[wheel])
+        let change = dragged.change_rad_s;
+        (
+            dragged.rate_rad_s + self.mean[wheel] * change,
+            dragged.variance + self.variance[wheel] * change * change,
+        )
     }
 
     /// Takes a rate as read, rad/s, with the variance of its noise.
@@ -36,9 +46,12 @@ impl RateOffsets {
         let (expected, variance) = self.expected(wheel, dragged);
         let (apart, total) = (rate - expected, variance + noise);
         if apart * apart <= FAR_SD * FAR_SD * total {
-            self.mean[wheel] += self.variance(wheel, dragged) / total * apart;
-            self.information[wheel] += 1.0 / (dragged.variance + noise);
+            let gain = self.variance[wheel] * dragged.change_rad_s / total;
+            self.mean[wheel] += gain * apart;
+            self.variance[wheel] *= 1.0 - gain * dragged.change_rad_s;
         }
+        let drifted = self.variance[wheel] + DRIFT_SD * DRIFT_SD;
+        self.variance[wheel] = drifted.min(TOGETHER_SD * TOGETHER_SD);
     }
 }
 
@@ -46,35 +59,49 @@ impl RateOffsets {
 mod tests {
     use super::*;
 
-    const DRAGGED: Dragged = Dragged {
-        rate: 2.0,
-        variance: 0.01,
-        offset_variance: 0.04,
-    };
+    fn dragged(change_rad_s: f64) -> Dragged {
+        Dragged {
+            rate_rad_s: 2.0 + change_rad_s,
+            change_rad_s,
+            variance: 0.001,
+        }
+    }
 
     #[test]
-    fn a_constant_offset_is_learned_as_by_the_mean_of_all_readings() {
+    fn the_factor_is_learned_whatever_the_command_makes_of_it() {
+        // Really 1.5 times the expected change, in turns to and fro.
         let mut offsets = RateOffsets::default();
-        assert_eq!(offsets.expected(3, &DRAGGED), (2.0, 0.05));
-        let rates = [2.2, 2.4, 2.1, 2.3];
-        for rate in rates {
-            offsets.update(3, &DRAGGED, rate, 0.02);
+        for k in 0..200 {
+            let expected = dragged(if k % 40 < 20 { -0.3 } else { 0.2 });
+            let rate = 2.0 + 1.5 * expected.change_rad_s;
+            offsets.update(3, &expected, rate, 0.001);
         }
-        // Conjugate normal: precision 1/0.04 at 0, and four readings of precision 1/0.03.
-        let (prior, each) = (1.0 / 0.04, 1.0 / 0.03);
-        let precision = prior + 4.0 * each;
-        let mean = 2.0 + each * rates.iter().map(|rate| rate - 2.0).sum::<f64>() / precision;
-        let (rate, variance) = offsets.expected(3, &DRAGGED);
-        assert!((rate - mean).abs() < 1e-12);
-        assert!((variance - (0.01 + 1.0 / precision)).abs() < 1e-12);
-        assert_eq!(offsets.expected(2, &DRAGGED), (2.0, 0.05));
+        for change in [-0.3, 0.2, 0.1] {
+            let (rate, variance) = offsets.expected(3, &dragged(change));
+            assert!((rate - (2.0 + 1.5 * change)).abs() < 0.01, "{rate}");
+            assert!(variance < 0.002, "{variance}");
+        }
+        let prior = TOGETHER_SD * TOGETHER_SD * 0.09 + 0.001;
+        assert_eq!(offsets.expected(2, &dragged(-0.3)), (1.7, prior));
+    }
+
+    #[test]
+    fn one_reading_is_the_conjugate_normal() {
+        let mut offsets = RateOffsets::default();
+        offsets.update(0, &dragged(0.5), 2.9, 0.02);
+        let (prior, reading) = (1.0 / (TOGETHER_SD * TOGETHER_SD), 0.25 / 0.021);
+        let mean = reading * 0.8 / (prior + reading);
+        let variance = 1.0 / (prior + reading) + DRIFT_SD * DRIFT_SD;
+        let (rate, total) = offsets.expected(0, &dragged(0.5));
+        assert!((rate - (2.5 + 0.5 * mean)).abs() < 1e-12);
+        assert!((total - (0.001 + 0.25 * variance)).abs() < 1e-12);
     }
 
     #[test]
     fn what_is_far_off_or_no_number_teaches_nothing() {
         let mut offsets = RateOffsets::default();
         for rate in [9.0, f64::NAN, f64::INFINITY] {
-            offsets.update(0, &DRAGGED, rate, 0.02);
+            offsets.update(0, &dragged(0.5), rate, 0.02);
         }
         assert_eq!(offsets, RateOffsets::default());
     }

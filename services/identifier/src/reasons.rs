@@ -16,6 +16,7 @@ use vigil_robot::learned::{
 use crate::exact::is_new;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
+use crate::rate_offsets::RateOffsets;
 
 /// What a diagnosis may say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,6 +35,7 @@ struct Lineage {
     /// Wheels whose encoders are broken, as bits.
     broken: u32,
     track: Track,
+    offsets: RateOffsets,
     /// Log-likelihood of the readings, by channel.
     heard: [f64; CHANNELS],
 }
@@ -90,12 +92,14 @@ impl Reasons {
         })
     }
 
-    /// Begins to follow the diagnosis of `posterior` and its rival from a pose at `onset_ns`.
+    /// Begins to follow the diagnosis of `posterior` and its rival from a pose at `onset_ns`, while
+    /// the robot drives at this curvature (1/m) and speed (m/s).
     pub fn begin(
         &mut self,
         posterior: &Posterior,
         leaves: &Leaves,
         (mean, covariance): (Vector3<f64>, Matrix3<f64>),
+        (curvature, speed): (f64, f64),
         onset_ns: u64,
     ) {
         let (named, rival) = contenders(posterior);
@@ -115,10 +119,12 @@ impl Reasons {
                 },
             };
             let mode = self.modes.iter().position(|mode| mode.moved == moved)?;
+            let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
             Some(Lineage {
                 mode,
                 broken,
-                track: Track::new(mean, covariance, &self.modes[mode].noise),
+                track: Track::new(mean, covariance, &noise),
+                offsets: RateOffsets::default(),
                 heard: [0.0; CHANNELS],
             })
         };
@@ -166,8 +172,18 @@ impl Reasons {
             let moved = self.modes[lineage.mode].moved;
             for wheel in 0..self.robot.wheels.len().min(WHEELS) {
                 let is_broken = lineage.broken >> wheel & 1 == 1;
+                let is_dragged = moved.stuck().count_ones() > 1 && !moved.is_stuck(wheel);
                 lineage.heard[Channel::wheel_rate(wheel)] += if is_broken {
                     evidence.broken_anyhow(wheel)
+                } else if is_dragged && !is_new {
+                    let dragged = evidence.dragged(&self.model, observation, moved.stuck(), wheel);
+                    let about = lineage.offsets.expected(wheel, &dragged);
+                    let reading = &observation.wheels[wheel];
+                    if reading.plain > 0 {
+                        let noise = evidence.sample_variance(reading.plain);
+                        lineage.offsets.update(wheel, &dragged, reading.mean, noise);
+                    }
+                    evidence.turning(&self.model, observation, wheel, about)
                 } else {
                     evidence.whole(&self.model, observation, moved, is_new, wheel)
                 };

@@ -17,6 +17,8 @@ pub struct Sets {
     /// Row i: motion mode i; column e: the encoders `e` (bits) are broken.
     p: Vec<f64>,
     moved: Vec<Moved>,
+    /// Per motion mode: what of it no fault describes.
+    p_unknown: Vec<f64>,
     wheels: usize,
     unknown: f64,
     products: Vec<f64>,
@@ -30,6 +32,7 @@ impl Sets {
         Self {
             p: vec![0.0; modes.len() * subsets],
             moved: modes.iter().map(|mode| mode.moved).collect(),
+            p_unknown: modes.iter().map(|mode| mode.p_unknown).collect(),
             wheels,
             unknown: 0.0,
             products: vec![0.0; subsets],
@@ -47,11 +50,12 @@ impl Sets {
         if p.is_nan() || p < NEGLIGIBLE {
             return;
         }
+        let p_unknown = self.p_unknown[mode];
+        self.unknown += p * p_unknown;
         if self.moved[mode].is_unknown() {
-            self.unknown += p;
             return;
         }
-        self.products[0] = p;
+        self.products[0] = p * (1.0 - p_unknown);
         for wheel in 0..self.wheels {
             let broken = broken(wheel);
             let (whole, with) = self.products[..2 << wheel].split_at_mut(1 << wheel);

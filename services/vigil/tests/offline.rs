@@ -61,8 +61,8 @@ fn cut(to: &Path, keep: impl Fn(u32, f64) -> bool) {
     fs::write(to, kept.join("\n")).unwrap();
 }
 
-/// How many times the sensor's noise a residual may be: a tenth more than it. The yaw of a rover whose
-/// right middle wheel is stuck falls short of that, with 1.11.
+/// How many times the sensor's noise a residual may be: a tenth more than it. The yaw of a rover
+/// whose right middle wheel is stuck falls short of that, with 1.11.
 fn largest_to_floor(mode: &Value, key: &str) -> f64 {
     match (mode["mode"].as_str().unwrap(), key) {
         ("RM_STUCK", "yaw") => 1.12,

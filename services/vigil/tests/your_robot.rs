@@ -119,7 +119,7 @@ fn check_step(command: &[String], output: &Output) {
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
     let step = command[1].as_str();
-    // Check says with its code whether this machine may run a graph, which is not the page's affair.
+    // Check says with its code whether this machine may run a graph: not the page's affair.
     let codes: &[i32] = if step == "check" { &[0, 1] } else { &[0] };
     let code = output.status.code().unwrap();
     assert!(

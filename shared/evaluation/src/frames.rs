@@ -188,7 +188,8 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
     Ok(runs)
 }
 
-/// Refuses a run with a gap of many times its median interval; `first_row`: that of its first frame.
+/// Refuses a run with a gap of many times its median interval; `first_row`: that of its first
+/// frame.
 fn even(path: &Path, run: &Run, first_row: u64) -> Result<(), FramesError> {
     let intervals_ns = intervals_ns(run);
     let Some(usual_s) = median_s(&mut intervals_ns.clone()) else {

@@ -88,8 +88,8 @@ fn polynomials_match_an_independent_fit_and_held_out_runs_take_no_part() {
     assert_eq!(again, model);
 }
 
-/// Means of recorded rates less rolling, rad/s, at 0.1, 0.2 and 0.3 m/s on curvatures up to 0.35 /m,
-/// taken from the runs elsewhere: stuck wheel, turning wheel.
+/// Means of recorded rates less rolling, rad/s, at 0.1, 0.2 and 0.3 m/s on curvatures up to
+/// 0.35 /m, taken from the runs elsewhere: stuck wheel, turning wheel.
 fn wheels_yield_by_the_same_at_every_speed(model: &Model) {
     let expected = [
         (0, 2, [-0.102, -0.107, -0.115]),

@@ -1,4 +1,4 @@
-//! What a learned nominal model says of a robot that moves unasked, and of sensors that fall silent.
+//! What a learned nominal model says of a robot that moves unasked, and of silent sensors.
 #![allow(clippy::unwrap_used)]
 
 use rand::{RngExt, SeedableRng};
@@ -20,7 +20,10 @@ fn robot(has_wheel_rates: bool) -> Description {
 name = "small"
 kinematics = "differential"
 wheel_radius_m = 0.1
-command = [{{ name = "v", unit = "m/s", limit = 1.0 }}, {{ name = "w", unit = "rad/s", limit = 2.0 }}]
+command = [
+  {{ name = "v", unit = "m/s", limit = 1.0 }},
+  {{ name = "w", unit = "rad/s", limit = 2.0 }},
+]
 wheels = [
   {{ name = "L", x = 0.0, y = 0.1, steered = false }},
   {{ name = "R", x = 0.0, y = -0.1, steered = false }},
@@ -117,7 +120,7 @@ fn a_robot_that_runs_away_is_noticed_by_its_pose_alone() {
     let robot = robot(false);
     let model = learned(&robot);
     for form in Form::ALL {
-        // Told to rest from 10 s on; what moves on is slower than it was driven in the log, or turns.
+        // Told to rest from 10 s on: what moves on is slow, or turns.
         for (id, unasked) in [
             (1, [0.4, 0.0]),
             (2, [0.1, 0.0]),
@@ -134,6 +137,14 @@ fn a_robot_that_runs_away_is_noticed_by_its_pose_alone() {
             );
             assert_eq!(channel, Channel::POSE);
         }
+        // One that was not told to move at all since the start.
+        let found = alarm(
+            &model,
+            &robot,
+            &run(5, 10.0, |_| [0.0; 2], |_| [0.4, 0.0]),
+            form,
+        );
+        assert!(found.unwrap().0 < 3.0, "{form:?}: {found:?}");
         for id in 10..14 {
             let healthy = run(id, 120.0, stop_and_go, stop_and_go);
             assert_eq!(alarm(&model, &robot, &healthy, form), None, "run {id}");

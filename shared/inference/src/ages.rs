@@ -9,6 +9,9 @@
 //! Onsets are resolved in proportion to their age ([`crate::onsets`]); where two components become
 //! one, their first two moments are kept.
 //!
+//! Residuals whose number of dimensions only a model tells stand in the first ones of a longer
+//! vector, the rest 0: [`Ages::of`].
+//!
 //! One prior deviation serves faults of every size: it enters the delay by its
 //! logarithm only, and mixtures of several gained on small faults what they lost on others.
 
@@ -26,6 +29,8 @@ struct Component<const D: usize> {
     log_weight: f64,
     bias: SVector<f64, D>,
     variance: f64,
+    /// How many of the D dimensions are used.
+    dimensions: f64,
 }
 
 /// Learned-bias detection filter over a whitened residual of D dimensions.
@@ -33,6 +38,7 @@ struct Component<const D: usize> {
 pub struct Ages<const D: usize> {
     components: Onsets<Component<D>>,
     prior_variance: f64,
+    dimensions: f64,
 }
 
 impl<const D: usize> Ages<D> {
@@ -40,9 +46,16 @@ impl<const D: usize> Ages<D> {
     /// residual's.
     #[must_use]
     pub fn new(bias_sd: f64) -> Self {
+        Self::of(D, bias_sd)
+    }
+
+    /// The same over residuals of the first `dimensions` of D, at most D; all others must be 0.
+    #[must_use]
+    pub fn of(dimensions: usize, bias_sd: f64) -> Self {
         Self {
             components: Onsets::default(),
             prior_variance: bias_sd * bias_sd,
+            dimensions: dimensions.min(D) as f64,
         }
     }
 
@@ -65,6 +78,7 @@ impl<const D: usize> Ages<D> {
             log_weight: birth.ln(),
             bias: SVector::zeros(),
             variance: self.prior_variance,
+            dimensions: self.dimensions,
         });
         let stays = (-birth).ln_1p();
         let mut highest = f64::NEG_INFINITY;
@@ -85,8 +99,8 @@ impl<const D: usize> Component<D> {
     fn take(&mut self, residual: &SVector<f64, D>, nominal: f64) {
         let spread = 1.0 + self.variance;
         let deviation = residual - self.bias;
-        self.log_weight +=
-            0.5 * (nominal - deviation.norm_squared() / spread) - 0.5 * D as f64 * spread.ln();
+        self.log_weight += 0.5 * (nominal - deviation.norm_squared() / spread)
+            - 0.5 * self.dimensions * spread.ln();
         let gain = self.variance / spread;
         self.bias += gain * deviation;
         self.variance *= 1.0 - gain;
@@ -104,7 +118,7 @@ impl<const D: usize> Onset for Component<D> {
             (self.log_weight - total).exp(),
             (older.log_weight - total).exp(),
         );
-        let apart = (self.bias - older.bias).norm_squared() / D as f64;
+        let apart = (self.bias - older.bias).norm_squared() / self.dimensions.max(1.0);
         // A distance beyond all numbers, after residuals beyond all sense, says nothing.
         let between = if one * two > 0.0 && apart.is_finite() {
             one * two * apart
@@ -115,6 +129,7 @@ impl<const D: usize> Onset for Component<D> {
             log_weight: total,
             bias: self.bias * one + older.bias * two,
             variance: one * self.variance + two * older.variance + between,
+            dimensions: self.dimensions,
         }
     }
 }
@@ -161,6 +176,21 @@ mod tests {
                 "{lambda}: {mean} steps, bound {bound}"
             );
         }
+    }
+
+    #[test]
+    fn dimensions_that_are_not_used_change_nothing() {
+        let (mut short, mut long) = (Ages::<2>::new(1.5), Ages::<5>::of(2, 1.5));
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(4);
+        for step in 0..200 {
+            let bias = if step < 150 { 0.0 } else { 1.0 };
+            let [x, y]: [f64; 2] =
+                std::array::from_fn(|_| bias + rng.sample::<f64, _>(StandardNormal));
+            short.step(&SVector::from([x, y]), 1e-4);
+            long.step(&SVector::from([x, y, 0.0, 0.0, 0.0]), 1e-4);
+            assert!((short.log_odds() - long.log_odds()).abs() < 1e-9);
+        }
+        assert!(short.log_odds() > 5.0);
     }
 
     #[test]

@@ -266,3 +266,64 @@ fn an_alarm_above_the_tempered_bound_of_a_form_is_refused_with_the_bound() {
         );
     }
 }
+
+/// After each observation of [`frames`]: log-odds as reported, and those of all channels together.
+fn with_joint(model: &Model, robot: &Description, rate_1_h: f64) -> Vec<(f64, f64)> {
+    let channels = Channels::PoseEncoders;
+    let mut monitor = Monitor::new(model, channels, Form::LearnedBias, rate_1_h);
+    let mut observer = Observer::new(robot);
+    let mut out = Vec::new();
+    for mut frame in frames() {
+        for wheel in 0..2 {
+            frame.current[wheel] = 0.05;
+            frame.valid |= Valid::current(wheel);
+        }
+        if observer.push(&frame).complete {
+            monitor.step(observer.history(), false);
+            let joint = monitor.joint_log_odds().unwrap();
+            out.push((monitor.report().log_odds, joint));
+        }
+    }
+    monitor.forget_evidence();
+    assert!(monitor.joint_log_odds().unwrap() <= -700.0);
+    out
+}
+
+#[test]
+fn all_channels_together_add_to_what_each_says() {
+    let robot: Description = toml::from_str(&config("robots/kobuki.toml")).unwrap();
+    let mut with = Model::from_toml(&shipped()).unwrap();
+    assert_eq!(with.joint.len(), 1);
+    let mut without = with.clone();
+    without.joint.clear();
+    // A tail by which the joint log-odds weigh more than those of each channel.
+    let tail = &mut with.joint[0].tail;
+    (tail.level_log_odds, tail.interval_h, tail.slope) = (-2.0, 3.0, 0.9);
+    let tail = tail.clone();
+    let rate_1_h = 2.0_f64;
+    let (together, each) = (
+        with_joint(&with, &robot, rate_1_h),
+        with_joint(&without, &robot, rate_1_h),
+    );
+    assert_eq!(together.len(), each.len());
+    let mut most = 0.0_f64;
+    for (&(all, joint), &(alone, same)) in together.iter().zip(&each) {
+        assert_eq!(joint, same);
+        let expected = log_add(alone, tail.tempered(joint) + rate_1_h.ln());
+        assert!(
+            (all - expected.max(-700.0)).abs() < 1e-9,
+            "{all} {expected}"
+        );
+        most = most.max(all - alone);
+    }
+    assert!(most > 1.0, "{most}");
+}
+
+#[test]
+fn a_joint_tail_without_sense_is_refused_by_name() {
+    let mut model = Model::from_toml(&shipped()).unwrap();
+    model.joint[0].tail.slope = 0.0;
+    let text = model.sealed().to_toml().unwrap();
+    let message = Model::from_toml(&text).unwrap_err().to_string();
+    assert!(message.starts_with("joint.learned-bias"), "{message}");
+}

@@ -149,6 +149,7 @@ pub fn learn(
         },
         command,
         channel: Vec::new(),
+        joint: Vec::new(),
         calibration: Vec::new(),
     };
     let mut report = Report::new(&model, runs.len() - left_out.len(), left_out.len());
@@ -157,14 +158,7 @@ pub fn learn(
     if targets.is_empty() {
         return Err(NominalError::NoChannels);
     }
-    let untold = [0.0, noise::SETTLED_S].map(|steady_s| {
-        let commands = excitation::settled(&records, &model.command, steady_s);
-        told::untold(&terms::command(robot), &commands, &model.command)
-    });
-    if let Some(axis) = untold[0].iter().find_map(told::single) {
-        let axis = model.command[axis].name.clone();
-        return Err(NominalError::Follows { axis });
-    }
+    let untold = untold(&records, &model, robot)?;
     report.untold(&untold, &model, robot);
     let (train, test): (Vec<Part<'_>>, Vec<Part<'_>>) = match tests.is_empty() {
         true => records.iter().map(|record| record.split(BLOCKS)).unzip(),
@@ -202,6 +196,26 @@ fn doubt(runs: &[&Run], until_s: f64, robot: &Description) -> Result<Option<Stri
             "{found} of {all} runs are doubtful and learned from nevertheless: {doubt}"
         ))),
         None => Ok(None),
+    }
+}
+
+/// Products of powers of the command that the log does not tell: for what is looked at in all motion,
+/// and for a pose.
+fn untold(
+    records: &[Record],
+    model: &Model,
+    robot: &Description,
+) -> Result<[Vec<Term>; 2], NominalError> {
+    let untold = [0.0, noise::SETTLED_S].map(|steady_s| {
+        let commands = excitation::settled(records, &model.command, steady_s);
+        told::untold(&terms::command(robot), &commands, &model.command)
+    });
+    let axis = untold[0].iter().find_map(told::single);
+    match axis.and_then(|axis| model.command.get(axis)) {
+        Some(range) => Err(NominalError::Follows {
+            axis: range.name.clone(),
+        }),
+        None => Ok(untold),
     }
 }
 

@@ -24,8 +24,8 @@ pub(super) fn is_settled(history: &History, ranges: &[Range]) -> bool {
 }
 
 /// The products of powers among `terms` that these commands do not tell from those of lower order
-/// (and from those before them), in order, with all products of which they are a factor; none without
-/// commands. Each axis counts from -1 to 1 over its range.
+/// (and from those before them), in order, with all products of which they are a factor; none
+/// without commands. Each axis counts from -1 to 1 over its range.
 pub(super) fn untold(terms: &[Term], commands: &[[f64; COMMANDS]], ranges: &[Range]) -> Vec<Term> {
     let order = |term: &Term| term.powers.iter().map(|&p| u32::from(p)).sum::<u32>();
     let mut products: Vec<Term> = terms.to_vec();
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn a_square_that_another_axis_always_equals_is_not_told_from_it() {
-        // w = v^2 in the scaled axes: told as w, so not as v^2; v·w is v^3, which the others are not.
+        // w = v^2 in the scaled axes: told as w, so not as v^2; v·w is v^3, and told.
         let terms = [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1]];
         let terms = terms.map(|[a, b]| Term::command([a, b, 0, 0]));
         let commands: Vec<_> = (0..=20)

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use vigil_robot::learned::Form;
 use vigil_robot::learned::monitor::Channels;
-use vigil_robot::nominal::{self, Model, Of, Range, Term};
+use vigil_robot::nominal::{self, Joint, Model, Of, Range, Tail, Term};
 
 use super::report;
 use crate::model_view::{Alarm, Source};
@@ -26,6 +26,8 @@ pub struct View {
     pub command: Vec<Range>,
     /// Channels.
     pub channels: Vec<Channel>,
+    /// Tails of all channels of a set together.
+    pub joint: Vec<Joint>,
     /// Alarm thresholds.
     pub alarms: Vec<Alarm>,
     /// For each form of the detection filter the highest log-odds that a lasting fault reaches: an
@@ -85,6 +87,7 @@ impl View {
             widened: model.widened,
             command: model.command.clone(),
             channels: model.channel.iter().map(channel).collect(),
+            joint: model.joint.clone(),
             alarms: Alarm::of(&model.calibration, fault_rate_1_h),
             reachable: Form::ALL.map(reachable).to_vec(),
         }
@@ -168,6 +171,20 @@ impl fmt::Display for View {
         )?;
         for channel in &self.channels {
             channel.write(f)?;
+        }
+        for joint in &self.joint {
+            let Tail {
+                level_log_odds,
+                interval_h,
+                slope,
+                ..
+            } = joint.tail;
+            writeln!(
+                f,
+                "\nall channels of {} together: log-odds above {level_log_odds:.2} every \
+                 {interval_h:.3} h without a fault, and more rarely by exp(-{slope:.2}) per unit",
+                joint.sensors
+            )?;
         }
         Alarm::write(&self.alarms, f)?;
         write!(

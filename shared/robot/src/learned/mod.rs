@@ -12,6 +12,7 @@
 //! | [`noise_scale`] | how much noisier the sensors are than the learned ones |
 //! | [`calibration`] | alarm thresholds for a stated mean time between false alarms |
 //! | [`form`] | what the detection filter's fault state says of a residual |
+//! | [`troubles`] | silent sensors, and motion that nobody commanded |
 //! | [`monitor`] | the detection filter over observations |
 
 pub mod calibration;
@@ -27,6 +28,7 @@ pub mod observation;
 mod provenance;
 mod reading;
 pub mod switching;
+pub mod troubles;
 pub mod wheel_evidence;
 pub mod wheels;
 
@@ -40,5 +42,6 @@ pub use noise_scale::NoiseScales;
 pub use observation::{Intake, Observation, Observer};
 pub use reading::Reading;
 pub use switching::Switching;
+pub use troubles::Troubles;
 pub use wheel_evidence::WheelEvidence;
 pub use wheels::{EncoderModel, EncoderState, RateModel};

@@ -22,7 +22,7 @@ use super::faults::{Faults, KINDS};
 use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION};
 use super::noise_scale::SensorNoise;
 use super::wheels::{rolling_rate, steering_angle};
-use super::{Model, Observation};
+use super::{Model, Observation, Troubles};
 use crate::Description;
 
 /// Shares of the prior: how a fault first shows.
@@ -36,6 +36,8 @@ const BIAS_POSE: f64 = 1.0;
 const BIAS_CHANNEL: f64 = 3.0;
 /// Probability that a frozen encoder does not repeat itself.
 const REPEAT_FAILS: f64 = 0.01;
+/// Log-odds of a channel that is silent, or moves when it should stand.
+const TROUBLE_LOG_ODDS: f64 = 40.0;
 /// Bound of the flag of exact repeats.
 const REPEATS_LOG_ODDS_MAX: f64 = 40.0;
 /// Diffusion of the pose per observation while following, in units of the measurement's deviation.
@@ -87,6 +89,7 @@ pub struct Monitor {
     any: Constant,
     noise: SensorNoise,
     moved_s: f64,
+    troubles: Troubles,
     report: Report,
 }
 
@@ -130,6 +133,7 @@ impl Monitor {
             any: Constant::default(),
             noise: SensorNoise::default(),
             moved_s: 0.0,
+            troubles: Troubles::default(),
             report: Report {
                 log_odds: f64::NEG_INFINITY,
                 channels: [f64::NEG_INFINITY; CHANNELS],
@@ -147,6 +151,7 @@ impl Monitor {
         self.coasted = 0;
         self.noise = SensorNoise::default();
         self.moved_s = 0.0;
+        self.troubles = Troubles::default();
         self.report.evidence = 0.0;
         self.forget_evidence();
     }
@@ -175,12 +180,13 @@ impl Monitor {
     }
 
     /// True once evidence counts: the track has settled, and the noise is known or the drive shows
-    /// nothing of it for long.
+    /// nothing of it for long; or something is the matter that needs no evidence.
     #[must_use]
     pub fn is_ready(&self) -> bool {
         let use_wheels = self.channels == Channels::PoseEncoders;
         let is_known = self.noise.is_known(use_wheels);
-        self.moved_s >= READY_S && (is_known || self.moved_s >= READY_LATEST_S)
+        let is_settled = self.moved_s >= READY_S;
+        is_settled && (is_known || self.moved_s >= READY_LATEST_S) || self.troubles.any(use_wheels)
     }
 
     /// How noisy the sensors are.
@@ -198,6 +204,7 @@ impl Monitor {
     /// that the return of a robot to its nominal mode is seen after a fault has led it away.
     pub fn step(&mut self, observation: &Observation, following: bool) {
         self.report.evidence = 0.0;
+        self.troubles = observation.troubles;
         if observation.moving {
             // A robot at rest shows nothing of its noise.
             self.moved_s += observation.dt_s;
@@ -348,6 +355,22 @@ impl Monitor {
                 if self.robot.wheels[i].steered {
                     channels[Channel::steer(i)] = self.steer[i].log_odds();
                 }
+            }
+        }
+        let mut trouble =
+            |channel: usize| channels[channel] = channels[channel].max(TROUBLE_LOG_ODDS);
+        let Troubles {
+            pose_silent,
+            pose_moves,
+            wheels_turn,
+            wheels_silent,
+        } = self.troubles;
+        if pose_silent || pose_moves {
+            trouble(Channel::POSE);
+        }
+        if self.channels == Channels::PoseEncoders {
+            for wheel in (0..WHEELS).filter(|w| wheels_turn || wheels_silent >> w & 1 == 1) {
+                trouble(Channel::wheel_rate(wheel));
             }
         }
         self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);

@@ -19,6 +19,9 @@ const UNKNOWN_LENGTH_M: f64 = 0.2;
 /// the factor's mean and deviation.
 const OTHER_GROUNDS: [(f64, f64, f64); 3] =
     [(0.08, 0.3, 0.12), (0.08, 0.65, 0.2), (0.04, 1.5, 0.35)];
+/// By the pose alone, a wheel stuck on other ground looks like one that is dragged at, has sunk in
+/// or lost its tyre: how probable these are, given either.
+const DRAGGED_AT: f64 = 0.25;
 /// Deviation of such an effect from one that is changed as a whole: yaw, forward, lateral.
 const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
 /// Two stuck wheels, of which nothing was learned together: their effects add up, and are more than
@@ -74,6 +77,8 @@ pub struct MotionMode {
     pub moved: Moved,
     /// Share of what moves the robot so that it does in this way.
     pub share: f64,
+    /// Probability that something moves the robot in this way that no fault describes.
+    pub p_unknown: f64,
     /// Displacement per commanded metre.
     pub motion: MotionModel,
     /// Its noise.
@@ -156,15 +161,15 @@ impl FaultRates {
 }
 
 /// The ways in which a robot may move whose wheels `stuck` (bits) may stick: nominal first, then
-/// single wheels, pairs if `pairs`, and both kinds of unknown; if `rare`, single wheels on other
-/// ground and a jump of the pose too.
+/// single wheels, pairs if the wheels' rates are `read`, and both kinds of unknown; if `rare`,
+/// single wheels on other ground and a jump of the pose too.
 #[must_use]
 pub fn motion_modes(
     model: &Model,
     robot: &Description,
     stuck: u32,
     rare: bool,
-    pairs: bool,
+    read: bool,
 ) -> Vec<MotionMode> {
     let grounds = match rare {
         true => OTHER_GROUNDS.as_slice(),
@@ -175,6 +180,7 @@ pub fn motion_modes(
     let mut modes = vec![MotionMode {
         moved: Moved::Nominal,
         share: 1.0,
+        p_unknown: 0.0,
         motion: nominal,
         noise: nominal.noise(),
         ground: (1.0, 0.0),
@@ -190,16 +196,18 @@ pub fn motion_modes(
     for &(share, factor, sd) in grounds {
         modes.extend(wheels().map(|w| MotionMode {
             share,
+            p_unknown: if read { 0.0 } else { DRAGGED_AT },
             ..on_other_ground(model, robot, w, (factor, sd))
         }));
     }
-    if pairs {
+    if read {
         let both = |a: usize| wheels().filter(move |&b| b > a).map(move |b| [a, b]);
         modes.extend(wheels().flat_map(both).map(|both| stuck_mode(model, &both)));
     }
     let drives_on = |moved| MotionMode {
         moved,
         share: 1.0,
+        p_unknown: 1.0,
         motion: nominal,
         noise: unknown_noise(model),
         ground: (1.0, 0.0),
@@ -270,6 +278,7 @@ fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
     }
     MotionMode {
         share: 1.0,
+        p_unknown: 0.0,
         moved: Moved::Stuck(wheels.iter().fold(0, |mask, w| mask | 1 << w)),
         motion,
         noise: noise.unwrap_or_else(|| nominal.noise()),

@@ -9,6 +9,7 @@ use vigil_blocks::{SensorFrame, Valid, WHEELS};
 use vigil_inference::angle::wrap;
 use vigil_inference::track::Displacement;
 
+use super::troubles::{Limits, Troubles, Watchdog};
 use super::{Model, MotionModel, Reading};
 use crate::Description;
 
@@ -18,6 +19,9 @@ const GAP_S: f64 = 1.0;
 const FRAME_UNKNOWN_S: f64 = 1e-3;
 /// Positions beyond this are no measurement, m.
 const POSITION_MAX_M: f64 = 1e7;
+/// So many frames in a row that are not newer than the last one taken mean that the clock was set
+/// back: the next is taken, as after a gap.
+const STALE_MAX: u32 = 10;
 /// Part of a frame that may lack to an interval: frames are never exactly periodic.
 const NEARLY: f64 = 0.4;
 
@@ -54,6 +58,8 @@ pub struct Observation {
     pub wheels: [Reading; WHEELS],
     /// Steering angles, rad.
     pub steer: [Reading; WHEELS],
+    /// What no filter could tell.
+    pub troubles: Troubles,
 }
 
 impl Observation {
@@ -120,6 +126,7 @@ pub struct Observer {
     interval_s: f64,
     lag_s: f64,
     standing_m_s: f64,
+    limits: Limits,
     state: State,
     observation: Observation,
 }
@@ -140,6 +147,9 @@ struct State {
     heading_before: f64,
     wheels: [Option<f64>; WHEELS],
     steer: [Option<f64>; WHEELS],
+    watchdog: Watchdog,
+    /// Frames in a row that were not newer than the last one taken.
+    stale: u32,
     sums: Sums,
 }
 
@@ -172,6 +182,7 @@ impl Observer {
             interval_s: model.interval_s,
             lag_s: model.command.lag_s,
             standing_m_s: model.command.standing_m_s,
+            limits: Limits::new(model),
             state: State::default(),
             observation: Observation::default(),
         }
@@ -192,13 +203,15 @@ impl Observer {
     pub fn push(&mut self, frame: &SensorFrame) -> Intake {
         let new_run = !self.state.started || frame.run_id != self.state.run_id;
         let t_ns = frame.header.t_capture_ns;
-        if !new_run && t_ns <= self.state.t_ns {
+        let is_stale = !new_run && t_ns <= self.state.t_ns;
+        self.state.stale = if is_stale { self.state.stale + 1 } else { 0 };
+        let mut invalid = is_stale;
+        if is_stale && self.state.stale < STALE_MAX {
             return Intake {
-                invalid: true,
+                invalid,
                 ..Intake::default()
             };
         }
-        let mut invalid = false;
         if new_run {
             self.state = State {
                 run_id: frame.run_id,
@@ -211,10 +224,11 @@ impl Observer {
         let dt_s = if new_run {
             0.0
         } else {
-            (t_ns - self.state.t_ns) as f64 * 1e-9
+            t_ns.saturating_sub(self.state.t_ns) as f64 * 1e-9
         };
         self.state.t_ns = t_ns;
-        let jumped = dt_s > GAP_S || frame.pose_reset_count != self.state.reset_count;
+        self.state.stale = 0;
+        let jumped = is_stale || dt_s > GAP_S || frame.pose_reset_count != self.state.reset_count;
         if jumped {
             // Poses before and after must not be averaged: drop what was collected.
             self.state.reset_count = frame.pose_reset_count;
@@ -361,7 +375,12 @@ impl Observer {
             pose,
             wheels: sums.wheels,
             steer: sums.steer,
+            troubles: Troubles::default(),
         };
+        let stands = |speed: f64| speed.abs() < self.standing_m_s;
+        let is_stopped = stands(command[1]) && stands(state.lagged[1]);
+        let (watchdog, observation) = (&mut state.watchdog, &mut self.observation);
+        observation.troubles = watchdog.step(observation, is_stopped, &self.limits);
         (state.travel_before, state.heading_before) = (travel, heading);
         // An anchor without a pose is still to come.
         state.anchor = state.anchor && sums.pose_frames == 0;

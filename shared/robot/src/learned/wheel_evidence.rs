@@ -21,8 +21,10 @@ pub const BREAKAGE_SHARES: [f64; BREAKAGES.len()] = [0.32, 0.32, 0.32, 0.04];
 const TAIL: f64 = 0.02;
 const TAIL_DRAGGED: f64 = 0.1;
 /// Two dragging wheels change the rates of the others by more than the sum of what each does: by
-/// this factor, give or take the second of it.
-const TOGETHER: (f64, f64) = (1.4, 0.4);
+/// this factor, which lies in the middle of what the equilibrium of forces gives for any two.
+const TOGETHER: f64 = 1.4;
+/// Deviation of the change from that, relative to it.
+pub const TOGETHER_SD: f64 = 0.4;
 /// Share of wheels that do anything, in the unknown.
 pub const ANYTHING: f64 = 0.2;
 /// Standard deviation of a steering angle that does anything, rad.
@@ -54,11 +56,11 @@ pub struct WheelEvidence {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dragged {
     /// Expected rate, rad/s.
-    pub rate: f64,
+    pub rate_rad_s: f64,
+    /// What the drag changes of it, rad/s.
+    pub change_rad_s: f64,
     /// Variance about it from one observation to the next, (rad/s)².
     pub variance: f64,
-    /// Variance of what is constant in a run, (rad/s)²: nothing was learned of two dragging wheels.
-    pub offset_variance: f64,
 }
 
 impl WheelEvidence {
@@ -122,7 +124,11 @@ impl WheelEvidence {
             _ if moved.is_stuck(i) => either(self.standing[i], self.any[i]),
             Moved::Stuck(stuck) => {
                 let dragged = self.dragged(model, observation, stuck, i);
-                let about = (dragged.rate, dragged.variance + dragged.offset_variance);
+                let sd = match stuck.count_ones() {
+                    0 | 1 => 0.0,
+                    _ => TOGETHER_SD * dragged.change_rad_s,
+                };
+                let about = (dragged.rate_rad_s, dragged.variance + sd * sd);
                 let dragged = self.turning(model, observation, i, about);
                 either(dragged, self.healthy[i])
             }
@@ -151,14 +157,13 @@ impl WheelEvidence {
             change += with - nominal;
             variance += its;
         }
-        let (factor, sd) = match stuck.count_ones() {
-            0 | 1 => (1.0, 0.0),
-            _ => TOGETHER,
-        };
+        if stuck.count_ones() > 1 {
+            change *= TOGETHER;
+        }
         Dragged {
-            rate: nominal + factor * change,
+            rate_rad_s: nominal + change,
+            change_rad_s: change,
             variance,
-            offset_variance: (sd * factor * change).powi(2),
         }
     }
 

@@ -31,8 +31,8 @@ pub fn steering_angle(robot: &Description, wheel: usize, curvature: f64) -> f64 
 pub struct RateModel {
     /// Ratio to [`rolling_rate`].
     pub ratio: f64,
-    /// How far the rate stays behind that at any speed, rad/s, as a polynomial of the curvature, κ^0
-    /// to κ^2: a motor under proportional control yields by its load over its gain.
+    /// How far the rate stays behind that at any speed, rad/s, as a polynomial of the curvature,
+    /// κ^0 to κ^2: a motor under proportional control yields by its load over its gain.
     pub droop_rad_s: [f64; 3],
     /// Standard deviation of the rate, rad/s.
     pub rate_sd_rad_s: f64,

@@ -9,17 +9,20 @@
 //! |---|---|
 //! | [`model`] | the model file |
 //! | [`channel`] | one channel: terms, weights, noise |
+//! | [`joint`] | all channels together |
 //! | [`observation`] | frames averaged into observations, and the last few of them |
 //! | [`track`] | a run's offset and the noise's colour: residuals become white |
 //! | [`monitor`] | the detection filter over observations |
 
 pub mod channel;
+pub mod joint;
 pub mod model;
 pub mod monitor;
 pub mod observation;
 pub mod track;
 
 pub use channel::{Channel, Of, Quantity, Residual, Tail, Target, Term};
+pub use joint::Joint;
 pub use model::{Model, Range};
 pub use monitor::Monitor;
 pub use observation::{History, Observation, Observer};

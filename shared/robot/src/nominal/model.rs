@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 use vigil_blocks::{COMMANDS, WHEELS};
 
-use super::channel::{Channel, FAULT_RATE_1_H, Of, Term};
+use super::channel::{Channel, FAULT_RATE_1_H, Of, Tail, Term};
+use super::joint::Joint;
 use super::observation::DEPTH;
 use crate::Description;
 use crate::alarm::{self, AlarmError};
@@ -18,7 +19,7 @@ pub const VERSION: u32 = 2;
 /// The word by which the file is told from a model with faults.
 pub const KIND: &str = "nominal";
 /// Limits of a file's size.
-const CHANNELS_MAX: usize = 2 * WHEELS + 4;
+pub(super) const CHANNELS_MAX: usize = 2 * WHEELS + 4;
 const TERMS_MAX: usize = 128;
 /// Largest lag of a term: a prediction is also made for the observation before the newest.
 const LAG_MAX: usize = DEPTH - 2;
@@ -99,6 +100,9 @@ pub struct Model {
     pub command: Vec<Range>,
     /// Channels.
     pub channel: Vec<Channel>,
+    /// Tails of all channels of a set together; without one they are not taken together.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joint: Vec<Joint>,
     /// Alarm thresholds, one per set of channels and form of the detection filter.
     pub calibration: Vec<Calibration>,
 }
@@ -174,13 +178,24 @@ impl Model {
         find(&self.calibration, channels, form)
     }
 
+    /// The tail of all channels of a set together, if the form has one.
+    #[must_use]
+    pub fn joint(&self, channels: Channels, form: Form) -> Option<&Tail> {
+        let mut joint = self.joint.iter();
+        let of = |j: &&Joint| j.sensors == channels.name() && j.tail.form == form.name();
+        joint.find(of).map(|joint| &joint.tail)
+    }
+
     /// The highest log-odds that a lasting fault keeps some channel at, tempered as the monitor
     /// does, at a prior fault rate of `fault_rate_1_h`.
     #[must_use]
     pub fn log_odds_max(&self, channels: Channels, form: Form, fault_rate_1_h: f64) -> f64 {
         let used = self.channel.iter().filter(|c| c.is_among(channels));
         let highest = used.map(|channel| channel.tempered(form, form.log_odds_max()));
-        highest.fold(f64::NEG_INFINITY, f64::max) + (fault_rate_1_h / FAULT_RATE_1_H).ln()
+        let joint = self.joint(channels, form).into_iter();
+        let joint = joint.map(|tail| tail.tempered(form.log_odds_max()));
+        highest.chain(joint).fold(f64::NEG_INFINITY, f64::max)
+            + (fault_rate_1_h / FAULT_RATE_1_H).ln()
     }
 
     /// Log-odds at which to alarm, so that `interval_h` pass on average between false alarms at a
@@ -249,6 +264,8 @@ impl ModelFile for Model {
         for (i, channel) in self.channel.iter().enumerate() {
             check_channel(&format!("channel.{i}"), channel, count, self.command.len())?;
         }
+        let mut tails = self.joint.iter().map(|joint| &joint.tail);
+        tails.try_for_each(|tail| check_tail("joint", tail))?;
         self.calibration.iter().try_for_each(check_calibration)
     }
 }
@@ -306,15 +323,18 @@ fn check_channel(
     sane("drift_sd", channel.drift_sd, 0.0)?;
     sane("rest_sd", channel.rest_sd, 0.0)?;
     sane("scatter", channel.scatter, 1.0)?;
-    for tail in &channel.tails {
-        let positive = tail.slope > 0.0 && tail.interval_h > 0.0 && tail.interval_h.is_finite();
-        if !(positive && tail.slope.is_finite() && tail.level_log_odds.is_finite()) {
-            let key = format!("{key}.tails.{}", tail.form);
-            let found = format!("{tail:?}");
-            return refuse(key, found, "finite numbers, interval and slope above 0");
-        }
+    let mut tails = channel.tails.iter();
+    tails.try_for_each(|tail| check_tail(&format!("{key}.tails"), tail))
+}
+
+/// Checks the numbers of a tail.
+fn check_tail(key: &str, tail: &Tail) -> Result<(), ModelError> {
+    let positive = tail.slope > 0.0 && tail.interval_h > 0.0 && tail.interval_h.is_finite();
+    if positive && tail.slope.is_finite() && tail.level_log_odds.is_finite() {
+        return Ok(());
     }
-    Ok(())
+    let (key, found) = (format!("{key}.{}", tail.form), format!("{tail:?}"));
+    refuse(key, found, "finite numbers, interval and slope above 0")
 }
 
 /// Checks that a term points at what exists.

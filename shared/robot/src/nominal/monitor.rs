@@ -4,7 +4,7 @@
 //! one, per channel: an unknown constant bias, which is learned ([`Form::LearnedBias`]), and the
 //! constant likelihood of any large residual, for faults that show as scatter (a taped wheel jolts
 //! the robot once a turn and has no mean). The channels' odds, each tempered by its [`Tail`], add
-//! up: a fault enters by one of them.
+//! up: a fault enters by one of them, or by all of them at once ([`super::joint`]).
 //!
 //! Two more states speak for a fault of a channel: it is not measured while the robot moves
 //! (`ABSENT_S`), as what is not looked at cannot be healthy; and the pose moves though no motion is
@@ -24,6 +24,7 @@ use vigil_inference::constant::Constant;
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 
 use super::channel::{Channel, FAULT_RATE_1_H, Quantity, REST_S, Tail};
+use super::joint::Together;
 use super::model::Model;
 use super::observation::{History, Observation};
 use super::track::Track;
@@ -115,6 +116,9 @@ pub struct Monitor {
     /// What the prior fault rate adds to the log-odds.
     prior_log_odds: f64,
     watched: Vec<Watched>,
+    together: Option<Together>,
+    /// The tail of all channels together; none while it is being learned.
+    joint: Option<Tail>,
     run_s: f64,
     extrapolated: bool,
     report: Report,
@@ -136,11 +140,14 @@ impl Monitor {
             rest: Evidence::new(form, BIAS),
             tail: channel.tail(form).cloned(),
         });
+        let watched: Vec<Watched> = watched.collect();
         let mut monitor = Self {
             sizes: model.sizes(),
             form,
             prior_log_odds: (fault_rate_1_h / FAULT_RATE_1_H).ln(),
-            watched: watched.collect(),
+            together: Together::new(form, watched.len(), BIAS),
+            joint: model.joint(channels, form).cloned(),
+            watched,
             run_s: 0.0,
             extrapolated: false,
             report: Report {
@@ -175,7 +182,17 @@ impl Monitor {
             watched.absent = Evidence::new(self.form, BIAS);
             watched.rest = Evidence::new(self.form, BIAS);
         }
+        if let Some(together) = &mut self.together {
+            together.forget();
+        }
         self.sum_up();
+    }
+
+    /// Log-odds of all channels together at [`FAULT_RATE_1_H`], not tempered; none for a single
+    /// channel, and for forms without.
+    #[must_use]
+    pub fn joint_log_odds(&self) -> Option<f64> {
+        self.together.as_ref().map(Together::log_odds)
     }
 
     /// What the last observation did.
@@ -184,10 +201,12 @@ impl Monitor {
         &self.report
     }
 
-    /// True once evidence counts.
+    /// True once evidence counts: the robot has moved for a while, or does so though it should
+    /// rest.
     #[must_use]
     pub fn is_ready(&self) -> bool {
-        self.run_s >= READY_S
+        let mut watched = self.watched.iter();
+        self.run_s >= READY_S || watched.any(|watched| watched.rest.log_odds() > 0.0)
     }
 
     /// True if the last command lay outside the range that was learned from.
@@ -204,17 +223,21 @@ impl Monitor {
         let widening = self.widening(now);
         let share = 1.0 / self.watched.len().max(1) as f64;
         let birth = FAULT_RATE_1_H / 3600.0 * now.dt_s * share;
+        let rests = !now.moving || now.moving_s < START_S;
         for watched in &mut self.watched {
             watched.rest(now, self.form, birth);
-        }
-        if !now.moving || now.moving_s < START_S {
-            for watched in &mut self.watched {
+            if rests {
                 watched.track.interrupt();
             }
+        }
+        if rests {
             self.sum_up();
             return;
         }
         self.run_s += now.dt_s;
+        if let Some(together) = &mut self.together {
+            together.begin();
+        }
         for watched in &mut self.watched {
             watched.present(now, self.form, birth);
             let Watched {
@@ -234,9 +257,15 @@ impl Monitor {
             let (apart, spread) = track.step(channel, residual.apart, variance, following);
             let whitened = (apart / spread.sqrt()).clamp(-CLIP, CLIP);
             bias.step(&SVector::from([whitened]), birth);
+            if let Some(together) = &mut self.together {
+                together.add(whitened);
+            }
             let square = whitened * whitened / channel.scatter;
             scatter.step(square, TAU_SQUARED_PER_DIMENSION, birth, birth);
             self.report.evidence += log_normal(apart, spread);
+        }
+        if let Some(together) = &mut self.together {
+            together.step(birth);
         }
         self.sum_up();
     }
@@ -265,7 +294,12 @@ impl Monitor {
             let odds = watched.log_odds();
             channels[slot] = log_add(channels[slot], odds + self.prior_log_odds);
         }
-        self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);
+        let mut log_odds = log_sum_exp(&channels);
+        if let (Some(together), Some(tail)) = (&self.together, &self.joint) {
+            let odds = tail.tempered(together.log_odds());
+            log_odds = log_add(log_odds, odds + self.prior_log_odds);
+        }
+        self.report.log_odds = log_odds.max(LOG_ODDS_MIN);
         self.report.channels = channels.map(|value| value.max(LOG_ODDS_MIN));
     }
 }

@@ -1,0 +1,65 @@
+//! Sensors that fall silent, clocks that are set back, and a robot that drives though it should
+//! stand: what no filter weighs must not pass for health.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+mod watched;
+
+use vigil_blocks::{MODE_UNKNOWN, SensorFrame, Valid};
+use watched::Watched;
+
+/// True once the alarm stands and the diagnosis is unknown.
+fn is_noticed(watched: &Watched) -> bool {
+    watched.detection.alarm != 0
+        && watched.diagnosis.mode == MODE_UNKNOWN
+        && watched.diagnosis.p_unknown > 0.99
+}
+
+fn is_well(watched: &Watched) -> bool {
+    watched.detection.alarm == 0 && watched.diagnosis.mode == 0 && watched.diagnosis.p[0] > 0.9
+}
+
+fn without(bits: u64) -> impl Fn(&mut SensorFrame) {
+    move |frame| frame.valid &= !bits
+}
+
+#[test]
+fn a_sensor_that_falls_silent_is_noticed_and_forgiven_when_it_reads_again() {
+    for bits in [Valid::POSE, Valid::wheel_rate(2)] {
+        let mut watched = Watched::new(31);
+        watched.drive(8.0);
+        watched.drive_with(1.5, without(bits));
+        assert!(is_well(&watched));
+        watched.drive_with(1.0, without(bits));
+        assert!(is_noticed(&watched), "{bits}");
+        watched.drive_with(5.0, without(bits));
+        assert!(is_noticed(&watched), "{bits}");
+        watched.drive(6.0);
+        assert!(is_well(&watched), "{bits}");
+    }
+}
+
+#[test]
+fn a_robot_that_drives_on_though_it_should_stand_is_noticed() {
+    let mut watched = Watched::new(32);
+    watched.drive(8.0);
+    let commanded_rest = |frame: &mut SensorFrame| frame.command[1] = 0.0;
+    watched.drive_with(2.5, commanded_rest);
+    assert!(is_noticed(&watched));
+}
+
+#[test]
+fn a_clock_that_is_set_back_stops_nobody() {
+    let mut watched = Watched::new(33);
+    watched.drive(8.0);
+    watched.frame_time_back(5.0);
+    watched.drive(3.0);
+    assert!(is_well(&watched));
+    let fault = vigil_robot::Fault {
+        kind: vigil_robot::FaultKind::Stuck,
+        wheel: 4,
+    };
+    watched.world.inject(fault).unwrap();
+    // Well before the clock is where it was.
+    watched.drive(1.0);
+    assert_eq!(watched.diagnosis.mode, watched.leaf(fault) as u32);
+}
