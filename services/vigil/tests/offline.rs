@@ -273,7 +273,7 @@ fn wrong_input_is_refused_with_its_name_and_exit_code_2() {
         ),
         (
             [&diagnose[..], &["--model", &model]].concat(),
-            "model.toml: the model has layout version 1; this program reads version 3: learn it",
+            "model.toml: the model has layout version 1; this program reads version 4: learn it",
         ),
         (
             [&diagnose[..], &["--model", &model, "--sensors", "lidar"]].concat(),
