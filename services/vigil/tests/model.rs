@@ -39,7 +39,7 @@ fn the_shipped_model_is_shown_as_text_and_as_one_document() {
     let shown = text(&["learn", "--show", "--model", MODEL]);
     for wanted in [
         "robot          rover (LF LM LR RF RM RR)",
-        "file layout    version 3",
+        "file layout    version 4",
         "frames         learn_frames.csv.gz",
         "labels         learn_runs.csv",
         "ground         soil",
@@ -130,7 +130,7 @@ fn an_edited_model_is_refused_unless_it_says_that_it_is_edited() {
     // Comments and layout are no content.
     fs::write(&path, format!("# ours\n{shipped}\n")).unwrap();
     assert!(text(&show).contains("model hash"));
-    fs::write(&path, shipped.replacen("version = 3", "version = 2", 1)).unwrap();
+    fs::write(&path, shipped.replacen("version = 4", "version = 3", 1)).unwrap();
     assert!(refused(&show).contains("learn it again with `vigil learn`"));
 }
 

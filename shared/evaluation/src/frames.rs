@@ -14,10 +14,10 @@ use std::path::Path;
 use vigil_blocks::{COMMANDS, SensorFrame, Valid, WHEELS};
 use vigil_robot::Description;
 
-use crate::table::Table;
 pub use crate::table::TableError as FramesError;
+use crate::table::{Table, wrong_row};
 
-/// A gap in time longer than this many usual intervals is refused.
+/// A gap in time longer than this many usual (median) intervals of its run is refused.
 const GAP_INTERVALS_MAX: f64 = 10.0;
 /// A gap in time longer than this is refused whatever is usual, s.
 const GAP_MAX_S: f64 = 1.0;
@@ -158,13 +158,19 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
     let mut table = Table::open(path)?;
     let columns = Columns::find(&table, robot)?;
     let (mut runs, mut seen) = (Vec::<Run>::new(), BTreeSet::new());
+    let (mut row, mut first_row) = (0, 1);
     while table.advance()? {
+        row += 1;
         let (id, mut frame) = columns.frame(&table)?;
         if runs.last().is_none_or(|run| run.id != id) {
             if !seen.insert(id) {
                 let message = format!("run {id} appears again: the rows of a run are contiguous");
                 return Err(table.wrong(message));
             }
+            if let Some(whole) = runs.last() {
+                even(path, whole, first_row)?;
+            }
+            first_row = row;
             runs.push(Run {
                 id,
                 frames: Vec::new(),
@@ -175,10 +181,44 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
         frame.header.seq = run.frames.len() as u64;
         run.frames.push(frame);
     }
-    if runs.is_empty() {
+    let Some(whole) = runs.last() else {
         return Err(table.wrong("there are no frames".into()));
-    }
+    };
+    even(path, whole, first_row)?;
     Ok(runs)
+}
+
+/// Refuses a run with a gap of many times its median interval; `first_row`: that of its first
+/// frame.
+fn even(path: &Path, run: &Run, first_row: u64) -> Result<(), FramesError> {
+    let intervals_ns = intervals_ns(run);
+    let Some(usual_s) = median_s(&mut intervals_ns.clone()) else {
+        return Ok(());
+    };
+    let gap = intervals_ns.iter().zip(first_row + 1..);
+    let mut gaps = gap.map(|(&gap_ns, row)| (gap_ns as f64 * 1e-9, row));
+    let Some((gap_s, row)) = gaps.find(|(gap_s, _)| *gap_s > GAP_INTERVALS_MAX * usual_s) else {
+        return Ok(());
+    };
+    let gap = format!(
+        "run {}: a gap of {gap_s:.3} s, usual are {usual_s:.3} s",
+        run.id
+    );
+    Err(wrong_row(path, row, format!("{gap}: start a new run")))
+}
+
+/// Time between consecutive frames, ns.
+fn intervals_ns(run: &Run) -> Vec<u64> {
+    let pairs = run.frames.windows(2);
+    let interval = |pair: &[SensorFrame]| pair[1].header.t_capture_ns - pair[0].header.t_capture_ns;
+    pairs.map(interval).collect()
+}
+
+/// The median, s, of two in the middle the shorter; none of nothing.
+fn median_s(intervals_ns: &mut [u64]) -> Option<f64> {
+    let middle = intervals_ns.len().checked_sub(1)? / 2;
+    let (_, median_ns, _) = intervals_ns.select_nth_unstable(middle);
+    Some(*median_ns as f64 * 1e-9)
 }
 
 /// Rate at which recorded runs are played at `speed` times their own, Hz: from the median interval
@@ -187,16 +227,10 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
 /// # Errors
 /// What is wrong, and what is allowed.
 pub fn playback_rate_hz(runs: &[Run], speed: f64) -> Result<f64, String> {
-    let pairs = runs.iter().flat_map(|run| run.frames.windows(2));
-    let mut intervals_ns: Vec<u64> = pairs
-        .map(|pair| pair[1].header.t_capture_ns - pair[0].header.t_capture_ns)
-        .collect();
-    let middle = intervals_ns.len() / 2;
-    if intervals_ns.is_empty() {
+    let mut all_ns: Vec<u64> = runs.iter().flat_map(intervals_ns).collect();
+    let Some(interval_s) = median_s(&mut all_ns) else {
         return Err("no run has two frames".into());
-    }
-    let (_, median_ns, _) = intervals_ns.select_nth_unstable(middle);
-    let interval_s = *median_ns as f64 * 1e-9;
+    };
     let rate_hz = speed / interval_s;
     if (1.0..=1e4).contains(&rate_hz) {
         return Ok(rate_hz);
@@ -225,14 +259,6 @@ fn follows(
         )));
     }
     let gap_s = (now_ns - last_ns) as f64 * 1e-9;
-    if let [first, second, ..] = run.frames.as_slice() {
-        let usual_s = (t_ns(second) - t_ns(first)) as f64 * 1e-9;
-        if gap_s > GAP_INTERVALS_MAX * usual_s {
-            let (id, usual) = (run.id, usual_s);
-            let message = format!("run {id}: a gap of {gap_s:.3} s, usual are {usual:.3} s");
-            return Err(table.wrong(format!("{message}: start a new run")));
-        }
-    }
     if gap_s > GAP_MAX_S {
         let message = format!(
             "run {}: a gap of {gap_s:.3} s, allowed is {GAP_MAX_S} s",

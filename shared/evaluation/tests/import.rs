@@ -220,6 +220,100 @@ fn what_does_not_fit_is_refused_with_its_place() {
 }
 
 #[test]
+fn numbers_and_units_that_make_no_sense_are_refused_by_their_keys() {
+    let folder = TempDir::new().unwrap();
+    write(&folder.path().join("run0"), |text| text);
+    let cases = [
+        (
+            "modulus = 1000",
+            "modulus = 0",
+            "source.0.device_clock.modulus: 0",
+        ),
+        ("modulus = 4096", "modulus = 0.0", "channel.2.modulus: 0"),
+        (
+            "modulus = 4096",
+            "modulus = -4096",
+            "channel.2.modulus: -4096",
+        ),
+        ("modulus = 4096", "modulus = inf", "channel.2.modulus: inf"),
+        ("modulus = 4096", "modulus = nan", "channel.2.modulus: NaN"),
+        ("scale = 0.001", "scale = nan", "channel.2.scale: NaN"),
+        ("scale = 0.001", "scale = 0", "channel.2.scale: 0"),
+        ("scale = 0.001", "offset = inf", "channel.2.offset: inf"),
+        (
+            "column = \"v\"",
+            "column = \"v\"\ninitial = nan",
+            "channel.0.initial: NaN",
+        ),
+        (
+            "enc_L = -1.0",
+            "enc_L = nan",
+            "channel.4.delay_against.enc_L: NaN",
+        ),
+        (
+            "unit = \"s\"",
+            "unit = \"deg\"",
+            "source.1.time.unit: is no unit of time",
+        ),
+        (
+            "unit = \"deg\"",
+            "unit = \"ms\"",
+            "channel.4.unit: is a unit of time",
+        ),
+        (
+            "rate_hz = 50.0",
+            "rate_hz = 50.0\ngap_max_s = nan",
+            "gap_max_s: NaN",
+        ),
+        (
+            "rate_hz = 50.0",
+            "rate_hz = 50.0\nhold_max_s = 0",
+            "hold_max_s: 0",
+        ),
+    ];
+    for (from, to, wanted) in cases {
+        let text = LOG.replacen(from, to, 1);
+        assert_ne!(text, LOG, "{from}");
+        let log: LogDescription = toml::from_str(&text).unwrap();
+        let refused = import(&log, &robot(), folder.path());
+        let message = refused.map(|_| ()).unwrap_err().to_string();
+        assert!(message.starts_with(wanted), "{to}: {message}");
+    }
+}
+
+#[test]
+fn a_command_is_not_held_for_ever() {
+    // The commands' topic ends after 2 of 10 s: by itself, in a file of its own.
+    let folder = TempDir::new().unwrap();
+    let run = folder.path().join("run0");
+    write(&run, |text| text);
+    let commands = (0..100).map(|i| format!("{},0.5\n", 50.0 + f64::from(i) * 0.02));
+    fs::write(
+        run.join("commands.csv"),
+        format!("t,v\n{}", commands.collect::<String>()),
+    )
+    .unwrap();
+    let source = "[[source]]\nname = \"commands\"\nfile = \"commands.csv\"\n\
+                  time = { column = \"t\", unit = \"s\" }\n[[channel]]";
+    let text = LOG.replacen("[[channel]]", source, 1);
+    let text = text.replacen("source = \"base\"", "source = \"commands\"", 1);
+    let mut log: LogDescription = toml::from_str(&text).unwrap();
+    assert_eq!(log.hold_max_s, 30.0);
+    assert!(import(&log, &robot(), folder.path()).is_ok());
+    log.hold_max_s = 5.0;
+    let message = import(&log, &robot(), folder.path())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        message.contains("commands.csv: row 100: column v: its value is held for 7.")
+            && message.contains("hold_max_s allows 5 s"),
+        "{message}"
+    );
+    log.hold_max_s = f64::INFINITY;
+    assert!(import(&log, &robot(), folder.path()).is_ok());
+}
+
+#[test]
 fn the_shipped_descriptions_can_be_read() {
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config");
     for name in ["kobuki", "robotino"] {

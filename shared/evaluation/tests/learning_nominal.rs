@@ -184,6 +184,11 @@ fn a_log_that_lacks_what_a_model_needs_is_refused_by_name() {
         matches!(coupled, NominalError::Together { .. }),
         "{coupled}"
     );
+    let rare = refused(&|t| [0.5 + 0.3 * t.sin(), if t < 0.6 { 0.8 } else { 0.0 }]);
+    assert!(
+        matches!(&rare, NominalError::Follows { axis } if axis == "w"),
+        "{rare}"
+    );
     let still = refused(&|_| [0.0, 0.0]);
     assert!(matches!(still, NominalError::Still { .. }), "{still}");
     assert_eq!(
@@ -204,6 +209,57 @@ fn commands_outside_the_learned_range_widen_the_noise() {
         }
     }
     assert!(monitor.is_extrapolating());
+}
+
+/// Two speeds, three yaw rates, each kept up for some seconds.
+fn two_speeds(t: f64) -> [f64; 2] {
+    let step = (t / 3.7) as u64 * 7919 % 101;
+    [
+        [0.2, 0.5][(step % 2) as usize],
+        [-0.6, 0.0, 0.6][(step % 3) as usize],
+    ]
+}
+
+#[test]
+fn speeds_between_those_of_the_log_are_no_fault_and_what_it_does_not_tell_is_said() {
+    // A drive that takes a few frames to follow: a fit may explain its steps by a curve.
+    let lagged = |id: u32, drive: &dyn Fn(f64) -> [f64; 2], length_s: f64| {
+        let mut run = run(id, length_s, drive, Fault::None);
+        let mut state = [run.frames[0].wheel_rate[0], run.frames[0].wheel_rate[1]];
+        for frame in &mut run.frames {
+            let commanded = [
+                (frame.command[0] - 0.5 * TRACK_M * frame.command[1]) / RADIUS_M,
+                (frame.command[0] + 0.5 * TRACK_M * frame.command[1]) / RADIUS_M,
+            ];
+            for (i, state) in state.iter_mut().enumerate() {
+                *state += 0.15 * (commanded[i] - *state);
+                frame.wheel_rate[i] += *state - commanded[i];
+            }
+            frame.yaw_rate += (state[1] - state[0]) * RADIUS_M / TRACK_M - frame.command[1];
+        }
+        run
+    };
+    let log = [lagged(0, &two_speeds, 700.0)];
+    let (model, report) = learn(&log, &[], f64::INFINITY, &robot()).unwrap();
+    assert_eq!(model.command[0].gaps, [[0.2, 0.5]]);
+    let told = |text: &str| report.warnings.iter().any(|w| w.contains(text));
+    assert!(
+        told("without v^2: ") && told("v was not driven between 0.200 and 0.500 m/s"),
+        "{:?}",
+        report.warnings
+    );
+    for id in 0..15 {
+        let speed = 0.25 + 0.05 * f64::from(id % 5);
+        let healthy = lagged(30 + id, &|t: f64| [speed, two_speeds(t)[1]], 25.0);
+        assert_eq!(alarm(&model, &healthy), None, "{speed} m/s");
+    }
+    // Noise is widened there, but a fault is still seen.
+    let mut stuck = lagged(50, &|t: f64| [0.35, two_speeds(t)[1]], 25.0);
+    for frame in stuck.frames.iter_mut().skip(500) {
+        frame.wheel_rate[0] = 0.0;
+    }
+    let found_s = alarm(&model, &stuck).unwrap();
+    assert!((10.0..11.0).contains(&found_s), "{found_s}");
 }
 
 #[test]

@@ -94,7 +94,7 @@ pub enum Method {
     /// Mean of the samples since the last frame; the last one where there is none.
     #[default]
     Mean,
-    /// The last sample, however old; `initial` before the first. For commands.
+    /// The last sample, up to `hold_max_s` old; `initial` before the first. For commands.
     Hold,
     /// On the line between the samples before and after.
     Interpolate,
@@ -204,6 +204,10 @@ pub struct LogDescription {
     /// Longest pause of a measured channel, s.
     #[serde(default = "one")]
     pub gap_max_s: f64,
+    /// Longest time for which a value is held, s, 30 if left out: beyond it a command is no longer
+    /// known. A robot that is told only what changes may need more.
+    #[serde(default = "thirty")]
+    pub hold_max_s: f64,
     /// Beginning of the first run from which delays are estimated, s.
     #[serde(default = "forty")]
     pub estimate_s: f64,
@@ -219,6 +223,10 @@ fn comma() -> char {
 
 fn one() -> f64 {
     1.0
+}
+
+fn thirty() -> f64 {
+    30.0
 }
 
 fn forty() -> f64 {
@@ -263,58 +271,5 @@ impl LogDescription {
         columns
             .iter()
             .filter_map(|column| self.channel.iter().find(|c| c.name == *column))
-    }
-
-    /// Checks that every column has one channel, and every channel a source.
-    pub(super) fn check(&self, columns: &[String]) -> Result<(), ImportError> {
-        let wrong = |key: String, message| Err(ImportError::Description { key, message });
-        if !(1.0..=1000.0).contains(&self.rate_hz) {
-            let message = format!("{} is out of range: allowed is 1 to 1000 Hz", self.rate_hz);
-            return wrong("rate_hz".into(), message);
-        }
-        let source = |name: &str| self.source.iter().any(|source| source.name == name);
-        for (i, channel) in self.channel.iter().enumerate() {
-            if !columns.contains(&channel.name) {
-                let message = format!(
-                    "the robot has no channel '{}': allowed are {}",
-                    channel.name,
-                    columns.join(", ")
-                );
-                return wrong(format!("channel.{i}.name"), message);
-            }
-            if !source(&channel.source) {
-                let message = format!("there is no source '{}'", channel.source);
-                return wrong(format!("channel.{i}.source"), message);
-            }
-            if channel.delay_s == Delay::Estimate && channel.delay_against.is_empty() {
-                let message = "is required for delay_s = \"estimate\"".to_owned();
-                return wrong(format!("channel.{i}.delay_against"), message);
-            }
-            let mut others = channel.delay_against.keys();
-            if let Some(name) = others.find(|name| !columns.contains(*name)) {
-                let message = format!("the robot has no channel '{name}'");
-                return wrong(format!("channel.{i}.delay_against"), message);
-            }
-        }
-        for column in columns {
-            let count = self.channel.iter().filter(|c| c.name == *column).count();
-            if count != 1 {
-                let message = format!("{column} is described {count} times: once is needed");
-                return wrong("channel".into(), message);
-            }
-        }
-        for (i, described) in self.source.iter().enumerate() {
-            if let Some([other, _]) = &described.time_as
-                && !source(other)
-            {
-                let message = format!("there is no source '{other}'");
-                return wrong(format!("source.{i}.time_as"), message);
-            }
-            if !described.delimiter.is_ascii() {
-                let message = "a single ASCII character is needed".to_owned();
-                return wrong(format!("source.{i}.delimiter"), message);
-            }
-        }
-        Ok(())
     }
 }

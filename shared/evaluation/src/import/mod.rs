@@ -16,6 +16,7 @@
 //!
 //! All else (`mean`, `hold`, differences, unwrapping, units) looks back only.
 
+mod check;
 mod delay;
 mod description;
 mod find;

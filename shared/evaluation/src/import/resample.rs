@@ -57,7 +57,7 @@ impl Grid {
             .map(|i| vec![(i as f64 * self.period_s * 1e6).round() * 1e-6])
             .collect();
         for (channel, series) in log.in_order(columns).zip(series) {
-            check(log, channel, series)?;
+            self.check(log, channel, series)?;
             for (i, row) in rows.iter_mut().enumerate() {
                 let t_s = self.start_s + i as f64 * self.period_s;
                 let value = self.value(channel, series, t_s);
@@ -88,25 +88,44 @@ impl Grid {
             }
         }
     }
-}
 
-/// Refuses a pause of a measured channel that is too long.
-fn check(
-    log: &LogDescription,
-    channel: &ChannelSource,
-    series: &Series,
-) -> Result<(), ImportError> {
-    if channel.method == Method::Hold {
-        return Ok(());
+    /// Refuses a pause of a measured channel that is too long, and a value held for too long.
+    fn check(
+        &self,
+        log: &LogDescription,
+        channel: &ChannelSource,
+        series: &Series,
+    ) -> Result<(), ImportError> {
+        let column = &channel.column;
+        let pairs = series.time_s.windows(2).map(|pair| pair[1] - pair[0]);
+        if channel.method != Method::Hold {
+            let mut pauses = pairs.enumerate();
+            return match pauses.find(|(_, gap_s)| *gap_s > log.gap_max_s) {
+                None => Ok(()),
+                Some((at, gap_s)) => {
+                    let limit_s = log.gap_max_s;
+                    let message = format!(
+                        "column {column}: a gap of {gap_s:.3} s; gap_max_s allows {limit_s} s"
+                    );
+                    Err(series.wrong(at + 1, message))
+                }
+            };
+        }
+        let end_s = self.start_s + (self.count - 1) as f64 * self.period_s;
+        for (at, &from_s) in series.time_s.iter().enumerate() {
+            let next_s = series.time_s.get(at + 1).copied().unwrap_or(f64::INFINITY);
+            let (until_s, limit_s) = (next_s.min(end_s), log.hold_max_s);
+            let held_s = until_s - from_s;
+            if until_s > self.start_s && held_s > limit_s {
+                return Err(series.wrong(
+                    at,
+                    format!(
+                        "column {column}: its value is held for {held_s:.3} s; hold_max_s allows \
+                         {limit_s} s: cut the run there, or raise it if only changes are recorded"
+                    ),
+                ));
+            }
+        }
+        Ok(())
     }
-    let mut pairs = series.time_s.windows(2);
-    let Some(at) = pairs.position(|pair| pair[1] - pair[0] > log.gap_max_s) else {
-        return Ok(());
-    };
-    let gap_s = series.time_s[at + 1] - series.time_s[at];
-    let message = format!(
-        "column {}: a gap of {gap_s:.3} s; gap_max_s allows {} s",
-        channel.column, log.gap_max_s
-    );
-    Err(series.wrong(at + 1, message))
 }

@@ -1,7 +1,7 @@
 //! Wheel rates beside rolling without slip.
 
 use vigil_robot::Description;
-use vigil_robot::learned::wheels::rolling_rate;
+use vigil_robot::learned::wheels::{CREEPING_RAD_S, rolling_rate};
 use vigil_robot::learned::{Observation, RateModel};
 
 use super::LearnError;
@@ -10,8 +10,6 @@ use super::segments::Segment;
 
 /// Observations averaged before the fit.
 const WINDOW: usize = 20;
-/// Slower wheels carry less than their load at speed and say nothing of it, rad/s.
-const ROLLING_MIN_RAD_S: f64 = 0.2;
 /// A rate is never known better than this, rad/s.
 const RATE_SD_MIN_RAD_S: f64 = 0.008;
 /// How far from 1 a ratio is expected to be: with speeds close together, ratio and droop are all but
@@ -107,7 +105,8 @@ impl Window {
             .map(|two| two[1].wheels[wheel].mean - two[0].wheels[wheel].mean);
         let noise = steps.map(|step| step * step).sum::<f64>() / (2.0 * (count - 1.0));
         let rolling = mean(&|o| rolling_rate(robot, wheel, o.command[0], o.command[1]));
-        (rolling.abs() >= ROLLING_MIN_RAD_S).then(|| Self {
+        // A creeping wheel carries less than its load at speed, and says nothing of it.
+        (rolling.abs() >= CREEPING_RAD_S).then(|| Self {
             curvature: mean(&|o| o.command[0]),
             rolling,
             rate: mean(&|o| o.wheels[wheel].mean),

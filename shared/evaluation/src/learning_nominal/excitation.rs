@@ -1,10 +1,13 @@
 //! Whether a log shows what a model must know.
 
+use vigil_blocks::COMMANDS;
 use vigil_robot::Description;
-use vigil_robot::nominal::Range;
+use vigil_robot::nominal::{History, Range};
 
 use super::NominalError;
+use super::noise::MOVING_S;
 use super::record::Record;
+use super::told::is_settled;
 use crate::correlation::correlation;
 
 /// Motion needed, s.
@@ -13,8 +16,15 @@ const MOVING_MIN_S: f64 = 10.0;
 const WIDTH_MIN: f64 = 0.05;
 /// Correlation of two axes from which they count as one.
 const TOGETHER: f64 = 0.98;
+/// Pieces of an axis's range, each of which counts as driven from so many observations on, or from
+/// such a part of all.
+const PIECES: usize = 20;
+const DRIVEN_MIN: usize = 3;
+const DRIVEN_PART: f64 = 0.002;
+/// Part of an axis's range that must be left out to count as a gap.
+const GAP: f64 = 0.15;
 
-/// Ranges of the command in motion.
+/// Ranges of the command in motion, and what was left out within them.
 pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Range>, NominalError> {
     let found_s: f64 = records.iter().map(Record::moving_s).sum();
     if found_s < MOVING_MIN_S {
@@ -52,6 +62,7 @@ pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Rang
             unit: axis.unit.clone(),
             min,
             max,
+            gaps: Vec::new(),
         });
     }
     for i in 0..ranges.len() {
@@ -69,5 +80,40 @@ pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Rang
             }
         }
     }
+    let settled = settled(records, &ranges, 0.0);
+    for (i, range) in ranges.iter_mut().enumerate() {
+        let mut values: Vec<f64> = settled.iter().map(|command| command[i]).collect();
+        range.gaps = gaps(&mut values, range);
+    }
     Ok(ranges)
+}
+
+/// Commands that were kept up in motion, for `steady_s` at least.
+pub(super) fn settled(records: &[Record], ranges: &[Range], steady_s: f64) -> Vec<[f64; COMMANDS]> {
+    let histories = records.iter().flat_map(|record| &record.histories);
+    let command = |history: &History| {
+        let now = history.ago(0)?;
+        let counts = now.moving && now.moving_s >= MOVING_S && now.steady_s >= steady_s;
+        (counts && is_settled(history, ranges)).then_some(now.command)
+    };
+    histories.filter_map(command).collect()
+}
+
+/// Wide stretches of the range in which hardly anything was driven.
+fn gaps(values: &mut Vec<f64>, range: &Range) -> Vec<[f64; 2]> {
+    let width = range.max - range.min;
+    let piece = |value: f64| {
+        let at = (value - range.min) / width * PIECES as f64;
+        (at.max(0.0) as usize).min(PIECES - 1)
+    };
+    let mut counts = [0_usize; PIECES];
+    for &value in values.iter() {
+        counts[piece(value)] += 1;
+    }
+    let needed = DRIVEN_MIN.max((DRIVEN_PART * values.len() as f64) as usize);
+    values.retain(|&value| counts[piece(value)] >= needed);
+    values.extend([range.min, range.max]);
+    values.sort_by(f64::total_cmp);
+    let pairs = values.windows(2).map(|pair| [pair[0], pair[1]]);
+    pairs.filter(|[from, to]| to - from > GAP * width).collect()
 }

@@ -13,17 +13,18 @@ mod record;
 mod regression;
 mod report;
 mod terms;
+mod told;
 mod view;
 
 use vigil_robot::Description;
 use vigil_robot::learned::model::Provenance;
 use vigil_robot::nominal::model::{KIND, VERSION};
-use vigil_robot::nominal::{Channel, Model};
+use vigil_robot::nominal::{Channel, Model, Target, Term};
 
 use crate::data_hash::data_hash;
 use crate::frames::Run;
 use crate::plausible::{self, Doubtful};
-use record::Record;
+use record::{Part, Record};
 pub use report::{ChannelError, Report};
 pub use view::View;
 
@@ -78,6 +79,15 @@ pub enum NominalError {
         other: String,
         /// Their correlation.
         correlation: f64,
+    },
+    /// An axis of the command hardly varies, or follows from the others.
+    #[error(
+        "{axis} hardly varies where the command is kept up, or follows from the other axes: its \
+         effect cannot be learned; record driving in which it changes by itself"
+    )]
+    Follows {
+        /// Axis.
+        axis: String,
     },
     /// The description measures nothing that a model could be made of.
     #[error(
@@ -148,16 +158,20 @@ pub fn learn(
     if targets.is_empty() {
         return Err(NominalError::NoChannels);
     }
-    for (target, terms) in targets {
+    let untold = untold(&records, &model, robot)?;
+    report.untold(&untold, &model, robot);
+    let (train, test): (Vec<Part<'_>>, Vec<Part<'_>>) = match tests.is_empty() {
+        true => records.iter().map(|record| record.split(BLOCKS)).unzip(),
+        false => (whole(&records), whole(&tests)),
+    };
+    let all = whole(&records);
+    for (target, mut terms) in targets {
         let name = report::name(target, &model.wheels);
-        let (train, test): (Vec<Record>, Vec<Record>) = if tests.is_empty() {
-            records.iter().map(|record| record.split(BLOCKS)).unzip()
-        } else {
-            (records.clone(), tests.clone())
-        };
+        let untold = &untold[usize::from(target.quantity.is_pose())];
+        terms.retain(|term| !untold.contains(term));
         let trial = fit(&model, target, &terms, &train, &name)?;
         let ratio = noise::whitened_rms(&trial, &test, &model);
-        let mut channel = fit(&model, target, &terms, &records, &name)?;
+        let mut channel = fit(&model, target, &terms, &all, &name)?;
         channel.held_out_ratio = ratio;
         let widen = model.widened * ratio.max(1.0);
         channel.variance = channel.variance.map(|variance| variance * widen * widen);
@@ -185,12 +199,36 @@ fn doubt(runs: &[&Run], until_s: f64, robot: &Description) -> Result<Option<Stri
     }
 }
 
+/// Products of powers of the command that the log does not tell: for what is looked at in all motion,
+/// and for a pose.
+fn untold(
+    records: &[Record],
+    model: &Model,
+    robot: &Description,
+) -> Result<[Vec<Term>; 2], NominalError> {
+    let untold = [0.0, noise::SETTLED_S].map(|steady_s| {
+        let commands = excitation::settled(records, &model.command, steady_s);
+        told::untold(&terms::command(robot), &commands, &model.command)
+    });
+    let axis = untold[0].iter().find_map(told::single);
+    match axis.and_then(|axis| model.command.get(axis)) {
+        Some(range) => Err(NominalError::Follows {
+            axis: range.name.clone(),
+        }),
+        None => Ok(untold),
+    }
+}
+
+fn whole(records: &[Record]) -> Vec<Part<'_>> {
+    records.iter().map(Record::whole).collect()
+}
+
 /// Fits weights and noise of one channel.
 fn fit(
     model: &Model,
-    target: vigil_robot::nominal::Target,
-    terms: &[vigil_robot::nominal::Term],
-    records: &[Record],
+    target: Target,
+    terms: &[Term],
+    records: &[Part<'_>],
     name: &str,
 ) -> Result<Channel, NominalError> {
     let mut channel = Channel {
@@ -201,6 +239,7 @@ fn fit(
         correlation: 0.0,
         offset_sd: 0.0,
         drift_sd: 0.0,
+        rest_sd: 0.0,
         scatter: 1.0,
         held_out_ratio: 1.0,
         tails: Vec::new(),

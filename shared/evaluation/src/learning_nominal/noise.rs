@@ -1,13 +1,14 @@
 //! What is left of a channel: its variance by speed, its colour, its scatter from run to run.
 
 use vigil_inference::logspace::log_normal;
+use vigil_robot::nominal::channel::REST_S;
 use vigil_robot::nominal::{Channel, History, Model, Residual, Track};
 
-use super::record::Record;
+use super::record::Part;
 
 /// Motion before an observation counts, s, and how long the command must be steady for a pose.
-const MOVING_S: f64 = 0.5;
-const SETTLED_S: f64 = 1.0;
+pub(super) const MOVING_S: f64 = 0.5;
+pub(super) const SETTLED_S: f64 = 1.0;
 /// Part of the runs whose scatter counts as usual, and the largest scatter.
 const USUAL: f64 = 0.95;
 const SCATTER_MAX: f64 = 10.0;
@@ -25,6 +26,11 @@ const PIECE_MIN: usize = 4;
 /// exactly would else see a fault in every rounding.
 const FLOOR: f64 = 1e-3;
 
+/// The fastest motion in the log at rest counts as so many deviations.
+const REST_SDS: f64 = 3.0;
+/// Least deviation of a velocity at rest, m/s or rad/s.
+const REST_SD_MIN: f64 = 1e-3;
+
 /// Drifts tried, per observation, relative to the residual's deviation.
 const DRIFTS: [f64; 7] = [0.0, 0.01, 0.02, 0.04, 0.07, 0.12, 0.2];
 /// Residuals beyond so many deviations say nothing more on the noise.
@@ -39,7 +45,7 @@ pub(super) fn counts(history: &History, channel: &Channel) -> bool {
 }
 
 /// Residuals, and whether each follows the one before.
-fn residuals(channel: &Channel, record: &[History], model: &Model) -> Vec<(Residual, bool)> {
+fn residuals(channel: &Channel, record: &[&History], model: &Model) -> Vec<(Residual, bool)> {
     let (mut out, mut follows) = (Vec::new(), false);
     for history in record {
         let residual = channel.residual(history, &model.sizes());
@@ -54,9 +60,9 @@ fn residuals(channel: &Channel, record: &[History], model: &Model) -> Vec<(Resid
 }
 
 /// Fits variance, correlation, offset and drift.
-pub(super) fn fit(channel: &mut Channel, records: &[Record], model: &Model) {
+pub(super) fn fit(channel: &mut Channel, records: &[Part<'_>], model: &Model) {
     let several = records.len() > 1;
-    let of = |record: &Record| residuals(channel, &record.histories, model);
+    let of = |record: &Part<'_>| residuals(channel, &record.histories, model);
     let whole: Vec<Vec<(Residual, bool)>> = records.iter().map(of).collect();
     let length = if several { usize::MAX } else { PIECE };
     let pieces = whole.iter().flat_map(|record| record.chunks(length));
@@ -96,6 +102,23 @@ pub(super) fn fit(channel: &mut Channel, records: &[Record], model: &Model) {
     let limit = channel.offset_sd * (model.interval_s / DRIFT_S).sqrt();
     channel.drift_sd = drift(channel, &whole).min(limit);
     channel.scatter = scatter(channel, &whole, length);
+    channel.rest_sd = rest_sd(channel, records, &whole);
+}
+
+/// Deviation of the velocity that a pose shows at rest: that of its residuals in motion, which have
+/// the sensor's noise and the ground's, or what the log's own rests ask for.
+fn rest_sd(channel: &Channel, records: &[Part<'_>], residuals: &[Vec<(Residual, bool)>]) -> f64 {
+    if !channel.target.quantity.is_pose() {
+        return 0.0;
+    }
+    // The second of the basis is the square of the commanded speed.
+    let squares = residuals.iter().flatten();
+    let in_motion = mean(squares.map(|(r, _)| r.apart * r.apart * r.basis[1])).sqrt();
+    let newest = records.iter().flat_map(|part| &part.histories);
+    let rests = newest.filter_map(|h| h.ago(0).filter(|now| now.rest_s >= REST_S)?.drift);
+    let sizes = rests.filter_map(|drift| Some(channel.target.quantity.of_pose(drift)?.abs()));
+    let largest = sizes.fold(0.0, f64::max);
+    in_motion.max(largest / REST_SDS).max(REST_SD_MIN)
 }
 
 /// Mean square of the whitened residuals in the noisiest usual run, or piece of one: no run's noise
@@ -211,10 +234,10 @@ fn innovations<'a>(
     })
 }
 
-fn usual_size(channel: &Channel, records: &[Record]) -> f64 {
+fn usual_size(channel: &Channel, records: &[Part<'_>]) -> f64 {
     let newest = records
         .iter()
-        .flat_map(|r| &r.histories)
+        .flat_map(|part| &part.histories)
         .filter_map(|h| h.ago(0));
     let values = newest.filter_map(|now| channel.target.value(now));
     mean(values.map(|value| value * value)).sqrt()
@@ -222,7 +245,7 @@ fn usual_size(channel: &Channel, records: &[Record]) -> f64 {
 
 /// Root mean square of the whitened residuals of other records: 1 if the model holds there, or if
 /// there is nothing to tell.
-pub(super) fn whitened_rms(channel: &Channel, records: &[Record], model: &Model) -> f64 {
+pub(super) fn whitened_rms(channel: &Channel, records: &[Part<'_>], model: &Model) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for record in records {
         let mut track = Track::new(channel);

@@ -12,6 +12,13 @@ pub(super) struct Record {
     pub histories: Vec<History>,
 }
 
+/// Observations of a run that one fit looks at.
+#[derive(Debug, Clone)]
+pub(super) struct Part<'a> {
+    /// After each observation: it and those before it.
+    pub histories: Vec<&'a History>,
+}
+
 impl Record {
     /// Time in motion, s.
     pub fn moving_s(&self) -> f64 {
@@ -19,16 +26,21 @@ impl Record {
         newest.filter(|now| now.moving).map(|now| now.dt_s).sum()
     }
 
+    /// All of it.
+    pub fn whole(&self) -> Part<'_> {
+        Part {
+            histories: self.histories.iter().collect(),
+        }
+    }
+
     /// Cut into blocks: all but every third, and every third.
-    pub fn split(&self, blocks: usize) -> (Self, Self) {
+    pub fn split(&self, blocks: usize) -> (Part<'_>, Part<'_>) {
         let length = self.histories.len().div_ceil(blocks.max(3)).max(1);
         let part = |is_test: bool| {
             let chunks = self.histories.chunks(length).enumerate();
             let chunks = chunks.filter(|(i, _)| (i % 3 == 2) == is_test);
-            Self {
-                histories: chunks
-                    .flat_map(|(_, chunk)| chunk.iter().copied())
-                    .collect(),
+            Part {
+                histories: chunks.flat_map(|(_, chunk)| chunk).collect(),
             }
         };
         (part(false), part(true))

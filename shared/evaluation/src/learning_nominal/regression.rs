@@ -6,7 +6,7 @@ use vigil_robot::nominal::Channel;
 
 use super::NominalError;
 use super::noise::counts;
-use super::record::Record;
+use super::record::Part;
 
 /// Ridge, per observation, on standardised terms: keeps terms that move together from growing
 /// against each other.
@@ -21,12 +21,15 @@ const PER_WEIGHT: usize = 3;
 /// Fits the channel's weights.
 pub(super) fn fit(
     channel: &mut Channel,
-    records: &[Record],
+    records: &[Part<'_>],
     sizes: &[f64; COMMANDS],
     name: &str,
 ) -> Result<(), NominalError> {
     let (mut rows, mut values) = (Vec::new(), Vec::new());
-    for history in records.iter().flat_map(|record| &record.histories) {
+    for history in records
+        .iter()
+        .flat_map(|part| part.histories.iter().copied())
+    {
         if !counts(history, channel) {
             continue;
         }

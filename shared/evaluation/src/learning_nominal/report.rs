@@ -3,10 +3,15 @@
 use std::fmt;
 
 use serde::Serialize;
-use vigil_robot::nominal::{Channel, Model, Quantity, Target};
+use vigil_robot::Description;
+use vigil_robot::nominal::{Channel, Model, Quantity, Target, Term};
 
 use super::LONG_ENOUGH_S;
+use super::view::word;
 use crate::learning::RESIDUAL_BAR;
+
+/// Deviation of a pose's velocity at rest from which it is told, m/s or rad/s.
+const RESTLESS_M_S: f64 = 0.1;
 
 /// One channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -64,6 +69,16 @@ impl Report {
                     range.name, range.min, range.max, range.unit
                 ));
             }
+            let between = |[from, to]: &[f64; 2]| format!("{from:.3} and {to:.3}");
+            let gaps: Vec<String> = range.gaps.iter().map(between).collect();
+            if !gaps.is_empty() {
+                warnings.push(format!(
+                    "{} was not driven between {} {}: commands there widen the deviations",
+                    range.name,
+                    gaps.join(", "),
+                    range.unit
+                ));
+            }
         }
         Self {
             runs_learned,
@@ -74,12 +89,48 @@ impl Report {
         }
     }
 
+    /// Tells which products of powers of the command are left out: of all channels, and of those of
+    /// the pose.
+    pub(super) fn untold(
+        &mut self,
+        [all, pose]: &[Vec<Term>; 2],
+        model: &Model,
+        robot: &Description,
+    ) {
+        let measured = &robot.measured;
+        let others = measured.wheel_rates || measured.yaw_rate || measured.currents;
+        let mut tell = |of: &str, terms: &[Term]| {
+            let words: Vec<String> = terms.iter().map(|term| word(term, model)).collect();
+            if !words.is_empty() {
+                self.warnings.push(format!(
+                    "{of}predicted without {}: the commands driven do not tell it from lower \
+                     powers; an order needs one more value of an axis than it counts, spread over \
+                     its range",
+                    words.join(", ")
+                ));
+            }
+        };
+        if others {
+            tell("", all);
+        }
+        if measured.pose && !(others && all == pose) {
+            tell("pose: ", pose);
+        }
+    }
+
     pub(super) fn add(&mut self, name: &str, channel: &Channel, widened: f64) {
         if channel.held_out_ratio > RESIDUAL_BAR {
             self.warnings.push(format!(
                 "{name}: the residual on the part left out is {:.2} times the floor: the \
                  deviations are widened by that",
                 channel.held_out_ratio
+            ));
+        }
+        if channel.rest_sd > RESTLESS_M_S {
+            self.warnings.push(format!(
+                "{name}: the log has motion of this kind without a command: a robot that runs away \
+                 is noticed from about {:.2} m/s or rad/s only",
+                3.0 * channel.rest_sd
             ));
         }
         self.channels.push(ChannelError {

@@ -17,7 +17,7 @@ pub(super) fn targets(robot: &Description) -> Vec<(Target, Vec<Term>)> {
     let mut out = Vec::new();
     let measured = &robot.measured;
     let target = |quantity, wheel| Target { quantity, wheel };
-    let polynomial = polynomial(robot.command.len(), robot.polynomial_order.min(ORDER_MAX));
+    let polynomial = command(robot);
     if measured.pose {
         for quantity in [Quantity::Forward, Quantity::Lateral, Quantity::Turn] {
             out.push((target(quantity, 0), polynomial.clone()));
@@ -51,6 +51,11 @@ pub(super) fn targets(robot: &Description) -> Vec<(Target, Vec<Term>)> {
         }
     }
     out
+}
+
+/// Products of powers of the command, up to the order that the description gives.
+pub(super) fn command(robot: &Description) -> Vec<Term> {
+    polynomial(robot.command.len(), robot.polynomial_order.min(ORDER_MAX))
 }
 
 /// A wheel's last rates.

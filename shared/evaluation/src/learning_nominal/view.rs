@@ -105,7 +105,7 @@ fn prediction(channel: &nominal::Channel, model: &Model) -> String {
 }
 
 /// A term in words; empty for the constant.
-fn word(term: &Term, model: &Model) -> String {
+pub(super) fn word(term: &Term, model: &Model) -> String {
     let axis = |i: usize| {
         model
             .command
@@ -151,9 +151,15 @@ impl fmt::Display for View {
             unit,
             min,
             max,
+            gaps,
         } in &self.command
         {
-            writeln!(f, "learned range  {name} {min:.3} to {max:.3} {unit}")?;
+            write!(f, "learned range  {name} {min:.3} to {max:.3} {unit}")?;
+            for (i, [from, to]) in gaps.iter().enumerate() {
+                let but = [", and", ", but not"][usize::from(i == 0)];
+                write!(f, "{but} between {from:.3} and {to:.3}")?;
+            }
+            writeln!(f)?;
         }
         writeln!(
             f,

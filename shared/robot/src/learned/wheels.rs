@@ -53,7 +53,7 @@ impl RateModel {
 }
 
 /// Below this rate a wheel carries less than its load at speed, rad/s.
-const CREEPING_RAD_S: f64 = 0.2;
+pub const CREEPING_RAD_S: f64 = 0.2;
 
 /// Deviation of a healthy wheel that no model explains, rad/s.
 const RATE_FLOOR_RAD_S: f64 = 0.01;

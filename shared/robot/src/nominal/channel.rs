@@ -10,6 +10,8 @@ use crate::learned::monitor::Channels;
 /// Rate at which a wheel's sense of turning counts as half decided, rad/s: friction changes its
 /// sign with it.
 const SENSE_RAD_S: f64 = 0.5;
+/// Rest after which a robot has stopped, s: motion then was not commanded.
+pub const REST_S: f64 = 1.0;
 /// Prior fault rate at which log-odds are collected and tempered, 1/h.
 pub const FAULT_RATE_1_H: f64 = 1.0;
 
@@ -37,6 +39,17 @@ impl Quantity {
     pub const fn is_pose(self) -> bool {
         matches!(self, Self::Forward | Self::Lateral | Self::Turn)
     }
+
+    /// The quantity in a velocity of the pose: forward, left, turn; none for what is no pose's.
+    #[must_use]
+    pub fn of_pose(self, velocity: [f64; 3]) -> Option<f64> {
+        match self {
+            Self::Forward => Some(velocity[0]),
+            Self::Lateral => Some(velocity[1]),
+            Self::Turn => Some(velocity[2]),
+            Self::YawRate | Self::WheelRate | Self::Current => None,
+        }
+    }
 }
 
 /// A measured channel.
@@ -62,6 +75,17 @@ impl Target {
             Quantity::YawRate => now.yaw_rate,
             Quantity::WheelRate => *now.wheels.get(self.wheel)?,
             Quantity::Current => *now.currents.get(self.wheel)?,
+        }
+    }
+
+    /// True if the newest observation has it, whether it says anything there or not.
+    #[must_use]
+    pub fn is_measured(&self, now: &Observation) -> bool {
+        match self.quantity {
+            Quantity::Forward | Quantity::Lateral | Quantity::Turn => now.has_pose,
+            Quantity::YawRate | Quantity::WheelRate | Quantity::Current => {
+                self.value(now).is_some()
+            }
         }
     }
 }
@@ -103,6 +127,10 @@ pub struct Term {
 
 fn is_zero(value: &usize) -> bool {
     *value == 0
+}
+
+fn is_unknown(deviation: &f64) -> bool {
+    *deviation == 0.0
 }
 
 fn are_zero(powers: &[u8; COMMANDS]) -> bool {
@@ -183,6 +211,10 @@ pub struct Channel {
     /// Standard deviation of the offset's change from one observation to the next (a ground that
     /// is not even).
     pub drift_sd: f64,
+    /// Of a pose: standard deviation of its velocity over one observation while no motion is
+    /// commanded, m/s or rad/s; 0: not known, motion at rest is not looked for.
+    #[serde(default, skip_serializing_if = "is_unknown")]
+    pub rest_sd: f64,
     /// Mean square of the whitened residual in the noisiest usual run, at least 1: more than that
     /// counts as scatter.
     pub scatter: f64,

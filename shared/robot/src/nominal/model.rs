@@ -23,6 +23,8 @@ pub(super) const CHANNELS_MAX: usize = 2 * WHEELS + 4;
 const TERMS_MAX: usize = 128;
 /// Largest lag of a term: a prediction is also made for the observation before the newest.
 const LAG_MAX: usize = DEPTH - 2;
+/// Gaps of a range: each is wider than a seventh of it.
+const GAPS_MAX: usize = 7;
 /// Largest order of a polynomial.
 const ORDER_MAX: u32 = 4;
 
@@ -38,6 +40,10 @@ pub struct Range {
     pub min: f64,
     /// Largest value learned from.
     pub max: f64,
+    /// Stretches within these bounds in which nothing was learned from, each from the last value
+    /// below to the first above.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gaps: Vec<[f64; 2]>,
 }
 
 impl Range {
@@ -47,11 +53,23 @@ impl Range {
         self.min.abs().max(self.max.abs()).max(1e-9)
     }
 
-    /// How far a command lies outside the range, in units of its width.
+    /// How far a command lies outside the range, or from the ends of the gap that it lies in, in
+    /// units of the range's width.
     #[must_use]
     pub fn beyond(&self, value: f64) -> f64 {
         let outside = (self.min - value).max(value - self.max).max(0.0);
-        outside / (self.max - self.min).max(1e-9)
+        let within = self
+            .gaps
+            .iter()
+            .map(|[from, to]| (value - from).min(to - value));
+        within.fold(outside, f64::max) / (self.max - self.min).max(1e-9)
+    }
+
+    /// True if its numbers make sense.
+    fn is_sane(&self) -> bool {
+        let inside = |[from, to]: &[f64; 2]| self.min <= *from && from < to && *to <= self.max;
+        let bounds = self.min.is_finite() && self.max.is_finite() && self.max >= self.min;
+        bounds && self.gaps.len() <= GAPS_MAX && self.gaps.iter().all(inside)
     }
 }
 
@@ -230,13 +248,14 @@ impl ModelFile for Model {
         if !(0.02..=1.0).contains(&self.interval_s) {
             return refuse("interval_s".into(), self.interval_s, "0.02 to 1");
         }
-        let ranges = self
-            .command
-            .iter()
-            .all(|r| r.min.is_finite() && r.max.is_finite() && r.max >= r.min);
+        let ranges = self.command.iter().all(Range::is_sane);
         if self.command.is_empty() || self.command.len() > COMMANDS || !ranges {
             let found = format!("{} axes", self.command.len());
-            return refuse("command".into(), found, "1 to 4 axes, min up to max");
+            return refuse(
+                "command".into(),
+                found,
+                "1 to 4 axes, min up to max, gaps inside",
+            );
         }
         if self.channel.is_empty() || self.channel.len() > CHANNELS_MAX {
             let found = format!("{} channels", self.channel.len());
@@ -302,6 +321,7 @@ fn check_channel(
     }
     sane("offset_sd", channel.offset_sd, 0.0)?;
     sane("drift_sd", channel.drift_sd, 0.0)?;
+    sane("rest_sd", channel.rest_sd, 0.0)?;
     sane("scatter", channel.scatter, 1.0)?;
     let mut tails = channel.tails.iter();
     tails.try_for_each(|tail| check_tail(&format!("{key}.tails"), tail))

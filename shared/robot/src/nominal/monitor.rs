@@ -6,6 +6,10 @@
 //! the robot once a turn and has no mean). The channels' odds, each tempered by its [`Tail`], add
 //! up: a fault enters by one of them, or by all of them at once ([`super::joint`]).
 //!
+//! Two more states speak for a fault of a channel: it is not measured while the robot moves
+//! (`ABSENT_S`), as what is not looked at cannot be healthy; and the pose moves though no motion is
+//! commanded ([`REST_S`]), a robot that runs away.
+//!
 //! All this is done at the prior fault rate at which the tails were found
 //! ([`super::channel::FAULT_RATE_1_H`]). Births enter the odds as a factor, so that another rate
 //! adds its logarithm to the log-odds of every channel, after they were tempered. Alarms do not
@@ -19,7 +23,7 @@ use vigil_blocks::{CHANNELS, Channel as Slot, WHEELS};
 use vigil_inference::constant::Constant;
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 
-use super::channel::{Channel, FAULT_RATE_1_H, Quantity, Tail};
+use super::channel::{Channel, FAULT_RATE_1_H, Quantity, REST_S, Tail};
 use super::joint::Together;
 use super::model::Model;
 use super::observation::{History, Observation};
@@ -38,6 +42,8 @@ const START_S: f64 = 0.5;
 const SETTLE_S: f64 = 1.0;
 /// Observed motion after which evidence counts, s.
 const READY_S: f64 = 1.0;
+/// A channel not measured for longer than this in motion is a fault of it, s.
+const ABSENT_S: f64 = 1.0;
 /// Growth of the deviation per width of the learned range by which a command lies outside it.
 const EXTRAPOLATION: f64 = 4.0;
 /// Log-odds below this are reported as this: no evidence for a fault at all.
@@ -50,8 +56,55 @@ struct Watched {
     track: Track,
     bias: Evidence<1>,
     scatter: Constant,
+    /// How long it has not been measured in motion, s, and what that says.
+    absent_s: f64,
+    absent: Evidence<1>,
+    /// Motion of the pose while none is commanded.
+    rest: Evidence<1>,
     /// Its tail for the form in use; none while it is being learned.
     tail: Option<Tail>,
+}
+
+impl Watched {
+    /// Whether the channel is there, in motion.
+    fn present(&mut self, now: &Observation, form: Form, birth: f64) {
+        if self.channel.target.is_measured(now) {
+            if self.absent_s > 0.0 {
+                (self.absent_s, self.absent) = (0.0, Evidence::new(form, BIAS));
+            }
+            return;
+        }
+        self.absent_s += now.dt_s;
+        if self.absent_s > ABSENT_S {
+            self.absent.step(&SVector::from([CLIP]), birth);
+        }
+    }
+
+    /// Whether the pose rests where no motion is commanded; the next command to move ends it.
+    fn rest(&mut self, now: &Observation, form: Form, birth: f64) {
+        if now.rest_s <= 0.0 {
+            self.rest = Evidence::new(form, BIAS);
+            return;
+        }
+        let velocity = now.drift.filter(|_| now.rest_s >= REST_S);
+        let velocity = velocity.and_then(|drift| self.channel.target.quantity.of_pose(drift));
+        if let Some(velocity) = velocity.filter(|_| self.channel.rest_sd > 0.0) {
+            let whitened = (velocity / self.channel.rest_sd).clamp(-CLIP, CLIP);
+            self.rest.step(&SVector::from([whitened]), birth);
+        }
+    }
+
+    /// Log-odds at [`FAULT_RATE_1_H`]. Those of its values are tempered if a tail is known: how
+    /// irregular they are says nothing on silence and on rest.
+    fn log_odds(&self) -> f64 {
+        let values = log_add(self.bias.log_odds(), self.scatter.log_odds());
+        let tail = self.tail.as_ref();
+        let values = tail.map_or(values, |tail| tail.tempered(values));
+        log_add(
+            values,
+            log_add(self.absent.log_odds(), self.rest.log_odds()),
+        )
+    }
 }
 
 /// The detection filter.
@@ -82,6 +135,9 @@ impl Monitor {
             track: Track::new(channel),
             bias: Evidence::new(form, BIAS),
             scatter: Constant::default(),
+            absent_s: 0.0,
+            absent: Evidence::new(form, BIAS),
+            rest: Evidence::new(form, BIAS),
             tail: channel.tail(form).cloned(),
         });
         let watched: Vec<Watched> = watched.collect();
@@ -110,6 +166,7 @@ impl Monitor {
     pub fn reset(&mut self) {
         for watched in &mut self.watched {
             watched.track = Track::new(&watched.channel);
+            watched.absent_s = 0.0;
         }
         self.run_s = 0.0;
         self.extrapolated = false;
@@ -122,6 +179,8 @@ impl Monitor {
         for watched in &mut self.watched {
             watched.bias = Evidence::new(self.form, BIAS);
             watched.scatter = Constant::default();
+            watched.absent = Evidence::new(self.form, BIAS);
+            watched.rest = Evidence::new(self.form, BIAS);
         }
         if let Some(together) = &mut self.together {
             together.forget();
@@ -142,10 +201,12 @@ impl Monitor {
         &self.report
     }
 
-    /// True once evidence counts.
+    /// True once evidence counts: the robot has moved for a while, or does so though it should
+    /// rest.
     #[must_use]
     pub fn is_ready(&self) -> bool {
-        self.run_s >= READY_S
+        let mut watched = self.watched.iter();
+        self.run_s >= READY_S || watched.any(|watched| watched.rest.log_odds() > 0.0)
     }
 
     /// True if the last command lay outside the range that was learned from.
@@ -160,20 +221,25 @@ impl Monitor {
         self.report.evidence = 0.0;
         let Some(now) = history.ago(0) else { return };
         let widening = self.widening(now);
-        if !now.moving || now.moving_s < START_S {
-            for watched in &mut self.watched {
+        let share = 1.0 / self.watched.len().max(1) as f64;
+        let birth = FAULT_RATE_1_H / 3600.0 * now.dt_s * share;
+        let rests = !now.moving || now.moving_s < START_S;
+        for watched in &mut self.watched {
+            watched.rest(now, self.form, birth);
+            if rests {
                 watched.track.interrupt();
             }
+        }
+        if rests {
             self.sum_up();
             return;
         }
         self.run_s += now.dt_s;
-        let share = 1.0 / self.watched.len().max(1) as f64;
-        let birth = FAULT_RATE_1_H / 3600.0 * now.dt_s * share;
         if let Some(together) = &mut self.together {
             together.begin();
         }
         for watched in &mut self.watched {
+            watched.present(now, self.form, birth);
             let Watched {
                 channel,
                 track,
@@ -225,11 +291,7 @@ impl Monitor {
                 Quantity::Current => Slot::current(wheel),
                 _ => Slot::POSE,
             };
-            let odds = log_add(watched.bias.log_odds(), watched.scatter.log_odds());
-            let odds = watched
-                .tail
-                .as_ref()
-                .map_or(odds, |tail| tail.tempered(odds));
+            let odds = watched.log_odds();
             channels[slot] = log_add(channels[slot], odds + self.prior_log_odds);
         }
         let mut log_odds = log_sum_exp(&channels);

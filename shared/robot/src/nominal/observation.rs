@@ -39,12 +39,19 @@ pub struct Observation {
     /// Displacement along and across (left) the commanded direction, and turn (rad), each per
     /// commanded metre of path; none without pose or command.
     pub per_metre: Option<[f64; 3]>,
-    /// True if the robot moves or is told to.
+    /// True if a pose was measured at its beginning and at its end.
+    pub has_pose: bool,
+    /// Velocity of the pose while no motion is commanded: forward m/s, left m/s, turn rad/s; none
+    /// without pose.
+    pub drift: Option<[f64; 3]>,
+    /// True if the robot is told to move, or its wheels turn.
     pub moving: bool,
     /// How long it has been moving, s.
     pub moving_s: f64,
     /// How long the command has hardly changed, s.
     pub steady_s: f64,
+    /// How long no motion has been commanded, s.
+    pub rest_s: f64,
 }
 
 /// The last few observations of one unbroken record.
@@ -262,7 +269,15 @@ impl Observer {
         now.path_speed_m_s = self.robot.path_speed_m_s(twist);
         let rolls = |rate: &f64| rate.abs() * self.robot.wheel_radius_m > STANDING_M_S;
         now.moving = now.path_speed_m_s > STANDING_M_S || now.wheels.iter().flatten().any(rolls);
-        now.per_metre = self.moved(twist, &now);
+        let moved = self.moved(twist);
+        now.has_pose = moved.is_some();
+        if now.path_speed_m_s < STANDING_M_S {
+            now.drift = moved.map(|moved| moved.map(|value| value / now.dt_s));
+            now.rest_s = last.map_or(0.0, |last| last.rest_s) + now.dt_s;
+        } else {
+            let path_m = now.path_speed_m_s * now.dt_s;
+            now.per_metre = moved.map(|moved| moved.map(|value| value / path_m));
+        }
         self.pose_before = self.pose.take();
         let changed = last.is_none_or(|last| {
             let axes = self.robot.command.iter().enumerate().take(COMMANDS);
@@ -279,12 +294,9 @@ impl Observer {
         self.history.push(now);
     }
 
-    fn moved(&self, twist: [f64; 3], now: &Observation) -> Option<[f64; 3]> {
+    /// Displacement along and across the commanded direction, m, and turn, rad.
+    fn moved(&self, twist: [f64; 3]) -> Option<[f64; 3]> {
         let (from, to) = (self.pose_before?, self.pose?);
-        let path_m = now.path_speed_m_s * now.dt_s;
-        if now.path_speed_m_s < STANDING_M_S {
-            return None;
-        }
         let turn = wrap(to[2] - from[2]);
         let along = if twist[0].hypot(twist[1]) > STANDING_M_S {
             twist[1].atan2(twist[0])
@@ -293,6 +305,6 @@ impl Observer {
         };
         let (sin, cos) = (from[2] + 0.5 * turn + along).sin_cos();
         let (x, y) = (to[0] - from[0], to[1] - from[1]);
-        Some([x * cos + y * sin, y * cos - x * sin, turn].map(|value| value / path_m))
+        Some([x * cos + y * sin, y * cos - x * sin, turn])
     }
 }

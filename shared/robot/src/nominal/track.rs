@@ -125,6 +125,7 @@ mod tests {
             correlation,
             offset_sd,
             drift_sd: 0.0,
+            rest_sd: 0.0,
             scatter: 1.0,
             held_out_ratio: 1.0,
             tails: Vec::new(),
