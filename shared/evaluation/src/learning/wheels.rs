@@ -12,8 +12,8 @@ use super::segments::Segment;
 const WINDOW: usize = 20;
 /// A rate is never known better than this, rad/s.
 const RATE_SD_MIN_RAD_S: f64 = 0.008;
-/// How far from 1 a ratio is expected to be: with speeds close together, ratio and droop are all but
-/// the same, and this decides.
+/// How far from 1 a ratio is expected to be: with speeds close together, ratio and droop are all
+/// but the same, and this decides.
 const RATIO_SD: f64 = 0.02;
 
 /// Fits every wheel's rate: a ratio to rolling, and a droop that is a quadratic in the curvature. A

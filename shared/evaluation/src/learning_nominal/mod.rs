@@ -160,10 +160,7 @@ pub fn learn(
     }
     let untold = untold(&records, &model, robot)?;
     report.untold(&untold, &model, robot);
-    let (train, test): (Vec<Part<'_>>, Vec<Part<'_>>) = match tests.is_empty() {
-        true => records.iter().map(|record| record.split(BLOCKS)).unzip(),
-        false => (whole(&records), whole(&tests)),
-    };
+    let (train, test) = parts(&records, &tests);
     let all = whole(&records);
     for (target, mut terms) in targets {
         let name = report::name(target, &model.wheels);
@@ -175,6 +172,7 @@ pub fn learn(
         channel.held_out_ratio = ratio;
         let widen = model.widened * ratio.max(1.0);
         channel.variance = channel.variance.map(|variance| variance * widen * widen);
+        channel.rest_sd *= widen;
         report.add(&name, &channel, widen);
         model.channel.push(channel);
     }
@@ -199,8 +197,8 @@ fn doubt(runs: &[&Run], until_s: f64, robot: &Description) -> Result<Option<Stri
     }
 }
 
-/// Products of powers of the command that the log does not tell: for what is looked at in all motion,
-/// and for a pose.
+/// Products of powers of the command that the log does not tell: for what is looked at in all
+/// motion, and for a pose.
 fn untold(
     records: &[Record],
     model: &Model,
@@ -216,6 +214,14 @@ fn untold(
             axis: range.name.clone(),
         }),
         None => Ok(untold),
+    }
+}
+
+/// What to learn from and what to test on: runs left out, or every third block of each.
+fn parts<'a>(records: &'a [Record], tests: &'a [Record]) -> (Vec<Part<'a>>, Vec<Part<'a>>) {
+    match tests.is_empty() {
+        true => records.iter().map(|record| record.split(BLOCKS)).unzip(),
+        false => (whole(records), whole(tests)),
     }
 }
 
