@@ -2,8 +2,8 @@
 //!
 //! Every pair of wheels in every turn, at once and one 2 s after the other, on the soil learned
 //! from, with encoders; and every pair again whose second wheel turns on while its encoder dies to
-//! zero with the sensor's noise, as a stuck wheel's reads. `--seeds N` worlds per cell (1), the first
-//! of them `--first-seed S` (1; tuning takes 100000 or more, and so no run that is archived);
+//! zero with the sensor's noise, as a stuck wheel's reads. `--seeds N` worlds per cell (1), the
+//! first of them `--first-seed S` (1; tuning takes 100000 or more, and so no run that is archived);
 //! `--json`: the document only, nothing is archived.
 //!
 //! The simulator's physics also told what to expect of two wheels (`SAME_SIDE` in the learned

@@ -188,12 +188,14 @@ fn a_fault_that_goes_is_let_go() {
 fn no_fault_fades_while_the_robot_stands() {
     let (mut frames, label) = unseen("RM_STUCK", "stuck");
     let onset_s = label.onset_s.unwrap();
+    let mut rest = None;
     for frame in frames
         .iter_mut()
         .filter(|frame| time_s(frame) > onset_s + 2.0)
     {
         frame.command[1] = 0.0;
         frame.wheel_rate = [0.0; 8];
+        frame.pose = *rest.get_or_insert(frame.pose);
     }
     let alarm = Alarm::between(onset_s + 0.2, 99.0);
     let mut bench = Bench::new(schema::Sensors::PoseEncoders, alarm);
