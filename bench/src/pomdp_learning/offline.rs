@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use vigil_decision::Pomdp;
-use vigil_decision::learning::{Learned, Record, Settings, Table, check, learn};
+use vigil_decision::learning::{Learned, Record, Settings, check, learn};
 use vigil_decision::simulation::{Paired, Summary};
 
 use super::{Failure, Models, agent, escalation, rewards, rules};
@@ -121,15 +121,7 @@ fn intervals(truth: &Pomdp, learned: &Learned) -> Value {
             }
             rows += 1;
             for entry in row.entries.iter().filter(|entry| entry.learned < 1.0) {
-                let (a, s) = (row.row.action, row.row.state);
-                let p = match row.row.table {
-                    Table::Start => truth.start()[entry.column],
-                    Table::Transition => {
-                        let row = truth.successors(s, a).iter();
-                        row.filter(|e| e.0 == entry.column).map(|e| e.1).sum()
-                    }
-                    Table::Observation => truth.likelihood(a, entry.column)[s],
-                };
+                let p = row.row.p(truth, entry.column);
                 numbers += 1;
                 inside += usize::from((entry.interval[0]..=entry.interval[1]).contains(&p));
                 error = error.max((entry.learned - p).abs());

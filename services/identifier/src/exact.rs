@@ -270,17 +270,16 @@ impl Exact {
                 let mut likelihoods = both[usize::from(is_new)];
                 let dragged = dragged.iter().flatten().filter(|_| !is_new);
                 for (wheel, dragged) in dragged.clone() {
-                    let about = offsets.expected(*wheel, dragged);
-                    let log = evidence.turning(&self.model, observation, *wheel, about);
+                    let model = &self.model;
+                    let log =
+                        offsets.log_likelihood(model, observation, &evidence, *wheel, dragged);
                     likelihoods.replace_whole(*wheel, log);
                 }
                 let gained = encoders.step(&births, death, &likelihoods, first_ns);
                 hypothesis.log_weight += steering + gained;
                 for (wheel, dragged) in dragged {
-                    let reading = &observation.wheels[*wheel];
-                    if reading.plain > 0 && encoders.p_broken(*wheel) < 0.5 {
-                        let noise = evidence.sample_variance(reading.plain);
-                        offsets.update(*wheel, dragged, reading.mean, noise);
+                    if encoders.p_broken(*wheel) < 0.5 {
+                        offsets.learn(observation, &evidence, *wheel, dragged);
                     }
                 }
             }

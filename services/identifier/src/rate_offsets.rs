@@ -6,6 +6,7 @@
 
 use vigil_blocks::WHEELS;
 use vigil_robot::learned::wheel_evidence::{Dragged, TOGETHER_SD};
+use vigil_robot::learned::{Model, Observation, WheelEvidence};
 
 /// A reading this many standard deviations off says nothing about the offset.
 const FAR_SD: f64 = 4.0;
@@ -31,9 +32,37 @@ impl Default for RateOffsets {
 }
 
 impl RateOffsets {
-    /// Rate (rad/s) and variance at which a wheel is expected, the offset included.
+    /// Natural log-likelihood of a dragged wheel's readings.
     #[must_use]
-    pub fn expected(&self, wheel: usize, dragged: &Dragged) -> (f64, f64) {
+    pub fn log_likelihood(
+        &self,
+        model: &Model,
+        observation: &Observation,
+        evidence: &WheelEvidence,
+        wheel: usize,
+        dragged: &Dragged,
+    ) -> f64 {
+        let about = self.expected(wheel, dragged);
+        evidence.turning(model, observation, wheel, about)
+    }
+
+    /// Learns from a dragged wheel's readings, if there are any.
+    pub fn learn(
+        &mut self,
+        observation: &Observation,
+        evidence: &WheelEvidence,
+        wheel: usize,
+        dragged: &Dragged,
+    ) {
+        let reading = &observation.wheels[wheel];
+        if reading.plain > 0 {
+            let noise = evidence.sample_variance(reading.plain);
+            self.update(wheel, dragged, reading.mean, noise);
+        }
+    }
+
+    /// Rate (rad/s) and variance at which a wheel is expected, the offset included.
+    fn expected(&self, wheel: usize, dragged: &Dragged) -> (f64, f64) {
         let change = dragged.change_rad_s;
         (
             dragged.rate_rad_s + self.mean[wheel] * change,
@@ -42,7 +71,7 @@ impl RateOffsets {
     }
 
     /// Takes a rate as read, rad/s, with the variance of its noise.
-    pub fn update(&mut self, wheel: usize, dragged: &Dragged, rate: f64, noise: f64) {
+    fn update(&mut self, wheel: usize, dragged: &Dragged, rate: f64, noise: f64) {
         let (expected, variance) = self.expected(wheel, dragged);
         let (apart, total) = (rate - expected, variance + noise);
         if apart * apart <= FAR_SD * FAR_SD * total {

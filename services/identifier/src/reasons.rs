@@ -177,13 +177,11 @@ impl Reasons {
                     evidence.broken_anyhow(wheel)
                 } else if is_dragged && !is_new {
                     let dragged = evidence.dragged(&self.model, observation, moved.stuck(), wheel);
-                    let about = lineage.offsets.expected(wheel, &dragged);
-                    let reading = &observation.wheels[wheel];
-                    if reading.plain > 0 {
-                        let noise = evidence.sample_variance(reading.plain);
-                        lineage.offsets.update(wheel, &dragged, reading.mean, noise);
-                    }
-                    evidence.turning(&self.model, observation, wheel, about)
+                    let (model, offsets) = (&self.model, &mut lineage.offsets);
+                    let heard =
+                        offsets.log_likelihood(model, observation, &evidence, wheel, &dragged);
+                    offsets.learn(observation, &evidence, wheel, &dragged);
+                    heard
                 } else {
                     evidence.whole(&self.model, observation, moved, is_new, wheel)
                 };

@@ -2,42 +2,20 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+mod recorded;
+
 use proptest::prelude::*;
+use recorded::missions;
 use vigil_decision::Pomdp;
 use vigil_decision::learning::{
     Iteration, LearnError, Learned, LearnedRow, Record, RecordError, Settings, Table, learn,
 };
-use vigil_decision::simulation::{Random, Rules};
 
 /// Three states, one of them never seen by mistake; wear cannot be undone by use.
-const WEAR: &str = "
-discount: 0.9 values: reward states: good worn broken
-actions: use mend observations: fine rattle still
-start: 0.7 0.3 0
-T: use : good 0.8 0.15 0.05
-T: use : worn 0 0.7 0.3
-T: use : broken 0 0 1
-T: mend : * 0.9 0.1 0
-O: * : good 0.85 0.15 0
-O: * : worn 0.4 0.5 0.1
-O: use : broken 0 0.1 0.9
-O: mend : broken 0.2 0.2 0.6
-R: use : good : * : * 2
-R: mend : * : * : * -1
-";
+const WEAR: &str = include_str!("recorded/wear.pomdp");
 
 fn model() -> Pomdp {
     Pomdp::parse(WEAR).unwrap()
-}
-
-fn missions(model: &Pomdp, seed: u64, count: u64, steps: usize, labelled: bool) -> Vec<Record> {
-    let rules = Rules {
-        steps_max: steps,
-        is_end: vec![false; model.actions().len()],
-    };
-    let mut agent = Random::new(model.actions().len());
-    let one = |e| Record::simulated(model, &mut agent, &rules, (seed, e), labelled).0;
-    (0..count).map(one).collect()
 }
 
 fn settings(prior_strength: f64, iterations_max: usize) -> Settings {
@@ -195,15 +173,7 @@ fn a_hidden_model_is_found_and_its_numbers_lie_in_their_intervals() {
     let (mut inside, mut all) = (0, 0);
     for row in found.rows() {
         for entry in &row.entries {
-            let (a, s) = (row.row.action, row.row.state);
-            let true_p = match row.row.table {
-                Table::Start => truth.start()[entry.column],
-                Table::Transition => {
-                    let row = truth.successors(s, a).iter();
-                    row.filter(|e| e.0 == entry.column).map(|e| e.1).sum()
-                }
-                Table::Observation => truth.likelihood(a, entry.column)[s],
-            };
+            let true_p = row.row.p(&truth, entry.column);
             if entry.learned < 1.0 {
                 assert!((entry.learned - true_p).abs() < 0.12, "{row:?} {true_p}");
                 assert!(entry.effective_visits <= row.visits);

@@ -2,53 +2,24 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+mod recorded;
+
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
+use recorded::missions;
 use vigil_decision::Pomdp;
-use vigil_decision::learning::{Learned, Posterior, Record, Settings, Table, learn};
-use vigil_decision::simulation::{Random, Rules};
+use vigil_decision::learning::{Learned, Posterior, Settings, learn};
 
-const HAND: &str = "
-discount: 0.9 values: reward states: good worn broken
-actions: use mend observations: fine rattle still
-start: 0.7 0.3 0
-T: use : good 0.8 0.15 0.05
-T: use : worn 0 0.7 0.3
-T: use : broken 0 0 1
-T: mend : * 0.9 0.1 0
-O: * : good 0.85 0.15 0
-O: * : worn 0.4 0.5 0.1
-O: use : broken 0 0.1 0.9
-O: mend : broken 0.2 0.2 0.6
-R: use : good : * : * 2
-";
+const HAND: &str = include_str!("recorded/wear.pomdp");
 /// Visits that the prior counts as.
 const STRENGTHS: [f64; 3] = [5.0, 20.0, 80.0];
-
-fn missions(world: &Pomdp, seed: u64) -> Vec<Record> {
-    let rules = Rules {
-        steps_max: 20,
-        is_end: vec![false; 2],
-    };
-    let mut agent = Random::new(2);
-    let one = |e| Record::simulated(world, &mut agent, &rules, (seed, e), false).0;
-    (0..200).map(one).collect()
-}
 
 /// How many true probabilities lie in their intervals, below and above them.
 fn coverage(truth: &Pomdp, learned: &Learned) -> [usize; 3] {
     let mut counts = [0; 3];
     for row in learned.rows() {
         for entry in row.entries.iter().filter(|entry| entry.learned < 1.0) {
-            let (a, s) = (row.row.action, row.row.state);
-            let p = match row.row.table {
-                Table::Start => truth.start()[entry.column],
-                Table::Transition => {
-                    let row = truth.successors(s, a).iter();
-                    row.filter(|e| e.0 == entry.column).map(|e| e.1).sum()
-                }
-                Table::Observation => truth.likelihood(a, entry.column)[s],
-            };
+            let p = row.row.p(truth, entry.column);
             let [low, high] = entry.interval;
             counts[usize::from(p < low) + 2 * usize::from(p > high)] += 1;
         }
@@ -71,7 +42,7 @@ fn where_the_prior_is_right_they_do() {
         // The world is one of those that the prior expects.
         let worlds = Posterior::new(&hand, strength).unwrap();
         let truth = worlds.sample(&mut generator).unwrap();
-        let records = missions(&truth, world);
+        let records = missions(&truth, world, 200, 20, false);
         let found = learn(&hand, &records, &settings, &mut |_| ()).unwrap();
         let counts = coverage(&truth, &found);
         sums.iter_mut().zip(counts).for_each(|(sum, n)| *sum += n);

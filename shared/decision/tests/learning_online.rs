@@ -2,11 +2,13 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+mod recorded;
+
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
+use recorded::missions;
 use vigil_decision::Pomdp;
 use vigil_decision::learning::{LearnError, Posterior, Record, check};
-use vigil_decision::simulation::{Random, Rules};
 
 const LAMP: &str = "
 discount: 0.8 values: reward states: on off
@@ -23,20 +25,10 @@ R: * : on : * : * 1
 R: press : * : off : * -2
 ";
 
-fn missions(model: &Pomdp, seed: u64, count: u64, steps: usize) -> Vec<Record> {
-    let rules = Rules {
-        steps_max: steps,
-        is_end: vec![false; 2],
-    };
-    let mut agent = Random::new(2);
-    let one = |e| Record::simulated(model, &mut agent, &rules, (seed, e), false).0;
-    (0..count).map(one).collect()
-}
-
 #[test]
 fn a_true_model_predicts_what_is_measured_and_a_wrong_one_is_refused() {
     let truth = Pomdp::parse(LAMP).unwrap();
-    let records = missions(&truth, 8, 4000, 12);
+    let records = missions(&truth, 8, 4000, 12, false);
     let followed = check::follow(&truth, &records).unwrap();
     assert_eq!(followed.missions, 4000);
     let (predicted, measured) = (followed.predicted, followed.measured);
@@ -89,7 +81,7 @@ fn a_fifth_is_allowed_and_no_more() {
 #[test]
 fn rewards_of_what_happened_have_the_expected_mean() {
     let model = Pomdp::parse(LAMP).unwrap();
-    let records = missions(&model, 1, 4000, 3);
+    let records = missions(&model, 1, 4000, 3, false);
     let all = || {
         records
             .iter()
@@ -126,7 +118,7 @@ fn a_posterior_narrows_around_the_truth() {
         "{mean} {before}"
     );
     assert!((p(&posterior.mean().unwrap()) - 0.6).abs() < 1e-12);
-    for record in missions(&truth, 6, 150, 20) {
+    for record in missions(&truth, 6, 150, 20, false) {
         posterior.absorb(record, 2).unwrap();
     }
     let (mean, after) = spread(&posterior);

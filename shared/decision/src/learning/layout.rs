@@ -28,6 +28,24 @@ pub struct Row {
     pub state: usize,
 }
 
+impl Row {
+    /// What `model` says of a column: s of the start belief, s' of T, z of Z.
+    ///
+    /// # Panics
+    /// For a row or column that the model does not have.
+    #[must_use]
+    pub fn p(&self, model: &Pomdp, column: usize) -> f64 {
+        match self.table {
+            Table::Start => model.start()[column],
+            Table::Transition => {
+                let row = model.successors(self.state, self.action).iter();
+                row.filter(|e| e.0 == column).map(|e| e.1).sum()
+            }
+            Table::Observation => model.likelihood(self.action, column)[self.state],
+        }
+    }
+}
+
 /// Marks an observation that is ruled out.
 const NONE: u32 = u32::MAX;
 
