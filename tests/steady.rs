@@ -53,7 +53,9 @@ fn setup(is_solved: bool) -> Setup {
 }
 
 fn cycle_parts(setup: &Setup, graph: &Graph, name: ServiceName) -> (DeadlineMonitor, HealthBoard) {
-    let schedule = setup.plan(name, None).schedule;
+    let schedule = setup
+        .plan(name, vigil_cycle::serve::Leave::default())
+        .schedule;
     let wanted = Wanted {
         core: 0,
         priority: 1,
@@ -78,7 +80,7 @@ fn simulator(setup: &Setup, graph: &Graph) -> SimulatorSource {
 /// Allocations of one turn.
 fn turn(cycle: &mut StageCycle, stage: &mut impl Stage, clock: &VirtualClock) -> u64 {
     let before = allocations();
-    cycle.turn(stage, clock).unwrap();
+    assert!(cycle.turn(stage, clock).unwrap().is_continue());
     allocations() - before
 }
 
@@ -126,7 +128,7 @@ fn demand_steady(setup: &Setup) {
         clock.set(k * period_ns);
         let before = allocations();
         if k != SILENT {
-            source.turn(&mut sensor, &clock).unwrap();
+            assert!(source.turn(&mut sensor, &clock).unwrap().is_continue());
         } else {
             // Later than every deadline of this period.
             clock.advance(period_ns - 1);

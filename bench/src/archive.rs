@@ -33,6 +33,12 @@ impl Archive {
         Ok(Self { folder, summary })
     }
 
+    /// Where it lies.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// Stores raw data.
     ///
     /// # Errors

@@ -7,6 +7,7 @@ pub mod archive;
 pub mod figure7;
 pub mod filters;
 pub mod ground;
+pub mod latency;
 pub mod machine;
 pub mod matched;
 pub mod missions;

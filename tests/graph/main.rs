@@ -11,4 +11,5 @@ mod identity;
 mod injection;
 mod killing;
 mod playback;
+mod realtime;
 mod recount;

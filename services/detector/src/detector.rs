@@ -157,6 +157,12 @@ impl Detector {
         self.monitors.is_some()
     }
 
+    /// Particles configured; 0 for a robot without fault models, which needs none.
+    #[must_use]
+    pub fn particles(&self) -> u32 {
+        self.watch.cloud().map_or(0, |_| self.particles as u32)
+    }
+
     /// Log-odds at which the alarm rises.
     #[must_use]
     pub const fn alarm_log_odds(&self) -> f64 {

@@ -31,13 +31,13 @@ fn main() -> ExitCode {
     if args.check {
         return ExitCode::SUCCESS;
     }
-    let plan = setup.plan(ServiceName::Detector, args.report);
+    let plan = setup.plan(ServiceName::Detector, args.leave());
     let build = |graph: &_| DetectorStage::new(detector, graph).map_err(ServeError::from);
     match serve::stage::<SensorFrame, _>(&plan, Topic::Sensor, build) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("detector: {error}");
-            ExitCode::from(1)
+            ExitCode::from(error.exit_code())
         }
     }
 }

@@ -73,6 +73,19 @@ impl Stage for DetectorStage {
         self.belief.send(stamp, clock)
     }
 
+    fn particles(&self) -> u32 {
+        self.detector.particles()
+    }
+
+    fn limit(&mut self, particles: u32) {
+        let (belief, cloud) = (self.belief.block(), self.particles.block());
+        self.detector.step(Entry::Budget(particles), belief, cloud);
+    }
+
+    fn has_input(&self) -> bool {
+        self.frames.is_waiting()
+    }
+
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         if self.detector.is_monitoring() && self.symptoms != self.symptoms_told {
             health.event(now_ns, EventKind::Symptoms, self.symptoms, 0.0, 0);

@@ -29,6 +29,14 @@ impl Engine {
         }
     }
 
+    /// From the next observation on at most `count` particles; those of the exact filter are only
+    /// drawn for observers, by [`Self::draw`].
+    pub fn limit(&mut self, count: usize) {
+        if let Self::Generic(filter) = self {
+            filter.limit(count);
+        }
+    }
+
     /// Takes one observation.
     pub fn step(&mut self, observation: &Observation, noise: NoiseScales) {
         match self {

@@ -154,6 +154,17 @@ impl Generic {
         }
     }
 
+    /// From the next observation on at most `count` particles.
+    pub fn limit(&mut self, count: usize) {
+        match &mut self.kind {
+            Kind::Sampled(filter) => filter.limit(count),
+            Kind::Hierarchical(filter) => filter.limit(count),
+            Kind::LookAhead(filter) => filter.limit(count.div_ceil(LOOK_AHEAD_SHARE)),
+            // One Gaussian a mode: nothing to save.
+            Kind::Merged(_) => {}
+        }
+    }
+
     const fn model_mut(&mut self) -> &mut Switching {
         match &mut self.kind {
             Kind::Sampled(filter) => filter.model_mut(),

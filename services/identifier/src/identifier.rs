@@ -168,6 +168,12 @@ impl Identifier {
         })
     }
 
+    /// Particles configured.
+    #[must_use]
+    pub const fn particles(&self) -> u32 {
+        self.particles as u32
+    }
+
     /// Takes one entry of the journal and fills the belief and the particles (headers and causes
     /// are the caller's).
     pub fn step(
@@ -186,7 +192,10 @@ impl Identifier {
             }
             // The state stays at the last frame: what is told is its prediction.
             Entry::Missed(_) => {}
-            Entry::Budget(count) => self.budget = (count as usize).clamp(1, self.particles),
+            Entry::Budget(count) => {
+                self.budget = (count as usize).clamp(1, self.particles);
+                self.engine.limit(self.budget);
+            }
             Entry::Reset => {
                 self.observer.reset();
                 self.begin_run();
@@ -399,6 +408,7 @@ impl Identifier {
         belief.runner_up = self.reasons.runner_up();
         belief.channel_evidence = self.reasons.channel_evidence();
         belief.degenerate_count = self.engine.degenerate_count();
+        belief.particle_limit = self.budget as u32;
     }
 
     fn onset(&self) -> u64 {

@@ -31,7 +31,7 @@ fn main() -> ExitCode {
     if args.check {
         return ExitCode::SUCCESS;
     }
-    let plan = setup.plan(ServiceName::Identifier, args.report);
+    let plan = setup.plan(ServiceName::Identifier, args.leave());
     let period_ns = setup.period_ns();
     let build =
         |graph: &_| IdentifierStage::new(identifier, graph, period_ns).map_err(ServeError::from);
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("identifier: {error}");
-            ExitCode::from(1)
+            ExitCode::from(error.exit_code())
         }
     }
 }

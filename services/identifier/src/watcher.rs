@@ -114,6 +114,15 @@ pub enum Diagnoser {
 }
 
 impl Diagnoser {
+    /// Particles configured; 0 without any.
+    #[must_use]
+    pub fn particles(&self) -> u32 {
+        match self {
+            Self::Identifier(identifier) => identifier.particles(),
+            Self::Watcher(_) => 0,
+        }
+    }
+
     /// Takes one entry of the journal; see [`Identifier::step`].
     pub fn step(
         &mut self,

@@ -180,6 +180,20 @@ impl Stage for IdentifierStage {
         Ok(published_ns)
     }
 
+    fn particles(&self) -> u32 {
+        self.identifier.particles()
+    }
+
+    fn limit(&mut self, particles: u32) {
+        let (belief, drawn) = (self.belief.block(), self.particles.block());
+        self.identifier
+            .step(Entry::Budget(particles), belief, drawn);
+    }
+
+    fn has_input(&self) -> bool {
+        self.detections.is_waiting()
+    }
+
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         health.add_input(&self.frame_account);
         let Reported {

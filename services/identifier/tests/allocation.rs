@@ -36,7 +36,13 @@ fn steady_cycles_of_every_filter_allocate_nothing() {
         let mut particles: Box<ParticleBlock> = Box::default();
         let mut alarm = alarm::Alarm::between(label.onset_s.unwrap() + 0.5, 10.0);
         let before = allocations();
-        for frame in &frames {
+        for (cycle, frame) in frames.iter().enumerate() {
+            if cycle % 100 == 0 {
+                // Fewer particles, and all of them again.
+                let count = [64, settings.particles as u32][cycle / 100 % 2];
+                identifier.step(Entry::Budget(count), &mut belief, &mut particles);
+                assert_eq!(belief.particle_limit, count);
+            }
             alarm.set(frame);
             let detection = Some((&alarm.belief, &*alarm.particles));
             let entry = Entry::Frame(Input { frame, detection });

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use vigil_cycle::serve::EXIT_MISSED;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Domain, RunReport, signal};
 
@@ -31,6 +32,7 @@ struct Supervised {
 /// All service processes of a graph.
 pub struct Children {
     services: Vec<Supervised>,
+    restarted: Vec<ServiceName>,
     gave_up: Option<ServiceName>,
 }
 
@@ -39,12 +41,13 @@ impl Children {
     pub fn start(plan: &Plan, domain: &Domain) -> io::Result<Self> {
         let mut children = Self {
             services: Vec::new(),
+            restarted: Vec::new(),
             gave_up: None,
         };
         for name in plan.services() {
             let report = domain.folder().join(format!("{}.report", name.as_str()));
             let _ = std::fs::remove_file(&report);
-            match spawn(plan.command(name), &report) {
+            match spawn(plan.command(name), &report, plan.stamps(name)) {
                 Ok(child) => children.services.push(Supervised {
                     name,
                     child,
@@ -83,7 +86,8 @@ impl Children {
                 let count = service.restarts.len() as u32;
                 let name = service.name.as_str();
                 // What was refused at a restart is refused at the next.
-                let is_final = status.code() == Some(2) || plan.cannot_resume(service.name);
+                let is_refused = [Some(2), Some(i32::from(EXIT_MISSED))].contains(&status.code());
+                let is_final = is_refused || plan.cannot_resume(service.name);
                 if count >= policy.max_restarts || is_final {
                     tell!("vigil: {name} ended ({status}); given up after {count} restarts");
                     self.gave_up = Some(service.name);
@@ -100,8 +104,11 @@ impl Children {
                 service.restarts.push(now);
                 service.restart_count += 1;
                 let command = plan.command_again(service.name, observer.drive().as_ref());
-                match spawn(command, &service.report) {
-                    Ok(child) => service.child = child,
+                match spawn(command, &service.report, plan.stamps(service.name)) {
+                    Ok(child) => {
+                        service.child = child;
+                        self.restarted.push(service.name);
+                    }
                     Err(error) => {
                         tell!(
                             "vigil: {} cannot be started: {error}",
@@ -114,6 +121,21 @@ impl Children {
             }
         }
         false
+    }
+
+    /// The services that have been restarted since this was last asked.
+    pub fn take_restarted(&mut self) -> Vec<ServiceName> {
+        std::mem::take(&mut self.restarted)
+    }
+
+    /// Ends a service that lives and does not do its work; it is then restarted like one that has
+    /// died. Not by a signal that it would have to handle: it may be stopped, or hang.
+    pub fn end(&mut self, name: ServiceName, why: &str) {
+        let found = self.services.iter_mut().find(|s| s.name == name);
+        if let Some(service) = found.filter(|s| s.restart_at.is_none()) {
+            tell!("vigil: {} {why}: killed", name.as_str());
+            let _ = service.child.kill();
+        }
     }
 
     /// Stops every service, the last of the chain first, so that none waits for input in vain;
@@ -172,12 +194,17 @@ impl Drop for Children {
     }
 }
 
-fn spawn((program, line): (PathBuf, Vec<String>), report: &Path) -> io::Result<Child> {
+fn spawn(
+    (program, line): (PathBuf, Vec<String>),
+    report: &Path,
+    stamps: Vec<String>,
+) -> io::Result<Child> {
     // A group of its own: Ctrl-C reaches the launcher alone, which stops the services in order.
     Command::new(&program)
         .args(line)
         .arg("--report")
         .arg(report)
+        .args(stamps)
         .process_group(0)
         .stdin(Stdio::null())
         .stdout(Stdio::null())

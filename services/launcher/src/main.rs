@@ -16,6 +16,7 @@ mod children;
 mod observer;
 mod plan;
 mod summary;
+mod supervision;
 mod timeline;
 mod words;
 
@@ -32,11 +33,10 @@ use crate::children::Children;
 use crate::observer::Observer;
 use crate::plan::{LauncherArgs, Plan};
 use crate::summary::Summary;
+use crate::supervision::Supervisor;
 
 /// Interval at which Health is read and children are looked after.
 const POLL: Duration = Duration::from_millis(4);
-/// Time that all services may take until the first action comes back.
-const STARTUP_LIMIT: Duration = Duration::from_secs(20);
 /// Time that the last answers may take after the end of a recording. Shorter than the time after
 /// which the supervisor stops a robot that nobody sees.
 const DRAIN: Duration = Duration::from_millis(80);
@@ -84,6 +84,7 @@ fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, Box<dyn std::error::
     signal::install();
     let link = Link::join(&domain, "launcher")?;
     let mut observer = Observer::new(link, plan)?;
+    let _awake = args.keep_awake.then(|| plan.keep_awake()).transpose()?;
     let mut children = Children::start(plan, &domain)?;
     let ended = watch(args, plan, &mut observer, &mut children);
     observer.close(DRAIN);
@@ -116,6 +117,8 @@ fn watch(
 ) -> summary::Ended {
     use summary::Ended;
     let started = Instant::now();
+    let startup_limit = Duration::from_secs_f64(plan.setup.file.watchdog.startup_s);
+    let mut supervisor = Supervisor::new(plan);
     let mut recording_ended: Option<Instant> = None;
     loop {
         std::thread::sleep(POLL);
@@ -126,12 +129,11 @@ fn watch(
         if children.look_after(plan, observer) {
             return Ended::GaveUp;
         }
+        supervisor.look_after(observer, children);
         if observer.ready_ns().is_none() && plan.waits_for_ready() {
-            if started.elapsed() > STARTUP_LIMIT {
-                tell!(
-                    "vigil: no action came back within {} s",
-                    STARTUP_LIMIT.as_secs()
-                );
+            if started.elapsed() > startup_limit {
+                let limit_s = startup_limit.as_secs_f64();
+                tell!("vigil: no action came back within {limit_s} s");
                 return Ended::NeverReady;
             }
             continue;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use vigil_blocks::{Block, Health};
+use vigil_blocks::{Block, Event, Health};
 use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Graph, Monotonic, PortError, Receiver, Topic, health};
@@ -161,6 +161,11 @@ impl Observer {
     /// Every service watched.
     pub fn watched(&self) -> &[Watched] {
         &self.watched
+    }
+
+    /// Adds what the launcher itself has found out about a service.
+    pub fn add_event(&mut self, service: ServiceName, event: &Event) {
+        self.timeline.add(service, event);
     }
 
     /// What has happened.

@@ -4,6 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
+use vigil_cycle::KeepAwake;
 use vigil_cycle::topic::ServiceName;
 use vigil_evaluation::frames;
 use vigil_robot::Injection;
@@ -24,6 +25,17 @@ pub struct LauncherArgs {
     /// word lists all 18 kinds.
     #[arg(long, value_name = "SPEC@T")]
     pub inject: Vec<String>,
+    /// Keep every core of the graph awake by a thread of the lowest class on each: waking a core
+    /// that has halted takes long. Costs power.
+    #[arg(long)]
+    pub keep_awake: bool,
+    /// Leave the instants of every cycle in this folder, `SERVICE.stamps`: records of four 64-bit
+    /// little-endian numbers (due, input published, awake, output published; CLOCK_MONOTONIC ns).
+    #[arg(long, value_name = "DIR")]
+    pub stamps: Option<PathBuf>,
+    /// Cycles whose instants are kept; the oldest give way.
+    #[arg(long, value_name = "N", default_value_t = 100_000, requires = "stamps")]
+    pub stamped_cycles: usize,
     /// Print one JSON document at the end, nothing else on standard output.
     #[arg(long)]
     pub json: bool,
@@ -50,6 +62,7 @@ pub struct Plan {
     /// Options for every service.
     options: Vec<String>,
     inject: Vec<String>,
+    stamps: Option<(PathBuf, usize)>,
 }
 
 impl Plan {
@@ -77,7 +90,12 @@ impl Plan {
             options: graph.to_command_line(),
             setup,
             inject: args.inject.clone(),
+            stamps: args.stamps.clone().map(|f| (f, args.stamped_cycles)),
         };
+        if let Some((folder, _)) = &plan.stamps {
+            std::fs::create_dir_all(folder)
+                .map_err(|error| format!("--stamps {}: {error}", folder.display()))?;
+        }
         plan.check_services()?;
         Ok(plan)
     }
@@ -109,6 +127,17 @@ impl Plan {
         Err(problems.join("\n").into())
     }
 
+    /// Options that make a service leave its stamps, if they are wanted.
+    pub fn stamps(&self, name: ServiceName) -> Vec<String> {
+        let Some((folder, cycles)) = &self.stamps else {
+            return Vec::new();
+        };
+        let file = folder.join(format!("{}.stamps", name.as_str()));
+        let file = file.display().to_string();
+        let cycles = cycles.to_string();
+        vec!["--stamps".into(), file, "--stamped-cycles".into(), cycles]
+    }
+
     /// True if a first action must come back within the start-up limit; an external sensor may
     /// take its time.
     pub fn waits_for_ready(&self) -> bool {
@@ -118,6 +147,11 @@ impl Plan {
     /// True for a source that could only begin its recording again.
     pub fn cannot_resume(&self, service: ServiceName) -> bool {
         service == ServiceName::SensorSim && self.setup.file.sensor.source == Source::Playback
+    }
+
+    /// Keeps the cores of the services awake until the result is dropped.
+    pub fn keep_awake(&self) -> std::io::Result<KeepAwake> {
+        KeepAwake::start(self.services().map(|name| self.setup.service(name).core))
     }
 
     /// The services to start: not sensor-sim when the sensor is external.

@@ -4,11 +4,12 @@ use std::fmt;
 
 use serde::Serialize;
 use vigil_blocks::{Channel, Event, EventKind, MODE_MULTIPLE, MODE_UNKNOWN, Refusal};
+use vigil_cycle::Supervision;
 use vigil_cycle::topic::ServiceName;
 use vigil_robot::injection::{Change, Wire};
 
 use crate::plan::Plan;
-use crate::words;
+use crate::{supervision, words};
 
 /// An event in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -273,6 +274,12 @@ impl Namer {
             EventKind::Run => event.value.to_string(),
             EventKind::Symptoms => words::symptoms(event.what),
             EventKind::Outcome => words::outcome(event),
+            EventKind::Degraded => words::degraded(event.what),
+            EventKind::Particles => format!("{} of {}", event.what, event.value),
+            EventKind::Watchdog => {
+                let found = Supervision::from_wire(event.what);
+                found.map_or("?", supervision::words).into()
+            }
             _ => String::new(),
         }
     }
@@ -312,5 +319,8 @@ const fn kind_name(kind: EventKind) -> &'static str {
         EventKind::Symptoms => "symptoms",
         EventKind::Outcome => "outcome",
         EventKind::Goal => "goal",
+        EventKind::Degraded => "degraded",
+        EventKind::Particles => "particles",
+        EventKind::Watchdog => "watchdog",
     }
 }

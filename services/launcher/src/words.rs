@@ -1,6 +1,6 @@
 //! Words for what happens to a robot on its path.
 
-use vigil_blocks::{ActionOutcome, Event, RecoveryKind, Symptoms};
+use vigil_blocks::{ActionOutcome, Degraded, Event, RecoveryKind, Symptoms};
 
 /// Symptoms, joined by `_` as in the decision model; `none` for the empty set.
 pub fn symptoms(set: u32) -> String {
@@ -33,4 +33,20 @@ pub fn outcome(event: &Event) -> String {
         (_, false) => "failed",
     };
     words.into()
+}
+
+/// Why a service is in degraded mode; `no longer` if it is not.
+pub fn degraded(bits: u32) -> String {
+    let reasons = [
+        (Degraded::INPUT_LOST, "input lost"),
+        (Degraded::LATE, "late"),
+        (Degraded::FEWER_PARTICLES, "fewer particles"),
+    ];
+    let present = reasons.iter().filter(|(bit, _)| bits & bit != 0);
+    let present: Vec<&str> = present.map(|(_, word)| *word).collect();
+    if present.is_empty() {
+        "no longer".into()
+    } else {
+        present.join(", ")
+    }
 }

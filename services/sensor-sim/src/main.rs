@@ -37,11 +37,11 @@ fn main() -> ExitCode {
     if args.service.check {
         return ExitCode::SUCCESS;
     }
-    match serve(&setup, source, args) {
+    match serve(&setup, source, &args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("sensor-sim: {error}");
-            ExitCode::from(1)
+            ExitCode::from(error.exit_code())
         }
     }
 }
@@ -52,8 +52,8 @@ fn prepare(args: &Args) -> Result<(Setup, Assembled), Box<dyn Error>> {
     Ok((setup, source))
 }
 
-fn serve(setup: &Setup, source: Assembled, args: Args) -> Result<(), ServeError> {
-    let plan = setup.plan(ServiceName::SensorSim, args.service.report);
+fn serve(setup: &Setup, source: Assembled, args: &Args) -> Result<(), ServeError> {
+    let plan = setup.plan(ServiceName::SensorSim, args.service.leave());
     let began_ns = args.began_ns;
     match source {
         Assembled::Simulator(simulation, schedule) => {

@@ -31,7 +31,7 @@ fn main() -> ExitCode {
     if args.check {
         return ExitCode::SUCCESS;
     }
-    let plan = setup.plan(ServiceName::Supervisor, args.report);
+    let plan = setup.plan(ServiceName::Supervisor, args.leave());
     let (period_ns, validity_ns) = (setup.period_ns(), validity_ns(&setup));
     let build = |graph: &_| {
         SupervisorStage::new(supervisor, graph, period_ns, validity_ns).map_err(ServeError::from)
@@ -40,7 +40,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("supervisor: {error}");
-            ExitCode::from(1)
+            ExitCode::from(error.exit_code())
         }
     }
 }

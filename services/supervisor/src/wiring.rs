@@ -130,6 +130,10 @@ impl Stage for SupervisorStage {
         self.action.send(stamp, clock)
     }
 
+    fn has_input(&self) -> bool {
+        self.diagnoses.is_waiting()
+    }
+
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         health.add_input(&self.detection_account);
         let Decided {

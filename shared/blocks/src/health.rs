@@ -73,6 +73,13 @@ pub enum EventKind {
     Outcome = 19,
     /// The robot is at the goal of its path.
     Goal = 20,
+    /// The degraded mode changed, other than by an input. `what`: bits of [`Degraded`].
+    Degraded = 21,
+    /// The time allows another number of particles. `what`: that number; `value`: the configured.
+    Particles = 22,
+    /// The launcher's watchdog finds a service failed. `what`: 1 start-up, 2 alive, 3 deadline, 4
+    /// logical.
+    Watchdog = 23,
 }
 
 impl EventKind {
@@ -100,6 +107,9 @@ impl EventKind {
             18 => Self::Symptoms,
             19 => Self::Outcome,
             20 => Self::Goal,
+            21 => Self::Degraded,
+            22 => Self::Particles,
+            23 => Self::Watchdog,
             _ => return None,
         })
     }
@@ -107,7 +117,7 @@ impl EventKind {
 
 block! {
     /// Written by each service, at about 20 Hz and at once when something happens.
-    pub struct Health, size 1264 {
+    pub struct Health, size 1288 {
         /// Common header.
         pub header: Header,
         /// Cycles done: blocks published, or frames for the source.
@@ -156,7 +166,7 @@ block! {
         pub memory_locked: u32,
         /// Process id.
         pub pid: u32,
-        /// 1 if in degraded mode: an input is lost.
+        /// Why the service is in degraded mode, bits of [`Degraded`]; 0 if it is not.
         pub degraded: u32,
         /// Result of the last control command: 1 done, 2 refused, 0 none yet.
         pub control_result: u32,
@@ -164,11 +174,32 @@ block! {
         pub control_seq: u64,
         /// Epoch of the writer of that command.
         pub control_epoch: u64,
+        /// Writer and sequence number of the newest sensor frame that an output has answered.
+        pub answered_epoch: u64,
+        /// See `answered_epoch`.
+        pub answered_seq: u64,
+        /// Particles that the time allows at present; 0 without particles.
+        pub particles: u32,
+        /// Particles configured.
+        pub particles_configured: u32,
         /// Events so far; event number n is at `events[n % EVENTS]`.
         pub event_count: u64,
         /// Recent events.
         pub events: [Event; EVENTS],
     }
+}
+
+/// Why a service is in degraded mode, as bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Degraded;
+
+impl Degraded {
+    /// An input is lost: what is published is prediction.
+    pub const INPUT_LOST: u32 = 1;
+    /// Its own deadlines are missed, and `on_miss = "degrade"`.
+    pub const LATE: u32 = 2;
+    /// It works with fewer particles than configured.
+    pub const FEWER_PARTICLES: u32 = 4;
 }
 
 /// Life of a service.

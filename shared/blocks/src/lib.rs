@@ -36,7 +36,7 @@ pub use control::{Control, ControlCommand};
 pub use detection::{CHANNELS, Channel, DetectionBelief};
 pub use diagnosis::{FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_MULTIPLE, MODE_UNKNOWN};
 pub use header::{Cause, CauseKind, Header};
-pub use health::{EVENTS, Event, EventKind, Health, ServiceState};
+pub use health::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
 pub use journal::Entry;
 pub use particles::{PARTICLE_CAPACITY, ParticleBlock};
 pub use sensor::{ActionOutcome, COMMANDS, SensorFrame, Symptoms, Valid, WHEELS};

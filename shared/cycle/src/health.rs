@@ -1,6 +1,6 @@
 //! A service's account of itself, and when to publish it.
 
-use vigil_blocks::{EVENTS, Event, EventKind, Health, ServiceState};
+use vigil_blocks::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
 
 use crate::clock::Clock;
 use crate::deadline::Schedule;
@@ -87,12 +87,27 @@ impl HealthBoard {
         }
     }
 
-    /// Sets or clears degraded mode; told at once.
-    pub fn set_degraded(&mut self, degraded: bool) {
-        if self.block.degraded != u32::from(degraded) {
-            self.block.degraded = u32::from(degraded);
+    /// Sets or clears a reason for degraded mode, one of [`Degraded`]; told at once.
+    pub fn set_degraded(&mut self, now_ns: u64, reason: u32, is_degraded: bool) {
+        let bits = self.block.degraded & !reason | if is_degraded { reason } else { 0 };
+        if self.block.degraded != bits {
+            self.block.degraded = bits;
             self.changed = true;
+            // A lost input has an event of its own.
+            if reason != Degraded::INPUT_LOST {
+                self.event(now_ns, EventKind::Degraded, bits, 0.0, 0);
+            }
         }
+    }
+
+    /// Notes the particles that the time allows; told at once when it changes.
+    pub fn set_particles(&mut self, now_ns: u64, allowed: u32, configured: u32) {
+        if self.block.particles != allowed && self.block.particles_configured != 0 {
+            let of = u64::from(configured);
+            self.event(now_ns, EventKind::Particles, allowed, 0.0, of);
+        }
+        (self.block.particles, self.block.particles_configured) = (allowed, configured);
+        self.set_degraded(now_ns, Degraded::FEWER_PARTICLES, allowed < configured);
     }
 
     /// Records the answer to a control command; told at once.

@@ -8,32 +8,44 @@
 //! One turn: wake, count deadlines that have passed, take input, check it, step, publish, account.
 
 pub mod allocation;
+pub mod canary;
 pub mod clock;
 pub mod deadline;
 pub mod domain;
+pub mod futex;
 pub mod health;
 pub mod input;
+pub mod keep_awake;
 pub mod latency;
 pub mod live;
+pub mod on_miss;
 pub mod placement;
 pub mod port;
 pub mod report;
 pub mod serve;
+pub mod shed;
 pub mod signal;
 pub mod source;
 pub mod stage;
+pub mod stamps;
 pub mod topic;
 pub mod wake;
+pub mod watchdog;
 
 pub use clock::{Clock, Monotonic, VirtualClock};
 pub use deadline::{DeadlineMonitor, Schedule};
 pub use domain::Domain;
 pub use health::HealthBoard;
 pub use input::InputAccount;
+pub use keep_awake::KeepAwake;
 pub use latency::Latency;
+pub use on_miss::OnMiss;
 pub use placement::Placement;
 pub use port::{Graph, PortError, Receiver, Sender, Stamp};
 pub use report::RunReport;
+pub use shed::Shedder;
 pub use source::{Produced, Source, SourceCycle};
 pub use stage::{Intake, Stage, StageCycle, Timing};
+pub use stamps::{CycleStamps, Stamps};
 pub use topic::Topic;
+pub use watchdog::{Supervision, Watchdog};

@@ -12,7 +12,52 @@ use crate::wake::{self, Timer, Wake};
 /// No wait is longer than this, ns: a stop request is seen at the latest then.
 const WAIT_NS_MAX: u64 = 50_000_000;
 
-/// Runs a stage until SIGINT or SIGTERM.
+/// Cycles after which a service is in its steady state: every page is touched, every connection
+/// made.
+const WARM_UP_CYCLES: u64 = 200;
+
+/// How a service's run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// SIGINT or SIGTERM.
+    Stopped,
+    /// It missed a deadline, and that was to end it.
+    Missed,
+}
+
+/// What a run has shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Run {
+    /// Why it ended.
+    pub ended: Ended,
+    /// Minor and major page faults in the steady state.
+    pub page_faults: [u64; 2],
+}
+
+/// Counts page faults from the end of the warm-up on.
+#[derive(Debug, Default)]
+struct SteadyFaults {
+    before: Option<[u64; 2]>,
+}
+
+impl SteadyFaults {
+    /// Takes the number of cycles done; asks the kernel once.
+    fn take(&mut self, cycles: u64) {
+        if self.before.is_none() && cycles >= WARM_UP_CYCLES {
+            self.before = Some(page_faults());
+        }
+    }
+
+    fn run(&self, ended: Ended) -> Run {
+        let after = page_faults();
+        let before = self.before.unwrap_or(after);
+        let page_faults = [after[0] - before[0], after[1] - before[1]];
+        Run { ended, page_faults }
+    }
+}
+
+/// Runs a stage until SIGINT or SIGTERM, or until a miss that is to end it. About when input is
+/// expected it looks for it for at most `spin_ns` before it blocks: 0 for never.
 ///
 /// # Errors
 /// The transport's; the service ends then and the launcher restarts it.
@@ -20,36 +65,96 @@ pub fn run_stage(
     cycle: &mut StageCycle,
     stage: &mut impl Stage,
     listener: &EventListener,
-) -> Result<(), PortError> {
+    spin_ns: u64,
+) -> Result<Run, PortError> {
     let timer = Timer::new().map_err(|e| PortError::setup("timer", &e))?;
+    let mut faults = SteadyFaults::default();
+    let mut ended = Ended::Stopped;
     cycle.ready(&Monotonic)?;
     while !signal::stop_requested() {
-        let latest_ns = Monotonic.now_ns() + WAIT_NS_MAX;
-        if wake::wait(
-            &timer,
-            listener.descriptor(),
-            cycle.next_wake_ns().min(latest_ns),
-        ) == Wake::Input
-        {
-            listener.drain();
+        await_input(cycle, stage, (listener, &timer), spin_ns);
+        if cycle.turn(stage, &Monotonic)?.is_break() {
+            ended = Ended::Missed;
+            break;
         }
-        cycle.turn(stage, &Monotonic)?;
+        faults.take(cycle.health().view().cycles);
     }
-    cycle.stop(&Monotonic)
+    cycle.stop(&Monotonic)?;
+    Ok(faults.run(ended))
 }
 
-/// Runs a source until SIGINT or SIGTERM.
+/// Returns when there may be input, or something is due.
+fn await_input(
+    cycle: &StageCycle,
+    stage: &impl Stage,
+    (listener, timer): (&EventListener, &Timer),
+    spin_ns: u64,
+) {
+    let due_ns = cycle.next_wake_ns().min(Monotonic.now_ns() + WAIT_NS_MAX);
+    let block_until = |at_ns| {
+        let wake = wake::wait(timer, listener.descriptor(), at_ns);
+        if wake == Wake::Input {
+            listener.drain();
+        }
+        wake
+    };
+    let expected_ns = cycle.expected_input_ns().filter(|_| spin_ns > 0);
+    if let Some(expected_ns) = expected_ns {
+        // What a spin has found may be announced only now.
+        listener.drain();
+        let from_ns = expected_ns.saturating_sub(spin_ns / 2).min(due_ns);
+        let until_ns = (expected_ns + spin_ns / 2).min(due_ns);
+        if Monotonic.now_ns() < from_ns && block_until(from_ns) != Wake::Deadline {
+            return;
+        }
+        if spin_until(until_ns, || stage.has_input()) {
+            return;
+        }
+    }
+    block_until(due_ns);
+}
+
+/// Looks until `found` or the instant has come; true if it was found.
+fn spin_until(until_ns: u64, found: impl Fn() -> bool) -> bool {
+    loop {
+        if found() {
+            return true;
+        }
+        if Monotonic.now_ns() >= until_ns {
+            return false;
+        }
+        std::hint::spin_loop();
+    }
+}
+
+/// Runs a source until SIGINT or SIGTERM, or until a miss that is to end it. The last `spin_ns`
+/// before each instant it does not sleep.
 ///
 /// # Errors
 /// The transport's; the service ends then and the launcher restarts it.
-pub fn run_source(cycle: &mut SourceCycle, source: &mut impl Source) -> Result<(), PortError> {
+pub fn run_source(
+    cycle: &mut SourceCycle,
+    source: &mut impl Source,
+    spin_ns: u64,
+) -> Result<Run, PortError> {
+    let mut faults = SteadyFaults::default();
+    let mut ended = Ended::Stopped;
     cycle.ready(&Monotonic)?;
     while !signal::stop_requested() {
         let latest_ns = Monotonic.now_ns() + WAIT_NS_MAX;
-        clock::sleep_until(cycle.next_wake_ns().min(latest_ns));
-        cycle.turn(source, &Monotonic)?;
+        let due_ns = cycle.next_wake_ns();
+        clock::sleep_until(due_ns.saturating_sub(spin_ns).min(latest_ns));
+        if spin_ns > 0 && due_ns < latest_ns {
+            spin_until(due_ns, || false);
+        }
+        if cycle.turn(source, &Monotonic)?.is_break() {
+            ended = Ended::Missed;
+            break;
+        }
+        faults.take(cycle.health().view().cycles);
     }
-    cycle.stop(&Monotonic)
+    cycle.stop(&Monotonic)?;
+    Ok(faults.run(ended))
 }
 
 /// Places the calling thread; see [`placement::apply`].
@@ -60,8 +165,7 @@ pub fn place(wanted: Wanted) -> Placement {
 }
 
 /// Minor and major page faults of this process so far.
-#[must_use]
-pub fn page_faults() -> [u64; 2] {
+fn page_faults() -> [u64; 2] {
     // SAFETY: getrusage only writes into the zeroed struct that it is given.
     #[allow(unsafe_code)]
     let usage = unsafe {

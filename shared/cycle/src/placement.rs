@@ -5,7 +5,7 @@
 pub struct Wanted {
     /// Core to run on.
     pub core: usize,
-    /// `SCHED_FIFO` priority.
+    /// `SCHED_FIFO` priority; 0 for `SCHED_OTHER`.
     pub priority: u8,
 }
 
@@ -36,19 +36,24 @@ impl Placement {
     }
 }
 
-/// Pins the calling thread, asks for `SCHED_FIFO`, locked memory and 1 ns of timer slack, and reads
-/// back what came of it. What is not permitted is left as it is: the caller reports it.
+/// Pins the calling thread, asks for the wanted class, locked memory and 1 ns of timer slack, and
+/// reads back what came of it. What is not permitted is left as it is: the caller reports it.
 #[must_use]
 pub fn apply(wanted: Wanted) -> Placement {
-    core_affinity::set_for_current(core_affinity::CoreId { id: wanted.core });
+    pin(wanted.core);
     let param = libc::sched_param {
         sched_priority: i32::from(wanted.priority),
+    };
+    let class = if wanted.priority > 0 {
+        libc::SCHED_FIFO
+    } else {
+        libc::SCHED_OTHER
     };
     // SAFETY: plain system calls on the calling thread; `param` outlives the call. Failure leaves
     // the thread as it was and shows in `read_back`.
     #[allow(unsafe_code)]
     let locked = unsafe {
-        libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const param);
+        libc::sched_setscheduler(0, class, &raw const param);
         libc::prctl(libc::PR_SET_TIMERSLACK, 1_u64, 0_u64, 0_u64, 0_u64);
         libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0
     };
@@ -56,6 +61,14 @@ pub fn apply(wanted: Wanted) -> Placement {
         memory_locked: locked,
         ..read_back(wanted.core)
     }
+}
+
+/// Lets the calling thread run on this core only; false if that is not permitted or there is no
+/// such core.
+pub fn pin(core: usize) -> bool {
+    // The library takes a number beyond the kernel's for a mistake of the program.
+    core < libc::CPU_SETSIZE as usize
+        && core_affinity::set_for_current(core_affinity::CoreId { id: core })
 }
 
 /// Core on which the calling thread runs at this moment.

@@ -29,7 +29,7 @@ pub struct RunReport {
     pub step: Stored,
     /// From the schedule to the publication of the output.
     pub from_schedule: Stored,
-    /// Minor and major page faults after the start-up.
+    /// Minor and major page faults in the steady state, after the first 200 cycles.
     pub page_faults: [u64; 2],
 }
 

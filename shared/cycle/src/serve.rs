@@ -1,17 +1,21 @@
 //! The life of a service process: place, open ports, warm up, cycle, report.
 
+use std::io;
 use std::path::PathBuf;
 
 use crate::clock::{Clock, Monotonic};
 use crate::deadline::{DeadlineMonitor, Schedule};
 use crate::domain::{Domain, Queues};
 use crate::health::HealthBoard;
-use crate::live;
+use crate::live::{self, Ended, Run};
+use crate::on_miss::OnMiss;
 use crate::placement::Wanted;
 use crate::port::{Graph, Link, PortError};
 use crate::report::{ReportError, RunReport};
+use crate::shed::Shedder;
 use crate::source::{Source, SourceCycle};
 use crate::stage::{Stage, StageCycle, Timing};
+use crate::stamps::Stamps;
 use crate::topic::{ServiceName, Topic};
 
 /// Delay between the opened ports and the first frame of a source, ns: time for the others.
@@ -30,8 +34,21 @@ pub struct Plan {
     pub wanted: Wanted,
     /// Period, deadline and budget.
     pub schedule: Schedule,
-    /// Where to leave the run report when the service stops.
+    /// What it does about its own misses.
+    pub on_miss: OnMiss,
+    /// How long it looks for input before it blocks, ns.
+    pub spin_ns: u64,
+    /// What it leaves behind when it stops.
+    pub leave: Leave,
+}
+
+/// What a service leaves behind when it stops.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Leave {
+    /// Where to write the run report.
     pub report: Option<PathBuf>,
+    /// Where to write the stamps of the last cycles, and of how many.
+    pub stamps: Option<(PathBuf, usize)>,
 }
 
 /// Why a service ended.
@@ -43,10 +60,30 @@ pub enum ServeError {
     /// The report could not be written.
     #[error(transparent)]
     Report(#[from] ReportError),
+    /// The stamps could not be written.
+    #[error("stamps: {0}")]
+    Stamps(#[from] io::Error),
+    /// A deadline was missed, and `on_miss` is `stop`.
+    #[error("a deadline was missed, and on_miss = \"stop\"")]
+    Missed,
     /// The service's own models or settings do not fit.
     #[error("{0}")]
     Build(String),
 }
+
+impl ServeError {
+    /// Exit code of a service that ended so: 1, or [`EXIT_MISSED`].
+    #[must_use]
+    pub const fn exit_code(&self) -> u8 {
+        match self {
+            Self::Missed => EXIT_MISSED,
+            _ => 1,
+        }
+    }
+}
+
+/// Exit code of a service that a missed deadline has ended: not to be restarted.
+pub const EXIT_MISSED: u8 = 3;
 
 /// Runs a stage that waits for blocks of `T` on `input`, until SIGINT or SIGTERM.
 ///
@@ -63,10 +100,17 @@ pub fn stage<T: vigil_blocks::Block, S: Stage>(
         return Ok(());
     };
     let listener = link.listener::<T>(input)?;
-    let mut cycle = StageCycle::new(DeadlineMonitor::new(plan.schedule), health)?;
-    let faults = live::page_faults();
-    live::run_stage(&mut cycle, &mut stage, &listener)?;
-    report(plan, cycle.timing(), faults)
+    let monitor = DeadlineMonitor::new(plan.schedule);
+    let mut cycle = StageCycle::new(monitor, health)?.with_on_miss(plan.on_miss);
+    if let Some((_, capacity)) = &plan.leave.stamps {
+        cycle = cycle.with_stamps(Stamps::new(*capacity));
+    }
+    if stage.particles() > 0 {
+        let shedder = Shedder::new(stage.particles(), plan.schedule.budget_ns);
+        cycle = cycle.with_shedder(shedder);
+    }
+    let run = live::run_stage(&mut cycle, &mut stage, &listener, plan.spin_ns)?;
+    leave(plan, cycle.timing(), cycle.stamps(), run)
 }
 
 /// Runs a source until SIGINT or SIGTERM.
@@ -80,10 +124,13 @@ pub fn source<S: Source>(
     let (graph, health) = open(plan)?;
     let mut source = build(&graph)?;
     let first_ns = Monotonic.now_ns() + START_DELAY_NS;
-    let mut cycle = SourceCycle::new(DeadlineMonitor::new(plan.schedule), health, first_ns)?;
-    let faults = live::page_faults();
-    live::run_source(&mut cycle, &mut source)?;
-    report(plan, cycle.timing(), faults)
+    let monitor = DeadlineMonitor::new(plan.schedule);
+    let mut cycle = SourceCycle::new(monitor, health, first_ns)?.with_on_miss(plan.on_miss);
+    if let Some((_, capacity)) = &plan.leave.stamps {
+        cycle = cycle.with_stamps(Stamps::new(*capacity));
+    }
+    let run = live::run_source(&mut cycle, &mut source, plan.spin_ns)?;
+    leave(plan, cycle.timing(), cycle.stamps(), run)
 }
 
 fn open(plan: &Plan) -> Result<(Graph, HealthBoard), PortError> {
@@ -95,11 +142,20 @@ fn open(plan: &Plan) -> Result<(Graph, HealthBoard), PortError> {
     Ok((graph, health))
 }
 
-fn report(plan: &Plan, timing: &Timing, before: [u64; 2]) -> Result<(), ServeError> {
-    let Some(path) = &plan.report else {
-        return Ok(());
-    };
-    let after = live::page_faults();
-    let page_faults = [after[0] - before[0], after[1] - before[1]];
-    Ok(RunReport::new(plan.service.as_str(), timing, page_faults)?.write(path)?)
+fn leave(
+    plan: &Plan,
+    timing: &Timing,
+    stamps: Option<&Stamps>,
+    run: Run,
+) -> Result<(), ServeError> {
+    if let (Some((path, _)), Some(stamps)) = (&plan.leave.stamps, stamps) {
+        stamps.write(path)?;
+    }
+    if let Some(path) = &plan.leave.report {
+        RunReport::new(plan.service.as_str(), timing, run.page_faults)?.write(path)?;
+    }
+    match run.ended {
+        Ended::Stopped => Ok(()),
+        Ended::Missed => Err(ServeError::Missed),
+    }
 }

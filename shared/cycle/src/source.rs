@@ -1,12 +1,16 @@
 //! The source of the graph: woken by its own absolute schedule.
 
-use vigil_blocks::ServiceState;
+use std::ops::ControlFlow;
+
+use vigil_blocks::{Degraded, ServiceState};
 
 use crate::clock::Clock;
 use crate::deadline::DeadlineMonitor;
 use crate::health::HealthBoard;
+use crate::on_miss::{Lateness, OnMiss};
 use crate::port::PortError;
 use crate::stage::Timing;
+use crate::stamps::{CycleStamps, Stamps};
 
 /// What a source did at an instant of its schedule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,6 +42,9 @@ pub struct SourceCycle {
     timing: Timing,
     next_ns: u64,
     ended: bool,
+    on_miss: OnMiss,
+    lateness: Lateness,
+    stamps: Option<Stamps>,
 }
 
 impl SourceCycle {
@@ -56,7 +63,24 @@ impl SourceCycle {
             timing: Timing::new()?,
             next_ns: first_ns,
             ended: false,
+            on_miss: OnMiss::default(),
+            lateness: Lateness::default(),
+            stamps: None,
         })
+    }
+
+    /// The same cycle with this answer to its own misses.
+    #[must_use]
+    pub const fn with_on_miss(mut self, on_miss: OnMiss) -> Self {
+        self.on_miss = on_miss;
+        self
+    }
+
+    /// The same cycle, which keeps the stamps of its last cycles.
+    #[must_use]
+    pub fn with_stamps(mut self, stamps: Stamps) -> Self {
+        self.stamps = Some(stamps);
+        self
     }
 
     /// When the next turn is due, ns.
@@ -78,12 +102,18 @@ impl SourceCycle {
         self.health.publish(clock)
     }
 
-    /// One turn: skip instants that were slept through (slips), produce, publish, account.
+    /// One turn: skip instants that were slept through (slips), produce, publish, account. Breaks
+    /// when a deadline was missed and that is to end the service.
     ///
     /// # Errors
     /// The transport's.
-    pub fn turn(&mut self, source: &mut impl Source, clock: &impl Clock) -> Result<(), PortError> {
+    pub fn turn(
+        &mut self,
+        source: &mut impl Source,
+        clock: &impl Clock,
+    ) -> Result<ControlFlow<()>, PortError> {
         let woken_ns = clock.now_ns();
+        let missed_before = self.monitor.missed();
         if !self.ended && woken_ns >= self.next_ns {
             let slips = (woken_ns - self.next_ns) / self.monitor.period_ns();
             let schedule_ns = self.next_ns + slips * self.monitor.period_ns();
@@ -98,7 +128,13 @@ impl SourceCycle {
             self.next_ns = schedule_ns + self.monitor.period_ns();
         }
         source.after(&mut self.health, clock.now_ns());
-        self.health.publish(clock)
+        self.health.publish(clock)?;
+        let is_end = self.monitor.missed() > missed_before && self.on_miss == OnMiss::Stop;
+        Ok(if is_end {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        })
     }
 
     fn account(&mut self, schedule_ns: u64, woken_ns: u64, published_ns: u64, slips: u64) {
@@ -109,12 +145,24 @@ impl SourceCycle {
         self.timing.step.record(cycle_ns);
         let seq = self.health.view().cycles;
         self.health.count_cycle(cycle_ns, seq);
+        self.health.block().answered_seq = seq;
+        if let Some(stamps) = &mut self.stamps {
+            stamps.push(CycleStamps {
+                t_schedule_ns: schedule_ns,
+                t_input_ns: schedule_ns,
+                t_wake_ns: woken_ns,
+                t_publish_ns: published_ns,
+            });
+        }
         self.health.enter(ServiceState::Running);
         let (total, accounted_ns) = (self.monitor.missed(), self.monitor.accounted_ns());
         let health = self.health.block();
         health.slips += slips;
         (health.missed, health.accounted_ns) = (total, accounted_ns);
         self.health.miss(published_ns, missed);
+        let is_late = self.lateness.take(self.on_miss, missed, true);
+        self.health
+            .set_degraded(published_ns, Degraded::LATE, is_late);
     }
 
     /// Announces the end.
@@ -130,6 +178,12 @@ impl SourceCycle {
     #[must_use]
     pub const fn timing(&self) -> &Timing {
         &self.timing
+    }
+
+    /// The stamps of the last cycles, if they are kept.
+    #[must_use]
+    pub const fn stamps(&self) -> Option<&Stamps> {
+        self.stamps.as_ref()
     }
 
     /// The board.

@@ -1,13 +1,18 @@
 //! A stage of the graph: woken by its input or its deadline.
 
-use vigil_blocks::{Block, Cause, CauseKind, Header, ServiceState};
+use std::ops::ControlFlow;
+
+use vigil_blocks::{Block, Cause, CauseKind, Degraded, Header, ServiceState};
 
 use crate::clock::Clock;
 use crate::deadline::DeadlineMonitor;
 use crate::health::HealthBoard;
 use crate::input::{Arrival, InputAccount};
 use crate::latency::Latency;
+use crate::on_miss::{Lateness, OnMiss};
 use crate::port::{PortError, Stamp};
+use crate::shed::Shedder;
+use crate::stamps::{CycleStamps, Stamps};
 
 /// Misses in a row after which the input counts as lost, and the service as degraded.
 const LOST_AFTER_MISSES: u64 = 3;
@@ -27,6 +32,20 @@ pub trait Stage {
     /// # Errors
     /// The transport's.
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError>;
+
+    /// Particles that this stage is configured for; 0 if it has none.
+    fn particles(&self) -> u32 {
+        0
+    }
+
+    /// From now on at most `particles`: the time allows no more.
+    fn limit(&mut self, _particles: u32) {}
+
+    /// True if input waits in shared memory, announced or not: for a stage that spins before it
+    /// blocks. Costs no system call.
+    fn has_input(&self) -> bool {
+        false
+    }
 
     /// Reports events of the last step, adds the accounts of further inputs (anew in each turn),
     /// handles control commands. Off the critical path.
@@ -115,6 +134,12 @@ pub struct StageCycle {
     last_cause: Cause,
     last_stamp: Stamp,
     misses_in_a_row: u64,
+    on_miss: OnMiss,
+    lateness: Lateness,
+    shedder: Option<Shedder>,
+    stamps: Option<Stamps>,
+    /// From the schedule to the publication of the last input, ns.
+    input_offset_ns: u64,
 }
 
 impl StageCycle {
@@ -131,7 +156,42 @@ impl StageCycle {
             last_cause: Cause::default(),
             last_stamp: Stamp::default(),
             misses_in_a_row: 0,
+            on_miss: OnMiss::default(),
+            lateness: Lateness::default(),
+            shedder: None,
+            stamps: None,
+            input_offset_ns: 0,
         })
+    }
+
+    /// The same cycle with this answer to its own misses.
+    #[must_use]
+    pub const fn with_on_miss(mut self, on_miss: OnMiss) -> Self {
+        self.on_miss = on_miss;
+        self
+    }
+
+    /// The same cycle, which sheds particles of the stage before its budget is spent.
+    #[must_use]
+    pub fn with_shedder(mut self, shedder: Shedder) -> Self {
+        self.shedder = Some(shedder);
+        self
+    }
+
+    /// The same cycle, which keeps the stamps of its last cycles.
+    #[must_use]
+    pub fn with_stamps(mut self, stamps: Stamps) -> Self {
+        self.stamps = Some(stamps);
+        self
+    }
+
+    /// When the next input is to be expected, ns: a period after the last one came; `None` before
+    /// the first, and while the input is lost.
+    #[must_use]
+    pub fn expected_input_ns(&self) -> Option<u64> {
+        let next_ns = self.last_stamp.t_schedule_ns + self.monitor.period_ns();
+        (self.last_stamp.t_schedule_ns > 0 && self.misses_in_a_row == 0)
+            .then_some(next_ns + self.input_offset_ns)
     }
 
     /// When the next turn is due at the latest, ns.
@@ -153,11 +213,16 @@ impl StageCycle {
         self.health.publish(clock)
     }
 
-    /// One turn: count passed deadlines, take input, step, publish, account.
+    /// One turn: count passed deadlines, take input, step, publish, account. Breaks when a deadline
+    /// was missed and that is to end the service.
     ///
     /// # Errors
     /// The transport's.
-    pub fn turn(&mut self, stage: &mut impl Stage, clock: &impl Clock) -> Result<(), PortError> {
+    pub fn turn(
+        &mut self,
+        stage: &mut impl Stage,
+        clock: &impl Clock,
+    ) -> Result<ControlFlow<()>, PortError> {
         let woken_ns = clock.now_ns();
         let mut overdue = self.monitor.overdue(woken_ns);
         let mut intake = Intake {
@@ -174,14 +239,9 @@ impl StageCycle {
         if frames > 0 {
             let stamp = Stamp::of(&newest);
             let published_ns = stage.publish(cause, stamp, clock)?;
+            self.answered(&newest, cause, [woken_ns, published_ns]);
             self.health.block().late +=
                 u64::from(woken_ns > newest.t_schedule_ns + self.monitor.deadline_ns());
-            self.timing
-                .wake_up
-                .record(woken_ns.saturating_sub(newest.t_publish_ns));
-            let cycle_ns = published_ns.saturating_sub(woken_ns);
-            self.timing.step.record(cycle_ns);
-            self.health.count_cycle(cycle_ns, newest.seq);
             overdue += self.monitor.published(
                 stamp.t_schedule_ns,
                 published_ns,
@@ -189,24 +249,72 @@ impl StageCycle {
             );
             (self.last_cause, self.last_stamp) = (cause, stamp);
         } else if overdue > 0 {
-            let count = u32::try_from(overdue).unwrap_or(u32::MAX);
-            stage.miss(count);
-            let cause = Cause {
-                kind: CauseKind::Missed as u32,
-                count,
-                ..self.last_cause
-            };
-            let t_schedule_ns = self.monitor.last_accounted_ns();
-            stage.publish(
-                cause,
-                Stamp {
-                    t_schedule_ns,
-                    ..self.last_stamp
-                },
-                clock,
-            )?;
+            self.predict(stage, overdue, clock)?;
         }
-        self.report(stage, frames, overdue, clock)
+        self.report(stage, frames, overdue, clock)?;
+        let is_end = overdue > 0 && self.on_miss == OnMiss::Stop;
+        Ok(if is_end {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        })
+    }
+
+    /// Notes the times of a cycle that answered the input behind `newest`.
+    fn answered(&mut self, newest: &Header, cause: Cause, [woken_ns, published_ns]: [u64; 2]) {
+        self.timing
+            .wake_up
+            .record(woken_ns.saturating_sub(newest.t_publish_ns));
+        let cycle_ns = published_ns.saturating_sub(woken_ns);
+        self.timing.step.record(cycle_ns);
+        self.health.count_cycle(cycle_ns, newest.seq);
+        self.input_offset_ns = newest.t_publish_ns.saturating_sub(newest.t_schedule_ns);
+        let health = self.health.block();
+        (health.answered_epoch, health.answered_seq) = (cause.frame_epoch, cause.frame_seq);
+        if let Some(stamps) = &mut self.stamps {
+            stamps.push(CycleStamps {
+                t_schedule_ns: newest.t_schedule_ns,
+                t_input_ns: newest.t_publish_ns,
+                t_wake_ns: woken_ns,
+                t_publish_ns: published_ns,
+            });
+        }
+    }
+
+    /// The deadline has passed without input: what can be said without it, if that is wanted.
+    fn predict(
+        &mut self,
+        stage: &mut impl Stage,
+        overdue: u64,
+        clock: &impl Clock,
+    ) -> Result<(), PortError> {
+        if !self.on_miss.predicts() {
+            return Ok(());
+        }
+        let count = u32::try_from(overdue).unwrap_or(u32::MAX);
+        stage.miss(count);
+        let cause = Cause {
+            kind: CauseKind::Missed as u32,
+            count,
+            ..self.last_cause
+        };
+        let stamp = Stamp {
+            t_schedule_ns: self.monitor.last_accounted_ns(),
+            ..self.last_stamp
+        };
+        stage.publish(cause, stamp, clock).map(drop)
+    }
+
+    /// Off the critical path: fewer particles if the time is short, more if there is room.
+    fn shed(&mut self, stage: &mut impl Stage, now_ns: u64) {
+        let Some(shedder) = &mut self.shedder else {
+            return;
+        };
+        if let Some(particles) = shedder.take(self.health.view().last_cycle_ns) {
+            stage.limit(particles);
+        }
+        let (allowed, configured) = (shedder.allowed(), shedder.configured());
+        self.health.set_particles(now_ns, allowed, configured);
     }
 
     fn report(
@@ -230,10 +338,14 @@ impl StageCycle {
             let kind = if is_lost { InputLost } else { InputBack };
             self.health
                 .event(now_ns, kind, 0, 0.0, self.misses_in_a_row);
-            self.health.set_degraded(is_lost);
+            self.health
+                .set_degraded(now_ns, Degraded::INPUT_LOST, is_lost);
         }
+        let is_late = self.lateness.take(self.on_miss, overdue, frames > 0);
+        self.health.set_degraded(now_ns, Degraded::LATE, is_late);
         if frames > 0 {
             self.health.enter(ServiceState::Running);
+            self.shed(stage, now_ns);
         }
         let (missed, accounted_ns) = (self.monitor.missed(), self.monitor.accounted_ns());
         let (lost, duplicate, invalid) = (
@@ -261,6 +373,12 @@ impl StageCycle {
     #[must_use]
     pub const fn timing(&self) -> &Timing {
         &self.timing
+    }
+
+    /// The stamps of the last cycles, if they are kept.
+    #[must_use]
+    pub const fn stamps(&self) -> Option<&Stamps> {
+        self.stamps.as_ref()
     }
 
     /// The board.

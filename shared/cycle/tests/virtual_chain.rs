@@ -260,13 +260,14 @@ impl World {
     /// One turn of service `i`, beginning at `at_ns`.
     fn turn(&mut self, i: usize, at_ns: u64) {
         self.clock.set(at_ns);
-        match i {
+        let flow = match i {
             0 => self.source.turn(&mut self.sensor, &self.clock),
             1 => self.detector.0.turn(&mut self.detector.1, &self.clock),
             2 => self.identifier.0.turn(&mut self.identifier.1, &self.clock),
             _ => self.supervisor.0.turn(&mut self.supervisor.1, &self.clock),
         }
         .unwrap();
+        assert!(flow.is_continue());
         self.free_ns[i] = self.clock.now_ns();
     }
 

@@ -28,6 +28,8 @@ pub struct ParticleFilter<M: Sampled> {
     resampling: Resampling,
     adaptive: Option<Adaptive>,
     count_max: usize,
+    /// Particles allowed at present, at most `count_max`.
+    allowed: usize,
     rng: Pcg64Mcg,
     modes: Vec<u16>,
     states: Vec<M::State>,
@@ -62,6 +64,7 @@ impl<M: Sampled> ParticleFilter<M> {
             resampling,
             adaptive: None,
             count_max: count,
+            allowed: count,
             rng,
             modes: vec![0; count],
             states: vec![state; count],
@@ -87,6 +90,12 @@ impl<M: Sampled> ParticleFilter<M> {
     pub fn with_adaptive_count(mut self, adaptive: Adaptive) -> Self {
         self.adaptive = Some(adaptive);
         self
+    }
+
+    /// From the next step on at most `count` particles, 1 to the number of the start: fewer cost
+    /// less, and are resampled from those there are.
+    pub fn limit(&mut self, count: usize) {
+        self.allowed = count.clamp(1, self.count_max);
     }
 
     /// The model.
@@ -137,9 +146,11 @@ impl<M: Sampled> ParticleFilter<M> {
                 })
                 .unwrap_or(0)
         };
-        self.modes.resize(self.count_max, 0);
-        self.weights.level(self.count_max);
-        for i in 0..self.count_max {
+        let count = self.allowed;
+        self.modes.resize(count, 0);
+        self.states.truncate(count);
+        self.weights.level(count);
+        for i in 0..count {
             let mode = initial(&self.model, self.rng.random());
             self.modes[i] = mode as u16;
             let found = z.and_then(|z| self.model.locate(mode, z, &mut self.rng));
@@ -152,7 +163,7 @@ impl<M: Sampled> ParticleFilter<M> {
             // Drawn from the prior, not from the tilted one.
             self.increments[i] = self.proposal.log_risk(mode);
         }
-        self.weights.absorb(&self.increments[..self.count_max]);
+        self.weights.absorb(&self.increments[..count]);
         self.coasted = 0;
         self.sum_modes();
     }
@@ -191,7 +202,6 @@ impl<M: Sampled> ParticleFilter<M> {
     }
 
     fn resample(&mut self) {
-        let count = self.count();
         let next = match &mut self.adaptive {
             Some(adaptive) => {
                 let model = &self.model;
@@ -203,9 +213,9 @@ impl<M: Sampled> ParticleFilter<M> {
                 let cells = occupied
                     .filter(|(_, weight)| **weight > 0.0)
                     .map(|((&mode, state), _)| (u64::from(mode) << 48) ^ model.cell(state));
-                adaptive.count(cells).min(self.count_max)
+                adaptive.count(cells).min(self.allowed)
             }
-            None => count,
+            None => self.allowed,
         };
         self.ancestors.resize(next, 0);
         let (weights, spare) = (self.weights.linear(), &mut self.increments);
@@ -256,8 +266,11 @@ impl<M: Sampled> Filter for ParticleFilter<M> {
             self.sum_modes();
         }
         let effective_sample_size = self.weights.effective_sample_size();
-        if effective_sample_size < self.resampling.threshold * self.count() as f64
+        let count = self.count();
+        let is_limited = count > self.allowed || self.adaptive.is_none() && count < self.allowed;
+        if effective_sample_size < self.resampling.threshold * count as f64
             || self.resampling.threshold >= 1.0
+            || is_limited
         {
             self.resample();
         }

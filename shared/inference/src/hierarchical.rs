@@ -72,6 +72,9 @@ pub struct Hierarchical<M: Sampled> {
     above: Vec<Vec<usize>>,
     resampling: Resampling,
     rng: Pcg64Mcg,
+    count_max: usize,
+    /// Particles wanted at present, at most `count_max`.
+    allowed: usize,
     states: Vec<M::State>,
     other_states: Vec<M::State>,
     /// Row i: the share of each mode in particle i.
@@ -114,6 +117,8 @@ impl<M: Sampled> Hierarchical<M> {
             above,
             resampling,
             rng,
+            count_max: count,
+            allowed: count,
             states: vec![state; count],
             other_states: vec![state; count],
             shares: vec![0.0; count * modes],
@@ -139,6 +144,12 @@ impl<M: Sampled> Hierarchical<M> {
     pub fn restart(&mut self, seed: u64) {
         self.rng = Pcg64Mcg::seed_from_u64(seed);
         self.reset();
+    }
+
+    /// From the next step on `count` particles, 1 to the number of the start: fewer cost less, and
+    /// are resampled from those there are.
+    pub fn limit(&mut self, count: usize) {
+        self.allowed = count.clamp(1, self.count_max);
     }
 
     /// The model, to give it the command of the next step.
@@ -295,6 +306,9 @@ impl<M: Sampled> Hierarchical<M> {
         let modes = self.model.modes();
         let scheme = self.resampling.scheme;
         let weights = self.weights.linear();
+        self.ancestors.resize(self.allowed, 0);
+        self.other_shares.resize(self.allowed * modes, 0.0);
+        self.other_states.resize(self.allowed, self.states[0]);
         if !scheme.resample(
             weights,
             &mut self.increments,
@@ -450,7 +464,8 @@ impl<M: Sampled> Filter for Hierarchical<M> {
         self.sum_modes();
         let effective_sample_size = self.weights.effective_sample_size();
         let limit = self.resampling.threshold * self.states.len() as f64;
-        if effective_sample_size < limit || self.resampling.threshold >= 1.0 {
+        let is_limited = self.states.len() != self.allowed;
+        if effective_sample_size < limit || self.resampling.threshold >= 1.0 || is_limited {
             self.resample();
         }
         self.choose_resolution();

@@ -27,6 +27,9 @@ struct Particle<const N: usize> {
 pub struct LookAhead<M, const N: usize> {
     model: M,
     rng: Pcg64Mcg,
+    count_max: usize,
+    /// Particles wanted at present, at most `count_max`.
+    allowed: usize,
     particles: Vec<Particle<N>>,
     children: Vec<Particle<N>>,
     /// Row i: `l_k` of particle i.
@@ -48,6 +51,8 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
         };
         let mut filter = Self {
             rng: Pcg64Mcg::seed_from_u64(seed),
+            count_max: count,
+            allowed: count,
             particles: vec![particle; count],
             children: vec![particle; count],
             log_joint: vec![0.0; count * modes],
@@ -69,6 +74,12 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
         self.reset();
     }
 
+    /// From the next step on `count` particles, 1 to the number of the start: fewer cost less, and
+    /// are drawn from those there are.
+    pub fn limit(&mut self, count: usize) {
+        self.allowed = count.clamp(1, self.count_max);
+    }
+
     /// The model, to give it the command of the next step.
     pub const fn model_mut(&mut self) -> &mut M {
         &mut self.model
@@ -83,8 +94,10 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
 
     /// Tries every mode on every particle; false if nothing explains the observation.
     fn look_ahead(&mut self, z: &M::Observation) -> bool {
-        let modes = self.model.modes();
+        let (modes, count) = (self.model.modes(), self.particles.len());
         self.log_p.fill(f64::NEG_INFINITY);
+        self.log_parent.resize(count, 0.0);
+        self.parent.resize(count, 0.0);
         for (i, particle) in self.particles.iter().enumerate() {
             let row = &mut self.log_joint[i * modes..(i + 1) * modes];
             for (mode, log_joint) in row.iter_mut().enumerate() {
@@ -110,6 +123,7 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
     /// Draws parents, then their modes, by what the look-ahead has found.
     fn draw(&mut self, z: &M::Observation) {
         let modes = self.model.modes();
+        self.ancestors.resize(self.allowed, 0);
         systematic(&self.parent, self.rng.random(), &mut self.ancestors);
         self.children.clear();
         for &ancestor in &self.ancestors {

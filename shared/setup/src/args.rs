@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use vigil_cycle::serve::Leave;
+
 use crate::load::{Setup, SetupError, load_graph};
 use crate::schema::{IdentifierFilter, Source};
 
@@ -49,9 +51,27 @@ pub struct ServiceArgs {
     /// Where to leave the run report.
     #[arg(long, value_name = "F")]
     pub report: Option<PathBuf>,
+    /// Where to leave the stamps of the last cycles; see `--stamped-cycles`.
+    #[arg(long, value_name = "F")]
+    pub stamps: Option<PathBuf>,
+    /// Cycles whose stamps are kept.
+    #[arg(long, value_name = "N", default_value_t = 100_000, requires = "stamps")]
+    pub stamped_cycles: usize,
     /// Only read and check everything that the service needs; exit code 0 or 2.
     #[arg(long)]
     pub check: bool,
+}
+
+impl ServiceArgs {
+    /// What the service is to leave behind when it stops.
+    #[must_use]
+    pub fn leave(&self) -> Leave {
+        let stamped = |path: &PathBuf| (path.clone(), self.stamped_cycles);
+        Leave {
+            report: self.report.clone(),
+            stamps: self.stamps.as_ref().map(stamped),
+        }
+    }
 }
 
 impl GraphArgs {

@@ -57,11 +57,26 @@ pub(crate) fn graph(
     );
     range("restart.window_s", file.restart.window_s, 1.0, 3600.0);
     range("restart.delay_ms", file.restart.delay_ms, 0.0, 10_000.0);
+    watchdog_ranges(file, &mut range);
     services(file, &mut report);
     sensor(file, path, &mut report);
     drive(file, robot, &mut report);
     navigation::check(file, robot, &mut report);
     supervisor::check(file, &mut report);
+}
+
+fn watchdog_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
+    let watchdog = &file.watchdog;
+    range("watchdog.startup_s", watchdog.startup_s, 0.1, 600.0);
+    let mut unless_off = |key: &str, value: f64, low: f64, high: f64| {
+        if value != 0.0 {
+            range(key, value, low, high);
+        }
+    };
+    unless_off("watchdog.alive_s", watchdog.alive_s, 0.2, 60.0);
+    unless_off("watchdog.logical_s", watchdog.logical_s, 0.2, 60.0);
+    let percent = watchdog.deadline_percent;
+    unless_off("watchdog.deadline_percent", percent, 1.0, 100.0);
 }
 
 fn simulator_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
@@ -158,6 +173,7 @@ fn services(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
     let online = online_cores().unwrap_or_else(|| (0..cores).collect());
     for (name, service) in stages {
         service_ranges(name, service, &online, report);
+        spin(name, file, report);
     }
     for pair in stages.windows(2) {
         let ((before, first), (after, second)) = (pair[0], pair[1]);
@@ -169,6 +185,40 @@ fn services(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
             );
             report(&key, message);
         }
+    }
+}
+
+/// One that spins keeps the others off its core, and a spin of more than a fifth of the time would
+/// come near to what the kernel takes from real-time threads by force.
+fn spin(name: &str, file: &GraphFile, report: &mut impl FnMut(&str, String)) {
+    let services = &file.services;
+    let all = [
+        ("sensor-sim", &services.sensor_sim),
+        ("detector", &services.detector),
+        ("identifier", &services.identifier),
+        ("supervisor", &services.supervisor),
+    ];
+    let Some((_, service)) = all.iter().find(|(other, _)| *other == name) else {
+        return;
+    };
+    let (key, spin_us) = (format!("services.{name}.spin_us"), service.spin_us);
+    let longest_us = 0.2e6 / file.graph.rate_hz;
+    if !(0.0..=longest_us).contains(&spin_us) {
+        let allowed = format!("0 to {longest_us}, a fifth of the period");
+        report(
+            &key,
+            format!("{spin_us} is out of range: allowed is {allowed}"),
+        );
+    }
+    let shares = |(other, o): &&(&str, &Service)| *other != name && o.core == service.core;
+    if let Some((other, _)) = all.iter().find(shares).filter(|_| spin_us > 0.0) {
+        let core = service.core;
+        report(
+            &key,
+            format!(
+                "{spin_us} needs a core of its own, and {other} is on core {core} too: allowed is 0"
+            ),
+        );
     }
 }
 
@@ -191,7 +241,7 @@ fn service_ranges(
             report(&format!("services.{name}.{key}"), message);
         }
     };
-    range("priority", f64::from(service.priority), 1.0, 90.0);
+    range("priority", f64::from(service.priority), 0.0, 90.0);
     range("deadline_percent", service.deadline_percent, 1.0, 100.0);
     range("budget_percent", service.budget_percent, 1.0, 100.0);
 }

@@ -1,10 +1,8 @@
 //! From the configuration to what the cycle needs.
 
-use std::path::PathBuf;
-
 use vigil_cycle::domain::Queues;
 use vigil_cycle::placement::Wanted;
-use vigil_cycle::serve::Plan;
+use vigil_cycle::serve::{Leave, Plan};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Domain, PortError, Schedule};
 
@@ -49,9 +47,9 @@ impl Setup {
         Domain::new(&self.file.graph.name, self.queues())
     }
 
-    /// What the process of a service is to be; it leaves its run report at `report`.
+    /// What the process of a service is to be, and what it is to leave behind.
     #[must_use]
-    pub fn plan(&self, name: ServiceName, report: Option<PathBuf>) -> Plan {
+    pub fn plan(&self, name: ServiceName, leave: Leave) -> Plan {
         let (service, period_ns) = (self.service(name), self.period_ns());
         let share_ns = |percent: f64| (period_ns as f64 * percent * 1e-2).round() as u64;
         Plan {
@@ -67,7 +65,9 @@ impl Setup {
                 deadline_ns: share_ns(service.deadline_percent),
                 budget_ns: share_ns(service.budget_percent),
             },
-            report,
+            on_miss: service.on_miss,
+            spin_ns: (service.spin_us * 1e3).round() as u64,
+            leave,
         }
     }
 }

@@ -8,6 +8,7 @@ use std::fmt;
 
 use clap::ValueEnum;
 use serde::Deserialize;
+use vigil_cycle::OnMiss;
 use vigil_robot::learned;
 use vigil_robot::learned::monitor::Channels;
 
@@ -59,6 +60,9 @@ pub struct GraphFile {
     /// What the launcher does when a service dies.
     #[serde(default)]
     pub restart: Restart,
+    /// When the launcher takes a service that lives for failed.
+    #[serde(default)]
+    pub watchdog: Watchdog,
 }
 
 /// Identity of the graph and its schedule.
@@ -109,15 +113,25 @@ pub struct Services {
 pub struct Service {
     /// Core to pin to. Several services may name one core; every report says so.
     pub core: usize,
-    /// `SCHED_FIFO` priority, 1 to 90; used where permitted.
+    /// `SCHED_FIFO` priority, 1 to 90, used where permitted; 0 for `SCHED_OTHER`.
     #[serde(default = "fifty")]
     pub priority: u8,
     /// Deadline after the scheduled instant, as a percentage of the period, 1 to 100. Stagger
     /// consecutive stages: each must leave time to the next.
     pub deadline_percent: f64,
-    /// Compute budget of one cycle, as a percentage of the period, 1 to 100.
+    /// Compute budget of one cycle, as a percentage of the period, 1 to 100, default 80. A filter
+    /// that nears it works with fewer particles until there is room again.
     #[serde(default = "eighty")]
     pub budget_percent: f64,
+    /// What follows a missed deadline, which is always counted: `count` nothing; `predict` (the
+    /// default) publishes the prediction at once; `degrade` that, and the service calls itself
+    /// degraded until 100 cycles in a row are in time; `stop` ends the graph, and so the robot.
+    #[serde(default)]
+    pub on_miss: OnMiss,
+    /// How long the service looks for its input without sleeping, about when it is due, us, 0 to a
+    /// fifth of the period; default 0. Only for a service alone on its core.
+    #[serde(default)]
+    pub spin_us: f64,
 }
 
 /// Sizes of the shared-memory queues; the same for every peer.
@@ -383,6 +397,36 @@ impl Default for Restart {
             max_restarts: 3,
             window_s: 60.0,
             delay_ms: 20.0,
+        }
+    }
+}
+
+/// When the launcher takes a service that lives for failed. It then ends and restarts it, within
+/// the bounds of `[restart]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Watchdog {
+    /// Time that all services may take until the first action comes back, and a restarted one until
+    /// it cycles, s, 0.1 to 600.
+    pub startup_s: f64,
+    /// Longest silence of a service that cycles (a healthy one reports 20 times a second), s, 0.2
+    /// to 60; 0 switches this supervision off.
+    pub alive_s: f64,
+    /// Longest time for which a service may publish without following its input, while that moves
+    /// on, s, 0.2 to 60; 0 switches this supervision off.
+    pub logical_s: f64,
+    /// Share of the deadlines of one second whose miss is reported as failed, %, 1 to 100; nothing
+    /// is restarted for it, as that would cost more deadlines. 0 switches this supervision off.
+    pub deadline_percent: f64,
+}
+
+impl Default for Watchdog {
+    fn default() -> Self {
+        Self {
+            startup_s: 20.0,
+            alive_s: 2.0,
+            logical_s: 2.0,
+            deadline_percent: 50.0,
         }
     }
 }

@@ -163,4 +163,10 @@ impl<T: Block> Receiver<T> for LocalReceiver<T> {
     fn buffer(&self) -> usize {
         BUFFER
     }
+
+    fn is_waiting(&self) -> bool {
+        let queue = self.queue.borrow();
+        let next = queue.blocks.front();
+        next.is_some_and(|block| block.header().t_publish_ns <= self.clock.now_ns())
+    }
 }

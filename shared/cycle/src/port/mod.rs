@@ -41,6 +41,9 @@ pub trait Receiver<T: Block> {
 
     /// Blocks that can wait at once.
     fn buffer(&self) -> usize;
+
+    /// True if a block waits; takes nothing and costs no system call.
+    fn is_waiting(&self) -> bool;
 }
 
 /// The times that a block carries on.

@@ -292,4 +292,8 @@ impl<T: Block> Receiver<T> for SharedReceiver<T> {
     fn buffer(&self) -> usize {
         self.buffer
     }
+
+    fn is_waiting(&self) -> bool {
+        self.subscriber.has_samples().unwrap_or(false)
+    }
 }

@@ -8,7 +8,7 @@ pub mod chart;
 mod contest;
 mod curves;
 mod matrix;
-mod page;
+pub mod page;
 mod summary;
 
 use crate::scoring::{Case, Contest, Score, Taxonomy};

@@ -1,0 +1,206 @@
+//! How long from the schedule to the action, under load, and whose misses are they?
+//!
+//! Without options the whole matrix of rates, loads and scheduling; with any of `--rate`, `--load`
+//! and `--scheduling` those cells alone.
+
+use std::error::Error;
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::Parser;
+use serde_json::Value;
+use vigil_bench::archive::Archive;
+use vigil_bench::latency::cell::{Cell, Scheduling, Spec};
+use vigil_bench::latency::load::Load;
+use vigil_bench::latency::{files, floor, page, system};
+use vigil_bench::machine;
+
+/// Rates of the matrix, Hz.
+const RATES_HZ: [f64; 3] = [100.0, 1000.0, 5000.0];
+/// Loads of the matrix.
+const LOADS: [Load; 7] = [
+    Load::Idle,
+    Load::KeepAwake,
+    Load::Cpu,
+    Load::Memory,
+    Load::Io,
+    Load::Switch,
+    Load::Timer,
+];
+
+/// Measures the latency from the schedule to the action.
+#[derive(Debug, Parser)]
+#[command(name = "scripts/bench latency")]
+struct Args {
+    /// Rates of the schedule, Hz; separated by commas.
+    #[arg(long, value_name = "HZ", value_delimiter = ',')]
+    rate: Vec<f64>,
+    /// Loads beside the graph; separated by commas.
+    #[arg(long, value_delimiter = ',')]
+    load: Vec<Load>,
+    /// Scheduling of the graph; separated by commas.
+    #[arg(long, value_delimiter = ',')]
+    scheduling: Vec<Scheduling>,
+    /// Time of each run of the graph, s.
+    #[arg(long, value_name = "S", default_value_t = 20.0)]
+    seconds: f64,
+    /// Particles of detector and identifier.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    particles: usize,
+    /// Runs of each cell.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    repeat: usize,
+    /// Name of the archive.
+    #[arg(long, value_name = "NAME", default_value = "latency")]
+    archive: String,
+    /// Print one JSON document of one cell, archive nothing.
+    #[arg(long)]
+    json: bool,
+}
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    if words.first().is_some_and(|word| word == floor::STAGE_WORD) {
+        return vigil_bench::ended("floor", floor::be_stage(&words[1..]));
+    }
+    let args = Args::parse();
+    vigil_bench::ended("latency", run(&args))
+}
+
+fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+    let specs = specs(args);
+    let folder = std::env::temp_dir().join(format!("vigil-latency-{}", std::process::id()));
+    std::fs::create_dir_all(&folder)?;
+    let result = if args.json {
+        print_one(&specs, &folder)
+    } else {
+        archive(args, &specs, &folder)
+    };
+    let _ = std::fs::remove_dir_all(&folder);
+    result
+}
+
+/// The cells asked for, in order.
+fn specs(args: &Args) -> Vec<Spec> {
+    let or = |given: &[f64], all: &[f64]| {
+        if given.is_empty() {
+            all.to_vec()
+        } else {
+            given.to_vec()
+        }
+    };
+    let is_matrix = args.rate.is_empty() && args.load.is_empty() && args.scheduling.is_empty();
+    let one_rate: &[f64] = if is_matrix { &RATES_HZ } else { &[1000.0] };
+    let loads: &[Load] = if is_matrix { &LOADS } else { &[Load::Idle] };
+    let loads = if args.load.is_empty() {
+        loads
+    } else {
+        &args.load
+    };
+    let both = [Scheduling::Fifo, Scheduling::Other];
+    let scheduling: &[Scheduling] = if is_matrix { &both } else { &both[..1] };
+    let scheduling = if args.scheduling.is_empty() {
+        scheduling
+    } else {
+        &args.scheduling
+    };
+    let mut specs = Vec::new();
+    for rate_hz in or(&args.rate, one_rate) {
+        for &load in loads {
+            for &scheduling in scheduling {
+                let spec = Spec {
+                    rate_hz,
+                    load,
+                    scheduling,
+                    seconds: args.seconds,
+                    particles: args.particles,
+                };
+                specs.extend(std::iter::repeat_n(spec, args.repeat.max(1)));
+            }
+        }
+    }
+    specs
+}
+
+fn print_one(specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
+    let [spec] = specs else {
+        return Err("--json measures one cell: give one --rate, --load and --scheduling".into());
+    };
+    let document = spec.run(folder)?.json();
+    println!("{document:#}");
+    Ok(())
+}
+
+fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
+    let mut archive = Archive::new(&args.archive)?;
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    archive.say(&format!("`scripts/bench latency {}`\n", words.join(" ")));
+    archive.say(
+        "Times in us; every latency from the schedule, hand-over and floor without compute. \
+         `report.html` shows all of it.\n",
+    );
+    archive.say(
+        "| cell | cycles | end to end p50 | p99 | p99.9 | max | hand-over p50 | p99 | floor p50 \
+         | p99 | missed: own | machine |\n|---|---|---|---|---|---|---|---|---|---|---|---|",
+    );
+    let mut cells: Vec<Cell> = Vec::new();
+    let mut facts = facts();
+    for (i, spec) in specs.iter().enumerate() {
+        eprintln!("{} of {}: {}", i + 1, specs.len(), spec.name());
+        let cell = spec.run(folder)?;
+        archive.say(&line(&cell));
+        let repeated = cells.iter().filter(|c| c.spec == *spec).count();
+        let mut name = spec.name();
+        if repeated > 0 {
+            name = format!("{name}-{}", repeated + 1);
+        }
+        files::write(&cell, &archive.folder().join(name))?;
+        cells.push(cell);
+    }
+    facts.push((
+        "command".into(),
+        format!("scripts/bench latency {}", words.join(" ")),
+    ));
+    let html = page::html("Latency from the schedule to the action", &facts, &cells)?;
+    archive.store_text("report.html", &html)?;
+    let all: Vec<Value> = cells.iter().map(Cell::json).collect();
+    archive.store("cells.json", &Value::from(all))?;
+    let folder = archive.close()?;
+    println!("archived in {}", folder.display());
+    Ok(())
+}
+
+fn line(cell: &Cell) -> String {
+    let us = |ns: u64| format!("{:.1}", ns as f64 * 1e-3);
+    let whole = cell.graph.end_to_end.percentiles();
+    let hand_over = cell.graph.hand_over.percentiles();
+    let floor = cell.floor.hand_over.percentiles();
+    let (ours, machine) = cell.missed();
+    format!(
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {ours} | {machine} |",
+        cell.spec.name(),
+        cell.cycles.len(),
+        us(whole.p50_ns),
+        us(whole.p99_ns),
+        us(whole.p999_ns),
+        us(whole.max_ns),
+        us(hand_over.p50_ns),
+        us(hand_over.p99_ns),
+        us(floor.p50_ns),
+        us(floor.p99_ns),
+    )
+}
+
+/// What is to be known of the machine, name and value.
+fn facts() -> Vec<(String, String)> {
+    let mut facts = Vec::new();
+    for group in [machine::facts(), system::facts()] {
+        for (name, value) in group.as_object().into_iter().flatten() {
+            let value = value
+                .as_str()
+                .map_or_else(|| value.to_string(), str::to_owned);
+            facts.push((name.clone(), value));
+        }
+    }
+    facts
+}

@@ -1,0 +1,16 @@
+//! How long a cycle takes from the instant it was due to the action, under load, with the
+//! machine's own share told apart.
+//!
+//! A *cell* is one rate, load and scheduling policy. In it the floor is measured before and after
+//! the graph on the same cores: the same four processes, priorities and block sizes handed over by
+//! a bare futex; and a canary on each core says when the machine was late.
+
+pub mod attribution;
+pub mod cell;
+pub mod cycles;
+pub mod files;
+pub mod floor;
+pub mod graph;
+pub mod load;
+pub mod page;
+pub mod system;

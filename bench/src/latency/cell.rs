@@ -1,0 +1,289 @@
+//! One cell: a rate, a load, a scheduling policy.
+
+use std::error::Error;
+use std::path::Path;
+use std::time::Duration;
+
+use clap::ValueEnum;
+use serde_json::{Value, json};
+use vigil_cycle::canary::{Canary, Seen};
+use vigil_cycle::latency::Percentiles;
+use vigil_cycle::placement::Wanted;
+use vigil_cycle::{CycleStamps, Latency, Placement};
+
+use super::attribution::{self, Miss, Record};
+use super::cycles::{self, Cycle, STAGE_NAMES, STAGES, Spectra};
+use super::floor::{self, Floor};
+use super::graph::{Change, Prepared, Ran};
+use super::load::{Load, Running};
+use super::system::Ticks;
+
+/// Cycles at the start that are no steady state, s.
+const WARM_UP_S: f64 = 2.0;
+/// The floor runs this share of the graph's time before it, and as much after it.
+const FLOOR_SHARE: f64 = 0.25;
+/// Time of a floor, s: at least, and at most.
+const FLOOR_S: [f64; 2] = [4.0, 60.0];
+/// Late wake-ups of a canary that are kept.
+const CANARY_KEPT: usize = 4_000_000;
+/// Time for a load to get going.
+const LOAD_START: Duration = Duration::from_secs(1);
+
+/// How the graph is scheduled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum Scheduling {
+    /// `SCHED_FIFO`, where permitted.
+    Fifo,
+    /// `SCHED_OTHER`.
+    Other,
+}
+
+/// What is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spec {
+    /// Rate of the schedule, Hz.
+    pub rate_hz: f64,
+    /// Load beside the graph.
+    pub load: Load,
+    /// How the graph is scheduled.
+    pub scheduling: Scheduling,
+    /// Time of the graph's run, s.
+    pub seconds: f64,
+    /// Particles of detector and identifier.
+    pub particles: usize,
+}
+
+/// What was found.
+#[derive(Debug)]
+pub struct Cell {
+    /// What was measured.
+    pub spec: Spec,
+    /// The launcher's document of the graph's run.
+    pub summary: Value,
+    /// Cycles of the graph after the warm-up.
+    pub cycles: Vec<Cycle>,
+    /// Their histograms.
+    pub graph: Spectra,
+    /// The same of the floor, before and after the graph together.
+    pub floor: Spectra,
+    /// What the canaries saw while the graph ran and the floors.
+    pub canaries: Vec<Seen>,
+    /// Cycles past the last deadline of the chain.
+    pub misses: Vec<Miss>,
+    /// Deadline of the chain after the schedule, ns.
+    pub deadline_ns: u64,
+    /// Share of the canaries' wake-ups that were late by the slack of a usual cycle, as misses a
+    /// million.
+    pub canary_late_ppm: f64,
+    /// What the machine did meanwhile.
+    pub system: Value,
+    /// Core and priority wanted for each stage.
+    pub wanted: [Wanted; STAGES],
+}
+
+impl Spec {
+    /// Name of the cell in files: `1000hz-cpu-fifo`.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let scheduling = match self.scheduling {
+            Scheduling::Fifo => "fifo",
+            Scheduling::Other => "other",
+        };
+        format!("{}hz-{}-{scheduling}", self.rate_hz, self.load.name())
+    }
+
+    /// Runs the cell; what it needs for the time lies in `folder`.
+    ///
+    /// # Errors
+    /// If the graph, the floor or the load fails.
+    pub fn run(&self, folder: &Path) -> Result<Cell, Box<dyn Error>> {
+        let change = Change {
+            rate_hz: self.rate_hz,
+            particles: self.particles,
+            is_fifo: self.scheduling == Scheduling::Fifo,
+        };
+        let prepared = Prepared::new(change, folder)?;
+        let wanted = prepared.wanted();
+        let period_ns = prepared.setup().period_ns();
+        let floor_s = (FLOOR_SHARE * self.seconds).clamp(FLOOR_S[0], FLOOR_S[1]);
+        let floor = Floor {
+            wanted,
+            period_ns,
+            cycles: (floor_s * self.rate_hz) as u64,
+        };
+        let mut cores: Vec<usize> = wanted.iter().map(|w| w.core).collect();
+        cores.sort_unstable();
+        cores.dedup();
+        let load = Running::start(self.load, &cores, folder)?;
+        std::thread::sleep(LOAD_START);
+        let canaries = canaries(&cores, &wanted, period_ns)?;
+        let before = floor::run(&floor, folder)?;
+        let ticks = Ticks::now();
+        let ran = prepared.run(self.seconds, &[], folder)?;
+        let system = Ticks::now().since(ticks);
+        let after = floor::run(&floor, folder)?;
+        let canaries: Vec<Seen> = canaries.into_iter().filter_map(Canary::finish).collect();
+        drop(load);
+        let deadline_percent = prepared.setup().file.services.supervisor.deadline_percent;
+        let deadline_ns = (period_ns as f64 * deadline_percent * 1e-2).round() as u64;
+        let times = (period_ns, deadline_ns);
+        self.judge((ran, [before, after]), canaries, times, (system, wanted))
+    }
+
+    fn judge(
+        &self,
+        (ran, floors): (Ran, [[Vec<CycleStamps>; STAGES]; 2]),
+        canaries: Vec<Seen>,
+        (period_ns, deadline_ns): (u64, u64),
+        (system, wanted): (Value, [Wanted; STAGES]),
+    ) -> Result<Cell, Box<dyn Error>> {
+        let first = ran.stamps[STAGES - 1].first();
+        let first = first.ok_or("the graph did nothing")?;
+        let from_ns = first.t_schedule_ns + (WARM_UP_S * 1e9) as u64;
+        let cycles = cycles::join(&ran.stamps, period_ns, from_ns);
+        let records: Vec<Record<'_>> = canaries.iter().map(|c| Record::new(&c.late)).collect();
+        let misses = attribution::misses(&cycles, deadline_ns, &records);
+        let graph = Spectra::of(&cycles)?;
+        let floors = floors.iter().flat_map(|stamps| {
+            let first = stamps[0].first().map_or(0, |s| s.t_schedule_ns);
+            cycles::join(stamps, period_ns, first + (1e9 * WARM_UP_S / 4.0) as u64)
+        });
+        let floor = Spectra::of(&floors.collect::<Vec<_>>())?;
+        let usual_ns = graph.end_to_end.percentiles().p50_ns;
+        let slack_ns = deadline_ns.saturating_sub(usual_ns);
+        let late = |seen: &Seen| {
+            seen.lateness
+                .histogram()
+                .count_between(slack_ns.max(1), u64::MAX)
+        };
+        let all: u64 = canaries.iter().map(|c| c.lateness.percentiles().n).sum();
+        let late: u64 = canaries.iter().map(late).sum();
+        Ok(Cell {
+            spec: *self,
+            summary: ran.summary,
+            graph,
+            floor,
+            misses,
+            deadline_ns,
+            canary_late_ppm: 1e6 * late as f64 / all.max(1) as f64,
+            system,
+            wanted,
+            cycles,
+            canaries,
+        })
+    }
+}
+
+/// A canary on each core, one priority above what runs there.
+fn canaries(
+    cores: &[usize],
+    wanted: &[Wanted; STAGES],
+    period_ns: u64,
+) -> Result<Vec<Canary>, Box<dyn Error>> {
+    let highest = wanted.iter().map(|w| w.priority).max().unwrap_or(0);
+    let canary_ns = (period_ns / 4).clamp(100_000, 1_000_000);
+    let start = |&core: &usize| {
+        let wanted = Wanted {
+            core,
+            priority: highest.max(1) + 1,
+        };
+        Ok(Canary::start(wanted, canary_ns, CANARY_KEPT)?)
+    };
+    cores.iter().map(start).collect()
+}
+
+/// Percentiles in us.
+#[must_use]
+pub fn us(latency: &Latency) -> Value {
+    let Percentiles {
+        n,
+        p50_ns,
+        p90_ns,
+        p99_ns,
+        p999_ns,
+        max_ns,
+        ..
+    } = latency.percentiles();
+    let us = |ns: u64| ns as f64 * 1e-3;
+    json!({
+        "n": n, "p50": us(p50_ns), "p90": us(p90_ns), "p99": us(p99_ns), "p999": us(p999_ns),
+        "max": us(max_ns),
+    })
+}
+
+impl Cell {
+    /// Misses of Vigil's own, and the machine's.
+    #[must_use]
+    pub fn missed(&self) -> (u64, u64) {
+        let machine = self.misses.iter().filter(|m| m.is_machine).count() as u64;
+        (self.misses.len() as u64 - machine, machine)
+    }
+
+    /// End to end minus compute, over the floor's: ratios of p50 and p99.
+    #[must_use]
+    pub fn over_floor(&self) -> (f64, f64) {
+        let (graph, floor) = (
+            self.graph.hand_over.percentiles(),
+            self.floor.hand_over.percentiles(),
+        );
+        let ratio = |a: u64, b: u64| a as f64 / b.max(1) as f64;
+        (
+            ratio(graph.p50_ns, floor.p50_ns),
+            ratio(graph.p99_ns, floor.p99_ns),
+        )
+    }
+
+    /// The cell for programs.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let (ours, machine) = self.missed();
+        let (p50, p99) = self.over_floor();
+        let round = |x: f64| (1e3 * x).round() * 1e-3;
+        let stage = |i: usize| {
+            let (hand_over, compute) = &self.graph.stages[i];
+            let of = &self.summary["services"][STAGE_NAMES[i]];
+            json!({
+                "hand_over_us": us(hand_over), "compute_us": us(compute),
+                "core": of["core"], "core_wanted": self.wanted[i].core, "pinned": of["pinned"],
+                "scheduling": of["scheduling"], "memory_locked": of["memory_locked"],
+                "missed_by_its_monitor": of["missed"], "lost": of["lost"], "late": of["late"],
+                "duplicate": of["duplicate"], "slips": of["slips"],
+                "page_faults": of["page_faults"],
+            })
+        };
+        let stages: serde_json::Map<String, Value> = (0..STAGES)
+            .map(|i| (STAGE_NAMES[i].to_owned(), stage(i)))
+            .collect();
+        let canary = |seen: &Seen| {
+            json!({
+                "core": seen.placement.core,
+                "scheduling": Placement::scheduling(seen.placement.policy, seen.placement.priority),
+                "lateness_us": us(&seen.lateness),
+                "not_kept": seen.not_kept,
+            })
+        };
+        json!({
+            "rate_hz": self.spec.rate_hz,
+            "load": self.spec.load.name(),
+            "load_arguments": self.spec.load.arguments(self.canaries.len()).join(" "),
+            "scheduling": self.summary["services"]["supervisor"]["scheduling"],
+            "seconds": self.spec.seconds,
+            "particles": self.spec.particles,
+            "end_to_end_us": us(&self.graph.end_to_end),
+            "compute_us": us(&self.graph.compute),
+            "hand_over_us": us(&self.graph.hand_over),
+            "floor_us": us(&self.floor.hand_over),
+            "floor_end_to_end_us": us(&self.floor.end_to_end),
+            "over_floor": { "p50": round(p50), "p99": round(p99) },
+            "deadline_us": self.deadline_ns as f64 * 1e-3,
+            "missed": { "ours": ours, "machine": machine },
+            "canary_late_ppm": round(self.canary_late_ppm),
+            "cycles": self.cycles.len(),
+            "stages": stages,
+            "canaries": self.canaries.iter().map(canary).collect::<Vec<_>>(),
+            "system": self.system,
+            "config_hash": self.summary["config_hash"],
+            "release_build": self.summary["release_build"],
+        })
+    }
+}

@@ -1,0 +1,148 @@
+//! The graph itself, started as a user starts it.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+use toml::Table;
+use vigil_cycle::placement::Wanted;
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{CycleStamps, stamps};
+use vigil_setup::{GraphArgs, Setup};
+
+use super::cycles::{STAGE_NAMES, STAGES};
+
+/// What is changed in the default graph.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// Rate of the schedule, Hz.
+    pub rate_hz: f64,
+    /// Particles of detector and identifier.
+    pub particles: usize,
+    /// True for `SCHED_FIFO` where permitted, false for `SCHED_OTHER`.
+    pub is_fifo: bool,
+}
+
+/// A graph file for measuring.
+#[derive(Debug)]
+pub struct Prepared {
+    path: PathBuf,
+    setup: Setup,
+}
+
+/// What a run of the graph left.
+#[derive(Debug)]
+pub struct Ran {
+    /// The launcher's document.
+    pub summary: Value,
+    /// Stamps of each service's cycles.
+    pub stamps: [Vec<CycleStamps>; STAGES],
+}
+
+impl Prepared {
+    /// The default graph with this change, written to `folder`.
+    ///
+    /// # Errors
+    /// If the default graph cannot be read, or the changed one is refused.
+    pub fn new(change: Change, folder: &Path) -> Result<Self, Box<dyn Error>> {
+        let config = root().join("config");
+        let text = std::fs::read_to_string(config.join("rover.toml"))?;
+        let mut file: Table = text.parse()?;
+        set(&mut file, "graph", "rate_hz", change.rate_hz.into())?;
+        let name = format!("bench-{}", std::process::id());
+        set(&mut file, "graph", "name", name.into())?;
+        let particles = i64::try_from(change.particles)?;
+        set(&mut file, "detector", "particles", particles.into())?;
+        set(&mut file, "identifier", "particles", particles.into())?;
+        let files = file.get_mut("files").and_then(toml::Value::as_table_mut);
+        for (_, path) in files.ok_or("no [files]")?.iter_mut() {
+            let name = path.as_str().unwrap_or_default();
+            *path = config.join(name).display().to_string().into();
+        }
+        if !change.is_fifo {
+            for service in STAGE_NAMES {
+                let services = file.get_mut("services").and_then(|s| s.get_mut(service));
+                let service = services.and_then(toml::Value::as_table_mut);
+                let service = service.ok_or("no such service")?;
+                service.insert("priority".into(), 0_i64.into());
+            }
+        }
+        let path = folder.join("graph.toml");
+        std::fs::write(&path, file.to_string())?;
+        let setup = GraphArgs {
+            config: path.clone(),
+            ..GraphArgs::default()
+        }
+        .load()?;
+        Ok(Self { path, setup })
+    }
+
+    /// The checked configuration.
+    #[must_use]
+    pub const fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// Core and priority of each stage.
+    #[must_use]
+    pub fn wanted(&self) -> [Wanted; STAGES] {
+        ServiceName::ALL.map(|name| {
+            let service = self.setup.service(name);
+            Wanted {
+                core: service.core,
+                priority: service.priority,
+            }
+        })
+    }
+
+    /// Runs it for `seconds`, with these further options of `scripts/up`.
+    ///
+    /// # Errors
+    /// If the graph fails or leaves no stamps.
+    pub fn run(
+        &self,
+        seconds: f64,
+        options: &[&str],
+        folder: &Path,
+    ) -> Result<Ran, Box<dyn Error>> {
+        let rate_hz = self.setup.file.graph.rate_hz;
+        let kept = ((seconds + 30.0) * rate_hz).ceil();
+        let output = Command::new(root().join("target/release/vigil-launcher"))
+            .arg("--config")
+            .arg(&self.path)
+            .args(["--json", "--duration", &seconds.to_string()])
+            .arg("--stamps")
+            .arg(folder)
+            .args(["--stamped-cycles", &kept.to_string()])
+            .args(options)
+            .output()?;
+        if !output.status.success() {
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            return Err(format!("the graph ended with {}\n{said}", output.status).into());
+        }
+        let read = |stage: usize| {
+            let path = folder.join(format!("{}.stamps", STAGE_NAMES[stage]));
+            let found = stamps::read(&path);
+            let _ = std::fs::remove_file(&path);
+            found
+        };
+        Ok(Ran {
+            summary: serde_json::from_slice(&output.stdout)?,
+            stamps: [read(0)?, read(1)?, read(2)?, read(3)?],
+        })
+    }
+}
+
+fn set(file: &mut Table, table: &str, key: &str, value: toml::Value) -> Result<(), String> {
+    let table = file.get_mut(table).and_then(toml::Value::as_table_mut);
+    let table = table.ok_or_else(|| format!("the default graph has no table for {key}"))?;
+    table.insert(key.to_owned(), value);
+    Ok(())
+}
+
+/// Folder of the project.
+#[must_use]
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}

@@ -1,0 +1,91 @@
+//! Services that live and have failed all the same: found, told, ended, so that they restart.
+
+use std::collections::BTreeMap;
+
+use vigil_blocks::{Event, EventKind};
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::watchdog::Limits;
+use vigil_cycle::{Clock, Monotonic, Supervision, Watchdog};
+use vigil_setup::schema;
+
+use crate::children::Children;
+use crate::observer::Observer;
+use crate::plan::Plan;
+
+/// Holds the watchdog against what the services report.
+pub struct Supervisor {
+    watchdog: Watchdog,
+    services: Vec<ServiceName>,
+    /// Reports seen of each service: (epoch, sequence number) of the last.
+    seen: BTreeMap<&'static str, (u64, u64)>,
+}
+
+impl Supervisor {
+    /// Watches over the services of the plan, which start now.
+    pub fn new(plan: &Plan) -> Self {
+        let services: Vec<ServiceName> = plan.services().collect();
+        let limits = limits(&plan.setup.file.watchdog);
+        Self {
+            watchdog: Watchdog::new(limits, services.len(), Monotonic.now_ns()),
+            services,
+            seen: BTreeMap::new(),
+        }
+    }
+
+    /// Takes what is new, and ends the services that only a new process can mend.
+    pub fn look_after(&mut self, observer: &mut Observer, children: &mut Children) {
+        let now_ns = Monotonic.now_ns();
+        for name in children.take_restarted() {
+            if let Some(service) = self.services.iter().position(|s| *s == name) {
+                self.watchdog.started(service, now_ns);
+            }
+        }
+        for watched in observer.watched() {
+            let Some(health) = watched.latest.as_deref() else {
+                continue;
+            };
+            let identity = (health.header.epoch, health.header.seq);
+            if self.seen.insert(watched.name.as_str(), identity) == Some(identity) {
+                continue;
+            }
+            if let Some(service) = self.services.iter().position(|s| *s == watched.name) {
+                self.watchdog.take(service, health, now_ns);
+            }
+        }
+        while let Some((service, supervision)) = self.watchdog.failed(now_ns) {
+            let name = self.services[service];
+            observer.add_event(
+                name,
+                &Event {
+                    t_ns: now_ns,
+                    kind: EventKind::Watchdog as u32,
+                    what: supervision as u32,
+                    ..Event::default()
+                },
+            );
+            if supervision.needs_restart() {
+                children.end(name, words(supervision));
+            }
+        }
+    }
+}
+
+/// What a failure is called.
+pub const fn words(supervision: Supervision) -> &'static str {
+    match supervision {
+        Supervision::StartUp => "did not start up in time",
+        Supervision::Alive => "has stopped reporting",
+        Supervision::Deadline => "misses its deadlines",
+        Supervision::Logical => "no longer follows its input",
+    }
+}
+
+fn limits(settings: &schema::Watchdog) -> Limits {
+    let ns = |s: f64| (s * 1e9).round() as u64;
+    Limits {
+        start_up_ns: ns(settings.startup_s),
+        alive_ns: ns(settings.alive_s),
+        logical_ns: ns(settings.logical_s),
+        missed_share: settings.deadline_percent * 1e-2,
+    }
+}

@@ -1,0 +1,141 @@
+//! A thread that does nothing but be on time, to see when the machine is not.
+//!
+//! It sleeps to an absolute schedule above the priority of what it watches over, like cyclictest:
+//! how late it wakes is the machine's doing alone. A stall of a core shorter than its period can
+//! fall between two wake-ups.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+
+use crate::clock::{self, Clock, Monotonic};
+use crate::latency::Latency;
+use crate::placement::{self, Placement, Wanted};
+use crate::port::PortError;
+
+/// Lateness from which a wake-up is kept one by one, ns.
+pub const KEPT_FROM_NS: u64 = 5_000;
+
+/// A late wake-up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Late {
+    /// When it was due, ns.
+    pub t_schedule_ns: u64,
+    /// How late it came, ns.
+    pub late_ns: u64,
+}
+
+/// What a canary has seen.
+#[derive(Debug)]
+pub struct Seen {
+    /// Where it ran, as the kernel says.
+    pub placement: Placement,
+    /// Lateness of every instant of its schedule, ns; those that it slept through too.
+    pub lateness: Latency,
+    /// Wake-ups late by [`KEPT_FROM_NS`] or more, in order.
+    pub late: Vec<Late>,
+    /// Late wake-ups for which there was no room.
+    pub not_kept: u64,
+}
+
+/// A running canary.
+#[derive(Debug)]
+pub struct Canary {
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<Seen>,
+}
+
+impl Canary {
+    /// Starts a canary with one wake-up each `period_ns`, with room for `capacity` late ones.
+    ///
+    /// # Errors
+    /// [`PortError::Setup`] if the thread or its histogram cannot be made.
+    pub fn start(wanted: Wanted, period_ns: u64, capacity: usize) -> Result<Self, PortError> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let lateness = Latency::new().map_err(|e| PortError::setup("histogram", &e))?;
+        let asked = Arc::clone(&stop);
+        let thread = std::thread::Builder::new()
+            .name(format!("canary-{}", wanted.core))
+            .spawn(move || watch(wanted, period_ns.max(1), capacity, lateness, &asked))
+            .map_err(|e| PortError::setup("canary", &e))?;
+        Ok(Self { stop, thread })
+    }
+
+    /// Ends it; what it has seen, `None` if it has died.
+    #[must_use]
+    pub fn finish(self) -> Option<Seen> {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.join().ok()
+    }
+}
+
+fn watch(
+    wanted: Wanted,
+    period_ns: u64,
+    capacity: usize,
+    lateness: Latency,
+    stop: &AtomicBool,
+) -> Seen {
+    let touched = Late {
+        t_schedule_ns: u64::MAX,
+        late_ns: 0,
+    };
+    let mut late = vec![touched; capacity];
+    late.clear();
+    let mut seen = Seen {
+        placement: placement::apply(wanted),
+        lateness,
+        late,
+        not_kept: 0,
+    };
+    let mut due_ns = Monotonic.now_ns() + period_ns;
+    while !stop.load(Ordering::Relaxed) {
+        clock::sleep_until(due_ns);
+        let now_ns = Monotonic.now_ns();
+        if now_ns < due_ns {
+            continue; // A signal.
+        }
+        let late_ns = now_ns - due_ns;
+        if late_ns >= KEPT_FROM_NS {
+            if seen.late.len() < capacity {
+                seen.late.push(Late {
+                    t_schedule_ns: due_ns,
+                    late_ns,
+                });
+            } else {
+                seen.not_kept += 1;
+            }
+        }
+        // Instants that were slept through are late as well.
+        while due_ns <= now_ns {
+            seen.lateness.record(now_ns - due_ns);
+            due_ns += period_ns;
+        }
+    }
+    seen
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_instant_of_its_schedule_is_accounted() {
+        let wanted = Wanted {
+            core: 0,
+            priority: 1,
+        };
+        let period_ns = 1_000_000;
+        let from_ns = Monotonic.now_ns();
+        let canary = Canary::start(wanted, period_ns, 64).unwrap();
+        clock::sleep_until(from_ns + 50 * period_ns);
+        let seen = canary.finish().unwrap();
+        let lasted_ns = Monotonic.now_ns() - from_ns;
+        let instants = seen.lateness.percentiles().n;
+        assert!(instants * period_ns <= lasted_ns, "{instants} instants");
+        assert!(instants > 0);
+        let order = seen.late.is_sorted_by_key(|late| late.t_schedule_ns);
+        assert!(order && seen.late.iter().all(|l| l.late_ns >= KEPT_FROM_NS));
+    }
+}

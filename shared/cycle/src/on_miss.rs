@@ -1,0 +1,74 @@
+//! What a service does about its own missed deadlines.
+
+use serde::Deserialize;
+
+/// What a service does when a deadline passes before its block is out. It is always counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnMiss {
+    /// Nothing more: readers see silence.
+    Count,
+    /// Publishes the prediction at once, without the input that is missing. A source has none and
+    /// only counts.
+    #[default]
+    Predict,
+    /// As `predict`, and declares itself degraded until [`IN_TIME_AGAIN`] cycles in a row were in
+    /// time.
+    Degrade,
+    /// Ends the service, and with it the graph: the robot stops, as no action is valid any more.
+    Stop,
+}
+
+impl OnMiss {
+    /// True if a prediction goes out in place of the missing block.
+    #[must_use]
+    pub const fn predicts(self) -> bool {
+        matches!(self, Self::Predict | Self::Degrade)
+    }
+}
+
+/// Cycles in time after which a service is no longer degraded for being late.
+pub const IN_TIME_AGAIN: u32 = 100;
+
+/// Whether a service is to be called degraded for being late.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Lateness {
+    in_time: u32,
+    is_late: bool,
+}
+
+impl Lateness {
+    /// Takes the misses of one turn, and whether it published a cycle; true while degraded.
+    pub const fn take(&mut self, on_miss: OnMiss, missed: u64, published: bool) -> bool {
+        if missed > 0 {
+            self.in_time = 0;
+            self.is_late = matches!(on_miss, OnMiss::Degrade);
+        } else if published && self.is_late {
+            self.in_time += 1;
+            self.is_late = self.in_time < IN_TIME_AGAIN;
+        }
+        self.is_late
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_row_of_cycles_in_time_ends_lateness() {
+        let mut lateness = Lateness::default();
+        assert!(!lateness.take(OnMiss::Degrade, 0, true));
+        assert!(lateness.take(OnMiss::Degrade, 2, false));
+        for _ in 1..IN_TIME_AGAIN {
+            assert!(lateness.take(OnMiss::Degrade, 0, true));
+        }
+        assert!(lateness.take(OnMiss::Degrade, 1, true));
+        for _ in 1..IN_TIME_AGAIN {
+            assert!(lateness.take(OnMiss::Degrade, 0, true));
+            assert!(lateness.take(OnMiss::Degrade, 0, false));
+        }
+        assert!(!lateness.take(OnMiss::Degrade, 0, true));
+        assert!(!lateness.take(OnMiss::Predict, 1, true));
+    }
+}

@@ -1,0 +1,167 @@
+//! Fewer particles before a missed deadline.
+//!
+//! A cycle that takes nearly its whole budget is a warning. Single ones are the machine's (a
+//! processor taken away for a while lengthens whatever runs), so a few in one window are needed,
+//! and the shortest of them says what the work itself costs. The allowance then falls in
+//! proportion, and returns step by step once long windows stay far below the budget.
+
+/// Share of the budget above which a cycle counts as a warning.
+const WARNING: f64 = 0.8;
+/// Share of the budget that a smaller number of particles is to take.
+const AIM: f64 = 0.5;
+/// Share of the budget below which there is room for more.
+const ROOM: f64 = 0.4;
+/// Warnings in one window after which particles are shed.
+const WARNINGS: u32 = 4;
+/// Cycles in a window: filters work on every observation, which at a high rate is every fiftieth
+/// cycle.
+const WINDOW: u32 = 256;
+/// Windows with room, in a row, before particles are given back.
+const CALM_WINDOWS: u32 = 4;
+/// Factor on the particles each time they are given back.
+const GIVE_BACK: f64 = 1.5;
+/// Never fewer particles, unless fewer are configured.
+const PARTICLES_MIN: u32 = 32;
+
+/// Decides how many particles the time allows.
+#[derive(Debug, Clone)]
+pub struct Shedder {
+    configured: u32,
+    allowed: u32,
+    budget_ns: u64,
+    cycles: u32,
+    warnings: u32,
+    /// Shortest of the cycles that were warnings, ns.
+    shortest_ns: u64,
+    without_room: u32,
+    calm_windows: u32,
+}
+
+impl Shedder {
+    /// For `configured` particles and cycles of `budget_ns`.
+    #[must_use]
+    pub const fn new(configured: u32, budget_ns: u64) -> Self {
+        Self {
+            configured,
+            allowed: configured,
+            budget_ns,
+            cycles: 0,
+            warnings: 0,
+            shortest_ns: u64::MAX,
+            without_room: 0,
+            calm_windows: 0,
+        }
+    }
+
+    /// Particles allowed at present.
+    #[must_use]
+    pub const fn allowed(&self) -> u32 {
+        self.allowed
+    }
+
+    /// Particles configured.
+    #[must_use]
+    pub const fn configured(&self) -> u32 {
+        self.configured
+    }
+
+    /// Takes the time of a cycle from wake-up to publication, ns; the new allowance if it changes.
+    pub fn take(&mut self, cycle_ns: u64) -> Option<u32> {
+        let share = cycle_ns as f64 / self.budget_ns.max(1) as f64;
+        self.cycles += 1;
+        self.without_room += u32::from(share > ROOM);
+        if share > WARNING {
+            self.warnings += 1;
+            self.shortest_ns = self.shortest_ns.min(cycle_ns);
+        }
+        if self.warnings == WARNINGS {
+            let fits = AIM * self.budget_ns as f64 / self.shortest_ns as f64;
+            let fewer = (f64::from(self.allowed) * fits) as u32;
+            self.begin_window();
+            self.calm_windows = 0;
+            return self.allow(fewer.max(PARTICLES_MIN));
+        }
+        if self.cycles < WINDOW {
+            return None;
+        }
+        let is_calm = self.without_room < WARNINGS;
+        self.begin_window();
+        self.calm_windows = if is_calm { self.calm_windows + 1 } else { 0 };
+        if self.calm_windows < CALM_WINDOWS {
+            return None;
+        }
+        self.calm_windows = 0;
+        self.allow((f64::from(self.allowed) * GIVE_BACK).ceil() as u32)
+    }
+
+    const fn begin_window(&mut self) {
+        (self.cycles, self.warnings, self.without_room) = (0, 0, 0);
+        self.shortest_ns = u64::MAX;
+    }
+
+    fn allow(&mut self, particles: u32) -> Option<u32> {
+        let particles = particles.min(self.configured);
+        let is_new = particles != self.allowed;
+        self.allowed = particles;
+        is_new.then_some(particles)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BUDGET_NS: u64 = 500_000;
+
+    /// Runs `cycles` cycles that cost `ns_a_particle` for each; returns the allowance at the end.
+    fn run(shedder: &mut Shedder, cycles: u32, ns_a_particle: u64) -> u32 {
+        for _ in 0..cycles {
+            shedder.take(ns_a_particle * u64::from(shedder.allowed()));
+        }
+        shedder.allowed()
+    }
+
+    #[test]
+    fn particles_are_shed_before_the_budget_is_spent_and_given_back_when_there_is_room() {
+        let mut shedder = Shedder::new(1000, BUDGET_NS);
+        assert_eq!(run(&mut shedder, 2000, 350), 1000, "70 % of the budget");
+        // 90 % of the budget: down to half of it at the fourth such cycle.
+        assert_eq!(run(&mut shedder, 3, 450), 1000);
+        assert_eq!(run(&mut shedder, 1, 450), 555);
+        assert_eq!(run(&mut shedder, 5000, 450), 555, "it stays there");
+        // The work becomes cheaper: 33 %, then 50 % of the budget.
+        assert_eq!(run(&mut shedder, 5000, 300), 833);
+        assert_eq!(run(&mut shedder, 5000, 200), 1000);
+    }
+
+    #[test]
+    fn single_stalls_of_the_machine_shed_nothing() {
+        let mut shedder = Shedder::new(1000, BUDGET_NS);
+        for cycle in 0..100_000 {
+            let cycle_ns = if cycle % 100 == 0 { 20_000_000 } else { 50_000 };
+            assert_eq!(shedder.take(cycle_ns), None, "cycle {cycle}");
+        }
+    }
+
+    #[test]
+    fn heavy_cycles_between_light_ones_count() {
+        let mut shedder = Shedder::new(1000, BUDGET_NS);
+        let found = (0..400).find_map(|cycle: u32| {
+            let cycle_ns = if cycle.is_multiple_of(50) {
+                480_000
+            } else {
+                5_000
+            };
+            shedder.take(cycle_ns)
+        });
+        assert_eq!(found, Some(520));
+    }
+
+    #[test]
+    fn there_are_always_some_particles() {
+        let mut shedder = Shedder::new(1000, BUDGET_NS);
+        assert_eq!(run(&mut shedder, 1000, 1_000_000), PARTICLES_MIN);
+        let mut few = Shedder::new(8, BUDGET_NS);
+        assert_eq!(run(&mut few, 1000, 1_000_000), 8);
+    }
+}

@@ -1,0 +1,317 @@
+//! Supervision of services that live, from what they say about themselves.
+//!
+//! The three kinds of AUTOSAR's watchdog manager (specification of Watchdog Manager, R4): *alive*,
+//! does it report as often as it should; *deadline*, does it keep its times; *logical*, does its
+//! output follow its input. A process that has died is the launcher's to see; this finds the ones
+//! that hang, are stopped, or go on repeating themselves.
+
+use vigil_blocks::{Health, ServiceState};
+
+/// Window in which missed deadlines are counted, ns.
+const WINDOW_NS: u64 = 1_000_000_000;
+
+/// What a service has failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Supervision {
+    /// It did not begin to report in time.
+    StartUp = 1,
+    /// It has stopped reporting.
+    Alive = 2,
+    /// It misses too many deadlines.
+    Deadline = 3,
+    /// It reports, its input moves on, and its output does not.
+    Logical = 4,
+}
+
+impl Supervision {
+    /// The kind behind an event's `what`.
+    #[must_use]
+    pub const fn from_wire(value: u32) -> Option<Self> {
+        Some(match value {
+            1 => Self::StartUp,
+            2 => Self::Alive,
+            3 => Self::Deadline,
+            4 => Self::Logical,
+            _ => return None,
+        })
+    }
+
+    /// True if only a new process can mend it. Missed deadlines are no such case: a restart would
+    /// cost more of them.
+    #[must_use]
+    pub const fn needs_restart(self) -> bool {
+        !matches!(self, Self::Deadline)
+    }
+}
+
+/// When a service counts as failed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Time to the first report, ns.
+    pub start_up_ns: u64,
+    /// Longest silence, ns; 0 for no such supervision.
+    pub alive_ns: u64,
+    /// Longest time that the output may stand still while the input moves on, ns; 0 for no such
+    /// supervision.
+    pub logical_ns: u64,
+    /// Share of missed deadlines in one second, 0 to 1; 0 for no such supervision.
+    pub missed_share: f64,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Watched {
+    started_ns: u64,
+    /// Writer of the reports before the last start: those of a process that is gone.
+    old_epoch: u64,
+    epoch: u64,
+    reported_ns: u64,
+    is_stopping: bool,
+    answered: (u64, u64),
+    answered_ns: u64,
+    window_ns: u64,
+    window_missed: u64,
+    missed: u64,
+    period_ns: u64,
+    has_missed_too_many: bool,
+    /// Failed, and told so: nothing more until it is started anew.
+    is_given_up: bool,
+}
+
+/// Watches the services of one graph, given in the order of the data.
+#[derive(Debug, Clone)]
+pub struct Watchdog {
+    limits: Limits,
+    services: Vec<Watched>,
+}
+
+impl Watchdog {
+    /// A watchdog over `count` services that start at `now_ns`.
+    #[must_use]
+    pub fn new(limits: Limits, count: usize, now_ns: u64) -> Self {
+        let watched = Watched {
+            started_ns: now_ns,
+            ..Watched::default()
+        };
+        Self {
+            limits,
+            services: vec![watched; count],
+        }
+    }
+
+    /// The process of a service has been started anew.
+    pub fn started(&mut self, service: usize, now_ns: u64) {
+        if let Some(watched) = self.services.get_mut(service) {
+            *watched = Watched {
+                started_ns: now_ns,
+                old_epoch: watched.epoch,
+                answered: watched.answered,
+                answered_ns: now_ns,
+                ..Watched::default()
+            };
+        }
+    }
+
+    /// Takes a report of a service, seen at `now_ns`.
+    pub fn take(&mut self, service: usize, health: &Health, now_ns: u64) {
+        let Some(watched) = self.services.get_mut(service) else {
+            return;
+        };
+        if health.header.epoch == watched.old_epoch {
+            return;
+        }
+        if watched.epoch != health.header.epoch {
+            watched.epoch = health.header.epoch;
+            (watched.window_ns, watched.window_missed) = (now_ns, health.missed);
+            watched.answered_ns = now_ns;
+        }
+        watched.reported_ns = now_ns;
+        watched.is_stopping = health.state == ServiceState::Stopping as u32;
+        (watched.missed, watched.period_ns) = (health.missed, health.period_ns);
+        let answered = (health.answered_epoch, health.answered_seq);
+        if answered != watched.answered {
+            (watched.answered, watched.answered_ns) = (answered, now_ns);
+        }
+    }
+
+    /// A service that has failed, and what; each failure is told once.
+    pub fn failed(&mut self, now_ns: u64) -> Option<(usize, Supervision)> {
+        (0..self.services.len()).find_map(|service| {
+            let found = self.examine(service, now_ns)?;
+            let watched = &mut self.services[service];
+            watched.is_given_up |= found.needs_restart();
+            Some((service, found))
+        })
+    }
+
+    fn examine(&mut self, service: usize, now_ns: u64) -> Option<Supervision> {
+        let limits = self.limits;
+        let before = service.checked_sub(1).map(|before| self.services[before]);
+        let watched = &mut self.services[service];
+        if watched.is_given_up || watched.is_stopping {
+            return None;
+        }
+        let since = |then_ns: u64| now_ns.saturating_sub(then_ns);
+        if watched.epoch == 0 {
+            let is_late = since(watched.started_ns) > limits.start_up_ns;
+            return is_late.then_some(Supervision::StartUp);
+        }
+        if limits.alive_ns > 0 && since(watched.reported_ns) > limits.alive_ns {
+            return Some(Supervision::Alive);
+        }
+        // It goes on reporting, and what comes before it goes on answering.
+        let behind_ns = watched.answered_ns.saturating_add(limits.logical_ns);
+        let is_left_behind = watched.reported_ns > behind_ns
+            && before.is_some_and(|before| before.answered_ns > behind_ns);
+        if limits.logical_ns > 0 && is_left_behind {
+            return Some(Supervision::Logical);
+        }
+        let misses = limits.missed_share > 0.0 && watched.misses(limits.missed_share, now_ns);
+        misses.then_some(Supervision::Deadline)
+    }
+}
+
+impl Watched {
+    /// True once for each time that a window has too many misses after one that had not.
+    fn misses(&mut self, share: f64, now_ns: u64) -> bool {
+        let window_ns = now_ns.saturating_sub(self.window_ns);
+        if window_ns < WINDOW_NS {
+            return false;
+        }
+        let instants = window_ns as f64 / self.period_ns.max(1) as f64;
+        let missed = self.missed.saturating_sub(self.window_missed) as f64;
+        (self.window_ns, self.window_missed) = (now_ns, self.missed);
+        let before = self.has_missed_too_many;
+        self.has_missed_too_many = missed >= share * instants;
+        self.has_missed_too_many && !before
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+    const LIMITS: Limits = Limits {
+        start_up_ns: 3000 * MS,
+        alive_ns: 500 * MS,
+        logical_ns: 400 * MS,
+        missed_share: 0.5,
+    };
+
+    /// A graph of three services that report every 50 ms and answer one frame in that time.
+    struct Services {
+        watchdog: Watchdog,
+        now_ns: u64,
+        health: [Health; 3],
+    }
+
+    impl Services {
+        fn new() -> Self {
+            let mut health = [Health::default(); 3];
+            for (epoch, health) in (1..).zip(&mut health) {
+                health.header.epoch = epoch;
+                health.period_ns = 10 * MS;
+                health.state = ServiceState::Running as u32;
+            }
+            Self {
+                watchdog: Watchdog::new(LIMITS, 3, 0),
+                now_ns: 0,
+                health,
+            }
+        }
+
+        /// Runs for `ms`; `change` says what happens to each report, None for none.
+        fn run(
+            &mut self,
+            ms: u64,
+            mut change: impl FnMut(usize, &mut Health) -> bool,
+        ) -> Vec<(u64, usize, Supervision)> {
+            let mut found = Vec::new();
+            for _ in 0..ms / 50 {
+                self.now_ns += 50 * MS;
+                for (service, health) in self.health.iter_mut().enumerate() {
+                    health.answered_seq += 5;
+                    if change(service, health) {
+                        self.watchdog.take(service, health, self.now_ns);
+                    }
+                }
+                while let Some((service, what)) = self.watchdog.failed(self.now_ns) {
+                    found.push((self.now_ns / MS, service, what));
+                }
+            }
+            found
+        }
+    }
+
+    #[test]
+    fn healthy_services_never_fail() {
+        let mut services = Services::new();
+        assert_eq!(services.run(60_000, |_, _| true), []);
+    }
+
+    #[test]
+    fn silence_is_found_within_its_limit_and_told_once_until_the_next_start() {
+        let mut services = Services::new();
+        services.run(1000, |_, _| true);
+        let found = services.run(3000, |service, _| service != 1);
+        assert_eq!(found, [(1550, 1, Supervision::Alive)]);
+        services.watchdog.started(1, services.now_ns);
+        // Old reports that are still about do not count for the new process.
+        let found = services.run(3050, |_, _| true);
+        assert_eq!(found, [(7050, 1, Supervision::StartUp)]);
+        services.watchdog.started(1, services.now_ns);
+        services.health[1].header.epoch = 77;
+        assert_eq!(services.run(3050, |_, _| true), []);
+    }
+
+    #[test]
+    fn an_output_that_stands_still_while_its_input_moves_is_found_and_only_there() {
+        let mut services = Services::new();
+        services.run(1000, |_, _| true);
+        let stuck = services.health[1].answered_seq;
+        // The third follows the second, which stands still: it is not to blame.
+        let found = services.run(2000, |service, health| {
+            if service > 0 {
+                health.answered_seq = stuck;
+            }
+            true
+        });
+        assert_eq!(found.len(), 1, "{found:?}");
+        let (at_ms, service, what) = found[0];
+        assert_eq!((service, what), (1, Supervision::Logical));
+        assert!((1400..=1550).contains(&at_ms), "{at_ms}");
+    }
+
+    #[test]
+    fn a_source_at_rest_is_nobodys_failure() {
+        let mut services = Services::new();
+        services.run(1000, |_, _| true);
+        let rest = services.health[0].answered_seq;
+        let found = services.run(5000, |_, health| {
+            health.answered_seq = rest;
+            true
+        });
+        assert_eq!(found, []);
+    }
+
+    #[test]
+    fn too_many_misses_are_told_when_they_begin_and_restart_nothing() {
+        let mut services = Services::new();
+        services.run(1000, |_, _| true);
+        let misses = |services: &mut Services, ms, each: u64| {
+            services.run(ms, |service, health| {
+                health.missed += if service == 2 { each } else { 0 };
+                true
+            })
+        };
+        // Two of five deadlines in 50 ms, then three of five.
+        assert_eq!(misses(&mut services, 5000, 2), []);
+        let found = misses(&mut services, 5000, 3);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!((found[0].1, found[0].2), (2, Supervision::Deadline));
+        assert!(!found[0].2.needs_restart());
+        assert_eq!(misses(&mut services, 3000, 0), []);
+        assert_eq!(misses(&mut services, 3000, 5).len(), 1, "a second time");
+    }
+}
