@@ -9,7 +9,6 @@ pub mod attribution;
 pub mod cell;
 pub mod cycles;
 pub mod files;
-pub mod floor;
 pub mod graph;
 pub mod load;
 pub mod page;

@@ -4,6 +4,7 @@
 use std::process::ExitCode;
 
 pub mod archive;
+pub mod chain;
 pub mod figure7;
 pub mod filters;
 pub mod ground;

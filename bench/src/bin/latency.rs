@@ -12,8 +12,8 @@ use serde_json::Value;
 use vigil_bench::archive::Archive;
 use vigil_bench::latency::cell::{Cell, Scheduling, Spec};
 use vigil_bench::latency::load::Load;
-use vigil_bench::latency::{files, floor, page, system};
-use vigil_bench::machine;
+use vigil_bench::latency::{files, page, system};
+use vigil_bench::{chain, machine};
 
 /// Rates of the matrix, Hz.
 const RATES_HZ: [f64; 3] = [100.0, 1000.0, 5000.0];
@@ -60,8 +60,8 @@ struct Args {
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    if words.first().is_some_and(|word| word == floor::STAGE_WORD) {
-        return vigil_bench::ended("floor", floor::be_stage(&words[1..]));
+    if words.first().is_some_and(|word| word == chain::STAGE_WORD) {
+        return vigil_bench::ended("chain", chain::be_stage(words.get(1)));
     }
     let args = Args::parse();
     vigil_bench::ended("latency", run(&args))

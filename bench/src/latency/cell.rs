@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::ValueEnum;
 use serde_json::{Value, json};
+use vigil_blocks::{Action, DetectionBelief, FaultBelief, ParticleBlock, SensorFrame};
 use vigil_cycle::canary::{Canary, Seen};
 use vigil_cycle::latency::Percentiles;
 use vigil_cycle::placement::Wanted;
@@ -13,10 +14,11 @@ use vigil_cycle::{CycleStamps, Latency, Placement};
 
 use super::attribution::{self, Miss, Record};
 use super::cycles::{self, Cycle, STAGE_NAMES, STAGES, Spectra};
-use super::floor::{self, Floor};
 use super::graph::{Change, Prepared, Ran};
 use super::load::{Load, Running};
 use super::system::Ticks;
+use crate::chain::Chain;
+use crate::chain::carriers::Carrier;
 
 /// Cycles at the start that are no steady state, s.
 const WARM_UP_S: f64 = 2.0;
@@ -28,6 +30,14 @@ const FLOOR_S: [f64; 2] = [4.0, 60.0];
 const CANARY_KEPT: usize = 4_000_000;
 /// Time for a load to get going.
 const LOAD_START: Duration = Duration::from_secs(1);
+
+/// Bytes that each stage of the graph writes in a cycle.
+const SIZES: [usize; STAGES] = [
+    size_of::<SensorFrame>(),
+    size_of::<DetectionBelief>() + size_of::<ParticleBlock>(),
+    size_of::<FaultBelief>() + size_of::<ParticleBlock>(),
+    size_of::<Action>(),
+];
 
 /// How the graph is scheduled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
@@ -106,8 +116,10 @@ impl Spec {
         let wanted = prepared.wanted();
         let period_ns = prepared.setup().period_ns();
         let floor_s = (FLOOR_SHARE * self.seconds).clamp(FLOOR_S[0], FLOOR_S[1]);
-        let floor = Floor {
-            wanted,
+        let floor = Chain {
+            carrier: Carrier::Futex,
+            sizes: SIZES,
+            placed: wanted.map(|w| (w.core, w.priority)),
             period_ns,
             cycles: (floor_s * self.rate_hz) as u64,
         };
@@ -117,11 +129,11 @@ impl Spec {
         let load = Running::start(self.load, &cores, folder)?;
         std::thread::sleep(LOAD_START);
         let canaries = canaries(&cores, &wanted, period_ns)?;
-        let before = floor::run(&floor, folder)?;
+        let before = floor.run(folder)?;
         let ticks = Ticks::now();
         let ran = prepared.run(self.seconds, &[], folder)?;
         let system = Ticks::now().since(ticks);
-        let after = floor::run(&floor, folder)?;
+        let after = floor.run(folder)?;
         let canaries: Vec<Seen> = canaries.into_iter().filter_map(Canary::finish).collect();
         drop(load);
         let deadline_percent = prepared.setup().file.services.supervisor.deadline_percent;

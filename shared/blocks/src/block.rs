@@ -4,9 +4,9 @@ use bytemuck::Pod;
 
 use crate::Header;
 
-/// A fixed-size wire block. Implement it with the `block!` macro of this crate only: the macro
-/// derives the schema hash from the names, types and offsets of the fields, so that two sides
-/// whose layouts differ never connect.
+/// A fixed-size wire block. Implement it with the [`block!`](crate::block!) macro only: it derives
+/// the schema hash from the names, types and offsets of the fields, so that two sides whose layouts
+/// differ never connect.
 pub trait Block: Pod + PartialEq + core::fmt::Debug {
     /// FNV-1a hash over the block's name and, per field, name, type text and offset, then size
     /// and alignment. Also stored in [`Header::schema`] of each block.
@@ -45,7 +45,9 @@ pub mod fnv1a {
 }
 
 /// Builds `<prefix><hex of hash>` at compile time; `N` must be `prefix.len() + 16`.
-pub(crate) const fn name_with_hash<const N: usize>(prefix: &str, hash: u64) -> [u8; N] {
+#[doc(hidden)]
+#[must_use]
+pub const fn name_with_hash<const N: usize>(prefix: &str, hash: u64) -> [u8; N] {
     let (mut out, bytes) = ([0_u8; N], prefix.as_bytes());
     assert!(N == bytes.len() + 16);
     let mut i = 0;
@@ -67,7 +69,9 @@ pub(crate) const fn name_with_hash<const N: usize>(prefix: &str, hash: u64) -> [
 }
 
 /// Reads compile-time ASCII as text.
-pub(crate) const fn ascii(bytes: &'static [u8]) -> &'static str {
+#[doc(hidden)]
+#[must_use]
+pub const fn ascii(bytes: &'static [u8]) -> &'static str {
     match core::str::from_utf8(bytes) {
         Ok(text) => text,
         Err(_) => "invalid",
@@ -75,7 +79,8 @@ pub(crate) const fn ascii(bytes: &'static [u8]) -> &'static str {
 }
 
 /// Defines a block: the `#[repr(C)]` struct, its schema hash, its type name, and the compile-time
-/// assertions on header position, alignment and size.
+/// assertions on header position, alignment and size. Whoever uses it needs `bytemuck`.
+#[macro_export]
 macro_rules! block {
     (
         $(#[$meta:meta])*
@@ -102,8 +107,8 @@ macro_rules! block {
             const TYPE_NAME: &'static str = {
                 const PREFIX: &str = concat!("vigil.", stringify!($name), ".v1.");
                 const BYTES: [u8; PREFIX.len() + 16] =
-                    $crate::block::name_with_hash(PREFIX, <$name as $crate::Block>::SCHEMA);
-                $crate::block::ascii(&BYTES)
+                    $crate::name_with_hash(PREFIX, <$name as $crate::Block>::SCHEMA);
+                $crate::ascii(&BYTES)
             };
             fn header(&self) -> &$crate::Header { &self.header }
             fn header_mut(&mut self) -> &mut $crate::Header { &mut self.header }

@@ -32,6 +32,8 @@ pub use action::{
     Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, Refusal, ValueKind,
 };
 pub use block::{Block, fnv1a};
+#[doc(hidden)]
+pub use block::{ascii, name_with_hash};
 pub use control::{Control, ControlCommand};
 pub use detection::{CHANNELS, Channel, DetectionBelief};
 pub use diagnosis::{FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_MULTIPLE, MODE_UNKNOWN};

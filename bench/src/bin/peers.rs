@@ -1,0 +1,159 @@
+//! Where does zero-copy pay? The same chain of four stages over Vigil's ports, a bare futex, Unix
+//! datagrams, pipes and a queue within one process, at four sizes of block.
+
+use std::error::Error;
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::{Parser, ValueEnum};
+use serde_json::{Value, json};
+use vigil_bench::archive::Archive;
+use vigil_bench::chain::carriers::Carrier;
+use vigil_bench::chain::{self, Chain};
+use vigil_bench::latency::cell::us;
+use vigil_bench::latency::cycles::{STAGES, Spectra, join};
+use vigil_bench::latency::load::{Load, Running};
+
+/// Sizes of block, bytes.
+const SIZES: [usize; 4] = [64, 4 << 10, 64 << 10, 1 << 20];
+/// Cycles at the start that do not count, ns.
+const WARM_UP_NS: u64 = 500_000_000;
+
+/// Compares ways of handing blocks on.
+#[derive(Debug, Parser)]
+#[command(name = "scripts/bench peers")]
+struct Args {
+    /// Rate of the schedule, Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
+    rate: f64,
+    /// Time of each run, s; there are three of each, interleaved.
+    #[arg(long, value_name = "S", default_value_t = 5.0)]
+    seconds: f64,
+    /// Load beside them.
+    #[arg(long, default_value = "keep-awake")]
+    load: Load,
+    /// Print one JSON document, archive nothing.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs of each combination, one round after the other.
+const ROUNDS: usize = 3;
+/// Cores and priorities as in the default graph.
+const PLACED: [(usize, u8); STAGES] = [(0, 55), (0, 52), (1, 51), (1, 50)];
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    if words.first().is_some_and(|word| word == chain::STAGE_WORD) {
+        return vigil_bench::ended("chain", chain::be_stage(words.get(1)));
+    }
+    let args = Args::parse();
+    vigil_bench::ended("peers", run(&args))
+}
+
+fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+    let folder = std::env::temp_dir().join(format!("vigil-peers-{}", std::process::id()));
+    std::fs::create_dir_all(&folder)?;
+    let mut cores: Vec<usize> = PLACED.map(|(core, _)| core).to_vec();
+    cores.dedup();
+    let load = Running::start(args.load, &cores, &folder)?;
+    let result = measure(args, &folder);
+    drop(load);
+    let _ = std::fs::remove_dir_all(&folder);
+    let rows = result?;
+    if args.json {
+        println!("{:#}", Value::from(rows));
+        return Ok(());
+    }
+    archive(args, &rows)
+}
+
+fn measure(args: &Args, folder: &Path) -> Result<Vec<Value>, Box<dyn Error>> {
+    let mut rows = Vec::new();
+    for round in 1..=ROUNDS {
+        for size in SIZES {
+            for &carrier in Carrier::value_variants() {
+                eprintln!("round {round} of {ROUNDS}: {carrier:?}, {size} bytes");
+                let chain = Chain {
+                    carrier,
+                    sizes: [size; STAGES],
+                    placed: PLACED,
+                    period_ns: (1e9 / args.rate).round() as u64,
+                    cycles: (args.rate * args.seconds) as u64,
+                };
+                rows.push(one(&chain, round, folder));
+            }
+        }
+    }
+    Ok(rows)
+}
+
+/// One run; what it cannot do is a row as well.
+fn one(chain: &Chain, round: usize, folder: &Path) -> Value {
+    let carrier = chain.carrier.to_possible_value();
+    let carrier = carrier.map_or_else(String::new, |v| v.get_name().to_owned());
+    let (size, period_ns) = (chain.sizes[0], chain.period_ns);
+    let spectra = chain.run(folder).and_then(|stamps| {
+        let first_ns = stamps[0].first().map_or(0, |s| s.t_schedule_ns);
+        let cycles = join(&stamps, period_ns, first_ns + WARM_UP_NS);
+        if cycles.is_empty() {
+            return Err("nothing arrived".into());
+        }
+        Spectra::of(&cycles)
+    });
+    match spectra {
+        Ok(spectra) => json!({
+            "carrier": carrier, "bytes": size, "round": round,
+            "end_to_end_us": us(&spectra.end_to_end),
+            "hand_over_us": us(&spectra.hand_over),
+            "compute_us": us(&spectra.compute),
+        }),
+        Err(error) => json!({
+            "carrier": carrier, "bytes": size, "round": round, "failed": error.to_string(),
+        }),
+    }
+}
+
+fn archive(args: &Args, rows: &[Value]) -> Result<(), Box<dyn Error>> {
+    let mut archive = Archive::new("peers")?;
+    let (rate, seconds, load) = (args.rate, args.seconds, args.load.name());
+    archive.say(&format!(
+        "`scripts/bench peers --rate {rate} --seconds {seconds} --load {load}`\n\nHand-over of \
+         three hops and the source's wake-up (end to end without the time in which a stage fills or \
+         looks at a block), us: the median of {ROUNDS} interleaved runs of p50, then of p99, with \
+         the range over the runs. `shared-memory` is Vigil's transport, `futex` the floor; both \
+         leave the block where it is. Cores {:?}.\n",
+        PLACED.map(|(core, _)| core)
+    ));
+    archive.say("| bytes | carrier | p50 | range | p99 | range |\n|---|---|---|---|---|---|");
+    for size in SIZES {
+        for carrier in Carrier::value_variants() {
+            let name = carrier.to_possible_value();
+            let name = name.map_or_else(String::new, |v| v.get_name().to_owned());
+            let of = |row: &&Value| row["carrier"] == *name && row["bytes"] == size;
+            let runs: Vec<&Value> = rows.iter().filter(of).collect();
+            archive.say(&line(size, &name, &runs));
+        }
+    }
+    archive.store("peers.json", &Value::from(rows.to_vec()))?;
+    println!("archived in {}", archive.close()?.display());
+    Ok(())
+}
+
+fn line(size: usize, name: &str, runs: &[&Value]) -> String {
+    if let Some(failed) = runs.iter().find_map(|run| run["failed"].as_str()) {
+        return format!("| {size} | {name} | not possible: {failed} | | | |");
+    }
+    let of = |key: &str| {
+        let values = runs
+            .iter()
+            .filter_map(|run| run["hand_over_us"][key].as_f64());
+        let mut values: Vec<f64> = values.collect();
+        let median = vigil_bench::quantile(&mut values, 0.5);
+        let (least, most) = (values.first().copied(), values.last().copied());
+        let range = [least, most].map(|v| v.unwrap_or(f64::NAN));
+        (median, range)
+    };
+    let ((p50, [a, b]), (p99, [c, d])) = (of("p50"), of("p99"));
+    format!("| {size} | {name} | {p50:.1} | {a:.1} to {b:.1} | {p99:.1} | {c:.1} to {d:.1} |")
+}

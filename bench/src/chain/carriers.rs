@@ -1,0 +1,300 @@
+//! Ways to hand a block to another process.
+
+use std::error::Error;
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::fs::FileTypeExt;
+use std::os::unix::net::UnixDatagram;
+use std::path::Path;
+use std::time::Duration;
+
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+use vigil_cycle::futex::FutexBlock;
+use vigil_cycle::{Clock, Monotonic};
+
+use super::payload;
+
+/// How blocks are handed over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[value(rename_all = "kebab-case")]
+pub enum Carrier {
+    /// Shared memory and a bare futex: the floor.
+    Futex,
+    /// Vigil's own ports: iceoryx2's shared memory and its events.
+    SharedMemory,
+    /// Unix datagram sockets.
+    Datagram,
+    /// Named pipes.
+    Pipe,
+    /// A queue between threads of one process.
+    Queue,
+}
+
+/// What a stage gets.
+pub trait Incoming {
+    /// Waits for a block, at most for `limit`; its scheduled and its publication instant, ns.
+    ///
+    /// # Errors
+    /// The system's.
+    fn receive(&mut self, limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>>;
+
+    /// Sum over one byte of each cache line of the last block: what looking at it costs.
+    fn checksum(&self) -> u64;
+}
+
+/// What a stage gives.
+pub trait Outgoing {
+    /// Fills the next block with one byte.
+    fn fill(&mut self, byte: u8);
+
+    /// Passes it on; returns the publication instant that it carries, ns.
+    ///
+    /// # Errors
+    /// The system's.
+    fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>>;
+}
+
+type Opened<T> = Result<Box<T>, Box<dyn Error>>;
+
+impl Carrier {
+    /// Opens the reading side behind stage `before`, which writes blocks of `size` bytes.
+    ///
+    /// # Errors
+    /// The system's; a queue has no sides that could be opened apart.
+    pub fn incoming(self, shared: &Path, before: usize, size: usize) -> Opened<dyn Incoming> {
+        let path = shared.join(before.to_string());
+        Ok(match self {
+            Self::Futex => Box::new(FutexReader {
+                block: FutexBlock::open(&path, size)?,
+                seen: 0,
+                last_ns: 0,
+            }),
+            Self::SharedMemory => payload::incoming(shared, before, size)?,
+            Self::Datagram => Box::new(DatagramReader {
+                socket: UnixDatagram::bind(&path)?,
+                buffer: vec![0; HEAD + size],
+            }),
+            Self::Pipe => Box::new(PipeReader {
+                pipe: open_pipe(&path, false)?,
+                buffer: vec![0; HEAD + size],
+            }),
+            Self::Queue => return Err("a queue lies within one process".into()),
+        })
+    }
+
+    /// Opens the writing side of `stage`.
+    ///
+    /// # Errors
+    /// As [`Self::incoming`].
+    pub fn outgoing(self, shared: &Path, stage: usize, size: usize) -> Opened<dyn Outgoing> {
+        let path = shared.join(stage.to_string());
+        // Nobody reads the last stage.
+        let is_last = stage + 1 == crate::latency::cycles::STAGES;
+        Ok(match self {
+            Self::Futex => Box::new(FutexWriter {
+                block: FutexBlock::open(&path, size)?,
+            }),
+            Self::SharedMemory => payload::outgoing(shared, stage, size)?,
+            Self::Queue => return Err("a queue lies within one process".into()),
+            _ if is_last => Box::new(Sink {
+                buffer: vec![0; HEAD + size],
+            }),
+            Self::Datagram => {
+                let socket = UnixDatagram::unbound()?;
+                wait_for(&path)?;
+                socket.connect(&path)?;
+                Box::new(DatagramWriter {
+                    socket,
+                    buffer: vec![0; HEAD + size],
+                })
+            }
+            Self::Pipe => Box::new(PipeWriter {
+                pipe: open_pipe(&path, true)?,
+                buffer: vec![0; HEAD + size],
+            }),
+        })
+    }
+}
+
+/// Bytes before the payload of a message: two instants.
+pub const HEAD: usize = 16;
+
+/// Writes the instants of a message.
+pub fn stamp(buffer: &mut [u8], t_schedule_ns: u64) -> u64 {
+    let t_publish_ns = Monotonic.now_ns();
+    buffer[..8].copy_from_slice(&t_schedule_ns.to_le_bytes());
+    buffer[8..HEAD].copy_from_slice(&t_publish_ns.to_le_bytes());
+    t_publish_ns
+}
+
+/// Reads the instants of a message.
+#[must_use]
+pub fn instants(buffer: &[u8]) -> (u64, u64) {
+    let number = |at: usize| {
+        let mut bytes = [0; 8];
+        bytes.copy_from_slice(&buffer[at..at + 8]);
+        u64::from_le_bytes(bytes)
+    };
+    (number(0), number(8))
+}
+
+/// Sum over one byte of each cache line.
+#[must_use]
+pub fn sum_lines(bytes: &[u8]) -> u64 {
+    bytes.iter().step_by(64).map(|b| u64::from(*b)).sum()
+}
+
+fn wait_for(path: &Path) -> Result<(), Box<dyn Error>> {
+    for _ in 0..2000 {
+        if path.exists() {
+            return Ok(());
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    Err(format!("{} never appeared", path.display()).into())
+}
+
+struct FutexReader {
+    block: FutexBlock,
+    seen: u32,
+    last_ns: u64,
+}
+
+impl Incoming for FutexReader {
+    fn receive(&mut self, limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>> {
+        let count = self.block.wait(self.seen, limit);
+        let times = self.block.times_ns();
+        if count == self.seen || times.0 == self.last_ns {
+            return Ok(None);
+        }
+        (self.seen, self.last_ns) = (count, times.0);
+        Ok(Some(times))
+    }
+
+    fn checksum(&self) -> u64 {
+        self.block.checksum()
+    }
+}
+
+struct FutexWriter {
+    block: FutexBlock,
+}
+
+impl Outgoing for FutexWriter {
+    fn fill(&mut self, byte: u8) {
+        self.block.fill(byte);
+    }
+
+    fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>> {
+        let t_publish_ns = Monotonic.now_ns();
+        self.block.publish(t_schedule_ns, t_publish_ns);
+        Ok(t_publish_ns)
+    }
+}
+
+/// The end of a chain over copies.
+struct Sink {
+    buffer: Vec<u8>,
+}
+
+impl Outgoing for Sink {
+    fn fill(&mut self, byte: u8) {
+        self.buffer[HEAD..].fill(byte);
+    }
+
+    fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>> {
+        Ok(stamp(&mut self.buffer, t_schedule_ns))
+    }
+}
+
+struct DatagramReader {
+    socket: UnixDatagram,
+    buffer: Vec<u8>,
+}
+
+impl Incoming for DatagramReader {
+    fn receive(&mut self, limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>> {
+        self.socket.set_read_timeout(Some(limit))?;
+        match self.socket.recv(&mut self.buffer) {
+            Ok(_) => Ok(Some(instants(&self.buffer))),
+            Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn checksum(&self) -> u64 {
+        sum_lines(&self.buffer[HEAD..])
+    }
+}
+
+struct DatagramWriter {
+    socket: UnixDatagram,
+    buffer: Vec<u8>,
+}
+
+impl Outgoing for DatagramWriter {
+    fn fill(&mut self, byte: u8) {
+        self.buffer[HEAD..].fill(byte);
+    }
+
+    fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>> {
+        let t_publish_ns = stamp(&mut self.buffer, t_schedule_ns);
+        self.socket.send(&self.buffer)?;
+        Ok(t_publish_ns)
+    }
+}
+
+/// Opens a named pipe, which the first of its users makes.
+fn open_pipe(path: &Path, is_writer: bool) -> Result<std::fs::File, Box<dyn Error>> {
+    let is_there = || std::fs::metadata(path).is_ok_and(|m| m.file_type().is_fifo());
+    if !is_there() {
+        // The other side may have been quicker.
+        let status = std::process::Command::new("mkfifo")
+            .arg(path)
+            .stderr(std::process::Stdio::null())
+            .status()?;
+        if !status.success() && !is_there() {
+            return Err(format!("mkfifo {}: {status}", path.display()).into());
+        }
+    }
+    let mut options = std::fs::OpenOptions::new();
+    // Opening waits for the other side.
+    Ok(options.read(!is_writer).write(is_writer).open(path)?)
+}
+
+struct PipeReader {
+    pipe: std::fs::File,
+    buffer: Vec<u8>,
+}
+
+impl Incoming for PipeReader {
+    /// Waits until the writer goes: a pipe has no time limit.
+    fn receive(&mut self, _limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>> {
+        match self.pipe.read_exact(&mut self.buffer) {
+            Ok(()) => Ok(Some(instants(&self.buffer))),
+            Err(e) if e.kind() == ErrorKind::UnexpectedEof => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn checksum(&self) -> u64 {
+        sum_lines(&self.buffer[HEAD..])
+    }
+}
+
+struct PipeWriter {
+    pipe: std::fs::File,
+    buffer: Vec<u8>,
+}
+
+impl Outgoing for PipeWriter {
+    fn fill(&mut self, byte: u8) {
+        self.buffer[HEAD..].fill(byte);
+    }
+
+    fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>> {
+        let t_publish_ns = stamp(&mut self.buffer, t_schedule_ns);
+        self.pipe.write_all(&self.buffer)?;
+        Ok(t_publish_ns)
+    }
+}
