@@ -70,8 +70,8 @@ fn a_miss_ends_the_graph_where_that_is_wanted() {
         let text = text.replace("deadline_percent = 50.0", "deadline_percent = 1.1");
         let text = text.replace("deadline_percent = 20.0", "deadline_percent = 1.0");
         text.replace(
-            "core = 1, priority = 50",
-            "core = 1, on_miss = \"stop\", priority = 50",
+            "core = 1, priority = 53",
+            "core = 1, on_miss = \"stop\", priority = 53",
         )
     });
     let output = binary("vigil-launcher")

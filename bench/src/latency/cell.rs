@@ -131,7 +131,7 @@ impl Spec {
         let canaries = canaries(&cores, &wanted, period_ns)?;
         let before = floor.run(folder)?;
         let ticks = Ticks::now();
-        let ran = prepared.run(self.seconds, &[], folder)?;
+        let ran = prepared.run(self.seconds, folder)?;
         let system = Ticks::now().since(ticks);
         let after = floor.run(folder)?;
         let canaries: Vec<Seen> = canaries.into_iter().filter_map(Canary::finish).collect();

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 
 use serde_json::Value;
 use toml::Table;
@@ -96,27 +96,42 @@ impl Prepared {
         })
     }
 
-    /// Runs it for `seconds`, with these further options of `scripts/up`.
-    ///
-    /// # Errors
-    /// If the graph fails or leaves no stamps.
-    pub fn run(
-        &self,
-        seconds: f64,
-        options: &[&str],
-        folder: &Path,
-    ) -> Result<Ran, Box<dyn Error>> {
-        let rate_hz = self.setup.file.graph.rate_hz;
-        let kept = ((seconds + 30.0) * rate_hz).ceil();
-        let output = Command::new(root().join("target/release/vigil-launcher"))
+    /// Where the graph file lies.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn command(&self, seconds: f64, options: &[&str]) -> Command {
+        let mut command = Command::new(root().join("target/release/vigil-launcher"));
+        command
             .arg("--config")
             .arg(&self.path)
             .args(["--json", "--duration", &seconds.to_string()])
-            .arg("--stamps")
-            .arg(folder)
-            .args(["--stamped-cycles", &kept.to_string()])
             .args(options)
-            .output()?;
+            .stdin(Stdio::null());
+        command
+    }
+
+    /// Starts it for `seconds`, with these further options of `scripts/up`; what it prints is lost.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn start(&self, seconds: f64, options: &[&str]) -> std::io::Result<Child> {
+        let mut command = self.command(seconds, options);
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn()
+    }
+
+    /// Runs it for `seconds`; its services leave their stamps, by way of `folder`.
+    ///
+    /// # Errors
+    /// If the graph fails or leaves no stamps.
+    pub fn run(&self, seconds: f64, folder: &Path) -> Result<Ran, Box<dyn Error>> {
+        let rate_hz = self.setup.file.graph.rate_hz;
+        let kept = ((seconds + 30.0) * rate_hz).ceil().to_string();
+        let stamps_in = folder.display().to_string();
+        let options = ["--stamps", &stamps_in, "--stamped-cycles", &kept];
+        let output = self.command(seconds, &options).output()?;
         if !output.status.success() {
             let said = String::from_utf8_lossy(&output.stderr).into_owned();
             return Err(format!("the graph ended with {}\n{said}", output.status).into());

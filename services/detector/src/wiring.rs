@@ -73,6 +73,11 @@ impl Stage for DetectorStage {
         self.belief.send(stamp, clock)
     }
 
+    fn prepare(&mut self) -> Result<(), PortError> {
+        self.belief.prepare()?;
+        self.particles.prepare()
+    }
+
     fn particles(&self) -> u32 {
         self.detector.particles()
     }

@@ -180,6 +180,11 @@ impl Stage for IdentifierStage {
         Ok(published_ns)
     }
 
+    fn prepare(&mut self) -> Result<(), PortError> {
+        self.belief.prepare()?;
+        self.particles.prepare()
+    }
+
     fn particles(&self) -> u32 {
         self.identifier.particles()
     }

@@ -47,7 +47,7 @@ impl Children {
         for name in plan.services() {
             let report = domain.folder().join(format!("{}.report", name.as_str()));
             let _ = std::fs::remove_file(&report);
-            match spawn(plan.command(name), &report, plan.stamps(name)) {
+            match spawn(plan.command(name), &report, plan.recording(name)) {
                 Ok(child) => children.services.push(Supervised {
                     name,
                     child,
@@ -104,7 +104,7 @@ impl Children {
                 service.restarts.push(now);
                 service.restart_count += 1;
                 let command = plan.command_again(service.name, observer.drive().as_ref());
-                match spawn(command, &service.report, plan.stamps(service.name)) {
+                match spawn(command, &service.report, plan.recording(service.name)) {
                     Ok(child) => {
                         service.child = child;
                         self.restarted.push(service.name);
@@ -197,14 +197,14 @@ impl Drop for Children {
 fn spawn(
     (program, line): (PathBuf, Vec<String>),
     report: &Path,
-    stamps: Vec<String>,
+    recording: Vec<String>,
 ) -> io::Result<Child> {
     // A group of its own: Ctrl-C reaches the launcher alone, which stops the services in order.
     Command::new(&program)
         .args(line)
         .arg("--report")
         .arg(report)
-        .args(stamps)
+        .args(recording)
         .process_group(0)
         .stdin(Stdio::null())
         .stdout(Stdio::null())

@@ -36,6 +36,9 @@ pub struct LauncherArgs {
     /// Cycles whose instants are kept; the oldest give way.
     #[arg(long, value_name = "N", default_value_t = 100_000, requires = "stamps")]
     pub stamped_cycles: usize,
+    /// Keep no histograms: the summary's latencies are empty. For measuring what they cost.
+    #[arg(long)]
+    pub no_timing: bool,
     /// Print one JSON document at the end, nothing else on standard output.
     #[arg(long)]
     pub json: bool,
@@ -63,6 +66,7 @@ pub struct Plan {
     options: Vec<String>,
     inject: Vec<String>,
     stamps: Option<(PathBuf, usize)>,
+    no_timing: bool,
 }
 
 impl Plan {
@@ -91,6 +95,7 @@ impl Plan {
             setup,
             inject: args.inject.clone(),
             stamps: args.stamps.clone().map(|f| (f, args.stamped_cycles)),
+            no_timing: args.no_timing,
         };
         if let Some((folder, _)) = &plan.stamps {
             std::fs::create_dir_all(folder)
@@ -127,15 +132,21 @@ impl Plan {
         Err(problems.join("\n").into())
     }
 
-    /// Options that make a service leave its stamps, if they are wanted.
-    pub fn stamps(&self, name: ServiceName) -> Vec<String> {
+    /// Options that say what a service is to record of its cycles.
+    pub fn recording(&self, name: ServiceName) -> Vec<String> {
+        let mut options = Vec::new();
+        if self.no_timing {
+            options.push("--no-timing".into());
+        }
         let Some((folder, cycles)) = &self.stamps else {
-            return Vec::new();
+            return options;
         };
         let file = folder.join(format!("{}.stamps", name.as_str()));
         let file = file.display().to_string();
         let cycles = cycles.to_string();
-        vec!["--stamps".into(), file, "--stamped-cycles".into(), cycles]
+        options.extend(["--stamps".into(), file]);
+        options.extend(["--stamped-cycles".into(), cycles]);
+        options
     }
 
     /// True if a first action must come back within the start-up limit; an external sensor may

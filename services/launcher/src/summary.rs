@@ -78,6 +78,9 @@ pub struct ServiceSummary {
     step_us: Option<Microseconds>,
     #[serde(skip_serializing_if = "Option::is_none")]
     from_schedule_us: Option<Microseconds>,
+    /// Minor and major page faults in the steady state.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    page_faults: Option<[u64; 2]>,
 }
 
 /// What happened in a run.
@@ -183,6 +186,7 @@ fn service(
         wake_up_us: of(|r| r.wake_up.percentiles),
         step_us: of(|r| r.step.percentiles),
         from_schedule_us: of(|r| r.from_schedule.percentiles),
+        page_faults: report.map(|r| r.page_faults),
     }
 }
 

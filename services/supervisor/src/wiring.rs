@@ -130,6 +130,10 @@ impl Stage for SupervisorStage {
         self.action.send(stamp, clock)
     }
 
+    fn prepare(&mut self) -> Result<(), PortError> {
+        self.action.prepare()
+    }
+
     fn has_input(&self) -> bool {
         self.diagnoses.is_waiting()
     }

@@ -49,6 +49,8 @@ pub struct Leave {
     pub report: Option<PathBuf>,
     /// Where to write the stamps of the last cycles, and of how many.
     pub stamps: Option<(PathBuf, usize)>,
+    /// No histograms: the report's are empty.
+    pub no_timing: bool,
 }
 
 /// Why a service ended.
@@ -102,6 +104,9 @@ pub fn stage<T: vigil_blocks::Block, S: Stage>(
     let listener = link.listener::<T>(input)?;
     let monitor = DeadlineMonitor::new(plan.schedule);
     let mut cycle = StageCycle::new(monitor, health)?.with_on_miss(plan.on_miss);
+    if plan.leave.no_timing {
+        cycle = cycle.without_timing();
+    }
     if let Some((_, capacity)) = &plan.leave.stamps {
         cycle = cycle.with_stamps(Stamps::new(*capacity));
     }
@@ -126,6 +131,9 @@ pub fn source<S: Source>(
     let first_ns = Monotonic.now_ns() + START_DELAY_NS;
     let monitor = DeadlineMonitor::new(plan.schedule);
     let mut cycle = SourceCycle::new(monitor, health, first_ns)?.with_on_miss(plan.on_miss);
+    if plan.leave.no_timing {
+        cycle = cycle.without_timing();
+    }
     if let Some((_, capacity)) = &plan.leave.stamps {
         cycle = cycle.with_stamps(Stamps::new(*capacity));
     }

@@ -31,6 +31,12 @@ pub trait Source {
     /// The transport's.
     fn produce(&mut self, t_schedule_ns: u64, clock: &dyn Clock) -> Result<Produced, PortError>;
 
+    /// Readies the block of the next cycle, see [`crate::Sender::prepare`]. Off the critical path.
+    ///
+    /// # Errors
+    /// The transport's.
+    fn prepare(&mut self) -> Result<(), PortError>;
+
     /// Reports events, handles control commands. Off the critical path.
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64);
 }
@@ -83,6 +89,13 @@ impl SourceCycle {
         self
     }
 
+    /// The same cycle without histograms: what they cost can be measured.
+    #[must_use]
+    pub fn without_timing(mut self) -> Self {
+        self.timing = self.timing.switched_off();
+        self
+    }
+
     /// When the next turn is due, ns.
     #[must_use]
     pub fn next_wake_ns(&self) -> u64 {
@@ -127,6 +140,7 @@ impl SourceCycle {
             }
             self.next_ns = schedule_ns + self.monitor.period_ns();
         }
+        source.prepare()?;
         source.after(&mut self.health, clock.now_ns());
         self.health.publish(clock)?;
         let is_end = self.monitor.missed() > missed_before && self.on_miss == OnMiss::Stop;

@@ -33,6 +33,12 @@ pub trait Stage {
     /// The transport's.
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError>;
 
+    /// Readies the blocks of the next cycle, see [`crate::Sender::prepare`]. Off the critical path.
+    ///
+    /// # Errors
+    /// The transport's.
+    fn prepare(&mut self) -> Result<(), PortError>;
+
     /// Particles that this stage is configured for; 0 if it has none.
     fn particles(&self) -> u32 {
         0
@@ -123,6 +129,16 @@ impl Timing {
             from_schedule: new()?,
         })
     }
+
+    /// The same histograms, which take nothing.
+    #[must_use]
+    pub fn switched_off(self) -> Self {
+        Self {
+            wake_up: self.wake_up.switched_off(),
+            step: self.step.switched_off(),
+            from_schedule: self.from_schedule.switched_off(),
+        }
+    }
 }
 
 /// Runs a [`Stage`], one turn at a time.
@@ -182,6 +198,13 @@ impl StageCycle {
     #[must_use]
     pub fn with_stamps(mut self, stamps: Stamps) -> Self {
         self.stamps = Some(stamps);
+        self
+    }
+
+    /// The same cycle without histograms: what they cost can be measured.
+    #[must_use]
+    pub fn without_timing(mut self) -> Self {
+        self.timing = self.timing.switched_off();
         self
     }
 
@@ -251,6 +274,7 @@ impl StageCycle {
         } else if overdue > 0 {
             self.predict(stage, overdue, clock)?;
         }
+        stage.prepare()?;
         self.report(stage, frames, overdue, clock)?;
         let is_end = overdue > 0 && self.on_miss == OnMiss::Stop;
         Ok(if is_end {

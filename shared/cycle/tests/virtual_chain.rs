@@ -79,6 +79,10 @@ impl<I: Block, O: Caused> Stage for Relay<I, O> {
         self.output.send(stamp, clock)
     }
 
+    fn prepare(&mut self) -> Result<(), PortError> {
+        self.output.prepare()
+    }
+
     fn after(&mut self, _health: &mut HealthBoard, _now_ns: u64) {}
 }
 
@@ -96,6 +100,10 @@ impl Source for Sensor {
             t_capture_ns: t_schedule_ns,
         };
         self.output.send(stamp, clock).map(Produced::Frame)
+    }
+
+    fn prepare(&mut self) -> Result<(), PortError> {
+        self.output.prepare()
     }
 
     fn after(&mut self, _health: &mut HealthBoard, _now_ns: u64) {}

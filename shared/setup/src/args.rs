@@ -57,6 +57,9 @@ pub struct ServiceArgs {
     /// Cycles whose stamps are kept.
     #[arg(long, value_name = "N", default_value_t = 100_000, requires = "stamps")]
     pub stamped_cycles: usize,
+    /// Keep no histograms; for measuring what they cost.
+    #[arg(long)]
+    pub no_timing: bool,
     /// Only read and check everything that the service needs; exit code 0 or 2.
     #[arg(long)]
     pub check: bool,
@@ -70,6 +73,7 @@ impl ServiceArgs {
         Leave {
             report: self.report.clone(),
             stamps: self.stamps.as_ref().map(stamped),
+            no_timing: self.no_timing,
         }
     }
 }

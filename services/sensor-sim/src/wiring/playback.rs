@@ -63,6 +63,10 @@ impl Source for PlaybackSource {
         self.frames.send(stamp, clock).map(Produced::Frame)
     }
 
+    fn prepare(&mut self) -> Result<(), PortError> {
+        self.frames.prepare()
+    }
+
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         if let (Some(ready_ns), false) = (self.actions.ready_ns(), self.ready_told) {
             health.event(ready_ns, EventKind::Ready, 0, 0.0, self.frames.next_seq());

@@ -116,6 +116,10 @@ impl<T: Block> Sender<T> for LocalSender<T> {
         &mut self.loaned
     }
 
+    fn prepare(&mut self) -> Result<(), PortError> {
+        Ok(())
+    }
+
     fn send(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
         let published_ns = stamp_header(&mut *self.loaned, self.epoch, self.seq, stamp, clock);
         self.seq += 1;

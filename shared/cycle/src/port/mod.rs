@@ -13,11 +13,19 @@ pub use shared_memory::{EventListener, Link, Wire};
 
 /// Sends blocks on one topic; the only writer of that topic.
 pub trait Sender<T: Block> {
-    /// The next block, all zero when it was loaned, written in place.
+    /// The next block, all zero when it was loaned, written in place. Loaned now unless it was
+    /// before, by [`Self::prepare`].
     fn block(&mut self) -> &mut T;
 
+    /// Loans and clears the next block: work for the time after a cycle, since a large block takes
+    /// long to clear.
+    ///
+    /// # Errors
+    /// [`PortError`] when the transport refuses.
+    fn prepare(&mut self) -> Result<(), PortError>;
+
     /// Stamps the header (schema, epoch, next sequence number, times), sends the block, wakes the
-    /// listeners, loans the next one. Returns the publication instant that it wrote, ns.
+    /// listeners. Returns the publication instant that it wrote, ns.
     ///
     /// # Errors
     /// [`PortError`] when the transport refuses.

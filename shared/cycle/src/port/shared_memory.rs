@@ -132,6 +132,7 @@ impl Link {
         Ok(SharedSender {
             loaned: Some(loaned),
             spare,
+            has_refused: false,
             publisher,
             notifier,
             path,
@@ -226,7 +227,9 @@ fn transfer(path: &str, operation: &'static str, cause: &impl std::fmt::Debug) -
 pub(super) struct SharedSender<T: Block> {
     // Fields drop in this order: the loaned block returns before its publisher goes.
     loaned: Option<Loaned<T>>,
+    /// Written to when the transport refuses a block.
     spare: Box<T>,
+    has_refused: bool,
     publisher: Publisher<ipc::Service, Wire<T>, ()>,
     notifier: Notifier<ipc::Service>,
     path: String,
@@ -236,18 +239,32 @@ pub(super) struct SharedSender<T: Block> {
 
 impl<T: Block> Sender<T> for SharedSender<T> {
     fn block(&mut self) -> &mut T {
+        if self.prepare().is_err() {
+            // `send` says so.
+            self.has_refused = true;
+        }
         match &mut self.loaned {
             Some(sample) => &mut sample.payload_mut().0,
-            // Only after a failed loan, and then `send` says so.
             None => &mut self.spare,
         }
     }
 
+    fn prepare(&mut self) -> Result<(), PortError> {
+        if self.loaned.is_none() {
+            self.loaned = Some(loan(&self.publisher, &self.path)?);
+        }
+        Ok(())
+    }
+
     fn send(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
         let (epoch, seq) = (self.epoch, self.seq);
-        let Some(mut sample) = self.loaned.take() else {
-            self.loaned = Some(loan(&self.publisher, &self.path)?);
-            return Err(transfer(&self.path, "send", &"the last loan had failed"));
+        if std::mem::take(&mut self.has_refused) {
+            let what = "a block was refused when it was to be written";
+            return Err(transfer(&self.path, "send", &what));
+        }
+        let mut sample = match self.loaned.take() {
+            Some(sample) => sample,
+            None => loan(&self.publisher, &self.path)?,
         };
         let published_ns = stamp_header(&mut sample.payload_mut().0, epoch, seq, stamp, clock);
         self.seq += 1;
@@ -257,7 +274,6 @@ impl<T: Block> Sender<T> for SharedSender<T> {
         self.notifier
             .notify()
             .map_err(|e| transfer(&self.path, "notify", &e))?;
-        self.loaned = Some(loan(&self.publisher, &self.path)?);
         Ok(published_ns)
     }
 

@@ -1,0 +1,119 @@
+//! How many instructions does a turn of each service take, and does that keep to the budget?
+//!
+//! Counts by valgrind's callgrind, which does not depend on the machine's load. Budgets:
+//! `bench/budgets.toml`, one table for each profile of the build. Exit: 0 within them, 1 not.
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::path::Path;
+use std::process::{Command, ExitCode, Stdio};
+
+use clap::Parser;
+use serde::Deserialize;
+use serde_json::json;
+use vigil_bench::archive::Archive;
+use vigil_bench::instructions::{InProcess, TURNS};
+
+/// Cycles that are counted: a wheel sticks after 300 of them.
+const CYCLES: u64 = 600;
+/// First argument of the process that is counted.
+const RUN_WORD: &str = "run-cycles";
+
+/// Counts the instructions of each service's turn.
+#[derive(Debug, Parser)]
+#[command(name = "scripts/bench instructions")]
+struct Args {
+    /// Only compare with the budgets, archive nothing.
+    #[arg(long)]
+    check: bool,
+}
+
+/// Instructions a turn that each service may take, by profile and service.
+#[derive(Debug, Deserialize)]
+struct Budgets(BTreeMap<String, BTreeMap<String, u64>>);
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    if words.first().is_some_and(|word| word == RUN_WORD) {
+        return vigil_bench::ended("instructions", run_cycles());
+    }
+    let args = Args::parse();
+    vigil_bench::ended("instructions", run(&args))
+}
+
+fn run_cycles() -> Result<(), Box<dyn Error>> {
+    let mut graph = InProcess::new()?;
+    graph.run(CYCLES)?;
+    if graph.cycles() + 5 < CYCLES {
+        return Err(format!("only {} cycles were answered", graph.cycles()).into());
+    }
+    Ok(())
+}
+
+fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+    let profile = if cfg!(debug_assertions) {
+        "dev"
+    } else {
+        "release"
+    };
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("budgets.toml");
+    let budgets: Budgets = toml::from_str(&std::fs::read_to_string(path)?)?;
+    let budgets = budgets
+        .0
+        .get(profile)
+        .ok_or("no budgets for this profile")?;
+    let mut lines = Vec::new();
+    let mut counts = BTreeMap::new();
+    let mut over = Vec::new();
+    for (service, function) in TURNS {
+        let turn = count(function)? / CYCLES;
+        let budget = *budgets.get(service).ok_or("a service has no budget")?;
+        let share = 100.0 * turn as f64 / budget as f64;
+        lines.push(format!("| {service} | {turn} | {budget} | {share:.0} % |"));
+        counts.insert(service, turn);
+        if turn > budget {
+            over.push(service);
+        }
+    }
+    let head = "| service | instructions a turn | budget | used |\n|---|---|---|---|";
+    if args.check {
+        println!("{head}\n{}", lines.join("\n"));
+    } else {
+        let mut archive = Archive::new("instructions")?;
+        archive.say(&format!(
+            "`scripts/bench instructions`: the mean of {CYCLES} turns at 100 Hz, a wheel sticks \
+             half way; over the in-process bus, by callgrind. Profile: {profile}.\n\n{head}"
+        ));
+        lines.iter().for_each(|line| archive.say(line));
+        archive.store("instructions.json", &json!({ profile: counts }))?;
+        println!("archived in {}", archive.close()?.display());
+    }
+    if over.is_empty() {
+        return Ok(());
+    }
+    Err(format!("over budget: {}; see bench/budgets.toml", over.join(", ")).into())
+}
+
+/// Instructions within a function and what it calls, over all cycles.
+fn count(function: &str) -> Result<u64, Box<dyn Error>> {
+    let output = Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .arg(format!("--toggle-collect=*{function}*"))
+        .arg(std::env::current_exe()?)
+        .arg(RUN_WORD)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| format!("valgrind: {error}; install valgrind"))?;
+    let text = String::from_utf8_lossy(&output.stderr);
+    if !output.status.success() {
+        return Err(format!("valgrind ended with {}\n{text}", output.status).into());
+    }
+    let line = text.lines().find(|line| line.contains("Collected :"));
+    let number = line.and_then(|line| line.rsplit(':').next());
+    let number = number.ok_or("valgrind did not say how many instructions it collected")?;
+    let count: u64 = number.trim().parse()?;
+    if count == 0 {
+        return Err(format!("{function} was never entered").into());
+    }
+    Ok(count)
+}

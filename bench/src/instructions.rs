@@ -1,0 +1,155 @@
+//! The four services' turns over the in-process bus under the virtual clock: what each takes from
+//! the processor, apart from the transport.
+//!
+//! Counted by callgrind between entry and return of the functions named in [`TURNS`]: instructions
+//! do not depend on what else the machine does.
+
+use std::error::Error;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use vigil_cycle::placement::{Wanted, read_back};
+use vigil_cycle::port::Bus;
+use vigil_cycle::serve::Leave;
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{
+    DeadlineMonitor, Graph, HealthBoard, PortError, Shedder, SourceCycle, StageCycle, Topic,
+    VirtualClock,
+};
+use vigil_detector::DetectorStage;
+use vigil_identifier::IdentifierStage;
+use vigil_sensor_sim::{Assembled, SimulatorSource};
+use vigil_setup::{GraphArgs, Setup};
+use vigil_supervisor::SupervisorStage;
+
+/// Each service and the function that is a turn of it.
+pub const TURNS: [(&str, &str); 4] = [
+    ("sensor-sim", "turn_of_sensor_sim"),
+    ("detector", "turn_of_detector"),
+    ("identifier", "turn_of_identifier"),
+    ("supervisor", "turn_of_supervisor"),
+];
+
+/// Instant at which a wheel of the simulated rover sticks, s.
+const STUCK_S: f64 = 3.0;
+
+/// The graph in one thread.
+pub struct InProcess {
+    clock: VirtualClock,
+    period_ns: u64,
+    sensor: (SourceCycle, SimulatorSource),
+    detector: (StageCycle, DetectorStage),
+    identifier: (StageCycle, IdentifierStage),
+    supervisor: (StageCycle, SupervisorStage),
+}
+
+type Turned = Result<ControlFlow<()>, PortError>;
+
+#[inline(never)]
+fn turn_of_sensor_sim(graph: &mut InProcess) -> Turned {
+    graph.sensor.0.turn(&mut graph.sensor.1, &graph.clock)
+}
+
+#[inline(never)]
+fn turn_of_detector(graph: &mut InProcess) -> Turned {
+    graph.detector.0.turn(&mut graph.detector.1, &graph.clock)
+}
+
+#[inline(never)]
+fn turn_of_identifier(graph: &mut InProcess) -> Turned {
+    let (cycle, stage) = &mut graph.identifier;
+    cycle.turn(stage, &graph.clock)
+}
+
+#[inline(never)]
+fn turn_of_supervisor(graph: &mut InProcess) -> Turned {
+    let (cycle, stage) = &mut graph.supervisor;
+    cycle.turn(stage, &graph.clock)
+}
+
+impl InProcess {
+    /// The default graph, one of whose rover's wheels will stick.
+    ///
+    /// # Errors
+    /// If the default graph cannot be read or does not simulate.
+    pub fn new() -> Result<Self, Box<dyn Error>> {
+        use ServiceName::{Detector, Identifier, SensorSim, Supervisor};
+        let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/rover.toml");
+        let setup = GraphArgs {
+            config,
+            ..GraphArgs::default()
+        }
+        .load()?;
+        let period_ns = setup.period_ns();
+        let clock = VirtualClock::default();
+        let graph = Graph::InProcess(Bus::new(clock.clone()));
+        let stage = |name, particles| -> Result<StageCycle, Box<dyn Error>> {
+            let (monitor, board) = parts(&setup, &graph, name)?;
+            let budget_ns = setup.plan(name, Leave::default()).schedule.budget_ns;
+            let cycle = StageCycle::new(monitor, board)?;
+            Ok(cycle.with_shedder(Shedder::new(particles, budget_ns)))
+        };
+        let inject = [format!("stuck:RM@{STUCK_S}")];
+        let Assembled::Simulator(simulation, drive) = vigil_sensor_sim::assemble(&setup, &inject)?
+        else {
+            return Err("the default graph does not simulate".into());
+        };
+        let sensor = SimulatorSource::new(*simulation, drive, true, period_ns, &graph)?;
+        let (monitor, board) = parts(&setup, &graph, SensorSim)?;
+        let detector = DetectorStage::new(vigil_detector::assemble(&setup)?, &graph)?;
+        let identifier = vigil_identifier::assemble(&setup)?;
+        let identifier = IdentifierStage::new(identifier, &graph, period_ns)?;
+        let supervisor = vigil_supervisor::assemble(&setup)?;
+        let validity_ns = vigil_supervisor::validity_ns(&setup);
+        let supervisor = SupervisorStage::new(supervisor, &graph, period_ns, validity_ns)?;
+        clock.set(period_ns);
+        let mut found = Self {
+            sensor: (SourceCycle::new(monitor, board, period_ns)?, sensor),
+            detector: (stage(Detector, 256)?, detector),
+            identifier: (stage(Identifier, 256)?, identifier),
+            supervisor: (stage(Supervisor, 0)?, supervisor),
+            period_ns,
+            clock,
+        };
+        found.detector.0.ready(&found.clock)?;
+        found.identifier.0.ready(&found.clock)?;
+        found.supervisor.0.ready(&found.clock)?;
+        Ok(found)
+    }
+
+    /// Runs `cycles` cycles.
+    ///
+    /// # Errors
+    /// The ports'; over the in-process bus none.
+    pub fn run(&mut self, cycles: u64) -> Result<(), PortError> {
+        for cycle in 1..=cycles {
+            self.clock.set(cycle * self.period_ns);
+            let _ = turn_of_sensor_sim(self)?;
+            let _ = turn_of_detector(self)?;
+            let _ = turn_of_identifier(self)?;
+            let _ = turn_of_supervisor(self)?;
+        }
+        Ok(())
+    }
+
+    /// Cycles that the supervisor has answered.
+    #[must_use]
+    pub const fn cycles(&self) -> u64 {
+        self.supervisor.0.health().view().cycles
+    }
+}
+
+fn parts(
+    setup: &Setup,
+    graph: &Graph,
+    name: ServiceName,
+) -> Result<(DeadlineMonitor, HealthBoard), PortError> {
+    let schedule = setup.plan(name, Leave::default()).schedule;
+    let wanted = Wanted {
+        core: 0,
+        priority: 1,
+    };
+    let sender = graph.sender(Topic::Health(name))?;
+    let board = HealthBoard::new(sender, schedule, wanted, read_back(0));
+    Ok((DeadlineMonitor::new(schedule), board))
+}
