@@ -1,11 +1,10 @@
-//! The four services' turns over the in-process bus under the virtual clock: what each takes from
-//! the processor, apart from the transport.
+//! The four services over the in-process bus under the virtual clock: what the step of each takes
+//! from the processor.
 //!
-//! Counted by callgrind between entry and return of the functions named in [`TURNS`]: instructions
+//! Counted by callgrind between entry and return of the functions named in [`STEPS`]: instructions
 //! do not depend on what else the machine does.
 
 use std::error::Error;
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use vigil_cycle::placement::{Wanted, read_back};
@@ -22,12 +21,15 @@ use vigil_sensor_sim::{Assembled, SimulatorSource};
 use vigil_setup::{GraphArgs, Setup};
 use vigil_supervisor::SupervisorStage;
 
-/// Each service and the function that is a turn of it.
-pub const TURNS: [(&str, &str); 4] = [
-    ("sensor-sim", "turn_of_sensor_sim"),
-    ("detector", "turn_of_detector"),
-    ("identifier", "turn_of_identifier"),
-    ("supervisor", "turn_of_supervisor"),
+/// Each service and the functions that are its step, as callgrind names them.
+pub const STEPS: [(&str, &[&str]); 4] = [
+    (
+        "sensor-sim",
+        &["*Simulation::step*", "*Simulation::measure*"],
+    ),
+    ("detector", &["*detector::Detector::step*"]),
+    ("identifier", &["*watcher::Diagnoser::step*"]),
+    ("supervisor", &["*supervisor::Supervisor::step*"]),
 ];
 
 /// Instant at which a wheel of the simulated rover sticks, s.
@@ -41,30 +43,6 @@ pub struct InProcess {
     detector: (StageCycle, DetectorStage),
     identifier: (StageCycle, IdentifierStage),
     supervisor: (StageCycle, SupervisorStage),
-}
-
-type Turned = Result<ControlFlow<()>, PortError>;
-
-#[inline(never)]
-fn turn_of_sensor_sim(graph: &mut InProcess) -> Turned {
-    graph.sensor.0.turn(&mut graph.sensor.1, &graph.clock)
-}
-
-#[inline(never)]
-fn turn_of_detector(graph: &mut InProcess) -> Turned {
-    graph.detector.0.turn(&mut graph.detector.1, &graph.clock)
-}
-
-#[inline(never)]
-fn turn_of_identifier(graph: &mut InProcess) -> Turned {
-    let (cycle, stage) = &mut graph.identifier;
-    cycle.turn(stage, &graph.clock)
-}
-
-#[inline(never)]
-fn turn_of_supervisor(graph: &mut InProcess) -> Turned {
-    let (cycle, stage) = &mut graph.supervisor;
-    cycle.turn(stage, &graph.clock)
 }
 
 impl InProcess {
@@ -124,10 +102,18 @@ impl InProcess {
     pub fn run(&mut self, cycles: u64) -> Result<(), PortError> {
         for cycle in 1..=cycles {
             self.clock.set(cycle * self.period_ns);
-            let _ = turn_of_sensor_sim(self)?;
-            let _ = turn_of_detector(self)?;
-            let _ = turn_of_identifier(self)?;
-            let _ = turn_of_supervisor(self)?;
+            let Self {
+                clock,
+                sensor,
+                detector,
+                identifier,
+                supervisor,
+                ..
+            } = self;
+            let _ = sensor.0.turn(&mut sensor.1, clock)?;
+            let _ = detector.0.turn(&mut detector.1, clock)?;
+            let _ = identifier.0.turn(&mut identifier.1, clock)?;
+            let _ = supervisor.0.turn(&mut supervisor.1, clock)?;
         }
         Ok(())
     }

@@ -73,7 +73,7 @@ const BAD: [(&str, &str, &str, &[&str]); 13] = [
         "rover.toml",
         "priority = 55",
         "priority = 99",
-        &["priority", "1 to 90"],
+        &["priority", "0 to 90"],
     ),
     (
         "rover.toml",

@@ -1,4 +1,4 @@
-//! How many instructions does a turn of each service take, and does that keep to the budget?
+//! How many instructions does a step of each service take, and does that keep to the budget?
 //!
 //! Counts by valgrind's callgrind, which does not depend on the machine's load. Budgets:
 //! `bench/budgets.toml`, one table for each profile of the build. Exit: 0 within them, 1 not.
@@ -12,14 +12,14 @@ use clap::Parser;
 use serde::Deserialize;
 use serde_json::json;
 use vigil_bench::archive::Archive;
-use vigil_bench::instructions::{InProcess, TURNS};
+use vigil_bench::instructions::{InProcess, STEPS};
 
 /// Cycles that are counted: a wheel sticks after 300 of them.
 const CYCLES: u64 = 600;
 /// First argument of the process that is counted.
 const RUN_WORD: &str = "run-cycles";
 
-/// Counts the instructions of each service's turn.
+/// Counts the instructions of each service's step.
 #[derive(Debug, Parser)]
 #[command(name = "scripts/bench instructions")]
 struct Args {
@@ -28,7 +28,7 @@ struct Args {
     check: bool,
 }
 
-/// Instructions a turn that each service may take, by profile and service.
+/// Instructions a step that each service may take, by profile and service.
 #[derive(Debug, Deserialize)]
 struct Budgets(BTreeMap<String, BTreeMap<String, u64>>);
 
@@ -65,24 +65,24 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let mut lines = Vec::new();
     let mut counts = BTreeMap::new();
     let mut over = Vec::new();
-    for (service, function) in TURNS {
-        let turn = count(function)? / CYCLES;
+    for (service, functions) in STEPS {
+        let step = count(functions)? / CYCLES;
         let budget = *budgets.get(service).ok_or("a service has no budget")?;
-        let share = 100.0 * turn as f64 / budget as f64;
-        lines.push(format!("| {service} | {turn} | {budget} | {share:.0} % |"));
-        counts.insert(service, turn);
-        if turn > budget {
+        let share = 100.0 * step as f64 / budget as f64;
+        lines.push(format!("| {service} | {step} | {budget} | {share:.0} % |"));
+        counts.insert(service, step);
+        if step > budget {
             over.push(service);
         }
     }
-    let head = "| service | instructions a turn | budget | used |\n|---|---|---|---|";
+    let head = "| service | instructions a step | budget | used |\n|---|---|---|---|";
     if args.check {
         println!("{head}\n{}", lines.join("\n"));
     } else {
         let mut archive = Archive::new("instructions")?;
         archive.say(&format!(
-            "`scripts/bench instructions`: the mean of {CYCLES} turns at 100 Hz, a wheel sticks \
-             half way; over the in-process bus, by callgrind. Profile: {profile}.\n\n{head}"
+            "`scripts/bench instructions`: the mean of {CYCLES} steps at 100 Hz, a wheel sticks \
+             half way; by callgrind. Profile: {profile}.\n\n{head}"
         ));
         lines.iter().for_each(|line| archive.say(line));
         archive.store("instructions.json", &json!({ profile: counts }))?;
@@ -94,11 +94,11 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     Err(format!("over budget: {}; see bench/budgets.toml", over.join(", ")).into())
 }
 
-/// Instructions within a function and what it calls, over all cycles.
-fn count(function: &str) -> Result<u64, Box<dyn Error>> {
+/// Instructions within these functions and what they call, over all cycles.
+fn count(functions: &[&str]) -> Result<u64, Box<dyn Error>> {
     let output = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
-        .arg(format!("--toggle-collect=*{function}*"))
+        .args(functions.iter().map(|f| format!("--toggle-collect={f}")))
         .arg(std::env::current_exe()?)
         .arg(RUN_WORD)
         .stdin(Stdio::null())
@@ -113,7 +113,7 @@ fn count(function: &str) -> Result<u64, Box<dyn Error>> {
     let number = number.ok_or("valgrind did not say how many instructions it collected")?;
     let count: u64 = number.trim().parse()?;
     if count == 0 {
-        return Err(format!("{function} was never entered").into());
+        return Err(format!("{functions:?} were never entered").into());
     }
     Ok(count)
 }

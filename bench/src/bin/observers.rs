@@ -1,4 +1,5 @@
-//! Do slow, stopped or dead observers disturb the graph? And what does its own instrumentation cost?
+//! Do slow, stopped or dead observers disturb the graph? And what does its own instrumentation
+//! cost?
 //!
 //! Interleaved pairs of runs: with and without three bad observers (one that never drains what it
 //! holds, one that is stopped, ones that are killed again and again), or with and without the

@@ -124,6 +124,8 @@ impl Diagnoser {
     }
 
     /// Takes one entry of the journal; see [`Identifier::step`].
+    // Never merged into its caller, so that its instructions can be counted.
+    #[inline(never)]
     pub fn step(
         &mut self,
         entry: Entry<Input<'_>>,

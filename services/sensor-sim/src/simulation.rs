@@ -27,6 +27,8 @@ impl Simulation {
     }
 
     /// One cycle of `dt_s` under the newest action, at `now_ns`.
+    // Never merged into its caller, so that its instructions can be counted.
+    #[inline(never)]
     pub fn step(&mut self, dt_s: f64, action: Option<&Action>, now_ns: u64) -> EffectiveCommand {
         let planned = match &mut self.navigator {
             None => self.world.planned(),
@@ -53,6 +55,8 @@ impl Simulation {
     }
 
     /// Reads the sensors into `frame`; its header is left to the caller.
+    // Never merged into its caller, so that its instructions can be counted.
+    #[inline(never)]
     pub fn measure(&mut self, frame: &mut SensorFrame) {
         self.world.measure(frame);
         if let Some(navigator) = &mut self.navigator {
