@@ -190,7 +190,7 @@ fn half(
     drop(bad);
     let (cycles, lost) = reader.join().map_err(|_| "the reader has died")??;
     let seen: Vec<_> = canaries.into_iter().filter_map(Canary::finish).collect();
-    let records: Vec<Record<'_>> = seen.iter().map(|s| Record::new(&s.late)).collect();
+    let records: Vec<Record<'_>> = seen.iter().map(Record::of).collect();
     let deadline = setup.file.services.supervisor.deadline_percent * 1e-2;
     let deadline_ns = (setup.period_ns() as f64 * deadline).round() as u64;
     let missed = misses(&cycles, deadline_ns, &records);

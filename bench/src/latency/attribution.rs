@@ -1,10 +1,16 @@
-//! Whose miss is it? The machine's, if a canary was late at that time; else Vigil's own.
+//! Whose miss is it? The machine's, if a canary was overdue for long enough at that time; else
+//! Vigil's own.
+//!
+//! A stall of the machine can come in one piece or in many: on a virtual machine whose host takes
+//! the processor away again and again, every wake-up of a canary is a millisecond late for tens of
+//! milliseconds. So the time counts in which a canary was overdue, beyond what is usual for it; the
+//! stricter rule, one wake-up late by as much, is told beside it.
 
-use vigil_cycle::canary::Late;
+use vigil_cycle::canary::{Late, Seen};
 
 use super::cycles::Cycle;
 
-/// Share of a miss by which a canary must have been late.
+/// Share of a miss for which a canary must have been overdue.
 const SHARE: f64 = 0.5;
 
 /// A missed cycle.
@@ -16,8 +22,10 @@ pub struct Miss {
     pub t_done_ns: u64,
     /// How far past its deadline, ns.
     pub overrun_ns: u64,
-    /// True if a canary was late by half the overrun or more between schedule and end.
+    /// True if a canary was overdue for half the overrun or more between schedule and end.
     pub is_machine: bool,
+    /// True if one wake-up of a canary in that time was late by as much.
+    pub is_one_stall: bool,
 }
 
 /// Late wake-ups of one canary, ready to be asked.
@@ -25,27 +33,47 @@ pub struct Miss {
 pub struct Record<'a> {
     late: &'a [Late],
     longest_ns: u64,
+    /// Lateness that is usual for this canary, ns.
+    usual_ns: u64,
 }
 
 impl<'a> Record<'a> {
-    /// Of late wake-ups in the order of their schedule.
+    /// Of what a canary has seen.
     #[must_use]
-    pub fn new(late: &'a [Late]) -> Self {
-        let longest_ns = late.iter().map(|l| l.late_ns).max().unwrap_or(0);
-        Self { late, longest_ns }
+    pub fn of(seen: &'a Seen) -> Self {
+        Self::new(&seen.late, seen.lateness.percentiles().p50_ns)
     }
 
-    /// True if the core was late by at least `ns` at some time from `from_ns` to `to_ns`.
-    #[must_use]
-    pub fn was_late(&self, from_ns: u64, to_ns: u64, ns: u64) -> bool {
+    /// Of late wake-ups in the order of their schedule.
+    fn new(late: &'a [Late], usual_ns: u64) -> Self {
+        let longest_ns = late.iter().map(|l| l.late_ns).max().unwrap_or(0);
+        Self {
+            late,
+            longest_ns,
+            usual_ns,
+        }
+    }
+
+    /// Wake-ups that were overdue at some time from `from_ns` to `to_ns`.
+    fn about(&self, from_ns: u64, to_ns: u64) -> impl Iterator<Item = &Late> {
         let earliest_ns = from_ns.saturating_sub(self.longest_ns);
         let first = self
             .late
             .partition_point(|late| late.t_schedule_ns < earliest_ns);
         let about = self.late[first..].iter();
         about
-            .take_while(|late| late.t_schedule_ns <= to_ns)
-            .any(|late| late.late_ns >= ns && late.t_schedule_ns + late.late_ns >= from_ns)
+            .take_while(move |late| late.t_schedule_ns <= to_ns)
+            .filter(move |late| late.t_schedule_ns + late.late_ns >= from_ns)
+    }
+
+    /// Time from `from_ns` to `to_ns` in which the canary was overdue beyond what is usual, ns.
+    fn overdue_ns(&self, from_ns: u64, to_ns: u64) -> u64 {
+        let within = |late: &Late| {
+            let begin_ns = (late.t_schedule_ns + self.usual_ns).max(from_ns);
+            let end_ns = (late.t_schedule_ns + late.late_ns).min(to_ns);
+            end_ns.saturating_sub(begin_ns)
+        };
+        self.about(from_ns, to_ns).map(within).sum()
     }
 }
 
@@ -59,12 +87,17 @@ pub fn misses(cycles: &[Cycle], deadline_ns: u64, canaries: &[Record<'_>]) -> Ve
             .filter(|overrun| *overrun > 0)?;
         let half_ns = (SHARE * overrun_ns as f64) as u64;
         let (from_ns, to_ns) = (cycle.t_schedule_ns, cycle.t_done_ns);
-        let was_late = |canary: &Record<'_>| canary.was_late(from_ns, to_ns, half_ns);
+        let overdue = |canary: &Record<'_>| canary.overdue_ns(from_ns, to_ns) >= half_ns;
+        let one_stall = |canary: &Record<'_>| {
+            let mut about = canary.about(from_ns, to_ns);
+            about.any(|late| late.late_ns >= half_ns)
+        };
         Some(Miss {
             t_schedule_ns: from_ns,
             t_done_ns: to_ns,
             overrun_ns,
-            is_machine: canaries.iter().any(was_late),
+            is_machine: canaries.iter().any(overdue),
+            is_one_stall: canaries.iter().any(one_stall),
         })
     };
     cycles.iter().filter_map(miss).collect()
@@ -83,33 +116,43 @@ mod tests {
     }
 
     #[test]
-    fn a_miss_is_the_machines_only_if_a_canary_was_late_enough_in_its_time() {
+    fn a_miss_is_the_machines_only_if_a_canary_was_overdue_long_enough_in_its_time() {
         let late = |t_schedule_ns, late_ns| Late {
             t_schedule_ns,
             late_ns,
         };
-        let first = [late(1_000, 600), late(50_000, 4_000)];
-        let second = [late(30_000, 100)];
-        let canaries = [Record::new(&first), Record::new(&second)];
+        let first = [
+            late(1_400, 700),
+            late(50_000, 4_000),
+            late(70_000, 700),
+            late(71_000, 700),
+            late(72_000, 700),
+        ];
+        let second = [late(30_000, 150), late(80_000, 540)];
+        let canaries = [Record::new(&first, 50), Record::new(&second, 50)];
         let cycles = [
             cycle(0, 900),        // in time
-            cycle(1_500, 2_000),  // 1000 over; the canary was 600 late until 1600
+            cycle(1_400, 2_000),  // 1000 over; the canary was overdue until 2100
             cycle(10_000, 2_000), // nobody was late
             cycle(29_000, 2_000), // a canary was late, by too little
-            cycle(53_000, 3_000), // the end of a long stall
+            cycle(52_000, 3_000), // the end of a long stall
             cycle(55_000, 3_000), // after it
+            cycle(69_500, 4_000), // 3000 over, in three pieces
+            cycle(80_000, 2_000), // enough but for what is usual
         ];
         let found = misses(&cycles, 1_000, &canaries);
         let told: Vec<_> = found
             .iter()
-            .map(|m| (m.t_schedule_ns, m.overrun_ns, m.is_machine))
+            .map(|m| (m.t_schedule_ns, m.overrun_ns, m.is_machine, m.is_one_stall))
             .collect();
         let expected = [
-            (1_500, 1_000, true),
-            (10_000, 1_000, false),
-            (29_000, 1_000, false),
-            (53_000, 2_000, true),
-            (55_000, 2_000, false),
+            (1_400, 1_000, true, true),
+            (10_000, 1_000, false, false),
+            (29_000, 1_000, false, false),
+            (52_000, 2_000, true, true),
+            (55_000, 2_000, false, false),
+            (69_500, 3_000, true, false),
+            (80_000, 1_000, false, true),
         ];
         assert_eq!(told, expected);
     }

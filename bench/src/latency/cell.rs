@@ -153,7 +153,7 @@ impl Spec {
         let first = first.ok_or("the graph did nothing")?;
         let from_ns = first.t_schedule_ns + (WARM_UP_S * 1e9) as u64;
         let cycles = cycles::join(&ran.stamps, period_ns, from_ns);
-        let records: Vec<Record<'_>> = canaries.iter().map(|c| Record::new(&c.late)).collect();
+        let records: Vec<Record<'_>> = canaries.iter().map(Record::of).collect();
         let misses = attribution::misses(&cycles, deadline_ns, &records);
         let graph = Spectra::of(&cycles)?;
         let floors = floors.iter().flat_map(|stamps| {
@@ -231,6 +231,12 @@ impl Cell {
         (self.misses.len() as u64 - machine, machine)
     }
 
+    /// Misses that no single late wake-up of a canary explains.
+    #[must_use]
+    pub fn not_one_stall(&self) -> u64 {
+        self.misses.iter().filter(|m| !m.is_one_stall).count() as u64
+    }
+
     /// End to end minus compute, over the floor's: ratios of p50 and p99.
     #[must_use]
     pub fn over_floor(&self) -> (f64, f64) {
@@ -289,6 +295,7 @@ impl Cell {
             "over_floor": { "p50": round(p50), "p99": round(p99) },
             "deadline_us": self.deadline_ns as f64 * 1e-3,
             "missed": { "ours": ours, "machine": machine },
+            "missed_without_one_long_stall": self.not_one_stall(),
             "canary_late_ppm": round(self.canary_late_ppm),
             "cycles": self.cycles.len(),
             "stages": stages,

@@ -17,8 +17,14 @@ use vigil_cycle::Latency;
 use super::cell::Cell;
 use super::cycles::{Cycle, STAGE_NAMES};
 
-/// Writes everything of a cell into `folder`: percentile spectra, interval log, misses, raw cycles
-/// and the document.
+/// Lateness of a canary from which it is told wake-up by wake-up, ns.
+const CANARY_FROM_NS: u64 = 200_000;
+
+/// Cycles of which each is written; of more, the interval log, the misses and the canaries tell.
+const RAW_MAX: usize = 25_000;
+
+/// Writes everything of a cell into `folder`: percentile spectra, interval log, misses, the canaries'
+/// late wake-ups, raw cycles and the document.
 ///
 /// # Errors
 /// The file system's.
@@ -40,7 +46,10 @@ pub fn write(cell: &Cell, folder: &Path) -> Result<(), Box<dyn Error>> {
     }
     fs::write(folder.join("end-to-end.hlog"), hlog(&cell.cycles)?)?;
     fs::write(folder.join("misses.csv"), misses(cell))?;
-    fs::write(folder.join("cycles.csv.gz"), raw(&cell.cycles)?)?;
+    fs::write(folder.join("canaries.csv"), canaries(cell))?;
+    if cell.cycles.len() <= RAW_MAX {
+        fs::write(folder.join("cycles.csv.gz"), raw(&cell.cycles)?)?;
+    }
     fs::write(folder.join("cell.json"), format!("{:#}\n", cell.json()))?;
     Ok(())
 }
@@ -103,6 +112,18 @@ fn misses(cell: &Cell) -> String {
         let took = (miss.t_done_ns - miss.t_schedule_ns) as f64 * 1e-3;
         let over = miss.overrun_ns as f64 * 1e-3;
         let _ = writeln!(text, "{},{took:.3},{over:.3},{whose}", miss.t_schedule_ns);
+    }
+    text
+}
+
+/// Wake-ups of the canaries that were late enough to matter.
+fn canaries(cell: &Cell) -> String {
+    let mut text = String::from("core,t_schedule_ns,late_us\n");
+    for seen in &cell.canaries {
+        for late in seen.late.iter().filter(|l| l.late_ns >= CANARY_FROM_NS) {
+            let (core, us) = (seen.placement.core, late.late_ns as f64 * 1e-3);
+            let _ = writeln!(text, "{core},{},{us:.3}", late.t_schedule_ns);
+        }
     }
     text
 }

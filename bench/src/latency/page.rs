@@ -8,6 +8,7 @@ use vigil_evaluation::report::ChartError;
 use vigil_evaluation::report::chart::{Axis, Chart, Curve, INK, Stroke};
 use vigil_evaluation::report::page::{beside, escaped, key, page, section};
 
+use super::attribution::Miss;
 use super::cell::Cell;
 
 /// Colours: end to end, hand-over, the floor's hand-over, compute, the machine's misses, ours.
@@ -18,6 +19,8 @@ const COMPUTE: usize = 4;
 const MACHINE: usize = 5;
 const OURS: usize = 6;
 
+/// Misses shown over time, the longest of each kind.
+const DOTS: usize = 200;
 /// Points of the curve over time.
 const MOMENTS: u64 = 300;
 /// Latencies of the axes, us.
@@ -48,8 +51,8 @@ const ABOUT: &str = "<p>Every latency counts from the instant at which the cycle
     with the same priorities and block sizes, that do nothing but hand over by a futex, measured \
     before and after the graph in the same cell. A missed deadline is the <em>machine's</em> if a \
     canary, a thread that does nothing but be on time on each core, one priority above the graph, \
-    was late by half the overrun or more between schedule and end; else it is Vigil's \
-    <em>own</em>.</p>\n";
+    was overdue, beyond its median lateness, for half the overrun or more between schedule and \
+    end; else it is Vigil's <em>own</em>.</p>\n";
 
 const ALL_CELLS: &str = "Times in us. Ratio: hand-over against the floor, median and 99th \
     percentile. Canary: wake-ups of the canaries, in a million, that would have missed the \
@@ -301,12 +304,12 @@ fn over_time(cell: &Cell) -> Chart {
         largest.push((x, place(latencies[latencies.len() - 1])));
     }
     let missed = |of_machine: bool| {
-        let of = cell
-            .misses
-            .iter()
-            .filter(move |m| m.is_machine == of_machine);
-        of.map(|m| (s(m.t_schedule_ns), place(m.t_done_ns - m.t_schedule_ns)))
-            .collect()
+        let of = cell.misses.iter();
+        let mut of: Vec<_> = of.filter(|m| m.is_machine == of_machine).collect();
+        of.sort_by_key(|miss| std::cmp::Reverse(miss.overrun_ns));
+        let shown = of.iter().take(DOTS);
+        let dot = |m: &&Miss| (s(m.t_schedule_ns), place(m.t_done_ns - m.t_schedule_ns));
+        shown.map(dot).collect()
     };
     let flat = |ns: u64| vec![(0.0, place(ns)), (end_s, place(ns))];
     let curve = |colour, stroke, points| Curve {
