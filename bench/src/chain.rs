@@ -77,6 +77,7 @@ impl Chain {
             _ => run_processes(&roles),
         };
         let _ = std::fs::remove_dir_all(&shared);
+        payload::clean(&shared);
         result?;
         let read = |stage: usize| stamps::read(&roles[stage].file());
         Ok([read(0)?, read(1)?, read(2)?, read(3)?])
@@ -162,9 +163,21 @@ impl Role {
     }
 }
 
+/// Processes that end with whoever started them.
+struct Children(Vec<Child>);
+
+impl Drop for Children {
+    fn drop(&mut self) {
+        for child in &mut self.0 {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
 fn run_processes(roles: &[Role; STAGES]) -> Result<(), Box<dyn Error>> {
     let program = std::env::current_exe()?;
-    let mut children: Vec<Child> = Vec::new();
+    let mut children = Children(Vec::new());
     // The last of the chain first: it waits.
     for role in roles.iter().rev() {
         let child = Command::new(&program)
@@ -172,13 +185,23 @@ fn run_processes(roles: &[Role; STAGES]) -> Result<(), Box<dyn Error>> {
             .arg(serde_json::to_string(role)?)
             .stdin(Stdio::null())
             .spawn()?;
-        children.push(child);
+        children.0.push(child);
     }
-    for mut child in children {
-        let status = child.wait()?;
-        if !status.success() {
-            return Err(format!("a stage of the chain ended with {status}").into());
+    // One that fails leaves the others waiting for it.
+    while !children.0.is_empty() {
+        let mut running = Vec::new();
+        while let Some(mut child) = children.0.pop() {
+            match child.try_wait()? {
+                None => running.push(child),
+                Some(status) if status.success() => {}
+                Some(status) => {
+                    children.0.append(&mut running);
+                    return Err(format!("a stage of the chain ended with {status}").into());
+                }
+            }
         }
+        children.0 = running;
+        std::thread::sleep(WAIT / 10);
     }
     Ok(())
 }

@@ -12,8 +12,7 @@ use vigil_cycle::port::Bus;
 use vigil_cycle::serve::Leave;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    DeadlineMonitor, Graph, HealthBoard, PortError, Shedder, SourceCycle, StageCycle, Topic,
-    VirtualClock,
+    DeadlineMonitor, Graph, HealthBoard, PortError, SourceCycle, StageCycle, Topic, VirtualClock,
 };
 use vigil_detector::DetectorStage;
 use vigil_identifier::IdentifierStage;
@@ -61,11 +60,9 @@ impl InProcess {
         let period_ns = setup.period_ns();
         let clock = VirtualClock::default();
         let graph = Graph::InProcess(Bus::new(clock.clone()));
-        let stage = |name, particles| -> Result<StageCycle, Box<dyn Error>> {
+        let stage = |name| -> Result<StageCycle, Box<dyn Error>> {
             let (monitor, board) = parts(&setup, &graph, name)?;
-            let budget_ns = setup.plan(name, Leave::default()).schedule.budget_ns;
-            let cycle = StageCycle::new(monitor, board)?;
-            Ok(cycle.with_shedder(Shedder::new(particles, budget_ns)))
+            Ok(StageCycle::new(monitor, board)?)
         };
         let inject = [format!("stuck:RM@{STUCK_S}")];
         let Assembled::Simulator(simulation, drive) = vigil_sensor_sim::assemble(&setup, &inject)?
@@ -83,9 +80,9 @@ impl InProcess {
         clock.set(period_ns);
         let mut found = Self {
             sensor: (SourceCycle::new(monitor, board, period_ns)?, sensor),
-            detector: (stage(Detector, 256)?, detector),
-            identifier: (stage(Identifier, 256)?, identifier),
-            supervisor: (stage(Supervisor, 0)?, supervisor),
+            detector: (stage(Detector)?, detector),
+            identifier: (stage(Identifier)?, identifier),
+            supervisor: (stage(Supervisor)?, supervisor),
             period_ns,
             clock,
         };

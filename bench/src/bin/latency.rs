@@ -15,6 +15,8 @@ use vigil_bench::latency::load::Load;
 use vigil_bench::latency::{files, page, system};
 use vigil_bench::{chain, machine};
 
+/// Shortest run, s: the first two seconds are warm-up.
+const SECONDS_MIN: f64 = 4.0;
 /// Rates of the matrix, Hz.
 const RATES_HZ: [f64; 3] = [100.0, 1000.0, 5000.0];
 /// Loads of the matrix.
@@ -68,6 +70,13 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+    if args.seconds.is_nan() || args.seconds < SECONDS_MIN {
+        return Err(format!(
+            "--seconds {}: allowed is {SECONDS_MIN} or more",
+            args.seconds
+        )
+        .into());
+    }
     let specs = specs(args);
     let folder = std::env::temp_dir().join(format!("vigil-latency-{}", std::process::id()));
     std::fs::create_dir_all(&folder)?;
@@ -147,7 +156,16 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
     let mut facts = facts();
     for (i, spec) in specs.iter().enumerate() {
         eprintln!("{} of {}: {}", i + 1, specs.len(), spec.name());
-        let cell = spec.run(folder)?;
+        let cell = match spec.run(folder) {
+            Ok(cell) => cell,
+            Err(error) => {
+                archive.say(&format!(
+                    "| {} | not measured: {error} | | | | | | | | | | |",
+                    spec.name()
+                ));
+                continue;
+            }
+        };
         archive.say(&line(&cell));
         let repeated = cells.iter().filter(|c| c.spec == *spec).count();
         let mut name = spec.name();

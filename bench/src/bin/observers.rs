@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::latency::attribution::{Record, misses};
 use vigil_bench::latency::cell::us;
-use vigil_bench::latency::cycles::Cycle;
+use vigil_bench::latency::cycles::{Cycle, join};
 use vigil_bench::latency::graph::{Change, Prepared};
 use vigil_bench::latency::load::{Load, Running};
 use vigil_bench::pairs::median_ratio;
@@ -24,7 +24,7 @@ use vigil_blocks::{Action, CauseKind, DetectionBelief, FaultBelief, ParticleBloc
 use vigil_cycle::canary::Canary;
 use vigil_cycle::placement::Wanted;
 use vigil_cycle::port::Link;
-use vigil_cycle::{Domain, Graph, Latency, Topic, placement, signal};
+use vigil_cycle::{CycleStamps, Domain, Graph, Latency, Topic, placement, signal};
 use vigil_setup::{GraphArgs, Setup};
 
 /// First argument of a process that is a bad observer.
@@ -70,22 +70,23 @@ struct Args {
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     if words.first().is_some_and(|word| word == OBSERVE_WORD) {
-        return vigil_bench::ended("observer", observe(words.get(1)));
+        return vigil_bench::ended("observer", observe(words.get(1), words.get(2)));
     }
     let args = Args::parse();
     vigil_bench::ended("observers", run(&args))
 }
 
 /// Is a bad observer: opens every topic, takes what it may hold, and never lets go.
-fn observe(config: Option<&String>) -> Result<(), Box<dyn Error>> {
+fn observe(config: Option<&String>, folder: Option<&String>) -> Result<(), Box<dyn Error>> {
     let config = PathBuf::from(config.ok_or("no graph file is given")?);
+    let folder = PathBuf::from(folder.ok_or("no folder is given")?);
     let setup = GraphArgs {
         config,
         ..GraphArgs::default()
     }
     .load()?;
     signal::install();
-    let graph = join(&setup, "slow")?;
+    let graph = graph_of(&setup, "slow")?;
     let mut frames = graph.receiver::<SensorFrame>(Topic::Sensor)?;
     let mut detections = graph.receiver::<DetectionBelief>(Topic::Detection)?;
     let mut particles = graph.receiver::<ParticleBlock>(Topic::DetectionParticles)?;
@@ -95,7 +96,9 @@ fn observe(config: Option<&String>) -> Result<(), Box<dyn Error>> {
     while !signal::stop_requested() {
         // Once: afterwards its queues are full for ever.
         if frames.held().is_none() {
-            frames.advance();
+            if frames.advance() {
+                std::fs::write(folder.join(std::process::id().to_string()), "")?;
+            }
             detections.advance();
             particles.advance();
             beliefs.advance();
@@ -107,7 +110,7 @@ fn observe(config: Option<&String>) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn join(setup: &Setup, name: &str) -> Result<Graph, Box<dyn Error>> {
+fn graph_of(setup: &Setup, name: &str) -> Result<Graph, Box<dyn Error>> {
     let domain = setup.domain()?;
     Ok(Graph::SharedMemory(Link::join(&domain, name)?))
 }
@@ -175,19 +178,33 @@ fn half(
         Difference::Instruments if with => &["--stamps", &recorded],
         Difference::Instruments => &["--no-timing"],
     };
-    let mut launcher = prepared.start(args.seconds, options)?;
+    let mut launcher = Started(prepared.start(args.seconds, options)?);
     let reader = {
-        let (domain, seconds) = (setup.domain()?, args.seconds);
-        std::thread::spawn(move || read(&domain, seconds).map_err(|e| e.to_string()))
+        let (domain, seconds, period_ns) = (setup.domain()?, args.seconds, setup.period_ns());
+        std::thread::spawn(move || read(&domain, seconds, period_ns).map_err(|e| e.to_string()))
     };
-    let mut bad = Bad::new(prepared.path());
-    while launcher.try_wait()?.is_none() {
-        if with && args.difference == Difference::Observers {
+    let mut bad = Bad::new(prepared.path(), folder);
+    let domain = setup.domain()?;
+    let status = loop {
+        if let Some(status) = launcher.0.try_wait()? {
+            break status;
+        }
+        // Not before the launcher has cleaned up and started its services.
+        let is_up = domain.processes_file().exists();
+        if with && is_up && args.difference == Difference::Observers {
             bad.keep_up()?;
         }
         std::thread::sleep(Duration::from_millis(50));
+    };
+    if !status.success() {
+        return Err(format!("the graph ended with {status}").into());
     }
+    let attached = bad.attached()?;
     drop(bad);
+    if with && args.difference == Difference::Observers && attached < 3 {
+        return Err(format!("only {attached} bad observers saw the graph").into());
+    }
+    domain.remove_residue();
     let (cycles, lost) = reader.join().map_err(|_| "the reader has died")??;
     let seen: Vec<_> = canaries.into_iter().filter_map(Canary::finish).collect();
     let records: Vec<Record<'_>> = seen.iter().map(Record::of).collect();
@@ -208,7 +225,11 @@ fn half(
 }
 
 /// Reads every action's stamps until the graph is gone; the cycles, and how many were lost.
-fn read(domain: &Domain, seconds: f64) -> Result<(Vec<Cycle>, u64), Box<dyn Error>> {
+fn read(
+    domain: &Domain,
+    seconds: f64,
+    period_ns: u64,
+) -> Result<(Vec<Cycle>, u64), Box<dyn Error>> {
     let _ = placement::apply(Wanted {
         core: 1,
         priority: READER_PRIORITY,
@@ -220,9 +241,10 @@ fn read(domain: &Domain, seconds: f64) -> Result<(Vec<Cycle>, u64), Box<dyn Erro
         }
         std::thread::sleep(Duration::from_millis(5));
     }
-    let graph = Graph::SharedMemory(Link::join(domain, "reader")?);
+    let link = Link::join(domain, "reader")?;
+    let graph = Graph::SharedMemory(link);
     let mut actions = graph.receiver::<Action>(Topic::Action)?;
-    let (mut cycles, mut lost, mut next) = (Vec::new(), 0, None);
+    let (mut answered, mut lost, mut next) = (Vec::new(), 0, None);
     while domain.processes_file().exists() && Instant::now() < until {
         while actions.advance() {
             let Some(action) = actions.held() else { break };
@@ -230,33 +252,50 @@ fn read(domain: &Domain, seconds: f64) -> Result<(Vec<Cycle>, u64), Box<dyn Erro
             lost += next.map_or(0, |next: u64| header.seq.saturating_sub(next));
             next = Some(header.seq + 1);
             if action.cause.kind() == Some(CauseKind::Frame) {
-                cycles.push(Cycle {
+                answered.push(CycleStamps {
                     t_schedule_ns: header.t_schedule_ns,
-                    t_done_ns: header.t_publish_ns,
-                    stages: None,
+                    t_publish_ns: header.t_publish_ns,
+                    ..CycleStamps::default()
                 });
             }
         }
         std::thread::sleep(Duration::from_millis(4));
     }
-    let first_ns = cycles.first().map_or(0, |c| c.t_schedule_ns);
+    let first_ns = answered.first().map_or(0, |s| s.t_schedule_ns);
     let from_ns = first_ns + (WARM_UP_S * 1e9) as u64;
-    cycles.retain(|cycle| cycle.t_schedule_ns >= from_ns);
+    // Every instant of the schedule, those included that nothing answered in time.
+    let stamps = [Vec::new(), Vec::new(), Vec::new(), answered];
+    let cycles = join(&stamps, period_ns, from_ns);
     Ok((cycles, lost))
+}
+
+/// The launcher: stopped when dropped.
+struct Started(Child);
+
+impl Drop for Started {
+    fn drop(&mut self) {
+        if matches!(self.0.try_wait(), Ok(None)) {
+            signal::terminate(self.0.id());
+        }
+        let _ = self.0.wait();
+    }
 }
 
 /// Bad observers of a run: ended when dropped.
 struct Bad<'a> {
     config: &'a Path,
+    /// Where each leaves a file once it holds a block.
+    folder: PathBuf,
     slow: Option<Child>,
     stopped: Option<Child>,
     killed: Option<(Child, Instant)>,
 }
 
 impl<'a> Bad<'a> {
-    const fn new(config: &'a Path) -> Self {
+    fn new(config: &'a Path, folder: &Path) -> Self {
         Self {
             config,
+            folder: folder.join("attached"),
             slow: None,
             stopped: None,
             killed: None,
@@ -267,11 +306,23 @@ impl<'a> Bad<'a> {
         Command::new(std::env::current_exe()?)
             .arg(OBSERVE_WORD)
             .arg(self.config)
+            .arg(&self.folder)
             .stdin(Stdio::null())
             .spawn()
     }
 
+    /// Observers that have held a block.
+    fn attached(&self) -> std::io::Result<usize> {
+        if !self.folder.exists() {
+            return Ok(0);
+        }
+        let count = std::fs::read_dir(&self.folder)?.count();
+        std::fs::remove_dir_all(&self.folder)?;
+        Ok(count)
+    }
+
     fn keep_up(&mut self) -> Result<(), Box<dyn Error>> {
+        std::fs::create_dir_all(&self.folder)?;
         if self.slow.is_none() {
             self.slow = Some(self.spawn()?);
             self.stopped = Some(self.spawn()?);

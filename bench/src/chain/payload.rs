@@ -108,13 +108,24 @@ pub fn outgoing(
     })
 }
 
-/// Joins the chain's own graph.
-fn join(shared: &Path, side: &str) -> Result<Graph, Box<dyn Error>> {
+/// The chain's own graph.
+fn domain(shared: &Path) -> Result<Domain, Box<dyn Error>> {
     let name = shared.file_name().unwrap_or_default().to_string_lossy();
     // Names of graphs are short.
     let name = name.replace("vigil-chain-", "chain-");
-    let domain = Domain::new(&name, QUEUES)?;
-    Ok(Graph::SharedMemory(Link::join(&domain, side)?))
+    Ok(Domain::new(&name, QUEUES)?)
+}
+
+fn join(shared: &Path, side: &str) -> Result<Graph, Box<dyn Error>> {
+    Ok(Graph::SharedMemory(Link::join(&domain(shared)?, side)?))
+}
+
+/// Removes what the chain's graph has left, once nobody is on it.
+pub fn clean(shared: &Path) {
+    if let Ok(domain) = domain(shared) {
+        domain.remove_residue();
+        let _ = std::fs::remove_dir_all(domain.folder());
+    }
 }
 
 struct Reader<T: Payload> {

@@ -82,9 +82,9 @@ pub struct Cell {
     pub misses: Vec<Miss>,
     /// Deadline of the chain after the schedule, ns.
     pub deadline_ns: u64,
-    /// Share of the canaries' wake-ups that were late by the slack of a usual cycle, as misses a
-    /// million.
-    pub canary_late_ppm: f64,
+    /// Wake-ups of the canaries, in a million, that were late by the slack of a usual cycle; `None`
+    /// if a usual cycle has none.
+    pub canary_late_ppm: Option<f64>,
     /// What the machine did meanwhile.
     pub system: Value,
     /// Core and priority wanted for each stage.
@@ -135,7 +135,7 @@ impl Spec {
         let system = Ticks::now().since(ticks);
         let after = floor.run(folder)?;
         let canaries: Vec<Seen> = canaries.into_iter().filter_map(Canary::finish).collect();
-        drop(load);
+        load.finish()?;
         let deadline_percent = prepared.setup().file.services.supervisor.deadline_percent;
         let deadline_ns = (period_ns as f64 * deadline_percent * 1e-2).round() as u64;
         let times = (period_ns, deadline_ns);
@@ -149,11 +149,15 @@ impl Spec {
         (period_ns, deadline_ns): (u64, u64),
         (system, wanted): (Value, [Wanted; STAGES]),
     ) -> Result<Cell, Box<dyn Error>> {
+        check(&ran.summary, &canaries, &wanted)?;
         let first = ran.stamps[STAGES - 1].first();
         let first = first.ok_or("the graph did nothing")?;
         let from_ns = first.t_schedule_ns + (WARM_UP_S * 1e9) as u64;
         let cycles = cycles::join(&ran.stamps, period_ns, from_ns);
         let records: Vec<Record<'_>> = canaries.iter().map(Record::of).collect();
+        if cycles.is_empty() {
+            return Err("no cycle was left after the warm-up".into());
+        }
         let misses = attribution::misses(&cycles, deadline_ns, &records);
         let graph = Spectra::of(&cycles)?;
         let floors = floors.iter().flat_map(|stamps| {
@@ -177,13 +181,35 @@ impl Spec {
             floor,
             misses,
             deadline_ns,
-            canary_late_ppm: 1e6 * late as f64 / all.max(1) as f64,
+            canary_late_ppm: (slack_ns > 0).then(|| 1e6 * late as f64 / all.max(1) as f64),
             system,
             wanted,
             cycles,
             canaries,
         })
     }
+}
+
+/// Refuses what would not be a measurement: a service that was restarted (its stamps are those
+/// since then), a canary that ran elsewhere or below what it watches over.
+fn check(
+    summary: &Value,
+    canaries: &[Seen],
+    wanted: &[Wanted; STAGES],
+) -> Result<(), Box<dyn Error>> {
+    for name in STAGE_NAMES {
+        if summary["services"][name]["restarts"] != 0 {
+            return Err(format!("{name} was restarted in the run").into());
+        }
+    }
+    let highest = wanted.iter().map(|w| u32::from(w.priority)).max();
+    let is_above =
+        |seen: &Seen| seen.placement.pinned && seen.placement.priority > highest.unwrap_or(0);
+    if canaries.is_empty() || !canaries.iter().all(is_above) {
+        let why = "no real-time priority for them";
+        return Err(format!("canaries could not be placed above the graph: {why}").into());
+    }
+    Ok(())
 }
 
 /// A canary on each core, one priority above what runs there.
@@ -296,7 +322,7 @@ impl Cell {
             "deadline_us": self.deadline_ns as f64 * 1e-3,
             "missed": { "ours": ours, "machine": machine },
             "missed_without_one_long_stall": self.not_one_stall(),
-            "canary_late_ppm": round(self.canary_late_ppm),
+            "canary_late_ppm": self.canary_late_ppm.map(round),
             "cycles": self.cycles.len(),
             "stages": stages,
             "canaries": self.canaries.iter().map(canary).collect::<Vec<_>>(),

@@ -23,8 +23,8 @@ const CANARY_FROM_NS: u64 = 200_000;
 /// Cycles of which each is written; of more, the interval log, the misses and the canaries tell.
 const RAW_MAX: usize = 25_000;
 
-/// Writes everything of a cell into `folder`: percentile spectra, interval log, misses, the canaries'
-/// late wake-ups, raw cycles and the document.
+/// Writes everything of a cell into `folder`: percentile spectra, interval log, misses, the
+/// canaries' late wake-ups, raw cycles and the document.
 ///
 /// # Errors
 /// The file system's.

@@ -49,6 +49,9 @@ impl Load {
     }
 }
 
+/// A load ends by itself after this long, should the bench be killed.
+const LONGEST: &str = "3600s";
+
 /// A load that lasts until it is dropped.
 #[derive(Debug)]
 pub struct Running {
@@ -72,6 +75,7 @@ impl Running {
         } else {
             let started = Command::new("stress-ng")
                 .args(&arguments)
+                .args(["--timeout", LONGEST])
                 .arg("--temp-path")
                 .arg(folder)
                 .stdin(Stdio::null())
@@ -88,11 +92,28 @@ impl Running {
     }
 }
 
+impl Running {
+    /// Ends it.
+    ///
+    /// # Errors
+    /// If it had ended before: what was measured was not under it.
+    pub fn finish(mut self) -> Result<(), Box<dyn Error>> {
+        if let Some(stress) = &mut self.stress
+            && let Some(status) = stress.try_wait()?
+        {
+            return Err(format!("stress-ng ended early with {status}").into());
+        }
+        Ok(())
+    }
+}
+
 impl Drop for Running {
     fn drop(&mut self) {
         if let Some(stress) = &mut self.stress {
-            // It ends its workers on SIGTERM.
-            vigil_cycle::signal::terminate(stress.id());
+            // It ends its workers on SIGTERM; one that has ended is not to be signalled.
+            if matches!(stress.try_wait(), Ok(None)) {
+                vigil_cycle::signal::terminate(stress.id());
+            }
             let _ = stress.wait();
         }
     }

@@ -51,35 +51,39 @@ const ABOUT: &str = "<p>Every latency counts from the instant at which the cycle
     with the same priorities and block sizes, that do nothing but hand over by a futex, measured \
     before and after the graph in the same cell. A missed deadline is the <em>machine's</em> if a \
     canary, a thread that does nothing but be on time on each core, one priority above the graph, \
-    was overdue, beyond its median lateness, for half the overrun or more between schedule and \
+    was overdue, beyond what nine of ten of its wake-ups keep to, for half the overrun or more \
+    between schedule and \
     end; else it is Vigil's <em>own</em>.</p>\n";
 
 const ALL_CELLS: &str = "Times in us. Ratio: hand-over against the floor, median and 99th \
     percentile. Canary: wake-ups of the canaries, in a million, that would have missed the \
     deadline of a usual cycle.";
 
+/// Heads of the table's columns.
+const HEADS: [&str; 18] = [
+    "rate, Hz",
+    "load",
+    "scheduling",
+    "cycles",
+    "end to end p50",
+    "p99",
+    "p99.9",
+    "max",
+    "compute p50",
+    "hand-over p50",
+    "p99",
+    "floor p50",
+    "p99",
+    "ratio p50",
+    "p99",
+    "missed: own",
+    "machine",
+    "canary, ppm",
+];
+
 fn table(cells: &[Cell]) -> String {
     let mut text = String::from("<div class=\"wide\"><table class=\"close\"><thead><tr>");
-    for head in [
-        "rate, Hz",
-        "load",
-        "scheduling",
-        "cycles",
-        "end to end p50",
-        "p99",
-        "p99.9",
-        "max",
-        "compute p50",
-        "hand-over p50",
-        "p99",
-        "floor p50",
-        "p99",
-        "ratio p50",
-        "p99",
-        "missed: own",
-        "machine",
-        "canary, ppm",
-    ] {
+    for head in HEADS {
         let _ = write!(text, "<th>{head}</th>");
     }
     text.push_str("</tr></thead><tbody>\n");
@@ -119,7 +123,8 @@ fn table(cells: &[Cell]) -> String {
             format!("{p99:.2}"),
             ours.to_string(),
             machine.to_string(),
-            format!("{:.0}", cell.canary_late_ppm),
+            cell.canary_late_ppm
+                .map_or_else(|| "-".into(), |ppm| format!("{ppm:.0}")),
         ] {
             let _ = write!(text, "<td class=\"n\">{value}</td>");
         }

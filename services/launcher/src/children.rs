@@ -128,6 +128,12 @@ impl Children {
         std::mem::take(&mut self.restarted)
     }
 
+    /// The services that have died and are to be restarted.
+    pub fn dead(&self) -> impl Iterator<Item = ServiceName> {
+        let dead = self.services.iter().filter(|s| s.restart_at.is_some());
+        dead.map(|s| s.name)
+    }
+
     /// Ends a service that lives and does not do its work; it is then restarted like one that has
     /// died. Not by a signal that it would have to handle: it may be stopped, or hang.
     pub fn end(&mut self, name: ServiceName, why: &str) {

@@ -126,6 +126,14 @@ fn watch(
         if signal::stop_requested() {
             return Ended::Stopped;
         }
+        if observer.timeline().has(EventKind::EndOfRecording) {
+            // What the services miss from now on, and do about it, is nothing to look after.
+            let since = *recording_ended.get_or_insert_with(Instant::now);
+            if since.elapsed() > DRAIN {
+                return Ended::EndOfRecording;
+            }
+            continue;
+        }
         if children.look_after(plan, observer) {
             return Ended::GaveUp;
         }
@@ -144,12 +152,6 @@ fn watch(
             .is_some_and(|limit_s| lasted.is_some_and(|s| s >= limit_s))
         {
             return Ended::Duration;
-        }
-        if observer.timeline().has(EventKind::EndOfRecording) {
-            let since = *recording_ended.get_or_insert_with(Instant::now);
-            if since.elapsed() > DRAIN {
-                return Ended::EndOfRecording;
-            }
         }
     }
 }

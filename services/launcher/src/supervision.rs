@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 use vigil_blocks::{Event, EventKind};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::watchdog::Limits;
-use vigil_cycle::{Clock, Monotonic, Supervision, Watchdog};
+use vigil_cycle::{Clock, Monotonic, Watchdog};
 use vigil_setup::schema;
 
 use crate::children::Children;
 use crate::observer::Observer;
 use crate::plan::Plan;
+use crate::words;
 
 /// Holds the watchdog against what the services report.
 pub struct Supervisor {
@@ -35,6 +36,12 @@ impl Supervisor {
     /// Takes what is new, and ends the services that only a new process can mend.
     pub fn look_after(&mut self, observer: &mut Observer, children: &mut Children) {
         let now_ns = Monotonic.now_ns();
+        self.watchdog.look(now_ns);
+        for name in children.dead() {
+            if let Some(service) = self.services.iter().position(|s| *s == name) {
+                self.watchdog.ended(service);
+            }
+        }
         for name in children.take_restarted() {
             if let Some(service) = self.services.iter().position(|s| *s == name) {
                 self.watchdog.started(service, now_ns);
@@ -64,19 +71,9 @@ impl Supervisor {
                 },
             );
             if supervision.needs_restart() {
-                children.end(name, words(supervision));
+                children.end(name, words::failure(supervision));
             }
         }
-    }
-}
-
-/// What a failure is called.
-pub const fn words(supervision: Supervision) -> &'static str {
-    match supervision {
-        Supervision::StartUp => "did not start up in time",
-        Supervision::Alive => "has stopped reporting",
-        Supervision::Deadline => "misses its deadlines",
-        Supervision::Logical => "no longer follows its input",
     }
 }
 

@@ -9,7 +9,7 @@ use vigil_cycle::topic::ServiceName;
 use vigil_robot::injection::{Change, Wire};
 
 use crate::plan::Plan;
-use crate::{supervision, words};
+use crate::words;
 
 /// An event in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -278,7 +278,7 @@ impl Namer {
             EventKind::Particles => format!("{} of {}", event.what, event.value),
             EventKind::Watchdog => {
                 let found = Supervision::from_wire(event.what);
-                found.map_or("?", supervision::words).into()
+                found.map_or("?", words::failure).into()
             }
             _ => String::new(),
         }

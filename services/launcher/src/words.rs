@@ -1,6 +1,7 @@
 //! Words for what happens to a robot on its path.
 
 use vigil_blocks::{ActionOutcome, Degraded, Event, RecoveryKind, Symptoms};
+use vigil_cycle::Supervision;
 
 /// Symptoms, joined by `_` as in the decision model; `none` for the empty set.
 pub fn symptoms(set: u32) -> String {
@@ -48,5 +49,15 @@ pub fn degraded(bits: u32) -> String {
         "no longer".into()
     } else {
         present.join(", ")
+    }
+}
+
+/// What a failure that the watchdog has found is called.
+pub const fn failure(supervision: Supervision) -> &'static str {
+    match supervision {
+        Supervision::StartUp => "did not start up in time",
+        Supervision::Alive => "has stopped reporting",
+        Supervision::Deadline => "misses its deadlines",
+        Supervision::Logical => "no longer follows its input",
     }
 }

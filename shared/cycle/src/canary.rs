@@ -42,7 +42,7 @@ pub struct Seen {
 #[derive(Debug)]
 pub struct Canary {
     stop: Arc<AtomicBool>,
-    thread: JoinHandle<Seen>,
+    thread: Option<JoinHandle<Seen>>,
 }
 
 impl Canary {
@@ -58,14 +58,26 @@ impl Canary {
             .name(format!("canary-{}", wanted.core))
             .spawn(move || watch(wanted, period_ns.max(1), capacity, lateness, &asked))
             .map_err(|e| PortError::setup("canary", &e))?;
-        Ok(Self { stop, thread })
+        Ok(Self {
+            stop,
+            thread: Some(thread),
+        })
     }
 
     /// Ends it; what it has seen, `None` if it has died.
     #[must_use]
-    pub fn finish(self) -> Option<Seen> {
+    pub fn finish(mut self) -> Option<Seen> {
         self.stop.store(true, Ordering::Relaxed);
-        self.thread.join().ok()
+        self.thread.take()?.join().ok()
+    }
+}
+
+impl Drop for Canary {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
     }
 }
 
@@ -112,6 +124,7 @@ fn watch(
             due_ns += period_ns;
         }
     }
+    seen.late.shrink_to_fit();
     seen
 }
 

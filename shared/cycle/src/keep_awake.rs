@@ -7,6 +7,7 @@
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::channel;
 use std::thread::JoinHandle;
 
 use crate::placement;
@@ -15,15 +16,15 @@ use crate::placement;
 #[derive(Debug)]
 pub struct KeepAwake {
     stop: Arc<AtomicBool>,
-    threads: Vec<JoinHandle<io::Result<()>>>,
+    threads: Vec<JoinHandle<()>>,
 }
 
 impl KeepAwake {
     /// Starts one spinning thread on each of `cores`; each counts once.
     ///
     /// # Errors
-    /// The system's, when a thread cannot be made. One that cannot be placed does not spin:
-    /// anything but the lowest class would do harm.
+    /// The system's, when a thread cannot be made or placed; none spins then, as anything but the
+    /// lowest class would do harm.
     pub fn start(cores: impl IntoIterator<Item = usize>) -> io::Result<Self> {
         let mut cores: Vec<usize> = cores.into_iter().collect();
         cores.sort_unstable();
@@ -35,23 +36,19 @@ impl KeepAwake {
         for core in cores {
             let stop = Arc::clone(&awake.stop);
             let builder = std::thread::Builder::new().name(format!("awake-{core}"));
+            let (placed, told) = channel();
             let thread = builder.spawn(move || {
-                enter_lowest_class(core)?;
-                while !stop.load(Ordering::Relaxed) {
+                let result = enter_lowest_class(core);
+                let is_placed = result.is_ok();
+                let _ = placed.send(result);
+                while is_placed && !stop.load(Ordering::Relaxed) {
                     std::hint::spin_loop();
                 }
-                Ok(())
             })?;
             awake.threads.push(thread);
+            told.recv().map_err(io::Error::other)??;
         }
         Ok(awake)
-    }
-
-    /// Threads that spin.
-    #[must_use]
-    pub fn spinning(&self) -> usize {
-        let spins = |thread: &&JoinHandle<io::Result<()>>| !thread.is_finished();
-        self.threads.iter().filter(spins).count()
     }
 }
 
@@ -89,11 +86,9 @@ mod tests {
     fn every_core_is_kept_awake_once_and_released() {
         let awake = KeepAwake::start([0, 0]).unwrap();
         assert_eq!(awake.threads.len(), 1);
-        assert_eq!(awake.spinning(), 1);
+        assert!(!awake.threads[0].is_finished());
         drop(awake);
-        let nowhere = KeepAwake::start([100_000]).unwrap();
-        while nowhere.spinning() > 0 {
-            std::thread::yield_now();
-        }
+        // A core that is not there is an error, and the thread on the other one ends.
+        assert!(KeepAwake::start([0, 100_000]).is_err());
     }
 }

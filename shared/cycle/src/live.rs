@@ -100,8 +100,11 @@ fn await_input(
     };
     let expected_ns = cycle.expected_input_ns().filter(|_| spin_ns > 0);
     if let Some(expected_ns) = expected_ns {
-        // What a spin has found may be announced only now.
+        // What a spin has found may be announced only now; what has come since is not lost with it.
         listener.drain();
+        if stage.has_input() {
+            return;
+        }
         let from_ns = expected_ns.saturating_sub(spin_ns / 2).min(due_ns);
         let until_ns = (expected_ns + spin_ns / 2).min(due_ns);
         if Monotonic.now_ns() < from_ns && block_until(from_ns) != Wake::Deadline {
@@ -143,8 +146,10 @@ pub fn run_source(
     while !signal::stop_requested() {
         let latest_ns = Monotonic.now_ns() + WAIT_NS_MAX;
         let due_ns = cycle.next_wake_ns();
-        clock::sleep_until(due_ns.saturating_sub(spin_ns).min(latest_ns));
-        if spin_ns > 0 && due_ns < latest_ns {
+        let from_ns = due_ns.saturating_sub(spin_ns);
+        clock::sleep_until(from_ns.min(latest_ns));
+        // Not after a signal, nor long before the instant.
+        if spin_ns > 0 && Monotonic.now_ns() >= from_ns {
             spin_until(due_ns, || false);
         }
         if cycle.turn(source, &Monotonic)?.is_break() {

@@ -111,8 +111,7 @@ pub fn stage<T: vigil_blocks::Block, S: Stage>(
         cycle = cycle.with_stamps(Stamps::new(*capacity));
     }
     if stage.particles() > 0 {
-        let shedder = Shedder::new(stage.particles(), plan.schedule.budget_ns);
-        cycle = cycle.with_shedder(shedder);
+        cycle = cycle.with_shedder(Shedder::new(stage.particles(), plan.schedule));
     }
     let run = live::run_stage(&mut cycle, &mut stage, &listener, plan.spin_ns)?;
     leave(plan, cycle.timing(), cycle.stamps(), run)

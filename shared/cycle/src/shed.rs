@@ -5,17 +5,20 @@
 //! and the shortest of them says what the work itself costs. The allowance then falls in
 //! proportion, and returns step by step once long windows stay far below the budget.
 
+use crate::deadline::Schedule;
+
 /// Share of the budget above which a cycle counts as a warning.
 const WARNING: f64 = 0.8;
 /// Share of the budget that a smaller number of particles is to take.
 const AIM: f64 = 0.5;
 /// Share of the budget below which there is room for more.
 const ROOM: f64 = 0.4;
-/// Warnings in one window after which particles are shed.
-const WARNINGS: u32 = 4;
-/// Cycles in a window: filters work on every observation, which at a high rate is every fiftieth
-/// cycle.
-const WINDOW: u32 = 256;
+/// Warnings in one window after which particles are shed: half of the observations of a second.
+const WARNINGS: u32 = 10;
+/// Length of a window, ns, and cycles in it at least: filters work on every observation, some
+/// twenty times a second, however short the cycles between are.
+const WINDOW_NS: u64 = 1_000_000_000;
+const WINDOW_CYCLES_MIN: u64 = 256;
 /// Windows with room, in a row, before particles are given back.
 const CALM_WINDOWS: u32 = 4;
 /// Factor on the particles each time they are given back.
@@ -29,6 +32,8 @@ pub struct Shedder {
     configured: u32,
     allowed: u32,
     budget_ns: u64,
+    /// Cycles in a window.
+    window: u32,
     cycles: u32,
     warnings: u32,
     /// Shortest of the cycles that were warnings, ns.
@@ -38,13 +43,15 @@ pub struct Shedder {
 }
 
 impl Shedder {
-    /// For `configured` particles and cycles of `budget_ns`.
+    /// For `configured` particles and the cycles of this schedule.
     #[must_use]
-    pub const fn new(configured: u32, budget_ns: u64) -> Self {
+    pub fn new(configured: u32, schedule: Schedule) -> Self {
+        let window = (WINDOW_NS / schedule.period_ns.max(1)).max(WINDOW_CYCLES_MIN);
         Self {
             configured,
             allowed: configured,
-            budget_ns,
+            budget_ns: schedule.budget_ns,
+            window: u32::try_from(window).unwrap_or(u32::MAX),
             cycles: 0,
             warnings: 0,
             shortest_ns: u64::MAX,
@@ -81,7 +88,7 @@ impl Shedder {
             self.calm_windows = 0;
             return self.allow(fewer.max(PARTICLES_MIN));
         }
-        if self.cycles < WINDOW {
+        if self.cycles < self.window {
             return None;
         }
         let is_calm = self.without_room < WARNINGS;
@@ -113,6 +120,15 @@ mod tests {
 
     const BUDGET_NS: u64 = 500_000;
 
+    fn of(configured: u32, period_ns: u64) -> Shedder {
+        let schedule = Schedule {
+            period_ns,
+            deadline_ns: period_ns,
+            budget_ns: BUDGET_NS,
+        };
+        Shedder::new(configured, schedule)
+    }
+
     /// Runs `cycles` cycles that cost `ns_a_particle` for each; returns the allowance at the end.
     fn run(shedder: &mut Shedder, cycles: u32, ns_a_particle: u64) -> u32 {
         for _ in 0..cycles {
@@ -123,10 +139,10 @@ mod tests {
 
     #[test]
     fn particles_are_shed_before_the_budget_is_spent_and_given_back_when_there_is_room() {
-        let mut shedder = Shedder::new(1000, BUDGET_NS);
+        let mut shedder = of(1000, 1_000_000);
         assert_eq!(run(&mut shedder, 2000, 350), 1000, "70 % of the budget");
-        // 90 % of the budget: down to half of it at the fourth such cycle.
-        assert_eq!(run(&mut shedder, 3, 450), 1000);
+        // 90 % of the budget: down to half of it at the tenth such cycle.
+        assert_eq!(run(&mut shedder, 9, 450), 1000);
         assert_eq!(run(&mut shedder, 1, 450), 555);
         assert_eq!(run(&mut shedder, 5000, 450), 555, "it stays there");
         // The work becomes cheaper: 33 %, then 50 % of the budget.
@@ -136,32 +152,31 @@ mod tests {
 
     #[test]
     fn single_stalls_of_the_machine_shed_nothing() {
-        let mut shedder = Shedder::new(1000, BUDGET_NS);
+        let mut shedder = of(1000, 1_000_000);
         for cycle in 0..100_000 {
-            let cycle_ns = if cycle % 100 == 0 { 20_000_000 } else { 50_000 };
+            let cycle_ns = if cycle % 200 == 0 { 20_000_000 } else { 50_000 };
             assert_eq!(shedder.take(cycle_ns), None, "cycle {cycle}");
         }
     }
 
     #[test]
     fn heavy_cycles_between_light_ones_count() {
-        let mut shedder = Shedder::new(1000, BUDGET_NS);
-        let found = (0..400).find_map(|cycle: u32| {
-            let cycle_ns = if cycle.is_multiple_of(50) {
-                480_000
-            } else {
-                5_000
-            };
-            shedder.take(cycle_ns)
-        });
-        assert_eq!(found, Some(520));
+        // An observation each 50 ms, at 1 kHz and at 5 kHz.
+        for (period_ns, each) in [(1_000_000, 50), (200_000, 250)] {
+            let mut shedder = of(1000, period_ns);
+            let found = (0..10 * each).find_map(|cycle: u32| {
+                let is_heavy = cycle.is_multiple_of(each);
+                shedder.take(if is_heavy { 480_000 } else { 5_000 })
+            });
+            assert_eq!(found, Some(520), "{period_ns} ns");
+        }
     }
 
     #[test]
     fn there_are_always_some_particles() {
-        let mut shedder = Shedder::new(1000, BUDGET_NS);
+        let mut shedder = of(1000, 1_000_000);
         assert_eq!(run(&mut shedder, 1000, 1_000_000), PARTICLES_MIN);
-        let mut few = Shedder::new(8, BUDGET_NS);
+        let mut few = of(8, 1_000_000);
         assert_eq!(run(&mut few, 1000, 1_000_000), 8);
     }
 }

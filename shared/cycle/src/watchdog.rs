@@ -5,7 +5,7 @@
 //! output follow its input. A process that has died is the launcher's to see; this finds the ones
 //! that hang, are stopped, or go on repeating themselves.
 
-use vigil_blocks::{Health, ServiceState};
+use vigil_blocks::{Degraded, Health, ServiceState};
 
 /// Window in which missed deadlines are counted, ns.
 const WINDOW_NS: u64 = 1_000_000_000;
@@ -68,21 +68,29 @@ struct Watched {
     reported_ns: u64,
     is_stopping: bool,
     answered: (u64, u64),
-    answered_ns: u64,
+    /// Since when the stage before has moved on and this one has not, ns.
+    behind_since_ns: Option<u64>,
     window_ns: u64,
     window_missed: u64,
     missed: u64,
     period_ns: u64,
+    has_lost_input: bool,
     has_missed_too_many: bool,
-    /// Failed, and told so: nothing more until it is started anew.
-    is_given_up: bool,
+    /// Dead, or failed and told so: nothing more until it is started anew.
+    is_gone: bool,
 }
+
+/// Longest time between two looks, ns. After a longer one nobody can say who was silent meanwhile:
+/// perhaps the whole machine stood still.
+const LOOK_NS_MAX: u64 = 200_000_000;
 
 /// Watches the services of one graph, given in the order of the data.
 #[derive(Debug, Clone)]
 pub struct Watchdog {
     limits: Limits,
     services: Vec<Watched>,
+    looked_ns: u64,
+    is_blind: bool,
 }
 
 impl Watchdog {
@@ -96,6 +104,31 @@ impl Watchdog {
         Self {
             limits,
             services: vec![watched; count],
+            looked_ns: now_ns,
+            is_blind: false,
+        }
+    }
+
+    /// Begins a look at the services. If the last is too long ago, that time does not count, and
+    /// this look finds no failure.
+    pub fn look(&mut self, now_ns: u64) {
+        let since_ns = now_ns.saturating_sub(self.looked_ns);
+        self.looked_ns = now_ns;
+        self.is_blind = since_ns > LOOK_NS_MAX;
+        if self.is_blind {
+            for watched in &mut self.services {
+                watched.started_ns += since_ns;
+                watched.reported_ns += since_ns;
+                watched.window_ns += since_ns;
+                watched.behind_since_ns = None;
+            }
+        }
+    }
+
+    /// The process of a service has died; it will be started anew.
+    pub fn ended(&mut self, service: usize) {
+        if let Some(watched) = self.services.get_mut(service) {
+            watched.is_gone = true;
         }
     }
 
@@ -105,8 +138,6 @@ impl Watchdog {
             *watched = Watched {
                 started_ns: now_ns,
                 old_epoch: watched.epoch,
-                answered: watched.answered,
-                answered_ns: now_ns,
                 ..Watched::default()
             };
         }
@@ -120,58 +151,66 @@ impl Watchdog {
         if health.header.epoch == watched.old_epoch {
             return;
         }
-        if watched.epoch != health.header.epoch {
+        let answered = (health.answered_epoch, health.answered_seq);
+        let is_first = watched.epoch != health.header.epoch;
+        if is_first {
             watched.epoch = health.header.epoch;
             (watched.window_ns, watched.window_missed) = (now_ns, health.missed);
-            watched.answered_ns = now_ns;
         }
         watched.reported_ns = now_ns;
         watched.is_stopping = health.state == ServiceState::Stopping as u32;
+        watched.has_lost_input = health.degraded & Degraded::INPUT_LOST != 0;
         (watched.missed, watched.period_ns) = (health.missed, health.period_ns);
-        let answered = (health.answered_epoch, health.answered_seq);
-        if answered != watched.answered {
-            (watched.answered, watched.answered_ns) = (answered, now_ns);
+        let has_moved = !is_first && answered != watched.answered;
+        watched.answered = answered;
+        if is_first || has_moved {
+            watched.behind_since_ns = None;
+        }
+        if let (true, Some(next)) = (has_moved, self.services.get_mut(service + 1)) {
+            next.behind_since_ns.get_or_insert(now_ns);
         }
     }
 
     /// A service that has failed, and what; each failure is told once.
     pub fn failed(&mut self, now_ns: u64) -> Option<(usize, Supervision)> {
-        (0..self.services.len()).find_map(|service| {
-            let found = self.examine(service, now_ns)?;
-            let watched = &mut self.services[service];
-            watched.is_given_up |= found.needs_restart();
-            Some((service, found))
-        })
-    }
-
-    fn examine(&mut self, service: usize, now_ns: u64) -> Option<Supervision> {
-        let limits = self.limits;
-        let before = service.checked_sub(1).map(|before| self.services[before]);
-        let watched = &mut self.services[service];
-        if watched.is_given_up || watched.is_stopping {
+        if self.is_blind {
             return None;
         }
-        let since = |then_ns: u64| now_ns.saturating_sub(then_ns);
-        if watched.epoch == 0 {
-            let is_late = since(watched.started_ns) > limits.start_up_ns;
-            return is_late.then_some(Supervision::StartUp);
-        }
-        if limits.alive_ns > 0 && since(watched.reported_ns) > limits.alive_ns {
-            return Some(Supervision::Alive);
-        }
-        // It goes on reporting, and what comes before it goes on answering.
-        let behind_ns = watched.answered_ns.saturating_add(limits.logical_ns);
-        let is_left_behind = watched.reported_ns > behind_ns
-            && before.is_some_and(|before| before.answered_ns > behind_ns);
-        if limits.logical_ns > 0 && is_left_behind {
-            return Some(Supervision::Logical);
-        }
-        let misses = limits.missed_share > 0.0 && watched.misses(limits.missed_share, now_ns);
-        misses.then_some(Supervision::Deadline)
+        let limits = self.limits;
+        let mut services = self.services.iter_mut().enumerate();
+        services.find_map(|(service, watched)| {
+            let found = watched.examine(&limits, now_ns)?;
+            watched.is_gone |= found.needs_restart();
+            Some((service, found))
+        })
     }
 }
 
 impl Watched {
+    fn examine(&mut self, limits: &Limits, now_ns: u64) -> Option<Supervision> {
+        if self.is_gone || self.is_stopping {
+            return None;
+        }
+        let since = |then_ns: u64| now_ns.saturating_sub(then_ns);
+        if self.epoch == 0 {
+            let is_late = since(self.started_ns) > limits.start_up_ns;
+            return is_late.then_some(Supervision::StartUp);
+        }
+        if limits.alive_ns > 0 && since(self.reported_ns) > limits.alive_ns {
+            return Some(Supervision::Alive);
+        }
+        // It goes on reporting all the while: silence is another failure.
+        let stood_still_ns = self
+            .behind_since_ns
+            .map_or(0, |behind_ns| self.reported_ns.saturating_sub(behind_ns));
+        if limits.logical_ns > 0 && stood_still_ns > limits.logical_ns {
+            return Some(Supervision::Logical);
+        }
+        let misses = limits.missed_share > 0.0 && self.misses(limits.missed_share, now_ns);
+        // Without input it can be in time for nothing.
+        (misses && !self.has_lost_input).then_some(Supervision::Deadline)
+    }
+
     /// True once for each time that a window has too many misses after one that had not.
     fn misses(&mut self, share: f64, now_ns: u64) -> bool {
         let window_ns = now_ns.saturating_sub(self.window_ns);
@@ -236,6 +275,7 @@ mod tests {
                         self.watchdog.take(service, health, self.now_ns);
                     }
                 }
+                self.watchdog.look(self.now_ns);
                 while let Some((service, what)) = self.watchdog.failed(self.now_ns) {
                     found.push((self.now_ns / MS, service, what));
                 }
@@ -313,5 +353,74 @@ mod tests {
         assert!(!found[0].2.needs_restart());
         assert_eq!(misses(&mut services, 3000, 0), []);
         assert_eq!(misses(&mut services, 3000, 5).len(), 1, "a second time");
+    }
+
+    #[test]
+    fn an_outage_of_one_service_is_not_held_against_those_behind_it() {
+        let mut services = Services::new();
+        services.run(1000, |_, _| true);
+        // The second is silent, and those behind it have nothing to answer.
+        let rest = services.health[2].answered_seq;
+        let mut still = |service: usize, health: &mut Health| {
+            if service == 2 {
+                health.answered_seq = rest;
+            }
+            service != 1
+        };
+        let found = services.run(3000, &mut still);
+        assert_eq!(found, [(1550, 1, Supervision::Alive)]);
+        services.watchdog.started(1, services.now_ns);
+        assert_eq!(services.run(1000, &mut still), []);
+        // It comes back and answers at once; the one behind it does so a report later.
+        services.health[1].header.epoch = 78;
+        let mut first = true;
+        let found = services.run(5000, |service, health| {
+            if service == 2 && std::mem::take(&mut first) {
+                health.answered_seq = rest;
+            }
+            true
+        });
+        assert_eq!(found, []);
+    }
+
+    #[test]
+    fn a_source_that_goes_on_after_a_rest_fails_nobody() {
+        let mut services = Services::new();
+        services.run(1000, |_, _| true);
+        let rest = services.health[0].answered_seq;
+        let found = services.run(5000, |_, health| {
+            health.answered_seq = rest;
+            true
+        });
+        assert_eq!(found, []);
+        assert_eq!(services.run(5000, |_, _| true), []);
+    }
+
+    #[test]
+    fn time_in_which_nobody_looked_is_held_against_nobody() {
+        let mut services = Services::new();
+        services.run(1000, |_, _| true);
+        services.now_ns += 5000 * MS;
+        // Only the first has reported when the look comes.
+        let found = services.run(50, |service, _| service == 0);
+        assert_eq!(found, []);
+        assert_eq!(services.run(400, |service, _| service == 0), []);
+        let found = services.run(200, |service, _| service == 0);
+        assert_eq!(found.len(), 2, "{found:?}");
+    }
+
+    #[test]
+    fn a_dead_service_is_not_called_silent_and_one_without_input_not_late() {
+        let mut services = Services::new();
+        services.run(1000, |_, _| true);
+        services.watchdog.ended(1);
+        let found = services.run(5000, |service, health| {
+            if service == 2 {
+                health.degraded = Degraded::INPUT_LOST;
+                health.missed += 5;
+            }
+            service != 1
+        });
+        assert_eq!(found, []);
     }
 }

@@ -104,7 +104,7 @@ impl World {
             },
             cycle: cycle
                 .with_on_miss(on_miss)
-                .with_shedder(Shedder::new(1000, SCHEDULE.budget_ns))
+                .with_shedder(Shedder::new(1000, SCHEDULE))
                 .with_stamps(Stamps::new(8)),
             clock,
             k: 0,
@@ -201,7 +201,7 @@ fn particles_are_shed_before_a_deadline_is_missed_and_that_is_told() {
     assert_eq!((health.particles, health.particles_configured), (600, 1000));
     assert_eq!(health.degraded, Degraded::FEWER_PARTICLES);
     world.worker.ns_a_particle = 100;
-    for _ in 0..3000 {
+    for _ in 0..9000 {
         assert!(world.instant(true).is_continue());
     }
     assert_eq!(
