@@ -33,6 +33,8 @@ const OBSERVE_WORD: &str = "observe";
 const WARM_UP_S: f64 = 2.0;
 /// Interval at which an observer of the last kind is killed and another started.
 const KILL_EVERY: Duration = Duration::from_secs(2);
+/// Late wake-ups of a canary that are kept.
+const CANARY_KEPT: usize = 1_000_000;
 /// The reader of the actions runs above ordinary processes and below the graph.
 const READER_PRIORITY: u8 = 10;
 
@@ -139,17 +141,14 @@ fn measure(args: &Args, folder: &Path) -> Result<Vec<[Half; 2]>, Box<dyn Error>>
         is_fifo: true,
     };
     let prepared = Prepared::new(change, folder)?;
-    let mut cores: Vec<usize> = prepared.wanted().iter().map(|w| w.core).collect();
-    cores.sort_unstable();
-    cores.dedup();
-    let _load = Running::start(args.load, &cores, folder)?;
+    let _load = Running::start(args.load, &prepared.cores(), folder)?;
     let mut pairs = Vec::new();
     for pair in 0..args.pairs {
         eprintln!("pair {} of {}", pair + 1, args.pairs);
         // The order changes from pair to pair: a drift of the machine falls on both alike.
         let first_with = pair % 2 == 1;
-        let one = half(args, &prepared, (first_with, folder), &cores)?;
-        let two = half(args, &prepared, (!first_with, folder), &cores)?;
+        let one = half(args, &prepared, (first_with, folder))?;
+        let two = half(args, &prepared, (!first_with, folder))?;
         pairs.push(if first_with { [two, one] } else { [one, two] });
     }
     Ok(pairs)
@@ -160,18 +159,9 @@ fn half(
     args: &Args,
     prepared: &Prepared,
     (with, folder): (bool, &Path),
-    cores: &[usize],
 ) -> Result<Half, Box<dyn Error>> {
     let setup = prepared.setup();
-    let highest = prepared.wanted().iter().map(|w| w.priority).max();
-    let canary = |&core: &usize| {
-        let wanted = Wanted {
-            core,
-            priority: highest.unwrap_or(0) + 1,
-        };
-        Canary::start(wanted, setup.period_ns() / 4, 1_000_000)
-    };
-    let canaries = cores.iter().map(canary).collect::<Result<Vec<_>, _>>()?;
+    let canaries = prepared.canaries(CANARY_KEPT)?;
     let recorded = folder.display().to_string();
     let options: &[&str] = match args.difference {
         Difference::Observers => &[],
@@ -208,9 +198,7 @@ fn half(
     let (cycles, lost) = reader.join().map_err(|_| "the reader has died")??;
     let seen: Vec<_> = canaries.into_iter().filter_map(Canary::finish).collect();
     let records: Vec<Record<'_>> = seen.iter().map(Record::of).collect();
-    let deadline = setup.file.services.supervisor.deadline_percent * 1e-2;
-    let deadline_ns = (setup.period_ns() as f64 * deadline).round() as u64;
-    let missed = misses(&cycles, deadline_ns, &records);
+    let missed = misses(&cycles, prepared.deadline_ns(), &records);
     let machine = missed.iter().filter(|m| m.is_machine).count();
     let mut end_to_end = Latency::new()?;
     cycles

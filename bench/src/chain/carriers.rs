@@ -72,11 +72,11 @@ impl Carrier {
             Self::SharedMemory => payload::incoming(shared, before, size)?,
             Self::Datagram => Box::new(DatagramReader {
                 socket: UnixDatagram::bind(&path)?,
-                buffer: vec![0; HEAD + size],
+                message: Message::new(size),
             }),
             Self::Pipe => Box::new(PipeReader {
                 pipe: open_pipe(&path, false)?,
-                buffer: vec![0; HEAD + size],
+                message: Message::new(size),
             }),
             Self::Queue => return Err("a queue lies within one process".into()),
         })
@@ -97,7 +97,7 @@ impl Carrier {
             Self::SharedMemory => payload::outgoing(shared, stage, size)?,
             Self::Queue => return Err("a queue lies within one process".into()),
             _ if is_last => Box::new(Sink {
-                buffer: vec![0; HEAD + size],
+                message: Message::new(size),
             }),
             Self::Datagram => {
                 let socket = UnixDatagram::unbound()?;
@@ -105,37 +105,60 @@ impl Carrier {
                 socket.connect(&path)?;
                 Box::new(DatagramWriter {
                     socket,
-                    buffer: vec![0; HEAD + size],
+                    message: Message::new(size),
                 })
             }
             Self::Pipe => Box::new(PipeWriter {
                 pipe: open_pipe(&path, true)?,
-                buffer: vec![0; HEAD + size],
+                message: Message::new(size),
             }),
         })
     }
 }
 
 /// Bytes before the payload of a message: two instants.
-pub const HEAD: usize = 16;
+const HEAD: usize = 16;
 
-/// Writes the instants of a message.
-pub fn stamp(buffer: &mut [u8], t_schedule_ns: u64) -> u64 {
-    let t_publish_ns = Monotonic.now_ns();
-    buffer[..8].copy_from_slice(&t_schedule_ns.to_le_bytes());
-    buffer[8..HEAD].copy_from_slice(&t_publish_ns.to_le_bytes());
-    t_publish_ns
-}
+/// A block with its instants before it, for carriers that copy or hand on bytes.
+#[derive(Debug, Default)]
+pub struct Message(pub Vec<u8>);
 
-/// Reads the instants of a message.
-#[must_use]
-pub fn instants(buffer: &[u8]) -> (u64, u64) {
-    let number = |at: usize| {
-        let mut bytes = [0; 8];
-        bytes.copy_from_slice(&buffer[at..at + 8]);
-        u64::from_le_bytes(bytes)
-    };
-    (number(0), number(8))
+impl Message {
+    /// For a block of `size` bytes.
+    #[must_use]
+    pub fn new(size: usize) -> Self {
+        Self(vec![0; HEAD + size])
+    }
+
+    /// Fills the block with one byte.
+    pub fn fill(&mut self, byte: u8) {
+        self.0[HEAD..].fill(byte);
+    }
+
+    /// Writes the instants; returns that of now, the publication's.
+    pub fn stamp(&mut self, t_schedule_ns: u64) -> u64 {
+        let t_publish_ns = Monotonic.now_ns();
+        self.0[..8].copy_from_slice(&t_schedule_ns.to_le_bytes());
+        self.0[8..HEAD].copy_from_slice(&t_publish_ns.to_le_bytes());
+        t_publish_ns
+    }
+
+    /// Reads the instants.
+    #[must_use]
+    pub fn instants(&self) -> (u64, u64) {
+        let number = |at: usize| {
+            let mut bytes = [0; 8];
+            bytes.copy_from_slice(&self.0[at..at + 8]);
+            u64::from_le_bytes(bytes)
+        };
+        (number(0), number(8))
+    }
+
+    /// See [`Incoming::checksum`].
+    #[must_use]
+    pub fn checksum(&self) -> u64 {
+        sum_lines(&self.0[HEAD..])
+    }
 }
 
 /// Sum over one byte of each cache line.
@@ -194,52 +217,52 @@ impl Outgoing for FutexWriter {
 
 /// The end of a chain over copies.
 struct Sink {
-    buffer: Vec<u8>,
+    message: Message,
 }
 
 impl Outgoing for Sink {
     fn fill(&mut self, byte: u8) {
-        self.buffer[HEAD..].fill(byte);
+        self.message.fill(byte);
     }
 
     fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>> {
-        Ok(stamp(&mut self.buffer, t_schedule_ns))
+        Ok(self.message.stamp(t_schedule_ns))
     }
 }
 
 struct DatagramReader {
     socket: UnixDatagram,
-    buffer: Vec<u8>,
+    message: Message,
 }
 
 impl Incoming for DatagramReader {
     fn receive(&mut self, limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>> {
         self.socket.set_read_timeout(Some(limit))?;
-        match self.socket.recv(&mut self.buffer) {
-            Ok(_) => Ok(Some(instants(&self.buffer))),
+        match self.socket.recv(&mut self.message.0) {
+            Ok(_) => Ok(Some(self.message.instants())),
             Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => Ok(None),
             Err(error) => Err(error.into()),
         }
     }
 
     fn checksum(&self) -> u64 {
-        sum_lines(&self.buffer[HEAD..])
+        self.message.checksum()
     }
 }
 
 struct DatagramWriter {
     socket: UnixDatagram,
-    buffer: Vec<u8>,
+    message: Message,
 }
 
 impl Outgoing for DatagramWriter {
     fn fill(&mut self, byte: u8) {
-        self.buffer[HEAD..].fill(byte);
+        self.message.fill(byte);
     }
 
     fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>> {
-        let t_publish_ns = stamp(&mut self.buffer, t_schedule_ns);
-        self.socket.send(&self.buffer)?;
+        let t_publish_ns = self.message.stamp(t_schedule_ns);
+        self.socket.send(&self.message.0)?;
         Ok(t_publish_ns)
     }
 }
@@ -264,37 +287,37 @@ fn open_pipe(path: &Path, is_writer: bool) -> Result<std::fs::File, Box<dyn Erro
 
 struct PipeReader {
     pipe: std::fs::File,
-    buffer: Vec<u8>,
+    message: Message,
 }
 
 impl Incoming for PipeReader {
     /// Waits until the writer goes: a pipe has no time limit.
     fn receive(&mut self, _limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>> {
-        match self.pipe.read_exact(&mut self.buffer) {
-            Ok(()) => Ok(Some(instants(&self.buffer))),
+        match self.pipe.read_exact(&mut self.message.0) {
+            Ok(()) => Ok(Some(self.message.instants())),
             Err(e) if e.kind() == ErrorKind::UnexpectedEof => Ok(None),
             Err(error) => Err(error.into()),
         }
     }
 
     fn checksum(&self) -> u64 {
-        sum_lines(&self.buffer[HEAD..])
+        self.message.checksum()
     }
 }
 
 struct PipeWriter {
     pipe: std::fs::File,
-    buffer: Vec<u8>,
+    message: Message,
 }
 
 impl Outgoing for PipeWriter {
     fn fill(&mut self, byte: u8) {
-        self.buffer[HEAD..].fill(byte);
+        self.message.fill(byte);
     }
 
     fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>> {
-        let t_publish_ns = stamp(&mut self.buffer, t_schedule_ns);
-        self.pipe.write_all(&self.buffer)?;
+        let t_publish_ns = self.message.stamp(t_schedule_ns);
+        self.pipe.write_all(&self.message.0)?;
         Ok(t_publish_ns)
     }
 }

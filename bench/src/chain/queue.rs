@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
 use super::Role;
-use super::carriers::{HEAD, Incoming, Outgoing, instants, stamp, sum_lines};
+use super::carriers::{Incoming, Message, Outgoing};
 use crate::latency::cycles::STAGES;
 
 /// Blocks that may wait.
@@ -20,18 +20,18 @@ pub fn run(roles: &[Role; STAGES]) -> Result<(), Box<dyn Error>> {
         let (full, waiting) = sync_channel(DEPTH);
         let (empty, used) = sync_channel(DEPTH + 1);
         for _ in 0..DEPTH {
-            empty.send(vec![0; HEAD + size])?;
+            empty.send(Message::new(size))?;
         }
         let is_last = role.stage + 1 == STAGES;
         writers.push(QueueWriter {
-            block: vec![0; HEAD + size],
+            block: Message::new(size),
             used,
             full: (!is_last).then_some(full),
         });
         readers.push(Some(QueueReader {
             waiting,
             empty,
-            block: Vec::new(),
+            block: Message::default(),
         }));
     }
     std::thread::scope(|scope| {
@@ -54,9 +54,9 @@ pub fn run(roles: &[Role; STAGES]) -> Result<(), Box<dyn Error>> {
 }
 
 struct QueueReader {
-    waiting: Receiver<Vec<u8>>,
-    empty: SyncSender<Vec<u8>>,
-    block: Vec<u8>,
+    waiting: Receiver<Message>,
+    empty: SyncSender<Message>,
+    block: Message,
 }
 
 impl Incoming for QueueReader {
@@ -66,30 +66,30 @@ impl Incoming for QueueReader {
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => return Ok(None),
         };
         let used = std::mem::replace(&mut self.block, next);
-        if !used.is_empty() {
+        if !used.0.is_empty() {
             let _ = self.empty.try_send(used);
         }
-        Ok(Some(instants(&self.block)))
+        Ok(Some(self.block.instants()))
     }
 
     fn checksum(&self) -> u64 {
-        sum_lines(&self.block[HEAD..])
+        self.block.checksum()
     }
 }
 
 struct QueueWriter {
-    block: Vec<u8>,
-    used: Receiver<Vec<u8>>,
-    full: Option<SyncSender<Vec<u8>>>,
+    block: Message,
+    used: Receiver<Message>,
+    full: Option<SyncSender<Message>>,
 }
 
 impl Outgoing for QueueWriter {
     fn fill(&mut self, byte: u8) {
-        self.block[HEAD..].fill(byte);
+        self.block.fill(byte);
     }
 
     fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>> {
-        let t_publish_ns = stamp(&mut self.block, t_schedule_ns);
+        let t_publish_ns = self.block.stamp(t_schedule_ns);
         if let Some(full) = &self.full {
             let next = self.used.recv()?;
             full.send(std::mem::replace(&mut self.block, next))?;

@@ -123,12 +123,9 @@ impl Spec {
             period_ns,
             cycles: (floor_s * self.rate_hz) as u64,
         };
-        let mut cores: Vec<usize> = wanted.iter().map(|w| w.core).collect();
-        cores.sort_unstable();
-        cores.dedup();
-        let load = Running::start(self.load, &cores, folder)?;
+        let load = Running::start(self.load, &prepared.cores(), folder)?;
         std::thread::sleep(LOAD_START);
-        let canaries = canaries(&cores, &wanted, period_ns)?;
+        let canaries = prepared.canaries(CANARY_KEPT)?;
         let before = floor.run(folder)?;
         let ticks = Ticks::now();
         let ran = prepared.run(self.seconds, folder)?;
@@ -136,9 +133,7 @@ impl Spec {
         let after = floor.run(folder)?;
         let canaries: Vec<Seen> = canaries.into_iter().filter_map(Canary::finish).collect();
         load.finish()?;
-        let deadline_percent = prepared.setup().file.services.supervisor.deadline_percent;
-        let deadline_ns = (period_ns as f64 * deadline_percent * 1e-2).round() as u64;
-        let times = (period_ns, deadline_ns);
+        let times = (period_ns, prepared.deadline_ns());
         self.judge((ran, [before, after]), canaries, times, (system, wanted))
     }
 
@@ -210,24 +205,6 @@ fn check(
         return Err(format!("canaries could not be placed above the graph: {why}").into());
     }
     Ok(())
-}
-
-/// A canary on each core, one priority above what runs there.
-fn canaries(
-    cores: &[usize],
-    wanted: &[Wanted; STAGES],
-    period_ns: u64,
-) -> Result<Vec<Canary>, Box<dyn Error>> {
-    let highest = wanted.iter().map(|w| w.priority).max().unwrap_or(0);
-    let canary_ns = (period_ns / 4).clamp(100_000, 1_000_000);
-    let start = |&core: &usize| {
-        let wanted = Wanted {
-            core,
-            priority: highest.max(1) + 1,
-        };
-        Ok(Canary::start(wanted, canary_ns, CANARY_KEPT)?)
-    };
-    cores.iter().map(start).collect()
 }
 
 /// Percentiles in us.

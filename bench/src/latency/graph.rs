@@ -6,9 +6,11 @@ use std::process::{Child, Command, Stdio};
 
 use serde_json::Value;
 use toml::Table;
+use vigil_cycle::canary::Canary;
 use vigil_cycle::placement::Wanted;
+use vigil_cycle::serve::Leave;
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{CycleStamps, stamps};
+use vigil_cycle::{CycleStamps, PortError, stamps};
 use vigil_setup::{GraphArgs, Setup};
 
 use super::cycles::{STAGE_NAMES, STAGES};
@@ -94,6 +96,35 @@ impl Prepared {
                 priority: service.priority,
             }
         })
+    }
+
+    /// Cores of the services, each once.
+    #[must_use]
+    pub fn cores(&self) -> Vec<usize> {
+        let mut cores = self.wanted().map(|w| w.core).to_vec();
+        cores.sort_unstable();
+        cores.dedup();
+        cores
+    }
+
+    /// Deadline of the last stage after the schedule, ns.
+    #[must_use]
+    pub fn deadline_ns(&self) -> u64 {
+        let plan = self.setup.plan(ServiceName::Supervisor, Leave::default());
+        plan.schedule.deadline_ns
+    }
+
+    /// A canary on each core, one priority above what runs there, with room for `capacity` late
+    /// wake-ups.
+    ///
+    /// # Errors
+    /// If one cannot be started.
+    pub fn canaries(&self, capacity: usize) -> Result<Vec<Canary>, PortError> {
+        let highest = self.wanted().iter().map(|w| w.priority).max().unwrap_or(0);
+        let priority = highest.max(1) + 1;
+        let period_ns = (self.setup.period_ns() / 4).clamp(100_000, 1_000_000);
+        let start = |core| Canary::start(Wanted { core, priority }, period_ns, capacity);
+        self.cores().into_iter().map(start).collect()
     }
 
     /// Where the graph file lies.

@@ -1,7 +1,5 @@
 //! Services that live and have failed all the same: found, told, ended, so that they restart.
 
-use std::collections::BTreeMap;
-
 use vigil_blocks::{Event, EventKind};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::watchdog::Limits;
@@ -17,8 +15,6 @@ use crate::words;
 pub struct Supervisor {
     watchdog: Watchdog,
     services: Vec<ServiceName>,
-    /// Reports seen of each service: (epoch, sequence number) of the last.
-    seen: BTreeMap<&'static str, (u64, u64)>,
 }
 
 impl Supervisor {
@@ -29,7 +25,6 @@ impl Supervisor {
         Self {
             watchdog: Watchdog::new(limits, services.len(), Monotonic.now_ns()),
             services,
-            seen: BTreeMap::new(),
         }
     }
 
@@ -37,25 +32,15 @@ impl Supervisor {
     pub fn look_after(&mut self, observer: &mut Observer, children: &mut Children) {
         let now_ns = Monotonic.now_ns();
         self.watchdog.look(now_ns);
-        for name in children.dead() {
-            if let Some(service) = self.services.iter().position(|s| *s == name) {
-                self.watchdog.ended(service);
-            }
+        let position = |name| self.services.iter().position(|s| *s == name);
+        for service in children.dead().filter_map(position) {
+            self.watchdog.ended(service);
         }
-        for name in children.take_restarted() {
-            if let Some(service) = self.services.iter().position(|s| *s == name) {
-                self.watchdog.started(service, now_ns);
-            }
+        for service in children.take_restarted().into_iter().filter_map(position) {
+            self.watchdog.started(service, now_ns);
         }
         for watched in observer.watched() {
-            let Some(health) = watched.latest.as_deref() else {
-                continue;
-            };
-            let identity = (health.header.epoch, health.header.seq);
-            if self.seen.insert(watched.name.as_str(), identity) == Some(identity) {
-                continue;
-            }
-            if let Some(service) = self.services.iter().position(|s| *s == watched.name) {
+            if let (Some(service), Some(health)) = (position(watched.name), &watched.latest) {
                 self.watchdog.take(service, health, now_ns);
             }
         }

@@ -11,11 +11,11 @@ use crate::live::{self, Ended, Run};
 use crate::on_miss::OnMiss;
 use crate::placement::Wanted;
 use crate::port::{Graph, Link, PortError};
+use crate::recorder::Recorder;
 use crate::report::{ReportError, RunReport};
 use crate::shed::Shedder;
 use crate::source::{Source, SourceCycle};
-use crate::stage::{Stage, StageCycle, Timing};
-use crate::stamps::Stamps;
+use crate::stage::{Stage, StageCycle};
 use crate::topic::{ServiceName, Topic};
 
 /// Delay between the opened ports and the first frame of a source, ns: time for the others.
@@ -51,6 +51,20 @@ pub struct Leave {
     pub stamps: Option<(PathBuf, usize)>,
     /// No histograms: the report's are empty.
     pub no_timing: bool,
+}
+
+impl Leave {
+    /// The recorder that keeps what is to be left.
+    fn recorder(&self) -> Result<Recorder, PortError> {
+        let mut recorder = Recorder::new()?;
+        if self.no_timing {
+            recorder = recorder.without_timing();
+        }
+        if let Some((_, capacity)) = &self.stamps {
+            recorder = recorder.with_stamps(*capacity);
+        }
+        Ok(recorder)
+    }
 }
 
 /// Why a service ended.
@@ -103,18 +117,14 @@ pub fn stage<T: vigil_blocks::Block, S: Stage>(
     };
     let listener = link.listener::<T>(input)?;
     let monitor = DeadlineMonitor::new(plan.schedule);
-    let mut cycle = StageCycle::new(monitor, health)?.with_on_miss(plan.on_miss);
-    if plan.leave.no_timing {
-        cycle = cycle.without_timing();
-    }
-    if let Some((_, capacity)) = &plan.leave.stamps {
-        cycle = cycle.with_stamps(Stamps::new(*capacity));
-    }
+    let mut cycle = StageCycle::new(monitor, health)?
+        .with_on_miss(plan.on_miss)
+        .with_recorder(plan.leave.recorder()?);
     if stage.particles() > 0 {
         cycle = cycle.with_shedder(Shedder::new(stage.particles(), plan.schedule));
     }
     let run = live::run_stage(&mut cycle, &mut stage, &listener, plan.spin_ns)?;
-    leave(plan, cycle.timing(), cycle.stamps(), run)
+    leave(plan, cycle.recorder(), run)
 }
 
 /// Runs a source until SIGINT or SIGTERM.
@@ -129,15 +139,11 @@ pub fn source<S: Source>(
     let mut source = build(&graph)?;
     let first_ns = Monotonic.now_ns() + START_DELAY_NS;
     let monitor = DeadlineMonitor::new(plan.schedule);
-    let mut cycle = SourceCycle::new(monitor, health, first_ns)?.with_on_miss(plan.on_miss);
-    if plan.leave.no_timing {
-        cycle = cycle.without_timing();
-    }
-    if let Some((_, capacity)) = &plan.leave.stamps {
-        cycle = cycle.with_stamps(Stamps::new(*capacity));
-    }
+    let mut cycle = SourceCycle::new(monitor, health, first_ns)?
+        .with_on_miss(plan.on_miss)
+        .with_recorder(plan.leave.recorder()?);
     let run = live::run_source(&mut cycle, &mut source, plan.spin_ns)?;
-    leave(plan, cycle.timing(), cycle.stamps(), run)
+    leave(plan, cycle.recorder(), run)
 }
 
 fn open(plan: &Plan) -> Result<(Graph, HealthBoard), PortError> {
@@ -149,17 +155,13 @@ fn open(plan: &Plan) -> Result<(Graph, HealthBoard), PortError> {
     Ok((graph, health))
 }
 
-fn leave(
-    plan: &Plan,
-    timing: &Timing,
-    stamps: Option<&Stamps>,
-    run: Run,
-) -> Result<(), ServeError> {
-    if let (Some((path, _)), Some(stamps)) = (&plan.leave.stamps, stamps) {
+fn leave(plan: &Plan, recorder: &Recorder, run: Run) -> Result<(), ServeError> {
+    if let (Some((path, _)), Some(stamps)) = (&plan.leave.stamps, recorder.stamps()) {
         stamps.write(path)?;
     }
     if let Some(path) = &plan.leave.report {
-        RunReport::new(plan.service.as_str(), timing, run.page_faults)?.write(path)?;
+        let service = plan.service.as_str();
+        RunReport::new(service, &recorder.timing, run.page_faults)?.write(path)?;
     }
     match run.ended {
         Ended::Stopped => Ok(()),

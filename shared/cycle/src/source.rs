@@ -9,8 +9,8 @@ use crate::deadline::DeadlineMonitor;
 use crate::health::HealthBoard;
 use crate::on_miss::{Lateness, OnMiss};
 use crate::port::PortError;
-use crate::stage::Timing;
-use crate::stamps::{CycleStamps, Stamps};
+use crate::recorder::Recorder;
+use crate::stamps::CycleStamps;
 
 /// What a source did at an instant of its schedule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,12 +45,11 @@ pub trait Source {
 pub struct SourceCycle {
     monitor: DeadlineMonitor,
     health: HealthBoard,
-    timing: Timing,
+    recorder: Recorder,
     next_ns: u64,
     ended: bool,
     on_miss: OnMiss,
     lateness: Lateness,
-    stamps: Option<Stamps>,
 }
 
 impl SourceCycle {
@@ -66,12 +65,11 @@ impl SourceCycle {
         Ok(Self {
             monitor,
             health,
-            timing: Timing::new()?,
+            recorder: Recorder::new()?,
             next_ns: first_ns,
             ended: false,
             on_miss: OnMiss::default(),
             lateness: Lateness::default(),
-            stamps: None,
         })
     }
 
@@ -82,17 +80,10 @@ impl SourceCycle {
         self
     }
 
-    /// The same cycle, which keeps the stamps of its last cycles.
+    /// The same cycle with this recorder.
     #[must_use]
-    pub fn with_stamps(mut self, stamps: Stamps) -> Self {
-        self.stamps = Some(stamps);
-        self
-    }
-
-    /// The same cycle without histograms: what they cost can be measured.
-    #[must_use]
-    pub fn without_timing(mut self) -> Self {
-        self.timing = self.timing.switched_off();
+    pub fn with_recorder(mut self, recorder: Recorder) -> Self {
+        self.recorder = recorder;
         self
     }
 
@@ -130,7 +121,8 @@ impl SourceCycle {
         if !self.ended && woken_ns >= self.next_ns {
             let slips = (woken_ns - self.next_ns) / self.monitor.period_ns();
             let schedule_ns = self.next_ns + slips * self.monitor.period_ns();
-            self.timing.wake_up.record(woken_ns - schedule_ns);
+            let timing = &mut self.recorder.timing;
+            timing.wake_up.record(woken_ns - schedule_ns);
             match source.produce(schedule_ns, clock)? {
                 Produced::Nothing => {}
                 Produced::End => self.ended = true,
@@ -152,22 +144,17 @@ impl SourceCycle {
     }
 
     fn account(&mut self, schedule_ns: u64, woken_ns: u64, published_ns: u64, slips: u64) {
-        let missed =
-            self.monitor
-                .published(schedule_ns, published_ns, &mut self.timing.from_schedule);
-        let cycle_ns = published_ns.saturating_sub(woken_ns);
-        self.timing.step.record(cycle_ns);
+        let latency = &mut self.recorder.timing.from_schedule;
+        let missed = self.monitor.published(schedule_ns, published_ns, latency);
+        let cycle_ns = self.recorder.keep(CycleStamps {
+            t_schedule_ns: schedule_ns,
+            t_input_ns: schedule_ns,
+            t_wake_ns: woken_ns,
+            t_publish_ns: published_ns,
+        });
         let seq = self.health.view().cycles;
         self.health.count_cycle(cycle_ns, seq);
         self.health.block().answered_seq = seq;
-        if let Some(stamps) = &mut self.stamps {
-            stamps.push(CycleStamps {
-                t_schedule_ns: schedule_ns,
-                t_input_ns: schedule_ns,
-                t_wake_ns: woken_ns,
-                t_publish_ns: published_ns,
-            });
-        }
         self.health.enter(ServiceState::Running);
         let (total, accounted_ns) = (self.monitor.missed(), self.monitor.accounted_ns());
         let health = self.health.block();
@@ -188,16 +175,10 @@ impl SourceCycle {
         self.health.publish(clock)
     }
 
-    /// The histograms so far.
+    /// What it has kept of its cycles.
     #[must_use]
-    pub const fn timing(&self) -> &Timing {
-        &self.timing
-    }
-
-    /// The stamps of the last cycles, if they are kept.
-    #[must_use]
-    pub const fn stamps(&self) -> Option<&Stamps> {
-        self.stamps.as_ref()
+    pub const fn recorder(&self) -> &Recorder {
+        &self.recorder
     }
 
     /// The board.

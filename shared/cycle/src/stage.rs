@@ -11,8 +11,9 @@ use crate::input::{Arrival, InputAccount};
 use crate::latency::Latency;
 use crate::on_miss::{Lateness, OnMiss};
 use crate::port::{PortError, Stamp};
+use crate::recorder::Recorder;
 use crate::shed::Shedder;
-use crate::stamps::{CycleStamps, Stamps};
+use crate::stamps::CycleStamps;
 
 /// Misses in a row after which the input counts as lost, and the service as degraded.
 const LOST_AFTER_MISSES: u64 = 3;
@@ -146,14 +147,13 @@ pub struct StageCycle {
     monitor: DeadlineMonitor,
     account: InputAccount,
     health: HealthBoard,
-    timing: Timing,
+    recorder: Recorder,
     last_cause: Cause,
     last_stamp: Stamp,
     misses_in_a_row: u64,
     on_miss: OnMiss,
     lateness: Lateness,
     shedder: Option<Shedder>,
-    stamps: Option<Stamps>,
     /// From the schedule to the publication of the last input, ns.
     input_offset_ns: u64,
 }
@@ -168,14 +168,13 @@ impl StageCycle {
             monitor,
             account: InputAccount::default(),
             health,
-            timing: Timing::new()?,
+            recorder: Recorder::new()?,
             last_cause: Cause::default(),
             last_stamp: Stamp::default(),
             misses_in_a_row: 0,
             on_miss: OnMiss::default(),
             lateness: Lateness::default(),
             shedder: None,
-            stamps: None,
             input_offset_ns: 0,
         })
     }
@@ -194,17 +193,10 @@ impl StageCycle {
         self
     }
 
-    /// The same cycle, which keeps the stamps of its last cycles.
+    /// The same cycle with this recorder.
     #[must_use]
-    pub fn with_stamps(mut self, stamps: Stamps) -> Self {
-        self.stamps = Some(stamps);
-        self
-    }
-
-    /// The same cycle without histograms: what they cost can be measured.
-    #[must_use]
-    pub fn without_timing(mut self) -> Self {
-        self.timing = self.timing.switched_off();
+    pub fn with_recorder(mut self, recorder: Recorder) -> Self {
+        self.recorder = recorder;
         self
     }
 
@@ -268,7 +260,7 @@ impl StageCycle {
             overdue += self.monitor.published(
                 stamp.t_schedule_ns,
                 published_ns,
-                &mut self.timing.from_schedule,
+                &mut self.recorder.timing.from_schedule,
             );
             (self.last_cause, self.last_stamp) = (cause, stamp);
         } else if overdue > 0 {
@@ -286,23 +278,20 @@ impl StageCycle {
 
     /// Notes the times of a cycle that answered the input behind `newest`.
     fn answered(&mut self, newest: &Header, cause: Cause, [woken_ns, published_ns]: [u64; 2]) {
-        self.timing
+        let timing = &mut self.recorder.timing;
+        timing
             .wake_up
             .record(woken_ns.saturating_sub(newest.t_publish_ns));
-        let cycle_ns = published_ns.saturating_sub(woken_ns);
-        self.timing.step.record(cycle_ns);
+        let cycle_ns = self.recorder.keep(CycleStamps {
+            t_schedule_ns: newest.t_schedule_ns,
+            t_input_ns: newest.t_publish_ns,
+            t_wake_ns: woken_ns,
+            t_publish_ns: published_ns,
+        });
         self.health.count_cycle(cycle_ns, newest.seq);
         self.input_offset_ns = newest.t_publish_ns.saturating_sub(newest.t_schedule_ns);
         let health = self.health.block();
         (health.answered_epoch, health.answered_seq) = (cause.frame_epoch, cause.frame_seq);
-        if let Some(stamps) = &mut self.stamps {
-            stamps.push(CycleStamps {
-                t_schedule_ns: newest.t_schedule_ns,
-                t_input_ns: newest.t_publish_ns,
-                t_wake_ns: woken_ns,
-                t_publish_ns: published_ns,
-            });
-        }
     }
 
     /// The deadline has passed without input: what can be said without it, if that is wanted.
@@ -393,16 +382,10 @@ impl StageCycle {
         self.health.publish(clock)
     }
 
-    /// The histograms so far.
+    /// What it has kept of its cycles.
     #[must_use]
-    pub const fn timing(&self) -> &Timing {
-        &self.timing
-    }
-
-    /// The stamps of the last cycles, if they are kept.
-    #[must_use]
-    pub const fn stamps(&self) -> Option<&Stamps> {
-        self.stamps.as_ref()
+    pub const fn recorder(&self) -> &Recorder {
+        &self.recorder
     }
 
     /// The board.

@@ -10,8 +10,8 @@ use vigil_cycle::placement::{Wanted, read_back};
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    Clock, DeadlineMonitor, Graph, HealthBoard, Intake, OnMiss, PortError, Receiver, Schedule,
-    Sender, Shedder, Stage, StageCycle, Stamp, Stamps, Topic, VirtualClock,
+    Clock, DeadlineMonitor, Graph, HealthBoard, Intake, OnMiss, PortError, Receiver, Recorder,
+    Schedule, Sender, Shedder, Stage, StageCycle, Stamp, Topic, VirtualClock,
 };
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -105,7 +105,7 @@ impl World {
             cycle: cycle
                 .with_on_miss(on_miss)
                 .with_shedder(Shedder::new(1000, SCHEDULE))
-                .with_stamps(Stamps::new(8)),
+                .with_recorder(Recorder::new().unwrap().with_stamps(8)),
             clock,
             k: 0,
         }
@@ -168,7 +168,7 @@ fn each_answer_publishes_and_says_what_it_is_to() {
         let predictions = u32::from(on_miss.predicts());
         assert_eq!(world.worker.predictions, predictions, "{on_miss:?}");
         // A prediction is no cycle: it has no stamps of its own.
-        assert_eq!(world.cycle.stamps().unwrap().iter().count(), 2);
+        assert_eq!(world.cycle.recorder().stamps().unwrap().iter().count(), 2);
     }
 }
 

@@ -398,9 +398,21 @@ fn a_stall_shows_in_the_latencies_of_every_cycle_that_it_delayed() {
     let stall_ns = 5 * PERIOD_NS + PERIOD_NS / 2;
     world.delays[2].set(Some((DELAYED * PERIOD_NS, stall_ns)));
     world.run();
-    let end_to_end = world.supervisor.0.timing().from_schedule.percentiles();
+    let end_to_end = world
+        .supervisor
+        .0
+        .recorder()
+        .timing
+        .from_schedule
+        .percentiles();
     assert_eq!((end_to_end.n, end_to_end.max_ns), (CYCLES, stall_ns));
-    let late = world.supervisor.0.timing().from_schedule.histogram();
+    let late = world
+        .supervisor
+        .0
+        .recorder()
+        .timing
+        .from_schedule
+        .histogram();
     // Six cycles waited: 5.5, 4.5, ... 0.5 periods.
     assert_eq!(late.count_between(PERIOD_NS / 4, u64::MAX / 2), 6);
 }

@@ -173,7 +173,7 @@ fn services(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
     let online = online_cores().unwrap_or_else(|| (0..cores).collect());
     for (name, service) in stages {
         service_ranges(name, service, &online, report);
-        spin(name, file, report);
+        spin((name, service), &stages, file.graph.rate_hz, report);
     }
     for pair in stages.windows(2) {
         let ((before, first), (after, second)) = (pair[0], pair[1]);
@@ -190,19 +190,14 @@ fn services(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
 
 /// One that spins keeps the others off its core, and a spin of more than a fifth of the time would
 /// come near to what the kernel takes from real-time threads by force.
-fn spin(name: &str, file: &GraphFile, report: &mut impl FnMut(&str, String)) {
-    let services = &file.services;
-    let all = [
-        ("sensor-sim", &services.sensor_sim),
-        ("detector", &services.detector),
-        ("identifier", &services.identifier),
-        ("supervisor", &services.supervisor),
-    ];
-    let Some((_, service)) = all.iter().find(|(other, _)| *other == name) else {
-        return;
-    };
+fn spin(
+    (name, service): (&str, &Service),
+    all: &[(&str, &Service)],
+    rate_hz: f64,
+    report: &mut impl FnMut(&str, String),
+) {
     let (key, spin_us) = (format!("services.{name}.spin_us"), service.spin_us);
-    let longest_us = 0.2e6 / file.graph.rate_hz;
+    let longest_us = 0.2e6 / rate_hz;
     if !(0.0..=longest_us).contains(&spin_us) {
         let allowed = format!("0 to {longest_us}, a fifth of the period");
         report(
