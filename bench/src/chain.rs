@@ -5,6 +5,7 @@
 //! placed like the service it stands for, and leaves stamps of the same form as a service.
 
 use std::error::Error;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -184,6 +185,7 @@ fn run_processes(roles: &[Role; STAGES]) -> Result<(), Box<dyn Error>> {
             .arg(STAGE_WORD)
             .arg(serde_json::to_string(role)?)
             .stdin(Stdio::null())
+            .stderr(Stdio::piped())
             .spawn()?;
         children.0.push(child);
     }
@@ -196,7 +198,8 @@ fn run_processes(roles: &[Role; STAGES]) -> Result<(), Box<dyn Error>> {
                 Some(status) if status.success() => {}
                 Some(status) => {
                     children.0.append(&mut running);
-                    return Err(format!("a stage of the chain ended with {status}").into());
+                    let said = said(&mut child);
+                    return Err(format!("a stage ended with {status}: {said}").into());
                 }
             }
         }
@@ -204,6 +207,15 @@ fn run_processes(roles: &[Role; STAGES]) -> Result<(), Box<dyn Error>> {
         std::thread::sleep(WAIT / 10);
     }
     Ok(())
+}
+
+/// The last line that a stage which has ended printed.
+fn said(child: &mut Child) -> String {
+    let mut text = String::new();
+    if let Some(mut stderr) = child.stderr.take() {
+        let _ = stderr.read_to_string(&mut text);
+    }
+    text.lines().last().unwrap_or_default().to_owned()
 }
 
 /// Is a stage of a chain, as the argument after [`STAGE_WORD`] says.

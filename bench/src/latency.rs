@@ -9,6 +9,7 @@ pub mod attribution;
 pub mod cell;
 pub mod cycles;
 pub mod files;
+pub mod flood;
 pub mod graph;
 pub mod load;
 pub mod page;

@@ -11,6 +11,7 @@ use clap::Parser;
 use serde_json::Value;
 use vigil_bench::archive::Archive;
 use vigil_bench::latency::cell::{Cell, Scheduling, Spec};
+use vigil_bench::latency::flood::{FLOOD_WORD, be_flood};
 use vigil_bench::latency::load::Load;
 use vigil_bench::latency::{files, page, system};
 use vigil_bench::{chain, machine};
@@ -20,13 +21,14 @@ const SECONDS_MIN: f64 = 4.0;
 /// Rates of the matrix, Hz.
 const RATES_HZ: [f64; 3] = [100.0, 1000.0, 5000.0];
 /// Loads of the matrix.
-const LOADS: [Load; 7] = [
+const LOADS: [Load; 8] = [
     Load::Idle,
     Load::KeepAwake,
     Load::Cpu,
     Load::Memory,
     Load::Io,
     Load::Switch,
+    Load::SensorFlood,
     Load::Timer,
 ];
 
@@ -64,6 +66,9 @@ fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     if words.first().is_some_and(|word| word == chain::STAGE_WORD) {
         return vigil_bench::ended("chain", chain::be_stage(words.get(1)));
+    }
+    if words.first().is_some_and(|word| word == FLOOD_WORD) {
+        return vigil_bench::ended("flood", be_flood(words.get(1)));
     }
     let args = Args::parse();
     vigil_bench::ended("latency", run(&args))
@@ -167,13 +172,9 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
             }
         };
         archive.say(&line(&cell));
-        let repeated = cells.iter().filter(|c| c.spec == *spec).count();
-        let mut name = spec.name();
-        if repeated > 0 {
-            name = format!("{name}-{}", repeated + 1);
-        }
-        files::write(&cell, &archive.folder().join(name))?;
         cells.push(cell);
+        let name = page::names(&cells).pop().unwrap_or_default();
+        files::write(&cells[cells.len() - 1], &archive.folder().join(name))?;
     }
     facts.push((
         "command".into(),

@@ -17,6 +17,7 @@ use vigil_bench::archive::Archive;
 use vigil_bench::latency::attribution::{Record, misses};
 use vigil_bench::latency::cell::us;
 use vigil_bench::latency::cycles::{Cycle, join};
+use vigil_bench::latency::flood::{FLOOD_WORD, be_flood};
 use vigil_bench::latency::graph::{Change, Prepared};
 use vigil_bench::latency::load::{Load, Running};
 use vigil_bench::pairs::median_ratio;
@@ -73,6 +74,9 @@ fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     if words.first().is_some_and(|word| word == OBSERVE_WORD) {
         return vigil_bench::ended("observer", observe(words.get(1), words.get(2)));
+    }
+    if words.first().is_some_and(|word| word == FLOOD_WORD) {
+        return vigil_bench::ended("flood", be_flood(words.get(1)));
     }
     let args = Args::parse();
     vigil_bench::ended("observers", run(&args))
@@ -141,7 +145,8 @@ fn measure(args: &Args, folder: &Path) -> Result<Vec<[Half; 2]>, Box<dyn Error>>
         is_fifo: true,
     };
     let prepared = Prepared::new(change, folder)?;
-    let _load = Running::start(args.load, &prepared.cores(), folder)?;
+    let graph = Some(prepared.path());
+    let _load = Running::start(args.load, &prepared.cores(), folder, graph)?;
     let mut pairs = Vec::new();
     for pair in 0..args.pairs {
         eprintln!("pair {} of {}", pair + 1, args.pairs);

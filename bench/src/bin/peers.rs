@@ -26,9 +26,15 @@ struct Args {
     /// Rate of the schedule, Hz.
     #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
     rate: f64,
-    /// Time of each run, s; there are three of each, interleaved.
+    /// Time of each run, s.
     #[arg(long, value_name = "S", default_value_t = 5.0)]
     seconds: f64,
+    /// Runs of each carrier and size, one round after the other.
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    rounds: usize,
+    /// Sizes of block, separated by commas; there are these alone.
+    #[arg(long, value_delimiter = ',', default_values_t = SIZES)]
+    bytes: Vec<usize>,
     /// Load beside them.
     #[arg(long, default_value = "keep-awake")]
     load: Load,
@@ -37,8 +43,6 @@ struct Args {
     json: bool,
 }
 
-/// Runs of each combination, one round after the other.
-const ROUNDS: usize = 3;
 /// Cores and priorities as in the default graph.
 const PLACED: [(usize, u8); STAGES] = [(0, 55), (0, 52), (1, 51), (1, 53)];
 
@@ -56,7 +60,7 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(&folder)?;
     let mut cores: Vec<usize> = PLACED.map(|(core, _)| core).to_vec();
     cores.dedup();
-    let load = Running::start(args.load, &cores, &folder)?;
+    let load = Running::start(args.load, &cores, &folder, None)?;
     let result = measure(args, &folder);
     drop(load);
     let _ = std::fs::remove_dir_all(&folder);
@@ -70,10 +74,13 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
 
 fn measure(args: &Args, folder: &Path) -> Result<Vec<Value>, Box<dyn Error>> {
     let mut rows = Vec::new();
-    for round in 1..=ROUNDS {
-        for size in SIZES {
+    for round in 1..=args.rounds {
+        for &size in &args.bytes {
             for &carrier in Carrier::value_variants() {
-                eprintln!("round {round} of {ROUNDS}: {carrier:?}, {size} bytes");
+                eprintln!(
+                    "round {round} of {}: {carrier:?}, {size} bytes",
+                    args.rounds
+                );
                 let chain = Chain {
                     carrier,
                     sizes: [size; STAGES],
@@ -117,16 +124,17 @@ fn one(chain: &Chain, round: usize, folder: &Path) -> Value {
 fn archive(args: &Args, rows: &[Value]) -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new("peers")?;
     let (rate, seconds, load) = (args.rate, args.seconds, args.load.name());
+    let rounds = args.rounds;
     archive.say(&format!(
-        "`scripts/bench peers --rate {rate} --seconds {seconds} --load {load}`\n\nHand-over of \
+        "`scripts/bench peers --rate {rate} --seconds {seconds} --rounds {rounds} --load {load}`\n\nHand-over of \
          three hops and the source's wake-up (end to end without the time in which a stage fills \
-         or looks at a block), us: the median of {ROUNDS} interleaved runs of p50, then of p99, \
+         or looks at a block), us: the median of {rounds} interleaved runs of p50, then of p99, \
          with the range over the runs. `shared-memory` is Vigil's transport, `futex` the floor; \
          both leave the block where it is. Cores {:?}.\n",
         PLACED.map(|(core, _)| core)
     ));
     archive.say("| bytes | carrier | p50 | range | p99 | range |\n|---|---|---|---|---|---|");
-    for size in SIZES {
+    for &size in &args.bytes {
         for carrier in Carrier::value_variants() {
             let name = carrier.to_possible_value();
             let name = name.map_or_else(String::new, |v| v.get_name().to_owned());

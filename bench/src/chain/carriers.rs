@@ -67,7 +67,6 @@ impl Carrier {
             Self::Futex => Box::new(FutexReader {
                 block: FutexBlock::open(&path, size)?,
                 seen: 0,
-                last_ns: 0,
             }),
             Self::SharedMemory => payload::incoming(shared, before, size)?,
             Self::Datagram => Box::new(DatagramReader {
@@ -180,18 +179,15 @@ fn wait_for(path: &Path) -> Result<(), Box<dyn Error>> {
 struct FutexReader {
     block: FutexBlock,
     seen: u32,
-    last_ns: u64,
 }
 
 impl Incoming for FutexReader {
     fn receive(&mut self, limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>> {
-        let count = self.block.wait(self.seen, limit);
-        let times = self.block.times_ns();
-        if count == self.seen || times.0 == self.last_ns {
-            return Ok(None);
-        }
-        (self.seen, self.last_ns) = (count, times.0);
-        Ok(Some(times))
+        self.block.wait(self.seen, limit);
+        let (newest, t_schedule_ns, t_publish_ns) = self.block.newest();
+        let is_new = newest != self.seen;
+        self.seen = newest;
+        Ok(is_new.then_some((t_schedule_ns, t_publish_ns)))
     }
 
     fn checksum(&self) -> u64 {

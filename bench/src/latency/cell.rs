@@ -123,7 +123,7 @@ impl Spec {
             period_ns,
             cycles: (floor_s * self.rate_hz) as u64,
         };
-        let load = Running::start(self.load, &prepared.cores(), folder)?;
+        let load = Running::start(self.load, &prepared.cores(), folder, Some(prepared.path()))?;
         std::thread::sleep(LOAD_START);
         let canaries = prepared.canaries(CANARY_KEPT)?;
         let before = floor.run(folder)?;

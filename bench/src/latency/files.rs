@@ -20,7 +20,7 @@ use super::cycles::{Cycle, STAGE_NAMES};
 /// Lateness of a canary from which it is told wake-up by wake-up, ns.
 const CANARY_FROM_NS: u64 = 200_000;
 
-/// Cycles of which each is written; of more, the interval log, the misses and the canaries tell.
+/// Cycles that are written one by one: of more, the longest; the interval log tells of the rest.
 const RAW_MAX: usize = 25_000;
 
 /// Writes everything of a cell into `folder`: percentile spectra, interval log, misses, the
@@ -47,8 +47,13 @@ pub fn write(cell: &Cell, folder: &Path) -> Result<(), Box<dyn Error>> {
     fs::write(folder.join("end-to-end.hlog"), hlog(&cell.cycles)?)?;
     fs::write(folder.join("misses.csv"), misses(cell))?;
     fs::write(folder.join("canaries.csv"), canaries(cell))?;
+    let start_ns = cell.cycles.first().map_or(0, |c| c.t_schedule_ns);
     if cell.cycles.len() <= RAW_MAX {
-        fs::write(folder.join("cycles.csv.gz"), raw(&cell.cycles)?)?;
+        let raw = raw(&cell.cycles, start_ns)?;
+        fs::write(folder.join("cycles.csv.gz"), raw)?;
+    } else {
+        let raw = raw(&longest(&cell.cycles, RAW_MAX), start_ns)?;
+        fs::write(folder.join("longest-cycles.csv.gz"), raw)?;
     }
     fs::write(folder.join("cell.json"), format!("{:#}\n", cell.json()))?;
     Ok(())
@@ -60,9 +65,10 @@ pub fn hgrm(latency: &Latency) -> String {
     let histogram = latency.histogram();
     let us = |ns: u64| ns as f64 * 1e-3;
     let mut text = String::from("       Value     Percentile TotalCount 1/(1-Percentile)\n\n");
+    let mut count = 0;
     for value in histogram.iter_quantiles(5) {
         let quantile = value.quantile_iterated_to();
-        let count = (quantile * histogram.len() as f64).round() as u64;
+        count += value.count_since_last_iteration();
         let at = us(value.value_iterated_to());
         let _ = if quantile < 1.0 {
             let inverse = 1.0 / (1.0 - quantile);
@@ -77,7 +83,7 @@ pub fn hgrm(latency: &Latency) -> String {
         text,
         "#[Mean    = {mean:12.3}, StdDeviation   = {deviation:12.3}]"
     );
-    let _ = writeln!(text, "#[Max     = {max:12.3}, Total count    = {total:12}]");
+    let _ = writeln!(text, "#[Max     = {max:12.3}, TotalCount     = {total:12}]");
     text
 }
 
@@ -128,15 +134,23 @@ fn canaries(cell: &Cell) -> String {
     text
 }
 
-/// Every cycle: when it was due since the first, and the two parts of each stage; empty for a
+/// The `count` cycles that took longest, in their order.
+fn longest(cycles: &[Cycle], count: usize) -> Vec<Cycle> {
+    let mut longest = cycles.to_vec();
+    longest.sort_unstable_by_key(|cycle| std::cmp::Reverse(cycle.end_to_end_ns()));
+    longest.truncate(count);
+    longest.sort_unstable_by_key(|cycle| cycle.t_schedule_ns);
+    longest
+}
+
+/// Each cycle: when it was due since `start_ns`, and the two parts of each stage; empty for a
 /// cycle that a stage left out.
-fn raw(cycles: &[Cycle]) -> Result<Vec<u8>, Box<dyn Error>> {
+fn raw(cycles: &[Cycle], start_ns: u64) -> Result<Vec<u8>, Box<dyn Error>> {
     let mut text = String::from("t_us,end_to_end_ns");
     for name in STAGE_NAMES {
         let _ = write!(text, ",{name}_hand_over_ns,{name}_compute_ns");
     }
     text.push('\n');
-    let start_ns = cycles.first().map_or(0, |c| c.t_schedule_ns);
     for cycle in cycles {
         let t_us = (cycle.t_schedule_ns - start_ns) / 1000;
         let _ = write!(text, "{t_us},{}", cycle.end_to_end_ns());
@@ -187,6 +201,13 @@ mod tests {
         assert_eq!(counts, [(0, 3), (1, 2), (2, 1)]);
     }
 
+    #[test]
+    fn the_longest_cycles_keep_their_order() {
+        let kept = longest(&cycles(&[100, 600, 300, 400, 500, 200]), 3);
+        let kept: Vec<u64> = kept.iter().map(|c| c.end_to_end_ns() / 1000).collect();
+        assert_eq!(kept, [600, 400, 500]);
+    }
+
     /// Decodes base 64.
     fn base64(text: &[u8]) -> Vec<u8> {
         let digit = |c: u8| match c {
@@ -207,14 +228,26 @@ mod tests {
     }
 
     #[test]
-    fn the_spectrum_ends_with_the_largest_value_and_counts_all() {
+    fn the_spectrum_counts_what_is_at_or_below_each_value() {
         let mut latency = Latency::new().unwrap();
-        (1..=1000).for_each(|us| latency.record(us * 1000));
+        let values: Vec<u64> = (1..=900).map(|_| 50).chain(1..=100).collect();
+        values.iter().for_each(|us| latency.record(us * 1000));
         let text = hgrm(&latency);
-        let last = text.lines().rfind(|line| !line.starts_with('#')).unwrap();
-        let fields: Vec<&str> = last.split_ascii_whitespace().collect();
-        assert_eq!(fields[1..], ["1.000000000000", "1000", "inf"]);
-        assert!((fields[0].parse::<f64>().unwrap() - 1000.0).abs() < 1.0);
-        assert!(text.contains("Total count    =         1000"));
+        let rows: Vec<Vec<&str>> = text
+            .lines()
+            .skip(2)
+            .filter(|line| !line.starts_with('#'))
+            .map(|line| line.split_ascii_whitespace().collect())
+            .collect();
+        for row in &rows {
+            // A bin is at most a thousandth of its value wide.
+            let value: f64 = row[0].parse().unwrap();
+            let below = values.iter().filter(|v| **v as f64 <= value * 1.001);
+            assert_eq!(row[2], below.count().to_string(), "{row:?}");
+        }
+        let last = rows.last().unwrap();
+        assert_eq!(last[1..], ["1.000000000000", "1000", "inf"]);
+        assert!((last[0].parse::<f64>().unwrap() - 100.0).abs() < 0.1);
+        assert!(text.contains("TotalCount     =         1000"));
     }
 }

@@ -34,13 +34,26 @@ pub fn html(title: &str, facts: &[(String, String)], cells: &[Cell]) -> Result<S
     let mut body = format!("<h1>{}</h1>\n", escaped(title));
     body.push_str(ABOUT);
     body.push_str(&section("cells", "All cells", ALL_CELLS, &table(cells)));
-    for cell in cells {
-        body.push_str(&one(cell)?);
+    for (cell, name) in cells.iter().zip(&names(cells)) {
+        body.push_str(&one(cell, name)?);
     }
     let checklist = rows(facts.iter().map(|(n, v)| (n.as_str(), v.clone())));
     let known = "What the figures depend on, read from the machine.";
     body.push_str(&section("machine", "The machine", known, &checklist));
     Ok(page(title, &body))
+}
+
+/// Names of cells: those of their specifications, numbered where one is repeated.
+#[must_use]
+pub fn names(cells: &[Cell]) -> Vec<String> {
+    let name = |(i, cell): (usize, &Cell)| {
+        let earlier = cells[..i].iter().filter(|c| c.spec == cell.spec).count();
+        match earlier {
+            0 => cell.spec.name(),
+            n => format!("{}-{}", cell.spec.name(), n + 1),
+        }
+    };
+    cells.iter().enumerate().map(name).collect()
 }
 
 const ABOUT: &str = "<p>Every latency counts from the instant at which the cycle was <em>due</em> \
@@ -87,7 +100,7 @@ fn table(cells: &[Cell]) -> String {
         let _ = write!(text, "<th>{head}</th>");
     }
     text.push_str("</tr></thead><tbody>\n");
-    for cell in cells {
+    for (cell, name) in cells.iter().zip(names(cells)) {
         let (whole, compute) = (
             cell.graph.end_to_end.percentiles(),
             cell.graph.compute.percentiles(),
@@ -100,7 +113,6 @@ fn table(cells: &[Cell]) -> String {
         let (p50, p99) = cell.over_floor();
         let us = |ns: u64| format!("{:.1}", ns as f64 * 1e-3);
         let scheduling = cell.summary["services"]["supervisor"]["scheduling"].as_str();
-        let name = cell.spec.name();
         let _ = write!(
             text,
             "<tr><td class=\"n\"><a href=\"#{name}\">{}</a></td><td>{}</td><td>{}</td>",
@@ -134,7 +146,7 @@ fn table(cells: &[Cell]) -> String {
     text
 }
 
-fn one(cell: &Cell) -> Result<String, ChartError> {
+fn one(cell: &Cell, name: &str) -> Result<String, ChartError> {
     let names = [
         (WHOLE, "end to end", false),
         (HAND_OVER, "hand-over", false),
@@ -191,10 +203,9 @@ fn one(cell: &Cell) -> Result<String, ChartError> {
         cell.cycles.len(),
         3.0 / cell.cycles.len().max(1) as f64,
     );
-    let name = cell.spec.name();
     Ok(section(
-        &name,
-        &name,
+        name,
+        name,
         &about,
         &format!("{charts}{time}{details}"),
     ))

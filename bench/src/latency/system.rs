@@ -40,11 +40,12 @@ impl Ticks {
     /// Shares of the time since `before`, %: busy, and taken by other machines of the host.
     #[must_use]
     pub fn since(self, before: Self) -> Value {
-        let total = (self.total - before.total).max(1) as f64;
+        // The kernel's counters of steal and waiting may run back by a tick.
+        let total = self.total.saturating_sub(before.total).max(1) as f64;
         let percent = |ticks: u64| (1e3 * ticks as f64 / total).round() / 10.0;
         json!({
-            "busy_percent": percent(self.busy - before.busy),
-            "steal_percent": percent(self.steal - before.steal),
+            "busy_percent": percent(self.busy.saturating_sub(before.busy)),
+            "steal_percent": percent(self.steal.saturating_sub(before.steal)),
         })
     }
 }
@@ -113,5 +114,6 @@ mod tests {
         let shares = after.since(before);
         assert_eq!(shares["busy_percent"], 70.0);
         assert_eq!(shares["steal_percent"], 10.0);
+        assert_eq!(before.since(after)["busy_percent"], 0.0);
     }
 }

@@ -88,50 +88,117 @@ fn watch(
     lateness: Latency,
     stop: &AtomicBool,
 ) -> Seen {
+    let placement = placement::apply(wanted);
+    let mut account = Account::new(
+        Seen {
+            placement,
+            lateness,
+            late: touched(capacity),
+            not_kept: 0,
+        },
+        Monotonic.now_ns() + period_ns,
+        period_ns,
+    );
+    while !stop.load(Ordering::Relaxed) {
+        clock::sleep_until(account.due_ns);
+        account.wake(Monotonic.now_ns());
+    }
+    account.seen.late.shrink_to_fit();
+    account.seen
+}
+
+/// An empty list with room for `capacity` wake-ups, every page of it touched.
+fn touched(capacity: usize) -> Vec<Late> {
     let touched = Late {
         t_schedule_ns: u64::MAX,
         late_ns: 0,
     };
     let mut late = vec![touched; capacity];
     late.clear();
-    let mut seen = Seen {
-        placement: placement::apply(wanted),
-        lateness,
-        late,
-        not_kept: 0,
-    };
-    let mut due_ns = Monotonic.now_ns() + period_ns;
-    while !stop.load(Ordering::Relaxed) {
-        clock::sleep_until(due_ns);
-        let now_ns = Monotonic.now_ns();
-        if now_ns < due_ns {
-            continue; // A signal.
+    late
+}
+
+/// The book of a canary: what each wake-up says.
+#[derive(Debug)]
+struct Account {
+    seen: Seen,
+    room: usize,
+    due_ns: u64,
+    period_ns: u64,
+}
+
+impl Account {
+    /// First due at `due_ns`; room for as many late wake-ups as the list of `seen` has now.
+    const fn new(seen: Seen, due_ns: u64, period_ns: u64) -> Self {
+        Self {
+            room: seen.late.capacity(),
+            seen,
+            due_ns,
+            period_ns,
         }
-        let late_ns = now_ns - due_ns;
+    }
+
+    /// Awake at `now_ns`: every instant up to then was due, those that were slept through too. One
+    /// late wake-up is kept for all of them, from the first: its lateness covers the others.
+    fn wake(&mut self, now_ns: u64) {
+        let Some(late_ns) = now_ns.checked_sub(self.due_ns) else {
+            return; // A signal: nothing was due.
+        };
         if late_ns >= KEPT_FROM_NS {
-            if seen.late.len() < capacity {
-                seen.late.push(Late {
-                    t_schedule_ns: due_ns,
+            if self.seen.late.len() < self.room {
+                self.seen.late.push(Late {
+                    t_schedule_ns: self.due_ns,
                     late_ns,
                 });
             } else {
-                seen.not_kept += 1;
+                self.seen.not_kept += 1;
             }
         }
-        // Instants that were slept through are late as well.
-        while due_ns <= now_ns {
-            seen.lateness.record(now_ns - due_ns);
-            due_ns += period_ns;
+        while self.due_ns <= now_ns {
+            self.seen.lateness.record(now_ns - self.due_ns);
+            self.due_ns += self.period_ns;
         }
     }
-    seen.late.shrink_to_fit();
-    seen
 }
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_wake_up_accounts_for_every_instant_that_it_slept_through() {
+        let seen = Seen {
+            placement: placement::read_back(0),
+            lateness: Latency::new().unwrap(),
+            late: Vec::with_capacity(2),
+            not_kept: 0,
+        };
+        let mut account = Account::new(seen, 100_000, 100_000);
+        for now_ns in [
+            100_100, // 100 ns late: usual
+            150_000, // a signal
+            500_000, // 200_000, 300_000, 400_000 and 500_000 itself
+            600_000, // on time
+            704_999, // a nanosecond short of being kept
+            805_000, 906_000, // kept; no room
+        ] {
+            account.wake(now_ns);
+        }
+        let Account { seen, due_ns, .. } = account;
+        assert_eq!(due_ns, 1_000_000);
+        let late = |t_schedule_ns, late_ns| Late {
+            t_schedule_ns,
+            late_ns,
+        };
+        assert_eq!(seen.late, [late(200_000, 300_000), late(800_000, 5_000)]);
+        assert_eq!(seen.not_kept, 1);
+        let mut all = Latency::new().unwrap();
+        for late_ns in [100, 300_000, 200_000, 100_000, 0, 0, 4_999, 5_000, 6_000] {
+            all.record(late_ns);
+        }
+        assert_eq!(seen.lateness.histogram(), all.histogram());
+    }
 
     #[test]
     fn every_instant_of_its_schedule_is_accounted() {

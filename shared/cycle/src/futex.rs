@@ -23,21 +23,28 @@ pub struct FutexBlock {
     size: usize,
 }
 
-/// The shared words at the start of the mapping.
+/// The shared words at the start of the mapping. Block `n` has its times in slot `n` modulo 2: as
+/// long as the count says `n`, nobody writes there.
 #[repr(C)]
 #[derive(Debug)]
 struct Words {
     count: AtomicU32,
     padding: u32,
-    t_schedule_ns: AtomicU64,
-    t_publish_ns: AtomicU64,
+    times: [Times; 2],
+}
+
+#[repr(C)]
+#[derive(Debug)]
+struct Times {
+    schedule_ns: AtomicU64,
+    publish_ns: AtomicU64,
 }
 
 impl FutexBlock {
     /// Maps the block of `size` bytes behind `path`, which the first of its users makes.
     ///
     /// # Errors
-    /// The system's.
+    /// The system's; [`io::ErrorKind::InvalidData`] if the block there has another size.
     pub fn open(path: &Path, size: usize) -> io::Result<Self> {
         let file = OpenOptions::new()
             .create(true)
@@ -46,7 +53,14 @@ impl FutexBlock {
             .write(true)
             .mode(0o600)
             .open(path)?;
-        file.set_len((HEAD + size) as u64)?;
+        let (there, wanted) = (file.metadata()?.len(), (HEAD + size) as u64);
+        if there == 0 {
+            // Both sides may find it empty; both make it the same.
+            file.set_len(wanted)?;
+        } else if there != wanted {
+            let what = format!("{} has {there} bytes, not {wanted}", path.display());
+            return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+        }
         Self::map(&file, size)
     }
 
@@ -88,12 +102,22 @@ impl FutexBlock {
         self.words().count.load(Ordering::Acquire)
     }
 
-    /// Scheduled and publication instant of the newest block, ns.
+    /// Number of the newest block, its scheduled and its publication instant, ns.
     #[must_use]
-    pub fn times_ns(&self) -> (u64, u64) {
-        let words = self.words();
-        let schedule_ns = words.t_schedule_ns.load(Ordering::Relaxed);
-        (schedule_ns, words.t_publish_ns.load(Ordering::Relaxed))
+    pub fn newest(&self) -> (u32, u64, u64) {
+        loop {
+            let count = self.count();
+            let times = self.times(count);
+            let schedule_ns = times.schedule_ns.load(Ordering::Acquire);
+            let publish_ns = times.publish_ns.load(Ordering::Acquire);
+            if self.count() == count {
+                return (count, schedule_ns, publish_ns);
+            }
+        }
+    }
+
+    const fn times(&self, count: u32) -> &Times {
+        &self.words().times[(count % 2) as usize]
     }
 
     /// Fills the payload with one byte, in place.
@@ -123,8 +147,9 @@ impl FutexBlock {
     /// reader.
     pub fn publish(&self, t_schedule_ns: u64, t_publish_ns: u64) {
         let words = self.words();
-        words.t_schedule_ns.store(t_schedule_ns, Ordering::Relaxed);
-        words.t_publish_ns.store(t_publish_ns, Ordering::Relaxed);
+        let times = self.times(words.count.load(Ordering::Relaxed).wrapping_add(1));
+        times.schedule_ns.store(t_schedule_ns, Ordering::Release);
+        times.publish_ns.store(t_publish_ns, Ordering::Release);
         words.count.fetch_add(1, Ordering::Release);
         // SAFETY: the word is aligned and mapped; waking touches no memory.
         #[allow(unsafe_code)]
@@ -138,13 +163,11 @@ impl FutexBlock {
         }
     }
 
-    /// Waits until more than `seen` blocks are published, at most for `limit`; the count then.
-    #[must_use]
-    pub fn wait(&self, seen: u32, limit: Duration) -> u32 {
+    /// Waits for a block other than the one numbered `seen`, at most for `limit`.
+    pub fn wait(&self, seen: u32, limit: Duration) {
         let words = self.words();
-        let count = self.count();
-        if count != seen {
-            return count;
+        if self.count() != seen {
+            return;
         }
         let limit = timespec(u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX));
         // SAFETY: the word is aligned and mapped, the limit outlives the call.
@@ -158,7 +181,6 @@ impl FutexBlock {
                 &raw const limit,
             );
         }
-        self.count()
     }
 }
 
@@ -182,11 +204,37 @@ mod tests {
         let path = std::env::temp_dir().join(format!("futex-{}", std::process::id()));
         let mut writer = FutexBlock::open(&path, 1000).unwrap();
         let reader = FutexBlock::open(&path, 1000).unwrap();
-        assert_eq!(reader.wait(0, Duration::from_millis(1)), 0);
+        reader.wait(0, Duration::from_millis(1));
+        assert_eq!(reader.newest(), (0, 0, 0));
         writer.fill(3);
         writer.publish(7, 9);
-        assert_eq!(reader.wait(0, Duration::from_secs(60)), 1);
-        assert_eq!((reader.times_ns(), reader.checksum()), ((7, 9), 3 * 16));
+        reader.wait(0, Duration::from_secs(60));
+        assert_eq!((reader.newest(), reader.checksum()), ((1, 7, 9), 3 * 16));
+        writer.publish(17, 19);
+        assert_eq!(reader.newest(), (2, 17, 19));
+        let other = FutexBlock::open(&path, 999).unwrap_err();
+        assert_eq!(other.kind(), io::ErrorKind::InvalidData);
+        std::fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn times_belong_to_one_block_while_the_writer_goes_on() {
+        const BLOCKS: u64 = 200_000;
+        let path = std::env::temp_dir().join(format!("futex-race-{}", std::process::id()));
+        let reader = FutexBlock::open(&path, 64).unwrap();
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let writer = FutexBlock::open(&path, 64).unwrap();
+                (1..=BLOCKS).for_each(|n| writer.publish(n, 3 * n));
+            });
+            let mut count = 0;
+            while u64::from(count) < BLOCKS {
+                let (newest, schedule_ns, publish_ns) = reader.newest();
+                assert_eq!(schedule_ns, u64::from(newest));
+                assert_eq!(publish_ns, 3 * schedule_ns);
+                count = newest;
+            }
+        });
         std::fs::remove_file(&path).unwrap();
     }
 }

@@ -72,24 +72,31 @@ pub fn run_stage(
     let mut ended = Ended::Stopped;
     cycle.ready(&Monotonic)?;
     while !signal::stop_requested() {
-        await_input(cycle, stage, (listener, &timer), spin_ns);
+        let wake = await_input(cycle, stage, (listener, &timer), spin_ns);
+        let before = cycle.health().view().cycles;
         if cycle.turn(stage, &Monotonic)?.is_break() {
             ended = Ended::Missed;
             break;
         }
-        faults.take(cycle.health().view().cycles);
+        let cycles = cycle.health().view().cycles;
+        faults.take(cycles);
+        if wake == Wake::Input && cycles == before {
+            // Whoever floods the topic with wake-ups is not to hold the core.
+            let until_ns = cycle.listens_again_ns(Monotonic.now_ns());
+            wake::wait(&timer, wake::NOTHING, until_ns);
+        }
     }
     cycle.stop(&Monotonic)?;
     Ok(faults.run(ended))
 }
 
-/// Returns when there may be input, or something is due.
+/// Returns when there may be input, or something is due, and which.
 fn await_input(
     cycle: &StageCycle,
     stage: &impl Stage,
     (listener, timer): (&EventListener, &Timer),
     spin_ns: u64,
-) {
+) -> Wake {
     let due_ns = cycle.next_wake_ns().min(Monotonic.now_ns() + WAIT_NS_MAX);
     let block_until = |at_ns| {
         let wake = wake::wait(timer, listener.descriptor(), at_ns);
@@ -103,18 +110,21 @@ fn await_input(
         // What a spin has found may be announced only now; what has come since is not lost with it.
         listener.drain();
         if stage.has_input() {
-            return;
+            return Wake::Input;
         }
         let from_ns = expected_ns.saturating_sub(spin_ns / 2).min(due_ns);
         let until_ns = (expected_ns + spin_ns / 2).min(due_ns);
-        if Monotonic.now_ns() < from_ns && block_until(from_ns) != Wake::Deadline {
-            return;
+        if Monotonic.now_ns() < from_ns {
+            let wake = block_until(from_ns);
+            if wake != Wake::Deadline {
+                return wake;
+            }
         }
         if spin_until(until_ns, || stage.has_input()) {
-            return;
+            return Wake::Input;
         }
     }
-    block_until(due_ns);
+    block_until(due_ns)
 }
 
 /// Looks until `found` or the instant has come; true if it was found.

@@ -17,6 +17,10 @@ use crate::stamps::CycleStamps;
 
 /// Misses in a row after which the input counts as lost, and the service as degraded.
 const LOST_AFTER_MISSES: u64 = 3;
+/// After a wake-up that brought nothing, the stage is deaf for this part of a period at least.
+const DEAF_PERIOD_PART: u64 = 32;
+/// It listens again this part of a period before its input is expected.
+const EARLY_PERIOD_PART: u64 = 16;
 
 /// A service's work, as the cycle sees it. Implementations hold the ports and the filter.
 pub trait Stage {
@@ -207,6 +211,20 @@ impl StageCycle {
         let next_ns = self.last_stamp.t_schedule_ns + self.monitor.period_ns();
         (self.last_stamp.t_schedule_ns > 0 && self.misses_in_a_row == 0)
             .then_some(next_ns + self.input_offset_ns)
+    }
+
+    /// When to listen again after a wake-up at `now_ns` that brought no input, ns: shortly before
+    /// the next input is expected, at once but for a breath if that is now, and no later than the
+    /// next turn is due.
+    #[must_use]
+    pub fn listens_again_ns(&self, now_ns: u64) -> u64 {
+        let period_ns = self.monitor.period_ns();
+        let early_ns = period_ns / EARLY_PERIOD_PART;
+        let expected_ns = self
+            .expected_input_ns()
+            .map_or(0, |ns| ns.saturating_sub(early_ns));
+        let breath_ns = now_ns + period_ns / DEAF_PERIOD_PART;
+        expected_ns.max(breath_ns).min(self.next_wake_ns())
     }
 
     /// When the next turn is due at the latest, ns.

@@ -64,6 +64,9 @@ impl Timer {
     }
 }
 
+/// In place of a descriptor: only the instant counts.
+pub const NOTHING: RawFd = -1;
+
 /// Blocks until `input` is readable or `deadline_ns` has come.
 pub fn wait(timer: &Timer, input: RawFd, deadline_ns: u64) -> Wake {
     timer.arm(deadline_ns);
@@ -107,5 +110,7 @@ mod tests {
         idle.arm(1);
         let far_ns = Monotonic.now_ns() + 3_600_000_000_000;
         assert_eq!(wait(&timer, idle.fd.as_raw_fd(), far_ns), Wake::Input);
+        let near_ns = Monotonic.now_ns() + 1_000_000;
+        assert_eq!(wait(&timer, NOTHING, near_ns), Wake::Deadline);
     }
 }

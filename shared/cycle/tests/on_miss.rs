@@ -220,3 +220,27 @@ fn input_is_expected_a_period_after_the_last_and_not_while_it_is_lost() {
     assert!(world.instant(false).is_continue());
     assert_eq!(world.cycle.expected_input_ns(), None);
 }
+
+#[test]
+fn a_wake_up_for_nothing_makes_deaf_until_shortly_before_the_next_input() {
+    let mut world = World::new(OnMiss::Predict);
+    let breath_ns = PERIOD_NS / 32;
+    // Nothing is known yet: a breath, and never past the time at which something is due.
+    world.clock.set(500_000);
+    let next_ns = world.cycle.next_wake_ns();
+    let expected_ns = (500_000 + breath_ns).min(next_ns);
+    assert_eq!(world.cycle.listens_again_ns(500_000), expected_ns);
+    world.k = 99;
+    assert!(world.instant(true).is_continue());
+    let now_ns = world.clock.now_ns();
+    assert_eq!(
+        world.cycle.listens_again_ns(now_ns),
+        101 * PERIOD_NS - PERIOD_NS / 16
+    );
+    // The input is late: a breath at a time.
+    let late_ns = 101 * PERIOD_NS + 10_000;
+    assert_eq!(world.cycle.listens_again_ns(late_ns), late_ns + breath_ns);
+    // And never past the deadline.
+    let close_ns = world.cycle.next_wake_ns() - 10;
+    assert_eq!(world.cycle.listens_again_ns(close_ns), close_ns + 10);
+}

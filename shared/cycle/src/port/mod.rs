@@ -9,7 +9,7 @@ use crate::clock::Clock;
 use crate::topic::Topic;
 
 pub use in_process::Bus;
-pub use shared_memory::{EventListener, Link, Wire};
+pub use shared_memory::{EventListener, EventNotifier, Link, Wire};
 
 /// Sends blocks on one topic; the only writer of that topic.
 pub trait Sender<T: Block> {

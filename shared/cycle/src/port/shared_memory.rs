@@ -169,6 +169,20 @@ impl Link {
         Ok(EventListener { listener })
     }
 
+    /// Opens a side of a topic that wakes its readers without a block: for measuring what a flood
+    /// of wake-ups does.
+    ///
+    /// # Errors
+    /// [`PortError::Open`].
+    pub fn notifier<T: Block>(&self, topic: Topic) -> Result<EventNotifier, PortError> {
+        let notifier = self
+            .event::<T>(topic)?
+            .notifier_builder()
+            .create()
+            .map_err(|e| self.open_error::<T>(topic, &e))?;
+        Ok(EventNotifier { notifier })
+    }
+
     /// Removes what dead processes of this graph left behind. File-system work: never on a
     /// real-time thread.
     pub fn remove_dead_peers(&self) {
@@ -195,6 +209,19 @@ impl EventListener {
     /// Consumes the pending wake-ups; else the descriptor stays readable.
     pub fn drain(&self) {
         let _ = self.listener.try_wait(|_| {});
+    }
+}
+
+/// Wakes the readers of a topic.
+pub struct EventNotifier {
+    notifier: Notifier<ipc::Service>,
+}
+
+impl EventNotifier {
+    /// Wakes them; false if the transport refused.
+    #[must_use]
+    pub fn notify(&self) -> bool {
+        self.notifier.notify().is_ok()
     }
 }
 
