@@ -73,7 +73,7 @@ fn simulator(setup: &Setup, graph: &Graph) -> SimulatorSource {
             let period_ns = setup.period_ns();
             SimulatorSource::new(*simulation, schedule, true, period_ns, graph).unwrap()
         }
-        Assembled::Playback(_) => unreachable!("the default graph simulates"),
+        _ => unreachable!("the default graph simulates"),
     }
 }
 
@@ -110,10 +110,10 @@ fn demand_steady(setup: &Setup) {
     let detector = vigil_detector::assemble(setup).unwrap();
     let mut detector = (
         stage(Detector),
-        DetectorStage::new(detector, &graph).unwrap(),
+        DetectorStage::new(detector, &setup.robot, &graph).unwrap(),
     );
     let identifier = vigil_identifier::assemble(setup).unwrap();
-    let identifier = IdentifierStage::new(identifier, &graph, period_ns).unwrap();
+    let identifier = IdentifierStage::new(identifier, &setup.robot, &graph, period_ns).unwrap();
     let mut identifier = (stage(Identifier), identifier);
     let supervisor = vigil_supervisor::assemble(setup).unwrap();
     let validity_ns = vigil_supervisor::validity_ns(setup);

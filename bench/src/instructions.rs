@@ -71,9 +71,9 @@ impl InProcess {
         };
         let sensor = SimulatorSource::new(*simulation, drive, true, period_ns, &graph)?;
         let (monitor, board) = parts(&setup, &graph, SensorSim)?;
-        let detector = DetectorStage::new(vigil_detector::assemble(&setup)?, &graph)?;
+        let detector = DetectorStage::new(vigil_detector::assemble(&setup)?, &setup.robot, &graph)?;
         let identifier = vigil_identifier::assemble(&setup)?;
-        let identifier = IdentifierStage::new(identifier, &graph, period_ns)?;
+        let identifier = IdentifierStage::new(identifier, &setup.robot, &graph, period_ns)?;
         let supervisor = vigil_supervisor::assemble(&setup)?;
         let validity_ns = vigil_supervisor::validity_ns(&setup);
         let supervisor = SupervisorStage::new(supervisor, &graph, period_ns, validity_ns)?;

@@ -11,6 +11,7 @@ pub mod cycles;
 pub mod files;
 pub mod flood;
 pub mod graph;
+pub mod halves;
 pub mod load;
 pub mod page;
 pub mod system;

@@ -8,6 +8,7 @@ pub mod chain;
 pub mod figure7;
 pub mod filters;
 pub mod ground;
+pub mod guard;
 pub mod instructions;
 pub mod latency;
 pub mod machine;

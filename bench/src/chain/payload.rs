@@ -7,7 +7,7 @@ use std::time::Duration;
 use vigil_blocks::{Block, Header};
 use vigil_cycle::domain::Queues;
 use vigil_cycle::port::{EventListener, Link};
-use vigil_cycle::wake::{self, Timer, Wake};
+use vigil_cycle::wake::{self, Inputs, Timer, Wake};
 use vigil_cycle::{Clock, Domain, Graph, Monotonic, Receiver, Sender, Stamp, Topic};
 
 use super::carriers::{Incoming, Outgoing, sum_lines};
@@ -154,7 +154,7 @@ impl<T: Payload> Reader<T> {
 impl<T: Payload> Incoming for Reader<T> {
     fn receive(&mut self, limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>> {
         let until_ns = Monotonic.now_ns() + limit.as_nanos() as u64;
-        if wake::wait(&self.timer, self.listener.descriptor(), until_ns) == Wake::Input {
+        if wake::wait(&self.timer, self.listener.descriptors(), until_ns) == Wake::Input {
             self.listener.drain();
         }
         // The newest, as a stage does.

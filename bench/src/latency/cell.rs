@@ -11,6 +11,7 @@ use vigil_cycle::canary::{Canary, Seen};
 use vigil_cycle::latency::Percentiles;
 use vigil_cycle::placement::Wanted;
 use vigil_cycle::{CycleStamps, Latency, Placement};
+use vigil_setup::schema::Source;
 
 use super::attribution::{self, Miss, Record};
 use super::cycles::{self, Cycle, STAGE_NAMES, STAGES, Spectra};
@@ -26,8 +27,8 @@ const WARM_UP_S: f64 = 2.0;
 const FLOOR_SHARE: f64 = 0.25;
 /// Time of a floor, s: at least, and at most.
 const FLOOR_S: [f64; 2] = [4.0, 60.0];
-/// Late wake-ups of a canary that are kept.
-const CANARY_KEPT: usize = 4_000_000;
+/// Time beside graph and floors in which canaries run: starting and ending processes, s.
+const AROUND_S: f64 = 60.0;
 /// Time for a load to get going.
 const LOAD_START: Duration = Duration::from_secs(1);
 
@@ -111,6 +112,7 @@ impl Spec {
             rate_hz: self.rate_hz,
             particles: self.particles,
             is_fifo: self.scheduling == Scheduling::Fifo,
+            source: Source::Simulator,
         };
         let prepared = Prepared::new(change, folder)?;
         let wanted = prepared.wanted();
@@ -125,7 +127,7 @@ impl Spec {
         };
         let load = Running::start(self.load, &prepared.cores(), folder, Some(prepared.path()))?;
         std::thread::sleep(LOAD_START);
-        let canaries = prepared.canaries(CANARY_KEPT)?;
+        let canaries = prepared.canaries(self.seconds + 2.0 * floor_s + AROUND_S)?;
         let before = floor.run(folder)?;
         let ticks = Ticks::now();
         let ran = prepared.run(self.seconds, folder)?;
@@ -186,7 +188,7 @@ impl Spec {
 }
 
 /// Refuses what would not be a measurement: a service that was restarted (its stamps are those
-/// since then), a canary that ran elsewhere or below what it watches over.
+/// since then), a canary that forgot, or ran elsewhere or below what it watches over.
 fn check(
     summary: &Value,
     canaries: &[Seen],
@@ -200,6 +202,9 @@ fn check(
     let highest = wanted.iter().map(|w| u32::from(w.priority)).max();
     let is_above =
         |seen: &Seen| seen.placement.pinned && seen.placement.priority > highest.unwrap_or(0);
+    if canaries.iter().any(|seen| seen.not_kept > 0) {
+        return Err("a canary had no room for what it saw: nobody can say whose a miss is".into());
+    }
     if canaries.is_empty() || !canaries.iter().all(is_above) {
         let why = "no real-time priority for them";
         return Err(format!("canaries could not be placed above the graph: {why}").into());

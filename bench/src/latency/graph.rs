@@ -11,6 +11,7 @@ use vigil_cycle::placement::Wanted;
 use vigil_cycle::serve::Leave;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{CycleStamps, PortError, stamps};
+use vigil_setup::schema::Source;
 use vigil_setup::{GraphArgs, Setup};
 
 use super::cycles::{STAGE_NAMES, STAGES};
@@ -24,6 +25,8 @@ pub struct Change {
     pub particles: usize,
     /// True for `SCHED_FIFO` where permitted, false for `SCHED_OTHER`.
     pub is_fifo: bool,
+    /// Where frames come from.
+    pub source: Source,
 }
 
 /// A graph file for measuring.
@@ -54,6 +57,12 @@ impl Prepared {
         set(&mut file, "graph", "rate_hz", change.rate_hz.into())?;
         let name = format!("bench-{}", std::process::id());
         set(&mut file, "graph", "name", name.into())?;
+        set(
+            &mut file,
+            "sensor",
+            "source",
+            change.source.to_string().into(),
+        )?;
         let particles = i64::try_from(change.particles)?;
         set(&mut file, "detector", "particles", particles.into())?;
         set(&mut file, "identifier", "particles", particles.into())?;
@@ -114,15 +123,16 @@ impl Prepared {
         plan.schedule.deadline_ns
     }
 
-    /// A canary on each core, one priority above what runs there, with room for `capacity` late
-    /// wake-ups.
+    /// A canary on each core, one priority above what runs there, with room for every wake-up of
+    /// `seconds`.
     ///
     /// # Errors
     /// If one cannot be started.
-    pub fn canaries(&self, capacity: usize) -> Result<Vec<Canary>, PortError> {
+    pub fn canaries(&self, seconds: f64) -> Result<Vec<Canary>, PortError> {
         let highest = self.wanted().iter().map(|w| w.priority).max().unwrap_or(0);
         let priority = highest.max(1) + 1;
         let period_ns = (self.setup.period_ns() / 4).clamp(100_000, 1_000_000);
+        let capacity = (seconds * 1e9 / period_ns as f64).ceil() as usize;
         let start = |core| Canary::start(Wanted { core, priority }, period_ns, capacity);
         self.cores().into_iter().map(start).collect()
     }
@@ -151,6 +161,29 @@ impl Prepared {
     pub fn start(&self, seconds: f64, options: &[&str]) -> std::io::Result<Child> {
         let mut command = self.command(seconds, options);
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn()
+    }
+
+    /// Runs it for `seconds` while `beside` does its part; the launcher's document.
+    ///
+    /// # Errors
+    /// If the graph or `beside` fails.
+    pub fn run_beside(
+        &self,
+        seconds: f64,
+        beside: impl FnOnce() -> Result<(), Box<dyn Error>>,
+    ) -> Result<Value, Box<dyn Error>> {
+        let mut command = self.command(seconds, &[]);
+        let launcher = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()?;
+        let done = beside();
+        let output = launcher.wait_with_output()?;
+        done?;
+        if !output.status.success() {
+            return Err(format!("the graph ended with {}", output.status).into());
+        }
+        Ok(serde_json::from_slice(&output.stdout)?)
     }
 
     /// Runs it for `seconds`; its services leave their stamps, by way of `folder`.

@@ -32,7 +32,8 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let plan = setup.plan(ServiceName::Detector, args.leave());
-    let build = |graph: &_| DetectorStage::new(detector, graph).map_err(ServeError::from);
+    let build =
+        |graph: &_| DetectorStage::new(detector, &setup.robot, graph).map_err(ServeError::from);
     match serve::stage::<SensorFrame, _>(&plan, Topic::Sensor, build) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

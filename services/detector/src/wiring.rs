@@ -5,11 +5,14 @@ use vigil_cycle::{
     Clock, Graph, HealthBoard, Intake, PortError, Receiver, Sender, Stage, Stamp, Topic,
 };
 
+use vigil_robot::{Description, FrameGuard};
+
 use crate::Detector;
 
 /// The detector as a stage of the graph: sensor frames in, belief and particles out.
 pub struct DetectorStage {
     detector: Detector,
+    guard: FrameGuard,
     frames: Box<dyn Receiver<SensorFrame>>,
     belief: Box<dyn Sender<DetectionBelief>>,
     particles: Box<dyn Sender<ParticleBlock>>,
@@ -21,13 +24,14 @@ pub struct DetectorStage {
 }
 
 impl DetectorStage {
-    /// Opens the detector's ports on `graph`.
+    /// Opens the detector's ports on `graph`, for frames of `robot`.
     ///
     /// # Errors
     /// The transport's.
-    pub fn new(detector: Detector, graph: &Graph) -> Result<Self, PortError> {
+    pub fn new(detector: Detector, robot: &Description, graph: &Graph) -> Result<Self, PortError> {
         Ok(Self {
             detector,
+            guard: FrameGuard::new(robot),
             frames: graph.receiver(Topic::Sensor)?,
             belief: graph.sender(Topic::Detection)?,
             particles: graph.sender(Topic::DetectionParticles)?,
@@ -49,7 +53,8 @@ impl Stage for DetectorStage {
             let Some(frame) = self.frames.held() else {
                 break;
             };
-            if intake.accept::<SensorFrame>(&frame.header) {
+            let content = || self.guard.check(frame);
+            if intake.admit::<SensorFrame>(&frame.header, content) {
                 let (belief, particles) = (self.belief.block(), self.particles.block());
                 self.detector.step(Entry::Frame(frame), belief, particles);
                 intake.stepped(&frame.header, (frame.header.epoch, frame.header.seq));
@@ -85,6 +90,10 @@ impl Stage for DetectorStage {
     fn limit(&mut self, particles: u32) {
         let (belief, cloud) = (self.belief.block(), self.particles.block());
         self.detector.step(Entry::Budget(particles), belief, cloud);
+    }
+
+    fn is_border(&self) -> bool {
+        true
     }
 
     fn has_input(&self) -> bool {

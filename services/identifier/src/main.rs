@@ -33,8 +33,9 @@ fn main() -> ExitCode {
     }
     let plan = setup.plan(ServiceName::Identifier, args.leave());
     let period_ns = setup.period_ns();
-    let build =
-        |graph: &_| IdentifierStage::new(identifier, graph, period_ns).map_err(ServeError::from);
+    let build = |graph: &_| {
+        IdentifierStage::new(identifier, &setup.robot, graph, period_ns).map_err(ServeError::from)
+    };
     match serve::stage::<DetectionBelief, _>(&plan, Topic::Detection, build) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -10,6 +10,8 @@ use vigil_cycle::{
     Topic,
 };
 
+use vigil_robot::{Description, FrameGuard};
+
 use crate::{Diagnoser, Input};
 
 /// Sensor frames that may wait for their detection.
@@ -25,6 +27,7 @@ pub struct IdentifierStage {
     detected: Box<dyn Receiver<ParticleBlock>>,
     frames: Box<dyn Receiver<SensorFrame>>,
     frame_account: InputAccount,
+    guard: FrameGuard,
     pending: VecDeque<SensorFrame>,
     period_ns: u64,
     belief: Box<dyn Sender<FaultBelief>>,
@@ -45,17 +48,24 @@ struct Reported {
 }
 
 impl IdentifierStage {
-    /// Opens the identifier's ports on `graph`, for a schedule of `period_ns`.
+    /// Opens the identifier's ports on `graph`, for frames of `robot` and a schedule of
+    /// `period_ns`.
     ///
     /// # Errors
     /// The transport's.
-    pub fn new(identifier: Diagnoser, graph: &Graph, period_ns: u64) -> Result<Self, PortError> {
+    pub fn new(
+        identifier: Diagnoser,
+        robot: &Description,
+        graph: &Graph,
+        period_ns: u64,
+    ) -> Result<Self, PortError> {
         Ok(Self {
             identifier,
             detections: graph.receiver(Topic::Detection)?,
             detected: graph.receiver(Topic::DetectionParticles)?,
             frames: graph.receiver(Topic::Sensor)?,
-            frame_account: InputAccount::default(),
+            frame_account: InputAccount::of_outsider(),
+            guard: FrameGuard::new(robot),
             pending: VecDeque::with_capacity(PENDING_MAX),
             period_ns,
             belief: graph.sender(Topic::Diagnosis)?,
@@ -73,9 +83,9 @@ impl IdentifierStage {
             let Some(frame) = self.frames.held() else {
                 break;
             };
-            let account = &mut self.frame_account;
+            let (account, content) = (&mut self.frame_account, || self.guard.check(frame));
             if account
-                .arrive::<SensorFrame>(&frame.header, now_ns, self.period_ns)
+                .admit::<SensorFrame>(&frame.header, now_ns, self.period_ns, content)
                 .is_taken()
             {
                 if self.pending.len() == PENDING_MAX {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use vigil_blocks::{Block, Event, Health};
+use vigil_blocks::{Block, Event, Health, REJECTIONS};
 use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Graph, Monotonic, PortError, Receiver, Topic, health};
@@ -33,6 +33,8 @@ pub struct Counters {
     pub late: u64,
     pub duplicate: u64,
     pub invalid: u64,
+    /// Refused input by cause, see [`vigil_blocks::Rejection`].
+    pub rejected: [u64; REJECTIONS],
 }
 
 impl Counters {
@@ -41,10 +43,13 @@ impl Counters {
         self.missed += health.missed;
         self.over_budget += health.over_budget;
         self.slips += health.slips;
-        self.lost += health.lost;
+        self.lost = self.lost.saturating_add(health.lost);
         self.late += health.late;
         self.duplicate += health.duplicate;
         self.invalid += health.invalid;
+        for (sum, count) in self.rejected.iter_mut().zip(health.rejected) {
+            *sum += count;
+        }
     }
 }
 

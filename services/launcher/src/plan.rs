@@ -149,10 +149,10 @@ impl Plan {
         options
     }
 
-    /// True if a first action must come back within the start-up limit; an external sensor may
+    /// True if a first action must come back within the start-up limit; a sensor outside may
     /// take its time.
     pub fn waits_for_ready(&self) -> bool {
-        self.setup.file.sensor.source != Source::External
+        !self.setup.file.sensor.source.is_outside()
     }
 
     /// True for a source that could only begin its recording again.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
+use vigil_blocks::Rejection;
 use vigil_cycle::latency::Percentiles;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Placement, RunReport};
@@ -65,6 +66,8 @@ pub struct ServiceSummary {
     late: u64,
     duplicate: u64,
     invalid: u64,
+    /// Refused input by cause; causes that did not occur are left out.
+    rejected: BTreeMap<&'static str, u64>,
     restarts: usize,
     pid: u32,
     core: u32,
@@ -173,6 +176,11 @@ fn service(
         late: counters.late,
         duplicate: counters.duplicate,
         invalid: counters.invalid,
+        rejected: Rejection::ALL
+            .into_iter()
+            .map(|cause| (cause.as_str(), counters.rejected[cause as usize]))
+            .filter(|(_, count)| *count > 0)
+            .collect(),
         restarts,
         pid: health.map_or(0, |h| h.pid),
         core: health.map_or(u32::MAX, |h| h.core),
@@ -225,6 +233,11 @@ impl fmt::Display for Summary {
                 s.late,
                 s.restarts
             )?;
+        }
+        for (name, s) in self.in_order().filter(|(_, s)| !s.rejected.is_empty()) {
+            let causes = s.rejected.iter().map(|(cause, n)| format!("{n} {cause}"));
+            let causes = causes.collect::<Vec<_>>().join(", ");
+            writeln!(f, "  {name} refused input: {causes}")?;
         }
         let e = &self.end_to_end_us;
         writeln!(

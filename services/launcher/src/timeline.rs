@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::Serialize;
-use vigil_blocks::{Channel, Event, EventKind, MODE_MULTIPLE, MODE_UNKNOWN, Refusal};
+use vigil_blocks::{Channel, Event, EventKind, MODE_MULTIPLE, MODE_UNKNOWN, Refusal, Rejection};
 use vigil_cycle::Supervision;
 use vigil_cycle::topic::ServiceName;
 use vigil_robot::injection::{Change, Wire};
@@ -275,6 +275,10 @@ impl Namer {
             EventKind::Symptoms => words::symptoms(event.what),
             EventKind::Outcome => words::outcome(event),
             EventKind::Degraded => words::degraded(event.what),
+            EventKind::Rejected => {
+                let cause = Rejection::from_wire(event.what).map_or("?", Rejection::as_str);
+                format!("{} frames: {cause}", event.value)
+            }
             EventKind::Particles => format!("{} of {}", event.what, event.value),
             EventKind::Watchdog => {
                 let found = Supervision::from_wire(event.what);
@@ -322,5 +326,6 @@ const fn kind_name(kind: EventKind) -> &'static str {
         EventKind::Degraded => "degraded",
         EventKind::Particles => "particles",
         EventKind::Watchdog => "watchdog",
+        EventKind::Rejected => "rejected",
     }
 }

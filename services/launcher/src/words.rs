@@ -42,6 +42,7 @@ pub fn degraded(bits: u32) -> String {
         (Degraded::INPUT_LOST, "input lost"),
         (Degraded::LATE, "late"),
         (Degraded::FEWER_PARTICLES, "fewer particles"),
+        (Degraded::QUARANTINE, "source in quarantine"),
     ];
     let present = reasons.iter().filter(|(bit, _)| bits & bit != 0);
     let present: Vec<&str> = present.map(|(_, word)| *word).collect();

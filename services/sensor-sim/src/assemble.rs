@@ -8,7 +8,7 @@ use vigil_robot::Injection;
 use vigil_setup::Setup;
 use vigil_setup::schema::Source;
 
-use crate::{Navigator, Obedience, Playback, Schedule, Simulation, World};
+use crate::{Listen, Navigator, Obedience, Playback, Schedule, Simulation, World};
 
 /// What is to be the source of the graph.
 pub enum Assembled {
@@ -16,6 +16,8 @@ pub enum Assembled {
     Simulator(Box<Simulation>, Schedule),
     /// Recorded frames.
     Playback(Playback),
+    /// Frames that arrive as datagrams.
+    Socket(Listen),
 }
 
 /// The source that a configuration describes; `injections` (`stuck:RM@5`) break it.
@@ -36,6 +38,7 @@ pub fn assemble(setup: &Setup, injections: &[String]) -> Result<Assembled, Box<d
             Assembled::Simulator(Box::new(simulation), schedule)
         }
         Source::Playback => Assembled::Playback(playback(setup)?),
+        Source::Socket => Assembled::Socket(listen(setup)?),
         Source::External => {
             return Err(format!("{path}: sensor.source is external: nothing to simulate").into());
         }
@@ -57,6 +60,18 @@ fn schedule(setup: &Setup, specs: &[String]) -> Result<Schedule, Box<dyn Error>>
     Ok(Schedule::new(
         specs.iter().map(parse).collect::<Result<_, _>>()?,
     ))
+}
+
+fn listen(setup: &Setup) -> Result<Listen, Box<dyn Error>> {
+    let socket = &setup.file.sensor.socket;
+    let udp = socket
+        .udp_address()
+        .map_err(|e| format!("sensor.socket.udp: {e}"))?;
+    let unix = match socket.unix.as_str() {
+        "" => None,
+        name => Some(setup.domain()?.folder().join(name)),
+    };
+    Ok(Listen { udp, unix })
 }
 
 fn playback(setup: &Setup) -> Result<Playback, Box<dyn Error>> {

@@ -1,4 +1,4 @@
-//! The simulated rover, and playback of recorded frames.
+//! The sensor source: the simulated rover, recorded frames, or frames that arrive at a socket.
 //!
 //! - [`World`]: the rover on its soil, its sensors, and the faults and disturbances of both;
 //! - [`Obedience`]: what the rover makes of the supervisor's actions;
@@ -10,6 +10,7 @@
 //! Nothing here knows a clock or a port: times are parameters, and equal input and seed give equal
 //! bits. The binary wires this to the graph.
 
+mod arrival_clock;
 mod assemble;
 mod check;
 mod disturbed;
@@ -27,6 +28,7 @@ mod soil;
 mod wiring;
 mod world;
 
+pub use arrival_clock::ArrivalClock;
 pub use assemble::{Assembled, assemble};
 pub use check::WorldError;
 pub use drive::{ACCELERATION_MAX_M_S2, CURVATURE_RATE_MAX_1_M_S, DriveCommand};
@@ -36,5 +38,5 @@ pub use obedience::{EffectiveCommand, Obedience};
 pub use playback::{Playback, PlaybackError};
 pub use schedule::Schedule;
 pub use simulation::Simulation;
-pub use wiring::{PlaybackSource, SimulatorSource};
+pub use wiring::{Listen, PlaybackSource, SimulatorSource, SocketStage};
 pub use world::{CURRENT_PER_TORQUE_A_N_M, Truth, World};

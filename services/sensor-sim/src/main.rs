@@ -1,16 +1,19 @@
-//! `vigil-sensor-sim`: the simulated rover, or recorded frames, as a process of the graph. Exit
-//! codes: 0 stopped, 1 failed, 2 configuration.
+//! `vigil-sensor-sim`: the simulated rover, recorded frames, or frames from a socket, as a process
+//! of the graph. Exit codes: 0 stopped, 1 failed, 2 configuration.
 
 use std::error::Error;
 use std::process::ExitCode;
+use std::rc::Rc;
 
 use clap::Parser;
-use vigil_cycle::serve::{self, ServeError};
+use vigil_cycle::OnMiss;
+use vigil_cycle::datagrams::Datagrams;
+use vigil_cycle::serve::{self, Plan, ServeError};
 use vigil_cycle::topic::ServiceName;
-use vigil_sensor_sim::{Assembled, PlaybackSource, SimulatorSource, assemble};
+use vigil_sensor_sim::{Assembled, Listen, PlaybackSource, SimulatorSource, SocketStage, assemble};
 use vigil_setup::{ServiceArgs, Setup};
 
-/// The simulated rover, and playback of recorded frames.
+/// The simulated rover, playback of recorded frames, and frames that arrive at a socket.
 #[derive(Debug, Parser)]
 #[command(version, about)]
 struct Args {
@@ -66,5 +69,20 @@ fn serve(setup: &Setup, source: Assembled, args: &Args) -> Result<(), ServeError
         Assembled::Playback(playback) => serve::source(&plan, |graph| {
             PlaybackSource::new(playback, graph).map_err(ServeError::from)
         }),
+        Assembled::Socket(listen) => serve_socket(setup, &listen, plan),
     }
+}
+
+fn serve_socket(setup: &Setup, listen: &Listen, mut plan: Plan) -> Result<(), ServeError> {
+    if plan.on_miss.predicts() {
+        // There is nothing to predict: a frame that is not there is not made up.
+        plan.on_miss = OnMiss::Count;
+    }
+    serve::woken_by(&plan, |graph| {
+        let datagrams = Datagrams::bind(listen.udp, listen.unix.as_deref())
+            .map_err(|e| ServeError::Build(format!("sensor.socket: {e}")))?;
+        let datagrams = Rc::new(datagrams);
+        let stage = SocketStage::new(Rc::clone(&datagrams), &setup.robot, graph)?;
+        Ok((stage, datagrams))
+    })
 }

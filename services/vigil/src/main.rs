@@ -1,14 +1,19 @@
 //! `vigil`: the operator's tool. Never in the data path of a running graph.
 
+mod bindings;
 mod commands;
+mod findings;
 mod output;
 mod pipeline;
+mod publisher;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use commands::{Outcome, check, diagnose, evaluate, import, inject, learn, pomdp};
+use commands::{
+    Outcome, check, check_publisher, diagnose, evaluate, import, inject, learn, pomdp, types,
+};
 
 /// Fault detection, diagnosis and recovery for mobile robots.
 ///
@@ -28,7 +33,9 @@ enum Command {
     Evaluate(evaluate::Args),
     Inject(inject::Args),
     Check(check::Args),
+    CheckPublisher(check_publisher::Args),
     Pomdp(pomdp::Args),
+    Types(types::Args),
 }
 
 fn main() -> ExitCode {
@@ -39,7 +46,9 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Inject(args) => inject::run(&args),
         Command::Check(args) => check::run(&args),
+        Command::CheckPublisher(args) => check_publisher::run(&args),
         Command::Pomdp(args) => pomdp::run(&args),
+        Command::Types(args) => types::run(&args),
     };
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -93,6 +93,8 @@ macro_rules! block {
         #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
         pub struct $name { $( $(#[$field_meta])* pub $field : $ty, )+ }
 
+        $crate::layout!($name { $( $([$field_meta])* $field : $ty, )+ });
+
         impl $crate::Block for $name {
             const SCHEMA: u64 = {
                 let mut h = $crate::fnv1a::hash($crate::fnv1a::BASIS, stringify!($name).as_bytes());

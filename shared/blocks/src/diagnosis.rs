@@ -1,8 +1,7 @@
 //! The identifier's belief: what is wrong?
 
-use bytemuck::{Pod, Zeroable};
-
 use crate::block::block;
+use crate::layout::part;
 use crate::{CHANNELS, Cause, Header};
 
 /// Capacity of nodes of the fault tree.
@@ -14,14 +13,14 @@ pub const MODE_UNKNOWN: u32 = 1000;
 /// [`FaultBelief::mode`] when two or more faults are present.
 pub const MODE_MULTIPLE: u32 = 1001;
 
+part! {
 /// A set of leaves of the fault tree and its probability.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct FaultSet {
+pub struct FaultSet, size 16 {
     /// Bit i: node i of the tree (always a leaf) is in the set; 0 is the nominal mode.
     pub leaves: u64,
     /// Probability that exactly this set is present.
     pub p: f64,
+}
 }
 
 block! {

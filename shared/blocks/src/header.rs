@@ -1,15 +1,15 @@
 //! What every block begins with, and what caused it.
 
-use bytemuck::{Pod, Zeroable};
+use crate::layout::part;
 
+part! {
 /// First 48 bytes of every block.
 ///
 /// `(epoch, seq)` identifies a block: `seq` restarts at 0 when its writer restarts, `epoch` is
 /// then a new one. `t_schedule_ns` and `t_capture_ns` of the sensor frame travel through the whole
 /// graph, so that latency is measured from the moment a cycle was due.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
-pub struct Header {
+#[derive(Eq)]
+pub struct Header, size 48 {
     /// Schema hash of the block ([`crate::Block::SCHEMA`]).
     pub schema: u64,
     /// Identity of the writer's start; differs after each restart, never 0 once written.
@@ -24,11 +24,12 @@ pub struct Header {
     /// Instant at which the block was handed to the transport, ns, `CLOCK_MONOTONIC`.
     pub t_publish_ns: u64,
 }
+}
 
+part! {
 /// Which journal entry a service had taken last when it wrote a block.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
-pub struct Cause {
+#[derive(Eq)]
+pub struct Cause, size 24 {
     /// A [`CauseKind`].
     pub kind: u32,
     /// Frames folded into this block (1 if on time), or periods missed.
@@ -37,6 +38,7 @@ pub struct Cause {
     pub frame_epoch: u64,
     /// Sequence number of the newest sensor frame taken.
     pub frame_seq: u64,
+}
 }
 
 /// Kind of a journal entry, as carried in [`Cause::kind`].

@@ -1,17 +1,16 @@
 //! What each service says about itself.
 
-use bytemuck::{Pod, Zeroable};
-
 use crate::Header;
 use crate::block::block;
+use crate::layout::part;
+use crate::rejection::REJECTIONS;
 
 /// Capacity of the ring of recent events in a [`Health`] block.
 pub const EVENTS: usize = 32;
 
+part! {
 /// Something worth telling a person. `what` is an index whose meaning depends on `kind`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Event {
+pub struct Event, size 32 {
     /// When, `CLOCK_MONOTONIC` ns.
     pub t_ns: u64,
     /// An [`EventKind`].
@@ -22,6 +21,7 @@ pub struct Event {
     pub p: f64,
     /// See [`EventKind`].
     pub value: u64,
+}
 }
 
 /// Kind of an [`Event`], and the meaning of its `what` and `value`.
@@ -80,6 +80,9 @@ pub enum EventKind {
     /// The launcher's watchdog finds a service failed. `what`: 1 start-up, 2 alive, 3 deadline, 4
     /// logical.
     Watchdog = 23,
+    /// Blocks from outside were refused. `what`: the [`crate::Rejection`]; `value`: how many since
+    /// it was told last.
+    Rejected = 24,
 }
 
 impl EventKind {
@@ -110,6 +113,7 @@ impl EventKind {
             21 => Self::Degraded,
             22 => Self::Particles,
             23 => Self::Watchdog,
+            24 => Self::Rejected,
             _ => return None,
         })
     }
@@ -117,7 +121,7 @@ impl EventKind {
 
 block! {
     /// Written by each service, at about 20 Hz and at once when something happens.
-    pub struct Health, size 1288 {
+    pub struct Health, size 1416 {
         /// Common header.
         pub header: Header,
         /// Cycles done: blocks published, or frames for the source.
@@ -136,6 +140,8 @@ block! {
         pub duplicate: u64,
         /// Input blocks refused: wrong schema, impossible time stamps, non-finite data.
         pub invalid: u64,
+        /// The refused ones by cause, see [`crate::Rejection`].
+        pub rejected: [u64; REJECTIONS],
         /// Longest time from wake-up to publication, ns.
         pub worst_cycle_ns: u64,
         /// Sequence number of that cycle.
@@ -200,6 +206,8 @@ impl Degraded {
     pub const LATE: u32 = 2;
     /// It works with fewer particles than configured.
     pub const FEWER_PARTICLES: u32 = 4;
+    /// Its source sends what cannot be trusted: all that it sends is refused until that ends.
+    pub const QUARANTINE: u32 = 8;
 }
 
 /// Life of a service.

@@ -20,12 +20,15 @@
 mod action;
 mod block;
 mod control;
+pub mod datagram;
 mod detection;
 mod diagnosis;
 mod header;
 mod health;
 mod journal;
+pub mod layout;
 mod particles;
+mod rejection;
 mod sensor;
 
 pub use action::{
@@ -41,4 +44,5 @@ pub use header::{Cause, CauseKind, Header};
 pub use health::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
 pub use journal::Entry;
 pub use particles::{PARTICLE_CAPACITY, ParticleBlock};
+pub use rejection::{REJECTIONS, Rejection};
 pub use sensor::{ActionOutcome, COMMANDS, SensorFrame, Symptoms, Valid, WHEELS};

@@ -1,6 +1,8 @@
 //! A service's account of itself, and when to publish it.
 
-use vigil_blocks::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
+use vigil_blocks::{
+    Degraded, EVENTS, Event, EventKind, Health, REJECTIONS, Rejection, ServiceState,
+};
 
 use crate::clock::Clock;
 use crate::deadline::Schedule;
@@ -13,12 +15,17 @@ pub const HEALTH_PERIOD_NS: u64 = 50_000_000;
 
 /// Misses are told at most this often, ns, summed up: a flood must not push out other events.
 const MISS_EVENT_INTERVAL_NS: u64 = 100_000_000;
+/// The same for refused blocks.
+const REJECTED_EVENT_INTERVAL_NS: u64 = 1_000_000_000;
 
 /// Collects counters and events, and publishes them.
 pub struct HealthBoard {
     block: Health,
     untold_misses: u64,
     next_miss_event_ns: u64,
+    /// Refused blocks that were told, and when the next may be.
+    rejected_told: [u64; REJECTIONS],
+    next_rejected_event_ns: u64,
     sender: Box<dyn Sender<Health>>,
     published_ns: u64,
     changed: bool,
@@ -51,6 +58,8 @@ impl HealthBoard {
             block,
             untold_misses: 0,
             next_miss_event_ns: 0,
+            rejected_told: [0; REJECTIONS],
+            next_rejected_event_ns: 0,
             sender,
             published_ns: 0,
             changed: true,
@@ -142,11 +151,36 @@ impl HealthBoard {
         }
     }
 
+    /// Notes what the account of the input says; tells what was refused, summed up, and a
+    /// quarantine at once.
+    pub fn set_input(&mut self, now_ns: u64, account: &InputAccount) {
+        let health = &mut self.block;
+        (health.lost, health.duplicate) = (account.lost, account.duplicate);
+        (health.invalid, health.rejected) = (account.invalid, account.rejected);
+        self.set_degraded(now_ns, Degraded::QUARANTINE, account.is_quarantined());
+        if account.rejected == self.rejected_told || now_ns < self.next_rejected_event_ns {
+            return;
+        }
+        for rejection in Rejection::ALL {
+            let i = rejection as usize;
+            let count = account.rejected[i] - self.rejected_told[i];
+            if count > 0 {
+                self.event(now_ns, EventKind::Rejected, rejection as u32, 0.0, count);
+            }
+        }
+        self.rejected_told = account.rejected;
+        self.next_rejected_event_ns = now_ns + REJECTED_EVENT_INTERVAL_NS;
+    }
+
     /// Adds what the account of a further input says.
-    pub const fn add_input(&mut self, account: &InputAccount) {
-        self.block.lost += account.lost;
-        self.block.duplicate += account.duplicate;
-        self.block.invalid += account.invalid;
+    pub fn add_input(&mut self, account: &InputAccount) {
+        let health = &mut self.block;
+        health.lost = health.lost.saturating_add(account.lost);
+        health.duplicate += account.duplicate;
+        health.invalid += account.invalid;
+        for (sum, count) in health.rejected.iter_mut().zip(account.rejected) {
+            *sum += count;
+        }
     }
 
     /// When the block has to go out next, ns.

@@ -1,14 +1,26 @@
-//! Accounting of input blocks by (epoch, sequence number), and refusal of impossible headers.
+//! End-to-end check of input blocks, by what their headers say, and the account of it.
+//!
+//! After AUTOSAR's end-to-end protocol (specification of E2E Protocol, R4): repetition, loss,
+//! wrong sequence, insertion and delay are told apart, and a source that misbehaves is trusted
+//! again only after it has behaved for a while.
 
-use vigil_blocks::{Block, Header};
+use vigil_blocks::{Block, Header, REJECTIONS, Rejection};
 
 /// A scheduled instant may be ahead of the reader's clock by this much at most, in periods.
 const AHEAD_PERIODS_MAX: u64 = 2;
 /// A scheduled instant may lie this far in the past, ns: older blocks are not of this drive, or of
 /// another clock.
 const BEHIND_NS_MAX: u64 = 10_000_000_000;
+/// Another writer is believed once the known one has been silent for so many periods.
+const SILENT_PERIODS: u64 = 2;
+/// Blocks closer to the last one than this part of a period are more than the schedule allows.
+const EARLY_PERIOD_PART: u64 = 4;
+/// A source that misbehaved in so many of its last [`HISTORY`] blocks is not trusted.
+const MISBEHAVED_MAX: u32 = 8;
+/// Blocks that are remembered; it is trusted again after so many good ones in a row.
+const HISTORY: u32 = 16;
 
-/// What an input block is, by its header.
+/// What an input block is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Arrival {
     /// The next in sequence, or the first of all.
@@ -17,58 +29,185 @@ pub enum Arrival {
     NewEpoch,
     /// In sequence after this many lost ones.
     AfterGap(u64),
-    /// Seen before, or older than one seen before: not to be taken.
-    Duplicate,
-    /// Impossible: wrong schema, or scheduled in the future or long ago. Not to be taken.
-    Invalid,
+    /// Not to be taken.
+    Rejected(Rejection),
 }
 
 impl Arrival {
     /// True if the block is to be taken.
     #[must_use]
     pub const fn is_taken(self) -> bool {
-        !matches!(self, Self::Duplicate | Self::Invalid)
+        !matches!(self, Self::Rejected(_))
     }
 }
 
-/// Accounts the blocks of one topic.
+/// Who writes the blocks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Writer {
+    /// A service of the graph.
+    #[default]
+    Service,
+    /// Somebody outside of it.
+    Outsider,
+}
+
+/// The newest block of the known writer.
+#[derive(Debug, Clone, Copy)]
+struct Last {
+    epoch: u64,
+    seq: u64,
+    /// When a block of it was taken last, and for when that was due, ns.
+    taken_ns: u64,
+    t_schedule_ns: u64,
+}
+
+/// Checks and accounts the blocks of one topic.
 #[derive(Debug, Clone, Default)]
 pub struct InputAccount {
-    last: Option<(u64, u64)>,
+    writer: Writer,
+    last: Option<Last>,
+    /// Whether the last blocks were misbehaviour, the newest in the lowest bit.
+    misbehaved: u32,
+    is_quarantined: bool,
     /// Blocks lost, by gaps in the sequence.
     pub lost: u64,
-    /// Blocks seen twice.
+    /// Blocks seen before, or older than one seen before.
     pub duplicate: u64,
-    /// Blocks refused.
+    /// Blocks refused for another reason.
     pub invalid: u64,
+    /// Refused blocks by [`Rejection`].
+    pub rejected: [u64; REJECTIONS],
 }
 
 impl InputAccount {
+    /// An account of blocks from outside the graph: of one living writer, no faster than the
+    /// schedule, and not trusted for ever. [`Self::default`] is one of a service's blocks.
+    #[must_use]
+    pub fn of_outsider() -> Self {
+        Self {
+            writer: Writer::Outsider,
+            ..Self::default()
+        }
+    }
+
+    /// True while nothing of this source is taken, since it has misbehaved.
+    #[must_use]
+    pub const fn is_quarantined(&self) -> bool {
+        self.is_quarantined
+    }
+
+    /// When a block was taken last, ns; `None` before the first.
+    #[must_use]
+    pub fn taken_ns(&self) -> Option<u64> {
+        self.last.map(|last| last.taken_ns)
+    }
+
     /// Accounts a block by its header, at `now_ns`, for a schedule of `period_ns`.
     pub fn arrive<T: Block>(&mut self, header: &Header, now_ns: u64, period_ns: u64) -> Arrival {
-        let due_ns = header.t_schedule_ns;
-        let is_live = due_ns <= now_ns.saturating_add(AHEAD_PERIODS_MAX * period_ns)
-            && due_ns >= now_ns.saturating_sub(BEHIND_NS_MAX);
-        if header.schema != T::SCHEMA || header.epoch == 0 || !is_live {
-            self.invalid += 1;
-            return Arrival::Invalid;
-        }
-        let arrival = match self.last {
-            None => Arrival::Next,
-            Some((epoch, _)) if epoch != header.epoch => Arrival::NewEpoch,
-            Some((_, seq)) if header.seq <= seq => Arrival::Duplicate,
-            Some((_, seq)) if header.seq == seq + 1 => Arrival::Next,
-            Some((_, seq)) => Arrival::AfterGap(header.seq - seq - 1),
+        self.admit::<T>(header, now_ns, period_ns, || Ok(()))
+    }
+
+    /// The same; a block that passes is taken only if `content` finds nothing wrong with it.
+    pub fn admit<T: Block>(
+        &mut self,
+        header: &Header,
+        now_ns: u64,
+        period_ns: u64,
+        content: impl FnOnce() -> Result<(), Rejection>,
+    ) -> Arrival {
+        let arrival = match self.judge::<T>(header, now_ns, period_ns) {
+            Arrival::Rejected(rejection) => return self.reject(rejection),
+            good => good,
         };
-        match arrival {
-            Arrival::Duplicate => self.duplicate += 1,
-            Arrival::AfterGap(lost) => self.lost += lost,
-            _ => {}
+        if let Arrival::AfterGap(lost) = arrival {
+            // A stranger may claim any number.
+            self.lost = self.lost.saturating_add(lost);
         }
-        if arrival.is_taken() {
-            self.last = Some((header.epoch, header.seq));
+        // It has arrived, whatever it says: the next one is not after a gap.
+        let last = self.last.get_or_insert(Last {
+            epoch: header.epoch,
+            seq: header.seq,
+            taken_ns: now_ns,
+            t_schedule_ns: 0,
+        });
+        (last.epoch, last.seq) = (header.epoch, header.seq);
+        if arrival == Arrival::NewEpoch {
+            last.t_schedule_ns = 0;
+        }
+        if let Err(rejection) = content() {
+            return self.reject(rejection);
+        }
+        if self.writer == Writer::Outsider {
+            let earliest_ns = last.t_schedule_ns + period_ns / EARLY_PERIOD_PART;
+            if last.t_schedule_ns > 0 && header.t_schedule_ns < earliest_ns {
+                return self.reject(Rejection::Early);
+            }
+            self.remember(false);
+            if self.is_quarantined {
+                return self.reject(Rejection::Quarantined);
+            }
+        }
+        if let Some(last) = &mut self.last {
+            (last.taken_ns, last.t_schedule_ns) = (now_ns, header.t_schedule_ns);
         }
         arrival
+    }
+
+    /// Accounts what was refused before it had a header to look at.
+    pub fn reject(&mut self, rejection: Rejection) -> Arrival {
+        self.rejected[rejection as usize] += 1;
+        match rejection {
+            Rejection::Repeated | Rejection::WrongSequence => self.duplicate += 1,
+            _ => self.invalid += 1,
+        }
+        if rejection.is_misbehaviour() && self.writer == Writer::Outsider {
+            self.remember(true);
+        }
+        Arrival::Rejected(rejection)
+    }
+
+    fn judge<T: Block>(&self, header: &Header, now_ns: u64, period_ns: u64) -> Arrival {
+        let due_ns = header.t_schedule_ns;
+        if header.schema != T::SCHEMA {
+            return Arrival::Rejected(Rejection::Schema);
+        }
+        if header.epoch == 0 {
+            return Arrival::Rejected(Rejection::NoEpoch);
+        }
+        if due_ns > now_ns.saturating_add(AHEAD_PERIODS_MAX * period_ns) {
+            return Arrival::Rejected(Rejection::Ahead);
+        }
+        if due_ns < now_ns.saturating_sub(BEHIND_NS_MAX) {
+            return Arrival::Rejected(Rejection::Behind);
+        }
+        let Some(last) = self.last else {
+            return Arrival::Next;
+        };
+        if header.epoch != last.epoch {
+            let silent_ns = now_ns.saturating_sub(last.taken_ns);
+            let is_alive = silent_ns < SILENT_PERIODS * period_ns && !self.is_quarantined;
+            return if self.writer == Writer::Outsider && is_alive {
+                Arrival::Rejected(Rejection::OtherWriter)
+            } else {
+                Arrival::NewEpoch
+            };
+        }
+        match header.seq.checked_sub(last.seq) {
+            None => Arrival::Rejected(Rejection::WrongSequence),
+            Some(0) => Arrival::Rejected(Rejection::Repeated),
+            Some(1) => Arrival::Next,
+            Some(steps) => Arrival::AfterGap(steps - 1),
+        }
+    }
+
+    fn remember(&mut self, is_misbehaviour: bool) {
+        let mask = (1 << HISTORY) - 1;
+        self.misbehaved = (self.misbehaved << 1 | u32::from(is_misbehaviour)) & mask;
+        if self.misbehaved.count_ones() >= MISBEHAVED_MAX {
+            self.is_quarantined = true;
+        } else if self.misbehaved == 0 {
+            self.is_quarantined = false;
+        }
     }
 }
 
@@ -77,61 +216,156 @@ mod tests {
     use super::*;
     use vigil_blocks::SensorFrame;
 
-    fn arrive(account: &mut InputAccount, epoch: u64, seq: u64) -> Arrival {
+    const PERIOD_NS: u64 = 1_000_000;
+    const START_NS: u64 = 60_000_000_000;
+
+    /// A block of `epoch` with `seq`, due in period `k` and taken right then.
+    fn at(account: &mut InputAccount, (epoch, seq, k): (u64, u64, u64)) -> Arrival {
+        with(account, (epoch, seq, k), Ok(()))
+    }
+
+    fn with(
+        account: &mut InputAccount,
+        (epoch, seq, k): (u64, u64, u64),
+        content: Result<(), Rejection>,
+    ) -> Arrival {
+        let now_ns = START_NS + k * PERIOD_NS;
         let header = Header {
             schema: SensorFrame::SCHEMA,
             epoch,
             seq,
+            t_schedule_ns: now_ns,
             ..Header::default()
         };
-        account.arrive::<SensorFrame>(&header, 1_000_000, 1000)
+        account.admit::<SensorFrame>(&header, now_ns, PERIOD_NS, || content)
     }
 
     #[test]
     fn sequence_faults_are_told_apart_and_counted() {
-        let mut a = InputAccount::default();
-        assert_eq!(arrive(&mut a, 7, 3), Arrival::Next);
-        assert_eq!(arrive(&mut a, 7, 4), Arrival::Next);
-        assert_eq!(arrive(&mut a, 7, 4), Arrival::Duplicate);
-        assert_eq!(arrive(&mut a, 7, 8), Arrival::AfterGap(3));
-        assert_eq!(arrive(&mut a, 7, 6), Arrival::Duplicate);
-        assert_eq!(arrive(&mut a, 8, 0), Arrival::NewEpoch);
-        assert_eq!(arrive(&mut a, 8, 1), Arrival::Next);
-        assert_eq!((a.lost, a.duplicate, a.invalid), (3, 2, 0));
+        use Rejection::{Repeated, WrongSequence};
+        for mut a in [InputAccount::default(), InputAccount::of_outsider()] {
+            assert_eq!(at(&mut a, (7, 3, 1)), Arrival::Next);
+            assert_eq!(at(&mut a, (7, 4, 2)), Arrival::Next);
+            assert_eq!(at(&mut a, (7, 4, 3)), Arrival::Rejected(Repeated));
+            assert_eq!(at(&mut a, (7, 8, 4)), Arrival::AfterGap(3));
+            assert_eq!(at(&mut a, (7, 6, 5)), Arrival::Rejected(WrongSequence));
+            assert_eq!(at(&mut a, (8, 0, 6)), Arrival::NewEpoch);
+            assert_eq!(at(&mut a, (8, 1, 7)), Arrival::Next);
+            assert_eq!((a.lost, a.duplicate, a.invalid), (3, 2, 0));
+            let counted = [Repeated, WrongSequence].map(|r| a.rejected[r as usize]);
+            assert_eq!(counted, [1, 1]);
+        }
     }
 
     #[test]
-    fn impossible_headers_are_refused() {
+    fn the_last_sequence_number_does_not_wrap() {
         let mut a = InputAccount::default();
+        assert_eq!(at(&mut a, (7, u64::MAX - 1, 1)), Arrival::Next);
+        assert_eq!(at(&mut a, (7, u64::MAX, 2)), Arrival::Next);
+        let wrapped = at(&mut a, (7, 0, 3));
+        assert_eq!(wrapped, Arrival::Rejected(Rejection::WrongSequence));
+    }
+
+    #[test]
+    fn impossible_headers_are_refused_each_with_its_cause() {
         let good = Header {
             schema: SensorFrame::SCHEMA,
             epoch: 1,
-            t_schedule_ns: 60_000_000_000,
+            t_schedule_ns: START_NS,
             ..Header::default()
         };
-        let now_ns = good.t_schedule_ns;
-        for bad in [
-            Header { schema: 1, ..good },
-            Header { epoch: 0, ..good },
-            Header {
-                t_schedule_ns: now_ns + 2001,
-                ..good
-            },
-            Header {
-                t_schedule_ns: u64::MAX,
-                ..good
-            },
-            Header {
-                t_schedule_ns: now_ns - BEHIND_NS_MAX - 1,
-                ..good
-            },
-        ] {
-            assert_eq!(
-                a.arrive::<SensorFrame>(&bad, now_ns, 1000),
-                Arrival::Invalid
-            );
+        let due = |t_schedule_ns| Header {
+            t_schedule_ns,
+            ..good
+        };
+        let cases = [
+            (Header { schema: 1, ..good }, Rejection::Schema),
+            (Header { epoch: 0, ..good }, Rejection::NoEpoch),
+            (due(START_NS + 2 * PERIOD_NS + 1), Rejection::Ahead),
+            (due(u64::MAX), Rejection::Ahead),
+            (due(START_NS - BEHIND_NS_MAX - 1), Rejection::Behind),
+            (due(0), Rejection::Behind),
+        ];
+        let mut a = InputAccount::default();
+        for (bad, cause) in cases {
+            let arrival = a.arrive::<SensorFrame>(&bad, START_NS, PERIOD_NS);
+            assert_eq!(arrival, Arrival::Rejected(cause));
         }
-        assert_eq!(a.arrive::<SensorFrame>(&good, now_ns, 1000), Arrival::Next);
-        assert_eq!(a.invalid, 5);
+        let latest = due(START_NS + 2 * PERIOD_NS);
+        let arrival = a.arrive::<SensorFrame>(&latest, START_NS, PERIOD_NS);
+        assert_eq!((arrival, a.invalid), (Arrival::Next, 6));
+    }
+
+    #[test]
+    fn an_outsider_is_replaced_only_once_it_is_silent() {
+        let mut a = InputAccount::of_outsider();
+        assert_eq!(at(&mut a, (7, 0, 1)), Arrival::Next);
+        let other = Arrival::Rejected(Rejection::OtherWriter);
+        assert_eq!(at(&mut a, (9, 0, 2)), other);
+        assert_eq!(at(&mut a, (7, 1, 2)), Arrival::Next);
+        assert_eq!(at(&mut a, (9, 1, 3)), other);
+        assert_eq!(at(&mut a, (9, 2, 4)), Arrival::NewEpoch);
+        assert_eq!(at(&mut a, (7, 2, 5)), other);
+        // A service that starts anew has the transport's word that the old one is gone.
+        let mut a = InputAccount::default();
+        assert_eq!(at(&mut a, (7, 0, 1)), Arrival::Next);
+        assert_eq!(at(&mut a, (9, 0, 1)), Arrival::NewEpoch);
+    }
+
+    #[test]
+    fn an_outsider_faster_than_the_schedule_is_thinned_out_and_stays_trusted() {
+        let mut a = InputAccount::of_outsider();
+        let mut taken = 0;
+        for seq in 0..10_000 {
+            // Twenty blocks a period.
+            let now_ns = START_NS + seq * PERIOD_NS / 20;
+            let header = Header {
+                schema: SensorFrame::SCHEMA,
+                epoch: 1,
+                seq,
+                t_schedule_ns: now_ns,
+                ..Header::default()
+            };
+            let arrival = a.arrive::<SensorFrame>(&header, now_ns, PERIOD_NS);
+            taken += u64::from(arrival.is_taken());
+        }
+        // One of five, a quarter of a period apart.
+        assert_eq!((taken, a.lost), (2_000, 0));
+        assert_eq!(a.rejected[Rejection::Early as usize], 8_000);
+        assert!(!a.is_quarantined());
+    }
+
+    #[test]
+    fn a_source_that_misbehaves_is_quarantined_until_it_behaves() {
+        let mut a = InputAccount::of_outsider();
+        let mut k = 0;
+        let mut next = |a: &mut InputAccount, content| {
+            k += 1;
+            with(a, (1, k, k), content)
+        };
+        let bad = Err(Rejection::NotFinite);
+        for _ in 0..7 {
+            assert_eq!(
+                next(&mut a, bad),
+                Arrival::Rejected(Rejection::NotFinite),
+                "told by its own cause"
+            );
+            assert!(next(&mut a, Ok(())).is_taken());
+        }
+        assert!(!a.is_quarantined(), "seven of the last sixteen");
+        next(&mut a, bad);
+        assert!(a.is_quarantined(), "eight");
+        for _ in 0..15 {
+            let refused = Arrival::Rejected(Rejection::Quarantined);
+            assert_eq!(next(&mut a, Ok(())), refused);
+        }
+        assert!(next(&mut a, Ok(())).is_taken(), "sixteen good ones");
+        assert_eq!(a.lost, 0);
+        // A service is not.
+        let mut a = InputAccount::default();
+        for k in 0..100 {
+            with(&mut a, (1, k, k), bad);
+        }
+        assert!(!a.is_quarantined());
     }
 }

@@ -10,7 +10,8 @@
 pub mod allocation;
 pub mod canary;
 pub mod clock;
-pub mod deadline;
+pub mod datagrams;
+mod deadline;
 pub mod domain;
 pub mod futex;
 pub mod health;

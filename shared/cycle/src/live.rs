@@ -2,12 +2,11 @@
 
 use crate::clock::{self, Clock, Monotonic};
 use crate::placement::{self, Placement, Wanted};
-use crate::port::EventListener;
 use crate::port::PortError;
 use crate::signal;
 use crate::source::{Source, SourceCycle};
 use crate::stage::{Stage, StageCycle};
-use crate::wake::{self, Timer, Wake};
+use crate::wake::{self, Inputs, NOTHING, Timer, Wake};
 
 /// No wait is longer than this, ns: a stop request is seen at the latest then.
 const WAIT_NS_MAX: u64 = 50_000_000;
@@ -64,7 +63,7 @@ impl SteadyFaults {
 pub fn run_stage(
     cycle: &mut StageCycle,
     stage: &mut impl Stage,
-    listener: &EventListener,
+    inputs: &impl Inputs,
     spin_ns: u64,
 ) -> Result<Run, PortError> {
     let timer = Timer::new().map_err(|e| PortError::setup("timer", &e))?;
@@ -72,7 +71,7 @@ pub fn run_stage(
     let mut ended = Ended::Stopped;
     cycle.ready(&Monotonic)?;
     while !signal::stop_requested() {
-        let wake = await_input(cycle, stage, (listener, &timer), spin_ns);
+        let wake = await_input(cycle, stage, (inputs, &timer), spin_ns);
         let before = cycle.health().view().cycles;
         if cycle.turn(stage, &Monotonic)?.is_break() {
             ended = Ended::Missed;
@@ -83,7 +82,7 @@ pub fn run_stage(
         if wake == Wake::Input && cycles == before {
             // Whoever floods the topic with wake-ups is not to hold the core.
             let until_ns = cycle.listens_again_ns(Monotonic.now_ns());
-            wake::wait(&timer, wake::NOTHING, until_ns);
+            wake::wait(&timer, [NOTHING; 2], until_ns);
         }
     }
     cycle.stop(&Monotonic)?;
@@ -94,21 +93,21 @@ pub fn run_stage(
 fn await_input(
     cycle: &StageCycle,
     stage: &impl Stage,
-    (listener, timer): (&EventListener, &Timer),
+    (inputs, timer): (&impl Inputs, &Timer),
     spin_ns: u64,
 ) -> Wake {
     let due_ns = cycle.next_wake_ns().min(Monotonic.now_ns() + WAIT_NS_MAX);
     let block_until = |at_ns| {
-        let wake = wake::wait(timer, listener.descriptor(), at_ns);
+        let wake = wake::wait(timer, inputs.descriptors(), at_ns);
         if wake == Wake::Input {
-            listener.drain();
+            inputs.drain();
         }
         wake
     };
     let expected_ns = cycle.expected_input_ns().filter(|_| spin_ns > 0);
     if let Some(expected_ns) = expected_ns {
         // What a spin has found may be announced only now; what has come since is not lost with it.
-        listener.drain();
+        inputs.drain();
         if stage.has_input() {
             return Wake::Input;
         }

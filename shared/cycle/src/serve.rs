@@ -17,6 +17,7 @@ use crate::shed::Shedder;
 use crate::source::{Source, SourceCycle};
 use crate::stage::{Stage, StageCycle};
 use crate::topic::{ServiceName, Topic};
+use crate::wake::Inputs;
 
 /// Delay between the opened ports and the first frame of a source, ns: time for the others.
 const START_DELAY_NS: u64 = 50_000_000;
@@ -110,12 +111,25 @@ pub fn stage<T: vigil_blocks::Block, S: Stage>(
     input: Topic,
     build: impl FnOnce(&Graph) -> Result<S, ServeError>,
 ) -> Result<(), ServeError> {
+    woken_by(plan, |graph| {
+        let stage = build(graph)?;
+        let Graph::SharedMemory(link) = graph else {
+            return Err(ServeError::Build("not in shared memory".into()));
+        };
+        Ok((stage, link.listener::<T>(input)?))
+    })
+}
+
+/// Runs a stage that is woken by what `build` opens with it, until SIGINT or SIGTERM.
+///
+/// # Errors
+/// As [`stage`].
+pub fn woken_by<S: Stage, I: Inputs>(
+    plan: &Plan,
+    build: impl FnOnce(&Graph) -> Result<(S, I), ServeError>,
+) -> Result<(), ServeError> {
     let (graph, health) = open(plan)?;
-    let mut stage = build(&graph)?;
-    let Graph::SharedMemory(link) = &graph else {
-        return Ok(());
-    };
-    let listener = link.listener::<T>(input)?;
+    let (mut stage, inputs) = build(&graph)?;
     let monitor = DeadlineMonitor::new(plan.schedule);
     let mut cycle = StageCycle::new(monitor, health)?
         .with_on_miss(plan.on_miss)
@@ -123,7 +137,10 @@ pub fn stage<T: vigil_blocks::Block, S: Stage>(
     if stage.particles() > 0 {
         cycle = cycle.with_shedder(Shedder::new(stage.particles(), plan.schedule));
     }
-    let run = live::run_stage(&mut cycle, &mut stage, &listener, plan.spin_ns)?;
+    if stage.is_border() {
+        cycle = cycle.guarded();
+    }
+    let run = live::run_stage(&mut cycle, &mut stage, &inputs, plan.spin_ns)?;
     leave(plan, cycle.recorder(), run)
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use vigil_blocks::{Block, Cause, CauseKind, Degraded, Header, ServiceState};
+use vigil_blocks::{Block, Cause, CauseKind, Degraded, Header, Rejection, ServiceState};
 
 use crate::clock::Clock;
 use crate::deadline::DeadlineMonitor;
@@ -52,6 +52,11 @@ pub trait Stage {
     /// From now on at most `particles`: the time allows no more.
     fn limit(&mut self, _particles: u32) {}
 
+    /// True if its input comes from outside the graph, and is to be checked accordingly.
+    fn is_border(&self) -> bool {
+        false
+    }
+
     /// True if input waits in shared memory, announced or not: for a stage that spins before it
     /// blocks. Costs no system call.
     fn has_input(&self) -> bool {
@@ -83,6 +88,23 @@ impl Intake<'_> {
             .arrive::<T>(header, self.now_ns, self.period_ns);
         self.new_epoch |= arrival == Arrival::NewEpoch;
         arrival.is_taken()
+    }
+
+    /// The same for a block from outside, of which `content` judges what it says.
+    pub fn admit<T: Block>(
+        &mut self,
+        header: &Header,
+        content: impl FnOnce() -> Result<(), Rejection>,
+    ) -> bool {
+        let (now_ns, period_ns) = (self.now_ns, self.period_ns);
+        let arrival = self.account.admit::<T>(header, now_ns, period_ns, content);
+        self.new_epoch |= arrival == Arrival::NewEpoch;
+        arrival.is_taken()
+    }
+
+    /// Accounts what was refused before it had a header.
+    pub fn reject(&mut self, rejection: Rejection) {
+        self.account.reject(rejection);
     }
 
     /// The filter has stepped the sensor frame (epoch, seq) behind the accepted block with this
@@ -181,6 +203,13 @@ impl StageCycle {
             shedder: None,
             input_offset_ns: 0,
         })
+    }
+
+    /// The same cycle, whose input comes from outside the graph.
+    #[must_use]
+    pub fn guarded(mut self) -> Self {
+        self.account = InputAccount::of_outsider();
+        self
     }
 
     /// The same cycle with this answer to its own misses.
@@ -379,14 +408,9 @@ impl StageCycle {
             self.shed(stage, now_ns);
         }
         let (missed, accounted_ns) = (self.monitor.missed(), self.monitor.accounted_ns());
-        let (lost, duplicate, invalid) = (
-            self.account.lost,
-            self.account.duplicate,
-            self.account.invalid,
-        );
+        self.health.set_input(now_ns, &self.account);
         let health = self.health.block();
         (health.missed, health.accounted_ns) = (missed, accounted_ns);
-        (health.lost, health.duplicate, health.invalid) = (lost, duplicate, invalid);
         stage.after(&mut self.health, now_ns);
         self.health.publish(clock)
     }

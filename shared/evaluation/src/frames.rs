@@ -52,6 +52,20 @@ pub enum Field {
 }
 
 impl Field {
+    /// Its value in a frame; `None` if it is not marked as measured.
+    #[must_use]
+    pub const fn get(self, frame: &SensorFrame) -> Option<f64> {
+        let (value, bit) = match self {
+            Self::Command(i) => (frame.command[i], Valid::command(i)),
+            Self::Pose(i) => (frame.pose[i], Valid::POSE),
+            Self::WheelRate(i) => (frame.wheel_rate[i], Valid::wheel_rate(i)),
+            Self::Steer(i) => (frame.steer[i], Valid::steer(i)),
+            Self::YawRate => (frame.yaw_rate, Valid::YAW_RATE),
+            Self::Current(i) => (frame.current[i], Valid::current(i)),
+        };
+        if frame.has(bit) { Some(value) } else { None }
+    }
+
     /// Writes a value to its place in a frame, and marks it as measured.
     pub fn put(self, value: f64, frame: &mut SensorFrame) {
         let (place, bit) = match self {

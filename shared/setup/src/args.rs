@@ -30,6 +30,9 @@ pub struct GraphArgs {
     /// Identification filter; replaces `identifier.filter`.
     #[arg(long, value_name = "NAME")]
     pub identifier: Option<IdentifierFilter>,
+    /// Where sensor frames come from; replaces `sensor.source`.
+    #[arg(long, value_name = "SOURCE", conflicts_with = "replay")]
+    pub source: Option<Source>,
     /// Play these recorded frames (CSV or CSV.gz) instead of the simulator.
     #[arg(long, value_name = "F")]
     pub replay: Option<PathBuf>,
@@ -97,6 +100,9 @@ impl GraphArgs {
             if let Some(filter) = self.identifier {
                 file.identifier.filter = filter;
             }
+            if let Some(source) = self.source {
+                file.sensor.source = source;
+            }
             if let Some(frames) = &self.replay {
                 file.sensor.source = Source::Playback;
                 let absolute = std::path::absolute(frames).unwrap_or_else(|_| frames.clone());
@@ -121,6 +127,7 @@ impl GraphArgs {
         option("--graph", self.graph.clone());
         option("--seed", self.seed.map(|v| v.to_string()));
         option("--identifier", self.identifier.map(|v| v.to_string()));
+        option("--source", self.source.map(|v| v.to_string()));
         option(
             "--replay",
             self.replay.as_ref().map(|p| p.display().to_string()),

@@ -6,7 +6,7 @@ use vigil_blocks::WHEELS;
 use vigil_robot::description::Kinematics;
 use vigil_robot::{AlarmError, Description, RobotModel};
 
-use crate::schema::{GraphFile, Service, Source};
+use crate::schema::{GraphFile, Service, Socket, Source};
 
 mod navigation;
 mod supervisor;
@@ -243,6 +243,9 @@ fn service_ranges(
 
 fn sensor(file: &GraphFile, path: &Path, report: &mut impl FnMut(&str, String)) {
     let sensor = &file.sensor;
+    if sensor.source == Source::Socket {
+        socket(&sensor.socket, report);
+    }
     if sensor.source == Source::Playback {
         match &sensor.frames {
             None => report(
@@ -274,6 +277,25 @@ fn sensor(file: &GraphFile, path: &Path, report: &mut impl FnMut(&str, String)) 
                 format!("{speed} is out of range: allowed is 0.01 to 100"),
             );
         }
+    }
+}
+
+fn socket(socket: &Socket, report: &mut impl FnMut(&str, String)) {
+    if let Err(error) = socket.udp_address() {
+        report("sensor.socket.udp", error);
+    }
+    let name = &socket.unix;
+    let legal = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    if !name.chars().all(legal) || name.starts_with('.') || name.len() > NAME_LENGTH_MAX {
+        let allowed = format!("at most {NAME_LENGTH_MAX} letters, digits, '-', '_' or '.'");
+        let message = format!("'{name}' is not a name: allowed are {allowed}");
+        report("sensor.socket.unix", message);
+    }
+    if socket.udp.is_empty() && name.is_empty() {
+        report(
+            "sensor.socket",
+            "udp and unix are empty: source = \"socket\" needs one of them".into(),
+        );
     }
 }
 

@@ -4,6 +4,8 @@ mod actions;
 mod peers;
 mod playback;
 mod simulator;
+mod socket;
 
 pub use playback::PlaybackSource;
 pub use simulator::SimulatorSource;
+pub use socket::{Listen, SocketStage};

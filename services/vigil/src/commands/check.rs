@@ -15,6 +15,7 @@ use vigil_setup::schema::Source;
 use vigil_setup::{GraphArgs, Setup};
 
 use super::{CommandError, Outcome};
+use crate::findings::{self, Finding, Status};
 use crate::output;
 
 /// Preflight: cores, scheduling rights, memory lock, shared memory, stale residue, configuration,
@@ -26,21 +27,6 @@ pub struct Args {
     /// Print one JSON document.
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-enum Status {
-    Ok,
-    Warning,
-    Failure,
-}
-
-#[derive(Debug, Serialize)]
-struct Finding {
-    check: &'static str,
-    status: Status,
-    detail: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -67,7 +53,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     ]);
     findings.push(residue(&setup));
     findings.push(build());
-    let ok = findings.iter().all(|f| f.status != Status::Failure);
+    let ok = findings::are_ok(&findings);
     if args.json {
         let document = Document {
             schema_version: 1,
@@ -76,29 +62,13 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         };
         output::json(&document).map_err(CommandError::failure)?;
     } else {
-        for Finding {
-            check,
-            status,
-            detail,
-        } in &findings
-        {
-            let mark = match status {
-                Status::Ok => "ok      ",
-                Status::Warning => "warning ",
-                Status::Failure => "FAILURE ",
-            };
-            output::line(&format!("{mark} {check:<15} {detail}")).map_err(CommandError::failure)?;
-        }
+        findings::print(&findings)?;
     }
     Ok(if ok { Outcome::Done } else { Outcome::Failed })
 }
 
 fn finding(check: &'static str, status: Status, detail: impl Into<String>) -> Finding {
-    Finding {
-        check,
-        status,
-        detail: detail.into(),
-    }
+    Finding::new(check, status, detail)
 }
 
 fn configuration(setup: &Setup) -> Finding {

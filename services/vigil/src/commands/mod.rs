@@ -3,6 +3,7 @@
 use std::fmt;
 
 pub mod check;
+pub mod check_publisher;
 pub mod diagnose;
 pub mod evaluate;
 pub mod import;
@@ -11,6 +12,7 @@ pub mod learn;
 mod learn_nominal;
 mod offline;
 pub mod pomdp;
+pub mod types;
 
 /// How a command ended that could do its work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,5 +1,6 @@
 //! Ports: typed senders and receivers of blocks, over shared memory or in process.
 
+mod found;
 mod in_process;
 mod shared_memory;
 
@@ -8,6 +9,7 @@ use vigil_blocks::{Block, Header};
 use crate::clock::Clock;
 use crate::topic::Topic;
 
+pub use found::FoundTopic;
 pub use in_process::Bus;
 pub use shared_memory::{EventListener, EventNotifier, Link, Wire};
 

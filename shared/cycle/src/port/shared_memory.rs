@@ -15,6 +15,7 @@ use super::{PortError, Receiver, Sender, Stamp, stamp_header};
 use crate::clock::{Clock, Monotonic};
 use crate::domain::{Domain, Queues};
 use crate::topic::Topic;
+use crate::wake::{Inputs, NOTHING};
 
 /// A block as the transport sees it: the same bytes, named by the block's schema.
 #[repr(transparent)]
@@ -195,19 +196,15 @@ pub struct EventListener {
     listener: Listener<ipc::Service>,
 }
 
-impl EventListener {
-    /// Descriptor that becomes readable when a block arrives.
-    #[must_use]
-    pub fn descriptor(&self) -> RawFd {
+impl Inputs for EventListener {
+    fn descriptors(&self) -> [RawFd; 2] {
         // SAFETY: the descriptor is only polled, and only while the listener lives.
         #[allow(unsafe_code)]
-        unsafe {
-            self.listener.file_descriptor().native_handle()
-        }
+        let descriptor = unsafe { self.listener.file_descriptor().native_handle() };
+        [descriptor, NOTHING]
     }
 
-    /// Consumes the pending wake-ups; else the descriptor stays readable.
-    pub fn drain(&self) {
+    fn drain(&self) {
         let _ = self.listener.try_wait(|_| {});
     }
 }

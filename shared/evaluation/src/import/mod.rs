@@ -21,6 +21,7 @@ mod delay;
 mod description;
 mod find;
 mod resample;
+mod ros;
 mod series;
 mod write;
 

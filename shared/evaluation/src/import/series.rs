@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use vigil_inference::angle::wrap;
 
-use super::ImportError;
 use super::description::{ChannelSource, Clock, LogDescription, Source};
+use super::{ImportError, ros};
 use crate::table::{Layout, Table};
 
 /// Columns of one source that are needed, with their rows.
@@ -109,18 +109,10 @@ fn read(log: &LogDescription, source: &Source, run: &Path) -> Result<SourceTable
     others
         .filter(|[name, _]| *name == source.name)
         .for_each(|[_, column]| add(column));
-    let layout = Layout {
-        delimiter: source.delimiter as u8,
-        skip_rows: source.skip_rows,
+    let values = match &source.topic {
+        Some(topic) => ros::columns(&path, topic, &columns)?,
+        None => table_columns(&path, source, &columns)?,
     };
-    let mut table = Table::open_as(&path, layout)?;
-    let at = table.require(&columns)?;
-    let mut values = vec![Vec::new(); at.len()];
-    while table.advance()? {
-        for (values, &at) in values.iter_mut().zip(&at) {
-            values.push(table.number(at)?);
-        }
-    }
     let mut out = SourceTable {
         name: source.name.clone(),
         path,
@@ -145,6 +137,27 @@ fn read(log: &LogDescription, source: &Source, run: &Path) -> Result<SourceTable
         out.time_s = steady(&out.device_s, &out.time_s);
     }
     Ok(out)
+}
+
+/// Columns of a CSV file.
+fn table_columns(
+    path: &Path,
+    source: &Source,
+    columns: &[String],
+) -> Result<Vec<Vec<f64>>, ImportError> {
+    let layout = Layout {
+        delimiter: source.delimiter as u8,
+        skip_rows: source.skip_rows,
+    };
+    let mut table = Table::open_as(path, layout)?;
+    let at = table.require(columns)?;
+    let mut values = vec![Vec::new(); at.len()];
+    while table.advance()? {
+        for (values, &at) in values.iter_mut().zip(&at) {
+            values.push(table.number(at)?);
+        }
+    }
+    Ok(values)
 }
 
 /// Times of a clock column, s, unwrapped, and what is out of order among them.

@@ -1,0 +1,206 @@
+//! What a flood of frames from a stranger costs: nothing is wanted.
+//!
+//! A publisher sends frames to the graph's UDP socket on its schedule; in one half of each pair
+//! another process sends good frames to it from another port, as fast as it can.
+
+use std::error::Error;
+use std::net::UdpSocket;
+use std::path::Path;
+use std::process::{Child, Command, ExitCode, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use vigil_bench::latency::graph::{Change, Prepared, root};
+use vigil_bench::latency::halves::{self, Half};
+use vigil_bench::latency::load::{Load, Running};
+use vigil_blocks::{Block, SensorFrame, datagram};
+use vigil_cycle::placement::{self, Wanted};
+use vigil_cycle::{Clock, Monotonic, clock, signal};
+use vigil_evaluation::frames;
+use vigil_setup::schema::Source;
+
+/// First argument of the process that is the flood.
+const FLOOD_WORD: &str = "flood";
+/// Where the publisher runs: below the graph, above ordinary processes.
+const PUBLISHER: Wanted = Wanted {
+    core: 0,
+    priority: 50,
+};
+/// The graph takes the first good sender for its own: the publisher begins so much earlier.
+const HEAD_START: Duration = Duration::from_secs(2);
+/// Datagrams between two looks at whether to stop.
+const BATCH: usize = 100;
+
+/// Measures in interleaved pairs.
+#[derive(Debug, Parser)]
+#[command(name = "scripts/bench flood")]
+struct Args {
+    /// Pairs.
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pairs: usize,
+    /// Time of each run, s.
+    #[arg(long, value_name = "S", default_value_t = 30.0)]
+    seconds: f64,
+    /// Rate of the publisher, Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 100.0)]
+    rate: f64,
+    /// Load beside the graph.
+    #[arg(long, default_value = "keep-awake")]
+    load: Load,
+}
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    if let [word, address] = words.as_slice()
+        && word == FLOOD_WORD
+    {
+        return vigil_bench::ended("flood", flood(address));
+    }
+    vigil_bench::ended("flood", run(&Args::parse()))
+}
+
+/// Sends good frames to `address` as fast as it can.
+fn flood(address: &str) -> Result<(), Box<dyn Error>> {
+    let socket = UdpSocket::bind("127.0.0.1:0")?;
+    let mut frame = SensorFrame::default();
+    frame.header.schema = SensorFrame::SCHEMA;
+    frame.header.epoch = Monotonic.now_ns();
+    signal::install();
+    while !signal::stop_requested() {
+        for _ in 0..BATCH {
+            frame.header.seq += 1;
+            frame.header.t_capture_ns = Monotonic.now_ns();
+            // Refused by the kernel, or not: all the same to a flood.
+            let _ = socket.send_to(&datagram::encode(&frame), address);
+        }
+    }
+    Ok(())
+}
+
+fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+    let folder = std::env::temp_dir().join(format!("vigil-flood-{}", std::process::id()));
+    std::fs::create_dir_all(&folder)?;
+    let result = measure(args, &folder);
+    let _ = std::fs::remove_dir_all(&folder);
+    let (n, seconds, rate, load) = (args.pairs, args.seconds, args.rate, args.load.name());
+    let about = format!(
+        "`scripts/bench flood --pairs {n} --seconds {seconds} --rate {rate} --load {load}`\n\nFrames \
+         by UDP; with a second sender that floods the socket from another port."
+    );
+    halves::archive("flood", &about, &result?)
+}
+
+fn measure(args: &Args, folder: &Path) -> Result<Vec<[Half; 2]>, Box<dyn Error>> {
+    let change = Change {
+        rate_hz: args.rate,
+        particles: 1000,
+        is_fifo: true,
+        source: Source::Socket,
+    };
+    let prepared = Prepared::new(change, folder)?;
+    let load = Running::start(args.load, &prepared.cores(), folder, None)?;
+    let pairs = halves::interleaved(args.pairs, |with| half(args, &prepared, with));
+    load.finish()?;
+    pairs
+}
+
+fn half(args: &Args, prepared: &Prepared, with: bool) -> Result<Half, Box<dyn Error>> {
+    let setup = prepared.setup();
+    let address = setup.file.sensor.socket.udp.clone();
+    let robot = &setup.robot;
+    let runs = frames::read(&root().join("tests/data/rover/learn_frames.csv.gz"), robot)?;
+    let recorded = runs
+        .into_iter()
+        .next()
+        .ok_or("the recording is empty")?
+        .frames;
+    let (mut publisher, mut flooding, mut since) = (None, None, Instant::now());
+    let half = halves::run(prepared, args.seconds, &[], || {
+        if publisher.is_none() {
+            let (recorded, address) = (recorded.clone(), address.clone());
+            publisher = Some(Publisher::start(recorded, address, setup.period_ns())?);
+            since = Instant::now();
+        } else if with && flooding.is_none() && since.elapsed() > HEAD_START {
+            flooding = Some(Flooding::start(&address)?);
+        }
+        Ok(())
+    })?;
+    if with && flooding.is_none_or(|mut flooding| flooding.has_ended()) {
+        return Err("the flood ended before the run".into());
+    }
+    Ok(half)
+}
+
+/// Sends frames on an absolute schedule until dropped.
+struct Publisher {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Publisher {
+    fn start(recorded: Vec<SensorFrame>, address: String, period_ns: u64) -> std::io::Result<Self> {
+        let socket = UdpSocket::bind("127.0.0.1:0")?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let asked = Arc::clone(&stop);
+        let thread = std::thread::Builder::new().name("publisher".into());
+        let thread = thread.spawn(move || {
+            let _ = placement::apply(PUBLISHER);
+            let epoch = Monotonic.now_ns();
+            let mut due_ns = epoch;
+            let rounds = (0_u64..).zip(recorded.iter().cycle());
+            for (seq, frame) in rounds.take_while(|_| !asked.load(Ordering::Relaxed)) {
+                due_ns += period_ns;
+                clock::sleep_until(due_ns);
+                let mut frame = *frame;
+                // Each round of the recording is a run of its own.
+                frame.run_id = 1 + seq / recorded.len() as u64;
+                let header = &mut frame.header;
+                header.schema = SensorFrame::SCHEMA;
+                (header.epoch, header.seq) = (epoch, seq);
+                (header.t_schedule_ns, header.t_capture_ns) = (due_ns, due_ns);
+                // Nobody may listen any more.
+                let _ = socket.send_to(&datagram::encode(&frame), &address);
+            }
+        })?;
+        Ok(Self {
+            stop,
+            thread: Some(thread),
+        })
+    }
+}
+
+impl Drop for Publisher {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The flood: ended when dropped.
+struct Flooding(Child);
+
+impl Flooding {
+    fn start(address: &str) -> std::io::Result<Self> {
+        let mut command = Command::new(std::env::current_exe()?);
+        command.args([FLOOD_WORD, address]).stdin(Stdio::null());
+        Ok(Self(command.spawn()?))
+    }
+
+    fn has_ended(&mut self) -> bool {
+        !matches!(self.0.try_wait(), Ok(None))
+    }
+}
+
+impl Drop for Flooding {
+    fn drop(&mut self) {
+        if !self.has_ended() {
+            signal::terminate(self.0.id());
+        }
+        let _ = self.0.wait();
+    }
+}

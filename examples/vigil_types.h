@@ -1,0 +1,577 @@
+/* Wire blocks of Vigil, for C11 and C++17. Made by `vigil types c`; do not edit.
+ *
+ * Units are SI, angles radians, times CLOCK_MONOTONIC nanoseconds; x forward, y left, yaw
+ * counter-clockwise. All numbers little-endian, no padding. */
+#ifndef VIGIL_TYPES_H
+#define VIGIL_TYPES_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifdef __cplusplus
+#define VIGIL_ASSERT(condition) static_assert(condition, #condition)
+#else
+#define VIGIL_ASSERT(condition) _Static_assert(condition, #condition)
+#endif
+
+#define VIGIL_VALID_COMMAND_0 1u
+#define VIGIL_VALID_POSE 16u
+#define VIGIL_VALID_PLANNED_POSE 32u
+#define VIGIL_VALID_YAW_RATE 64u
+#define VIGIL_VALID_WHEEL_RATE_0 256u
+#define VIGIL_VALID_STEER_0 65536u
+#define VIGIL_VALID_CURRENT_0 16777216u
+#define VIGIL_SYMPTOM_EPS 1u
+#define VIGIL_SYMPTOM_EPM 2u
+#define VIGIL_SYMPTOM_LD 4u
+#define VIGIL_SYMPTOM_SD 8u
+#define VIGIL_SYMPTOM_BO 16u
+#define VIGIL_SYMPTOM_ALT 32u
+#define VIGIL_SYMPTOM_NNA 64u
+#define VIGIL_OUTCOME_NONE 0u
+#define VIGIL_OUTCOME_RUNNING 1u
+#define VIGIL_OUTCOME_SUCCEEDED 2u
+#define VIGIL_OUTCOME_FAILED 3u
+#define VIGIL_RECOVERY_NONE 0u
+#define VIGIL_RECOVERY_GO_ON 1u
+#define VIGIL_RECOVERY_SLOW_DOWN 2u
+#define VIGIL_RECOVERY_STOP 3u
+#define VIGIL_RECOVERY_COMPENSATE 4u
+#define VIGIL_RECOVERY_IGNORE_ENCODER 5u
+#define VIGIL_RECOVERY_CALL_FOR_HELP 6u
+#define VIGIL_RECOVERY_NEW_PATH 7u
+#define VIGIL_RECOVERY_RELOCALISE 8u
+#define VIGIL_RECOVERY_GO_THROUGH 9u
+#define VIGIL_RECOVERY_MOVE_AWAY 10u
+#define VIGIL_RECOVERY_GIVE_UP 11u
+#define VIGIL_CONTROL_POLICY 1u
+#define VIGIL_CONTROL_DUAL 2u
+#define VIGIL_CONTROL_FALLBACK 3u
+#define VIGIL_CONTROL_SAFE 4u
+#define VIGIL_CAUSE_FRAME 1u
+#define VIGIL_CAUSE_MISSED 2u
+#define VIGIL_DATAGRAM_SIZE 424u
+
+typedef struct {
+  /* Schema hash of the block (Block::SCHEMA). */
+  uint64_t schema;
+  /* Identity of the writer's start; differs after each restart, never 0 once written. */
+  uint64_t epoch;
+  /* Sequence number of the block under its epoch, from 0. */
+  uint64_t seq;
+  /* Instant at which the sensor cycle behind this block was due, ns, CLOCK_MONOTONIC. */
+  uint64_t t_schedule_ns;
+  /* Instant at which the data was captured, ns; the recording's own time in a playback. Only its differences have meaning. */
+  uint64_t t_capture_ns;
+  /* Instant at which the block was handed to the transport, ns, CLOCK_MONOTONIC. */
+  uint64_t t_publish_ns;
+} vigil_header;
+VIGIL_ASSERT(sizeof(vigil_header) == 48);
+VIGIL_ASSERT(offsetof(vigil_header, schema) == 0);
+VIGIL_ASSERT(offsetof(vigil_header, epoch) == 8);
+VIGIL_ASSERT(offsetof(vigil_header, seq) == 16);
+VIGIL_ASSERT(offsetof(vigil_header, t_schedule_ns) == 24);
+VIGIL_ASSERT(offsetof(vigil_header, t_capture_ns) == 32);
+VIGIL_ASSERT(offsetof(vigil_header, t_publish_ns) == 40);
+
+typedef struct {
+  /* A CauseKind. */
+  uint32_t kind;
+  /* Frames folded into this block (1 if on time), or periods missed. */
+  uint32_t count;
+  /* Epoch of the newest sensor frame taken. */
+  uint64_t frame_epoch;
+  /* Sequence number of the newest sensor frame taken. */
+  uint64_t frame_seq;
+} vigil_cause;
+VIGIL_ASSERT(sizeof(vigil_cause) == 24);
+VIGIL_ASSERT(offsetof(vigil_cause, kind) == 0);
+VIGIL_ASSERT(offsetof(vigil_cause, count) == 4);
+VIGIL_ASSERT(offsetof(vigil_cause, frame_epoch) == 8);
+VIGIL_ASSERT(offsetof(vigil_cause, frame_seq) == 16);
+
+typedef struct {
+  /* Bit i: node i of the tree (always a leaf) is in the set; 0 is the nominal mode. */
+  uint64_t leaves;
+  /* Probability that exactly this set is present. */
+  double p;
+} vigil_fault_set;
+VIGIL_ASSERT(sizeof(vigil_fault_set) == 16);
+VIGIL_ASSERT(offsetof(vigil_fault_set, leaves) == 0);
+VIGIL_ASSERT(offsetof(vigil_fault_set, p) == 8);
+
+typedef struct {
+  /* When, CLOCK_MONOTONIC ns. */
+  uint64_t t_ns;
+  /* An EventKind. */
+  uint32_t kind;
+  /* See EventKind. */
+  uint32_t what;
+  /* Probability, where the event has one; else as EventKind says, or 0. */
+  double p;
+  /* See EventKind. */
+  uint64_t value;
+} vigil_event;
+VIGIL_ASSERT(sizeof(vigil_event) == 32);
+VIGIL_ASSERT(offsetof(vigil_event, t_ns) == 0);
+VIGIL_ASSERT(offsetof(vigil_event, kind) == 8);
+VIGIL_ASSERT(offsetof(vigil_event, what) == 12);
+VIGIL_ASSERT(offsetof(vigil_event, p) == 16);
+VIGIL_ASSERT(offsetof(vigil_event, value) == 24);
+
+#define VIGIL_SENSOR_FRAME_SCHEMA 0x6b44d8438af199afull
+#define VIGIL_SENSOR_FRAME_TYPE_NAME "vigil.SensorFrame.v1.6b44d8438af199af"
+typedef struct {
+  /* Common header; t_schedule_ns is when this cycle was due. */
+  vigil_header header;
+  /* Identity of the run; a new value resets every filter. */
+  uint64_t run_id;
+  /* Which fields hold a measurement: bits of Valid. */
+  uint64_t valid;
+  /* decision_seq of the last Action that the robot obeyed; 0 for none. */
+  uint64_t action_seq;
+  /* Outcome of that action: an ActionOutcome. */
+  uint32_t action_outcome;
+  /* Symptoms reported by monitors outside Vigil: bits of Symptoms. */
+  uint32_t symptoms;
+  /* Counts jumps of the pose's frame (relocalisation): a new value re-anchors the track. */
+  uint32_t pose_reset_count;
+  /* 1 while the robot holds itself stopped because it has no valid action. */
+  uint32_t safe_stop;
+  /* The command as executed; its meaning is given by the robot's description. Rover: signed curvature 1/m (left +), speed m/s. */
+  double command[4];
+  /* Pose x m, y m, yaw rad (wrapped to ±π), in a continuous frame. */
+  double pose[3];
+  /* Planned pose x m, y m, yaw rad, same frame as pose. */
+  double planned_pose[3];
+  /* Yaw rate, rad/s. */
+  double yaw_rate;
+  /* Wheel rates, rad/s, in the order of the robot's description. */
+  double wheel_rate[8];
+  /* Steering angles, rad, in the order of the robot's description (same index as wheel). */
+  double steer[8];
+  /* Motor currents, A, in the order of the robot's description. */
+  double current[8];
+  /* Reserved, zero. */
+  double reserved[5];
+} vigil_sensor_frame;
+VIGIL_ASSERT(sizeof(vigil_sensor_frame) == 408);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, header) == 0);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, run_id) == 48);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, valid) == 56);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, action_seq) == 64);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, action_outcome) == 72);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, symptoms) == 76);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, pose_reset_count) == 80);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, safe_stop) == 84);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, command) == 88);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, pose) == 120);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, planned_pose) == 144);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, yaw_rate) == 168);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, wheel_rate) == 176);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, steer) == 240);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, current) == 304);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, reserved) == 368);
+
+#define VIGIL_DETECTION_BELIEF_SCHEMA 0xf2eea19958bb6641ull
+#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.f2eea19958bb6641"
+typedef struct {
+  /* Common header. */
+  vigil_header header;
+  /* The journal entry behind this belief. */
+  vigil_cause cause;
+  /* Run of the frame. */
+  uint64_t run_id;
+  /* Probability that the robot is not in its nominal mode. */
+  double p_fault;
+  /* Its log-odds, natural logarithm. */
+  double log_odds;
+  /* Log-odds at which the alarm rises (calibrated; natural logarithm). */
+  double alarm_log_odds;
+  /* Log-likelihood of this frame under the nominal mode, natural logarithm. */
+  double evidence;
+  /* Effective sample size of the particles, before resampling. */
+  double effective_sample_size;
+  /* Estimated ratio of the pose's noise to the learned one (standard deviations). */
+  double noise_scale;
+  /* The same for the wheel rates. */
+  double noise_scale_wheels;
+  /* The same for the steering angles. */
+  double noise_scale_steer;
+  /* Log-odds of a fault seen by each channel alone (see Channel). */
+  double channel_log_odds[32];
+  /* decision_seq of the last action that the robot obeyed, as the frame says it. */
+  uint64_t action_seq;
+  /* Capture time of the frame that raised the present alarm, ns; 0 without alarm. */
+  uint64_t alarm_t_capture_ns;
+  /* 1 while the alarm stands. */
+  uint32_t alarm;
+  /* Alarms raised so far. */
+  uint32_t alarm_count;
+  /* Symptoms: the detector's own or-ed with external ones (see Symptoms). */
+  uint32_t symptoms;
+  /* Frames refused by the filter because a channel was not finite or out of range. */
+  uint32_t invalid_count;
+  /* Steps whose weights degenerated (coasted, or re-initialised). */
+  uint32_t degenerate_count;
+  /* Particles in use. */
+  uint32_t particle_count;
+  /* Outcome of that action, as the frame says it: an ActionOutcome. */
+  uint32_t action_outcome;
+  /* Reserved, zero. */
+  uint32_t reserved;
+} vigil_detection_belief;
+VIGIL_ASSERT(sizeof(vigil_detection_belief) == 448);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, header) == 0);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, cause) == 48);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, run_id) == 72);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, p_fault) == 80);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, log_odds) == 88);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_log_odds) == 96);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, evidence) == 104);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, effective_sample_size) == 112);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale) == 120);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale_wheels) == 128);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale_steer) == 136);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, channel_log_odds) == 144);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, action_seq) == 400);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_t_capture_ns) == 408);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm) == 416);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_count) == 420);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, symptoms) == 424);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, invalid_count) == 428);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, degenerate_count) == 432);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, particle_count) == 436);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, action_outcome) == 440);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, reserved) == 444);
+
+#define VIGIL_PARTICLE_BLOCK_SCHEMA 0x7d929f90c981a707ull
+#define VIGIL_PARTICLE_BLOCK_TYPE_NAME "vigil.ParticleBlock.v1.7d929f90c981a707"
+typedef struct {
+  /* Common header. */
+  vigil_header header;
+  /* The journal entry behind these particles. */
+  vigil_cause cause;
+  /* Particles in use; the rest of the arrays is unspecified. */
+  uint32_t count;
+  /* Reserved, zero. */
+  uint32_t reserved;
+  /* Mode of each particle: index into the fault tree's nodes (0 is nominal). */
+  uint32_t mode[4096];
+  /* x, m. */
+  float x[4096];
+  /* y, m. */
+  float y[4096];
+  /* Yaw, rad. */
+  float yaw[4096];
+  /* Natural logarithm of the normalised weight. */
+  float log_weight[4096];
+  /* Reserved, zero. */
+  uint64_t reserved_tail[2];
+} vigil_particle_block;
+VIGIL_ASSERT(sizeof(vigil_particle_block) == 82016);
+VIGIL_ASSERT(offsetof(vigil_particle_block, header) == 0);
+VIGIL_ASSERT(offsetof(vigil_particle_block, cause) == 48);
+VIGIL_ASSERT(offsetof(vigil_particle_block, count) == 72);
+VIGIL_ASSERT(offsetof(vigil_particle_block, reserved) == 76);
+VIGIL_ASSERT(offsetof(vigil_particle_block, mode) == 80);
+VIGIL_ASSERT(offsetof(vigil_particle_block, x) == 16464);
+VIGIL_ASSERT(offsetof(vigil_particle_block, y) == 32848);
+VIGIL_ASSERT(offsetof(vigil_particle_block, yaw) == 49232);
+VIGIL_ASSERT(offsetof(vigil_particle_block, log_weight) == 65616);
+VIGIL_ASSERT(offsetof(vigil_particle_block, reserved_tail) == 82000);
+
+#define VIGIL_FAULT_BELIEF_SCHEMA 0x4f1baec44c62b92eull
+#define VIGIL_FAULT_BELIEF_TYPE_NAME "vigil.FaultBelief.v1.4f1baec44c62b92e"
+typedef struct {
+  /* Common header. */
+  vigil_header header;
+  /* The journal entry behind this belief. */
+  vigil_cause cause;
+  /* Run of the frame. */
+  uint64_t run_id;
+  /* Hash of the fault tree that gives the nodes their meaning. */
+  uint64_t tree_hash;
+  /* Probability of each node: that a leaf's fault is present, alone or with others; that any fault below an abstract node is. Node 0 is nominal: no fault at all. */
+  double p[64];
+  /* The same before this cycle's data: prediction from the last cycle. */
+  double p_predicted[64];
+  /* Probability that no modelled fault explains the data. */
+  double p_unknown;
+  /* The same before this cycle's data. */
+  double p_unknown_predicted;
+  /* Most probable sets of leaves, in falling order. */
+  vigil_fault_set sets[8];
+  /* Entropy of the distribution over sets and unknown, nats. */
+  double entropy;
+  /* Why this diagnosis and not the next best one: by channel, how much more the readings since the onset are expected under it than under runner_up, natural log-likelihood; see Channel. 0 while nothing is diagnosed. */
+  double channel_evidence[32];
+  /* Probability of mode. */
+  double p_mode;
+  /* Capture time of the frame that raised the alarm, ns; 0 before an alarm. */
+  uint64_t alarm_t_capture_ns;
+  /* Most probable onset of the most probable fault, capture time ns; 0 if none. */
+  uint64_t onset_t_capture_ns;
+  /* Reported mode: a node's index, MODE_UNKNOWN or MODE_MULTIPLE. */
+  uint32_t mode;
+  /* The next best explanation that is not the best and one more fault: a node's index (0 is nominal), MODE_UNKNOWN or MODE_MULTIPLE. */
+  uint32_t runner_up;
+  /* Particles allowed at present; fewer than configured while the time is short. */
+  uint32_t particle_limit;
+  /* Changes of mode so far. */
+  uint32_t mode_change_count;
+  /* Nodes in use. */
+  uint32_t node_count;
+  /* Sets in use. */
+  uint32_t set_count;
+  /* 1 while identifying (an alarm stands or a fault is believed), 0 while watching. */
+  uint32_t identifying;
+  /* Steps that met impossible or non-finite evidence and kept the prediction. */
+  uint32_t degenerate_count;
+} vigil_fault_belief;
+VIGIL_ASSERT(sizeof(vigil_fault_belief) == 1576);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, header) == 0);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, cause) == 48);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, run_id) == 72);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, tree_hash) == 80);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, p) == 88);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, p_predicted) == 600);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, p_unknown) == 1112);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, p_unknown_predicted) == 1120);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, sets) == 1128);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, entropy) == 1256);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, channel_evidence) == 1264);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, p_mode) == 1520);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, alarm_t_capture_ns) == 1528);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, onset_t_capture_ns) == 1536);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, mode) == 1544);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, runner_up) == 1548);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, particle_limit) == 1552);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, mode_change_count) == 1556);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, node_count) == 1560);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, set_count) == 1564);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, identifying) == 1568);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, degenerate_count) == 1572);
+
+#define VIGIL_ACTION_SCHEMA 0xd2dc9b45f9f508d3ull
+#define VIGIL_ACTION_TYPE_NAME "vigil.Action.v1.d2dc9b45f9f508d3"
+typedef struct {
+  /* Common header. */
+  vigil_header header;
+  /* The journal entry behind this decision. */
+  vigil_cause cause;
+  /* Run of the frame. */
+  uint64_t run_id;
+  /* Counts decisions: rises when action or its parameters change. From 1. */
+  uint64_t decision_seq;
+  /* CLOCK_MONOTONIC ns after which the robot must no longer obey this block, but stop. */
+  uint64_t valid_until_ns;
+  /* Hash of the decision model that gives states and actions their meaning. */
+  uint64_t model_hash;
+  /* Belief over the decision model's states. */
+  double belief[64];
+  /* What the policy thinks of each action, the larger the better; value_kind says what it is. Finite. */
+  double value[32];
+  /* Entropy of the belief, normalised to 0..1. */
+  double entropy;
+  /* Entropy of the states' votes for their best actions, normalised to 0..1: doubt about what to do. */
+  double action_entropy;
+  /* Value of the chosen action minus the runner-up's. */
+  double margin;
+  /* Natural logarithm of the probability of the last evidence under the belief. */
+  double log_evidence;
+  /* Speed factor to apply, 0..1. */
+  double speed_scale;
+  /* Curvature to command: curvature_gain * curvature + curvature_offset. */
+  double curvature_gain;
+  /* See curvature_gain; 1/m. */
+  double curvature_offset;
+  /* Index of the chosen action in the decision model. */
+  uint32_t action;
+  /* What the robot is to do: a RecoveryKind. */
+  uint32_t kind;
+  /* Wheel that the action is about; u32::MAX for none. */
+  uint32_t wheel;
+  /* How the action was chosen: a ControlMode. */
+  uint32_t control_mode;
+  /* States in use. */
+  uint32_t state_count;
+  /* Actions in use. */
+  uint32_t action_count;
+  /* Observations that were impossible under the belief so far. */
+  uint32_t impossible_count;
+  /* Bit 0: identifier lost; bit 1: detector lost. */
+  uint32_t lost_stages;
+  /* What value is: a ValueKind. */
+  uint32_t value_kind;
+  /* Reserved, zero. */
+  uint32_t reserved_word;
+  /* Reserved, zero. */
+  uint64_t reserved[2];
+} vigil_action;
+VIGIL_ASSERT(sizeof(vigil_action) == 984);
+VIGIL_ASSERT(offsetof(vigil_action, header) == 0);
+VIGIL_ASSERT(offsetof(vigil_action, cause) == 48);
+VIGIL_ASSERT(offsetof(vigil_action, run_id) == 72);
+VIGIL_ASSERT(offsetof(vigil_action, decision_seq) == 80);
+VIGIL_ASSERT(offsetof(vigil_action, valid_until_ns) == 88);
+VIGIL_ASSERT(offsetof(vigil_action, model_hash) == 96);
+VIGIL_ASSERT(offsetof(vigil_action, belief) == 104);
+VIGIL_ASSERT(offsetof(vigil_action, value) == 616);
+VIGIL_ASSERT(offsetof(vigil_action, entropy) == 872);
+VIGIL_ASSERT(offsetof(vigil_action, action_entropy) == 880);
+VIGIL_ASSERT(offsetof(vigil_action, margin) == 888);
+VIGIL_ASSERT(offsetof(vigil_action, log_evidence) == 896);
+VIGIL_ASSERT(offsetof(vigil_action, speed_scale) == 904);
+VIGIL_ASSERT(offsetof(vigil_action, curvature_gain) == 912);
+VIGIL_ASSERT(offsetof(vigil_action, curvature_offset) == 920);
+VIGIL_ASSERT(offsetof(vigil_action, action) == 928);
+VIGIL_ASSERT(offsetof(vigil_action, kind) == 932);
+VIGIL_ASSERT(offsetof(vigil_action, wheel) == 936);
+VIGIL_ASSERT(offsetof(vigil_action, control_mode) == 940);
+VIGIL_ASSERT(offsetof(vigil_action, state_count) == 944);
+VIGIL_ASSERT(offsetof(vigil_action, action_count) == 948);
+VIGIL_ASSERT(offsetof(vigil_action, impossible_count) == 952);
+VIGIL_ASSERT(offsetof(vigil_action, lost_stages) == 956);
+VIGIL_ASSERT(offsetof(vigil_action, value_kind) == 960);
+VIGIL_ASSERT(offsetof(vigil_action, reserved_word) == 964);
+VIGIL_ASSERT(offsetof(vigil_action, reserved) == 968);
+
+#define VIGIL_HEALTH_SCHEMA 0x22ca8e52d533df67ull
+#define VIGIL_HEALTH_TYPE_NAME "vigil.Health.v1.22ca8e52d533df67"
+typedef struct {
+  /* Common header. */
+  vigil_header header;
+  /* Cycles done: blocks published, or frames for the source. */
+  uint64_t cycles;
+  /* Scheduled cycles whose deadline passed before the block was out. */
+  uint64_t missed;
+  /* Cycles whose time from wake-up to publication exceeded the budget. */
+  uint64_t over_budget;
+  /* Schedule instants that the source slept through. */
+  uint64_t slips;
+  /* Input blocks that never arrived, by gaps of their sequence numbers. */
+  uint64_t lost;
+  /* Input blocks that arrived after their deadline. */
+  uint64_t late;
+  /* Input blocks that arrived twice. */
+  uint64_t duplicate;
+  /* Input blocks refused: wrong schema, impossible time stamps, non-finite data. */
+  uint64_t invalid;
+  /* The refused ones by cause, see Rejection. */
+  uint64_t rejected[16];
+  /* Longest time from wake-up to publication, ns. */
+  uint64_t worst_cycle_ns;
+  /* Sequence number of that cycle. */
+  uint64_t worst_cycle_seq;
+  /* Last time from wake-up to publication, ns. */
+  uint64_t last_cycle_ns;
+  /* Period of the schedule, ns. */
+  uint64_t period_ns;
+  /* Deadline after the schedule, ns. */
+  uint64_t deadline_ns;
+  /* Budget of one cycle, from wake-up to publication, ns. */
+  uint64_t budget_ns;
+  /* Schedule instant of the service's first and last accounted cycle, ns. */
+  uint64_t accounted_ns[2];
+  /* A ServiceState. */
+  uint32_t state;
+  /* Core that was asked for. */
+  uint32_t core_wanted;
+  /* Core that the kernel reported in the last check. */
+  uint32_t core;
+  /* 1 if the kernel lets the service run on no other core than core_wanted. */
+  uint32_t pinned;
+  /* Scheduling policy read back (SCHED_FIFO is 1, SCHED_OTHER 0). */
+  uint32_t policy;
+  /* Priority read back. */
+  uint32_t priority;
+  /* 1 if all memory is locked. */
+  uint32_t memory_locked;
+  /* Process id. */
+  uint32_t pid;
+  /* Why the service is in degraded mode, bits of Degraded; 0 if it is not. */
+  uint32_t degraded;
+  /* Result of the last control command: 1 done, 2 refused, 0 none yet. */
+  uint32_t control_result;
+  /* Sequence number of the last control command handled. */
+  uint64_t control_seq;
+  /* Epoch of the writer of that command. */
+  uint64_t control_epoch;
+  /* Writer and sequence number of the newest sensor frame that an output has answered. */
+  uint64_t answered_epoch;
+  /* See answered_epoch. */
+  uint64_t answered_seq;
+  /* Particles that the time allows at present; 0 without particles. */
+  uint32_t particles;
+  /* Particles configured. */
+  uint32_t particles_configured;
+  /* Events so far; event number n is at eventsn % EVENTS. */
+  uint64_t event_count;
+  /* Recent events. */
+  vigil_event events[32];
+} vigil_health;
+VIGIL_ASSERT(sizeof(vigil_health) == 1416);
+VIGIL_ASSERT(offsetof(vigil_health, header) == 0);
+VIGIL_ASSERT(offsetof(vigil_health, cycles) == 48);
+VIGIL_ASSERT(offsetof(vigil_health, missed) == 56);
+VIGIL_ASSERT(offsetof(vigil_health, over_budget) == 64);
+VIGIL_ASSERT(offsetof(vigil_health, slips) == 72);
+VIGIL_ASSERT(offsetof(vigil_health, lost) == 80);
+VIGIL_ASSERT(offsetof(vigil_health, late) == 88);
+VIGIL_ASSERT(offsetof(vigil_health, duplicate) == 96);
+VIGIL_ASSERT(offsetof(vigil_health, invalid) == 104);
+VIGIL_ASSERT(offsetof(vigil_health, rejected) == 112);
+VIGIL_ASSERT(offsetof(vigil_health, worst_cycle_ns) == 240);
+VIGIL_ASSERT(offsetof(vigil_health, worst_cycle_seq) == 248);
+VIGIL_ASSERT(offsetof(vigil_health, last_cycle_ns) == 256);
+VIGIL_ASSERT(offsetof(vigil_health, period_ns) == 264);
+VIGIL_ASSERT(offsetof(vigil_health, deadline_ns) == 272);
+VIGIL_ASSERT(offsetof(vigil_health, budget_ns) == 280);
+VIGIL_ASSERT(offsetof(vigil_health, accounted_ns) == 288);
+VIGIL_ASSERT(offsetof(vigil_health, state) == 304);
+VIGIL_ASSERT(offsetof(vigil_health, core_wanted) == 308);
+VIGIL_ASSERT(offsetof(vigil_health, core) == 312);
+VIGIL_ASSERT(offsetof(vigil_health, pinned) == 316);
+VIGIL_ASSERT(offsetof(vigil_health, policy) == 320);
+VIGIL_ASSERT(offsetof(vigil_health, priority) == 324);
+VIGIL_ASSERT(offsetof(vigil_health, memory_locked) == 328);
+VIGIL_ASSERT(offsetof(vigil_health, pid) == 332);
+VIGIL_ASSERT(offsetof(vigil_health, degraded) == 336);
+VIGIL_ASSERT(offsetof(vigil_health, control_result) == 340);
+VIGIL_ASSERT(offsetof(vigil_health, control_seq) == 344);
+VIGIL_ASSERT(offsetof(vigil_health, control_epoch) == 352);
+VIGIL_ASSERT(offsetof(vigil_health, answered_epoch) == 360);
+VIGIL_ASSERT(offsetof(vigil_health, answered_seq) == 368);
+VIGIL_ASSERT(offsetof(vigil_health, particles) == 376);
+VIGIL_ASSERT(offsetof(vigil_health, particles_configured) == 380);
+VIGIL_ASSERT(offsetof(vigil_health, event_count) == 384);
+VIGIL_ASSERT(offsetof(vigil_health, events) == 392);
+
+
+/* CRC-32C (Castagnoli), bit by bit: `crc` is what came before, 0 to begin. */
+static inline uint32_t vigil_crc32c(uint32_t crc, const uint8_t *bytes, size_t count) {
+  crc = ~crc;
+  for (size_t i = 0; i < count; i++) {
+    crc ^= bytes[i];
+    for (int bit = 0; bit < 8; bit++) crc = (crc >> 1) ^ (0x82f63b78u & (0u - (crc & 1u)));
+  }
+  return ~crc;
+}
+
+/* The datagram of a frame, for the sockets of `sensor.source = "socket"`. The sender fills in
+ * header.epoch (not 0, another at each start), header.seq and header.t_capture_ns; it leaves
+ * header.t_schedule_ns at 0 unless it runs on Vigil's machine and has its CLOCK_MONOTONIC. */
+static inline void vigil_datagram(const vigil_sensor_frame *frame, uint8_t bytes[VIGIL_DATAGRAM_SIZE]) {
+  const uint8_t head[12] = {'V', 'G', 'I', 'L', 1, 0, 1, 0, sizeof *frame & 0xff, sizeof *frame >> 8, 0, 0};
+  memcpy(bytes, head, 12);
+  memcpy(bytes + 16, frame, sizeof *frame);
+  const uint64_t schema = VIGIL_SENSOR_FRAME_SCHEMA;
+  memcpy(bytes + 16, &schema, 8);
+  uint32_t crc = vigil_crc32c(0, bytes, 12);
+  crc = vigil_crc32c(crc, bytes + 16, sizeof *frame);
+  for (int i = 0; i < 4; i++) bytes[12 + i] = (uint8_t)(crc >> (8 * i));
+}
+
+#endif

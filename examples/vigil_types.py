@@ -1,0 +1,665 @@
+"""Wire blocks of Vigil, as ctypes. Made by `vigil types python`; do not edit.
+
+Units are SI, angles radians, times CLOCK_MONOTONIC nanoseconds; x forward, y left, yaw
+counter-clockwise. All numbers little-endian, no padding.
+"""
+
+import ctypes
+import os
+import struct
+
+VALID_COMMAND_0 = 1
+VALID_POSE = 16
+VALID_PLANNED_POSE = 32
+VALID_YAW_RATE = 64
+VALID_WHEEL_RATE_0 = 256
+VALID_STEER_0 = 65536
+VALID_CURRENT_0 = 16777216
+SYMPTOM_EPS = 1
+SYMPTOM_EPM = 2
+SYMPTOM_LD = 4
+SYMPTOM_SD = 8
+SYMPTOM_BO = 16
+SYMPTOM_ALT = 32
+SYMPTOM_NNA = 64
+OUTCOME_NONE = 0
+OUTCOME_RUNNING = 1
+OUTCOME_SUCCEEDED = 2
+OUTCOME_FAILED = 3
+RECOVERY_NONE = 0
+RECOVERY_GO_ON = 1
+RECOVERY_SLOW_DOWN = 2
+RECOVERY_STOP = 3
+RECOVERY_COMPENSATE = 4
+RECOVERY_IGNORE_ENCODER = 5
+RECOVERY_CALL_FOR_HELP = 6
+RECOVERY_NEW_PATH = 7
+RECOVERY_RELOCALISE = 8
+RECOVERY_GO_THROUGH = 9
+RECOVERY_MOVE_AWAY = 10
+RECOVERY_GIVE_UP = 11
+CONTROL_POLICY = 1
+CONTROL_DUAL = 2
+CONTROL_FALLBACK = 3
+CONTROL_SAFE = 4
+CAUSE_FRAME = 1
+CAUSE_MISSED = 2
+
+
+class Header(ctypes.LittleEndianStructure):
+    _fields_ = [
+        # Schema hash of the block (Block::SCHEMA).
+        ("schema", ctypes.c_uint64),
+        # Identity of the writer's start; differs after each restart, never 0 once written.
+        ("epoch", ctypes.c_uint64),
+        # Sequence number of the block under its epoch, from 0.
+        ("seq", ctypes.c_uint64),
+        # Instant at which the sensor cycle behind this block was due, ns, CLOCK_MONOTONIC.
+        ("t_schedule_ns", ctypes.c_uint64),
+        # Instant at which the data was captured, ns; the recording's own time in a playback. Only its differences have meaning.
+        ("t_capture_ns", ctypes.c_uint64),
+        # Instant at which the block was handed to the transport, ns, CLOCK_MONOTONIC.
+        ("t_publish_ns", ctypes.c_uint64),
+    ]
+
+
+assert ctypes.sizeof(Header) == 48
+assert Header.schema.offset == 0
+assert Header.epoch.offset == 8
+assert Header.seq.offset == 16
+assert Header.t_schedule_ns.offset == 24
+assert Header.t_capture_ns.offset == 32
+assert Header.t_publish_ns.offset == 40
+
+
+class Cause(ctypes.LittleEndianStructure):
+    _fields_ = [
+        # A CauseKind.
+        ("kind", ctypes.c_uint32),
+        # Frames folded into this block (1 if on time), or periods missed.
+        ("count", ctypes.c_uint32),
+        # Epoch of the newest sensor frame taken.
+        ("frame_epoch", ctypes.c_uint64),
+        # Sequence number of the newest sensor frame taken.
+        ("frame_seq", ctypes.c_uint64),
+    ]
+
+
+assert ctypes.sizeof(Cause) == 24
+assert Cause.kind.offset == 0
+assert Cause.count.offset == 4
+assert Cause.frame_epoch.offset == 8
+assert Cause.frame_seq.offset == 16
+
+
+class FaultSet(ctypes.LittleEndianStructure):
+    _fields_ = [
+        # Bit i: node i of the tree (always a leaf) is in the set; 0 is the nominal mode.
+        ("leaves", ctypes.c_uint64),
+        # Probability that exactly this set is present.
+        ("p", ctypes.c_double),
+    ]
+
+
+assert ctypes.sizeof(FaultSet) == 16
+assert FaultSet.leaves.offset == 0
+assert FaultSet.p.offset == 8
+
+
+class Event(ctypes.LittleEndianStructure):
+    _fields_ = [
+        # When, CLOCK_MONOTONIC ns.
+        ("t_ns", ctypes.c_uint64),
+        # An EventKind.
+        ("kind", ctypes.c_uint32),
+        # See EventKind.
+        ("what", ctypes.c_uint32),
+        # Probability, where the event has one; else as EventKind says, or 0.
+        ("p", ctypes.c_double),
+        # See EventKind.
+        ("value", ctypes.c_uint64),
+    ]
+
+
+assert ctypes.sizeof(Event) == 32
+assert Event.t_ns.offset == 0
+assert Event.kind.offset == 8
+assert Event.what.offset == 12
+assert Event.p.offset == 16
+assert Event.value.offset == 24
+
+
+class SensorFrame(ctypes.LittleEndianStructure):
+    SCHEMA = 0x6B44D8438AF199AF
+    TYPE_NAME = "vigil.SensorFrame.v1.6b44d8438af199af"
+
+    @staticmethod
+    def type_name():
+        return SensorFrame.TYPE_NAME
+
+    _fields_ = [
+        # Common header; t_schedule_ns is when this cycle was due.
+        ("header", Header),
+        # Identity of the run; a new value resets every filter.
+        ("run_id", ctypes.c_uint64),
+        # Which fields hold a measurement: bits of Valid.
+        ("valid", ctypes.c_uint64),
+        # decision_seq of the last Action that the robot obeyed; 0 for none.
+        ("action_seq", ctypes.c_uint64),
+        # Outcome of that action: an ActionOutcome.
+        ("action_outcome", ctypes.c_uint32),
+        # Symptoms reported by monitors outside Vigil: bits of Symptoms.
+        ("symptoms", ctypes.c_uint32),
+        # Counts jumps of the pose's frame (relocalisation): a new value re-anchors the track.
+        ("pose_reset_count", ctypes.c_uint32),
+        # 1 while the robot holds itself stopped because it has no valid action.
+        ("safe_stop", ctypes.c_uint32),
+        # The command as executed; its meaning is given by the robot's description. Rover: signed curvature 1/m (left +), speed m/s.
+        ("command", ctypes.c_double * 4),
+        # Pose x m, y m, yaw rad (wrapped to ±π), in a continuous frame.
+        ("pose", ctypes.c_double * 3),
+        # Planned pose x m, y m, yaw rad, same frame as pose.
+        ("planned_pose", ctypes.c_double * 3),
+        # Yaw rate, rad/s.
+        ("yaw_rate", ctypes.c_double),
+        # Wheel rates, rad/s, in the order of the robot's description.
+        ("wheel_rate", ctypes.c_double * 8),
+        # Steering angles, rad, in the order of the robot's description (same index as wheel).
+        ("steer", ctypes.c_double * 8),
+        # Motor currents, A, in the order of the robot's description.
+        ("current", ctypes.c_double * 8),
+        # Reserved, zero.
+        ("reserved", ctypes.c_double * 5),
+    ]
+
+
+assert ctypes.sizeof(SensorFrame) == 408
+assert SensorFrame.header.offset == 0
+assert SensorFrame.run_id.offset == 48
+assert SensorFrame.valid.offset == 56
+assert SensorFrame.action_seq.offset == 64
+assert SensorFrame.action_outcome.offset == 72
+assert SensorFrame.symptoms.offset == 76
+assert SensorFrame.pose_reset_count.offset == 80
+assert SensorFrame.safe_stop.offset == 84
+assert SensorFrame.command.offset == 88
+assert SensorFrame.pose.offset == 120
+assert SensorFrame.planned_pose.offset == 144
+assert SensorFrame.yaw_rate.offset == 168
+assert SensorFrame.wheel_rate.offset == 176
+assert SensorFrame.steer.offset == 240
+assert SensorFrame.current.offset == 304
+assert SensorFrame.reserved.offset == 368
+
+
+class DetectionBelief(ctypes.LittleEndianStructure):
+    SCHEMA = 0xF2EEA19958BB6641
+    TYPE_NAME = "vigil.DetectionBelief.v1.f2eea19958bb6641"
+
+    @staticmethod
+    def type_name():
+        return DetectionBelief.TYPE_NAME
+
+    _fields_ = [
+        # Common header.
+        ("header", Header),
+        # The journal entry behind this belief.
+        ("cause", Cause),
+        # Run of the frame.
+        ("run_id", ctypes.c_uint64),
+        # Probability that the robot is not in its nominal mode.
+        ("p_fault", ctypes.c_double),
+        # Its log-odds, natural logarithm.
+        ("log_odds", ctypes.c_double),
+        # Log-odds at which the alarm rises (calibrated; natural logarithm).
+        ("alarm_log_odds", ctypes.c_double),
+        # Log-likelihood of this frame under the nominal mode, natural logarithm.
+        ("evidence", ctypes.c_double),
+        # Effective sample size of the particles, before resampling.
+        ("effective_sample_size", ctypes.c_double),
+        # Estimated ratio of the pose's noise to the learned one (standard deviations).
+        ("noise_scale", ctypes.c_double),
+        # The same for the wheel rates.
+        ("noise_scale_wheels", ctypes.c_double),
+        # The same for the steering angles.
+        ("noise_scale_steer", ctypes.c_double),
+        # Log-odds of a fault seen by each channel alone (see Channel).
+        ("channel_log_odds", ctypes.c_double * 32),
+        # decision_seq of the last action that the robot obeyed, as the frame says it.
+        ("action_seq", ctypes.c_uint64),
+        # Capture time of the frame that raised the present alarm, ns; 0 without alarm.
+        ("alarm_t_capture_ns", ctypes.c_uint64),
+        # 1 while the alarm stands.
+        ("alarm", ctypes.c_uint32),
+        # Alarms raised so far.
+        ("alarm_count", ctypes.c_uint32),
+        # Symptoms: the detector's own or-ed with external ones (see Symptoms).
+        ("symptoms", ctypes.c_uint32),
+        # Frames refused by the filter because a channel was not finite or out of range.
+        ("invalid_count", ctypes.c_uint32),
+        # Steps whose weights degenerated (coasted, or re-initialised).
+        ("degenerate_count", ctypes.c_uint32),
+        # Particles in use.
+        ("particle_count", ctypes.c_uint32),
+        # Outcome of that action, as the frame says it: an ActionOutcome.
+        ("action_outcome", ctypes.c_uint32),
+        # Reserved, zero.
+        ("reserved", ctypes.c_uint32),
+    ]
+
+
+assert ctypes.sizeof(DetectionBelief) == 448
+assert DetectionBelief.header.offset == 0
+assert DetectionBelief.cause.offset == 48
+assert DetectionBelief.run_id.offset == 72
+assert DetectionBelief.p_fault.offset == 80
+assert DetectionBelief.log_odds.offset == 88
+assert DetectionBelief.alarm_log_odds.offset == 96
+assert DetectionBelief.evidence.offset == 104
+assert DetectionBelief.effective_sample_size.offset == 112
+assert DetectionBelief.noise_scale.offset == 120
+assert DetectionBelief.noise_scale_wheels.offset == 128
+assert DetectionBelief.noise_scale_steer.offset == 136
+assert DetectionBelief.channel_log_odds.offset == 144
+assert DetectionBelief.action_seq.offset == 400
+assert DetectionBelief.alarm_t_capture_ns.offset == 408
+assert DetectionBelief.alarm.offset == 416
+assert DetectionBelief.alarm_count.offset == 420
+assert DetectionBelief.symptoms.offset == 424
+assert DetectionBelief.invalid_count.offset == 428
+assert DetectionBelief.degenerate_count.offset == 432
+assert DetectionBelief.particle_count.offset == 436
+assert DetectionBelief.action_outcome.offset == 440
+assert DetectionBelief.reserved.offset == 444
+
+
+class ParticleBlock(ctypes.LittleEndianStructure):
+    SCHEMA = 0x7D929F90C981A707
+    TYPE_NAME = "vigil.ParticleBlock.v1.7d929f90c981a707"
+
+    @staticmethod
+    def type_name():
+        return ParticleBlock.TYPE_NAME
+
+    _fields_ = [
+        # Common header.
+        ("header", Header),
+        # The journal entry behind these particles.
+        ("cause", Cause),
+        # Particles in use; the rest of the arrays is unspecified.
+        ("count", ctypes.c_uint32),
+        # Reserved, zero.
+        ("reserved", ctypes.c_uint32),
+        # Mode of each particle: index into the fault tree's nodes (0 is nominal).
+        ("mode", ctypes.c_uint32 * 4096),
+        # x, m.
+        ("x", ctypes.c_float * 4096),
+        # y, m.
+        ("y", ctypes.c_float * 4096),
+        # Yaw, rad.
+        ("yaw", ctypes.c_float * 4096),
+        # Natural logarithm of the normalised weight.
+        ("log_weight", ctypes.c_float * 4096),
+        # Reserved, zero.
+        ("reserved_tail", ctypes.c_uint64 * 2),
+    ]
+
+
+assert ctypes.sizeof(ParticleBlock) == 82016
+assert ParticleBlock.header.offset == 0
+assert ParticleBlock.cause.offset == 48
+assert ParticleBlock.count.offset == 72
+assert ParticleBlock.reserved.offset == 76
+assert ParticleBlock.mode.offset == 80
+assert ParticleBlock.x.offset == 16464
+assert ParticleBlock.y.offset == 32848
+assert ParticleBlock.yaw.offset == 49232
+assert ParticleBlock.log_weight.offset == 65616
+assert ParticleBlock.reserved_tail.offset == 82000
+
+
+class FaultBelief(ctypes.LittleEndianStructure):
+    SCHEMA = 0x4F1BAEC44C62B92E
+    TYPE_NAME = "vigil.FaultBelief.v1.4f1baec44c62b92e"
+
+    @staticmethod
+    def type_name():
+        return FaultBelief.TYPE_NAME
+
+    _fields_ = [
+        # Common header.
+        ("header", Header),
+        # The journal entry behind this belief.
+        ("cause", Cause),
+        # Run of the frame.
+        ("run_id", ctypes.c_uint64),
+        # Hash of the fault tree that gives the nodes their meaning.
+        ("tree_hash", ctypes.c_uint64),
+        # Probability of each node: that a leaf's fault is present, alone or with others; that any fault below an abstract node is. Node 0 is nominal: no fault at all.
+        ("p", ctypes.c_double * 64),
+        # The same before this cycle's data: prediction from the last cycle.
+        ("p_predicted", ctypes.c_double * 64),
+        # Probability that no modelled fault explains the data.
+        ("p_unknown", ctypes.c_double),
+        # The same before this cycle's data.
+        ("p_unknown_predicted", ctypes.c_double),
+        # Most probable sets of leaves, in falling order.
+        ("sets", FaultSet * 8),
+        # Entropy of the distribution over sets and unknown, nats.
+        ("entropy", ctypes.c_double),
+        # Why this diagnosis and not the next best one: by channel, how much more the readings since the onset are expected under it than under runner_up, natural log-likelihood; see Channel. 0 while nothing is diagnosed.
+        ("channel_evidence", ctypes.c_double * 32),
+        # Probability of mode.
+        ("p_mode", ctypes.c_double),
+        # Capture time of the frame that raised the alarm, ns; 0 before an alarm.
+        ("alarm_t_capture_ns", ctypes.c_uint64),
+        # Most probable onset of the most probable fault, capture time ns; 0 if none.
+        ("onset_t_capture_ns", ctypes.c_uint64),
+        # Reported mode: a node's index, MODE_UNKNOWN or MODE_MULTIPLE.
+        ("mode", ctypes.c_uint32),
+        # The next best explanation that is not the best and one more fault: a node's index (0 is nominal), MODE_UNKNOWN or MODE_MULTIPLE.
+        ("runner_up", ctypes.c_uint32),
+        # Particles allowed at present; fewer than configured while the time is short.
+        ("particle_limit", ctypes.c_uint32),
+        # Changes of mode so far.
+        ("mode_change_count", ctypes.c_uint32),
+        # Nodes in use.
+        ("node_count", ctypes.c_uint32),
+        # Sets in use.
+        ("set_count", ctypes.c_uint32),
+        # 1 while identifying (an alarm stands or a fault is believed), 0 while watching.
+        ("identifying", ctypes.c_uint32),
+        # Steps that met impossible or non-finite evidence and kept the prediction.
+        ("degenerate_count", ctypes.c_uint32),
+    ]
+
+
+assert ctypes.sizeof(FaultBelief) == 1576
+assert FaultBelief.header.offset == 0
+assert FaultBelief.cause.offset == 48
+assert FaultBelief.run_id.offset == 72
+assert FaultBelief.tree_hash.offset == 80
+assert FaultBelief.p.offset == 88
+assert FaultBelief.p_predicted.offset == 600
+assert FaultBelief.p_unknown.offset == 1112
+assert FaultBelief.p_unknown_predicted.offset == 1120
+assert FaultBelief.sets.offset == 1128
+assert FaultBelief.entropy.offset == 1256
+assert FaultBelief.channel_evidence.offset == 1264
+assert FaultBelief.p_mode.offset == 1520
+assert FaultBelief.alarm_t_capture_ns.offset == 1528
+assert FaultBelief.onset_t_capture_ns.offset == 1536
+assert FaultBelief.mode.offset == 1544
+assert FaultBelief.runner_up.offset == 1548
+assert FaultBelief.particle_limit.offset == 1552
+assert FaultBelief.mode_change_count.offset == 1556
+assert FaultBelief.node_count.offset == 1560
+assert FaultBelief.set_count.offset == 1564
+assert FaultBelief.identifying.offset == 1568
+assert FaultBelief.degenerate_count.offset == 1572
+
+
+class Action(ctypes.LittleEndianStructure):
+    SCHEMA = 0xD2DC9B45F9F508D3
+    TYPE_NAME = "vigil.Action.v1.d2dc9b45f9f508d3"
+
+    @staticmethod
+    def type_name():
+        return Action.TYPE_NAME
+
+    _fields_ = [
+        # Common header.
+        ("header", Header),
+        # The journal entry behind this decision.
+        ("cause", Cause),
+        # Run of the frame.
+        ("run_id", ctypes.c_uint64),
+        # Counts decisions: rises when action or its parameters change. From 1.
+        ("decision_seq", ctypes.c_uint64),
+        # CLOCK_MONOTONIC ns after which the robot must no longer obey this block, but stop.
+        ("valid_until_ns", ctypes.c_uint64),
+        # Hash of the decision model that gives states and actions their meaning.
+        ("model_hash", ctypes.c_uint64),
+        # Belief over the decision model's states.
+        ("belief", ctypes.c_double * 64),
+        # What the policy thinks of each action, the larger the better; value_kind says what it is. Finite.
+        ("value", ctypes.c_double * 32),
+        # Entropy of the belief, normalised to 0..1.
+        ("entropy", ctypes.c_double),
+        # Entropy of the states' votes for their best actions, normalised to 0..1: doubt about what to do.
+        ("action_entropy", ctypes.c_double),
+        # Value of the chosen action minus the runner-up's.
+        ("margin", ctypes.c_double),
+        # Natural logarithm of the probability of the last evidence under the belief.
+        ("log_evidence", ctypes.c_double),
+        # Speed factor to apply, 0..1.
+        ("speed_scale", ctypes.c_double),
+        # Curvature to command: curvature_gain * curvature + curvature_offset.
+        ("curvature_gain", ctypes.c_double),
+        # See curvature_gain; 1/m.
+        ("curvature_offset", ctypes.c_double),
+        # Index of the chosen action in the decision model.
+        ("action", ctypes.c_uint32),
+        # What the robot is to do: a RecoveryKind.
+        ("kind", ctypes.c_uint32),
+        # Wheel that the action is about; u32::MAX for none.
+        ("wheel", ctypes.c_uint32),
+        # How the action was chosen: a ControlMode.
+        ("control_mode", ctypes.c_uint32),
+        # States in use.
+        ("state_count", ctypes.c_uint32),
+        # Actions in use.
+        ("action_count", ctypes.c_uint32),
+        # Observations that were impossible under the belief so far.
+        ("impossible_count", ctypes.c_uint32),
+        # Bit 0: identifier lost; bit 1: detector lost.
+        ("lost_stages", ctypes.c_uint32),
+        # What value is: a ValueKind.
+        ("value_kind", ctypes.c_uint32),
+        # Reserved, zero.
+        ("reserved_word", ctypes.c_uint32),
+        # Reserved, zero.
+        ("reserved", ctypes.c_uint64 * 2),
+    ]
+
+
+assert ctypes.sizeof(Action) == 984
+assert Action.header.offset == 0
+assert Action.cause.offset == 48
+assert Action.run_id.offset == 72
+assert Action.decision_seq.offset == 80
+assert Action.valid_until_ns.offset == 88
+assert Action.model_hash.offset == 96
+assert Action.belief.offset == 104
+assert Action.value.offset == 616
+assert Action.entropy.offset == 872
+assert Action.action_entropy.offset == 880
+assert Action.margin.offset == 888
+assert Action.log_evidence.offset == 896
+assert Action.speed_scale.offset == 904
+assert Action.curvature_gain.offset == 912
+assert Action.curvature_offset.offset == 920
+assert Action.action.offset == 928
+assert Action.kind.offset == 932
+assert Action.wheel.offset == 936
+assert Action.control_mode.offset == 940
+assert Action.state_count.offset == 944
+assert Action.action_count.offset == 948
+assert Action.impossible_count.offset == 952
+assert Action.lost_stages.offset == 956
+assert Action.value_kind.offset == 960
+assert Action.reserved_word.offset == 964
+assert Action.reserved.offset == 968
+
+
+class Health(ctypes.LittleEndianStructure):
+    SCHEMA = 0x22CA8E52D533DF67
+    TYPE_NAME = "vigil.Health.v1.22ca8e52d533df67"
+
+    @staticmethod
+    def type_name():
+        return Health.TYPE_NAME
+
+    _fields_ = [
+        # Common header.
+        ("header", Header),
+        # Cycles done: blocks published, or frames for the source.
+        ("cycles", ctypes.c_uint64),
+        # Scheduled cycles whose deadline passed before the block was out.
+        ("missed", ctypes.c_uint64),
+        # Cycles whose time from wake-up to publication exceeded the budget.
+        ("over_budget", ctypes.c_uint64),
+        # Schedule instants that the source slept through.
+        ("slips", ctypes.c_uint64),
+        # Input blocks that never arrived, by gaps of their sequence numbers.
+        ("lost", ctypes.c_uint64),
+        # Input blocks that arrived after their deadline.
+        ("late", ctypes.c_uint64),
+        # Input blocks that arrived twice.
+        ("duplicate", ctypes.c_uint64),
+        # Input blocks refused: wrong schema, impossible time stamps, non-finite data.
+        ("invalid", ctypes.c_uint64),
+        # The refused ones by cause, see Rejection.
+        ("rejected", ctypes.c_uint64 * 16),
+        # Longest time from wake-up to publication, ns.
+        ("worst_cycle_ns", ctypes.c_uint64),
+        # Sequence number of that cycle.
+        ("worst_cycle_seq", ctypes.c_uint64),
+        # Last time from wake-up to publication, ns.
+        ("last_cycle_ns", ctypes.c_uint64),
+        # Period of the schedule, ns.
+        ("period_ns", ctypes.c_uint64),
+        # Deadline after the schedule, ns.
+        ("deadline_ns", ctypes.c_uint64),
+        # Budget of one cycle, from wake-up to publication, ns.
+        ("budget_ns", ctypes.c_uint64),
+        # Schedule instant of the service's first and last accounted cycle, ns.
+        ("accounted_ns", ctypes.c_uint64 * 2),
+        # A ServiceState.
+        ("state", ctypes.c_uint32),
+        # Core that was asked for.
+        ("core_wanted", ctypes.c_uint32),
+        # Core that the kernel reported in the last check.
+        ("core", ctypes.c_uint32),
+        # 1 if the kernel lets the service run on no other core than core_wanted.
+        ("pinned", ctypes.c_uint32),
+        # Scheduling policy read back (SCHED_FIFO is 1, SCHED_OTHER 0).
+        ("policy", ctypes.c_uint32),
+        # Priority read back.
+        ("priority", ctypes.c_uint32),
+        # 1 if all memory is locked.
+        ("memory_locked", ctypes.c_uint32),
+        # Process id.
+        ("pid", ctypes.c_uint32),
+        # Why the service is in degraded mode, bits of Degraded; 0 if it is not.
+        ("degraded", ctypes.c_uint32),
+        # Result of the last control command: 1 done, 2 refused, 0 none yet.
+        ("control_result", ctypes.c_uint32),
+        # Sequence number of the last control command handled.
+        ("control_seq", ctypes.c_uint64),
+        # Epoch of the writer of that command.
+        ("control_epoch", ctypes.c_uint64),
+        # Writer and sequence number of the newest sensor frame that an output has answered.
+        ("answered_epoch", ctypes.c_uint64),
+        # See answered_epoch.
+        ("answered_seq", ctypes.c_uint64),
+        # Particles that the time allows at present; 0 without particles.
+        ("particles", ctypes.c_uint32),
+        # Particles configured.
+        ("particles_configured", ctypes.c_uint32),
+        # Events so far; event number n is at eventsn % EVENTS.
+        ("event_count", ctypes.c_uint64),
+        # Recent events.
+        ("events", Event * 32),
+    ]
+
+
+assert ctypes.sizeof(Health) == 1416
+assert Health.header.offset == 0
+assert Health.cycles.offset == 48
+assert Health.missed.offset == 56
+assert Health.over_budget.offset == 64
+assert Health.slips.offset == 72
+assert Health.lost.offset == 80
+assert Health.late.offset == 88
+assert Health.duplicate.offset == 96
+assert Health.invalid.offset == 104
+assert Health.rejected.offset == 112
+assert Health.worst_cycle_ns.offset == 240
+assert Health.worst_cycle_seq.offset == 248
+assert Health.last_cycle_ns.offset == 256
+assert Health.period_ns.offset == 264
+assert Health.deadline_ns.offset == 272
+assert Health.budget_ns.offset == 280
+assert Health.accounted_ns.offset == 288
+assert Health.state.offset == 304
+assert Health.core_wanted.offset == 308
+assert Health.core.offset == 312
+assert Health.pinned.offset == 316
+assert Health.policy.offset == 320
+assert Health.priority.offset == 324
+assert Health.memory_locked.offset == 328
+assert Health.pid.offset == 332
+assert Health.degraded.offset == 336
+assert Health.control_result.offset == 340
+assert Health.control_seq.offset == 344
+assert Health.control_epoch.offset == 352
+assert Health.answered_epoch.offset == 360
+assert Health.answered_seq.offset == 368
+assert Health.particles.offset == 376
+assert Health.particles_configured.offset == 380
+assert Health.event_count.offset == 384
+assert Health.events.offset == 392
+
+
+def runtime_folder(graph="rover"):
+    """Folder of a running graph: its sockets and the files of its transport.
+
+    Raises FileNotFoundError while there is none: what joins before the graph would be cleaned up by it.
+    """
+    user = os.environ.get("XDG_RUNTIME_DIR")
+    candidates = ["/run/vigil"] + ([f"{user}/vigil"] if user else []) + [f"/tmp/vigil-{os.getuid()}"]
+    for folder in candidates:
+        if os.path.exists(f"{folder}/{graph}/processes"):
+            return f"{folder}/{graph}"
+    raise FileNotFoundError(f"DoesNotExist: no graph '{graph}' is running (looked in {candidates})")
+
+
+def transport(graph="rover"):
+    """Configuration of iceoryx2 (package `iceoryx2`, version 0.10) with which to join the graph."""
+    import iceoryx2
+
+    config = iceoryx2.config.default()
+    config.global_cfg.prefix = iceoryx2.FileName.new(f"vigil_{graph}_")
+    config.global_cfg.root_path = iceoryx2.Path.new(f"{runtime_folder(graph)}/t")
+    return config
+
+
+def _table():
+    for byte in range(256):
+        for _ in range(8):
+            byte = (byte >> 1) ^ (0x82F63B78 if byte & 1 else 0)
+        yield byte
+
+
+_CRC_TABLE = tuple(_table())
+
+
+def crc32c(data):
+    """CRC-32C (Castagnoli)."""
+    crc = 0xFFFFFFFF
+    for byte in data:
+        crc = _CRC_TABLE[(crc ^ byte) & 0xFF] ^ (crc >> 8)
+    return crc ^ 0xFFFFFFFF
+
+
+def datagram(frame):
+    """The datagram of a SensorFrame, for the sockets of `sensor.source = "socket"`.
+
+    The sender fills in header.epoch (not 0, another at each start), header.seq and
+    header.t_capture_ns; it leaves header.t_schedule_ns at 0 unless it runs on Vigil's machine.
+    """
+    frame.header.schema = SensorFrame.SCHEMA
+    body = bytes(frame)
+    head = b"VGIL" + struct.pack("<HHI", 1, 1, len(body))
+    return head + struct.pack("<I", crc32c(head + body)) + body

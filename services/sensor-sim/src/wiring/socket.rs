@@ -1,0 +1,146 @@
+//! Frames that arrive as datagrams, checked and passed on.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::rc::Rc;
+
+use vigil_blocks::datagram::{self, DATAGRAM_SIZE};
+use vigil_blocks::{Cause, Rejection, SensorFrame};
+use vigil_cycle::datagrams::{Datagrams, From};
+use vigil_cycle::{Clock, Graph, HealthBoard, Intake, PortError, Sender, Stage, Stamp, Topic};
+use vigil_robot::{Description, FrameGuard};
+
+use crate::arrival_clock::ArrivalClock;
+
+/// Datagrams that one turn takes at most: a flood must not hold it.
+const TURN_MAX: usize = 64;
+/// A source silent for so long may be replaced by another, ns.
+const SILENT_NS: u64 = 1_000_000_000;
+
+/// Where datagrams are to arrive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Listen {
+    /// Address of the UDP socket; `None` for none.
+    pub udp: Option<SocketAddr>,
+    /// File of the Unix datagram socket; `None` for none.
+    pub unix: Option<PathBuf>,
+}
+
+/// Takes frames from sockets and publishes those that pass every check. The first source whose
+/// frame is taken is the graph's, until it is silent.
+pub struct SocketStage {
+    datagrams: Rc<Datagrams>,
+    guard: FrameGuard,
+    clock: ArrivalClock,
+    source: Option<From>,
+    taken_ns: u64,
+    /// Frames of this turn.
+    waiting: Vec<SensorFrame>,
+    frames: Box<dyn Sender<SensorFrame>>,
+}
+
+impl SocketStage {
+    /// Publishes on `graph` what arrives at `datagrams`, for frames of `robot`.
+    ///
+    /// # Errors
+    /// The transport's.
+    pub fn new(
+        datagrams: Rc<Datagrams>,
+        robot: &Description,
+        graph: &Graph,
+    ) -> Result<Self, PortError> {
+        Ok(Self {
+            datagrams,
+            guard: FrameGuard::new(robot),
+            clock: ArrivalClock::default(),
+            source: None,
+            taken_ns: 0,
+            waiting: Vec::with_capacity(TURN_MAX),
+            frames: graph.sender(Topic::Sensor)?,
+        })
+    }
+
+    /// The frame of a datagram, its times on this machine's clock.
+    fn read(&mut self, bytes: &[u8], now_ns: u64) -> Result<SensorFrame, Rejection> {
+        let mut frame = datagram::decode(bytes)?;
+        let header = &mut frame.header;
+        if header.t_schedule_ns == 0 {
+            header.t_schedule_ns = self.clock.due_ns(header.epoch, header.t_capture_ns, now_ns);
+        }
+        header.t_publish_ns = now_ns;
+        Ok(frame)
+    }
+
+    fn choose(&mut self, from: From) {
+        self.source = Some(from);
+        if let From::Udp(peer) = from {
+            // If the kernel cannot, the comparison of addresses remains.
+            let _ = self.datagrams.only_from(peer);
+        }
+    }
+}
+
+impl Stage for SocketStage {
+    fn take(&mut self, intake: &mut Intake<'_>) {
+        // One byte more than a datagram has: a longer one shows.
+        let mut buffer = [0; DATAGRAM_SIZE + 1];
+        let now_ns = intake.now_ns();
+        for _ in 0..TURN_MAX {
+            let Some((length, from)) = self.datagrams.receive(&mut buffer) else {
+                break;
+            };
+            if self.source.is_some_and(|source| source != from) {
+                intake.reject(Rejection::OtherWriter);
+                continue;
+            }
+            let frame = match self.read(&buffer[..length], now_ns) {
+                Ok(frame) => frame,
+                Err(rejection) => {
+                    intake.reject(rejection);
+                    continue;
+                }
+            };
+            let content = || self.guard.check(&frame);
+            if !intake.admit::<SensorFrame>(&frame.header, content) {
+                continue;
+            }
+            if self.source.is_none() {
+                self.choose(from);
+            }
+            self.taken_ns = now_ns;
+            self.waiting.push(frame);
+            intake.stepped(&frame.header, (frame.header.epoch, frame.header.seq));
+        }
+    }
+
+    fn miss(&mut self, _count: u32) {}
+
+    fn publish(
+        &mut self,
+        _cause: Cause,
+        _stamp: Stamp,
+        clock: &dyn Clock,
+    ) -> Result<u64, PortError> {
+        let mut published_ns = clock.now_ns();
+        for frame in self.waiting.drain(..) {
+            *self.frames.block() = frame;
+            published_ns = self.frames.send(Stamp::of(&frame.header), clock)?;
+        }
+        Ok(published_ns)
+    }
+
+    fn prepare(&mut self) -> Result<(), PortError> {
+        self.frames.prepare()
+    }
+
+    fn is_border(&self) -> bool {
+        true
+    }
+
+    fn after(&mut self, _health: &mut HealthBoard, now_ns: u64) {
+        if self.source.is_some() && now_ns.saturating_sub(self.taken_ns) > SILENT_NS {
+            self.source = None;
+            self.datagrams.from_anywhere();
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The header for C and C++.
+
+use std::fmt::Write as _;
+
+use vigil_blocks::datagram::DATAGRAM_SIZE;
+
+use super::{Struct, constants, doc, elements, structs};
+
+const HEAD: &str = r#"/* Wire blocks of Vigil, for C11 and C++17. Made by `vigil types c`; do not edit.
+ *
+ * Units are SI, angles radians, times CLOCK_MONOTONIC nanoseconds; x forward, y left, yaw
+ * counter-clockwise. All numbers little-endian, no padding. */
+#ifndef VIGIL_TYPES_H
+#define VIGIL_TYPES_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifdef __cplusplus
+#define VIGIL_ASSERT(condition) static_assert(condition, #condition)
+#else
+#define VIGIL_ASSERT(condition) _Static_assert(condition, #condition)
+#endif
+
+"#;
+
+/// The datagram, see `vigil_blocks::datagram`.
+const TAIL: &str = r#"
+/* CRC-32C (Castagnoli), bit by bit: `crc` is what came before, 0 to begin. */
+static inline uint32_t vigil_crc32c(uint32_t crc, const uint8_t *bytes, size_t count) {
+  crc = ~crc;
+  for (size_t i = 0; i < count; i++) {
+    crc ^= bytes[i];
+    for (int bit = 0; bit < 8; bit++) crc = (crc >> 1) ^ (0x82f63b78u & (0u - (crc & 1u)));
+  }
+  return ~crc;
+}
+
+/* The datagram of a frame, for the sockets of `sensor.source = "socket"`. The sender fills in
+ * header.epoch (not 0, another at each start), header.seq and header.t_capture_ns; it leaves
+ * header.t_schedule_ns at 0 unless it runs on Vigil's machine and has its CLOCK_MONOTONIC. */
+static inline void vigil_datagram(const vigil_sensor_frame *frame, uint8_t bytes[VIGIL_DATAGRAM_SIZE]) {
+  const uint8_t head[12] = {'V', 'G', 'I', 'L', 1, 0, 1, 0, sizeof *frame & 0xff, sizeof *frame >> 8, 0, 0};
+  memcpy(bytes, head, 12);
+  memcpy(bytes + 16, frame, sizeof *frame);
+  const uint64_t schema = VIGIL_SENSOR_FRAME_SCHEMA;
+  memcpy(bytes + 16, &schema, 8);
+  uint32_t crc = vigil_crc32c(0, bytes, 12);
+  crc = vigil_crc32c(crc, bytes + 16, sizeof *frame);
+  for (int i = 0; i < 4; i++) bytes[12 + i] = (uint8_t)(crc >> (8 * i));
+}
+
+#endif
+"#;
+
+/// The whole header.
+pub fn header() -> String {
+    let mut text = String::from(HEAD);
+    for (prefix, name, value) in constants() {
+        let _ = writeln!(text, "#define VIGIL_{prefix}_{name} {value}u");
+    }
+    let _ = writeln!(text, "#define VIGIL_DATAGRAM_SIZE {DATAGRAM_SIZE}u\n");
+    for item in structs() {
+        one(&item, &mut text);
+    }
+    text.push_str(TAIL);
+    text
+}
+
+fn one(item: &Struct, text: &mut String) {
+    let name = snake(item.name);
+    if let Some((schema, type_name)) = item.block {
+        let upper = name.to_uppercase();
+        let _ = writeln!(text, "#define VIGIL_{upper}_SCHEMA 0x{schema:016x}ull");
+        let _ = writeln!(text, "#define VIGIL_{upper}_TYPE_NAME \"{type_name}\"");
+    }
+    let _ = writeln!(text, "typedef struct {{");
+    for field in item.fields {
+        let (element, count) = elements(field);
+        let count = count.map_or_else(String::new, |n| format!("[{n}]"));
+        let _ = writeln!(text, "  /* {} */", doc(field));
+        let _ = writeln!(text, "  {} {}{count};", c_type(element), field.name);
+    }
+    let _ = writeln!(text, "}} vigil_{name};");
+    let _ = writeln!(text, "VIGIL_ASSERT(sizeof(vigil_{name}) == {});", item.size);
+    for field in item.fields {
+        let (field, offset) = (field.name, field.offset);
+        let _ = writeln!(
+            text,
+            "VIGIL_ASSERT(offsetof(vigil_{name}, {field}) == {offset});"
+        );
+    }
+    text.push('\n');
+}
+
+fn c_type(rust: &str) -> String {
+    match rust {
+        "f64" => "double".into(),
+        "f32" => "float".into(),
+        "u64" | "u32" | "u16" | "u8" => format!("uint{}_t", &rust[1..]),
+        "i64" | "i32" | "i16" | "i8" => format!("int{}_t", &rust[1..]),
+        name => format!("vigil_{}", snake(name)),
+    }
+}
+
+/// `SensorFrame` as `sensor_frame`.
+fn snake(name: &str) -> String {
+    let mut text = String::new();
+    for c in name.chars() {
+        if c.is_ascii_uppercase() && !text.is_empty() {
+            text.push('_');
+        }
+        text.push(c.to_ascii_lowercase());
+    }
+    text
+}

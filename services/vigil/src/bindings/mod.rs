@@ -1,0 +1,156 @@
+//! The wire blocks as types of other languages, made from the Rust structs themselves.
+
+mod c;
+mod python;
+
+use vigil_blocks::layout::{Field, Layout};
+use vigil_blocks::{
+    Action, ActionOutcome, Block, Cause, CauseKind, ControlMode, DetectionBelief, Event,
+    FaultBelief, FaultSet, Header, Health, ParticleBlock, RecoveryKind, SensorFrame, Symptoms,
+    Valid,
+};
+
+pub use c::header;
+pub use python::module;
+
+/// A struct of the wire.
+struct Struct {
+    name: &'static str,
+    fields: &'static [Field],
+    size: usize,
+    /// Schema and type name of a block; none for a part of blocks.
+    block: Option<(u64, &'static str)>,
+}
+
+fn part<T: Layout>() -> Struct {
+    Struct {
+        name: T::NAME,
+        fields: T::FIELDS,
+        size: size_of::<T>(),
+        block: None,
+    }
+}
+
+fn block<T: Block + Layout>() -> Struct {
+    Struct {
+        block: Some((T::SCHEMA, T::TYPE_NAME)),
+        ..part::<T>()
+    }
+}
+
+/// Parts before the blocks that hold them.
+fn structs() -> Vec<Struct> {
+    vec![
+        part::<Header>(),
+        part::<Cause>(),
+        part::<FaultSet>(),
+        part::<Event>(),
+        block::<SensorFrame>(),
+        block::<DetectionBelief>(),
+        block::<ParticleBlock>(),
+        block::<FaultBelief>(),
+        block::<Action>(),
+        block::<Health>(),
+    ]
+}
+
+/// Named values of fields: prefix, name, value.
+fn constants() -> Vec<(&'static str, String, u64)> {
+    let mut all = vec![
+        ("VALID", "COMMAND_0".to_owned(), Valid::COMMAND),
+        ("VALID", "POSE".to_owned(), Valid::POSE),
+        ("VALID", "PLANNED_POSE".to_owned(), Valid::PLANNED_POSE),
+        ("VALID", "YAW_RATE".to_owned(), Valid::YAW_RATE),
+        ("VALID", "WHEEL_RATE_0".to_owned(), Valid::wheel_rate(0)),
+        ("VALID", "STEER_0".to_owned(), Valid::steer(0)),
+        ("VALID", "CURRENT_0".to_owned(), Valid::current(0)),
+    ];
+    for (name, bit) in Symptoms::NAMED {
+        all.push(("SYMPTOM", name.to_owned(), u64::from(bit)));
+    }
+    let outcomes = [
+        ("NONE", ActionOutcome::None),
+        ("RUNNING", ActionOutcome::Running),
+        ("SUCCEEDED", ActionOutcome::Succeeded),
+        ("FAILED", ActionOutcome::Failed),
+    ];
+    all.extend(outcomes.map(|(name, value)| ("OUTCOME", name.to_owned(), value as u64)));
+    let kinds = [
+        ("NONE", RecoveryKind::None),
+        ("GO_ON", RecoveryKind::GoOn),
+        ("SLOW_DOWN", RecoveryKind::SlowDown),
+        ("STOP", RecoveryKind::Stop),
+        ("COMPENSATE", RecoveryKind::Compensate),
+        ("IGNORE_ENCODER", RecoveryKind::IgnoreEncoder),
+        ("CALL_FOR_HELP", RecoveryKind::CallForHelp),
+        ("NEW_PATH", RecoveryKind::NewPath),
+        ("RELOCALISE", RecoveryKind::Relocalise),
+        ("GO_THROUGH", RecoveryKind::GoThrough),
+        ("MOVE_AWAY", RecoveryKind::MoveAway),
+        ("GIVE_UP", RecoveryKind::GiveUp),
+    ];
+    all.extend(kinds.map(|(name, value)| ("RECOVERY", name.to_owned(), value as u64)));
+    let modes = [
+        ("POLICY", ControlMode::Policy),
+        ("DUAL", ControlMode::Dual),
+        ("FALLBACK", ControlMode::Fallback),
+        ("SAFE", ControlMode::Safe),
+    ];
+    all.extend(modes.map(|(name, value)| ("CONTROL", name.to_owned(), value as u64)));
+    let causes = [("FRAME", CauseKind::Frame), ("MISSED", CauseKind::Missed)];
+    all.extend(causes.map(|(name, value)| ("CAUSE", name.to_owned(), value as u64)));
+    all
+}
+
+/// Element type of a field and, of an array, how many of them: `[f64; WHEELS]` is eight `f64`.
+fn elements(field: &Field) -> (&'static str, Option<usize>) {
+    let Some(inner) = field.type_text.strip_prefix('[') else {
+        return (field.type_text, None);
+    };
+    let element = inner.split(';').next().unwrap_or_default().trim();
+    let size = match element {
+        "f64" | "u64" | "i64" => 8,
+        "u32" | "f32" | "i32" => 4,
+        "u16" | "i16" => 2,
+        "u8" | "i8" => 1,
+        name => {
+            let parts = structs();
+            let part = parts.iter().find(|s| s.name == name);
+            part.map_or(1, |s| s.size)
+        }
+    };
+    (element, Some(field.size / size))
+}
+
+/// Documentation of a field as one line of plain text.
+fn doc(field: &Field) -> String {
+    let line = |attribute: &&str| {
+        let text = attribute.strip_prefix("doc").unwrap_or(attribute).trim();
+        let text = text.strip_prefix('=').unwrap_or(text).trim();
+        let text = text.trim_start_matches('r').trim_matches('#');
+        text.trim_matches('"').trim().replace("\\\"", "\"")
+    };
+    let lines: Vec<String> = field.doc.iter().map(line).collect();
+    // Links are for Rust's documentation.
+    lines
+        .join(" ")
+        .replace(['[', ']', '`'], "")
+        .replace("crate::", "")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_and_documentation_are_read_from_the_structs() {
+        let field = |name| SensorFrame::FIELDS.iter().find(|f| f.name == name);
+        let of = |name| field(name).map(|f| (elements(f), doc(f)));
+        let rates = "Wheel rates, rad/s, in the order of the robot's description.".to_owned();
+        assert_eq!(of("wheel_rate"), Some((("f64", Some(8)), rates)));
+        let yaw_rate = "Yaw rate, rad/s.".to_owned();
+        assert_eq!(of("yaw_rate"), Some((("f64", None), yaw_rate)));
+        let events = Health::FIELDS.iter().find(|f| f.name == "events");
+        assert_eq!(events.map(elements), Some(("Event", Some(32))));
+    }
+}

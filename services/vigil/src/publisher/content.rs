@@ -1,0 +1,169 @@
+//! What the frames say, field by field.
+
+use std::f64::consts::{PI, TAU};
+
+use vigil_blocks::SensorFrame;
+use vigil_evaluation::frames::{Field, Run, fields};
+use vigil_evaluation::plausible;
+use vigil_robot::Description;
+
+use super::Arrived;
+use crate::findings::{Finding, Status};
+
+/// Commanded speed above which a robot is to move, m/s.
+const MOVING_M_S: f64 = 0.02;
+/// Frames with motion commanded from which a field that never changes is told.
+const MOVING_FRAMES_MIN: usize = 50;
+
+/// What one field held.
+#[derive(Debug, Clone, Copy, Default)]
+struct Stretch {
+    measured: usize,
+    not_finite: usize,
+    least: f64,
+    most: f64,
+    /// Frames in which motion was commanded, and the extremes in those.
+    moving: usize,
+    moving_least: f64,
+    moving_most: f64,
+}
+
+/// One finding for each field of the robot, and one about what they mean together.
+pub fn findings(robot: &Description, frames: &[Arrived]) -> Vec<Finding> {
+    let fields = fields(robot);
+    let one = |(name, field): &(String, Field)| {
+        judge(
+            name,
+            *field,
+            robot,
+            stretch(robot, *field, frames),
+            frames.len(),
+        )
+    };
+    let mut all: Vec<Finding> = fields.iter().map(one).collect();
+    all.push(meaning(robot, frames));
+    all
+}
+
+fn is_moving(robot: &Description, frame: &SensorFrame) -> bool {
+    robot.path_speed_m_s(robot.twist(&frame.command)) > MOVING_M_S
+}
+
+fn stretch(robot: &Description, field: Field, frames: &[Arrived]) -> Stretch {
+    let mut found = Stretch {
+        least: f64::INFINITY,
+        most: f64::NEG_INFINITY,
+        moving_least: f64::INFINITY,
+        moving_most: f64::NEG_INFINITY,
+        ..Stretch::default()
+    };
+    for Arrived { frame, .. } in frames {
+        let Some(value) = field.get(frame) else {
+            continue;
+        };
+        found.measured += 1;
+        if !value.is_finite() {
+            found.not_finite += 1;
+            continue;
+        }
+        (found.least, found.most) = (found.least.min(value), found.most.max(value));
+        if is_moving(robot, frame) {
+            found.moving += 1;
+            found.moving_least = found.moving_least.min(value);
+            found.moving_most = found.moving_most.max(value);
+        }
+    }
+    found
+}
+
+fn judge(name: &str, field: Field, robot: &Description, of: Stretch, frames: usize) -> Finding {
+    let told = |status, detail: String| Finding::new(name, status, detail);
+    if of.measured == 0 {
+        let detail = "never marked as valid, but the robot's description says that it is measured: set its \
+                      bit in `valid`, or take it out of [measured]";
+        return told(Status::Failure, detail.into());
+    }
+    if of.not_finite > 0 {
+        let detail = format!(
+            "NaN or infinite in {} of {frames} frames: leave it 0 and its bit in `valid` unset",
+            of.not_finite
+        );
+        return told(Status::Failure, detail);
+    }
+    let mut detail = format!("{:.4} to {:.4}", of.least, of.most);
+    if of.measured < frames {
+        let share = 100.0 * of.measured as f64 / frames as f64;
+        detail.push_str(&format!(", valid in {share:.0} % of the frames"));
+    }
+    let largest = of.least.abs().max(of.most.abs());
+    if let Some(limit) = limit(field, robot).filter(|limit| largest > *limit) {
+        let guess = unit_guess(field, largest);
+        let detail = format!("{detail}: beyond {limit:.3}, which the description allows{guess}");
+        return told(Status::Failure, detail);
+    }
+    let is_command = matches!(field, Field::Command(_));
+    if !is_command && of.moving >= MOVING_FRAMES_MIN && of.moving_least == of.moving_most {
+        let detail = format!("{detail}: never changes, though motion is commanded");
+        return told(Status::Warning, detail);
+    }
+    told(Status::Ok, detail)
+}
+
+/// Largest magnitude that makes sense.
+fn limit(field: Field, robot: &Description) -> Option<f64> {
+    let limits = &robot.limits;
+    match field {
+        Field::Command(i) => robot.command.get(i).map(|axis| 1.001 * axis.limit),
+        // A wrapped angle may be rounded up.
+        Field::Pose(2) | Field::Steer(_) => Some(PI + 1e-3),
+        Field::WheelRate(_) => Some(limits.wheel_rate_rad_s),
+        Field::YawRate => Some(limits.yaw_rate_rad_s),
+        Field::Pose(_) | Field::Current(_) => None,
+    }
+}
+
+fn unit_guess(field: Field, largest: f64) -> &'static str {
+    match field {
+        Field::Pose(2) if largest <= 361.0 && largest > TAU + 0.01 => {
+            ". Looks like degrees: rad is wanted, wrapped to -pi to pi"
+        }
+        Field::Pose(2) => ". Wrap it to -pi to pi",
+        Field::Steer(_) => ". Looks like degrees: rad is wanted",
+        Field::YawRate => ". Looks like degrees per second: rad/s is wanted",
+        Field::WheelRate(_) => {
+            ". Looks like degrees per second or revolutions per minute: rad/s is wanted"
+        }
+        _ => ". Is the unit right?",
+    }
+}
+
+/// Units, signs and sides, from what the frames say about each other.
+fn meaning(robot: &Description, frames: &[Arrived]) -> Finding {
+    let mut run = Run {
+        id: 0,
+        frames: Vec::new(),
+    };
+    let newest = frames
+        .last()
+        .map(|f| (f.frame.header.epoch, f.frame.run_id));
+    let of_newest = frames
+        .iter()
+        .filter(|f| Some((f.frame.header.epoch, f.frame.run_id)) == newest);
+    run.frames.extend(of_newest.map(|f| f.frame));
+    match plausible::doubt(&run, robot, f64::INFINITY) {
+        Some(doubt) => {
+            let detail = doubt.to_string();
+            let detail = detail.strip_prefix("run 0: ").unwrap_or(&detail).to_owned();
+            Finding::new("meaning", Status::Failure, detail)
+        }
+        None if plausible::is_judged(&run, robot, f64::INFINITY) => {
+            let detail = "units, signs and sides fit the commanded motion";
+            Finding::new("meaning", Status::Ok, detail)
+        }
+        None => {
+            let detail =
+                "too little motion to judge units, signs and sides: drive a curve, and look longer";
+            Finding::new("meaning", Status::Warning, detail)
+        }
+    }
+}

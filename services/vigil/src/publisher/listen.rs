@@ -1,0 +1,205 @@
+//! Listens to a publisher: beside a running graph, or in its place.
+
+use vigil_blocks::datagram::{self, DATAGRAM_SIZE};
+use vigil_blocks::{Health, REJECTIONS, Rejection, SensorFrame};
+use vigil_cycle::datagrams::Datagrams;
+use vigil_cycle::port::{EventListener, Link};
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::wake::{self, Inputs, Timer};
+use vigil_cycle::{Clock, Graph, InputAccount, Monotonic, PortError, Receiver, Topic, signal};
+use vigil_robot::FrameGuard;
+use vigil_setup::Setup;
+use vigil_setup::schema::Source;
+
+use super::{Arrived, Heard};
+
+/// Frames that are kept.
+pub const FRAMES_MAX: usize = 500_000;
+/// Longest sleep, ns: a wish to stop is heard then.
+const SLEEP_NS: u64 = 50_000_000;
+
+/// Listens for `seconds`, or until a signal.
+///
+/// # Errors
+/// The transport's, or that a socket cannot be bound.
+pub fn listen(setup: &Setup, seconds: f64) -> Result<Heard, PortError> {
+    let domain = setup.domain()?;
+    // Held as long as this listens: no graph is started meanwhile.
+    let lock = domain.lock().map_err(|e| PortError::setup("lock", &e))?;
+    let mut heard = Heard {
+        is_graph_running: lock.is_none(),
+        ..Heard::default()
+    };
+    signal::install();
+    if lock.is_some() {
+        // Publishers wait for this file.
+        std::fs::write(domain.processes_file(), "").map_err(|e| PortError::setup("folder", &e))?;
+    }
+    if setup.file.sensor.source == Source::Socket && lock.is_some() {
+        sockets(setup, seconds, &mut heard)?;
+    } else {
+        topic(setup, seconds, &mut heard)?;
+    }
+    if lock.is_some() {
+        domain.remove_residue();
+    }
+    Ok(heard)
+}
+
+impl Heard {
+    fn take(&mut self, frame: SensorFrame, now_ns: u64) {
+        if self.frames.len() < FRAMES_MAX {
+            self.frames.push(Arrived { now_ns, frame });
+        } else {
+            self.more += 1;
+        }
+    }
+}
+
+/// What a graph would refuse.
+struct Guard {
+    account: InputAccount,
+    content: FrameGuard,
+    period_ns: u64,
+}
+
+impl Guard {
+    fn new(setup: &Setup) -> Self {
+        Self {
+            account: InputAccount::of_outsider(),
+            content: FrameGuard::new(&setup.robot),
+            period_ns: setup.period_ns(),
+        }
+    }
+
+    fn take(&mut self, frame: &SensorFrame, now_ns: u64) {
+        let content = || self.content.check(frame);
+        self.account
+            .admit::<SensorFrame>(&frame.header, now_ns, self.period_ns, content);
+    }
+}
+
+/// Calls `take` whenever there may be input, until the time is over.
+fn while_it_lasts(
+    seconds: f64,
+    inputs: &impl Inputs,
+    heard: &mut Heard,
+    mut take: impl FnMut(&mut Heard),
+) -> Result<(), PortError> {
+    let timer = Timer::new().map_err(|e| PortError::setup("timer", &e))?;
+    let from_ns = Monotonic.now_ns();
+    let until_ns = from_ns + (seconds * 1e9) as u64;
+    while Monotonic.now_ns() < until_ns && !signal::stop_requested() {
+        let next_ns = (Monotonic.now_ns() + SLEEP_NS).min(until_ns);
+        if wake::wait(&timer, inputs.descriptors(), next_ns) == wake::Wake::Input {
+            inputs.drain();
+        }
+        take(heard);
+    }
+    heard.seconds = Monotonic.now_ns().saturating_sub(from_ns) as f64 * 1e-9;
+    Ok(())
+}
+
+/// Reads the sensor's topic.
+fn topic(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortError> {
+    let domain = setup.domain()?;
+    let graph = Graph::SharedMemory(Link::join(&domain, "check-publisher")?);
+    let Graph::SharedMemory(link) = &graph else {
+        return Ok(());
+    };
+    let mut frames = graph.receiver::<SensorFrame>(Topic::Sensor)?;
+    let listener: EventListener = link.listener::<SensorFrame>(Topic::Sensor)?;
+    let mut guard = Guard::new(setup);
+    let mut border = Border::new(setup, &graph)?;
+    while_it_lasts(seconds, &listener, heard, |heard| {
+        border.look();
+        while frames.advance() {
+            let Some(frame) = frames.held() else { break };
+            let now_ns = Monotonic.now_ns();
+            guard.take(frame, now_ns);
+            heard.take(*frame, now_ns);
+        }
+    })?;
+    heard.rejected = if heard.is_graph_running {
+        border.rejected()
+    } else {
+        guard.account.rejected
+    };
+    Ok(())
+}
+
+/// Reads the sockets that a graph would read.
+fn sockets(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortError> {
+    let socket = &setup.file.sensor.socket;
+    let folder = setup.domain()?.folder().to_owned();
+    let unix = (!socket.unix.is_empty()).then(|| folder.join(&socket.unix));
+    let udp = socket
+        .udp_address()
+        .map_err(|e| PortError::setup("sensor.socket.udp", &e))?;
+    let datagrams = Datagrams::bind(udp, unix.as_deref());
+    let datagrams = datagrams.map_err(|e| PortError::setup("sensor.socket", &e))?;
+    let datagrams = std::rc::Rc::new(datagrams);
+    let mut guard = Guard::new(setup);
+    while_it_lasts(seconds, &datagrams, heard, |heard| {
+        let mut buffer = [0; DATAGRAM_SIZE + 1];
+        while let Some((length, _)) = datagrams.receive(&mut buffer) {
+            let now_ns = Monotonic.now_ns();
+            match datagram::decode(&buffer[..length]) {
+                Ok(mut frame) => {
+                    if frame.header.t_schedule_ns == 0 {
+                        frame.header.t_schedule_ns = now_ns;
+                    }
+                    guard.take(&frame, now_ns);
+                    heard.take(frame, now_ns);
+                }
+                Err(rejection) => {
+                    guard.account.reject(rejection);
+                }
+            }
+        }
+    })?;
+    heard.rejected = guard.account.rejected;
+    Ok(())
+}
+
+/// The service at the border of a running graph: what it refuses.
+struct Border {
+    health: Box<dyn Receiver<Health>>,
+    first: Option<[u64; REJECTIONS]>,
+    last: [u64; REJECTIONS],
+}
+
+impl Border {
+    fn new(setup: &Setup, graph: &Graph) -> Result<Self, PortError> {
+        let service = match setup.file.sensor.source {
+            Source::Socket => ServiceName::SensorSim,
+            _ => ServiceName::Detector,
+        };
+        Ok(Self {
+            health: graph.receiver(Topic::Health(service))?,
+            first: None,
+            last: [0; REJECTIONS],
+        })
+    }
+
+    fn look(&mut self) {
+        while self.health.advance() {
+            let Some(health) = self.health.held() else {
+                break;
+            };
+            self.first.get_or_insert(health.rejected);
+            self.last = health.rejected;
+        }
+    }
+
+    /// Refused since the first look; counters of a service that was restarted begin anew.
+    fn rejected(&self) -> [u64; REJECTIONS] {
+        let mut since = self.last;
+        for cause in Rejection::ALL {
+            let i = cause as usize;
+            let before = self.first.map_or(0, |first| first[i]);
+            since[i] = self.last[i].checked_sub(before).unwrap_or(self.last[i]);
+        }
+        since
+    }
+}

@@ -1,0 +1,242 @@
+//! Rate, jitter, gaps, clocks.
+
+use vigil_cycle::Latency;
+
+use super::{Arrived, Heard};
+use crate::findings::{Finding, Status};
+
+/// A rate may be off by this share.
+const RATE_OFF_MAX: f64 = 0.05;
+/// An interval may be off by this share of the period in one of a hundred frames.
+const JITTER_MAX: f64 = 0.25;
+/// Shortest time over which the rate of a clock is judged, s.
+const CLOCK_S_MIN: f64 = 2.0;
+/// A clock may be off by this share of time.
+const CLOCK_OFF_MAX: f64 = 1e-3;
+
+/// Findings about the times of the frames; there is at least one frame.
+pub fn findings(rate_hz: f64, heard: &Heard) -> Vec<Finding> {
+    let frames = &heard.frames;
+    let mut all = vec![rate(rate_hz, frames)];
+    all.extend(jitter(rate_hz, frames));
+    all.push(gaps(frames));
+    all.extend(way(frames));
+    all.push(capture(frames));
+    all
+}
+
+/// Middle of a sorted list.
+fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// Intervals between consecutive frames of one start, by `at`, s.
+fn intervals(frames: &[Arrived], at: impl Fn(&Arrived) -> u64) -> Vec<f64> {
+    let pairs = frames.windows(2);
+    let same = pairs.filter(|p| p[0].frame.header.epoch == p[1].frame.header.epoch);
+    same.map(|p| (at(&p[1]) as f64 - at(&p[0]) as f64) * 1e-9)
+        .collect()
+}
+
+fn rate(expected_hz: f64, frames: &[Arrived]) -> Finding {
+    let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
+        return Finding::new("rate", Status::Failure, "no frame");
+    };
+    let lasted_s = last.now_ns.saturating_sub(first.now_ns) as f64 * 1e-9;
+    if frames.len() < 10 || lasted_s <= 0.0 {
+        let detail = format!("{} frames are too few to tell", frames.len());
+        return Finding::new("rate", Status::Warning, detail);
+    }
+    let found_hz = (frames.len() - 1) as f64 / lasted_s;
+    let detail = format!("{found_hz:.2} Hz; graph.rate_hz is {expected_hz}");
+    if (found_hz / expected_hz - 1.0).abs() <= RATE_OFF_MAX {
+        return Finding::new("rate", Status::Ok, detail);
+    }
+    let round = if found_hz > 3.0 {
+        found_hz.round()
+    } else {
+        found_hz
+    };
+    let detail = format!("{detail}: start the graph with --rate {round}, or publish at that rate");
+    Finding::new("rate", Status::Failure, detail)
+}
+
+fn jitter(rate_hz: f64, frames: &[Arrived]) -> Option<Finding> {
+    let mut latency = Latency::new().ok()?;
+    let due = intervals(frames, |f| f.frame.header.t_schedule_ns);
+    let middle_s = median(&mut due.clone())?;
+    for interval_s in due {
+        latency.record(((interval_s - middle_s).abs() * 1e9) as u64);
+    }
+    let found = latency.percentiles();
+    let us = |ns: u64| ns as f64 * 1e-3;
+    let detail = format!(
+        "intervals of header.t_schedule_ns are {:.3} ms, off by {:.0} us in half of them, by {:.0} us in \
+         one of a hundred, by {:.0} us at most",
+        middle_s * 1e3,
+        us(found.p50_ns),
+        us(found.p99_ns),
+        us(found.max_ns)
+    );
+    let is_steady = found.p99_ns as f64 * 1e-9 <= JITTER_MAX / rate_hz;
+    Some(if is_steady {
+        Finding::new("jitter", Status::Ok, detail)
+    } else {
+        let advice = "publish on an absolute schedule, and stamp when the frame was due";
+        Finding::new("jitter", Status::Warning, format!("{detail}: {advice}"))
+    })
+}
+
+/// Lost frames and starts, by epoch and sequence number.
+fn gaps(frames: &[Arrived]) -> Finding {
+    let (mut lost, mut longest, mut starts) = (0, 0, 0);
+    for pair in frames.windows(2) {
+        let [before, after] = [0, 1].map(|i| &pair[i].frame.header);
+        if before.epoch != after.epoch {
+            starts += 1;
+            continue;
+        }
+        let missing = after.seq.saturating_sub(before.seq).saturating_sub(1);
+        lost += missing;
+        longest = longest.max(missing);
+    }
+    if lost == 0 && starts == 0 {
+        return Finding::new("gaps", Status::Ok, "none: no sequence number is missing");
+    }
+    let mut detail = format!("{lost} frames are missing by their sequence numbers");
+    if lost > 0 {
+        detail.push_str(&format!(", {longest} in a row at most"));
+    }
+    if starts > 0 {
+        detail.push_str(&format!("; the epoch changed {starts} times"));
+    }
+    Finding::new("gaps", Status::Warning, detail)
+}
+
+/// From when a frame was due to its arrival.
+fn way(frames: &[Arrived]) -> Option<Finding> {
+    let mut latency = Latency::new().ok()?;
+    for arrived in frames {
+        let header = &arrived.frame.header;
+        latency.record(arrived.now_ns.saturating_sub(header.t_schedule_ns));
+    }
+    let found = latency.percentiles();
+    let us = |ns: u64| ns as f64 * 1e-3;
+    let detail = format!(
+        "from header.t_schedule_ns to the arrival: {:.0} us in half of the frames, {:.0} us in one of a \
+         hundred, {:.0} us at most",
+        us(found.p50_ns),
+        us(found.p99_ns),
+        us(found.max_ns)
+    );
+    Some(Finding::new("latency", Status::Ok, detail))
+}
+
+/// The clock of the capture times against this machine's.
+fn capture(frames: &[Arrived]) -> Finding {
+    let times = intervals(frames, |f| f.frame.header.t_capture_ns);
+    if !times.is_empty() && times.iter().all(|s| *s == 0.0) {
+        let detail = "header.t_capture_ns never changes: it is when the data was captured, in ns of any \
+                      clock that runs evenly";
+        return Finding::new("capture clock", Status::Failure, detail);
+    }
+    let back = times.iter().filter(|s| **s < 0.0).count();
+    if back > 0 {
+        let detail = format!("header.t_capture_ns goes back {back} times within one start");
+        return Finding::new("capture clock", Status::Failure, detail);
+    }
+    let (mut ours_s, mut theirs_s) = (0.0, 0.0);
+    for (ours, theirs) in intervals(frames, |f| f.now_ns).iter().zip(&times) {
+        ours_s += ours;
+        theirs_s += theirs;
+    }
+    if ours_s < CLOCK_S_MIN {
+        return Finding::new("capture clock", Status::Ok, "too short to judge its rate");
+    }
+    let off = theirs_s / ours_s - 1.0;
+    let detail = format!("{:+.0} ppm against this machine's", off * 1e6);
+    if off.abs() <= CLOCK_OFF_MAX {
+        return Finding::new("capture clock", Status::Ok, detail);
+    }
+    let what = if (theirs_s / ours_s * 1e3 - 1.0).abs() < 0.1 {
+        "is it in us? ns are wanted"
+    } else if (theirs_s / ours_s * 1e6 - 1.0).abs() < 0.1 {
+        "is it in ms? ns are wanted"
+    } else if (theirs_s / ours_s * 1e9 - 1.0).abs() < 0.1 {
+        "is it in s? ns are wanted"
+    } else {
+        "the filters believe it: a recording that is played at another speed, or a clock that is wrong"
+    };
+    Finding::new(
+        "capture clock",
+        Status::Warning,
+        format!("{detail}: {what}"),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use vigil_blocks::SensorFrame;
+
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    /// Frames of 100 Hz that arrive when they are due; `change` spoils them.
+    fn frames(count: u64, change: impl Fn(u64, &mut Arrived)) -> Vec<Arrived> {
+        let one = |k: u64| {
+            let mut frame = SensorFrame::default();
+            let now_ns = 5_000 * MS + k * 10 * MS;
+            (frame.header.epoch, frame.header.seq) = (1, k);
+            (frame.header.t_schedule_ns, frame.header.t_capture_ns) = (now_ns, now_ns);
+            let mut arrived = Arrived { now_ns, frame };
+            change(k, &mut arrived);
+            arrived
+        };
+        (0..count).map(one).collect()
+    }
+
+    fn found(rate_hz: f64, frames: Vec<Arrived>) -> Vec<(String, Status)> {
+        let heard = Heard {
+            frames,
+            ..Heard::default()
+        };
+        let found = findings(rate_hz, &heard);
+        found.into_iter().map(|f| (f.check, f.status)).collect()
+    }
+
+    fn status(found: &[(String, Status)], check: &str) -> Option<Status> {
+        let one = found.iter().find(|(name, _)| name == check);
+        one.map(|(_, status)| *status)
+    }
+
+    #[test]
+    fn a_good_publisher_has_nothing_but_good_findings() {
+        let found = found(100.0, frames(500, |_, _| {}));
+        assert!(found.iter().all(|(_, s)| *s == Status::Ok), "{found:?}");
+        assert_eq!(found.len(), 5);
+    }
+
+    #[test]
+    fn each_fault_is_found_under_its_name() {
+        let (warning, failure) = (Some(Status::Warning), Some(Status::Failure));
+        let of = |change: fn(u64, &mut Arrived)| found(100.0, frames(500, change));
+        assert_eq!(
+            status(&found(50.0, frames(500, |_, _| {})), "rate"),
+            failure
+        );
+        let shaky = of(|k, f| f.frame.header.t_schedule_ns += 8 * MS * (k % 2));
+        assert_eq!(status(&shaky, "jitter"), warning);
+        let lossy = of(|k, f| f.frame.header.seq += 3 * (k / 100));
+        assert_eq!(status(&lossy, "gaps"), warning);
+        let restarted = of(|k, f| f.frame.header.epoch += k / 250);
+        assert_eq!(status(&restarted, "gaps"), warning);
+        let still = of(|_, f| f.frame.header.t_capture_ns = 7);
+        assert_eq!(status(&still, "capture clock"), failure);
+        let back = of(|k, f| f.frame.header.t_capture_ns -= 50 * MS * (k / 250));
+        assert_eq!(status(&back, "capture clock"), failure);
+        let micros = of(|_, f| f.frame.header.t_capture_ns /= 1000);
+        assert_eq!(status(&micros, "capture clock"), warning);
+    }
+}

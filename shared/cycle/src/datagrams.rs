@@ -1,0 +1,191 @@
+//! Sockets on which datagrams arrive, none of which ever blocks.
+
+use std::fs;
+use std::io;
+use std::net::{SocketAddr, UdpSocket};
+use std::os::fd::{AsRawFd, RawFd};
+use std::os::unix::fs::FileTypeExt;
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+
+use crate::wake::{Inputs, NOTHING};
+
+/// Where a datagram came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum From {
+    /// A port of this or another machine.
+    Udp(SocketAddr),
+    /// A process of this machine that may write to the socket's file.
+    Unix,
+}
+
+/// A UDP socket, a Unix datagram socket, or both.
+#[derive(Debug)]
+pub struct Datagrams {
+    udp: Option<UdpSocket>,
+    unix: Option<UnixDatagram>,
+    file: Option<PathBuf>,
+}
+
+impl Datagrams {
+    /// Binds them; a socket's file that a process has left behind is replaced.
+    ///
+    /// # Errors
+    /// The system's, with the address.
+    pub fn bind(udp: Option<SocketAddr>, unix: Option<&Path>) -> io::Result<Self> {
+        let at = |address: String| {
+            move |error: io::Error| io::Error::new(error.kind(), format!("{address}: {error}"))
+        };
+        let udp = match udp {
+            None => None,
+            Some(address) => {
+                let socket = UdpSocket::bind(address).map_err(at(format!("udp {address}")))?;
+                socket.set_nonblocking(true)?;
+                Some(socket)
+            }
+        };
+        let (mut unix_socket, mut file) = (None, None);
+        if let Some(path) = unix {
+            if fs::symlink_metadata(path).is_ok_and(|m| m.file_type().is_socket()) {
+                fs::remove_file(path)?;
+            }
+            let socket =
+                UnixDatagram::bind(path).map_err(at(format!("unix {}", path.display())))?;
+            socket.set_nonblocking(true)?;
+            unix_socket = Some(socket);
+            file = Some(path.to_owned());
+        }
+        Ok(Self {
+            udp,
+            unix: unix_socket,
+            file,
+        })
+    }
+
+    /// Address of the UDP socket.
+    #[must_use]
+    pub fn udp_address(&self) -> Option<SocketAddr> {
+        self.udp.as_ref()?.local_addr().ok()
+    }
+
+    /// Takes the next waiting datagram into `buffer`: how long it was, at most the buffer's length,
+    /// and where it came from. `None` if none waits.
+    pub fn receive(&self, buffer: &mut [u8]) -> Option<(usize, From)> {
+        if let Some(udp) = &self.udp {
+            loop {
+                match udp.recv_from(buffer) {
+                    Ok((length, from)) => return Some((length, From::Udp(from))),
+                    // Something else about the last one that was sent.
+                    Err(e) if e.kind() == io::ErrorKind::ConnectionRefused => {}
+                    Err(_) => break,
+                }
+            }
+        }
+        let length = self.unix.as_ref()?.recv(buffer).ok()?;
+        Some((length, From::Unix))
+    }
+
+    /// From now on the kernel refuses UDP datagrams that come from elsewhere.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn only_from(&self, peer: SocketAddr) -> io::Result<()> {
+        self.udp.as_ref().map_or(Ok(()), |udp| udp.connect(peer))
+    }
+
+    /// From now on they may come from anywhere again.
+    pub fn from_anywhere(&self) {
+        let Some(udp) = &self.udp else { return };
+        let nobody = libc::sockaddr {
+            sa_family: libc::AF_UNSPEC as u16,
+            sa_data: [0; 14],
+        };
+        // SAFETY: the descriptor is the socket's, the address is a valid one of its kind and
+        // outlives the call. Failure leaves the peer as it was.
+        #[allow(unsafe_code)]
+        unsafe {
+            libc::connect(
+                udp.as_raw_fd(),
+                &raw const nobody,
+                size_of::<libc::sockaddr>() as libc::socklen_t,
+            );
+        }
+    }
+}
+
+impl Inputs for std::rc::Rc<Datagrams> {
+    fn descriptors(&self) -> [RawFd; 2] {
+        let udp = self.udp.as_ref().map_or(NOTHING, AsRawFd::as_raw_fd);
+        let unix = self.unix.as_ref().map_or(NOTHING, AsRawFd::as_raw_fd);
+        [udp, unix]
+    }
+}
+
+impl Drop for Datagrams {
+    fn drop(&mut self) {
+        if let Some(file) = &self.file {
+            let _ = fs::remove_file(file);
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// Everything that waits; loopback delivers before the sender's call returns.
+    fn received(datagrams: &Datagrams) -> Vec<(Vec<u8>, From)> {
+        let mut buffer = [0; 8];
+        let mut all = Vec::new();
+        while let Some((length, from)) = datagrams.receive(&mut buffer) {
+            all.push((buffer[..length].to_vec(), from));
+        }
+        all
+    }
+
+    #[test]
+    fn both_sockets_receive_and_the_file_goes_with_them() {
+        let path = std::env::temp_dir().join(format!("datagrams-{}", std::process::id()));
+        // Left behind by a process that has died.
+        std::mem::forget(UnixDatagram::bind(&path).unwrap());
+        let local = "127.0.0.1:0".parse().unwrap();
+        let datagrams = Datagrams::bind(Some(local), Some(&path)).unwrap();
+        assert_eq!(received(&datagrams), []);
+        let sender = UnixDatagram::unbound().unwrap();
+        sender.send_to(b"one", &path).unwrap();
+        let udp = UdpSocket::bind(local).unwrap();
+        let to = datagrams.udp_address().unwrap();
+        udp.send_to(b"longer than the buffer", to).unwrap();
+        let from = From::Udp(udp.local_addr().unwrap());
+        let expected = [(b"longer t".to_vec(), from), (b"one".to_vec(), From::Unix)];
+        assert_eq!(received(&datagrams), expected);
+        drop(datagrams);
+        assert!(!path.exists());
+        fs::write(&path, "not a socket").unwrap();
+        assert!(Datagrams::bind(None, Some(&path)).is_err());
+        fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn a_chosen_peer_is_the_only_one_until_it_is_let_go() {
+        let local = "127.0.0.1:0".parse().unwrap();
+        let datagrams = Datagrams::bind(Some(local), None).unwrap();
+        let to = datagrams.udp_address().unwrap();
+        let [chosen, other] = [(); 2].map(|()| UdpSocket::bind(local).unwrap());
+        let from = From::Udp(chosen.local_addr().unwrap());
+        datagrams.only_from(chosen.local_addr().unwrap()).unwrap();
+        let _ = other.send_to(b"no", to);
+        chosen.send_to(b"yes", to).unwrap();
+        assert_eq!(received(&datagrams), [(b"yes".to_vec(), from)]);
+        datagrams.from_anywhere();
+        assert_eq!(datagrams.udp_address(), Some(to));
+        // The first call may still hear that the last datagram was refused.
+        let _ = other.send_to(b"no", to);
+        received(&datagrams);
+        other.send_to(b"now", to).unwrap();
+        let from = From::Udp(other.local_addr().unwrap());
+        let all = received(&datagrams);
+        assert_eq!(all.last(), Some(&(b"now".to_vec(), from)));
+    }
+}

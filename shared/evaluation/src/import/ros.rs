@@ -1,0 +1,332 @@
+//! ROS 2 messages in MCAP files: the fields of a topic's messages as columns.
+//!
+//! | message | columns |
+//! |---|---|
+//! | `nav_msgs/msg/Odometry` | `pose.x`, `pose.y`, `pose.yaw`, and those of a twist |
+//! | `sensor_msgs/msg/JointState` | `position[NAME]`, `velocity[NAME]`, `effort[NAME]` |
+//! | `geometry_msgs/msg/Twist`, `TwistStamped` | `linear.x`, `linear.y`, `angular.z`, `curvature` |
+//! | `sensor_msgs/msg/Imu` | `angular_velocity.z`, `yaw` |
+//! | all | `log_time`; those with a header also `stamp`; both in ns |
+//!
+//! `curvature` is the yaw rate over the forward speed, 0 at rest.
+
+use std::fs;
+use std::path::Path;
+
+use byteorder::{BigEndian, LittleEndian};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+use super::ImportError;
+use crate::table::wrong_row;
+
+/// Largest file that is read, bytes.
+const FILE_BYTES_MAX: u64 = 4 << 30;
+/// Forward speed below which a twist has no curvature, m/s.
+const REST_M_S: f64 = 1e-3;
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct Time {
+    sec: i32,
+    nanosec: u32,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct Header {
+    stamp: Time,
+    #[serde(rename = "frame_id")]
+    _frame_id: String,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct Vector {
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct Quaternion {
+    x: f64,
+    y: f64,
+    z: f64,
+    w: f64,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct Pose {
+    position: Vector,
+    orientation: Quaternion,
+}
+
+/// 36 numbers.
+type Covariance = ([f64; 18], [f64; 18]);
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct Twist {
+    linear: Vector,
+    angular: Vector,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct TwistStamped {
+    header: Header,
+    twist: Twist,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct Odometry {
+    header: Header,
+    #[serde(rename = "child_frame_id")]
+    _child_frame_id: String,
+    pose: (Pose, Covariance),
+    twist: (Twist, Covariance),
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct JointState {
+    header: Header,
+    name: Vec<String>,
+    position: Vec<f64>,
+    velocity: Vec<f64>,
+    effort: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct Imu {
+    header: Header,
+    orientation: Quaternion,
+    _orientation_covariance: [f64; 9],
+    angular_velocity: Vector,
+    _angular_velocity_covariance: [f64; 9],
+    _linear_acceleration: Vector,
+    _linear_acceleration_covariance: [f64; 9],
+}
+
+/// A message of a kind that is known.
+enum Message {
+    Odometry(Box<Odometry>),
+    JointState(JointState),
+    Twist(Twist),
+    TwistStamped(TwistStamped),
+    Imu(Box<Imu>),
+}
+
+/// Kinds that are known, as a file names them.
+const KINDS: [&str; 5] = [
+    "nav_msgs/msg/Odometry",
+    "sensor_msgs/msg/JointState",
+    "geometry_msgs/msg/Twist",
+    "geometry_msgs/msg/TwistStamped",
+    "sensor_msgs/msg/Imu",
+];
+
+impl Message {
+    /// Reads a message of this kind; `None` for a kind that is not known.
+    fn read(kind: &str, data: &[u8]) -> Option<Result<Self, String>> {
+        Some(match kind {
+            "nav_msgs/msg/Odometry" => decode(data).map(|m| Self::Odometry(Box::new(m))),
+            "sensor_msgs/msg/JointState" => decode(data).map(Self::JointState),
+            "geometry_msgs/msg/Twist" => decode(data).map(Self::Twist),
+            "geometry_msgs/msg/TwistStamped" => decode(data).map(Self::TwistStamped),
+            "sensor_msgs/msg/Imu" => decode(data).map(|m| Self::Imu(Box::new(m))),
+            _ => return None,
+        })
+    }
+
+    const fn header(&self) -> Option<&Header> {
+        Some(match self {
+            Self::Odometry(m) => &m.header,
+            Self::JointState(m) => &m.header,
+            Self::TwistStamped(m) => &m.header,
+            Self::Imu(m) => &m.header,
+            Self::Twist(_) => return None,
+        })
+    }
+
+    /// Value of a column.
+    fn value(&self, column: &str) -> Option<f64> {
+        if column == "stamp" {
+            let Time { sec, nanosec } = self.header()?.stamp;
+            return Some(f64::from(sec) * 1e9 + f64::from(nanosec));
+        }
+        match self {
+            Self::Odometry(m) => match column {
+                "pose.x" => Some(m.pose.0.position.x),
+                "pose.y" => Some(m.pose.0.position.y),
+                "pose.yaw" => Some(yaw(m.pose.0.orientation)),
+                _ => twist(&m.twist.0, column),
+            },
+            Self::JointState(m) => m.value(column),
+            Self::Twist(m) => twist(m, column),
+            Self::TwistStamped(m) => twist(&m.twist, column),
+            Self::Imu(m) => match column {
+                "angular_velocity.z" => Some(m.angular_velocity.z),
+                "yaw" => Some(yaw(m.orientation)),
+                _ => None,
+            },
+        }
+    }
+}
+
+impl JointState {
+    fn value(&self, column: &str) -> Option<f64> {
+        let (list, rest) = column.split_once('[')?;
+        let joint = rest.strip_suffix(']')?;
+        let at = self.name.iter().position(|name| name == joint)?;
+        let values = match list {
+            "position" => &self.position,
+            "velocity" => &self.velocity,
+            "effort" => &self.effort,
+            _ => return None,
+        };
+        values.get(at).copied()
+    }
+}
+
+fn twist(twist: &Twist, column: &str) -> Option<f64> {
+    Some(match column {
+        "linear.x" => twist.linear.x,
+        "linear.y" => twist.linear.y,
+        "angular.z" => twist.angular.z,
+        "curvature" if twist.linear.x.abs() < REST_M_S => 0.0,
+        "curvature" => twist.angular.z / twist.linear.x,
+        _ => return None,
+    })
+}
+
+/// Rotation about the vertical axis, rad.
+fn yaw(q: Quaternion) -> f64 {
+    let (sine, cosine) = (q.w * q.z + q.x * q.y, 0.5 - q.y * q.y - q.z * q.z);
+    sine.atan2(cosine)
+}
+
+/// Reads CDR with its four bytes of encapsulation, of either byte order.
+fn decode<T: DeserializeOwned>(data: &[u8]) -> Result<T, String> {
+    let (head, body) = data.split_at_checked(4).ok_or("too short")?;
+    let message = match head {
+        [0, 0, ..] => cdr_encoding::from_bytes::<T, BigEndian>(body),
+        [0, 1, ..] => cdr_encoding::from_bytes::<T, LittleEndian>(body),
+        _ => return Err("not in plain CDR".into()),
+    };
+    message.map(|(m, _)| m).map_err(|e| e.to_string())
+}
+
+/// The values of `columns` in every message of `topic`, column by column.
+///
+/// # Errors
+/// With the file, the message (from 1) and what is known, if the file or a message cannot be read,
+/// or a column does not exist.
+pub(super) fn columns(
+    path: &Path,
+    topic: &str,
+    columns: &[String],
+) -> Result<Vec<Vec<f64>>, ImportError> {
+    let io = |error| ImportError::Io {
+        path: path.to_owned(),
+        error,
+    };
+    let bytes = fs::metadata(path).map_err(io)?.len();
+    let wrong = |row: u64, message: String| ImportError::from(wrong_row(path, row, message));
+    if bytes > FILE_BYTES_MAX {
+        let allowed = format!("{bytes} bytes: allowed are {FILE_BYTES_MAX}");
+        return Err(wrong(0, allowed));
+    }
+    let content = fs::read(path).map_err(io)?;
+    let stream = mcap::MessageStream::new(&content).map_err(|e| wrong(0, e.to_string()))?;
+    let mut values = vec![Vec::new(); columns.len()];
+    let (mut row, mut others) = (0, Vec::<String>::new());
+    for message in stream {
+        let message = message.map_err(|e| wrong(row, e.to_string()))?;
+        if message.channel.topic != topic {
+            if !others.contains(&message.channel.topic) {
+                others.push(message.channel.topic.clone());
+            }
+            continue;
+        }
+        row += 1;
+        let schema = message.channel.schema.as_ref();
+        let kind = schema.map_or("", |schema| schema.name.as_str());
+        let decoded = Message::read(kind, &message.data).ok_or_else(|| {
+            let known = KINDS.join(", ");
+            wrong(
+                row,
+                format!("{topic} has messages of '{kind}'; known are {known}"),
+            )
+        })?;
+        let decoded = decoded.map_err(|e| wrong(row, format!("{topic}, {kind}: {e}")))?;
+        for (values, column) in values.iter_mut().zip(columns) {
+            let value = match column.as_str() {
+                "log_time" => Some(message.log_time as f64),
+                name => decoded.value(name),
+            };
+            let finite = value.filter(|value| value.is_finite());
+            values.push(finite.ok_or_else(|| {
+                wrong(
+                    row,
+                    format!("{topic}, {kind}: there is no finite '{column}'"),
+                )
+            })?);
+        }
+    }
+    if row == 0 {
+        let others = others.join(", ");
+        return Err(wrong(
+            0,
+            format!("no message on {topic}; there are {others}"),
+        ));
+    }
+    Ok(values)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// CDR by hand: a twist (1, 2, 3), (4, 5, 6).
+    fn twist_bytes(big: bool) -> Vec<u8> {
+        let mut bytes = vec![0, u8::from(!big), 0, 0];
+        for value in 1..=6 {
+            let value = f64::from(value);
+            bytes.extend(if big {
+                value.to_be_bytes()
+            } else {
+                value.to_le_bytes()
+            });
+        }
+        bytes
+    }
+
+    #[test]
+    fn both_byte_orders_are_read_and_nothing_else() {
+        for big in [false, true] {
+            let read = Message::read("geometry_msgs/msg/Twist", &twist_bytes(big));
+            let message = read.unwrap().unwrap();
+            let of = |column| message.value(column);
+            assert_eq!([of("linear.x"), of("linear.y")], [Some(1.0), Some(2.0)]);
+            assert_eq!([of("angular.z"), of("curvature")], [Some(6.0), Some(6.0)]);
+            assert_eq!([of("stamp"), of("linear.w")], [None, None]);
+        }
+        let mut other = twist_bytes(false);
+        other[1] = 7;
+        assert!(decode::<Twist>(&other).is_err());
+        assert!(decode::<Twist>(&other[..3]).is_err());
+        let short = &twist_bytes(false)[..40];
+        assert!(decode::<Twist>(short).is_err());
+        assert!(Message::read("std_msgs/msg/String", short).is_none());
+    }
+
+    #[test]
+    fn yaw_is_the_rotation_about_the_vertical_axis() {
+        for angle in [-3.0_f64, -1.0, 0.0, 0.5, 3.1] {
+            let q = Quaternion {
+                x: 0.0,
+                y: 0.0,
+                z: (angle / 2.0).sin(),
+                w: (angle / 2.0).cos(),
+            };
+            assert!((yaw(q) - angle).abs() < 1e-12);
+        }
+    }
+}

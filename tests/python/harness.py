@@ -1,0 +1,83 @@
+"""Starts graphs and publishers, and ends them."""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import time
+import uuid
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BINARIES = ROOT / "target" / "debug"
+EXAMPLES = ROOT / "examples"
+FRAMES = ROOT / "tests" / "data" / "rover" / "learn_frames.csv.gz"
+# Of a run in which the left front wheel sticks, and which the shipped model has not seen.
+STUCK_RUN, STUCK_LEAF = 3, "LF_STUCK"
+# A test that hangs is ended after this long.
+WATCHDOG_S = 120
+
+sys.path.insert(0, str(EXAMPLES))
+
+
+def vigil(*arguments):
+    command = [BINARIES / "vigil", *arguments]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=WATCHDOG_S)
+
+
+def publisher(name, *arguments):
+    """A publisher of examples/ as a process."""
+    command = [sys.executable, EXAMPLES / name, *map(str, arguments)]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+
+class Graph:
+    """A graph of its own name on the default configuration; stopped at the end of a `with`."""
+
+    def __init__(self, *options):
+        self.name = f"py{os.getpid()}-{uuid.uuid4().hex[:6]}"
+        self.options = options
+        self.summary = None
+
+    def __enter__(self):
+        command = [BINARIES / "vigil-launcher", "--json", "--config", ROOT / "config" / "rover.toml"]
+        command += ["--graph", self.name, *self.options]
+        self.launcher = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return self
+
+    def wait_until_up(self):
+        """Until its services are being started; its folder."""
+        import vigil_types
+
+        until = time.monotonic() + WATCHDOG_S
+        while time.monotonic() < until:
+            assert self.launcher.poll() is None, self.launcher.stderr.read()
+            try:
+                return pathlib.Path(vigil_types.runtime_folder(self.name))
+            except FileNotFoundError:
+                time.sleep(0.05)
+        raise TimeoutError("the graph did not come up")
+
+    def finish(self):
+        """Waits for the end; the summary."""
+        out, err = self.launcher.communicate(timeout=WATCHDOG_S)
+        assert self.launcher.returncode == 0, err
+        return json.loads(out)
+
+    def stop(self):
+        """Asks it to stop; the summary."""
+        self.launcher.terminate()
+        return self.finish()
+
+    def __exit__(self, *_):
+        if self.launcher.poll() is None:
+            self.launcher.terminate()
+            try:
+                self.launcher.communicate(timeout=20)
+            except subprocess.TimeoutExpired:
+                self.launcher.kill()
+                self.launcher.communicate()
+
+
+def events(summary, kind):
+    return [event["what"] for event in summary["events"] if event["event"] == kind]

@@ -1,0 +1,102 @@
+"""Publishers of examples/ drive real graphs, which find the fault that was recorded."""
+
+import json
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+from harness import EXAMPLES, FRAMES, ROOT, STUCK_LEAF, STUCK_RUN, Graph, events, publisher, vigil
+
+# Three times the recording's own: the filters go by its capture times.
+RATE_HZ = 60
+
+
+class Publishers(unittest.TestCase):
+    def assert_found(self, summary, border):
+        self.assertTrue(events(summary, "alarm"), summary["events"])
+        self.assertIn(STUCK_LEAF, events(summary, "diagnosis"))
+        self.assertEqual(summary["services"][border]["rejected"], {})
+        self.assertEqual(summary["services"][border]["lost"], 0)
+
+    def run_to_its_end(self, process):
+        _, errors = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 0, errors)
+
+    def test_python_through_shared_memory(self):
+        with Graph("--source", "external", "--rate", str(RATE_HZ)) as graph:
+            self.run_to_its_end(publisher("publisher.py", FRAMES, STUCK_RUN, RATE_HZ, graph.name))
+            self.assert_found(graph.stop(), "detector")
+
+    def test_python_through_the_unix_socket(self):
+        with Graph("--source", "socket", "--rate", str(RATE_HZ)) as graph:
+            socket = graph.wait_until_up() / "sensor.sock"
+            while not socket.exists():
+                self.assertIsNone(graph.launcher.poll())
+            self.run_to_its_end(publisher("socket_publisher.py", FRAMES, STUCK_RUN, RATE_HZ, socket))
+            self.assert_found(graph.stop(), "sensor-sim")
+
+    def test_cpp_through_udp(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program = pathlib.Path(folder) / "publisher"
+            flags = ["-std=c++17", "-O1", "-Wall", "-Wextra", f"-I{EXAMPLES}"]
+            subprocess.run(["c++", *flags, EXAMPLES / "publisher.cpp", "-o", program], check=True)
+            rows = subprocess.run(["zcat", FRAMES], check=True, capture_output=True, text=True).stdout
+            rows = "".join(row + "\n" for row in rows.split("\n") if row.startswith(f"{STUCK_RUN},"))
+            with Graph("--source", "socket", "--rate", "20") as graph:
+                socket = graph.wait_until_up() / "sensor.sock"
+                while not socket.exists():
+                    self.assertIsNone(graph.launcher.poll())
+                subprocess.run([program], input=rows, text=True, check=True, timeout=60, stdout=subprocess.DEVNULL)
+                self.assert_found(graph.stop(), "sensor-sim")
+
+    def test_a_publisher_of_another_version_is_told_so(self):
+        code = "import vigil_types as v; v.SensorFrame.TYPE_NAME = 'vigil.SensorFrame.v0.0123456789abcdef'\n"
+        text = code + (EXAMPLES / "publisher.py").read_text()
+        with Graph("--source", "external") as graph, tempfile.TemporaryDirectory() as folder:
+            graph.wait_until_up()
+            for name in ["recording.py", "vigil_types.py"]:
+                (pathlib.Path(folder) / name).write_text((EXAMPLES / name).read_text())
+            file = pathlib.Path(folder) / "publisher.py"
+            file.write_text(text)
+            import sys
+
+            command = [sys.executable, file, FRAMES, str(STUCK_RUN), "20", graph.name]
+            done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("check-publisher", done.stderr)
+
+
+class CheckPublisher(unittest.TestCase):
+    def check(self, graph, *options):
+        done = vigil("check-publisher", "--graph", graph, "--seconds", "3", "--json", *options)
+        document = json.loads(done.stdout)
+        self.assertEqual(done.returncode, 0 if document["ok"] else 1)
+        return document
+
+    def status(self, document):
+        return {finding["check"]: finding["status"] for finding in document["findings"]}
+
+    def test_a_good_publisher_fits(self):
+        with Graph("--source", "external", "--rate", str(RATE_HZ)) as graph:
+            process = publisher("publisher.py", FRAMES, STUCK_RUN, RATE_HZ, graph.name)
+            graph.wait_until_up()
+            document = self.check(graph.name, "--source", "external", "--rate", str(RATE_HZ))
+            self.run_it(process)
+        found = self.status(document)
+        self.assertTrue(document["ok"], document)
+        self.assertEqual([found[check] for check in ["type", "frames", "refused", "rate", "gaps"]], 5 * ["ok"])
+
+    def run_it(self, process):
+        process.terminate()
+        process.communicate(timeout=20)
+
+    def test_without_a_publisher_it_says_what_to_do(self):
+        document = self.check("nobody", "--source", "external")
+        self.assertFalse(document["ok"])
+        (frames,) = [f for f in document["findings"] if f["check"] == "frames"]
+        self.assertIn("vigil/nobody/sensor", frames["detail"])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,54 @@
+"""The types of other languages are those of the Rust structs, and compile."""
+
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+from harness import EXAMPLES, vigil
+
+import vigil_types
+
+
+class Types(unittest.TestCase):
+    def test_the_checked_in_files_are_what_the_structs_say(self):
+        for language, name in [("c", "vigil_types.h"), ("python", "vigil_types.py")]:
+            made = vigil("types", language)
+            self.assertEqual(made.returncode, 0, made.stderr)
+            hint = f"run: vigil types {language} > examples/{name}"
+            self.assertEqual((EXAMPLES / name).read_text(), made.stdout, hint)
+
+    def test_the_header_compiles_and_makes_the_same_datagram_as_python(self):
+        frame = vigil_types.SensorFrame(run_id=7, valid=vigil_types.VALID_POSE)
+        frame.header.epoch, frame.header.seq = 3, 11
+        frame.pose[:] = 1.5, -2.0, 0.25
+        source = """
+            #include "vigil_types.h"
+            #include <stdio.h>
+            int main(void) {
+              vigil_sensor_frame frame;
+              uint8_t bytes[VIGIL_DATAGRAM_SIZE];
+              memset(&frame, 0, sizeof frame);
+              frame.run_id = 7, frame.valid = VIGIL_VALID_POSE;
+              frame.header.epoch = 3, frame.header.seq = 11;
+              frame.pose[0] = 1.5, frame.pose[1] = -2.0, frame.pose[2] = 0.25;
+              vigil_datagram(&frame, bytes);
+              return fwrite(bytes, sizeof bytes, 1, stdout) != 1;
+            }"""
+        for compiler, standard, suffix in [("cc", "c11", ".c"), ("c++", "c++17", ".cpp")]:
+            with self.subTest(compiler), tempfile.TemporaryDirectory() as folder:
+                file = pathlib.Path(folder) / f"main{suffix}"
+                file.write_text(source)
+                program = pathlib.Path(folder) / "main"
+                flags = [f"-std={standard}", "-Wall", "-Wextra", "-Werror", f"-I{EXAMPLES}"]
+                subprocess.run([compiler, *flags, file, "-o", program], check=True)
+                made = subprocess.run([program], check=True, capture_output=True).stdout
+                self.assertEqual(made, vigil_types.datagram(frame))
+
+    def test_the_checksum_is_castagnolis(self):
+        # The check value of the catalogue of parametrised CRC algorithms.
+        self.assertEqual(vigil_types.crc32c(b"123456789"), 0xE3069283)
+
+
+if __name__ == "__main__":
+    unittest.main()
