@@ -1,38 +1,35 @@
 """Drives the rover in real time as Vigil's robot: publishes its sensors, obeys Vigil's actions.
 
-pip install iceoryx2==0.10.0 mujoco
+pip install iceoryx2==0.10.0 mujoco==4.0.0
 scripts/up --source external              # in another window
 python3 drive.py [--break stuck:RM@5] [--seconds 20] [--graph rover] [--viewer]
-While it drives: type `stuck RM` or `clear RM`, and return.
+While it drives: type `stuck RM` or `clear RM`, and return. It ends with the graph, or with Ctrl-C.
 """
 
 import argparse
+import math
+import os
 import pathlib
-import queue
+import re
+import select
+import signal
 import sys
-import threading
 import time
-
-import iceoryx2
-import numpy
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 import vigil_types as vigil
 
-from rover import STEERED, WHEELS, Rover
+try:
+    import iceoryx2
+    import numpy
+    from rover import NOISE, NOISE_HZ, STEERED, WHEELS, Rover, planned
+except ModuleNotFoundError as error:
+    raise SystemExit(f"{error}: pip install iceoryx2==0.10.0 mujoco==4.0.0")
 
-# Left, straight, right, straight: seconds, 1/m, m/s.
-DRIVE = [(8.0, 0.5, 0.2), (6.0, 0.0, 0.2), (8.0, -0.4, 0.2), (6.0, 0.0, 0.25)]
-# Standard deviations of the sensors for a sample at 20 Hz: m, rad, rad/s, rad.
-NOISE_HZ, NOISE = 20.0, (0.005, 0.005, 0.05, 0.003)
-
-
-def planned(t):
-    t %= sum(segment[0] for segment in DRIVE)
-    for seconds, curvature, speed in DRIVE:
-        if t < seconds:
-            return curvature, speed
-        t -= seconds
+VALID = vigil.VALID_POSE | 3 * vigil.VALID_COMMAND_0 | 0x3F * vigil.VALID_WHEEL_RATE_0
+VALID |= sum(vigil.VALID_STEER_0 << i for i in STEERED)
+KINDS = {value: name[9:].lower() for name, value in vars(vigil).items() if name.startswith("RECOVERY_")}
+DRIVING = ("go_on", "slow_down", "compensate", "ignore_encoder", "go_through", "move_away")
 
 
 def join(graph):
@@ -41,9 +38,9 @@ def join(graph):
         try:
             node = iceoryx2.NodeBuilder.new().config(vigil.transport(graph)).create(iceoryx2.ServiceType.Ipc)
             topic = lambda name: node.service_builder(iceoryx2.ServiceName.new(f"vigil/{graph}/{name}"))
+            actions = topic("action").publish_subscribe(vigil.Action).open().subscriber_builder().create()
             bell = topic("sensor").event().open().notifier_builder().create()
             publisher = topic("sensor").publish_subscribe(vigil.SensorFrame).open().publisher_builder().create()
-            actions = topic("action").publish_subscribe(vigil.Action).open().subscriber_builder().create()
             return node, publisher, bell, actions
         except (FileNotFoundError, iceoryx2.EventOpenError, iceoryx2.PublishSubscribeOpenError) as error:
             if "DoesNotExist" not in str(error):
@@ -52,98 +49,114 @@ def join(graph):
 
 
 class Obedience:
-    """What the robot makes of the newest action: without a valid one it stops."""
+    """What the robot makes of the newest action. Without a valid one it stops."""
 
-    STANDS = (vigil.RECOVERY_NONE, vigil.RECOVERY_STOP, vigil.RECOVERY_CALL_FOR_HELP, vigil.RECOVERY_NEW_PATH,
-              vigil.RECOVERY_RELOCALISE, vigil.RECOVERY_GIVE_UP)
+    def __init__(self, actions):
+        self.actions, self.action, self.is_valid, self.told = actions, vigil.Action(), False, ""
 
-    def __init__(self):
-        self.seq, self.kind, self.until_ns, self.bend, self.scale = 0, vigil.RECOVERY_NONE, 0, (1.0, 0.0), 0.0
+    def command(self, curvature, speed):
+        """The plan as the action has it: curvature, speed, share of the planned speed."""
+        while (sample := self.actions.receive()) is not None:
+            self.action = vigil.Action.from_buffer_copy(sample.payload().contents)
+        action, kind = self.action, KINDS.get(self.action.kind, "none")
+        self.is_valid = kind != "none" and time.monotonic_ns() <= action.valid_until_ns
+        scale = action.speed_scale if self.is_valid and kind in DRIVING else 0.0
+        bent = action.curvature_gain * curvature + action.curvature_offset if scale else curvature
+        told = f"{kind} {(*WHEELS, '')[min(action.wheel, 6)]}".strip() if self.is_valid else "nothing"
+        if told != self.told:
+            values = f"curvature {curvature:+.2f} -> {bent:+.2f} 1/m, speed {speed:.2f} -> {scale * speed:.2f} m/s"
+            print(f"obeys {told}: {values}", flush=True)
+            self.told = told
+        return bent, scale * speed, scale
 
-    def take(self, actions):
-        while (sample := actions.receive()) is not None:
-            action = sample.payload().contents
-            if action.decision_seq != self.seq:
-                print(f"obeys decision {action.decision_seq}: kind {action.kind}, wheel {action.wheel}", flush=True)
-            self.seq, self.kind, self.until_ns = action.decision_seq, action.kind, action.valid_until_ns
-            self.bend, self.scale = (action.curvature_gain, action.curvature_offset), action.speed_scale
-
-    def command(self, curvature, speed, is_begun):
-        """The command to execute, and whether the robot holds itself stopped."""
-        if time.monotonic_ns() > self.until_ns:
-            # Before the first action there is nothing to obey yet: the graph needs frames to begin.
-            return (curvature, 0.0), is_begun
-        if self.kind in self.STANDS:
-            return (curvature, 0.0), False
-        gain, offset = self.bend
-        return (gain * curvature + offset, self.scale * speed), False
-
-
-def breaks(options):
-    """Breaks as they are due: (seconds, what, wheel)."""
-    return [(float(at), *spec.split(":")) for spec, at in (text.split("@") for text in options)]
+    def outcome(self, has_arrived):
+        """What to tell about the action."""
+        if self.is_valid:
+            return vigil.OUTCOME_SUCCEEDED if has_arrived else vigil.OUTCOME_RUNNING
+        return vigil.OUTCOME_FAILED if self.action.decision_seq else vigil.OUTCOME_NONE
 
 
-def typed(lines):
-    for line in sys.stdin:
-        lines.put(line.split())
+def change(text):
+    """(5.0, "stuck", "RM") of stuck:RM@5; without a time it is due at once."""
+    found = re.fullmatch(rf"(stuck|clear)[ :]({'|'.join(WHEELS)})(@\d+(\.\d+)?)?", text.strip())
+    if found is None:
+        raise argparse.ArgumentTypeError(f"'{text.strip()}': say stuck or clear, and one of {' '.join(WHEELS)}")
+    return float((found[3] or "@0")[1:]), found[1], found[2]
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--graph", default="rover")
-    parser.add_argument("--hz", type=float, default=100.0)
-    parser.add_argument("--seconds", type=float, default=float("inf"))
-    parser.add_argument("--break", dest="breaks", action="append", default=[], metavar="stuck:RM@5")
-    parser.add_argument("--viewer", action="store_true", help="show it (needs a display)")
-    options = parser.parse_args()
-    rover, obedience, lines = Rover(), Obedience(), queue.SimpleQueue()
-    rover.drive(0.0, 0.0, 1.0)
-    pending, random = breaks(options.breaks), numpy.random.default_rng(1)
+def typed():
+    """What has been typed, as changes."""
+    text = os.read(0, 4096).decode(errors="replace") if sys.stdin and select.select([0], [], [], 0)[0] else ""
+    try:
+        return [change(line) for line in text.splitlines()]
+    except argparse.ArgumentTypeError as error:
+        print(error, flush=True)
+        return []
+
+
+def drive(options, rover, viewer):
     node, publisher, bell, actions = join(options.graph)
-    threading.Thread(target=typed, args=(lines,), daemon=True).start()
-    viewer = None
-    if options.viewer:
-        import mujoco.viewer
-
-        viewer = mujoco.viewer.launch_passive(rover.model, rover.data)
-    print("driving; type `stuck RM` or `clear RM`", flush=True)
-    began = due = epoch = time.monotonic_ns()
-    scale, late, seq = (options.hz / NOISE_HZ) ** 0.5, 0, 0
+    obedience, random = Obedience(actions), numpy.random.default_rng(options.seed)
+    noise = NOISE * math.sqrt(options.hz / NOISE_HZ)
+    period, plan_s, seq, pending = round(1e9 / options.hz), 0.0, 0, list(options.breaks)
+    began = due = time.monotonic_ns()
+    print("drives; type `stuck RM` or `clear RM`", flush=True)
     while (t := (due - began) * 1e-9) < options.seconds:
-        due += round(1e9 / options.hz)
-        obedience.take(actions)
-        (curvature, speed), is_stopped = obedience.command(*planned(t), is_begun=obedience.seq > 0)
-        rover.drive(curvature, speed, 1.0 / options.hz)
-        for at, what, wheel in [b for b in pending if b[0] <= t]:
-            lines.put([what, wheel])
-        pending = [b for b in pending if b[0] > t]
-        while not lines.empty():
-            words = lines.get()
-            if len(words) == 2 and words[0] in ("stuck", "clear") and words[1] in WHEELS:
-                rover.stuck[WHEELS.index(words[1])] = words[0] == "stuck"
-                print(f"{t:.3f} s: {' '.join(words)}", flush=True)
-        frame = vigil.SensorFrame(run_id=1, safe_stop=int(is_stopped), action_seq=obedience.seq)
-        frame.action_outcome = vigil.OUTCOME_RUNNING if obedience.seq else vigil.OUTCOME_NONE
-        frame.header.schema, frame.header.epoch, frame.header.seq = vigil.SensorFrame.SCHEMA, epoch, seq
-        frame.valid = vigil.VALID_POSE | 3 * vigil.VALID_COMMAND_0 | 0x3F * vigil.VALID_WHEEL_RATE_0
-        frame.command[:2] = curvature, speed
-        (x, y, yaw), noise = rover.pose(), scale * random.standard_normal(15)
-        frame.pose[:] = x + NOISE[0] * noise[0], y + NOISE[0] * noise[1], yaw + NOISE[1] * noise[2]
-        frame.wheel_rate[:6] = rover.rates() + NOISE[2] * noise[3:9]
-        for i, angle in enumerate(rover.angles() + NOISE[3] * noise[9:15]):
-            if i in STEERED:
-                frame.steer[i], frame.valid = angle, frame.valid | vigil.VALID_STEER_0 << i
-        late += time.monotonic_ns() > due
-        time.sleep(max(0, due - time.monotonic_ns()) / 1e9)
+        # A period that was slept through gets no frame, but the world goes on.
+        step = max(1, (time.monotonic_ns() - due) // period) * period
+        due, seconds = due + step, step * 1e-9
+        pending += typed()
+        for at, what, wheel in [change for change in pending if change[0] <= t]:
+            pending.remove((at, what, wheel))
+            rover.stick(WHEELS.index(wheel), what == "stuck")
+            print(f"{t:.2f} s: {what} {wheel}", flush=True)
+        curvature, speed, share = obedience.command(*planned(plan_s))
+        has_arrived = rover.drive(curvature, speed, seconds)
+        plan_s += share * seconds
+        # Another start is another run: its pose begins anew.
+        frame = vigil.SensorFrame(run_id=began, valid=VALID, safe_stop=not obedience.is_valid)
+        frame.action_seq, frame.action_outcome = obedience.action.decision_seq, obedience.outcome(has_arrived)
+        sensed = rover.state() + noise * random.standard_normal(15)
+        frame.command[:2], frame.pose[:] = rover.command, sensed[:3]
+        frame.wheel_rate[:6], frame.steer[:6] = sensed[3:9], sensed[9:]
+        frame.header.schema, frame.header.epoch, frame.header.seq = vigil.SensorFrame.SCHEMA, began, seq
         frame.header.t_schedule_ns = frame.header.t_capture_ns = due
+        time.sleep(max(0, due - time.monotonic_ns()) * 1e-9)
         frame.header.t_publish_ns = time.monotonic_ns()
         publisher.loan_uninit().write_payload(frame).send()
         bell.notify()
         seq += 1
         if viewer is not None and seq % 4 == 0:
             viewer.sync()
-    print(f"{seq} frames, {late} of them late", flush=True)
+        if seq % 100 == 0:
+            # Raises FileNotFoundError once the graph has ended.
+            vigil.runtime_folder(options.graph)
+    print(f"{seq} frames")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--graph", default="rover")
+    parser.add_argument("--hz", type=float, default=100.0, help="frames a second, as the graph's rate")
+    parser.add_argument("--seconds", type=float, default=math.inf)
+    parser.add_argument("--break", dest="breaks", type=change, action="append", default=[], metavar="stuck:RM@5")
+    parser.add_argument("--seed", type=int, default=1, help="of the sensors' noise")
+    parser.add_argument("--viewer", action="store_true", help="show it (needs a display)")
+    options = parser.parse_args()
+    rover, viewer = Rover(), None
+    if options.viewer:
+        import mujoco.viewer
+
+        viewer = mujoco.viewer.launch_passive(rover.model, rover.data)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        drive(options, rover, viewer)
+    except KeyboardInterrupt:
+        print("interrupted")
+    except FileNotFoundError:
+        print(f"graph '{options.graph}' has ended")
+        # It has cleaned up; what iceoryx2 misses then is no news.
+        iceoryx2.set_log_level(iceoryx2.LogLevel.Fatal)
 
 
 if __name__ == "__main__":

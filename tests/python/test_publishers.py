@@ -1,12 +1,17 @@
 """Publishers of examples/ drive real graphs, which find the fault that was recorded."""
 
+import ctypes
 import json
+import os
 import pathlib
 import subprocess
+import sys
 import tempfile
 import unittest
 
 from harness import EXAMPLES, FRAMES, ROOT, STUCK_LEAF, STUCK_RUN, Graph, events, publisher, vigil
+
+import vigil_types
 
 # Three times the recording's own: the filters go by its capture times.
 RATE_HZ = 60
@@ -59,8 +64,6 @@ class Publishers(unittest.TestCase):
                 (pathlib.Path(folder) / name).write_text((EXAMPLES / name).read_text())
             file = pathlib.Path(folder) / "publisher.py"
             file.write_text(text)
-            import sys
-
             command = [sys.executable, file, FRAMES, str(STUCK_RUN), "20", graph.name]
             done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
             self.assertEqual(done.returncode, 1)
@@ -90,6 +93,33 @@ class CheckPublisher(unittest.TestCase):
     def run_it(self, process):
         process.terminate()
         process.communicate(timeout=20)
+
+    def test_another_type_is_told_by_size_hash_and_version(self):
+        import iceoryx2
+
+        class Other(ctypes.Structure):
+            _fields_ = [("header", vigil_types.Header), ("speed", ctypes.c_double)]
+
+            @staticmethod
+            def type_name():
+                return "vigil.SensorFrame.v1.0123456789abcdef"
+
+        name = f"py{os.getpid()}-other"
+        # Where a graph of this name would be: told when nobody publishes.
+        (none,) = [f for f in self.check(name, "--source", "external")["findings"] if f["check"] == "frames"]
+        config = iceoryx2.config.default()
+        config.global_cfg.prefix = iceoryx2.FileName.new(f"vigil_{name}_")
+        config.global_cfg.root_path = iceoryx2.Path.new(none["detail"].split("root path '")[1].split("'")[0])
+        node = iceoryx2.NodeBuilder.new().config(config).create(iceoryx2.ServiceType.Ipc)
+        topic = node.service_builder(iceoryx2.ServiceName.new(f"vigil/{name}/sensor"))
+        held = topic.publish_subscribe(Other).open_or_create()
+        document = self.check(name, "--source", "external")
+        del held, topic, node
+        (found,) = [f for f in document["findings"] if f["check"] == "type"]
+        self.assertEqual(found["status"], "failure")
+        self.assertIn("the schema hash is '0123456789abcdef', not '", found["detail"])
+        self.assertIn("its size is 56 bytes, not 408", found["detail"])
+        self.assertIn("iceoryx2 0.10", found["detail"])
 
     def test_without_a_publisher_it_says_what_to_do(self):
         document = self.check("nobody", "--source", "external")

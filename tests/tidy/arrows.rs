@@ -73,6 +73,10 @@ fn allowed(manifest: &Manifest) -> Option<Vec<&'static str>> {
     if ["vigil", "vigil-bench", "vigil-tests"].contains(&package) {
         return Some([SHARED, SERVICES].concat());
     }
+    // Publishers to begin with use what a robot's program would use.
+    if package == "vigil-examples" {
+        return Some(SHARED.to_vec());
+    }
     // Fuzzing of a shared crate, outside the workspace.
     if is_fuzzing(manifest) {
         return Some(SHARED.to_vec());

@@ -87,8 +87,8 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let _ = std::fs::remove_dir_all(&folder);
     let (n, seconds, rate, load) = (args.pairs, args.seconds, args.rate, args.load.name());
     let about = format!(
-        "`scripts/bench flood --pairs {n} --seconds {seconds} --rate {rate} --load {load}`\n\nFrames \
-         by UDP; with a second sender that floods the socket from another port."
+        "`scripts/bench flood --pairs {n} --seconds {seconds} --rate {rate} --load \
+         {load}`\n\nFrames by UDP; with a second sender that floods the socket from another port."
     );
     halves::archive("flood", &about, &result?)
 }

@@ -126,11 +126,11 @@ fn archive(args: &Args, rows: &[Value]) -> Result<(), Box<dyn Error>> {
     let (rate, seconds, load) = (args.rate, args.seconds, args.load.name());
     let rounds = args.rounds;
     archive.say(&format!(
-        "`scripts/bench peers --rate {rate} --seconds {seconds} --rounds {rounds} --load {load}`\n\nHand-over of \
-         three hops and the source's wake-up (end to end without the time in which a stage fills \
-         or looks at a block), us: the median of {rounds} interleaved runs of p50, then of p99, \
-         with the range over the runs. `shared-memory` is Vigil's transport, `futex` the floor; \
-         both leave the block where it is. Cores {:?}.\n",
+        "`scripts/bench peers --rate {rate} --seconds {seconds} --rounds {rounds} --load \
+         {load}`\n\nHand-over of three hops and the source's wake-up (end to end without the time \
+         in which a stage fills or looks at a block), us: the median of {rounds} interleaved runs \
+         of p50, then of p99, with the range over the runs. `shared-memory` is Vigil's transport, \
+         `futex` the floor; both leave the block where it is. Cores {:?}.\n",
         PLACED.map(|(core, _)| core)
     ));
     archive.say("| bytes | carrier | p50 | range | p99 | range |\n|---|---|---|---|---|---|");

@@ -50,12 +50,13 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     archive.say(&format!(
         "`scripts/bench publishers --seconds {} --load {load}`\n\nA publisher in Python \
          (`bench/pace.py`, SCHED_OTHER) through shared memory. Lost: by the detector's account of \
-         sequence numbers. Times in us, from when a frame was due.\n",
+         sequence numbers; frames that come together are answered once. Times in us, from when a \
+         frame was due.\n",
         args.seconds
     ));
     archive.say(
-        "| rate, Hz | sent | taken | lost | refused | sent p50 | p99 | max | action p50 | p99 | max \
-         |\n|---|---|---|---|---|---|---|---|---|---|---|",
+        "| rate, Hz | sent | answered | lost | refused | sent p50 | p99 | max | action p50 | p99 | \
+         max |\n|---|---|---|---|---|---|---|---|---|---|---|",
     );
     for row in &rows {
         let n = |key: &str| row[key].to_string();
@@ -64,7 +65,7 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
             "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
             n("rate_hz"),
             n("sent"),
-            n("taken"),
+            n("answered"),
             n("lost"),
             n("refused"),
             us("sent_us", "p50"),
@@ -111,7 +112,7 @@ fn one(args: &Args, rate_hz: f64, folder: &Path) -> Result<Value, Box<dyn Error>
         "rate_hz": rate_hz,
         "sent": told["sent"],
         "sent_us": told["late_us"],
-        "taken": detector["cycles"],
+        "answered": detector["cycles"],
         "lost": detector["lost"],
         "refused": detector["rejected"],
         "missed": detector["missed"],

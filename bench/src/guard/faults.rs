@@ -24,7 +24,7 @@ pub const KINDS: [(&str, Inject); 17] = [
     ("NaN or infinity", not_finite),
     ("1e308", huge),
     ("degrees for radians", degrees),
-    ("a pose in millimetres", millimetres),
+    ("a pose in millimetres, within a run", millimetres),
     ("a clock ahead", ahead),
     ("a clock behind", behind),
     ("a flipped bit", flipped_bit),

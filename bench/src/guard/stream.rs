@@ -50,9 +50,8 @@ impl<'a> Stream<'a> {
     #[must_use]
     pub fn good(&self) -> SensorFrame {
         let count = self.recorded.len() as u64;
+        // One run throughout: where the recording begins anew, the pose moves by a few metres.
         let mut frame = self.recorded[(self.period % count) as usize];
-        // Each round is a run of its own: the recording's pose begins anew.
-        frame.run_id = 1 + self.period / count;
         let header = &mut frame.header;
         header.schema = SensorFrame::SCHEMA;
         (header.epoch, header.seq) = (self.epoch, self.seq);

@@ -177,8 +177,8 @@ impl Drop for Started {
 pub fn archive(name: &str, about: &str, pairs: &[[Half; 2]]) -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new(name)?;
     archive.say(&format!(
-        "{about}\n\nEnd to end, us, of {} interleaved pairs: without, then with. Missed: Vigil's own, \
-         and the machine's.\n",
+        "{about}\n\nEnd to end, us, of {} interleaved pairs: without, then with. Missed: Vigil's \
+         own, and the machine's.\n",
         pairs.len()
     ));
     archive.say(

@@ -14,8 +14,8 @@ use vigil_robot::{Description, FrameGuard};
 
 use crate::{Diagnoser, Input};
 
-/// Sensor frames that may wait for their detection.
-const PENDING_MAX: usize = 64;
+/// Sensor frames that may wait for their detection: more than a queue of them holds by default.
+const PENDING_MAX: usize = 256;
 
 /// The identifier as a stage of the graph: detections and sensor frames in, belief out.
 ///

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use commands::{
-    Outcome, check, check_publisher, diagnose, evaluate, import, inject, learn, pomdp, types,
+    Outcome, check, check_publisher, diagnose, evaluate, import, inject, learn, pomdp, print_types,
 };
 
 /// Fault detection, diagnosis and recovery for mobile robots.
@@ -35,7 +35,8 @@ enum Command {
     Check(check::Args),
     CheckPublisher(check_publisher::Args),
     Pomdp(pomdp::Args),
-    Types(types::Args),
+    #[command(name = "types")]
+    PrintTypes(print_types::Args),
 }
 
 fn main() -> ExitCode {
@@ -48,7 +49,7 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::CheckPublisher(args) => check_publisher::run(&args),
         Command::Pomdp(args) => pomdp::run(&args),
-        Command::Types(args) => types::run(&args),
+        Command::PrintTypes(args) => print_types::run(&args),
     };
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -169,8 +169,11 @@ mod tests {
 
     #[test]
     fn a_chosen_peer_is_the_only_one_until_it_is_let_go() {
-        let local = "127.0.0.1:0".parse().unwrap();
-        let datagrams = Datagrams::bind(Some(local), None).unwrap();
+        let local: SocketAddr = "127.0.0.1:0".parse().unwrap();
+        // A port that is asked for by its number stays with the socket; one that is free is found
+        // by asking for any.
+        let free = UdpSocket::bind(local).unwrap().local_addr().unwrap();
+        let datagrams = Datagrams::bind(Some(free), None).unwrap();
         let to = datagrams.udp_address().unwrap();
         let [chosen, other] = [(); 2].map(|()| UdpSocket::bind(local).unwrap());
         let from = From::Udp(chosen.local_addr().unwrap());

@@ -9,11 +9,16 @@ use std::path::{Path, PathBuf};
 use iceoryx2::prelude::{Config, FileName, SemanticString};
 
 use crate::port::PortError;
+use crate::topic::Topic;
+
+/// Sensor frames are small, and a publisher that was held up sends many at once: so many times
+/// more of them may wait.
+const SENSOR_BUFFERS: usize = 8;
 
 /// Sizes of the shared-memory queues; the same for every peer of a graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Queues {
-    /// Blocks a reader may fall behind before the oldest is overwritten.
+    /// Blocks a reader may fall behind before the oldest is overwritten; see [`Self::of`].
     pub buffer: usize,
     /// Blocks kept for a reader that connects late.
     pub history: usize,
@@ -172,6 +177,15 @@ pub fn shared_memory_free_bytes() -> Option<u64> {
 }
 
 impl Queues {
+    /// The sizes of one topic's queues: sensor frames may wait eight times as many.
+    #[must_use]
+    pub const fn of(mut self, topic: Topic) -> Self {
+        if matches!(topic, Topic::Sensor) {
+            self.buffer *= SENSOR_BUFFERS;
+        }
+        self
+    }
+
     /// Bytes of shared memory that one writer of blocks of `size` bytes reserves: a slot for
     /// every block that may wait or be held, and one of history and loan.
     #[must_use]

@@ -85,7 +85,8 @@ pub fn wait(timer: &Timer, inputs: [RawFd; 2], deadline_ns: u64) -> Wake {
         revents: 0,
     };
     let mut fds = [poll(inputs[0]), poll(inputs[1]), poll(timer.fd.as_raw_fd())];
-    // SAFETY: `fds` holds three valid entries, of which the kernel ignores negative ones; null time-out and mask mean "no limit, no change".
+    // SAFETY: `fds` holds three valid entries, of which the kernel ignores negative ones; null
+    // time-out and mask mean "no limit, no change".
     #[allow(unsafe_code)]
     let ready = unsafe {
         libc::ppoll(

@@ -17,11 +17,12 @@ fn robot() -> Description {
     toml::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// A frame in which everything is marked valid, and a name, a place and a bound for each number.
-fn places(
-    robot: &Description,
-) -> Vec<(String, fn(&mut SensorFrame, usize) -> &mut f64, usize, f64)> {
-    let mut all: Vec<(String, fn(&mut SensorFrame, usize) -> &mut f64, usize, f64)> = Vec::new();
+/// A number of a frame: its name, how to get at it, which of an array, and its bound.
+type Place = (String, fn(&mut SensorFrame, usize) -> &mut f64, usize, f64);
+
+/// Every number but the pose.
+fn places(robot: &Description) -> Vec<Place> {
+    let mut all: Vec<Place> = Vec::new();
     for i in 0..COMMANDS {
         let bound = robot
             .command

@@ -7,7 +7,8 @@ use super::{Struct, constants, doc, elements, structs};
 const HEAD: &str = r#""""Wire blocks of Vigil, as ctypes. Made by `vigil types python`; do not edit.
 
 Units are SI, angles radians, times CLOCK_MONOTONIC nanoseconds; x forward, y left, yaw
-counter-clockwise. All numbers little-endian, no padding.
+counter-clockwise. All numbers little-endian, no padding. VALID_..._0 is the bit of the first
+element of an array; shift it left for the others.
 """
 
 import ctypes
@@ -22,10 +23,11 @@ const TAIL: &str = r#"
 def runtime_folder(graph="rover"):
     """Folder of a running graph: its sockets and the files of its transport.
 
-    Raises FileNotFoundError while there is none: what joins before the graph would be cleaned up by it.
+    Raises FileNotFoundError while there is none: the graph cleans up what joins before it.
     """
     user = os.environ.get("XDG_RUNTIME_DIR")
-    candidates = ["/run/vigil"] + ([f"{user}/vigil"] if user else []) + [f"/tmp/vigil-{os.getuid()}"]
+    candidates = ["/run/vigil"] + ([f"{user}/vigil"] if user else [])
+    candidates.append(f"/tmp/vigil-{os.getuid()}")
     for folder in candidates:
         if os.path.exists(f"{folder}/{graph}/processes"):
             return f"{folder}/{graph}"

@@ -7,6 +7,7 @@ use serde::Serialize;
 use vigil_blocks::{
     Action, Control, DetectionBelief, FaultBelief, Health, ParticleBlock, SensorFrame,
 };
+use vigil_cycle::Topic;
 use vigil_cycle::domain::shared_memory_free_bytes;
 use vigil_cycle::placement::{self, Placement, Wanted};
 use vigil_cycle::topic::ServiceName;
@@ -202,15 +203,17 @@ fn preemption() -> Finding {
 
 fn shared_memory(setup: &Setup) -> Finding {
     let queues = setup.queues();
+    let frames = queues.of(Topic::Sensor);
+    let frames = frames.reserved_bytes(size_of::<SensorFrame>());
     let sizes = [
-        size_of::<SensorFrame>(),
         size_of::<DetectionBelief>(),
         2 * size_of::<ParticleBlock>(),
         size_of::<FaultBelief>(),
         size_of::<Action>(),
         ServiceName::ALL.len() * (size_of::<Health>() + size_of::<Control>()),
     ];
-    let need: u64 = sizes.iter().map(|&size| queues.reserved_bytes(size)).sum();
+    let others = sizes.iter().map(|&size| queues.reserved_bytes(size));
+    let need = frames + others.sum::<u64>();
     let mib = |bytes: u64| bytes >> 20;
     match shared_memory_free_bytes() {
         Some(free) if free >= 2 * need => {

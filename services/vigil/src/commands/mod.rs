@@ -12,7 +12,7 @@ pub mod learn;
 mod learn_nominal;
 mod offline;
 pub mod pomdp;
-pub mod types;
+pub mod print_types;
 
 /// How a command ended that could do its work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

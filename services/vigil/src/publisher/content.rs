@@ -79,8 +79,8 @@ fn stretch(robot: &Description, field: Field, frames: &[Arrived]) -> Stretch {
 fn judge(name: &str, field: Field, robot: &Description, of: Stretch, frames: usize) -> Finding {
     let told = |status, detail: String| Finding::new(name, status, detail);
     if of.measured == 0 {
-        let detail = "never marked as valid, but the robot's description says that it is measured: set its \
-                      bit in `valid`, or take it out of [measured]";
+        let detail = "never marked as valid, but the robot's description says that it is \
+                      measured: set its bit in `valid`, or take it out of [measured]";
         return told(Status::Failure, detail.into());
     }
     if of.not_finite > 0 {

@@ -1,5 +1,8 @@
 //! Listens to a publisher: beside a running graph, or in its place.
 
+use std::fs;
+use std::path::PathBuf;
+
 use vigil_blocks::datagram::{self, DATAGRAM_SIZE};
 use vigil_blocks::{Health, REJECTIONS, Rejection, SensorFrame};
 use vigil_cycle::datagrams::Datagrams;
@@ -31,19 +34,36 @@ pub fn listen(setup: &Setup, seconds: f64) -> Result<Heard, PortError> {
         ..Heard::default()
     };
     signal::install();
-    if lock.is_some() {
-        // Publishers wait for this file.
-        std::fs::write(domain.processes_file(), "").map_err(|e| PortError::setup("folder", &e))?;
-    }
+    let sign = if lock.is_some() {
+        Some(Sign::put(domain.processes_file())?)
+    } else {
+        None
+    };
     if setup.file.sensor.source == Source::Socket && lock.is_some() {
         sockets(setup, seconds, &mut heard)?;
     } else {
         topic(setup, seconds, &mut heard)?;
     }
-    if lock.is_some() {
+    if sign.is_some() {
         domain.remove_residue();
     }
     Ok(heard)
+}
+
+/// The file by which publishers know that a graph runs; taken away when dropped.
+struct Sign(PathBuf);
+
+impl Sign {
+    fn put(path: PathBuf) -> Result<Self, PortError> {
+        fs::write(&path, "").map_err(|e| PortError::setup("runtime folder", &e))?;
+        Ok(Self(path))
+    }
+}
+
+impl Drop for Sign {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.0);
+    }
 }
 
 impl Heard {

@@ -35,8 +35,8 @@ const fn advice(cause: Rejection) -> &'static str {
              this version"
         }
         Rejection::NoEpoch => {
-            "header.epoch is 0: set it once at the start of the publisher to a number that no other \
-             start has, such as the time in ns"
+            "header.epoch is 0: set it once at the start of the publisher to a number that no \
+             other start has, such as the time in ns"
         }
         Rejection::OtherWriter => {
             "of another epoch, or from another address, while the known publisher was alive: is \
@@ -44,31 +44,32 @@ const fn advice(cause: Rejection) -> &'static str {
         }
         Rejection::Repeated => "header.seq repeats: count it up by one for each frame",
         Rejection::WrongSequence => {
-            "header.seq goes back: count it up by one for each frame, and change header.epoch when it \
-             starts anew"
+            "header.seq goes back: count it up by one for each frame, and change header.epoch \
+             when it starts anew"
         }
         Rejection::Ahead => {
-            "header.t_schedule_ns lies in the future: it is CLOCK_MONOTONIC of this machine, not the \
-             time of day (Python: time.monotonic_ns())"
+            "header.t_schedule_ns lies in the future: it is CLOCK_MONOTONIC of this machine, not \
+             the time of day (Python: time.monotonic_ns())"
         }
         Rejection::Behind => {
-            "header.t_schedule_ns lies more than 10 s back: it is CLOCK_MONOTONIC of this machine, in \
-             ns, when the frame was due"
+            "header.t_schedule_ns lies more than 10 s back: it is CLOCK_MONOTONIC of this \
+             machine, in ns, when the frame was due"
         }
         Rejection::Early => {
-            "sooner than a quarter of a period after the one before: graph.rate_hz must be the rate at \
-             which frames come, and header.t_schedule_ns advance with them"
+            "sooner than a quarter of a period after the one before: graph.rate_hz must be the \
+             rate at which frames come, and header.t_schedule_ns advance with them"
         }
         Rejection::NotFinite => {
-            "a value is NaN or infinite: leave what was not measured at 0 and its bit in `valid` unset"
+            "a value is NaN or infinite: leave what was not measured at 0 and its bit in `valid` \
+             unset"
         }
         Rejection::OutOfRange => {
-            "a value is beyond all that the robot's description allows: is the unit right (rad, rad/s, \
-             m, A)?"
+            "a value is beyond all that the robot's description allows: is the unit right (rad, \
+             rad/s, m, A)?"
         }
         Rejection::Jump => {
-            "the pose moved more than 100 m between two frames: is the unit m? If its frame really was \
-             moved, count pose_reset_count up"
+            "the pose moved more than 100 m between two frames: is the unit m? If its frame \
+             really was moved, count pose_reset_count up"
         }
         Rejection::Quarantined => {
             "good in themselves, but half of those before were not: mend the other causes"

@@ -72,8 +72,8 @@ fn jitter(rate_hz: f64, frames: &[Arrived]) -> Option<Finding> {
     let found = latency.percentiles();
     let us = |ns: u64| ns as f64 * 1e-3;
     let detail = format!(
-        "intervals of header.t_schedule_ns are {:.3} ms, off by {:.0} us in half of them, by {:.0} us in \
-         one of a hundred, by {:.0} us at most",
+        "intervals of header.t_schedule_ns are {:.3} ms, off by {:.0} us in half of them, by \
+         {:.0} us in one of a hundred, by {:.0} us at most",
         middle_s * 1e3,
         us(found.p50_ns),
         us(found.p99_ns),
@@ -124,8 +124,8 @@ fn way(frames: &[Arrived]) -> Option<Finding> {
     let found = latency.percentiles();
     let us = |ns: u64| ns as f64 * 1e-3;
     let detail = format!(
-        "from header.t_schedule_ns to the arrival: {:.0} us in half of the frames, {:.0} us in one of a \
-         hundred, {:.0} us at most",
+        "from header.t_schedule_ns to the arrival: {:.0} us in half of the frames, {:.0} us in \
+         one of a hundred, {:.0} us at most",
         us(found.p50_ns),
         us(found.p99_ns),
         us(found.max_ns)
@@ -137,8 +137,8 @@ fn way(frames: &[Arrived]) -> Option<Finding> {
 fn capture(frames: &[Arrived]) -> Finding {
     let times = intervals(frames, |f| f.frame.header.t_capture_ns);
     if !times.is_empty() && times.iter().all(|s| *s == 0.0) {
-        let detail = "header.t_capture_ns never changes: it is when the data was captured, in ns of any \
-                      clock that runs evenly";
+        let detail = "header.t_capture_ns never changes: it is when the data was captured, in ns \
+                      of any clock that runs evenly";
         return Finding::new("capture clock", Status::Failure, detail);
     }
     let back = times.iter().filter(|s| **s < 0.0).count();
@@ -166,7 +166,8 @@ fn capture(frames: &[Arrived]) -> Finding {
     } else if (theirs_s / ours_s * 1e9 - 1.0).abs() < 0.1 {
         "is it in s? ns are wanted"
     } else {
-        "the filters believe it: a recording that is played at another speed, or a clock that is wrong"
+        "the filters believe it: a recording that is played at another speed, or a clock that is \
+         wrong"
     };
     Finding::new(
         "capture clock",

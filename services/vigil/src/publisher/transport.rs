@@ -76,8 +76,8 @@ fn types(setup: &Setup) -> Finding {
         differs.push(format!("its alignment is {is} bytes, not {alignment}"));
     }
     let detail = format!(
-        "{path} was made with another type (iceoryx2 {}): {}. Wanted is {wanted}. Make your types anew \
-         with 'vigil types c' or 'vigil types python', and stop whoever holds the topic",
+        "{path} was made with another type (iceoryx2 {}): {}. Wanted is {wanted}. Make your types \
+         anew with 'vigil types c' or 'vigil types python', and stop whoever holds the topic",
         found.version,
         differs.join("; "),
     );
@@ -122,9 +122,9 @@ fn frames(setup: &Setup, heard: &Heard) -> Finding {
         )
     } else {
         format!(
-            "publish on '{}' with iceoryx2 0.10, prefix 'vigil_{graph}_', root path '{folder}/t', and \
-             notify the event service of the same name; a publisher with another type or version is \
-             refused by the transport and never seen here",
+            "publish on '{}' with iceoryx2 0.10, prefix 'vigil_{graph}_', root path '{folder}/t', \
+             and notify the event service of the same name; a publisher with another type or \
+             version is refused by the transport and never seen here",
             Topic::Sensor.path(graph)
         )
     };

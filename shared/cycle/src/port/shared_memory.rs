@@ -67,16 +67,16 @@ impl Link {
 
     /// The one place where topics are opened: the same settings for every peer, whoever is first.
     fn topic<T: Block>(&self, topic: Topic) -> Result<TopicFactory<T>, PortError> {
-        let name = self.name::<T>(topic)?;
+        let (name, queues) = (self.name::<T>(topic)?, self.queues.of(topic));
         self.node
             .service_builder(&name)
             .publish_subscribe::<Wire<T>>()
             .max_publishers(1)
-            .max_subscribers(self.queues.max_subscribers)
-            .max_nodes(self.queues.max_subscribers + 4)
-            .subscriber_max_buffer_size(self.queues.buffer)
+            .max_subscribers(queues.max_subscribers)
+            .max_nodes(queues.max_subscribers + 4)
+            .subscriber_max_buffer_size(queues.buffer)
             .subscriber_max_borrowed_samples(2)
-            .history_size(self.queues.history)
+            .history_size(queues.history)
             .enable_safe_overflow(true)
             .open_or_create()
             .map_err(|e| self.open_error::<T>(topic, &e))
@@ -144,16 +144,17 @@ impl Link {
 
     /// Opens a reading side.
     pub(super) fn receiver<T: Block>(&self, topic: Topic) -> Result<SharedReceiver<T>, PortError> {
+        let buffer = self.queues.of(topic).buffer;
         let subscriber = self
             .topic::<T>(topic)?
             .subscriber_builder()
-            .buffer_size(self.queues.buffer)
+            .buffer_size(buffer)
             .create()
             .map_err(|e| self.open_error::<T>(topic, &e))?;
         Ok(SharedReceiver {
             subscriber,
             held: None,
-            buffer: self.queues.buffer,
+            buffer,
         })
     }
 

@@ -27,35 +27,48 @@ const REST_M_S: f64 = 1e-3;
 
 #[derive(Debug, Clone, Copy, Deserialize)]
 struct Time {
+    /// Seconds.
     sec: i32,
+    /// Nanoseconds besides.
     nanosec: u32,
 }
 
 #[derive(Debug, Clone, Deserialize)]
 struct Header {
+    /// When it was measured.
     stamp: Time,
+    /// Frame of its poses.
     #[serde(rename = "frame_id")]
     _frame_id: String,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]
 struct Vector {
+    /// Forward.
     x: f64,
+    /// Left.
     y: f64,
+    /// Up.
     z: f64,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]
 struct Quaternion {
+    /// Imaginary part.
     x: f64,
+    /// Imaginary part.
     y: f64,
+    /// Imaginary part.
     z: f64,
+    /// Real part.
     w: f64,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]
 struct Pose {
+    /// m.
     position: Vector,
+    /// Rotation.
     orientation: Quaternion,
 }
 
@@ -64,42 +77,62 @@ type Covariance = ([f64; 18], [f64; 18]);
 
 #[derive(Debug, Clone, Copy, Deserialize)]
 struct Twist {
+    /// m/s.
     linear: Vector,
+    /// rad/s.
     angular: Vector,
 }
 
 #[derive(Debug, Clone, Deserialize)]
 struct TwistStamped {
+    /// Stamp and frame.
     header: Header,
+    /// Velocity.
     twist: Twist,
 }
 
 #[derive(Debug, Clone, Deserialize)]
 struct Odometry {
+    /// Stamp and frame.
     header: Header,
+    /// Frame of the twist.
     #[serde(rename = "child_frame_id")]
     _child_frame_id: String,
+    /// Where it is.
     pose: (Pose, Covariance),
+    /// Velocity.
     twist: (Twist, Covariance),
 }
 
 #[derive(Debug, Clone, Deserialize)]
 struct JointState {
+    /// Stamp and frame.
     header: Header,
+    /// Joints.
     name: Vec<String>,
+    /// rad, one each, or none.
     position: Vec<f64>,
+    /// rad/s, one each, or none.
     velocity: Vec<f64>,
+    /// N m or A, one each, or none.
     effort: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
 struct Imu {
+    /// Stamp and frame.
     header: Header,
+    /// Rotation.
     orientation: Quaternion,
+    /// Not used.
     _orientation_covariance: [f64; 9],
+    /// rad/s.
     angular_velocity: Vector,
+    /// Not used.
     _angular_velocity_covariance: [f64; 9],
+    /// Not used.
     _linear_acceleration: Vector,
+    /// Not used.
     _linear_acceleration_covariance: [f64; 9],
 }
 
