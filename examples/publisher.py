@@ -1,4 +1,4 @@
-"""Publishes a recorded drive into a running graph, through shared memory, without a copy.
+"""Publishes a recorded drive into a running graph, through shared memory.
 
 pip install iceoryx2==0.10.0
 python3 publisher.py FRAMES.csv.gz RUN [HZ] [GRAPH]
@@ -24,7 +24,7 @@ while publisher is None:
         publisher = topic.publish_subscribe(vigil.SensorFrame).open().publisher_builder().create()
     except (FileNotFoundError, iceoryx2.EventOpenError, iceoryx2.PublishSubscribeOpenError) as error:
         if "DoesNotExist" not in str(error):
-            raise SystemExit(f"{error}: 'vigil check-publisher' says what differs")
+            raise SystemExit(f"{error}: {vigil.difference(vigil.SensorFrame, graph)}")
         time.sleep(0.1)
 print(f"publishing {len(frames)} frames at {hz} Hz; scripts/up shows 'alarm' and 'diagnosis'")
 epoch = due = time.monotonic_ns()

@@ -1,4 +1,4 @@
-//! Publishes a recorded drive into a running graph, through shared memory, without a copy:
+//! Publishes a recorded drive into a running graph, through shared memory:
 //! `publisher FRAMES.csv.gz RUN`, after `scripts/up --source external --rate 20`.
 
 use std::error::Error;

@@ -22,13 +22,14 @@ def frame(odometry, joints, command):
         out.pose[:] = position.x, position.y, yaw(odometry.pose.pose.orientation)
         out.valid |= vigil.VALID_POSE
     if joints is not None:
-        place = {name: i for i, name in enumerate(joints.name)}
+        # A joint without a velocity or a position, or with NaN, was not measured.
+        rates, angles = dict(zip(joints.name, joints.velocity)), dict(zip(joints.name, joints.position))
         for i, (roll, steer) in enumerate(zip(ROLL, STEER)):
-            if roll in place:
-                out.wheel_rate[i] = joints.velocity[place[roll]]
+            if math.isfinite(rates.get(roll, math.nan)):
+                out.wheel_rate[i] = rates[roll]
                 out.valid |= vigil.VALID_WHEEL_RATE_0 << i
-            if steer in place:
-                out.steer[i] = joints.position[place[steer]]
+            if math.isfinite(angles.get(steer, math.nan)):
+                out.steer[i] = angles[steer]
                 out.valid |= vigil.VALID_STEER_0 << i
     if command is not None:
         # The rover's command is curvature and speed.

@@ -7,6 +7,10 @@
 #ifndef VIGIL_TYPES_H
 #define VIGIL_TYPES_H
 
+#if defined(__BYTE_ORDER__) && __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
+#error "blocks and datagrams are little-endian"
+#endif
+
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
@@ -509,7 +513,7 @@ typedef struct {
   uint32_t particles;
   /* Particles configured. */
   uint32_t particles_configured;
-  /* Events so far; event number n is at eventsn % EVENTS. */
+  /* Events so far; event number n is at events[n % EVENTS]. */
   uint64_t event_count;
   /* Recent events. */
   vigil_event events[32];

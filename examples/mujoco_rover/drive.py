@@ -44,7 +44,7 @@ def join(graph):
             return node, publisher, bell, actions
         except (FileNotFoundError, iceoryx2.EventOpenError, iceoryx2.PublishSubscribeOpenError) as error:
             if "DoesNotExist" not in str(error):
-                raise SystemExit(f"{error}: 'vigil check-publisher' says what differs")
+                raise SystemExit(f"{error}: {vigil.difference(vigil.SensorFrame, graph)}")
             time.sleep(0.1)
 
 

@@ -145,7 +145,8 @@ class Guard(unittest.TestCase):
             source, expected = Source(send), {}
             # The first frames may come before a reader is there.
             source.good(200)
-            for cause, spoil in BAD:
+            # Another epoch is another start here: the transport admits one publisher at a time.
+            for cause, spoil in [bad for bad in BAD if bad[0] != "other-writer"]:
                 send(spoil(source.next()))
                 source.good()
                 expected[cause] = expected.get(cause, 0) + (2 if cause == "jump" else 1)

@@ -112,6 +112,10 @@ class Ros(unittest.TestCase):
             self.assertTrue(frame.valid & bit)
         self.assertFalse(frame.valid & (vigil_types.VALID_STEER_0 << 1))
         self.assertEqual(ros2_mapping.frame(None, None, None).valid, 0)
+        joints = messages(row)[1][1]
+        joints.velocity, joints.position[9] = joints.velocity[:0], math.nan
+        frame = ros2_mapping.frame(None, joints, None)
+        self.assertEqual(frame.valid, 0b1101 * vigil_types.VALID_STEER_0)
 
 
 if __name__ == "__main__":

@@ -48,10 +48,15 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let (rows, load) = (rows?, args.load.name());
     let mut archive = Archive::new("publishers")?;
     archive.say(&format!(
-        "`scripts/bench publishers --seconds {} --load {load}`\n\nA publisher in Python \
+        "`scripts/bench publishers --rate {} --seconds {} --load {load}`\n\nA publisher in Python \
          (`bench/pace.py`, SCHED_OTHER) through shared memory. Lost: by the detector's account of \
          sequence numbers; frames that come together are answered once. Times in us, from when a \
          frame was due.\n",
+        args.rate
+            .iter()
+            .map(f64::to_string)
+            .collect::<Vec<_>>()
+            .join(","),
         args.seconds
     ));
     archive.say(

@@ -2,7 +2,7 @@
 
 use vigil_blocks::datagram;
 use vigil_blocks::{Block, REJECTIONS, Rejection, SensorFrame};
-use vigil_cycle::InputAccount;
+use vigil_cycle::{InputAccount, Writer};
 use vigil_robot::{Description, FrameGuard};
 
 /// Period of the schedule, ns.
@@ -31,7 +31,7 @@ impl<'a> Stream<'a> {
     pub fn new(robot: &Description, recorded: &'a [SensorFrame]) -> Self {
         Self {
             recorded,
-            account: InputAccount::of_outsider(),
+            account: InputAccount::of(Writer::Stranger),
             content: FrameGuard::new(robot),
             period: 0,
             seq: 0,

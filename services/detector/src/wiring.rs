@@ -2,7 +2,7 @@
 
 use vigil_blocks::{Cause, DetectionBelief, Entry, EventKind, ParticleBlock, SensorFrame};
 use vigil_cycle::{
-    Clock, Graph, HealthBoard, Intake, PortError, Receiver, Sender, Stage, Stamp, Topic,
+    Clock, Graph, HealthBoard, Intake, PortError, Receiver, Sender, Stage, Stamp, Topic, Writer,
 };
 
 use vigil_robot::{Description, FrameGuard};
@@ -13,6 +13,8 @@ use crate::Detector;
 pub struct DetectorStage {
     detector: Detector,
     guard: FrameGuard,
+    /// Epoch of the last frame that was stepped.
+    epoch: u64,
     frames: Box<dyn Receiver<SensorFrame>>,
     belief: Box<dyn Sender<DetectionBelief>>,
     particles: Box<dyn Sender<ParticleBlock>>,
@@ -32,6 +34,7 @@ impl DetectorStage {
         Ok(Self {
             detector,
             guard: FrameGuard::new(robot),
+            epoch: 0,
             frames: graph.receiver(Topic::Sensor)?,
             belief: graph.sender(Topic::Detection)?,
             particles: graph.sender(Topic::DetectionParticles)?,
@@ -56,6 +59,11 @@ impl Stage for DetectorStage {
             let content = || self.guard.check(frame);
             if intake.admit::<SensorFrame>(&frame.header, content) {
                 let (belief, particles) = (self.belief.block(), self.particles.block());
+                let before = std::mem::replace(&mut self.epoch, frame.header.epoch);
+                if before != 0 && before != self.epoch {
+                    // A publisher that starts anew may have another clock.
+                    self.detector.step(Entry::Reset, belief, particles);
+                }
                 self.detector.step(Entry::Frame(frame), belief, particles);
                 intake.stepped(&frame.header, (frame.header.epoch, frame.header.seq));
             }
@@ -92,8 +100,8 @@ impl Stage for DetectorStage {
         self.detector.step(Entry::Budget(particles), belief, cloud);
     }
 
-    fn is_border(&self) -> bool {
-        true
+    fn writer(&self) -> Writer {
+        Writer::Publisher
     }
 
     fn has_input(&self) -> bool {

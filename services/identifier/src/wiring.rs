@@ -7,7 +7,7 @@ use vigil_blocks::{
 };
 use vigil_cycle::{
     Clock, Graph, HealthBoard, InputAccount, Intake, PortError, Receiver, Sender, Stage, Stamp,
-    Topic,
+    Topic, Writer,
 };
 
 use vigil_robot::{Description, FrameGuard};
@@ -28,6 +28,8 @@ pub struct IdentifierStage {
     frames: Box<dyn Receiver<SensorFrame>>,
     frame_account: InputAccount,
     guard: FrameGuard,
+    /// Epoch of the last frame that was stepped.
+    epoch: u64,
     pending: VecDeque<SensorFrame>,
     period_ns: u64,
     belief: Box<dyn Sender<FaultBelief>>,
@@ -64,8 +66,9 @@ impl IdentifierStage {
             detections: graph.receiver(Topic::Detection)?,
             detected: graph.receiver(Topic::DetectionParticles)?,
             frames: graph.receiver(Topic::Sensor)?,
-            frame_account: InputAccount::of_outsider(),
+            frame_account: InputAccount::of(Writer::Publisher),
             guard: FrameGuard::new(robot),
+            epoch: 0,
             pending: VecDeque::with_capacity(PENDING_MAX),
             period_ns,
             belief: graph.sender(Topic::Diagnosis)?,
@@ -129,6 +132,10 @@ impl IdentifierStage {
                 detection,
             };
             let (belief, out) = (self.belief.block(), self.particles.block());
+            let before = std::mem::replace(&mut self.epoch, frame.header.epoch);
+            if before != 0 && before != self.epoch {
+                self.identifier.step(Entry::Reset, belief, out);
+            }
             self.identifier.step(Entry::Frame(input), belief, out);
         }
         true

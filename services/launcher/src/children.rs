@@ -69,6 +69,8 @@ impl Children {
     fn list(&self, domain: &Domain) -> io::Result<()> {
         let line = |s: &Supervised| format!("{} {}\n", s.name.as_str(), s.child.id());
         let text: String = self.services.iter().map(line).collect();
+        // First: a publisher that finds the graph may ask for its types.
+        domain.tell_types()?;
         std::fs::write(domain.processes_file(), text)
     }
 

@@ -2,6 +2,8 @@
 
 /// The publisher's clock may run slower than ours by this share.
 const DRIFT_MAX: f64 = 5e-4;
+/// A frame that seems to be held up by more than this, ns, tells that the clock runs otherwise.
+const HELD_UP_MAX_NS: i128 = 1_000_000_000;
 
 /// Places capture times of another clock on ours: by the shortest way that a frame ever took, so
 /// that a frame held up on its way still counts from when it was due.
@@ -27,7 +29,11 @@ impl ArrivalClock {
             Some(known) if known.epoch == epoch && known.t_capture_ns <= t_capture_ns => {
                 let elapsed_ns = (t_capture_ns - known.t_capture_ns) as f64;
                 let drifted_ns = known.offset_ns + (DRIFT_MAX * elapsed_ns).ceil() as i128;
-                drifted_ns.min(seen_ns)
+                if seen_ns - drifted_ns > HELD_UP_MAX_NS {
+                    seen_ns
+                } else {
+                    drifted_ns.min(seen_ns)
+                }
             }
             _ => seen_ns,
         };
@@ -53,6 +59,16 @@ mod tests {
         let arrivals = [(10, 1000), (20, 1010), (30, 1031), (40, 1031), (50, 1040)];
         let due = arrivals.map(|(capture, now)| clock.due_ns(1, capture * MS, now * MS) / MS);
         assert_eq!(due, [1000, 1010, 1020, 1030, 1040]);
+    }
+
+    #[test]
+    fn a_clock_at_half_speed_is_never_more_than_a_second_behind() {
+        let mut clock = ArrivalClock::default();
+        for k in 1..=10_000_u64 {
+            let (now_ns, capture_ns) = (k * 100 * MS, k * 50 * MS);
+            let due_ns = clock.due_ns(1, capture_ns, now_ns);
+            assert!(due_ns <= now_ns && now_ns - due_ns <= 1000 * MS, "{k}");
+        }
     }
 
     #[test]

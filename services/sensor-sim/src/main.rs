@@ -78,6 +78,8 @@ fn serve_socket(setup: &Setup, listen: &Listen, mut plan: Plan) -> Result<(), Se
         // There is nothing to predict: a frame that is not there is not made up.
         plan.on_miss = OnMiss::Count;
     }
+    // There is nothing to look at without a system call.
+    plan.spin_ns = 0;
     serve::woken_by(&plan, |graph| {
         let datagrams = Datagrams::bind(listen.udp, listen.unix.as_deref())
             .map_err(|e| ServeError::Build(format!("sensor.socket: {e}")))?;

@@ -13,8 +13,8 @@
 //!
 //! In the frame's header the sender fills in schema, epoch (any number but 0, another one at each
 //! start), sequence number and capture time (its own clock: only differences count). A
-//! `t_schedule_ns` of 0 means that the sender does not have this machine's clock: the frame counts
-//! as due when it arrives.
+//! `t_schedule_ns` of 0 means that the sender does not have this machine's clock: it is
+//! found from the capture time and the quickest arrival so far.
 
 use crc::{CRC_32_ISCSI, Crc};
 

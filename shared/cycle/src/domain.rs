@@ -7,10 +7,13 @@ use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 use iceoryx2::prelude::{Config, FileName, SemanticString};
+use vigil_blocks::{Action, Block, SensorFrame};
 
 use crate::port::PortError;
 use crate::topic::Topic;
 
+/// Version of the transport, as the workspace's manifest demands it.
+const TRANSPORT_VERSION: &str = "0.10.0";
 /// Sensor frames are small, and a publisher that was held up sends many at once: so many times
 /// more of them may wait.
 const SENSOR_BUFFERS: usize = 8;
@@ -93,6 +96,30 @@ impl Domain {
         self.folder.join("processes")
     }
 
+    /// File that tells publishers the graph's types while it runs: name, size, alignment and the
+    /// transport's version a line.
+    #[must_use]
+    pub fn types_file(&self) -> PathBuf {
+        self.folder.join("types")
+    }
+
+    /// Writes [`Self::types_file`].
+    ///
+    /// # Errors
+    /// The file system's.
+    pub fn tell_types(&self) -> io::Result<()> {
+        let line = |name: &str, size: usize, alignment: usize| {
+            format!("{name} {size} {alignment} {TRANSPORT_VERSION}\n")
+        };
+        let frame = line(
+            SensorFrame::TYPE_NAME,
+            size_of::<SensorFrame>(),
+            align_of::<SensorFrame>(),
+        );
+        let action = line(Action::TYPE_NAME, size_of::<Action>(), align_of::<Action>());
+        fs::write(self.types_file(), frame + &action)
+    }
+
     /// Sizes of the queues.
     #[must_use]
     pub const fn queues(&self) -> Queues {
@@ -161,6 +188,7 @@ impl Domain {
         }
         let _ = fs::remove_dir_all(self.folder.join("t"));
         let _ = fs::remove_file(self.processes_file());
+        let _ = fs::remove_file(self.types_file());
     }
 }
 

@@ -13,6 +13,11 @@ const AHEAD_PERIODS_MAX: u64 = 2;
 const BEHIND_NS_MAX: u64 = 10_000_000_000;
 /// Another writer is believed once the known one has been silent for so many periods.
 const SILENT_PERIODS: u64 = 2;
+/// A sequence number that is further ahead is not believed.
+const STEP_MAX: u64 = 1_000_000;
+/// Once nothing was taken for so long, ns, a lower sequence number is a new start: of a counter
+/// that wraps around, or of a device that always has the same epoch.
+const RESTART_NS: u64 = 1_000_000_000;
 /// Blocks closer to the last one than this part of a period are more than the schedule allows.
 const EARLY_PERIOD_PART: u64 = 4;
 /// A source that misbehaved in so many of its last [`HISTORY`] blocks is not trusted.
@@ -43,12 +48,14 @@ impl Arrival {
 
 /// Who writes the blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-enum Writer {
+pub enum Writer {
     /// A service of the graph.
     #[default]
     Service,
-    /// Somebody outside of it.
-    Outsider,
+    /// A program outside of it, through shared memory: the transport admits one at a time.
+    Publisher,
+    /// Anybody who reaches a socket: one is believed at a time.
+    Stranger,
 }
 
 /// The newest block of the known writer.
@@ -80,12 +87,12 @@ pub struct InputAccount {
 }
 
 impl InputAccount {
-    /// An account of blocks from outside the graph: of one living writer, no faster than the
-    /// schedule, and not trusted for ever. [`Self::default`] is one of a service's blocks.
+    /// An account of this writer's blocks. One outside the graph is no faster than the schedule,
+    /// and not trusted for ever.
     #[must_use]
-    pub fn of_outsider() -> Self {
+    pub fn of(writer: Writer) -> Self {
         Self {
-            writer: Writer::Outsider,
+            writer,
             ..Self::default()
         }
     }
@@ -133,11 +140,12 @@ impl InputAccount {
         (last.epoch, last.seq) = (header.epoch, header.seq);
         if arrival == Arrival::NewEpoch {
             last.t_schedule_ns = 0;
+            (self.misbehaved, self.is_quarantined) = (0, false);
         }
         if let Err(rejection) = content() {
             return self.reject(rejection);
         }
-        if self.writer == Writer::Outsider {
+        if self.writer != Writer::Service {
             let earliest_ns = last.t_schedule_ns + period_ns / EARLY_PERIOD_PART;
             if last.t_schedule_ns > 0 && header.t_schedule_ns < earliest_ns {
                 return self.reject(Rejection::Early);
@@ -160,7 +168,9 @@ impl InputAccount {
             Rejection::Repeated | Rejection::WrongSequence => self.duplicate += 1,
             _ => self.invalid += 1,
         }
-        if rejection.is_misbehaviour() && self.writer == Writer::Outsider {
+        // Before there is a known writer, nobody can misbehave in its name.
+        let is_known = self.writer != Writer::Service && self.last.is_some();
+        if rejection.is_misbehaviour() && is_known {
             self.remember(true);
         }
         Arrival::Rejected(rejection)
@@ -183,19 +193,21 @@ impl InputAccount {
         let Some(last) = self.last else {
             return Arrival::Next;
         };
+        let silent_ns = now_ns.saturating_sub(last.taken_ns);
         if header.epoch != last.epoch {
-            let silent_ns = now_ns.saturating_sub(last.taken_ns);
             let is_alive = silent_ns < SILENT_PERIODS * period_ns && !self.is_quarantined;
-            return if self.writer == Writer::Outsider && is_alive {
+            return if self.writer == Writer::Stranger && is_alive {
                 Arrival::Rejected(Rejection::OtherWriter)
             } else {
                 Arrival::NewEpoch
             };
         }
         match header.seq.checked_sub(last.seq) {
+            None if self.writer != Writer::Service && silent_ns > RESTART_NS => Arrival::NewEpoch,
             None => Arrival::Rejected(Rejection::WrongSequence),
             Some(0) => Arrival::Rejected(Rejection::Repeated),
             Some(1) => Arrival::Next,
+            Some(steps) if steps > STEP_MAX => Arrival::Rejected(Rejection::WrongSequence),
             Some(steps) => Arrival::AfterGap(steps - 1),
         }
     }
@@ -243,7 +255,8 @@ mod tests {
     #[test]
     fn sequence_faults_are_told_apart_and_counted() {
         use Rejection::{Repeated, WrongSequence};
-        for mut a in [InputAccount::default(), InputAccount::of_outsider()] {
+        for writer in [Writer::Service, Writer::Publisher, Writer::Stranger] {
+            let mut a = InputAccount::of(writer);
             assert_eq!(at(&mut a, (7, 3, 1)), Arrival::Next);
             assert_eq!(at(&mut a, (7, 4, 2)), Arrival::Next);
             assert_eq!(at(&mut a, (7, 4, 3)), Arrival::Rejected(Repeated));
@@ -260,6 +273,7 @@ mod tests {
     #[test]
     fn the_last_sequence_number_does_not_wrap() {
         let mut a = InputAccount::default();
+        // A service's epoch changes when it starts anew, and its numbers with it.
         assert_eq!(at(&mut a, (7, u64::MAX - 1, 1)), Arrival::Next);
         assert_eq!(at(&mut a, (7, u64::MAX, 2)), Arrival::Next);
         let wrapped = at(&mut a, (7, 0, 3));
@@ -298,7 +312,7 @@ mod tests {
 
     #[test]
     fn an_outsider_is_replaced_only_once_it_is_silent() {
-        let mut a = InputAccount::of_outsider();
+        let mut a = InputAccount::of(Writer::Stranger);
         assert_eq!(at(&mut a, (7, 0, 1)), Arrival::Next);
         let other = Arrival::Rejected(Rejection::OtherWriter);
         assert_eq!(at(&mut a, (9, 0, 2)), other);
@@ -306,15 +320,43 @@ mod tests {
         assert_eq!(at(&mut a, (9, 1, 3)), other);
         assert_eq!(at(&mut a, (9, 2, 4)), Arrival::NewEpoch);
         assert_eq!(at(&mut a, (7, 2, 5)), other);
-        // A service that starts anew has the transport's word that the old one is gone.
-        let mut a = InputAccount::default();
-        assert_eq!(at(&mut a, (7, 0, 1)), Arrival::Next);
-        assert_eq!(at(&mut a, (9, 0, 1)), Arrival::NewEpoch);
+        // For one that starts anew in shared memory there is the transport's word that the old one
+        // is gone.
+        for writer in [Writer::Service, Writer::Publisher] {
+            let mut a = InputAccount::of(writer);
+            assert_eq!(at(&mut a, (7, 0, 1)), Arrival::Next);
+            assert_eq!(at(&mut a, (9, 0, 1)), Arrival::NewEpoch);
+        }
+    }
+
+    #[test]
+    fn a_counter_that_starts_again_is_believed_after_a_second_without_it() {
+        let mut a = InputAccount::of(Writer::Publisher);
+        let wrong = Arrival::Rejected(Rejection::WrongSequence);
+        assert_eq!(at(&mut a, (1, 65_535, 1)), Arrival::Next);
+        for k in 2..=1001 {
+            assert_eq!(at(&mut a, (1, k - 2, k)), wrong);
+        }
+        assert_eq!(at(&mut a, (1, 1000, 1002)), Arrival::NewEpoch);
+        assert_eq!(at(&mut a, (1, 1001, 1003)), Arrival::Next);
+        // A number far ahead is not believed, and spoils nothing.
+        assert_eq!(at(&mut a, (1, 1 << 63, 1004)), wrong);
+        assert_eq!(at(&mut a, (1, 1003, 1005)), Arrival::AfterGap(1));
+        assert_eq!(a.lost, 1);
+    }
+
+    #[test]
+    fn nobody_misbehaves_in_the_name_of_a_writer_that_is_not_known_yet() {
+        let mut a = InputAccount::of(Writer::Stranger);
+        for _ in 0..100 {
+            a.reject(Rejection::Schema);
+        }
+        assert_eq!(at(&mut a, (1, 0, 1)), Arrival::Next);
     }
 
     #[test]
     fn an_outsider_faster_than_the_schedule_is_thinned_out_and_stays_trusted() {
-        let mut a = InputAccount::of_outsider();
+        let mut a = InputAccount::of(Writer::Stranger);
         let mut taken = 0;
         for seq in 0..10_000 {
             // Twenty blocks a period.
@@ -337,7 +379,7 @@ mod tests {
 
     #[test]
     fn a_source_that_misbehaves_is_quarantined_until_it_behaves() {
-        let mut a = InputAccount::of_outsider();
+        let mut a = InputAccount::of(Writer::Stranger);
         let mut k = 0;
         let mut next = |a: &mut InputAccount, content| {
             k += 1;

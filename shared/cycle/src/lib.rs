@@ -38,7 +38,7 @@ pub use clock::{Clock, Monotonic, VirtualClock};
 pub use deadline::{DeadlineMonitor, Schedule};
 pub use domain::Domain;
 pub use health::HealthBoard;
-pub use input::InputAccount;
+pub use input::{InputAccount, Writer};
 pub use keep_awake::KeepAwake;
 pub use latency::Latency;
 pub use on_miss::OnMiss;

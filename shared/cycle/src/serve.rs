@@ -133,12 +133,10 @@ pub fn woken_by<S: Stage, I: Inputs>(
     let monitor = DeadlineMonitor::new(plan.schedule);
     let mut cycle = StageCycle::new(monitor, health)?
         .with_on_miss(plan.on_miss)
+        .with_input_of(stage.writer())
         .with_recorder(plan.leave.recorder()?);
     if stage.particles() > 0 {
         cycle = cycle.with_shedder(Shedder::new(stage.particles(), plan.schedule));
-    }
-    if stage.is_border() {
-        cycle = cycle.guarded();
     }
     let run = live::run_stage(&mut cycle, &mut stage, &inputs, plan.spin_ns)?;
     leave(plan, cycle.recorder(), run)

@@ -7,7 +7,7 @@ use vigil_blocks::{Block, Cause, CauseKind, Degraded, Header, Rejection, Service
 use crate::clock::Clock;
 use crate::deadline::DeadlineMonitor;
 use crate::health::HealthBoard;
-use crate::input::{Arrival, InputAccount};
+use crate::input::{Arrival, InputAccount, Writer};
 use crate::latency::Latency;
 use crate::on_miss::{Lateness, OnMiss};
 use crate::port::{PortError, Stamp};
@@ -52,9 +52,9 @@ pub trait Stage {
     /// From now on at most `particles`: the time allows no more.
     fn limit(&mut self, _particles: u32) {}
 
-    /// True if its input comes from outside the graph, and is to be checked accordingly.
-    fn is_border(&self) -> bool {
-        false
+    /// Who writes its input: what comes from outside the graph is checked accordingly.
+    fn writer(&self) -> Writer {
+        Writer::Service
     }
 
     /// True if input waits in shared memory, announced or not: for a stage that spins before it
@@ -205,10 +205,10 @@ impl StageCycle {
         })
     }
 
-    /// The same cycle, whose input comes from outside the graph.
+    /// The same cycle, whose input this writer writes.
     #[must_use]
-    pub fn guarded(mut self) -> Self {
-        self.account = InputAccount::of_outsider();
+    pub fn with_input_of(mut self, writer: Writer) -> Self {
+        self.account = InputAccount::of(writer);
         self
     }
 
@@ -237,9 +237,16 @@ impl StageCycle {
     /// the first, and while the input is lost.
     #[must_use]
     pub fn expected_input_ns(&self) -> Option<u64> {
+        Some(
+            self.next_schedule_ns()?
+                .saturating_add(self.input_offset_ns),
+        )
+    }
+
+    /// When the next instant of the schedule is, ns; `None` as above.
+    fn next_schedule_ns(&self) -> Option<u64> {
         let next_ns = self.last_stamp.t_schedule_ns + self.monitor.period_ns();
-        (self.last_stamp.t_schedule_ns > 0 && self.misses_in_a_row == 0)
-            .then_some(next_ns + self.input_offset_ns)
+        (self.last_stamp.t_schedule_ns > 0 && self.misses_in_a_row == 0).then_some(next_ns)
     }
 
     /// When to listen again after a wake-up at `now_ns` that brought no input, ns: shortly before
@@ -249,8 +256,9 @@ impl StageCycle {
     pub fn listens_again_ns(&self, now_ns: u64) -> u64 {
         let period_ns = self.monitor.period_ns();
         let early_ns = period_ns / EARLY_PERIOD_PART;
+        // The last input may have been late: the next may come as soon as it is due.
         let expected_ns = self
-            .expected_input_ns()
+            .next_schedule_ns()
             .map_or(0, |ns| ns.saturating_sub(early_ns));
         let breath_ns = now_ns + period_ns / DEAF_PERIOD_PART;
         expected_ns.max(breath_ns).min(self.next_wake_ns())
@@ -336,7 +344,9 @@ impl StageCycle {
             t_publish_ns: published_ns,
         });
         self.health.count_cycle(cycle_ns, newest.seq);
-        self.input_offset_ns = newest.t_publish_ns.saturating_sub(newest.t_schedule_ns);
+        // Somebody outside may claim any time of publication.
+        let offset_ns = newest.t_publish_ns.saturating_sub(newest.t_schedule_ns);
+        self.input_offset_ns = offset_ns.min(self.monitor.deadline_ns());
         let health = self.health.block();
         (health.answered_epoch, health.answered_seq) = (cause.frame_epoch, cause.frame_seq);
     }

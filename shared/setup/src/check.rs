@@ -281,13 +281,24 @@ fn sensor(file: &GraphFile, path: &Path, report: &mut impl FnMut(&str, String)) 
 }
 
 fn socket(socket: &Socket, report: &mut impl FnMut(&str, String)) {
-    if let Err(error) = socket.udp_address() {
-        report("sensor.socket.udp", error);
+    match socket.udp_address() {
+        Err(error) => report("sensor.socket.udp", error),
+        Ok(Some(address)) if address.port() == 0 => report(
+            "sensor.socket.udp",
+            "port 0 is any port, which no publisher knows: allowed is 1 to 65535".into(),
+        ),
+        Ok(_) => {}
     }
     let name = &socket.unix;
     let legal = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    if !name.chars().all(legal) || name.starts_with('.') || name.len() > NAME_LENGTH_MAX {
-        let allowed = format!("at most {NAME_LENGTH_MAX} letters, digits, '-', '_' or '.'");
+    let is_name = name.chars().all(legal) && name.len() <= NAME_LENGTH_MAX;
+    let is_socket = name
+        .strip_suffix(".sock")
+        .is_some_and(|stem| !stem.is_empty());
+    if !(name.is_empty() || is_name && is_socket) {
+        let allowed = format!(
+            "at most {NAME_LENGTH_MAX} letters, digits, '-', '_' or '.', ending in '.sock'"
+        );
         let message = format!("'{name}' is not a name: allowed are {allowed}");
         report("sensor.socket.unix", message);
     }

@@ -7,7 +7,9 @@ use std::rc::Rc;
 use vigil_blocks::datagram::{self, DATAGRAM_SIZE};
 use vigil_blocks::{Cause, Rejection, SensorFrame};
 use vigil_cycle::datagrams::{Datagrams, From};
-use vigil_cycle::{Clock, Graph, HealthBoard, Intake, PortError, Sender, Stage, Stamp, Topic};
+use vigil_cycle::{
+    Clock, Graph, HealthBoard, Intake, PortError, Sender, Stage, Stamp, Topic, Writer,
+};
 use vigil_robot::{Description, FrameGuard};
 
 use crate::arrival_clock::ArrivalClock;
@@ -16,6 +18,9 @@ use crate::arrival_clock::ArrivalClock;
 const TURN_MAX: usize = 64;
 /// A source silent for so long may be replaced by another, ns.
 const SILENT_NS: u64 = 1_000_000_000;
+
+/// Starts of the source are counted in the bits of `run_id` from this one on.
+const START_SHIFT: u32 = 48;
 
 /// Where datagrams are to arrive.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -34,6 +39,9 @@ pub struct SocketStage {
     clock: ArrivalClock,
     source: Option<From>,
     taken_ns: u64,
+    /// Epoch of the source, and how often it has changed.
+    epoch: u64,
+    starts: u64,
     /// Frames of this turn.
     waiting: Vec<SensorFrame>,
     frames: Box<dyn Sender<SensorFrame>>,
@@ -55,6 +63,8 @@ impl SocketStage {
             clock: ArrivalClock::default(),
             source: None,
             taken_ns: 0,
+            epoch: 0,
+            starts: 0,
             waiting: Vec::with_capacity(TURN_MAX),
             frames: graph.sender(Topic::Sensor)?,
         })
@@ -73,10 +83,8 @@ impl SocketStage {
 
     fn choose(&mut self, from: From) {
         self.source = Some(from);
-        if let From::Udp(peer) = from {
-            // If the kernel cannot, the comparison of addresses remains.
-            let _ = self.datagrams.only_from(peer);
-        }
+        // If the kernel cannot, the comparison of addresses remains.
+        let _ = self.datagrams.only(from);
     }
 }
 
@@ -93,7 +101,7 @@ impl Stage for SocketStage {
                 intake.reject(Rejection::OtherWriter);
                 continue;
             }
-            let frame = match self.read(&buffer[..length], now_ns) {
+            let mut frame = match self.read(&buffer[..length], now_ns) {
                 Ok(frame) => frame,
                 Err(rejection) => {
                     intake.reject(rejection);
@@ -108,6 +116,10 @@ impl Stage for SocketStage {
                 self.choose(from);
             }
             self.taken_ns = now_ns;
+            self.starts += u64::from(frame.header.epoch != self.epoch);
+            self.epoch = frame.header.epoch;
+            // Behind this service its own epoch is seen: a new start of the source is a new run.
+            frame.run_id ^= self.starts << START_SHIFT;
             self.waiting.push(frame);
             intake.stepped(&frame.header, (frame.header.epoch, frame.header.seq));
         }
@@ -133,8 +145,8 @@ impl Stage for SocketStage {
         self.frames.prepare()
     }
 
-    fn is_border(&self) -> bool {
-        true
+    fn writer(&self) -> Writer {
+        Writer::Stranger
     }
 
     fn after(&mut self, _health: &mut HealthBoard, now_ns: u64) {

@@ -15,6 +15,10 @@ const HEAD: &str = r#"/* Wire blocks of Vigil, for C11 and C++17.
 #ifndef VIGIL_TYPES_H
 #define VIGIL_TYPES_H
 
+#if defined(__BYTE_ORDER__) && __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
+#error "blocks and datagrams are little-endian"
+#endif
+
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>

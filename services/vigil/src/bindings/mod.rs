@@ -132,10 +132,8 @@ fn doc(field: &Field) -> String {
     };
     let lines: Vec<String> = field.doc.iter().map(line).collect();
     // Links are for Rust's documentation.
-    lines
-        .join(" ")
-        .replace(['[', ']', '`'], "")
-        .replace("crate::", "")
+    let text = lines.join(" ").replace("[`", "").replace("`]", "");
+    text.replace('`', "").replace("crate::", "")
 }
 
 #[cfg(test)]

@@ -12,8 +12,10 @@ element of an array; shift it left for the others.
 """
 
 import ctypes
+import importlib.metadata
 import os
 import struct
+import tempfile
 
 "#;
 
@@ -27,10 +29,15 @@ def runtime_folder(graph="rover"):
     """
     user = os.environ.get("XDG_RUNTIME_DIR")
     candidates = ["/run/vigil"] + ([f"{user}/vigil"] if user else [])
-    candidates.append(f"/tmp/vigil-{os.getuid()}")
+    candidates.append(f"{tempfile.gettempdir()}/vigil-{os.getuid()}")
     for folder in candidates:
-        if os.path.exists(f"{folder}/{graph}/processes"):
+        try:
+            os.stat(f"{folder}/{graph}/processes")
             return f"{folder}/{graph}"
+        except FileNotFoundError:
+            pass
+        except PermissionError:
+            raise PermissionError(f"{folder} is another user's: run as the user who runs the graph")
     raise FileNotFoundError(f"DoesNotExist: no graph '{graph}' is running (looked in {candidates})")
 
 
@@ -42,6 +49,19 @@ def transport(graph="rover"):
     config.global_cfg.prefix = iceoryx2.FileName.new(f"vigil_{graph}_")
     config.global_cfg.root_path = iceoryx2.Path.new(f"{runtime_folder(graph)}/t")
     return config
+
+
+def difference(kind, graph="rover"):
+    """What is different between a running graph's type and ours, of the same name: a sentence."""
+    with open(f"{runtime_folder(graph)}/types") as file:
+        for line in file:
+            name, size, alignment, version = line.split()
+            if name.split(".")[1] == kind.__name__:
+                theirs = f"{name}, {size} bytes, alignment {alignment} (iceoryx2 {version})"
+    here = importlib.metadata.version("iceoryx2")
+    ours = f"{kind.type_name()}, {ctypes.sizeof(kind)} bytes, alignment {ctypes.alignment(kind)}"
+    change = "make vigil_types.py anew with 'vigil types python'"
+    return f"the graph has {theirs}; this program has {ours} (iceoryx2 {here}): {change}"
 
 
 def _table():

@@ -44,15 +44,18 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     if !args.json {
         eprintln!("listening for {} s", args.seconds);
     }
-    let (heard, unheard) = match publisher::listen(&setup, args.seconds) {
-        Ok(heard) => (heard, None),
-        Err(error) => (publisher::Heard::default(), Some(error)),
-    };
+    let (heard, unheard) =
+        publisher::listen(&setup, args.seconds).map_err(CommandError::failure)?;
     let mut found = publisher::findings(&setup, &heard);
     if let Some(error) = unheard {
-        let (detail, at) = (error.to_string(), found.len().min(1));
-        found.insert(at, Finding::new("listening", Status::Failure, detail));
+        found.push(Finding::new(
+            "listening",
+            Status::Failure,
+            error.to_string(),
+        ));
     }
+    // What is to be changed comes last, where it is read first.
+    found.sort_by_key(|finding| finding.status);
     let ok = findings::are_ok(&found);
     if args.json {
         let document = Document {
@@ -69,7 +72,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             "the publisher fits".to_owned()
         } else {
             let wrong = found.iter().filter(|f| f.status == Status::Failure).count();
-            format!("{wrong} things to change")
+            format!("to change: {wrong}, see FAILURE")
         };
         output::line(&end).map_err(CommandError::failure)?;
     }

@@ -1,6 +1,6 @@
 //! What the frames say, field by field.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use vigil_blocks::SensorFrame;
 use vigil_evaluation::frames::{Field, Run, fields};
@@ -14,6 +14,9 @@ use crate::findings::{Finding, Status};
 const MOVING_M_S: f64 = 0.02;
 /// Frames with motion commanded from which a field that never changes is told.
 const MOVING_FRAMES_MIN: usize = 50;
+
+/// Largest yaw, rad: a publisher need not wrap it, but after so many turns it is no angle in rad.
+const YAW_MAX_RAD: f64 = 60.0;
 
 /// What one field held.
 #[derive(Debug, Clone, Copy, Default)]
@@ -97,12 +100,13 @@ fn judge(name: &str, field: Field, robot: &Description, of: Stretch, frames: usi
     }
     let largest = of.least.abs().max(of.most.abs());
     if let Some(limit) = limit(field, robot).filter(|limit| largest > *limit) {
-        let guess = unit_guess(field, largest);
+        let guess = unit_guess(field);
         let detail = format!("{detail}: beyond {limit:.3}, which the description allows{guess}");
         return told(Status::Failure, detail);
     }
-    let is_command = matches!(field, Field::Command(_));
-    if !is_command && of.moving >= MOVING_FRAMES_MIN && of.moving_least == of.moving_most {
+    // A steering angle may stay as it is in a steady curve.
+    let may_stay = matches!(field, Field::Command(_) | Field::Steer(_));
+    if !may_stay && of.moving >= MOVING_FRAMES_MIN && of.moving_least == of.moving_most {
         let detail = format!("{detail}: never changes, though motion is commanded");
         return told(Status::Warning, detail);
     }
@@ -115,19 +119,17 @@ fn limit(field: Field, robot: &Description) -> Option<f64> {
     match field {
         Field::Command(i) => robot.command.get(i).map(|axis| 1.001 * axis.limit),
         // A wrapped angle may be rounded up.
-        Field::Pose(2) | Field::Steer(_) => Some(PI + 1e-3),
+        Field::Steer(_) => Some(PI + 1e-3),
+        Field::Pose(2) => Some(YAW_MAX_RAD),
         Field::WheelRate(_) => Some(limits.wheel_rate_rad_s),
         Field::YawRate => Some(limits.yaw_rate_rad_s),
         Field::Pose(_) | Field::Current(_) => None,
     }
 }
 
-fn unit_guess(field: Field, largest: f64) -> &'static str {
+const fn unit_guess(field: Field) -> &'static str {
     match field {
-        Field::Pose(2) if largest <= 361.0 && largest > TAU + 0.01 => {
-            ". Looks like degrees: rad is wanted, wrapped to -pi to pi"
-        }
-        Field::Pose(2) => ". Wrap it to -pi to pi",
+        Field::Pose(2) => ": looks like degrees, rad is wanted",
         Field::Steer(_) => ". Looks like degrees: rad is wanted",
         Field::YawRate => ". Looks like degrees per second: rad/s is wanted",
         Field::WheelRate(_) => {
@@ -165,5 +167,101 @@ fn meaning(robot: &Description, frames: &[Arrived]) -> Finding {
                 "too little motion to judge units, signs and sides: drive a curve, and look longer";
             Finding::new("meaning", Status::Warning, detail)
         }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::path::PathBuf;
+
+    use vigil_blocks::Valid;
+
+    use super::*;
+
+    /// A recorded run without a fault, in a curve, as a good publisher would send it.
+    fn recorded() -> (Description, Vec<Arrived>) {
+        let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let robot = vigil_setup::load_robot(&root.join("config/robots/rover.toml")).unwrap();
+        let path = root.join("tests/data/rover/learn_frames.csv.gz");
+        let runs = vigil_evaluation::frames::read(&path, &robot).unwrap();
+        let arrived = |frame: &SensorFrame| Arrived {
+            now_ns: frame.header.t_capture_ns,
+            frame: *frame,
+        };
+        let frames = runs[1].frames.iter().map(arrived).collect();
+        (robot, frames)
+    }
+
+    /// What is found once every frame was changed.
+    fn found(change: impl Fn(&mut SensorFrame)) -> Vec<Finding> {
+        let (robot, mut frames) = recorded();
+        frames.iter_mut().for_each(|f| change(&mut f.frame));
+        findings(&robot, &frames)
+    }
+
+    /// The one finding that is not good: its name, how bad it is, and its text.
+    fn only_bad(change: impl Fn(&mut SensorFrame)) -> (String, Status, String) {
+        let mut bad = found(change);
+        bad.retain(|f| f.status != Status::Ok);
+        assert_eq!(bad.len(), 1, "{bad:?}");
+        let one = bad.remove(0);
+        (one.check, one.status, one.detail)
+    }
+
+    #[test]
+    fn a_good_publisher_has_nothing_but_good_findings() {
+        let found = found(|_| ());
+        assert!(found.iter().all(|f| f.status == Status::Ok), "{found:?}");
+        // Pose, command, six wheels, four steered, and what they mean together.
+        assert_eq!(found.len(), 3 + 2 + 6 + 4 + 1);
+    }
+
+    #[test]
+    fn a_field_that_is_missing_broken_or_still_is_told_under_its_name() {
+        let failure = |name: &str| (name.to_owned(), Status::Failure);
+        let of = |change: fn(&mut SensorFrame)| {
+            let (check, status, detail) = only_bad(change);
+            ((check, status), detail)
+        };
+        let (missing, detail) = of(|f| f.valid &= !Valid::steer(0));
+        assert_eq!(missing, failure("steer_LF"));
+        assert!(detail.starts_with("never marked as valid"), "{detail}");
+        let (broken, detail) = of(|f| f.wheel_rate[4] = f64::NAN);
+        assert_eq!(broken, failure("enc_RM"));
+        assert!(
+            detail.starts_with("NaN or infinite in 300 of 300"),
+            "{detail}"
+        );
+        let (degrees, detail) = of(|f| f.steer[3] = f.steer[3].to_degrees());
+        assert_eq!(degrees, failure("steer_RF"));
+        assert!(detail.contains("Looks like degrees"), "{detail}");
+    }
+
+    #[test]
+    fn what_the_fields_mean_together_is_told() {
+        let swapped = |f: &mut SensorFrame| {
+            for left in 0..3 {
+                f.wheel_rate.swap(left, left + 3);
+            }
+        };
+        let (check, status, detail) = only_bad(swapped);
+        assert_eq!((check.as_str(), status), ("meaning", Status::Failure));
+        assert!(
+            detail.starts_with("left wheels turn as right ones"),
+            "{detail}"
+        );
+        let millimetres = |f: &mut SensorFrame| {
+            f.pose[0] *= 1e3;
+            f.pose[1] *= 1e3;
+        };
+        let (check, _, detail) = only_bad(millimetres);
+        assert_eq!(check, "meaning");
+        assert!(detail.contains("x and y in mm"), "{detail}");
+        let still = |f: &mut SensorFrame| f.wheel_rate[2] = 1.25;
+        let bad = found(still);
+        let bad: Vec<_> = bad.iter().filter(|f| f.status != Status::Ok).collect();
+        assert_eq!(bad[0].check, "enc_LR");
+        assert!(bad[0].detail.ends_with("though motion is commanded"));
     }
 }

@@ -9,8 +9,11 @@ use vigil_cycle::datagrams::Datagrams;
 use vigil_cycle::port::{EventListener, Link};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::wake::{self, Inputs, Timer};
-use vigil_cycle::{Clock, Graph, InputAccount, Monotonic, PortError, Receiver, Topic, signal};
+use vigil_cycle::{
+    Clock, Graph, InputAccount, Monotonic, PortError, Receiver, Topic, Writer, signal,
+};
 use vigil_robot::FrameGuard;
+use vigil_sensor_sim::ArrivalClock;
 use vigil_setup::Setup;
 use vigil_setup::schema::Source;
 
@@ -18,14 +21,16 @@ use super::{Arrived, Heard};
 
 /// Frames that are kept.
 pub const FRAMES_MAX: usize = 500_000;
+/// Datagrams that are taken at once.
+const DATAGRAMS_MAX: usize = 64;
 /// Longest sleep, ns: a wish to stop is heard then.
 const SLEEP_NS: u64 = 50_000_000;
 
-/// Listens for `seconds`, or until a signal.
+/// Listens for `seconds`, or until a signal; what was heard, and why no more.
 ///
 /// # Errors
-/// The transport's, or that a socket cannot be bound.
-pub fn listen(setup: &Setup, seconds: f64) -> Result<Heard, PortError> {
+/// That there is no place for a graph.
+pub fn listen(setup: &Setup, seconds: f64) -> Result<(Heard, Option<PortError>), PortError> {
     let domain = setup.domain()?;
     // Held as long as this listens: no graph is started meanwhile.
     let lock = domain.lock().map_err(|e| PortError::setup("lock", &e))?;
@@ -35,19 +40,22 @@ pub fn listen(setup: &Setup, seconds: f64) -> Result<Heard, PortError> {
     };
     signal::install();
     let sign = if lock.is_some() {
+        domain
+            .tell_types()
+            .map_err(|e| PortError::setup("runtime folder", &e))?;
         Some(Sign::put(domain.processes_file())?)
     } else {
         None
     };
-    if setup.file.sensor.source == Source::Socket && lock.is_some() {
-        sockets(setup, seconds, &mut heard)?;
+    let listened = if setup.file.sensor.source == Source::Socket && lock.is_some() {
+        sockets(setup, seconds, &mut heard)
     } else {
-        topic(setup, seconds, &mut heard)?;
-    }
-    if sign.is_some() {
+        topic(setup, seconds, &mut heard)
+    };
+    if sign.is_some() && listened.is_ok() {
         domain.remove_residue();
     }
-    Ok(heard)
+    Ok((heard, listened.err()))
 }
 
 /// The file by which publishers know that a graph runs; taken away when dropped.
@@ -86,7 +94,10 @@ struct Guard {
 impl Guard {
     fn new(setup: &Setup) -> Self {
         Self {
-            account: InputAccount::of_outsider(),
+            account: InputAccount::of(match setup.file.sensor.source {
+                Source::Socket => Writer::Stranger,
+                _ => Writer::Publisher,
+            }),
             content: FrameGuard::new(&setup.robot),
             period_ns: setup.period_ns(),
         }
@@ -133,7 +144,10 @@ fn topic(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortError
     let mut border = Border::new(setup, &graph)?;
     while_it_lasts(seconds, &listener, heard, |heard| {
         border.look();
-        while frames.advance() {
+        for _ in 0..frames.buffer() {
+            if !frames.advance() {
+                break;
+            }
             let Some(frame) = frames.held() else { break };
             let now_ns = Monotonic.now_ns();
             guard.take(frame, now_ns);
@@ -159,15 +173,19 @@ fn sockets(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortErr
     let datagrams = Datagrams::bind(udp, unix.as_deref());
     let datagrams = datagrams.map_err(|e| PortError::setup("sensor.socket", &e))?;
     let datagrams = std::rc::Rc::new(datagrams);
-    let mut guard = Guard::new(setup);
+    let (mut guard, mut clock) = (Guard::new(setup), ArrivalClock::default());
     while_it_lasts(seconds, &datagrams, heard, |heard| {
         let mut buffer = [0; DATAGRAM_SIZE + 1];
-        while let Some((length, _)) = datagrams.receive(&mut buffer) {
+        for _ in 0..DATAGRAMS_MAX {
+            let Some((length, _)) = datagrams.receive(&mut buffer) else {
+                break;
+            };
             let now_ns = Monotonic.now_ns();
             match datagram::decode(&buffer[..length]) {
                 Ok(mut frame) => {
                     if frame.header.t_schedule_ns == 0 {
-                        frame.header.t_schedule_ns = now_ns;
+                        let (epoch, t_ns) = (frame.header.epoch, frame.header.t_capture_ns);
+                        frame.header.t_schedule_ns = clock.due_ns(epoch, t_ns, now_ns);
                     }
                     guard.take(&frame, now_ns);
                     heard.take(frame, now_ns);

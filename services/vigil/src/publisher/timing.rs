@@ -12,7 +12,7 @@ const JITTER_MAX: f64 = 0.25;
 /// Shortest time over which the rate of a clock is judged, s.
 const CLOCK_S_MIN: f64 = 2.0;
 /// A clock may be off by this share of time.
-const CLOCK_OFF_MAX: f64 = 1e-3;
+const CLOCK_OFF_MAX: f64 = 5e-4;
 
 /// Findings about the times of the frames; there is at least one frame.
 pub fn findings(rate_hz: f64, heard: &Heard) -> Vec<Finding> {
@@ -53,12 +53,8 @@ fn rate(expected_hz: f64, frames: &[Arrived]) -> Finding {
     if (found_hz / expected_hz - 1.0).abs() <= RATE_OFF_MAX {
         return Finding::new("rate", Status::Ok, detail);
     }
-    let round = if found_hz > 3.0 {
-        found_hz.round()
-    } else {
-        found_hz
-    };
-    let detail = format!("{detail}: start the graph with --rate {round}, or publish at that rate");
+    let advice = format!("start the graph with --rate {found_hz:.2}, or publish at that rate");
+    let detail = format!("{detail}: {advice}");
     Finding::new("rate", Status::Failure, detail)
 }
 
@@ -159,16 +155,14 @@ fn capture(frames: &[Arrived]) -> Finding {
     if off.abs() <= CLOCK_OFF_MAX {
         return Finding::new("capture clock", Status::Ok, detail);
     }
-    let what = if (theirs_s / ours_s * 1e3 - 1.0).abs() < 0.1 {
-        "is it in us? ns are wanted"
-    } else if (theirs_s / ours_s * 1e6 - 1.0).abs() < 0.1 {
-        "is it in ms? ns are wanted"
-    } else if (theirs_s / ours_s * 1e9 - 1.0).abs() < 0.1 {
-        "is it in s? ns are wanted"
-    } else {
-        "the filters believe it: a recording that is played at another speed, or a clock that is \
-         wrong"
-    };
+    let units = [(1e3, "us"), (1e6, "ms"), (1e9, "s")];
+    let is_unit = |(factor, _): &&(f64, &str)| (theirs_s / ours_s * factor - 1.0).abs() < 0.1;
+    if let Some((_, unit)) = units.iter().find(is_unit) {
+        let detail = format!("{detail}: it is in {unit}, ns are wanted");
+        return Finding::new("capture clock", Status::Failure, detail);
+    }
+    let what = "the filters believe it: a recording that is played at another speed, or a clock \
+                that is wrong";
     Finding::new(
         "capture clock",
         Status::Warning,
@@ -238,6 +232,6 @@ mod tests {
         let back = of(|k, f| f.frame.header.t_capture_ns -= 50 * MS * (k / 250));
         assert_eq!(status(&back, "capture clock"), failure);
         let micros = of(|_, f| f.frame.header.t_capture_ns /= 1000);
-        assert_eq!(status(&micros, "capture clock"), warning);
+        assert_eq!(status(&micros, "capture clock"), failure);
     }
 }

@@ -61,7 +61,12 @@ fn types(setup: &Setup) -> Finding {
     };
     let same = (found.type_name.as_str(), found.size, found.alignment) == (name, size, alignment);
     if same {
-        let detail = format!("{wanted}; iceoryx2 {}", found.version);
+        let (buffer, readers) = (found.buffer, found.max_subscribers);
+        let detail = format!(
+            "{wanted}; iceoryx2 {}; {buffer} frames may wait, {} publisher and {readers} readers \
+             are admitted",
+            found.version, found.max_publishers
+        );
         return Finding::new("type", Status::Ok, detail);
     }
     let mut differs = Vec::new();

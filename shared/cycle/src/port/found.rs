@@ -1,5 +1,8 @@
 //! What is there on the transport, whoever made it.
 
+use std::fmt;
+
+use iceoryx2::config::Config;
 use iceoryx2::prelude::*;
 use iceoryx2::service::static_config::messaging_pattern::MessagingPattern;
 
@@ -34,9 +37,13 @@ impl FoundTopic {
     /// [`PortError::Setup`] if they cannot be listed.
     pub fn all(domain: &Domain) -> Result<Vec<Self>, PortError> {
         set_log_level(LogLevel::Error);
-        let config = domain.transport_config()?;
+        Self::listed(&domain.transport_config()?)
+    }
+
+    /// The same by the transport's own settings.
+    pub(super) fn listed(config: &Config) -> Result<Vec<Self>, PortError> {
         let mut found = Vec::new();
-        ipc::Service::list(&config, |service| {
+        ipc::Service::list(config, |service| {
             let details = &service.static_details;
             if let MessagingPattern::PublishSubscribe(topic) = details.messaging_pattern() {
                 let payload = &topic.message_type_details().payload;
@@ -55,5 +62,15 @@ impl FoundTopic {
         })
         .map_err(|e| PortError::setup("list of topics", &e))?;
         Ok(found)
+    }
+}
+
+impl fmt::Display for FoundTopic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}, {} bytes, alignment {} (iceoryx2 {})",
+            self.type_name, self.size, self.alignment, self.version
+        )
     }
 }

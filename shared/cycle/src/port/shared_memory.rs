@@ -11,7 +11,7 @@ use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
 use vigil_blocks::Block;
 
-use super::{PortError, Receiver, Sender, Stamp, stamp_header};
+use super::{FoundTopic, PortError, Receiver, Sender, Stamp, stamp_header};
 use crate::clock::{Clock, Monotonic};
 use crate::domain::{Domain, Queues};
 use crate::topic::Topic;
@@ -101,11 +101,18 @@ impl Link {
     }
 
     fn open_error<T: Block>(&self, topic: Topic, cause: &impl std::fmt::Debug) -> PortError {
+        let path = topic.path(&self.graph);
+        let mut cause = format!("{cause:?}");
+        let found = FoundTopic::listed(self.node.config()).unwrap_or_default();
+        let other = |found: &&FoundTopic| found.path == path && found.type_name != T::TYPE_NAME;
+        if let Some(found) = found.iter().find(other) {
+            cause.push_str(&format!("; somebody has made it as {found}"));
+        }
         PortError::Open {
-            topic: topic.path(&self.graph),
+            topic: path,
             type_name: T::TYPE_NAME,
             size: size_of::<T>(),
-            cause: format!("{cause:?}"),
+            cause,
         }
     }
 

@@ -268,7 +268,7 @@ pub(super) fn columns(
     let content = fs::read(path).map_err(io)?;
     let stream = mcap::MessageStream::new(&content).map_err(|e| wrong(0, e.to_string()))?;
     let mut values = vec![Vec::new(); columns.len()];
-    let (mut row, mut others) = (0, Vec::<String>::new());
+    let (mut row, mut others, mut lacking) = (0, Vec::<String>::new(), None);
     for message in stream {
         let message = message.map_err(|e| wrong(row, e.to_string()))?;
         if message.channel.topic != topic {
@@ -282,32 +282,31 @@ pub(super) fn columns(
         let kind = schema.map_or("", |schema| schema.name.as_str());
         let decoded = Message::read(kind, &message.data).ok_or_else(|| {
             let known = KINDS.join(", ");
-            wrong(
-                row,
-                format!("{topic} has messages of '{kind}'; known are {known}"),
-            )
+            let found = format!("{topic} has messages of '{kind}'");
+            wrong(row, format!("{found}; known are {known}"))
         })?;
         let decoded = decoded.map_err(|e| wrong(row, format!("{topic}, {kind}: {e}")))?;
-        for (values, column) in values.iter_mut().zip(columns) {
-            let value = match column.as_str() {
-                "log_time" => Some(message.log_time as f64),
-                name => decoded.value(name),
-            };
-            let finite = value.filter(|value| value.is_finite());
-            values.push(finite.ok_or_else(|| {
-                wrong(
-                    row,
-                    format!("{topic}, {kind}: there is no finite '{column}'"),
-                )
-            })?);
+        let value = |column: &String| match column.as_str() {
+            "log_time" => Some(message.log_time as f64),
+            name => decoded.value(name).filter(|value| value.is_finite()),
+        };
+        match columns.iter().find(|column| value(column).is_none()) {
+            // Two programs may share a topic, each with joints of its own; a first message may hold
+            // nothing yet.
+            Some(column) => lacking = Some(format!("there is no finite '{column}' on {topic}")),
+            None => {
+                let found = columns.iter().filter_map(value);
+                values
+                    .iter_mut()
+                    .zip(found)
+                    .for_each(|(all, value)| all.push(value));
+            }
         }
     }
-    if row == 0 {
+    if values.iter().all(Vec::is_empty) {
         let others = others.join(", ");
-        return Err(wrong(
-            0,
-            format!("no message on {topic}; there are {others}"),
-        ));
+        let nothing = format!("no message on {topic}; there are {others}");
+        return Err(wrong(row, lacking.unwrap_or(nothing)));
     }
     Ok(values)
 }

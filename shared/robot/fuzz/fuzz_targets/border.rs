@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 use libfuzzer_sys::fuzz_target;
 use vigil_blocks::datagram::{self, DATAGRAM_SIZE};
 use vigil_blocks::{Block, SensorFrame, Valid};
-use vigil_cycle::InputAccount;
+use vigil_cycle::{InputAccount, Writer};
 use vigil_robot::frame_guard::{POSITION_MAX_M, STEER_MAX_RAD};
 use vigil_robot::{Description, FrameGuard};
 
@@ -32,7 +32,7 @@ fn mended(bytes: &[u8]) -> Vec<u8> {
 }
 
 fuzz_target!(|input: &[u8]| {
-    let mut account = InputAccount::of_outsider();
+    let mut account = InputAccount::of(Writer::Stranger);
     let Some(mut guard) = GUARD.clone() else {
         return;
     };

@@ -10,6 +10,9 @@ use crate::learned::Intake;
 pub const DEPTH: usize = 5;
 /// A pause between frames longer than this breaks the record, s.
 const GAP_S: f64 = 0.5;
+/// So many frames in a row that are not newer than the last one taken mean that the clock was set
+/// back: the next is taken, as after a gap.
+const STALE_MAX: u32 = 10;
 /// A frame that comes this part of a period early still completes an observation.
 const NEARLY: f64 = 0.5;
 /// Readings beyond so many times the robot's limits are garbage.
@@ -121,6 +124,8 @@ pub struct Observer {
     currents: [Mean; WHEELS],
     pose: Option<[f64; 3]>,
     pose_before: Option<[f64; 3]>,
+    /// Frames in a row that were not newer than the last one taken.
+    stale: u32,
 }
 
 impl Observer {
@@ -141,6 +146,7 @@ impl Observer {
             currents: [Mean::default(); WHEELS],
             pose: None,
             pose_before: None,
+            stale: 0,
         }
     }
 
@@ -159,7 +165,9 @@ impl Observer {
     pub fn push(&mut self, frame: &SensorFrame) -> Intake {
         let new_run = !self.started || frame.run_id != self.run_id;
         let t_ns = frame.header.t_capture_ns;
-        if !new_run && t_ns <= self.t_ns {
+        let is_stale = !new_run && t_ns <= self.t_ns;
+        self.stale = if is_stale { self.stale + 1 } else { 0 };
+        if is_stale && self.stale < STALE_MAX {
             return Intake {
                 invalid: true,
                 ..Intake::default()
@@ -168,9 +176,10 @@ impl Observer {
         let dt_s = if new_run {
             0.0
         } else {
-            (t_ns - self.t_ns) as f64 * 1e-9
+            t_ns.saturating_sub(self.t_ns) as f64 * 1e-9
         };
-        let broken = new_run || dt_s > GAP_S;
+        let broken = new_run || is_stale || dt_s > GAP_S;
+        self.stale = 0;
         if broken {
             self.begin();
         }

@@ -1,0 +1,164 @@
+//! Frames that arrive at real sockets, under the virtual clock: who is believed, and for how long.
+
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use std::net::UdpSocket;
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use vigil_blocks::{Block, Rejection, SensorFrame, datagram};
+use vigil_cycle::datagrams::Datagrams;
+use vigil_cycle::placement::{Wanted, read_back};
+use vigil_cycle::port::Bus;
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{
+    Clock, DeadlineMonitor, Graph, HealthBoard, OnMiss, Receiver, Schedule, Stage, StageCycle,
+    Topic, VirtualClock,
+};
+use vigil_sensor_sim::SocketStage;
+
+const PERIOD_NS: u64 = 10_000_000;
+const SCHEDULE: Schedule = Schedule {
+    period_ns: PERIOD_NS,
+    deadline_ns: PERIOD_NS,
+    budget_ns: PERIOD_NS,
+};
+
+/// The stage with its sockets, and a reader of what it publishes.
+struct Border {
+    clock: VirtualClock,
+    cycle: StageCycle,
+    stage: SocketStage,
+    published: Box<dyn Receiver<SensorFrame>>,
+    datagrams: Rc<Datagrams>,
+    file: PathBuf,
+}
+
+impl Border {
+    fn new(name: &str) -> Self {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let robot = vigil_setup::load_robot(&root.join("config/robots/rover.toml")).unwrap();
+        let clock = VirtualClock::default();
+        clock.set(60_000_000_000);
+        let graph = Graph::InProcess(Bus::new(clock.clone()));
+        let wanted = Wanted {
+            core: 0,
+            priority: 1,
+        };
+        let sender = graph.sender(Topic::Health(ServiceName::SensorSim)).unwrap();
+        let board = HealthBoard::new(sender, SCHEDULE, wanted, read_back(0));
+        let file = std::env::temp_dir().join(format!("{name}-{}.sock", std::process::id()));
+        // A port that is free, asked for by its number: such a one stays with the socket.
+        let free = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr();
+        let datagrams = Datagrams::bind(Some(free.unwrap()), Some(&file)).unwrap();
+        let datagrams = Rc::new(datagrams);
+        let published = graph.receiver(Topic::Sensor).unwrap();
+        let stage = SocketStage::new(Rc::clone(&datagrams), &robot, &graph).unwrap();
+        let cycle = StageCycle::new(DeadlineMonitor::new(SCHEDULE), board).unwrap();
+        Self {
+            clock,
+            cycle: cycle
+                .with_on_miss(OnMiss::Count)
+                .with_input_of(stage.writer()),
+            stage,
+            published,
+            datagrams,
+            file,
+        }
+    }
+
+    /// A period passes, then a turn; the runs of the frames that went out.
+    fn turn(&mut self) -> Vec<u64> {
+        let next = self.cycle.turn(&mut self.stage, &self.clock).unwrap();
+        assert!(next.is_continue());
+        let mut runs = Vec::new();
+        while self.published.advance() {
+            runs.push(self.published.held().unwrap().run_id);
+        }
+        self.clock.advance(PERIOD_NS);
+        runs
+    }
+
+    /// A frame of this epoch, due now.
+    fn frame(&self, epoch: u64, seq: u64) -> [u8; datagram::DATAGRAM_SIZE] {
+        let mut frame = SensorFrame {
+            run_id: 5,
+            ..SensorFrame::default()
+        };
+        frame.header.schema = SensorFrame::SCHEMA;
+        (frame.header.epoch, frame.header.seq) = (epoch, seq);
+        frame.header.t_schedule_ns = self.clock.now_ns();
+        frame.header.t_capture_ns = self.clock.now_ns();
+        datagram::encode(&frame)
+    }
+
+    fn rejected(&self, cause: Rejection) -> u64 {
+        self.cycle.health().view().rejected[cause as usize]
+    }
+}
+
+#[test]
+fn the_first_good_source_is_the_graphs_until_it_is_silent_for_a_second() {
+    let mut border = Border::new("source");
+    let to = border.datagrams.udp_address().unwrap();
+    let [first, other] = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
+    // Garbage makes nobody a source.
+    other.send_to(b"garbage", to).unwrap();
+    assert!(border.turn().is_empty());
+    assert_eq!(border.rejected(Rejection::Malformed), 1);
+    let run = 5 ^ 1 << 48;
+    first.send_to(&border.frame(1, 0), to).unwrap();
+    assert_eq!(border.turn(), [run]);
+    for seq in 1..50 {
+        // The kernel refuses it, or the stage.
+        let _ = other.send_to(&border.frame(2, seq), to);
+        first.send_to(&border.frame(1, seq), to).unwrap();
+        assert_eq!(border.turn(), [run]);
+    }
+    // Silent: for a second still the source.
+    for _ in 0..100 {
+        let _ = other.send_to(&border.frame(2, 50), to);
+        assert!(border.turn().is_empty());
+    }
+    border.turn();
+    // An old refusal may come back to the sender first.
+    let _ = other.send_to(&border.frame(2, 60), to);
+    other.send_to(&border.frame(2, 61), to).unwrap();
+    // A new start is a new run.
+    assert!(border.turn().contains(&(5 ^ 2 << 48)));
+}
+
+#[test]
+fn a_flood_by_udp_does_not_shut_out_a_source_on_the_unix_socket() {
+    let mut border = Border::new("flood");
+    let to = border.datagrams.udp_address().unwrap();
+    let flood = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let source = UnixDatagram::unbound().unwrap();
+    for seq in 0..100 {
+        for n in 0..100 {
+            let _ = flood.send_to(&border.frame(0, n), to);
+        }
+        source.send_to(&border.frame(1, seq), &border.file).unwrap();
+        assert_eq!(border.turn().len(), 1, "{seq}");
+    }
+    // From the first good frame on the kernel threw the others away.
+    assert!(border.rejected(Rejection::NoEpoch) <= 64);
+    assert!(border.rejected(Rejection::OtherWriter) <= 100);
+}
+
+#[test]
+fn frames_that_come_together_all_go_out() {
+    let mut border = Border::new("burst");
+    let source = UnixDatagram::unbound().unwrap();
+    let mut sent = Vec::new();
+    for seq in 0..8 {
+        sent.push(border.frame(1, seq));
+        border.clock.advance(PERIOD_NS);
+    }
+    for bytes in &sent {
+        source.send_to(bytes, &border.file).unwrap();
+    }
+    assert_eq!(border.turn().len(), 8);
+    assert_eq!(border.cycle.health().view().lost, 0);
+}
