@@ -1,11 +1,13 @@
-//! Whose miss is it? The machine's, if a canary was overdue for long enough at that time; else
+//! Whose miss is it? The machine's, if canaries were overdue for long enough at that time; else
 //! Vigil's own.
 //!
-//! A stall of the machine can come in one piece or in many: on a virtual machine whose host takes
-//! the processor away again and again, every wake-up of a canary is a millisecond late for tens of
-//! milliseconds. So the time counts in which a canary was overdue, beyond what nine of ten of its
-//! wake-ups keep to; that one wake-up alone was overdue for as long is told beside it. Instants
-//! that one answer has ended share its verdict: the first of them says how long it was due.
+//! A stall of the machine can come in one piece or in many, now on one core, now on the other: on a
+//! virtual machine whose host takes processors away again and again, every wake-up of a canary is
+//! late for tens of milliseconds. The chain passes over all its cores, one after the other, so the
+//! time counts in which a canary of any of them was overdue, beyond what nine of ten of its
+//! wake-ups keep to; time in which two were counts once. That one wake-up alone was overdue for as
+//! long is told beside it. Instants that one answer has ended share its verdict: the first of them
+//! says how long it was due.
 
 use vigil_cycle::canary::{Late, Seen};
 
@@ -23,7 +25,7 @@ pub struct Miss {
     pub t_done_ns: u64,
     /// How far past its deadline, ns.
     pub overrun_ns: u64,
-    /// True if a canary was overdue for half the overrun or more between schedule and end.
+    /// True if canaries were overdue for half the overrun or more between schedule and end.
     pub is_machine: bool,
     /// True if one wake-up of a canary in that time was late by as much.
     pub is_one_stall: bool,
@@ -67,15 +69,26 @@ impl<'a> Record<'a> {
             .filter(move |late| late.t_schedule_ns + late.late_ns >= from_ns)
     }
 
-    /// For each wake-up about that time, how long of it the canary was overdue beyond what is
-    /// usual, ns.
-    fn overdue_ns(&self, from_ns: u64, to_ns: u64) -> impl Iterator<Item = u64> {
-        self.about(from_ns, to_ns).map(move |late| {
+    /// For each wake-up about that time, when of it the canary was overdue beyond what is usual:
+    /// from, to, ns.
+    fn overdue(&self, from_ns: u64, to_ns: u64) -> impl Iterator<Item = [u64; 2]> {
+        self.about(from_ns, to_ns).filter_map(move |late| {
             let begin_ns = (late.t_schedule_ns + self.usual_ns).max(from_ns);
             let end_ns = (late.t_schedule_ns + late.late_ns).min(to_ns);
-            end_ns.saturating_sub(begin_ns)
+            (begin_ns < end_ns).then_some([begin_ns, end_ns])
         })
     }
+}
+
+/// How long at least one of these stretches of time lasted, ns.
+fn covered_ns(mut stretches: Vec<[u64; 2]>) -> u64 {
+    stretches.sort_unstable();
+    let (mut covered_ns, mut until_ns) = (0, 0);
+    for [from_ns, to_ns] in stretches {
+        covered_ns += to_ns.saturating_sub(from_ns.max(until_ns));
+        until_ns = until_ns.max(to_ns);
+    }
+    covered_ns
 }
 
 /// The cycles done more than `deadline_ns` after their schedule, each attributed.
@@ -86,10 +99,11 @@ pub fn misses(cycles: &[Cycle], deadline_ns: u64, canaries: &[Record<'_>]) -> Ve
     for answered in cycles.chunk_by(|a, b| a.t_done_ns == b.t_done_ns) {
         let (first, half_ns) = (answered[0], SHARE * overrun_ns(&answered[0]) as f64);
         let (from_ns, to_ns) = (first.t_schedule_ns, first.t_done_ns);
-        let overdue = |canary: &Record<'_>| canary.overdue_ns(from_ns, to_ns).sum::<u64>();
-        let longest = |canary: &Record<'_>| canary.overdue_ns(from_ns, to_ns).max().unwrap_or(0);
-        let is_machine = canaries.iter().any(|c| overdue(c) as f64 >= half_ns);
-        let is_one_stall = canaries.iter().any(|c| longest(c) as f64 >= half_ns);
+        let overdue = canaries.iter().flat_map(|c| c.overdue(from_ns, to_ns));
+        let overdue: Vec<[u64; 2]> = overdue.collect();
+        let longest_ns = overdue.iter().map(|[from, to]| to - from).max();
+        let is_one_stall = longest_ns.unwrap_or(0) as f64 >= half_ns;
+        let is_machine = covered_ns(overdue) as f64 >= half_ns;
         let late = answered.iter().filter(|cycle| overrun_ns(cycle) > 0);
         found.extend(late.map(|cycle| Miss {
             t_schedule_ns: cycle.t_schedule_ns,
@@ -126,8 +140,16 @@ mod tests {
             late(70_000, 700),
             late(71_000, 700),
             late(72_000, 700),
+            late(95_000, 350),
+            late(96_000, 350),
         ];
-        let second = [late(30_000, 150), late(80_000, 540), late(92_000, 650)];
+        let second = [
+            late(30_000, 150),
+            late(70_300, 600),
+            late(80_000, 540),
+            late(92_000, 650),
+            late(95_200, 350),
+        ];
         let canaries = [Record::new(&first, 50), Record::new(&second, 50)];
         let cycles = [
             cycle(0, 900),        // in time
@@ -136,11 +158,13 @@ mod tests {
             cycle(29_000, 2_000), // a canary was late, by too little
             cycle(52_000, 3_000), // the end of a long stall
             cycle(55_000, 3_000), // after it
-            cycle(69_500, 4_000), // 3000 over, in three pieces
+            cycle(69_500, 4_000), // 3000 over, in pieces
             cycle(80_000, 2_000), // enough but for what is usual
             cycle(90_000, 3_500),
             cycle(91_000, 2_500),
             cycle(92_000, 1_500),
+            cycle(94_800, 2_701), // 1701 over: 300 + 300 + 300, 100 of them twice
+            cycle(94_900, 2_600), // the same of 1600
         ];
         let found = misses(&cycles, 1_000, &canaries);
         let told: Vec<_> = found
@@ -159,6 +183,8 @@ mod tests {
             (90_000, 2_500, false, false),
             (91_000, 1_500, false, false),
             (92_000, 500, false, false),
+            (94_800, 1_701, false, false),
+            (94_900, 1_600, true, false),
         ];
         assert_eq!(told, expected);
     }

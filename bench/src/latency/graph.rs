@@ -131,7 +131,7 @@ impl Prepared {
     pub fn canaries(&self, seconds: f64) -> Result<Vec<Canary>, PortError> {
         let highest = self.wanted().iter().map(|w| w.priority).max().unwrap_or(0);
         let priority = highest.max(1) + 1;
-        let period_ns = (self.setup.period_ns() / 4).clamp(100_000, 1_000_000);
+        let period_ns = (self.setup.period_ns() / 8).clamp(100_000, 1_000_000);
         let capacity = (seconds * 1e9 / period_ns as f64).ceil() as usize;
         let start = |core| Canary::start(Wanted { core, priority }, period_ns, capacity);
         self.cores().into_iter().map(start).collect()

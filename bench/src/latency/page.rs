@@ -62,11 +62,12 @@ const ABOUT: &str = "<p>Every latency counts from the instant at which the cycle
     out as warm-up. <em>Hand-over</em> is the part in which no stage computes: waking up and \
     passing on, four times. <em>Floor</em> is the same part of four processes on the same cores, \
     with the same priorities and block sizes, that do nothing but hand over by a futex, measured \
-    before and after the graph in the same cell. A missed deadline is the <em>machine's</em> if a \
-    canary, a thread that does nothing but be on time on each core, one priority above the graph, \
-    was overdue, beyond what nine of ten of its wake-ups keep to, for half the overrun or more \
-    between schedule and \
-    end; else it is Vigil's <em>own</em>.</p>\n";
+    before and after the graph in the same cell. Canaries are threads that do nothing but be on \
+    time, one on each core, one priority above the graph. A missed deadline is the \
+    <em>machine's</em> if canaries were overdue, beyond what nine of ten of their wake-ups keep \
+    to, for half the overrun or more between schedule and end (time in which two were overdue \
+    counts once, as the chain passes over their cores in turn); else it is Vigil's \
+    <em>own</em>.</p>\n";
 
 const ALL_CELLS: &str = "Times in us. Ratio: hand-over against the floor, median and 99th \
     percentile. Canary: wake-ups of the canaries, in a million, that would have missed the \
