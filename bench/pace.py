@@ -11,23 +11,14 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 
-import iceoryx2
-
 import recording
-import vigil_types as vigil
+from joining import join, sensor
 
 graph, hz, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
-frames, publisher = list(recording.frames(ROOT / "tests/data/rover/learn_frames.csv.gz", 0)), None
-while publisher is None:
-    try:
-        node = iceoryx2.NodeBuilder.new().config(vigil.transport(graph)).create(iceoryx2.ServiceType.Ipc)
-        topic = node.service_builder(iceoryx2.ServiceName.new(f"vigil/{graph}/sensor"))
-        bell = topic.event().open().notifier_builder().create()
-        publisher = topic.publish_subscribe(vigil.SensorFrame).open().publisher_builder().create()
-    except (FileNotFoundError, iceoryx2.EventOpenError, iceoryx2.PublishSubscribeOpenError) as error:
-        if "DoesNotExist" not in str(error):
-            raise
-        time.sleep(0.1)
+frames = list(recording.frames(ROOT / "tests/data/rover/learn_frames.csv.gz", 0))
+node, (publisher, bell) = join(graph, sensor)
+# All readers are there before the first frame: none is lost unseen.
+time.sleep(2)
 epoch = due = time.monotonic_ns()
 late_us = []
 for seq in range(round(hz * seconds)):

@@ -1,19 +1,20 @@
 // Sends a recorded drive to a graph with `--source socket`. Rows of tests/data/rover on standard input:
-//   c++ -std=c++17 publisher.cpp -o publisher && zcat FRAMES.csv.gz | grep '^3,' | ./publisher
+//   c++ -std=c++17 publisher.cpp -o publisher && zcat FRAMES.csv.gz | grep '^3,' | ./publisher [PORT]
 #include "vigil_types.h"
 
 #include <arpa/inet.h>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <thread>
 
-int main() {
+int main(int count, char **words) {
   using namespace std::chrono;
   const int to = socket(AF_INET, SOCK_DGRAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
-  address.sin_port = htons(7401);
+  address.sin_port = htons(count > 1 ? std::atoi(words[1]) : 7401);
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   const int steered[4] = {0, 2, 3, 5};  // LF, LR, RF, RR of LF LM LR RF RM RR
   std::puts("sending at 20 Hz; scripts/up shows 'alarm' and 'diagnosis' when the wheel sticks");

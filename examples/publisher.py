@@ -7,25 +7,14 @@ python3 publisher.py FRAMES.csv.gz RUN [HZ] [GRAPH]
 import sys
 import time
 
-import iceoryx2
-
 import recording
-import vigil_types as vigil
+from joining import join, sensor
 
 path, run = sys.argv[1], int(sys.argv[2])
 hz = float(sys.argv[3]) if len(sys.argv) > 3 else 20.0
 graph = sys.argv[4] if len(sys.argv) > 4 else "rover"
-frames, publisher = list(recording.frames(path, run)), None
-while publisher is None:
-    try:
-        node = iceoryx2.NodeBuilder.new().config(vigil.transport(graph)).create(iceoryx2.ServiceType.Ipc)
-        topic = node.service_builder(iceoryx2.ServiceName.new(f"vigil/{graph}/sensor"))
-        bell = topic.event().open().notifier_builder().create()
-        publisher = topic.publish_subscribe(vigil.SensorFrame).open().publisher_builder().create()
-    except (FileNotFoundError, iceoryx2.EventOpenError, iceoryx2.PublishSubscribeOpenError) as error:
-        if "DoesNotExist" not in str(error):
-            raise SystemExit(f"{error}: {vigil.difference(vigil.SensorFrame, graph)}")
-        time.sleep(0.1)
+frames = list(recording.frames(path, run))
+node, (publisher, bell) = join(graph, sensor)
 print(f"publishing {len(frames)} frames at {hz} Hz; scripts/up shows 'alarm' and 'diagnosis'")
 epoch = due = time.monotonic_ns()
 for seq, frame in enumerate(frames):

@@ -1,8 +1,7 @@
 //! Publishes a recorded drive into a running graph, through shared memory:
 //! `publisher FRAMES.csv.gz RUN`, after `scripts/up --source external --rate 20`.
 
-use std::error::Error;
-use std::path::Path;
+use std::{error::Error, path::Path};
 
 use vigil_blocks::SensorFrame;
 use vigil_cycle::port::Link;
@@ -18,7 +17,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let setup = args.load()?;
     let runs = frames::read(Path::new(&path), &setup.robot)?;
     let run = runs.iter().find(|r| r.id == run).ok_or("no such run")?;
-    let graph = Graph::SharedMemory(Link::join(&setup.domain()?, "publisher")?);
+    let domain = setup.domain()?;
+    while !domain.processes_file().exists() {
+        clock::sleep_until(Monotonic.now_ns() + 100_000_000);
+    }
+    let graph = Graph::SharedMemory(Link::join(&domain, "publisher")?);
     let mut sender = graph.sender::<SensorFrame>(Topic::Sensor)?;
     println!("publishing; scripts/up shows 'alarm' and 'diagnosis'");
     let mut t_schedule_ns = Monotonic.now_ns();

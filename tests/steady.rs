@@ -113,11 +113,11 @@ fn demand_steady(setup: &Setup) {
         DetectorStage::new(detector, &setup.robot, &graph).unwrap(),
     );
     let identifier = vigil_identifier::assemble(setup).unwrap();
-    let identifier = IdentifierStage::new(identifier, &setup.robot, &graph, period_ns).unwrap();
+    let identifier = IdentifierStage::new(identifier, &setup.robot, &graph).unwrap();
     let mut identifier = (stage(Identifier), identifier);
     let supervisor = vigil_supervisor::assemble(setup).unwrap();
     let validity_ns = vigil_supervisor::validity_ns(setup);
-    let supervisor = SupervisorStage::new(supervisor, &graph, period_ns, validity_ns).unwrap();
+    let supervisor = SupervisorStage::new(supervisor, &graph, validity_ns).unwrap();
     let mut supervisor = (stage(Supervisor), supervisor);
     clock.set(period_ns);
     detector.0.ready(&clock).unwrap();

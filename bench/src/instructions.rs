@@ -73,10 +73,10 @@ impl InProcess {
         let (monitor, board) = parts(&setup, &graph, SensorSim)?;
         let detector = DetectorStage::new(vigil_detector::assemble(&setup)?, &setup.robot, &graph)?;
         let identifier = vigil_identifier::assemble(&setup)?;
-        let identifier = IdentifierStage::new(identifier, &setup.robot, &graph, period_ns)?;
+        let identifier = IdentifierStage::new(identifier, &setup.robot, &graph)?;
         let supervisor = vigil_supervisor::assemble(&setup)?;
         let validity_ns = vigil_supervisor::validity_ns(&setup);
-        let supervisor = SupervisorStage::new(supervisor, &graph, period_ns, validity_ns)?;
+        let supervisor = SupervisorStage::new(supervisor, &graph, validity_ns)?;
         clock.set(period_ns);
         let mut found = Self {
             sensor: (SourceCycle::new(monitor, board, period_ns)?, sensor),

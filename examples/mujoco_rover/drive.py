@@ -22,6 +22,7 @@ import vigil_types as vigil
 try:
     import iceoryx2
     import numpy
+    from joining import join, sensor
     from rover import NOISE, NOISE_HZ, STEERED, WHEELS, Rover, planned
 except ModuleNotFoundError as error:
     raise SystemExit(f"{error}: pip install iceoryx2==0.10.0 mujoco==4.0.0")
@@ -32,20 +33,10 @@ KINDS = {value: name[9:].lower() for name, value in vars(vigil).items() if name.
 DRIVING = ("go_on", "slow_down", "compensate", "ignore_encoder", "go_through", "move_away")
 
 
-def join(graph):
-    """Node, publisher of frames, its bell, and subscriber to actions; waits for the graph."""
-    while True:
-        try:
-            node = iceoryx2.NodeBuilder.new().config(vigil.transport(graph)).create(iceoryx2.ServiceType.Ipc)
-            topic = lambda name: node.service_builder(iceoryx2.ServiceName.new(f"vigil/{graph}/{name}"))
-            actions = topic("action").publish_subscribe(vigil.Action).open().subscriber_builder().create()
-            bell = topic("sensor").event().open().notifier_builder().create()
-            publisher = topic("sensor").publish_subscribe(vigil.SensorFrame).open().publisher_builder().create()
-            return node, publisher, bell, actions
-        except (FileNotFoundError, iceoryx2.EventOpenError, iceoryx2.PublishSubscribeOpenError) as error:
-            if "DoesNotExist" not in str(error):
-                raise SystemExit(f"{error}: {vigil.difference(vigil.SensorFrame, graph)}")
-            time.sleep(0.1)
+def ports(topic):
+    """Publisher of frames, its bell, and subscriber to actions."""
+    actions = topic("action").publish_subscribe(vigil.Action).open().subscriber_builder().create()
+    return *sensor(topic), actions
 
 
 class Obedience:
@@ -95,16 +86,16 @@ def typed():
 
 
 def drive(options, rover, viewer):
-    node, publisher, bell, actions = join(options.graph)
+    node, (publisher, bell, actions) = join(options.graph, ports)
     obedience, random = Obedience(actions), numpy.random.default_rng(options.seed)
     noise = NOISE * math.sqrt(options.hz / NOISE_HZ)
-    period, plan_s, seq, pending = round(1e9 / options.hz), 0.0, 0, list(options.breaks)
+    period, plan_s, seq, skipped, pending = round(1e9 / options.hz), 0.0, 0, 0, list(options.breaks)
     began = due = time.monotonic_ns()
     print("drives; type `stuck RM` or `clear RM`", flush=True)
     while (t := (due - began) * 1e-9) < options.seconds:
         # A period that was slept through gets no frame, but the world goes on.
         step = max(1, (time.monotonic_ns() - due) // period) * period
-        due, seconds = due + step, step * 1e-9
+        due, seconds, skipped = due + step, step * 1e-9, skipped + step // period - 1
         pending += typed()
         for at, what, wheel in [change for change in pending if change[0] <= t]:
             pending.remove((at, what, wheel))
@@ -131,7 +122,7 @@ def drive(options, rover, viewer):
         if seq % 100 == 0:
             # Raises FileNotFoundError once the graph has ended.
             vigil.runtime_folder(options.graph)
-    print(f"{seq} frames")
+    print(f"{seq} frames; {skipped} periods were slept through")
 
 
 def main():

@@ -3,8 +3,11 @@
 import json
 import os
 import pathlib
+import shutil
+import socket
 import subprocess
 import sys
+import tempfile
 import time
 import uuid
 
@@ -37,10 +40,18 @@ class Graph:
     def __init__(self, *options):
         self.name = f"py{os.getpid()}-{uuid.uuid4().hex[:6]}"
         self.options = options
-        self.summary = None
+        # A port of its own: another graph may be taking datagrams on this machine.
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+            free.bind(("127.0.0.1", 0))
+            self.udp_port = free.getsockname()[1]
 
     def __enter__(self):
-        command = [BINARIES / "vigil-launcher", "--json", "--config", ROOT / "config" / "rover.toml"]
+        self.folder = tempfile.TemporaryDirectory()
+        config = pathlib.Path(self.folder.name) / "config"
+        shutil.copytree(ROOT / "config", config)
+        with open(config / "rover.toml", "a") as file:
+            file.write(f'\n[sensor.socket]\nudp = "127.0.0.1:{self.udp_port}"\n')
+        command = [BINARIES / "vigil-launcher", "--json", "--config", config / "rover.toml"]
         command += ["--graph", self.name, *self.options]
         self.launcher = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         return self
@@ -57,6 +68,16 @@ class Graph:
             except FileNotFoundError:
                 time.sleep(0.05)
         raise TimeoutError("the graph did not come up")
+
+    def wait_for_socket(self):
+        """Until it takes datagrams; the path of its Unix socket."""
+        address = self.wait_until_up() / "sensor.sock"
+        until = time.monotonic() + WATCHDOG_S
+        while not address.exists():
+            assert self.launcher.poll() is None, self.launcher.stderr.read()
+            assert time.monotonic() < until, "the socket did not appear"
+            time.sleep(0.02)
+        return address
 
     def finish(self):
         """Waits for the end; the summary."""
@@ -77,6 +98,7 @@ class Graph:
             except subprocess.TimeoutExpired:
                 self.launcher.kill()
                 self.launcher.communicate()
+        self.folder.cleanup()
 
 
 def events(summary, kind):

@@ -72,9 +72,7 @@ class Guard(unittest.TestCase):
     def test_every_cause_is_counted_at_the_socket(self):
         expected = {}
         with Graph("--source", "socket", "--rate", str(RATE_HZ)) as graph:
-            address = graph.wait_until_up() / "sensor.sock"
-            while not address.exists():
-                self.assertIsNone(graph.launcher.poll())
+            address = graph.wait_for_socket()
             to = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
             self.addCleanup(to.close)
             source = Source(lambda frame: to.sendto(vigil.datagram(frame), str(address)))
@@ -105,9 +103,7 @@ class Guard(unittest.TestCase):
 
     def test_a_source_of_garbage_is_quarantined_and_comes_back(self):
         with Graph("--source", "socket", "--rate", str(RATE_HZ)) as graph:
-            address = graph.wait_until_up() / "sensor.sock"
-            while not address.exists():
-                self.assertIsNone(graph.launcher.poll())
+            address = graph.wait_for_socket()
             to = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
             self.addCleanup(to.close)
             source = Source(lambda frame: to.sendto(vigil.datagram(frame), str(address)))
@@ -122,20 +118,10 @@ class Guard(unittest.TestCase):
         self.assertTrue(any("source in quarantine" in what for what in told), told)
 
     def test_both_readers_refuse_what_comes_through_shared_memory(self):
-        import iceoryx2
+        from joining import join, sensor
 
         with Graph("--source", "external", "--rate", str(RATE_HZ)) as graph:
-            graph.wait_until_up()
-            publisher = None
-            while publisher is None:
-                try:
-                    config = vigil.transport(graph.name)
-                    node = iceoryx2.NodeBuilder.new().config(config).create(iceoryx2.ServiceType.Ipc)
-                    topic = node.service_builder(iceoryx2.ServiceName.new(f"vigil/{graph.name}/sensor"))
-                    bell = topic.event().open().notifier_builder().create()
-                    publisher = topic.publish_subscribe(vigil.SensorFrame).open().publisher_builder().create()
-                except (iceoryx2.EventOpenError, iceoryx2.PublishSubscribeOpenError):
-                    time.sleep(0.05)
+            node, (publisher, bell) = join(graph.name, sensor)
 
             def send(frame):
                 frame.header.schema = vigil.SensorFrame.SCHEMA
@@ -151,7 +137,7 @@ class Guard(unittest.TestCase):
                 source.good()
                 expected[cause] = expected.get(cause, 0) + (2 if cause == "jump" else 1)
             summary = graph.stop()
-            del publisher, bell, topic, node
+            del publisher, bell, node
         for name in ["detector", "identifier"]:
             self.assertEqual(summary["services"][name]["rejected"], expected, name)
         self.assertGreater(summary["services"]["supervisor"]["cycles"], 300)

@@ -3,6 +3,7 @@ what breaks in it and is obeyed."""
 
 import importlib.util
 import math
+import re
 import subprocess
 import sys
 import unittest
@@ -71,6 +72,10 @@ class ClosedLoop(unittest.TestCase):
         self.assertIn("RM_STUCK", events(summary, "diagnosis"))
         detector = summary["services"]["detector"]
         self.assertEqual((detector["lost"], detector["rejected"]), (0, {}))
+        frames, slept = map(int, re.search(r"(\d+) frames; (\d+) periods were slept through", done.stdout).groups())
+        self.assertEqual(frames + slept, 15 * RATE_HZ)
+        # The first few may come before the detector is there.
+        self.assertGreater(detector["cycles"], 0.9 * frames)
         # It drove until the wheel broke, and counter-steered after that.
         before, after = done.stdout.split("s: stuck RM\n")
         self.assertIn("obeys go_on:", before)

@@ -36,9 +36,7 @@ class Publishers(unittest.TestCase):
     def test_python_through_the_unix_socket(self):
         # At the recording's own rate: due times are found from its capture times.
         with Graph("--source", "socket", "--rate", "20") as graph:
-            socket = graph.wait_until_up() / "sensor.sock"
-            while not socket.exists():
-                self.assertIsNone(graph.launcher.poll())
+            socket = graph.wait_for_socket()
             self.run_to_its_end(publisher("socket_publisher.py", FRAMES, STUCK_RUN, 20, socket))
             self.assert_found(graph.stop(), "sensor-sim")
 
@@ -50,10 +48,8 @@ class Publishers(unittest.TestCase):
             rows = subprocess.run(["zcat", FRAMES], check=True, capture_output=True, text=True).stdout
             rows = "".join(row + "\n" for row in rows.split("\n") if row.startswith(f"{STUCK_RUN},"))
             with Graph("--source", "socket", "--rate", "20") as graph:
-                socket = graph.wait_until_up() / "sensor.sock"
-                while not socket.exists():
-                    self.assertIsNone(graph.launcher.poll())
-                subprocess.run([program], input=rows, text=True, check=True, timeout=60, stdout=subprocess.DEVNULL)
+                graph.wait_for_socket()
+                subprocess.run([program, str(graph.udp_port)], input=rows, text=True, check=True, timeout=60, stdout=subprocess.DEVNULL)
                 self.assert_found(graph.stop(), "sensor-sim")
 
     def test_a_publisher_of_another_version_is_told_so(self):
@@ -61,7 +57,7 @@ class Publishers(unittest.TestCase):
         text = code + (EXAMPLES / "publisher.py").read_text()
         with Graph("--source", "external") as graph, tempfile.TemporaryDirectory() as folder:
             graph.wait_until_up()
-            for name in ["recording.py", "vigil_types.py"]:
+            for name in ["joining.py", "recording.py", "vigil_types.py"]:
                 (pathlib.Path(folder) / name).write_text((EXAMPLES / name).read_text())
             file = pathlib.Path(folder) / "publisher.py"
             file.write_text(text)
@@ -91,6 +87,36 @@ class CheckPublisher(unittest.TestCase):
         found = self.status(document)
         self.assertTrue(document["ok"], document)
         self.assertEqual([found[check] for check in ["type", "frames", "refused", "rate", "gaps"]], 5 * ["ok"])
+
+    def test_a_good_publisher_fits_where_there_is_no_graph(self):
+        name = f"py{os.getpid()}-alone"
+        process = publisher("publisher.py", FRAMES, STUCK_RUN, RATE_HZ, name)
+        document = self.check(name, "--source", "external", "--rate", str(RATE_HZ))
+        self.run_it(process)
+        self.assertTrue(document["ok"], document)
+
+    def test_beside_a_graph_it_knows_how_that_was_started(self):
+        with Graph("--source", "external", "--rate", "50") as graph:
+            process = publisher("publisher.py", FRAMES, STUCK_RUN, 50, graph.name)
+            graph.wait_until_up()
+            document = self.check(graph.name)
+            self.run_it(process)
+        self.assertTrue(document["ok"], document)
+
+    def test_an_epoch_for_each_frame_is_told(self):
+        text = (EXAMPLES / "publisher.py").read_text().replace("seq = epoch, seq", "seq = epoch + seq, seq")
+        with Graph("--source", "external", "--rate", str(RATE_HZ)) as graph, tempfile.TemporaryDirectory() as folder:
+            for name in ["joining.py", "recording.py", "vigil_types.py"]:
+                (pathlib.Path(folder) / name).write_text((EXAMPLES / name).read_text())
+            file = pathlib.Path(folder) / "publisher.py"
+            file.write_text(text)
+            command = [sys.executable, file, FRAMES, str(STUCK_RUN), str(RATE_HZ), graph.name]
+            process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+            graph.wait_until_up()
+            document = self.check(graph.name)
+            self.run_it(process)
+        self.assertEqual(self.status(document)["starts"], "failure")
+        self.assertEqual(self.status(document)["refused: other-writer"], "failure")
 
     def run_it(self, process):
         process.terminate()

@@ -73,9 +73,12 @@ class Ros(unittest.TestCase):
             folder = pathlib.Path(folder)
             with Writer(folder / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
                 open_topics = {}
-                for row in rows():
+                for i, row in enumerate(rows()):
                     for topic, message in messages(row):
                         kind = message.__msgtype__
+                        if topic == "/joint_states" and i == 100:
+                            # As from another program that knows other joints.
+                            message.name[0] = "arm"
                         if topic not in open_topics:
                             open_topics[topic] = writer.add_connection(topic, kind, typestore=STORE)
                         t_ns = round((1000.0 + float(row["t"])) * 1e9)
@@ -85,18 +88,20 @@ class Ros(unittest.TestCase):
             done = vigil("import", *arguments, "--json")
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(len(json.loads(done.stdout)["runs"]), 1)
+            lacking = "messages on /joint_states have no finite 'velocity[LF_wheel]'"
+            self.assertIn(f"1 of {len(rows())} {lacking}", done.stderr)
             with open(out) as file:
                 imported = list(csv.DictReader(file))
             driven = rows()
             self.assertAlmostEqual(len(imported), len(driven), delta=2)
-            # The same values, a frame later or earlier at most.
+            # The same values, a frame later or earlier at most, or held over the message that was lacking.
             for column in driven[0]:
                 if column in ("run", "t"):
                     continue
                 ours = [float(row[column]) for row in imported]
                 theirs = [float(row[column]) for row in driven]
                 for i, value in enumerate(ours):
-                    near = theirs[max(0, i - 1) : i + 2]
+                    near = theirs[max(0, i - 2) : i + 2]
                     self.assertTrue(any(abs(value - other) < 2e-4 for other in near), (column, i, value, near))
 
     def test_the_bridge_maps_messages_to_a_frame(self):

@@ -1,10 +1,13 @@
 //! What a flood of frames from a stranger costs: nothing is wanted.
 //!
 //! A publisher sends frames to the graph's UDP socket on its schedule; in one half of each pair
-//! another process sends good frames to it from another port, as fast as it can.
+//! another process sends good frames as fast as it can: to the graph's Unix socket, from where
+//! each has to be read and refused, or to the same socket from another port, where the kernel
+//! throws them away.
 
 use std::error::Error;
 use std::net::UdpSocket;
+use std::os::unix::net::UnixDatagram;
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
 use std::sync::Arc;
@@ -12,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use vigil_bench::latency::graph::{Change, Prepared, root};
 use vigil_bench::latency::halves::{self, Half};
 use vigil_bench::latency::load::{Load, Running};
@@ -34,6 +37,15 @@ const HEAD_START: Duration = Duration::from_secs(2);
 /// Datagrams between two looks at whether to stop.
 const BATCH: usize = 100;
 
+/// Where the flood arrives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Through {
+    /// At the Unix socket.
+    Unix,
+    /// At the publisher's UDP socket.
+    Udp,
+}
+
 /// Measures in interleaved pairs.
 #[derive(Debug, Parser)]
 #[command(name = "scripts/bench flood")]
@@ -50,6 +62,9 @@ struct Args {
     /// Load beside the graph.
     #[arg(long, default_value = "keep-awake")]
     load: Load,
+    /// Where the flood arrives.
+    #[arg(long, default_value = "unix")]
+    through: Through,
 }
 
 fn main() -> ExitCode {
@@ -64,7 +79,10 @@ fn main() -> ExitCode {
 
 /// Sends good frames to `address` as fast as it can.
 fn flood(address: &str) -> Result<(), Box<dyn Error>> {
-    let socket = UdpSocket::bind("127.0.0.1:0")?;
+    let udp = UdpSocket::bind("127.0.0.1:0")?;
+    let unix = UnixDatagram::unbound()?;
+    // One that waits for room is no flood.
+    unix.set_nonblocking(true)?;
     let mut frame = SensorFrame::default();
     frame.header.schema = SensorFrame::SCHEMA;
     frame.header.epoch = Monotonic.now_ns();
@@ -74,7 +92,12 @@ fn flood(address: &str) -> Result<(), Box<dyn Error>> {
             frame.header.seq += 1;
             frame.header.t_capture_ns = Monotonic.now_ns();
             // Refused by the kernel, or not: all the same to a flood.
-            let _ = socket.send_to(&datagram::encode(&frame), address);
+            let bytes = datagram::encode(&frame);
+            let _ = if address.contains('/') {
+                unix.send_to(&bytes, address)
+            } else {
+                udp.send_to(&bytes, address)
+            };
         }
     }
     Ok(())
@@ -86,11 +109,15 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let result = measure(args, &folder);
     let _ = std::fs::remove_dir_all(&folder);
     let (n, seconds, rate, load) = (args.pairs, args.seconds, args.rate, args.load.name());
+    let (through, socket) = match args.through {
+        Through::Unix => ("unix", "the graph's Unix socket"),
+        Through::Udp => ("udp", "the same socket from another port"),
+    };
     let about = format!(
-        "`scripts/bench flood --pairs {n} --seconds {seconds} --rate {rate} --load \
-         {load}`\n\nFrames by UDP; with a second sender that floods the socket from another port."
+        "`scripts/bench flood --pairs {n} --seconds {seconds} --rate {rate} --load {load} \
+         --through {through}`\n\nFrames by UDP; with a second sender that floods {socket}."
     );
-    halves::archive("flood", &about, &result?)
+    halves::archive(&format!("flood-{through}"), &about, &result?)
 }
 
 fn measure(args: &Args, folder: &Path) -> Result<Vec<[Half; 2]>, Box<dyn Error>> {
@@ -109,7 +136,15 @@ fn measure(args: &Args, folder: &Path) -> Result<Vec<[Half; 2]>, Box<dyn Error>>
 
 fn half(args: &Args, prepared: &Prepared, with: bool) -> Result<Half, Box<dyn Error>> {
     let setup = prepared.setup();
-    let address = setup.file.sensor.socket.udp.clone();
+    let socket = &setup.file.sensor.socket;
+    let address = socket.udp.clone();
+    let flooded = match args.through {
+        Through::Udp => address.clone(),
+        Through::Unix => {
+            let path = setup.domain()?.folder().join(&socket.unix);
+            path.display().to_string()
+        }
+    };
     let robot = &setup.robot;
     let runs = frames::read(&root().join("tests/data/rover/learn_frames.csv.gz"), robot)?;
     let recorded = runs
@@ -124,7 +159,7 @@ fn half(args: &Args, prepared: &Prepared, with: bool) -> Result<Half, Box<dyn Er
             publisher = Some(Publisher::start(recorded, address, setup.period_ns())?);
             since = Instant::now();
         } else if with && flooding.is_none() && since.elapsed() > HEAD_START {
-            flooding = Some(Flooding::start(&address)?);
+            flooding = Some(Flooding::start(&flooded)?);
         }
         Ok(())
     })?;

@@ -11,8 +11,9 @@ use vigil_bench::latency::graph::{Change, Prepared, root};
 use vigil_bench::latency::load::{Load, Running};
 use vigil_setup::schema::Source;
 
-/// A run is longer than the publisher's by this, s: the graph ends after it.
-const AFTER_S: f64 = 1.0;
+/// A run is longer than the publisher's by this, s: the publisher waits for all readers to be
+/// there, and the graph ends after it.
+const AROUND_S: f64 = 4.0;
 
 /// Runs the graph with a publisher in Python.
 #[derive(Debug, Parser)]
@@ -37,6 +38,9 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+    if !root().join(&args.python).exists() {
+        return Err(format!("there is no {}: scripts/test makes one", args.python).into());
+    }
     let folder = std::env::temp_dir().join(format!("vigil-publishers-{}", std::process::id()));
     std::fs::create_dir_all(&folder)?;
     let rows: Result<Vec<Value>, Box<dyn Error>> = args
@@ -97,7 +101,7 @@ fn one(args: &Args, rate_hz: f64, folder: &Path) -> Result<Value, Box<dyn Error>
     let prepared = Prepared::new(change, folder)?;
     let load = Running::start(args.load, &prepared.cores(), folder, None)?;
     let mut told = Value::Null;
-    let summary = prepared.run_beside(args.seconds + AFTER_S, || {
+    let summary = prepared.run_beside(args.seconds + AROUND_S, || {
         let output = Command::new(root().join(&args.python))
             .arg(root().join("bench/pace.py"))
             .arg(&prepared.setup().file.graph.name)

@@ -44,6 +44,9 @@ pub fn be_flood(config: Option<&String>) -> Result<(), Box<dyn Error>> {
             }
         }
     }
-    domain.remove_residue();
+    // Unless the next graph runs already.
+    if let Some(_lock) = domain.lock()? {
+        domain.remove_residue();
+    }
     Ok(())
 }

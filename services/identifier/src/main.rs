@@ -32,10 +32,8 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let plan = setup.plan(ServiceName::Identifier, args.leave());
-    let period_ns = setup.period_ns();
-    let build = |graph: &_| {
-        IdentifierStage::new(identifier, &setup.robot, graph, period_ns).map_err(ServeError::from)
-    };
+    let build =
+        |graph: &_| IdentifierStage::new(identifier, &setup.robot, graph).map_err(ServeError::from);
     match serve::stage::<DetectionBelief, _>(&plan, Topic::Detection, build) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -31,7 +31,8 @@ pub struct IdentifierStage {
     /// Epoch of the last frame that was stepped.
     epoch: u64,
     pending: VecDeque<SensorFrame>,
-    period_ns: u64,
+    /// Epoch and sequence number of the last detection that was taken.
+    detection: (u64, u64),
     belief: Box<dyn Sender<FaultBelief>>,
     particles: Box<dyn Sender<ParticleBlock>>,
     reported: Reported,
@@ -50,8 +51,7 @@ struct Reported {
 }
 
 impl IdentifierStage {
-    /// Opens the identifier's ports on `graph`, for frames of `robot` and a schedule of
-    /// `period_ns`.
+    /// Opens the identifier's ports on `graph`, for frames of `robot`.
     ///
     /// # Errors
     /// The transport's.
@@ -59,7 +59,6 @@ impl IdentifierStage {
         identifier: Diagnoser,
         robot: &Description,
         graph: &Graph,
-        period_ns: u64,
     ) -> Result<Self, PortError> {
         Ok(Self {
             identifier,
@@ -70,7 +69,7 @@ impl IdentifierStage {
             guard: FrameGuard::new(robot),
             epoch: 0,
             pending: VecDeque::with_capacity(PENDING_MAX),
-            period_ns,
+            detection: (0, 0),
             belief: graph.sender(Topic::Diagnosis)?,
             particles: graph.sender(Topic::DiagnosisParticles)?,
             reported: Reported::default(),
@@ -78,7 +77,7 @@ impl IdentifierStage {
         })
     }
 
-    fn take_frames(&mut self, now_ns: u64) {
+    fn take_frames(&mut self, intake: &Intake<'_>) {
         for _ in 0..self.frames.buffer() {
             if !self.frames.advance() {
                 break;
@@ -87,10 +86,7 @@ impl IdentifierStage {
                 break;
             };
             let (account, content) = (&mut self.frame_account, || self.guard.check(frame));
-            if account
-                .admit::<SensorFrame>(&frame.header, now_ns, self.period_ns, content)
-                .is_taken()
-            {
+            if intake.admit_further::<SensorFrame>(account, &frame.header, content) {
                 if self.pending.len() == PENDING_MAX {
                     self.pending.pop_front();
                 }
@@ -105,12 +101,12 @@ impl IdentifierStage {
             .position(|frame| (frame.header.epoch, frame.header.seq) == (epoch, seq))
     }
 
-    /// Steps the frames up to `wanted`, the one behind the held detection; false if it was lost on
-    /// its way here.
-    fn step_held(&mut self, wanted: (u64, u64), now_ns: u64) -> bool {
+    /// Steps the frames up to `wanted`, the one behind the held detection, of which the detector
+    /// has folded `count`; false if it was lost on its way here.
+    fn step_held(&mut self, wanted: (u64, u64), count: usize, intake: &Intake<'_>) -> bool {
         if self.position(wanted).is_none() {
             // It was published before its detection, but perhaps after the frames were taken.
-            self.take_frames(now_ns);
+            self.take_frames(intake);
         }
         let (Some(last), Some(detection)) = (self.position(wanted), self.detections.held()) else {
             return false;
@@ -125,7 +121,9 @@ impl IdentifierStage {
             }
         }
         let particles = self.detected.held().filter(|p| p.cause == detection.cause);
-        for (i, frame) in self.pending.drain(..=last).enumerate() {
+        // Frames before those that it has folded, it has refused: by a clock that is not this one's.
+        let refused = (last + 1).saturating_sub(count);
+        for (i, frame) in self.pending.drain(..=last).enumerate().skip(refused) {
             let detection = particles.filter(|_| i == last).map(|p| (detection, p));
             let input = Input {
                 frame: &frame,
@@ -152,7 +150,7 @@ const fn precedes(a: &Cause, b: &Cause) -> bool {
 
 impl Stage for IdentifierStage {
     fn take(&mut self, intake: &mut Intake<'_>) {
-        self.take_frames(intake.now_ns());
+        self.take_frames(intake);
         for _ in 0..self.detections.buffer() {
             if !self.detections.advance() {
                 break;
@@ -161,11 +159,20 @@ impl Stage for IdentifierStage {
                 break;
             };
             let (header, cause) = (detection.header, detection.cause);
+            if !intake.accept::<DetectionBelief>(&header) {
+                continue;
+            }
+            let newest = (header.epoch, header.seq);
+            let before = std::mem::replace(&mut self.detection, newest);
+            // Nobody knows what a detection that was lost on its way has folded.
+            let is_next = newest == (before.0, before.1 + 1);
+            let folded = if is_next {
+                cause.count as usize
+            } else {
+                PENDING_MAX
+            };
             let identity = (cause.frame_epoch, cause.frame_seq);
-            if intake.accept::<DetectionBelief>(&header)
-                && cause.kind() == Some(CauseKind::Frame)
-                && self.step_held(identity, intake.now_ns())
-            {
+            if cause.kind() == Some(CauseKind::Frame) && self.step_held(identity, folded, intake) {
                 intake.stepped(&header, identity);
             }
         }

@@ -43,7 +43,7 @@ impl Counters {
         self.missed += health.missed;
         self.over_budget += health.over_budget;
         self.slips += health.slips;
-        self.lost = self.lost.saturating_add(health.lost);
+        self.lost += health.lost;
         self.late += health.late;
         self.duplicate += health.duplicate;
         self.invalid += health.invalid;

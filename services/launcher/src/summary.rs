@@ -194,7 +194,7 @@ fn service(
         wake_up_us: of(|r| r.wake_up.percentiles),
         step_us: of(|r| r.step.percentiles),
         from_schedule_us: of(|r| r.from_schedule.percentiles),
-        page_faults: report.map(|r| r.page_faults),
+        page_faults: report.and_then(|r| r.page_faults),
     }
 }
 

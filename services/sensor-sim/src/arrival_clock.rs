@@ -1,5 +1,7 @@
 //! When a frame of a publisher with a clock of its own was due, by this machine's clock.
 
+use vigil_blocks::Header;
+
 /// The publisher's clock may run slower than ours by this share.
 const DRIFT_MAX: f64 = 5e-4;
 /// A frame that seems to be held up by more than this, ns, tells that the clock runs otherwise.
@@ -7,7 +9,7 @@ const HELD_UP_MAX_NS: i128 = 1_000_000_000;
 
 /// Places capture times of another clock on ours: by the shortest way that a frame ever took, so
 /// that a frame held up on its way still counts from when it was due.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct ArrivalClock {
     known: Option<Known>,
 }
@@ -21,10 +23,17 @@ struct Known {
 }
 
 impl ArrivalClock {
-    /// When the frame of `epoch` captured at `t_capture_ns` of its clock, which arrived at
-    /// `now_ns` of ours, was due on ours, ns: never later than it arrived.
-    pub fn due_ns(&mut self, epoch: u64, t_capture_ns: u64, now_ns: u64) -> u64 {
-        let seen_ns = i128::from(now_ns) - i128::from(t_capture_ns);
+    /// Dates a frame that is here at `now_ns`, if its publisher has left that to us; the clock as
+    /// this frame makes it. Of the frames of its epoch that are here, the newest was captured at
+    /// `newest_capture_ns`: none can have been held up for longer than that one says.
+    #[must_use]
+    pub fn date(self, header: &mut Header, newest_capture_ns: u64, now_ns: u64) -> Self {
+        if header.t_schedule_ns != 0 {
+            return self;
+        }
+        let (epoch, t_capture_ns) = (header.epoch, header.t_capture_ns);
+        let newest_ns = newest_capture_ns.max(t_capture_ns);
+        let seen_ns = i128::from(now_ns) - i128::from(newest_ns);
         let offset_ns = match self.known {
             Some(known) if known.epoch == epoch && known.t_capture_ns <= t_capture_ns => {
                 let elapsed_ns = (t_capture_ns - known.t_capture_ns) as f64;
@@ -37,12 +46,14 @@ impl ArrivalClock {
             }
             _ => seen_ns,
         };
-        self.known = Some(Known {
-            epoch,
-            t_capture_ns,
-            offset_ns,
-        });
-        u64::try_from(i128::from(t_capture_ns) + offset_ns).unwrap_or(0)
+        header.t_schedule_ns = u64::try_from(i128::from(t_capture_ns) + offset_ns).unwrap_or(0);
+        Self {
+            known: Some(Known {
+                epoch,
+                t_capture_ns,
+                offset_ns,
+            }),
+        }
     }
 }
 
@@ -52,13 +63,53 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
+    /// When a frame was due that has come alone, and was taken.
+    fn due_ns(clock: &mut ArrivalClock, epoch: u64, t_capture_ns: u64, now_ns: u64) -> u64 {
+        let mut header = Header {
+            epoch,
+            t_capture_ns,
+            ..Header::default()
+        };
+        *clock = clock.date(&mut header, t_capture_ns, now_ns);
+        header.t_schedule_ns
+    }
+
     #[test]
     fn frames_that_were_held_up_count_from_when_they_were_due() {
         let mut clock = ArrivalClock::default();
         // Ten milliseconds apart on their clock; the third and the fourth come together.
         let arrivals = [(10, 1000), (20, 1010), (30, 1031), (40, 1031), (50, 1040)];
-        let due = arrivals.map(|(capture, now)| clock.due_ns(1, capture * MS, now * MS) / MS);
+        let due = arrivals.map(|(capture, now)| due_ns(&mut clock, 1, capture * MS, now * MS) / MS);
         assert_eq!(due, [1000, 1010, 1020, 1030, 1040]);
+    }
+
+    #[test]
+    fn frames_that_come_together_are_as_far_apart_as_they_were_captured_from_the_first_on() {
+        let mut clock = ArrivalClock::default();
+        let due = [10, 20, 30].map(|capture| {
+            let mut header = Header {
+                epoch: 1,
+                t_capture_ns: capture * MS,
+                ..Header::default()
+            };
+            clock = clock.date(&mut header, 30 * MS, 1000 * MS);
+            header.t_schedule_ns / MS
+        });
+        assert_eq!(due, [980, 990, 1000]);
+    }
+
+    #[test]
+    fn a_frame_that_was_not_taken_changes_nothing() {
+        let mut clock = ArrivalClock::default();
+        assert_eq!(due_ns(&mut clock, 1, 10 * MS, 1000 * MS), 1000 * MS);
+        // Of another epoch, and from the future of its own clock.
+        let mut foreign = Header {
+            epoch: 2,
+            t_capture_ns: 90 * MS,
+            ..Header::default()
+        };
+        let _ = clock.date(&mut foreign, 90 * MS, 1001 * MS);
+        assert_eq!(due_ns(&mut clock, 1, 20 * MS, 1015 * MS) / MS, 1010);
     }
 
     #[test]
@@ -66,7 +117,7 @@ mod tests {
         let mut clock = ArrivalClock::default();
         for k in 1..=10_000_u64 {
             let (now_ns, capture_ns) = (k * 100 * MS, k * 50 * MS);
-            let due_ns = clock.due_ns(1, capture_ns, now_ns);
+            let due_ns = due_ns(&mut clock, 1, capture_ns, now_ns);
             assert!(due_ns <= now_ns && now_ns - due_ns <= 1000 * MS, "{k}");
         }
     }
@@ -78,14 +129,14 @@ mod tests {
         for k in 1..=36_000_u64 {
             // An hour at 10 Hz; their clock is 400 ppm slower.
             let (now_ns, capture_ns) = (k * 100 * MS, k * 100 * MS - k * 40_000);
-            let due_ns = clock.due_ns(1, capture_ns, now_ns);
+            let due_ns = due_ns(&mut clock, 1, capture_ns, now_ns);
             assert!(due_ns <= now_ns);
             worst_ns = worst_ns.max(now_ns - due_ns);
         }
         assert!(worst_ns < MS, "{worst_ns}");
-        assert_eq!(clock.due_ns(2, 5, 7_000), 7_000);
+        assert_eq!(due_ns(&mut clock, 2, 5, 7_000), 7_000);
         // Set back: as if it began anew.
-        assert_eq!(clock.due_ns(2, 4, 9_000), 9_000);
-        assert_eq!(clock.due_ns(3, u64::MAX, 9_000), 9_000);
+        assert_eq!(due_ns(&mut clock, 2, 4, 9_000), 9_000);
+        assert_eq!(due_ns(&mut clock, 3, u64::MAX, 9_000), 9_000);
     }
 }

@@ -32,10 +32,9 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let plan = setup.plan(ServiceName::Supervisor, args.leave());
-    let (period_ns, validity_ns) = (setup.period_ns(), validity_ns(&setup));
-    let build = |graph: &_| {
-        SupervisorStage::new(supervisor, graph, period_ns, validity_ns).map_err(ServeError::from)
-    };
+    let validity_ns = validity_ns(&setup);
+    let build =
+        |graph: &_| SupervisorStage::new(supervisor, graph, validity_ns).map_err(ServeError::from);
     match serve::stage::<FaultBelief, _>(&plan, Topic::Diagnosis, build) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

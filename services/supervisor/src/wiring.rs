@@ -16,7 +16,6 @@ pub struct SupervisorStage {
     detection_account: InputAccount,
     detection: Box<DetectionBelief>,
     detection_is_new: bool,
-    period_ns: u64,
     validity_ns: u64,
     action: Box<dyn Sender<Action>>,
     decided: Decided,
@@ -38,12 +37,7 @@ impl SupervisorStage {
     ///
     /// # Errors
     /// The transport's.
-    pub fn new(
-        supervisor: Supervisor,
-        graph: &Graph,
-        period_ns: u64,
-        validity_ns: u64,
-    ) -> Result<Self, PortError> {
+    pub fn new(supervisor: Supervisor, graph: &Graph, validity_ns: u64) -> Result<Self, PortError> {
         Ok(Self {
             supervisor,
             diagnoses: graph.receiver(Topic::Diagnosis)?,
@@ -51,7 +45,6 @@ impl SupervisorStage {
             detection_account: InputAccount::default(),
             detection: Box::default(),
             detection_is_new: false,
-            period_ns,
             validity_ns,
             action: graph.sender(Topic::Action)?,
             decided: Decided::default(),
@@ -59,7 +52,7 @@ impl SupervisorStage {
         })
     }
 
-    fn take_detections(&mut self, now_ns: u64) {
+    fn take_detections(&mut self, intake: &Intake<'_>) {
         for _ in 0..self.detections.buffer() {
             if !self.detections.advance() {
                 break;
@@ -68,8 +61,9 @@ impl SupervisorStage {
                 break;
             };
             let account = &mut self.detection_account;
-            let arrival = account.arrive::<DetectionBelief>(&block.header, now_ns, self.period_ns);
-            if arrival.is_taken() && block.cause.kind() == Some(CauseKind::Frame) {
+            let is_taken =
+                intake.admit_further::<DetectionBelief>(account, &block.header, || Ok(()));
+            if is_taken && block.cause.kind() == Some(CauseKind::Frame) {
                 *self.detection = *block;
                 self.detection_is_new = true;
             }
@@ -79,7 +73,7 @@ impl SupervisorStage {
 
 impl Stage for SupervisorStage {
     fn take(&mut self, intake: &mut Intake<'_>) {
-        self.take_detections(intake.now_ns());
+        self.take_detections(intake);
         for _ in 0..self.diagnoses.buffer() {
             if !self.diagnoses.advance() {
                 break;

@@ -175,7 +175,7 @@ impl HealthBoard {
     /// Adds what the account of a further input says.
     pub fn add_input(&mut self, account: &InputAccount) {
         let health = &mut self.block;
-        health.lost = health.lost.saturating_add(account.lost);
+        health.lost += account.lost;
         health.duplicate += account.duplicate;
         health.invalid += account.invalid;
         for (sum, count) in health.rejected.iter_mut().zip(account.rejected) {

@@ -11,15 +11,16 @@ const AHEAD_PERIODS_MAX: u64 = 2;
 /// A scheduled instant may lie this far in the past, ns: older blocks are not of this drive, or of
 /// another clock.
 const BEHIND_NS_MAX: u64 = 10_000_000_000;
-/// Another writer is believed once the known one has been silent for so many periods.
-const SILENT_PERIODS: u64 = 2;
 /// A sequence number that is further ahead is not believed.
 const STEP_MAX: u64 = 1_000_000;
-/// Once nothing was taken for so long, ns, a lower sequence number is a new start: of a counter
-/// that wraps around, or of a device that always has the same epoch.
-const RESTART_NS: u64 = 1_000_000_000;
+/// Once nothing was taken for so long, ns, a source is silent: another one is believed, and a lower
+/// or far higher sequence number is a new start, of a counter that wraps around or of a device that
+/// always has the same epoch.
+const SILENT_NS: u64 = 1_000_000_000;
 /// Blocks closer to the last one than this part of a period are more than the schedule allows.
 const EARLY_PERIOD_PART: u64 = 4;
+/// So many blocks are taken at once, whenever they say that they were due: those that have waited.
+const BURST_MAX: u64 = 256;
 /// A source that misbehaved in so many of its last [`HISTORY`] blocks is not trusted.
 const MISBEHAVED_MAX: u32 = 8;
 /// Blocks that are remembered; it is trusted again after so many good ones in a row.
@@ -63,7 +64,9 @@ pub enum Writer {
 struct Last {
     epoch: u64,
     seq: u64,
-    /// When a block of it was taken last, and for when that was due, ns.
+    /// When its first block came, ns.
+    started_ns: u64,
+    /// When a block was taken last, and for when that was due, ns.
     taken_ns: u64,
     t_schedule_ns: u64,
 }
@@ -76,6 +79,8 @@ pub struct InputAccount {
     /// Whether the last blocks were misbehaviour, the newest in the lowest bit.
     misbehaved: u32,
     is_quarantined: bool,
+    /// What has been taken is what the schedule allows up to then, ns.
+    paced_ns: u64,
     /// Blocks lost, by gaps in the sequence.
     pub lost: u64,
     /// Blocks seen before, or older than one seen before.
@@ -103,12 +108,6 @@ impl InputAccount {
         self.is_quarantined
     }
 
-    /// When a block was taken last, ns; `None` before the first.
-    #[must_use]
-    pub fn taken_ns(&self) -> Option<u64> {
-        self.last.map(|last| last.taken_ns)
-    }
-
     /// Accounts a block by its header, at `now_ns`, for a schedule of `period_ns`.
     pub fn arrive<T: Block>(&mut self, header: &Header, now_ns: u64, period_ns: u64) -> Arrival {
         self.admit::<T>(header, now_ns, period_ns, || Ok(()))
@@ -127,33 +126,40 @@ impl InputAccount {
             good => good,
         };
         if let Arrival::AfterGap(lost) = arrival {
-            // A stranger may claim any number.
-            self.lost = self.lost.saturating_add(lost);
+            self.lost += lost;
         }
         // It has arrived, whatever it says: the next one is not after a gap.
         let last = self.last.get_or_insert(Last {
             epoch: header.epoch,
             seq: header.seq,
+            started_ns: now_ns,
             taken_ns: now_ns,
             t_schedule_ns: 0,
         });
         (last.epoch, last.seq) = (header.epoch, header.seq);
         if arrival == Arrival::NewEpoch {
-            last.t_schedule_ns = 0;
-            (self.misbehaved, self.is_quarantined) = (0, false);
+            (last.started_ns, last.t_schedule_ns) = (now_ns, 0);
+            // Another start is no other source: only silence makes its misdeeds forgotten.
+            if now_ns.saturating_sub(last.taken_ns) > SILENT_NS {
+                (self.misbehaved, self.is_quarantined) = (0, false);
+            }
         }
         if let Err(rejection) = content() {
             return self.reject(rejection);
         }
         if self.writer != Writer::Service {
             let earliest_ns = last.t_schedule_ns + period_ns / EARLY_PERIOD_PART;
-            if last.t_schedule_ns > 0 && header.t_schedule_ns < earliest_ns {
+            let is_too_soon = last.t_schedule_ns > 0 && header.t_schedule_ns < earliest_ns;
+            if is_too_soon || self.paced_ns > now_ns {
                 return self.reject(Rejection::Early);
             }
             self.remember(false);
             if self.is_quarantined {
                 return self.reject(Rejection::Quarantined);
             }
+            let spacing_ns = period_ns / EARLY_PERIOD_PART;
+            let burst_ns = (BURST_MAX - 1) * spacing_ns;
+            self.paced_ns = self.paced_ns.max(now_ns.saturating_sub(burst_ns)) + spacing_ns;
         }
         if let Some(last) = &mut self.last {
             (last.taken_ns, last.t_schedule_ns) = (now_ns, header.t_schedule_ns);
@@ -193,22 +199,27 @@ impl InputAccount {
         let Some(last) = self.last else {
             return Arrival::Next;
         };
-        let silent_ns = now_ns.saturating_sub(last.taken_ns);
+        let is_silent = now_ns.saturating_sub(last.taken_ns) > SILENT_NS;
         if header.epoch != last.epoch {
-            let is_alive = silent_ns < SILENT_PERIODS * period_ns && !self.is_quarantined;
-            return if self.writer == Writer::Stranger && is_alive {
-                Arrival::Rejected(Rejection::OtherWriter)
-            } else {
+            let is_believed = match self.writer {
+                Writer::Service => true,
+                // The transport says that the one before is gone; but nobody starts anew each time.
+                Writer::Publisher => now_ns.saturating_sub(last.started_ns) > SILENT_NS,
+                Writer::Stranger => is_silent,
+            };
+            return if is_believed {
                 Arrival::NewEpoch
+            } else {
+                Arrival::Rejected(Rejection::OtherWriter)
             };
         }
+        let starts_again = self.writer != Writer::Service && is_silent;
         match header.seq.checked_sub(last.seq) {
-            None if self.writer != Writer::Service && silent_ns > RESTART_NS => Arrival::NewEpoch,
-            None => Arrival::Rejected(Rejection::WrongSequence),
             Some(0) => Arrival::Rejected(Rejection::Repeated),
             Some(1) => Arrival::Next,
-            Some(steps) if steps > STEP_MAX => Arrival::Rejected(Rejection::WrongSequence),
-            Some(steps) => Arrival::AfterGap(steps - 1),
+            Some(steps) if steps <= STEP_MAX => Arrival::AfterGap(steps - 1),
+            _ if starts_again => Arrival::NewEpoch,
+            _ => Arrival::Rejected(Rejection::WrongSequence),
         }
     }
 
@@ -257,13 +268,15 @@ mod tests {
         use Rejection::{Repeated, WrongSequence};
         for writer in [Writer::Service, Writer::Publisher, Writer::Stranger] {
             let mut a = InputAccount::of(writer);
+            // Another start is believed at once, or after a second.
+            let later = if writer == Writer::Service { 6 } else { 1006 };
             assert_eq!(at(&mut a, (7, 3, 1)), Arrival::Next);
             assert_eq!(at(&mut a, (7, 4, 2)), Arrival::Next);
             assert_eq!(at(&mut a, (7, 4, 3)), Arrival::Rejected(Repeated));
             assert_eq!(at(&mut a, (7, 8, 4)), Arrival::AfterGap(3));
             assert_eq!(at(&mut a, (7, 6, 5)), Arrival::Rejected(WrongSequence));
-            assert_eq!(at(&mut a, (8, 0, 6)), Arrival::NewEpoch);
-            assert_eq!(at(&mut a, (8, 1, 7)), Arrival::Next);
+            assert_eq!(at(&mut a, (8, 0, later)), Arrival::NewEpoch);
+            assert_eq!(at(&mut a, (8, 1, later + 1)), Arrival::Next);
             assert_eq!((a.lost, a.duplicate, a.invalid), (3, 2, 0));
             let counted = [Repeated, WrongSequence].map(|r| a.rejected[r as usize]);
             assert_eq!(counted, [1, 1]);
@@ -317,16 +330,20 @@ mod tests {
         let other = Arrival::Rejected(Rejection::OtherWriter);
         assert_eq!(at(&mut a, (9, 0, 2)), other);
         assert_eq!(at(&mut a, (7, 1, 2)), Arrival::Next);
-        assert_eq!(at(&mut a, (9, 1, 3)), other);
-        assert_eq!(at(&mut a, (9, 2, 4)), Arrival::NewEpoch);
-        assert_eq!(at(&mut a, (7, 2, 5)), other);
+        assert_eq!(at(&mut a, (9, 1, 1002)), other);
+        assert_eq!(at(&mut a, (9, 2, 1003)), Arrival::NewEpoch);
+        assert_eq!(at(&mut a, (7, 2, 1004)), other);
         // For one that starts anew in shared memory there is the transport's word that the old one
-        // is gone.
-        for writer in [Writer::Service, Writer::Publisher] {
-            let mut a = InputAccount::of(writer);
-            assert_eq!(at(&mut a, (7, 0, 1)), Arrival::Next);
-            assert_eq!(at(&mut a, (9, 0, 1)), Arrival::NewEpoch);
+        // is gone: only who starts anew again and again is not believed.
+        let mut a = InputAccount::of(Writer::Publisher);
+        assert_eq!(at(&mut a, (7, 0, 1)), Arrival::Next);
+        assert_eq!(at(&mut a, (7, 1, 1001)), Arrival::Next);
+        assert_eq!(at(&mut a, (8, 0, 1001)), other);
+        assert_eq!(at(&mut a, (8, 0, 1002)), Arrival::NewEpoch);
+        for k in 1003..=2002 {
+            assert_eq!(at(&mut a, (k, 0, k)), other);
         }
+        assert_eq!(at(&mut a, (9, 0, 2003)), Arrival::NewEpoch);
     }
 
     #[test]
@@ -339,10 +356,39 @@ mod tests {
         }
         assert_eq!(at(&mut a, (1, 1000, 1002)), Arrival::NewEpoch);
         assert_eq!(at(&mut a, (1, 1001, 1003)), Arrival::Next);
-        // A number far ahead is not believed, and spoils nothing.
+        // A number far ahead is not believed at once either, and spoils nothing.
         assert_eq!(at(&mut a, (1, 1 << 63, 1004)), wrong);
         assert_eq!(at(&mut a, (1, 1003, 1005)), Arrival::AfterGap(1));
+        assert_eq!(at(&mut a, (1, 1 << 63, 2005)), wrong);
+        assert_eq!(at(&mut a, (1, 1 << 63, 2006)), Arrival::NewEpoch);
         assert_eq!(a.lost, 1);
+    }
+
+    #[test]
+    fn no_more_than_a_burst_is_taken_at_once_whenever_it_says_that_it_was_due() {
+        let mut a = InputAccount::of(Writer::Publisher);
+        let mut sent = 0;
+        let mut taken_at = |now_ns: u64, count: u64| {
+            let mut taken = 0;
+            for _ in 0..count {
+                sent += 1;
+                let header = Header {
+                    schema: SensorFrame::SCHEMA,
+                    epoch: 1,
+                    seq: sent,
+                    t_schedule_ns: START_NS - 9_000_000_000 + sent * PERIOD_NS / 4,
+                    ..Header::default()
+                };
+                let arrival = a.arrive::<SensorFrame>(&header, now_ns, PERIOD_NS);
+                taken += u64::from(arrival.is_taken());
+            }
+            taken
+        };
+        assert_eq!(taken_at(START_NS, 1000), BURST_MAX);
+        assert_eq!(taken_at(START_NS + PERIOD_NS / 4 - 1, 1000), 0);
+        assert_eq!(taken_at(START_NS + PERIOD_NS / 4, 1000), 1);
+        assert_eq!(taken_at(START_NS + 5 * PERIOD_NS, 1000), 19);
+        assert_eq!(taken_at(START_NS + 1000 * PERIOD_NS, 1000), BURST_MAX);
     }
 
     #[test]

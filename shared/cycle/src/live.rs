@@ -29,8 +29,8 @@ pub enum Ended {
 pub struct Run {
     /// Why it ended.
     pub ended: Ended,
-    /// Minor and major page faults in the steady state.
-    pub page_faults: [u64; 2],
+    /// Minor and major page faults in the steady state; `None` if it was never reached.
+    pub page_faults: Option<[u64; 2]>,
 }
 
 /// Counts page faults from the end of the warm-up on.
@@ -49,9 +49,11 @@ impl SteadyFaults {
 
     fn run(&self, ended: Ended) -> Run {
         let after = page_faults();
-        let before = self.before.unwrap_or(after);
-        let page_faults = [after[0] - before[0], after[1] - before[1]];
-        Run { ended, page_faults }
+        let since = |before: [u64; 2]| [after[0] - before[0], after[1] - before[1]];
+        Run {
+            ended,
+            page_faults: self.before.map(since),
+        }
     }
 }
 

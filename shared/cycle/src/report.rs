@@ -29,8 +29,9 @@ pub struct RunReport {
     pub step: Stored,
     /// From the schedule to the publication of the output.
     pub from_schedule: Stored,
-    /// Minor and major page faults in the steady state, after the first 200 cycles.
-    pub page_faults: [u64; 2],
+    /// Minor and major page faults in the steady state, after the first 200 cycles; `None` if it
+    /// did not come to that.
+    pub page_faults: Option<[u64; 2]>,
 }
 
 /// A histogram in a file: its percentiles, and all of it in HdrHistogram's V2 form.
@@ -85,7 +86,11 @@ impl RunReport {
     ///
     /// # Errors
     /// [`ReportError::Format`] if a histogram cannot be serialised.
-    pub fn new(service: &str, timing: &Timing, page_faults: [u64; 2]) -> Result<Self, ReportError> {
+    pub fn new(
+        service: &str,
+        timing: &Timing,
+        page_faults: Option<[u64; 2]>,
+    ) -> Result<Self, ReportError> {
         Ok(Self {
             service: service.to_owned(),
             wake_up: Stored::new(&timing.wake_up)?,
@@ -167,7 +172,7 @@ mod tests {
     fn report() -> RunReport {
         let mut timing = Timing::new().unwrap();
         (1..=1000).for_each(|us| timing.step.record(us * 1000));
-        RunReport::new("detector", &timing, [3, 0]).unwrap()
+        RunReport::new("detector", &timing, Some([3, 0])).unwrap()
     }
 
     #[test]

@@ -71,7 +71,7 @@ pub trait Stage {
 /// What the stage takes in one turn.
 pub struct Intake<'a> {
     account: &'a mut InputAccount,
-    now_ns: u64,
+    clock: &'a dyn Clock,
     period_ns: u64,
     /// Frames stepped in this turn.
     frames: u32,
@@ -83,11 +83,7 @@ pub struct Intake<'a> {
 impl Intake<'_> {
     /// Accounts an input block; true if it is to be taken.
     pub fn accept<T: Block>(&mut self, header: &Header) -> bool {
-        let arrival = self
-            .account
-            .arrive::<T>(header, self.now_ns, self.period_ns);
-        self.new_epoch |= arrival == Arrival::NewEpoch;
-        arrival.is_taken()
+        self.admit::<T>(header, || Ok(()))
     }
 
     /// The same for a block from outside, of which `content` judges what it says.
@@ -96,9 +92,21 @@ impl Intake<'_> {
         header: &Header,
         content: impl FnOnce() -> Result<(), Rejection>,
     ) -> bool {
-        let (now_ns, period_ns) = (self.now_ns, self.period_ns);
+        let (now_ns, period_ns) = (self.now_ns(), self.period_ns);
         let arrival = self.account.admit::<T>(header, now_ns, period_ns, content);
         self.new_epoch |= arrival == Arrival::NewEpoch;
+        arrival.is_taken()
+    }
+
+    /// Accounts a block of a further input in an account of the stage's own; true if it is to be
+    /// taken.
+    pub fn admit_further<T: Block>(
+        &self,
+        account: &mut InputAccount,
+        header: &Header,
+        content: impl FnOnce() -> Result<(), Rejection>,
+    ) -> bool {
+        let arrival = account.admit::<T>(header, self.now_ns(), self.period_ns, content);
         arrival.is_taken()
     }
 
@@ -124,10 +132,10 @@ impl Intake<'_> {
         };
     }
 
-    /// The instant at which this turn began, ns.
+    /// Now, ns: who is held up in a turn gets blocks that were not due when it began.
     #[must_use]
-    pub const fn now_ns(&self) -> u64 {
-        self.now_ns
+    pub fn now_ns(&self) -> u64 {
+        self.clock.now_ns()
     }
 }
 
@@ -297,7 +305,7 @@ impl StageCycle {
         let mut overdue = self.monitor.overdue(woken_ns);
         let mut intake = Intake {
             account: &mut self.account,
-            now_ns: woken_ns,
+            clock,
             period_ns: self.monitor.period_ns(),
             frames: 0,
             newest: Header::default(),

@@ -76,7 +76,8 @@ struct Watched {
     window_missed: u64,
     missed: u64,
     period_ns: u64,
-    has_lost_input: bool,
+    /// It was without input at some time in this window.
+    was_without_input: bool,
     has_missed_too_many: bool,
     /// Dead, or failed and told so: nothing more until it is started anew.
     is_gone: bool,
@@ -165,7 +166,7 @@ impl Watchdog {
         }
         watched.reported_ns = now_ns;
         watched.is_stopping = health.state == ServiceState::Stopping as u32;
-        watched.has_lost_input = health.degraded & Degraded::INPUT_LOST != 0;
+        watched.was_without_input |= health.degraded & Degraded::INPUT_LOST != 0;
         (watched.missed, watched.period_ns) = (health.missed, health.period_ns);
         let has_moved = !is_first && answered != watched.answered;
         watched.answered = answered;
@@ -213,8 +214,7 @@ impl Watched {
             return Some(Supervision::Logical);
         }
         let misses = limits.missed_share > 0.0 && self.misses(limits.missed_share, now_ns);
-        // Without input it can be in time for nothing.
-        (misses && !self.has_lost_input).then_some(Supervision::Deadline)
+        misses.then_some(Supervision::Deadline)
     }
 
     /// True once for each time that a window has too many misses after one that had not.
@@ -227,7 +227,9 @@ impl Watched {
         let missed = self.missed.saturating_sub(self.window_missed) as f64;
         (self.window_ns, self.window_missed) = (now_ns, self.missed);
         let before = self.has_missed_too_many;
-        self.has_missed_too_many = missed >= share * instants;
+        // Without input it can be in time for nothing.
+        let had_input = !std::mem::take(&mut self.was_without_input);
+        self.has_missed_too_many = had_input && missed >= share * instants;
         self.has_missed_too_many && !before
     }
 }
@@ -348,6 +350,24 @@ mod tests {
         assert!(!found[0].2.needs_restart());
         assert_eq!(misses(&mut services, 3000, 0), []);
         assert_eq!(misses(&mut services, 3000, 5).len(), 1, "a second time");
+    }
+
+    #[test]
+    fn misses_while_there_is_no_input_are_not_held_against_a_service() {
+        let mut services = Services::new();
+        services.run(1000, |_, _| true);
+        // Gone for .85 s of every second, and back each time before the window ends.
+        let mut reports = 0;
+        let found = services.run(5000, |service, health| {
+            if service == 2 {
+                let is_gone = reports % 20 < 17;
+                reports += 1;
+                health.missed += if is_gone { 5 } else { 0 };
+                health.degraded = if is_gone { Degraded::INPUT_LOST } else { 0 };
+            }
+            true
+        });
+        assert_eq!(found, []);
     }
 
     #[test]

@@ -29,6 +29,8 @@ struct Worker {
     particles: u32,
     ns_a_particle: u64,
     predictions: u32,
+    /// Once: the source goes on for so many periods while this one is held up in its turn.
+    held_up: Option<(Box<dyn Sender<SensorFrame>>, u64)>,
 }
 
 impl Stage for Worker {
@@ -39,6 +41,16 @@ impl Stage for Worker {
                 self.clock
                     .advance(self.ns_a_particle * u64::from(self.particles));
                 intake.stepped(&header, (header.epoch, header.seq));
+            }
+            if let Some((mut sensor, periods)) = self.held_up.take() {
+                for _ in 0..periods {
+                    self.clock.advance(PERIOD_NS);
+                    let stamp = Stamp {
+                        t_schedule_ns: self.clock.now_ns(),
+                        t_capture_ns: self.clock.now_ns(),
+                    };
+                    sensor.send(stamp, &self.clock).unwrap();
+                }
             }
         }
     }
@@ -72,6 +84,7 @@ impl Stage for Worker {
 }
 
 struct World {
+    graph: Graph,
     clock: VirtualClock,
     sensor: Box<dyn Sender<SensorFrame>>,
     actions: Box<dyn Receiver<Action>>,
@@ -101,11 +114,13 @@ impl World {
                 particles: 1000,
                 ns_a_particle: 10,
                 predictions: 0,
+                held_up: None,
             },
             cycle: cycle
                 .with_on_miss(on_miss)
                 .with_shedder(Shedder::new(1000, SCHEDULE))
                 .with_recorder(Recorder::new().unwrap().with_stamps(8)),
+            graph,
             clock,
             k: 0,
         }
@@ -209,6 +224,24 @@ fn particles_are_shed_before_a_deadline_is_missed_and_that_is_told() {
         (1000, 0)
     );
     assert_eq!(world.worker.particles, 1000);
+}
+
+#[test]
+fn what_came_while_a_stage_was_held_up_in_its_turn_is_taken_in_that_turn() {
+    let mut world = World::new(OnMiss::Count);
+    assert!(world.instant(true).is_continue());
+    world.worker.held_up = Some((world.graph.sender(Topic::Sensor).unwrap(), 6));
+    assert!(world.instant(true).is_continue());
+    let mut answered_ns = 0;
+    while world.actions.advance() {
+        answered_ns = world.actions.held().unwrap().header.t_schedule_ns;
+    }
+    // The first of the turn took 10 us before the others came.
+    assert_eq!(answered_ns, 8 * PERIOD_NS + 10_000);
+    let health = world.health();
+    assert_eq!((health.cycles, health.lost, health.invalid), (2, 0, 0));
+    // With their deadlines, the seven instants of that turn but the last were missed.
+    assert_eq!(health.missed, 6);
 }
 
 #[test]

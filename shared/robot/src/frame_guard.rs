@@ -2,7 +2,9 @@
 //!
 //! The bounds are wide. What a broken sensor or a broken robot may say is for the filters to judge,
 //! however strange; this refuses what only a wrong publisher says: degrees for radians, millimetres
-//! for metres, memory that was never written.
+//! for metres, memory that was never written. Of changes from one frame to the next only the
+//! position's has a bound, what the robot can drive: rates, angles and currents step at once when a
+//! sensor or a wheel breaks, and those steps are what the filters live on.
 
 use std::f64::consts::PI;
 

@@ -42,7 +42,8 @@ pub struct SocketStage {
     /// Epoch of the source, and how often it has changed.
     epoch: u64,
     starts: u64,
-    /// Frames of this turn.
+    /// What has arrived in this turn, and what of it goes out.
+    arrived: Vec<(SensorFrame, From)>,
     waiting: Vec<SensorFrame>,
     frames: Box<dyn Sender<SensorFrame>>,
 }
@@ -65,20 +66,41 @@ impl SocketStage {
             taken_ns: 0,
             epoch: 0,
             starts: 0,
+            arrived: Vec::with_capacity(TURN_MAX),
             waiting: Vec::with_capacity(TURN_MAX),
             frames: graph.sender(Topic::Sensor)?,
         })
     }
 
-    /// The frame of a datagram, its times on this machine's clock.
-    fn read(&mut self, bytes: &[u8], now_ns: u64) -> Result<SensorFrame, Rejection> {
-        let mut frame = datagram::decode(bytes)?;
-        let header = &mut frame.header;
-        if header.t_schedule_ns == 0 {
-            header.t_schedule_ns = self.clock.due_ns(header.epoch, header.t_capture_ns, now_ns);
+    /// Reads the datagrams that are here.
+    fn receive(&mut self, intake: &mut Intake<'_>) {
+        // One byte more than a datagram has: a longer one shows.
+        let mut buffer = [0; DATAGRAM_SIZE + 1];
+        self.arrived.clear();
+        for _ in 0..TURN_MAX {
+            let Some((length, from)) = self.datagrams.receive(&mut buffer) else {
+                break;
+            };
+            if self.source.is_some_and(|source| source != from) {
+                intake.reject(Rejection::OtherWriter);
+                continue;
+            }
+            match datagram::decode(&buffer[..length]) {
+                Ok(frame) => self.arrived.push((frame, from)),
+                Err(rejection) => {
+                    intake.reject(rejection);
+                }
+            }
         }
-        header.t_publish_ns = now_ns;
-        Ok(frame)
+    }
+
+    /// The newest capture time among the arrived frames of this start of a source, ns.
+    fn newest_capture_ns(&self, epoch: u64, from: From) -> u64 {
+        let same = self.arrived.iter();
+        let same = same.filter(|(frame, other)| frame.header.epoch == epoch && *other == from);
+        same.map(|(frame, _)| frame.header.t_capture_ns)
+            .max()
+            .unwrap_or(0)
     }
 
     fn choose(&mut self, from: From) {
@@ -90,28 +112,22 @@ impl SocketStage {
 
 impl Stage for SocketStage {
     fn take(&mut self, intake: &mut Intake<'_>) {
-        // One byte more than a datagram has: a longer one shows.
-        let mut buffer = [0; DATAGRAM_SIZE + 1];
+        self.receive(intake);
         let now_ns = intake.now_ns();
-        for _ in 0..TURN_MAX {
-            let Some((length, from)) = self.datagrams.receive(&mut buffer) else {
-                break;
-            };
+        for i in 0..self.arrived.len() {
+            let (mut frame, from) = self.arrived[i];
             if self.source.is_some_and(|source| source != from) {
                 intake.reject(Rejection::OtherWriter);
                 continue;
             }
-            let mut frame = match self.read(&buffer[..length], now_ns) {
-                Ok(frame) => frame,
-                Err(rejection) => {
-                    intake.reject(rejection);
-                    continue;
-                }
-            };
+            let newest_ns = self.newest_capture_ns(frame.header.epoch, from);
+            let clock = self.clock.date(&mut frame.header, newest_ns, now_ns);
+            frame.header.t_publish_ns = now_ns;
             let content = || self.guard.check(&frame);
             if !intake.admit::<SensorFrame>(&frame.header, content) {
                 continue;
             }
+            self.clock = clock;
             if self.source.is_none() {
                 self.choose(from);
             }

@@ -30,6 +30,7 @@ def runtime_folder(graph="rover"):
     user = os.environ.get("XDG_RUNTIME_DIR")
     candidates = ["/run/vigil"] + ([f"{user}/vigil"] if user else [])
     candidates.append(f"{tempfile.gettempdir()}/vigil-{os.getuid()}")
+    closed = None
     for folder in candidates:
         try:
             os.stat(f"{folder}/{graph}/processes")
@@ -37,7 +38,9 @@ def runtime_folder(graph="rover"):
         except FileNotFoundError:
             pass
         except PermissionError:
-            raise PermissionError(f"{folder} is another user's: run as the user who runs the graph")
+            closed = folder
+    if closed is not None:
+        raise PermissionError(f"no graph '{graph}' of yours is running, and {closed} is another user's")
     raise FileNotFoundError(f"DoesNotExist: no graph '{graph}' is running (looked in {candidates})")
 
 
@@ -51,17 +54,19 @@ def transport(graph="rover"):
     return config
 
 
-def difference(kind, graph="rover"):
-    """What is different between a running graph's type and ours, of the same name: a sentence."""
+def difference(graph="rover"):
+    """What is different between a running graph's types and ours: a sentence."""
     with open(f"{runtime_folder(graph)}/types") as file:
-        for line in file:
-            name, size, alignment, version = line.split()
-            if name.split(".")[1] == kind.__name__:
-                theirs = f"{name}, {size} bytes, alignment {alignment} (iceoryx2 {version})"
-    here = importlib.metadata.version("iceoryx2")
-    ours = f"{kind.type_name()}, {ctypes.sizeof(kind)} bytes, alignment {ctypes.alignment(kind)}"
-    change = "make vigil_types.py anew with 'vigil types python'"
-    return f"the graph has {theirs}; this program has {ours} (iceoryx2 {here}): {change}"
+        theirs = {line.split(".")[1]: line.split() for line in file}
+    here, there = importlib.metadata.version("iceoryx2"), theirs["SensorFrame"][3]
+    for kind in (SensorFrame, Action):
+        ours = [kind.type_name(), str(ctypes.sizeof(kind)), str(ctypes.alignment(kind))]
+        if ours != theirs[kind.__name__][:3]:
+            both = (f"{name}, {size} bytes, alignment {alignment}" for name, size, alignment in (
+                theirs[kind.__name__][:3], ours))
+            change = "make vigil_types.py anew with 'vigil types python'"
+            return f"the graph has {next(both)} (iceoryx2 {there}); this program has {next(both)} (iceoryx2 {here}): {change}"
+    return f"the types are the same; the graph has iceoryx2 {there}, this program {here}"
 
 
 def _table():

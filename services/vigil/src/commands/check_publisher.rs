@@ -40,7 +40,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         let message = format!("--seconds {}: allowed is 0.1 to 3600", args.seconds);
         return Err(CommandError::usage(message));
     }
-    let setup = args.graph.load().map_err(CommandError::usage)?;
+    let mut setup = args.graph.load().map_err(CommandError::usage)?;
+    setup.file.sensor.source = publisher::source(&setup).map_err(CommandError::failure)?;
     if !args.json {
         eprintln!("listening for {} s", args.seconds);
     }

@@ -135,6 +135,21 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 fn warnings(imported: &import::Imported, robot: &Description) -> Vec<String> {
     let frames = imported.frames(robot);
     let mut warnings = plausible::warnings(frames.iter().map(|run| (run, f64::INFINITY)), robot);
+    let lacking = imported.runs.iter().flat_map(|run| &run.lacking);
+    warnings.extend(lacking.map(|found| {
+        let import::Lacking {
+            path,
+            topic,
+            column,
+            messages,
+            of,
+        } = found;
+        format!(
+            "{}: {messages} of {of} messages on {topic} have no finite '{column}': nothing was \
+             made of them",
+            path.display()
+        )
+    }));
     let runs = imported.runs.iter();
     warnings.extend(runs.flat_map(|run| &run.disorder).map(|found| {
         let import::Disorder {

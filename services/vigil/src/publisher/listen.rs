@@ -4,9 +4,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use vigil_blocks::datagram::{self, DATAGRAM_SIZE};
-use vigil_blocks::{Health, REJECTIONS, Rejection, SensorFrame};
+use vigil_blocks::{Action, Health, REJECTIONS, SensorFrame};
 use vigil_cycle::datagrams::Datagrams;
-use vigil_cycle::port::{EventListener, Link};
+use vigil_cycle::port::{EventListener, FoundTopic, Link};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::wake::{self, Inputs, Timer};
 use vigil_cycle::{
@@ -17,7 +17,7 @@ use vigil_sensor_sim::ArrivalClock;
 use vigil_setup::Setup;
 use vigil_setup::schema::Source;
 
-use super::{Arrived, Heard};
+use super::{Arrived, BorderReport, Heard};
 
 /// Frames that are kept.
 pub const FRAMES_MAX: usize = 500_000;
@@ -50,7 +50,11 @@ pub fn listen(setup: &Setup, seconds: f64) -> Result<(Heard, Option<PortError>),
     let listened = if setup.file.sensor.source == Source::Socket && lock.is_some() {
         sockets(setup, seconds, &mut heard)
     } else {
-        topic(setup, seconds, &mut heard)
+        let listened = topic(setup, seconds, &mut heard);
+        if heard.topic.is_none() {
+            heard.topic = found_topic(setup)?;
+        }
+        listened
     };
     if sign.is_some() && listened.is_ok() {
         domain.remove_residue();
@@ -103,10 +107,12 @@ impl Guard {
         }
     }
 
-    fn take(&mut self, frame: &SensorFrame, now_ns: u64) {
+    /// True if a graph would take it.
+    fn take(&mut self, frame: &SensorFrame, now_ns: u64) -> bool {
         let content = || self.content.check(frame);
         self.account
-            .admit::<SensorFrame>(&frame.header, now_ns, self.period_ns, content);
+            .admit::<SensorFrame>(&frame.header, now_ns, self.period_ns, content)
+            .is_taken()
     }
 }
 
@@ -131,6 +137,13 @@ fn while_it_lasts(
     Ok(())
 }
 
+/// The sensor's topic as it is, if it is there.
+fn found_topic(setup: &Setup) -> Result<Option<FoundTopic>, PortError> {
+    let path = Topic::Sensor.path(&setup.file.graph.name);
+    let mut all = FoundTopic::all(&setup.domain()?)?.into_iter();
+    Ok(all.find(|topic| topic.path == path))
+}
+
 /// Reads the sensor's topic.
 fn topic(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortError> {
     let domain = setup.domain()?;
@@ -140,6 +153,12 @@ fn topic(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortError
     };
     let mut frames = graph.receiver::<SensorFrame>(Topic::Sensor)?;
     let listener: EventListener = link.listener::<SensorFrame>(Topic::Sensor)?;
+    // Publishers that obey actions wait for their topic: in the graph's place nobody else makes it.
+    let _actions = if heard.is_graph_running {
+        None
+    } else {
+        Some(graph.sender::<Action>(Topic::Action)?)
+    };
     let mut guard = Guard::new(setup);
     let mut border = Border::new(setup, &graph)?;
     while_it_lasts(seconds, &listener, heard, |heard| {
@@ -154,7 +173,9 @@ fn topic(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortError
             heard.take(*frame, now_ns);
         }
     })?;
+    heard.topic = found_topic(setup)?;
     heard.rejected = if heard.is_graph_running {
+        heard.border = border.report();
         border.rejected()
     } else {
         guard.account.rejected
@@ -174,26 +195,31 @@ fn sockets(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortErr
     let datagrams = datagrams.map_err(|e| PortError::setup("sensor.socket", &e))?;
     let datagrams = std::rc::Rc::new(datagrams);
     let (mut guard, mut clock) = (Guard::new(setup), ArrivalClock::default());
+    let mut arrived = Vec::with_capacity(DATAGRAMS_MAX);
     while_it_lasts(seconds, &datagrams, heard, |heard| {
         let mut buffer = [0; DATAGRAM_SIZE + 1];
+        arrived.clear();
         for _ in 0..DATAGRAMS_MAX {
             let Some((length, _)) = datagrams.receive(&mut buffer) else {
                 break;
             };
-            let now_ns = Monotonic.now_ns();
             match datagram::decode(&buffer[..length]) {
-                Ok(mut frame) => {
-                    if frame.header.t_schedule_ns == 0 {
-                        let (epoch, t_ns) = (frame.header.epoch, frame.header.t_capture_ns);
-                        frame.header.t_schedule_ns = clock.due_ns(epoch, t_ns, now_ns);
-                    }
-                    guard.take(&frame, now_ns);
-                    heard.take(frame, now_ns);
-                }
+                Ok(frame) => arrived.push(frame),
                 Err(rejection) => {
                     guard.account.reject(rejection);
                 }
             }
+        }
+        let now_ns = Monotonic.now_ns();
+        for mut frame in arrived.iter().copied() {
+            let same = arrived.iter().map(|other| &other.header);
+            let same = same.filter(|other| other.epoch == frame.header.epoch);
+            let newest_ns = same.map(|other| other.t_capture_ns).max().unwrap_or(0);
+            let dated = clock.date(&mut frame.header, newest_ns, now_ns);
+            if guard.take(&frame, now_ns) {
+                clock = dated;
+            }
+            heard.take(frame, now_ns);
         }
     })?;
     heard.rejected = guard.account.rejected;
@@ -203,8 +229,9 @@ fn sockets(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortErr
 /// The service at the border of a running graph: what it refuses.
 struct Border {
     health: Box<dyn Receiver<Health>>,
-    first: Option<[u64; REJECTIONS]>,
-    last: [u64; REJECTIONS],
+    is_socket: bool,
+    /// The first report and the newest.
+    seen: Option<[Box<Health>; 2]>,
 }
 
 impl Border {
@@ -215,8 +242,8 @@ impl Border {
         };
         Ok(Self {
             health: graph.receiver(Topic::Health(service))?,
-            first: None,
-            last: [0; REJECTIONS],
+            is_socket: service == ServiceName::SensorSim,
+            seen: None,
         })
     }
 
@@ -225,19 +252,30 @@ impl Border {
             let Some(health) = self.health.held() else {
                 break;
             };
-            self.first.get_or_insert(health.rejected);
-            self.last = health.rejected;
+            let seen = self
+                .seen
+                .get_or_insert_with(|| [Box::new(*health), Box::new(*health)]);
+            *seen[1] = *health;
         }
     }
 
-    /// Refused since the first look; counters of a service that was restarted begin anew.
+    /// Since the first look; counters of a service that was restarted begin anew.
+    fn since(&self, of: impl Fn(&Health) -> u64) -> u64 {
+        self.seen.as_ref().map_or(0, |[first, last]| {
+            let (before, now) = (of(first), of(last));
+            now.checked_sub(before).unwrap_or(now)
+        })
+    }
+
     fn rejected(&self) -> [u64; REJECTIONS] {
-        let mut since = self.last;
-        for cause in Rejection::ALL {
-            let i = cause as usize;
-            let before = self.first.map_or(0, |first| first[i]);
-            since[i] = self.last[i].checked_sub(before).unwrap_or(self.last[i]);
-        }
-        since
+        std::array::from_fn(|i| self.since(|health| health.rejected[i]))
+    }
+
+    fn report(&self) -> Option<BorderReport> {
+        let [_, last] = self.seen.as_ref()?;
+        Some(BorderReport {
+            period_ns: last.period_ns.max(1),
+            lost_at_socket: self.is_socket.then(|| self.since(|health| health.lost)),
+        })
     }
 }

@@ -3,15 +3,18 @@
 mod content;
 mod listen;
 mod refused;
+mod running;
 mod timing;
 mod transport;
 
 use vigil_blocks::{REJECTIONS, SensorFrame};
+use vigil_cycle::port::FoundTopic;
 use vigil_setup::Setup;
 
 use crate::findings::Finding;
 
 pub use listen::listen;
+pub use running::source;
 
 /// A frame, and when it arrived.
 #[derive(Debug, Clone)]
@@ -33,9 +36,22 @@ pub struct Heard {
     pub seconds: f64,
     /// True if a graph was running, false if this program listened in its place.
     pub is_graph_running: bool,
+    /// The sensor's topic as its first user has made it.
+    pub topic: Option<FoundTopic>,
     /// Frames that the running graph refused meanwhile, by cause; without a graph, what one would
     /// have refused.
     pub rejected: [u64; REJECTIONS],
+    /// What the graph's border says, where that is known.
+    pub border: Option<BorderReport>,
+}
+
+/// What the service at the border of a running graph says of its input.
+#[derive(Debug, Clone, Copy)]
+pub struct BorderReport {
+    /// Period of the schedule, ns.
+    pub period_ns: u64,
+    /// Frames that got lost on their way to a socket; what goes on from there is numbered anew.
+    pub lost_at_socket: Option<u64>,
 }
 
 /// Everything that can be said about it.
@@ -45,7 +61,10 @@ pub fn findings(setup: &Setup, heard: &Heard) -> Vec<Finding> {
     if heard.frames.is_empty() {
         return all;
     }
-    all.extend(timing::findings(setup.file.graph.rate_hz, heard));
+    let rate_hz = heard.border.map_or(setup.file.graph.rate_hz, |border| {
+        1e9 / border.period_ns as f64
+    });
+    all.extend(timing::findings(rate_hz, heard));
     all.extend(content::findings(&setup.robot, &heard.frames));
     all
 }

@@ -39,13 +39,13 @@ const fn advice(cause: Rejection) -> &'static str {
              other start has, such as the time in ns"
         }
         Rejection::OtherWriter => {
-            "of another epoch, or from another address, while the known publisher was alive: is \
-             header.epoch set anew for each frame, or do two publishers run?"
+            "of another epoch, or from another address, within a second of the known publisher's \
+             frames: is header.epoch set anew for each frame, or do two publishers run?"
         }
         Rejection::Repeated => "header.seq repeats: count it up by one for each frame",
         Rejection::WrongSequence => {
-            "header.seq goes back: count it up by one for each frame, and change header.epoch \
-             when it starts anew"
+            "header.seq goes back, or leaps by more than a million: count it up by one for each \
+             frame, and change header.epoch when it starts anew"
         }
         Rejection::Ahead => {
             "header.t_schedule_ns lies in the future: it is CLOCK_MONOTONIC of this machine, not \

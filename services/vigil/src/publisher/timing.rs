@@ -11,6 +11,8 @@ const RATE_OFF_MAX: f64 = 0.05;
 const JITTER_MAX: f64 = 0.25;
 /// Shortest time over which the rate of a clock is judged, s.
 const CLOCK_S_MIN: f64 = 2.0;
+/// A publisher that starts anew more often, in a second, does not mean it.
+const STARTS_S_MAX: f64 = 0.5;
 /// A clock may be off by this share of time.
 const CLOCK_OFF_MAX: f64 = 5e-4;
 
@@ -19,7 +21,8 @@ pub fn findings(rate_hz: f64, heard: &Heard) -> Vec<Finding> {
     let frames = &heard.frames;
     let mut all = vec![rate(rate_hz, frames)];
     all.extend(jitter(rate_hz, frames));
-    all.push(gaps(frames));
+    all.push(gaps(heard));
+    all.extend(starts(frames));
     all.extend(way(frames));
     all.push(capture(frames));
     all
@@ -84,30 +87,61 @@ fn jitter(rate_hz: f64, frames: &[Arrived]) -> Option<Finding> {
     })
 }
 
-/// Lost frames and starts, by epoch and sequence number.
-fn gaps(frames: &[Arrived]) -> Finding {
-    let (mut lost, mut longest, mut starts) = (0, 0, 0);
-    for pair in frames.windows(2) {
+/// Lost frames, by sequence number.
+fn gaps(heard: &Heard) -> Finding {
+    if let Some(lost) = heard.border.and_then(|border| border.lost_at_socket) {
+        let detail = format!("{lost} frames were lost on their way to the socket");
+        let status = if lost == 0 {
+            Status::Ok
+        } else {
+            Status::Warning
+        };
+        return Finding::new("gaps", status, detail);
+    }
+    let (mut lost, mut longest) = (0, 0);
+    for pair in heard.frames.windows(2) {
         let [before, after] = [0, 1].map(|i| &pair[i].frame.header);
         if before.epoch != after.epoch {
-            starts += 1;
             continue;
         }
         let missing = after.seq.saturating_sub(before.seq).saturating_sub(1);
         lost += missing;
         longest = longest.max(missing);
     }
-    if lost == 0 && starts == 0 {
+    if lost == 0 {
         return Finding::new("gaps", Status::Ok, "none: no sequence number is missing");
     }
-    let mut detail = format!("{lost} frames are missing by their sequence numbers");
-    if lost > 0 {
-        detail.push_str(&format!(", {longest} in a row at most"));
-    }
-    if starts > 0 {
-        detail.push_str(&format!("; the epoch changed {starts} times"));
-    }
+    let detail =
+        format!("{lost} frames are missing by their sequence numbers, {longest} in a row at most");
     Finding::new("gaps", Status::Warning, detail)
+}
+
+/// How often the filters are made to begin anew.
+fn starts(frames: &[Arrived]) -> Option<Finding> {
+    let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
+        return None;
+    };
+    let changes = |of: fn(&Arrived) -> u64| {
+        let pairs = frames.windows(2);
+        pairs.filter(|pair| of(&pair[0]) != of(&pair[1])).count()
+    };
+    let epochs = changes(|arrived| arrived.frame.header.epoch);
+    let runs = changes(|arrived| arrived.frame.run_id);
+    if epochs + runs == 0 {
+        return None;
+    }
+    let seconds = last.now_ns.saturating_sub(first.now_ns) as f64 * 1e-9;
+    let detail = format!(
+        "header.epoch changed {epochs} times, run_id {runs} times: each time the filters forget \
+         everything"
+    );
+    Some(if (epochs + runs) as f64 > STARTS_S_MAX * seconds + 1.0 {
+        let advice = "set header.epoch once when the publisher starts, run_id once when a drive \
+                      does";
+        Finding::new("starts", Status::Failure, format!("{detail}; {advice}"))
+    } else {
+        Finding::new("starts", Status::Warning, detail)
+    })
 }
 
 /// From when a frame was due to its arrival.
@@ -226,7 +260,11 @@ mod tests {
         let lossy = of(|k, f| f.frame.header.seq += 3 * (k / 100));
         assert_eq!(status(&lossy, "gaps"), warning);
         let restarted = of(|k, f| f.frame.header.epoch += k / 250);
-        assert_eq!(status(&restarted, "gaps"), warning);
+        assert_eq!(status(&restarted, "starts"), warning);
+        let anew = of(|k, f| f.frame.header.epoch += k);
+        assert_eq!(status(&anew, "starts"), failure);
+        let runs = of(|k, f| f.frame.run_id = k);
+        assert_eq!(status(&runs, "starts"), failure);
         let still = of(|_, f| f.frame.header.t_capture_ns = 7);
         assert_eq!(status(&still, "capture clock"), failure);
         let back = of(|k, f| f.frame.header.t_capture_ns -= 50 * MS * (k / 250));

@@ -2,7 +2,6 @@
 
 use vigil_blocks::{Block, SensorFrame};
 use vigil_cycle::Topic;
-use vigil_cycle::port::FoundTopic;
 use vigil_setup::Setup;
 use vigil_setup::schema::Source;
 
@@ -13,7 +12,7 @@ use crate::findings::{Finding, Status};
 pub fn findings(setup: &Setup, heard: &Heard) -> Vec<Finding> {
     let mut all = vec![source(setup, heard)];
     if setup.file.sensor.source != Source::Socket {
-        all.push(types(setup));
+        all.push(types(setup, heard));
     }
     all.push(frames(setup, heard));
     all
@@ -42,20 +41,15 @@ fn source(setup: &Setup, heard: &Heard) -> Finding {
 }
 
 /// The type on the topic, which its first user has fixed.
-fn types(setup: &Setup) -> Finding {
+fn types(setup: &Setup, heard: &Heard) -> Finding {
     let path = Topic::Sensor.path(&setup.file.graph.name);
-    let found = setup.domain().and_then(|domain| FoundTopic::all(&domain));
-    let found = match found {
-        Ok(found) => found.into_iter().find(|topic| topic.path == path),
-        Err(error) => return Finding::new("type", Status::Failure, error.to_string()),
-    };
     let (name, size, alignment) = (
         SensorFrame::TYPE_NAME,
         size_of::<SensorFrame>(),
         align_of::<SensorFrame>(),
     );
     let wanted = format!("{name}, {size} bytes, alignment {alignment}");
-    let Some(found) = found else {
+    let Some(found) = &heard.topic else {
         let detail = format!("{path} does not exist; wanted is {wanted}");
         return Finding::new("type", Status::Failure, detail);
     };
@@ -110,6 +104,11 @@ fn frames(setup: &Setup, heard: &Heard) -> Finding {
     if count > 0 {
         let detail = format!("{count} in {seconds:.1} s");
         return Finding::new("frames", Status::Ok, detail);
+    }
+    let refused: u64 = heard.rejected.iter().sum();
+    if refused > 0 {
+        let detail = format!("none in {seconds:.1} s was taken, {refused} were refused: see there");
+        return Finding::new("frames", Status::Failure, detail);
     }
     let sensor = &setup.file.sensor;
     let folder = setup

@@ -29,6 +29,7 @@ use std::path::{Path, PathBuf};
 
 pub use description::{ChannelSource, Clock, Delay, LogDescription, Method, Source, Unit};
 use resample::Grid;
+pub use ros::Lacking;
 pub use series::Disorder;
 use series::Series;
 use vigil_blocks::SensorFrame;
@@ -131,6 +132,8 @@ pub struct ImportedRun {
     pub rows: Vec<Vec<f64>>,
     /// Clocks that do not rise in its files.
     pub disorder: Vec<Disorder>,
+    /// Messages of which nothing was made.
+    pub lacking: Vec<Lacking>,
     /// Channels that are differentiated, with the rows of which nothing was made as their stamp
     /// repeats or precedes the one before: repeated packets.
     pub repeated: Vec<(String, usize)>,
@@ -189,6 +192,7 @@ pub fn import(
         let repeated = columns.iter().zip(&series);
         let repeated = repeated.filter(|(_, series)| series.repeated > 0);
         runs.push(ImportedRun {
+            lacking: tables.iter().filter_map(|t| t.lacking.clone()).collect(),
             disorder: tables
                 .into_iter()
                 .flat_map(|table| table.disorder)

@@ -11,7 +11,7 @@
 //! `curvature` is the yaw rate over the forward speed, 0 at rest.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use byteorder::{BigEndian, LittleEndian};
 use serde::Deserialize;
@@ -245,7 +245,24 @@ fn decode<T: DeserializeOwned>(data: &[u8]) -> Result<T, String> {
     message.map(|(m, _)| m).map_err(|e| e.to_string())
 }
 
-/// The values of `columns` in every message of `topic`, column by column.
+/// Messages of a topic that lack a column: nothing is made of them. Two programs may share a topic,
+/// each with joints of its own; a first message may hold nothing yet.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Lacking {
+    /// The file.
+    pub path: PathBuf,
+    /// Its topic.
+    pub topic: String,
+    /// The first column that is not there, or not finite, in the first such message.
+    pub column: String,
+    /// Such messages.
+    pub messages: usize,
+    /// All messages of the topic.
+    pub of: usize,
+}
+
+/// The values of `columns` in every message of `topic` that has them all, column by column; and
+/// the messages that have not.
 ///
 /// # Errors
 /// With the file, the message (from 1) and what is known, if the file or a message cannot be read,
@@ -254,7 +271,7 @@ pub(super) fn columns(
     path: &Path,
     topic: &str,
     columns: &[String],
-) -> Result<Vec<Vec<f64>>, ImportError> {
+) -> Result<(Vec<Vec<f64>>, Option<Lacking>), ImportError> {
     let io = |error| ImportError::Io {
         path: path.to_owned(),
         error,
@@ -268,7 +285,7 @@ pub(super) fn columns(
     let content = fs::read(path).map_err(io)?;
     let stream = mcap::MessageStream::new(&content).map_err(|e| wrong(0, e.to_string()))?;
     let mut values = vec![Vec::new(); columns.len()];
-    let (mut row, mut others, mut lacking) = (0, Vec::<String>::new(), None);
+    let (mut row, mut others, mut lacking) = (0, Vec::<String>::new(), None::<Lacking>);
     for message in stream {
         let message = message.map_err(|e| wrong(row, e.to_string()))?;
         if message.channel.topic != topic {
@@ -291,9 +308,16 @@ pub(super) fn columns(
             name => decoded.value(name).filter(|value| value.is_finite()),
         };
         match columns.iter().find(|column| value(column).is_none()) {
-            // Two programs may share a topic, each with joints of its own; a first message may hold
-            // nothing yet.
-            Some(column) => lacking = Some(format!("there is no finite '{column}' on {topic}")),
+            Some(column) => {
+                let lacking = lacking.get_or_insert_with(|| Lacking {
+                    path: path.to_owned(),
+                    topic: topic.to_owned(),
+                    column: column.clone(),
+                    messages: 0,
+                    of: 0,
+                });
+                lacking.messages += 1;
+            }
             None => {
                 let found = columns.iter().filter_map(value);
                 values
@@ -304,11 +328,16 @@ pub(super) fn columns(
         }
     }
     if values.iter().all(Vec::is_empty) {
-        let others = others.join(", ");
-        let nothing = format!("no message on {topic}; there are {others}");
-        return Err(wrong(row, lacking.unwrap_or(nothing)));
+        let why = lacking.map_or_else(
+            || format!("no message on {topic}; there are {}", others.join(", ")),
+            |lacking| format!("there is no finite '{}' on {topic}", lacking.column),
+        );
+        return Err(wrong(row, why));
     }
-    Ok(values)
+    if let Some(lacking) = &mut lacking {
+        lacking.of = row as usize;
+    }
+    Ok((values, lacking))
 }
 
 #[cfg(test)]

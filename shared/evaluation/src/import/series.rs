@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use vigil_inference::angle::wrap;
 
+use super::ImportError;
 use super::description::{ChannelSource, Clock, LogDescription, Source};
-use super::{ImportError, ros};
+use super::ros::{self, Lacking};
 use crate::table::{Layout, Table};
 
 /// Columns of one source that are needed, with their rows.
@@ -21,6 +22,8 @@ pub(super) struct SourceTable {
     device_s: Vec<f64>,
     /// What was out of order.
     pub disorder: Vec<Disorder>,
+    /// Messages of which nothing was made.
+    pub lacking: Option<Lacking>,
 }
 
 /// Rows of a file whose clock does not rise: they are put in order of time, and told.
@@ -109,9 +112,9 @@ fn read(log: &LogDescription, source: &Source, run: &Path) -> Result<SourceTable
     others
         .filter(|[name, _]| *name == source.name)
         .for_each(|[_, column]| add(column));
-    let values = match &source.topic {
+    let (values, lacking) = match &source.topic {
         Some(topic) => ros::columns(&path, topic, &columns)?,
-        None => table_columns(&path, source, &columns)?,
+        None => (table_columns(&path, source, &columns)?, None),
     };
     let mut out = SourceTable {
         name: source.name.clone(),
@@ -121,6 +124,7 @@ fn read(log: &LogDescription, source: &Source, run: &Path) -> Result<SourceTable
         time_s: Vec::new(),
         device_s: Vec::new(),
         disorder: Vec::new(),
+        lacking,
     };
     let (time_s, disorder) = clock(&out, &source.time)?;
     out.disorder.extend(disorder);
