@@ -633,7 +633,8 @@ def runtime_folder(graph="rover"):
         except PermissionError:
             closed = folder
     if closed is not None:
-        raise PermissionError(f"no graph '{graph}' of yours is running, and {closed} is another user's")
+        other = f"{closed} is another user's"
+        raise PermissionError(f"no graph '{graph}' of yours is running, and {other}")
     raise FileNotFoundError(f"DoesNotExist: no graph '{graph}' is running (looked in {candidates})")
 
 
@@ -655,10 +656,10 @@ def difference(graph="rover"):
     for kind in (SensorFrame, Action):
         ours = [kind.type_name(), str(ctypes.sizeof(kind)), str(ctypes.alignment(kind))]
         if ours != theirs[kind.__name__][:3]:
-            both = (f"{name}, {size} bytes, alignment {alignment}" for name, size, alignment in (
-                theirs[kind.__name__][:3], ours))
-            change = "make vigil_types.py anew with 'vigil types python'"
-            return f"the graph has {next(both)} (iceoryx2 {there}); this program has {next(both)} (iceoryx2 {here}): {change}"
+            words = "{}, {} bytes, alignment {} (iceoryx2 {})"
+            graphs = "the graph has " + words.format(*theirs[kind.__name__])
+            program = "this program has " + words.format(*ours, here)
+            return f"{graphs}; {program}: make vigil_types.py anew with 'vigil types python'"
     return f"the types are the same; the graph has iceoryx2 {there}, this program {here}"
 
 

@@ -121,7 +121,7 @@ impl IdentifierStage {
             }
         }
         let particles = self.detected.held().filter(|p| p.cause == detection.cause);
-        // Frames before those that it has folded, it has refused: by a clock that is not this one's.
+        // Frames before those that it has folded, it has refused, by its own clock.
         let refused = (last + 1).saturating_sub(count);
         for (i, frame) in self.pending.drain(..=last).enumerate().skip(refused) {
             let detection = particles.filter(|_| i == last).map(|p| (detection, p));

@@ -167,6 +167,19 @@ impl Message {
         })
     }
 
+    /// Reads a message of a recording.
+    fn of(message: &mcap::Message<'_>) -> Result<Self, String> {
+        let schema = message.channel.schema.as_ref();
+        let kind = schema.map_or("", |schema| schema.name.as_str());
+        match Self::read(kind, &message.data) {
+            Some(read) => read.map_err(|e| format!("{kind}: {e}")),
+            None => Err(format!(
+                "messages of '{kind}'; known are {}",
+                KINDS.join(", ")
+            )),
+        }
+    }
+
     const fn header(&self) -> Option<&Header> {
         Some(match self {
             Self::Odometry(m) => &m.header,
@@ -295,14 +308,7 @@ pub(super) fn columns(
             continue;
         }
         row += 1;
-        let schema = message.channel.schema.as_ref();
-        let kind = schema.map_or("", |schema| schema.name.as_str());
-        let decoded = Message::read(kind, &message.data).ok_or_else(|| {
-            let known = KINDS.join(", ");
-            let found = format!("{topic} has messages of '{kind}'");
-            wrong(row, format!("{found}; known are {known}"))
-        })?;
-        let decoded = decoded.map_err(|e| wrong(row, format!("{topic}, {kind}: {e}")))?;
+        let decoded = Message::of(&message).map_err(|e| wrong(row, format!("{topic}: {e}")))?;
         let value = |column: &String| match column.as_str() {
             "log_time" => Some(message.log_time as f64),
             name => decoded.value(name).filter(|value| value.is_finite()),
