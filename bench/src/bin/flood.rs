@@ -126,6 +126,7 @@ fn measure(args: &Args, folder: &Path) -> Result<Vec<[Half; 2]>, Box<dyn Error>>
         particles: 1000,
         is_fifo: true,
         source: Source::Socket,
+        is_faulty: false,
     };
     let prepared = Prepared::new(change, folder)?;
     let load = Running::start(args.load, &prepared.cores(), folder, None)?;

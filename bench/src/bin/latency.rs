@@ -51,6 +51,10 @@ struct Args {
     /// Particles of detector and identifier.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     particles: usize,
+    /// The hierarchical filter identifies, and a wheel sticks at the beginning: every particle is
+    /// stepped in every cycle.
+    #[arg(long)]
+    faulty: bool,
     /// Runs of each cell.
     #[arg(long, value_name = "N", default_value_t = 1)]
     repeat: usize,
@@ -128,6 +132,7 @@ fn specs(args: &Args) -> Vec<Spec> {
                     scheduling,
                     seconds: args.seconds,
                     particles: args.particles,
+                    is_faulty: args.faulty,
                 };
                 specs.extend(std::iter::repeat_n(spec, args.repeat.max(1)));
             }
@@ -150,12 +155,14 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
     let words: Vec<String> = std::env::args().skip(1).collect();
     archive.say(&format!("`scripts/bench latency {}`\n", words.join(" ")));
     archive.say(
-        "Times in us; every latency from the schedule, hand-over and floor without compute. \
+        "Times in us; every latency from the schedule, hand-over and floor without compute; \
+         folded are instants that only a later one's answer ended. \
          `report.html` shows all of it.\n",
     );
     archive.say(
-        "| cell | cycles | end to end p50 | p99 | p99.9 | max | hand-over p50 | p99 | floor p50 \
-         | p99 | missed: own | machine |\n|---|---|---|---|---|---|---|---|---|---|---|---|",
+        "| cell | cycles | folded | end to end p50 | p99 | p99.9 | max | hand-over p50 | p99 | \
+         floor p50 | p99 | missed: own | machine | no one stall |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
     );
     let mut cells: Vec<Cell> = Vec::new();
     let mut facts = facts();
@@ -165,7 +172,7 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
             Ok(cell) => cell,
             Err(error) => {
                 archive.say(&format!(
-                    "| {} | not measured: {error} | | | | | | | | | | |",
+                    "| {} | not measured: {error} | | | | | | | | | | | | |",
                     spec.name()
                 ));
                 continue;
@@ -186,6 +193,10 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
     archive.store("cells.json", &Value::from(all))?;
     let folder = archive.close()?;
     println!("archived in {}", folder.display());
+    let unmeasured = specs.len() - cells.len();
+    if unmeasured > 0 {
+        return Err(format!("{unmeasured} cells were not measured").into());
+    }
     Ok(())
 }
 
@@ -196,9 +207,10 @@ fn line(cell: &Cell) -> String {
     let floor = cell.floor.hand_over.percentiles();
     let (ours, machine) = cell.missed();
     format!(
-        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {ours} | {machine} |",
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {ours} | {machine} | {} |",
         cell.spec.name(),
         cell.cycles.len(),
+        cell.folded(),
         us(whole.p50_ns),
         us(whole.p99_ns),
         us(whole.p999_ns),
@@ -207,6 +219,7 @@ fn line(cell: &Cell) -> String {
         us(hand_over.p99_ns),
         us(floor.p50_ns),
         us(floor.p99_ns),
+        cell.not_one_stall(),
     )
 }
 

@@ -135,6 +135,7 @@ fn measure(args: &Args, folder: &Path) -> Result<Vec<[Half; 2]>, Box<dyn Error>>
         particles: 1000,
         is_fifo: true,
         source: Source::Simulator,
+        is_faulty: false,
     };
     let prepared = Prepared::new(change, folder)?;
     let graph = Some(prepared.path());

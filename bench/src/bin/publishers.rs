@@ -97,6 +97,7 @@ fn one(args: &Args, rate_hz: f64, folder: &Path) -> Result<Value, Box<dyn Error>
         particles: 1000,
         is_fifo: true,
         source: Source::External,
+        is_faulty: false,
     };
     let prepared = Prepared::new(change, folder)?;
     let load = Running::start(args.load, &prepared.cores(), folder, None)?;

@@ -124,6 +124,7 @@ mod tests {
         Cycle {
             t_schedule_ns,
             t_done_ns: t_schedule_ns + took_ns,
+            answer_compute_ns: 0,
             stages: None,
         }
     }

@@ -62,6 +62,9 @@ pub struct Spec {
     pub seconds: f64,
     /// Particles of detector and identifier.
     pub particles: usize,
+    /// True if a filter of particles identifies and a wheel sticks at the beginning: then every
+    /// particle is stepped in every cycle.
+    pub is_faulty: bool,
 }
 
 /// What was found.
@@ -81,6 +84,10 @@ pub struct Cell {
     pub canaries: Vec<Seen>,
     /// Cycles past the last deadline of the chain.
     pub misses: Vec<Miss>,
+    /// False if no canary could be placed above the graph: every miss counts as Vigil's own.
+    pub is_attributed: bool,
+    /// The graph's.
+    pub seed: u64,
     /// Deadline of the chain after the schedule, ns.
     pub deadline_ns: u64,
     /// Wake-ups of the canaries, in a million, that were late by the slack of a usual cycle; `None`
@@ -100,7 +107,12 @@ impl Spec {
             Scheduling::Fifo => "fifo",
             Scheduling::Other => "other",
         };
-        format!("{}hz-{}-{scheduling}", self.rate_hz, self.load.name())
+        let faulty = if self.is_faulty { "-faulty" } else { "" };
+        format!(
+            "{}hz-{}-{scheduling}{faulty}",
+            self.rate_hz,
+            self.load.name()
+        )
     }
 
     /// Runs the cell; what it needs for the time lies in `folder`.
@@ -113,6 +125,7 @@ impl Spec {
             particles: self.particles,
             is_fifo: self.scheduling == Scheduling::Fifo,
             source: Source::Simulator,
+            is_faulty: self.is_faulty,
         };
         let prepared = Prepared::new(change, folder)?;
         let wanted = prepared.wanted();
@@ -136,7 +149,9 @@ impl Spec {
         let canaries: Vec<Seen> = canaries.into_iter().filter_map(Canary::finish).collect();
         load.finish()?;
         let times = (period_ns, prepared.deadline_ns());
-        self.judge((ran, [before, after]), canaries, times, (system, wanted))
+        let mut cell = self.judge((ran, [before, after]), canaries, times, (system, wanted))?;
+        cell.seed = prepared.setup().file.graph.seed;
+        Ok(cell)
     }
 
     fn judge(
@@ -146,12 +161,13 @@ impl Spec {
         (period_ns, deadline_ns): (u64, u64),
         (system, wanted): (Value, [Wanted; STAGES]),
     ) -> Result<Cell, Box<dyn Error>> {
-        check(&ran.summary, &canaries, &wanted)?;
+        let is_attributed = check(&ran.summary, &canaries, &wanted)?;
         let first = ran.stamps[STAGES - 1].first();
         let first = first.ok_or("the graph did nothing")?;
         let from_ns = first.t_schedule_ns + (WARM_UP_S * 1e9) as u64;
         let cycles = cycles::join(&ran.stamps, period_ns, from_ns);
-        let records: Vec<Record<'_>> = canaries.iter().map(Record::of).collect();
+        let believed = canaries.iter().filter(|_| is_attributed);
+        let records: Vec<Record<'_>> = believed.map(Record::of).collect();
         if cycles.is_empty() {
             return Err("no cycle was left after the warm-up".into());
         }
@@ -177,6 +193,8 @@ impl Spec {
             graph,
             floor,
             misses,
+            is_attributed,
+            seed: 0,
             deadline_ns,
             canary_late_ppm: (slack_ns > 0).then(|| 1e6 * late as f64 / all.max(1) as f64),
             system,
@@ -188,12 +206,13 @@ impl Spec {
 }
 
 /// Refuses what would not be a measurement: a service that was restarted (its stamps are those
-/// since then), a canary that forgot, or ran elsewhere or below what it watches over.
+/// since then), a canary that forgot. False if canaries ran elsewhere or below what they watch
+/// over, as without the right to real-time priority.
 fn check(
     summary: &Value,
     canaries: &[Seen],
     wanted: &[Wanted; STAGES],
-) -> Result<(), Box<dyn Error>> {
+) -> Result<bool, Box<dyn Error>> {
     for name in STAGE_NAMES {
         if summary["services"][name]["restarts"] != 0 {
             return Err(format!("{name} was restarted in the run").into());
@@ -205,11 +224,7 @@ fn check(
     if canaries.iter().any(|seen| seen.not_kept > 0) {
         return Err("a canary had no room for what it saw: nobody can say whose a miss is".into());
     }
-    if canaries.is_empty() || !canaries.iter().all(is_above) {
-        let why = "no real-time priority for them";
-        return Err(format!("canaries could not be placed above the graph: {why}").into());
-    }
-    Ok(())
+    Ok(!canaries.is_empty() && canaries.iter().all(is_above))
 }
 
 /// Percentiles in us.
@@ -237,6 +252,12 @@ impl Cell {
     pub fn missed(&self) -> (u64, u64) {
         let machine = self.misses.iter().filter(|m| m.is_machine).count() as u64;
         (self.misses.len() as u64 - machine, machine)
+    }
+
+    /// Instants that only a later one's answer ended.
+    #[must_use]
+    pub fn folded(&self) -> usize {
+        self.cycles.iter().filter(|cycle| cycle.is_folded()).count()
     }
 
     /// Misses that no single late wake-up of a canary explains.
@@ -303,9 +324,12 @@ impl Cell {
             "over_floor": { "p50": round(p50), "p99": round(p99) },
             "deadline_us": self.deadline_ns as f64 * 1e-3,
             "missed": { "ours": ours, "machine": machine },
+            "attributed": self.is_attributed,
             "missed_without_one_long_stall": self.not_one_stall(),
             "canary_late_ppm": self.canary_late_ppm.map(round),
             "cycles": self.cycles.len(),
+            "folded": self.folded(),
+            "seed": self.seed,
             "stages": stages,
             "canaries": self.canaries.iter().map(canary).collect::<Vec<_>>(),
             "system": self.system,

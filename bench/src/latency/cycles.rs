@@ -17,6 +17,8 @@ pub struct Cycle {
     /// When the last stage had published an answer, ns: to this instant or, if nothing answered
     /// it, to the next that was.
     pub t_done_ns: u64,
+    /// How long stages computed for that answer, ns.
+    pub answer_compute_ns: u64,
     /// Time of each stage from its wake-up to its publication, and before it from the publication
     /// of its input to its wake-up, ns; `None` if a stage did not answer this very instant.
     pub stages: Option<[Stage; STAGES]>,
@@ -38,18 +40,17 @@ impl Cycle {
         self.t_done_ns.saturating_sub(self.t_schedule_ns)
     }
 
-    /// The part of it in which no stage computed, ns.
+    /// The part of it in which no stage computed for its answer, ns: also for an instant that only
+    /// a later one's answer ended.
     #[must_use]
-    pub fn hand_over_ns(&self) -> Option<u64> {
-        self.stages
-            .map(|stages| stages.iter().map(|s| s.hand_over_ns).sum())
+    pub const fn hand_over_ns(&self) -> u64 {
+        self.end_to_end_ns().saturating_sub(self.answer_compute_ns)
     }
 
-    /// The part of it in which a stage computed, ns.
+    /// True if only a later instant's answer ended it.
     #[must_use]
-    pub fn compute_ns(&self) -> Option<u64> {
-        self.stages
-            .map(|stages| stages.iter().map(|s| s.compute_ns).sum())
+    pub const fn is_folded(&self) -> bool {
+        self.stages.is_none()
     }
 }
 
@@ -73,14 +74,18 @@ pub fn join(stamps: &[Vec<CycleStamps>; STAGES], period_ns: u64, from_ns: u64) -
     let cycle = |k: u64| {
         let t_schedule_ns = first_ns + k * period_ns;
         // The first answer that is no older than the instant.
-        let (_, answer) = done.range(t_schedule_ns..).next()?;
-        let of = |map: &BTreeMap<u64, CycleStamps>| map.get(&t_schedule_ns).copied();
-        let all = [of(&maps[0]), of(&maps[1]), of(&maps[2]), of(&maps[3])];
-        let complete = all.iter().all(Option::is_some);
+        let (answered_ns, answer) = done.range(t_schedule_ns..).next()?;
+        let parts = |at_ns: u64| {
+            let of = |map: &BTreeMap<u64, CycleStamps>| map.get(&at_ns).copied().map(stage);
+            [of(&maps[0]), of(&maps[1]), of(&maps[2]), of(&maps[3])]
+        };
+        let answer_parts = parts(*answered_ns);
+        let complete = answer_parts.iter().all(Option::is_some) && *answered_ns == t_schedule_ns;
         Some(Cycle {
             t_schedule_ns,
             t_done_ns: answer.t_publish_ns,
-            stages: complete.then(|| all.map(|s| s.map_or_else(Stage::default, stage))),
+            answer_compute_ns: answer_parts.iter().flatten().map(|s| s.compute_ns).sum(),
+            stages: complete.then(|| answer_parts.map(Option::unwrap_or_default)),
         })
     };
     (0..count).filter_map(cycle).collect()
@@ -98,11 +103,11 @@ const fn stage(stamps: CycleStamps) -> Stage {
 pub struct Spectra {
     /// From the schedule to the action, every instant.
     pub end_to_end: Latency,
-    /// The part in which stages computed, complete cycles.
+    /// The part in which stages computed for an answer, one for each answer.
     pub compute: Latency,
-    /// The rest, complete cycles.
+    /// The rest, every instant.
     pub hand_over: Latency,
-    /// Both parts of each stage.
+    /// Both parts of each stage, of instants that have an answer of their own.
     pub stages: [(Latency, Latency); STAGES],
 }
 
@@ -121,13 +126,11 @@ impl Spectra {
         };
         for cycle in cycles {
             spectra.end_to_end.record(cycle.end_to_end_ns());
-            let (Some(compute), Some(hand_over), Some(stages)) =
-                (cycle.compute_ns(), cycle.hand_over_ns(), cycle.stages)
-            else {
+            spectra.hand_over.record(cycle.hand_over_ns());
+            let Some(stages) = cycle.stages else {
                 continue;
             };
-            spectra.compute.record(compute);
-            spectra.hand_over.record(hand_over);
+            spectra.compute.record(cycle.answer_compute_ns);
             for (histograms, stage) in spectra.stages.iter_mut().zip(stages) {
                 histograms.0.record(stage.hand_over_ns);
                 histograms.1.record(stage.compute_ns);
@@ -170,18 +173,21 @@ mod tests {
         let cycles = join(&stamps, P, 2 * P);
         let end_to_end: Vec<u64> = cycles.iter().map(Cycle::end_to_end_ns).collect();
         assert_eq!(end_to_end, [79, 3274, 2274, 1274, 274, 79]);
-        let parts = cycles.iter().map(|c| (c.hand_over_ns(), c.compute_ns()));
-        let parts: Vec<_> = parts.collect();
-        assert_eq!(parts[0], (Some(26), Some(53)));
-        assert_eq!(parts[1], (None, None));
-        assert_eq!(parts[4], (Some(221), Some(53)));
+        let hand_over: Vec<u64> = cycles.iter().map(Cycle::hand_over_ns).collect();
+        assert_eq!(hand_over, [26, 3221, 2221, 1221, 221, 26]);
+        assert!(cycles.iter().all(|c| c.answer_compute_ns == 53));
+        let folded = cycles.iter().map(Cycle::is_folded).collect::<Vec<_>>();
+        assert_eq!(folded, [false, true, true, true, false, false]);
+        for stages in cycles.iter().filter_map(|c| c.stages) {
+            assert_eq!(stages.iter().map(|s| s.compute_ns).sum::<u64>(), 53);
+        }
         let spectra = Spectra::of(&cycles).ok();
         let counts = spectra.map(|s| (s.end_to_end.percentiles().n, s.compute.percentiles().n));
         assert_eq!(counts, Some((6, 3)));
     }
 
     #[test]
-    fn a_frame_that_was_folded_into_the_next_has_its_latency_and_no_parts() {
+    fn a_frame_that_was_folded_into_the_next_has_its_latency_and_waits_for_all_but_one_answer() {
         let mut stamps: [Vec<CycleStamps>; STAGES] = Default::default();
         let usual = [(5, 1), (6, 20), (7, 30), (8, 2)];
         for k in 1..=4 {
@@ -195,8 +201,7 @@ mod tests {
             .iter()
             .map(|c| (c.end_to_end_ns(), c.hand_over_ns()))
             .collect();
-        let whole = Some(26);
-        assert_eq!(found, [(79, whole), (1079, None), (79, whole), (79, whole)]);
+        assert_eq!(found, [(79, 26), (1079, 1026), (79, 26), (79, 26)]);
         assert!(join(&Default::default(), P, 0).is_empty());
     }
 }

@@ -13,11 +13,12 @@ use hdrhistogram::Histogram;
 use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::IntervalLogWriterBuilder;
 use vigil_cycle::Latency;
+use vigil_cycle::canary::Late;
 
 use super::cell::Cell;
-use super::cycles::{Cycle, STAGE_NAMES};
+use super::cycles::{Cycle, STAGE_NAMES, Stage};
 
-/// Lateness of a canary from which it is told wake-up by wake-up, ns.
+/// Lateness of a canary from which it is told wake-up by wake-up, ns; about a miss all are.
 const CANARY_FROM_NS: u64 = 200_000;
 
 /// Cycles that are written one by one: of more, the longest; the interval log tells of the rest.
@@ -44,7 +45,14 @@ pub fn write(cell: &Cell, folder: &Path) -> Result<(), Box<dyn Error>> {
     for (name, latency) in spectra {
         fs::write(folder.join(format!("{name}.hgrm")), hgrm(latency))?;
     }
-    fs::write(folder.join("end-to-end.hlog"), hlog(&cell.cycles)?)?;
+    let whole = hlog(&cell.cycles, "end to end", |c| Some(c.end_to_end_ns()))?;
+    fs::write(folder.join("end-to-end.hlog"), whole)?;
+    for (i, name) in STAGE_NAMES.iter().enumerate() {
+        let took = |stage: Stage| stage.hand_over_ns + stage.compute_ns;
+        let of = |cycle: &Cycle| cycle.stages.map(|stages| took(stages[i]));
+        let log = hlog(&cell.cycles, &format!("{name}, from input to output"), of)?;
+        fs::write(folder.join(format!("{name}.hlog")), log)?;
+    }
     fs::write(folder.join("misses.csv"), misses(cell))?;
     fs::write(folder.join("canaries.csv"), canaries(cell))?;
     let start_ns = cell.cycles.first().map_or(0, |c| c.t_schedule_ns);
@@ -87,22 +95,26 @@ pub fn hgrm(latency: &Latency) -> String {
     text
 }
 
-/// End-to-end latencies in ns, one histogram a second.
-fn hlog(cycles: &[Cycle]) -> Result<Vec<u8>, Box<dyn Error>> {
+/// Latencies in ns, one histogram a second: of each cycle what `of` says, if anything.
+fn hlog(
+    cycles: &[Cycle],
+    what: &str,
+    of: impl Fn(&Cycle) -> Option<u64>,
+) -> Result<Vec<u8>, Box<dyn Error>> {
     let mut text = Vec::new();
     let mut serializer = V2DeflateSerializer::new();
     let start_ns = cycles.first().map_or(0, |c| c.t_schedule_ns);
     let at = |ns: u64| UNIX_EPOCH + Duration::from_nanos(ns);
     let mut writer = IntervalLogWriterBuilder::new()
-        .add_comment("end to end, ns; times are CLOCK_MONOTONIC")
+        .add_comment(&format!("{what}, ns; times are CLOCK_MONOTONIC"))
         .with_start_time(at(start_ns))
         .with_base_time(at(start_ns))
         .begin_log_with(&mut text, &mut serializer)?;
     let second = |cycle: &Cycle| (cycle.t_schedule_ns - start_ns) / 1_000_000_000;
     for group in cycles.chunk_by(|a, b| second(a) == second(b)) {
         let mut histogram = Histogram::<u64>::new(3)?;
-        for cycle in group {
-            histogram.record(cycle.end_to_end_ns().max(1))?;
+        for ns in group.iter().filter_map(&of) {
+            histogram.record(ns.max(1))?;
         }
         let from = Duration::from_secs(second(&group[0]));
         writer.write_histogram(&histogram, from, Duration::from_secs(1), None)?;
@@ -112,12 +124,13 @@ fn hlog(cycles: &[Cycle]) -> Result<Vec<u8>, Box<dyn Error>> {
 }
 
 fn misses(cell: &Cell) -> String {
-    let mut text = String::from("t_schedule_ns,end_to_end_us,overrun_us,whose\n");
+    let mut text = String::from("t_schedule_ns,end_to_end_us,overrun_us,whose,one_stall\n");
     for miss in &cell.misses {
         let whose = if miss.is_machine { "machine" } else { "ours" };
         let took = (miss.t_done_ns - miss.t_schedule_ns) as f64 * 1e-3;
         let over = miss.overrun_ns as f64 * 1e-3;
-        let _ = writeln!(text, "{},{took:.3},{over:.3},{whose}", miss.t_schedule_ns);
+        let (t_ns, one) = (miss.t_schedule_ns, u8::from(miss.is_one_stall));
+        let _ = writeln!(text, "{t_ns},{took:.3},{over:.3},{whose},{one}");
     }
     text
 }
@@ -125,8 +138,17 @@ fn misses(cell: &Cell) -> String {
 /// Wake-ups of the canaries that were late enough to matter.
 fn canaries(cell: &Cell) -> String {
     let mut text = String::from("core,t_schedule_ns,late_us\n");
+    let is_about_a_miss = |late: &Late| {
+        let until_ns = late.t_schedule_ns + late.late_ns;
+        let first = cell
+            .misses
+            .partition_point(|miss| miss.t_done_ns < late.t_schedule_ns);
+        let miss = cell.misses.get(first);
+        miss.is_some_and(|miss| miss.t_schedule_ns <= until_ns)
+    };
+    let matters = |late: &&Late| late.late_ns >= CANARY_FROM_NS || is_about_a_miss(late);
     for seen in &cell.canaries {
-        for late in seen.late.iter().filter(|l| l.late_ns >= CANARY_FROM_NS) {
+        for late in seen.late.iter().filter(matters) {
             let (core, us) = (seen.placement.core, late.late_ns as f64 * 1e-3);
             let _ = writeln!(text, "{core},{},{us:.3}", late.t_schedule_ns);
         }
@@ -178,6 +200,7 @@ mod tests {
         let cycle = |(k, us): (u64, &u64)| Cycle {
             t_schedule_ns: 5_000_000_000 + k * 400_000_000,
             t_done_ns: 5_000_000_000 + k * 400_000_000 + us * 1000,
+            answer_compute_ns: 0,
             stages: None,
         };
         (0..).zip(latencies_us).map(cycle).collect()
@@ -187,7 +210,12 @@ mod tests {
     fn the_interval_log_holds_every_cycle_in_its_second() {
         use hdrhistogram::serialization::Deserializer;
         use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
-        let log = hlog(&cycles(&[100, 200, 300, 400, 500, 600])).unwrap();
+        let log = hlog(
+            &cycles(&[100, 200, 300, 400, 500, 600]),
+            "end to end",
+            |c| Some(c.end_to_end_ns()),
+        )
+        .unwrap();
         let mut counts = Vec::new();
         for entry in IntervalLogIterator::new(&log) {
             if let LogEntry::Interval(interval) = entry.unwrap() {

@@ -27,13 +27,19 @@ pub struct Change {
     pub is_fifo: bool,
     /// Where frames come from.
     pub source: Source,
+    /// True if the hierarchical filter identifies, with all its particles, and a wheel sticks.
+    pub is_faulty: bool,
 }
+
+/// What breaks in a graph that is to have a fault, before any warm-up ends.
+const FAULT: &str = "stuck:RM@1";
 
 /// A graph file for measuring.
 #[derive(Debug)]
 pub struct Prepared {
     path: PathBuf,
     setup: Setup,
+    is_faulty: bool,
 }
 
 /// What a run of the graph left.
@@ -66,6 +72,9 @@ impl Prepared {
         let particles = i64::try_from(change.particles)?;
         set(&mut file, "detector", "particles", particles.into())?;
         set(&mut file, "identifier", "particles", particles.into())?;
+        if change.is_faulty {
+            set(&mut file, "identifier", "filter", "hierarchical".into())?;
+        }
         let files = file.get_mut("files").and_then(toml::Value::as_table_mut);
         for (_, path) in files.ok_or("no [files]")?.iter_mut() {
             let name = path.as_str().unwrap_or_default();
@@ -86,7 +95,12 @@ impl Prepared {
             ..GraphArgs::default()
         }
         .load()?;
-        Ok(Self { path, setup })
+        let is_faulty = change.is_faulty;
+        Ok(Self {
+            path,
+            setup,
+            is_faulty,
+        })
     }
 
     /// The checked configuration.
@@ -151,6 +165,9 @@ impl Prepared {
             .args(["--json", "--duration", &seconds.to_string()])
             .args(options)
             .stdin(Stdio::null());
+        if self.is_faulty {
+            command.args(["--inject", FAULT]);
+        }
         command
     }
 

@@ -69,16 +69,18 @@ const ABOUT: &str = "<p>Every latency counts from the instant at which the cycle
     counts once, as the chain passes over their cores in turn); else it is Vigil's \
     <em>own</em>.</p>\n";
 
-const ALL_CELLS: &str = "Times in us. Ratio: hand-over against the floor, median and 99th \
-    percentile. Canary: wake-ups of the canaries, in a million, that would have missed the \
-    deadline of a usual cycle.";
+const ALL_CELLS: &str = "Times in us. Folded: instants that only a later one's answer ended. \
+    Ratio: hand-over against the floor, median and 99th percentile. No one stall: misses, of \
+    either kind, that no single late wake-up of a canary explains. Canary: wake-ups of the \
+    canaries, in a million, that would have missed the deadline of a usual cycle.";
 
 /// Heads of the table's columns.
-const HEADS: [&str; 18] = [
+const HEADS: [&str; 20] = [
     "rate, Hz",
     "load",
     "scheduling",
     "cycles",
+    "folded",
     "end to end p50",
     "p99",
     "p99.9",
@@ -92,6 +94,7 @@ const HEADS: [&str; 18] = [
     "p99",
     "missed: own",
     "machine",
+    "no one stall",
     "canary, ppm",
 ];
 
@@ -123,6 +126,7 @@ fn table(cells: &[Cell]) -> String {
         );
         for value in [
             cell.cycles.len().to_string(),
+            cell.folded().to_string(),
             us(whole.p50_ns),
             us(whole.p99_ns),
             us(whole.p999_ns),
@@ -136,6 +140,7 @@ fn table(cells: &[Cell]) -> String {
             format!("{p99:.2}"),
             ours.to_string(),
             machine.to_string(),
+            cell.not_one_stall().to_string(),
             cell.canary_late_ppm
                 .map_or_else(|| "-".into(), |ppm| format!("{ppm:.0}")),
         ] {
@@ -187,6 +192,9 @@ fn one(cell: &Cell, name: &str) -> Result<String, ChartError> {
         "load_arguments",
         "deadline_us",
         "missed",
+        "missed_without_one_long_stall",
+        "folded",
+        "seed",
         "over_floor",
         "system",
         "stages",
@@ -197,19 +205,27 @@ fn one(cell: &Cell, name: &str) -> Result<String, ChartError> {
     ];
     let facts = rows(facts.iter().map(|name| (*name, of(&document[name]))));
     let details = format!("<details><summary>All figures</summary>\n{facts}</details>\n");
-    let (ours, machine) = cell.missed();
-    let about = format!(
-        "{} cycles; {ours} missed by Vigil itself (a rate below {:.2e} with 95 % confidence if \
-         none), {machine} by the machine.",
-        cell.cycles.len(),
-        3.0 / cell.cycles.len().max(1) as f64,
-    );
     Ok(section(
         name,
         name,
-        &about,
+        &misses_in_words(cell),
         &format!("{charts}{time}{details}"),
     ))
+}
+
+fn misses_in_words(cell: &Cell) -> String {
+    let (ours, machine) = cell.missed();
+    let nobody = if cell.is_attributed {
+        ""
+    } else {
+        " No canary could be placed above the graph: every miss counts as Vigil's own."
+    };
+    format!(
+        "{} cycles; {ours} missed by Vigil itself (a rate below {:.2e} with 95 % confidence if \
+         none), {machine} by the machine.{nobody}",
+        cell.cycles.len(),
+        3.0 / cell.cycles.len().max(1) as f64,
+    )
 }
 
 /// Latency in us on a logarithmic axis.

@@ -6,7 +6,6 @@ use std::process::ExitCode;
 use std::rc::Rc;
 
 use clap::Parser;
-use vigil_cycle::OnMiss;
 use vigil_cycle::datagrams::Datagrams;
 use vigil_cycle::serve::{self, Plan, ServeError};
 use vigil_cycle::topic::ServiceName;
@@ -74,10 +73,6 @@ fn serve(setup: &Setup, source: Assembled, args: &Args) -> Result<(), ServeError
 }
 
 fn serve_socket(setup: &Setup, listen: &Listen, mut plan: Plan) -> Result<(), ServeError> {
-    if plan.on_miss.predicts() {
-        // There is nothing to predict: a frame that is not there is not made up.
-        plan.on_miss = OnMiss::Count;
-    }
     // There is nothing to look at without a system call.
     plan.spin_ns = 0;
     serve::woken_by(&plan, |graph| {

@@ -9,7 +9,7 @@
 use crate::latency::Latency;
 
 /// Most schedule instants that one gap may account for; a larger gap re-anchors the grid.
-const GAP_INSTANTS_MAX: u64 = 100_000;
+pub(crate) const GAP_INSTANTS_MAX: u64 = 100_000;
 
 /// When a service's cycles are due, and how long they may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,6 +88,11 @@ impl DeadlineMonitor {
             self.missed += u64::from(publish_ns > schedule_ns + self.deadline_ns);
             self.undecided_ns = Some(schedule_ns + self.period_ns);
             self.accounted_ns[1] = schedule_ns;
+        } else {
+            // The clock has counted it; but where its instants lie now, the source knows better.
+            let ahead_ns = (first - schedule_ns).saturating_sub(self.period_ns / 2);
+            let steps = ahead_ns.div_ceil(self.period_ns);
+            self.undecided_ns = Some(schedule_ns + steps * self.period_ns);
         }
         self.missed - missed_before
     }
@@ -207,6 +212,40 @@ mod tests {
         assert_eq!(m.published(3 * P, 3 * P + 10, &mut l), 2);
         let p = l.percentiles();
         assert_eq!((p.n, p.max_ns), (4, 2 * P + 10));
+    }
+
+    #[test]
+    fn whatever_the_phase_after_a_restart_nothing_more_is_missed() {
+        for deadline_ns in [100, 200, 400, 500, 700, 950] {
+            for phase_ns in (0..P).step_by(10) {
+                let (mut m, mut l) = (
+                    DeadlineMonitor::new(Schedule {
+                        period_ns: P,
+                        deadline_ns,
+                        budget_ns: P,
+                    }),
+                    Latency::new().unwrap(),
+                );
+                m.published(0, 10, &mut l);
+                // The monitor looks at each deadline, and when a block comes.
+                let mut missed_ns = 0;
+                for now_ns in (10..60 * P).step_by(10) {
+                    let schedule_ns = now_ns - 10;
+                    let is_due = now_ns > 3 * P && schedule_ns % P == phase_ns;
+                    let mut missed = m.overdue(now_ns);
+                    if is_due {
+                        missed += m.published(schedule_ns, now_ns, &mut l);
+                    }
+                    if missed > 0 {
+                        missed_ns = now_ns;
+                    }
+                }
+                assert!(
+                    missed_ns < 5 * P,
+                    "{deadline_ns} {phase_ns}: at {missed_ns}"
+                );
+            }
+        }
     }
 
     #[test]

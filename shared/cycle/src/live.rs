@@ -74,14 +74,12 @@ pub fn run_stage(
     cycle.ready(&Monotonic)?;
     while !signal::stop_requested() {
         let wake = await_input(cycle, stage, (inputs, &timer), spin_ns);
-        let before = cycle.health().view().cycles;
         if cycle.turn(stage, &Monotonic)?.is_break() {
             ended = Ended::Missed;
             break;
         }
-        let cycles = cycle.health().view().cycles;
-        faults.take(cycles);
-        if wake == Wake::Input && cycles == before {
+        faults.take(cycle.health().view().cycles);
+        if wake == Wake::Input && !cycle.had_input() {
             // Whoever floods the topic with wake-ups is not to hold the core.
             let until_ns = cycle.listens_again_ns(Monotonic.now_ns());
             wake::wait(&timer, [NOTHING; 2], until_ns);

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use vigil_blocks::{Degraded, ServiceState};
 
 use crate::clock::Clock;
-use crate::deadline::DeadlineMonitor;
+use crate::deadline::{DeadlineMonitor, GAP_INSTANTS_MAX};
 use crate::health::HealthBoard;
 use crate::on_miss::{Lateness, OnMiss};
 use crate::port::PortError;
@@ -121,8 +121,11 @@ impl SourceCycle {
         if !self.ended && woken_ns >= self.next_ns {
             let slips = (woken_ns - self.next_ns) / self.monitor.period_ns();
             let schedule_ns = self.next_ns + slips * self.monitor.period_ns();
-            let timing = &mut self.recorder.timing;
-            timing.wake_up.record(woken_ns - schedule_ns);
+            // Each instant that was slept through waited, too.
+            for instant in 0..=slips.min(GAP_INSTANTS_MAX) {
+                let late_ns = woken_ns - schedule_ns + instant * self.monitor.period_ns();
+                self.recorder.timing.wake_up.record(late_ns);
+            }
             match source.produce(schedule_ns, clock)? {
                 Produced::Nothing => {}
                 Produced::End => self.ended = true,

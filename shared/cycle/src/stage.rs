@@ -57,6 +57,11 @@ pub trait Stage {
         Writer::Service
     }
 
+    /// False if without input there is nothing to publish.
+    fn predicts(&self) -> bool {
+        true
+    }
+
     /// True if input waits in shared memory, announced or not: for a stage that spins before it
     /// blocks. Costs no system call.
     fn has_input(&self) -> bool {
@@ -73,6 +78,8 @@ pub struct Intake<'a> {
     account: &'a mut InputAccount,
     clock: &'a dyn Clock,
     period_ns: u64,
+    /// True if a block was taken in this turn.
+    is_input: bool,
     /// Frames stepped in this turn.
     frames: u32,
     newest: Header,
@@ -95,6 +102,7 @@ impl Intake<'_> {
         let (now_ns, period_ns) = (self.now_ns(), self.period_ns);
         let arrival = self.account.admit::<T>(header, now_ns, period_ns, content);
         self.new_epoch |= arrival == Arrival::NewEpoch;
+        self.is_input |= arrival.is_taken();
         arrival.is_taken()
     }
 
@@ -190,6 +198,8 @@ pub struct StageCycle {
     shedder: Option<Shedder>,
     /// From the schedule to the publication of the last input, ns.
     input_offset_ns: u64,
+    /// True if the last turn has taken a block.
+    had_input: bool,
 }
 
 impl StageCycle {
@@ -210,6 +220,7 @@ impl StageCycle {
             lateness: Lateness::default(),
             shedder: None,
             input_offset_ns: 0,
+            had_input: false,
         })
     }
 
@@ -255,6 +266,12 @@ impl StageCycle {
     fn next_schedule_ns(&self) -> Option<u64> {
         let next_ns = self.last_stamp.t_schedule_ns + self.monitor.period_ns();
         (self.last_stamp.t_schedule_ns > 0 && self.misses_in_a_row == 0).then_some(next_ns)
+    }
+
+    /// True if the last turn has taken a block of its input, with a frame behind it or without.
+    #[must_use]
+    pub const fn had_input(&self) -> bool {
+        self.had_input
     }
 
     /// When to listen again after a wake-up at `now_ns` that brought no input, ns: shortly before
@@ -307,6 +324,7 @@ impl StageCycle {
             account: &mut self.account,
             clock,
             period_ns: self.monitor.period_ns(),
+            is_input: false,
             frames: 0,
             newest: Header::default(),
             new_epoch: false,
@@ -314,9 +332,12 @@ impl StageCycle {
         };
         stage.take(&mut intake);
         let (frames, newest, cause) = (intake.frames, intake.newest, intake.cause);
+        self.had_input = intake.is_input;
         if frames > 0 {
             let stamp = Stamp::of(&newest);
             let published_ns = stage.publish(cause, stamp, clock)?;
+            // What came while it was held up in this turn, it had not before it came.
+            let woken_ns = woken_ns.max(newest.t_publish_ns.min(published_ns));
             self.answered(&newest, cause, [woken_ns, published_ns]);
             self.health.block().late +=
                 u64::from(woken_ns > newest.t_schedule_ns + self.monitor.deadline_ns());
@@ -366,7 +387,7 @@ impl StageCycle {
         overdue: u64,
         clock: &impl Clock,
     ) -> Result<(), PortError> {
-        if !self.on_miss.predicts() {
+        if !self.on_miss.predicts() || !stage.predicts() {
             return Ok(());
         }
         let count = u32::try_from(overdue).unwrap_or(u32::MAX);

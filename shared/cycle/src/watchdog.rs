@@ -122,7 +122,7 @@ impl Watchdog {
             for watched in &mut self.services {
                 watched.started_ns += since_ns;
                 watched.reported_ns += since_ns;
-                watched.window_ns += since_ns;
+                (watched.window_ns, watched.window_missed) = (now_ns, watched.missed);
                 watched.behind_since_ns = None;
             }
         }
@@ -140,7 +140,12 @@ impl Watchdog {
         if let Some(watched) = self.services.get_mut(service) {
             *watched = Watched {
                 started_ns: now_ns,
-                old_epoch: watched.epoch,
+                // One that never reported has left nothing about.
+                old_epoch: if watched.epoch == 0 {
+                    watched.old_epoch
+                } else {
+                    watched.epoch
+                },
                 ..Watched::default()
             };
         }
@@ -309,6 +314,10 @@ mod tests {
         // Old reports that are still about do not count for the new process.
         let found = services.run(3050, |_, _| true);
         assert_eq!(found, [(7050, 1, Supervision::StartUp)]);
+        // Nor after another one that never reported.
+        services.watchdog.started(1, services.now_ns);
+        let found = services.run(3050, |_, _| true);
+        assert_eq!(found, [(10_100, 1, Supervision::StartUp)]);
         services.watchdog.started(1, services.now_ns);
         services.health[1].header.epoch = 77;
         assert_eq!(services.run(3050, |_, _| true), []);

@@ -73,7 +73,7 @@ fn watchdog_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)
             range(key, value, low, high);
         }
     };
-    unless_off("watchdog.alive_s", watchdog.alive_s, 0.2, 60.0);
+    unless_off("watchdog.alive_s", watchdog.alive_s, 0.3, 60.0);
     unless_off("watchdog.logical_s", watchdog.logical_s, 0.2, 60.0);
     let percent = watchdog.deadline_percent;
     unless_off("watchdog.deadline_percent", percent, 1.0, 100.0);

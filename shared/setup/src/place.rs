@@ -63,7 +63,7 @@ impl Setup {
             schedule: Schedule {
                 period_ns,
                 deadline_ns: share_ns(service.deadline_percent),
-                budget_ns: share_ns(service.budget_percent),
+                budget_ns: share_ns(service.budget_percent.min(service.deadline_percent)),
             },
             on_miss: service.on_miss,
             spin_ns: (service.spin_us * 1e3).round() as u64,

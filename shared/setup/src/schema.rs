@@ -121,8 +121,9 @@ pub struct Service {
     /// Deadline after the scheduled instant, as a percentage of the period, 1 to 100. Stagger
     /// consecutive stages: each must leave time to the next.
     pub deadline_percent: f64,
-    /// Compute budget of one cycle, as a percentage of the period, 1 to 100, default 80. A filter
-    /// that nears it works with fewer particles until there is room again.
+    /// Compute budget of one cycle, as a percentage of the period, 1 to 100, default 80; no more
+    /// than the deadline, if that is shorter. A filter that nears it works with fewer particles
+    /// until there is room again.
     #[serde(default = "eighty")]
     pub budget_percent: f64,
     /// What follows a missed deadline, which is always counted: `count` nothing; `predict` (the

@@ -161,6 +161,11 @@ impl Stage for SocketStage {
         self.frames.prepare()
     }
 
+    /// A frame that is not there is not made up.
+    fn predicts(&self) -> bool {
+        false
+    }
+
     fn writer(&self) -> Writer {
         Writer::Stranger
     }
