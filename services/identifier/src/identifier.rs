@@ -23,8 +23,6 @@ use crate::reasons::Reasons;
 
 /// A ring is worked off in about this time after an alarm, s.
 const CATCH_UP_S: f64 = 0.1;
-/// Observations worked off per cycle at least while catching up: more than arrive.
-const CATCH_UP_MIN: usize = 2;
 /// Observations since which the reasons of a diagnosis are looked for, at most.
 const REASONS_MAX: usize = 20;
 /// Probability that something unknown is wrong while sensors are silent or the robot runs away.
@@ -92,6 +90,8 @@ pub struct Identifier {
     rng: Pcg64Mcg,
     ring: VecDeque<Kept>,
     capacity: usize,
+    /// Time of an observation, s.
+    interval_s: f64,
     phase: Phase,
     detection: Detection,
     posterior: Posterior,
@@ -158,6 +158,7 @@ impl Identifier {
             rng: Pcg64Mcg::seed_from_u64(seed),
             ring: VecDeque::with_capacity(capacity),
             capacity,
+            interval_s: model.interval_s,
             phase: Phase::Watching,
             detection: Detection::default(),
             posterior: Posterior::nominal(),
@@ -267,7 +268,7 @@ impl Identifier {
         if self.ring.len() == self.capacity {
             self.ring.pop_front();
             if let Phase::Identifying(next) = self.phase {
-                // An observation that nobody has taken is taken before it goes; see CATCH_UP_MIN.
+                // An observation that nobody has taken is taken before it goes; see catch_up.
                 self.phase = Phase::Identifying(next.saturating_sub(1));
             }
         }
@@ -369,11 +370,12 @@ impl Identifier {
         }
     }
 
-    /// Observations to work off in one cycle while behind.
+    /// Observations to work off in one cycle while behind: more than arrive.
     fn catch_up(&self) -> usize {
         let frame_s = self.observer.observation().frame_s;
-        ((self.capacity as f64 * frame_s / CATCH_UP_S).ceil() as usize)
-            .clamp(CATCH_UP_MIN, self.capacity)
+        let arriving = frame_s / self.interval_s;
+        let wanted = (self.capacity as f64 * frame_s / CATCH_UP_S).ceil() as usize;
+        wanted.max(arriving as usize + 1).min(self.capacity)
     }
 
     fn is_catching_up(&self) -> bool {
