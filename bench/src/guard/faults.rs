@@ -7,6 +7,9 @@ use vigil_blocks::{Rejection, SensorFrame};
 
 use super::stream::{PERIOD_NS, Stream};
 
+/// Frames of a second.
+const SECOND_PERIODS: u64 = 1_000_000_000 / PERIOD_NS;
+
 /// A kind of fault: injects one, and says if the border found it by its right cause.
 pub type Inject = fn(&mut Stream<'_>, &mut Pcg64Mcg) -> bool;
 
@@ -86,7 +89,7 @@ fn wrapped(stream: &mut Stream<'_>, _: &mut Pcg64Mcg) -> bool {
     // It counts from 0 again, in the same epoch: refused for a second, then believed.
     stream.seq = 0;
     let mut found = true;
-    for _ in 0..1_000_000_000 / PERIOD_NS {
+    for _ in 0..SECOND_PERIODS {
         found &= stream.send(&stream.good()) == Some(Rejection::WrongSequence);
         stream.pass();
     }
@@ -95,10 +98,13 @@ fn wrapped(stream: &mut Stream<'_>, _: &mut Pcg64Mcg) -> bool {
 
 fn restart(stream: &mut Stream<'_>, random: &mut Pcg64Mcg) -> bool {
     stream.epoch += random.random_range(1..1_000_000);
-    stream.period += 2;
     stream.seq = 0;
     let before = stream.lost();
-    let is_taken = stream.send_good();
+    // Within a second it might be a second publisher; after it, it is believed.
+    let too_soon = stream.send(&stream.good()) == Some(Rejection::OtherWriter);
+    stream.period += SECOND_PERIODS + 1;
+    stream.seq = 0;
+    let is_taken = too_soon && stream.send_good();
     // So that an older frame can be sent later.
     (0..4).for_each(|_| {
         stream.send_good();

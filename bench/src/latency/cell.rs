@@ -28,7 +28,7 @@ const FLOOR_SHARE: f64 = 0.25;
 /// Time of a floor, s: at least, and at most.
 const FLOOR_S: [f64; 2] = [4.0, 60.0];
 /// Time beside graph and floors in which canaries run: starting and ending processes, s.
-const AROUND_S: f64 = 60.0;
+const AROUND_S: f64 = 240.0;
 /// Time for a load to get going.
 const LOAD_START: Duration = Duration::from_secs(1);
 

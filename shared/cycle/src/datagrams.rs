@@ -28,7 +28,13 @@ pub struct Datagrams {
     file: Option<PathBuf>,
     /// Whose turn it is to be read first: neither socket is to wait for the other.
     is_unix_first: Cell<bool>,
+    /// What arrives at the Unix socket stays in the kernel.
+    is_unix_shut: Cell<bool>,
 }
+
+/// Datagrams that are thrown away at most when the Unix socket is opened again: more than its queue
+/// holds.
+const STALE_MAX: usize = 4096;
 
 impl Datagrams {
     /// Binds them; a socket's file that a process has left behind is replaced.
@@ -63,6 +69,7 @@ impl Datagrams {
             unix: unix_socket,
             file,
             is_unix_first: Cell::new(false),
+            is_unix_shut: Cell::new(false),
         })
     }
 
@@ -99,15 +106,19 @@ impl Datagrams {
     }
 
     fn receive_unix(&self, buffer: &mut [u8]) -> Option<(usize, From)> {
+        if self.is_unix_shut.get() {
+            return None;
+        }
         let length = self.unix.as_ref()?.recv(buffer).ok()?;
         Some((length, From::Unix))
     }
 
-    /// From now on the kernel refuses UDP datagrams that come from elsewhere.
+    /// From now on what comes from elsewhere stays in the kernel: nobody is woken by it.
     ///
     /// # Errors
     /// The system's.
     pub fn only(&self, from: From) -> io::Result<()> {
+        self.is_unix_shut.set(from != From::Unix);
         let Some(udp) = &self.udp else {
             return Ok(());
         };
@@ -118,8 +129,13 @@ impl Datagrams {
         }
     }
 
-    /// From now on they may come from anywhere again.
+    /// From now on they may come from anywhere again; what has waited meanwhile is old and goes.
     pub fn from_anywhere(&self) {
+        if self.is_unix_shut.replace(false) {
+            let mut old = [0; 1];
+            let mut waiting = (0..STALE_MAX).map(|_| self.receive_unix(&mut old));
+            while waiting.next().flatten().is_some() {}
+        }
         let Some(udp) = &self.udp else { return };
         let nobody = libc::sockaddr {
             sa_family: libc::AF_UNSPEC as u16,
@@ -141,7 +157,8 @@ impl Datagrams {
 impl Inputs for std::rc::Rc<Datagrams> {
     fn descriptors(&self) -> [RawFd; 2] {
         let udp = self.udp.as_ref().map_or(NOTHING, AsRawFd::as_raw_fd);
-        let unix = self.unix.as_ref().map_or(NOTHING, AsRawFd::as_raw_fd);
+        let unix = self.unix.as_ref().filter(|_| !self.is_unix_shut.get());
+        let unix = unix.map_or(NOTHING, AsRawFd::as_raw_fd);
         [udp, unix]
     }
 }
@@ -167,6 +184,27 @@ mod tests {
             all.push((buffer[..length].to_vec(), from));
         }
         all
+    }
+
+    #[test]
+    fn what_comes_from_elsewhere_waits_in_the_kernel_and_is_gone_afterwards() {
+        let path = std::env::temp_dir().join(format!("elsewhere-{}", std::process::id()));
+        let local = "127.0.0.1:0".parse().unwrap();
+        let datagrams = std::rc::Rc::new(Datagrams::bind(Some(local), Some(&path)).unwrap());
+        let to = datagrams.udp_address().unwrap();
+        let source = UdpSocket::bind(local).unwrap();
+        let from = From::Udp(source.local_addr().unwrap());
+        let other = UnixDatagram::unbound().unwrap();
+        datagrams.only(from).unwrap();
+        other.send_to(b"other", &path).unwrap();
+        source.send_to(b"ours", to).unwrap();
+        assert_eq!(received(&datagrams), [(b"ours".to_vec(), from)]);
+        assert_eq!(datagrams.descriptors()[1], NOTHING);
+        datagrams.from_anywhere();
+        assert_eq!(received(&datagrams), []);
+        other.send_to(b"new", &path).unwrap();
+        assert_eq!(received(&datagrams), [(b"new".to_vec(), From::Unix)]);
+        assert_ne!(datagrams.descriptors()[1], NOTHING);
     }
 
     #[test]
