@@ -14,4 +14,5 @@ pub mod graph;
 pub mod halves;
 pub mod load;
 pub mod page;
+pub mod recording;
 pub mod system;

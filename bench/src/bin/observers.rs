@@ -12,10 +12,12 @@ use std::process::{Child, Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
 use clap::{Parser, ValueEnum};
+use vigil_bench::latency::cycles::STAGES;
 use vigil_bench::latency::flood::{FLOOD_WORD, be_flood};
 use vigil_bench::latency::graph::{Change, Prepared};
 use vigil_bench::latency::halves::{self, Half};
 use vigil_bench::latency::load::{Load, Running};
+use vigil_bench::latency::recording;
 use vigil_blocks::{Action, DetectionBelief, FaultBelief, ParticleBlock, SensorFrame};
 use vigil_cycle::port::Link;
 use vigil_cycle::{Graph, Topic, signal};
@@ -122,10 +124,19 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let (n, seconds, rate, load) = (args.pairs, args.seconds, args.rate, args.load.name());
     let difference = args.difference.to_possible_value();
     let difference = difference.map_or_else(String::new, |v| v.get_name().to_owned());
-    let about = format!(
+    let mut about = format!(
         "`scripts/bench observers --difference {difference} --pairs {n} --seconds {seconds} --rate \
          {rate} --load {load}`"
     );
+    if args.difference == Difference::Instruments {
+        let cycle_ns = recording::cycle_ns()?;
+        let stages = STAGES as f64;
+        about.push_str(&format!(
+            "\n\nBy itself, recording a cycle takes a service {cycle_ns:.0} ns (three histograms \
+             and the stamps, median of batches): {:.2} us for all {stages} of them.",
+            1e-3 * stages * cycle_ns,
+        ));
+    }
     halves::archive(name, &about, &pairs)
 }
 

@@ -45,7 +45,7 @@ impl Recorder {
     }
 
     /// Keeps a cycle that has published; returns its time from wake-up to publication, ns.
-    pub(crate) fn keep(&mut self, cycle: CycleStamps) -> u64 {
+    pub fn keep(&mut self, cycle: CycleStamps) -> u64 {
         let cycle_ns = cycle.t_publish_ns.saturating_sub(cycle.t_wake_ns);
         self.timing.step.record(cycle_ns);
         if let Some(stamps) = &mut self.stamps {

@@ -163,14 +163,25 @@ fn topic(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortError
     let mut border = Border::new(setup, &graph)?;
     while_it_lasts(seconds, &listener, heard, |heard| {
         border.look();
+        // Who joins is given frames that were sent before: of the first batch the newest counts.
+        let is_first = heard.frames.is_empty();
+        let mut newest = None;
         for _ in 0..frames.buffer() {
             if !frames.advance() {
                 break;
             }
             let Some(frame) = frames.held() else { break };
             let now_ns = Monotonic.now_ns();
+            if is_first {
+                newest = Some((*frame, now_ns));
+                continue;
+            }
             guard.take(frame, now_ns);
             heard.take(*frame, now_ns);
+        }
+        if let Some((frame, now_ns)) = newest {
+            guard.take(&frame, now_ns);
+            heard.take(frame, now_ns);
         }
     })?;
     heard.topic = found_topic(setup)?;

@@ -13,6 +13,8 @@ const JITTER_MAX: f64 = 0.25;
 const CLOCK_S_MIN: f64 = 2.0;
 /// A publisher that starts anew more often, in a second, does not mean it.
 const STARTS_S_MAX: f64 = 0.5;
+/// Frames may arrive by this much earlier or later than usual, s.
+const ARRIVAL_OFF_MAX_S: f64 = 0.01;
 /// A clock may be off by this share of time.
 const CLOCK_OFF_MAX: f64 = 5e-4;
 
@@ -186,7 +188,7 @@ fn capture(frames: &[Arrived]) -> Finding {
     }
     let off = theirs_s / ours_s - 1.0;
     let detail = format!("{:+.0} ppm against this machine's", off * 1e6);
-    if off.abs() <= CLOCK_OFF_MAX {
+    if off.abs() <= CLOCK_OFF_MAX + ARRIVAL_OFF_MAX_S / ours_s {
         return Finding::new("capture clock", Status::Ok, detail);
     }
     let units = [(1e3, "us"), (1e6, "ms"), (1e9, "s")];
