@@ -1,11 +1,10 @@
 //! Publishes a recorded drive into a running graph, through shared memory:
-//! `publisher FRAMES.csv.gz RUN`, after `scripts/up --source external --rate 20`.
+//! `publisher FRAMES.csv.gz RUN [GRAPH]`, after `scripts/up --source external --rate 20`.
 
 use std::{error::Error, path::Path};
 
 use vigil_blocks::SensorFrame;
-use vigil_cycle::port::Link;
-use vigil_cycle::{Clock, Graph, Monotonic, Stamp, Topic, clock};
+use vigil_cycle::{Clock, Graph, Monotonic, Stamp, Topic, clock, port::Link};
 use vigil_evaluation::frames;
 use vigil_setup::GraphArgs;
 
@@ -14,6 +13,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let run: u32 = std::env::args().nth(2).ok_or("which run?")?.parse()?;
     let mut args = GraphArgs::default();
     (args.config, args.rate) = ("config/rover.toml".into(), Some(20.0));
+    args.graph = std::env::args().nth(3);
     let setup = args.load()?;
     let runs = frames::read(Path::new(&path), &setup.robot)?;
     let run = runs.iter().find(|r| r.id == run).ok_or("no such run")?;

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::process::Command;
 
 use serde_json::Value;
@@ -17,19 +17,29 @@ pub struct Archive {
 }
 
 impl Archive {
-    /// Makes the folder for `question` and stores the machine's facts in it.
+    /// Makes the folder for `question` and stores the machine's facts in it. It is made anew: what
+    /// an earlier run of the same day has left in it goes, so that no summary lies beside data of
+    /// another run.
     ///
     /// # Errors
-    /// The file system's.
+    /// The file system's, and a `question` that is no name of a folder.
     pub fn new(question: &str) -> io::Result<Self> {
+        if !is_name(question) {
+            let text = format!("archive '{question}': allowed is the name of one folder");
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
+        }
         let date = output(Command::new("date").args(["-u", "+%Y-%m-%d"]));
         let host = output(&mut Command::new("hostname"));
         let runs = Path::new(env!("CARGO_MANIFEST_DIR")).join("runs");
         let folder = runs.join(format!("{date}-{host}")).join(question);
+        if fs::exists(&folder)? {
+            fs::remove_dir_all(&folder)?;
+        }
         fs::create_dir_all(&folder)?;
         let facts = machine::facts();
         fs::write(folder.join("machine.json"), format!("{facts:#}\n"))?;
-        let summary = format!("# {question}, {date}\n\nMachine: `machine.json`.\n\n");
+        let commit = machine::commit_in_words(&facts);
+        let summary = format!("# {question}, {date}\n\n{commit} Machine: `machine.json`.\n\n");
         Ok(Self { folder, summary })
     }
 
@@ -72,6 +82,13 @@ impl Archive {
     }
 }
 
+/// True for the name of one folder: what an archive clears must not lie elsewhere.
+fn is_name(text: &str) -> bool {
+    let mut parts = Path::new(text).components();
+    let first = parts.next();
+    matches!(first, Some(Component::Normal(name)) if name == text) && parts.next().is_none()
+}
+
 /// First line that a command prints; empty if it cannot run.
 pub(crate) fn output(command: &mut Command) -> String {
     let output = command.output().map(|o| o.stdout).unwrap_or_default();
@@ -81,4 +98,33 @@ pub(crate) fn output(command: &mut Command) -> String {
         .unwrap_or_default()
         .trim()
         .to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_archive_has_the_name_of_one_folder() {
+        for name in [
+            "latency",
+            "latency-1000hz-cpu-fifo",
+            "latency-0.5hz-idle-other",
+        ] {
+            assert!(is_name(name), "{name}");
+        }
+        for name in [
+            "",
+            ".",
+            "..",
+            "/",
+            "/latency",
+            "../latency",
+            "a/b",
+            "a/",
+            "./a",
+        ] {
+            assert!(!is_name(name), "{name}");
+        }
+    }
 }

@@ -1,8 +1,9 @@
 //! Four processes that do nothing but hand blocks on: what a hand-over costs by itself.
 //!
 //! The source is woken by the schedule, every other stage by its input; each reads its input, fills
-//! a block and passes it on. A stage is this program again (or, over a queue, a thread of it),
-//! placed like the service it stands for, and leaves stamps of the same form as a service.
+//! a block and passes it on. What a carrier does to have its next block comes after that, as in a
+//! service. A stage is this program again (or, over a queue, a thread of it), placed like the
+//! service it stands for, and leaves stamps of the same form as a service.
 
 use std::error::Error;
 use std::io::Read;

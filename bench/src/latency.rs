@@ -14,5 +14,7 @@ pub mod graph;
 pub mod halves;
 pub mod load;
 pub mod page;
+pub mod parts;
 pub mod recording;
+pub mod stalls;
 pub mod system;

@@ -32,11 +32,51 @@ pub fn facts() -> Value {
         "load_average": read("/proc/loadavg").trim(),
         "rustc": output(Command::new("rustc").arg("--version")),
         "commit": output(Command::new("git").args(["rev-parse", "HEAD"])),
-        "uncommitted_changes":
-            !output(Command::new("git").args(["status", "--porcelain", "-uno"])).is_empty(),
+        "uncommitted_changes": !changed().is_empty(),
     })
+}
+
+/// A tracked file that differs from the commit; empty if none does. Archived runs do not count:
+/// they change with each run, and no run depends on them.
+fn changed() -> String {
+    let status = ["status", "--porcelain", "-uno", "--"];
+    let mut command = Command::new("git");
+    output(
+        command
+            .args(status)
+            .args([":/", ":(top,exclude)bench/runs"]),
+    )
+}
+
+/// Which commit was measured, for a summary: a sentence.
+#[must_use]
+pub fn commit_in_words(facts: &Value) -> String {
+    match (facts["commit"].as_str(), &facts["uncommitted_changes"]) {
+        (None | Some(""), _) => "Commit: not known.".into(),
+        (Some(commit), Value::Bool(false)) => format!("Commit: {commit}."),
+        (Some(commit), _) => format!("Commit: {commit}, with changes that are not in it."),
+    }
 }
 
 fn read(path: &str) -> String {
     fs::read_to_string(path).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_summary_says_which_commit_and_what_it_does_not_hold() {
+        let said = |commit: &str, is_changed: bool| {
+            commit_in_words(&json!({ "commit": commit, "uncommitted_changes": is_changed }))
+        };
+        assert_eq!(said("ab12", false), "Commit: ab12.");
+        assert_eq!(
+            said("ab12", true),
+            "Commit: ab12, with changes that are not in it."
+        );
+        assert_eq!(said("", false), "Commit: not known.");
+        assert_eq!(commit_in_words(&json!({})), "Commit: not known.");
+    }
 }

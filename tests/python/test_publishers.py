@@ -4,17 +4,23 @@ import ctypes
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
 import unittest
 
-from harness import EXAMPLES, FRAMES, ROOT, STUCK_LEAF, STUCK_RUN, Graph, events, publisher, vigil
+from harness import BINARIES, EXAMPLES, FRAMES, ROOT, STUCK_LEAF, STUCK_RUN, Graph, events, publisher, vigil
 
 import vigil_types
 
 # Three times the recording's own: the filters go by its capture times.
 RATE_HZ = 60
+# Asks for what examples/CMakeLists.txt needs, and for nothing else.
+BINDING = """cmake_minimum_required(VERSION 3.22)
+project(binding LANGUAGES CXX)
+find_package(iceoryx2-cxx 0.10.0 EXACT REQUIRED)
+"""
 
 
 class Publishers(unittest.TestCase):
@@ -33,6 +39,13 @@ class Publishers(unittest.TestCase):
             self.run_to_its_end(publisher("publisher.py", FRAMES, STUCK_RUN, RATE_HZ, graph.name))
             self.assert_found(graph.stop(), "detector")
 
+    def test_rust_through_shared_memory(self):
+        with Graph("--source", "external", "--rate", "20") as graph:
+            command = [BINARIES / "publisher", FRAMES, str(STUCK_RUN), graph.name]
+            pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+            self.run_to_its_end(subprocess.Popen(command, cwd=ROOT, text=True, **pipes))
+            self.assert_found(graph.stop(), "detector")
+
     def test_python_through_the_unix_socket(self):
         # At the recording's own rate: due times are found from its capture times.
         with Graph("--source", "socket", "--rate", "20") as graph:
@@ -40,17 +53,47 @@ class Publishers(unittest.TestCase):
             self.run_to_its_end(publisher("socket_publisher.py", FRAMES, STUCK_RUN, 20, socket))
             self.assert_found(graph.stop(), "sensor-sim")
 
+    def rows(self):
+        """Rows of the recorded run, as the C++ publishers read them."""
+        rows = subprocess.run(["zcat", FRAMES], check=True, capture_output=True, text=True).stdout
+        return "".join(row + "\n" for row in rows.split("\n") if row.startswith(f"{STUCK_RUN},"))
+
+    def feed(self, *command):
+        subprocess.run(command, input=self.rows(), text=True, check=True, timeout=60, stdout=subprocess.DEVNULL)
+
     def test_cpp_through_udp(self):
         with tempfile.TemporaryDirectory() as folder:
             program = pathlib.Path(folder) / "publisher"
             flags = ["-std=c++17", "-O1", "-Wall", "-Wextra", f"-I{EXAMPLES}"]
-            subprocess.run(["c++", *flags, EXAMPLES / "publisher.cpp", "-o", program], check=True)
-            rows = subprocess.run(["zcat", FRAMES], check=True, capture_output=True, text=True).stdout
-            rows = "".join(row + "\n" for row in rows.split("\n") if row.startswith(f"{STUCK_RUN},"))
+            subprocess.run(["c++", *flags, EXAMPLES / "socket_publisher.cpp", "-o", program], check=True)
             with Graph("--source", "socket", "--rate", "20") as graph:
                 graph.wait_for_socket()
-                subprocess.run([program, str(graph.udp_port)], input=rows, text=True, check=True, timeout=60, stdout=subprocess.DEVNULL)
+                self.feed(program, str(graph.udp_port))
                 self.assert_found(graph.stop(), "sensor-sim")
+
+    def has_binding(self, folder):
+        """True if cmake finds iceoryx2's C++ binding."""
+        probe = pathlib.Path(folder) / "binding"
+        probe.mkdir()
+        (probe / "CMakeLists.txt").write_text(BINDING)
+        command = ["cmake", "-S", probe, "-B", probe / "build"]
+        return shutil.which("cmake") is not None and subprocess.run(command, capture_output=True).returncode == 0
+
+    def build(self, *command):
+        done = subprocess.run(command, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_cpp_through_shared_memory(self):
+        with tempfile.TemporaryDirectory() as folder:
+            if not self.has_binding(folder):
+                self.skipTest("cmake does not find iceoryx2's C++ binding (iceoryx2-cxx 0.10)")
+            built = pathlib.Path(folder) / "built"
+            self.build("cmake", "-S", EXAMPLES, "-B", built)
+            self.build("cmake", "--build", built)
+            with Graph("--source", "external", "--rate", "20") as graph:
+                graph.wait_until_up()
+                self.feed(built / "publisher", graph.name)
+                self.assert_found(graph.stop(), "detector")
 
     def test_a_publisher_of_another_version_is_told_so(self):
         code = "import vigil_types as v; v.SensorFrame.TYPE_NAME = 'vigil.SensorFrame.v0.0123456789abcdef'\n"

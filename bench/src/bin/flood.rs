@@ -1,9 +1,9 @@
-//! What a flood of frames from a stranger costs: nothing is wanted.
+//! What a flood of frames costs: nothing is wanted if it is a stranger's.
 //!
 //! A publisher sends frames to the graph's UDP socket on its schedule; in one half of each pair
-//! another process sends good frames as fast as it can: to the graph's Unix socket, from where
-//! each has to be read and refused, or to the same socket from another port, where the kernel
-//! throws them away.
+//! another process sends good frames as fast as it can: to the graph's Unix socket, or to the same
+//! socket from another port. Or the publisher itself sends old frames besides, through the socket
+//! that the graph listens to: each of those has to be read and refused.
 
 use std::error::Error;
 use std::net::UdpSocket;
@@ -13,7 +13,7 @@ use std::process::{Child, Command, ExitCode, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
 use vigil_bench::latency::graph::{Change, Prepared, root};
@@ -32,8 +32,6 @@ const PUBLISHER: Wanted = Wanted {
     core: 0,
     priority: 50,
 };
-/// The graph takes the first good sender for its own: the publisher begins so much earlier.
-const HEAD_START: Duration = Duration::from_secs(2);
 /// Datagrams between two looks at whether to stop.
 const BATCH: usize = 100;
 
@@ -44,6 +42,8 @@ enum Through {
     Unix,
     /// At the publisher's UDP socket.
     Udp,
+    /// There too, from the publisher itself.
+    Source,
 }
 
 /// Measures in interleaved pairs.
@@ -53,7 +53,7 @@ struct Args {
     /// Pairs.
     #[arg(long, value_name = "N", default_value_t = 10)]
     pairs: usize,
-    /// Time of each run, s.
+    /// Time of each half, s.
     #[arg(long, value_name = "S", default_value_t = 30.0)]
     seconds: f64,
     /// Rate of the publisher, Hz.
@@ -109,13 +109,20 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let result = measure(args, &folder);
     let _ = std::fs::remove_dir_all(&folder);
     let (n, seconds, rate, load) = (args.pairs, args.seconds, args.rate, args.load.name());
-    let (through, socket) = match args.through {
-        Through::Unix => ("unix", "the graph's Unix socket"),
-        Through::Udp => ("udp", "the same socket from another port"),
+    let (through, flood) = match args.through {
+        Through::Unix => ("unix", "a second sender floods the graph's Unix socket"),
+        Through::Udp => (
+            "udp",
+            "a second sender floods the same socket from another port",
+        ),
+        Through::Source => (
+            "source",
+            "the sender floods its socket with old frames besides",
+        ),
     };
     let about = format!(
         "`scripts/bench flood --pairs {n} --seconds {seconds} --rate {rate} --load {load} \
-         --through {through}`\n\nFrames by UDP; with a second sender that floods {socket}."
+         --through {through}`\n\nFrames by UDP; in the halves of one run that are `with`, {flood}."
     );
     halves::archive(&format!("flood-{through}"), &about, &result?)
 }
@@ -130,17 +137,17 @@ fn measure(args: &Args, folder: &Path) -> Result<Vec<[Half; 2]>, Box<dyn Error>>
     };
     let prepared = Prepared::new(change, folder)?;
     let load = Running::start(args.load, &prepared.cores(), folder, None)?;
-    let pairs = halves::interleaved(args.pairs, |with| half(args, &prepared, with));
+    let pairs = pairs(args, &prepared);
     load.finish()?;
     pairs
 }
 
-fn half(args: &Args, prepared: &Prepared, with: bool) -> Result<Half, Box<dyn Error>> {
+fn pairs(args: &Args, prepared: &Prepared) -> Result<Vec<[Half; 2]>, Box<dyn Error>> {
     let setup = prepared.setup();
     let socket = &setup.file.sensor.socket;
     let address = socket.udp.clone();
     let flooded = match args.through {
-        Through::Udp => address.clone(),
+        Through::Udp | Through::Source => address.clone(),
         Through::Unix => {
             let path = setup.domain()?.folder().join(&socket.unix);
             path.display().to_string()
@@ -148,45 +155,54 @@ fn half(args: &Args, prepared: &Prepared, with: bool) -> Result<Half, Box<dyn Er
     };
     let robot = &setup.robot;
     let runs = frames::read(&root().join("tests/data/rover/learn_frames.csv.gz"), robot)?;
-    let recorded = runs
-        .into_iter()
-        .next()
-        .ok_or("the recording is empty")?
-        .frames;
-    let (mut publisher, mut flooding, mut since) = (None, None, Instant::now());
-    let half = halves::run(prepared, args.seconds, &[], || {
-        if publisher.is_none() {
-            let (recorded, address) = (recorded.clone(), address.clone());
-            publisher = Some(Publisher::start(recorded, address, setup.period_ns())?);
-            since = Instant::now();
-        } else if with && flooding.is_none() && since.elapsed() > HEAD_START {
+    let first = runs.into_iter().next();
+    let recorded = first.ok_or("the recording is empty")?.frames;
+    let (mut publisher, mut flooding): (Option<Publisher>, Option<Flooding>) = (None, None);
+    halves::alternating(prepared, (args.pairs, args.seconds), |with| {
+        let publisher = match &mut publisher {
+            Some(publisher) => publisher,
+            none => {
+                let (recorded, address) = (recorded.clone(), address.clone());
+                none.insert(Publisher::start(recorded, address, setup.period_ns())?)
+            }
+        };
+        let is_wanted = with == Some(true);
+        if args.through == Through::Source {
+            publisher.floods.store(is_wanted, Ordering::Relaxed);
+        } else if !is_wanted {
+            flooding = None;
+        } else if flooding.is_none() {
             flooding = Some(Flooding::start(&flooded)?);
+        } else if flooding.as_mut().is_some_and(Flooding::has_ended) {
+            return Err("the flood ended before its time".into());
         }
         Ok(())
-    })?;
-    if with && flooding.is_none_or(|mut flooding| flooding.has_ended()) {
-        return Err("the flood ended before the run".into());
-    }
-    Ok(half)
+    })
 }
 
 /// Sends frames on an absolute schedule until dropped.
 struct Publisher {
     stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    /// Sends old frames besides while this is set.
+    floods: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
 }
 
 impl Publisher {
     fn start(recorded: Vec<SensorFrame>, address: String, period_ns: u64) -> std::io::Result<Self> {
         let socket = UdpSocket::bind("127.0.0.1:0")?;
-        let stop = Arc::new(AtomicBool::new(false));
+        let [stop, floods] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+        let epoch = Monotonic.now_ns();
+        let old = (socket.try_clone()?, address.clone(), epoch);
+        let asked = (Arc::clone(&stop), Arc::clone(&floods));
+        let flood = std::thread::Builder::new().name("flood".into());
+        let flood = flood.spawn(move || send_old(&old, &asked))?;
         let asked = Arc::clone(&stop);
         let thread = std::thread::Builder::new().name("publisher".into());
         let thread = thread.spawn(move || {
             let _ = placement::apply(PUBLISHER);
-            let epoch = Monotonic.now_ns();
             let mut due_ns = epoch;
-            let rounds = (0_u64..).zip(recorded.iter().cycle());
+            let rounds = (1_u64..).zip(recorded.iter().cycle());
             for (seq, frame) in rounds.take_while(|_| !asked.load(Ordering::Relaxed)) {
                 due_ns += period_ns;
                 clock::sleep_until(due_ns);
@@ -203,15 +219,36 @@ impl Publisher {
         })?;
         Ok(Self {
             stop,
-            thread: Some(thread),
+            floods,
+            threads: vec![thread, flood],
         })
+    }
+}
+
+/// Sends the frame before the first again and again while that is wanted.
+fn send_old(
+    (socket, address, epoch): &(UdpSocket, String, u64),
+    (stop, floods): &(Arc<AtomicBool>, Arc<AtomicBool>),
+) {
+    let mut frame = SensorFrame::default();
+    (frame.header.schema, frame.header.epoch) = (SensorFrame::SCHEMA, *epoch);
+    while !stop.load(Ordering::Relaxed) {
+        if !floods.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(5));
+            continue;
+        }
+        for _ in 0..BATCH {
+            frame.header.t_schedule_ns = Monotonic.now_ns();
+            frame.header.t_capture_ns = frame.header.t_schedule_ns;
+            let _ = socket.send_to(&datagram::encode(&frame), address);
+        }
     }
 }
 
 impl Drop for Publisher {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
+        for thread in self.threads.drain(..) {
             let _ = thread.join();
         }
     }

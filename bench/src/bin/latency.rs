@@ -58,9 +58,10 @@ struct Args {
     /// Runs of each cell.
     #[arg(long, value_name = "N", default_value_t = 1)]
     repeat: usize,
-    /// Name of the archive.
-    #[arg(long, value_name = "NAME", default_value = "latency")]
-    archive: String,
+    /// Name of the archive; else `latency` for the whole matrix, and for chosen cells
+    /// `latency-CELL`, or `latency-cells` for several.
+    #[arg(long, value_name = "NAME")]
+    archive: Option<String>,
     /// Print one JSON document of one cell, archive nothing.
     #[arg(long)]
     json: bool,
@@ -98,6 +99,24 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     result
 }
 
+/// True if no cell was chosen.
+fn is_matrix(args: &Args) -> bool {
+    args.rate.is_empty() && args.load.is_empty() && args.scheduling.is_empty()
+}
+
+/// Name of the archive: that of the matrix is its alone.
+fn archive_name(args: &Args, specs: &[Spec]) -> String {
+    let faulty = if args.faulty { "-faulty" } else { "" };
+    match (&args.archive, specs) {
+        (Some(name), _) => name.clone(),
+        _ if is_matrix(args) => format!("latency{faulty}"),
+        (None, [spec, others @ ..]) if others.iter().all(|other| other == spec) => {
+            format!("latency-{}", spec.name())
+        }
+        _ => format!("latency-cells{faulty}"),
+    }
+}
+
 /// The cells asked for, in order.
 fn specs(args: &Args) -> Vec<Spec> {
     let or = |given: &[f64], all: &[f64]| {
@@ -107,7 +126,7 @@ fn specs(args: &Args) -> Vec<Spec> {
             given.to_vec()
         }
     };
-    let is_matrix = args.rate.is_empty() && args.load.is_empty() && args.scheduling.is_empty();
+    let is_matrix = is_matrix(args);
     let one_rate: &[f64] = if is_matrix { &RATES_HZ } else { &[1000.0] };
     let loads: &[Load] = if is_matrix { &LOADS } else { &[Load::Idle] };
     let loads = if args.load.is_empty() {
@@ -151,18 +170,19 @@ fn print_one(specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
 }
 
 fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
-    let mut archive = Archive::new(&args.archive)?;
+    let mut archive = Archive::new(&archive_name(args, specs))?;
     let words: Vec<String> = std::env::args().skip(1).collect();
     archive.say(&format!("`scripts/bench latency {}`\n", words.join(" ")));
     archive.say(
         "Times in us; every latency from the schedule, hand-over and floor without compute; \
-         folded are instants that only a later one's answer ended. \
+         folded are instants that only a later one's answer ended. Own, by stage: instants that \
+         each stage answered after its own deadline and that are not the machine's. \
          `report.html` shows all of it.\n",
     );
     archive.say(
         "| cell | cycles | folded | end to end p50 | p99 | p99.9 | max | hand-over p50 | p99 | \
-         floor p50 | p99 | missed: own | machine | no one stall |\n\
-         |---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
+         floor p50 | p99 | missed: own | machine | no one stall | machine / canary | own, by \
+         stage |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
     );
     let mut cells: Vec<Cell> = Vec::new();
     let mut facts = facts();
@@ -172,7 +192,7 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
             Ok(cell) => cell,
             Err(error) => {
                 archive.say(&format!(
-                    "| {} | not measured: {error} | | | | | | | | | | | | |",
+                    "| {} | not measured: {error} | | | | | | | | | | | | | | |",
                     spec.name()
                 ));
                 continue;
@@ -207,7 +227,8 @@ fn line(cell: &Cell) -> String {
     let floor = cell.floor.hand_over.percentiles();
     let (ours, machine) = cell.missed();
     format!(
-        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {ours} | {machine} | {} |",
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {ours} | {machine} | {} | {} | \
+         {} |",
         cell.spec.name(),
         cell.cycles.len(),
         cell.folded(),
@@ -220,6 +241,9 @@ fn line(cell: &Cell) -> String {
         us(floor.p50_ns),
         us(floor.p99_ns),
         cell.not_one_stall(),
+        cell.machine_over_canary()
+            .map_or_else(|| "-".into(), |times| format!("{times:.2}")),
+        cell.own_by_stage(),
     )
 }
 

@@ -1,10 +1,10 @@
 //! Do slow, stopped or dead observers disturb the graph? And what does its own instrumentation
 //! cost?
 //!
-//! Interleaved pairs of runs: with and without three bad observers (one that never drains what it
-//! holds, one that is stopped, ones that are killed again and again), or with and without the
-//! services' histograms and stamps. Latencies are read by a light observer from the actions' own
-//! stamps, in both halves of a pair alike.
+//! Interleaved pairs: halves of one run with and without three bad observers (one that never drains
+//! what it holds, one that is stopped, ones that are killed again and again), or runs with and
+//! without the services' histograms and stamps. Latencies are read by a light observer from the
+//! actions' own stamps, in both halves of a pair alike.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -49,7 +49,7 @@ struct Args {
     /// Pairs.
     #[arg(long, value_name = "N", default_value_t = 10)]
     pairs: usize,
-    /// Time of each run, s.
+    /// Time of each half, s.
     #[arg(long, value_name = "S", default_value_t = 60.0)]
     seconds: f64,
     /// Rate of the schedule, Hz.
@@ -149,38 +149,51 @@ fn measure(args: &Args, folder: &Path) -> Result<Vec<[Half; 2]>, Box<dyn Error>>
         is_faulty: false,
     };
     let prepared = Prepared::new(change, folder)?;
-    let graph = Some(prepared.path());
-    let load = Running::start(args.load, &prepared.cores(), folder, graph)?;
-    let pairs = halves::interleaved(args.pairs, |with| half(args, &prepared, (with, folder)));
+    let load = Running::start(args.load, &prepared.cores(), folder, Some(prepared.path()))?;
+    let pairs = match args.difference {
+        Difference::Observers => observed(args, &prepared, folder),
+        Difference::Instruments => halves::interleaved(args.pairs, |with| {
+            let recorded = folder.display().to_string();
+            let with: &[&str] = if with {
+                &["--stamps", &recorded]
+            } else {
+                &["--no-timing"]
+            };
+            let half = halves::run(&prepared, args.seconds, with)?;
+            prepared.setup().domain()?.remove_residue();
+            Ok(half)
+        }),
+    };
     load.finish()?;
     pairs
 }
 
-/// One run; `with` what makes the difference or without.
-fn half(
+/// Halves of one run, with bad observers and without.
+fn observed(
     args: &Args,
     prepared: &Prepared,
-    (with, folder): (bool, &Path),
-) -> Result<Half, Box<dyn Error>> {
-    let recorded = folder.display().to_string();
-    let options: &[&str] = match args.difference {
-        Difference::Observers => &[],
-        Difference::Instruments if with => &["--stamps", &recorded],
-        Difference::Instruments => &["--no-timing"],
-    };
-    let has_bad = with && args.difference == Difference::Observers;
-    let mut bad = Bad::new(prepared.path(), folder);
-    let half = halves::run(prepared, args.seconds, options, || match has_bad {
-        true => bad.keep_up(),
-        false => Ok(()),
+    folder: &Path,
+) -> Result<Vec<[Half; 2]>, Box<dyn Error>> {
+    let (mut bad, mut attached): (Option<Bad<'_>>, Vec<usize>) = (None, Vec::new());
+    let pairs = halves::alternating(prepared, (args.pairs, args.seconds), |with| {
+        if with == Some(true) {
+            let bad = bad.get_or_insert_with(|| Bad::new(prepared.path(), folder));
+            return bad.keep_up();
+        }
+        if let Some(bad) = bad.take() {
+            attached.push(bad.attached()?);
+        }
+        Ok(())
     })?;
-    let attached = bad.attached()?;
-    drop(bad);
-    if has_bad && attached < 3 {
-        return Err(format!("only {attached} bad observers saw the graph").into());
+    // The last half may have been one with them.
+    if let Some(bad) = bad.take() {
+        attached.push(bad.attached()?);
     }
     prepared.setup().domain()?.remove_residue();
-    Ok(half)
+    match attached.iter().min() {
+        Some(3..) => Ok(pairs),
+        least => Err(format!("only {least:?} bad observers saw the graph in a half").into()),
+    }
 }
 
 /// Bad observers of a run: ended when dropped.

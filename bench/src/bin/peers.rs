@@ -100,17 +100,18 @@ fn one(chain: &Chain, round: usize, folder: &Path) -> Value {
     let carrier = chain.carrier.to_possible_value();
     let carrier = carrier.map_or_else(String::new, |v| v.get_name().to_owned());
     let (size, period_ns) = (chain.sizes[0], chain.period_ns);
-    let spectra = chain.run(folder).and_then(|stamps| {
+    let found = chain.run(folder).and_then(|stamps| {
         let first_ns = stamps[0].first().map_or(0, |s| s.t_schedule_ns);
         let cycles = join(&stamps, period_ns, first_ns + WARM_UP_NS);
         if cycles.is_empty() {
             return Err("nothing arrived".into());
         }
-        Spectra::of(&cycles)
+        Ok((Spectra::of(&cycles)?, cycles))
     });
-    match spectra {
-        Ok(spectra) => json!({
-            "carrier": carrier, "bytes": size, "round": round,
+    match found {
+        Ok((spectra, cycles)) => json!({
+            "carrier": carrier, "bytes": size, "round": round, "cycles": cycles.len(),
+            "folded": cycles.iter().filter(|cycle| cycle.is_folded()).count(),
             "end_to_end_us": us(&spectra.end_to_end),
             "hand_over_us": us(&spectra.hand_over),
             "compute_us": us(&spectra.compute),
@@ -127,13 +128,18 @@ fn archive(args: &Args, rows: &[Value]) -> Result<(), Box<dyn Error>> {
     let rounds = args.rounds;
     archive.say(&format!(
         "`scripts/bench peers --rate {rate} --seconds {seconds} --rounds {rounds} --load \
-         {load}`\n\nHand-over of three hops and the source's wake-up (end to end without the time \
-         in which a stage fills or looks at a block), us: the median of {rounds} interleaved runs \
-         of p50, then of p99, with the range over the runs. `shared-memory` is Vigil's transport, \
-         `futex` the floor; both leave the block where it is. Cores {:?}.\n",
+         {load}`\n\nFrom the schedule to the last publication (end to end), and the part of it in \
+         which no stage fills or looks at a block: three hops and the source's wake-up \
+         (hand-over). In us: the median of {rounds} interleaved runs of p50 and of p99, with the \
+         range over the runs. Folded: instants of all runs that had no answer of their own; they \
+         have the latency until the next. `shared-memory` is Vigil's transport, `futex` the \
+         floor; both leave the block where it is. Cores {:?}.\n",
         PLACED.map(|(core, _)| core)
     ));
-    archive.say("| bytes | carrier | p50 | range | p99 | range |\n|---|---|---|---|---|---|");
+    archive.say(
+        "| bytes | carrier | hand-over p50 | p99 | end to end p50 | p99 | folded |\n\
+         |---|---|---|---|---|---|---|",
+    );
     for &size in &args.bytes {
         for carrier in Carrier::value_variants() {
             let name = carrier.to_possible_value();
@@ -150,18 +156,24 @@ fn archive(args: &Args, rows: &[Value]) -> Result<(), Box<dyn Error>> {
 
 fn line(size: usize, name: &str, runs: &[&Value]) -> String {
     if let Some(failed) = runs.iter().find_map(|run| run["failed"].as_str()) {
-        return format!("| {size} | {name} | not possible: {failed} | | | |");
+        return format!("| {size} | {name} | not possible: {failed} | | | | |");
     }
-    let of = |key: &str| {
-        let values = runs
-            .iter()
-            .filter_map(|run| run["hand_over_us"][key].as_f64());
+    let of = |part: &str, key: &str| {
+        let values = runs.iter().filter_map(|run| run[part][key].as_f64());
         let mut values: Vec<f64> = values.collect();
         let median = vigil_bench::quantile(&mut values, 0.5);
-        let (least, most) = (values.first().copied(), values.last().copied());
-        let range = [least, most].map(|v| v.unwrap_or(f64::NAN));
-        (median, range)
+        let ends = [values.first(), values.last()];
+        let [least, most] = ends.map(|value| value.copied().unwrap_or(f64::NAN));
+        format!("{median:.1} ({least:.1} to {most:.1})")
     };
-    let ((p50, [a, b]), (p99, [c, d])) = (of("p50"), of("p99"));
-    format!("| {size} | {name} | {p50:.1} | {a:.1} to {b:.1} | {p99:.1} | {c:.1} to {d:.1} |")
+    let sum = |key: &str| -> u64 { runs.iter().filter_map(|run| run[key].as_u64()).sum() };
+    format!(
+        "| {size} | {name} | {} | {} | {} | {} | {} of {} |",
+        of("hand_over_us", "p50"),
+        of("hand_over_us", "p99"),
+        of("end_to_end_us", "p50"),
+        of("end_to_end_us", "p99"),
+        sum("folded"),
+        sum("cycles"),
+    )
 }

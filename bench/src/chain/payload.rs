@@ -201,6 +201,9 @@ impl<T: Payload> Outgoing for Writer<T> {
             t_schedule_ns,
             t_capture_ns: t_schedule_ns,
         };
-        Ok(self.sender.send(stamp, &Monotonic)?)
+        let t_publish_ns = self.sender.send(stamp, &Monotonic)?;
+        // The next block is loaned and cleared now, as by a stage: not when it is to be filled.
+        self.sender.prepare()?;
+        Ok(t_publish_ns)
     }
 }

@@ -14,7 +14,7 @@ const SECOND_PERIODS: u64 = 1_000_000_000 / PERIOD_NS;
 pub type Inject = fn(&mut Stream<'_>, &mut Pcg64Mcg) -> bool;
 
 /// Every kind, with the faults of the threat list that it belongs to.
-pub const KINDS: [(&str, Inject); 17] = [
+pub const KINDS: [(&str, Inject); 19] = [
     ("another schema", another_schema),
     ("no epoch", no_epoch),
     ("a second publisher", second_publisher),
@@ -26,10 +26,15 @@ pub const KINDS: [(&str, Inject); 17] = [
     ("a flood of good frames", flood),
     ("NaN or infinity", not_finite),
     ("1e308", huge),
-    ("degrees for radians", degrees),
+    (
+        "steering angles of more than 3.2 degrees, in degrees",
+        steering_in_degrees,
+    ),
     ("a pose in millimetres, within a run", millimetres),
     ("a clock ahead", ahead),
     ("a clock behind", behind),
+    ("a capture time that stands", standing),
+    ("a capture clock that was set", clock_set),
     ("a flipped bit", flipped_bit),
     ("a wrong length", wrong_length),
 ];
@@ -115,10 +120,12 @@ fn restart(stream: &mut Stream<'_>, random: &mut Pcg64Mcg) -> bool {
 fn flood(stream: &mut Stream<'_>, random: &mut Pcg64Mcg) -> bool {
     let mut found = stream.send(&stream.good()).is_none();
     let extra = random.random_range(100..1000);
-    for _ in 0..extra {
+    for k in 1..=extra {
         stream.seq += 1;
         let mut frame = stream.good();
         frame.header.t_schedule_ns += random.random_range(0..PERIOD_NS / 4);
+        // Each is captured after the one before it, and all before the next good one.
+        frame.header.t_capture_ns += k;
         found &= stream.send(&frame) == Some(Rejection::Early);
     }
     stream.pass();
@@ -159,10 +166,11 @@ fn huge(stream: &mut Stream<'_>, random: &mut Pcg64Mcg) -> bool {
     cause == Some(Rejection::OutOfRange)
 }
 
-fn degrees(stream: &mut Stream<'_>, random: &mut Pcg64Mcg) -> bool {
-    let angle: f64 = random.random_range(0.2..1.5);
+fn steering_in_degrees(stream: &mut Stream<'_>, random: &mut Pcg64Mcg) -> bool {
+    // Smaller ones could be radians: no bound on a single frame tells them apart.
+    let angle_deg: f64 = random.random_range(3.2..90.0);
     let wheel = [0, 2, 3, 5][random.random_range(0..4)];
-    let cause = spoilt(stream, |frame| frame.steer[wheel] = angle.to_degrees());
+    let cause = spoilt(stream, |frame| frame.steer[wheel] = angle_deg);
     cause == Some(Rejection::OutOfRange)
 }
 
@@ -190,6 +198,37 @@ fn behind(stream: &mut Stream<'_>, random: &mut Pcg64Mcg) -> bool {
     let by_ns = 10_000_000_000 + between(random, 1e3, 9e11);
     let cause = spoilt(stream, |frame| frame.header.t_schedule_ns -= by_ns);
     cause == Some(Rejection::Behind)
+}
+
+fn standing(stream: &mut Stream<'_>, random: &mut Pcg64Mcg) -> bool {
+    let before_ns = stream.good().header.t_capture_ns;
+    let frames = random.random_range(1..=50);
+    stream.send_good()
+        && (0..frames).all(|_| {
+            let cause = spoilt(stream, |frame| frame.header.t_capture_ns = before_ns);
+            cause == Some(Rejection::Clock)
+        })
+}
+
+fn clock_set(stream: &mut Stream<'_>, random: &mut Pcg64Mcg) -> bool {
+    // More than an hour ahead, or any time back; and after one frame right again.
+    let hour_ns = 3_600_000_000_000;
+    let t_ns = stream.good().header.t_capture_ns;
+    let is_ahead = random.random();
+    let set_ns = if is_ahead {
+        t_ns.saturating_add(random.random_range(hour_ns + 1..=u64::MAX / 2))
+    } else {
+        t_ns - random.random_range(PERIOD_NS..=t_ns)
+    };
+    let set = spoilt(stream, |frame| frame.header.t_capture_ns = set_ns);
+    // Setting it right sets it once more; from far ahead that is back, from little back it is not.
+    let back = spoilt(stream, |_| ());
+    let is_right = if is_ahead || t_ns - set_ns > hour_ns {
+        back == Some(Rejection::Clock)
+    } else {
+        back.is_none()
+    };
+    set == Some(Rejection::Clock) && is_right
 }
 
 fn flipped_bit(stream: &mut Stream<'_>, random: &mut Pcg64Mcg) -> bool {

@@ -17,6 +17,7 @@ use super::attribution::{self, Miss, Record};
 use super::cycles::{self, Cycle, STAGE_NAMES, STAGES, Spectra};
 use super::graph::{Change, Prepared, Ran};
 use super::load::{Load, Running};
+use super::parts::{self, Part};
 use super::system::Ticks;
 use crate::chain::Chain;
 use crate::chain::carriers::Carrier;
@@ -29,6 +30,8 @@ const FLOOR_SHARE: f64 = 0.25;
 const FLOOR_S: [f64; 2] = [4.0, 60.0];
 /// Time beside graph and floors in which canaries run: starting and ending processes, s.
 const AROUND_S: f64 = 240.0;
+/// Instants at the very end that the monitor may count and nothing answers.
+const LAST_INSTANTS_MAX: u64 = 100;
 /// Time for a load to get going.
 const LOAD_START: Duration = Duration::from_secs(1);
 
@@ -84,8 +87,15 @@ pub struct Cell {
     pub canaries: Vec<Seen>,
     /// Cycles past the last deadline of the chain.
     pub misses: Vec<Miss>,
+    /// Instants that each stage has answered after its own deadline: Vigil's own, the machine's.
+    pub stage_misses: [(u64, u64); STAGES],
     /// False if no canary could be placed above the graph: every miss counts as Vigil's own.
     pub is_attributed: bool,
+    /// Late instants of the whole run, from the supervisor's first answer to its last, counted from
+    /// the stamps: what its monitor counts too, and to the end of the run beyond.
+    pub recounted: u64,
+    /// Text of the graph file.
+    pub graph_file: String,
     /// The graph's.
     pub seed: u64,
     /// Deadline of the chain after the schedule, ns.
@@ -143,35 +153,44 @@ impl Spec {
         let canaries = prepared.canaries(self.seconds + 2.0 * floor_s + AROUND_S)?;
         let before = floor.run(folder)?;
         let ticks = Ticks::now();
-        let ran = prepared.run(self.seconds, folder)?;
+        let ran = prepared.run(self.seconds, folder, || Ok(()))?;
         let system = Ticks::now().since(ticks);
         let after = floor.run(folder)?;
         let canaries: Vec<Seen> = canaries.into_iter().filter_map(Canary::finish).collect();
         load.finish()?;
-        let times = (period_ns, prepared.deadline_ns());
-        let mut cell = self.judge((ran, [before, after]), canaries, times, (system, wanted))?;
-        cell.seed = prepared.setup().file.graph.seed;
-        Ok(cell)
+        self.judge(&prepared, (ran, [before, after]), canaries, system)
     }
 
     fn judge(
         &self,
+        prepared: &Prepared,
         (ran, floors): (Ran, [[Vec<CycleStamps>; STAGES]; 2]),
         canaries: Vec<Seen>,
-        (period_ns, deadline_ns): (u64, u64),
-        (system, wanted): (Value, [Wanted; STAGES]),
+        system: Value,
     ) -> Result<Cell, Box<dyn Error>> {
+        let (wanted, deadline_ns) = (prepared.wanted(), prepared.deadline_ns());
+        let period_ns = prepared.setup().period_ns();
         let is_attributed = check(&ran.summary, &canaries, &wanted)?;
         let first = ran.stamps[STAGES - 1].first();
         let first = first.ok_or("the graph did nothing")?;
         let from_ns = first.t_schedule_ns + (WARM_UP_S * 1e9) as u64;
-        let cycles = cycles::join(&ran.stamps, period_ns, from_ns);
+        let mut cycles = cycles::join(&ran.stamps, period_ns, 0);
+        let recounted = recounted(&cycles, deadline_ns, &ran.summary)?;
+        cycles.retain(|cycle| cycle.t_schedule_ns >= from_ns);
         let believed = canaries.iter().filter(|_| is_attributed);
         let records: Vec<Record<'_>> = believed.map(Record::of).collect();
         if cycles.is_empty() {
             return Err("no cycle was left after the warm-up".into());
         }
         let misses = attribution::misses(&cycles, deadline_ns, &records);
+        let stage_misses = std::array::from_fn(|i| {
+            let mut stamps: [Vec<CycleStamps>; STAGES] = Default::default();
+            stamps[STAGES - 1].clone_from(&ran.stamps[i]);
+            let mut cycles = cycles::join(&stamps, period_ns, 0);
+            cycles.retain(|cycle| cycle.t_schedule_ns >= from_ns);
+            let deadline_ns = prepared.stage_deadline_ns(i);
+            counts(&attribution::misses(&cycles, deadline_ns, &records))
+        });
         let graph = Spectra::of(&cycles)?;
         let floors = floors.iter().flat_map(|stamps| {
             let first = stamps[0].first().map_or(0, |s| s.t_schedule_ns);
@@ -193,8 +212,11 @@ impl Spec {
             graph,
             floor,
             misses,
+            stage_misses,
             is_attributed,
-            seed: 0,
+            recounted,
+            graph_file: std::fs::read_to_string(prepared.path())?,
+            seed: prepared.setup().file.graph.seed,
             deadline_ns,
             canary_late_ppm: (slack_ns > 0).then(|| 1e6 * late as f64 / all.max(1) as f64),
             system,
@@ -205,10 +227,32 @@ impl Spec {
     }
 }
 
+/// Late instants of a whole run.
+///
+/// # Errors
+/// If the supervisor's monitor has counted otherwise.
+fn recounted(cycles: &[Cycle], deadline_ns: u64, summary: &Value) -> Result<u64, String> {
+    let is_late = |cycle: &&Cycle| cycle.end_to_end_ns() > deadline_ns;
+    let recounted = cycles.iter().filter(is_late).count() as u64;
+    // It goes on counting until it is stopped, after its last answer.
+    let monitor = missed_by_the_monitor(summary).unwrap_or(0);
+    if (recounted..=recounted + LAST_INSTANTS_MAX).contains(&monitor) {
+        return Ok(recounted);
+    }
+    Err(format!(
+        "the monitor counted {monitor} misses, the stamps say {recounted}"
+    ))
+}
+
+/// What the supervisor's deadline monitor has counted in the whole run.
+fn missed_by_the_monitor(summary: &Value) -> Option<u64> {
+    summary["services"][STAGE_NAMES[STAGES - 1]]["missed"].as_u64()
+}
+
 /// Refuses what would not be a measurement: a service that was restarted (its stamps are those
 /// since then), a canary that forgot. False if canaries ran elsewhere or below what they watch
 /// over, as without the right to real-time priority.
-fn check(
+pub(super) fn check(
     summary: &Value,
     canaries: &[Seen],
     wanted: &[Wanted; STAGES],
@@ -225,6 +269,12 @@ fn check(
         return Err("a canary had no room for what it saw: nobody can say whose a miss is".into());
     }
     Ok(!canaries.is_empty() && canaries.iter().all(is_above))
+}
+
+/// Vigil's own, and the machine's.
+fn counts(misses: &[Miss]) -> (u64, u64) {
+    let machine = misses.iter().filter(|m| m.is_machine).count() as u64;
+    (misses.len() as u64 - machine, machine)
 }
 
 /// Percentiles in us.
@@ -250,8 +300,24 @@ impl Cell {
     /// Misses of Vigil's own, and the machine's.
     #[must_use]
     pub fn missed(&self) -> (u64, u64) {
-        let machine = self.misses.iter().filter(|m| m.is_machine).count() as u64;
-        (self.misses.len() as u64 - machine, machine)
+        counts(&self.misses)
+    }
+
+    /// Misses of Vigil's own of each stage by its own deadline, in the order of data: `0/0/2/0`.
+    #[must_use]
+    pub fn own_by_stage(&self) -> String {
+        self.stage_misses
+            .map(|(ours, _)| ours.to_string())
+            .join("/")
+    }
+
+    /// How many times as often cycles were missed by the machine as wake-ups of the canaries were
+    /// late by the slack of a usual cycle; `None` if these never were.
+    #[must_use]
+    pub fn machine_over_canary(&self) -> Option<f64> {
+        let canary_ppm = self.canary_late_ppm.filter(|ppm| *ppm > 0.0)?;
+        let machine_ppm = 1e6 * self.missed().1 as f64 / self.cycles.len() as f64;
+        Some(machine_ppm / canary_ppm)
     }
 
     /// Instants that only a later one's answer ended.
@@ -264,6 +330,16 @@ impl Cell {
     #[must_use]
     pub fn not_one_stall(&self) -> u64 {
         self.misses.iter().filter(|m| !m.is_one_stall).count() as u64
+    }
+
+    /// The slowest cycle: which, and when it was due.
+    fn slowest(&self) -> Value {
+        let cycles = self.cycles.iter().enumerate();
+        let slowest = cycles.max_by_key(|(_, cycle)| cycle.end_to_end_ns());
+        slowest.map_or(Value::Null, |(i, cycle)| {
+            let after_ns = cycle.t_schedule_ns - self.cycles[0].t_schedule_ns;
+            json!({ "cycle": i, "after_s": after_ns as f64 * 1e-9 })
+        })
     }
 
     /// End to end minus compute, over the floor's: ratios of p50 and p99.
@@ -289,10 +365,13 @@ impl Cell {
         let stage = |i: usize| {
             let (hand_over, compute) = &self.graph.stages[i];
             let of = &self.summary["services"][STAGE_NAMES[i]];
+            let (ours, machine) = self.stage_misses[i];
             json!({
+                "missed": { "ours": ours, "machine": machine },
                 "hand_over_us": us(hand_over), "compute_us": us(compute),
                 "core": of["core"], "core_wanted": self.wanted[i].core, "pinned": of["pinned"],
                 "scheduling": of["scheduling"], "memory_locked": of["memory_locked"],
+                "timer_slack_ns": of["timer_slack_ns"],
                 "missed_by_its_monitor": of["missed"], "lost": of["lost"], "late": of["late"],
                 "duplicate": of["duplicate"], "slips": of["slips"],
                 "page_faults": of["page_faults"],
@@ -325,8 +404,15 @@ impl Cell {
             "deadline_us": self.deadline_ns as f64 * 1e-3,
             "missed": { "ours": ours, "machine": machine },
             "attributed": self.is_attributed,
+            "whole_run": {
+                "missed_by_the_monitor": missed_by_the_monitor(&self.summary),
+                "missed_by_recount": self.recounted,
+            },
             "missed_without_one_long_stall": self.not_one_stall(),
+            "parts": parts::of(self).iter().map(Part::json).collect::<Vec<_>>(),
             "canary_late_ppm": self.canary_late_ppm.map(round),
+            "machine_over_canary": self.machine_over_canary().map(round),
+            "max_at": self.slowest(),
             "cycles": self.cycles.len(),
             "folded": self.folded(),
             "seed": self.seed,

@@ -25,7 +25,7 @@ const CANARY_FROM_NS: u64 = 200_000;
 const RAW_MAX: usize = 25_000;
 
 /// Writes everything of a cell into `folder`: percentile spectra, interval log, misses, the
-/// canaries' late wake-ups, raw cycles and the document.
+/// canaries' late wake-ups, raw cycles, the graph file and the document.
 ///
 /// # Errors
 /// The file system's.
@@ -63,6 +63,7 @@ pub fn write(cell: &Cell, folder: &Path) -> Result<(), Box<dyn Error>> {
         let raw = raw(&longest(&cell.cycles, RAW_MAX), start_ns)?;
         fs::write(folder.join("longest-cycles.csv.gz"), raw)?;
     }
+    fs::write(folder.join("graph.toml"), &cell.graph_file)?;
     fs::write(folder.join("cell.json"), format!("{:#}\n", cell.json()))?;
     Ok(())
 }

@@ -38,6 +38,7 @@ const FAULT: &str = "stuck:RM@1";
 #[derive(Debug)]
 pub struct Prepared {
     path: PathBuf,
+    launcher: PathBuf,
     setup: Setup,
     is_faulty: bool,
 }
@@ -98,6 +99,7 @@ impl Prepared {
         let is_faulty = change.is_faulty;
         Ok(Self {
             path,
+            launcher: std::env::current_exe()?.with_file_name("vigil-launcher"),
             setup,
             is_faulty,
         })
@@ -133,7 +135,13 @@ impl Prepared {
     /// Deadline of the last stage after the schedule, ns.
     #[must_use]
     pub fn deadline_ns(&self) -> u64 {
-        let plan = self.setup.plan(ServiceName::Supervisor, Leave::default());
+        self.stage_deadline_ns(STAGES - 1)
+    }
+
+    /// Deadline of a stage after the schedule, ns.
+    #[must_use]
+    pub fn stage_deadline_ns(&self, stage: usize) -> u64 {
+        let plan = self.setup.plan(ServiceName::ALL[stage], Leave::default());
         plan.schedule.deadline_ns
     }
 
@@ -158,7 +166,7 @@ impl Prepared {
     }
 
     fn command(&self, seconds: f64, options: &[&str]) -> Command {
-        let mut command = Command::new(root().join("target/release/vigil-launcher"));
+        let mut command = Command::new(&self.launcher);
         command
             .arg("--config")
             .arg(&self.path)
@@ -180,43 +188,48 @@ impl Prepared {
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn()
     }
 
-    /// Runs it for `seconds` while `beside` does its part; the launcher's document.
+    /// Runs it for `seconds` with these further options while `beside` does its part; the
+    /// launcher's document.
     ///
     /// # Errors
     /// If the graph or `beside` fails.
     pub fn run_beside(
         &self,
         seconds: f64,
+        options: &[&str],
         beside: impl FnOnce() -> Result<(), Box<dyn Error>>,
     ) -> Result<Value, Box<dyn Error>> {
-        let mut command = self.command(seconds, &[]);
+        let mut command = self.command(seconds, options);
         let launcher = command
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+            .stderr(Stdio::piped())
             .spawn()?;
         let done = beside();
         let output = launcher.wait_with_output()?;
         done?;
         if !output.status.success() {
-            return Err(format!("the graph ended with {}", output.status).into());
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            return Err(format!("the graph ended with {}\n{said}", output.status).into());
         }
         Ok(serde_json::from_slice(&output.stdout)?)
     }
 
-    /// Runs it for `seconds`; its services leave their stamps, by way of `folder`.
+    /// Runs it for `seconds` while `beside` does its part; its services leave their stamps, by way
+    /// of `folder`.
     ///
     /// # Errors
-    /// If the graph fails or leaves no stamps.
-    pub fn run(&self, seconds: f64, folder: &Path) -> Result<Ran, Box<dyn Error>> {
+    /// If the graph or `beside` fails, or the graph leaves no stamps.
+    pub fn run(
+        &self,
+        seconds: f64,
+        folder: &Path,
+        beside: impl FnOnce() -> Result<(), Box<dyn Error>>,
+    ) -> Result<Ran, Box<dyn Error>> {
         let rate_hz = self.setup.file.graph.rate_hz;
         let kept = ((seconds + 30.0) * rate_hz).ceil().to_string();
         let stamps_in = folder.display().to_string();
         let options = ["--stamps", &stamps_in, "--stamped-cycles", &kept];
-        let output = self.command(seconds, &options).output()?;
-        if !output.status.success() {
-            let said = String::from_utf8_lossy(&output.stderr).into_owned();
-            return Err(format!("the graph ended with {}\n{said}", output.status).into());
-        }
+        let summary = self.run_beside(seconds, &options, beside)?;
         let read = |stage: usize| {
             let path = folder.join(format!("{}.stamps", STAGE_NAMES[stage]));
             let found = stamps::read(&path);
@@ -224,7 +237,7 @@ impl Prepared {
             found
         };
         Ok(Ran {
-            summary: serde_json::from_slice(&output.stdout)?,
+            summary,
             stamps: [read(0)?, read(1)?, read(2)?, read(3)?],
         })
     }

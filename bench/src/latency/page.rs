@@ -10,6 +10,7 @@ use vigil_evaluation::report::page::{beside, escaped, key, page, section};
 
 use super::attribution::Miss;
 use super::cell::Cell;
+use super::parts::{self, Part};
 
 /// Colours: end to end, hand-over, the floor's hand-over, compute, the machine's misses, ours.
 const WHOLE: usize = 1;
@@ -62,7 +63,8 @@ const ABOUT: &str = "<p>Every latency counts from the instant at which the cycle
     out as warm-up. <em>Hand-over</em> is the part in which no stage computes: waking up and \
     passing on, four times. <em>Floor</em> is the same part of four processes on the same cores, \
     with the same priorities and block sizes, that do nothing but hand over by a futex, measured \
-    before and after the graph in the same cell. Canaries are threads that do nothing but be on \
+    before and after the graph in the same cell. A sensor flood needs a graph's topic: in its \
+    cells the floor is measured without the flood. Canaries are threads that do nothing but be on \
     time, one on each core, one priority above the graph. A missed deadline is the \
     <em>machine's</em> if canaries were overdue, beyond what nine of ten of their wake-ups keep \
     to, for half the overrun or more between schedule and end (time in which two were overdue \
@@ -72,10 +74,12 @@ const ABOUT: &str = "<p>Every latency counts from the instant at which the cycle
 const ALL_CELLS: &str = "Times in us. Folded: instants that only a later one's answer ended. \
     Ratio: hand-over against the floor, median and 99th percentile. No one stall: misses, of \
     either kind, that no single late wake-up of a canary explains. Canary: wake-ups of the \
-    canaries, in a million, that would have missed the deadline of a usual cycle.";
+    canaries, in a million, that would have missed the deadline of a usual cycle. Machine / \
+    canary: misses of the machine over that. Own, by stage: instants that each stage answered \
+    after its own deadline and that are not the machine's.";
 
 /// Heads of the table's columns.
-const HEADS: [&str; 20] = [
+const HEADS: [&str; 22] = [
     "rate, Hz",
     "load",
     "scheduling",
@@ -96,6 +100,8 @@ const HEADS: [&str; 20] = [
     "machine",
     "no one stall",
     "canary, ppm",
+    "machine / canary",
+    "own, by stage",
 ];
 
 fn table(cells: &[Cell]) -> String {
@@ -143,6 +149,9 @@ fn table(cells: &[Cell]) -> String {
             cell.not_one_stall().to_string(),
             cell.canary_late_ppm
                 .map_or_else(|| "-".into(), |ppm| format!("{ppm:.0}")),
+            cell.machine_over_canary()
+                .map_or_else(|| "-".into(), |times| format!("{times:.2}")),
+            cell.own_by_stage(),
         ] {
             let _ = write!(text, "<td class=\"n\">{value}</td>");
         }
@@ -193,6 +202,8 @@ fn one(cell: &Cell, name: &str) -> Result<String, ChartError> {
         "deadline_us",
         "missed",
         "missed_without_one_long_stall",
+        "whole_run",
+        "parts",
         "folded",
         "seed",
         "over_floor",
@@ -222,10 +233,26 @@ fn misses_in_words(cell: &Cell) -> String {
     };
     format!(
         "{} cycles; {ours} missed by Vigil itself (a rate below {:.2e} with 95 % confidence if \
-         none), {machine} by the machine.{nobody}",
+         none), {machine} by the machine.{nobody}{}",
         cell.cycles.len(),
         3.0 / cell.cycles.len().max(1) as f64,
+        limit_in_words(cell),
     )
+}
+
+/// Which part of the cycles that Vigil missed itself is longer than usual.
+fn limit_in_words(cell: &Cell) -> String {
+    let parts = parts::of(cell);
+    let excess = |part: &Part| part.own_misses_p50_us - part.p50_us;
+    let longest = parts.iter().max_by(|a, b| excess(a).total_cmp(&excess(b)));
+    let longest = longest.filter(|part| part.own_misses > 0);
+    longest.map_or_else(String::new, |part| {
+        format!(
+            " Of its own misses {} have an answer of their own; in these the {} of {} stands out: \
+             {:.0} us at the median, {:.0} us in all cycles.",
+            part.own_misses, part.what, part.stage, part.own_misses_p50_us, part.p50_us,
+        )
+    })
 }
 
 /// Latency in us on a logarithmic axis.

@@ -1,18 +1,16 @@
 //! Particles drawn from the detector's belief about the pose, for those who read particles.
 
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{PARTICLE_CAPACITY, ParticleBlock};
 use vigil_inference::angle::wrap;
+use vigil_inference::normals::Normals;
 use vigil_inference::particles::PoseParticles;
 use vigil_inference::track::Track;
 
-/// Particles of equal weight, and the generator that draws them.
+/// Particles of equal weight, and the numbers that they are drawn with.
 #[derive(Debug, Clone)]
 pub(crate) struct Cloud {
     particles: PoseParticles,
-    seed: u64,
-    rng: Pcg64Mcg,
+    normals: Normals,
 }
 
 impl Cloud {
@@ -20,15 +18,19 @@ impl Cloud {
     pub fn new(count: usize, seed: u64) -> Self {
         Self {
             particles: PoseParticles::new(count),
-            seed,
-            rng: Pcg64Mcg::seed_from_u64(seed),
+            normals: Normals::new(seed, count),
         }
     }
 
     /// The generator starts from its seed again, so that equal runs have equal particles whatever
     /// came before.
     pub fn reset(&mut self) {
-        self.rng = Pcg64Mcg::seed_from_u64(self.seed);
+        self.normals.reset();
+    }
+
+    /// Draws the numbers for the next particles.
+    pub fn draw_ahead(&mut self) {
+        self.normals.draw_ahead();
     }
 
     /// Changes the number of particles, at most to the number at the start.
@@ -39,7 +41,7 @@ impl Cloud {
     /// Draws all particles anew.
     pub fn draw(&mut self, track: &Track) {
         let (pose, covariance) = (track.pose(), track.pose_covariance());
-        self.particles.draw(pose, covariance, &mut self.rng);
+        self.particles.draw(pose, covariance, &mut self.normals);
     }
 
     /// Number of particles.

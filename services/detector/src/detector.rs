@@ -203,6 +203,13 @@ impl Detector {
         self.publish(particles);
     }
 
+    /// Does ahead of the next step what does not depend on its entry. Changes no result.
+    // Never merged into its caller, so that its instructions can be counted.
+    #[inline(never)]
+    pub fn prepare(&mut self) {
+        self.watch.draw_ahead();
+    }
+
     fn begin_run(&mut self) {
         self.watch.reset();
         self.armed = false;

@@ -119,6 +119,13 @@ impl Watch {
         }
     }
 
+    /// Draws the numbers for the next particles, where there are any.
+    pub fn draw_ahead(&mut self) {
+        if let Self::Faults { cloud, .. } = self {
+            cloud.draw_ahead();
+        }
+    }
+
     /// True once evidence counts.
     pub fn is_ready(&self) -> bool {
         match self {

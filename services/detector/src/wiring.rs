@@ -53,10 +53,11 @@ impl Stage for DetectorStage {
             if !self.frames.advance() {
                 break;
             }
-            let Some(frame) = self.frames.held() else {
+            // A copy: what is judged must be what is stepped, whatever its writer writes meanwhile.
+            let Some(frame) = self.frames.held().copied() else {
                 break;
             };
-            let content = || self.guard.check(frame);
+            let content = || self.guard.check(&frame);
             if intake.admit::<SensorFrame>(&frame.header, content) {
                 let (belief, particles) = (self.belief.block(), self.particles.block());
                 let before = std::mem::replace(&mut self.epoch, frame.header.epoch);
@@ -64,7 +65,7 @@ impl Stage for DetectorStage {
                     // A publisher that starts anew may have another clock.
                     self.detector.step(Entry::Reset, belief, particles);
                 }
-                self.detector.step(Entry::Frame(frame), belief, particles);
+                self.detector.step(Entry::Frame(&frame), belief, particles);
                 intake.stepped(&frame.header, (frame.header.epoch, frame.header.seq));
             }
         }
@@ -87,6 +88,7 @@ impl Stage for DetectorStage {
     }
 
     fn prepare(&mut self) -> Result<(), PortError> {
+        self.detector.prepare();
         self.belief.prepare()?;
         self.particles.prepare()
     }

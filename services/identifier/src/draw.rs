@@ -5,7 +5,8 @@ use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{MODE_MULTIPLE, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock, WHEELS};
 use vigil_inference::angle::wrap;
-use vigil_inference::particles::{PRECISION, factor, normal};
+use vigil_inference::normals::normal;
+use vigil_inference::particles::{PRECISION, factor};
 use vigil_robot::learned::Moved;
 
 use crate::encoders::Encoders;

@@ -82,15 +82,16 @@ impl IdentifierStage {
             if !self.frames.advance() {
                 break;
             }
-            let Some(frame) = self.frames.held() else {
+            // A copy: what is judged must be what is stepped, whatever its writer writes meanwhile.
+            let Some(frame) = self.frames.held().copied() else {
                 break;
             };
-            let (account, content) = (&mut self.frame_account, || self.guard.check(frame));
+            let (account, content) = (&mut self.frame_account, || self.guard.check(&frame));
             if intake.admit_further::<SensorFrame>(account, &frame.header, content) {
                 if self.pending.len() == PENDING_MAX {
                     self.pending.pop_front();
                 }
-                self.pending.push_back(*frame);
+                self.pending.push_back(frame);
             }
         }
     }

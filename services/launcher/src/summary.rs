@@ -74,6 +74,8 @@ pub struct ServiceSummary {
     core_wanted: u32,
     pinned: bool,
     scheduling: String,
+    /// Of the thread that cycles; null if the service left no report.
+    timer_slack_ns: Option<u64>,
     memory_locked: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     wake_up_us: Option<Microseconds>,
@@ -190,6 +192,7 @@ fn service(
             || "unknown".into(),
             |h| Placement::scheduling(h.policy, h.priority),
         ),
+        timer_slack_ns: report.and_then(|r| r.timer_slack_ns),
         memory_locked: health.is_some_and(|h| h.memory_locked != 0),
         wake_up_us: of(|r| r.wake_up.percentiles),
         step_us: of(|r| r.step.percentiles),

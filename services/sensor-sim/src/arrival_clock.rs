@@ -22,23 +22,42 @@ struct Known {
     offset_ns: i128,
 }
 
+/// Frames of one source that are here at the same time.
+#[derive(Debug, Clone, Copy)]
+pub struct Here<I> {
+    /// Their headers.
+    pub headers: I,
+    /// False if more of them wait: the newest of these may have been held up as well.
+    pub are_all: bool,
+}
+
 impl ArrivalClock {
     /// Dates a frame that is here at `now_ns`, if its publisher has left that to us; the clock as
-    /// this frame makes it. Of the frames of its epoch that are here, the newest was captured at
-    /// `newest_capture_ns`: none can have been held up for longer than that one says.
+    /// this frame makes it. Of those that are here with it, none can have been held up for longer
+    /// than the newest of its epoch says.
     #[must_use]
-    pub fn date(self, header: &mut Header, newest_capture_ns: u64, now_ns: u64) -> Self {
+    pub fn date<'a>(
+        self,
+        header: &mut Header,
+        here: Here<impl IntoIterator<Item = &'a Header>>,
+        now_ns: u64,
+    ) -> Self {
         if header.t_schedule_ns != 0 {
             return self;
         }
         let (epoch, t_capture_ns) = (header.epoch, header.t_capture_ns);
-        let newest_ns = newest_capture_ns.max(t_capture_ns);
+        let same = here
+            .headers
+            .into_iter()
+            .filter(|other| other.epoch == epoch);
+        let newest_ns = same.map(|other| other.t_capture_ns).max();
+        let newest_ns = newest_ns.unwrap_or(0).max(t_capture_ns);
         let seen_ns = i128::from(now_ns) - i128::from(newest_ns);
         let offset_ns = match self.known {
             Some(known) if known.epoch == epoch && known.t_capture_ns <= t_capture_ns => {
                 let elapsed_ns = (t_capture_ns - known.t_capture_ns) as f64;
                 let drifted_ns = known.offset_ns + (DRIFT_MAX * elapsed_ns).ceil() as i128;
-                if seen_ns - drifted_ns > HELD_UP_MAX_NS {
+                if here.are_all && seen_ns - drifted_ns > HELD_UP_MAX_NS {
                     seen_ns
                 } else {
                     drifted_ns.min(seen_ns)
@@ -63,6 +82,13 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
+    fn all<I>(headers: I) -> Here<I> {
+        Here {
+            headers,
+            are_all: true,
+        }
+    }
+
     /// When a frame was due that has come alone, and was taken.
     fn due_ns(clock: &mut ArrivalClock, epoch: u64, t_capture_ns: u64, now_ns: u64) -> u64 {
         let mut header = Header {
@@ -70,7 +96,7 @@ mod tests {
             t_capture_ns,
             ..Header::default()
         };
-        *clock = clock.date(&mut header, t_capture_ns, now_ns);
+        *clock = clock.date(&mut header, all([]), now_ns);
         header.t_schedule_ns
     }
 
@@ -86,13 +112,13 @@ mod tests {
     #[test]
     fn frames_that_come_together_are_as_far_apart_as_they_were_captured_from_the_first_on() {
         let mut clock = ArrivalClock::default();
-        let due = [10, 20, 30].map(|capture| {
-            let mut header = Header {
-                epoch: 1,
-                t_capture_ns: capture * MS,
-                ..Header::default()
-            };
-            clock = clock.date(&mut header, 30 * MS, 1000 * MS);
+        let here = [10, 20, 30].map(|capture| Header {
+            epoch: 1,
+            t_capture_ns: capture * MS,
+            ..Header::default()
+        });
+        let due = here.map(|mut header| {
+            clock = clock.date(&mut header, all(&here), 1000 * MS);
             header.t_schedule_ns / MS
         });
         assert_eq!(due, [980, 990, 1000]);
@@ -108,7 +134,7 @@ mod tests {
             t_capture_ns: 90 * MS,
             ..Header::default()
         };
-        let _ = clock.date(&mut foreign, 90 * MS, 1001 * MS);
+        let _ = clock.date(&mut foreign, all([]), 1001 * MS);
         assert_eq!(due_ns(&mut clock, 1, 20 * MS, 1015 * MS) / MS, 1010);
     }
 
@@ -138,5 +164,37 @@ mod tests {
         // Set back: as if it began anew.
         assert_eq!(due_ns(&mut clock, 2, 4, 9_000), 9_000);
         assert_eq!(due_ns(&mut clock, 3, u64::MAX, 9_000), 9_000);
+    }
+
+    #[test]
+    fn a_long_stall_that_is_read_in_pieces_leaves_the_frames_as_far_apart_as_they_were() {
+        let mut clock = ArrivalClock::default();
+        assert_eq!(due_ns(&mut clock, 1, 10 * MS, 1000 * MS) / MS, 1000);
+        // Three seconds later, 300 frames are here; they are read 64 at a time.
+        let waiting: Vec<Header> = (2..=300)
+            .map(|k| Header {
+                epoch: 1,
+                t_capture_ns: k * 10 * MS,
+                ..Header::default()
+            })
+            .collect();
+        let mut due_ms = Vec::new();
+        for piece in waiting.chunks(64) {
+            for mut header in piece.iter().copied() {
+                let here = Here {
+                    headers: piece,
+                    are_all: piece.len() < 64,
+                };
+                clock = clock.date(&mut header, here, 3990 * MS);
+                due_ms.push(header.t_schedule_ns / MS);
+            }
+        }
+        // The other clock may be slow: a little more at each frame, taken back at the newest.
+        let apart_ms = due_ms.windows(2).map(|pair| pair[1] - pair[0]);
+        assert!(
+            apart_ms.into_iter().all(|ms| (8..=11).contains(&ms)),
+            "{due_ms:?}"
+        );
+        assert!((3989..=3990).contains(&due_ms[due_ms.len() - 1]));
     }
 }

@@ -28,7 +28,7 @@ mod soil;
 mod wiring;
 mod world;
 
-pub use arrival_clock::ArrivalClock;
+pub use arrival_clock::{ArrivalClock, Here};
 pub use assemble::{Assembled, assemble};
 pub use check::WorldError;
 pub use drive::{ACCELERATION_MAX_M_S2, CURVATURE_RATE_MAX_1_M_S, DriveCommand};

@@ -36,11 +36,13 @@ pub enum Rejection {
     Malformed = 12,
     /// Its checksum does not fit.
     Corrupt = 13,
+    /// Its capture time is not after that of the one before it, or leaps.
+    Clock = 14,
 }
 
 impl Rejection {
     /// All of them, in the order of their counters.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Schema,
         Self::NoEpoch,
         Self::OtherWriter,
@@ -55,6 +57,7 @@ impl Rejection {
         Self::Quarantined,
         Self::Malformed,
         Self::Corrupt,
+        Self::Clock,
     ];
 
     /// Name, as in reports.
@@ -75,6 +78,7 @@ impl Rejection {
             Self::Quarantined => "quarantined",
             Self::Malformed => "malformed",
             Self::Corrupt => "corrupt",
+            Self::Clock => "clock",
         }
     }
 
@@ -95,6 +99,7 @@ impl Rejection {
                 | Self::WrongSequence
                 | Self::Early
                 | Self::Quarantined
+                | Self::Clock
         )
     }
 }

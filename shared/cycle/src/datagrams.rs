@@ -122,21 +122,31 @@ impl Datagrams {
         let Some(udp) = &self.udp else {
             return Ok(());
         };
+        let own = udp.local_addr()?;
+        if own.ip().is_unspecified() {
+            // It would be bound to one of this machine's addresses, and deaf to what the peer sends
+            // to another of them, or to all: the comparison of addresses is left to the caller.
+            return Ok(());
+        }
         match from {
             From::Udp(peer) => udp.connect(peer),
             // From itself: nobody else has that address.
-            From::Unix => udp.connect(udp.local_addr()?),
+            From::Unix => udp.connect(own),
         }
     }
 
-    /// From now on they may come from anywhere again; what has waited meanwhile is old and goes.
-    pub fn from_anywhere(&self) {
+    /// From now on they may come from anywhere again; what has waited meanwhile is old and goes:
+    /// how many datagrams that were.
+    pub fn from_anywhere(&self) -> usize {
+        let mut old = 0;
         if self.is_unix_shut.replace(false) {
-            let mut old = [0; 1];
-            let mut waiting = (0..STALE_MAX).map(|_| self.receive_unix(&mut old));
-            while waiting.next().flatten().is_some() {}
+            let mut buffer = [0; 1];
+            let mut waiting = (0..STALE_MAX).map(|_| self.receive_unix(&mut buffer));
+            while waiting.next().flatten().is_some() {
+                old += 1;
+            }
         }
-        let Some(udp) = &self.udp else { return };
+        let Some(udp) = &self.udp else { return old };
         let nobody = libc::sockaddr {
             sa_family: libc::AF_UNSPEC as u16,
             sa_data: [0; 14],
@@ -151,6 +161,7 @@ impl Datagrams {
                 size_of::<libc::sockaddr>() as libc::socklen_t,
             );
         }
+        old
     }
 }
 
@@ -200,7 +211,7 @@ mod tests {
         source.send_to(b"ours", to).unwrap();
         assert_eq!(received(&datagrams), [(b"ours".to_vec(), from)]);
         assert_eq!(datagrams.descriptors()[1], NOTHING);
-        datagrams.from_anywhere();
+        assert_eq!(datagrams.from_anywhere(), 1);
         assert_eq!(received(&datagrams), []);
         other.send_to(b"new", &path).unwrap();
         assert_eq!(received(&datagrams), [(b"new".to_vec(), From::Unix)]);
@@ -231,6 +242,19 @@ mod tests {
         fs::write(&path, "not a socket").unwrap();
         assert!(Datagrams::bind(None, Some(&path)).is_err());
         fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn who_listens_everywhere_hears_a_peer_at_each_of_its_addresses() {
+        let datagrams = Datagrams::bind(Some("0.0.0.0:0".parse().unwrap()), None).unwrap();
+        let port = datagrams.udp_address().unwrap().port();
+        let peer = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let from = From::Udp(peer.local_addr().unwrap());
+        for (to, sent) in [("127.0.0.1", b"one"), ("127.0.0.2", b"two")] {
+            peer.send_to(sent, (to, port)).unwrap();
+            assert_eq!(received(&datagrams), [(sent.to_vec(), from)]);
+            datagrams.only(from).unwrap();
+        }
     }
 
     #[test]

@@ -80,6 +80,15 @@ pub fn current_core() -> usize {
     usize::try_from(core).unwrap_or(usize::MAX)
 }
 
+/// Timer slack of the calling thread, ns: 1 after [`apply`], 0 where a real-time class has none.
+#[must_use]
+pub fn timer_slack_ns() -> Option<u64> {
+    // SAFETY: a plain system call on the calling thread.
+    #[allow(unsafe_code)]
+    let slack_ns = unsafe { libc::prctl(libc::PR_GET_TIMERSLACK, 0_u64, 0_u64, 0_u64, 0_u64) };
+    u64::try_from(slack_ns).ok()
+}
+
 /// Reads the placement of the calling thread, which was to run on `core`, from the kernel
 /// (`memory_locked` is not known here and false).
 #[must_use]

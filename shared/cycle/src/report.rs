@@ -11,10 +11,11 @@ use hdrhistogram::serialization::{Deserializer, Serializer, V2Serializer};
 use serde::{Deserialize, Serialize};
 
 use crate::latency::{Latency, Percentiles};
+use crate::placement;
 use crate::stage::Timing;
 
 const MAGIC: [u8; 4] = *b"VGRP";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Largest payload that is decoded, bytes.
 const PAYLOAD_MAX: usize = 4 << 20;
 
@@ -32,6 +33,8 @@ pub struct RunReport {
     /// Minor and major page faults in the steady state, after the first 200 cycles; `None` if it
     /// did not come to that.
     pub page_faults: Option<[u64; 2]>,
+    /// Timer slack of the thread that cycles, ns; 0 where a real-time class has none.
+    pub timer_slack_ns: Option<u64>,
 }
 
 /// A histogram in a file: its percentiles, and all of it in HdrHistogram's V2 form.
@@ -82,7 +85,7 @@ impl Stored {
 }
 
 impl RunReport {
-    /// A report of `service`'s timing.
+    /// A report of `service`'s timing, by the thread that cycles.
     ///
     /// # Errors
     /// [`ReportError::Format`] if a histogram cannot be serialised.
@@ -97,6 +100,7 @@ impl RunReport {
             step: Stored::new(&timing.step)?,
             from_schedule: Stored::new(&timing.from_schedule)?,
             page_faults,
+            timer_slack_ns: placement::timer_slack_ns(),
         })
     }
 
@@ -187,7 +191,7 @@ mod tests {
     #[test]
     fn the_envelope_is_pinned_byte_by_byte() {
         let bytes = report().encode().unwrap();
-        assert_eq!(&bytes[..8], b"VGRP\x01\0\0\0");
+        assert_eq!(&bytes[..8], b"VGRP\x02\0\0\0");
         assert_eq!(bytes[8..12], crc32fast::hash(&bytes[12..]).to_le_bytes());
         // Legacy encoding: the name's length as u64, then its bytes.
         assert_eq!(&bytes[12..28], b"\x08\0\0\0\0\0\0\0detector");

@@ -1,18 +1,22 @@
 //! Fewer particles before a missed deadline.
 //!
-//! A cycle that takes nearly its whole budget is a warning. Single ones are the machine's (a
-//! processor taken away for a while lengthens whatever runs), so a few in one window are needed,
-//! and the shortest of them says what the work itself costs. The allowance then falls in
-//! proportion, and returns step by step once long windows stay far below the budget.
+//! A cycle that takes nearly all the time that it has is a warning: its budget, or less if its
+//! input came so late that the deadline is nearer. Single ones are the machine's (a processor
+//! taken away for a while lengthens whatever runs), so a few in one window are needed, and the
+//! shortest of them says what the work itself costs. The allowance then falls in proportion, and
+//! returns step by step once long windows stay far below what they have.
 
 use crate::deadline::Schedule;
 
-/// Share of the budget above which a cycle counts as a warning.
+/// Share of its time above which a cycle counts as a warning.
 const WARNING: f64 = 0.8;
-/// Share of the budget that a smaller number of particles is to take.
+/// Share of its time that a smaller number of particles is to take.
 const AIM: f64 = 0.5;
-/// Share of the budget below which there is room for more.
+/// Share of its time below which there is room for more.
 const ROOM: f64 = 0.4;
+/// Share of the deadline that a cycle has at least: who is woken later than that has been held up,
+/// and fewer particles would not help.
+const TIME_MIN: f64 = 0.5;
 /// Warnings in one window after which particles are shed: half of the observations of a second.
 const WARNINGS: u32 = 10;
 /// Length of a window, ns, and cycles in it at least: filters work on every observation, some
@@ -31,13 +35,13 @@ const PARTICLES_MIN: u32 = 32;
 pub struct Shedder {
     configured: u32,
     allowed: u32,
-    budget_ns: u64,
+    schedule: Schedule,
     /// Cycles in a window.
     window: u32,
     cycles: u32,
     warnings: u32,
-    /// Shortest of the cycles that were warnings, ns.
-    shortest_ns: u64,
+    /// Share of its time that the shortest of the cycles took that were warnings.
+    shortest: f64,
     without_room: u32,
     calm_windows: u32,
 }
@@ -50,14 +54,22 @@ impl Shedder {
         Self {
             configured,
             allowed: configured,
-            budget_ns: schedule.budget_ns,
+            schedule,
             window: u32::try_from(window).unwrap_or(u32::MAX),
             cycles: 0,
             warnings: 0,
-            shortest_ns: u64::MAX,
+            shortest: f64::INFINITY,
             without_room: 0,
             calm_windows: 0,
         }
+    }
+
+    /// Share of the time that it had of a cycle that took `cycle_ns` and was woken so long after
+    /// its instant of the schedule, ns.
+    fn share(&self, cycle_ns: u64, woken_after_ns: u64) -> f64 {
+        let deadline_ns = self.schedule.deadline_ns as f64;
+        let left_ns = (deadline_ns - woken_after_ns as f64).max(TIME_MIN * deadline_ns);
+        cycle_ns as f64 / left_ns.min(self.schedule.budget_ns as f64).max(1.0)
     }
 
     /// Particles allowed at present.
@@ -72,18 +84,18 @@ impl Shedder {
         self.configured
     }
 
-    /// Takes the time of a cycle from wake-up to publication, ns; the new allowance if it changes.
-    pub fn take(&mut self, cycle_ns: u64) -> Option<u32> {
-        let share = cycle_ns as f64 / self.budget_ns.max(1) as f64;
+    /// Takes the time of a cycle from wake-up to publication, and how long after its instant of the
+    /// schedule it was woken, ns; the new allowance if it changes.
+    pub fn take(&mut self, cycle_ns: u64, woken_after_ns: u64) -> Option<u32> {
+        let share = self.share(cycle_ns, woken_after_ns);
         self.cycles += 1;
         self.without_room += u32::from(share > ROOM);
         if share > WARNING {
             self.warnings += 1;
-            self.shortest_ns = self.shortest_ns.min(cycle_ns);
+            self.shortest = self.shortest.min(share);
         }
         if self.warnings == WARNINGS {
-            let fits = AIM * self.budget_ns as f64 / self.shortest_ns as f64;
-            let fewer = (f64::from(self.allowed) * fits) as u32;
+            let fewer = (f64::from(self.allowed) * AIM / self.shortest) as u32;
             self.begin_window();
             self.calm_windows = 0;
             return self.allow(fewer.max(PARTICLES_MIN));
@@ -103,7 +115,7 @@ impl Shedder {
 
     const fn begin_window(&mut self) {
         (self.cycles, self.warnings, self.without_room) = (0, 0, 0);
-        self.shortest_ns = u64::MAX;
+        self.shortest = f64::INFINITY;
     }
 
     fn allow(&mut self, particles: u32) -> Option<u32> {
@@ -123,7 +135,7 @@ mod tests {
     fn of(configured: u32, period_ns: u64) -> Shedder {
         let schedule = Schedule {
             period_ns,
-            deadline_ns: period_ns,
+            deadline_ns: period_ns.max(BUDGET_NS),
             budget_ns: BUDGET_NS,
         };
         Shedder::new(configured, schedule)
@@ -132,7 +144,7 @@ mod tests {
     /// Runs `cycles` cycles that cost `ns_a_particle` for each; returns the allowance at the end.
     fn run(shedder: &mut Shedder, cycles: u32, ns_a_particle: u64) -> u32 {
         for _ in 0..cycles {
-            shedder.take(ns_a_particle * u64::from(shedder.allowed()));
+            shedder.take(ns_a_particle * u64::from(shedder.allowed()), 0);
         }
         shedder.allowed()
     }
@@ -155,7 +167,7 @@ mod tests {
         let mut shedder = of(1000, 1_000_000);
         for cycle in 0..100_000 {
             let cycle_ns = if cycle % 200 == 0 { 20_000_000 } else { 50_000 };
-            assert_eq!(shedder.take(cycle_ns), None, "cycle {cycle}");
+            assert_eq!(shedder.take(cycle_ns, 0), None, "cycle {cycle}");
         }
     }
 
@@ -166,10 +178,31 @@ mod tests {
             let mut shedder = of(1000, period_ns);
             let found = (0..10 * each).find_map(|cycle: u32| {
                 let is_heavy = cycle.is_multiple_of(each);
-                shedder.take(if is_heavy { 480_000 } else { 5_000 })
+                shedder.take(if is_heavy { 480_000 } else { 5_000 }, 0)
             });
             assert_eq!(found, Some(520), "{period_ns} ns");
         }
+    }
+
+    #[test]
+    fn input_that_comes_late_leaves_less_time() {
+        let schedule = Schedule {
+            period_ns: 1_000_000,
+            deadline_ns: 750_000,
+            budget_ns: 750_000,
+        };
+        let run = |cycle_ns: u64, woken_after_ns: u64| {
+            let mut shedder = Shedder::new(1000, schedule);
+            for _ in 0..2000 {
+                let allowed = u64::from(shedder.allowed());
+                shedder.take(cycle_ns * allowed / 1000, woken_after_ns);
+            }
+            shedder.allowed()
+        };
+        // 520 us are 69 % of the budget, but all there is between 230 and 750 us: half of it.
+        assert_eq!([run(520_000, 0), run(520_000, 230_000)], [1000, 500]);
+        // Woken after the deadline: held up by something else, whatever it computes.
+        assert_eq!([run(200_000, 900_000), run(200_000, u64::MAX)], [1000; 2]);
     }
 
     #[test]

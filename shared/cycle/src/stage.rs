@@ -38,7 +38,8 @@ pub trait Stage {
     /// The transport's.
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError>;
 
-    /// Readies the blocks of the next cycle, see [`crate::Sender::prepare`]. Off the critical path.
+    /// Readies the blocks of the next cycle, see [`crate::Sender::prepare`], and whatever else does
+    /// not depend on its input. Off the critical path.
     ///
     /// # Errors
     /// The transport's.
@@ -123,6 +124,11 @@ impl Intake<'_> {
         self.account.reject(rejection);
     }
 
+    /// Accounts what was refused and is nobody's.
+    pub fn count(&mut self, rejection: Rejection) {
+        self.account.count(rejection);
+    }
+
     /// The filter has stepped the sensor frame (epoch, seq) behind the accepted block with this
     /// header: the output answers its instant of the schedule.
     pub fn stepped(&mut self, header: &Header, (frame_epoch, frame_seq): (u64, u64)) {
@@ -198,6 +204,8 @@ pub struct StageCycle {
     shedder: Option<Shedder>,
     /// From the schedule to the publication of the last input, ns.
     input_offset_ns: u64,
+    /// From the schedule to the wake-up of the last cycle, ns.
+    woken_after_ns: u64,
     /// True if the last turn has taken a block.
     had_input: bool,
 }
@@ -220,6 +228,7 @@ impl StageCycle {
             lateness: Lateness::default(),
             shedder: None,
             input_offset_ns: 0,
+            woken_after_ns: 0,
             had_input: false,
         })
     }
@@ -376,6 +385,7 @@ impl StageCycle {
         // Somebody outside may claim any time of publication.
         let offset_ns = newest.t_publish_ns.saturating_sub(newest.t_schedule_ns);
         self.input_offset_ns = offset_ns.min(self.monitor.deadline_ns());
+        self.woken_after_ns = woken_ns.saturating_sub(newest.t_schedule_ns);
         let health = self.health.block();
         (health.answered_epoch, health.answered_seq) = (cause.frame_epoch, cause.frame_seq);
     }
@@ -409,7 +419,8 @@ impl StageCycle {
         let Some(shedder) = &mut self.shedder else {
             return;
         };
-        if let Some(particles) = shedder.take(self.health.view().last_cycle_ns) {
+        let cycle_ns = self.health.view().last_cycle_ns;
+        if let Some(particles) = shedder.take(cycle_ns, self.woken_after_ns) {
             stage.limit(particles);
         }
         let (allowed, configured) = (shedder.allowed(), shedder.configured());

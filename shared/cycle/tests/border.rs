@@ -90,6 +90,21 @@ impl Came {
         self.rejection
             .is_none_or(|rejection| after.contains(&rejection))
     }
+
+    /// Nothing was wrong with what it said.
+    fn said_something_good(&self) -> bool {
+        let good = [None, Some(Rejection::Early), Some(Rejection::Quarantined)];
+        good.contains(&self.rejection)
+    }
+}
+
+/// The known writer's blocks, with their places in the history: from the first on that said
+/// something good.
+fn in_sequence(history: &[Came]) -> impl DoubleEndedIterator<Item = (usize, &Came)> {
+    let first = history.iter().position(Came::said_something_good);
+    let all = history.iter().enumerate();
+    all.skip(first.unwrap_or(history.len()))
+        .filter(|(_, came)| came.was_in_sequence())
 }
 
 /// What is wrong with a block after `history`; the first cause that applies, in the order told.
@@ -101,7 +116,7 @@ fn wrong(
 ) -> Option<Rejection> {
     let is_outside = writer != Writer::Service;
     let silent_ns = silent_ns(history, now_ns);
-    let last = history.iter().rfind(|came| came.was_in_sequence());
+    let last = in_sequence(history).next_back().map(|(_, came)| came);
     let same = last.filter(|last| last.header.epoch == header.epoch);
     let before = same.map(|last| last.header.seq);
     let begins_anew = same.is_none_or(|last| is_new_start(&last.header, header));
@@ -153,7 +168,7 @@ fn wrong(
 
 /// Since when nothing was taken, ns, or since the first that might have been.
 fn silent_ns(history: &[Came], now_ns: u64) -> u64 {
-    let first = history.iter().find(|came| came.was_in_sequence());
+    let first = in_sequence(history).next().map(|(_, came)| came);
     let taken = history.iter().rfind(|came| came.rejection.is_none());
     taken.or(first).map_or(0, |came| now_ns - came.now_ns)
 }
@@ -166,11 +181,7 @@ fn is_new_start(before: &Header, after: &Header) -> bool {
 
 /// Where in the history starts of the writer begin.
 fn starts(history: &[Came]) -> Vec<usize> {
-    let known = history.iter().enumerate();
-    let known: Vec<usize> = known
-        .filter(|(_, came)| came.was_in_sequence())
-        .map(|(i, _)| i)
-        .collect();
+    let known: Vec<usize> = in_sequence(history).map(|(i, _)| i).collect();
     let others = known.windows(2).map(|pair| (pair[0], pair[1]));
     let others = others.filter(|(a, b)| is_new_start(&history[*a].header, &history[*b].header));
     known
@@ -189,12 +200,19 @@ fn taken_of_start(history: &[Came]) -> Option<&Came> {
         .rfind(|came| came.rejection.is_none())
 }
 
-/// Since when its deeds count for the source: its first block, or the first after a second of
-/// silence that is a new start.
+/// Since when no block came, ns; what is none says nothing.
+fn quiet_ns(history: &[Came], now_ns: u64) -> u64 {
+    let garbage = [Some(Rejection::Malformed), Some(Rejection::Corrupt)];
+    let last = history.iter().rfind(|c| !garbage.contains(&c.rejection));
+    last.map_or(u64::MAX, |came| now_ns - came.now_ns)
+}
+
+/// Since when its deeds count for the source: its first block, or the first after a second in which
+/// nothing came that is a new start.
 fn judged_from(history: &[Came]) -> usize {
     let mut starts = starts(history);
     let first = starts.first().copied().unwrap_or(history.len());
-    starts.retain(|i| silent_ns(&history[..*i], history[*i].now_ns) > S);
+    starts.retain(|i| quiet_ns(&history[..*i], history[*i].now_ns) > S);
     starts.pop().unwrap_or(first)
 }
 
@@ -267,7 +285,7 @@ proptest! {
             let counted = history.iter().filter(|came| came.rejection == Some(cause)).count();
             prop_assert_eq!(account.rejected[cause as usize], counted as u64, "{:?}", cause);
         }
-        let known: Vec<&Came> = history.iter().filter(|came| came.was_in_sequence()).collect();
+        let known: Vec<&Came> = in_sequence(&history).map(|(_, came)| came).collect();
         let gaps = known.windows(2).filter_map(|pair| {
             let [before, after] = [pair[0].header, pair[1].header];
             (!is_new_start(&before, &after)).then(|| after.seq - before.seq - 1)

@@ -1,10 +1,14 @@
 //! Angles on the circle.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// `angle` (rad) moved by whole turns into ±π. Not finite stays not finite.
 #[must_use]
 pub fn wrap(angle: f64) -> f64 {
+    // The usual case, without a call to round.
+    if angle.abs() < PI {
+        return angle;
+    }
     angle - TAU * (angle / TAU).round()
 }
 

@@ -33,6 +33,7 @@
 //! | [`risk`] | what losing track of a mode costs, for risk-sensitive proposals |
 //! | [`resample`], [`weights`], [`adaptive`] | four schemes, log-weights, number of particles |
 //! | [`gaussian`], [`track`], [`particles`] | Kalman filter, pose track, pose particles |
+//! | [`normals`] | standard normals, drawn ahead of their use |
 //! | [`onsets`] | components by the age of their onset, in bounded number |
 //! | [`bank`] | exact single faults: one hypothesis per (mode, onset) |
 //! | [`tree`] | the fault tree |
@@ -55,6 +56,7 @@ pub mod lanes;
 pub mod logspace;
 pub mod look_ahead;
 pub mod merged;
+pub mod normals;
 pub mod onsets;
 pub mod particles;
 pub mod proposal;

@@ -1,9 +1,8 @@
 //! Planar pose particles of equal weight, drawn from a Gaussian.
 
 use nalgebra::{Cholesky, Matrix3, Vector3};
-use rand::RngExt;
-use rand_distr::StandardNormal;
-use rand_pcg::Pcg64Mcg;
+
+use crate::normals::Normals;
 
 /// Variance added to a covariance: particles are carried in single precision.
 pub const PRECISION: f64 = 1e-10;
@@ -31,10 +30,10 @@ impl PoseParticles {
 
     /// Draws every particle anew from the normal distribution with these moments; all at the mean
     /// if the covariance is none.
-    pub fn draw(&mut self, mean: Vector3<f64>, covariance: Matrix3<f64>, rng: &mut Pcg64Mcg) {
+    pub fn draw(&mut self, mean: Vector3<f64>, covariance: Matrix3<f64>, normals: &mut Normals) {
         let factor = factor(covariance);
         for pose in &mut self.poses {
-            *pose = mean + factor * normal(rng);
+            *pose = mean + factor * normals.take();
         }
     }
 
@@ -53,22 +52,16 @@ pub fn factor(covariance: Matrix3<f64>) -> Matrix3<f64> {
     Cholesky::new(spread).map_or(Matrix3::zeros(), |factor| factor.l())
 }
 
-/// Three standard normals.
-pub fn normal(rng: &mut Pcg64Mcg) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| rng.sample(StandardNormal))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::SeedableRng;
 
     #[test]
     fn particles_have_the_moments_that_they_were_drawn_from() {
         let mean = Vector3::new(3.0, -1.0, 0.5);
         let covariance = Matrix3::new(0.04, 0.01, 0.0, 0.01, 0.09, -0.02, 0.0, -0.02, 0.01);
         let mut cloud = PoseParticles::new(40_000);
-        cloud.draw(mean, covariance, &mut Pcg64Mcg::seed_from_u64(3));
+        cloud.draw(mean, covariance, &mut Normals::new(3, 100));
         let count = cloud.poses().len() as f64;
         let found = cloud.poses().iter().sum::<Vector3<f64>>() / count;
         let apart = cloud.poses().iter().map(|pose| pose - found);
@@ -79,7 +72,7 @@ mod tests {
         cloud.draw(
             mean,
             Matrix3::identity() * f64::NAN,
-            &mut Pcg64Mcg::seed_from_u64(3),
+            &mut Normals::new(3, 100),
         );
         assert!(cloud.poses().iter().all(|pose| *pose == mean));
     }

@@ -1,10 +1,12 @@
 //! What no frame of a robot can say: the content check of frames from outside.
 //!
 //! The bounds are wide. What a broken sensor or a broken robot may say is for the filters to judge,
-//! however strange; this refuses what only a wrong publisher says: degrees for radians, millimetres
-//! for metres, memory that was never written. Of changes from one frame to the next only the
-//! position's has a bound, what the robot can drive: rates, angles and currents step at once when a
-//! sensor or a wheel breaks, and those steps are what the filters live on.
+//! however strange; this refuses what only a wrong publisher says: steering angles beyond half a
+//! turn, as most are in degrees, positions beyond the horizon, memory that was never written, a
+//! capture time that was never set. (Degrees that are small enough to be radians are found by
+//! `vigil check-publisher`, which knows how the robot turns.) Of changes from one frame to the next
+//! only the position's has a bound, what the robot can drive: rates, angles and currents step at
+//! once when a sensor or a wheel breaks, and those steps are what the filters live on.
 
 use std::f64::consts::PI;
 
@@ -16,8 +18,8 @@ use crate::Description;
 pub const POSITION_MAX_M: f64 = 1e6;
 /// Largest yaw, rad: a publisher need not wrap it.
 pub const YAW_MAX_RAD: f64 = 1e3;
-/// Largest steering angle, rad: more than a turn is none.
-pub const STEER_MAX_RAD: f64 = 2.0 * PI;
+/// Largest steering angle, rad: more than half a turn is none.
+pub const STEER_MAX_RAD: f64 = PI;
 /// Largest motor current, A.
 pub const CURRENT_MAX_A: f64 = 1e4;
 /// Commands, wheel rates and yaw rates may exceed the robot's limits by this factor.
@@ -27,6 +29,9 @@ pub const COMMAND_MAX: f64 = 1e6;
 /// A pose may be off by this much between two frames, m, besides what the robot can drive: a robot
 /// that loses its way may jump, and that is for the filters to see.
 pub const JUMP_MAX_M: f64 = 100.0;
+/// Longest time between the captures of two frames of a run, ns: an hour. Beyond it a clock was
+/// set.
+pub const PAUSE_MAX_NS: u64 = 3_600_000_000_000;
 
 /// Checks the frames of one robot.
 #[derive(Debug, Clone)]
@@ -36,6 +41,8 @@ pub struct FrameGuard {
     yaw_rate_max_rad_s: f64,
     wheel_rate_max_rad_s: f64,
     last: Option<Place>,
+    /// Run of the last frame, and when that was captured, ns.
+    captured: Option<((u64, u64), u64)>,
 }
 
 /// Where the last frame with a pose was.
@@ -62,6 +69,7 @@ impl FrameGuard {
             yaw_rate_max_rad_s: BEYOND_LIMITS * limits.yaw_rate_rad_s,
             wheel_rate_max_rad_s: BEYOND_LIMITS * limits.wheel_rate_rad_s,
             last: None,
+            captured: None,
         }
     }
 
@@ -69,13 +77,17 @@ impl FrameGuard {
     /// must be within bounds.
     ///
     /// # Errors
-    /// [`Rejection::NotFinite`], [`Rejection::OutOfRange`] or [`Rejection::Jump`].
+    /// [`Rejection::NotFinite`], [`Rejection::OutOfRange`], [`Rejection::Clock`] or
+    /// [`Rejection::Jump`].
     pub fn check(&mut self, frame: &SensorFrame) -> Result<(), Rejection> {
         if !is_finite(frame) {
             return Err(Rejection::NotFinite);
         }
         if !self.is_in_range(frame) {
             return Err(Rejection::OutOfRange);
+        }
+        if !self.follows(frame) {
+            return Err(Rejection::Clock);
         }
         if !frame.has(Valid::POSE) {
             return Ok(());
@@ -93,6 +105,17 @@ impl FrameGuard {
             return Err(Rejection::Jump);
         }
         Ok(())
+    }
+
+    /// True if a frame was captured after the one before it of its run, and not ages after.
+    fn follows(&mut self, frame: &SensorFrame) -> bool {
+        let t_ns = frame.header.t_capture_ns;
+        let run = (frame.header.epoch, frame.run_id);
+        // The next is measured by this one: a clock that was set is one refusal.
+        let last = self.captured.replace((run, t_ns));
+        last.is_none_or(|(of, last_ns)| {
+            of != run || (last_ns < t_ns && t_ns - last_ns <= PAUSE_MAX_NS)
+        })
     }
 
     fn jumps(&self, last: &Place, place: &Place) -> bool {

@@ -7,8 +7,8 @@ use std::path::Path;
 use proptest::prelude::*;
 use vigil_blocks::{COMMANDS, Rejection, SensorFrame, Valid, WHEELS};
 use vigil_robot::frame_guard::{
-    BEYOND_LIMITS, COMMAND_MAX, CURRENT_MAX_A, JUMP_MAX_M, POSITION_MAX_M, STEER_MAX_RAD,
-    YAW_MAX_RAD,
+    BEYOND_LIMITS, COMMAND_MAX, CURRENT_MAX_A, JUMP_MAX_M, PAUSE_MAX_NS, POSITION_MAX_M,
+    STEER_MAX_RAD, YAW_MAX_RAD,
 };
 use vigil_robot::{Description, FrameGuard};
 
@@ -135,19 +135,52 @@ fn a_jump_is_measured_from_the_frame_before_and_a_new_track_has_none() {
     let mut guard = FrameGuard::new(&robot);
     assert_eq!(guard.check(&at(5000.0, 1)), Ok(()), "the first");
     assert_eq!(guard.check(&at(5000.0 + way_m, 2)), Ok(()));
-    let too_far = at(5000.0 + 2.0 * way_m + 0.1, 3);
-    assert_eq!(guard.check(&too_far), Err(Rejection::Jump));
-    assert_eq!(guard.check(&too_far), Ok(()), "one jump is one refusal");
+    let too_far = |t_s| at(5000.0 + 2.0 * way_m + 0.1, t_s);
+    assert_eq!(guard.check(&too_far(3)), Err(Rejection::Jump));
+    assert_eq!(guard.check(&too_far(4)), Ok(()), "one jump is one refusal");
     for change in [
         (|f: &mut SensorFrame| f.run_id = 2) as fn(&mut SensorFrame),
         |f| f.pose_reset_count = 7,
         |f| f.header.epoch = 9,
     ] {
-        let mut frame = at(0.0, 4);
+        let mut frame = at(0.0, 5);
         change(&mut frame);
         assert_eq!(guard.clone().check(&frame), Ok(()));
     }
-    assert_eq!(guard.check(&at(0.0, 4)), Err(Rejection::Jump));
+    assert_eq!(guard.check(&at(0.0, 5)), Err(Rejection::Jump));
+}
+
+#[test]
+fn a_capture_time_that_stands_goes_back_or_leaps_is_refused_once_for_each_setting_of_the_clock() {
+    let robot = robot();
+    let mut guard = FrameGuard::new(&robot);
+    let mut check = |run_id: u64, t_capture_ns: u64| {
+        let mut frame = SensorFrame {
+            run_id,
+            ..SensorFrame::default()
+        };
+        frame.header.t_capture_ns = t_capture_ns;
+        guard.check(&frame)
+    };
+    let clock = Err(Rejection::Clock);
+    for (run_id, t_ns, expected) in [
+        (1, 5_000, Ok(())),
+        (1, 5_001, Ok(())),
+        (1, 5_001, clock),
+        (1, 5_002, Ok(())),
+        (1, 4_000, clock), // set back
+        (1, 4_010, Ok(())),
+        (1, 4_010 + PAUSE_MAX_NS, Ok(())),
+        (1, 4_011 + 2 * PAUSE_MAX_NS, clock), // set forward
+        (1, 4_012 + 2 * PAUSE_MAX_NS, Ok(())),
+        (1, u64::MAX, clock),
+        (1, 4_013 + 2 * PAUSE_MAX_NS, clock), // and back
+        (1, 4_014 + 2 * PAUSE_MAX_NS, Ok(())),
+        (2, 0, Ok(())), // a new run may begin at any time
+        (2, 0, clock),
+    ] {
+        assert_eq!(check(run_id, t_ns), expected, "{run_id}, {t_ns}");
+    }
 }
 
 /// Any bits at all, often those of special numbers.

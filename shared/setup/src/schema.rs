@@ -385,7 +385,7 @@ pub struct Watchdog {
     /// Time that all services may take until the first action comes back, and a restarted one until
     /// it cycles, s, 0.1 to 600.
     pub startup_s: f64,
-    /// Longest silence of a service that cycles (a healthy one reports 20 times a second), s, 0.2
+    /// Longest silence of a service that cycles (a healthy one reports 20 times a second), s, 0.3
     /// to 60; 0 switches this supervision off.
     pub alive_s: f64,
     /// Longest time for which a service may publish without following its input, while that moves

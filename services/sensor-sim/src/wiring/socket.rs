@@ -7,18 +7,16 @@ use std::rc::Rc;
 use vigil_blocks::datagram::{self, DATAGRAM_SIZE};
 use vigil_blocks::{Cause, Rejection, SensorFrame};
 use vigil_cycle::datagrams::{Datagrams, From};
+use vigil_cycle::input::SILENT_NS;
 use vigil_cycle::{
     Clock, Graph, HealthBoard, Intake, PortError, Sender, Stage, Stamp, Topic, Writer,
 };
 use vigil_robot::{Description, FrameGuard};
 
-use crate::arrival_clock::ArrivalClock;
+use crate::arrival_clock::{ArrivalClock, Here};
 
 /// Datagrams that one turn takes at most: a flood must not hold it.
 const TURN_MAX: usize = 64;
-/// A source silent for so long may be replaced by another, ns.
-const SILENT_NS: u64 = 1_000_000_000;
-
 /// Starts of the source are counted in the bits of `run_id` from this one on.
 const START_SHIFT: u32 = 48;
 
@@ -44,6 +42,8 @@ pub struct SocketStage {
     starts: u64,
     /// What has arrived in this turn, and what of it goes out.
     arrived: Vec<(SensorFrame, From)>,
+    /// Datagrams of others that have waited in the kernel and were thrown away unread.
+    unread: usize,
     waiting: Vec<SensorFrame>,
     frames: Box<dyn Sender<SensorFrame>>,
 }
@@ -67,19 +67,23 @@ impl SocketStage {
             epoch: 0,
             starts: 0,
             arrived: Vec::with_capacity(TURN_MAX),
+            unread: 0,
             waiting: Vec::with_capacity(TURN_MAX),
             frames: graph.sender(Topic::Sensor)?,
         })
     }
 
-    /// Reads the datagrams that are here.
-    fn receive(&mut self, intake: &mut Intake<'_>) {
+    /// Reads the datagrams that are here; true if those are all.
+    fn receive(&mut self, intake: &mut Intake<'_>) -> bool {
         // One byte more than a datagram has: a longer one shows.
         let mut buffer = [0; DATAGRAM_SIZE + 1];
         self.arrived.clear();
+        for _ in 0..std::mem::take(&mut self.unread) {
+            intake.count(Rejection::OtherWriter);
+        }
         for _ in 0..TURN_MAX {
             let Some((length, from)) = self.datagrams.receive(&mut buffer) else {
-                break;
+                return true;
             };
             if self.source.is_some_and(|source| source != from) {
                 intake.reject(Rejection::OtherWriter);
@@ -87,20 +91,12 @@ impl SocketStage {
             }
             match datagram::decode(&buffer[..length]) {
                 Ok(frame) => self.arrived.push((frame, from)),
-                Err(rejection) => {
-                    intake.reject(rejection);
-                }
+                // While nobody is known, it is nobody's misbehaviour.
+                Err(rejection) if self.source.is_none() => intake.count(rejection),
+                Err(rejection) => intake.reject(rejection),
             }
         }
-    }
-
-    /// The newest capture time among the arrived frames of this start of a source, ns.
-    fn newest_capture_ns(&self, epoch: u64, from: From) -> u64 {
-        let same = self.arrived.iter();
-        let same = same.filter(|(frame, other)| frame.header.epoch == epoch && *other == from);
-        same.map(|(frame, _)| frame.header.t_capture_ns)
-            .max()
-            .unwrap_or(0)
+        false
     }
 
     fn choose(&mut self, from: From) {
@@ -112,7 +108,7 @@ impl SocketStage {
 
 impl Stage for SocketStage {
     fn take(&mut self, intake: &mut Intake<'_>) {
-        self.receive(intake);
+        let are_all_here = self.receive(intake);
         let now_ns = intake.now_ns();
         for i in 0..self.arrived.len() {
             let (mut frame, from) = self.arrived[i];
@@ -120,8 +116,13 @@ impl Stage for SocketStage {
                 intake.reject(Rejection::OtherWriter);
                 continue;
             }
-            let newest_ns = self.newest_capture_ns(frame.header.epoch, from);
-            let clock = self.clock.date(&mut frame.header, newest_ns, now_ns);
+            let here = self.arrived.iter().filter(|(_, other)| *other == from);
+            let here = here.map(|(frame, _)| &frame.header);
+            let here = Here {
+                headers: here,
+                are_all: are_all_here,
+            };
+            let clock = self.clock.date(&mut frame.header, here, now_ns);
             frame.header.t_publish_ns = now_ns;
             let content = || self.guard.check(&frame);
             if !intake.admit::<SensorFrame>(&frame.header, content) {
@@ -173,7 +174,7 @@ impl Stage for SocketStage {
     fn after(&mut self, _health: &mut HealthBoard, now_ns: u64) {
         if self.source.is_some() && now_ns.saturating_sub(self.taken_ns) > SILENT_NS {
             self.source = None;
-            self.datagrams.from_anywhere();
+            self.unread += self.datagrams.from_anywhere();
         }
     }
 }

@@ -13,7 +13,7 @@ use vigil_cycle::{
     Clock, Graph, InputAccount, Monotonic, PortError, Receiver, Topic, Writer, signal,
 };
 use vigil_robot::FrameGuard;
-use vigil_sensor_sim::ArrivalClock;
+use vigil_sensor_sim::{ArrivalClock, Here};
 use vigil_setup::Setup;
 use vigil_setup::schema::Source;
 
@@ -161,25 +161,23 @@ fn topic(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortError
     };
     let mut guard = Guard::new(setup);
     let mut border = Border::new(setup, &graph)?;
+    let mut arrived = Vec::with_capacity(frames.buffer());
     while_it_lasts(seconds, &listener, heard, |heard| {
         border.look();
-        // Who joins is given frames that were sent before: of the first batch the newest counts.
-        let is_first = heard.frames.is_empty();
-        let mut newest = None;
         for _ in 0..frames.buffer() {
             if !frames.advance() {
                 break;
             }
             let Some(frame) = frames.held() else { break };
-            let now_ns = Monotonic.now_ns();
-            if is_first {
-                newest = Some((*frame, now_ns));
-                continue;
-            }
-            guard.take(frame, now_ns);
-            heard.take(*frame, now_ns);
+            arrived.push((*frame, Monotonic.now_ns()));
         }
-        if let Some((frame, now_ns)) = newest {
+        // Who joins is given frames that were sent before: of the first batch the newest counts.
+        let old = if heard.frames.is_empty() {
+            arrived.len().saturating_sub(1)
+        } else {
+            0
+        };
+        for (frame, now_ns) in arrived.drain(..).skip(old) {
             guard.take(&frame, now_ns);
             heard.take(frame, now_ns);
         }
@@ -223,10 +221,11 @@ fn sockets(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortErr
         }
         let now_ns = Monotonic.now_ns();
         for mut frame in arrived.iter().copied() {
-            let same = arrived.iter().map(|other| &other.header);
-            let same = same.filter(|other| other.epoch == frame.header.epoch);
-            let newest_ns = same.map(|other| other.t_capture_ns).max().unwrap_or(0);
-            let dated = clock.date(&mut frame.header, newest_ns, now_ns);
+            let here = Here {
+                headers: arrived.iter().map(|other: &SensorFrame| &other.header),
+                are_all: arrived.len() < DATAGRAMS_MAX,
+            };
+            let dated = clock.date(&mut frame.header, here, now_ns);
             if guard.take(&frame, now_ns) {
                 clock = dated;
             }

@@ -57,7 +57,8 @@ const fn advice(cause: Rejection) -> &'static str {
         }
         Rejection::Early => {
             "sooner than a quarter of a period after the one before: graph.rate_hz must be the \
-             rate at which frames come, and header.t_schedule_ns advance with them"
+             rate at which frames come, and header.t_schedule_ns advance with them; or, where it \
+             is left at 0, header.t_capture_ns, in ns"
         }
         Rejection::NotFinite => {
             "a value is NaN or infinite: leave what was not measured at 0 and its bit in `valid` \
@@ -76,6 +77,10 @@ const fn advice(cause: Rejection) -> &'static str {
         }
         Rejection::Malformed => {
             "datagrams of another length, mark or version than the generated types make"
+        }
+        Rejection::Clock => {
+            "header.t_capture_ns is not after that of the frame before, or leaps by more than an \
+             hour: set it to when the data was captured, in ns, by a clock that runs evenly"
         }
         Rejection::Corrupt => "the checksum of a datagram does not fit: CRC-32C (Castagnoli)",
     }

@@ -2,17 +2,25 @@
 
 use vigil_blocks::{Block, SensorFrame};
 use vigil_cycle::Topic;
+use vigil_cycle::domain::Queues;
+use vigil_cycle::port::FoundTopic;
 use vigil_setup::Setup;
 use vigil_setup::schema::Source;
 
 use super::Heard;
 use crate::findings::{Finding, Status};
 
-/// The first few findings: the source, the type, whether frames came.
+/// Publishers that the graph lets a topic admit.
+const PUBLISHERS: usize = 1;
+
+/// The first few findings: the source, the type, its topic's settings, whether frames came.
 pub fn findings(setup: &Setup, heard: &Heard) -> Vec<Finding> {
     let mut all = vec![source(setup, heard)];
     if setup.file.sensor.source != Source::Socket {
         all.push(types(setup, heard));
+        let demanded = setup.queues().of(Topic::Sensor);
+        let found = heard.topic.as_ref();
+        all.extend(found.map(|found| settings(demanded, found)));
     }
     all.push(frames(setup, heard));
     all
@@ -55,12 +63,7 @@ fn types(setup: &Setup, heard: &Heard) -> Finding {
     };
     let same = (found.type_name.as_str(), found.size, found.alignment) == (name, size, alignment);
     if same {
-        let (buffer, readers) = (found.buffer, found.max_subscribers);
-        let detail = format!(
-            "{wanted}; iceoryx2 {}; {buffer} frames may wait, {} publisher and {readers} readers \
-             are admitted",
-            found.version, found.max_publishers
-        );
+        let detail = format!("{wanted}; iceoryx2 {}", found.version);
         return Finding::new("type", Status::Ok, detail);
     }
     let mut differs = Vec::new();
@@ -81,6 +84,33 @@ fn types(setup: &Setup, heard: &Heard) -> Finding {
         differs.join("; "),
     );
     Finding::new("type", Status::Failure, detail)
+}
+
+/// Settings of the topic, which its first user has fixed, beside those of the graph: who opens it
+/// is refused if it has less.
+fn settings(demanded: Queues, found: &FoundTopic) -> Finding {
+    let each = [
+        ("frames that may wait", found.buffer, demanded.buffer),
+        ("publishers", found.max_publishers, PUBLISHERS),
+        ("readers", found.max_subscribers, demanded.max_subscribers),
+    ];
+    let told = each.map(|(what, is, wanted)| format!("{what}: {is}, the graph's {wanted}"));
+    let detail = told.join("; ");
+    if each.iter().all(|(_, is, wanted)| is == wanted) {
+        return Finding::new("settings", Status::Ok, detail);
+    }
+    let is_less = each.iter().any(|(_, is, wanted)| is < wanted);
+    let (status, what) = if is_less {
+        (Status::Failure, "the graph cannot open it")
+    } else {
+        (Status::Warning, "the graph can open it")
+    };
+    let detail = format!(
+        "{detail}: a program has made the topic with settings of its own, {what}. Stop it; a \
+         publisher must open the topic (open()) once the graph has made it, and not create it \
+         (open_or_create())"
+    );
+    Finding::new("settings", status, detail)
 }
 
 /// What of the name is different: another block, another version, another layout.
@@ -139,6 +169,46 @@ fn frames(setup: &Setup, heard: &Heard) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn settings_of_another_maker_are_told_beside_the_graphs() {
+        let demanded = Queues {
+            buffer: 128,
+            history: 1,
+            max_subscribers: 8,
+        };
+        let of = |buffer, max_publishers, max_subscribers| {
+            let found = FoundTopic {
+                path: "vigil/rover/sensor".to_owned(),
+                type_name: SensorFrame::TYPE_NAME.to_owned(),
+                size: size_of::<SensorFrame>(),
+                alignment: align_of::<SensorFrame>(),
+                version: "0.10.0".to_owned(),
+                buffer,
+                max_publishers,
+                max_subscribers,
+            };
+            settings(demanded, &found)
+        };
+        let same = of(128, 1, 8);
+        assert_eq!(same.status, Status::Ok);
+        let expected = "frames that may wait: 128, the graph's 128; publishers: 1, the graph's 1; \
+                        readers: 8, the graph's 8";
+        assert_eq!(same.detail, expected);
+        // The transport's own, with which `open_or_create()` makes a topic.
+        let own = of(2, 2, 8);
+        assert_eq!(own.status, Status::Failure);
+        let detail = own.detail;
+        for told in [
+            "frames that may wait: 2, the graph's 128; publishers: 2, the graph's 1",
+            "must open the topic (open())",
+        ] {
+            assert!(detail.contains(told), "{detail}");
+        }
+        assert_eq!(of(128, 1, 7).status, Status::Failure);
+        assert_eq!(of(128, 2, 8).status, Status::Warning);
+        assert_eq!(of(256, 1, 16).status, Status::Warning);
+    }
 
     #[test]
     fn the_part_of_the_name_that_differs_is_told() {
