@@ -28,7 +28,7 @@ const GAP: Duration = Duration::from_millis(250);
 /// Time to start and stop the graph, s.
 const AROUND_S: f64 = 60.0;
 /// Priority of who makes stalls: above graph and canaries.
-const KEEPER_PRIORITY: u8 = 95;
+const MAKER_PRIORITY: u8 = 95;
 
 /// Who made a stall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -136,37 +136,54 @@ fn make(
 ) -> Result<Vec<Stall>, Box<dyn Error>> {
     wait_for_the_first_action(domain)?;
     let pids = pids(domain)?;
-    std::thread::sleep(Duration::from_secs_f64(WARM_UP_S));
-    let mut stalls = Vec::new();
-    for i in 0..count {
-        for &length in lengths {
-            std::thread::sleep(GAP);
-            let (pid, core) = (pids[i % STAGES], cores[i % cores.len()]);
-            let t_ns = above(core, move || {
-                signal::hold(pid);
-                clock::sleep_until(Monotonic.now_ns() + length.as_nanos() as u64);
-                signal::release(pid);
-            })?;
-            stalls.push(Stall {
-                origin: Origin::Graph,
-                length,
-                t_ns,
-            });
-            std::thread::sleep(GAP);
-            let t_ns = above(core, move || {
-                let until_ns = Monotonic.now_ns() + length.as_nanos() as u64;
-                while Monotonic.now_ns() < until_ns {
-                    std::hint::spin_loop();
+    let (cores, lengths) = (cores.to_vec(), lengths.to_vec());
+    // One thread for all of them: to start one above everything else is a stall of its own.
+    let maker = std::thread::spawn(move || {
+        let placement = placement::apply(Wanted {
+            core: cores[0],
+            priority: MAKER_PRIORITY,
+        });
+        if placement.priority != u32::from(MAKER_PRIORITY) {
+            return None;
+        }
+        std::thread::sleep(Duration::from_secs_f64(WARM_UP_S));
+        let mut stalls = Vec::new();
+        for i in 0..count {
+            placement::pin(cores[i % cores.len()]);
+            for &length in &lengths {
+                for origin in [Origin::Graph, Origin::Machine] {
+                    std::thread::sleep(GAP);
+                    stalls.push(one(origin, pids[i % STAGES], length));
                 }
-            })?;
-            stalls.push(Stall {
-                origin: Origin::Machine,
-                length,
-                t_ns,
-            });
+            }
+        }
+        Some(stalls)
+    });
+    let stalls = maker.join().map_err(|_| "who makes stalls has died")?;
+    Ok(stalls.ok_or("no stall may be made: real-time priority is not permitted")?)
+}
+
+/// Makes a stall: of this process, or of the core that we run on.
+fn one(origin: Origin, pid: u32, length: Duration) -> Stall {
+    let from_ns = Monotonic.now_ns();
+    let until_ns = from_ns + length.as_nanos() as u64;
+    match origin {
+        Origin::Graph => {
+            signal::hold(pid);
+            clock::sleep_until(until_ns);
+            signal::release(pid);
+        }
+        Origin::Machine => {
+            while Monotonic.now_ns() < until_ns {
+                std::hint::spin_loop();
+            }
         }
     }
-    Ok(stalls)
+    Stall {
+        origin,
+        length,
+        t_ns: [from_ns, Monotonic.now_ns()],
+    }
 }
 
 fn wait_for_the_first_action(domain: &Domain) -> Result<(), Box<dyn Error>> {
@@ -196,25 +213,6 @@ fn pids(domain: &Domain) -> Result<[u32; STAGES], Box<dyn Error>> {
         *pid = line.ok_or("a service is not listed")?.trim().parse()?;
     }
     Ok(pids)
-}
-
-/// Does `what` on this core above graph and canaries; from when to when, ns.
-fn above(core: usize, what: impl FnOnce() + Send + 'static) -> Result<[u64; 2], Box<dyn Error>> {
-    let thread = std::thread::spawn(move || {
-        let wanted = Wanted {
-            core,
-            priority: KEEPER_PRIORITY,
-        };
-        let placement = placement::apply(wanted);
-        if !placement.pinned || placement.priority != u32::from(KEEPER_PRIORITY) {
-            return None;
-        }
-        let from_ns = Monotonic.now_ns();
-        what();
-        Some([from_ns, Monotonic.now_ns()])
-    });
-    let lasted = thread.join().map_err(|_| "who makes stalls has died")?;
-    Ok(lasted.ok_or("no stall may be made: real-time priority is not permitted")?)
 }
 
 #[cfg(test)]
