@@ -31,6 +31,9 @@ pub struct Change {
     pub is_faulty: bool,
 }
 
+/// Time that the services may take to start, s: under context switches it is minutes.
+const START_S: f64 = 240.0;
+
 /// What breaks in a graph that is to have a fault, before any warm-up ends.
 const FAULT: &str = "stuck:RM@1";
 
@@ -226,7 +229,7 @@ impl Prepared {
         beside: impl FnOnce() -> Result<(), Box<dyn Error>>,
     ) -> Result<Ran, Box<dyn Error>> {
         let rate_hz = self.setup.file.graph.rate_hz;
-        let kept = ((seconds + 30.0) * rate_hz).ceil().to_string();
+        let kept = ((seconds + START_S) * rate_hz).ceil().to_string();
         let stamps_in = folder.display().to_string();
         let options = ["--stamps", &stamps_in, "--stamped-cycles", &kept];
         let summary = self.run_beside(seconds, &options, beside)?;
