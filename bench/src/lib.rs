@@ -1,6 +1,8 @@
 //! What measuring programs share: the archive, the facts about the machine, the yardstick and
 //! the filters that are compared.
 
+use std::error::Error;
+use std::path::Path;
 use std::process::ExitCode;
 
 pub mod archive;
@@ -28,7 +30,7 @@ pub mod speed;
 pub mod unmodelled;
 
 /// What a program of this name ends with: 0, or 1 and the reason.
-pub fn ended(name: &str, result: Result<(), Box<dyn std::error::Error>>) -> ExitCode {
+pub fn ended(name: &str, result: Result<(), Box<dyn Error>>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -36,6 +38,21 @@ pub fn ended(name: &str, result: Result<(), Box<dyn std::error::Error>>) -> Exit
             ExitCode::from(1)
         }
     }
+}
+
+/// What `work` makes of a folder of its own, which is gone afterwards.
+///
+/// # Errors
+/// The file system's, and those of `work`.
+pub fn in_folder<T>(
+    name: &str,
+    work: impl FnOnce(&Path) -> Result<T, Box<dyn Error>>,
+) -> Result<T, Box<dyn Error>> {
+    let folder = std::env::temp_dir().join(format!("vigil-{name}-{}", std::process::id()));
+    std::fs::create_dir_all(&folder)?;
+    let result = work(&folder);
+    let _ = std::fs::remove_dir_all(&folder);
+    result
 }
 
 /// The value below which the share `q` of `values` lies; sorts them. NaN if there are none.

@@ -52,11 +52,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Box<dyn Error>> {
-    let folder = std::env::temp_dir().join(format!("vigil-attribution-{}", std::process::id()));
-    std::fs::create_dir_all(&folder)?;
-    let result = measure(args, &folder);
-    let _ = std::fs::remove_dir_all(&folder);
-    let rows = result?;
+    let rows = vigil_bench::in_folder("attribution", |folder| measure(args, folder))?;
     if args.json {
         println!("{:#}", Value::from(rows));
         return Ok(());

@@ -104,10 +104,7 @@ fn flood(address: &str) -> Result<(), Box<dyn Error>> {
 }
 
 fn run(args: &Args) -> Result<(), Box<dyn Error>> {
-    let folder = std::env::temp_dir().join(format!("vigil-flood-{}", std::process::id()));
-    std::fs::create_dir_all(&folder)?;
-    let result = measure(args, &folder);
-    let _ = std::fs::remove_dir_all(&folder);
+    let pairs = vigil_bench::in_folder("flood", |folder| measure(args, folder))?;
     let (n, seconds, rate, load) = (args.pairs, args.seconds, args.rate, args.load.name());
     let (through, flood) = match args.through {
         Through::Unix => ("unix", "a second sender floods the graph's Unix socket"),
@@ -124,7 +121,7 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         "`scripts/bench flood --pairs {n} --seconds {seconds} --rate {rate} --load {load} \
          --through {through}`\n\nFrames by UDP; in the halves of one run that are `with`, {flood}."
     );
-    halves::archive(&format!("flood-{through}"), &about, &result?)
+    halves::archive(&format!("flood-{through}"), &about, &pairs)
 }
 
 fn measure(args: &Args, folder: &Path) -> Result<Vec<[Half; 2]>, Box<dyn Error>> {

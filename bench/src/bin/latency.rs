@@ -88,15 +88,13 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         .into());
     }
     let specs = specs(args);
-    let folder = std::env::temp_dir().join(format!("vigil-latency-{}", std::process::id()));
-    std::fs::create_dir_all(&folder)?;
-    let result = if args.json {
-        print_one(&specs, &folder)
-    } else {
-        archive(args, &specs, &folder)
-    };
-    let _ = std::fs::remove_dir_all(&folder);
-    result
+    vigil_bench::in_folder("latency", |folder| {
+        if args.json {
+            print_one(&specs, folder)
+        } else {
+            archive(args, &specs, folder)
+        }
+    })
 }
 
 /// True if no cell was chosen.

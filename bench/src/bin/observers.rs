@@ -112,11 +112,7 @@ fn graph_of(setup: &Setup, name: &str) -> Result<Graph, Box<dyn Error>> {
 }
 
 fn run(args: &Args) -> Result<(), Box<dyn Error>> {
-    let folder = std::env::temp_dir().join(format!("vigil-observers-{}", std::process::id()));
-    std::fs::create_dir_all(&folder)?;
-    let result = measure(args, &folder);
-    let _ = std::fs::remove_dir_all(&folder);
-    let pairs = result?;
+    let pairs = vigil_bench::in_folder("observers", |folder| measure(args, folder))?;
     let name = match args.difference {
         Difference::Observers => "observers",
         Difference::Instruments => "instrumentation",
@@ -253,8 +249,7 @@ impl<'a> Bad<'a> {
         child.wait()?;
         if let Some(stopped) = &self.stopped {
             // Harmless the second time.
-            let pid = stopped.id().to_string();
-            Command::new("kill").args(["-STOP", &pid]).status()?;
+            signal::hold(stopped.id());
         }
         self.killed = Some((self.spawn()?, Instant::now()));
         Ok(())

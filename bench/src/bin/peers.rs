@@ -56,15 +56,12 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Box<dyn Error>> {
-    let folder = std::env::temp_dir().join(format!("vigil-peers-{}", std::process::id()));
-    std::fs::create_dir_all(&folder)?;
     let mut cores: Vec<usize> = PLACED.map(|(core, _)| core).to_vec();
     cores.dedup();
-    let load = Running::start(args.load, &cores, &folder, None)?;
-    let result = measure(args, &folder);
-    drop(load);
-    let _ = std::fs::remove_dir_all(&folder);
-    let rows = result?;
+    let rows = vigil_bench::in_folder("peers", |folder| {
+        let _load = Running::start(args.load, &cores, folder, None)?;
+        measure(args, folder)
+    })?;
     if args.json {
         println!("{:#}", Value::from(rows));
         return Ok(());

@@ -11,7 +11,7 @@ use vigil_bench::latency::graph::{Change, Prepared, root};
 use vigil_bench::latency::load::{Load, Running};
 use vigil_cycle::serve::Leave;
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{CycleStamps, Schedule, stamps};
+use vigil_cycle::{CycleStamps, Schedule};
 use vigil_setup::schema::Source;
 
 /// A run is longer than the publisher's by this, s: the publisher waits for all readers to be
@@ -46,15 +46,10 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if !root().join(&args.python).exists() {
         return Err(format!("there is no {}: scripts/test makes one", args.python).into());
     }
-    let folder = std::env::temp_dir().join(format!("vigil-publishers-{}", std::process::id()));
-    std::fs::create_dir_all(&folder)?;
-    let rows: Result<Vec<Value>, Box<dyn Error>> = args
-        .rate
-        .iter()
-        .map(|rate_hz| one(args, *rate_hz, &folder))
-        .collect();
-    let _ = std::fs::remove_dir_all(&folder);
-    let rows = rows?;
+    let rows: Vec<Value> = vigil_bench::in_folder("publishers", |folder| {
+        let rates = args.rate.iter();
+        rates.map(|rate_hz| one(args, *rate_hz, folder)).collect()
+    })?;
     let mut archive = Archive::new("publishers")?;
     tell(args, &rows, &mut archive);
     archive.store("publishers.json", &Value::from(rows))?;
@@ -112,11 +107,8 @@ fn one(args: &Args, rate_hz: f64, folder: &Path) -> Result<Value, Box<dyn Error>
     let prepared = Prepared::new(change, folder)?;
     let load = Running::start(args.load, &prepared.cores(), folder, None)?;
     let seconds = args.seconds + AROUND_S + f64::from(AFTER_FRAMES) / rate_hz;
-    let kept = ((seconds + 30.0) * rate_hz).ceil().to_string();
-    let stamps_in = folder.display().to_string();
-    let options = ["--stamps", &stamps_in, "--stamped-cycles", &kept];
     let mut told = Value::Null;
-    let summary = prepared.run_beside(seconds, &options, || {
+    let ran = prepared.run(seconds, folder, || {
         let output = Command::new(root().join(&args.python))
             .arg(root().join("bench/pace.py"))
             .arg(&prepared.setup().file.graph.name)
@@ -134,11 +126,11 @@ fn one(args: &Args, rate_hz: f64, folder: &Path) -> Result<Value, Box<dyn Error>
     load.finish()?;
     // The detector's own count goes on when nobody publishes any more.
     let name = ServiceName::Detector;
-    let cycles = stamps::read(&folder.join(format!("{}.stamps", name.as_str())))?;
+    let cycles = &ran.stamps[name.index()];
     let due_ns = |i: usize| told["due_ns"][i].as_u64().ok_or("no times were told");
     let schedule = prepared.setup().plan(name, Leave::default()).schedule;
-    let (answered, missed) = answers(&cycles, [due_ns(0)?, due_ns(1)?], schedule);
-    let detector = &summary["services"]["detector"];
+    let (answered, missed) = answers(cycles, [due_ns(0)?, due_ns(1)?], schedule);
+    let detector = &ran.summary["services"]["detector"];
     Ok(json!({
         "rate_hz": rate_hz,
         "sent": told["sent"],
@@ -147,7 +139,7 @@ fn one(args: &Args, rate_hz: f64, folder: &Path) -> Result<Value, Box<dyn Error>
         "lost": detector["lost"],
         "refused": detector["rejected"],
         "missed": missed,
-        "end_to_end_us": summary["end_to_end_us"],
+        "end_to_end_us": ran.summary["end_to_end_us"],
     }))
 }
 

@@ -184,9 +184,7 @@ impl Spec {
         }
         let misses = attribution::misses(&cycles, deadline_ns, &records);
         let stage_misses = std::array::from_fn(|i| {
-            let mut stamps: [Vec<CycleStamps>; STAGES] = Default::default();
-            stamps[STAGES - 1].clone_from(&ran.stamps[i]);
-            let mut cycles = cycles::join(&stamps, period_ns, 0);
+            let mut cycles = cycles::of_stage(&ran.stamps[i], period_ns);
             cycles.retain(|cycle| cycle.t_schedule_ns >= from_ns);
             let deadline_ns = prepared.stage_deadline_ns(i);
             counts(&attribution::misses(&cycles, deadline_ns, &records))
@@ -215,7 +213,7 @@ impl Spec {
             stage_misses,
             is_attributed,
             recounted,
-            graph_file: std::fs::read_to_string(prepared.path())?,
+            graph_file: prepared.text()?,
             seed: prepared.setup().file.graph.seed,
             deadline_ns,
             canary_late_ppm: (slack_ns > 0).then(|| 1e6 * late as f64 / all.max(1) as f64),

@@ -54,16 +54,30 @@ impl Cycle {
     }
 }
 
+/// Every instant that one stage answered, by itself or with a later one: how long until then.
+#[must_use]
+pub fn of_stage(stamps: &[CycleStamps], period_ns: u64) -> Vec<Cycle> {
+    joined([&[], &[], &[], stamps], period_ns, 0)
+}
+
 /// Every instant of the schedule from `from_ns` on that the stamps cover, in order: from the first
 /// to the last that the last stage answered. Nothing is left out: an instant without a frame has
 /// the latency until the next answer.
 #[must_use]
 pub fn join(stamps: &[Vec<CycleStamps>; STAGES], period_ns: u64, from_ns: u64) -> Vec<Cycle> {
+    joined(
+        std::array::from_fn(|i| stamps[i].as_slice()),
+        period_ns,
+        from_ns,
+    )
+}
+
+fn joined(stamps: [&[CycleStamps]; STAGES], period_ns: u64, from_ns: u64) -> Vec<Cycle> {
     let by_instant = |stamps: &[CycleStamps]| -> BTreeMap<u64, CycleStamps> {
         stamps.iter().map(|s| (s.t_schedule_ns, *s)).collect()
     };
     let maps: [BTreeMap<u64, CycleStamps>; STAGES] =
-        std::array::from_fn(|stage| by_instant(&stamps[stage]));
+        std::array::from_fn(|stage| by_instant(stamps[stage]));
     let done = &maps[STAGES - 1];
     let (Some((first_ns, _)), Some((last_ns, _))) =
         (done.range(from_ns..).next(), done.last_key_value())

@@ -2,7 +2,8 @@
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use toml::Table;
@@ -34,6 +35,9 @@ pub struct Change {
 /// Time that the services may take to start, s: under context switches it is minutes.
 const START_S: f64 = 240.0;
 
+/// Time to the start of the first service at most.
+const STARTED_MAX: Duration = Duration::from_secs(60);
+
 /// What breaks in a graph that is to have a fault, before any warm-up ends.
 const FAULT: &str = "stuck:RM@1";
 
@@ -51,7 +55,7 @@ pub struct Prepared {
 pub struct Ran {
     /// The launcher's document.
     pub summary: Value,
-    /// Stamps of each service's cycles.
+    /// Stamps of each service's cycles; none of a service that the graph does without.
     pub stamps: [Vec<CycleStamps>; STAGES],
 }
 
@@ -162,6 +166,30 @@ impl Prepared {
         self.cores().into_iter().map(start).collect()
     }
 
+    /// Text of the graph file, its paths relative to the project's folder.
+    ///
+    /// # Errors
+    /// The file system's.
+    pub fn text(&self) -> std::io::Result<String> {
+        let text = std::fs::read_to_string(&self.path)?;
+        Ok(text.replace(&format!("{}/", root().display()), ""))
+    }
+
+    /// Waits until its services are being started; before that the launcher cleans up.
+    ///
+    /// # Errors
+    /// If that does not come to pass.
+    pub fn wait_until_started(&self) -> Result<(), Box<dyn Error>> {
+        let (domain, until) = (self.setup.domain()?, Instant::now() + STARTED_MAX);
+        while !domain.processes_file().exists() {
+            if Instant::now() > until {
+                return Err("the graph did not start".into());
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        Ok(())
+    }
+
     /// Where the graph file lies.
     #[must_use]
     pub fn path(&self) -> &Path {
@@ -180,15 +208,6 @@ impl Prepared {
             command.args(["--inject", FAULT]);
         }
         command
-    }
-
-    /// Starts it for `seconds`, with these further options of `scripts/up`; what it prints is lost.
-    ///
-    /// # Errors
-    /// The system's.
-    pub fn start(&self, seconds: f64, options: &[&str]) -> std::io::Result<Child> {
-        let mut command = self.command(seconds, options);
-        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn()
     }
 
     /// Runs it for `seconds` with these further options while `beside` does its part; the
@@ -234,15 +253,16 @@ impl Prepared {
         let options = ["--stamps", &stamps_in, "--stamped-cycles", &kept];
         let summary = self.run_beside(seconds, &options, beside)?;
         let read = |stage: usize| {
+            if summary["services"].get(STAGE_NAMES[stage]).is_none() {
+                return Ok(Vec::new());
+            }
             let path = folder.join(format!("{}.stamps", STAGE_NAMES[stage]));
             let found = stamps::read(&path);
             let _ = std::fs::remove_file(&path);
             found
         };
-        Ok(Ran {
-            summary,
-            stamps: [read(0)?, read(1)?, read(2)?, read(3)?],
-        })
+        let stamps = [read(0)?, read(1)?, read(2)?, read(3)?];
+        Ok(Ran { summary, stamps })
     }
 }
 

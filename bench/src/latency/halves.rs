@@ -15,7 +15,7 @@ use vigil_cycle::{Clock, CycleStamps, Domain, Graph, Latency, Monotonic, Topic, 
 
 use super::attribution::{Miss, Record, misses};
 use super::cell::{self, us};
-use super::cycles::{Cycle, join};
+use super::cycles::{Cycle, of_stage};
 use super::graph::Prepared;
 use crate::archive::Archive;
 use crate::pairs::median_ratio;
@@ -174,17 +174,9 @@ fn watched(
     let setup = prepared.setup();
     let canaries = prepared.canaries(seconds + AROUND_S)?;
     let mut reader: Option<JoinHandle<Result<Read, String>>> = None;
-    let domain = setup.domain()?;
     let period_ns = setup.period_ns();
     let summary = prepared.run_beside(seconds, options, || {
-        let until = Instant::now() + Duration::from_secs_f64(AROUND_S);
-        // Not before the launcher has cleaned up and started its services.
-        while !domain.processes_file().exists() {
-            if Instant::now() > until {
-                return Err("the graph did not start".into());
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
+        prepared.wait_until_started()?;
         let (send, first) = channel();
         let place = setup.domain()?;
         reader = Some(std::thread::spawn(move || {
@@ -241,9 +233,7 @@ fn read(
         }
         std::thread::sleep(Duration::from_millis(4));
     }
-    // Every instant of the schedule, those included that nothing answered in time.
-    let stamps = [Vec::new(), Vec::new(), Vec::new(), answered];
-    let cycles = join(&stamps, period_ns, 0);
+    let cycles = of_stage(&answered, period_ns);
     Ok((cycles, lost))
 }
 

@@ -116,6 +116,7 @@ pub fn run(
     let mut stalls = Vec::new();
     let domain = prepared.setup().domain()?;
     let ran = prepared.run(seconds, folder, || {
+        prepared.wait_until_started()?;
         stalls = make(&domain, &prepared.cores(), (count, lengths))?;
         Ok(())
     })?;
@@ -188,20 +189,15 @@ fn one(origin: Origin, pid: u32, length: Duration) -> Stall {
 
 fn wait_for_the_first_action(domain: &Domain) -> Result<(), Box<dyn Error>> {
     let until = Instant::now() + Duration::from_secs_f64(AROUND_S);
-    let wait = |is_there: &mut dyn FnMut() -> bool| {
-        while !is_there() {
-            if Instant::now() > until {
-                return Err("the graph did nothing");
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        Ok(())
-    };
-    // Not before the launcher has cleaned up and started its services.
-    wait(&mut || domain.processes_file().exists())?;
     let graph = Graph::SharedMemory(Link::join(domain, "stalls")?);
     let mut actions = graph.receiver::<Action>(Topic::Action)?;
-    Ok(wait(&mut || actions.advance())?)
+    while !actions.advance() {
+        if Instant::now() > until {
+            return Err("the graph did nothing".into());
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    Ok(())
 }
 
 /// Process of each stage.

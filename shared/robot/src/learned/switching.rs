@@ -6,14 +6,13 @@
 //! of the motion become white noise of the same power at low frequencies.
 
 use nalgebra::{Cholesky, Matrix3, Vector3};
-use rand::RngExt;
-use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::WHEELS;
 use vigil_inference::angle::wrap;
 use vigil_inference::gaussian::Gaussian;
 use vigil_inference::hybrid::{Conditional, Modes, Sampled};
 use vigil_inference::logspace::{log_add, log_normal};
+use vigil_inference::normals::normal;
 use vigil_inference::track::{Displacement, TRACK_DIMENSION, Track};
 
 use super::{
@@ -230,10 +229,6 @@ fn transitions(modes: &[Mode], rates: &FaultRates, interval_s: f64) -> Vec<f64> 
 fn factor(covariance: Matrix3<f64>) -> Matrix3<f64> {
     let diagonal = || Matrix3::from_diagonal(&covariance.diagonal().map(|v| v.max(0.0).sqrt()));
     Cholesky::new(covariance).map_or_else(diagonal, |factor| factor.l())
-}
-
-fn normal(rng: &mut Pcg64Mcg) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| rng.sample(StandardNormal))
 }
 
 /// `ln N(residual; 0, L Lᵀ)`.
