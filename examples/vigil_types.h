@@ -180,8 +180,8 @@ VIGIL_ASSERT(offsetof(vigil_sensor_frame, steer) == 240);
 VIGIL_ASSERT(offsetof(vigil_sensor_frame, current) == 304);
 VIGIL_ASSERT(offsetof(vigil_sensor_frame, reserved) == 368);
 
-#define VIGIL_DETECTION_BELIEF_SCHEMA 0xf2eea19958bb6641ull
-#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.f2eea19958bb6641"
+#define VIGIL_DETECTION_BELIEF_SCHEMA 0x3e794b5936d8eb7aull
+#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.3e794b5936d8eb7a"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -225,10 +225,14 @@ typedef struct {
   uint32_t particle_count;
   /* Outcome of that action, as the frame says it: an ActionOutcome. */
   uint32_t action_outcome;
+  /* Why the detector sees nothing: a Blindness; 0 while it sees. */
+  uint32_t blind;
+  /* Whether an alarm could rise now: a Readiness. */
+  uint32_t readiness;
   /* Reserved, zero. */
   uint32_t reserved;
 } vigil_detection_belief;
-VIGIL_ASSERT(sizeof(vigil_detection_belief) == 448);
+VIGIL_ASSERT(sizeof(vigil_detection_belief) == 456);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, cause) == 48);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, run_id) == 72);
@@ -250,7 +254,9 @@ VIGIL_ASSERT(offsetof(vigil_detection_belief, invalid_count) == 428);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, degenerate_count) == 432);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, particle_count) == 436);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, action_outcome) == 440);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, reserved) == 444);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, blind) == 444);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, readiness) == 448);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, reserved) == 452);
 
 #define VIGIL_PARTICLE_BLOCK_SCHEMA 0x7d929f90c981a707ull
 #define VIGIL_PARTICLE_BLOCK_TYPE_NAME "vigil.ParticleBlock.v1.7d929f90c981a707"
@@ -288,8 +294,8 @@ VIGIL_ASSERT(offsetof(vigil_particle_block, yaw) == 49232);
 VIGIL_ASSERT(offsetof(vigil_particle_block, log_weight) == 65616);
 VIGIL_ASSERT(offsetof(vigil_particle_block, reserved_tail) == 82000);
 
-#define VIGIL_FAULT_BELIEF_SCHEMA 0x4f1baec44c62b92eull
-#define VIGIL_FAULT_BELIEF_TYPE_NAME "vigil.FaultBelief.v1.4f1baec44c62b92e"
+#define VIGIL_FAULT_BELIEF_SCHEMA 0x5ff34eae855a52adull
+#define VIGIL_FAULT_BELIEF_TYPE_NAME "vigil.FaultBelief.v1.5ff34eae855a52ad"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -319,8 +325,12 @@ typedef struct {
   uint64_t alarm_t_capture_ns;
   /* Most probable onset of the most probable fault, capture time ns; 0 if none. */
   uint64_t onset_t_capture_ns;
-  /* Reported mode: a node's index, MODE_UNKNOWN or MODE_MULTIPLE. */
+  /* Mode, memoryless: a node's index, MODE_UNKNOWN, MODE_MULTIPLE or MODE_BLIND. */
   uint32_t mode;
+  /* Reported mode: follows mode with hysteresis. */
+  uint32_t reported;
+  /* Changes of reported so far. */
+  uint32_t reported_change_count;
   /* The next best explanation that is not the best and one more fault: a node's index (0 is nominal), MODE_UNKNOWN or MODE_MULTIPLE. */
   uint32_t runner_up;
   /* Particles allowed at present; fewer than configured while the time is short. */
@@ -336,7 +346,7 @@ typedef struct {
   /* Steps that met impossible or non-finite evidence and kept the prediction. */
   uint32_t degenerate_count;
 } vigil_fault_belief;
-VIGIL_ASSERT(sizeof(vigil_fault_belief) == 1576);
+VIGIL_ASSERT(sizeof(vigil_fault_belief) == 1584);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, cause) == 48);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, run_id) == 72);
@@ -352,16 +362,18 @@ VIGIL_ASSERT(offsetof(vigil_fault_belief, p_mode) == 1520);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, alarm_t_capture_ns) == 1528);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, onset_t_capture_ns) == 1536);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, mode) == 1544);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, runner_up) == 1548);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, particle_limit) == 1552);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, mode_change_count) == 1556);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, node_count) == 1560);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, set_count) == 1564);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, identifying) == 1568);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, degenerate_count) == 1572);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, reported) == 1548);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, reported_change_count) == 1552);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, runner_up) == 1556);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, particle_limit) == 1560);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, mode_change_count) == 1564);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, node_count) == 1568);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, set_count) == 1572);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, identifying) == 1576);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, degenerate_count) == 1580);
 
-#define VIGIL_ACTION_SCHEMA 0xd2dc9b45f9f508d3ull
-#define VIGIL_ACTION_TYPE_NAME "vigil.Action.v1.d2dc9b45f9f508d3"
+#define VIGIL_ACTION_SCHEMA 0x608fc64b66c4f8b7ull
+#define VIGIL_ACTION_TYPE_NAME "vigil.Action.v1.608fc64b66c4f8b7"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -411,10 +423,14 @@ typedef struct {
   uint32_t lost_stages;
   /* What value is: a ValueKind. */
   uint32_t value_kind;
-  /* Reserved, zero. */
-  uint32_t reserved_word;
-  /* Reserved, zero. */
-  uint64_t reserved[2];
+  /* 1 while the alarm stands: the detector's, unless the identifier has found the robot nominal since. */
+  uint32_t alarm;
+  /* Capture time of the frame that raised it, ns; 0 without alarm. */
+  uint64_t alarm_t_capture_ns;
+  /* Alarms raised so far. */
+  uint32_t alarm_count;
+  /* Why nothing is seen: a Blindness; 0 while something is. */
+  uint32_t blind;
 } vigil_action;
 VIGIL_ASSERT(sizeof(vigil_action) == 984);
 VIGIL_ASSERT(offsetof(vigil_action, header) == 0);
@@ -441,8 +457,10 @@ VIGIL_ASSERT(offsetof(vigil_action, action_count) == 948);
 VIGIL_ASSERT(offsetof(vigil_action, impossible_count) == 952);
 VIGIL_ASSERT(offsetof(vigil_action, lost_stages) == 956);
 VIGIL_ASSERT(offsetof(vigil_action, value_kind) == 960);
-VIGIL_ASSERT(offsetof(vigil_action, reserved_word) == 964);
-VIGIL_ASSERT(offsetof(vigil_action, reserved) == 968);
+VIGIL_ASSERT(offsetof(vigil_action, alarm) == 964);
+VIGIL_ASSERT(offsetof(vigil_action, alarm_t_capture_ns) == 968);
+VIGIL_ASSERT(offsetof(vigil_action, alarm_count) == 976);
+VIGIL_ASSERT(offsetof(vigil_action, blind) == 980);
 
 #define VIGIL_HEALTH_SCHEMA 0x22ca8e52d533df67ull
 #define VIGIL_HEALTH_TYPE_NAME "vigil.Health.v1.22ca8e52d533df67"

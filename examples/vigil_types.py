@@ -196,8 +196,8 @@ assert SensorFrame.reserved.offset == 368
 
 
 class DetectionBelief(ctypes.LittleEndianStructure):
-    SCHEMA = 0xF2EEA19958BB6641
-    TYPE_NAME = "vigil.DetectionBelief.v1.f2eea19958bb6641"
+    SCHEMA = 0x3E794B5936D8EB7A
+    TYPE_NAME = "vigil.DetectionBelief.v1.3e794b5936d8eb7a"
 
     @staticmethod
     def type_name():
@@ -246,12 +246,16 @@ class DetectionBelief(ctypes.LittleEndianStructure):
         ("particle_count", ctypes.c_uint32),
         # Outcome of that action, as the frame says it: an ActionOutcome.
         ("action_outcome", ctypes.c_uint32),
+        # Why the detector sees nothing: a Blindness; 0 while it sees.
+        ("blind", ctypes.c_uint32),
+        # Whether an alarm could rise now: a Readiness.
+        ("readiness", ctypes.c_uint32),
         # Reserved, zero.
         ("reserved", ctypes.c_uint32),
     ]
 
 
-assert ctypes.sizeof(DetectionBelief) == 448
+assert ctypes.sizeof(DetectionBelief) == 456
 assert DetectionBelief.header.offset == 0
 assert DetectionBelief.cause.offset == 48
 assert DetectionBelief.run_id.offset == 72
@@ -273,7 +277,9 @@ assert DetectionBelief.invalid_count.offset == 428
 assert DetectionBelief.degenerate_count.offset == 432
 assert DetectionBelief.particle_count.offset == 436
 assert DetectionBelief.action_outcome.offset == 440
-assert DetectionBelief.reserved.offset == 444
+assert DetectionBelief.blind.offset == 444
+assert DetectionBelief.readiness.offset == 448
+assert DetectionBelief.reserved.offset == 452
 
 
 class ParticleBlock(ctypes.LittleEndianStructure):
@@ -322,8 +328,8 @@ assert ParticleBlock.reserved_tail.offset == 82000
 
 
 class FaultBelief(ctypes.LittleEndianStructure):
-    SCHEMA = 0x4F1BAEC44C62B92E
-    TYPE_NAME = "vigil.FaultBelief.v1.4f1baec44c62b92e"
+    SCHEMA = 0x5FF34EAE855A52AD
+    TYPE_NAME = "vigil.FaultBelief.v1.5ff34eae855a52ad"
 
     @staticmethod
     def type_name():
@@ -358,8 +364,12 @@ class FaultBelief(ctypes.LittleEndianStructure):
         ("alarm_t_capture_ns", ctypes.c_uint64),
         # Most probable onset of the most probable fault, capture time ns; 0 if none.
         ("onset_t_capture_ns", ctypes.c_uint64),
-        # Reported mode: a node's index, MODE_UNKNOWN or MODE_MULTIPLE.
+        # Mode, memoryless: a node's index, MODE_UNKNOWN, MODE_MULTIPLE or MODE_BLIND.
         ("mode", ctypes.c_uint32),
+        # Reported mode: follows mode with hysteresis.
+        ("reported", ctypes.c_uint32),
+        # Changes of reported so far.
+        ("reported_change_count", ctypes.c_uint32),
         # The next best explanation that is not the best and one more fault: a node's index (0 is nominal), MODE_UNKNOWN or MODE_MULTIPLE.
         ("runner_up", ctypes.c_uint32),
         # Particles allowed at present; fewer than configured while the time is short.
@@ -377,7 +387,7 @@ class FaultBelief(ctypes.LittleEndianStructure):
     ]
 
 
-assert ctypes.sizeof(FaultBelief) == 1576
+assert ctypes.sizeof(FaultBelief) == 1584
 assert FaultBelief.header.offset == 0
 assert FaultBelief.cause.offset == 48
 assert FaultBelief.run_id.offset == 72
@@ -393,18 +403,20 @@ assert FaultBelief.p_mode.offset == 1520
 assert FaultBelief.alarm_t_capture_ns.offset == 1528
 assert FaultBelief.onset_t_capture_ns.offset == 1536
 assert FaultBelief.mode.offset == 1544
-assert FaultBelief.runner_up.offset == 1548
-assert FaultBelief.particle_limit.offset == 1552
-assert FaultBelief.mode_change_count.offset == 1556
-assert FaultBelief.node_count.offset == 1560
-assert FaultBelief.set_count.offset == 1564
-assert FaultBelief.identifying.offset == 1568
-assert FaultBelief.degenerate_count.offset == 1572
+assert FaultBelief.reported.offset == 1548
+assert FaultBelief.reported_change_count.offset == 1552
+assert FaultBelief.runner_up.offset == 1556
+assert FaultBelief.particle_limit.offset == 1560
+assert FaultBelief.mode_change_count.offset == 1564
+assert FaultBelief.node_count.offset == 1568
+assert FaultBelief.set_count.offset == 1572
+assert FaultBelief.identifying.offset == 1576
+assert FaultBelief.degenerate_count.offset == 1580
 
 
 class Action(ctypes.LittleEndianStructure):
-    SCHEMA = 0xD2DC9B45F9F508D3
-    TYPE_NAME = "vigil.Action.v1.d2dc9b45f9f508d3"
+    SCHEMA = 0x608FC64B66C4F8B7
+    TYPE_NAME = "vigil.Action.v1.608fc64b66c4f8b7"
 
     @staticmethod
     def type_name():
@@ -459,10 +471,14 @@ class Action(ctypes.LittleEndianStructure):
         ("lost_stages", ctypes.c_uint32),
         # What value is: a ValueKind.
         ("value_kind", ctypes.c_uint32),
-        # Reserved, zero.
-        ("reserved_word", ctypes.c_uint32),
-        # Reserved, zero.
-        ("reserved", ctypes.c_uint64 * 2),
+        # 1 while the alarm stands: the detector's, unless the identifier has found the robot nominal since.
+        ("alarm", ctypes.c_uint32),
+        # Capture time of the frame that raised it, ns; 0 without alarm.
+        ("alarm_t_capture_ns", ctypes.c_uint64),
+        # Alarms raised so far.
+        ("alarm_count", ctypes.c_uint32),
+        # Why nothing is seen: a Blindness; 0 while something is.
+        ("blind", ctypes.c_uint32),
     ]
 
 
@@ -491,8 +507,10 @@ assert Action.action_count.offset == 948
 assert Action.impossible_count.offset == 952
 assert Action.lost_stages.offset == 956
 assert Action.value_kind.offset == 960
-assert Action.reserved_word.offset == 964
-assert Action.reserved.offset == 968
+assert Action.alarm.offset == 964
+assert Action.alarm_t_capture_ns.offset == 968
+assert Action.alarm_count.offset == 976
+assert Action.blind.offset == 980
 
 
 class Health(ctypes.LittleEndianStructure):

@@ -61,10 +61,15 @@ block! {
         pub lost_stages: u32,
         /// What `value` is: a [`ValueKind`].
         pub value_kind: u32,
-        /// Reserved, zero.
-        pub reserved_word: u32,
-        /// Reserved, zero.
-        pub reserved: [u64; 2],
+        /// 1 while the alarm stands: the detector's, unless the identifier has found the robot
+        /// nominal since.
+        pub alarm: u32,
+        /// Capture time of the frame that raised it, ns; 0 without alarm.
+        pub alarm_t_capture_ns: u64,
+        /// Alarms raised so far.
+        pub alarm_count: u32,
+        /// Why nothing is seen: a [`crate::Blindness`]; 0 while something is.
+        pub blind: u32,
     }
 }
 

@@ -37,7 +37,7 @@ impl Channel {
 
 block! {
     /// Written by the detector every cycle.
-    pub struct DetectionBelief, size 448 {
+    pub struct DetectionBelief, size 456 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -80,7 +80,87 @@ block! {
         pub particle_count: u32,
         /// Outcome of that action, as the frame says it: an [`crate::ActionOutcome`].
         pub action_outcome: u32,
+        /// Why the detector sees nothing: a [`Blindness`]; 0 while it sees.
+        pub blind: u32,
+        /// Whether an alarm could rise now: a [`Readiness`].
+        pub readiness: u32,
         /// Reserved, zero.
         pub reserved: u32,
+    }
+}
+
+/// Why no valid frame has been seen for a second. A robot that stands by command is not blind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Blindness {
+    /// No frame comes.
+    Silence = 1,
+    /// Capture times do not advance like the graph's clock.
+    Clock = 2,
+    /// No channel that is watched is marked as valid.
+    Validity = 3,
+    /// Every frame begins a run of its own.
+    Run = 4,
+    /// Frames carry no valid command.
+    Command = 5,
+    /// Every frame comes from a writer of its own.
+    Epoch = 6,
+    /// Frames come, and the border refuses them all.
+    Refused = 7,
+}
+
+impl Blindness {
+    /// The cause behind a block's `blind`, if this version knows it; none for 0.
+    #[must_use]
+    pub const fn from_wire(value: u32) -> Option<Self> {
+        Some(match value {
+            1 => Self::Silence,
+            2 => Self::Clock,
+            3 => Self::Validity,
+            4 => Self::Run,
+            5 => Self::Command,
+            6 => Self::Epoch,
+            7 => Self::Refused,
+            _ => return None,
+        })
+    }
+
+    /// In few words.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Silence => "no frames",
+            Self::Clock => "capture times do not follow the clock",
+            Self::Validity => "no channel is marked as valid",
+            Self::Run => "another run id in every frame",
+            Self::Command => "no valid command",
+            Self::Epoch => "another writer epoch in every frame",
+            Self::Refused => "every frame is refused",
+        }
+    }
+}
+
+/// Whether an alarm could rise now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Readiness {
+    /// Not yet: the track settles, and the noise becomes known.
+    Arming = 1,
+    /// Yes.
+    Armed = 2,
+    /// Armed, but the robot stands by command and shows nothing: the belief is held.
+    NotExcited = 3,
+}
+
+impl Readiness {
+    /// The readiness behind a block's word, if this version knows it.
+    #[must_use]
+    pub const fn from_wire(value: u32) -> Option<Self> {
+        Some(match value {
+            1 => Self::Arming,
+            2 => Self::Armed,
+            3 => Self::NotExcited,
+            _ => return None,
+        })
     }
 }

@@ -12,6 +12,8 @@ pub const FAULT_SETS: usize = 8;
 pub const MODE_UNKNOWN: u32 = 1000;
 /// [`FaultBelief::mode`] when two or more faults are present.
 pub const MODE_MULTIPLE: u32 = 1001;
+/// [`FaultBelief::mode`] without valid input for a second.
+pub const MODE_BLIND: u32 = 1002;
 
 part! {
 /// A set of leaves of the fault tree and its probability.
@@ -26,7 +28,7 @@ pub struct FaultSet, size 16 {
 block! {
     /// Written by the identifier every cycle. Before an alarm it reports nominal with
     /// probability 1 - p_fault and the rest as unknown.
-    pub struct FaultBelief, size 1576 {
+    pub struct FaultBelief, size 1584 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -58,8 +60,12 @@ block! {
         pub alarm_t_capture_ns: u64,
         /// Most probable onset of the most probable fault, capture time ns; 0 if none.
         pub onset_t_capture_ns: u64,
-        /// Reported mode: a node's index, [`MODE_UNKNOWN`] or [`MODE_MULTIPLE`].
+        /// Mode, memoryless: a node's index, [`MODE_UNKNOWN`], [`MODE_MULTIPLE`] or [`MODE_BLIND`].
         pub mode: u32,
+        /// Reported mode: follows `mode` with hysteresis.
+        pub reported: u32,
+        /// Changes of `reported` so far.
+        pub reported_change_count: u32,
         /// The next best explanation that is not the best and one more fault: a node's index (0 is
         /// nominal), [`MODE_UNKNOWN`] or [`MODE_MULTIPLE`].
         pub runner_up: u32,

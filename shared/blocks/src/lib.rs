@@ -38,8 +38,10 @@ pub use block::{Block, fnv1a};
 #[doc(hidden)]
 pub use block::{ascii, name_with_hash};
 pub use control::{Control, ControlCommand};
-pub use detection::{CHANNELS, Channel, DetectionBelief};
-pub use diagnosis::{FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_MULTIPLE, MODE_UNKNOWN};
+pub use detection::{Blindness, CHANNELS, Channel, DetectionBelief, Readiness};
+pub use diagnosis::{
+    FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
+};
 pub use header::{Cause, CauseKind, Header};
 pub use health::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
 pub use journal::Entry;
