@@ -3,6 +3,7 @@
 use vigil_blocks::{
     Channel, DetectionBelief, Entry, PARTICLE_CAPACITY, ParticleBlock, SensorFrame, Symptoms,
 };
+use vigil_inference::ending::Ending;
 use vigil_inference::logspace::probability;
 use vigil_robot::learned::monitor::Channels;
 use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
@@ -16,6 +17,10 @@ use crate::watch::{Observed, Watch};
 
 /// Without monitors, pose log-odds beyond which the detector reports an error in position.
 const SYMPTOM_LOG_ODDS: f64 = 0.0;
+
+/// Rates at which a fault that has been alarmed comes again and ends, 1/s of motion.
+const APPEARS_AGAIN_1_S: f64 = 1e-3;
+const ENDS_1_S: f64 = 1.0 / 60.0;
 
 /// Why a detector was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -48,6 +53,10 @@ pub struct Detector {
     watch: Watch,
     fault_rate_1_s: f64,
     alarm: Alarm,
+    /// While an alarm stands: is its fault still there?
+    ending: Ending,
+    /// Of a fault now.
+    log_odds: f64,
     particles: usize,
     armed: bool,
     period_s: f64,
@@ -124,10 +133,13 @@ impl Detector {
             return Err(DetectorError::Particles(settings.particles));
         }
         let particles = settings.particles;
+        let watch = watch(particles);
         Ok(Self {
-            watch: watch(particles),
+            log_odds: watch.report().log_odds,
+            watch,
             fault_rate_1_s: settings.fault_rate_1_h / 3600.0,
             alarm: Alarm::new(alarm_log_odds),
+            ending: Ending::new(APPEARS_AGAIN_1_S, ENDS_1_S),
             particles,
             armed: false,
             period_s: interval_s,
@@ -214,6 +226,7 @@ impl Detector {
         self.watch.reset();
         self.armed = false;
         self.alarm.reset();
+        self.log_odds = self.watch.report().log_odds;
         (self.alarm_t_ns, self.symptoms) = (0, 0);
         if let Some(monitors) = &mut self.monitors {
             monitors.reset();
@@ -251,13 +264,20 @@ impl Detector {
             self.armed = self.watch.is_ready();
             self.watch.forget_evidence();
         }
-        let log_odds = self.watch.report().log_odds;
+        self.weigh_end(&observation);
+        let stood = self.alarm.stands();
         // Clearing needs evidence: time at rest does not count.
-        if self.armed && self.alarm.take(log_odds, observation.dt_s, moving) {
+        if self.armed && self.alarm.take(self.log_odds, observation.dt_s, moving) {
             self.alarm_t_ns = observation.t_ns.max(1);
             self.alarm_count = self.alarm_count.saturating_add(1);
+            self.ending.begin();
         } else if !self.alarm.stands() {
             self.alarm_t_ns = 0;
+        }
+        if stood && !self.alarm.stands() {
+            // What spoke for the fault that has ended does not speak for the next one.
+            self.watch.forget_evidence();
+            self.log_odds = self.watch.report().log_odds;
         }
         let off_course = self.watch.report().channels[Channel::POSE] > SYMPTOM_LOG_ODDS;
         self.symptoms = if !off_course {
@@ -269,9 +289,22 @@ impl Detector {
         };
     }
 
+    /// Log-odds of a fault now: while an alarm stands, no more than those that its fault has not
+    /// ended.
+    fn weigh_end(&mut self, observation: &Observed) {
+        let report = self.watch.report();
+        self.log_odds = report.log_odds;
+        if self.alarm.stands() {
+            if observation.moving {
+                self.ending.step(report.gain, observation.dt_s);
+            }
+            self.log_odds = self.log_odds.min(self.ending.log_odds());
+        }
+    }
+
     fn report(&self, missed: u32, belief: &mut DetectionBelief) {
         let report = self.watch.report();
-        let p_now = probability(report.log_odds);
+        let p_now = probability(self.log_odds);
         // The state stays at the last frame; what is told is its prediction.
         let appears = self.fault_rate_1_s * self.period_s * f64::from(missed);
         let p_fault = p_now + (1.0 - p_now) * (1.0 - (-appears).exp());
@@ -281,7 +314,7 @@ impl Detector {
         belief.log_odds = if missed > 0 && odds.is_finite() {
             odds
         } else {
-            report.log_odds
+            self.log_odds
         };
         belief.alarm_log_odds = self.alarm_log_odds();
         belief.evidence = if report.evidence.is_finite() {

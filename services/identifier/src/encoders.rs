@@ -9,8 +9,16 @@ use vigil_robot::learned::wheel_evidence::{ANYTHING, BREAKAGE_SHARES, BREAKAGES}
 /// State of a whole encoder whose wheel turns at a rate of its own, in the unknown. The states
 /// before it are whole, and the breakages.
 pub const OWN_RATE: usize = 1 + BREAKAGES.len();
+/// State of a whole encoder that reads exactly zero, as its wheel stands: many do, without noise.
+pub const SILENT: usize = 2 + BREAKAGES.len();
+/// State of an encoder that reads exactly zero, the first of the breakages.
+pub const ZERO: usize = 1;
+/// State of an encoder that reads noise, the third of the breakages.
+const NOISE: usize = 3;
 /// State of a dead encoder, the last of the breakages.
 const DEAD: usize = BREAKAGES.len();
+/// Share of whole encoders that read exactly zero on a standing wheel.
+const SILENT_SHARE: f64 = 0.5;
 /// Share of wheels at a rate of their own among those that do anything, in the unknown.
 const ANYTHING_OWN_RATE: f64 = 0.7;
 
@@ -18,8 +26,9 @@ const ANYTHING_OWN_RATE: f64 = 0.7;
 /// the product over all wheels stays a number.
 const AGAINST_MAX: f64 = -80.0;
 
-/// States of an encoder: whole, broken in one way, whole on a wheel with a rate of its own.
-pub const STATES: usize = 2 + BREAKAGES.len();
+/// States of an encoder: whole, broken in one way, whole on a wheel with a rate of its own, whole
+/// and silent on a standing wheel.
+pub const STATES: usize = 3 + BREAKAGES.len();
 
 /// Log-likelihoods of one observation's readings in each state, prepared for many hypotheses.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,7 +95,8 @@ impl Encoders {
     /// tell: in the unknown these are the same.
     #[must_use]
     pub fn unsure(t_ns: u64) -> Self {
-        let mut p = [1.0 - ANYTHING; STATES];
+        let mut p = [0.0; STATES];
+        p[0] = 1.0 - ANYTHING;
         for (p, share) in p[1..OWN_RATE].iter_mut().zip(BREAKAGE_SHARES) {
             *p = ANYTHING * (1.0 - ANYTHING_OWN_RATE) * share;
         }
@@ -105,12 +115,29 @@ impl Encoders {
         self.onset[wheel] = t_ns;
     }
 
-    /// One observation: encoder w breaks with the probability `births[w]`, recovers with `death`.
-    /// Returns the log-evidence of all readings.
+    /// The wheel sticks: a whole encoder reads zero from now on, with noise or exactly.
+    pub fn stick(&mut self, wheel: usize) {
+        let p = &mut self.p[wheel];
+        let whole = p[0] + p[SILENT];
+        (p[0], p[SILENT]) = ((1.0 - SILENT_SHARE) * whole, SILENT_SHARE * whole);
+    }
+
+    /// The wheel turns again.
+    pub fn release(&mut self, wheel: usize) {
+        let p = &mut self.p[wheel];
+        (p[0], p[SILENT]) = (p[0] + p[SILENT], 0.0);
+    }
+
+    /// One observation: encoder w breaks with the probability `births[w]`, recovers with `death`;
+    /// the wheels `stuck` (bits) stand. What an encoder on a standing wheel reads when it breaks to
+    /// zero or freezes is what it read before: nobody could see it, so neither happens there, and
+    /// no prior moves the odds of what the readings cannot tell. Returns the log-evidence of all
+    /// readings.
     pub fn step(
         &mut self,
         births: &[f64; WHEELS],
         death: f64,
+        stuck: u32,
         likelihoods: &Likelihoods,
         t_ns: u64,
     ) -> f64 {
@@ -118,14 +145,23 @@ impl Encoders {
         let wheels = births.iter().enumerate().take(likelihoods.wheels);
         for (wheel, &birth) in wheels {
             let p = &mut self.p[wheel];
-            let (whole, broken) = (p[0], p[1..OWN_RATE].iter().sum::<f64>());
-            // The onset is that of the mass that came last in quantity.
-            if whole * birth > broken {
-                self.onset[wheel] = t_ns;
-            }
-            p[0] = whole * (1.0 - birth) + broken * death;
-            for (p, share) in p[1..OWN_RATE].iter_mut().zip(BREAKAGE_SHARES) {
-                *p = *p * (1.0 - death) + whole * birth * share;
+            if stuck >> wheel & 1 == 0 {
+                let (whole, broken) = (p[0], p[1..OWN_RATE].iter().sum::<f64>());
+                // The onset is that of the mass that came last in quantity.
+                if whole * birth > broken {
+                    self.onset[wheel] = t_ns;
+                }
+                p[0] = whole * (1.0 - birth) + broken * death;
+                for (p, share) in p[1..OWN_RATE].iter_mut().zip(BREAKAGE_SHARES) {
+                    *p = *p * (1.0 - death) + whole * birth * share;
+                }
+            } else {
+                let birth = birth * BREAKAGE_SHARES[NOISE - 1];
+                let (noisy, silent, noise) = (p[0], p[SILENT], p[NOISE]);
+                let back = noise * death;
+                p[0] = noisy * (1.0 - birth) + back * (1.0 - SILENT_SHARE);
+                p[SILENT] = silent * (1.0 - birth) + back * SILENT_SHARE;
+                p[NOISE] = noise - back + (noisy + silent) * birth;
             }
             let joint: [f64; STATES] =
                 std::array::from_fn(|state| p[state] * likelihoods.relative[wheel][state]);
@@ -172,7 +208,7 @@ mod tests {
         for step in 1..=5 {
             (whole, broken) = (0.9 * whole + 0.2 * broken, 0.1 * whole + 0.8 * broken);
             let (a, b) = (whole * (-3.0_f64).exp(), broken * (-1.0_f64).exp());
-            let evidence = encoders.step(&births, death, &likelihoods, step);
+            let evidence = encoders.step(&births, death, 0, &likelihoods, step);
             assert!((evidence - (a + b).ln()).abs() < 1e-12);
             (whole, broken) = (a / (a + b), b / (a + b));
             assert!((encoders.p_broken(0) - broken).abs() < 1e-12);
@@ -189,8 +225,8 @@ mod tests {
         let mut unknown = Encoders::unsure(0);
         let (mut for_known, mut for_unknown) = (0.0, 0.0);
         for step in 1..=10 {
-            for_known += known.step(&births, 0.0, &own_rate, step);
-            for_unknown += unknown.step(&births, 0.0, &own_rate, step);
+            for_known += known.step(&births, 0.0, 0, &own_rate, step);
+            for_unknown += unknown.step(&births, 0.0, 0, &own_rate, step);
         }
         assert_eq!(known.p[0][OWN_RATE], 0.0);
         assert!(unknown.p[0][OWN_RATE] > 0.99);
@@ -207,7 +243,7 @@ mod tests {
         let impossible = Likelihoods::new(WHEELS, |_, state| if state == 0 { -1e5 } else { 0.0 });
         let mut encoders = Encoders::healthy(0);
         for step in 1..=20 {
-            let evidence = encoders.step(&[0.0; WHEELS], 0.0, &impossible, step);
+            let evidence = encoders.step(&[0.0; WHEELS], 0.0, 0, &impossible, step);
             let expected = AGAINST_MAX * WHEELS as f64;
             assert!((evidence - expected).abs() < 1e-6, "{evidence}");
             assert_eq!(encoders.p_broken(0), 0.0);

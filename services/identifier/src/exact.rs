@@ -19,7 +19,7 @@ use vigil_robot::learned::{
     FaultRates, Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
 };
 
-use crate::encoders::{Encoders, Likelihoods, OWN_RATE};
+use crate::encoders::{Encoders, Likelihoods, OWN_RATE, SILENT, ZERO};
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
 use crate::rate_offsets::RateOffsets;
@@ -240,6 +240,13 @@ impl Exact {
         if let Some(wheel) = sticks.filter(|&w| age_s(t_ns, encoders.onset(w)) < EXPLAINED_S) {
             encoders.suppose_whole(wheel, t_ns);
         }
+        for wheel in 0..WHEELS {
+            match (before.is_stuck(wheel), after.is_stuck(wheel)) {
+                (false, true) => encoders.stick(wheel),
+                (true, false) => encoders.release(wheel),
+                _ => {}
+            }
+        }
         State {
             track,
             encoders,
@@ -261,6 +268,7 @@ impl Exact {
                 Moved::UnknownAny => evidence.steering,
                 _ => 0.0,
             };
+            let stuck = self.modes[mode].moved.stuck();
             let all = self.bank.hypotheses_mut().iter_mut();
             for hypothesis in all.filter(|hypothesis| hypothesis.mode == mode) {
                 let is_new = is_new(observation.t_ns, hypothesis.onset);
@@ -275,7 +283,7 @@ impl Exact {
                         offsets.log_likelihood(model, observation, &evidence, *wheel, dragged);
                     likelihoods.replace_whole(*wheel, log);
                 }
-                let gained = encoders.step(&births, death, &likelihoods, first_ns);
+                let gained = encoders.step(&births, death, stuck, &likelihoods, first_ns);
                 hypothesis.log_weight += steering + gained;
                 for (wheel, dragged) in dragged {
                     if encoders.p_broken(*wheel) < 0.5 {
@@ -318,6 +326,9 @@ impl Exact {
                 (0, _) => evidence.whole(&self.model, observation, moved, is_new, wheel),
                 (OWN_RATE, Moved::UnknownAny) => evidence.own_rate[wheel],
                 (OWN_RATE, _) => f64::NEG_INFINITY,
+                // What reads alike shares one likelihood, broken or not.
+                (SILENT, _) if moved.is_stuck(wheel) => evidence.broken[wheel][ZERO - 1],
+                (SILENT, _) => f64::NEG_INFINITY,
                 (broken, _) => evidence.broken[wheel][broken - 1],
             }
         })

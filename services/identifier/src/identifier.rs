@@ -20,6 +20,7 @@ use crate::generic::Generic;
 use crate::modes::{IdentifierError, Leaves};
 use crate::posterior::Posterior;
 use crate::reasons::Reasons;
+use crate::reported::Reported;
 
 /// A ring is worked off in about this time after an alarm, s.
 const CATCH_UP_S: f64 = 0.1;
@@ -99,6 +100,9 @@ pub struct Identifier {
     reasons: Reasons,
     mode: u32,
     mode_changes: u32,
+    reported: Reported,
+    /// Motion in the last observation, s, until it has been reported.
+    moved_s: f64,
     run_id: u64,
 }
 
@@ -165,6 +169,8 @@ impl Identifier {
             predicted: Posterior::nominal(),
             mode: 0,
             mode_changes: 0,
+            reported: Reported::default(),
+            moved_s: 0.0,
             run_id: 0,
         })
     }
@@ -216,9 +222,11 @@ impl Identifier {
         self.posterior = Posterior::nominal();
         self.predicted = self.posterior;
         self.reasons.clear();
+        self.reported.begin_run();
     }
 
     fn take(&mut self, input: &Input<'_>) {
+        self.observer.hold_context(self.detection.alarm);
         let intake = self.observer.push(input.frame);
         if intake.new_run {
             self.begin_run();
@@ -243,6 +251,12 @@ impl Identifier {
         if intake.complete {
             self.in_trouble = self.observer.observation().troubles.any(self.use_wheels);
             self.keep(input);
+            let observation = self.observer.observation();
+            self.moved_s += if observation.moving {
+                observation.dt_s
+            } else {
+                0.0
+            };
         }
         if self.in_trouble {
             self.phase = Phase::Watching;
@@ -397,6 +411,10 @@ impl Identifier {
             self.mode = mode;
             self.mode_changes = self.mode_changes.saturating_add(1);
         }
+        let moved_s = std::mem::take(&mut self.moved_s);
+        self.reported.take((mode, p_mode), &self.posterior, moved_s);
+        belief.reported = self.reported.name();
+        belief.reported_change_count = self.reported.changes();
         belief.mode = mode;
         belief.p_mode = p_mode;
         belief.mode_change_count = self.mode_changes;

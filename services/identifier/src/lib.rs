@@ -13,6 +13,7 @@ mod modes;
 mod posterior;
 mod rate_offsets;
 mod reasons;
+mod reported;
 mod risk;
 mod sets;
 mod watcher;

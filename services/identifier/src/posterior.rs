@@ -115,8 +115,9 @@ impl Posterior {
         belief.set_count = self.set_count as u32;
     }
 
-    /// The mode to report and its probability: unknown above one half, else several faults if a set
-    /// of them has one half, else the deepest node of at least one half, else nominal.
+    /// The mode and its probability: unknown above one half, else several faults if a set of them
+    /// has one half, else the deepest node of at least one half, else unknown if some fault is more
+    /// probable than none, else nominal.
     #[must_use]
     pub fn mode(&self, leaves: &Leaves) -> (u32, f64) {
         if self.unknown > 0.5 {
@@ -135,7 +136,10 @@ impl Posterior {
                 best = Some(node);
             }
         }
-        let node = best.unwrap_or(0);
-        (node as u32, p[node])
+        match best {
+            Some(node) => (node as u32, p[node]),
+            None if p[0] < 0.5 => (MODE_UNKNOWN, 1.0 - p[0]),
+            None => (0, p[0]),
+        }
     }
 }

@@ -4,6 +4,7 @@ use vigil_blocks::{DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, ParticleBl
 use vigil_inference::FaultTree;
 
 use crate::posterior::Posterior;
+
 use crate::{Identifier, Input};
 
 /// Reports ND with 1 - p(fault) of the detector and the rest as unknown.
@@ -96,6 +97,8 @@ impl Watcher {
         belief.sets = posterior.sets;
         belief.set_count = posterior.set_count as u32;
         belief.mode = mode;
+        belief.reported = mode;
+        belief.reported_change_count = self.mode_changes;
         belief.p_mode = p_mode;
         belief.mode_change_count = self.mode_changes;
         belief.alarm_t_capture_ns = self.alarm_t_ns;

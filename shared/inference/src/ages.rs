@@ -39,6 +39,8 @@ pub struct Ages<const D: usize> {
     components: Onsets<Component<D>>,
     prior_variance: f64,
     dimensions: f64,
+    log_odds: f64,
+    gain: f64,
 }
 
 impl<const D: usize> Ages<D> {
@@ -56,15 +58,22 @@ impl<const D: usize> Ages<D> {
             components: Onsets::default(),
             prior_variance: bias_sd * bias_sd,
             dimensions: dimensions.min(D) as f64,
+            log_odds: f64::NEG_INFINITY,
+            gain: 0.0,
         }
     }
 
     /// Natural log-odds of the fault state.
     #[must_use]
-    pub fn log_odds(&self) -> f64 {
-        let log_weights = self.components.iter().map(|component| component.log_weight);
-        let log_odds = log_weights.fold(f64::NEG_INFINITY, log_add);
-        log_odds.clamp(-LOG_ODDS_MAX, LOG_ODDS_MAX)
+    pub const fn log_odds(&self) -> f64 {
+        self.log_odds.clamp(-LOG_ODDS_MAX, LOG_ODDS_MAX)
+    }
+
+    /// What the last step said for a fault that was there, and is: the logarithm of the
+    /// likelihoods' ratio.
+    #[must_use]
+    pub const fn gain(&self) -> f64 {
+        self.gain
     }
 
     /// One step with the whitened residual and the probability `birth` that a fault appears in it.
@@ -87,9 +96,16 @@ impl<const D: usize> Ages<D> {
             component.log_weight -= stays;
             highest = highest.max(component.log_weight);
         }
+        let before = log_add(self.log_odds, birth.ln()) - stays;
+        let log_weights = self.components.iter().map(|component| component.log_weight);
+        self.log_odds = log_weights.fold(f64::NEG_INFINITY, log_add);
+        self.gain = self.log_odds - before;
         let excess = (highest - LOG_ODDS_MAX).max(0.0);
-        for component in self.components.iter_mut() {
-            component.log_weight -= excess;
+        if excess > 0.0 {
+            for component in self.components.iter_mut() {
+                component.log_weight -= excess;
+            }
+            self.log_odds -= excess;
         }
     }
 }

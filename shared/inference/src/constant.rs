@@ -17,12 +17,14 @@ const LOG_ODDS_MAX: f64 = 40.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Constant {
     log_odds: f64,
+    gain: f64,
 }
 
 impl Default for Constant {
     fn default() -> Self {
         Self {
             log_odds: f64::NEG_INFINITY,
+            gain: 0.0,
         }
     }
 }
@@ -32,6 +34,13 @@ impl Constant {
     #[must_use]
     pub const fn log_odds(&self) -> f64 {
         self.log_odds
+    }
+
+    /// What the last step said for a fault that was there, and is: the logarithm of the
+    /// likelihoods' ratio.
+    #[must_use]
+    pub const fn gain(&self) -> f64 {
+        self.gain
     }
 
     /// One step with the squared norm of the whitened residual, the constant's `tau_squared` (above
@@ -48,6 +57,7 @@ impl Constant {
         let stays = log_add(self.log_odds + (1.0 - death).ln(), birth.ln());
         let leaves = log_add((1.0 - birth).ln(), self.log_odds + death.ln());
         self.log_odds = (stays - leaves + evidence).min(LOG_ODDS_MAX);
+        self.gain = evidence;
     }
 }
 
@@ -90,7 +100,10 @@ mod tests {
             let drift = residuals(lambda, seed)
                 .take(steps)
                 .map(|residual| {
-                    let mut filter = Constant { log_odds: 10.0 };
+                    let mut filter = Constant {
+                        log_odds: 10.0,
+                        gain: 0.0,
+                    };
                     filter.step(residual.norm_squared(), 5.0, 1e-12, 1e-12);
                     filter.log_odds() - 10.0
                 })

@@ -43,6 +43,7 @@ pub struct Departure<const K: usize> {
     nominal: MotionNoise,
     track: Track,
     faults: [Onsets<Fault>; K],
+    gain: f64,
 }
 
 /// What a pose said.
@@ -63,6 +64,7 @@ impl<const K: usize> Departure<K> {
             track: Track::new(Vector3::zeros(), Matrix3::identity(), &nominal),
             faults: [Onsets::default(); K],
             nominal,
+            gain: 0.0,
         }
     }
 
@@ -101,19 +103,27 @@ impl<const K: usize> Departure<K> {
         log_weights.fold(f64::NEG_INFINITY, log_add)
     }
 
+    /// What the last pose said for a fault that was there, and is: the logarithm of the
+    /// likelihoods' ratio; 0 where it is no evidence.
+    #[must_use]
+    pub const fn gain(&self) -> f64 {
+        self.gain
+    }
+
     fn all_mut(&mut self) -> impl Iterator<Item = &mut Fault> {
         self.faults.iter_mut().flat_map(Onsets::iter_mut)
     }
 
     /// Moves by one displacement, each fault by that of its kind. A fault begins before it with the
-    /// probability `birth`, 0 for none. The nominal track diffuses by `follow` (variances of x, y,
-    /// yaw) besides.
+    /// probability `birth`, 0 for none. With `follow` the nominal track diffuses by these variances
+    /// (x, y, yaw) besides and learns nothing of the motion: what a fault does is no context of the
+    /// nominal mode.
     pub fn predict(
         &mut self,
         step: &Displacement,
         kinds: &[Kind; K],
         birth: f64,
-        follow: [f64; 3],
+        follow: Option<[f64; 3]>,
     ) {
         for (faults, kind) in self.faults.iter_mut().zip(kinds) {
             let born = birth * kind.share;
@@ -127,15 +137,20 @@ impl<const K: usize> Departure<K> {
                 fault.track.predict(&kind.step, &kind.noise);
             }
         }
+        if let Some(variance) = follow {
+            self.track = self.track.fork(&self.nominal);
+            self.track.diffuse(variance);
+        }
         self.track.predict(step, &self.nominal);
-        self.track.diffuse(follow);
     }
 
     /// Conditions on a measured pose (x, y, yaw) with independent noise of `variance`; it is
     /// evidence if `counts`. None, unchanged, if the nominal track cannot take it.
     pub fn update(&mut self, pose: [f64; 3], variance: [f64; 3], counts: bool) -> Option<Said> {
+        self.gain = 0.0;
         let said = self.residual(pose, variance)?;
         self.track.update(pose, variance)?;
+        let before = self.log_odds();
         let mut highest = f64::NEG_INFINITY;
         for fault in self.all_mut() {
             let gained = fault.track.update(pose, variance);
@@ -146,6 +161,8 @@ impl<const K: usize> Departure<K> {
             }
             highest = highest.max(fault.log_weight);
         }
+        let gain = self.log_odds() - before;
+        self.gain = if gain.is_finite() { gain } else { 0.0 };
         let excess = (highest - LOG_ODDS_MAX).max(0.0);
         for faults in &mut self.faults {
             for fault in faults.iter_mut() {
@@ -279,7 +296,7 @@ mod tests {
             let poses = poses(apart, onset, steps, 7);
             let mut filter = filter();
             for pose in &poses {
-                filter.predict(&STEP, &kinds(), BIRTH, [0.0; 3]);
+                filter.predict(&STEP, &kinds(), BIRTH, None);
                 filter.update(*pose, VARIANCE, true).unwrap();
             }
             let expected = every_onset(&poses);
@@ -298,11 +315,7 @@ mod tests {
         let (there, back) = (poses(0.2, 100, 300, 3), poses(0.0, 0, 300, 4));
         let mut seen = None;
         for (step, pose) in there.iter().enumerate() {
-            let follow = if seen.is_some() {
-                [2.5e-7; 3]
-            } else {
-                [0.0; 3]
-            };
+            let follow = seen.map(|_| [2.5e-7; 3]);
             filter.predict(&STEP, &kinds(), BIRTH, follow);
             filter.update(*pose, VARIANCE, true).unwrap();
             if seen.is_none() && filter.log_odds() > 3.0 {
@@ -322,7 +335,7 @@ mod tests {
     fn what_does_not_count_is_no_evidence() {
         let mut filter = filter();
         for pose in poses(0.3, 0, 100, 5) {
-            filter.predict(&STEP, &kinds(), 0.0, [0.0; 3]);
+            filter.predict(&STEP, &kinds(), 0.0, None);
             filter.update(pose, VARIANCE, false).unwrap();
         }
         assert_eq!(filter.log_odds(), f64::NEG_INFINITY);
@@ -333,7 +346,7 @@ mod tests {
         fn no_pose_breaks_the_filter(values in prop::collection::vec(any::<[f64; 3]>(), 1..40)) {
             let mut filter = filter();
             for pose in values {
-                filter.predict(&STEP, &kinds(), BIRTH, [0.0; 3]);
+                filter.predict(&STEP, &kinds(), BIRTH, None);
                 filter.update(pose, VARIANCE, true);
                 prop_assert!(!filter.log_odds().is_nan() && filter.log_odds() < 1e3);
                 prop_assert!(filter.track().pose().iter().all(|value| value.is_finite()));

@@ -29,6 +29,7 @@
 //! |---|---|
 //! | [`constant`] | the paper's detection: a constant likelihood, and its blind spot |
 //! | [`departure`] | a planar robot departing from its nominal motion by an unknown amount |
+//! | [`ending`] | whether a fault that was alarmed is still there |
 //! | [`windowed`] | the same on sums over overlapping windows: a smaller blind spot |
 //! | [`risk`] | what losing track of a mode costs, for risk-sensitive proposals |
 //! | [`resample`], [`weights`], [`adaptive`] | four schemes, log-weights, number of particles |
@@ -46,6 +47,7 @@ pub mod bank;
 pub mod bootstrap;
 pub mod constant;
 pub mod departure;
+pub mod ending;
 pub mod fault_sets;
 pub mod filter;
 pub mod forward;

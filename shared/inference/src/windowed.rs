@@ -39,6 +39,12 @@ impl<const D: usize, const W: usize> Windowed<D, W> {
         self.states.log_odds()
     }
 
+    /// See [`Constant::gain`].
+    #[must_use]
+    pub const fn gain(&self) -> f64 {
+        self.states.gain()
+    }
+
     /// One step with the whitened residual; the other arguments as in [`Constant::step`]. Until W
     /// residuals have come, the window holds those that have. A residual that is not finite is no
     /// evidence and enters no window.

@@ -3,7 +3,7 @@
 use crate::learned::{Calibration, ModelError};
 
 /// An alarm falls when the log-odds have stayed this far below those that raise it ..
-const CLEAR_BELOW: f64 = 8.0;
+const CLEAR_BELOW: f64 = 5.0;
 /// .. and below these odds, whatever the threshold ..
 const CLEAR_LOG_ODDS: f64 = -4.0;
 /// .. for this long, s.
@@ -128,9 +128,9 @@ mod tests {
         let mut alarm = Alarm::new(3.0);
         assert!(!alarm.take(3.0, 0.1, true) && !alarm.stands());
         assert!(alarm.take(3.1, 0.1, true) && alarm.stands());
-        // Not low enough: below -5 is asked for, as 3 - 8 is lower than -4.
+        // Not low enough: below -4 is asked for, as 3 - 5 is higher.
         for _ in 0..30 {
-            assert!(!alarm.take(-4.9, 0.1, true) && alarm.stands());
+            assert!(!alarm.take(-3.9, 0.1, true) && alarm.stands());
         }
         // Time at rest does not count, and one high value begins the second anew.
         let low = [(-5.1, true); 9].into_iter();

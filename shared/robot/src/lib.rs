@@ -14,6 +14,7 @@ pub mod kinematics;
 pub mod learned;
 mod model_file;
 pub mod nominal;
+pub mod period;
 mod robot_model;
 pub mod slip;
 

@@ -297,7 +297,7 @@ pub fn follow(
         let step = Displacement {
             per_metre: motion.per_metre(observation.curvature, observation.speed, limit),
             travel_m: observation.travel_m,
-            extra: observation.lag_variance(model),
+            extra: observation.lag_variance(),
         };
         track.predict(&step, &noise);
         tracked_s += observation.dt_s;

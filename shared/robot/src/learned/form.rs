@@ -78,6 +78,15 @@ impl<const D: usize> Evidence<D> {
         }
     }
 
+    /// What the last residual said for a fault that was there, and is.
+    pub(crate) fn gain(&self) -> f64 {
+        match self {
+            Self::LearnedBias(filter) => filter.gain(),
+            Self::Constant(filter) => filter.gain(),
+            Self::Windowed(filter) => filter.gain(),
+        }
+    }
+
     /// Takes a whitened residual; `birth` is the probability that a fault appears with it.
     pub(crate) fn step(&mut self, residual: &SVector<f64, D>, birth: f64) {
         let tau_squared = TAU_SQUARED_PER_DIMENSION * D as f64;

@@ -5,6 +5,7 @@
 //! | [`model`] | the model file |
 //! | [`motion`] | displacement per commanded metre, and its noise |
 //! | [`wheels`] | wheel rates and steering angles, and what an encoder says about its wheel |
+//! | [`BodyLag`] | how the body follows a changing command, learned on the way |
 //! | [`observation`] | frames averaged into observations of about the learned interval |
 //! | [`motion_modes`] | the ways in which a robot may move: nominal, wheels stuck, unknown |
 //! | [`wheel_evidence`] | what the wheels say, for everything that each may be doing |
@@ -15,6 +16,7 @@
 //! | [`troubles`] | silent sensors, and motion that nobody commanded |
 //! | [`monitor`] | the detection filter over observations |
 
+mod body_lag;
 pub mod calibration;
 mod compensation;
 mod faults;
@@ -32,6 +34,7 @@ pub mod troubles;
 pub mod wheel_evidence;
 pub mod wheels;
 
+pub use body_lag::BodyLag;
 pub use calibration::Calibration;
 pub use form::Form;
 pub use model::{Model, ModelError};

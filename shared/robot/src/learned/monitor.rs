@@ -41,7 +41,7 @@ const TROUBLE_LOG_ODDS: f64 = 40.0;
 /// Bound of the flag of exact repeats.
 const REPEATS_LOG_ODDS_MAX: f64 = 40.0;
 /// Diffusion of the pose per observation while following, in units of the measurement's deviation.
-const FOLLOWING: f64 = 0.1;
+const FOLLOWING: f64 = 0.3;
 /// Residuals beyond this many deviations mean a lost track.
 const LOST: f64 = 10.0;
 /// Time in motion after which evidence counts, s: once the noise is known, and at the latest.
@@ -90,7 +90,18 @@ pub struct Monitor {
     noise: SensorNoise,
     moved_s: f64,
     troubles: Troubles,
+    gains: Gains,
     report: Report,
+}
+
+/// What the last observation said for a fault in each group of channels.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gains {
+    pose: f64,
+    any: f64,
+    wheels: [f64; WHEELS],
+    repeats: [f64; WHEELS],
+    steer: [f64; WHEELS],
 }
 
 /// What the last observation did.
@@ -100,6 +111,9 @@ pub struct Report {
     pub log_odds: f64,
     /// The same by each channel alone; see [`Channel`].
     pub channels: [f64; CHANNELS],
+    /// What the observation said for a fault that was there, and is: the logarithm of the
+    /// likelihoods' ratio; 0 where nothing is evidence.
+    pub gain: f64,
     /// Log-likelihood of the observation under the nominal mode.
     pub evidence: f64,
     /// Observations that the track could not take.
@@ -134,9 +148,11 @@ impl Monitor {
             noise: SensorNoise::default(),
             moved_s: 0.0,
             troubles: Troubles::default(),
+            gains: Gains::default(),
             report: Report {
                 log_odds: f64::NEG_INFINITY,
                 channels: [f64::NEG_INFINITY; CHANNELS],
+                gain: 0.0,
                 evidence: 0.0,
                 degenerate_count: 0,
             },
@@ -164,6 +180,7 @@ impl Monitor {
         self.steer = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
         self.repeats = [self.birth(self.model.interval_s, SHARE_REPEATS).ln(); WHEELS];
         self.any = Constant::default();
+        self.gains = Gains::default();
         self.sum_up();
     }
 
@@ -204,6 +221,7 @@ impl Monitor {
     /// that the return of a robot to its nominal mode is seen after a fault has led it away.
     pub fn step(&mut self, observation: &Observation, following: bool) {
         self.report.evidence = 0.0;
+        self.gains = Gains::default();
         self.troubles = observation.troubles;
         if observation.moving {
             // A robot at rest shows nothing of its noise.
@@ -242,10 +260,7 @@ impl Monitor {
             true => self.birth(observation.dt_s, SHARE_POSE),
             false => 0.0,
         };
-        let follow = match following {
-            true => variance.map(|variance| FOLLOWING * FOLLOWING * variance),
-            false => [0.0; 3],
-        };
+        let follow = following.then(|| variance.map(|variance| FOLLOWING * FOLLOWING * variance));
         let kinds = self.faults.kinds(&self.model, observation, &step);
         self.departure.predict(&step, &kinds, birth, follow);
         if measured {
@@ -268,13 +283,18 @@ impl Monitor {
         if !counts {
             return;
         }
-        if self.form != Form::LearnedBias {
-            let birth = self.birth(observation.dt_s, SHARE_POSE);
-            self.pose.step(&said.residual, birth);
-        }
+        self.gains.pose = match self.form {
+            Form::LearnedBias => self.departure.gain(),
+            Form::Constant | Form::Windowed => {
+                let birth = self.birth(observation.dt_s, SHARE_POSE);
+                self.pose.step(&said.residual, birth);
+                self.pose.gain()
+            }
+        };
         let birth = self.birth(observation.dt_s, SHARE_ANY);
         self.any
             .step(norm, 3.0 * TAU_SQUARED_PER_DIMENSION, birth, birth);
+        self.gains.any = self.any.gain();
         self.report.evidence += said.log_density;
     }
 
@@ -301,6 +321,7 @@ impl Monitor {
             let variance = variance + behind * behind + noise;
             let apart = reading.mean - rate;
             self.wheels[i].step(&SVector::from([apart / variance.sqrt()]), birth);
+            self.gains.wheels[i] = self.wheels[i].gain();
             self.report.evidence += log_normal(apart, variance);
         }
     }
@@ -311,6 +332,7 @@ impl Monitor {
         let seen = f64::from(repeats) * ((1.0 - REPEAT_FAILS) / healthy).ln()
             + f64::from(plain) * (REPEAT_FAILS / (1.0 - healthy)).ln();
         let log_odds = log_add(self.repeats[wheel], birth.ln()) + seen;
+        self.gains.repeats[wheel] = seen;
         self.repeats[wheel] = log_odds.clamp(birth.ln(), REPEATS_LOG_ODDS_MAX);
     }
 
@@ -337,26 +359,38 @@ impl Monitor {
             let variance = noise + extra * extra + behind * behind;
             let apart = reading.mean - angle;
             self.steer[i].step(&SVector::from([apart / variance.sqrt()]), birth);
+            self.gains.steer[i] = self.steer[i].gain();
             self.report.evidence += log_normal(apart, variance);
         }
     }
 
     fn sum_up(&mut self) {
         let mut channels = [f64::NEG_INFINITY; CHANNELS];
-        channels[Channel::POSE] = match self.form {
+        // The same before the observation.
+        let mut before = channels;
+        let mut enter = |channel: usize, log_odds: f64, gain: f64| {
+            channels[channel] = log_add(channels[channel], log_odds);
+            before[channel] = log_add(before[channel], log_odds - gain);
+        };
+        let pose = match self.form {
             Form::LearnedBias => self.departure.log_odds(),
             Form::Constant | Form::Windowed => self.pose.log_odds(),
         };
-        channels[Channel::ANY] = self.any.log_odds();
+        let gains = &self.gains;
+        enter(Channel::POSE, pose, gains.pose);
+        enter(Channel::ANY, self.any.log_odds(), gains.any);
         if self.channels == Channels::PoseEncoders {
             for i in 0..self.robot.wheels.len() {
-                let wheel = log_add(self.wheels[i].log_odds(), self.repeats[i]);
-                channels[Channel::wheel_rate(i)] = wheel;
+                let channel = Channel::wheel_rate(i);
+                enter(channel, self.wheels[i].log_odds(), gains.wheels[i]);
+                enter(channel, self.repeats[i], gains.repeats[i]);
                 if self.robot.wheels[i].steered {
-                    channels[Channel::steer(i)] = self.steer[i].log_odds();
+                    enter(Channel::steer(i), self.steer[i].log_odds(), gains.steer[i]);
                 }
             }
         }
+        let gain = log_sum_exp(&channels) - log_sum_exp(&before);
+        self.report.gain = if gain.is_finite() { gain } else { 0.0 };
         let mut trouble =
             |channel: usize| channels[channel] = channels[channel].max(TROUBLE_LOG_ODDS);
         let Troubles {

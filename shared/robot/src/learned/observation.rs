@@ -10,8 +10,9 @@ use vigil_inference::angle::wrap;
 use vigil_inference::track::Displacement;
 
 use super::troubles::{Limits, Troubles, Watchdog};
-use super::{Model, MotionModel, Reading};
+use super::{BodyLag, Model, MotionModel, Reading};
 use crate::Description;
+use crate::period::FramePeriod;
 
 /// A gap in the frames beyond which the pose starts anew, s.
 const GAP_S: f64 = 1.0;
@@ -24,6 +25,8 @@ const POSITION_MAX_M: f64 = 1e7;
 const STALE_MAX: u32 = 10;
 /// Part of a frame that may lack to an interval: frames are never exactly periodic.
 const NEARLY: f64 = 0.4;
+/// Part of the speed at which a robot counts as standing that is no command to creep.
+const STANDS: f64 = 0.1;
 
 /// Frames averaged over about the learned interval.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -34,7 +37,7 @@ pub struct Observation {
     pub t_first_ns: u64,
     /// Time since the observation before, s.
     pub dt_s: f64,
-    /// Time covered by one frame, s.
+    /// Period of the frames, s: what the noise of one sample depends on.
     pub frame_s: f64,
     /// Frames averaged.
     pub frames: u32,
@@ -44,6 +47,10 @@ pub struct Observation {
     pub curvature: f64,
     /// Speed, lag included, m/s.
     pub speed: f64,
+    /// Variances of the travel, m², and of its turn, rad², by what is not known of the body's lag.
+    pub travel_variance: f64,
+    /// See `travel_variance`.
+    pub turn_variance: f64,
     /// Command itself, averaged: curvature 1/m, speed m/s.
     pub command: [f64; 2],
     /// Whether the robot was commanded to move: otherwise nothing is evidence.
@@ -88,20 +95,15 @@ impl Observation {
         Displacement {
             per_metre: motion.per_metre(self.curvature, self.speed, limit),
             travel_m: self.travel_m,
-            extra: self.lag_variance(model),
+            extra: self.lag_variance(),
         }
     }
 
-    /// Variance of the yaw, forward and lateral displacement beyond the motion model: the body's
-    /// lag behind a changing command is known only roughly, and the error is coherent.
+    /// Variance of the yaw, forward and lateral displacement beyond the motion model: how the body
+    /// follows a changing command is known only roughly.
     #[must_use]
-    pub fn lag_variance(&self, model: &Model) -> [f64; 3] {
-        let command = &model.command;
-        let scale = command.lag_uncertainty * command.lag_uncertainty * command.lag_s;
-        let turn = (self.command[0] - self.curvature).abs() * model.command.curvature_max_1_m;
-        let surge = (self.command[1] - self.speed).abs() * command.speed_range_m_s[1];
-        let yaw = scale * self.dt_s * turn * self.speed * self.speed;
-        [yaw, scale * self.dt_s * surge, 0.0]
+    pub const fn lag_variance(&self) -> [f64; 3] {
+        [self.turn_variance, self.travel_variance, 0.0]
     }
 }
 
@@ -124,9 +126,10 @@ pub struct Observer {
     curvature_max: f64,
     speed_max: f64,
     interval_s: f64,
-    lag_s: f64,
     standing_m_s: f64,
     limits: Limits,
+    model: Box<Model>,
+    holds_context: bool,
     state: State,
     observation: Observation,
 }
@@ -138,13 +141,12 @@ struct State {
     t_ns: u64,
     started: bool,
     command: [f64; 2],
-    lagged: [f64; 2],
+    body: BodyLag,
+    period: FramePeriod,
+    /// The last observation's pose.
+    pose_before: Option<[f64; 3]>,
     reset_count: u32,
     anchor: bool,
-    travel: f64,
-    heading: f64,
-    travel_before: f64,
-    heading_before: f64,
     wheels: [Option<f64>; WHEELS],
     steer: [Option<f64>; WHEELS],
     watchdog: Watchdog,
@@ -159,8 +161,6 @@ struct Sums {
     frames: u32,
     elapsed_s: f64,
     t_first_ns: u64,
-    travel: f64,
-    heading: f64,
     command: [f64; 2],
     first_pose: [f64; 3],
     pose: [f64; 3],
@@ -180,9 +180,10 @@ impl Observer {
             curvature_max: 10.0 * robot.limits.curvature_1_m,
             speed_max: 10.0 * robot.limits.speed_m_s,
             interval_s: model.interval_s,
-            lag_s: model.command.lag_s,
             standing_m_s: model.command.standing_m_s,
             limits: Limits::new(model),
+            model: Box::new(model.clone()),
+            holds_context: false,
             state: State::default(),
             observation: Observation::default(),
         }
@@ -192,6 +193,12 @@ impl Observer {
     #[must_use]
     pub const fn observation(&self) -> &Observation {
         &self.observation
+    }
+
+    /// While a fault is suspected nothing is learned about the healthy robot: what the fault does
+    /// is none of its context.
+    pub const fn hold_context(&mut self, holds: bool) {
+        self.holds_context = holds;
     }
 
     /// Forgets everything: the next frame begins a new run.
@@ -220,12 +227,17 @@ impl Observer {
             };
             self.state.reset_count = frame.pose_reset_count;
             self.state.anchor = true;
+            let command = &self.model.command;
+            self.state.body = BodyLag::new(command.lag_s, command.lag_uncertainty);
         }
         let dt_s = if new_run {
             0.0
         } else {
             t_ns.saturating_sub(self.state.t_ns) as f64 * 1e-9
         };
+        if !new_run && !is_stale {
+            self.state.period.push(t_ns - self.state.t_ns);
+        }
         self.state.t_ns = t_ns;
         self.state.stale = 0;
         let jumped = is_stale || dt_s > GAP_S || frame.pose_reset_count != self.state.reset_count;
@@ -244,10 +256,10 @@ impl Observer {
         self.state.sums.elapsed_s += dt_s;
         invalid |= self.take_pose(frame);
         invalid |= self.take_wheels(frame);
-        let enough = self.state.sums.elapsed_s + NEARLY * dt_s >= self.interval_s;
+        let enough = self.state.sums.elapsed_s + NEARLY * self.period_s() >= self.interval_s;
         let complete = new_run || enough || jumped;
         if complete {
-            self.complete(dt_s);
+            self.complete();
         }
         Intake {
             complete,
@@ -256,7 +268,11 @@ impl Observer {
         }
     }
 
-    /// The body follows the command with a first-order lag.
+    /// Period of the frames, s.
+    fn period_s(&self) -> f64 {
+        self.state.period.period_s().unwrap_or(FRAME_UNKNOWN_S)
+    }
+
     fn take_command(&mut self, frame: &SensorFrame, dt_s: f64, new_run: bool) -> bool {
         let [curvature, speed, ..] = frame.command;
         let valid = frame.has(Valid::command(0) | Valid::command(1));
@@ -266,22 +282,9 @@ impl Observer {
             state.command = [curvature, speed];
         }
         if new_run {
-            state.lagged = state.command;
+            state.body.begin(state.command);
         }
-        let follows = if self.lag_s > 0.0 {
-            1.0 - (-dt_s / self.lag_s).exp()
-        } else {
-            1.0
-        };
-        let before = state.lagged;
-        for i in 0..2 {
-            state.lagged[i] += follows * (state.command[i] - state.lagged[i]);
-        }
-        let travel = 0.5 * (before[1] + state.lagged[1]) * dt_s;
-        state.travel += travel;
-        state.heading += 0.5 * (before[0] + state.lagged[0]) * travel;
-        state.sums.travel += state.travel;
-        state.sums.heading += state.heading;
+        state.body.advance(state.command, dt_s);
         for i in 0..2 {
             state.sums.command[i] += state.command[i];
         }
@@ -332,56 +335,47 @@ impl Observer {
         invalid
     }
 
-    fn complete(&mut self, dt_s: f64) {
+    fn complete(&mut self) {
+        let frame_s = self.period_s();
         let state = &mut self.state;
         let sums = state.sums;
-        let count = f64::from(sums.frames.max(1));
-        let (travel, heading) = (sums.travel / count, sums.heading / count);
-        let moved = travel - state.travel_before;
-        let turned = heading - state.heading_before;
-        let mut pose = sums.first_pose;
-        if sums.pose_frames > 0 {
-            for (value, sum) in pose.iter_mut().zip(sums.pose) {
-                *value += sum / f64::from(sums.pose_frames);
-            }
-            pose[2] = wrap(pose[2]);
-        }
-        let command = sums.command.map(|sum| sum / count);
         let elapsed = sums.elapsed_s.min(GAP_S);
+        let followed = state.body.complete(elapsed);
+        let command = sums.command.map(|sum| sum / f64::from(sums.frames.max(1)));
         // Dividing by a small travel would amplify rounding: a standing robot has its command's.
-        let curvature = if moved.abs() > 1e-6 {
-            turned / moved
+        let curvature = if followed.travel_m.abs() > 1e-6 {
+            followed.turn_rad / followed.travel_m
         } else {
             command[0]
         };
+        let speed = followed.speed_m_s;
         self.observation = Observation {
             t_ns: state.t_ns,
             t_first_ns: sums.t_first_ns,
             dt_s: elapsed,
-            frame_s: if dt_s > 0.0 {
-                elapsed / count
-            } else {
-                FRAME_UNKNOWN_S
-            },
+            frame_s,
             frames: sums.frames,
-            travel_m: moved,
+            travel_m: followed.travel_m,
             curvature: curvature.clamp(-self.curvature_max, self.curvature_max),
-            speed: state.lagged[1],
+            speed,
+            travel_variance: followed.travel_variance,
+            turn_variance: followed.turn_variance,
             command,
-            moving: command[1].abs() >= self.standing_m_s
-                && state.lagged[1].abs() >= self.standing_m_s,
+            moving: command[1].abs() >= self.standing_m_s && speed.abs() >= self.standing_m_s,
             anchor: state.anchor,
             pose_frames: sums.pose_frames,
-            pose,
+            pose: sums.mean_pose(),
             wheels: sums.wheels,
             steer: sums.steer,
             troubles: Troubles::default(),
         };
-        let stands = |speed: f64| speed.abs() < self.standing_m_s;
-        let is_stopped = stands(command[1]) && stands(state.lagged[1]);
+        // A robot that is commanded to creep is not commanded to stand.
+        let stands = |speed: f64| speed.abs() < STANDS * self.standing_m_s;
+        let is_stopped = stands(command[1]) && stands(speed);
         let (watchdog, observation) = (&mut state.watchdog, &mut self.observation);
         observation.troubles = watchdog.step(observation, is_stopped, &self.limits);
-        (state.travel_before, state.heading_before) = (travel, heading);
+        self.learn_lag();
+        let state = &mut self.state;
         // An anchor without a pose is still to come.
         state.anchor = state.anchor && sums.pose_frames == 0;
         state.sums = Sums {
@@ -389,11 +383,44 @@ impl Observer {
             steer: sums.steer.map(|reading| reading.next()),
             ..Sums::default()
         };
-        // Cumulative sums stay small however long the run.
-        if travel.abs() > 1e3 {
-            state.travel -= travel;
-            state.heading -= heading;
-            (state.travel_before, state.heading_before) = (0.0, 0.0);
+    }
+
+    /// Compares the measured displacement since the last observation with what each lag predicts.
+    fn learn_lag(&mut self) {
+        let now = &self.observation;
+        let pose = (now.pose_frames > 0).then_some(now.pose);
+        let before = std::mem::replace(&mut self.state.pose_before, pose);
+        let is_followed = !now.anchor && !self.holds_context;
+        let (Some(before), Some(pose), true) = (before, pose, is_followed) else {
+            self.state.body.interrupt();
+            return;
+        };
+        let motion = &self.model.nominal.motion;
+        let limit = self.model.command.curvature_max_1_m;
+        let [yaw, forward, _] = motion.per_metre(now.curvature, now.speed, limit);
+        let (sin, cos) = before[2].sin_cos();
+        let measured = [
+            cos * (pose[0] - before[0]) + sin * (pose[1] - before[1]),
+            wrap(pose[2] - before[2]),
+        ];
+        // Two poses, each as noisy as this one.
+        let [position, _, heading] = now.pose_variance(&self.model, 1.0).map(|v| 2.0 * v);
+        let beyond = yaw - now.curvature;
+        let body = &mut self.state.body;
+        body.learn(measured, [position, heading], [forward, beyond]);
+    }
+}
+
+impl Sums {
+    /// Mean pose; the first one, which means nothing, without any.
+    fn mean_pose(&self) -> [f64; 3] {
+        let mut pose = self.first_pose;
+        if self.pose_frames > 0 {
+            for (value, sum) in pose.iter_mut().zip(self.pose) {
+                *value += sum / f64::from(self.pose_frames);
+            }
+            pose[2] = wrap(pose[2]);
         }
+        pose
     }
 }

@@ -12,8 +12,10 @@ pub const BREAKAGES: [EncoderState; 4] = [
     EncoderState::Zero,
     EncoderState::Frozen,
     EncoderState::Noise,
-    EncoderState::Dead,
+    EncoderState::Standing,
 ];
+/// Index of the breakage that reads what a standing wheel's encoder does.
+const DEAD: usize = 3;
 /// Prior shares of [`BREAKAGES`].
 pub const BREAKAGE_SHARES: [f64; BREAKAGES.len()] = [0.32, 0.32, 0.32, 0.04];
 
@@ -29,8 +31,6 @@ pub const TOGETHER_SD: f64 = 0.4;
 pub const ANYTHING: f64 = 0.2;
 /// Standard deviation of a steering angle that does anything, rad.
 const STEER_ANY_RAD: f64 = 0.3;
-/// Variance of a standing wheel's rate, (rad/s)².
-const STANDING_VARIANCE: f64 = 4e-4;
 
 /// Natural log-likelihoods of one observation's wheel readings; comparable within a wheel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,8 +41,6 @@ pub struct WheelEvidence {
     pub broken: [[f64; BREAKAGES.len()]; WHEELS],
     /// It turns, or is said to turn, at a rate of its own.
     pub own_rate: [f64; WHEELS],
-    /// It stands.
-    pub standing: [f64; WHEELS],
     /// It does anything.
     pub any: [f64; WHEELS],
     /// Steering angles that may be anything, relative to angles as commanded.
@@ -78,7 +76,6 @@ impl WheelEvidence {
             healthy: [0.0; WHEELS],
             broken: [[0.0; BREAKAGES.len()]; WHEELS],
             own_rate: [0.0; WHEELS],
-            standing: [0.0; WHEELS],
             any: [0.0; WHEELS],
             steering: steering(model, robot, observation, noise.steer),
             rolling: [(0.0, 0.0); WHEELS],
@@ -96,7 +93,6 @@ impl WheelEvidence {
             evidence.rolling[i] = (rate, behind);
             let (mean, variance) = model.nominal.rates[i].rate(rate, command[0]);
             evidence.healthy[i] = read(EncoderState::Turning(mean, variance + behind, TAIL));
-            evidence.standing[i] = read(EncoderState::Turning(0.0, STANDING_VARIANCE, TAIL));
             evidence.own_rate[i] = read(EncoderState::OwnRate);
             evidence.any[i] = read(EncoderState::Any);
             evidence.broken[i] = BREAKAGES.map(read);
@@ -121,7 +117,7 @@ impl WheelEvidence {
             false => a,
         };
         match moved {
-            _ if moved.is_stuck(i) => either(self.standing[i], self.any[i]),
+            _ if moved.is_stuck(i) => either(self.standing(i), self.any[i]),
             Moved::Stuck(stuck) => {
                 let dragged = self.dragged(model, observation, stuck, i);
                 let sd = match stuck.count_ones() {
@@ -179,6 +175,13 @@ impl WheelEvidence {
         let state = EncoderState::Turning(rate, variance, TAIL_DRAGGED);
         let reading = &observation.wheels[i];
         model.encoder.log_likelihood(state, reading, self.sample_sd)
+    }
+
+    /// Wheel `i` stands and its encoder is whole. The very number that a dead encoder has: what
+    /// reads alike is told apart by the motion alone.
+    #[must_use]
+    pub const fn standing(&self, i: usize) -> f64 {
+        self.broken[i][DEAD]
     }
 
     /// Variance of the mean of `plain` samples by the sensor's noise, (rad/s)².

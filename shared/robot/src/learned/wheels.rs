@@ -84,8 +84,8 @@ pub enum EncoderState {
     Frozen,
     /// The encoder reports noise.
     Noise,
-    /// The encoder reports zero plus the sensor's noise.
-    Dead,
+    /// The encoder reports zero plus the sensor's noise: its wheel stands, or it is dead.
+    Standing,
     /// A smooth rate of its own: that of the observation before, or nearly so. A wheel that slips
     /// or is driven, a scaled or late encoder.
     OwnRate,
@@ -128,7 +128,7 @@ impl EncoderModel {
             EncoderState::Zero => zeros * hit + (count - zeros) * miss,
             EncoderState::Frozen => repeats * hit + plain * miss,
             EncoderState::Noise => noise,
-            EncoderState::Dead => {
+            EncoderState::Standing => {
                 let variance = STANDING_SD_RAD_S * STANDING_SD_RAD_S;
                 let standing = self.common(reading, 0.0, variance, sample_sd);
                 log_add(standing, OUTLIER.ln() + noise)
@@ -230,7 +230,7 @@ mod tests {
             EncoderState::OwnRate,
             EncoderState::Turning(2.0, 4e-4, 0.02),
             EncoderState::Noise,
-            EncoderState::Dead,
+            EncoderState::Standing,
         ];
         let mut sums = [0.0; 4];
         let mut last = reading(&[1.61]);

@@ -32,6 +32,7 @@ pub(super) struct Together {
     bias_sd: f64,
     whitened: SVector<f64, CHANNELS_MAX>,
     found: usize,
+    gain: f64,
 }
 
 impl Together {
@@ -47,6 +48,7 @@ impl Together {
                 bias_sd,
                 whitened: SVector::zeros(),
                 found: 0,
+                gain: 0.0,
             }
         })
     }
@@ -58,7 +60,7 @@ impl Together {
 
     /// An observation begins.
     pub fn begin(&mut self) {
-        self.found = 0;
+        (self.found, self.gain) = (0, 0.0);
     }
 
     /// The whitened residual of one of its channels.
@@ -71,9 +73,16 @@ impl Together {
 
     /// It is complete: an observation that lacks a channel says nothing here.
     pub fn step(&mut self, birth: f64) {
+        self.gain = 0.0;
         if self.found == self.channels {
             self.bias.step(&self.whitened, birth);
+            self.gain = self.bias.gain();
         }
+    }
+
+    /// What the last observation said for a fault that was there, and is.
+    pub fn gain(&self) -> f64 {
+        self.gain
     }
 
     /// Natural log-odds, as they come.

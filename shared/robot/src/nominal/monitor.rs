@@ -21,7 +21,7 @@
 use nalgebra::SVector;
 use vigil_blocks::{CHANNELS, Channel as Slot, WHEELS};
 use vigil_inference::constant::Constant;
-use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
+use vigil_inference::logspace::{log_add, log_normal};
 
 use super::channel::{Channel, FAULT_RATE_1_H, Quantity, REST_S, Tail};
 use super::joint::Together;
@@ -61,6 +61,8 @@ struct Watched {
     absent: Evidence<1>,
     /// Motion of the pose while none is commanded.
     rest: Evidence<1>,
+    /// What the last observation said for a fault in the values, by silence and at rest.
+    gains: [f64; 3],
     /// Its tail for the form in use; none while it is being learned.
     tail: Option<Tail>,
 }
@@ -77,6 +79,7 @@ impl Watched {
         self.absent_s += now.dt_s;
         if self.absent_s > ABSENT_S {
             self.absent.step(&SVector::from([CLIP]), birth);
+            self.gains[1] = self.absent.gain();
         }
     }
 
@@ -91,19 +94,39 @@ impl Watched {
         if let Some(velocity) = velocity.filter(|_| self.channel.rest_sd > 0.0) {
             let whitened = (velocity / self.channel.rest_sd).clamp(-CLIP, CLIP);
             self.rest.step(&SVector::from([whitened]), birth);
+            self.gains[2] = self.rest.gain();
         }
     }
 
-    /// Log-odds at [`FAULT_RATE_1_H`]. Those of its values are tempered if a tail is known: how
-    /// irregular they are says nothing on silence and on rest.
-    fn log_odds(&self) -> f64 {
+    /// Log-odds at [`FAULT_RATE_1_H`], and before the last observation. Those of its values are
+    /// tempered if a tail is known: how irregular they are says nothing on silence and on rest.
+    fn log_odds(&self) -> [f64; 2] {
         let values = log_add(self.bias.log_odds(), self.scatter.log_odds());
-        let tail = self.tail.as_ref();
-        let values = tail.map_or(values, |tail| tail.tempered(values));
-        log_add(
-            values,
-            log_add(self.absent.log_odds(), self.rest.log_odds()),
-        )
+        let others = [self.absent.log_odds(), self.rest.log_odds()];
+        let at = |[values_gain, absent_gain, rest_gain]: [f64; 3]| {
+            let values = values - values_gain;
+            let tail = self.tail.as_ref();
+            let values = tail.map_or(values, |tail| tail.tempered(values));
+            let others = log_add(others[0] - absent_gain, others[1] - rest_gain);
+            log_add(values, others)
+        };
+        [at([0.0; 3]), at(self.gains)]
+    }
+
+    /// Takes a whitened residual of its values.
+    fn take(&mut self, whitened: f64, birth: f64) {
+        let before = log_add(
+            log_add(self.bias.log_odds(), birth.ln()),
+            log_add(self.scatter.log_odds(), birth.ln()),
+        );
+        self.bias.step(&SVector::from([whitened]), birth);
+        let square = whitened * whitened / self.channel.scatter;
+        self.scatter
+            .step(square, TAU_SQUARED_PER_DIMENSION, birth, birth);
+        let after = log_add(self.bias.log_odds(), self.scatter.log_odds());
+        // At their bounds the log-odds say less than the readings.
+        let bound = self.bias.gain().min(self.scatter.gain());
+        self.gains[0] = (after - before).max(bound);
     }
 }
 
@@ -138,6 +161,7 @@ impl Monitor {
             absent_s: 0.0,
             absent: Evidence::new(form, BIAS),
             rest: Evidence::new(form, BIAS),
+            gains: [0.0; 3],
             tail: channel.tail(form).cloned(),
         });
         let watched: Vec<Watched> = watched.collect();
@@ -153,6 +177,7 @@ impl Monitor {
             report: Report {
                 log_odds: f64::NEG_INFINITY,
                 channels: [f64::NEG_INFINITY; CHANNELS],
+                gain: 0.0,
                 evidence: 0.0,
                 degenerate_count: 0,
             },
@@ -219,6 +244,9 @@ impl Monitor {
     /// [`Track::step`].
     pub fn step(&mut self, history: &History, following: bool) {
         self.report.evidence = 0.0;
+        for watched in &mut self.watched {
+            watched.gains = [0.0; 3];
+        }
         let Some(now) = history.ago(0) else { return };
         let widening = self.widening(now);
         let share = 1.0 / self.watched.len().max(1) as f64;
@@ -240,13 +268,7 @@ impl Monitor {
         }
         for watched in &mut self.watched {
             watched.present(now, self.form, birth);
-            let Watched {
-                channel,
-                track,
-                bias,
-                scatter,
-                ..
-            } = watched;
+            let Watched { channel, track, .. } = watched;
             let settled = now.steady_s >= SETTLE_S || !channel.target.quantity.is_pose();
             let residual = channel.residual(history, &self.sizes);
             let Some(residual) = residual.filter(|_| settled) else {
@@ -256,12 +278,10 @@ impl Monitor {
             let variance = widening * residual.variance;
             let (apart, spread) = track.step(channel, residual.apart, variance, following);
             let whitened = (apart / spread.sqrt()).clamp(-CLIP, CLIP);
-            bias.step(&SVector::from([whitened]), birth);
+            watched.take(whitened, birth);
             if let Some(together) = &mut self.together {
                 together.add(whitened);
             }
-            let square = whitened * whitened / channel.scatter;
-            scatter.step(square, TAU_SQUARED_PER_DIMENSION, birth, birth);
             self.report.evidence += log_normal(apart, spread);
         }
         if let Some(together) = &mut self.together {
@@ -282,6 +302,7 @@ impl Monitor {
 
     fn sum_up(&mut self) {
         let mut channels = [f64::NEG_INFINITY; CHANNELS];
+        let mut sums = [f64::NEG_INFINITY; 2];
         for watched in &self.watched {
             let target = watched.channel.target;
             let wheel = target.wheel.min(WHEELS - 1);
@@ -291,15 +312,18 @@ impl Monitor {
                 Quantity::Current => Slot::current(wheel),
                 _ => Slot::POSE,
             };
-            let odds = watched.log_odds();
-            channels[slot] = log_add(channels[slot], odds + self.prior_log_odds);
+            let odds = watched.log_odds().map(|odds| odds + self.prior_log_odds);
+            channels[slot] = log_add(channels[slot], odds[0]);
+            sums = std::array::from_fn(|i| log_add(sums[i], odds[i]));
         }
-        let mut log_odds = log_sum_exp(&channels);
         if let (Some(together), Some(tail)) = (&self.together, &self.joint) {
-            let odds = tail.tempered(together.log_odds());
-            log_odds = log_add(log_odds, odds + self.prior_log_odds);
+            let odds = together.log_odds();
+            let odds = [odds, odds - together.gain()].map(|odds| tail.tempered(odds));
+            sums = std::array::from_fn(|i| log_add(sums[i], odds[i] + self.prior_log_odds));
         }
-        self.report.log_odds = log_odds.max(LOG_ODDS_MIN);
+        let gain = sums[0] - sums[1];
+        self.report.gain = if gain.is_finite() { gain } else { 0.0 };
+        self.report.log_odds = sums[0].max(LOG_ODDS_MIN);
         self.report.channels = channels.map(|value| value.max(LOG_ODDS_MIN));
     }
 }

@@ -1,0 +1,117 @@
+//! The reported mode: the memoryless one with the one hysteresis.
+
+use vigil_blocks::{MODE_MULTIPLE, MODE_UNKNOWN};
+
+use crate::posterior::Posterior;
+
+/// A held name is given up for another one when its own probability is below this.
+const HELD_MIN: f64 = 0.3;
+/// A held name is given up for the nominal mode when that has been more probable than this ..
+const NOMINAL_MIN: f64 = 0.9;
+/// .. for this long, s of motion.
+const NOMINAL_S: f64 = 1.0;
+/// Slack when that time is compared, s: it is a sum of short intervals.
+const SLACK_S: f64 = 1e-6;
+
+/// The name that is held: index of a node, [`MODE_UNKNOWN`] or [`MODE_MULTIPLE`].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Reported {
+    held: u32,
+    changes: u32,
+    nominal_s: f64,
+}
+
+impl Reported {
+    /// The held name.
+    #[must_use]
+    pub const fn name(&self) -> u32 {
+        self.held
+    }
+
+    /// How often it has changed.
+    #[must_use]
+    pub const fn changes(&self) -> u32 {
+        self.changes
+    }
+
+    /// A new run: nominal.
+    pub const fn begin_run(&mut self) {
+        self.set(0);
+        self.nominal_s = 0.0;
+    }
+
+    /// Takes the memoryless `mode` and its probability, of the belief that holds after `moved_s` of
+    /// motion.
+    pub fn take(&mut self, (mode, p_mode): (u32, f64), belief: &Posterior, moved_s: f64) {
+        let is_nominal = mode == 0 && p_mode > NOMINAL_MIN;
+        self.nominal_s = if is_nominal {
+            self.nominal_s + moved_s
+        } else {
+            0.0
+        };
+        let gives_way = if mode == 0 {
+            self.nominal_s >= NOMINAL_S - SLACK_S
+        } else {
+            p_mode > 0.5 && self.p_held(belief) < HELD_MIN
+        };
+        if gives_way {
+            self.set(mode);
+        }
+    }
+
+    const fn set(&mut self, mode: u32) {
+        if self.held != mode {
+            self.held = mode;
+            self.changes = self.changes.saturating_add(1);
+        }
+    }
+
+    /// Probability of what is held.
+    fn p_held(&self, belief: &Posterior) -> f64 {
+        match self.held {
+            MODE_UNKNOWN => belief.unknown,
+            MODE_MULTIPLE => {
+                let sets = belief.sets.iter().take(belief.set_count);
+                let several = sets.filter(|set| set.leaves.count_ones() > 1);
+                several.map(|set| set.p).sum()
+            }
+            node => belief.nodes.get(node as usize).copied().unwrap_or(0.0),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn belief(nominal: f64, leaf: f64, unknown: f64) -> Posterior {
+        let mut belief = Posterior::nominal();
+        (belief.nodes[0], belief.nodes[3], belief.unknown) = (nominal, leaf, unknown);
+        belief
+    }
+
+    #[test]
+    fn a_name_is_held_until_another_one_is_clear_or_the_robot_is_nominal_for_a_second() {
+        let mut reported = Reported::default();
+        reported.take((3, 0.69), &belief(0.31, 0.69, 0.0), 0.05);
+        assert_eq!(reported.name(), 0, "the nominal mode is above .3");
+        reported.take((3, 0.8), &belief(0.2, 0.8, 0.0), 0.05);
+        assert_eq!(reported.name(), 3);
+        reported.take((MODE_UNKNOWN, 0.6), &belief(0.0, 0.4, 0.6), 0.05);
+        assert_eq!(reported.name(), 3, "the leaf is above .3");
+        reported.take((MODE_UNKNOWN, 0.8), &belief(0.0, 0.2, 0.8), 0.05);
+        assert_eq!((reported.name(), reported.changes()), (MODE_UNKNOWN, 2));
+        for _ in 0..9 {
+            reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), 0.1);
+        }
+        // A moment of doubt begins the second anew; time at rest does not count.
+        reported.take((0, 0.85), &belief(0.85, 0.0, 0.15), 0.1);
+        for _ in 0..9 {
+            reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), 0.1);
+            reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), 0.0);
+        }
+        assert_eq!(reported.name(), MODE_UNKNOWN);
+        reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), 0.1);
+        assert_eq!((reported.name(), reported.changes()), (0, 3));
+    }
+}

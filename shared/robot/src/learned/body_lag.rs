@@ -1,0 +1,300 @@
+//! The body follows the command with a first-order lag that depends on robot, load and ground: it
+//! is learned from changes of the command, on the way.
+//!
+//! A bank of candidate time constants predicts travel and heading; each is weighed by how well its
+//! prediction fits the measured pose. While the command is constant all predict the same, so that
+//! nothing is learned and no lasting fault can pass for a lag. What the candidates disagree about
+//! is the uncertainty of the prediction.
+
+/// Candidate time constants, s: the range that is tolerated in a healthy robot.
+const LAGS_S: [f64; LAGS] = [0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5];
+/// Number of candidates.
+const LAGS: usize = 7;
+/// No candidate becomes less probable than this: a load may change.
+const P_MIN: f64 = 1e-4;
+/// Observations whose displacements are compared as one: over a single one the noise of the pose
+/// hides what a lag does, and more of them are as likely to hold a change of the ground.
+const WINDOW: u32 = 20;
+/// One window changes the odds of two candidates by this much at most, nat: it may hold an outlier.
+const GAIN_MAX: f64 = 3.0;
+/// Deviation of a healthy displacement from its model, m/m and rad/m: no lag is learned from that.
+const DISPLACEMENT_SD: f64 = 0.03;
+/// Time for which an error of the prediction counts as one with those before, s: about as long as
+/// a change of the command and its correction by the pose take.
+const COHERENT_S: f64 = 3.0;
+
+/// Commanded motion between two observations, from middle to middle, as the body follows it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Followed {
+    /// Travel, m.
+    pub travel_m: f64,
+    /// Change of heading by the commanded curvature, rad.
+    pub turn_rad: f64,
+    /// Speed at the end, m/s.
+    pub speed_m_s: f64,
+    /// Variance of the travel by what is not known of the lag and of the command between frames, m².
+    pub travel_variance: f64,
+    /// The same of the change of heading, rad².
+    pub turn_variance: f64,
+}
+
+/// One candidate.
+#[derive(Debug, Clone, Copy, Default)]
+struct Candidate {
+    /// Curvature 1/m and speed m/s of the body.
+    body: [f64; 2],
+    /// Travel m and heading rad since the last observation's middle.
+    sums: [f64; 2],
+    /// Mean of `sums` over the frames of the observation under way, times their number.
+    middles: [f64; 2],
+    /// Travel and turn from middle to middle, of the observation that was completed last.
+    moved: [f64; 2],
+    /// The same since the window began.
+    window: [f64; 2],
+    /// How far it is apart from the mean of all, m and rad, fading.
+    apart: [f64; 2],
+    p: f64,
+}
+
+/// The bank.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct BodyLag {
+    candidates: [Candidate; LAGS],
+    command: [f64; 2],
+    frames: u32,
+    /// Variances of travel and turn by what the command did between frames.
+    between: [f64; 2],
+    /// Variances of `apart` over the candidates.
+    coherent: [f64; 2],
+    window: Window,
+}
+
+/// What was measured since a window began.
+#[derive(Debug, Clone, Copy, Default)]
+struct Window {
+    observations: u32,
+    measured: [f64; 2],
+    between: [f64; 2],
+}
+
+impl BodyLag {
+    /// A bank about a learned time constant `lag_s`, whose logarithm has the deviation
+    /// `uncertainty`.
+    #[must_use]
+    pub fn new(lag_s: f64, uncertainty: f64) -> Self {
+        let mut bank = Self::default();
+        let apart = |candidate_s: f64| (candidate_s / lag_s.max(LAGS_S[0])).ln();
+        for (candidate, candidate_s) in bank.candidates.iter_mut().zip(LAGS_S) {
+            let z = apart(candidate_s) / uncertainty.max(1e-3);
+            candidate.p = (-0.5 * z * z).exp().max(P_MIN);
+        }
+        bank.normalise();
+        bank
+    }
+
+    /// The body moves as commanded, with (curvature 1/m, speed m/s).
+    pub fn begin(&mut self, command: [f64; 2]) {
+        self.command = command;
+        for candidate in &mut self.candidates {
+            candidate.body = command;
+        }
+    }
+
+    /// Takes the command of the next frame, `dt_s` after the one before.
+    pub fn advance(&mut self, command: [f64; 2], dt_s: f64) {
+        // The command changed at some instant since the last frame.
+        let middle: [f64; 2] = std::array::from_fn(|i| 0.5 * (self.command[i] + command[i]));
+        let surge_m = (command[1] - self.command[1]) * dt_s;
+        let swing_rad = (command[0] - self.command[0]) * middle[1] * dt_s;
+        self.between[0] += surge_m * surge_m / 12.0;
+        self.between[1] +=
+            (swing_rad * swing_rad + middle[0] * middle[0] * surge_m * surge_m) / 12.0;
+        self.command = command;
+        self.frames += 1;
+        for (candidate, lag_s) in self.candidates.iter_mut().zip(LAGS_S) {
+            let follows = 1.0 - (-dt_s / lag_s).exp();
+            let before = candidate.body;
+            for i in 0..2 {
+                candidate.body[i] += follows * (middle[i] - candidate.body[i]);
+            }
+            let after = candidate.body;
+            let travel_m = 0.5 * (before[1] + after[1]) * dt_s;
+            candidate.sums[0] += travel_m;
+            candidate.sums[1] += 0.5 * (before[0] + after[0]) * travel_m;
+            for (middle, sum) in candidate.middles.iter_mut().zip(candidate.sums) {
+                *middle += sum;
+            }
+        }
+    }
+
+    /// Closes an observation of `interval_s`.
+    pub fn complete(&mut self, interval_s: f64) -> Followed {
+        let frames = f64::from(self.frames.max(1));
+        for candidate in &mut self.candidates {
+            candidate.moved = candidate.middles.map(|middle| middle / frames);
+            for (sum, moved) in candidate.sums.iter_mut().zip(candidate.moved) {
+                *sum -= moved;
+            }
+            candidate.middles = [0.0; 2];
+        }
+        let mean = |of: &dyn Fn(&Candidate) -> f64| -> f64 {
+            self.candidates.iter().map(|c| c.p * of(c)).sum()
+        };
+        let [travel_m, turn_rad] = [mean(&|c| c.moved[0]), mean(&|c| c.moved[1])];
+        let speed_m_s = mean(&|c| c.body[1]);
+        // The error of a wrong lag has one sign while the command changes: what counts is the
+        // growth of its sum.
+        let fading = (-interval_s / COHERENT_S).exp();
+        for candidate in &mut self.candidates {
+            for (i, mean) in [travel_m, turn_rad].into_iter().enumerate() {
+                candidate.apart[i] = fading * candidate.apart[i] + candidate.moved[i] - mean;
+            }
+        }
+        let coherent: [f64; 2] = std::array::from_fn(|i| {
+            let squares = self
+                .candidates
+                .iter()
+                .map(|c| c.p * c.apart[i] * c.apart[i]);
+            squares.sum()
+        });
+        let grown: [f64; 2] = std::array::from_fn(|i| (coherent[i] - self.coherent[i]).max(0.0));
+        let followed = Followed {
+            travel_m,
+            turn_rad,
+            speed_m_s,
+            travel_variance: self.between[0] + grown[0],
+            turn_variance: self.between[1] + grown[1],
+        };
+        for (sum, between) in self.window.between.iter_mut().zip(self.between) {
+            *sum += between;
+        }
+        (self.frames, self.between, self.coherent) = (0, [0.0; 2], coherent);
+        followed
+    }
+
+    /// Forgets the window under way: what was measured before has no relation to what follows.
+    pub fn interrupt(&mut self) {
+        self.window = Window::default();
+        for candidate in &mut self.candidates {
+            candidate.window = [0.0; 2];
+        }
+    }
+
+    /// Takes the measured travel (m) and turn (rad) of the observation that was completed last, and
+    /// weighs the candidates at the end of a window. The noise of the measurement over a window has
+    /// these variances. `per_metre`: what a metre of commanded travel is expected to be, and what
+    /// it turns the robot beyond the commanded curvature.
+    pub fn learn(&mut self, measured: [f64; 2], variance: [f64; 2], per_metre: [f64; 2]) {
+        for candidate in &mut self.candidates {
+            let [travel_m, turn_rad] = candidate.moved;
+            candidate.window[0] += per_metre[0] * travel_m;
+            candidate.window[1] += turn_rad + per_metre[1] * travel_m;
+        }
+        for (sum, measured) in self.window.measured.iter_mut().zip(measured) {
+            *sum += measured;
+        }
+        self.window.observations += 1;
+        if self.window.observations >= WINDOW {
+            self.weigh(variance);
+            self.interrupt();
+        }
+    }
+
+    fn weigh(&mut self, variance: [f64; 2]) {
+        let Window {
+            measured, between, ..
+        } = self.window;
+        let slip = DISPLACEMENT_SD * measured[0];
+        let spread: [f64; 2] = std::array::from_fn(|i| variance[i] + slip * slip + between[i]);
+        let fits = self.candidates.map(|candidate| {
+            let square = |i: usize| (measured[i] - candidate.window[i]).powi(2) / spread[i];
+            -0.5 * (square(0) + square(1))
+        });
+        let best = fits.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        if !best.is_finite() {
+            return;
+        }
+        for (candidate, fit) in self.candidates.iter_mut().zip(fits) {
+            candidate.p *= (fit - best).max(-GAIN_MAX).exp();
+        }
+        self.normalise();
+    }
+
+    /// Mean of the time constant, s.
+    #[must_use]
+    pub fn lag_s(&self) -> f64 {
+        let all = self.candidates.iter().zip(LAGS_S);
+        all.map(|(candidate, lag_s)| candidate.p * lag_s).sum()
+    }
+
+    fn normalise(&mut self) {
+        let total: f64 = self.candidates.iter().map(|c| c.p).sum();
+        for candidate in &mut self.candidates {
+            candidate.p = (candidate.p / total).max(P_MIN);
+        }
+        let total: f64 = self.candidates.iter().map(|c| c.p).sum();
+        for candidate in &mut self.candidates {
+            candidate.p /= total;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A body with the lag `true_s` whose speed is commanded to and fro every 2 s; the bank's mean
+    /// lag after `changes`, and the largest travel error in deviations of the last two changes.
+    fn drive(true_s: f64, changes: usize) -> (f64, f64) {
+        const DT_S: f64 = 0.01;
+        let mut bank = BodyLag::new(0.1, 0.5);
+        let mut body = 0.1;
+        bank.begin([0.5, body]);
+        let (mut sum, mut middle, mut worst) = (0.0, 0.0, 0.0_f64);
+        for k in 0..changes * 200 {
+            let command = if k / 200 % 2 == 0 { 0.3 } else { 0.1 };
+            let before = body;
+            body += (1.0 - (-DT_S / true_s).exp()) * (command - body);
+            sum += 0.5 * (before + body) * DT_S;
+            middle += sum;
+            bank.advance([0.5, command], DT_S);
+            if k % 5 == 4 {
+                let travel_m = middle / 5.0;
+                (sum, middle) = (sum - travel_m, 0.0);
+                let followed = bank.complete(0.05);
+                let apart = (travel_m - followed.travel_m).abs();
+                if k / 200 + 2 >= changes {
+                    worst = worst.max(apart / (followed.travel_variance + 1e-7).sqrt());
+                }
+                let measured = [0.97 * travel_m, 0.5 * travel_m];
+                bank.learn(measured, [1e-5, 1e-5], [0.97, 0.0]);
+            }
+        }
+        (bank.lag_s(), worst)
+    }
+
+    #[test]
+    fn the_lag_is_learned_from_changes_of_the_command() {
+        for true_s in [0.02, 0.05, 0.1, 0.2, 0.3, 0.5] {
+            let (lag_s, worst) = drive(true_s, 12);
+            let near = (lag_s - true_s).abs() < 0.35 * true_s + 0.03;
+            assert!(near, "{true_s}: {lag_s}");
+            assert!(worst < 4.0, "{true_s}: {worst}");
+        }
+    }
+
+    #[test]
+    fn a_constant_command_teaches_nothing_whatever_the_robot_does() {
+        let mut bank = BodyLag::new(0.1, 0.5);
+        bank.begin([0.2, 0.2]);
+        let before = bank.lag_s();
+        for _ in 0..10_000 {
+            bank.advance([0.2, 0.2], 0.01);
+            let followed = bank.complete(0.01);
+            // The robot slips by a third and drifts.
+            let measured = [0.66 * followed.travel_m, followed.turn_rad + 1e-3];
+            bank.learn(measured, [1e-8, 1e-8], [1.0, 0.0]);
+        }
+        assert!((bank.lag_s() - before).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,59 @@
+//! The period of a sensor's frames, from the times at which they were captured.
+
+/// Intervals remembered.
+const MEMORY: usize = 31;
+
+/// A low quantile of the last intervals between frames. Frames that are lost, late or come in
+/// bursts do not change it while a third comes in time: the noise of a sample belongs to the
+/// sensor, not to the gap before it. What jitter makes of it is too short a period, of samples
+/// believed to be noisier than they are, which the estimate of the noise puts right.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FramePeriod {
+    recent_ns: [u64; MEMORY],
+    count: usize,
+}
+
+impl FramePeriod {
+    /// Takes the interval to the frame before, ns.
+    pub fn push(&mut self, interval_ns: u64) {
+        self.recent_ns[self.count % MEMORY] = interval_ns;
+        self.count += 1;
+    }
+
+    /// The period, s; none before the first interval.
+    #[must_use]
+    pub fn period_s(&self) -> Option<f64> {
+        let known = self.count.min(MEMORY);
+        if known == 0 {
+            return None;
+        }
+        let mut recent = self.recent_ns;
+        let (_, low_ns, _) = recent[..known].select_nth_unstable(known / 3);
+        Some(*low_ns as f64 * 1e-9)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn lost_frames_do_not_change_the_period(
+            lost in prop::collection::vec(prop::bool::weighted(0.3), 400),
+            gap in 1_u64..200,
+        ) {
+            let mut period = FramePeriod::default();
+            let mut last = 0;
+            let kept = (1_u64..).zip(&lost).filter(|(_, lost)| !**lost).map(|(k, _)| k);
+            for k in kept {
+                // One long gap besides.
+                let at = if k > 200 { k + gap } else { k };
+                period.push((at - last) * 10_000_000);
+                last = at;
+            }
+            prop_assert_eq!(period.period_s(), Some(0.01));
+        }
+    }
+}
