@@ -70,12 +70,13 @@ pub struct Way {
 }
 
 impl Way {
-    /// The way of a run's frames; `noise` is the factor on the world's noise.
+    /// The way of a run's frames; `noise` is the factor on the world's noise, gaps are
+    /// later by `later_s`.
     pub fn new(
         frames: &Frames,
         robot: &Description,
         (rate_hz, noise): (f64, f64),
-        run: usize,
+        (run, later_s): (usize, f64),
         mut rng: Pcg64Mcg,
     ) -> Self {
         let mut of = |draw: &Option<Draw>, otherwise: f64| {
@@ -106,7 +107,7 @@ impl Way {
         let drifts = drawn.yaw_drift_rad_s != 0.0 || drawn.pose_scale != 1.0;
         Self {
             drawn,
-            gaps_s: frames.gaps_s.clone(),
+            gaps_s: frames.gaps_s.iter().map(|gap| gap.map(|t_s| t_s + later_s)).collect(),
             period_s: 1.0 / rate_hz,
             noise: [
                 factor * robot.noise.position_m,

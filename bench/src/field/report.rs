@@ -7,7 +7,7 @@ use super::bar::Bar;
 use super::scenario::Scenario;
 
 /// Figures that stand in the table even where no bar asks for them; the others are in the document.
-const SHOWN: [&str; 23] = [
+const SHOWN: [&str; 24] = [
     "detected",
     "delay_p50_s",
     "delay_p95_s",
@@ -29,6 +29,7 @@ const SHOWN: [&str; 23] = [
     "runs_with_alarm",
     "healthy_wrong_share",
     "actions_per_h",
+    "blind_stops_per_h",
     "help_latched",
     "contradiction_s",
 ];
@@ -127,7 +128,8 @@ fn says_something(figure: &Figure) -> bool {
     let is_rule = figure.name.starts_with("reported_changes")
         || figure.name.starts_with("mode_changes")
         || figure.name == "contradiction_s"
-        || figure.name == "help_latched";
+        || figure.name == "help_latched"
+        || figure.name == "blind_stops_per_h";
     !(is_rule && figure.value == Some(0.0))
 }
 

@@ -127,7 +127,7 @@ impl Conditions {
                 &scenario.frames,
                 robot,
                 (rate_hz, noise),
-                run,
+                (run, later_s),
                 stream(seed, 4),
             ),
             rate_hz,

@@ -50,7 +50,7 @@ pub struct Scenario {
     /// wheels, drawn for each run, `S1` a steered one, `SIDE` a side.
     #[serde(default)]
     pub faults: Vec<String>,
-    /// All times of `faults` and `context` are later by up to so much, s, drawn for each run;
+    /// All times of `faults`, `context` and gaps are later by up to so much, s, drawn for each run;
     /// default 2.
     #[serde(default = "two")]
     pub spread_s: f64,

@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use vigil_blocks::{
-    Action, DetectionBelief, Entry, FaultBelief, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
+    Action, ControlMode, DetectionBelief, Entry, FaultBelief, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
     ParticleBlock, RecoveryKind, SensorFrame,
 };
 use vigil_detector::Detector;
@@ -134,7 +134,7 @@ impl Stages {
             p_mode: belief.p_mode,
             set: &self.set.1,
             reported: self.name(belief.reported),
-            told: told(RecoveryKind::from_wire(action.kind).unwrap_or(RecoveryKind::None)),
+            told: told(action),
             action: u64::from(action.action) << 32 | u64::from(action.wheel),
         }
     }
@@ -153,9 +153,12 @@ impl Stages {
     }
 }
 
-/// A kind of action as it is scored. What is not decided stops the robot.
-const fn told(kind: RecoveryKind) -> Told {
-    match kind {
+/// An action as it is scored. What is not decided stops the robot.
+fn told(action: &Action) -> Told {
+    if action.control_mode == ControlMode::Safe as u32 {
+        return Told::Blind;
+    }
+    match RecoveryKind::from_wire(action.kind).unwrap_or(RecoveryKind::None) {
         RecoveryKind::GoOn => Told::GoOn,
         RecoveryKind::SlowDown => Told::Slow,
         RecoveryKind::None | RecoveryKind::Stop | RecoveryKind::GiveUp => Told::Stop,

@@ -16,7 +16,8 @@
 //! - *time to clear*: driven time from the end of all faults until the alarm is down, and until
 //!   `mode` and the reported name are nominal; what does not happen before the next fault or the end
 //!   is missing;
-//! - *false alarm*: a rise while nothing is wrong; *action*: each entry into anything but going on;
+//! - *false alarm*: a rise while nothing is wrong; *action*: each entry into anything but going on,
+//!   but for stops by rule while no belief is usable, which are counted apart;
 //! - *latched*: a call for help that stands when a run ends without a fault;
 //! - *contradiction*: an alarm while the nominal mode has more than one half, or a reported fault
 //!   without alarm.
@@ -72,6 +73,8 @@ pub enum Told {
     Slow,
     /// Stop.
     Stop,
+    /// Stop by rule, because no usable belief is left.
+    Blind,
     /// Stop and call for help.
     Help,
     /// Anything else: a remedy for one component, another path.

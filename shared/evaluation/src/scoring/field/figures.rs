@@ -215,6 +215,7 @@ fn of_health(runs: &[Run]) -> Vec<Figure> {
         rate("stop_per_h", runs, |run| run.actions.stop, hours),
         rate("help_per_h", runs, |run| run.actions.help, hours),
         rate("other_per_h", runs, |run| run.actions.other, hours),
+        rate("blind_stops_per_h", runs, |run| run.actions.blind, hours),
         rate("help_latched", runs, latched, one),
     ];
     found.into_iter().flatten().collect()

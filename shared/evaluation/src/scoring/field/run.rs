@@ -66,10 +66,12 @@ pub struct Actions {
     pub help: usize,
     /// Into anything else but going on.
     pub other: usize,
+    /// Into a stop by rule, without a usable belief: no decision, and not among all.
+    pub blind: usize,
 }
 
 impl Actions {
-    /// All of them.
+    /// All decisions.
     #[must_use]
     pub const fn all(&self) -> usize {
         self.slow + self.stop + self.help + self.other
@@ -80,6 +82,7 @@ impl Actions {
             Told::GoOn => {}
             Told::Slow => self.slow += 1,
             Told::Stop => self.stop += 1,
+            Told::Blind => self.blind += 1,
             Told::Help => self.help += 1,
             Told::Other => self.other += 1,
         }
