@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 pub mod archive;
 pub mod chain;
+pub mod field;
 pub mod figure7;
 pub mod filters;
 pub mod ground;

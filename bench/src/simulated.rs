@@ -2,9 +2,11 @@
 
 mod chain;
 mod drives;
+mod stages;
 
 pub use chain::{Chain, Said};
 pub use drives::{Conditions, constant, weaving};
+pub use stages::Stages;
 
 use std::error::Error;
 use std::path::Path;

@@ -49,6 +49,12 @@ impl SoilPath {
         }
     }
 
+    /// Another soil begins.
+    pub(crate) const fn set(&mut self, friction: f64, shear_modulus: f64) {
+        self.friction = friction;
+        self.shear_modulus = shear_modulus;
+    }
+
     /// The soil under the wheels.
     pub(crate) fn here(&self) -> Soil {
         Soil {

@@ -301,6 +301,24 @@ impl World {
         }
     }
 
+    /// Changes the ground under way: mean friction coefficient and shear modulus. The scatter about
+    /// them stays.
+    ///
+    /// # Errors
+    /// [`WorldError::Quantity`].
+    pub fn set_ground(&mut self, friction: f64, shear_modulus: f64) -> Result<(), WorldError> {
+        check::settings(
+            &Simulator {
+                friction,
+                shear_modulus,
+                ..Simulator::default()
+            },
+            1.0,
+        )?;
+        self.soil.set(friction, shear_modulus);
+        Ok(())
+    }
+
     /// The true state.
     #[must_use]
     pub fn truth(&self) -> Truth {

@@ -20,6 +20,7 @@ mod calibration;
 mod confusion;
 mod contest;
 mod detection;
+pub mod field;
 mod identification;
 mod ratio;
 mod table;

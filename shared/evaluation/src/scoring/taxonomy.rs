@@ -93,6 +93,13 @@ impl Taxonomy {
         (position == 0 || self.nodes[position].is_leaf).then_some(position)
     }
 
+    /// True if `mode` is a node above leaves.
+    #[must_use]
+    pub fn is_abstract(&self, mode: &str) -> bool {
+        let position = self.nodes.iter().position(|node| node.name == mode);
+        position.is_some_and(|i| i > 0 && !self.nodes[i].is_leaf)
+    }
+
     /// Side on which a node's leaves lie, if it is one.
     #[must_use]
     pub fn side(&self, mode: &str) -> Option<Side> {

@@ -1,0 +1,151 @@
+//! Does the diagnosis hold in the field: for hours, over gaps, on other grounds, with other lags?
+//!
+//! Scenarios and bars: `bench/field.toml`. Every figure: `scoring::field` of the evaluation library.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use clap::Parser;
+use serde_json::{Value, json};
+use vigil_bench::archive::Archive;
+use vigil_bench::field::{File, Graph, Job, Outcome, Scenario, Scored, document, jobs, lines};
+use vigil_bench::field::{run, select};
+use vigil_bench::machine;
+use vigil_bench::matched::in_parallel;
+
+/// Does the diagnosis hold in the field?
+#[derive(Debug, Parser)]
+struct Args {
+    /// Only scenarios whose names begin with one of these.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    only: Vec<String>,
+    /// Factor on the number of runs; at least one of each scenario stays.
+    #[arg(long, value_name = "F", default_value_t = 1.0)]
+    scale: f64,
+    /// Only say which scenarios there are.
+    #[arg(long)]
+    list: bool,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+    /// Also keep what every run brought.
+    #[arg(long)]
+    raw: bool,
+    /// Archive a part, too. All scenarios at scale 1 always are.
+    #[arg(long)]
+    archive: bool,
+    /// End with 1 if a bar is not met.
+    #[arg(long)]
+    check: bool,
+    /// Other scenarios.
+    #[arg(long, value_name = "F")]
+    scenarios: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    match answer(&args) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(error) => vigil_bench::ended("field", Err(error)),
+    }
+}
+
+/// True unless a bar that was to be checked is not met.
+fn answer(args: &Args) -> Result<bool, Box<dyn Error>> {
+    if cfg!(debug_assertions) {
+        return Err("a debug build takes hours: use scripts/bench".into());
+    }
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let path = args.scenarios.clone();
+    let file = File::read(&path.unwrap_or_else(|| here.join("field.toml")))?;
+    let scenarios = select(&file, &args.only)?;
+    if args.list {
+        for scenario in scenarios {
+            println!("{}: {}", scenario.name, scenario.about);
+        }
+        return Ok(true);
+    }
+    let began = Instant::now();
+    let graph = Graph::read(&here.join(".."))?;
+    let outcomes = measure(&graph, &scenarios, args.scale)?;
+    let wall_s = began.elapsed().as_secs_f64();
+    let document = document(&outcomes, machine::facts(), wall_s, args.scale);
+    let is_met = outcomes.iter().all(|o| o.bars().all(|(_, met)| met));
+    match args.json {
+        true => println!("{document:#}"),
+        false => show(args, &outcomes, &document)?,
+    }
+    Ok(is_met || !args.check)
+}
+
+fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), Box<dyn Error>> {
+    let is_whole = args.only.is_empty() && args.scale == 1.0 && args.scenarios.is_none();
+    let last = format!(
+        "{} of {} bars are met, in {:.0} s.",
+        document["bars_met"],
+        document["bars"],
+        document["wall_s"].as_f64().unwrap_or(f64::NAN)
+    );
+    if !(is_whole || args.archive) {
+        lines(outcomes).iter().for_each(|line| println!("{line}"));
+        println!("\n{last}\nNot archived: only a part was measured.");
+        return Ok(());
+    }
+    let mut archive = Archive::new("field")?;
+    archive.store("field.json", document)?;
+    if args.raw {
+        archive.store("runs.json", &raw(outcomes))?;
+    }
+    lines(outcomes).iter().for_each(|line| archive.say(line));
+    archive.say(&format!("\n{last}"));
+    println!("archived in {}", archive.close()?.display());
+    Ok(())
+}
+
+/// What every run brought.
+fn raw(outcomes: &[Outcome<'_>]) -> Value {
+    let one = |outcome: &Outcome<'_>| {
+        let runs: Vec<String> = outcome.runs.iter().map(|run| format!("{run:?}")).collect();
+        json!({
+            "scenario": outcome.scenario.name, "sensors": outcome.sensors, "runs": runs,
+        })
+    };
+    outcomes.iter().map(one).collect()
+}
+
+fn measure<'a>(
+    graph: &Graph,
+    scenarios: &[&'a Scenario],
+    scale: f64,
+) -> Result<Vec<Outcome<'a>>, Box<dyn Error>> {
+    let all = jobs(scenarios, scale);
+    let (done, began) = (AtomicUsize::new(0), Instant::now());
+    let one = |job: &Job<'_>| {
+        let found = run(graph, job);
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        let (all, name, wall_s) = (all.len(), &job.scenario.name, began.elapsed().as_secs());
+        if done.is_multiple_of((all / 100).max(1)) || done == all {
+            eprintln!("field: {done} of {all} runs, {wall_s} s, {name}");
+        }
+        found
+    };
+    let found: Result<Vec<Vec<Scored>>, String> = in_parallel(&all, one).into_iter().collect();
+    let found = found?;
+    let mut outcomes = Vec::new();
+    for scenario in scenarios {
+        let mine = || {
+            let both = all.iter().zip(&found);
+            both.filter(|(job, _)| std::ptr::eq(job.scenario, *scenario))
+        };
+        let sets = mine().next().map(|(_, scored)| scored.as_slice());
+        for (set, Scored { sensors, .. }) in sets.unwrap_or_default().iter().enumerate() {
+            let runs = mine().filter_map(|(_, scored)| Some(scored.get(set)?.run.clone()));
+            outcomes.push(Outcome::new(scenario, sensors, runs.collect()));
+        }
+    }
+    Ok(outcomes)
+}

@@ -1,0 +1,20 @@
+//! Does the diagnosis hold in the field? Long runs, gaps, other grounds, lags and noise, faults that
+//! come, go and come again: scenarios of `bench/field.toml`, scored at every instant.
+//!
+//! Detector, identifier and supervisor run in one process over the simulator's world. The world is
+//! driven with every set of sensors at once; what is decided is scored, but obeyed only where a
+//! scenario says so.
+
+mod bar;
+mod course;
+mod fault;
+mod frames;
+mod ground;
+mod report;
+mod run;
+mod scenario;
+
+pub use bar::{Bar, Comparison};
+pub use report::{Outcome, document, lines};
+pub use run::{Graph, Job, Scored, jobs, run, select};
+pub use scenario::{Draw, File, Frames, Scenario, World};

@@ -1,0 +1,185 @@
+//! What breaks in a run, and what is therefore true.
+
+use std::collections::BTreeSet;
+
+use rand::seq::SliceRandom;
+use rand::{Rng, RngExt};
+use vigil_evaluation::scoring::field::{Stretch, Truth};
+use vigil_inference::FaultTree;
+use vigil_robot::injection::Change;
+use vigil_robot::{Description, FaultKind, Injection};
+use vigil_setup::schema::Sensors;
+
+/// The names that stand for drawn places in a run.
+#[derive(Debug, Clone)]
+pub struct Places {
+    wheels: Vec<String>,
+    steered: String,
+    side: &'static str,
+}
+
+impl Places {
+    /// Every wheel comes first equally often over the runs; the others follow in any order.
+    #[must_use]
+    pub fn draw(robot: &Description, run: usize, rng: &mut impl Rng) -> Self {
+        let mut wheels: Vec<String> = robot.wheels.iter().map(|w| w.name.clone()).collect();
+        let steered = robot.wheels.iter().filter(|wheel| wheel.steered);
+        let steered: Vec<&String> = steered.map(|wheel| &wheel.name).collect();
+        let count = wheels.len().max(1);
+        wheels.rotate_left(run % count);
+        if let Some(rest) = wheels.get_mut(1..) {
+            rest.shuffle(rng);
+        }
+        let side = if rng.random::<bool>() {
+            "left"
+        } else {
+            "right"
+        };
+        let at = run % steered.len().max(1);
+        Self {
+            steered: steered
+                .get(at)
+                .map_or_else(String::new, |name| (*name).clone()),
+            wheels,
+            side,
+        }
+    }
+
+    /// `text` with the drawn places.
+    fn put(&self, text: &str) -> String {
+        let word = |word: &str| match (word, word.strip_prefix('W')) {
+            ("S1", _) => self.steered.clone(),
+            ("SIDE", _) => self.side.to_owned(),
+            (_, Some(digit)) => {
+                let index = digit.parse::<usize>().ok().and_then(|n| n.checked_sub(1));
+                let wheel = index.and_then(|index| self.wheels.get(index));
+                wheel.cloned().unwrap_or_else(|| word.to_owned())
+            }
+            _ => word.to_owned(),
+        };
+        text.split(':').map(word).collect::<Vec<_>>().join(":")
+    }
+}
+
+/// The changes of a list, in order of time, `later_s` later than they say.
+///
+/// # Errors
+/// A change that the robot does not know.
+pub fn changes(
+    specs: &[String],
+    places: &Places,
+    robot: &Description,
+    later_s: f64,
+) -> Result<Vec<Injection>, String> {
+    let one = |spec: &String| {
+        let (what, at_s) = spec.rsplit_once('@').unwrap_or((spec, ""));
+        let text = format!("{}@{at_s}", places.put(what));
+        let found = Injection::parse(&text, robot).map_err(|error| format!("'{spec}': {error}"))?;
+        Ok(Injection {
+            at_s: found.at_s + later_s,
+            ..found
+        })
+    };
+    let mut all: Vec<Injection> = specs.iter().map(one).collect::<Result<_, String>>()?;
+    all.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    Ok(all)
+}
+
+/// What is wrong at an instant.
+#[derive(Debug, Clone, Default)]
+struct Wrong {
+    stuck: BTreeSet<usize>,
+    encoders: BTreeSet<usize>,
+    /// Kind and place of what no model describes.
+    others: BTreeSet<(u32, usize)>,
+}
+
+impl Wrong {
+    fn take(&mut self, change: &Change) {
+        match *change {
+            Change::Inject(fault) => {
+                let set = match fault.kind {
+                    FaultKind::Stuck => &mut self.stuck,
+                    _ => &mut self.encoders,
+                };
+                set.insert(fault.wheel);
+            }
+            Change::Disturb(this) => {
+                self.others.insert((this.kind as u32, this.place));
+            }
+            Change::Clear(wheel) => {
+                self.stuck.remove(&wheel);
+                self.encoders.remove(&wheel);
+                self.others.retain(|(kind, place)| {
+                    let at_wheel = vigil_robot::DisturbanceKind::from_wire(*kind)
+                        .is_some_and(|kind| is_of_a_wheel(kind.row().place));
+                    !(at_wheel && *place == wheel)
+                });
+            }
+            Change::Calm(kind, at) => self.others.retain(|(other, place)| {
+                *other != kind as u32 || at.is_some_and(|at| at != *place)
+            }),
+            Change::ClearAll => *self = Self::default(),
+        }
+    }
+
+    fn truth(&self, tree: &FaultTree, robot: &Description, sensors: Sensors) -> Truth {
+        // By the pose alone nothing can be seen of an encoder: the robot is as good as healthy.
+        let sees_encoders = sensors != Sensors::Pose;
+        let leaf = |kind: &str, wheel: usize| {
+            let fault = format!("{kind}:{}", robot.wheels[wheel].name);
+            let node = tree.nodes().iter();
+            let mut node = node.filter(|node| node.fault.as_deref() == Some(fault.as_str()));
+            node.next().map(|node| node.name.clone())
+        };
+        let others = self.others.iter().filter_map(|(kind, place)| {
+            let row = vigil_robot::DisturbanceKind::from_wire(*kind)?.row();
+            let is_encoder = row.name.starts_with("encoder");
+            (sees_encoders || !is_encoder).then_some((is_encoder, *place))
+        });
+        let others: Vec<(bool, usize)> = others.collect();
+        if let Some((is_encoder, wheel)) = others.first() {
+            let own = is_encoder.then(|| leaf("encoder", *wheel)).flatten();
+            return Truth::Unmodelled { own };
+        }
+        let stuck = self.stuck.iter().filter_map(|wheel| leaf("stuck", *wheel));
+        let encoders = self.encoders.iter().filter(|_| sees_encoders);
+        let encoders = encoders.filter_map(|wheel| leaf("encoder", *wheel));
+        let leaves: Vec<String> = stuck.chain(encoders).collect();
+        match leaves.is_empty() {
+            true => Truth::Healthy,
+            false => Truth::Faults(leaves),
+        }
+    }
+}
+
+const fn is_of_a_wheel(place: vigil_robot::disturbance::Place) -> bool {
+    use vigil_robot::disturbance::Place;
+    matches!(place, Place::Wheel | Place::SteeredWheel)
+}
+
+/// What is true over a run, for what a set of sensors can see.
+#[must_use]
+pub fn truth(
+    changes: &[Injection],
+    tree: &FaultTree,
+    robot: &Description,
+    sensors: Sensors,
+) -> Vec<Stretch> {
+    let mut wrong = Wrong::default();
+    let mut stretches = vec![Stretch {
+        from_s: 0.0,
+        truth: Truth::Healthy,
+    }];
+    for injection in changes {
+        wrong.take(&injection.change);
+        let truth = wrong.truth(tree, robot, sensors);
+        let from_s = injection.at_s;
+        // What changes at one instant is one change.
+        stretches.retain(|stretch| stretch.from_s < from_s || stretch.from_s <= 0.0);
+        if stretches.last().is_some_and(|last| last.truth != truth) {
+            stretches.push(Stretch { from_s, truth });
+        }
+    }
+    stretches
+}

@@ -1,0 +1,189 @@
+//! What is shown and kept.
+
+use serde_json::{Value, json};
+use vigil_evaluation::scoring::field::{Figure, Run, figures};
+
+use super::bar::Bar;
+use super::scenario::Scenario;
+
+/// Figures that stand in the table even where no bar asks for them; the others are in the document.
+const SHOWN: [&str; 24] = [
+    "detected",
+    "delay_p50_s",
+    "delay_p95_s",
+    "leaf_2s",
+    "side_2s",
+    "leaf_10s",
+    "side_10s",
+    "right_share",
+    "right_side_share",
+    "reported_right_share",
+    "confident_wrong_share",
+    "settled_mode_changes_per_min",
+    "mode_changes_per_min",
+    "reported_changes_per_min",
+    "alarm_cleared_p50_s",
+    "alarm_cleared_10s",
+    "name_cleared_10s",
+    "alarms_per_h",
+    "runs_with_alarm",
+    "healthy_wrong_share",
+    "actions_per_h",
+    "blind_stops_per_h",
+    "help_latched",
+    "contradiction_s",
+];
+
+/// A scenario with one set of sensors.
+#[derive(Debug, Clone)]
+pub struct Outcome<'a> {
+    /// The scenario.
+    pub scenario: &'a Scenario,
+    /// Name of the set of sensors.
+    pub sensors: &'static str,
+    /// Its runs.
+    pub runs: Vec<Run>,
+    /// Their figures.
+    pub figures: Vec<Figure>,
+}
+
+impl<'a> Outcome<'a> {
+    /// Of these runs.
+    #[must_use]
+    pub fn new(scenario: &'a Scenario, sensors: &'static str, runs: Vec<Run>) -> Self {
+        Self {
+            figures: figures(&runs),
+            scenario,
+            sensors,
+            runs,
+        }
+    }
+
+    /// The bars that hold for this set of sensors, and whether each is met.
+    pub fn bars(&self) -> impl Iterator<Item = (&Bar, bool)> {
+        let all = self.scenario.bars.iter();
+        let mine = all.filter(|bar| bar.is_for(self.sensors));
+        mine.map(|bar| (bar, bar.is_met(&self.figures)))
+    }
+
+    /// Driven time of all runs, h.
+    #[must_use]
+    pub fn hours(&self) -> f64 {
+        self.runs.iter().map(|run| run.duration_s).sum::<f64>() / 3600.0
+    }
+
+    fn json(&self) -> Value {
+        let bars = self
+            .bars()
+            .map(|(bar, met)| json!({ "figure": bar.figure, "bar": bar.to_string(), "met": met }));
+        let figures = self.figures.iter().map(|figure| {
+            let mut value = json!(figure);
+            if let Some(map) = value.as_object_mut() {
+                map.remove("name");
+            }
+            (figure.name.to_owned(), value)
+        });
+        json!({
+            "scenario": self.scenario.name, "about": self.scenario.about,
+            "sensors": self.sensors, "runs": self.runs.len(), "hours": self.hours(),
+            "first_seed": self.scenario.first_seed,
+            "figures": figures.collect::<serde_json::Map<_, _>>(),
+            "bars": bars.collect::<Vec<Value>>(),
+        })
+    }
+
+    fn lines(&self) -> Vec<String> {
+        let head = format!(
+            "| {} | {} | {} | {:.2} ",
+            self.scenario.name,
+            self.sensors,
+            self.runs.len(),
+            self.hours()
+        );
+        let is_asked = |name: &str| self.bars().any(|(bar, _)| bar.figure == name);
+        let shown = self.figures.iter().filter(|figure| {
+            is_asked(figure.name) || SHOWN.contains(&figure.name) && says_something(figure)
+        });
+        let mut lines: Vec<String> = Vec::new();
+        for figure in shown {
+            let bars = self.bars().filter(|(bar, _)| bar.figure == figure.name);
+            let bars: Vec<String> = bars.map(|(bar, met)| verdict(bar, met)).collect();
+            lines.push(format!("{head}{}| {} |", words(figure), bars.join("; ")));
+        }
+        // A bar whose figure has no case is not met either.
+        let has = |bar: &Bar| self.figures.iter().any(|figure| figure.name == bar.figure);
+        for (bar, met) in self.bars().filter(|(bar, _)| !has(bar)) {
+            lines.push(format!(
+                "{head}| {} | no case | | | {} |",
+                bar.figure,
+                verdict(bar, met)
+            ));
+        }
+        lines
+    }
+}
+
+/// False for what never happened where nothing is the rule.
+fn says_something(figure: &Figure) -> bool {
+    let is_rule = figure.name.starts_with("reported_changes")
+        || figure.name.starts_with("mode_changes")
+        || figure.name == "contradiction_s"
+        || figure.name == "help_latched"
+        || figure.name == "blind_stops_per_h";
+    !(is_rule && figure.value == Some(0.0))
+}
+
+fn verdict(bar: &Bar, met: bool) -> String {
+    format!("{bar}: {}", if met { "met" } else { "NOT met" })
+}
+
+fn words(figure: &Figure) -> String {
+    let text = |value: Option<f64>| value.map_or("never".to_owned(), number);
+    let bounds = match (figure.lower_95, figure.upper_95) {
+        (Some(lower), Some(upper)) => format!("{} to {}", number(lower), number(upper)),
+        _ => String::new(),
+    };
+    let worst = figure.worst.map_or(String::new(), |worst| {
+        format!("{} ({})", text(worst.value), worst.seed)
+    });
+    let (name, value, n) = (figure.name, text(figure.value), figure.n);
+    format!("| {name} | {value} | {bounds} | {n} | {worst} ")
+}
+
+/// Four digits, or all of a whole number.
+fn number(value: f64) -> String {
+    let magnitude = value.abs();
+    match magnitude {
+        _ if value == value.trunc() && magnitude < 1e6 => format!("{value:.0}"),
+        m if m >= 100.0 => format!("{value:.0}"),
+        m if m >= 1.0 => format!("{value:.2}"),
+        _ => format!("{value:.4}"),
+    }
+}
+
+/// The table.
+#[must_use]
+pub fn lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
+    let mut lines = vec![
+        "| scenario | sensors | runs | h | figure | value | 95 % | n | worst (seed) | bar |"
+            .to_owned(),
+        "|---|---|---|---|---|---|---|---|---|---|".to_owned(),
+    ];
+    lines.extend(outcomes.iter().flat_map(Outcome::lines));
+    lines
+}
+
+/// Everything as data.
+#[must_use]
+pub fn document(outcomes: &[Outcome<'_>], machine: Value, wall_s: f64, scale: f64) -> Value {
+    let (mut bars, mut met) = (0, 0);
+    for (_, is_met) in outcomes.iter().flat_map(Outcome::bars) {
+        bars += 1;
+        met += usize::from(is_met);
+    }
+    let results: Vec<Value> = outcomes.iter().map(Outcome::json).collect();
+    json!({
+        "schema_version": 1, "machine": machine, "wall_s": wall_s, "scale": scale,
+        "bars": bars, "bars_met": met, "results": results,
+    })
+}

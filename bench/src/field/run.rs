@@ -1,0 +1,277 @@
+//! Runs of scenarios.
+
+use std::error::Error;
+use std::path::Path;
+
+use vigil_blocks::SensorFrame;
+use vigil_evaluation::scoring::Taxonomy;
+use vigil_evaluation::scoring::field::{Run, Scorer, Stretch};
+use vigil_robot::Injection;
+use vigil_robot::learned::Model;
+use vigil_sensor_sim::{EffectiveCommand, Obedience, World};
+use vigil_setup::schema::{Sensors, Simulator};
+use vigil_setup::{GraphArgs, Setup};
+
+use super::course::{Range, course};
+use super::fault::{self, Places};
+use super::frames::{Fate, Way};
+use super::ground::{Ground, stream};
+use super::scenario::{File, Scenario};
+use crate::simulated::{SENSOR_SETS, Stages};
+
+/// Commanded speed from which a robot drives, m/s.
+const DRIVES_M_S: f64 = 0.005;
+
+/// One run of a scenario.
+#[derive(Debug, Clone, Copy)]
+pub struct Job<'a> {
+    /// The scenario.
+    pub scenario: &'a Scenario,
+    /// Number of the run, from 0.
+    pub run: usize,
+}
+
+/// What a run brought with one set of sensors.
+#[derive(Debug, Clone)]
+pub struct Scored {
+    /// Name of the set.
+    pub sensors: &'static str,
+    /// The score.
+    pub run: Run,
+}
+
+/// Every run of the scenarios; `scale` multiplies their number, at least one each stays.
+#[must_use]
+pub fn jobs<'a>(scenarios: &[&'a Scenario], scale: f64) -> Vec<Job<'a>> {
+    let runs = |scenario: &Scenario| (scenario.runs as f64 * scale).round().max(1.0) as usize;
+    let all = scenarios
+        .iter()
+        .flat_map(|scenario| (0..runs(scenario)).map(|run| Job { scenario, run }));
+    all.collect()
+}
+
+/// The rover's graph as it ships.
+#[derive(Debug, Clone)]
+pub struct Graph {
+    setup: Setup,
+    model: Model,
+    taxonomy: Taxonomy,
+}
+
+impl Graph {
+    /// Reads `config/rover.toml` below `root`.
+    ///
+    /// # Errors
+    /// A configuration that is refused.
+    pub fn read(root: &Path) -> Result<Self, Box<dyn Error>> {
+        let args = GraphArgs {
+            config: root.join("config/rover.toml"),
+            ..GraphArgs::default()
+        };
+        let setup = args.load()?;
+        let model = setup.model.clone().with_faults();
+        Ok(Self {
+            model: model.ok_or("the rover's model has no faults")?,
+            taxonomy: Taxonomy::new(&setup.tree, &setup.robot),
+            setup,
+        })
+    }
+}
+
+/// What is the same for every set of sensors in a run.
+struct Conditions {
+    rate_hz: f64,
+    simulator: Simulator,
+    drive: Vec<vigil_setup::schema::DriveSegment>,
+    /// Faults, which count as such, and everything that changes in the world.
+    faults: Vec<Injection>,
+    changes: Vec<Injection>,
+    ground: Ground,
+    way: Way,
+    seed: u64,
+}
+
+impl Conditions {
+    fn draw(graph: &Graph, job: &Job<'_>) -> Result<Self, String> {
+        let Job { scenario, run } = *job;
+        let seed = scenario.first_seed + run as u64;
+        let (robot, rng) = (&graph.setup.robot, &mut stream(seed, 0));
+        let rate_hz = scenario.rate_hz.of(run, rng);
+        let usual = Simulator::default();
+        let mut of = |draw: &Option<super::Draw>, otherwise: f64| {
+            draw.as_ref().map_or(otherwise, |draw| draw.of(run, rng))
+        };
+        let noise = of(&scenario.world.noise, 1.0);
+        let mut simulator = Simulator {
+            lag_s: of(&scenario.world.lag_s, usual.lag_s),
+            friction_scatter: of(&scenario.world.scatter, usual.friction_scatter),
+            noise_scale: Way::world_noise(&scenario.frames, noise),
+            ..usual
+        };
+        let range = Range {
+            command: &graph.model.command,
+            robot,
+            graph: &graph.setup.file.drive,
+        };
+        let drive = course(&scenario.drive, range, scenario.run_s, &mut stream(seed, 1))?;
+        let mut rng = stream(seed, 2);
+        let places = Places::draw(robot, run, &mut rng);
+        let later_s = scenario.spread_s * rand::RngExt::random::<f64>(&mut rng);
+        let faults = fault::changes(&scenario.faults, &places, robot, later_s)?;
+        let context = fault::changes(&scenario.context, &places, robot, later_s)?;
+        let mut changes: Vec<Injection> = faults.iter().chain(&context).copied().collect();
+        changes.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+        Ok(Self {
+            ground: Ground::new(&scenario.world, &mut simulator, run, stream(seed, 3)),
+            way: Way::new(
+                &scenario.frames,
+                robot,
+                (rate_hz, noise),
+                (run, later_s),
+                stream(seed, 4),
+            ),
+            rate_hz,
+            simulator,
+            drive,
+            faults,
+            changes,
+            seed,
+        })
+    }
+}
+
+/// Drives a run with every set of sensors of its scenario.
+///
+/// # Errors
+/// A scenario that cannot be driven, with its name.
+pub fn run(graph: &Graph, job: &Job<'_>) -> Result<Vec<Scored>, String> {
+    let named = |error: String| format!("{}: {error}", job.scenario.name);
+    let conditions = Conditions::draw(graph, job).map_err(named)?;
+    let sets = SENSOR_SETS.into_iter().filter(|(_, name)| {
+        let mut asked = job.scenario.sensors.iter();
+        asked.any(|asked| asked == name)
+    });
+    let sets: Vec<(Sensors, &'static str)> = sets.collect();
+    // A world that obeys is another one for each set.
+    let groups: Vec<&[(Sensors, &'static str)]> = match job.scenario.obeys {
+        true => sets.chunks(1).collect(),
+        false => vec![&sets],
+    };
+    let mut scored = Vec::new();
+    for group in groups {
+        let found = drive(graph, job.scenario, &conditions, group);
+        scored.extend(found.map_err(|error| named(error.to_string()))?);
+    }
+    Ok(scored)
+}
+
+/// One world, and the stages that watch it.
+fn drive(
+    graph: &Graph,
+    scenario: &Scenario,
+    conditions: &Conditions,
+    sets: &[(Sensors, &'static str)],
+) -> Result<Vec<Scored>, Box<dyn Error>> {
+    let Setup { robot, tree, .. } = &graph.setup;
+    let &Conditions { rate_hz, seed, .. } = conditions;
+    let truths = sets
+        .iter()
+        .map(|(sensors, _)| fault::truth(&conditions.faults, tree, robot, *sensors));
+    let truths: Vec<Vec<Stretch>> = truths.collect();
+    let mut watches = Vec::new();
+    for ((sensors, _), truth) in sets.iter().zip(&truths) {
+        watches.push(Watch {
+            stages: Stages::new(&graph.setup, *sensors, rate_hz, seed)?,
+            scorer: Scorer::new(truth, &graph.taxonomy, seed),
+        });
+    }
+    let (simulator, segments) = (&conditions.simulator, &conditions.drive);
+    let mut world = World::new(robot, simulator, segments, rate_hz, seed)?;
+    let (mut ground, mut way) = (conditions.ground.clone(), conditions.way.clone());
+    ground.begin(&mut world)?;
+    let mut pending = conditions.changes.iter().peekable();
+    let mut obedience = Obedience::new(&robot.limits);
+    let mut held: Option<SensorFrame> = None;
+    let (mut frame, mut t_s) = (SensorFrame::default(), 0.0);
+    for k in 0..(scenario.run_s * rate_hz).round() as u64 {
+        while let Some(injection) = pending.next_if(|change| change.at_s <= t_s) {
+            world.change(injection.change)?;
+        }
+        let (planned, before) = (world.planned(), world.truth().pose);
+        let command = match watches.first().filter(|_| scenario.obeys && k > 0) {
+            Some(watch) => obedience.apply(planned, Some(watch.stages.action()), 0),
+            None => EffectiveCommand::as_planned(planned),
+        };
+        let dt_s = way.instant_s(t_s, (k + 1) as f64 / rate_hz) - t_s;
+        world.step(dt_s, command);
+        t_s += dt_s;
+        world.measure(&mut frame);
+        let pose = world.truth().pose;
+        ground.advance((pose[0] - before[0]).hypot(pose[1] - before[1]), &mut world)?;
+        way.blur(&mut frame, pose, dt_s);
+        frame.header.epoch = 1;
+        frame.header.seq = k;
+        frame.header.t_capture_ns = (1e9 * way.stamp_s(t_s)).round() as u64;
+        let drives = frame.command[1].abs() >= DRIVES_M_S;
+        let fate = way.fate(t_s);
+        for watch in &mut watches {
+            watch.deliver(&frame, fate, held.as_ref());
+            let moment = watch.stages.moment(t_s, dt_s, drives);
+            watch.scorer.take(&moment);
+        }
+        held = (fate == Fate::Overtaken).then_some(frame);
+    }
+    let named = watches.into_iter().zip(sets);
+    Ok(named
+        .map(|(watch, (_, sensors))| Scored {
+            sensors,
+            run: watch.scorer.finish(),
+        })
+        .collect())
+}
+
+/// The stages of one set of sensors, and their score.
+struct Watch<'a> {
+    stages: Stages,
+    scorer: Scorer<'a>,
+}
+
+impl Watch<'_> {
+    /// What comes of a frame; `held` is one that this one has overtaken.
+    fn deliver(&mut self, frame: &SensorFrame, fate: Fate, held: Option<&SensorFrame>) {
+        let stages = &mut self.stages;
+        match fate {
+            Fate::Lost | Fate::Overtaken => stages.miss(),
+            Fate::Late => {
+                stages.miss();
+                stages.take(frame);
+            }
+            Fate::Comes | Fate::Doubled => stages.take(frame),
+        }
+        if let Some(held) = held {
+            stages.take(held);
+        }
+        if fate == Fate::Doubled {
+            stages.take(frame);
+        }
+    }
+}
+
+/// The scenarios of a file whose names begin with any of `names`; all without one.
+///
+/// # Errors
+/// A name that no scenario begins with.
+pub fn select<'a>(file: &'a File, names: &[String]) -> Result<Vec<&'a Scenario>, String> {
+    let begins = |name: &String| {
+        let mut all = file.scenario.iter();
+        all.any(|scenario| scenario.name.starts_with(name.as_str()))
+    };
+    if let Some(unknown) = names.iter().find(|name| !begins(name)) {
+        return Err(format!("no scenario begins with '{unknown}': see --list"));
+    }
+    let is = |scenario: &&Scenario| {
+        let mut wanted = names.iter();
+        names.is_empty() || wanted.any(|name| scenario.name.starts_with(name.as_str()))
+    };
+    Ok(file.scenario.iter().filter(is).collect())
+}

@@ -1,0 +1,227 @@
+//! Scenarios as their file states them.
+
+use std::error::Error;
+use std::path::Path;
+
+use rand::{Rng, RngExt};
+use serde::Deserialize;
+
+use super::bar::Bar;
+
+/// The file of all scenarios.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct File {
+    /// Scenarios, in the order in which they are shown.
+    pub scenario: Vec<Scenario>,
+}
+
+/// One scenario.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Its name: words joined by `/`, the general one first.
+    pub name: String,
+    /// What it is about, in a sentence.
+    pub about: String,
+    /// Sets of sensors: `pose`, `pose+encoders`; default both.
+    #[serde(default = "both")]
+    pub sensors: Vec<String>,
+    /// Frames per second; default 20.
+    #[serde(default = "twenty")]
+    pub rate_hz: Draw,
+    /// Length of a run, s.
+    pub run_s: f64,
+    /// Runs.
+    pub runs: usize,
+    /// Seed of the first run; the others follow it.
+    pub first_seed: u64,
+    /// What is driven: `random`, `stops`, `reversals`, `creep`, `tight`, `mixed`, `graph` (the
+    /// drive of `config/rover.toml`), or segments `CURVATURE_1_M:SPEED_M_S:S` joined by commas.
+    pub drive: String,
+    /// True if the world obeys the supervisor's actions; default false.
+    #[serde(default)]
+    pub obeys: bool,
+    /// A scenario of its own is made of each of these; it takes the place of `EACH` in `faults` and
+    /// `context`.
+    #[serde(default)]
+    pub each: Vec<String>,
+    /// Changes of health as `SPEC@T`, s: `stuck:W1@10`, `clear:W1@30`. `W1` to `W6` are different
+    /// wheels, drawn for each run, `S1` a steered one, `SIDE` a side.
+    #[serde(default)]
+    pub faults: Vec<String>,
+    /// All times of `faults`, `context` and gaps are later by up to so much, s, drawn for each run;
+    /// default 2.
+    #[serde(default = "two")]
+    pub spread_s: f64,
+    /// The same, but of the ground or of what counts as healthy.
+    #[serde(default)]
+    pub context: Vec<String>,
+    /// The world.
+    #[serde(default)]
+    pub world: World,
+    /// What becomes of the frames.
+    #[serde(default)]
+    pub frames: Frames,
+    /// Bars.
+    #[serde(default)]
+    pub bars: Vec<Bar>,
+}
+
+/// Settings of the world. Those not given are the simulator's.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct World {
+    /// Time constant of the body's velocity, s.
+    pub lag_s: Option<Draw>,
+    /// Factor on the noise of every sensor.
+    pub noise: Option<Draw>,
+    /// Factor on the soil's friction.
+    pub friction: Option<Draw>,
+    /// Factor on the soil's shear modulus.
+    pub shear_modulus: Option<Draw>,
+    /// Relative scatter of the friction.
+    pub scatter: Option<Draw>,
+    /// Slope ahead, rad.
+    pub slope_rad: Option<Draw>,
+    /// Slope to the side, rad.
+    pub side_slope_rad: Option<Draw>,
+    /// Friction, shear modulus and slopes are drawn anew after so much driving, m.
+    pub ground_each_m: Option<Draw>,
+    /// They change over this length, m, alike left and right; default 0.5.
+    pub ground_over_m: Option<Draw>,
+}
+
+/// What becomes of the frames on their way.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Frames {
+    /// Share of frames that are lost one by one.
+    pub loss: Option<Draw>,
+    /// Gaps at given times: from, to, s.
+    pub gaps_s: Vec<[f64; 2]>,
+    /// Length of gaps at random times, s.
+    pub burst_s: Option<Draw>,
+    /// Mean time between them, s; default 20.
+    pub burst_each_s: Option<Draw>,
+    /// Instants of capture differ by up to so much of a period from regular ones, either way.
+    pub jitter: Option<Draw>,
+    /// Stamps differ by so much from the instants of capture, which are regular.
+    pub stamp_jitter: Option<Draw>,
+    /// Share of frames that come after the deadline: every stage misses them first.
+    pub late: Option<Draw>,
+    /// Share of frames that come after their successor.
+    pub overtaken: Option<Draw>,
+    /// Share of frames that come twice.
+    pub doubled: Option<Draw>,
+    /// Factor on the noise of x alone.
+    pub noise_x: Option<Draw>,
+    /// Factor on the noise of y alone.
+    pub noise_y: Option<Draw>,
+    /// Factor on the noise of yaw alone.
+    pub noise_yaw: Option<Draw>,
+    /// Factor on the noise of one encoder alone.
+    pub noise_encoder: Option<Draw>,
+    /// Share of samples of pose and encoders with ten times the noise.
+    pub outliers: Option<Draw>,
+    /// Noise is Student's with so many degrees of freedom, above 2, instead of normal, with the
+    /// same standard deviation.
+    pub student: Option<Draw>,
+    /// The pose is an odometry whose yaw drifts, rad/s.
+    pub yaw_drift_rad_s: Option<Draw>,
+    /// The same: distances are scaled by a factor.
+    pub pose_scale: Option<Draw>,
+}
+
+/// A number for each run.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum Draw {
+    /// Always this one.
+    Always(f64),
+    /// One after the other, run by run.
+    InTurn(Vec<f64>),
+    /// Any of these, drawn for each run.
+    Any {
+        /// The numbers.
+        any: Vec<f64>,
+    },
+    /// Evenly drawn for each run.
+    Between {
+        /// Least value.
+        from: f64,
+        /// Greatest value.
+        to: f64,
+    },
+}
+
+impl Draw {
+    /// The number of a run.
+    pub fn of(&self, run: usize, rng: &mut impl Rng) -> f64 {
+        match self {
+            Self::Always(value) => *value,
+            Self::InTurn(values) => *values.get(run % values.len().max(1)).unwrap_or(&f64::NAN),
+            Self::Any { any } => {
+                let at = rng.random_range(0..any.len().max(1));
+                *any.get(at).unwrap_or(&f64::NAN)
+            }
+            Self::Between { from, to } => from + (to - from) * rng.random::<f64>(),
+        }
+    }
+}
+
+fn both() -> Vec<String> {
+    ["pose", "pose+encoders"].map(str::to_owned).to_vec()
+}
+
+const fn twenty() -> Draw {
+    Draw::Always(20.0)
+}
+
+const fn two() -> f64 {
+    2.0
+}
+
+impl File {
+    /// Reads a file of scenarios; those with `each` become several.
+    ///
+    /// # Errors
+    /// What is malformed, and names that appear twice.
+    pub fn read(path: &Path) -> Result<Self, Box<dyn Error>> {
+        let at = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
+        let text = std::fs::read_to_string(path).map_err(|error| at(&error))?;
+        let file: Self = toml::from_str(&text).map_err(|error| at(&error))?;
+        let scenario: Vec<Scenario> = file.scenario.iter().flat_map(Scenario::spread).collect();
+        let mut names: Vec<&str> = scenario.iter().map(|s| s.name.as_str()).collect();
+        names.sort_unstable();
+        if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(at(&format!("scenario '{}' appears twice", twice[0])).into());
+        }
+        Ok(Self { scenario })
+    }
+}
+
+impl Scenario {
+    fn spread(&self) -> Vec<Self> {
+        if self.each.is_empty() {
+            return vec![self.clone()];
+        }
+        let one = |each: &String| {
+            let put = |specs: &[String]| -> Vec<String> {
+                specs
+                    .iter()
+                    .map(|spec| spec.replace("EACH", each))
+                    .collect()
+            };
+            let kind = each.split(':').next().unwrap_or(each);
+            Self {
+                name: format!("{}/{kind}", self.name),
+                faults: put(&self.faults),
+                context: put(&self.context),
+                each: Vec::new(),
+                ..self.clone()
+            }
+        };
+        self.each.iter().map(one).collect()
+    }
+}

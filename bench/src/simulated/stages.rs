@@ -1,0 +1,173 @@
+//! Detector, identifier and supervisor, one frame at a time, as the graph wires them.
+
+use std::error::Error;
+
+use vigil_blocks::{
+    Action, ControlMode, DetectionBelief, Entry, FaultBelief, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
+    ParticleBlock, RecoveryKind, SensorFrame,
+};
+use vigil_detector::Detector;
+use vigil_evaluation::scoring::field::{BLIND, Moment, Told};
+use vigil_evaluation::scoring::{MULTIPLE, UNKNOWN};
+use vigil_identifier::{Diagnoser, Input};
+use vigil_setup::Setup;
+use vigil_setup::schema::Sensors;
+use vigil_supervisor::{Inputs, Supervisor};
+
+/// The alarm that a user sees. The supervisor, which alone sees both stages, publishes it as
+/// `action.alarm`; until it does, the detector's stands for it.
+const fn fused_alarm(detection: &DetectionBelief, _action: &Action) -> bool {
+    detection.alarm != 0
+}
+
+/// The three stages of a graph.
+pub struct Stages {
+    detector: Detector,
+    identifier: Diagnoser,
+    supervisor: Supervisor,
+    names: Vec<String>,
+    detection: Box<DetectionBelief>,
+    detection_particles: Box<ParticleBlock>,
+    diagnosis: Box<FaultBelief>,
+    diagnosis_particles: Box<ParticleBlock>,
+    action: Box<Action>,
+    /// The most probable set in words; kept while the leaves stay.
+    set: (u64, String),
+}
+
+impl Stages {
+    /// The stages of a configuration, but for the sensors they use, the rate and the seed.
+    ///
+    /// # Errors
+    /// If model, robot, tree and settings do not fit together.
+    pub fn new(
+        setup: &Setup,
+        sensors: Sensors,
+        rate_hz: f64,
+        seed: u64,
+    ) -> Result<Self, Box<dyn Error>> {
+        let mut setup = setup.clone();
+        setup.file.graph.rate_hz = rate_hz;
+        setup.file.graph.seed = seed;
+        setup.file.detector.sensors = sensors;
+        let names = setup.tree.nodes().iter().map(|node| node.name.clone());
+        let names: Vec<String> = names.collect();
+        let nominal = names.first().cloned().unwrap_or_default();
+        Ok(Self {
+            detector: vigil_detector::assemble(&setup)?,
+            identifier: vigil_identifier::assemble(&setup)?,
+            supervisor: vigil_supervisor::assemble(&setup)?,
+            names,
+            detection: Box::default(),
+            detection_particles: Box::default(),
+            diagnosis: Box::default(),
+            diagnosis_particles: Box::default(),
+            action: Box::default(),
+            set: (0, nominal),
+        })
+    }
+
+    /// Takes a frame.
+    pub fn take(&mut self, frame: &SensorFrame) {
+        let (detection, particles) = (&mut *self.detection, &mut *self.detection_particles);
+        self.detector
+            .step(Entry::Frame(frame), detection, particles);
+        detection.header = frame.header;
+        let input = Input {
+            frame,
+            detection: Some((detection, particles)),
+        };
+        let (diagnosis, particles) = (&mut *self.diagnosis, &mut *self.diagnosis_particles);
+        self.identifier
+            .step(Entry::Frame(input), diagnosis, particles);
+        diagnosis.header = frame.header;
+        let inputs = Inputs {
+            diagnosis: Some(diagnosis),
+            detection: Some(detection),
+        };
+        self.supervisor.step(Entry::Frame(inputs), &mut self.action);
+        self.after();
+    }
+
+    /// No frame came in time: every stage misses its input.
+    pub fn miss(&mut self) {
+        let (detection, particles) = (&mut *self.detection, &mut *self.detection_particles);
+        self.detector.step(Entry::Missed(1), detection, particles);
+        let (diagnosis, particles) = (&mut *self.diagnosis, &mut *self.diagnosis_particles);
+        self.identifier.step(Entry::Missed(1), diagnosis, particles);
+        self.supervisor.step(Entry::Missed(1), &mut self.action);
+        self.after();
+    }
+
+    fn after(&mut self) {
+        // The world obeys what was decided last; how long an action is valid is the ports' matter.
+        self.action.valid_until_ns = u64::MAX;
+        let leaves = self.diagnosis.sets[0].leaves;
+        if self.set.0 != leaves {
+            let members = (1..u64::BITS as usize).filter(|i| leaves >> i & 1 == 1);
+            let members: Vec<&str> = members.map(|node| self.node(node)).collect();
+            let text = match members.is_empty() {
+                true => self.node(0).to_owned(),
+                false => members.join("+"),
+            };
+            self.set = (leaves, text);
+        }
+    }
+
+    /// The action that stands.
+    #[must_use]
+    pub const fn action(&self) -> &Action {
+        &self.action
+    }
+
+    /// What is said now.
+    #[must_use]
+    pub fn moment(&self, t_s: f64, dt_s: f64, drives: bool) -> Moment<'_> {
+        let (belief, action) = (&self.diagnosis, &self.action);
+        Moment {
+            t_s,
+            dt_s,
+            drives,
+            alarm: fused_alarm(&self.detection, action),
+            p_nominal: belief.p[0],
+            mode: self.name(belief.mode),
+            p_mode: belief.p_mode,
+            set: &self.set.1,
+            reported: self.name(belief.reported),
+            told: told(action),
+            action: u64::from(action.action) << 32 | u64::from(action.wheel),
+        }
+    }
+
+    fn name(&self, mode: u32) -> &str {
+        match mode {
+            MODE_UNKNOWN => UNKNOWN,
+            MODE_MULTIPLE => MULTIPLE,
+            MODE_BLIND => BLIND,
+            node => self.node(node as usize),
+        }
+    }
+
+    fn node(&self, node: usize) -> &str {
+        self.names.get(node).map_or("?", String::as_str)
+    }
+}
+
+/// An action as it is scored. What is not decided stops the robot.
+fn told(action: &Action) -> Told {
+    if action.control_mode == ControlMode::Safe as u32 {
+        return Told::Blind;
+    }
+    match RecoveryKind::from_wire(action.kind).unwrap_or(RecoveryKind::None) {
+        RecoveryKind::GoOn => Told::GoOn,
+        RecoveryKind::SlowDown => Told::Slow,
+        RecoveryKind::None | RecoveryKind::Stop | RecoveryKind::GiveUp => Told::Stop,
+        RecoveryKind::CallForHelp => Told::Help,
+        RecoveryKind::Compensate
+        | RecoveryKind::IgnoreEncoder
+        | RecoveryKind::NewPath
+        | RecoveryKind::Relocalise
+        | RecoveryKind::GoThrough
+        | RecoveryKind::MoveAway => Told::Other,
+    }
+}

@@ -1,0 +1,156 @@
+//! Scores long runs as a user lives through them: what is said at every instant, not only at a few.
+//!
+//! A run is a series of [`Moment`]s against the truth, a series of [`Stretch`]es. Definitions:
+//!
+//! - *onset*: the truth changes to a fault, or to another fault; it is judged until the truth
+//!   changes again. From healthy, the *delay* runs to the next rise of the alarm; an alarm that
+//!   stands already announces nothing. During another fault, to that or the next change of `mode`;
+//! - *right leaf*: `mode` is the leaf that is true; for several faults `MULTIPLE` with exactly the
+//!   true set; for what no model describes `UNKNOWN`, or its own leaf if it has one; without a fault
+//!   the nominal mode;
+//! - *right side*: the right leaf, or a node of the true side; for what no model describes also
+//!   every abstract node;
+//! - *from h seconds on*: driven time at least h after the last onset, while the fault persists;
+//! - *changes*: of `mode` and of the reported name; *settled* ones come 2 s after an onset or later,
+//!   while the fault persists, where there should be none;
+//! - *time to clear*: driven time from the end of all faults until the alarm is down, and until
+//!   `mode` and the reported name are nominal; what does not happen before the next fault or the end
+//!   is missing;
+//! - *false alarm*: a rise while nothing is wrong; *action*: each entry into anything but going on,
+//!   but for stops by rule while no belief is usable, which are counted apart;
+//! - *latched*: a call for help that stands when a run ends without a fault;
+//! - *contradiction*: an alarm while the nominal mode has more than one half, or a reported fault
+//!   without alarm.
+//!
+//! All runs count; what is not seen is missed. While nothing valid comes in, `BLIND` is neither
+//! right nor wrong.
+
+mod figures;
+mod run;
+
+pub use figures::{Figure, Worst, figures};
+pub use run::{Actions, Changes, End, Onset, Run, Scorer, Seen};
+
+use super::Taxonomy;
+
+/// Reported without valid input.
+pub const BLIND: &str = "BLIND";
+/// Times after an onset at which the name is judged, s.
+pub const JUDGED_S: [f64; 3] = [2.0, 5.0, 10.0];
+/// Probability above which a wrong name counts as confident.
+const CONFIDENT: f64 = 0.9;
+
+/// What is true.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Truth {
+    /// Nothing is wrong.
+    Healthy,
+    /// These leaves of the fault tree, at least one.
+    Faults(Vec<String>),
+    /// Something that no model describes; naming `own` is right too.
+    Unmodelled {
+        /// The leaf that is about the same component, if there is one.
+        own: Option<String>,
+    },
+}
+
+/// What is true from an instant on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stretch {
+    /// Since when, s.
+    pub from_s: f64,
+    /// What.
+    pub truth: Truth,
+}
+
+/// What a robot is told to do, as far as it is scored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Told {
+    /// As planned.
+    #[default]
+    GoOn,
+    /// Slower.
+    Slow,
+    /// Stop.
+    Stop,
+    /// Stop by rule, because no usable belief is left.
+    Blind,
+    /// Stop and call for help.
+    Help,
+    /// Anything else: a remedy for one component, another path.
+    Other,
+}
+
+/// What was reported at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment<'a> {
+    /// Time, s.
+    pub t_s: f64,
+    /// Time since the moment before, s.
+    pub dt_s: f64,
+    /// True if the robot is told to move.
+    pub drives: bool,
+    /// True while the alarm stands.
+    pub alarm: bool,
+    /// Probability of the nominal mode.
+    pub p_nominal: f64,
+    /// Memoryless mode.
+    pub mode: &'a str,
+    /// Its probability.
+    pub p_mode: f64,
+    /// Most probable set of leaves, joined by `+`.
+    pub set: &'a str,
+    /// Mode with hysteresis.
+    pub reported: &'a str,
+    /// What the robot is told.
+    pub told: Told,
+    /// Which of the decision model's actions that is, and about which component: a change of either
+    /// is another action.
+    pub action: u64,
+}
+
+impl Truth {
+    /// True if nothing is wrong.
+    #[must_use]
+    pub const fn is_healthy(&self) -> bool {
+        matches!(self, Self::Healthy)
+    }
+
+    /// True if the name, with `set` where it is `MULTIPLE`, is the one to say.
+    fn is_leaf(&self, name: &str, set: &str, taxonomy: &Taxonomy) -> bool {
+        match self {
+            Self::Healthy => taxonomy.name(0) == Some(name),
+            Self::Unmodelled { own } => name == super::UNKNOWN || own.as_deref() == Some(name),
+            Self::Faults(leaves) => match leaves.as_slice() {
+                [leaf] => name == leaf,
+                several => {
+                    let found = set.split('+').count();
+                    let has = |leaf: &String| set.split('+').any(|part| part == leaf);
+                    name == super::MULTIPLE && found == several.len() && several.iter().all(has)
+                }
+            },
+        }
+    }
+
+    /// True if the name is right, or of the true side.
+    fn is_side(&self, name: &str, set: &str, taxonomy: &Taxonomy) -> bool {
+        if self.is_leaf(name, set, taxonomy) {
+            return true;
+        }
+        match self {
+            Self::Healthy => false,
+            Self::Unmodelled { .. } => taxonomy.is_abstract(name),
+            Self::Faults(leaves) => {
+                let side = leaves.first().and_then(|leaf| taxonomy.side(leaf));
+                let common = leaves.iter().all(|leaf| taxonomy.side(leaf) == side);
+                side.is_some() && common && taxonomy.side(name) == side
+            }
+        }
+    }
+
+    /// True if the name is a leaf that is not true.
+    fn is_wrong_leaf(&self, name: &str, set: &str, taxonomy: &Taxonomy) -> bool {
+        let is_leaf = taxonomy.index(name).is_some_and(|index| index > 0);
+        is_leaf && !self.is_leaf(name, set, taxonomy)
+    }
+}

@@ -1,0 +1,370 @@
+//! One run, moment by moment.
+
+use super::{BLIND, CONFIDENT, JUDGED_S, Moment, Stretch, Told, Truth};
+use crate::scoring::{TIME_SLACK_S, Taxonomy};
+
+/// One onset of a fault.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Onset {
+    /// When, s.
+    pub t_s: f64,
+    /// Until when it is judged, s: the truth changes, or the run ends.
+    pub until_s: f64,
+    /// Time to its announcement, s; `None` if it was missed.
+    pub delay_s: Option<f64>,
+    /// Right leaf at [`JUDGED_S`]; `None` if it did not last so long.
+    pub leaf: [Option<bool>; JUDGED_S.len()],
+    /// Right side at the same times.
+    pub side: [Option<bool>; JUDGED_S.len()],
+}
+
+/// The end of all faults.
+#[derive(Debug, Clone, PartialEq)]
+pub struct End {
+    /// When, s.
+    pub t_s: f64,
+    /// Driven time until the next fault or the end of the run, s.
+    pub driven_s: f64,
+    /// Driven time until the alarm was down, s; `None` if it never was.
+    pub alarm_s: Option<f64>,
+    /// Driven time until the names were nominal, s; `None` if they never were.
+    pub name_s: Option<f64>,
+}
+
+/// Driven time in which something was judged.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Seen {
+    /// All of it, s.
+    pub driven_s: f64,
+    /// With the right leaf as `mode`, s.
+    pub leaf_s: f64,
+    /// With the right side as `mode`, s.
+    pub side_s: f64,
+    /// With the right leaf as the reported name, s.
+    pub reported_s: f64,
+    /// With a wrong leaf as `mode` whose probability is above 0.9, s.
+    pub confident_wrong_s: f64,
+}
+
+/// How often a name changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Changes {
+    /// In the whole run.
+    pub all: usize,
+    /// From 2 s after an onset on, while the fault persists.
+    pub settled: usize,
+}
+
+/// Entries into actions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Actions {
+    /// Into slower driving.
+    pub slow: usize,
+    /// Into a stop.
+    pub stop: usize,
+    /// Into a call for help.
+    pub help: usize,
+    /// Into anything else but going on.
+    pub other: usize,
+    /// Into a stop by rule, without a usable belief: no decision, and not among all.
+    pub blind: usize,
+}
+
+impl Actions {
+    /// All decisions.
+    #[must_use]
+    pub const fn all(&self) -> usize {
+        self.slow + self.stop + self.help + self.other
+    }
+
+    const fn add(&mut self, told: Told) {
+        match told {
+            Told::GoOn => {}
+            Told::Slow => self.slow += 1,
+            Told::Stop => self.stop += 1,
+            Told::Blind => self.blind += 1,
+            Told::Help => self.help += 1,
+            Told::Other => self.other += 1,
+        }
+    }
+}
+
+/// What one run brought.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Run {
+    /// Seed or id by which it is found again.
+    pub seed: u64,
+    /// Length, s.
+    pub duration_s: f64,
+    /// Driven time, s.
+    pub driven_s: f64,
+    /// Driven time without a fault, s.
+    pub healthy_driven_s: f64,
+    /// Of it with another mode than the nominal one, s.
+    pub healthy_wrong_s: f64,
+    /// Of it with an alarm, s.
+    pub healthy_alarm_s: f64,
+    /// Onsets, in order.
+    pub onsets: Vec<Onset>,
+    /// Ends of faults, in order.
+    pub ends: Vec<End>,
+    /// Time in a wrong mode, s: at any time, standing or not.
+    pub wrong_s: f64,
+    /// From 2 s after an onset on.
+    pub from_2_s: Seen,
+    /// From 10 s after an onset on.
+    pub from_10_s: Seen,
+    /// Changes of `mode`.
+    pub mode: Changes,
+    /// Changes of the reported name.
+    pub reported: Changes,
+    /// Rises of the alarm while nothing was wrong.
+    pub alarms: usize,
+    /// Actions begun while nothing was wrong.
+    pub actions: Actions,
+    /// Actions begun during faults.
+    pub actions_in_fault: Actions,
+    /// A call for help stands at the end, and nothing is wrong.
+    pub is_help_latched: bool,
+    /// Time of contradictions, s.
+    pub contradiction_s: f64,
+    /// Longest one, s.
+    pub contradiction_longest_s: f64,
+    /// Time without valid input as it is reported, s.
+    pub blind_s: f64,
+}
+
+/// What was said a moment ago.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct Before {
+    alarm: bool,
+    mode: String,
+    reported: String,
+    action: u64,
+    told: Told,
+}
+
+/// Scores one run while it goes on.
+#[derive(Debug, Clone)]
+pub struct Scorer<'a> {
+    truth: &'a [Stretch],
+    taxonomy: &'a Taxonomy,
+    /// The stretch that holds now.
+    at: usize,
+    before: Option<Before>,
+    contradiction_s: f64,
+    run: Run,
+}
+
+impl<'a> Scorer<'a> {
+    /// Against the truth, in order of time; the first stretch holds from the beginning.
+    #[must_use]
+    pub fn new(truth: &'a [Stretch], taxonomy: &'a Taxonomy, seed: u64) -> Self {
+        let mut scorer = Self {
+            truth,
+            taxonomy,
+            at: 0,
+            before: None,
+            contradiction_s: 0.0,
+            run: Run {
+                seed,
+                ..Run::default()
+            },
+        };
+        scorer.begin_stretch(&Truth::Healthy);
+        scorer
+    }
+
+    fn now(&self) -> &'a Truth {
+        let stretch = self.truth.get(self.at);
+        stretch.map_or(&Truth::Healthy, |stretch| &stretch.truth)
+    }
+
+    /// Takes the next moment; moments come in order of time.
+    pub fn take(&mut self, moment: &Moment<'_>) {
+        let begins = |stretch: &Stretch| stretch.from_s <= moment.t_s + TIME_SLACK_S;
+        while self.truth.get(self.at + 1).is_some_and(begins) {
+            let before = self.now();
+            self.at += 1;
+            self.begin_stretch(before);
+        }
+        let run = &mut self.run;
+        run.duration_s += moment.dt_s;
+        if moment.drives {
+            run.driven_s += moment.dt_s;
+        }
+        let is_first = self.before.is_none();
+        let before = self.before.take().unwrap_or_else(|| Before {
+            mode: moment.mode.to_owned(),
+            reported: moment.reported.to_owned(),
+            ..Before::default()
+        });
+        self.judge_onset(moment, &before);
+        self.judge_end(moment);
+        self.judge_names(moment);
+        self.count(moment, &before, is_first);
+        self.before = Some(Before {
+            alarm: moment.alarm,
+            mode: moment.mode.to_owned(),
+            reported: moment.reported.to_owned(),
+            action: moment.action,
+            told: moment.told,
+        });
+    }
+
+    /// What the run brought.
+    #[must_use]
+    pub fn finish(mut self) -> Run {
+        let helps = |before: &Before| before.told == Told::Help;
+        self.run.is_help_latched =
+            self.now().is_healthy() && self.before.as_ref().is_some_and(helps);
+        self.run
+    }
+
+    /// The truth has changed.
+    fn begin_stretch(&mut self, before: &Truth) {
+        let (now, t_s) = (
+            self.now(),
+            self.truth.get(self.at).map_or(0.0, |s| s.from_s),
+        );
+        if now == before {
+            return;
+        }
+        if now.is_healthy() {
+            self.run.ends.push(End {
+                t_s,
+                driven_s: 0.0,
+                alarm_s: None,
+                name_s: None,
+            });
+        } else {
+            self.run.onsets.push(Onset {
+                t_s,
+                until_s: t_s,
+                delay_s: None,
+                leaf: [None; JUDGED_S.len()],
+                side: [None; JUDGED_S.len()],
+            });
+        }
+    }
+
+    /// True if a fault was there before the present one.
+    fn follows_a_fault(&self) -> bool {
+        let before = self.at.checked_sub(1).and_then(|i| self.truth.get(i));
+        before.is_some_and(|stretch| !stretch.truth.is_healthy())
+    }
+
+    fn judge_onset(&mut self, moment: &Moment<'_>, before: &Before) {
+        let (truth, taxonomy) = (self.now(), self.taxonomy);
+        if truth.is_healthy() {
+            return;
+        }
+        let follows = self.follows_a_fault();
+        let Some(onset) = self.run.onsets.last_mut() else {
+            return;
+        };
+        onset.until_s = moment.t_s;
+        let since_s = (moment.t_s - onset.t_s).max(0.0);
+        let rises = moment.alarm && !before.alarm;
+        let changes = follows && moment.mode != before.mode;
+        if onset.delay_s.is_none() && (rises || changes) {
+            onset.delay_s = Some(since_s);
+        }
+        // The last moment up to each instant counts: it is overwritten until the instant is past.
+        for (i, judged_s) in JUDGED_S.into_iter().enumerate() {
+            let due = since_s + TIME_SLACK_S >= judged_s;
+            if due && onset.leaf[i].is_none() {
+                let (name, set) = (moment.mode, moment.set);
+                onset.leaf[i] = Some(truth.is_leaf(name, set, taxonomy));
+                onset.side[i] = Some(truth.is_side(name, set, taxonomy));
+            }
+        }
+    }
+
+    fn judge_end(&mut self, moment: &Moment<'_>) {
+        if !self.now().is_healthy() {
+            return;
+        }
+        let nominal = self.taxonomy.name(0).unwrap_or_default();
+        let Some(end) = self.run.ends.last_mut() else {
+            return;
+        };
+        if !moment.alarm {
+            end.alarm_s.get_or_insert(end.driven_s);
+        }
+        if moment.mode == nominal && moment.reported == nominal {
+            end.name_s.get_or_insert(end.driven_s);
+        }
+        end.driven_s += if moment.drives { moment.dt_s } else { 0.0 };
+    }
+
+    fn judge_names(&mut self, moment: &Moment<'_>) {
+        let (truth, taxonomy, dt_s) = (self.now(), self.taxonomy, moment.dt_s);
+        let run = &mut self.run;
+        if moment.mode == BLIND {
+            run.blind_s += dt_s;
+        }
+        let (name, set) = (moment.mode, moment.set);
+        let is_leaf = truth.is_leaf(name, set, taxonomy);
+        let is_wrong = !is_leaf && name != BLIND;
+        run.wrong_s += if is_wrong { dt_s } else { 0.0 };
+        if !moment.drives {
+            return;
+        }
+        if truth.is_healthy() {
+            run.healthy_driven_s += dt_s;
+            run.healthy_wrong_s += if is_wrong { dt_s } else { 0.0 };
+            run.healthy_alarm_s += if moment.alarm { dt_s } else { 0.0 };
+            return;
+        }
+        let onset_s = run.onsets.last().map_or(f64::INFINITY, |onset| onset.t_s);
+        let since_s = moment.t_s - onset_s + TIME_SLACK_S;
+        let confident = moment.p_mode > CONFIDENT && truth.is_wrong_leaf(name, set, taxonomy);
+        for (seen, from_s) in [
+            (&mut run.from_2_s, JUDGED_S[0]),
+            (&mut run.from_10_s, JUDGED_S[2]),
+        ] {
+            if since_s < from_s {
+                continue;
+            }
+            let of = |is: bool| if is { dt_s } else { 0.0 };
+            seen.driven_s += dt_s;
+            seen.leaf_s += of(is_leaf);
+            seen.side_s += of(truth.is_side(name, set, taxonomy));
+            seen.reported_s += of(truth.is_leaf(moment.reported, set, taxonomy));
+            seen.confident_wrong_s += of(confident);
+        }
+    }
+
+    fn count(&mut self, moment: &Moment<'_>, before: &Before, is_first: bool) {
+        let truth = self.now();
+        let nominal = self.taxonomy.name(0).unwrap_or_default();
+        let run = &mut self.run;
+        let onset_s = run.onsets.last().map_or(f64::INFINITY, |onset| onset.t_s);
+        let is_settled = !truth.is_healthy() && moment.t_s - onset_s + TIME_SLACK_S >= JUDGED_S[0];
+        for (changes, is) in [
+            (&mut run.mode, moment.mode != before.mode),
+            (&mut run.reported, moment.reported != before.reported),
+        ] {
+            changes.all += usize::from(is);
+            changes.settled += usize::from(is && is_settled);
+        }
+        let rises = moment.alarm && !before.alarm;
+        run.alarms += usize::from(rises && truth.is_healthy());
+        let enters = moment.action != before.action || moment.told != before.told;
+        if enters || is_first {
+            match truth.is_healthy() {
+                true => run.actions.add(moment.told),
+                false => run.actions_in_fault.add(moment.told),
+            }
+        }
+        let names = moment.reported != nominal && moment.reported != BLIND;
+        let contradicts = (moment.alarm && moment.p_nominal > 0.5) || (names && !moment.alarm);
+        self.contradiction_s = match contradicts {
+            true => self.contradiction_s + moment.dt_s,
+            false => 0.0,
+        };
+        run.contradiction_s += if contradicts { moment.dt_s } else { 0.0 };
+        run.contradiction_longest_s = run.contradiction_longest_s.max(self.contradiction_s);
+    }
+}
