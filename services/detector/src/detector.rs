@@ -5,6 +5,7 @@ use vigil_blocks::{
 };
 use vigil_inference::ending::Ending;
 use vigil_inference::logspace::probability;
+use vigil_robot::alarm::{APPEARS_AGAIN_1_S, ENDS_1_S};
 use vigil_robot::learned::monitor::Channels;
 use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
 use vigil_robot::nominal;
@@ -17,10 +18,6 @@ use crate::watch::{Observed, Watch};
 
 /// Without monitors, pose log-odds beyond which the detector reports an error in position.
 const SYMPTOM_LOG_ODDS: f64 = 0.0;
-
-/// Rates at which a fault that has been alarmed comes again and ends, 1/s of motion.
-const APPEARS_AGAIN_1_S: f64 = 1e-3;
-const ENDS_1_S: f64 = 1.0 / 60.0;
 
 /// Why a detector was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

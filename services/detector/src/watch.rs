@@ -58,7 +58,7 @@ impl Watch {
                 monitor,
                 cloud,
             } => {
-                observer.hold_context(following);
+                observer.suspect(following);
                 let observation = observer.observation();
                 monitor.step(observation, following);
                 cloud.draw(monitor.track());

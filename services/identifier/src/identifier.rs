@@ -226,7 +226,7 @@ impl Identifier {
     }
 
     fn take(&mut self, input: &Input<'_>) {
-        self.observer.hold_context(self.detection.alarm);
+        self.observer.suspect(self.detection.alarm);
         let intake = self.observer.push(input.frame);
         if intake.new_run {
             self.begin_run();

@@ -43,7 +43,18 @@ pub struct Departure<const K: usize> {
     nominal: MotionNoise,
     track: Track,
     faults: [Onsets<Fault>; K],
+    /// While a fault is suspected: nominal motion again, since one of some successive steps.
+    ended: Onsets<Fault>,
     gain: f64,
+}
+
+/// How a suspected fault may end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Suspicion {
+    /// Variances (x, y, yaw) by which the nominal track diffuses in a step, so that it is not lost.
+    pub variance: [f64; 3],
+    /// Probability that the fault ends in a step.
+    pub ends: f64,
 }
 
 /// What a pose said.
@@ -63,6 +74,7 @@ impl<const K: usize> Departure<K> {
         Self {
             track: Track::new(Vector3::zeros(), Matrix3::identity(), &nominal),
             faults: [Onsets::default(); K],
+            ended: Onsets::default(),
             nominal,
             gain: 0.0,
         }
@@ -75,9 +87,14 @@ impl<const K: usize> Departure<K> {
         self.forget();
     }
 
-    /// Forgets what speaks for a fault, and keeps the track.
+    /// Forgets what speaks for a fault, and keeps the track: that of the most probable end, if a
+    /// fault was suspected.
     pub fn forget(&mut self) {
+        if let Some(track) = best(&self.ended).map(|ended| ended.track) {
+            self.track = track;
+        }
         self.faults = [Onsets::default(); K];
+        self.ended = Onsets::default();
     }
 
     /// Puts every track at this pose and keeps what is known of the motion: the frame of the
@@ -86,6 +103,9 @@ impl<const K: usize> Departure<K> {
         self.track.anchor(pose, variance);
         for fault in self.all_mut() {
             fault.track.anchor(pose, variance);
+        }
+        for ended in self.ended.iter_mut() {
+            ended.track.anchor(pose, variance);
         }
     }
 
@@ -98,13 +118,11 @@ impl<const K: usize> Departure<K> {
     /// Natural log-odds of a fault.
     #[must_use]
     pub fn log_odds(&self) -> f64 {
-        let faults = self.faults.iter().flat_map(Onsets::iter);
-        let log_weights = faults.map(|fault| fault.log_weight);
-        log_weights.fold(f64::NEG_INFINITY, log_add)
+        total(self.faults.iter().flat_map(Onsets::iter))
     }
 
     /// What the last pose said for a fault that was there, and is: the logarithm of the
-    /// likelihoods' ratio; 0 where it is no evidence.
+    /// likelihoods' ratio to one that has ended, or to none that began; 0 where it is no evidence.
     #[must_use]
     pub const fn gain(&self) -> f64 {
         self.gain
@@ -115,15 +133,15 @@ impl<const K: usize> Departure<K> {
     }
 
     /// Moves by one displacement, each fault by that of its kind. A fault begins before it with the
-    /// probability `birth`, 0 for none. With `follow` the nominal track diffuses by these variances
-    /// (x, y, yaw) besides and learns nothing of the motion: what a fault does is no context of the
-    /// nominal mode.
+    /// probability `birth`, 0 for none. While a fault is `suspected` it may end, wherever it has led
+    /// the robot, and the nominal track learns nothing of the motion: what a fault does is no
+    /// context of the nominal mode.
     pub fn predict(
         &mut self,
         step: &Displacement,
         kinds: &[Kind; K],
         birth: f64,
-        follow: Option<[f64; 3]>,
+        suspected: Option<Suspicion>,
     ) {
         for (faults, kind) in self.faults.iter_mut().zip(kinds) {
             let born = birth * kind.share;
@@ -137,11 +155,26 @@ impl<const K: usize> Departure<K> {
                 fault.track.predict(&kind.step, &kind.noise);
             }
         }
-        if let Some(variance) = follow {
-            self.track = self.track.fork(&self.nominal);
-            self.track.diffuse(variance);
-        }
+        self.predict_end(step, suspected);
         self.track.predict(step, &self.nominal);
+    }
+
+    fn predict_end(&mut self, step: &Displacement, suspected: Option<Suspicion>) {
+        let Some(Suspicion { variance, ends }) = suspected else {
+            self.ended = Onsets::default();
+            return;
+        };
+        self.track = self.track.fork(&self.nominal);
+        self.track.diffuse(variance);
+        let faults = self.faults.iter().filter_map(best);
+        let likeliest = faults.max_by(|a, b| a.log_weight.total_cmp(&b.log_weight));
+        if let Some(track) = likeliest.map(|fault| fault.track.fork(&self.nominal)) {
+            let log_weight = self.log_odds() + ends.ln();
+            self.ended.enter(Fault { log_weight, track });
+        }
+        for ended in self.ended.iter_mut() {
+            ended.track.predict(step, &self.nominal);
+        }
     }
 
     /// Conditions on a measured pose (x, y, yaw) with independent noise of `variance`; it is
@@ -150,27 +183,43 @@ impl<const K: usize> Departure<K> {
         self.gain = 0.0;
         let said = self.residual(pose, variance)?;
         self.track.update(pose, variance)?;
-        let before = self.log_odds();
-        let mut highest = f64::NEG_INFINITY;
-        for fault in self.all_mut() {
-            let gained = fault.track.update(pose, variance);
+        let before = self.log_odds() - total(self.ended.iter()).max(0.0);
+        let take = |hypothesis: &mut Fault| {
+            let gained = hypothesis.track.update(pose, variance);
             // What cannot take it is impossible.
             let gained = gained.map_or(f64::NEG_INFINITY, |gained| gained - said.log_density);
             if counts || gained == f64::NEG_INFINITY {
-                fault.log_weight += gained;
+                hypothesis.log_weight += gained;
             }
-            highest = highest.max(fault.log_weight);
-        }
-        let gain = self.log_odds() - before;
+        };
+        self.all_mut().for_each(take);
+        self.ended.iter_mut().for_each(take);
+        let gain = self.log_odds() - total(self.ended.iter()).max(0.0) - before;
         self.gain = if gain.is_finite() { gain } else { 0.0 };
-        let excess = (highest - LOG_ODDS_MAX).max(0.0);
+        self.bound();
+        Some(said)
+    }
+
+    /// Keeps the weights within bounds.
+    fn bound(&mut self) {
+        let highest = self
+            .faults
+            .iter()
+            .filter_map(best)
+            .map(|fault| fault.log_weight);
+        let excess = highest.fold(0.0, |most, w| f64::max(most, w - LOG_ODDS_MAX));
         for faults in &mut self.faults {
             for fault in faults.iter_mut() {
                 fault.log_weight -= excess;
             }
             faults.retain(|fault| fault.log_weight > LOG_ODDS_MIN);
         }
-        Some(said)
+        for ended in self.ended.iter_mut() {
+            ended.log_weight -= excess;
+        }
+        let likeliest = best(&self.ended).map_or(0.0, |ended| ended.log_weight);
+        self.ended
+            .retain(|ended| ended.log_weight > likeliest + LOG_ODDS_MIN);
     }
 
     /// What a pose would say of the nominal motion.
@@ -186,6 +235,18 @@ impl<const K: usize> Departure<K> {
             residual,
         })
     }
+}
+
+/// The most probable of some hypotheses.
+fn best(all: &Onsets<Fault>) -> Option<&Fault> {
+    all.iter()
+        .max_by(|a, b| a.log_weight.total_cmp(&b.log_weight))
+}
+
+/// Logarithm of the sum of their weights.
+fn total<'a>(all: impl Iterator<Item = &'a Fault>) -> f64 {
+    all.map(|fault| fault.log_weight)
+        .fold(f64::NEG_INFINITY, log_add)
 }
 
 impl Onset for Fault {
@@ -214,6 +275,10 @@ mod tests {
 
     const VARIANCE: [f64; 3] = [2.5e-5; 3];
     const BIRTH: f64 = 1e-4;
+    const SUSPECTED: Suspicion = Suspicion {
+        variance: [2.5e-7; 3],
+        ends: 1e-3,
+    };
 
     fn noise(offset: f64, deviation: f64) -> MotionNoise {
         MotionNoise {
@@ -315,7 +380,7 @@ mod tests {
         let (there, back) = (poses(0.2, 100, 300, 3), poses(0.0, 0, 300, 4));
         let mut seen = None;
         for (step, pose) in there.iter().enumerate() {
-            let follow = seen.map(|_| [2.5e-7; 3]);
+            let follow = seen.map(|_| SUSPECTED);
             filter.predict(&STEP, &kinds(), BIRTH, follow);
             filter.update(*pose, VARIANCE, true).unwrap();
             if seen.is_none() && filter.log_odds() > 3.0 {
@@ -325,7 +390,7 @@ mod tests {
         assert!((103..130).contains(&seen.unwrap()), "{seen:?}");
         filter.anchor(back[0], VARIANCE);
         for pose in &back[1..] {
-            filter.predict(&STEP, &kinds(), BIRTH, [2.5e-7; 3]);
+            filter.predict(&STEP, &kinds(), BIRTH, Some(SUSPECTED));
             filter.update(*pose, VARIANCE, true).unwrap();
         }
         assert!(filter.log_odds() < -3.0, "{}", filter.log_odds());

@@ -17,8 +17,13 @@ const P_MIN: f64 = 1e-4;
 const WINDOW: u32 = 20;
 /// One window changes the odds of two candidates by this much at most, nat: it may hold an outlier.
 const GAIN_MAX: f64 = 3.0;
-/// Deviation of a healthy displacement from its model, m/m and rad/m: no lag is learned from that.
-const DISPLACEMENT_SD: f64 = 0.03;
+/// How far a displacement per metre changes with the command beyond its model, m/m and rad/m: in
+/// health, and while a fault is suspected. No lag is learned from that.
+const SLIP_SD: [f64; 2] = [0.03, 0.1];
+/// Part of a window's slip that enters the running estimate of it.
+const SLIP_SHARE: f64 = 0.3;
+/// A window with less travel than this says nothing on slip, m.
+const TRAVEL_MIN_M: f64 = 0.02;
 /// Time for which an error of the prediction counts as one with those before, s: about as long as
 /// a change of the command and its correction by the pose take.
 const COHERENT_S: f64 = 3.0;
@@ -41,7 +46,7 @@ pub struct Followed {
 /// One candidate.
 #[derive(Debug, Clone, Copy, Default)]
 struct Candidate {
-    /// Curvature 1/m and speed m/s of the body.
+    /// Yaw rate rad/s and speed m/s of the body.
     body: [f64; 2],
     /// Travel m and heading rad since the last observation's middle.
     sums: [f64; 2],
@@ -67,6 +72,8 @@ pub struct BodyLag {
     /// Variances of `apart` over the candidates.
     coherent: [f64; 2],
     window: Window,
+    /// Displacement per metre of travel beyond the model, by ground or a fault: m/m and rad/m.
+    slip: [f64; 2],
 }
 
 /// What was measured since a window began.
@@ -96,7 +103,7 @@ impl BodyLag {
     pub fn begin(&mut self, command: [f64; 2]) {
         self.command = command;
         for candidate in &mut self.candidates {
-            candidate.body = command;
+            candidate.body = [command[0] * command[1], command[1]];
         }
     }
 
@@ -109,18 +116,18 @@ impl BodyLag {
         self.between[0] += surge_m * surge_m / 12.0;
         self.between[1] +=
             (swing_rad * swing_rad + middle[0] * middle[0] * surge_m * surge_m) / 12.0;
+        let target = [middle[0] * middle[1], middle[1]];
         self.command = command;
         self.frames += 1;
         for (candidate, lag_s) in self.candidates.iter_mut().zip(LAGS_S) {
             let follows = 1.0 - (-dt_s / lag_s).exp();
             let before = candidate.body;
-            for i in 0..2 {
-                candidate.body[i] += follows * (middle[i] - candidate.body[i]);
+            for (body, target) in candidate.body.iter_mut().zip(target) {
+                *body += follows * (target - *body);
             }
             let after = candidate.body;
-            let travel_m = 0.5 * (before[1] + after[1]) * dt_s;
-            candidate.sums[0] += travel_m;
-            candidate.sums[1] += 0.5 * (before[0] + after[0]) * travel_m;
+            candidate.sums[0] += 0.5 * (before[1] + after[1]) * dt_s;
+            candidate.sums[1] += 0.5 * (before[0] + after[0]) * dt_s;
             for (middle, sum) in candidate.middles.iter_mut().zip(candidate.sums) {
                 *middle += sum;
             }
@@ -183,8 +190,14 @@ impl BodyLag {
     /// Takes the measured travel (m) and turn (rad) of the observation that was completed last, and
     /// weighs the candidates at the end of a window. The noise of the measurement over a window has
     /// these variances. `per_metre`: what a metre of commanded travel is expected to be, and what
-    /// it turns the robot beyond the commanded curvature.
-    pub fn learn(&mut self, measured: [f64; 2], variance: [f64; 2], per_metre: [f64; 2]) {
+    /// it turns the robot beyond the commanded curvature; less certain while a fault `is_suspected`.
+    pub fn learn(
+        &mut self,
+        measured: [f64; 2],
+        variance: [f64; 2],
+        per_metre: [f64; 2],
+        is_suspected: bool,
+    ) {
         for candidate in &mut self.candidates {
             let [travel_m, turn_rad] = candidate.moved;
             candidate.window[0] += per_metre[0] * travel_m;
@@ -195,21 +208,37 @@ impl BodyLag {
         }
         self.window.observations += 1;
         if self.window.observations >= WINDOW {
-            self.weigh(variance);
+            self.weigh(variance, SLIP_SD[usize::from(is_suspected)]);
             self.interrupt();
         }
     }
 
-    fn weigh(&mut self, variance: [f64; 2]) {
+    /// Weighs the candidates by the window. What the robot slips in all of them alike is no lag.
+    fn weigh(&mut self, variance: [f64; 2], slip_sd: f64) {
         let Window {
             measured, between, ..
         } = self.window;
-        let slip = DISPLACEMENT_SD * measured[0];
-        let spread: [f64; 2] = std::array::from_fn(|i| variance[i] + slip * slip + between[i]);
+        let expected: [f64; 2] = std::array::from_fn(|i| {
+            let all = self.candidates.iter().map(|c| c.p * c.window[i]);
+            all.sum()
+        });
+        let travel_m = expected[0];
+        let slip_m = slip_sd * travel_m;
+        let spread: [f64; 2] = std::array::from_fn(|i| variance[i] + slip_m * slip_m + between[i]);
+        let slipped: [f64; 2] =
+            std::array::from_fn(|i| measured[i] - self.slip[i] * travel_m - expected[i]);
         let fits = self.candidates.map(|candidate| {
-            let square = |i: usize| (measured[i] - candidate.window[i]).powi(2) / spread[i];
+            let square = |i: usize| {
+                let apart = slipped[i] + expected[i] - candidate.window[i];
+                apart * apart / spread[i]
+            };
             -0.5 * (square(0) + square(1))
         });
+        if travel_m.abs() > TRAVEL_MIN_M {
+            for i in 0..2 {
+                self.slip[i] += SLIP_SHARE * slipped[i] / travel_m;
+            }
+        }
         let best = fits.into_iter().fold(f64::NEG_INFINITY, f64::max);
         if !best.is_finite() {
             return;
@@ -267,7 +296,7 @@ mod tests {
                     worst = worst.max(apart / (followed.travel_variance + 1e-7).sqrt());
                 }
                 let measured = [0.97 * travel_m, 0.5 * travel_m];
-                bank.learn(measured, [1e-5, 1e-5], [0.97, 0.0]);
+                bank.learn(measured, [1e-5, 1e-5], [0.97, 0.0], false);
             }
         }
         (bank.lag_s(), worst)
@@ -293,7 +322,7 @@ mod tests {
             let followed = bank.complete(0.01);
             // The robot slips by a third and drifts.
             let measured = [0.66 * followed.travel_m, followed.turn_rad + 1e-3];
-            bank.learn(measured, [1e-8, 1e-8], [1.0, 0.0]);
+            bank.learn(measured, [1e-8, 1e-8], [1.0, 0.0], true);
         }
         assert!((bank.lag_s() - before).abs() < 1e-9);
     }

@@ -14,7 +14,7 @@
 use nalgebra::SVector;
 use vigil_blocks::{CHANNELS, Channel, WHEELS};
 use vigil_inference::constant::Constant;
-use vigil_inference::departure::Departure;
+use vigil_inference::departure::{Departure, Suspicion};
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 use vigil_inference::track::Track;
 
@@ -24,6 +24,7 @@ use super::noise_scale::SensorNoise;
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Model, Observation, Troubles};
 use crate::Description;
+use crate::alarm::ENDS_1_S;
 
 /// Shares of the prior: how a fault first shows.
 const SHARE_POSE: f64 = 0.5;
@@ -41,7 +42,7 @@ const TROUBLE_LOG_ODDS: f64 = 40.0;
 /// Bound of the flag of exact repeats.
 const REPEATS_LOG_ODDS_MAX: f64 = 40.0;
 /// Diffusion of the pose per observation while following, in units of the measurement's deviation.
-const FOLLOWING: f64 = 0.3;
+const FOLLOWING: f64 = 0.1;
 /// Residuals beyond this many deviations mean a lost track.
 const LOST: f64 = 10.0;
 /// Time in motion after which evidence counts, s: once the noise is known, and at the latest.
@@ -260,9 +261,12 @@ impl Monitor {
             true => self.birth(observation.dt_s, SHARE_POSE),
             false => 0.0,
         };
-        let follow = following.then(|| variance.map(|variance| FOLLOWING * FOLLOWING * variance));
+        let suspected = following.then(|| Suspicion {
+            variance: variance.map(|variance| FOLLOWING * FOLLOWING * variance),
+            ends: ENDS_1_S * observation.dt_s,
+        });
         let kinds = self.faults.kinds(&self.model, observation, &step);
-        self.departure.predict(&step, &kinds, birth, follow);
+        self.departure.predict(&step, &kinds, birth, suspected);
         if measured {
             self.weigh_pose(observation, variance);
         }

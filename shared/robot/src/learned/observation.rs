@@ -129,7 +129,7 @@ pub struct Observer {
     standing_m_s: f64,
     limits: Limits,
     model: Box<Model>,
-    holds_context: bool,
+    is_suspected: bool,
     state: State,
     observation: Observation,
 }
@@ -183,7 +183,7 @@ impl Observer {
             standing_m_s: model.command.standing_m_s,
             limits: Limits::new(model),
             model: Box::new(model.clone()),
-            holds_context: false,
+            is_suspected: false,
             state: State::default(),
             observation: Observation::default(),
         }
@@ -195,10 +195,10 @@ impl Observer {
         &self.observation
     }
 
-    /// While a fault is suspected nothing is learned about the healthy robot: what the fault does
-    /// is none of its context.
-    pub const fn hold_context(&mut self, holds: bool) {
-        self.holds_context = holds;
+    /// Whether a fault is suspected: what is learned on the way about the healthy robot allows for
+    /// what a fault does.
+    pub const fn suspect(&mut self, is_suspected: bool) {
+        self.is_suspected = is_suspected;
     }
 
     /// Forgets everything: the next frame begins a new run.
@@ -390,8 +390,7 @@ impl Observer {
         let now = &self.observation;
         let pose = (now.pose_frames > 0).then_some(now.pose);
         let before = std::mem::replace(&mut self.state.pose_before, pose);
-        let is_followed = !now.anchor && !self.holds_context;
-        let (Some(before), Some(pose), true) = (before, pose, is_followed) else {
+        let (Some(before), Some(pose), false) = (before, pose, now.anchor) else {
             self.state.body.interrupt();
             return;
         };
@@ -407,7 +406,8 @@ impl Observer {
         let [position, _, heading] = now.pose_variance(&self.model, 1.0).map(|v| 2.0 * v);
         let beyond = yaw - now.curvature;
         let body = &mut self.state.body;
-        body.learn(measured, [position, heading], [forward, beyond]);
+        let variance = [position, heading];
+        body.learn(measured, variance, [forward, beyond], self.is_suspected);
     }
 }
 
