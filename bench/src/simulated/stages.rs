@@ -3,8 +3,8 @@
 use std::error::Error;
 
 use vigil_blocks::{
-    Action, ControlMode, DetectionBelief, Entry, FaultBelief, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
-    ParticleBlock, RecoveryKind, SensorFrame,
+    Action, ControlMode, DetectionBelief, Entry, FaultBelief, MODE_BLIND, MODE_MULTIPLE,
+    MODE_UNKNOWN, ParticleBlock, RecoveryKind, SensorFrame,
 };
 use vigil_detector::Detector;
 use vigil_evaluation::scoring::field::{BLIND, Moment, Told};
