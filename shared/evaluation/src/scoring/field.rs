@@ -25,6 +25,8 @@
 //! All runs count; what is not seen is missed. While nothing valid comes in, `BLIND` is neither
 //! right nor wrong.
 
+#[cfg(test)]
+mod cases;
 mod figures;
 mod run;
 
