@@ -28,9 +28,11 @@
 #[cfg(test)]
 mod cases;
 mod figures;
+mod recorded;
 mod run;
 
 pub use figures::{Figure, Worst, figures};
+pub use recorded::{Figures, SAFE_STOP, of_cases};
 pub use run::{Actions, Changes, End, Onset, Run, Scorer, Seen};
 
 use super::Taxonomy;
