@@ -7,6 +7,7 @@ use rand::{Rng, RngExt};
 use serde::Deserialize;
 
 use super::bar::Bar;
+use super::recorded::Source;
 
 /// The file of all scenarios.
 #[derive(Debug, Clone, Deserialize)]
@@ -31,13 +32,19 @@ pub struct Scenario {
     #[serde(default = "twenty")]
     pub rate_hz: Draw,
     /// Length of a run, s.
+    #[serde(default)]
     pub run_s: f64,
-    /// Runs.
+    /// Runs; of recorded ones all there are.
+    #[serde(default)]
     pub runs: usize,
+    /// Recorded runs instead of simulated ones; only `frames` then changes anything.
+    #[serde(default)]
+    pub recorded: Option<Source>,
     /// Seed of the first run; the others follow it.
     pub first_seed: u64,
     /// What is driven: `random`, `stops`, `reversals`, `creep`, `tight`, `mixed`, `graph` (the
     /// drive of `config/rover.toml`), or segments `CURVATURE_1_M:SPEED_M_S:S` joined by commas.
+    #[serde(default)]
     pub drive: String,
     /// True if the world obeys the supervisor's actions; default false.
     #[serde(default)]
@@ -323,7 +330,7 @@ mod tests {
             "delay",
         ];
         let mut seeds = BTreeSet::new();
-        for scenario in &file.scenario {
+        for scenario in file.scenario.iter().filter(|s| s.recorded.is_none()) {
             let rng = &mut stream(scenario.first_seed, 1);
             let range = Range {
                 command: &rover.model.command,

@@ -73,7 +73,7 @@ impl Score {
             "\n\n{figure:<30} {class:<10} {value:>9} {bounds:>20} {worst:>16}"
         )?;
         for name in FIELD {
-            for (class, figures) in &self.field {
+            for (class, figures) in self.field.iter().filter(|(class, _)| *class == "all") {
                 let Some(figure) = figures.get(name) else {
                     continue;
                 };
