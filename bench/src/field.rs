@@ -3,18 +3,20 @@
 //!
 //! Detector, identifier and supervisor run in one process over the simulator's world. The world is
 //! driven with every set of sensors at once; what is decided is scored, but obeyed only where a
-//! scenario says so.
+//! scenario says so. Recorded runs are played to the same stages.
 
 mod bar;
 mod course;
 mod fault;
 mod frames;
 mod ground;
+mod recorded;
 mod report;
 mod run;
 mod scenario;
 
 pub use bar::{Bar, Comparison};
+pub use recorded::{Library, Material, Source, library};
 pub use report::{Outcome, document, lines};
 pub use run::{Graph, Job, Scored, jobs, run, select};
 pub use scenario::{Draw, File, Frames, Scenario, World};

@@ -11,8 +11,10 @@ use std::time::Instant;
 use clap::Parser;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
-use vigil_bench::field::{File, Graph, Job, Outcome, Scenario, Scored, document, jobs, lines};
-use vigil_bench::field::{run, select};
+use vigil_bench::field::{
+    File, Graph, Job, Library, Outcome, Scenario, Scored, document, jobs, library, lines, run,
+    select,
+};
 use vigil_bench::machine;
 use vigil_bench::matched::in_parallel;
 
@@ -71,7 +73,8 @@ fn answer(args: &Args) -> Result<bool, Box<dyn Error>> {
     }
     let began = Instant::now();
     let graph = Graph::read(&here.join(".."))?;
-    let outcomes = measure(&graph, &scenarios, args.scale)?;
+    let library = library(&here.join(".."), &scenarios)?;
+    let outcomes = measure(&graph, &library, &scenarios, args.scale)?;
     let wall_s = began.elapsed().as_secs_f64();
     let document = document(&outcomes, machine::facts(), wall_s, args.scale);
     let is_met = outcomes.iter().all(|o| o.bars().all(|(_, met)| met));
@@ -119,13 +122,14 @@ fn raw(outcomes: &[Outcome<'_>]) -> Value {
 
 fn measure<'a>(
     graph: &Graph,
+    library: &Library,
     scenarios: &[&'a Scenario],
     scale: f64,
 ) -> Result<Vec<Outcome<'a>>, Box<dyn Error>> {
-    let all = jobs(scenarios, scale);
+    let all = jobs(scenarios, scale, library);
     let (done, began) = (AtomicUsize::new(0), Instant::now());
     let one = |job: &Job<'_>| {
-        let found = run(graph, job);
+        let found = run(graph, library, job);
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         let (all, name, wall_s) = (all.len(), &job.scenario.name, began.elapsed().as_secs());
         if done.is_multiple_of((all / 100).max(1)) || done == all {

@@ -72,7 +72,12 @@ pub fn changes(
     later_s: f64,
 ) -> Result<Vec<Injection>, String> {
     let one = |spec: &String| {
-        let (what, at_s) = spec.rsplit_once('@').unwrap_or((spec, ""));
+        let (what, at) = spec.rsplit_once('@').unwrap_or((spec, ""));
+        // A time may be a sum: onset and duration.
+        let terms = at.split('+').map(|term| term.parse::<f64>());
+        let at_s: f64 = terms
+            .sum::<Result<f64, _>>()
+            .map_err(|e| format!("'{spec}': {e}"))?;
         let text = format!("{}@{at_s}", places.put(what));
         let found = Injection::parse(&text, robot).map_err(|error| format!("'{spec}': {error}"))?;
         Ok(Injection {

@@ -107,7 +107,11 @@ impl Way {
         let drifts = drawn.yaw_drift_rad_s != 0.0 || drawn.pose_scale != 1.0;
         Self {
             drawn,
-            gaps_s: frames.gaps_s.iter().map(|gap| gap.map(|t_s| t_s + later_s)).collect(),
+            gaps_s: frames
+                .gaps_s
+                .iter()
+                .map(|gap| gap.map(|t_s| t_s + later_s))
+                .collect(),
             period_s: 1.0 / rate_hz,
             noise: [
                 factor * robot.noise.position_m,

@@ -76,13 +76,10 @@ impl<'a> Outcome<'a> {
         let bars = self
             .bars()
             .map(|(bar, met)| json!({ "figure": bar.figure, "bar": bar.to_string(), "met": met }));
-        let figures = self.figures.iter().map(|figure| {
-            let mut value = json!(figure);
-            if let Some(map) = value.as_object_mut() {
-                map.remove("name");
-            }
-            (figure.name.to_owned(), value)
-        });
+        let figures = self
+            .figures
+            .iter()
+            .map(|figure| (figure.name.to_owned(), json!(figure)));
         json!({
             "scenario": self.scenario.name, "about": self.scenario.about,
             "sensors": self.sensors, "runs": self.runs.len(), "hours": self.hours(),

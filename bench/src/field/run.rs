@@ -16,6 +16,7 @@ use super::course::{Range, course};
 use super::fault::{self, Places};
 use super::frames::{Fate, Way};
 use super::ground::{Ground, stream};
+use super::recorded::{self, Library, Material};
 use super::scenario::{File, Scenario};
 use crate::simulated::{SENSOR_SETS, Stages};
 
@@ -40,10 +41,14 @@ pub struct Scored {
     pub run: Run,
 }
 
-/// Every run of the scenarios; `scale` multiplies their number, at least one each stays.
+/// Every run of the scenarios; `scale` multiplies their number, at least one each stays. Recorded
+/// runs are all played, whatever the scale, and none without their files.
 #[must_use]
-pub fn jobs<'a>(scenarios: &[&'a Scenario], scale: f64) -> Vec<Job<'a>> {
-    let runs = |scenario: &Scenario| (scenario.runs as f64 * scale).round().max(1.0) as usize;
+pub fn jobs<'a>(scenarios: &[&'a Scenario], scale: f64, library: &Library) -> Vec<Job<'a>> {
+    let runs = |scenario: &Scenario| match &scenario.recorded {
+        Some(_) => library.get(&scenario.name).map_or(0, Material::len),
+        None => (scenario.runs as f64 * scale).round().max(1.0) as usize,
+    };
     let all = scenarios
         .iter()
         .flat_map(|scenario| (0..runs(scenario)).map(|run| Job { scenario, run }));
@@ -144,8 +149,11 @@ impl Conditions {
 ///
 /// # Errors
 /// A scenario that cannot be driven, with its name.
-pub fn run(graph: &Graph, job: &Job<'_>) -> Result<Vec<Scored>, String> {
+pub fn run(graph: &Graph, library: &Library, job: &Job<'_>) -> Result<Vec<Scored>, String> {
     let named = |error: String| format!("{}: {error}", job.scenario.name);
+    if let Some(material) = library.get(&job.scenario.name) {
+        return recorded::play(material, job).map_err(|error| named(error.to_string()));
+    }
     let conditions = Conditions::draw(graph, job).map_err(named)?;
     let sets = SENSOR_SETS.into_iter().filter(|(_, name)| {
         let mut asked = job.scenario.sensors.iter();
@@ -231,14 +239,14 @@ fn drive(
 }
 
 /// The stages of one set of sensors, and their score.
-struct Watch<'a> {
-    stages: Stages,
-    scorer: Scorer<'a>,
+pub(super) struct Watch<'a> {
+    pub(super) stages: Stages,
+    pub(super) scorer: Scorer<'a>,
 }
 
 impl Watch<'_> {
     /// What comes of a frame; `held` is one that this one has overtaken.
-    fn deliver(&mut self, frame: &SensorFrame, fate: Fate, held: Option<&SensorFrame>) {
+    pub(super) fn deliver(&mut self, frame: &SensorFrame, fate: Fate, held: Option<&SensorFrame>) {
         let stages = &mut self.stages;
         match fate {
             Fate::Lost | Fate::Overtaken => stages.miss(),

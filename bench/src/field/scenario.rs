@@ -7,6 +7,7 @@ use rand::{Rng, RngExt};
 use serde::Deserialize;
 
 use super::bar::Bar;
+use super::recorded::Source;
 
 /// The file of all scenarios.
 #[derive(Debug, Clone, Deserialize)]
@@ -31,13 +32,19 @@ pub struct Scenario {
     #[serde(default = "twenty")]
     pub rate_hz: Draw,
     /// Length of a run, s.
+    #[serde(default)]
     pub run_s: f64,
-    /// Runs.
+    /// Runs; of recorded ones all there are.
+    #[serde(default)]
     pub runs: usize,
+    /// Recorded runs instead of simulated ones; only `frames` then changes anything.
+    #[serde(default)]
+    pub recorded: Option<Source>,
     /// Seed of the first run; the others follow it.
     pub first_seed: u64,
     /// What is driven: `random`, `stops`, `reversals`, `creep`, `tight`, `mixed`, `graph` (the
     /// drive of `config/rover.toml`), or segments `CURVATURE_1_M:SPEED_M_S:S` joined by commas.
+    #[serde(default)]
     pub drive: String,
     /// True if the world obeys the supervisor's actions; default false.
     #[serde(default)]
@@ -47,7 +54,7 @@ pub struct Scenario {
     #[serde(default)]
     pub each: Vec<String>,
     /// Changes of health as `SPEC@T`, s: `stuck:W1@10`, `clear:W1@30`. `W1` to `W6` are different
-    /// wheels, drawn for each run, `S1` a steered one, `SIDE` a side.
+    /// wheels, drawn for each run, `S1` a steered one, `SIDE` a side. A time may be a sum.
     #[serde(default)]
     pub faults: Vec<String>,
     /// All times of `faults`, `context` and gaps are later by up to so much, s, drawn for each run;
@@ -190,7 +197,9 @@ impl File {
     pub fn read(path: &Path) -> Result<Self, Box<dyn Error>> {
         let at = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
         let text = std::fs::read_to_string(path).map_err(|error| at(&error))?;
-        let file: Self = toml::from_str(&text).map_err(|error| at(&error))?;
+        let mut table: toml::Table = toml::from_str(&text).map_err(|error| at(&error))?;
+        vary(&mut table).map_err(|error| at(&error))?;
+        let file: Self = table.try_into().map_err(|error| at(&error))?;
         let scenario: Vec<Scenario> = file.scenario.iter().flat_map(Scenario::spread).collect();
         let mut names: Vec<&str> = scenario.iter().map(|s| s.name.as_str()).collect();
         names.sort_unstable();
@@ -198,6 +207,61 @@ impl File {
             return Err(at(&format!("scenario '{}' appears twice", twice[0])).into());
         }
         Ok(Self { scenario })
+    }
+}
+
+/// Makes several scenarios of each with `vary = { key = "world.lag_s", values = [..] }`: one for
+/// each value, which is put in the place of the key and ends the name.
+fn vary(file: &mut toml::Table) -> Result<(), String> {
+    let Some(toml::Value::Array(all)) = file.get_mut("scenario") else {
+        return Ok(());
+    };
+    let mut varied = Vec::new();
+    for scenario in std::mem::take(all) {
+        let toml::Value::Table(mut scenario) = scenario else {
+            return Err("a scenario is no table".to_owned());
+        };
+        let Some(how) = scenario.remove("vary") else {
+            varied.push(toml::Value::Table(scenario));
+            continue;
+        };
+        let how: Variation = how.try_into().map_err(|error| format!("vary: {error}"))?;
+        for value in how.values {
+            let name = scenario.get("name").and_then(toml::Value::as_str);
+            let name = format!("{}/{value}", name.unwrap_or_default());
+            let mut one = scenario.clone();
+            one.insert("name".to_owned(), name.into());
+            put(&mut one, &how.key, value);
+            varied.push(toml::Value::Table(one));
+        }
+    }
+    *all = varied;
+    Ok(())
+}
+
+/// What differs between scenarios that are written as one.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Variation {
+    /// Which setting: names joined by points.
+    key: String,
+    /// Its values.
+    values: Vec<toml::Value>,
+}
+
+fn put(table: &mut toml::Table, key: &str, value: toml::Value) {
+    match key.split_once('.') {
+        None => {
+            table.insert(key.to_owned(), value);
+        }
+        Some((head, rest)) => {
+            let below = table
+                .entry(head)
+                .or_insert_with(|| toml::Table::new().into());
+            if let toml::Value::Table(below) = below {
+                put(below, rest, value);
+            }
+        }
     }
 }
 
@@ -223,5 +287,130 @@ impl Scenario {
             }
         };
         self.each.iter().map(one).collect()
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::field::course::{Range, course};
+    use crate::field::fault::{Places, changes, truth};
+    use crate::field::ground::stream;
+    use crate::simulated::Rover;
+    use vigil_evaluation::scoring::field::{Run, Truth, figures};
+    use vigil_robot::disturbance::KINDS;
+    use vigil_setup::schema::Sensors;
+
+    fn shipped() -> (File, Rover) {
+        let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let file = File::read(&here.join("field.toml")).unwrap();
+        (file, Rover::read(&here.join("..")).unwrap())
+    }
+
+    #[test]
+    fn every_scenario_can_be_driven_and_every_bar_has_a_figure() {
+        let (file, rover) = shipped();
+        let mut run = Run {
+            healthy_driven_s: 1.0,
+            duration_s: 1.0,
+            ..Run::default()
+        };
+        run.from_2_s.driven_s = 1.0;
+        run.from_10_s.driven_s = 1.0;
+        let names = figures(&[run]);
+        let of_cases = [
+            "detected",
+            "leaf",
+            "side",
+            "alarm_cleared",
+            "name_cleared",
+            "delay",
+        ];
+        let mut seeds = BTreeSet::new();
+        for scenario in file.scenario.iter().filter(|s| s.recorded.is_none()) {
+            let rng = &mut stream(scenario.first_seed, 1);
+            let range = Range {
+                command: &rover.model.command,
+                robot: &rover.robot,
+                graph: &[],
+            };
+            course(&scenario.drive, range, scenario.run_s, rng).unwrap();
+            let places = Places::draw(&rover.robot, 0, rng);
+            for specs in [&scenario.faults, &scenario.context] {
+                changes(specs, &places, &rover.robot, 0.0).unwrap();
+            }
+            for bar in &scenario.bars {
+                let known = names.iter().any(|figure| figure.name == bar.figure);
+                let is_case = of_cases.iter().any(|head| bar.figure.starts_with(head));
+                assert!(known || is_case, "{}: {bar}", scenario.name);
+            }
+            seeds.insert(scenario.first_seed);
+        }
+        let disturbed = file.scenario.iter().flat_map(|s| &s.faults);
+        let disturbed: BTreeSet<&str> = disturbed.filter_map(|s| s.split(':').next()).collect();
+        assert!(KINDS.iter().all(|row| disturbed.contains(row.name)));
+        assert!(seeds.len() > 40);
+    }
+
+    #[test]
+    fn values_and_places_are_put_in() {
+        let text = "[[scenario]]\nname = \"a\"\nabout = \"b\"\nrun_s = 1\nruns = 1\n\
+                    first_seed = 1\ndrive = \"random\"\nvary = { key = \"world.lag_s\", \
+                    values = [0.1, 0.2] }\neach = [\"tether:10\", \"slope\"]\n\
+                    faults = [\"EACH@1\"]\n";
+        let path = std::env::temp_dir().join(format!("vigil-field-{}.toml", std::process::id()));
+        std::fs::write(&path, text).unwrap();
+        let file = File::read(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let names: Vec<&str> = file.scenario.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!(
+            names,
+            ["a/0.1/tether", "a/0.1/slope", "a/0.2/tether", "a/0.2/slope"]
+        );
+        assert_eq!(file.scenario[2].world.lag_s, Some(Draw::Always(0.2)));
+        assert_eq!(file.scenario[2].faults, ["tether:10@1"]);
+    }
+
+    #[test]
+    fn truth_follows_what_breaks_and_mends() {
+        let (_, rover) = shipped();
+        let specs = [
+            "stuck:LF@10",
+            "encoder:RM:zero@20+5",
+            "clear:LF@30",
+            "tether:20@40",
+        ];
+        let specs = specs.map(str::to_owned);
+        let places = Places::draw(&rover.robot, 0, &mut stream(1, 1));
+        let all = changes(&specs, &places, &rover.robot, 1.0).unwrap();
+        let of = |sensors| -> Vec<(f64, Truth)> {
+            let found = truth(&all, &rover.tree, &rover.robot, sensors);
+            found.into_iter().map(|s| (s.from_s, s.truth)).collect()
+        };
+        let faults =
+            |names: &[&str]| Truth::Faults(names.iter().map(ToString::to_string).collect());
+        let unmodelled = Truth::Unmodelled { own: None };
+        assert_eq!(
+            of(Sensors::PoseEncoders),
+            [
+                (0.0, Truth::Healthy),
+                (11.0, faults(&["LF_STUCK"])),
+                (26.0, faults(&["LF_STUCK", "RM_ENC"])),
+                (31.0, faults(&["RM_ENC"])),
+                (41.0, unmodelled.clone()),
+            ]
+        );
+        assert_eq!(
+            of(Sensors::Pose),
+            [
+                (0.0, Truth::Healthy),
+                (11.0, faults(&["LF_STUCK"])),
+                (31.0, Truth::Healthy),
+                (41.0, unmodelled),
+            ]
+        );
     }
 }

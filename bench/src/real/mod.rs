@@ -2,6 +2,7 @@
 
 pub mod border;
 pub mod changes;
+pub mod husky;
 pub mod kobuki;
 pub mod robotino;
 pub mod seen;
@@ -39,6 +40,28 @@ pub struct Log {
 /// # Errors
 /// What is missing or malformed.
 pub fn log(archive: &str, log: &str) -> Result<Log, Box<dyn Error>> {
+    let folder = unpacked(archive)?;
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let path = root.join(format!("config/logs/{log}.toml"));
+    let description = LogDescription::load(&path)?;
+    let robot = load_robot(&description.robot_path(&path))?;
+    let imported = import(&description, &robot, &folder)?;
+    for (channel, delay_s) in &imported.delays_s {
+        eprintln!("{log}: {channel} is late by {delay_s:.3} s");
+    }
+    Ok(Log {
+        runs: imported.frames(&robot),
+        names: imported.runs.into_iter().map(|run| run.name).collect(),
+        robot,
+        folder,
+    })
+}
+
+/// The folder of an unpacked archive of `$VIGIL_DATA/real`, below the build folder.
+///
+/// # Errors
+/// What is missing or malformed.
+pub fn unpacked(archive: &str) -> Result<PathBuf, Box<dyn Error>> {
     let data = std::env::var("VIGIL_DATA").map_err(
         |_| "VIGIL_DATA is not set: the folder that holds real/kobuki_wheel_fault.tar.xz",
     )?;
@@ -60,19 +83,7 @@ pub fn log(archive: &str, log: &str) -> Result<Log, Box<dyn Error>> {
             return Err(format!("{}: tar failed", packed.display()).into());
         }
     }
-    let path = root.join(format!("config/logs/{log}.toml"));
-    let description = LogDescription::load(&path)?;
-    let robot = load_robot(&description.robot_path(&path))?;
-    let imported = import(&description, &robot, &folder)?;
-    for (channel, delay_s) in &imported.delays_s {
-        eprintln!("{log}: {channel} is late by {delay_s:.3} s");
-    }
-    Ok(Log {
-        runs: imported.frames(&robot),
-        names: imported.runs.into_iter().map(|run| run.name).collect(),
-        robot,
-        folder,
-    })
+    Ok(folder)
 }
 
 /// Area under the receiver operating characteristic: the probability that a faulty score is above

@@ -3,8 +3,8 @@
 use std::error::Error;
 
 use vigil_blocks::{
-    Action, ControlMode, DetectionBelief, Entry, FaultBelief, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
-    ParticleBlock, RecoveryKind, SensorFrame,
+    Action, ControlMode, DetectionBelief, Entry, FaultBelief, MODE_BLIND, MODE_MULTIPLE,
+    MODE_UNKNOWN, ParticleBlock, RecoveryKind, SensorFrame,
 };
 use vigil_detector::Detector;
 use vigil_evaluation::scoring::field::{BLIND, Moment, Told};
@@ -12,13 +12,7 @@ use vigil_evaluation::scoring::{MULTIPLE, UNKNOWN};
 use vigil_identifier::{Diagnoser, Input};
 use vigil_setup::Setup;
 use vigil_setup::schema::Sensors;
-use vigil_supervisor::{Inputs, Supervisor};
-
-/// The alarm that a user sees. The supervisor, which alone sees both stages, publishes it as
-/// `action.alarm`; until it does, the detector's stands for it.
-const fn fused_alarm(detection: &DetectionBelief, _action: &Action) -> bool {
-    detection.alarm != 0
-}
+use vigil_supervisor::{Inputs, Supervisor, fused_alarm};
 
 /// The three stages of a graph.
 pub struct Stages {
@@ -128,7 +122,7 @@ impl Stages {
             t_s,
             dt_s,
             drives,
-            alarm: fused_alarm(&self.detection, action),
+            alarm: fused_alarm(&self.detection, Some(action)),
             p_nominal: belief.p[0],
             mode: self.name(belief.mode),
             p_mode: belief.p_mode,

@@ -7,6 +7,7 @@ mod assemble;
 mod epoch;
 mod evidence;
 mod exceptions;
+mod fused;
 mod hardware;
 mod leaves;
 mod mapping;
@@ -19,6 +20,7 @@ mod told;
 mod wiring;
 
 pub use assemble::{assemble, validity_ns};
+pub use fused::fused_alarm;
 pub use mapping::{Compensation, SupervisorError};
 pub use supervisor::{Inputs, Supervisor};
 pub use wiring::SupervisorStage;

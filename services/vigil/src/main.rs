@@ -6,6 +6,7 @@ mod findings;
 mod output;
 mod pipeline;
 mod publisher;
+mod recovery;
 
 use std::process::ExitCode;
 

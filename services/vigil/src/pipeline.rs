@@ -1,15 +1,23 @@
 //! Detector and identifier over recorded runs, as they run live.
 
 use vigil_blocks::{
-    DetectionBelief, Entry, FaultBelief, MODE_MULTIPLE, MODE_UNKNOWN, ParticleBlock,
+    DetectionBelief, Entry, FaultBelief, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN, ParticleBlock,
+    SensorFrame,
 };
 use vigil_detector::{Detector, DetectorError};
 use vigil_evaluation::frames::Run;
+use vigil_evaluation::scoring::field::BLIND;
 use vigil_evaluation::scoring::{MULTIPLE, Side, Taxonomy, UNKNOWN, Verdict};
 use vigil_identifier::{Diagnoser, Identifier, IdentifierError, Input, Models, Watcher};
 use vigil_inference::FaultTree;
 use vigil_robot::{Description, nominal};
 use vigil_setup::schema;
+use vigil_supervisor::fused_alarm;
+
+use crate::recovery::{Recoverer, Recovering};
+
+/// Velocity from which a robot counts as driving, m/s and rad/s.
+const DRIVES: f64 = 0.005;
 
 /// Why a pipeline was refused.
 #[derive(Debug, thiserror::Error)]
@@ -22,8 +30,10 @@ pub enum PipelineError {
     Identifier(#[from] IdentifierError),
 }
 
-/// Detector and identifier in one process.
+/// Detector, identifier and, with a decision model, supervisor in one process.
 pub struct Pipeline {
+    robot: Description,
+    recoverer: Option<Recoverer>,
     detector: Detector,
     identifier: Diagnoser,
     taxonomy: Taxonomy,
@@ -48,7 +58,8 @@ impl Pipeline {
         Ok(Self::of(
             Detector::new(models.model, models.robot, detector, seed)?,
             Diagnoser::from(identifier),
-            Taxonomy::new(models.tree, models.robot),
+            models.tree,
+            models.robot,
         ))
     }
 
@@ -65,20 +76,34 @@ impl Pipeline {
         Ok(Self::of(
             Detector::nominal(model, robot, detector)?,
             Diagnoser::from(Watcher::new(tree)),
-            Taxonomy::new(tree, robot),
+            tree,
+            robot,
         ))
     }
 
-    fn of(detector: Detector, identifier: Diagnoser, taxonomy: Taxonomy) -> Self {
+    fn of(
+        detector: Detector,
+        identifier: Diagnoser,
+        tree: &FaultTree,
+        robot: &Description,
+    ) -> Self {
         Self {
+            taxonomy: Taxonomy::new(tree, robot),
+            robot: robot.clone(),
+            recoverer: None,
             detector,
             identifier,
-            taxonomy,
             detection: Box::default(),
             detection_particles: Box::default(),
             diagnosis: Box::default(),
             diagnosis_particles: Box::default(),
         }
+    }
+
+    /// Decides, too, what the robot is told.
+    pub fn recovering(mut self, recoverer: Option<Recoverer>) -> Self {
+        self.recoverer = recoverer;
+        self
     }
 
     /// Log-odds at which the detector's alarm rises, nats.
@@ -96,6 +121,7 @@ impl Pipeline {
     pub fn run(&mut self, run: &Run, mut take: impl FnMut(Verdict)) {
         let mut detector = self.detector.clone();
         let mut identifier = self.identifier.clone();
+        let mut recovering = self.recoverer.as_ref().and_then(Recoverer::begin);
         for frame in &run.frames {
             let (detection, particles) = (&mut *self.detection, &mut *self.detection_particles);
             detector.step(Entry::Frame(frame), detection, particles);
@@ -105,18 +131,29 @@ impl Pipeline {
             };
             let (diagnosis, particles) = (&mut *self.diagnosis, &mut *self.diagnosis_particles);
             identifier.step(Entry::Frame(input), diagnosis, particles);
-            take(self.verdict(frame.header.t_capture_ns, !detector.is_armed()));
+            (detection.header, diagnosis.header) = (frame.header, frame.header);
+            if let Some(recovering) = &mut recovering {
+                recovering.take(detection, diagnosis);
+            }
+            take(self.verdict(frame, !detector.is_armed(), recovering.as_ref()));
         }
     }
 
-    fn verdict(&self, t_ns: u64, warming_up: bool) -> Verdict {
+    fn verdict(
+        &self,
+        frame: &SensorFrame,
+        warming_up: bool,
+        recovering: Option<&Recovering<'_>>,
+    ) -> Verdict {
         let belief = &self.diagnosis;
         let name = |i: usize| self.taxonomy.name(i).unwrap_or(UNKNOWN).to_owned();
-        let mode = match belief.mode {
+        let word = |mode: u32| match mode {
             MODE_UNKNOWN => UNKNOWN.to_owned(),
             MODE_MULTIPLE => MULTIPLE.to_owned(),
+            MODE_BLIND => BLIND.to_owned(),
             node => name(node as usize),
         };
+        let velocity = self.robot.twist(&frame.command);
         let leaves = belief.sets[0].leaves;
         let members: Vec<String> = (1..u64::BITS as usize)
             .filter(|i| leaves >> i & 1 == 1)
@@ -124,12 +161,12 @@ impl Pipeline {
             .collect();
         let stuck = |side| any_of(belief, self.taxonomy.leaves("stuck", side));
         Verdict {
-            t_s: t_ns as f64 / 1e9,
+            t_s: frame.header.t_capture_ns as f64 / 1e9,
             p_fault: self.detection.p_fault,
             log_odds: self.detection.log_odds,
-            alarm: self.detection.alarm != 0,
+            alarm: fused_alarm(&self.detection, recovering.map(Recovering::action)),
             warming_up,
-            mode,
+            mode: word(belief.mode),
             p_mode: belief.p_mode,
             p_unknown: belief.p_unknown,
             fault_set: if members.is_empty() {
@@ -140,6 +177,9 @@ impl Pipeline {
             p_left_stuck: stuck(Side::Left),
             p_right_stuck: stuck(Side::Right),
             p_nodes: belief.p[..(belief.node_count as usize).min(belief.p.len())].to_vec(),
+            reported: word(belief.reported),
+            action: recovering.map_or_else(String::new, Recovering::name),
+            drives: velocity.iter().any(|value| value.abs() >= DRIVES),
         }
     }
 }

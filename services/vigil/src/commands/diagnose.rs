@@ -21,7 +21,7 @@ pub struct Args {
 }
 
 /// Header of the verdicts.
-const COLUMNS: [&str; 10] = [
+const COLUMNS: [&str; 13] = [
     "run",
     "t",
     "p_fault",
@@ -32,6 +32,9 @@ const COLUMNS: [&str; 10] = [
     "fault_set",
     "p_left_stuck",
     "p_right_stuck",
+    "reported",
+    "reason",
+    "action",
 ];
 
 /// Writes the verdicts.
@@ -68,7 +71,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     Ok(Outcome::Done)
 }
 
-fn row(run: u32, verdict: &Verdict) -> [String; 10] {
+fn row(run: u32, verdict: &Verdict) -> [String; 13] {
     let p = |value: f64| format!("{value:.6}");
     [
         run.to_string(),
@@ -81,5 +84,8 @@ fn row(run: u32, verdict: &Verdict) -> [String; 10] {
         verdict.fault_set.clone(),
         p(verdict.p_left_stuck),
         p(verdict.p_right_stuck),
+        verdict.reported.clone(),
+        String::new(),
+        verdict.action.clone(),
     ]
 }

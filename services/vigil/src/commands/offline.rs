@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::PossibleValuesParser;
 use serde::Serialize;
+use vigil_decision::Pomdp;
 use vigil_evaluation::frames::{self, Run};
 use vigil_identifier::Models;
 use vigil_inference::FaultTree;
@@ -14,6 +15,10 @@ use vigil_setup::{load_decision, load_robot, load_tree};
 
 use super::CommandError;
 use crate::pipeline::Pipeline;
+use crate::recovery::Recoverer;
+
+/// Decision model of a robot with faults unless another is given.
+const DECISION: &str = "config/rover.pomdp";
 
 /// Sets of channels, as `--sensors` names them.
 pub const SENSOR_SETS: [&str; 2] = ["pose", "pose+encoders"];
@@ -73,9 +78,10 @@ pub struct FilterArgs {
     /// Fault tree (TOML); a nominal model needs none.
     #[arg(long, value_name = "F", default_value = "config/trees/rover.toml")]
     tree: PathBuf,
-    /// Decision model (`.pomdp`), read for `--identifier risk-sensitive` only.
-    #[arg(long, value_name = "F", default_value = "config/rover.pomdp")]
-    decision: PathBuf,
+    /// Decision model (`.pomdp`): what the robot would be told. A model with faults uses
+    /// config/rover.pomdp unless another is given; one of nominal behaviour alone decides nothing.
+    #[arg(long, value_name = "F")]
+    decision: Option<PathBuf>,
 }
 
 /// What was used, for the record.
@@ -171,7 +177,7 @@ impl FilterArgs {
     /// Detector and identifier with the settings given, but for channels and filter.
     pub fn pipeline(
         &self,
-        model: &RobotModel,
+        learned: &RobotModel,
         robot: &Description,
         tree: &FaultTree,
         sensors: &str,
@@ -186,10 +192,12 @@ impl FilterArgs {
         let refuse = |error: &dyn std::fmt::Display| {
             CommandError::usage(format!("{}: {error}", self.model.display()))
         };
-        let model = match model {
+        let model = match learned {
             RobotModel::Faults(model) => model,
             RobotModel::Nominal(model) => {
-                return Pipeline::nominal(model, robot, tree, &detector).map_err(|e| refuse(&e));
+                let pipeline = Pipeline::nominal(model, robot, tree, &detector);
+                let recoverer = self.recoverer(learned, robot, tree)?;
+                return Ok(pipeline.map_err(|e| refuse(&e))?.recovering(recoverer));
             }
         };
         let identifier = schema::Identifier {
@@ -198,15 +206,57 @@ impl FilterArgs {
             ..schema::Identifier::default()
         };
         let needs_decision = identifier.filter == IdentifierFilter::RiskSensitive;
-        let decision = needs_decision.then(|| load_decision(&self.decision));
-        let decision = decision.transpose().map_err(CommandError::usage)?;
+        let decision = match needs_decision {
+            true => self.decision(learned)?,
+            false => None,
+        };
         let models = Models {
             model,
             robot,
             tree,
             decision: decision.as_ref(),
         };
-        Pipeline::new(&models, &detector, &identifier, self.seed).map_err(|e| refuse(&e))
+        let pipeline = Pipeline::new(&models, &detector, &identifier, self.seed);
+        let recoverer = self.recoverer(learned, robot, tree)?;
+        Ok(pipeline.map_err(|e| refuse(&e))?.recovering(recoverer))
+    }
+
+    /// The decision model given, or the rover's for a model with faults.
+    fn decision(&self, learned: &RobotModel) -> Result<Option<Pomdp>, CommandError> {
+        let usual = match learned {
+            RobotModel::Faults(_) => Some(Path::new(DECISION)),
+            RobotModel::Nominal(_) => None,
+        };
+        let path = self.decision.as_deref().or(usual);
+        let decision = path.map(load_decision).transpose();
+        decision.map_err(CommandError::usage)
+    }
+
+    /// The supervisor of a decision model. One that was not asked for and does not fit this robot
+    /// is left out: another robot than the rover has its own.
+    fn recoverer(
+        &self,
+        learned: &RobotModel,
+        robot: &Description,
+        tree: &FaultTree,
+    ) -> Result<Option<Recoverer>, CommandError> {
+        if self.decision.is_none() && !Path::new(DECISION).is_file() {
+            return Ok(None);
+        }
+        let Some(decision) = self.decision(learned)? else {
+            return Ok(None);
+        };
+        match (
+            Recoverer::new(decision, tree, robot, learned),
+            &self.decision,
+        ) {
+            (Ok(recoverer), _) => Ok(Some(recoverer)),
+            (Err(_), None) => Ok(None),
+            (Err(error), Some(path)) => {
+                let message = format!("--decision {}: {error}", path.display());
+                Err(CommandError::usage(message))
+            }
+        }
     }
 }
 

@@ -25,10 +25,14 @@
 //! All runs count; what is not seen is missed. While nothing valid comes in, `BLIND` is neither
 //! right nor wrong.
 
+#[cfg(test)]
+mod cases;
 mod figures;
+mod recorded;
 mod run;
 
 pub use figures::{Figure, Worst, figures};
+pub use recorded::{Figures, SAFE_STOP, of_cases};
 pub use run::{Actions, Changes, End, Onset, Run, Scorer, Seen};
 
 use super::Taxonomy;

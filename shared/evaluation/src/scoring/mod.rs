@@ -79,6 +79,13 @@ pub struct Verdict {
     pub p_right_stuck: f64,
     /// Probability of every node of the tree, in its order.
     pub p_nodes: Vec<f64>,
+    /// Mode with hysteresis, named as `mode` is.
+    pub reported: String,
+    /// What the robot is told, and the wheel that it is about after a colon; empty if nothing is
+    /// decided.
+    pub action: String,
+    /// True if the robot is told to move.
+    pub drives: bool,
 }
 
 /// One run: what was true and what was reported.
@@ -143,6 +150,8 @@ pub struct Score {
     pub calibration: BTreeMap<String, Calibration>,
     /// Detection delay against false alarms over all thresholds of the detector.
     pub trade_off: TradeOff,
+    /// What is said and done at every instant, by class: see [`field`].
+    pub field: BTreeMap<String, field::Figures>,
 }
 
 /// Scores runs. `alarm_log_odds`: the detector's threshold, nats.
@@ -184,5 +193,6 @@ pub fn score(cases: &[Case], taxonomy: &Taxonomy, alarm_log_odds: f64) -> Score 
         },
         calibration: calibration.collect(),
         trade_off: TradeOff::of(cases, taxonomy, alarm_log_odds),
+        field: field::of_cases(cases, taxonomy),
     }
 }

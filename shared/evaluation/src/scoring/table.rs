@@ -34,18 +34,65 @@ impl fmt::Display for Score {
                 "\nleaf, side, type and their calibration do not apply: the model is of nominal \
                  behaviour alone"
             )?;
-            return self.confusion_table(f);
+            self.confusion_table(f)?;
+            return self.field_table(f);
         }
         for what in ["leaf", "side", "type", "unknown"] {
             self.identification_table(f, what)?;
         }
         self.isolation_table(f)?;
         self.confusion_table(f)?;
-        self.calibration_table(f)
+        self.calibration_table(f)?;
+        self.field_table(f)
     }
 }
 
+/// Figures of every instant that the tables show; the document has all.
+const FIELD: [&str; 13] = [
+    "right_share",
+    "right_side_share",
+    "wrong_s",
+    "mode_changes_per_min",
+    "reported_changes_per_min",
+    "settled_mode_changes_per_min",
+    "alarms_per_h",
+    "actions_per_h",
+    "slow_per_h",
+    "stop_per_h",
+    "help_per_h",
+    "other_per_h",
+    "contradiction_s",
+];
+
 impl Score {
+    fn field_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let heads = ["every instant", "class", "value", "95 %", "worst (run)"];
+        let [figure, class, value, bounds, worst] = heads;
+        write!(
+            f,
+            "\n\n{figure:<30} {class:<10} {value:>9} {bounds:>20} {worst:>16}"
+        )?;
+        for name in FIELD {
+            for (class, figures) in self.field.iter().filter(|(class, _)| *class == "all") {
+                let Some(figure) = figures.get(name) else {
+                    continue;
+                };
+                let text = |value: Option<f64>| value.map_or("-".into(), |x| format!("{x:.3}"));
+                let both = figure.lower_95.zip(figure.upper_95);
+                let both = both.map_or("-".into(), |(a, b)| format!("{a:.3} to {b:.3}"));
+                let worst = figure.worst.map_or("-".into(), |worst| {
+                    format!("{} ({})", text(worst.value), worst.seed)
+                });
+                let value = text(figure.value);
+                write!(
+                    f,
+                    "\n{name:<30} {class:<10} {value:>9} {both:>20} {worst:>16}"
+                )?;
+            }
+        }
+        Ok(())
+    }
+
     fn detection_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let found = &self.false_alarms;
         let (alarms, exposure_h) = (found.alarms, found.exposure_h);

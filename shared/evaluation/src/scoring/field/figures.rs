@@ -22,7 +22,8 @@ pub struct Worst {
 /// A figure over all runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figure {
-    /// Its name; the unit is last.
+    /// Its name; the unit is last. Documents have it as their key.
+    #[serde(skip)]
     pub name: &'static str,
     /// Its value; missing where something never happened.
     pub value: Option<f64>,
@@ -48,6 +49,12 @@ impl Figure {
             n,
             worst: None,
         }
+    }
+
+    /// True if it is about what the robot was told.
+    pub(super) fn is_of_actions(&self) -> bool {
+        let heads = ["actions", "slow", "stop", "help", "other", "blind_stops"];
+        heads.iter().any(|head| self.name.starts_with(head))
     }
 
     fn with_worst(mut self, worst: Option<(f64, u64)>) -> Self {

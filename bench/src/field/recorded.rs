@@ -1,0 +1,292 @@
+//! Recorded runs as scenarios: the rover's, and logs of real robots.
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use vigil_evaluation::scoring::Taxonomy;
+use vigil_evaluation::scoring::field::{Scorer, Stretch, Truth};
+use vigil_evaluation::{frames, labels, learning_nominal};
+use vigil_robot::RobotModel;
+use vigil_setup::schema::Sensors;
+use vigil_setup::{GraphArgs, Setup, load_robot};
+
+use super::frames::{Fate, Way};
+use super::ground::stream;
+use super::run::{Job, Scored, Watch};
+use super::scenario::Scenario;
+use crate::real;
+use crate::simulated::{SENSOR_SETS, Stages};
+
+/// Velocity from which a robot counts as driving, m/s and rad/s.
+const DRIVES: f64 = 0.005;
+
+/// Which recorded runs.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    /// `left-out` (the third of the rover's learn runs that was left out), `grounds` (the rover on
+    /// other grounds), `kobuki`, `husky`.
+    pub log: String,
+    /// Only runs on this ground.
+    pub ground: Option<String>,
+    /// Only runs whose label has this kind (`nominal`, `stuck`, `encoder`).
+    pub class: Option<String>,
+    /// Of logs that are learned from, too: which half is judged, 0 or 1, by the model of the other.
+    pub half: Option<usize>,
+}
+
+/// A run, and what is true in it.
+#[derive(Debug, Clone)]
+struct Case {
+    run: frames::Run,
+    ground: String,
+    /// The leaf, and since when, s.
+    fault: Option<(String, f64)>,
+}
+
+/// The runs of one scenario, and who watches them.
+#[derive(Debug, Clone)]
+pub struct Material {
+    setup: Setup,
+    taxonomy: Taxonomy,
+    cases: Vec<Case>,
+}
+
+/// The runs of every scenario, by the scenario's name.
+pub type Library = BTreeMap<String, Material>;
+
+/// Reads what the scenarios name; nothing without `VIGIL_DATA`, which is said.
+///
+/// # Errors
+/// What is missing or malformed.
+pub fn library(root: &Path, scenarios: &[&Scenario]) -> Result<Library, Box<dyn Error>> {
+    let named = scenarios
+        .iter()
+        .filter_map(|s| Some((s, s.recorded.as_ref()?)));
+    let Ok(data) = std::env::var("VIGIL_DATA") else {
+        for (scenario, _) in named {
+            eprintln!("field: {} is SKIPPED: VIGIL_DATA is not set", scenario.name);
+        }
+        return Ok(Library::new());
+    };
+    let data = PathBuf::from(data);
+    let (mut library, mut read) = (Library::new(), BTreeMap::new());
+    for (scenario, source) in named {
+        let key = (source.log.clone(), source.half);
+        if !read.contains_key(&key) {
+            read.insert(key.clone(), material(root, &data, source)?);
+        }
+        let Some(whole) = read.get(&key) else {
+            continue;
+        };
+        let mut mine = whole.clone();
+        mine.cases.retain(|case| source.takes(case, &mine.taxonomy));
+        if mine.cases.is_empty() {
+            return Err(format!("{}: there is no such recorded run", scenario.name).into());
+        }
+        library.insert(scenario.name.clone(), mine);
+    }
+    Ok(library)
+}
+
+impl Source {
+    fn takes(&self, case: &Case, taxonomy: &Taxonomy) -> bool {
+        let of_fault = |(leaf, _): &(String, f64)| taxonomy.class_or_unmodelled(leaf).to_owned();
+        let class = case.fault.as_ref().map_or("nominal".to_owned(), of_fault);
+        let is = |wanted: &Option<String>, found: &str| {
+            wanted.as_deref().is_none_or(|wanted| wanted == found)
+        };
+        is(&self.ground, &case.ground) && is(&self.class, &class)
+    }
+}
+
+impl Material {
+    /// Number of runs.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.cases.len()
+    }
+
+    /// True without a run.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.cases.is_empty()
+    }
+}
+
+fn graph(root: &Path, name: &str) -> Result<Setup, Box<dyn Error>> {
+    let args = GraphArgs {
+        config: root.join(format!("config/{name}.toml")),
+        ..GraphArgs::default()
+    };
+    Ok(args.load()?)
+}
+
+fn material(root: &Path, data: &Path, source: &Source) -> Result<Material, Box<dyn Error>> {
+    match source.log.as_str() {
+        "left-out" | "grounds" => rover(root, data, &source.log),
+        "kobuki" => {
+            let log = real::log("kobuki_wheel_fault", "kobuki")?;
+            let whole = log.runs.into_iter().next().ok_or("no run")?;
+            let middle = whole.frames.len() / 2;
+            let half = |id: u32, frames: &[vigil_blocks::SensorFrame]| {
+                let run = frames::Run {
+                    id,
+                    frames: frames.to_vec(),
+                };
+                ("nonfaulty".to_owned(), run)
+            };
+            let (first, second) = whole.frames.split_at(middle);
+            let halves = vec![half(0, first), half(1, second)];
+            learned(root, log.robot, halves, source.half.unwrap_or(1))
+        }
+        "husky" => {
+            let folder = real::unpacked("husky_boreal")?;
+            let robot = load_robot(&root.join("config/robots/husky.toml"))?;
+            let runs = real::husky::runs(&folder, &robot)?;
+            learned(root, robot, runs, source.half.unwrap_or(1))
+        }
+        other => Err(format!("log '{other}': allowed are left-out, grounds, kobuki, husky").into()),
+    }
+}
+
+/// The rover with its shipped model, which was learned from the other runs alone.
+fn rover(root: &Path, data: &Path, log: &str) -> Result<Material, Box<dyn Error>> {
+    let setup = graph(root, "rover")?;
+    let name = if log == "grounds" {
+        "grounds_dev"
+    } else {
+        "learn"
+    };
+    let at = |kind: &str| data.join("rover").join(format!("{name}_{kind}"));
+    let runs = frames::read(&at("frames.csv.gz"), &setup.robot)?;
+    let labelled = labels::read(&at("runs.csv"), &setup.robot)?;
+    let labelled: BTreeMap<u32, _> = labelled.into_iter().map(|l| (l.run, l)).collect();
+    let left_out = &setup.model.provenance().runs_held_out;
+    let mut cases = Vec::new();
+    for run in runs {
+        if log == "left-out" && !left_out.contains(&run.id) {
+            continue;
+        }
+        let label = labelled.get(&run.id).ok_or("a run has no label")?;
+        cases.push(Case {
+            ground: labels::terrain(&at("runs.csv"), &[run.id])?,
+            fault: label.onset_s.map(|onset_s| (label.mode.clone(), onset_s)),
+            run,
+        });
+    }
+    Ok(Material {
+        taxonomy: Taxonomy::new(&setup.tree, &setup.robot),
+        setup,
+        cases,
+    })
+}
+
+/// A robot learned from every second run; the others are judged.
+fn learned(
+    root: &Path,
+    robot: vigil_robot::Description,
+    runs: Vec<(String, frames::Run)>,
+    judged: usize,
+) -> Result<Material, Box<dyn Error>> {
+    let mut setup = graph(root, "kobuki")?;
+    let is_judged = |run: &frames::Run| run.id as usize % 2 == judged;
+    let others = runs.iter().filter(|(_, run)| !is_judged(run));
+    let others: Vec<frames::Run> = others.map(|(_, run)| run.clone()).collect();
+    let (model, _) = learning_nominal::learn(&others, &[], f64::INFINITY, &robot)?;
+    let cases = runs.into_iter().filter(|(_, run)| is_judged(run));
+    let cases = cases.map(|(ground, run)| Case {
+        run,
+        ground,
+        fault: None,
+    });
+    setup.model = RobotModel::Nominal(Box::new(model));
+    setup.robot = robot;
+    Ok(Material {
+        cases: cases.collect(),
+        taxonomy: Taxonomy::new(&setup.tree, &setup.robot),
+        setup,
+    })
+}
+
+impl Case {
+    fn truth(&self, sensors: Sensors, taxonomy: &Taxonomy) -> Vec<Stretch> {
+        let begins = Stretch {
+            from_s: f64::NEG_INFINITY,
+            truth: Truth::Healthy,
+        };
+        // By the pose alone nothing can be seen of an encoder.
+        let sees = |leaf: &str| {
+            sensors == Sensors::PoseEncoders || taxonomy.class(leaf) != Some("encoder")
+        };
+        let fault = self.fault.as_ref().filter(|(leaf, _)| sees(leaf));
+        let breaks = fault.map(|(leaf, from_s)| Stretch {
+            from_s: *from_s,
+            truth: match taxonomy.index(leaf) {
+                Some(_) => Truth::Faults(vec![leaf.clone()]),
+                None => Truth::Unmodelled { own: None },
+            },
+        });
+        std::iter::once(begins).chain(breaks).collect()
+    }
+
+    /// Usual time between frames, s.
+    fn period_s(&self) -> f64 {
+        let t_s = |i: usize| self.run.frames[i].header.t_capture_ns as f64 * 1e-9;
+        let mut apart: Vec<f64> = (1..self.run.frames.len())
+            .map(|i| t_s(i) - t_s(i - 1))
+            .collect();
+        crate::quantile(&mut apart, 0.5)
+    }
+}
+
+/// Plays a recorded run to every set of sensors.
+///
+/// # Errors
+/// Stages that cannot be made.
+pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<Scored>, Box<dyn Error>> {
+    let Material {
+        setup,
+        taxonomy,
+        cases,
+    } = material;
+    let case = cases.get(job.run).ok_or("there is no such run")?;
+    let mut scored = Vec::new();
+    for (sensors, name) in SENSOR_SETS {
+        if !job.scenario.sensors.iter().any(|asked| asked == name) {
+            continue;
+        }
+        let period_s = case.period_s();
+        let seed = u64::from(case.run.id);
+        let truth = case.truth(sensors, taxonomy);
+        let mut watch = Watch {
+            stages: Stages::new(setup, sensors, 1.0 / period_s, seed)?,
+            scorer: Scorer::new(&truth, taxonomy, seed),
+        };
+        let rate = (1.0 / period_s, 0.0);
+        let mut rng = stream(job.scenario.first_seed + seed, 4);
+        let later_s = job.scenario.spread_s * rand::RngExt::random::<f64>(&mut rng);
+        let frames = &job.scenario.frames;
+        let mut way = Way::new(frames, &setup.robot, rate, (job.run, later_s), rng);
+        let (mut t_before_s, mut held) = (None, None);
+        for frame in &case.run.frames {
+            let t_s = frame.header.t_capture_ns as f64 * 1e-9;
+            let fate = way.fate(t_s);
+            watch.deliver(frame, fate, held.as_ref());
+            held = (fate == Fate::Overtaken).then_some(*frame);
+            let velocity = setup.robot.twist(&frame.command);
+            let drives = velocity.iter().any(|value| value.abs() >= DRIVES);
+            let dt_s = t_s - t_before_s.unwrap_or(t_s);
+            let moment = watch.stages.moment(t_s, dt_s, drives);
+            watch.scorer.take(&moment);
+            t_before_s = Some(t_s);
+        }
+        scored.push(Scored {
+            sensors: name,
+            run: watch.scorer.finish(),
+        });
+    }
+    Ok(scored)
+}
