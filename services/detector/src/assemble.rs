@@ -2,6 +2,7 @@
 
 use vigil_robot::RobotModel;
 use vigil_setup::Setup;
+use vigil_setup::schema::Source;
 
 use crate::{Detector, DetectorError};
 
@@ -17,5 +18,9 @@ pub fn assemble(setup: &Setup) -> Result<Detector, DetectorError> {
         }
         RobotModel::Nominal(model) => Detector::nominal(model, &setup.robot, &file.detector),
     }?;
+    // Recorded frames come at the recording's pace, times the speed.
+    let judges_clock = file.sensor.source != Source::Playback;
+    let period_s = setup.period_ns() as f64 * 1e-9;
+    let detector = detector.in_graph(period_s, judges_clock);
     Ok(detector.with_monitors(file.monitors.as_ref()))
 }

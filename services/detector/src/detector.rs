@@ -1,7 +1,8 @@
 //! The detector's `step`: guard, observe, monitor, alarm, report.
 
 use vigil_blocks::{
-    Channel, DetectionBelief, Entry, PARTICLE_CAPACITY, ParticleBlock, SensorFrame, Symptoms,
+    Channel, DetectionBelief, Entry, PARTICLE_CAPACITY, ParticleBlock, Readiness, SensorFrame,
+    Symptoms, Valid,
 };
 use vigil_inference::ending::Ending;
 use vigil_inference::logspace::probability;
@@ -14,6 +15,7 @@ use vigil_setup::schema;
 
 use crate::cloud::Cloud;
 use crate::monitors::Monitors;
+use crate::sight::{self, Sight};
 use crate::watch::{Observed, Watch};
 
 /// Without monitors, pose log-odds beyond which the detector reports an error in position.
@@ -56,6 +58,9 @@ pub struct Detector {
     log_odds: f64,
     particles: usize,
     armed: bool,
+    /// Whether the last observation was of a robot in motion.
+    moving: bool,
+    sight: Sight,
     period_s: f64,
     t_last_ns: u64,
     run_id: u64,
@@ -88,13 +93,18 @@ impl Detector {
         let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
         let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
-        Self::watching(model.interval_s, alarm_log_odds, settings, |particles| {
-            Watch::Faults {
+        let sight = sight_of(robot, settings);
+        Self::watching(
+            model.interval_s,
+            alarm_log_odds,
+            settings,
+            sight,
+            |particles| Watch::Faults {
                 observer: Box::new(Observer::new(model, robot)),
                 monitor: Box::new(Monitor::new(model, robot, channels, form, rate)),
                 cloud: Cloud::new(particles, seed),
-            }
-        })
+            },
+        )
     }
 
     /// A detector for a robot of which only the nominal behaviour is known.
@@ -111,7 +121,8 @@ impl Detector {
         let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
         let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
-        Self::watching(model.interval_s, alarm_log_odds, settings, |_| {
+        let sight = sight_of(robot, settings);
+        Self::watching(model.interval_s, alarm_log_odds, settings, sight, |_| {
             Watch::Nominal {
                 observer: Box::new(nominal::Observer::new(robot)),
                 monitor: Box::new(nominal::Monitor::new(model, channels, form, rate)),
@@ -124,6 +135,7 @@ impl Detector {
         interval_s: f64,
         alarm_log_odds: f64,
         settings: &schema::Detector,
+        sight: Sight,
         watch: impl FnOnce(usize) -> Watch,
     ) -> Result<Self, DetectorError> {
         if !(1..=PARTICLE_CAPACITY).contains(&settings.particles) {
@@ -139,6 +151,8 @@ impl Detector {
             ending: Ending::new(APPEARS_AGAIN_1_S, ENDS_1_S),
             particles,
             armed: false,
+            moving: false,
+            sight,
             period_s: interval_s,
             t_last_ns: 0,
             run_id: 0,
@@ -158,6 +172,19 @@ impl Detector {
     pub fn with_monitors(mut self, settings: Option<&schema::Monitors>) -> Self {
         self.monitors = settings.map(Monitors::new);
         self
+    }
+
+    /// The same detector in a graph of this period, s: it tells when it sees nothing by the graph's
+    /// time; see [`Sight::in_graph`].
+    #[must_use]
+    pub fn in_graph(mut self, period_s: f64, judges_clock: bool) -> Self {
+        self.sight = self.sight.in_graph(period_s, judges_clock);
+        self
+    }
+
+    /// A frame came, and the border refused it: an entry of the journal that changes no belief.
+    pub const fn refuse(&mut self) {
+        self.sight.refuse();
     }
 
     /// True with monitors of the planned pose.
@@ -197,8 +224,14 @@ impl Detector {
     ) {
         let mut missed = 0;
         match entry {
-            Entry::Frame(frame) => self.take(frame),
-            Entry::Missed(count) => missed = count,
+            Entry::Frame(frame) => {
+                self.sight.take(frame);
+                self.take(frame);
+            }
+            Entry::Missed(count) => {
+                self.sight.miss(count);
+                missed = count;
+            }
             Entry::Budget(count) => {
                 let count = (count as usize).clamp(1, self.particles);
                 self.watch.resize(count);
@@ -221,7 +254,7 @@ impl Detector {
 
     fn begin_run(&mut self) {
         self.watch.reset();
-        self.armed = false;
+        (self.armed, self.moving) = (false, false);
         self.alarm.reset();
         self.log_odds = self.watch.report().log_odds;
         (self.alarm_t_ns, self.symptoms) = (0, 0);
@@ -256,6 +289,7 @@ impl Detector {
     fn observe(&mut self) {
         let observation = self.watch.step(self.alarm.stands());
         let moving = observation.moving;
+        self.moving = moving;
         if !self.armed {
             // Evidence from before the noise scale is known is no evidence.
             self.armed = self.watch.is_ready();
@@ -336,6 +370,12 @@ impl Detector {
         belief.symptoms = self.symptoms | self.external;
         (belief.action_seq, belief.action_outcome) = self.obeyed;
         belief.invalid_count = self.invalid_count;
+        belief.blind = self.sight.blind().map_or(0, |cause| cause as u32);
+        belief.readiness = match (self.armed, self.moving) {
+            (false, _) => Readiness::Arming,
+            (true, true) => Readiness::Armed,
+            (true, false) => Readiness::NotExcited,
+        } as u32;
         belief.degenerate_count = report.degenerate_count;
         belief.particle_count = self.watch.cloud().map_or(0, Cloud::len) as u32;
     }
@@ -350,6 +390,16 @@ impl Detector {
 
 fn chosen(settings: &schema::Detector) -> (Channels, Form) {
     (settings.sensors.into(), settings.form.into())
+}
+
+/// What frames of `robot` must carry for these settings.
+fn sight_of(robot: &Description, settings: &schema::Detector) -> Sight {
+    let channels = match settings.sensors {
+        schema::Sensors::Pose => Valid::POSE,
+        schema::Sensors::PoseEncoders => sight::all_channels(robot.wheels.len()),
+    };
+    let axes = 0..robot.command.len();
+    Sight::new(channels, axes.fold(0, |bits, i| bits | Valid::command(i)))
 }
 
 fn positive(key: &'static str, value: f64) -> Result<f64, DetectorError> {

@@ -6,10 +6,12 @@ mod assemble;
 mod cloud;
 mod detector;
 mod monitors;
+mod sight;
 mod watch;
 pub mod wiring;
 
 pub use assemble::assemble;
 pub use detector::{Detector, DetectorError};
 pub use monitors::Monitors;
+pub use sight::Sight;
 pub use wiring::DetectorStage;

@@ -1,6 +1,8 @@
 //! The detector at its ports.
 
-use vigil_blocks::{Cause, DetectionBelief, Entry, EventKind, ParticleBlock, SensorFrame};
+use vigil_blocks::{
+    Cause, DetectionBelief, Entry, EventKind, ParticleBlock, Readiness, SensorFrame,
+};
 use vigil_cycle::{
     Clock, Graph, HealthBoard, Intake, PortError, Receiver, Sender, Stage, Stamp, Topic, Writer,
 };
@@ -8,6 +10,9 @@ use vigil_cycle::{
 use vigil_robot::{Description, FrameGuard};
 
 use crate::Detector;
+
+/// A robot at rest is told of after so long, ns: one that turns round does not count.
+const REST_NS: u64 = 1_000_000_000;
 
 /// The detector as a stage of the graph: sensor frames in, belief and particles out.
 pub struct DetectorStage {
@@ -23,6 +28,57 @@ pub struct DetectorStage {
     p_fault: f64,
     symptoms: u32,
     symptoms_told: u32,
+    watch: Watch,
+}
+
+/// What the timeline says about sight and readiness.
+#[derive(Debug, Clone, Copy, Default)]
+struct Watch {
+    blind: u32,
+    blind_told: u32,
+    blind_since_ns: u64,
+    readiness: u32,
+    armed_told: bool,
+    /// Since when the robot rests, ns, and whether that was told.
+    rest_ns: Option<u64>,
+    rest_told: bool,
+}
+
+impl Watch {
+    fn tell(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        if self.blind != self.blind_told {
+            if self.blind_told == 0 {
+                self.blind_since_ns = now_ns;
+            }
+            if self.blind == 0 {
+                let blind_ns = now_ns.saturating_sub(self.blind_since_ns);
+                health.event(now_ns, EventKind::BlindEnds, 0, 0.0, blind_ns);
+            } else {
+                health.event(now_ns, EventKind::Blind, self.blind, 0.0, 0);
+            }
+            self.blind_told = self.blind;
+        }
+        // Who sees nothing does not know whether the robot stands.
+        let is_blind = self.blind != 0;
+        let readiness = Readiness::from_wire(self.readiness).filter(|_| !is_blind);
+        let is_armed = matches!(readiness, Some(Readiness::Armed | Readiness::NotExcited));
+        if is_armed && !self.armed_told {
+            health.event(now_ns, EventKind::Armed, 0, 0.0, 0);
+        }
+        self.armed_told = is_armed || is_blind && self.armed_told;
+        if readiness == Some(Readiness::NotExcited) {
+            let since_ns = *self.rest_ns.get_or_insert(now_ns);
+            if !self.rest_told && now_ns.saturating_sub(since_ns) >= REST_NS {
+                health.event(now_ns, EventKind::NotExcited, 0, 0.0, 0);
+                self.rest_told = true;
+            }
+            return;
+        }
+        self.rest_ns = None;
+        if std::mem::take(&mut self.rest_told) {
+            health.event(now_ns, EventKind::Excited, 0, 0.0, 0);
+        }
+    }
 }
 
 impl DetectorStage {
@@ -43,6 +99,7 @@ impl DetectorStage {
             p_fault: 0.0,
             symptoms: 0,
             symptoms_told: 0,
+            watch: Watch::default(),
         })
     }
 }
@@ -58,7 +115,9 @@ impl Stage for DetectorStage {
                 break;
             };
             let content = || self.guard.check(&frame);
-            if intake.admit::<SensorFrame>(&frame.header, content) {
+            if !intake.admit::<SensorFrame>(&frame.header, content) {
+                self.detector.refuse();
+            } else {
                 let (belief, particles) = (self.belief.block(), self.particles.block());
                 let before = std::mem::replace(&mut self.epoch, frame.header.epoch);
                 if before != 0 && before != self.epoch {
@@ -81,6 +140,7 @@ impl Stage for DetectorStage {
         belief.cause = cause;
         (self.alarm, self.p_fault) = (belief.alarm != 0, belief.p_fault);
         self.symptoms = belief.symptoms;
+        (self.watch.blind, self.watch.readiness) = (belief.blind, belief.readiness);
         self.particles.block().cause = cause;
         // Particles first: they are there when the belief wakes the identifier.
         self.particles.send(stamp, clock)?;
@@ -111,6 +171,7 @@ impl Stage for DetectorStage {
     }
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        self.watch.tell(health, now_ns);
         if self.detector.is_monitoring() && self.symptoms != self.symptoms_told {
             health.event(now_ns, EventKind::Symptoms, self.symptoms, 0.0, 0);
             self.symptoms_told = self.symptoms;

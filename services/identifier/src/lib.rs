@@ -3,6 +3,7 @@
 //! [`Identifier`] is a pure function of journal entries; [`wiring`] connects it to its ports.
 
 mod assemble;
+mod blindfold;
 mod draw;
 mod encoders;
 mod engine;

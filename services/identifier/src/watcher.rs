@@ -3,6 +3,7 @@
 use vigil_blocks::{DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, ParticleBlock};
 use vigil_inference::FaultTree;
 
+use crate::blindfold::Blindfold;
 use crate::posterior::Posterior;
 
 use crate::{Identifier, Input};
@@ -107,9 +108,15 @@ impl Watcher {
     }
 }
 
-/// An identifier of either kind.
+/// An identifier of either kind, which says so while the detector is blind.
 #[derive(Debug, Clone)]
-pub enum Diagnoser {
+pub struct Diagnoser {
+    of: Of,
+    blindfold: Blindfold,
+}
+
+#[derive(Debug, Clone)]
+enum Of {
     /// Tells faults apart.
     Identifier(Box<Identifier>),
     /// Tells nominal from unknown.
@@ -120,9 +127,9 @@ impl Diagnoser {
     /// Particles configured; 0 without any.
     #[must_use]
     pub fn particles(&self) -> u32 {
-        match self {
-            Self::Identifier(identifier) => identifier.particles(),
-            Self::Watcher(_) => 0,
+        match &self.of {
+            Of::Identifier(identifier) => identifier.particles(),
+            Of::Watcher(_) => 0,
         }
     }
 
@@ -135,21 +142,41 @@ impl Diagnoser {
         belief: &mut FaultBelief,
         particles: &mut ParticleBlock,
     ) {
-        match self {
-            Self::Identifier(identifier) => identifier.step(entry, belief, particles),
-            Self::Watcher(watcher) => watcher.step(entry, belief, particles),
+        if let Entry::Frame(Input {
+            detection: Some((detection, _)),
+            ..
+        }) = entry
+        {
+            self.look(detection);
         }
+        match &mut self.of {
+            Of::Identifier(identifier) => identifier.step(entry, belief, particles),
+            Of::Watcher(watcher) => watcher.step(entry, belief, particles),
+        }
+        self.blindfold.cover(belief);
+    }
+
+    /// Takes a detection without a frame behind it: of its words, only those of the detector's
+    /// sight count.
+    pub const fn look(&mut self, detection: &DetectionBelief) {
+        self.blindfold.look(detection);
     }
 }
 
 impl From<Watcher> for Diagnoser {
     fn from(watcher: Watcher) -> Self {
-        Self::Watcher(Box::new(watcher))
+        Self {
+            of: Of::Watcher(Box::new(watcher)),
+            blindfold: Blindfold::default(),
+        }
     }
 }
 
 impl From<Identifier> for Diagnoser {
     fn from(identifier: Identifier) -> Self {
-        Self::Identifier(Box::new(identifier))
+        Self {
+            of: Of::Identifier(Box::new(identifier)),
+            blindfold: Blindfold::default(),
+        }
     }
 }

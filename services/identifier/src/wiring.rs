@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 
 use vigil_blocks::{
-    Cause, CauseKind, DetectionBelief, Entry, EventKind, FaultBelief, ParticleBlock, SensorFrame,
+    Cause, CauseKind, DetectionBelief, Entry, EventKind, FaultBelief, MODE_BLIND, ParticleBlock,
+    SensorFrame,
 };
 use vigil_cycle::{
     Clock, Graph, HealthBoard, InputAccount, Intake, PortError, Receiver, Sender, Stage, Stamp,
@@ -37,6 +38,8 @@ pub struct IdentifierStage {
     particles: Box<dyn Sender<ParticleBlock>>,
     reported: Reported,
     told: u32,
+    /// The mode that was told last. That nothing is seen, the detector tells.
+    told_mode: u32,
 }
 
 /// What the last belief said, for the timeline.
@@ -74,6 +77,7 @@ impl IdentifierStage {
             particles: graph.sender(Topic::DiagnosisParticles)?,
             reported: Reported::default(),
             told: 0,
+            told_mode: 0,
         })
     }
 
@@ -163,6 +167,7 @@ impl Stage for IdentifierStage {
             if !intake.accept::<DetectionBelief>(&header) {
                 continue;
             }
+            self.identifier.look(detection);
             let newest = (header.epoch, header.seq);
             let before = std::mem::replace(&mut self.detection, newest);
             // Nobody knows what a detection that was lost on its way has folded.
@@ -234,6 +239,10 @@ impl Stage for IdentifierStage {
             reason: (channel, evidence, runner_up),
         } = self.reported;
         if changes != self.told {
+            self.told = changes;
+            if mode == MODE_BLIND || mode == std::mem::replace(&mut self.told_mode, mode) {
+                return;
+            }
             let kind = if mode == 0 {
                 EventKind::Cleared
             } else {
@@ -244,7 +253,6 @@ impl Stage for IdentifierStage {
                 let against = u64::from(runner_up);
                 health.event(now_ns, EventKind::Reason, channel, evidence, against);
             }
-            self.told = changes;
         }
     }
 }

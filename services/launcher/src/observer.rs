@@ -178,6 +178,13 @@ impl Observer {
         &self.timeline
     }
 
+    /// Instant at which the run ended, ns: now, unless it was closed before.
+    pub fn end_ns(&self) -> u64 {
+        self.timeline
+            .closed_ns()
+            .unwrap_or_else(|| Monotonic.now_ns())
+    }
+
     /// The services are about to be stopped: what they say of that is no event.
     /// After the end of a recording they may answer for as long as `drain`.
     pub fn close(&mut self, drain: Duration) {

@@ -100,6 +100,8 @@ pub struct Summary {
     config_hash: String,
     services: BTreeMap<&'static str, ServiceSummary>,
     end_to_end_us: Microseconds,
+    /// Per detector, how long it saw nothing, s, by cause.
+    blind: BTreeMap<&'static str, BTreeMap<&'static str, f64>>,
     events: Vec<Told>,
     events_overwritten: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -136,6 +138,8 @@ impl Summary {
                 )
             })
             .collect();
+        let blind_s = observer.timeline().blind_s(observer.end_ns());
+        let blind = (!blind_s.is_empty()).then_some((ServiceName::Detector.as_str(), blind_s));
         let end_to_end = report(ServiceName::Supervisor).map(|r| r.from_schedule.percentiles);
         Self {
             schema_version: 1,
@@ -147,6 +151,7 @@ impl Summary {
             config_hash: format!("{:016x}", plan.setup.hash),
             services,
             end_to_end_us: end_to_end.unwrap_or_default().into(),
+            blind: blind.into_iter().collect(),
             events: observer.timeline().told(),
             events_overwritten: observer.timeline().overwritten(),
             gave_up: children
@@ -155,9 +160,9 @@ impl Summary {
         }
     }
 
-    /// True if the run itself failed.
-    pub const fn failed(&self) -> bool {
-        matches!(self.ended, Ended::GaveUp | Ended::NeverReady)
+    /// True if the run itself failed, or nothing was seen for a part of it.
+    pub fn failed(&self) -> bool {
+        matches!(self.ended, Ended::GaveUp | Ended::NeverReady) || !self.blind.is_empty()
     }
 }
 
@@ -254,6 +259,13 @@ impl fmt::Display for Summary {
                 f,
                 "  latencies of a restarted service are those since its last start"
             )?;
+        }
+        for (name, causes) in &self.blind {
+            let causes = causes
+                .iter()
+                .map(|(cause, s)| format!("{s:.1} s ({cause})"));
+            let causes = causes.collect::<Vec<_>>().join(", ");
+            writeln!(f, "  {name} was blind: {causes}")?;
         }
         writeln!(f, "  timeline:")?;
         for event in &self.events {

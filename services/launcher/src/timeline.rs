@@ -1,9 +1,13 @@
 //! What happened, in order, in words.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
-use vigil_blocks::{Channel, Event, EventKind, MODE_MULTIPLE, MODE_UNKNOWN, Refusal, Rejection};
+use vigil_blocks::{
+    Blindness, Channel, Event, EventKind, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN, Refusal,
+    Rejection,
+};
 use vigil_cycle::Supervision;
 use vigil_cycle::topic::ServiceName;
 use vigil_robot::injection::{Change, Wire};
@@ -88,6 +92,11 @@ impl Timeline {
         self.closed_ns = Some(t_ns);
     }
 
+    /// Instant after which events are of no interest, ns, once it is known.
+    pub const fn closed_ns(&self) -> Option<u64> {
+        self.closed_ns
+    }
+
     /// Counts events that were overwritten before they could be read.
     pub const fn add_overwritten(&mut self, count: u64) {
         self.overwritten += count;
@@ -161,6 +170,13 @@ impl Timeline {
             .map(|(_, e)| e.t_ns)
     }
 
+    /// Seconds for which the detector was blind, by cause, until `end_ns`.
+    pub fn blind_s(&self, end_ns: u64) -> BTreeMap<&'static str, f64> {
+        let mut sorted: Vec<&Event> = self.raw.iter().map(|(_, event)| event).collect();
+        sorted.sort_by_key(|event| event.t_ns);
+        blind_s(sorted.into_iter(), end_ns)
+    }
+
     /// True if an event of this kind is there.
     pub fn has(&self, kind: EventKind) -> bool {
         self.first(kind).is_some()
@@ -177,6 +193,33 @@ impl Timeline {
             .map(|(service, event)| self.namer.tell(*service, event, origin_ns))
             .collect()
     }
+}
+
+/// Adds up what lies between events of blindness.
+fn blind_s<'a>(
+    events: impl Iterator<Item = &'a Event>,
+    end_ns: u64,
+) -> BTreeMap<&'static str, f64> {
+    let mut sums = BTreeMap::new();
+    let mut since: Option<(u64, u32)> = None;
+    let mut close = |since: &mut Option<(u64, u32)>, t_ns: u64| {
+        if let Some((from_ns, cause)) = since.take() {
+            let name = Blindness::from_wire(cause).map_or("unknown", Blindness::name);
+            *sums.entry(name).or_insert(0.0) += t_ns.saturating_sub(from_ns) as f64 * 1e-9;
+        }
+    };
+    for event in events.take_while(|event| event.t_ns <= end_ns) {
+        match EventKind::from_wire(event.kind) {
+            Some(EventKind::Blind) => {
+                close(&mut since, event.t_ns);
+                since = Some((event.t_ns, event.what));
+            }
+            Some(EventKind::BlindEnds) => close(&mut since, event.t_ns),
+            _ => {}
+        }
+    }
+    close(&mut since, end_ns);
+    sums
 }
 
 /// Gives names to what events are about.
@@ -279,6 +322,17 @@ impl Namer {
                 let cause = Rejection::from_wire(event.what).map_or("?", Rejection::as_str);
                 format!("{} frames: {cause}", event.value)
             }
+            EventKind::Blind => words::blind(event.what).into(),
+            EventKind::BlindEnds => format!("after {:.1} s", event.value as f64 * 1e-9),
+            EventKind::NotExcited => "the robot stands: the belief is held".into(),
+            EventKind::Latched | EventKind::Released => {
+                let action = self.actions.get(event.what as usize);
+                let action = action.map_or("?", String::as_str);
+                match kind {
+                    EventKind::Latched => format!("{action}, until a new run or a reset"),
+                    _ => action.to_owned(),
+                }
+            }
             EventKind::Particles => format!("{} of {}", event.what, event.value),
             EventKind::Watchdog => {
                 let found = Supervision::from_wire(event.what);
@@ -292,6 +346,7 @@ impl Namer {
         match node {
             MODE_UNKNOWN => "UNKNOWN".into(),
             MODE_MULTIPLE => "MULTIPLE".into(),
+            MODE_BLIND => "BLIND".into(),
             node => self
                 .nodes
                 .get(node as usize)
@@ -327,5 +382,39 @@ const fn kind_name(kind: EventKind) -> &'static str {
         EventKind::Particles => "particles",
         EventKind::Watchdog => "watchdog",
         EventKind::Rejected => "rejected",
+        EventKind::Blind => "blind",
+        EventKind::BlindEnds => "blind-ends",
+        EventKind::Armed => "armed",
+        EventKind::NotExcited => "not-excited",
+        EventKind::Excited => "excited",
+        EventKind::Latched => "latched",
+        EventKind::Released => "released",
+        EventKind::Publisher => "publisher",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blind_time_is_added_up_by_cause_until_the_end() {
+        let event = |t_s: u64, kind: EventKind, what| Event {
+            t_ns: t_s * 1_000_000_000,
+            kind: kind as u32,
+            what,
+            ..Event::default()
+        };
+        let events = [
+            event(1, EventKind::Blind, Blindness::Silence as u32),
+            event(3, EventKind::Blind, Blindness::Clock as u32),
+            event(4, EventKind::BlindEnds, 0),
+            event(5, EventKind::Alarm, 0),
+            event(6, EventKind::Blind, Blindness::Clock as u32),
+            event(99, EventKind::BlindEnds, 0),
+        ];
+        let expected = BTreeMap::from([("clock", 1.0 + 2.0), ("silence", 2.0)]);
+        assert_eq!(blind_s(events.iter(), 8_000_000_000), expected);
+        assert_eq!(blind_s(events[3..4].iter(), 8_000_000_000), BTreeMap::new());
     }
 }

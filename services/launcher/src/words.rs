@@ -1,6 +1,6 @@
 //! Words for what happens to a robot on its path.
 
-use vigil_blocks::{ActionOutcome, Degraded, Event, RecoveryKind, Symptoms};
+use vigil_blocks::{ActionOutcome, Blindness, Degraded, Event, RecoveryKind, Symptoms};
 use vigil_cycle::Supervision;
 
 /// Symptoms, joined by `_` as in the decision model; `none` for the empty set.
@@ -51,6 +51,11 @@ pub fn degraded(bits: u32) -> String {
     } else {
         present.join(", ")
     }
+}
+
+/// Why the detector sees nothing.
+pub fn blind(cause: u32) -> &'static str {
+    Blindness::from_wire(cause).map_or("?", Blindness::as_str)
 }
 
 /// What a failure that the watchdog has found is called.

@@ -18,7 +18,9 @@
 //! that wheel: to counter-steer for it is right then. A set of encoders is shared among them. A set
 //! of two or more stuck wheels is UNKNOWN: the yaw of one wheel alone is not what the robot does,
 //! and counter-steering for it would lead off the path. What the sets that are reported leave of a
-//! leaf's probability counts for the leaf. Quotients are of single leaves, and the drift from the
+//! leaf's probability counts for the leaf. What has no name is nothing before the fused alarm: the
+//! odds of a departure wander on a healthy robot too, and the alarm alone is calibrated. From the
+//! alarm on it is what the identifier says. Quotients are of single leaves, and the drift from the
 //! sets, which is looked at in each epoch, bounds what they may say about several.
 
 use vigil_blocks::{DECISION_STATES, FaultBelief, FaultSet};
@@ -39,7 +41,8 @@ const P_TOLERANCE: f64 = 1e-6;
 #[derive(Debug, Clone)]
 pub(crate) struct Gathered {
     log_likelihood: [f64; DECISION_STATES],
-    identifying: Option<u32>,
+    /// Whether the identifier identifies, and whether an alarm stands.
+    reports: Option<(u32, bool)>,
     mode_changes: u32,
     writer_epoch: u64,
 }
@@ -57,7 +60,7 @@ impl Gathered {
     pub(crate) const fn new() -> Self {
         Self {
             log_likelihood: [0.0; DECISION_STATES],
-            identifying: None,
+            reports: None,
             mode_changes: 0,
             writer_epoch: 0,
         }
@@ -65,11 +68,17 @@ impl Gathered {
 
     /// Takes a diagnosis. One from another start of the identifier is taken over: what it
     /// predicted has nothing to do with what was said before.
-    pub(crate) fn add(&mut self, diagnosis: &FaultBelief, states: &[StateMeaning]) -> Effect {
-        let before = self.identifying.replace(diagnosis.identifying);
+    pub(crate) fn add(
+        &mut self,
+        diagnosis: &FaultBelief,
+        states: &[StateMeaning],
+        alarm: bool,
+    ) -> Effect {
+        let reports = Some((diagnosis.identifying, alarm));
+        let before = std::mem::replace(&mut self.reports, reports);
         let changes = std::mem::replace(&mut self.mode_changes, diagnosis.mode_change_count);
         let writer = std::mem::replace(&mut self.writer_epoch, diagnosis.header.epoch);
-        if before != Some(diagnosis.identifying)
+        if before != reports
             || changes != diagnosis.mode_change_count
             || writer != diagnosis.header.epoch
         {
@@ -77,7 +86,7 @@ impl Gathered {
             return Effect::Anchor;
         }
         for (sum, meaning) in self.log_likelihood.iter_mut().zip(states) {
-            let (p, predicted) = probabilities(diagnosis, *meaning);
+            let (p, predicted) = probabilities(diagnosis, *meaning, alarm);
             *sum = (*sum + log_ratio(p, predicted)).clamp(-LOG_EPOCH_MAX, LOG_EPOCH_MAX);
         }
         Effect::Wait
@@ -95,7 +104,7 @@ impl Gathered {
 
     /// The next diagnosis is taken over as it is.
     pub(crate) fn forget(&mut self) {
-        self.identifying = None;
+        self.reports = None;
         self.clear();
     }
 
@@ -104,10 +113,16 @@ impl Gathered {
     }
 }
 
-/// Probability and predicted probability of a state.
-fn probabilities(diagnosis: &FaultBelief, meaning: StateMeaning) -> (f64, f64) {
+/// Probability and predicted probability of a state; without an alarm, the unknown is nominal.
+fn probabilities(diagnosis: &FaultBelief, meaning: StateMeaning, alarm: bool) -> (f64, f64) {
+    let unknown = (diagnosis.p_unknown, diagnosis.p_unknown_predicted);
     match meaning.node {
-        None => (diagnosis.p_unknown, diagnosis.p_unknown_predicted),
+        None if alarm => unknown,
+        None => (0.0, 0.0),
+        Some(0) if !alarm => (
+            (diagnosis.p[0] + unknown.0).min(1.0),
+            (diagnosis.p_predicted[0] + unknown.1).min(1.0),
+        ),
         Some(node) => (
             diagnosis.p.get(node).copied().unwrap_or(0.0),
             diagnosis.p_predicted.get(node).copied().unwrap_or(0.0),
@@ -125,9 +140,14 @@ fn log_ratio(p: f64, predicted: f64) -> f64 {
 }
 
 /// Writes the identifier's belief over the decision model's states into `weights`.
-pub(crate) fn weights(diagnosis: &FaultBelief, states: &[StateMeaning], weights: &mut [f64]) {
+pub(crate) fn weights(
+    diagnosis: &FaultBelief,
+    states: &[StateMeaning],
+    alarm: bool,
+    weights: &mut [f64],
+) {
     for (weight, meaning) in weights.iter_mut().zip(states) {
-        *weight = probabilities(diagnosis, *meaning).0;
+        *weight = probabilities(diagnosis, *meaning, alarm).0;
     }
     for set in reported(diagnosis).filter(|set| set.leaves.count_ones() > 1) {
         divide(set, states, weights);
@@ -165,7 +185,7 @@ fn divide(set: &FaultSet, states: &[StateMeaning], weights: &mut [f64]) {
 pub(crate) fn is_sound(diagnosis: &FaultBelief, states: &[StateMeaning], tree_hash: u64) -> bool {
     let mut sum = 0.0;
     for meaning in states {
-        let (p, predicted) = probabilities(diagnosis, *meaning);
+        let (p, predicted) = probabilities(diagnosis, *meaning, true);
         if ![p, predicted]
             .iter()
             .all(|p| (0.0..=1.0 + P_TOLERANCE).contains(p))

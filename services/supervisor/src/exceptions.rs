@@ -14,6 +14,7 @@ use crate::policy::{self, Worth};
 use crate::silence::Silence;
 use crate::supervisor::Inputs;
 use crate::told::{Decided, Told};
+use crate::watch::Seen;
 
 /// Tracks the belief over exceptions, one step an epoch, and chooses actions.
 ///
@@ -100,8 +101,9 @@ impl Exceptions {
     }
 
     /// See [`crate::Supervisor::step`].
-    pub(crate) fn step(&mut self, entry: Entry<Inputs<'_>>, action: &mut Action) {
+    pub(crate) fn step(&mut self, entry: Entry<Inputs<'_>>, seen: Seen, action: &mut Action) {
         match entry {
+            Entry::Frame(inputs) if seen.is_blind => self.take_blindly(inputs),
             Entry::Frame(inputs) => self.take(inputs),
             Entry::Missed(count) => self.miss(count),
             Entry::Reset => self.reset(),
@@ -132,6 +134,22 @@ impl Exceptions {
             None if !refuses && self.silence.no_detection() => self.go_blind(),
             None => {}
         }
+    }
+
+    /// The detector sees nothing: who is heard is known, what is said is not.
+    const fn take_blindly(&mut self, inputs: Inputs<'_>) {
+        if inputs.diagnosis.is_some() {
+            self.silence.identifier_heard();
+        }
+        if inputs.detection.is_some() {
+            self.silence.detection();
+        }
+        self.go_blind();
+    }
+
+    /// The call for help, or the end of the task, that stands.
+    pub(crate) const fn latched(&self) -> Option<usize> {
+        self.held
     }
 
     fn take_diagnosis(&mut self, diagnosis: &FaultBelief, was_lost: bool) {

@@ -13,6 +13,7 @@ use crate::restraint::Restraint;
 use crate::silence::Silence;
 use crate::supervisor::Inputs;
 use crate::told::{Decided, Told};
+use crate::watch::Seen;
 
 /// Tracks the belief over the leaves of the fault tree, nominal and unknown, and chooses actions.
 pub(crate) struct Leaves {
@@ -39,6 +40,8 @@ pub(crate) struct Leaves {
     impossible_count: u32,
     control_mode: ControlMode,
     run_id: u64,
+    seen: Seen,
+    hold_epochs: u32,
 }
 
 impl Leaves {
@@ -62,6 +65,7 @@ impl Leaves {
         mapping::check_compensation(&model, &states, &actions, &compensation)?;
         let solution = mdp::solve(&model)?;
         let decider = policy::decider(&model, &solution, solved, settings)?;
+        let hold_epochs = (settings.hold_s * 1e3 / settings.epoch_ms).ceil() as u32;
         let mut supervisor = Self {
             decider,
             worth: Worth::new(solution, actions.len()),
@@ -70,7 +74,7 @@ impl Leaves {
             silence: Silence::new(blind_after_misses),
             epoch_ns: (settings.epoch_ms * 1e6) as u64,
             gathered: Gathered::new(),
-            restraint: Restraint::new(),
+            restraint: Restraint::new(hold_epochs),
             scratch: vec![0.0; states.len()],
             epoch_t_capture_ns: None,
             choice: Choice {
@@ -85,6 +89,8 @@ impl Leaves {
             impossible_count: 0,
             control_mode: ControlMode::Policy,
             run_id: 0,
+            seen: Seen::default(),
+            hold_epochs,
             model,
             states,
             actions,
@@ -95,14 +101,33 @@ impl Leaves {
     }
 
     /// See [`crate::Supervisor::step`].
-    pub(crate) fn step(&mut self, entry: Entry<Inputs<'_>>, action: &mut Action) {
+    pub(crate) fn step(&mut self, entry: Entry<Inputs<'_>>, seen: Seen, action: &mut Action) {
+        self.seen = seen;
         match entry {
+            Entry::Frame(inputs) if seen.is_blind => self.take_blindly(inputs),
             Entry::Frame(inputs) => self.take(inputs),
             Entry::Missed(count) => self.miss(count),
             Entry::Reset => self.reset(),
             Entry::Budget(_) => {}
         }
         self.write(action);
+    }
+
+    /// The detector sees nothing: who is heard is known, what is said is not.
+    fn take_blindly(&mut self, inputs: Inputs<'_>) {
+        if inputs.diagnosis.is_some() {
+            self.silence.diagnosis();
+        }
+        if inputs.detection.is_some() {
+            self.silence.detection();
+        }
+        self.control_mode = ControlMode::Safe;
+        self.gathered.forget();
+    }
+
+    /// The call for help that stands.
+    pub(crate) const fn latched(&self) -> Option<usize> {
+        self.restraint.called()
     }
 
     fn take(&mut self, inputs: Inputs<'_>) {
@@ -139,11 +164,12 @@ impl Leaves {
             self.reset();
             self.run_id = diagnosis.run_id;
         }
-        let effect = self.gathered.add(diagnosis, &self.states);
+        let alarm = self.seen.alarm;
+        let effect = self.gathered.add(diagnosis, &self.states, alarm);
         let timed = self.epoch_is_over(diagnosis.header.t_capture_ns);
         self.control_mode = ControlMode::Policy;
         if effect == Effect::Anchor {
-            evidence::weights(diagnosis, &self.states, &mut self.scratch);
+            evidence::weights(diagnosis, &self.states, alarm, &mut self.scratch);
             self.tracker.anchor(&self.scratch);
             self.log_evidence = 0.0;
             self.decide(timed);
@@ -156,7 +182,7 @@ impl Leaves {
                     self.impossible_count = self.impossible_count.saturating_add(1);
                 }
             }
-            evidence::weights(diagnosis, &self.states, &mut self.scratch);
+            evidence::weights(diagnosis, &self.states, alarm, &mut self.scratch);
             if evidence::has_drifted(self.tracker.belief(), &self.scratch) {
                 self.tracker.anchor(&self.scratch);
             }
@@ -178,9 +204,12 @@ impl Leaves {
     }
 
     /// The identifier is lost: the detector says how probable a fault is, the belief before the
-    /// loss says which.
+    /// loss says which. Before an alarm its odds mean nothing.
     fn fall_back(&mut self, detection: &DetectionBelief) {
-        let p_fault = detection.p_fault.clamp(0.0, 1.0);
+        let p_fault = match self.seen.alarm {
+            true => detection.p_fault.clamp(0.0, 1.0),
+            false => 0.0,
+        };
         let belief = self.tracker.belief();
         let is_nominal = |meaning: &StateMeaning| meaning.node == Some(0);
         let faulty: f64 = belief
@@ -216,7 +245,7 @@ impl Leaves {
         self.tracker.reset();
         self.decider.reset();
         self.gathered.forget();
-        self.restraint = Restraint::new();
+        self.restraint = Restraint::new(self.hold_epochs);
         self.epoch_t_capture_ns = None;
         self.log_evidence = 0.0;
         self.control_mode = ControlMode::Policy;

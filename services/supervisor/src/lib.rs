@@ -17,6 +17,7 @@ mod restraint;
 mod silence;
 mod supervisor;
 mod told;
+mod watch;
 mod wiring;
 
 pub use assemble::{assemble, validity_ns};

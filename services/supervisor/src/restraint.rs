@@ -1,7 +1,9 @@
 //! Keeps decisions from chattering and from crying wolf.
 //!
 //! - An action that lets the robot move faster than the present one must be best for
-//!   [`HOLD_EPOCHS`] epochs in a row. A more cautious one is taken at once.
+//!   [`HOLD_EPOCHS`] epochs in a row, and going on as before, once it was left, for as long as the
+//!   settings say (`supervisor.hold_s`): weak evidence that lasts must not make a robot slow down
+//!   and go on by turns. A more cautious action is taken at once.
 //! - Help is called for only when that has been best for [`HELP_EPOCHS`] epochs in a row; until
 //!   then the best of the other actions is taken, by what they are worth: votes and entropies rank
 //!   only the best.
@@ -26,18 +28,32 @@ pub(crate) struct Restraint {
     candidate: usize,
     epochs: u32,
     help_epochs: u32,
+    /// Epochs for which going on must be best before it is taken again, and whether it was left.
+    hold_epochs: u32,
+    has_left: bool,
     /// The action that calls for help, once it has been taken.
     called: Option<usize>,
 }
 
 impl Restraint {
-    pub(crate) const fn new() -> Self {
+    pub(crate) const fn new(hold_epochs: u32) -> Self {
         Self {
+            hold_epochs: if hold_epochs > HOLD_EPOCHS {
+                hold_epochs
+            } else {
+                HOLD_EPOCHS
+            },
+            has_left: false,
             candidate: usize::MAX,
             epochs: 0,
             help_epochs: 0,
             called: None,
         }
+    }
+
+    /// The call for help that stands.
+    pub(crate) const fn called(&self) -> Option<usize> {
+        self.called
     }
 
     /// The action to take. `current` is the present action, `best` the policy's choice, `values`
@@ -78,7 +94,10 @@ impl Restraint {
         } else {
             self.help_epochs = 0;
         }
+        // A stop by rule, and its end, are not the policy's doing.
+        self.has_left |= !goes_on(meanings, choice.action);
         let choice = self.hold(current, choice, meanings, timed);
+        self.has_left &= !goes_on(meanings, choice.action);
         if self.called.is_none() && self.help_epochs >= HELP_EPOCHS && is_help(choice.action) {
             self.called = Some(choice.action);
         }
@@ -102,7 +121,11 @@ impl Restraint {
         self.epochs = self.epochs.saturating_add(u32::from(timed));
         let speed = |action: usize| meanings.get(action).map_or(0.0, |m| m.speed_scale);
         let faster = speed(choice.action) > speed(current);
-        if faster && self.epochs < HOLD_EPOCHS {
+        let needed = match self.has_left && goes_on(meanings, choice.action) {
+            true => self.hold_epochs,
+            false => HOLD_EPOCHS,
+        };
+        if faster && self.epochs < needed {
             return Choice {
                 action: current,
                 margin: 0.0,
@@ -111,4 +134,10 @@ impl Restraint {
         }
         choice
     }
+}
+
+/// True for going on as before.
+fn goes_on(meanings: &[ActionMeaning], action: usize) -> bool {
+    let kind = meanings.get(action).map(|m| m.kind);
+    kind == Some(RecoveryKind::GoOn)
 }

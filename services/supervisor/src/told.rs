@@ -70,8 +70,6 @@ impl Told<'_> {
         action.control_mode = self.control_mode() as u32;
         action.state_count = belief.len() as u32;
         action.action_count = values.len() as u32;
-        (action.alarm, action.alarm_t_capture_ns) = (0, 0);
-        (action.alarm_count, action.blind) = (0, 0);
     }
 
     /// Gathering information is a way to use a belief with fresh evidence, and no other.

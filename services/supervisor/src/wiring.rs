@@ -20,6 +20,10 @@ pub struct SupervisorStage {
     action: Box<dyn Sender<Action>>,
     decided: Decided,
     told: u64,
+    /// Whether the alarm stands, how many there were, and what was told of both.
+    alarm: (bool, u32),
+    alarm_told: (bool, u32),
+    latched_told: Option<usize>,
 }
 
 /// What the last block decided, for the timeline.
@@ -49,6 +53,9 @@ impl SupervisorStage {
             action: graph.sender(Topic::Action)?,
             decided: Decided::default(),
             told: 0,
+            alarm: (false, 0),
+            alarm_told: (false, 0),
+            latched_told: None,
         })
     }
 
@@ -63,10 +70,42 @@ impl SupervisorStage {
             let account = &mut self.detection_account;
             let is_taken =
                 intake.admit_further::<DetectionBelief>(account, &block.header, || Ok(()));
-            if is_taken && block.cause.kind() == Some(CauseKind::Frame) {
+            if !is_taken {
+                continue;
+            }
+            // A prediction hides no word about a frame; its own is whether anything is seen.
+            if self.detection_is_new && block.cause.kind() != Some(CauseKind::Frame) {
+                self.detection.blind = block.blind;
+            } else {
                 *self.detection = *block;
                 self.detection_is_new = true;
             }
+        }
+    }
+
+    /// The fused alarm, each of them, and actions that stand whatever is believed.
+    fn tell(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        let (stands, count) = self.alarm;
+        if self.alarm != self.alarm_told {
+            let kind = match stands {
+                true => EventKind::Alarm,
+                false => EventKind::Cleared,
+            };
+            if stands || self.alarm_told.0 {
+                health.event(now_ns, kind, 0, self.detection.p_fault, u64::from(count));
+            }
+            self.alarm_told = self.alarm;
+        }
+        let latched = self.supervisor.latched();
+        if latched != self.latched_told {
+            let kind = match latched {
+                Some(_) => EventKind::Latched,
+                None => EventKind::Released,
+            };
+            if let Some(action) = latched.or(self.latched_told) {
+                health.event(now_ns, kind, action as u32, 0.0, 0);
+            }
+            self.latched_told = latched;
         }
     }
 }
@@ -114,6 +153,7 @@ impl Stage for SupervisorStage {
         let action = self.action.block();
         action.cause = cause;
         action.valid_until_ns = clock.now_ns() + self.validity_ns;
+        self.alarm = (action.alarm != 0, action.alarm_count);
         let states = (action.state_count as usize).min(action.belief.len());
         self.decided = Decided {
             seq: action.decision_seq,
@@ -134,6 +174,7 @@ impl Stage for SupervisorStage {
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         health.add_input(&self.detection_account);
+        self.tell(health, now_ns);
         let Decided {
             seq,
             action,

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
+mod sight;
 mod world;
 
 use proptest::prelude::*;
@@ -96,7 +97,10 @@ fn a_cleared_fault_lets_the_rover_go_on_after_a_while() {
     world.cycle(false, &nominal, &nominal);
     assert_eq!(world.kind(), RecoveryKind::Compensate);
     assert_eq!((world.action.wheel, world.action.decision_seq), decision);
-    world.rest(50, false, &nominal);
+    // It was left, and is taken again after `hold_s`.
+    world.rest(180, false, &nominal);
+    assert_eq!(world.kind(), RecoveryKind::Compensate);
+    world.rest(40, false, &nominal);
     assert_eq!(world.kind(), RecoveryKind::GoOn);
 }
 
@@ -317,21 +321,27 @@ fn a_lost_identifier_leaves_the_detector_and_two_lost_stages_stop_the_robot() {
         p_fault: 0.5,
         ..Default::default()
     };
-    detection.header.t_capture_ns = world.t_ns + CYCLE_NS;
-    let inputs = Inputs {
-        diagnosis: None,
-        detection: Some(&detection),
+    let mut tell = |world: &mut World, alarm| {
+        world.t_ns += CYCLE_NS;
+        (detection.alarm, detection.header.t_capture_ns) = (alarm, world.t_ns);
+        let inputs = Inputs {
+            diagnosis: None,
+            detection: Some(&detection),
+        };
+        let action = &mut world.action;
+        world.supervisor.step(Entry::Frame(inputs), action);
     };
-    world
-        .supervisor
-        .step(Entry::Frame(inputs), &mut world.action);
+    // Before an alarm its odds mean nothing.
+    (0..30).for_each(|_| tell(&mut world, 0));
+    assert_eq!(world.kind(), RecoveryKind::GoOn);
+    tell(&mut world, 1);
     assert_eq!(world.action.control_mode, ControlMode::Fallback as u32);
     assert_eq!(world.action.lost_stages, 1);
     assert_eq!(world.kind(), RecoveryKind::SlowDown);
     world.supervisor.step(Entry::Missed(10), &mut world.action);
     assert_eq!(world.kind(), RecoveryKind::Stop);
     assert_eq!(world.action.control_mode, ControlMode::Safe as u32);
-    world.rest(50, false, &[("ND", 0.9999), ("UNKNOWN", 0.0001)]);
+    world.rest(250, false, &[("ND", 0.9999), ("UNKNOWN", 0.0001)]);
     assert_eq!(
         (world.kind(), world.action.lost_stages),
         (RecoveryKind::GoOn, 0)

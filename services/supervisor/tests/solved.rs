@@ -102,9 +102,14 @@ fn faults_are_met_by_a_solved_policy_without_allocating() {
         (diagnosis.p_unknown, diagnosis.p_unknown_predicted) = (unknown, unknown);
         for _ in 0..cycles {
             diagnosis.header.t_capture_ns += CYCLE_NS;
+            let mut detection = DetectionBelief {
+                alarm: diagnosis.identifying,
+                ..DetectionBelief::default()
+            };
+            detection.header.t_capture_ns = diagnosis.header.t_capture_ns;
             let inputs = Inputs {
                 diagnosis: Some(&diagnosis),
-                detection: None,
+                detection: Some(&detection),
             };
             let before = allocations();
             assert!(before > 0, "the allocator does not count");

@@ -110,6 +110,31 @@ pub enum Blindness {
 }
 
 impl Blindness {
+    /// All causes, in the order of their codes, which begin with 1.
+    pub const ALL: [Self; 7] = [
+        Self::Silence,
+        Self::Clock,
+        Self::Validity,
+        Self::Run,
+        Self::Command,
+        Self::Epoch,
+        Self::Refused,
+    ];
+
+    /// Name, as in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Silence => "silence",
+            Self::Clock => "clock",
+            Self::Validity => "validity",
+            Self::Run => "run",
+            Self::Command => "command",
+            Self::Epoch => "epoch",
+            Self::Refused => "refused",
+        }
+    }
+
     /// The cause behind a block's `blind`, if this version knows it; none for 0.
     #[must_use]
     pub const fn from_wire(value: u32) -> Option<Self> {

@@ -36,9 +36,9 @@ pub enum EventKind {
     /// Faults or disturbances were removed. `what`: wheel or side (255 for all) + 256 x kind code
     /// (0 for all).
     Restored = 3,
-    /// The detector's alarm rose.
+    /// An alarm rose: the detector's own, or the supervisor's, fused of both stages.
     Alarm = 4,
-    /// The detector's alarm fell, or the identifier is back at nominal.
+    /// It fell, or the identifier is back at nominal.
     Cleared = 5,
     /// A diagnosis. `what`: node of the fault tree, or one of the `MODE_*`; `value`: leaves of
     /// the most probable fault set as bits.
@@ -83,6 +83,24 @@ pub enum EventKind {
     /// Blocks from outside were refused. `what`: the [`crate::Rejection`]; `value`: how many since
     /// it was told last.
     Rejected = 24,
+    /// The detector sees nothing any more. `what`: a [`crate::Blindness`], told anew when it is
+    /// another.
+    Blind = 25,
+    /// It sees again. `value`: how long it was blind, ns.
+    BlindEnds = 26,
+    /// From now on an alarm can rise.
+    Armed = 27,
+    /// The robot stands by command, for a second at least: the belief is held.
+    NotExcited = 28,
+    /// It moves again.
+    Excited = 29,
+    /// An action stands whatever is believed, until a new run or a reset. `what`: the action.
+    Latched = 30,
+    /// It stands no longer. `what`: the action.
+    Released = 31,
+    /// What frames say cannot be as the robot's description has it. `what`: a finding of the
+    /// tests of a publisher + 256 x the index of a wheel; `p`: how far off.
+    Publisher = 32,
 }
 
 impl EventKind {
@@ -114,6 +132,14 @@ impl EventKind {
             22 => Self::Particles,
             23 => Self::Watchdog,
             24 => Self::Rejected,
+            25 => Self::Blind,
+            26 => Self::BlindEnds,
+            27 => Self::Armed,
+            28 => Self::NotExcited,
+            29 => Self::Excited,
+            30 => Self::Latched,
+            31 => Self::Released,
+            32 => Self::Publisher,
             _ => return None,
         })
     }

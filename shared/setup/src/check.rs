@@ -150,6 +150,9 @@ fn filter_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) 
         1000.0,
     );
     range("supervisor.threshold", file.supervisor.threshold, 0.0, 1.0);
+    let arming = file.supervisor.arming_speed_scale;
+    range("supervisor.arming_speed_scale", arming, 0.0, 1.0);
+    range("supervisor.hold_s", file.supervisor.hold_s, 0.0, 600.0);
     range(
         "supervisor.stall_guard_steps",
         f64::from(file.supervisor.stall_guard_steps),

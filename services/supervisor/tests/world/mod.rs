@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use vigil_blocks::{Action, Entry, FaultBelief, RecoveryKind};
+use vigil_blocks::{Action, DetectionBelief, Entry, FaultBelief, RecoveryKind};
 use vigil_decision::Pomdp;
 use vigil_inference::FaultTree;
 use vigil_robot::Description;
@@ -62,7 +62,8 @@ impl World {
         }
     }
 
-    /// One cycle in which the identifier believes `p` (by name), having predicted `predicted`.
+    /// One cycle in which the identifier believes `p` (by name), having predicted `predicted`;
+    /// while it identifies, the detector's alarm stands.
     pub fn cycle(&mut self, identifying: bool, p: &[(&str, f64)], predicted: &[(&str, f64)]) {
         self.t_ns += CYCLE_NS;
         let mut belief = FaultBelief {
@@ -82,9 +83,14 @@ impl World {
                 }
             }
         }
+        let mut detection = DetectionBelief {
+            alarm: u32::from(identifying),
+            ..DetectionBelief::default()
+        };
+        detection.header.t_capture_ns = self.t_ns;
         let inputs = Inputs {
             diagnosis: Some(&belief),
-            detection: None,
+            detection: Some(&detection),
         };
         self.supervisor.step(Entry::Frame(inputs), &mut self.action);
     }

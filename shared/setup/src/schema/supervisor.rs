@@ -49,6 +49,12 @@ pub struct Supervisor {
     /// 1 to 3600, and no less than the longest that `[navigation]` allows. Waiting for help has no
     /// limit.
     pub action_max_s: f64,
+    /// Factor on the speed of `go_on` until the detector is armed, 0 to 1: before that no alarm can
+    /// rise, and a fault would go unseen.
+    pub arming_speed_scale: f64,
+    /// With `faults`: once `go_on` was left, it is taken again after it has been the best action
+    /// for so long without a break, s, 0 to 600. More cautious actions are taken at once.
+    pub hold_s: f64,
     /// Validity of a published action, as a multiple of the period, 1 to 1000 (at least 20 ms).
     pub validity_periods: f64,
     /// What each action of the decision model makes the robot do, by the action's name.
@@ -70,6 +76,8 @@ impl Default for Supervisor {
             as_published: false,
             epoch_ms: 100.0,
             action_max_s: 60.0,
+            arming_speed_scale: 0.5,
+            hold_s: 2.0,
             validity_periods: 10.0,
             actions: BTreeMap::new(),
         }

@@ -1,0 +1,317 @@
+//! Whether the detector sees anything, and why not.
+//!
+//! A frame is *valid* if it goes on where the one before it ended: same writer, same run, capture
+//! times that advance like the graph's clock, a command, and a reading of what is watched. Without
+//! a valid frame for [`BLIND_S`] the detector is blind: no filter behind it would notice a fault,
+//! and all of them would go on saying what they said last.
+//!
+//! Time is counted by the graph's schedule: a period for each frame and each missed deadline. What
+//! capture times say is held against the scheduled instants, which passed the border's clock. A
+//! frame's neighbours decide nothing about it, so that jitter, gaps and bursts leave valid frames
+//! among the others. Sight outlives a reset of the filters: a source that resets them with every
+//! frame is just what must be found.
+
+use vigil_blocks::{Blindness, SensorFrame, Valid};
+
+/// Without a valid frame for so long, s, the detector is blind.
+const BLIND_S: f64 = 1.0;
+/// Slack when that time is compared, s: it is a sum of periods.
+const SLACK_S: f64 = 1e-6;
+/// It sees again after valid frames for so long, s, ..
+const SEEN_S: f64 = 0.2;
+/// .. with no longer pause between them than this, s. One frame shows at most ..
+const PAUSE_S: f64 = 0.5;
+/// .. so much time, s.
+const FRAME_MAX_S: f64 = 0.1;
+/// A clock that runs faster or slower than this is no clock.
+const RATE_MAX: f64 = 2.0;
+
+/// What carries over from the frame before.
+#[derive(Debug, Clone, Copy)]
+struct Last {
+    epoch: u64,
+    run_id: u64,
+    t_capture_ns: u64,
+    t_schedule_ns: u64,
+}
+
+/// Follows the frames of one graph.
+#[derive(Debug, Clone)]
+pub struct Sight {
+    /// Bits of which a frame needs any, and of which it needs all.
+    channels: u64,
+    command: u64,
+    /// Period of the graph, s; none offline, where capture times are the only time there is.
+    period_s: Option<f64>,
+    /// False for recorded frames: their times are the recording's.
+    judges_clock: bool,
+    last: Option<Last>,
+    /// Since the last valid frame, s.
+    dark_s: f64,
+    /// Part of that not yet judged, s, and by cause.
+    unjudged_s: f64,
+    by_cause: [f64; Blindness::ALL.len()],
+    refused: bool,
+    /// Of valid frames, without a pause, s.
+    seen_s: f64,
+    blind: Option<Blindness>,
+}
+
+impl Sight {
+    /// Of frames that need any of the bits `channels` of [`SensorFrame::valid`] and all of the bits
+    /// `command`.
+    #[must_use]
+    pub const fn new(channels: u64, command: u64) -> Self {
+        Self {
+            channels,
+            command,
+            period_s: None,
+            judges_clock: false,
+            last: None,
+            dark_s: 0.0,
+            unjudged_s: 0.0,
+            by_cause: [0.0; Blindness::ALL.len()],
+            refused: false,
+            seen_s: 0.0,
+            blind: None,
+        }
+    }
+
+    /// The same in a graph of this period, s. `judges_clock` unless frames are recorded ones, the
+    /// capture times of which are the recording's.
+    #[must_use]
+    pub const fn in_graph(mut self, period_s: f64, judges_clock: bool) -> Self {
+        self.period_s = Some(period_s);
+        self.judges_clock = judges_clock;
+        self
+    }
+
+    /// Why nothing is seen; none while something is.
+    #[must_use]
+    pub const fn blind(&self) -> Option<Blindness> {
+        self.blind
+    }
+
+    /// Takes a frame.
+    pub fn take(&mut self, frame: &SensorFrame) {
+        let now = Last {
+            epoch: frame.header.epoch,
+            run_id: frame.run_id,
+            t_capture_ns: frame.header.t_capture_ns,
+            t_schedule_ns: frame.header.t_schedule_ns,
+        };
+        let Some(last) = self.last.replace(now) else {
+            return;
+        };
+        let captured_s = seconds(last.t_capture_ns, now.t_capture_ns);
+        let scheduled_s = match seconds(last.t_schedule_ns, now.t_schedule_ns) {
+            // Who leaves the schedule out publishes once a period.
+            s if s <= 0.0 => self.period_s.unwrap_or(captured_s),
+            s => s,
+        };
+        let is_clock = captured_s <= RATE_MAX * scheduled_s && scheduled_s <= RATE_MAX * captured_s;
+        let cause = if now.epoch != last.epoch {
+            Blindness::Epoch
+        } else if now.run_id != last.run_id {
+            Blindness::Run
+        } else if self.judges_clock && !is_clock {
+            Blindness::Clock
+        } else if frame.valid & self.channels == 0 {
+            Blindness::Validity
+        } else if !frame.has(self.command) {
+            Blindness::Command
+        } else {
+            return self.see(scheduled_s);
+        };
+        let span_s = self.period_s.unwrap_or(captured_s);
+        self.darken(span_s.clamp(0.0, BLIND_S), cause);
+    }
+
+    /// The deadline passed so many times without input.
+    pub fn miss(&mut self, count: u32) {
+        let cause = match self.refused {
+            true => Blindness::Refused,
+            false => Blindness::Silence,
+        };
+        self.darken(f64::from(count) * self.period_s.unwrap_or(0.0), cause);
+    }
+
+    /// A frame came, and the border refused it.
+    pub const fn refuse(&mut self) {
+        self.refused = true;
+    }
+
+    fn see(&mut self, span_s: f64) {
+        if self.dark_s > PAUSE_S {
+            self.seen_s = 0.0;
+        }
+        self.dark_s = 0.0;
+        self.forget_causes();
+        if self.blind.is_some() {
+            self.seen_s += span_s.clamp(0.0, FRAME_MAX_S);
+            if self.seen_s >= SEEN_S - SLACK_S {
+                (self.blind, self.seen_s) = (None, 0.0);
+            }
+        }
+    }
+
+    fn darken(&mut self, span_s: f64, cause: Blindness) {
+        self.dark_s += span_s;
+        self.unjudged_s += span_s;
+        self.by_cause[cause as usize - 1] += span_s;
+        if self.unjudged_s < BLIND_S - SLACK_S {
+            return;
+        }
+        let causes = Blindness::ALL.into_iter().zip(self.by_cause);
+        let most = causes.max_by(|a, b| a.1.total_cmp(&b.1));
+        self.blind = most.map(|(cause, _)| cause);
+        self.seen_s = 0.0;
+        self.forget_causes();
+    }
+
+    const fn forget_causes(&mut self) {
+        self.unjudged_s = 0.0;
+        self.by_cause = [0.0; Blindness::ALL.len()];
+        self.refused = false;
+    }
+}
+
+/// The bits of everything that a robot of `wheels` wheels may measure.
+#[must_use]
+pub fn all_channels(wheels: usize) -> u64 {
+    let wheel = |i: usize| Valid::wheel_rate(i) | Valid::steer(i) | Valid::current(i);
+    (0..wheels).fold(Valid::POSE | Valid::YAW_RATE, |bits, i| bits | wheel(i))
+}
+
+/// From one instant to another, s; negative if time went back.
+fn seconds(from_ns: u64, to_ns: u64) -> f64 {
+    to_ns.wrapping_sub(from_ns).cast_signed() as f64 * 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_S: f64 = 0.02;
+    const PERIOD_NS: u64 = 20_000_000;
+    const COMMAND: u64 = Valid::command(0) | Valid::command(1);
+
+    fn sight() -> Sight {
+        Sight::new(all_channels(2), COMMAND).in_graph(PERIOD_S, true)
+    }
+
+    fn frame(k: u64) -> SensorFrame {
+        let mut frame = SensorFrame {
+            run_id: 1,
+            valid: COMMAND | Valid::POSE,
+            ..SensorFrame::default()
+        };
+        (frame.header.epoch, frame.header.seq) = (9, k);
+        frame.header.t_schedule_ns = 5_000_000_000 + k * PERIOD_NS;
+        frame.header.t_capture_ns = 70_000_000_000 + k * PERIOD_NS;
+        frame
+    }
+
+    /// Seconds after which the sight is lost, of 10 s of frames; and why.
+    fn lost(spoil: impl Fn(u64, &mut SensorFrame)) -> Option<(f64, Blindness)> {
+        let mut sight = sight();
+        for k in 0..500 {
+            let mut frame = frame(k);
+            spoil(k, &mut frame);
+            sight.take(&frame);
+            if let Some(cause) = sight.blind() {
+                return Some((k as f64 * PERIOD_S, cause));
+            }
+        }
+        None
+    }
+
+    #[test]
+    fn each_cause_is_named_after_a_second() {
+        type Spoil = fn(u64, &mut SensorFrame);
+        let spoils: [(Spoil, Blindness); 8] = [
+            (|_, f| f.header.t_capture_ns /= 1000, Blindness::Clock),
+            (|_, f| f.header.t_capture_ns /= 1_000_000, Blindness::Clock),
+            (|_, f| f.header.t_capture_ns *= 3, Blindness::Clock),
+            (|_, f| f.header.t_capture_ns = 5, Blindness::Clock),
+            (|_, f| f.valid = COMMAND, Blindness::Validity),
+            (|_, f| f.valid = Valid::POSE, Blindness::Command),
+            (|k, f| f.run_id = k, Blindness::Run),
+            (|k, f| f.header.epoch = 1 + k, Blindness::Epoch),
+        ];
+        for (spoil, cause) in spoils {
+            let Some((after_s, found)) = lost(spoil) else {
+                unreachable!("{cause:?} is not found");
+            };
+            assert_eq!(found, cause);
+            assert!((0.98..=1.02).contains(&after_s), "{cause:?}: {after_s} s");
+        }
+    }
+
+    #[test]
+    fn jitter_other_rates_and_a_clock_of_its_own_are_no_blindness() {
+        // Capture a tenth fast, from another origin; jitter of half a period; bursts of ten.
+        assert_eq!(
+            lost(|k, f| f.header.t_capture_ns = 1 + k * 22_000_000),
+            None
+        );
+        let jitter = |k: u64| (k * 7919) % (PERIOD_NS / 2);
+        assert_eq!(lost(|k, f| f.header.t_capture_ns += jitter(k)), None);
+        let burst = |k: u64| (k / 10 + 1) * 10 * PERIOD_NS;
+        assert_eq!(lost(|k, f| f.header.t_schedule_ns = burst(k)), None);
+        // No schedule at all; one run after the other; no command now and then.
+        assert_eq!(lost(|_, f| f.header.t_schedule_ns = 0), None);
+        assert_eq!(lost(|k, f| f.run_id = k / 20), None);
+        assert_eq!(
+            lost(|k, f| f.valid = if k % 9 == 0 { f.valid } else { 0 }),
+            None
+        );
+        let mut slow = sight();
+        for k in 0..100 {
+            slow.take(&frame(5 * k));
+            slow.miss(4);
+            assert_eq!(slow.blind(), None);
+        }
+    }
+
+    #[test]
+    fn silence_is_blindness_until_frames_have_come_for_a_while() {
+        let mut sight = sight();
+        for k in 0..10 {
+            sight.take(&frame(k));
+        }
+        for _ in 0..49 {
+            sight.miss(1);
+        }
+        assert_eq!(sight.blind(), None);
+        sight.miss(1);
+        assert_eq!(sight.blind(), Some(Blindness::Silence));
+        for _ in 0..20 {
+            sight.refuse();
+            sight.miss(3);
+        }
+        assert_eq!(sight.blind(), Some(Blindness::Refused));
+        // A frame a second is no sight.
+        for k in 2..6 {
+            sight.take(&frame(50 * k));
+            sight.miss(49);
+            assert!(sight.blind().is_some());
+        }
+        let seen = (300..400).find(|&k| {
+            sight.take(&frame(k));
+            sight.blind().is_none()
+        });
+        assert!(seen.is_some_and(|k| (303..=311).contains(&k)), "{seen:?}");
+    }
+
+    #[test]
+    fn recorded_frames_keep_their_own_time() {
+        let mut sight = Sight::new(Valid::POSE, COMMAND).in_graph(PERIOD_S, false);
+        for k in 0..500 {
+            let mut frame = frame(k);
+            frame.header.t_capture_ns = k * 10 * PERIOD_NS;
+            sight.take(&frame);
+            assert_eq!(sight.blind(), None);
+        }
+    }
+}
