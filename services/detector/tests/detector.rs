@@ -269,7 +269,7 @@ proptest! {
             prop_assert!((0.0..=1.0).contains(&belief.p_fault));
             prop_assert!(belief.log_odds.is_finite() && belief.evidence.is_finite());
             prop_assert!(belief.effective_sample_size.is_finite());
-            prop_assert!(belief.noise_scale.is_finite());
+            prop_assert!(belief.noise_scale.iter().all(|scale| scale.is_finite()));
             prop_assert!(belief.channel_log_odds.iter().all(|value| value.is_finite()));
             let count = bench.particles.count as usize;
             prop_assert!(bench.particles.x[..count].iter().all(|x| x.is_finite()));

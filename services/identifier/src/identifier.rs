@@ -242,9 +242,9 @@ impl Identifier {
                 t_ns: belief.alarm_t_capture_ns,
                 p_fault: belief.p_fault,
                 noise: NoiseScales {
-                    pose: sane(belief.noise_scale),
-                    wheels: sane(belief.noise_scale_wheels),
-                    steer: sane(belief.noise_scale_steer),
+                    pose: belief.noise_scale.map(sane),
+                    wheels: belief.noise_scale_wheels.map(sane),
+                    steer: belief.noise_scale_steer.map(sane),
                 },
             };
         }

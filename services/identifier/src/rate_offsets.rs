@@ -56,7 +56,7 @@ impl RateOffsets {
     ) {
         let reading = &observation.wheels[wheel];
         if reading.plain > 0 {
-            let noise = evidence.sample_variance(reading.plain);
+            let noise = evidence.sample_variance(wheel, reading.plain);
             self.update(wheel, dragged, reading.mean, noise);
         }
     }

@@ -461,9 +461,9 @@ proptest! {
             }
             bench.alarm.set(&frame);
             bench.alarm.belief.p_fault = p_fault;
-            bench.alarm.belief.noise_scale = noise_scale;
-            bench.alarm.belief.noise_scale_wheels = noise_scale;
-            bench.alarm.belief.noise_scale_steer = noise_scale;
+            bench.alarm.belief.noise_scale = [noise_scale; 3];
+            bench.alarm.belief.noise_scale_wheels = [noise_scale; 8];
+            bench.alarm.belief.noise_scale_steer = [noise_scale; 8];
             let detection = (i % 4 != 0).then_some((&bench.alarm.belief, &*bench.alarm.particles));
             let entry = Entry::Frame(Input { frame: &frame, detection });
             bench.identifier.step(entry, &mut bench.belief, &mut bench.particles);

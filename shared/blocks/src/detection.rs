@@ -1,7 +1,7 @@
 //! The detector's belief: is something wrong?
 
 use crate::block::block;
-use crate::{Cause, Header};
+use crate::{Cause, Header, WHEELS};
 
 /// Capacity of the per-channel evidence.
 pub const CHANNELS: usize = 32;
@@ -37,7 +37,7 @@ impl Channel {
 
 block! {
     /// Written by the detector every cycle.
-    pub struct DetectionBelief, size 456 {
+    pub struct DetectionBelief, size 584 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -54,12 +54,13 @@ block! {
         pub evidence: f64,
         /// Effective sample size of the particles, before resampling.
         pub effective_sample_size: f64,
-        /// Estimated ratio of the pose's noise to the learned one (standard deviations).
-        pub noise_scale: f64,
-        /// The same for the wheel rates.
-        pub noise_scale_wheels: f64,
-        /// The same for the steering angles.
-        pub noise_scale_steer: f64,
+        /// Estimated ratio of the noise of the pose (x, y, yaw) to the learned one (standard
+        /// deviations).
+        pub noise_scale: [f64; 3],
+        /// The same for each wheel's rate.
+        pub noise_scale_wheels: [f64; WHEELS],
+        /// The same for each steering angle.
+        pub noise_scale_steer: [f64; WHEELS],
         /// Log-odds of a fault seen by each channel alone (see [`Channel`]).
         pub channel_log_odds: [f64; CHANNELS],
         /// `decision_seq` of the last action that the robot obeyed, as the frame says it.

@@ -13,9 +13,9 @@ pub struct Alarm {
 impl Alarm {
     pub fn between(from_s: f64, to_s: f64) -> Self {
         let belief = DetectionBelief {
-            noise_scale: 1.0,
-            noise_scale_wheels: 1.0,
-            noise_scale_steer: 1.0,
+            noise_scale: [1.0; 3],
+            noise_scale_wheels: [1.0; 8],
+            noise_scale_steer: [1.0; 8],
             ..DetectionBelief::default()
         };
         Self {

@@ -269,7 +269,7 @@ fn blank(robot: &Description, options: &Options) -> Model {
         },
         command: CommandModel {
             lag_s: 0.1,
-            lag_uncertainty: 1.0,
+            lag_uncertainty: 2.0,
             curvature_max_1_m: robot.limits.curvature_1_m,
             speed_range_m_s: [0.0, robot.limits.speed_m_s],
             standing_m_s: 0.02,

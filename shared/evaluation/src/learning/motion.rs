@@ -285,7 +285,7 @@ pub fn follow(
     let mut track: Option<Track> = None;
     let mut tracked_s = 0.0;
     for observation in segment {
-        let sensor = observation.pose_variance(model, 1.0);
+        let sensor = observation.pose_variance(model, [1.0; 3]);
         let Some(track) = track.as_mut().filter(|_| !observation.anchor) else {
             if observation.pose_frames > 0 {
                 let spread = Matrix3::from_diagonal(&Vector3::from(sensor));

@@ -22,11 +22,18 @@ const GAIN_MAX: f64 = 3.0;
 const SLIP_SD: [f64; 2] = [0.03, 0.1];
 /// Part of a window's slip that enters the running estimate of it.
 const SLIP_SHARE: f64 = 0.3;
+/// Part of a window's misfit that enters the running estimate of how noisy the measurement is, and
+/// how many times that it may be.
+const MISFIT_SHARE: f64 = 0.1;
+const MISFIT_CLIP: f64 = 9.0;
 /// A window with less travel than this says nothing on slip, m.
 const TRAVEL_MIN_M: f64 = 0.02;
 /// Time for which an error of the prediction counts as one with those before, s: about as long as
 /// a change of the command and its correction by the pose take.
 const COHERENT_S: f64 = 3.0;
+/// Factor on the growth of its variance: a filter takes it for white noise and averages it, which
+/// an error of one sign does not do.
+const COHERENCE: f64 = 3.0;
 
 /// Commanded motion between two observations, from middle to middle, as the body follows it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -74,6 +81,8 @@ pub struct BodyLag {
     window: Window,
     /// Displacement per metre of travel beyond the model, by ground or a fault: m/m and rad/m.
     slip: [f64; 2],
+    /// Mean square by which the fitting candidates miss, over that expected, less 1.
+    misfit: f64,
 }
 
 /// What was measured since a window began.
@@ -169,8 +178,8 @@ impl BodyLag {
             travel_m,
             turn_rad,
             speed_m_s,
-            travel_variance: self.between[0] + grown[0],
-            turn_variance: self.between[1] + grown[1],
+            travel_variance: self.between[0] + COHERENCE * grown[0],
+            turn_variance: self.between[1] + COHERENCE * grown[1],
         };
         for (sum, between) in self.window.between.iter_mut().zip(self.between) {
             *sum += between;
@@ -232,7 +241,7 @@ impl BodyLag {
                 let apart = slipped[i] + expected[i] - candidate.window[i];
                 apart * apart / spread[i]
             };
-            -0.5 * (square(0) + square(1))
+            -0.5 * (square(0) + square(1)) / (1.0 + self.misfit)
         });
         if travel_m.abs() > TRAVEL_MIN_M {
             for i in 0..2 {
@@ -243,6 +252,10 @@ impl BodyLag {
         if !best.is_finite() {
             return;
         }
+        // A pose that is noisier than learned says less; that it is less noisy is not relied on.
+        let noise = 1.0 + self.misfit;
+        let found = (-best).min(MISFIT_CLIP) * noise;
+        self.misfit = (self.misfit + MISFIT_SHARE * (found - noise)).max(0.0);
         for (candidate, fit) in self.candidates.iter_mut().zip(fits) {
             candidate.p *= (fit - best).max(-GAIN_MAX).exp();
         }

@@ -303,8 +303,8 @@ impl Monitor {
     }
 
     fn step_wheels(&mut self, observation: &Observation) {
-        let sd = self.model.noise.wheel_rate_rad_s * self.noise.scales().wheels;
-        let sample = self.model.sample_variance(sd, observation.frame_s);
+        let learned = self.model.noise.wheel_rate_rad_s;
+        let scales = self.noise.scales().wheels;
         let share = 1.0 / self.robot.wheels.len() as f64;
         let birth = self.birth(observation.dt_s, SHARE_WHEELS * share);
         let birth_repeats = self.birth(observation.dt_s, SHARE_REPEATS * share);
@@ -321,6 +321,9 @@ impl Monitor {
             let rolling = rolling_rate(&self.robot, i, command[0], command[1]);
             let behind = rolling - rolling_rate(&self.robot, i, lagged[0], lagged[1]);
             let (rate, variance) = self.model.nominal.rates[i].rate(rolling, command[0]);
+            let sample = self
+                .model
+                .sample_variance(learned * scales[i], observation.frame_s);
             let noise = observation.mean_variance(sample, reading.plain);
             let variance = variance + behind * behind + noise;
             let apart = reading.mean - rate;
@@ -341,8 +344,8 @@ impl Monitor {
     }
 
     fn step_steer(&mut self, observation: &Observation) {
-        let sd = self.model.noise.steer_rad * self.noise.scales().steer;
-        let sample = self.model.sample_variance(sd, observation.frame_s);
+        let learned = self.model.noise.steer_rad;
+        let scales = self.noise.scales().steer;
         let extra = self.model.nominal.steer_sd_rad;
         let steered = self
             .robot
@@ -359,6 +362,9 @@ impl Monitor {
             }
             let angle = steering_angle(&self.robot, i, observation.command[0]);
             let behind = angle - steering_angle(&self.robot, i, observation.curvature);
+            let sample = self
+                .model
+                .sample_variance(learned * scales[i], observation.frame_s);
             let noise = observation.mean_variance(sample, reading.plain);
             let variance = noise + extra * extra + behind * behind;
             let apart = reading.mean - angle;

@@ -19,25 +19,26 @@ const PRIOR: f64 = 20.0;
 /// Standard errors of the estimate by which it leans to the high side.
 const LEAN: f64 = 1.0;
 /// Samples over which the estimate forgets.
-const MEMORY: f64 = 900.0;
+const MEMORY: f64 = 600.0;
 
-/// How much noisier the sensors are than the learned ones, as ratios of standard deviations.
+/// How much noisier each channel is than learned, as ratios of standard deviations. A channel has
+/// a scale of its own: one that is noisy hides nothing on another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseScales {
-    /// The pose sensor.
-    pub pose: f64,
+    /// The pose: x, y, yaw.
+    pub pose: [f64; 3],
     /// The wheels' encoders.
-    pub wheels: f64,
+    pub wheels: [f64; WHEELS],
     /// The steering angles.
-    pub steer: f64,
+    pub steer: [f64; WHEELS],
 }
 
 impl Default for NoiseScales {
     fn default() -> Self {
         Self {
-            pose: 1.0,
-            wheels: 1.0,
-            steer: 1.0,
+            pose: [1.0; 3],
+            wheels: [1.0; WHEELS],
+            steer: [1.0; WHEELS],
         }
     }
 }
@@ -82,8 +83,8 @@ impl NoiseScale {
     }
 }
 
-/// Samples of a kind after which its noise counts as known.
-const KNOWN: f64 = 100.0;
+/// Samples of a channel after which its noise counts as known.
+const KNOWN: f64 = 25.0;
 /// Difference of commanded and lagged curvature, 1/m, and change of speed, m/s, up to which a drive
 /// counts as steady: further apart, the motion is not known well enough to tell it from noise.
 const STEADY_1_M: f64 = 0.1;
@@ -92,9 +93,9 @@ const STEADY_M_S: f64 = 1e-3;
 /// How noisy the sensors are, from differences between successive observations.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SensorNoise {
-    pose: NoiseScale,
-    wheels: NoiseScale,
-    steer: NoiseScale,
+    pose: [NoiseScale; 3],
+    wheels: [NoiseScale; WHEELS],
+    steer: [NoiseScale; WHEELS],
     history: [Option<Observation>; 2],
 }
 
@@ -104,18 +105,18 @@ impl SensorNoise {
     pub fn scales(&self) -> NoiseScales {
         let sd = |scale: &NoiseScale| scale.variance_ratio().sqrt();
         NoiseScales {
-            pose: sd(&self.pose),
-            wheels: sd(&self.wheels),
-            steer: sd(&self.steer),
+            pose: self.pose.each_ref().map(sd),
+            wheels: self.wheels.each_ref().map(sd),
+            steer: self.steer.each_ref().map(sd),
         }
     }
 
-    /// True once the noise of the pose, and of the wheels if they are used, has been seen often
-    /// enough. The steering is seen with the wheels.
+    /// True once the noise of the pose, and of a wheel if they are used, has been seen often enough:
+    /// a broken encoder shows none.
     #[must_use]
     pub fn is_known(&self, use_wheels: bool) -> bool {
         let is_known = |scale: &NoiseScale| scale.count >= PRIOR + KNOWN;
-        is_known(&self.pose) && (!use_wheels || is_known(&self.wheels))
+        self.pose.iter().all(is_known) && (!use_wheels || self.wheels.iter().any(is_known))
     }
 
     /// Second differences of the pose and first differences of wheel rates and steering angles,
@@ -137,10 +138,10 @@ impl SensorNoise {
         }
         if all.iter().all(|o| o.pose_frames > 0) {
             let (up, down) = (apart(model, &last, now), apart(model, &before, &last));
-            let [a, b, c] = all.map(|o| o.pose_variance(model, 1.0));
+            let [a, b, c] = all.map(|o| o.pose_variance(model, [1.0; 3]));
             for i in 0..a.len() {
                 let bend = up[i] - down[i];
-                self.pose.push(bend * bend / (a[i] + 4.0 * b[i] + c[i]));
+                self.pose[i].push(bend * bend / (a[i] + 4.0 * b[i] + c[i]));
             }
         }
         let surge = (now.command[1] - last.command[1]).abs();
@@ -152,10 +153,10 @@ impl SensorNoise {
             for i in 0..count {
                 let expected = turns(now, i) - turns(&last, i);
                 let readings = [&last.wheels[i], &now.wheels[i]];
-                push_step(&mut self.wheels, model, now, rate, readings, expected);
+                push_step(&mut self.wheels[i], model, now, rate, readings, expected);
                 let expected = steers(now, i) - steers(&last, i);
                 let readings = [&last.steer[i], &now.steer[i]];
-                push_step(&mut self.steer, model, now, angle, readings, expected);
+                push_step(&mut self.steer[i], model, now, angle, readings, expected);
             }
         }
     }

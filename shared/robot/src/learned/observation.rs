@@ -77,13 +77,13 @@ impl Observation {
         sample_variance / f64::from(valid.max(1))
     }
 
-    /// Variances of the mean pose (x, y, yaw) when the pose's noise is `noise_scale` times the
-    /// learned one.
+    /// Variances of the mean pose (x, y, yaw) when its noise is `scales` times the learned one.
     #[must_use]
-    pub fn pose_variance(&self, model: &Model, noise_scale: f64) -> [f64; 3] {
+    pub fn pose_variance(&self, model: &Model, scales: [f64; 3]) -> [f64; 3] {
         let noise = &model.noise;
-        [noise.position_m, noise.position_m, noise.yaw_rad].map(|sd| {
-            let sample = model.sample_variance(sd, self.frame_s) * noise_scale * noise_scale;
+        let learned = [noise.position_m, noise.position_m, noise.yaw_rad];
+        std::array::from_fn(|i| {
+            let sample = model.sample_variance(learned[i] * scales[i], self.frame_s);
             self.mean_variance(sample, self.pose_frames)
         })
     }
@@ -403,7 +403,7 @@ impl Observer {
             wrap(pose[2] - before[2]),
         ];
         // Two poses, each as noisy as this one.
-        let [position, _, heading] = now.pose_variance(&self.model, 1.0).map(|v| 2.0 * v);
+        let [position, _, heading] = now.pose_variance(&self.model, [1.0; 3]).map(|v| 2.0 * v);
         let beyond = yaw - now.curvature;
         let body = &mut self.state.body;
         let variance = [position, heading];

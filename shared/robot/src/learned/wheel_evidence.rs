@@ -47,7 +47,7 @@ pub struct WheelEvidence {
     pub steering: f64,
     /// Rate by rolling, and its variance by the lag of the body.
     rolling: [(f64, f64); WHEELS],
-    sample_sd: f64,
+    sample_sd: [f64; WHEELS],
 }
 
 /// How a wheel turns while others drag.
@@ -70,8 +70,12 @@ impl WheelEvidence {
         observation: &Observation,
         noise: NoiseScales,
     ) -> Self {
-        let sd = model.noise.wheel_rate_rad_s * noise.wheels;
-        let sample_sd = model.sample_variance(sd, observation.frame_s).sqrt();
+        let learned = model.noise.wheel_rate_rad_s;
+        let sample_sd = noise.wheels.map(|scale| {
+            model
+                .sample_variance(learned * scale, observation.frame_s)
+                .sqrt()
+        });
         let mut evidence = Self {
             healthy: [0.0; WHEELS],
             broken: [[0.0; BREAKAGES.len()]; WHEELS],
@@ -85,7 +89,7 @@ impl WheelEvidence {
         for i in 0..robot.wheels.len().min(WHEELS) {
             let read = |state| {
                 let reading = &observation.wheels[i];
-                model.encoder.log_likelihood(state, reading, sample_sd)
+                model.encoder.log_likelihood(state, reading, sample_sd[i])
             };
             let rate = rolling_rate(robot, i, command[0], command[1]);
             let lagged = rolling_rate(robot, i, observation.curvature, observation.speed);
@@ -174,7 +178,9 @@ impl WheelEvidence {
     ) -> f64 {
         let state = EncoderState::Turning(rate, variance, TAIL_DRAGGED);
         let reading = &observation.wheels[i];
-        model.encoder.log_likelihood(state, reading, self.sample_sd)
+        model
+            .encoder
+            .log_likelihood(state, reading, self.sample_sd[i])
     }
 
     /// Wheel `i` stands and its encoder is whole. The very number that a dead encoder has: what
@@ -184,10 +190,11 @@ impl WheelEvidence {
         self.broken[i][DEAD]
     }
 
-    /// Variance of the mean of `plain` samples by the sensor's noise, (rad/s)².
+    /// Variance of the mean of `plain` samples of a wheel's rate by the sensor's noise, (rad/s)².
     #[must_use]
-    pub fn sample_variance(&self, plain: u32) -> f64 {
-        self.sample_sd * self.sample_sd / f64::from(plain.max(1))
+    pub fn sample_variance(&self, wheel: usize, plain: u32) -> f64 {
+        let sample_sd = self.sample_sd[wheel];
+        sample_sd * sample_sd / f64::from(plain.max(1))
     }
 
     /// Wheel `i` may do anything or turn as it should, as in the unknown.
@@ -214,10 +221,8 @@ fn steering(
     model: &Model,
     robot: &Description,
     observation: &Observation,
-    noise_scale: f64,
+    scales: [f64; WHEELS],
 ) -> f64 {
-    let sd = model.noise.steer_rad * noise_scale;
-    let sample = model.sample_variance(sd, observation.frame_s);
     let extra = model.nominal.steer_sd_rad;
     let mut sum = 0.0;
     for i in (0..robot.wheels.len().min(WHEELS)).filter(|&i| robot.wheels[i].steered) {
@@ -227,6 +232,8 @@ fn steering(
         }
         let angle = steering_angle(robot, i, observation.command[0]);
         let behind = angle - steering_angle(robot, i, observation.curvature);
+        let sd = model.noise.steer_rad * scales[i];
+        let sample = model.sample_variance(sd, observation.frame_s);
         let noise = observation.mean_variance(sample, reading.plain);
         let variance = noise + extra * extra + behind * behind;
         let apart = reading.mean - angle;
