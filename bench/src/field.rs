@@ -1,5 +1,5 @@
-//! Does the diagnosis hold in the field? Long runs, gaps, other grounds, lags and noise, faults that
-//! come, go and come again: scenarios of `bench/field.toml`, scored at every instant.
+//! Does the diagnosis hold in the field? Long runs, gaps, other grounds, lags and noise, faults
+//! that come, go and come again: scenarios of `bench/field.toml`, scored at every instant.
 //!
 //! Detector, identifier and supervisor run in one process over the simulator's world. The world is
 //! driven with every set of sensors at once; what is decided is scored, but obeyed only where a

@@ -1,6 +1,7 @@
 //! Does the diagnosis hold in the field: for hours, over gaps, on other grounds, with other lags?
 //!
-//! Scenarios and bars: `bench/field.toml`. Every figure: `scoring::field` of the evaluation library.
+//! Scenarios and bars: `bench/field.toml`. Every figure: `scoring::field` of the evaluation
+//! library.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -77,7 +78,9 @@ fn answer(args: &Args) -> Result<bool, Box<dyn Error>> {
     let outcomes = measure(&graph, &library, &scenarios, args.scale)?;
     let wall_s = began.elapsed().as_secs_f64();
     let document = document(&outcomes, machine::facts(), wall_s, args.scale);
-    let is_met = outcomes.iter().all(|o| o.bars().all(|(_, met)| met));
+    let is_met = outcomes
+        .iter()
+        .all(|o| o.bars().all(|(_, met)| met != Some(false)));
     match args.json {
         true => println!("{document:#}"),
         false => show(args, &outcomes, &document)?,

@@ -36,16 +36,14 @@ impl Bar {
         self.sensors.as_deref().is_none_or(|of| of == sensors)
     }
 
-    /// Whether the figure's value meets it; a figure that is not there, or whose value is that
-    /// something never happened, does not.
+    /// Whether the figure's value meets it; what never happened does not. `None` without a case.
     #[must_use]
-    pub fn is_met(&self, figures: &[Figure]) -> bool {
-        let figure = figures.iter().find(|figure| figure.name == self.figure);
-        let value = figure.and_then(|figure| figure.value);
-        value.is_some_and(|value| match self.comparison {
+    pub fn is_met(&self, figures: &[Figure]) -> Option<bool> {
+        let figure = figures.iter().find(|figure| figure.name == self.figure)?;
+        Some(figure.value.is_some_and(|value| match self.comparison {
             Comparison::AtMost => value <= self.number,
             Comparison::AtLeast => value >= self.number,
-        })
+        }))
     }
 }
 

@@ -59,8 +59,8 @@ impl<'a> Outcome<'a> {
         }
     }
 
-    /// The bars that hold for this set of sensors, and whether each is met.
-    pub fn bars(&self) -> impl Iterator<Item = (&Bar, bool)> {
+    /// The bars that hold for this set of sensors, and whether each is met; none without a case.
+    pub fn bars(&self) -> impl Iterator<Item = (&Bar, Option<bool>)> {
         let all = self.scenario.bars.iter();
         let mine = all.filter(|bar| bar.is_for(self.sensors));
         mine.map(|bar| (bar, bar.is_met(&self.figures)))
@@ -107,7 +107,7 @@ impl<'a> Outcome<'a> {
             let bars: Vec<String> = bars.map(|(bar, met)| verdict(bar, met)).collect();
             lines.push(format!("{head}{}| {} |", words(figure), bars.join("; ")));
         }
-        // A bar whose figure has no case is not met either.
+        // A bar whose figure has no case is shown all the same.
         let has = |bar: &Bar| self.figures.iter().any(|figure| figure.name == bar.figure);
         for (bar, met) in self.bars().filter(|(bar, _)| !has(bar)) {
             lines.push(format!(
@@ -130,8 +130,13 @@ fn says_something(figure: &Figure) -> bool {
     !(is_rule && figure.value == Some(0.0))
 }
 
-fn verdict(bar: &Bar, met: bool) -> String {
-    format!("{bar}: {}", if met { "met" } else { "NOT met" })
+fn verdict(bar: &Bar, met: Option<bool>) -> String {
+    let word = match met {
+        Some(true) => "met",
+        Some(false) => "NOT met",
+        None => "no case",
+    };
+    format!("{bar}: {word}")
 }
 
 fn words(figure: &Figure) -> String {
@@ -174,7 +179,10 @@ pub fn lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
 #[must_use]
 pub fn document(outcomes: &[Outcome<'_>], machine: Value, wall_s: f64, scale: f64) -> Value {
     let (mut bars, mut met) = (0, 0);
-    for (_, is_met) in outcomes.iter().flat_map(Outcome::bars) {
+    for is_met in outcomes
+        .iter()
+        .flat_map(|o| o.bars().filter_map(|(_, met)| met))
+    {
         bars += 1;
         met += usize::from(is_met);
     }

@@ -228,7 +228,10 @@ fn vary(file: &mut toml::Table) -> Result<(), String> {
         let how: Variation = how.try_into().map_err(|error| format!("vary: {error}"))?;
         for value in how.values {
             let name = scenario.get("name").and_then(toml::Value::as_str);
-            let name = format!("{}/{value}", name.unwrap_or_default());
+            let word = value
+                .as_str()
+                .map_or_else(|| value.to_string(), str::to_owned);
+            let name = format!("{}/{word}", name.unwrap_or_default());
             let mut one = scenario.clone();
             one.insert("name".to_owned(), name.into());
             put(&mut one, &how.key, value);

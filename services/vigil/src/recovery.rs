@@ -27,8 +27,8 @@ pub struct Recoverer {
 }
 
 impl Recoverer {
-    /// For a decision model whose states are the leaves of the tree and whose actions have the names
-    /// of what they make the robot do (`go_on`, `slow_down`, `compensate`, ...).
+    /// For a decision model whose states are the leaves of the tree and whose actions have the
+    /// names of what they make the robot do (`go_on`, `slow_down`, `compensate`, ...).
     ///
     /// # Errors
     /// [`SupervisorError`] if model, tree and robot do not fit together.

@@ -6,16 +6,16 @@
 //!   changes again. From healthy, the *delay* runs to the next rise of the alarm; an alarm that
 //!   stands already announces nothing. During another fault, to that or the next change of `mode`;
 //! - *right leaf*: `mode` is the leaf that is true; for several faults `MULTIPLE` with exactly the
-//!   true set; for what no model describes `UNKNOWN`, or its own leaf if it has one; without a fault
-//!   the nominal mode;
+//!   true set; for what no model describes `UNKNOWN`, or its own leaf if it has one; without a
+//!   fault the nominal mode;
 //! - *right side*: the right leaf, or a node of the true side; for what no model describes also
 //!   every abstract node;
 //! - *from h seconds on*: driven time at least h after the last onset, while the fault persists;
-//! - *changes*: of `mode` and of the reported name; *settled* ones come 2 s after an onset or later,
-//!   while the fault persists, where there should be none;
+//! - *changes*: of `mode` and of the reported name; *settled* ones come 2 s after an onset or
+//!   later, while the fault persists, where there should be none;
 //! - *time to clear*: driven time from the end of all faults until the alarm is down, and until
-//!   `mode` and the reported name are nominal; what does not happen before the next fault or the end
-//!   is missing;
+//!   `mode` and the reported name are nominal, and have been for 2 s; what does not happen before
+//!   the next fault or the end is missing;
 //! - *false alarm*: a rise while nothing is wrong; *action*: each entry into anything but going on,
 //!   but for stops by rule while no belief is usable, which are counted apart;
 //! - *latched*: a call for help that stands when a run ends without a fault;
@@ -41,6 +41,8 @@ use super::Taxonomy;
 pub const BLIND: &str = "BLIND";
 /// Times after an onset at which the name is judged, s.
 pub const JUDGED_S: [f64; 3] = [2.0, 5.0, 10.0];
+/// So long an alarm must be down, or a name be nominal, to have cleared, s.
+const HELD_S: f64 = 2.0;
 /// Probability above which a wrong name counts as confident.
 const CONFIDENT: f64 = 0.9;
 

@@ -115,12 +115,14 @@ fn of_onsets(runs: &[Run]) -> Vec<Figure> {
     found.into_iter().flatten().collect()
 }
 
+/// The time of a run from an instant after each onset on.
+type From = fn(&Run) -> &Seen;
+
 fn of_time(runs: &[Run]) -> Vec<Figure> {
-    let of = |pick: fn(&Run) -> &Seen, part: fn(&Seen) -> f64| {
-        move |run: &Run| (part(pick(run)), pick(run).driven_s)
-    };
-    let (early, late): (fn(&Run) -> &Seen, fn(&Run) -> &Seen) =
-        (|run| &run.from_2_s, |run| &run.from_10_s);
+    let of =
+        |pick: From, part: fn(&Seen) -> f64| move |run: &Run| (part(pick(run)), pick(run).driven_s);
+    let early: From = |run| &run.from_2_s;
+    let late: From = |run| &run.from_10_s;
     let minutes = |run: &Run| run.duration_s / 60.0;
     let settled_minutes = |run: &Run| run.from_2_s.driven_s / 60.0;
     let found = [

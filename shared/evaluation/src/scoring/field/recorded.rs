@@ -11,8 +11,8 @@ pub const SAFE_STOP: &str = "safe_stop";
 /// Figures by name.
 pub type Figures = BTreeMap<&'static str, Figure>;
 
-/// Figures of recorded runs by class: `all`, `nominal`, and the classes of faults. Figures of actions
-/// are left out if nothing was decided.
+/// Figures of recorded runs by class: `all`, `nominal`, and the classes of faults. Figures of
+/// actions are left out if nothing was decided.
 #[must_use]
 pub fn of_cases(cases: &[Case], taxonomy: &Taxonomy) -> BTreeMap<String, Figures> {
     let mut classes: BTreeMap<String, Vec<Run>> = BTreeMap::new();

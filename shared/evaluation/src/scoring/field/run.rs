@@ -1,6 +1,6 @@
 //! One run, moment by moment.
 
-use super::{BLIND, CONFIDENT, JUDGED_S, Moment, Stretch, Told, Truth};
+use super::{BLIND, CONFIDENT, HELD_S, JUDGED_S, Moment, Stretch, Told, Truth};
 use crate::scoring::{TIME_SLACK_S, Taxonomy};
 
 /// One onset of a fault.
@@ -153,6 +153,8 @@ pub struct Scorer<'a> {
     at: usize,
     before: Option<Before>,
     contradiction_s: f64,
+    /// Driven time after the last end at which alarm and name were down, and since when in time.
+    down: [Option<(f64, f64)>; 2],
     run: Run,
 }
 
@@ -166,6 +168,7 @@ impl<'a> Scorer<'a> {
             at: 0,
             before: None,
             contradiction_s: 0.0,
+            down: [None; 2],
             run: Run {
                 seed,
                 ..Run::default()
@@ -230,6 +233,7 @@ impl<'a> Scorer<'a> {
         if now == before {
             return;
         }
+        self.down = [None; 2];
         if now.is_healthy() {
             self.run.ends.push(End {
                 t_s,
@@ -289,11 +293,21 @@ impl<'a> Scorer<'a> {
         let Some(end) = self.run.ends.last_mut() else {
             return;
         };
-        if !moment.alarm {
-            end.alarm_s.get_or_insert(end.driven_s);
-        }
-        if moment.mode == nominal && moment.reported == nominal {
-            end.name_s.get_or_insert(end.driven_s);
+        let named = moment.mode != nominal || moment.reported != nominal;
+        let slots = [&mut end.alarm_s, &mut end.name_s];
+        for ((is_up, slot), down) in [moment.alarm, named]
+            .into_iter()
+            .zip(slots)
+            .zip(&mut self.down)
+        {
+            if is_up {
+                *down = None;
+                continue;
+            }
+            let (driven_s, since_s) = *down.get_or_insert((end.driven_s, moment.t_s));
+            if slot.is_none() && moment.t_s - since_s + TIME_SLACK_S >= HELD_S {
+                *slot = Some(driven_s);
+            }
         }
         end.driven_s += if moment.drives { moment.dt_s } else { 0.0 };
     }
