@@ -59,7 +59,7 @@ impl<'a> Follower<'a> {
     fn innovation(&mut self, observation: &Observation) -> Option<([f64; 3], Matrix3<f64>)> {
         let model = &self.rover.model;
         let motion = &model.nominal.motion;
-        let variance = observation.pose_variance(model, 1.0);
+        let variance = observation.pose_variance(model, [1.0; 3]);
         let has_pose = observation.pose_frames > 0;
         let Some(track) = &mut self.track else {
             let spread = Matrix3::from_diagonal(&variance.into());

@@ -188,7 +188,7 @@ impl Recorded {
     ) -> Trace {
         let mut filter = Exact::new(&self.model, &self.robot, &self.leaves, with_wheels, rates);
         if let Some(first) = run.observations.first() {
-            let variance = first.pose_variance(&self.model, 1.0);
+            let variance = first.pose_variance(&self.model, [1.0; 3]);
             let spread = nalgebra::Matrix3::from_diagonal(&variance.into());
             filter.restart(first.pose.into(), spread, first.t_ns);
         }
@@ -249,7 +249,7 @@ impl Recorded {
     ) -> Trace {
         let mut switching = switching.clone();
         if let Some(first) = run.observations.first() {
-            let variance = first.pose_variance(&self.model, 1.0);
+            let variance = first.pose_variance(&self.model, [1.0; 3]);
             let spread = nalgebra::Matrix3::from_diagonal(&variance.into());
             switching.start_at(first.pose.into(), spread);
         }

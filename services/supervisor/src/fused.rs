@@ -2,9 +2,12 @@
 
 use vigil_blocks::{Action, DetectionBelief};
 
-/// The fused alarm of a cycle. The supervisor, which alone sees both stages, is to publish it as
-/// `action.alarm`; until it does, and without a supervisor, the detector's stands for it.
+/// The fused alarm of a cycle: what the supervisor, which alone sees both stages, has published.
+/// Without a supervisor the detector's stands for it.
 #[must_use]
-pub const fn fused_alarm(detection: &DetectionBelief, _action: Option<&Action>) -> bool {
-    detection.alarm != 0
+pub const fn fused_alarm(detection: &DetectionBelief, action: Option<&Action>) -> bool {
+    match action {
+        Some(action) => action.alarm != 0,
+        None => detection.alarm != 0,
+    }
 }

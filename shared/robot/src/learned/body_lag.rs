@@ -244,8 +244,8 @@ impl BodyLag {
             -0.5 * (square(0) + square(1)) / (1.0 + self.misfit)
         });
         if travel_m.abs() > TRAVEL_MIN_M {
-            for i in 0..2 {
-                self.slip[i] += SLIP_SHARE * slipped[i] / travel_m;
+            for (slip, slipped) in self.slip.iter_mut().zip(slipped) {
+                *slip += SLIP_SHARE * slipped / travel_m;
             }
         }
         let best = fits.into_iter().fold(f64::NEG_INFINITY, f64::max);

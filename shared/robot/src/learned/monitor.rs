@@ -303,8 +303,11 @@ impl Monitor {
     }
 
     fn step_wheels(&mut self, observation: &Observation) {
-        let learned = self.model.noise.wheel_rate_rad_s;
-        let scales = self.noise.scales().wheels;
+        let scales = self.noise.scales();
+        let sample = |sd: f64| self.model.sample_variance(sd, observation.frame_s);
+        let samples = scales
+            .wheels
+            .map(|scale| sample(scale * self.model.noise.wheel_rate_rad_s));
         let share = 1.0 / self.robot.wheels.len() as f64;
         let birth = self.birth(observation.dt_s, SHARE_WHEELS * share);
         let birth_repeats = self.birth(observation.dt_s, SHARE_REPEATS * share);
@@ -312,7 +315,11 @@ impl Monitor {
             observation.command,
             [observation.curvature, observation.speed],
         );
-        for i in 0..self.robot.wheels.len() {
+        for (i, sample) in samples
+            .into_iter()
+            .enumerate()
+            .take(self.robot.wheels.len())
+        {
             let reading = &observation.wheels[i];
             self.update_repeats(i, reading.plain, reading.repeats, birth_repeats);
             if reading.plain == 0 {
@@ -321,9 +328,6 @@ impl Monitor {
             let rolling = rolling_rate(&self.robot, i, command[0], command[1]);
             let behind = rolling - rolling_rate(&self.robot, i, lagged[0], lagged[1]);
             let (rate, variance) = self.model.nominal.rates[i].rate(rolling, command[0]);
-            let sample = self
-                .model
-                .sample_variance(learned * scales[i], observation.frame_s);
             let noise = observation.mean_variance(sample, reading.plain);
             let variance = variance + behind * behind + noise;
             let apart = reading.mean - rate;
@@ -344,8 +348,11 @@ impl Monitor {
     }
 
     fn step_steer(&mut self, observation: &Observation) {
-        let learned = self.model.noise.steer_rad;
-        let scales = self.noise.scales().steer;
+        let scales = self.noise.scales();
+        let sample = |sd: f64| self.model.sample_variance(sd, observation.frame_s);
+        let samples = scales
+            .steer
+            .map(|scale| sample(scale * self.model.noise.steer_rad));
         let extra = self.model.nominal.steer_sd_rad;
         let steered = self
             .robot
@@ -355,16 +362,17 @@ impl Monitor {
             .count()
             .max(1);
         let birth = self.birth(observation.dt_s, SHARE_STEER / steered as f64);
-        for i in 0..self.robot.wheels.len() {
+        for (i, sample) in samples
+            .into_iter()
+            .enumerate()
+            .take(self.robot.wheels.len())
+        {
             let reading = &observation.steer[i];
             if !self.robot.wheels[i].steered || reading.plain == 0 {
                 continue;
             }
             let angle = steering_angle(&self.robot, i, observation.command[0]);
             let behind = angle - steering_angle(&self.robot, i, observation.curvature);
-            let sample = self
-                .model
-                .sample_variance(learned * scales[i], observation.frame_s);
             let noise = observation.mean_variance(sample, reading.plain);
             let variance = noise + extra * extra + behind * behind;
             let apart = reading.mean - angle;

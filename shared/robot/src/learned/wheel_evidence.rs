@@ -89,7 +89,9 @@ impl WheelEvidence {
         for i in 0..robot.wheels.len().min(WHEELS) {
             let read = |state| {
                 let reading = &observation.wheels[i];
-                model.encoder.log_likelihood(state, reading, sample_sd[i])
+                model
+                    .encoder
+                    .log_likelihood(state, reading, evidence.sample_sd[i])
             };
             let rate = rolling_rate(robot, i, command[0], command[1]);
             let lagged = rolling_rate(robot, i, observation.curvature, observation.speed);
