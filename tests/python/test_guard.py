@@ -143,5 +143,56 @@ class Guard(unittest.TestCase):
         self.assertGreater(summary["services"]["supervisor"]["cycles"], 300)
 
 
+# Cause of blindness, and how every frame of a drive is made to show nothing.
+BLINDING = [
+    ("clock", lambda f: change(f, header_t_capture_ns=f.header.t_capture_ns // 1000)),
+    ("validity", lambda f: change(f, valid=0)),
+    ("command", lambda f: change(f, valid=f.valid & ~3)),
+    ("run", lambda f: change(f, run_id=1 + f.header.seq)),
+]
+
+
+class Blind(unittest.TestCase):
+    """What passes every check and shows nothing is named, stops the robot, and fails the run."""
+
+    def drive(self, seconds, rate_hz, spoil, run=STUCK_RUN):
+        """The summary of a drive whose frames are spoilt."""
+        with Graph("--source", "socket", "--rate", str(rate_hz)) as graph:
+            address = graph.wait_for_socket()
+            to = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+            self.addCleanup(to.close)
+            frames = list(recording.frames(FRAMES, run))
+            began = due = time.monotonic_ns()
+            for seq in range(seconds * rate_hz):
+                due += 10**9 // rate_hz
+                time.sleep(max(0, due - time.monotonic_ns()) / 1e9)
+                frame = vigil.SensorFrame.from_buffer_copy(frames[seq])
+                frame.header.epoch, frame.header.seq, frame.run_id = began, seq, 1
+                frame.header.t_schedule_ns = frame.header.t_capture_ns = due
+                to.sendto(vigil.datagram(spoil(frame)), str(address))
+            return graph.stop()
+
+    def test_a_source_that_shows_nothing_is_named_and_the_robot_stops(self):
+        for cause, spoil in BLINDING:
+            with self.subTest(cause):
+                summary = self.drive(2, RATE_HZ, spoil)
+                self.assertEqual(list(summary["blind"]["detector"]), [cause])
+                actions = [e["what"] for e in summary["events"] if e["event"] == "action"]
+                self.assertEqual(actions[-1], "stop")
+
+    def test_fields_of_another_unit_or_sign_are_told_by_the_graph(self):
+        def millimetres(frame):
+            frame.pose[0], frame.pose[1] = 1000 * frame.pose[0], 1000 * frame.pose[1]
+            return frame
+
+        summary = self.drive(4, 20, millimetres)
+        told = [e["what"] for e in summary["events"] if e["event"] == "publisher"]
+        self.assertTrue(any("are they in mm?" in what for what in told), told)
+        self.assertEqual(list(summary["blind"]["detector"]), ["meaning"])
+        summary = self.drive(3, 20, lambda f: change(f, wheel_rate=(4, -f.wheel_rate[4])))
+        told = [e["what"] for e in summary["events"] if e["event"] == "publisher"]
+        self.assertEqual(told, ["signs: enc_RM has the other sign"])
+
+
 if __name__ == "__main__":
     unittest.main()

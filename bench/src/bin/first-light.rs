@@ -84,7 +84,10 @@ fn events<'a>(summary: &'a Value, kind: &'a str) -> impl Iterator<Item = (f64, &
         .as_array()
         .map(Vec::as_slice)
         .unwrap_or_default();
-    all.iter().filter(move |e| e["event"] == kind).map(|e| {
+    // Two services tell alarms: what a user reads is the supervisor's.
+    let is_told = |e: &&Value| e["event"] != "alarm" || e["service"] == "supervisor";
+    let all = all.iter().filter(is_told);
+    all.filter(move |e| e["event"] == kind).map(|e| {
         (
             e["t_s"].as_f64().unwrap_or(f64::NAN),
             e["what"].as_str().unwrap_or_default(),

@@ -19,8 +19,8 @@ pub fn assemble(setup: &Setup) -> Result<Detector, DetectorError> {
         RobotModel::Nominal(model) => Detector::nominal(model, &setup.robot, &file.detector),
     }?;
     // Recorded frames come at the recording's pace, times the speed.
-    let judges_clock = file.sensor.source != Source::Playback;
+    let live = file.sensor.source != Source::Playback;
     let period_s = setup.period_ns() as f64 * 1e-9;
-    let detector = detector.in_graph(period_s, judges_clock);
+    let detector = detector.in_graph(&setup.robot, period_s, live);
     Ok(detector.with_monitors(file.monitors.as_ref()))
 }

@@ -9,12 +9,14 @@ use vigil_inference::logspace::probability;
 use vigil_robot::alarm::{APPEARS_AGAIN_1_S, ENDS_1_S};
 use vigil_robot::learned::monitor::Channels;
 use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
+use vigil_robot::meaning::Finding;
 use vigil_robot::nominal;
 use vigil_robot::{Alarm, AlarmError, Description};
 use vigil_setup::schema;
 
 use crate::cloud::Cloud;
 use crate::monitors::Monitors;
+use crate::publisher::Publisher;
 use crate::sight::{self, Sight};
 use crate::watch::{Observed, Watch};
 
@@ -61,6 +63,8 @@ pub struct Detector {
     /// Whether the last observation was of a robot in motion.
     moving: bool,
     sight: Sight,
+    /// With a live publisher.
+    publisher: Option<Publisher>,
     period_s: f64,
     t_last_ns: u64,
     run_id: u64,
@@ -153,6 +157,7 @@ impl Detector {
             armed: false,
             moving: false,
             sight,
+            publisher: None,
             period_s: interval_s,
             t_last_ns: 0,
             run_id: 0,
@@ -175,11 +180,19 @@ impl Detector {
     }
 
     /// The same detector in a graph of this period, s: it tells when it sees nothing by the graph's
-    /// time; see [`Sight::in_graph`].
+    /// time; see [`Sight::in_graph`]. A publisher that is `live`, and no recording, is tested in
+    /// passing.
     #[must_use]
-    pub fn in_graph(mut self, period_s: f64, judges_clock: bool) -> Self {
-        self.sight = self.sight.in_graph(period_s, judges_clock);
+    pub fn in_graph(mut self, robot: &Description, period_s: f64, live: bool) -> Self {
+        self.sight = self.sight.in_graph(period_s, live);
+        self.publisher = live.then(|| Publisher::new(robot, period_s));
         self
+    }
+
+    /// What was found of the publisher since it was asked last.
+    #[must_use]
+    pub fn found(&mut self) -> [Option<Finding>; 2] {
+        self.publisher.as_mut().map_or([None; 2], Publisher::tell)
     }
 
     /// A frame came, and the border refused it: an entry of the journal that changes no belief.
@@ -226,10 +239,17 @@ impl Detector {
         match entry {
             Entry::Frame(frame) => {
                 self.sight.take(frame);
+                if let Some(publisher) = &mut self.publisher {
+                    publisher.take(frame);
+                    self.sight.doubt(publisher.is_blinding());
+                }
                 self.take(frame);
             }
             Entry::Missed(count) => {
                 self.sight.miss(count);
+                if let Some(publisher) = &mut self.publisher {
+                    publisher.miss(count);
+                }
                 missed = count;
             }
             Entry::Budget(count) => {

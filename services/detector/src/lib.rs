@@ -6,6 +6,8 @@ mod assemble;
 mod cloud;
 mod detector;
 mod monitors;
+mod pace;
+mod publisher;
 mod sight;
 mod watch;
 pub mod wiring;

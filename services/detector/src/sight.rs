@@ -55,6 +55,7 @@ pub struct Sight {
     /// Of valid frames, without a pause, s.
     seen_s: f64,
     blind: Option<Blindness>,
+    is_doubtful: bool,
 }
 
 impl Sight {
@@ -74,6 +75,7 @@ impl Sight {
             refused: false,
             seen_s: 0.0,
             blind: None,
+            is_doubtful: false,
         }
     }
 
@@ -89,7 +91,15 @@ impl Sight {
     /// Why nothing is seen; none while something is.
     #[must_use]
     pub const fn blind(&self) -> Option<Blindness> {
-        self.blind
+        match self.blind {
+            None if self.is_doubtful => Some(Blindness::Meaning),
+            blind => blind,
+        }
+    }
+
+    /// Whether what is measured cannot mean what it should.
+    pub const fn doubt(&mut self, is_doubtful: bool) {
+        self.is_doubtful = is_doubtful;
     }
 
     /// Takes a frame.

@@ -172,6 +172,10 @@ impl Stage for DetectorStage {
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         self.watch.tell(health, now_ns);
+        for finding in self.detector.found().into_iter().flatten() {
+            let what = finding.to_wire();
+            health.event(now_ns, EventKind::Publisher, what, finding.value, 0);
+        }
         if self.detector.is_monitoring() && self.symptoms != self.symptoms_told {
             health.event(now_ns, EventKind::Symptoms, self.symptoms, 0.0, 0);
             self.symptoms_told = self.symptoms;

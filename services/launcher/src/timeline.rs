@@ -11,6 +11,7 @@ use vigil_blocks::{
 use vigil_cycle::Supervision;
 use vigil_cycle::topic::ServiceName;
 use vigil_robot::injection::{Change, Wire};
+use vigil_robot::meaning::Finding;
 
 use crate::plan::Plan;
 use crate::words;
@@ -322,6 +323,8 @@ impl Namer {
                 let cause = Rejection::from_wire(event.what).map_or("?", Rejection::as_str);
                 format!("{} frames: {cause}", event.value)
             }
+            EventKind::Publisher => Finding::from_wire(event.what, event.p)
+                .map_or_else(|| "?".into(), |finding| finding.text(&self.robot)),
             EventKind::Blind => words::blind(event.what).into(),
             EventKind::BlindEnds => format!("after {:.1} s", event.value as f64 * 1e-9),
             EventKind::NotExcited => "the robot stands: the belief is held".into(),

@@ -108,11 +108,14 @@ pub enum Blindness {
     Epoch = 6,
     /// Frames come, and the border refuses them all.
     Refused = 7,
+    /// What is measured does not mean what the robot's description says: units, signs, axes. Until
+    /// another publisher or a new run.
+    Meaning = 8,
 }
 
 impl Blindness {
     /// All causes, in the order of their codes, which begin with 1.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Silence,
         Self::Clock,
         Self::Validity,
@@ -120,6 +123,7 @@ impl Blindness {
         Self::Command,
         Self::Epoch,
         Self::Refused,
+        Self::Meaning,
     ];
 
     /// Name, as in reports.
@@ -133,6 +137,7 @@ impl Blindness {
             Self::Command => "command",
             Self::Epoch => "epoch",
             Self::Refused => "refused",
+            Self::Meaning => "meaning",
         }
     }
 
@@ -147,6 +152,7 @@ impl Blindness {
             5 => Self::Command,
             6 => Self::Epoch,
             7 => Self::Refused,
+            8 => Self::Meaning,
             _ => return None,
         })
     }
@@ -162,6 +168,7 @@ impl Blindness {
             Self::Command => "no valid command",
             Self::Epoch => "another writer epoch in every frame",
             Self::Refused => "every frame is refused",
+            Self::Meaning => "units, signs or axes are not the description's",
         }
     }
 }

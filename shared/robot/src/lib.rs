@@ -13,6 +13,7 @@ pub mod fused_alarm;
 pub mod injection;
 pub mod kinematics;
 pub mod learned;
+pub mod meaning;
 mod model_file;
 pub mod nominal;
 pub mod period;

@@ -1,0 +1,200 @@
+//! What a publisher does that the robot's description does not say.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::Description;
+use crate::description::Kinematics;
+
+/// What is wrong. The value is its code in events.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Kind {
+    /// The pose moves so many times the commanded travel.
+    Travel = 1,
+    /// The pose moves at this angle to its yaw, rad, where 0 is commanded.
+    Heading = 2,
+    /// The yaw turns so many times the commanded angle.
+    Turn = 3,
+    /// The gyro turns so many times the commanded angle.
+    Gyro = 4,
+    /// The wheels turn so many times as fast as the command makes them roll.
+    Rates = 5,
+    /// This wheel's rate has the other sign.
+    RateSign = 6,
+    /// This wheel and the one opposite turn as each other should.
+    Sides = 7,
+    /// This wheel's steering angle has the other sign.
+    SteerSign = 8,
+    /// Frames come, and most come after their deadlines: the share that does.
+    Late = 9,
+    /// Frames come so many times as often as the graph's rate says.
+    Rate = 10,
+}
+
+impl Kind {
+    const ALL: [Self; 10] = [
+        Self::Travel,
+        Self::Heading,
+        Self::Turn,
+        Self::Gyro,
+        Self::Rates,
+        Self::RateSign,
+        Self::Sides,
+        Self::SteerSign,
+        Self::Late,
+        Self::Rate,
+    ];
+
+    /// True if faults go unseen behind it: what is watched does not mean what it says. One wheel
+    /// among others is seen, as a departure.
+    #[must_use]
+    pub const fn is_blinding(self) -> bool {
+        matches!(
+            self,
+            Self::Travel | Self::Heading | Self::Turn | Self::Gyro | Self::Rates
+        )
+    }
+}
+
+/// One thing that is wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finding {
+    /// What.
+    pub kind: Kind,
+    /// Of which wheel, where it is of one.
+    pub wheel: Option<usize>,
+    /// How far off; see [`Kind`].
+    pub value: f64,
+}
+
+/// In an event: no wheel.
+const NO_WHEEL: u32 = 255;
+
+impl Finding {
+    /// As an event's `what`.
+    #[must_use]
+    pub fn to_wire(&self) -> u32 {
+        let wheel = self.wheel.and_then(|wheel| u32::try_from(wheel).ok());
+        self.kind as u32 + 256 * wheel.map_or(NO_WHEEL, |wheel| wheel.min(NO_WHEEL))
+    }
+
+    /// From an event's `what` and `p`, if this version knows it.
+    #[must_use]
+    pub fn from_wire(what: u32, value: f64) -> Option<Self> {
+        let kind = Kind::ALL.into_iter().find(|k| *k as u32 == what & 255)?;
+        let wheel = (what >> 8 != NO_WHEEL).then_some((what >> 8) as usize);
+        Some(Self { kind, wheel, value })
+    }
+
+    /// In words, for who wrote the publisher.
+    #[must_use]
+    pub fn text(&self, robot: &Description) -> String {
+        let wheel = self.wheel.and_then(|wheel| robot.wheels.get(wheel));
+        let wheel = wheel.map_or("?", |wheel| wheel.name.as_str());
+        let turn = turning(robot);
+        let v = self.value;
+        let unit = |units: &[(f64, &str)]| unit(v, units);
+        match self.kind {
+            Kind::Travel => format!(
+                "units: x and y move {v:.3} times the commanded travel{}",
+                unit(&TRAVEL)
+            ),
+            Kind::Heading => format!(
+                "axes: x and y move at {v:.2} rad to yaw, 0 is commanded: is yaw 0 along x, y to \
+                 the left, and yaw in rad?"
+            ),
+            Kind::Turn if v < 0.0 => format!(
+                "signs: yaw turns {v:.2} times the commanded angle: is yaw or {turn} positive to \
+                 the right?"
+            ),
+            Kind::Turn => format!(
+                "units: yaw turns {v:.2} times the commanded angle{}",
+                unit(&TURN)
+            ),
+            Kind::Gyro if v < 0.0 => format!(
+                "signs: yaw_rate is {v:.2} times the commanded one: is it or {turn} positive to \
+                 the right?"
+            ),
+            Kind::Gyro => format!(
+                "units: yaw_rate is {v:.2} times the commanded one{}",
+                unit(&TURN)
+            ),
+            Kind::Rates => format!(
+                "units: the wheels turn {v:.3} times as fast as the command makes them roll{}",
+                unit(&RATES)
+            ),
+            Kind::RateSign => format!("signs: enc_{wheel} has the other sign"),
+            Kind::Sides => format!(
+                "sides: enc_{wheel} and the wheel opposite turn as each other should: are they \
+                 exchanged, or is {turn} positive to the right?"
+            ),
+            Kind::SteerSign => {
+                format!("signs: steer_{wheel} has the other sign, or is another wheel's")
+            }
+            Kind::Late => format!(
+                "late: {:.0} % of the frames come after their deadlines: in bursts, or without the \
+                 event that wakes the graph",
+                100.0 * v
+            ),
+            Kind::Rate => format!("rate: frames come at {v:.2} times the graph's rate"),
+        }
+    }
+}
+
+/// The command's axis that asks for turns.
+fn turning(robot: &Description) -> &str {
+    let axis = match robot.kinematics {
+        Kinematics::Ackermann6 => 0,
+        Kinematics::Differential => 1,
+        Kinematics::Omni3 => 2,
+    };
+    let axis = robot.command.get(axis);
+    axis.map_or("the command", |axis| axis.name.as_str())
+}
+
+/// Factors that units make.
+const TRAVEL: [(f64, &str); 4] = [
+    (1000.0, "mm"),
+    (100.0, "cm"),
+    (39.37, "inches"),
+    (3.281, "feet"),
+];
+const TURN: [(f64, &str); 2] = [(180.0 / PI, "degrees"), (1000.0, "thousandths of a rad")];
+const RATES: [(f64, &str); 3] = [
+    (180.0 / PI, "deg/s"),
+    (60.0 / TAU, "rpm"),
+    (1.0 / TAU, "revolutions per second"),
+];
+
+/// The unit whose factor is within a fifth of the ratio.
+fn unit(ratio: f64, units: &[(f64, &str)]) -> String {
+    let near = |factor: f64| (0.8..1.25).contains(&(ratio / factor));
+    let found = units.iter().find(|(factor, _)| near(*factor));
+    found.map_or_else(String::new, |(_, name)| format!(": are they in {name}?"))
+}
+
+/// True if the ratio is what the rates' units make of 1.
+pub(super) fn is_rate_unit(ratio: f64) -> bool {
+    let near = |factor: f64| (0.8..1.25).contains(&(ratio / factor));
+    RATES.iter().any(|(factor, _)| near(*factor))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn findings_survive_the_wire() {
+        for kind in Kind::ALL {
+            for wheel in [None, Some(0), Some(5)] {
+                let finding = Finding {
+                    kind,
+                    wheel,
+                    value: 2.5,
+                };
+                assert_eq!(Finding::from_wire(finding.to_wire(), 2.5), Some(finding));
+            }
+        }
+        assert_eq!(Finding::from_wire(99, 0.0), None);
+    }
+}

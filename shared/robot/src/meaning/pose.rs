@@ -1,0 +1,150 @@
+//! Pose against command, over stretches of half a second.
+
+use vigil_blocks::{SensorFrame, Valid};
+use vigil_inference::angle::wrap;
+
+use super::{Finding, Judged, Kind, MOVING_M_S, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M};
+
+/// Length of a stretch, s: a path is nearly straight over it, and noise hardly counts.
+const STRETCH_S: f64 = 0.5;
+/// Stretches from which the pose is judged, and commanded travel, m.
+const STRETCHES_MIN: f64 = 2.3;
+const TRAVEL_MIN_M: f64 = 0.1;
+/// Weight of a stretch beside the next: exchanged axes show in some headings, and not in others.
+const FORGET: f64 = 0.75;
+/// Once a robot has turned so far, rad, or come so far, m, its headings are judged.
+const TURNED_RAD: f64 = 1.6;
+const COME_M: f64 = 4.0;
+/// Angle to the yaw that no ground explains, rad.
+const ANGLE_MAX_RAD: f64 = 0.6;
+/// The mean displacement must exceed its standard error by this factor.
+const CERTAIN: f64 = 4.0;
+
+/// A stretch under way.
+#[derive(Debug, Clone, Copy)]
+struct Stretch {
+    from: [f64; 3],
+    last_yaw: f64,
+    turned_rad: f64,
+    elapsed_s: f64,
+    /// Commanded displacement, forward and left, m, and turn, rad.
+    commanded: [f64; 3],
+}
+
+/// Sums over the stretches of a run.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Poses {
+    stretch: Option<Stretch>,
+    count: f64,
+    commanded_m: f64,
+    /// Displacement along the commanded direction and to its left: sums, and of their squares.
+    moved_m: [f64; 2],
+    squares: f64,
+    /// All that was commanded, m and rad.
+    come_m: f64,
+    swung_rad: f64,
+    turned_rad: f64,
+    turn_rad: f64,
+}
+
+impl Poses {
+    /// The motion is interrupted.
+    pub fn interrupt(&mut self) {
+        self.stretch = None;
+    }
+
+    /// Takes a frame of a robot in motion, `dt_s` after the last; true if a stretch is complete.
+    pub fn take(&mut self, frame: &SensorFrame, twist: [f64; 3], dt_s: f64) -> bool {
+        if !frame.has(Valid::POSE) {
+            self.stretch = None;
+            return false;
+        }
+        let pose = frame.pose;
+        let stretch = self.stretch.get_or_insert(Stretch {
+            from: pose,
+            last_yaw: pose[2],
+            turned_rad: 0.0,
+            elapsed_s: -dt_s,
+            commanded: [0.0; 3],
+        });
+        stretch.elapsed_s += dt_s;
+        if stretch.elapsed_s > 0.0 {
+            for (sum, rate) in stretch.commanded.iter_mut().zip(twist) {
+                *sum += rate * dt_s;
+            }
+        }
+        stretch.turned_rad += wrap(pose[2] - stretch.last_yaw);
+        stretch.last_yaw = pose[2];
+        if stretch.elapsed_s < STRETCH_S {
+            return false;
+        }
+        let done = *stretch;
+        self.stretch = None;
+        self.add(&done, pose);
+        true
+    }
+
+    fn add(&mut self, stretch: &Stretch, to: [f64; 3]) {
+        let [forward, left, turn] = stretch.commanded;
+        let way_m = forward.hypot(left);
+        self.come_m += way_m;
+        self.swung_rad += turn.abs();
+        if turn.abs() >= TURNING_1_M * way_m {
+            self.turn_rad += turn.abs();
+            self.turned_rad += stretch.turned_rad * turn.signum();
+        }
+        // A turn in place goes nowhere.
+        if way_m < MOVING_M_S * stretch.elapsed_s {
+            return;
+        }
+        let heading = stretch.from[2] + 0.5 * stretch.turned_rad + left.atan2(forward);
+        let (sin, cos) = heading.sin_cos();
+        let (x, y) = (to[0] - stretch.from[0], to[1] - stretch.from[1]);
+        let moved = [x * cos + y * sin, y * cos - x * sin];
+        self.count = FORGET * self.count + 1.0;
+        self.commanded_m = FORGET * self.commanded_m + way_m;
+        for (sum, value) in self.moved_m.iter_mut().zip(moved) {
+            *sum = FORGET * *sum + value;
+        }
+        self.squares = FORGET * self.squares + moved[0] * moved[0] + moved[1] * moved[1];
+    }
+
+    /// What is found of travel and heading.
+    pub fn travel(&self) -> Judged {
+        if self.count < STRETCHES_MIN || self.commanded_m < TRAVEL_MIN_M {
+            return Judged::NotYet;
+        }
+        let [along, left] = self.moved_m;
+        let total_m = along.hypot(left);
+        let scatter = (self.squares - total_m * total_m / self.count).max(0.0);
+        let error_m = (scatter * self.count / (self.count - 1.0)).sqrt();
+        let ratio = total_m / self.commanded_m;
+        if ratio > RATIO_MAX && total_m > CERTAIN * error_m {
+            return Judged::of(Kind::Travel, None, ratio);
+        }
+        // A robot that hardly moves has no direction.
+        if ratio < 1.0 / RATIO_MAX || total_m < CERTAIN * error_m {
+            return Judged::NotYet;
+        }
+        let angle = left.atan2(along);
+        match angle.abs() > ANGLE_MAX_RAD {
+            true => Judged::of(Kind::Heading, None, angle),
+            false if self.swung_rad < TURNED_RAD && self.come_m < COME_M => Judged::NotYet,
+            false => Judged::Fits,
+        }
+    }
+
+    /// What is found of turns.
+    pub fn turn(&self) -> Judged {
+        if self.turn_rad < TURN_MIN_RAD {
+            return Judged::NotYet;
+        }
+        super::turn(Kind::Turn, self.turned_rad / self.turn_rad)
+    }
+}
+
+impl Judged {
+    pub(super) const fn of(kind: Kind, wheel: Option<usize>, value: f64) -> Self {
+        Self::Wrong(Finding { kind, wheel, value })
+    }
+}

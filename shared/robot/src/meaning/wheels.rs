@@ -1,0 +1,222 @@
+//! Wheel rates and steering angles against the command, wheel by wheel.
+
+use vigil_blocks::{SensorFrame, Valid, WHEELS};
+
+use super::finding::is_rate_unit;
+use super::{Judged, Kind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M};
+use crate::Description;
+use crate::description::Kinematics;
+use crate::learned::wheels::{rolling_rate, steering_angle};
+
+/// Time in motion from which wheels are judged, s, and how far they must be told to roll, rad.
+const TIME_MIN_S: f64 = 1.0;
+const ROLLED_MIN_RAD: f64 = 2.0;
+/// Ratios from here to its inverse are of a channel of the other sign, if ..
+const REVERSED: f64 = -0.4;
+/// .. and only if, the channel follows the command by this square of a correlation.
+const FOLLOWS: f64 = 0.6;
+/// Exchanged wheels must fit each other's places better by this factor.
+const EXCHANGED: f64 = 0.25;
+/// Mean commanded steering angle from which its sign is judged, rad.
+const STEER_MIN_RAD: f64 = 0.06;
+
+/// Sums of a channel against what is expected of it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Against {
+    time_s: f64,
+    found: f64,
+    expected: f64,
+    squares: f64,
+}
+
+impl Against {
+    fn add(&mut self, value: f64, expected: f64, dt_s: f64) {
+        self.time_s += dt_s;
+        self.found += value * expected * dt_s;
+        self.expected += expected * expected * dt_s;
+        self.squares += value * value * dt_s;
+    }
+
+    fn ratio(&self) -> f64 {
+        self.found / self.expected
+    }
+
+    fn follows(&self) -> bool {
+        self.found * self.found > FOLLOWS * self.expected * self.squares
+    }
+
+    fn is_reversed(&self) -> bool {
+        (1.0 / REVERSED..=REVERSED).contains(&self.ratio()) && self.follows()
+    }
+}
+
+/// Two wheels opposite each other: how well they fit as named and exchanged, and how far apart what
+/// is expected of them is.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pair {
+    wheels: [usize; 2],
+    named: f64,
+    exchanged: f64,
+    apart: f64,
+    turned_rad: f64,
+}
+
+/// All wheels of a robot.
+#[derive(Debug, Clone)]
+pub(super) struct Wheels {
+    rates: [Against; WHEELS],
+    steer: [Against; WHEELS],
+    pairs: [Pair; WHEELS / 2],
+    pair_count: usize,
+    wheel_count: usize,
+}
+
+impl Wheels {
+    /// Nothing is known of them.
+    pub fn new(robot: &Description) -> Self {
+        let mut wheels = Self {
+            rates: [Against::default(); WHEELS],
+            steer: [Against::default(); WHEELS],
+            pairs: [Pair::default(); WHEELS / 2],
+            pair_count: 0,
+            wheel_count: match robot.kinematics {
+                // In which sense its wheels turn differs from maker to maker.
+                Kinematics::Omni3 => 0,
+                _ => robot.wheels.len().min(WHEELS),
+            },
+        };
+        for (i, left) in robot.wheels.iter().enumerate().take(wheels.wheel_count) {
+            let is_opposite = |other: &crate::description::Wheel| {
+                (other.x - left.x).abs() < 1e-6 && (other.y + left.y).abs() < 1e-6 && left.y > 0.0
+            };
+            let right = robot.wheels.iter().position(is_opposite);
+            if let (Some(j), Some(pair)) = (right, wheels.pairs.get_mut(wheels.pair_count)) {
+                pair.wheels = [i, j];
+                wheels.pair_count += 1;
+            }
+        }
+        wheels
+    }
+
+    /// Nothing is known of them any more.
+    pub fn reset(&mut self) {
+        self.rates = [Against::default(); WHEELS];
+        self.steer = [Against::default(); WHEELS];
+        for pair in &mut self.pairs {
+            *pair = Pair {
+                wheels: pair.wheels,
+                ..Pair::default()
+            };
+        }
+    }
+
+    /// Takes a frame of a robot in motion.
+    pub fn take(&mut self, robot: &Description, frame: &SensorFrame, twist: [f64; 3], dt_s: f64) {
+        let [speed, _, turn] = twist;
+        let mut expected = [0.0; WHEELS];
+        for wheel in 0..self.wheel_count {
+            expected[wheel] = match robot.kinematics {
+                Kinematics::Ackermann6 => rolling_rate(robot, wheel, frame.command[0], speed),
+                _ => (speed - robot.wheels[wheel].y * turn) / robot.wheel_radius_m,
+            };
+            if frame.has(Valid::wheel_rate(wheel)) {
+                self.rates[wheel].add(frame.wheel_rate[wheel], expected[wheel], dt_s);
+            }
+            if frame.has(Valid::steer(wheel)) && robot.wheels[wheel].steered {
+                let angle = steering_angle(robot, wheel, frame.command[0]);
+                self.steer[wheel].add(frame.steer[wheel], angle, dt_s);
+            }
+        }
+        if turn.abs() < TURNING_1_M * speed.abs() {
+            return;
+        }
+        for pair in &mut self.pairs[..self.pair_count] {
+            let [i, j] = pair.wheels;
+            if !frame.has(Valid::wheel_rate(i) | Valid::wheel_rate(j)) {
+                continue;
+            }
+            let square = |wheel: usize, place: usize| {
+                (frame.wheel_rate[wheel] - expected[place]).powi(2) * dt_s
+            };
+            pair.named += square(i, i) + square(j, j);
+            pair.exchanged += square(i, j) + square(j, i);
+            pair.apart += (expected[i] - expected[j]).powi(2) * dt_s;
+            pair.turned_rad += turn.abs() * dt_s;
+        }
+    }
+
+    /// True once wheels were told to roll far enough.
+    fn is_judged(&self, wheel: usize) -> bool {
+        let rate = &self.rates[wheel];
+        let rolled_rad = (rate.expected * rate.time_s).sqrt();
+        rate.time_s >= TIME_MIN_S && rolled_rad >= ROLLED_MIN_RAD
+    }
+
+    /// What is found of the rates' unit: all wheels agree on it.
+    pub fn unit(&self) -> Judged {
+        let mut ratios = [0.0; WHEELS];
+        let mut count = 0;
+        for wheel in (0..self.wheel_count).filter(|&wheel| self.is_judged(wheel)) {
+            if self.rates[wheel].follows() {
+                ratios[count] = self.rates[wheel].ratio();
+                count += 1;
+            }
+        }
+        // Fewer than half of the wheels speak for no unit.
+        if 2 * count <= self.wheel_count {
+            return Judged::NotYet;
+        }
+        let ratios = &mut ratios[..count];
+        ratios.sort_unstable_by(f64::total_cmp);
+        let middle = ratios[count / 2];
+        match middle.abs() > RATIO_MAX || is_rate_unit(middle) {
+            true => Judged::of(Kind::Rates, None, middle),
+            false => Judged::Fits,
+        }
+    }
+
+    /// What is found of one wheel's sign.
+    pub fn sign(&self, wheel: usize) -> Judged {
+        if wheel >= self.wheel_count || !self.is_judged(wheel) {
+            return Judged::NotYet;
+        }
+        match self.rates[wheel].is_reversed() {
+            true => Judged::of(Kind::RateSign, Some(wheel), self.rates[wheel].ratio()),
+            false => Judged::Fits,
+        }
+    }
+
+    /// What is found of one wheel's steering.
+    pub fn steering(&self, wheel: usize) -> Judged {
+        let Some(steer) = self.steer.get(wheel) else {
+            return Judged::NotYet;
+        };
+        let is_judged = steer.time_s >= TIME_MIN_S
+            && steer.expected >= STEER_MIN_RAD * STEER_MIN_RAD * steer.time_s;
+        match (is_judged, steer.is_reversed()) {
+            (false, _) => Judged::NotYet,
+            (true, true) => Judged::of(Kind::SteerSign, Some(wheel), steer.ratio()),
+            (true, false) => Judged::Fits,
+        }
+    }
+
+    /// What is found of the sides of a pair of wheels.
+    pub fn sides(&self, pair: usize) -> Judged {
+        let Some(pair) = self.pairs[..self.pair_count].get(pair) else {
+            return Judged::NotYet;
+        };
+        if pair.turned_rad < TURN_MIN_RAD {
+            return Judged::NotYet;
+        }
+        let is_exchanged = pair.exchanged < EXCHANGED * pair.named && pair.named > pair.apart;
+        match is_exchanged {
+            true => Judged::of(Kind::Sides, Some(pair.wheels[0]), 0.0),
+            false => Judged::Fits,
+        }
+    }
+
+    /// Wheels and pairs there are.
+    pub const fn counts(&self) -> (usize, usize) {
+        (self.wheel_count, self.pair_count)
+    }
+}
