@@ -158,8 +158,8 @@ impl Meaning {
         let last_ns = last.filter(|(of, _)| *of == run).map(|(_, t_ns)| t_ns);
         let dt_s = last_ns.map_or(0.0, |last_ns| t_ns.saturating_sub(last_ns) as f64 * 1e-9);
         let twist = self.robot.twist(&frame.command);
-        let axes = 0..self.robot.command.len();
-        let is_told = axes.fold(true, |all, i| all && frame.has(Valid::command(i)));
+        let mut axes = 0..self.robot.command.len();
+        let is_told = axes.all(|i| frame.has(Valid::command(i)));
         let moves = is_told && self.robot.path_speed_m_s(twist) >= MOVING_M_S;
         let is_broken = !moves || !(f64::MIN_POSITIVE..=PAUSE_S).contains(&dt_s);
         let mut changes = self.twist.iter().zip(twist).map(|(a, b)| (a - b).abs());
@@ -249,7 +249,7 @@ impl Meaning {
 
 /// A ratio of turns.
 fn turn(kind: Kind, ratio: f64) -> Judged {
-    match ratio < TURN_REVERSED || ratio > TURN_UNIT {
+    match !(TURN_REVERSED..=TURN_UNIT).contains(&ratio) {
         true => Judged::of(kind, None, ratio),
         false => Judged::Fits,
     }

@@ -114,13 +114,13 @@ impl Wheels {
     pub fn take(&mut self, robot: &Description, frame: &SensorFrame, twist: [f64; 3], dt_s: f64) {
         let [speed, _, turn] = twist;
         let mut expected = [0.0; WHEELS];
-        for wheel in 0..self.wheel_count {
-            expected[wheel] = match robot.kinematics {
+        for (wheel, expected) in expected.iter_mut().enumerate().take(self.wheel_count) {
+            *expected = match robot.kinematics {
                 Kinematics::Ackermann6 => rolling_rate(robot, wheel, frame.command[0], speed),
                 _ => (speed - robot.wheels[wheel].y * turn) / robot.wheel_radius_m,
             };
             if frame.has(Valid::wheel_rate(wheel)) {
-                self.rates[wheel].add(frame.wheel_rate[wheel], expected[wheel], dt_s);
+                self.rates[wheel].add(frame.wheel_rate[wheel], *expected, dt_s);
             }
             if frame.has(Valid::steer(wheel)) && robot.wheels[wheel].steered {
                 let angle = steering_angle(robot, wheel, frame.command[0]);
