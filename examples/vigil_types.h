@@ -180,8 +180,8 @@ VIGIL_ASSERT(offsetof(vigil_sensor_frame, steer) == 240);
 VIGIL_ASSERT(offsetof(vigil_sensor_frame, current) == 304);
 VIGIL_ASSERT(offsetof(vigil_sensor_frame, reserved) == 368);
 
-#define VIGIL_DETECTION_BELIEF_SCHEMA 0x3e794b5936d8eb7aull
-#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.3e794b5936d8eb7a"
+#define VIGIL_DETECTION_BELIEF_SCHEMA 0x4c5fa2c6d09bb964ull
+#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.4c5fa2c6d09bb964"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -199,12 +199,12 @@ typedef struct {
   double evidence;
   /* Effective sample size of the particles, before resampling. */
   double effective_sample_size;
-  /* Estimated ratio of the pose's noise to the learned one (standard deviations). */
-  double noise_scale;
-  /* The same for the wheel rates. */
-  double noise_scale_wheels;
-  /* The same for the steering angles. */
-  double noise_scale_steer;
+  /* Estimated ratio of the noise of the pose (x, y, yaw) to the learned one (standard deviations). */
+  double noise_scale[3];
+  /* The same for each wheel's rate. */
+  double noise_scale_wheels[8];
+  /* The same for each steering angle. */
+  double noise_scale_steer[8];
   /* Log-odds of a fault seen by each channel alone (see Channel). */
   double channel_log_odds[32];
   /* decision_seq of the last action that the robot obeyed, as the frame says it. */
@@ -232,7 +232,7 @@ typedef struct {
   /* Reserved, zero. */
   uint32_t reserved;
 } vigil_detection_belief;
-VIGIL_ASSERT(sizeof(vigil_detection_belief) == 456);
+VIGIL_ASSERT(sizeof(vigil_detection_belief) == 584);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, cause) == 48);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, run_id) == 72);
@@ -242,21 +242,21 @@ VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_log_odds) == 96);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, evidence) == 104);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, effective_sample_size) == 112);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale) == 120);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale_wheels) == 128);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale_steer) == 136);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, channel_log_odds) == 144);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, action_seq) == 400);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_t_capture_ns) == 408);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm) == 416);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_count) == 420);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, symptoms) == 424);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, invalid_count) == 428);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, degenerate_count) == 432);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, particle_count) == 436);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, action_outcome) == 440);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, blind) == 444);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, readiness) == 448);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, reserved) == 452);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale_wheels) == 144);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale_steer) == 208);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, channel_log_odds) == 272);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, action_seq) == 528);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_t_capture_ns) == 536);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm) == 544);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_count) == 548);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, symptoms) == 552);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, invalid_count) == 556);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, degenerate_count) == 560);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, particle_count) == 564);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, action_outcome) == 568);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, blind) == 572);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, readiness) == 576);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, reserved) == 580);
 
 #define VIGIL_PARTICLE_BLOCK_SCHEMA 0x7d929f90c981a707ull
 #define VIGIL_PARTICLE_BLOCK_TYPE_NAME "vigil.ParticleBlock.v1.7d929f90c981a707"

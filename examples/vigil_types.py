@@ -196,8 +196,8 @@ assert SensorFrame.reserved.offset == 368
 
 
 class DetectionBelief(ctypes.LittleEndianStructure):
-    SCHEMA = 0x3E794B5936D8EB7A
-    TYPE_NAME = "vigil.DetectionBelief.v1.3e794b5936d8eb7a"
+    SCHEMA = 0x4C5FA2C6D09BB964
+    TYPE_NAME = "vigil.DetectionBelief.v1.4c5fa2c6d09bb964"
 
     @staticmethod
     def type_name():
@@ -220,12 +220,12 @@ class DetectionBelief(ctypes.LittleEndianStructure):
         ("evidence", ctypes.c_double),
         # Effective sample size of the particles, before resampling.
         ("effective_sample_size", ctypes.c_double),
-        # Estimated ratio of the pose's noise to the learned one (standard deviations).
-        ("noise_scale", ctypes.c_double),
-        # The same for the wheel rates.
-        ("noise_scale_wheels", ctypes.c_double),
-        # The same for the steering angles.
-        ("noise_scale_steer", ctypes.c_double),
+        # Estimated ratio of the noise of the pose (x, y, yaw) to the learned one (standard deviations).
+        ("noise_scale", ctypes.c_double * 3),
+        # The same for each wheel's rate.
+        ("noise_scale_wheels", ctypes.c_double * 8),
+        # The same for each steering angle.
+        ("noise_scale_steer", ctypes.c_double * 8),
         # Log-odds of a fault seen by each channel alone (see Channel).
         ("channel_log_odds", ctypes.c_double * 32),
         # decision_seq of the last action that the robot obeyed, as the frame says it.
@@ -255,7 +255,7 @@ class DetectionBelief(ctypes.LittleEndianStructure):
     ]
 
 
-assert ctypes.sizeof(DetectionBelief) == 456
+assert ctypes.sizeof(DetectionBelief) == 584
 assert DetectionBelief.header.offset == 0
 assert DetectionBelief.cause.offset == 48
 assert DetectionBelief.run_id.offset == 72
@@ -265,21 +265,21 @@ assert DetectionBelief.alarm_log_odds.offset == 96
 assert DetectionBelief.evidence.offset == 104
 assert DetectionBelief.effective_sample_size.offset == 112
 assert DetectionBelief.noise_scale.offset == 120
-assert DetectionBelief.noise_scale_wheels.offset == 128
-assert DetectionBelief.noise_scale_steer.offset == 136
-assert DetectionBelief.channel_log_odds.offset == 144
-assert DetectionBelief.action_seq.offset == 400
-assert DetectionBelief.alarm_t_capture_ns.offset == 408
-assert DetectionBelief.alarm.offset == 416
-assert DetectionBelief.alarm_count.offset == 420
-assert DetectionBelief.symptoms.offset == 424
-assert DetectionBelief.invalid_count.offset == 428
-assert DetectionBelief.degenerate_count.offset == 432
-assert DetectionBelief.particle_count.offset == 436
-assert DetectionBelief.action_outcome.offset == 440
-assert DetectionBelief.blind.offset == 444
-assert DetectionBelief.readiness.offset == 448
-assert DetectionBelief.reserved.offset == 452
+assert DetectionBelief.noise_scale_wheels.offset == 144
+assert DetectionBelief.noise_scale_steer.offset == 208
+assert DetectionBelief.channel_log_odds.offset == 272
+assert DetectionBelief.action_seq.offset == 528
+assert DetectionBelief.alarm_t_capture_ns.offset == 536
+assert DetectionBelief.alarm.offset == 544
+assert DetectionBelief.alarm_count.offset == 548
+assert DetectionBelief.symptoms.offset == 552
+assert DetectionBelief.invalid_count.offset == 556
+assert DetectionBelief.degenerate_count.offset == 560
+assert DetectionBelief.particle_count.offset == 564
+assert DetectionBelief.action_outcome.offset == 568
+assert DetectionBelief.blind.offset == 572
+assert DetectionBelief.readiness.offset == 576
+assert DetectionBelief.reserved.offset == 580
 
 
 class ParticleBlock(ctypes.LittleEndianStructure):
