@@ -251,6 +251,24 @@ fn frame() -> impl Strategy<Value = SensorFrame> {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn frames_that_are_lost_are_no_evidence_of_a_fault(
+        lost in prop::collection::vec(prop::bool::weighted(0.2), 400),
+        gap_at in 20_usize..250, gap in 0_usize..18,
+        sensors in prop::sample::select(vec![schema::Sensors::Pose, schema::Sensors::PoseEncoders]),
+    ) {
+        let (frames, _) = unseen("ND", "");
+        let is_kept = |k: usize| !lost[k % lost.len()] && !(gap_at..gap_at + gap).contains(&k);
+        let kept: Vec<SensorFrame> = (0..frames.len())
+            .filter(|&k| is_kept(k))
+            .map(|k| frames[k])
+            .collect();
+        prop_assert_eq!(Bench::new(sensors).alarm_s(&kept), None);
+    }
+}
+
+proptest! {
     #![proptest_config(ProptestConfig {
         cases: 200,
         failure_persistence: None,

@@ -239,6 +239,36 @@ mod tests {
     }
 
     #[test]
+    fn readings_that_cannot_tell_move_no_odds_in_an_hour() {
+        // Noise about zero, then exact zeros: what a standing wheel's whole encoder may read.
+        for (whole, alike) in [(0, DEAD), (SILENT, ZERO)] {
+            let likelihoods = Likelihoods::new(1, |_, state| {
+                if state == whole || state == alike {
+                    -1.0
+                } else {
+                    -9.0
+                }
+            });
+            let mut encoders = Encoders::healthy(0);
+            encoders.stick(0);
+            for step in 0..72_000 {
+                encoders.step(&[4e-5; WHEELS], 8e-4, 1, &likelihoods, step);
+            }
+            let p_broken = encoders.p_broken(0);
+            assert!(p_broken < 0.01, "{p_broken}");
+            // Nor is a dead encoder forgotten whose wheel sticks.
+            let mut encoders = Encoders::healthy(0);
+            encoders.p[0] = [0.0; STATES];
+            encoders.p[0][alike] = 1.0;
+            encoders.stick(0);
+            for step in 0..72_000 {
+                encoders.step(&[4e-5; WHEELS], 8e-4, 1, &likelihoods, step);
+            }
+            assert!(encoders.p_broken(0) > 0.99);
+        }
+    }
+
+    #[test]
     fn encoders_that_cannot_break_stay_whole_whatever_they_read() {
         let impossible = Likelihoods::new(WHEELS, |_, state| if state == 0 { -1e5 } else { 0.0 });
         let mut encoders = Encoders::healthy(0);
