@@ -22,7 +22,12 @@ const PERIOD_NS: u64 = 10_000_000;
 /// A shipped graph, changed.
 fn setup(name: &str, change: impl FnOnce(&mut GraphFile)) -> Setup {
     let config = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../config");
-    load_graph(&config.join(name), change).unwrap()
+    // The sequences below are those of a drive at full speed from its first instant on.
+    let at_full_speed = |file: &mut GraphFile| {
+        file.supervisor.arming_speed_scale = 1.0;
+        change(file);
+    };
+    load_graph(&config.join(name), at_full_speed).unwrap()
 }
 
 /// Four services in one thread.
