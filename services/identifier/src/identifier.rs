@@ -28,8 +28,6 @@ const CATCH_UP_S: f64 = 0.1;
 const REASONS_MAX: usize = 20;
 /// Probability that something unknown is wrong while sensors are silent or the robot runs away.
 const TROUBLE: f64 = 1.0 - 1e-6;
-/// Probability of the nominal mode at which an identification ends, once the alarm has fallen.
-const RECOVERED: f64 = 0.95;
 
 /// What the identifier takes each cycle.
 #[derive(Debug, Clone, Copy)]
@@ -341,8 +339,8 @@ impl Identifier {
         self.engine.posterior(&self.leaves, &mut self.posterior);
         self.find_reasons(next, next + taken);
         self.updated = true;
-        let recovered = self.posterior.nodes[0] > RECOVERED;
-        if recovered && !self.detection.alarm {
+        if !self.detection.alarm {
+            // The detector decides whether there is a fault: none is named without its alarm.
             self.phase = Phase::Watching;
         }
     }

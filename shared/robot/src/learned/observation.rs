@@ -370,8 +370,8 @@ impl Observer {
             troubles: Troubles::default(),
         };
         // A robot that is commanded to creep is not commanded to stand.
-        let stands = |speed: f64| speed.abs() < STANDS * self.standing_m_s;
-        let is_stopped = stands(command[1]) && stands(speed);
+        let is_stopped =
+            command[1].abs() < STANDS * self.standing_m_s && speed.abs() < self.standing_m_s;
         let (watchdog, observation) = (&mut state.watchdog, &mut self.observation);
         observation.troubles = watchdog.step(observation, is_stopped, &self.limits);
         self.learn_lag();
