@@ -262,6 +262,10 @@ impl Identifier {
             self.reasons.clear();
             return;
         }
+        if !self.detection.alarm {
+            // The detector decides whether there is a fault: none is named without its alarm.
+            self.phase = Phase::Watching;
+        }
         match self.phase {
             Phase::Watching if self.detection.alarm => self.begin(),
             Phase::Watching => {
@@ -339,10 +343,6 @@ impl Identifier {
         self.engine.posterior(&self.leaves, &mut self.posterior);
         self.find_reasons(next, next + taken);
         self.updated = true;
-        if !self.detection.alarm {
-            // The detector decides whether there is a fault: none is named without its alarm.
-            self.phase = Phase::Watching;
-        }
     }
 
     /// Follows the diagnosis and its rival over the observations `first..end`, which have just been
@@ -410,7 +410,9 @@ impl Identifier {
             self.mode_changes = self.mode_changes.saturating_add(1);
         }
         let moved_s = std::mem::take(&mut self.moved_s);
-        self.reported.take((mode, p_mode), &self.posterior, moved_s);
+        let (posterior, leaves) = (&self.posterior, &self.leaves);
+        self.reported
+            .take((mode, p_mode), posterior, leaves, moved_s);
         belief.reported = self.reported.name();
         belief.reported_change_count = self.reported.changes();
         belief.mode = mode;

@@ -2,6 +2,7 @@
 
 use vigil_blocks::{MODE_MULTIPLE, MODE_UNKNOWN};
 
+use crate::modes::Leaves;
 use crate::posterior::Posterior;
 
 /// A held name is given up for another one when its own probability is below this.
@@ -42,7 +43,13 @@ impl Reported {
 
     /// Takes the memoryless `mode` and its probability, of the belief that holds after `moved_s` of
     /// motion.
-    pub fn take(&mut self, (mode, p_mode): (u32, f64), belief: &Posterior, moved_s: f64) {
+    pub fn take(
+        &mut self,
+        (mode, p_mode): (u32, f64),
+        belief: &Posterior,
+        leaves: &Leaves,
+        moved_s: f64,
+    ) {
         let is_nominal = mode == 0 && p_mode > NOMINAL_MIN;
         self.nominal_s = if is_nominal {
             self.nominal_s + moved_s
@@ -52,7 +59,13 @@ impl Reported {
         let gives_way = if mode == 0 {
             self.nominal_s >= NOMINAL_S - SLACK_S
         } else {
-            p_mode > 0.5 && self.p_held(belief) < HELD_MIN
+            // What holds with the held name is no rival of it, but says more.
+            let implied = if self.is_implied_by(mode, leaves) {
+                p_mode
+            } else {
+                0.0
+            };
+            p_mode > 0.5 && self.p_held(belief) - implied < HELD_MIN
         };
         if gives_way {
             self.set(mode);
@@ -64,6 +77,14 @@ impl Reported {
             self.held = mode;
             self.changes = self.changes.saturating_add(1);
         }
+    }
+
+    /// True if the held name is a node and `mode` says more: several faults, or a node below it.
+    fn is_implied_by(&self, mode: u32, leaves: &Leaves) -> bool {
+        let below = |node: u32| leaves.below.get(node as usize).copied().unwrap_or(0);
+        let (held, finer) = (below(self.held), below(mode));
+        let is_node = self.held != 0 && held != 0;
+        is_node && (mode == MODE_MULTIPLE || finer != 0 && finer & !held == 0)
     }
 
     /// Probability of what is held.
@@ -83,6 +104,22 @@ impl Reported {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use vigil_blocks::{FAULT_NODES, FaultSet, WHEELS};
+
+    /// Leaves 3 and 4, both below node 2.
+    fn leaves() -> Leaves {
+        let mut below = [0; FAULT_NODES];
+        (below[3], below[4], below[2]) = (1 << 3, 1 << 4, 1 << 3 | 1 << 4);
+        Leaves {
+            stuck: [None; WHEELS],
+            encoder: [None; WHEELS],
+            count: 2,
+            depths: [0; FAULT_NODES],
+            below,
+            nodes: 5,
+            hash: 0,
+        }
+    }
 
     fn belief(nominal: f64, leaf: f64, unknown: f64) -> Posterior {
         let mut belief = Posterior::nominal();
@@ -92,26 +129,46 @@ mod tests {
 
     #[test]
     fn a_name_is_held_until_another_one_is_clear_or_the_robot_is_nominal_for_a_second() {
-        let mut reported = Reported::default();
-        reported.take((3, 0.69), &belief(0.31, 0.69, 0.0), 0.05);
+        let (mut reported, leaves) = (Reported::default(), leaves());
+        reported.take((3, 0.69), &belief(0.31, 0.69, 0.0), &leaves, 0.05);
         assert_eq!(reported.name(), 0, "the nominal mode is above .3");
-        reported.take((3, 0.8), &belief(0.2, 0.8, 0.0), 0.05);
+        reported.take((3, 0.8), &belief(0.2, 0.8, 0.0), &leaves, 0.05);
         assert_eq!(reported.name(), 3);
-        reported.take((MODE_UNKNOWN, 0.6), &belief(0.0, 0.4, 0.6), 0.05);
+        reported.take((MODE_UNKNOWN, 0.6), &belief(0.0, 0.4, 0.6), &leaves, 0.05);
         assert_eq!(reported.name(), 3, "the leaf is above .3");
-        reported.take((MODE_UNKNOWN, 0.8), &belief(0.0, 0.2, 0.8), 0.05);
+        reported.take((MODE_UNKNOWN, 0.8), &belief(0.0, 0.2, 0.8), &leaves, 0.05);
         assert_eq!((reported.name(), reported.changes()), (MODE_UNKNOWN, 2));
         for _ in 0..9 {
-            reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), 0.1);
+            reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), &leaves, 0.1);
         }
         // A moment of doubt begins the second anew; time at rest does not count.
-        reported.take((0, 0.85), &belief(0.85, 0.0, 0.15), 0.1);
+        reported.take((0, 0.85), &belief(0.85, 0.0, 0.15), &leaves, 0.1);
         for _ in 0..9 {
-            reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), 0.1);
-            reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), 0.0);
+            reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), &leaves, 0.1);
+            reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), &leaves, 0.0);
         }
         assert_eq!(reported.name(), MODE_UNKNOWN);
-        reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), 0.1);
+        reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), &leaves, 0.1);
         assert_eq!((reported.name(), reported.changes()), (0, 3));
+    }
+
+    #[test]
+    fn what_holds_with_the_held_name_takes_its_place() {
+        let (mut reported, leaves) = (Reported::default(), leaves());
+        let mut belief = belief(0.0, 0.9, 0.0);
+        belief.nodes[2] = 0.99;
+        reported.take((2, 0.99), &belief, &leaves, 0.05);
+        assert_eq!(reported.name(), 2);
+        // A leaf below the held side.
+        reported.take((3, 0.9), &belief, &leaves, 0.05);
+        assert_eq!(reported.name(), 3);
+        // The same leaf and another one.
+        belief.sets[0] = FaultSet {
+            leaves: 1 << 3 | 1 << 4,
+            p: 0.85,
+        };
+        belief.set_count = 1;
+        reported.take((MODE_MULTIPLE, 0.85), &belief, &leaves, 0.05);
+        assert_eq!(reported.name(), MODE_MULTIPLE);
     }
 }

@@ -46,7 +46,7 @@ impl Watch {
         Self {
             alarm: FusedAlarm::default(),
             blind: 0,
-            readiness: 0,
+            readiness: Readiness::Arming as u32,
             run_id: 0,
             t_ns: 0,
             p_nominal: 1.0,
@@ -62,6 +62,8 @@ impl Watch {
         let Entry::Frame(inputs) = entry else {
             if matches!(entry, Entry::Reset) {
                 self.alarm.reset();
+                self.readiness = Readiness::Arming as u32;
+                (self.p_nominal, self.faults, self.unanswered) = (1.0, 0, 0);
             }
             return entry;
         };

@@ -133,8 +133,8 @@ impl<const K: usize> Departure<K> {
     }
 
     /// Moves by one displacement, each fault by that of its kind. A fault begins before it with the
-    /// probability `birth`, 0 for none. While a fault is `suspected` it may end, wherever it has led
-    /// the robot, and the nominal track learns nothing of the motion: what a fault does is no
+    /// probability `birth`, 0 for none. While a fault is `suspected` it may end, wherever it has
+    /// led the robot, and the nominal track learns nothing of the motion: what a fault does is no
     /// context of the nominal mode.
     pub fn predict(
         &mut self,
@@ -168,6 +168,7 @@ impl<const K: usize> Departure<K> {
         self.track.diffuse(variance);
         let faults = self.faults.iter().filter_map(best);
         let likeliest = faults.max_by(|a, b| a.log_weight.total_cmp(&b.log_weight));
+        let likeliest = likeliest.filter(|_| ends > 0.0);
         if let Some(track) = likeliest.map(|fault| fault.track.fork(&self.nominal)) {
             let log_weight = self.log_odds() + ends.ln();
             self.ended.enter(Fault { log_weight, track });

@@ -10,6 +10,8 @@
 const NOMINAL: f64 = 0.5;
 /// .. and ends it after so much motion, s: which includes being all but certain for so long.
 const NOMINAL_S: f64 = 1.0;
+/// An alarm that a nominal diagnosis has ended stands again once that is below this.
+const DOUBTED: f64 = 0.3;
 /// A set of faults that has grown is believed after so much motion, s.
 const GROWN_S: f64 = 0.2;
 /// Slack when times are compared, s: they are sums of short intervals.
@@ -87,7 +89,7 @@ impl FusedAlarm {
             return self.rise(said.alarm_t_ns.max(1), said.faults);
         }
         if !self.stands {
-            if said.p_nominal < NOMINAL {
+            if said.p_nominal < DOUBTED {
                 self.rise(said.t_ns.max(1), said.faults);
             }
             return;

@@ -2,6 +2,10 @@
 
 /// Intervals remembered.
 const MEMORY: usize = 31;
+/// Intervals after which one is judged by the others, and the part of the period below which it is
+/// none.
+const KNOWN: usize = 8;
+const DOUBLE: f64 = 0.2;
 
 /// A low quantile of the last intervals between frames. Frames that are lost, late or come in
 /// bursts do not change it while a third comes in time: the noise of a sample belongs to the
@@ -11,11 +15,20 @@ const MEMORY: usize = 31;
 pub struct FramePeriod {
     recent_ns: [u64; MEMORY],
     count: usize,
+    /// Frames in a row that seemed to be sent twice.
+    doubles: usize,
 }
 
 impl FramePeriod {
-    /// Takes the interval to the frame before, ns.
+    /// Takes the interval to the frame before, ns. One that is far too short is a frame sent twice,
+    /// unless that goes on: then the period has changed.
     pub fn push(&mut self, interval_ns: u64) {
+        let period_ns = self.period_s().unwrap_or(0.0) * 1e9;
+        let is_double = self.count >= KNOWN && (interval_ns as f64) < DOUBLE * period_ns;
+        self.doubles = if is_double { self.doubles + 1 } else { 0 };
+        if is_double && self.doubles < MEMORY {
+            return;
+        }
         self.recent_ns[self.count % MEMORY] = interval_ns;
         self.count += 1;
     }
@@ -37,6 +50,19 @@ impl FramePeriod {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn a_frame_sent_twice_is_one_and_another_rate_is_taken() {
+        let mut period = FramePeriod::default();
+        (0..20).for_each(|_| period.push(10_000_000));
+        for _ in 0..100 {
+            period.push(100_000);
+            period.push(9_900_000);
+        }
+        assert_eq!(period.period_s(), Some(0.0099));
+        (0..200).for_each(|_| period.push(1_000_000));
+        assert_eq!(period.period_s(), Some(0.001));
+    }
 
     proptest! {
         #[test]

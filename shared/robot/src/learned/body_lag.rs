@@ -44,7 +44,8 @@ pub struct Followed {
     pub turn_rad: f64,
     /// Speed at the end, m/s.
     pub speed_m_s: f64,
-    /// Variance of the travel by what is not known of the lag and of the command between frames, m².
+    /// Variance of the travel by what is not known of the lag and of the command between frames,
+    /// m².
     pub travel_variance: f64,
     /// The same of the change of heading, rad².
     pub turn_variance: f64,
@@ -199,7 +200,8 @@ impl BodyLag {
     /// Takes the measured travel (m) and turn (rad) of the observation that was completed last, and
     /// weighs the candidates at the end of a window. The noise of the measurement over a window has
     /// these variances. `per_metre`: what a metre of commanded travel is expected to be, and what
-    /// it turns the robot beyond the commanded curvature; less certain while a fault `is_suspected`.
+    /// it turns the robot beyond the commanded curvature; less certain while a fault
+    /// `is_suspected`.
     pub fn learn(
         &mut self,
         measured: [f64; 2],

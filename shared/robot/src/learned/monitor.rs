@@ -263,7 +263,11 @@ impl Monitor {
         };
         let suspected = following.then(|| Suspicion {
             variance: variance.map(|variance| FOLLOWING * FOLLOWING * variance),
-            ends: ENDS_1_S * observation.dt_s,
+            // At rest no fault ends.
+            ends: match observation.moving {
+                true => ENDS_1_S * observation.dt_s,
+                false => 0.0,
+            },
         });
         let kinds = self.faults.kinds(&self.model, observation, &step);
         self.departure.predict(&step, &kinds, birth, suspected);
@@ -342,9 +346,11 @@ impl Monitor {
         let healthy = self.model.encoder.repeat_rate;
         let seen = f64::from(repeats) * ((1.0 - REPEAT_FAILS) / healthy).ln()
             + f64::from(plain) * (REPEAT_FAILS / (1.0 - healthy)).ln();
-        let log_odds = log_add(self.repeats[wheel], birth.ln()) + seen;
-        self.gains.repeats[wheel] = seen;
-        self.repeats[wheel] = log_odds.clamp(birth.ln(), REPEATS_LOG_ODDS_MAX);
+        let before = log_add(self.repeats[wheel], birth.ln());
+        let after = (before + seen).clamp(birth.ln(), REPEATS_LOG_ODDS_MAX);
+        self.repeats[wheel] = after;
+        // At the lower bound there is nothing to lose: a gain below what was lost is none.
+        self.gains.repeats[wheel] = seen.max(after - before);
     }
 
     fn step_steer(&mut self, observation: &Observation) {
@@ -424,6 +430,9 @@ impl Monitor {
             for wheel in (0..WHEELS).filter(|w| wheels_turn || wheels_silent >> w & 1 == 1) {
                 trouble(Channel::wheel_rate(wheel));
             }
+        }
+        if self.troubles.any(self.channels == Channels::PoseEncoders) {
+            self.report.gain = TROUBLE_LOG_ODDS;
         }
         self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);
         self.report.channels = channels.map(|value| value.max(LOG_ODDS_MIN));

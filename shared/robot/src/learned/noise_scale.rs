@@ -13,7 +13,8 @@ const CLIP: f64 = 9.0;
 const CLIPPED_MEAN: f64 = 0.99;
 /// Bounds of the ratio.
 const RATIO_MIN: f64 = 0.1;
-const RATIO_MAX: f64 = 100.0;
+/// A channel five times as noisy as learned is no healthy one: what is beyond is evidence.
+const RATIO_MAX: f64 = 25.0;
 /// Samples that the learned scale of 1 counts for.
 const PRIOR: f64 = 20.0;
 /// Standard errors of the estimate by which it leans to the high side.
@@ -111,8 +112,8 @@ impl SensorNoise {
         }
     }
 
-    /// True once the noise of the pose, and of a wheel if they are used, has been seen often enough:
-    /// a broken encoder shows none.
+    /// True once the noise of the pose, and of a wheel if they are used, has been seen often
+    /// enough: a broken encoder shows none.
     #[must_use]
     pub fn is_known(&self, use_wheels: bool) -> bool {
         let is_known = |scale: &NoiseScale| scale.count >= PRIOR + KNOWN;

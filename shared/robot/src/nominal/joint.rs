@@ -56,6 +56,7 @@ impl Together {
     /// No evidence yet.
     pub fn forget(&mut self) {
         self.bias = Ages::of(self.channels, self.bias_sd);
+        self.gain = 0.0;
     }
 
     /// An observation begins.

@@ -206,6 +206,7 @@ impl Monitor {
             watched.scatter = Constant::default();
             watched.absent = Evidence::new(self.form, BIAS);
             watched.rest = Evidence::new(self.form, BIAS);
+            watched.gains = [0.0; 3];
         }
         if let Some(together) = &mut self.together {
             together.forget();
@@ -247,6 +248,9 @@ impl Monitor {
         for watched in &mut self.watched {
             watched.gains = [0.0; 3];
         }
+        if let Some(together) = &mut self.together {
+            together.begin();
+        }
         let Some(now) = history.ago(0) else { return };
         let widening = self.widening(now);
         let share = 1.0 / self.watched.len().max(1) as f64;
@@ -263,9 +267,6 @@ impl Monitor {
             return;
         }
         self.run_s += now.dt_s;
-        if let Some(together) = &mut self.together {
-            together.begin();
-        }
         for watched in &mut self.watched {
             watched.present(now, self.form, birth);
             let Watched { channel, track, .. } = watched;
