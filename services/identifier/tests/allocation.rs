@@ -34,7 +34,7 @@ fn steady_cycles_of_every_filter_allocate_nothing() {
         let mut identifier = Identifier::new(&models, &settings, sensors, 1).unwrap();
         let mut belief = FaultBelief::default();
         let mut particles: Box<ParticleBlock> = Box::default();
-        let mut alarm = alarm::Alarm::between(label.onset_s.unwrap() + 0.5, 10.0);
+        let mut alarm = alarm::Alarm::between(label.onset_s.unwrap() + 0.5, 99.0);
         let before = allocations();
         for (cycle, frame) in frames.iter().enumerate() {
             if cycle % 100 == 0 {

@@ -206,13 +206,13 @@ mod tests {
             &mut alarm,
             50,
             Said {
-                p_nominal: 0.6,
+                p_nominal: 0.35,
                 ..nominal
             },
         );
         assert_eq!((alarm.stands(), alarm.count()), (false, 1));
         alarm.take(&Said {
-            p_nominal: 0.4,
+            p_nominal: 0.25,
             ..nominal
         });
         assert_eq!((alarm.stands(), alarm.t_ns(), alarm.count()), (true, 7, 2));
