@@ -249,12 +249,7 @@ impl Identifier {
         if intake.complete {
             self.in_trouble = self.observer.observation().troubles.any(self.use_wheels);
             self.keep(input);
-            let observation = self.observer.observation();
-            self.moved_s += if observation.moving {
-                observation.dt_s
-            } else {
-                0.0
-            };
+            self.moved_s += self.observer.observation().moved_s();
         }
         if self.in_trouble {
             self.phase = Phase::Watching;
@@ -321,11 +316,7 @@ impl Identifier {
         for i in next..next + taken {
             let Some(kept) = self.ring.get(i) else { break };
             self.engine.step(&kept.observation, kept.noise);
-            moved_s += if kept.observation.moving {
-                kept.observation.dt_s
-            } else {
-                0.0
-            };
+            moved_s += kept.observation.moved_s();
         }
         self.phase = Phase::Identifying(next + taken);
         if taken < behind {

@@ -16,8 +16,6 @@ pub struct Watcher {
     posterior: Posterior,
     run_id: u64,
     alarm_t_ns: u64,
-    mode: u32,
-    mode_changes: u32,
 }
 
 impl Watcher {
@@ -30,8 +28,6 @@ impl Watcher {
             posterior: Posterior::nominal(),
             run_id: 0,
             alarm_t_ns: 0,
-            mode: 0,
-            mode_changes: 0,
         }
     }
 
@@ -75,18 +71,15 @@ impl Watcher {
         };
     }
 
-    /// Before the alarm the mode is nominal, whatever the odds are in passing.
-    fn report(&mut self, predicted: &Posterior, belief: &mut FaultBelief) {
+    /// Before the alarm the mode is nominal, whatever the odds are in passing. Its changes are
+    /// counted where they are seen, by [`Blindfold`].
+    fn report(&self, predicted: &Posterior, belief: &mut FaultBelief) {
         let posterior = &self.posterior;
         let alarm = self.alarm_t_ns != 0;
         let (mode, p_mode) = match alarm && posterior.unknown > 0.5 {
             true => (MODE_UNKNOWN, posterior.unknown),
             false => (0, posterior.nodes[0]),
         };
-        if mode != self.mode {
-            self.mode = mode;
-            self.mode_changes = self.mode_changes.saturating_add(1);
-        }
         belief.run_id = self.run_id;
         belief.p = posterior.nodes;
         belief.p_unknown = posterior.unknown;
@@ -99,9 +92,7 @@ impl Watcher {
         belief.set_count = posterior.set_count as u32;
         belief.mode = mode;
         belief.reported = mode;
-        belief.reported_change_count = self.mode_changes;
         belief.p_mode = p_mode;
-        belief.mode_change_count = self.mode_changes;
         belief.alarm_t_capture_ns = self.alarm_t_ns;
         belief.onset_t_capture_ns = 0;
         belief.identifying = u32::from(alarm);

@@ -15,6 +15,8 @@ const DOUBLE: f64 = 0.2;
 pub struct FramePeriod {
     recent_ns: [u64; MEMORY],
     count: usize,
+    /// The quantile of those remembered.
+    low_ns: u64,
     /// Frames in a row that seemed to be sent twice.
     doubles: usize,
 }
@@ -23,26 +25,23 @@ impl FramePeriod {
     /// Takes the interval to the frame before, ns. One that is far too short is a frame sent twice,
     /// unless that goes on: then the period has changed.
     pub fn push(&mut self, interval_ns: u64) {
-        let period_ns = self.period_s().unwrap_or(0.0) * 1e9;
-        let is_double = self.count >= KNOWN && (interval_ns as f64) < DOUBLE * period_ns;
+        let short_ns = DOUBLE * self.low_ns as f64;
+        let is_double = self.count >= KNOWN && (interval_ns as f64) < short_ns;
         self.doubles = if is_double { self.doubles + 1 } else { 0 };
         if is_double && self.doubles < MEMORY {
             return;
         }
         self.recent_ns[self.count % MEMORY] = interval_ns;
         self.count += 1;
+        let known = self.count.min(MEMORY);
+        let mut recent = self.recent_ns;
+        self.low_ns = *recent[..known].select_nth_unstable(known / 3).1;
     }
 
     /// The period, s; none before the first interval.
     #[must_use]
     pub fn period_s(&self) -> Option<f64> {
-        let known = self.count.min(MEMORY);
-        if known == 0 {
-            return None;
-        }
-        let mut recent = self.recent_ns;
-        let (_, low_ns, _) = recent[..known].select_nth_unstable(known / 3);
-        Some(*low_ns as f64 * 1e-9)
+        (self.count > 0).then_some(self.low_ns as f64 * 1e-9)
     }
 }
 

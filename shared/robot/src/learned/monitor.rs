@@ -20,7 +20,7 @@ use vigil_inference::track::Track;
 
 use super::faults::{Faults, KINDS};
 use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION};
-use super::noise_scale::SensorNoise;
+use super::noise_scale::{NoiseScales, SensorNoise};
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Model, Observation, Troubles};
 use crate::Description;
@@ -224,21 +224,20 @@ impl Monitor {
         self.report.evidence = 0.0;
         self.gains = Gains::default();
         self.troubles = observation.troubles;
-        if observation.moving {
-            // A robot at rest shows nothing of its noise.
-            self.moved_s += observation.dt_s;
-        }
+        // A robot at rest shows nothing of its noise.
+        self.moved_s += observation.moved_s();
         self.noise.update(&self.model, &self.robot, observation);
-        self.step_pose(observation, following);
+        let scales = self.noise.scales();
+        self.step_pose(observation, following, scales);
         if observation.moving && self.channels == Channels::PoseEncoders {
-            self.step_wheels(observation);
-            self.step_steer(observation);
+            self.step_wheels(observation, scales);
+            self.step_steer(observation, scales);
         }
         self.sum_up();
     }
 
-    fn step_pose(&mut self, observation: &Observation, following: bool) {
-        let variance = observation.pose_variance(&self.model, self.noise.scales().pose);
+    fn step_pose(&mut self, observation: &Observation, following: bool, scales: NoiseScales) {
+        let variance = observation.pose_variance(&self.model, scales.pose);
         let measured = observation.pose_frames > 0;
         if !self.tracking {
             if measured {
@@ -264,10 +263,7 @@ impl Monitor {
         let suspected = following.then(|| Suspicion {
             variance: variance.map(|variance| FOLLOWING * FOLLOWING * variance),
             // At rest no fault ends.
-            ends: match observation.moving {
-                true => ENDS_1_S * observation.dt_s,
-                false => 0.0,
-            },
+            ends: ENDS_1_S * observation.moved_s(),
         });
         let kinds = self.faults.kinds(&self.model, observation, &step);
         self.departure.predict(&step, &kinds, birth, suspected);
@@ -306,12 +302,9 @@ impl Monitor {
         self.report.evidence += said.log_density;
     }
 
-    fn step_wheels(&mut self, observation: &Observation) {
-        let scales = self.noise.scales();
-        let sample = |sd: f64| self.model.sample_variance(sd, observation.frame_s);
-        let samples = scales
-            .wheels
-            .map(|scale| sample(scale * self.model.noise.wheel_rate_rad_s));
+    fn step_wheels(&mut self, observation: &Observation, scales: NoiseScales) {
+        let learned = self.model.noise.wheel_rate_rad_s;
+        let samples = observation.sample_variances(&self.model, learned, scales.wheels);
         let share = 1.0 / self.robot.wheels.len() as f64;
         let birth = self.birth(observation.dt_s, SHARE_WHEELS * share);
         let birth_repeats = self.birth(observation.dt_s, SHARE_REPEATS * share);
@@ -319,11 +312,8 @@ impl Monitor {
             observation.command,
             [observation.curvature, observation.speed],
         );
-        for (i, sample) in samples
-            .into_iter()
-            .enumerate()
-            .take(self.robot.wheels.len())
-        {
+        let wheels = self.robot.wheels.len();
+        for (i, sample) in samples.into_iter().enumerate().take(wheels) {
             let reading = &observation.wheels[i];
             self.update_repeats(i, reading.plain, reading.repeats, birth_repeats);
             if reading.plain == 0 {
@@ -353,12 +343,9 @@ impl Monitor {
         self.gains.repeats[wheel] = seen.max(after - before);
     }
 
-    fn step_steer(&mut self, observation: &Observation) {
-        let scales = self.noise.scales();
-        let sample = |sd: f64| self.model.sample_variance(sd, observation.frame_s);
-        let samples = scales
-            .steer
-            .map(|scale| sample(scale * self.model.noise.steer_rad));
+    fn step_steer(&mut self, observation: &Observation, scales: NoiseScales) {
+        let learned = self.model.noise.steer_rad;
+        let samples = observation.sample_variances(&self.model, learned, scales.steer);
         let extra = self.model.nominal.steer_sd_rad;
         let steered = self
             .robot
@@ -368,11 +355,8 @@ impl Monitor {
             .count()
             .max(1);
         let birth = self.birth(observation.dt_s, SHARE_STEER / steered as f64);
-        for (i, sample) in samples
-            .into_iter()
-            .enumerate()
-            .take(self.robot.wheels.len())
-        {
+        let wheels = self.robot.wheels.len();
+        for (i, sample) in samples.into_iter().enumerate().take(wheels) {
             let reading = &observation.steer[i];
             if !self.robot.wheels[i].steered || reading.plain == 0 {
                 continue;

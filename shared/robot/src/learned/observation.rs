@@ -88,6 +88,19 @@ impl Observation {
         })
     }
 
+    /// Variances of one sample of each wheel's channel whose learned deviation is `sd`, when its
+    /// noise is `scales` times that.
+    #[must_use]
+    pub fn sample_variances(&self, model: &Model, sd: f64, scales: [f64; WHEELS]) -> [f64; WHEELS] {
+        scales.map(|scale| model.sample_variance(sd * scale, self.frame_s))
+    }
+
+    /// How long the robot moved, s: time at rest is no evidence.
+    #[must_use]
+    pub const fn moved_s(&self) -> f64 {
+        if self.moving { self.dt_s } else { 0.0 }
+    }
+
     /// The displacement to this observation that a motion model expects.
     #[must_use]
     pub fn displacement(&self, model: &Model, motion: &MotionModel) -> Displacement {

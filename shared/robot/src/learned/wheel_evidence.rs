@@ -71,11 +71,8 @@ impl WheelEvidence {
         noise: NoiseScales,
     ) -> Self {
         let learned = model.noise.wheel_rate_rad_s;
-        let sample_sd = noise.wheels.map(|scale| {
-            model
-                .sample_variance(learned * scale, observation.frame_s)
-                .sqrt()
-        });
+        let samples = observation.sample_variances(model, learned, noise.wheels);
+        let sample_sd = samples.map(f64::sqrt);
         let mut evidence = Self {
             healthy: [0.0; WHEELS],
             broken: [[0.0; BREAKAGES.len()]; WHEELS],
