@@ -188,9 +188,11 @@ impl Recorded {
     ) -> Trace {
         let mut filter = Exact::new(&self.model, &self.robot, &self.leaves, with_wheels, rates);
         if let Some(first) = run.observations.first() {
-            let variance = first.pose_variance(&self.model, [1.0; 3]);
-            let spread = nalgebra::Matrix3::from_diagonal(&variance.into());
-            filter.restart(first.pose.into(), spread, first.t_ns);
+            let start = Healthy {
+                pose: first.pose.into(),
+                ..Healthy::unsure(&self.model, &self.robot)
+            };
+            filter.restart(&start, first.t_ns);
         }
         let steps = run.steps(until_onset);
         let mut trace = Trace::new(run.onset);

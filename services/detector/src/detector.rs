@@ -1,7 +1,7 @@
 //! The detector's `step`: guard, observe, monitor, alarm, report.
 
 use vigil_blocks::{
-    Channel, DetectionBelief, Entry, PARTICLE_CAPACITY, ParticleBlock, Readiness, SensorFrame,
+    Channel, DetectionBelief, Entry, HealthyBelief, PARTICLE_CAPACITY, ParticleBlock, Readiness, SensorFrame,
     Symptoms, Valid,
 };
 use vigil_inference::ending::Ending;
@@ -383,6 +383,8 @@ impl Detector {
         belief.noise_scale = pose;
         belief.noise_scale_wheels = wheels;
         belief.noise_scale_steer = steer;
+        let healthy = self.watch.healthy();
+        belief.healthy = healthy.map_or_else(HealthyBelief::default, |it| it.to_block());
         belief.channel_log_odds = report.channels;
         belief.alarm_t_capture_ns = self.alarm_t_ns;
         belief.alarm = u32::from(self.alarm.stands());

@@ -2,7 +2,7 @@
 
 use vigil_blocks::SensorFrame;
 use vigil_robot::learned::monitor::Report;
-use vigil_robot::learned::{Intake, Monitor, NoiseScales, Observer};
+use vigil_robot::learned::{Healthy, Intake, Monitor, NoiseScales, Observer};
 use vigil_robot::nominal;
 
 use crate::cloud::Cloud;
@@ -148,6 +148,14 @@ impl Watch {
         match self {
             Self::Faults { monitor, .. } => monitor.noise().scales(),
             Self::Nominal { .. } => NoiseScales::default(),
+        }
+    }
+
+    /// What is believed of the robot as long as it is healthy, where its pose is tracked.
+    pub fn healthy(&self) -> Option<Healthy> {
+        match self {
+            Self::Faults { monitor, .. } => monitor.healthy(),
+            Self::Nominal { .. } => None,
         }
     }
 

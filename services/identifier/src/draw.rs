@@ -1,45 +1,16 @@
-//! Particles: moments of a block, and a block drawn from the belief.
+//! Particles drawn from the belief, for those who read particles.
 
-use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{MODE_MULTIPLE, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock, WHEELS};
 use vigil_inference::angle::wrap;
 use vigil_inference::normals::normal;
-use vigil_inference::particles::{PRECISION, factor};
+use vigil_inference::particles::factor;
 use vigil_robot::learned::Moved;
 
 use crate::encoders::Encoders;
 use crate::exact::Exact;
 use crate::modes::Leaves;
-
-/// Weighted mean and covariance of a block (x, y, yaw); None if it is empty or not finite.
-#[must_use]
-pub fn moments(block: &ParticleBlock) -> Option<(Vector3<f64>, Matrix3<f64>)> {
-    let count = (block.count as usize).min(PARTICLE_CAPACITY);
-    if count == 0 {
-        return None;
-    }
-    let at = |i: usize| Vector3::new(block.x[i].into(), block.y[i].into(), block.yaw[i].into());
-    let origin: Vector3<f64> = at(0);
-    let (mut total, mut mean, mut square) = (0.0, Vector3::zeros(), Matrix3::zeros());
-    for i in 0..count {
-        let weight = f64::from(block.log_weight[i]).exp();
-        let mut apart: Vector3<f64> = at(i) - origin;
-        apart[2] = wrap(apart[2]);
-        total += weight;
-        mean += apart * weight;
-        square += apart * apart.transpose() * weight;
-    }
-    let mean = mean / total;
-    let covariance = square / total - mean * mean.transpose() + Matrix3::identity() * PRECISION;
-    let finite = total > 0.0
-        && mean
-            .iter()
-            .chain(covariance.iter())
-            .all(|value| value.is_finite());
-    finite.then(|| (mean + origin, covariance))
-}
 
 /// Draws `count` particles of equal weight from the belief: hypotheses by systematic sampling,
 /// the pose from its Gaussian.

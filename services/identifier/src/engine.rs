@@ -1,9 +1,8 @@
 //! The filter that an identification runs on.
 
-use nalgebra::{Matrix3, Vector3};
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::ParticleBlock;
-use vigil_robot::learned::{NoiseScales, Observation};
+use vigil_robot::learned::{Healthy, NoiseScales, Observation};
 
 use crate::draw::draw;
 use crate::exact::Exact;
@@ -21,11 +20,11 @@ pub enum Engine {
 }
 
 impl Engine {
-    /// Starts from the nominal mode, its pose known to these moments at `t_ns`.
-    pub fn restart(&mut self, mean: Vector3<f64>, covariance: Matrix3<f64>, t_ns: u64) {
+    /// Starts from the nominal mode, as the detector knew it at `t_ns`.
+    pub fn restart(&mut self, healthy: &Healthy, t_ns: u64) {
         match self {
-            Self::Exact(filter) => filter.restart(mean, covariance, t_ns),
-            Self::Generic(filter) => filter.restart(mean, covariance, t_ns),
+            Self::Exact(filter) => filter.restart(healthy, t_ns),
+            Self::Generic(filter) => filter.restart(healthy, t_ns),
         }
     }
 

@@ -9,14 +9,14 @@
 //! once. A stuck wheel's encoder reads zero with the sensor's noise. The unknown is nominal motion
 //! with a large constant deviation, and wheels that may do anything.
 
-use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::WHEELS;
 use vigil_inference::bank::{Bank, Hypothesis};
-use vigil_inference::track::Track;
+use vigil_inference::track::{Context, Track};
 use vigil_robot::Description;
 use vigil_robot::learned::wheel_evidence::Dragged;
 use vigil_robot::learned::{
-    FaultRates, Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
+    FaultRates, Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext,
+    WheelEvidence, motion_modes,
 };
 
 use crate::encoders::{Encoders, Likelihoods, OWN_RATE, SILENT, ZERO};
@@ -53,6 +53,8 @@ pub struct State {
     pub encoders: Encoders,
     /// With two stuck wheels: what the other wheels' rates are off by.
     pub offsets: RateOffsets,
+    /// Part of the weight of the unknown: that its departure is material.
+    pub log_material: f64,
 }
 
 /// The filter.
@@ -67,6 +69,9 @@ pub struct Exact {
     /// Of each wheel's encoder.
     births_1_s: [f64; WHEELS],
     bank: Bank<State>,
+    /// Of the healthy robot, from before the faults; it fades as the robot drives on.
+    context: Context,
+    wheels: WheelContext,
     sets: Sets,
     degenerate_count: u32,
 }
@@ -83,6 +88,14 @@ impl Exact {
     ) -> Self {
         // A pose alone cannot tell two stuck wheels from one on another soil.
         let modes = motion_modes(model, robot, leaves.stuck_wheels(), true, use_wheels);
+        let on_any_ground = |mode: MotionMode| match mode.moved {
+            Moved::Nominal | Moved::Unknown if mode.is_nominal_motion() => MotionMode {
+                noise: model.nominal_noise(robot),
+                ..mode
+            },
+            _ => mode,
+        };
+        let modes: Vec<MotionMode> = modes.into_iter().map(on_any_ground).collect();
         let is_leaf = leaves.encoder.map(|leaf| leaf.is_some());
         let capacities: Vec<usize> = modes
             .iter()
@@ -101,17 +114,20 @@ impl Exact {
             rates,
             births_1_s: is_leaf.map(|leaf| if leaf { rates.fault_1_s } else { 0.0 }),
             bank: Bank::new(&capacities),
+            context: Context::default(),
+            wheels: WheelContext::default(),
             degenerate_count: 0,
         }
     }
 
-    /// Starts from the nominal mode, its pose known to `moments` at `t_ns`.
-    pub fn restart(&mut self, mean: Vector3<f64>, covariance: Matrix3<f64>, t_ns: u64) {
-        let track = Track::new(mean, covariance, &self.modes[NOMINAL].noise);
+    /// Starts from the nominal mode, as the detector knew it at `t_ns`.
+    pub fn restart(&mut self, healthy: &Healthy, t_ns: u64) {
+        (self.context, self.wheels) = (healthy.context, healthy.wheels);
         let state = State {
-            track,
+            track: healthy.track(&self.modes[NOMINAL].noise),
             encoders: Encoders::healthy(t_ns),
             offsets: RateOffsets::default(),
+            log_material: 0.0,
         };
         self.bank.restart(NOMINAL, t_ns, state);
     }
@@ -158,13 +174,42 @@ impl Exact {
                 failed |= gained.is_none();
                 hypothesis.log_weight += gained.unwrap_or(2.0 * FLOOR);
             }
+            self.cut_off();
         }
         if self.bank.normalise(FLOOR).is_none() || failed {
             self.degenerate_count = self.degenerate_count.saturating_add(1);
         }
     }
 
+    /// Holds healthy motion within the tolerance, and unknown motion beyond it.
+    fn cut_off(&mut self) {
+        let bound = self.modes[NOMINAL].noise.bound;
+        if !self.modes[NOMINAL].noise.is_bounded() {
+            return;
+        }
+        for hypothesis in self.bank.hypotheses_mut() {
+            let mode = &self.modes[hypothesis.mode];
+            // Wheels that do anything are unknown however the robot moves.
+            let is_material = match mode.moved {
+                Moved::Unknown => !mode.is_nominal_motion(),
+                Moved::UnknownAny => !self.use_wheels,
+                _ => false,
+            };
+            let state = &mut hypothesis.state;
+            if mode.noise.is_bounded() {
+                state.track.saturate(&bound);
+            } else if is_material {
+                let log_material = state.track.log_material(&bound);
+                hypothesis.log_weight += log_material - state.log_material;
+                state.log_material = log_material;
+            }
+        }
+    }
+
     fn predict(&mut self, observation: &Observation) {
+        self.context
+            .fade(observation.travel_m, &self.modes[NOMINAL].noise);
+        self.wheels.fade(observation.travel_m);
         for index in 0..self.modes.len() {
             let mode = &self.modes[index];
             let step = observation.displacement(&self.model, &mode.motion);
@@ -228,7 +273,11 @@ impl Exact {
         let (before, after) = (self.modes[from.mode].moved, self.modes[mode].moved);
         let (curvature, speed) = (observation.curvature, observation.speed);
         let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
-        let mut track = from.state.track.fork(&noise);
+        let context = match before {
+            Moved::Nominal => from.state.track.context(),
+            _ => self.context,
+        };
+        let mut track = from.state.track.enter(&context, &noise);
         track.diffuse(self.modes[mode].jump);
         let t_ns = observation.t_first_ns;
         let mut encoders = match (before, after) {
@@ -251,12 +300,14 @@ impl Exact {
             track,
             encoders,
             offsets: RateOffsets::default(),
+            log_material: 0.0,
         }
     }
 
     /// Weighs by the wheels' readings. Each is evaluated once per motion mode, not per hypothesis.
     fn weigh_wheels(&mut self, observation: &Observation, noise: NoiseScales) {
-        let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise);
+        let (model, robot) = (&self.model, &self.robot);
+        let evidence = WheelEvidence::new(model, robot, observation, noise, &self.wheels);
         let births = self.births_1_s.map(|rate| rate * observation.dt_s);
         let death = self.rates.death_1_s * observation.dt_s;
         let first_ns = observation.t_first_ns;

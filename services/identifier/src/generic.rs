@@ -1,6 +1,6 @@
 //! The library's filters over single faults, by name.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{FaultSet, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock, WHEELS};
@@ -20,7 +20,7 @@ use vigil_inference::proposal::Proposal;
 use vigil_inference::resample::Resampling;
 use vigil_inference::track::TRACK_DIMENSION;
 use vigil_robot::learned::switching::{MODES_MAX, Seen};
-use vigil_robot::learned::{Moved, NoiseScales, Observation, Switching};
+use vigil_robot::learned::{Healthy, Moved, NoiseScales, Observation, Switching};
 use vigil_setup::schema::{self, IdentifierFilter};
 
 use crate::assemble::Models;
@@ -142,11 +142,12 @@ impl Generic {
         })
     }
 
-    /// Starts from the nominal mode, its pose known to these moments at `t_ns`.
-    pub fn restart(&mut self, mean: Vector3<f64>, covariance: Matrix3<f64>, t_ns: u64) {
+    /// Starts from the nominal mode, its pose known as the detector knew it at `t_ns`.
+    pub fn restart(&mut self, healthy: &Healthy, t_ns: u64) {
         self.pending_m = 0.0;
         self.since_ns = [t_ns; MODES_MAX];
-        self.model_mut().start_at(mean, covariance);
+        self.model_mut()
+            .start_at(healthy.pose, healthy.covariance);
         match &mut self.kind {
             Kind::Sampled(filter) => filter.restart(self.seed),
             Kind::Hierarchical(filter) => filter.restart(self.seed),

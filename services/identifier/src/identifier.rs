@@ -2,18 +2,18 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{
     DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock,
     SensorFrame,
 };
-use vigil_robot::learned::{NoiseScales, Observation, Observer};
+use vigil_robot::learned::{Healthy, NoiseScales, Observation, Observer};
 use vigil_setup::schema;
 
 use crate::assemble::Models;
-use crate::draw::{copy, moments};
+use crate::draw::copy;
 use crate::engine::Engine;
 use crate::exact::{BIRTH_1_S, DEATH_1_S, Exact, fault_rates};
 use crate::generic::Generic;
@@ -38,20 +38,12 @@ pub struct Input<'a> {
     pub detection: Option<(&'a DetectionBelief, &'a ParticleBlock)>,
 }
 
-/// An observation kept for an identification, and the pose as the detector knew it after it.
+/// An observation kept for an identification, and what the detector believed after it.
 #[derive(Debug, Clone, Copy)]
 struct Kept {
     observation: Observation,
     noise: NoiseScales,
-    pose: Option<(Vector3<f64>, Matrix3<f64>)>,
-}
-
-impl Kept {
-    /// The pose as the detector knew it, or as it was measured.
-    fn pose(&self) -> (Vector3<f64>, Matrix3<f64>) {
-        let measured = Vector3::from(self.observation.pose);
-        self.pose.unwrap_or((measured, Matrix3::identity() * 1e-4))
-    }
+    healthy: Option<Healthy>,
 }
 
 /// What the identifier is doing.
@@ -66,9 +58,9 @@ enum Phase {
 /// The identification filter at frame rate.
 ///
 /// Before an alarm it reports nominal with 1 - p(fault) and keeps a ring of observations, each
-/// with the moments of the detector's particles. An alarm starts the filter from the pose
-/// that the detector's particles had at the beginning of the ring: the fault had not happened yet,
-/// and the particles of later cycles follow a nominal model that no longer holds. The ring is
+/// with what the detector believed after it. An alarm starts the filter from what it believed at the
+/// beginning of the ring: the fault had not happened yet, and later beliefs of the robot as a
+/// healthy one follow a nominal model that no longer holds. The ring is
 /// worked off within about 0.1 s, a bounded number of observations per cycle; until then the
 /// report stays what it was. Then every observation is one update; cycles between observations
 /// repeat the belief, with predicted and present probability equal.
@@ -77,6 +69,8 @@ pub struct Identifier {
     leaves: Leaves,
     engine: Engine,
     observer: Observer,
+    /// What is known of a healthy robot of which the detector says nothing.
+    unsure: Healthy,
     p_unknown: f64,
     use_wheels: bool,
     /// Sensors are silent, or the robot moves though it should stand: nothing can be identified.
@@ -149,6 +143,7 @@ impl Identifier {
             reasons: Reasons::new(model, robot, &leaves, use_wheels),
             leaves,
             observer: Observer::new(model, robot),
+            unsure: Healthy::unsure(model, robot),
             p_unknown: settings.p_unknown,
             use_wheels,
             in_trouble: false,
@@ -286,8 +281,19 @@ impl Identifier {
         self.ring.push_back(Kept {
             observation: *self.observer.observation(),
             noise: self.detection.noise,
-            pose: input.detection.and_then(|(_, block)| moments(block)),
+            healthy: input
+                .detection
+                .and_then(|(belief, _)| Healthy::from_block(&belief.healthy, self.unsure.wheels)),
         });
+    }
+
+    /// What the detector believed, or else that the pose is as it was measured.
+    fn healthy(&self, kept: &Kept) -> Healthy {
+        let pose = Vector3::from(kept.observation.pose);
+        kept.healthy.unwrap_or(Healthy {
+            pose,
+            ..self.unsure
+        })
     }
 
     /// Starts from the oldest kept observation whose pose is known.
@@ -295,13 +301,13 @@ impl Identifier {
         let known = self
             .ring
             .iter()
-            .position(|kept| kept.pose.is_some() || kept.observation.pose_frames > 0);
+            .position(|kept| kept.healthy.is_some() || kept.observation.pose_frames > 0);
         let start = known.unwrap_or(0);
         let Some(kept) = self.ring.get(start) else {
             return;
         };
-        let (mean, covariance) = kept.pose();
-        self.engine.restart(mean, covariance, kept.observation.t_ns);
+        let healthy = self.healthy(kept);
+        self.engine.restart(&healthy, kept.observation.t_ns);
         self.phase = Phase::Identifying(start + 1);
         // What was unknown so far is now any of the faults, by their priors.
         self.predicted = self.predicted.divided(&self.leaves, self.p_unknown);
@@ -356,13 +362,14 @@ impl Identifier {
         let taken = self.ring.range(earliest..end);
         let before = taken.take_while(|kept| kept.observation.t_ns <= onset_ns);
         let start = earliest + before.count().saturating_sub(1);
-        let Some(pose) = self.ring.get(start).map(Kept::pose) else {
+        let Some(kept) = self.ring.get(start) else {
             return;
         };
+        let healthy = self.healthy(kept);
         let (posterior, leaves) = (&self.posterior, &self.leaves);
-        let observation = &self.ring[start].observation;
-        let drive = (observation.curvature, observation.speed);
-        self.reasons.begin(posterior, leaves, pose, drive, onset_ns);
+        let drive = (kept.observation.curvature, kept.observation.speed);
+        self.reasons
+            .begin(posterior, leaves, &healthy, drive, onset_ns);
         self.follow(start + 1, end);
     }
 

@@ -5,12 +5,12 @@
 //! The filter's own hypotheses cannot say this: the next best of them has usually become it a
 //! moment ago, and owes its past to the best.
 
-use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
 use vigil_inference::track::Track;
 use vigil_robot::Description;
 use vigil_robot::learned::{
-    Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
+    Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext, WheelEvidence,
+    motion_modes,
 };
 
 use crate::exact::is_new;
@@ -47,6 +47,8 @@ pub struct Reasons {
     robot: Description,
     modes: Vec<MotionMode>,
     use_wheels: bool,
+    /// Of the wheels, from before the onset.
+    wheels: WheelContext,
     followed: Option<[Lineage; 2]>,
     onset_ns: u64,
     runner_up: u32,
@@ -61,6 +63,7 @@ impl Reasons {
             robot: robot.clone(),
             modes: motion_modes(model, robot, leaves.stuck_wheels(), false, true),
             use_wheels,
+            wheels: WheelContext::default(),
             followed: None,
             onset_ns: 0,
             runner_up: 0,
@@ -92,13 +95,13 @@ impl Reasons {
         })
     }
 
-    /// Begins to follow the diagnosis of `posterior` and its rival from a pose at `onset_ns`, while
+    /// Begins to follow the diagnosis of `posterior` and its rival from before `onset_ns`, while
     /// the robot drives at this curvature (1/m) and speed (m/s).
     pub fn begin(
         &mut self,
         posterior: &Posterior,
         leaves: &Leaves,
-        (mean, covariance): (Vector3<f64>, Matrix3<f64>),
+        healthy: &Healthy,
         (curvature, speed): (f64, f64),
         onset_ns: u64,
     ) {
@@ -109,7 +112,7 @@ impl Reasons {
             Explanation::Leaves(set) if set.count_ones() > 1 => MODE_MULTIPLE,
             Explanation::Leaves(set) => set.trailing_zeros(),
         };
-        self.onset_ns = onset_ns;
+        (self.onset_ns, self.wheels) = (onset_ns, healthy.wheels);
         let lineage = |explanation| {
             let (moved, broken) = match explanation {
                 Explanation::Unknown => (Moved::UnknownAny, 0),
@@ -123,7 +126,7 @@ impl Reasons {
             Some(Lineage {
                 mode,
                 broken,
-                track: Track::new(mean, covariance, &noise),
+                track: healthy.track(&noise),
                 offsets: RateOffsets::default(),
                 heard: [0.0; CHANNELS],
             })
@@ -136,6 +139,7 @@ impl Reasons {
         let Some(mut followed) = self.followed else {
             return;
         };
+        self.wheels.fade(observation.travel_m);
         let variance = observation.pose_variance(&self.model, noise.pose);
         for Lineage { mode, track, .. } in &mut followed {
             let mode = &self.modes[*mode];
@@ -166,7 +170,8 @@ impl Reasons {
         observation: &Observation,
         noise: NoiseScales,
     ) {
-        let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise);
+        let (model, robot) = (&self.model, &self.robot);
+        let evidence = WheelEvidence::new(model, robot, observation, noise, &self.wheels);
         let is_new = is_new(observation.t_ns, self.onset_ns);
         for lineage in followed {
             let moved = self.modes[lineage.mode].moved;

@@ -1,6 +1,7 @@
 //! The detector's belief: is something wrong?
 
 use crate::block::block;
+use crate::layout::part;
 use crate::{Cause, Header, WHEELS};
 
 /// Capacity of the per-channel evidence.
@@ -35,9 +36,31 @@ impl Channel {
     }
 }
 
+part! {
+/// What the detector believes of the robot as long as it is healthy. Zero where it tracks no pose.
+/// Covariances hold the upper triangle, row by row.
+pub struct HealthyBelief, size 288 {
+    /// Pose: x m, y m, yaw rad.
+    pub pose: [f64; 3],
+    /// Its covariance.
+    pub pose_covariance: [f64; 6],
+    /// What the motion departs from its model by where the robot drives, per metre: yaw rad/m,
+    /// forward, lateral. While a fault is suspected: from before it.
+    pub deviation: [f64; 3],
+    /// Its covariance.
+    pub deviation_covariance: [f64; 6],
+    /// Share of their rates that all wheels depart by together: mean and variance.
+    pub wheel_ratio: [f64; 2],
+    /// Rate by which each wheel departs beside that, rad/s.
+    pub wheel_offset: [f64; WHEELS],
+    /// Its variance.
+    pub wheel_offset_variance: [f64; WHEELS],
+}
+}
+
 block! {
     /// Written by the detector every cycle.
-    pub struct DetectionBelief, size 584 {
+    pub struct DetectionBelief, size 872 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -61,6 +84,8 @@ block! {
         pub noise_scale_wheels: [f64; WHEELS],
         /// The same for each steering angle.
         pub noise_scale_steer: [f64; WHEELS],
+        /// What an identification starts from.
+        pub healthy: HealthyBelief,
         /// Log-odds of a fault seen by each channel alone (see [`Channel`]).
         pub channel_log_odds: [f64; CHANNELS],
         /// `decision_seq` of the last action that the robot obeyed, as the frame says it.

@@ -38,7 +38,7 @@ pub use block::{Block, fnv1a};
 #[doc(hidden)]
 pub use block::{ascii, name_with_hash};
 pub use control::{Control, ControlCommand};
-pub use detection::{Blindness, CHANNELS, Channel, DetectionBelief, Readiness};
+pub use detection::{Blindness, CHANNELS, Channel, DetectionBelief, HealthyBelief, Readiness};
 pub use diagnosis::{
     FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
 };

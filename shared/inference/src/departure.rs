@@ -6,13 +6,19 @@
 //! along by the measurements, the residuals of such a fault are no constant, but grow and settle;
 //! here they are what they should be for every fault, and a fault is seen sooner than by a constant
 //! bias of the residual.
+//!
+//! A healthy robot departs from its model too: slip, slope, a servo that stands off. The nominal
+//! track learns that as its context, up to a bound ([`MotionNoise::bound`]): what departs by more
+//! for good is never learned away. A fault of an unknown kind counts as far as its departure lies
+//! beyond the same bound, with the probability that it does: that is Bayes for a departure whose
+//! prior is cut off there.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::angle::wrap;
 use crate::logspace::log_add;
 use crate::onsets::{Onset, Onsets};
-use crate::track::{Displacement, MotionNoise, Track};
+use crate::track::{Context, Displacement, MotionNoise, Track};
 
 /// Log-odds beyond which more evidence changes nothing, but delays recovery.
 pub const LOG_ODDS_MAX: f64 = 40.0;
@@ -23,6 +29,8 @@ const LOG_ODDS_MIN: f64 = -30.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Fault {
     log_weight: f64,
+    /// Part of the weight: that its departure is material.
+    log_material: f64,
     track: Track,
 }
 
@@ -35,6 +43,8 @@ pub struct Kind {
     pub step: Displacement,
     /// How far faults of this kind depart from that.
     pub noise: MotionNoise,
+    /// Whether such a fault is one only where it departs beyond the nominal bound.
+    pub is_unknown: bool,
 }
 
 /// The filter, over K kinds of faults.
@@ -42,6 +52,9 @@ pub struct Kind {
 pub struct Departure<const K: usize> {
     nominal: MotionNoise,
     track: Track,
+    /// Of the nominal mode, from before a fault was suspected.
+    context: Context,
+    is_unknown: [bool; K],
     faults: [Onsets<Fault>; K],
     /// While a fault is suspected: nominal motion again, since one of some successive steps.
     ended: Onsets<Fault>,
@@ -73,6 +86,8 @@ impl<const K: usize> Departure<K> {
     pub fn new(nominal: MotionNoise) -> Self {
         Self {
             track: Track::new(Vector3::zeros(), Matrix3::identity(), &nominal),
+            context: Context::default(),
+            is_unknown: [false; K],
             faults: [Onsets::default(); K],
             ended: Onsets::default(),
             nominal,
@@ -115,6 +130,12 @@ impl<const K: usize> Departure<K> {
         &self.track
     }
 
+    /// What is known of the nominal mode's deviations; while a fault is suspected, from before it.
+    #[must_use]
+    pub const fn context(&self) -> &Context {
+        &self.context
+    }
+
     /// Natural log-odds of a fault.
     #[must_use]
     pub fn log_odds(&self) -> f64 {
@@ -143,12 +164,18 @@ impl<const K: usize> Departure<K> {
         birth: f64,
         suspected: Option<Suspicion>,
     ) {
+        match suspected {
+            None => self.context = self.track.context(),
+            Some(_) => self.context.fade(step.travel_m, &self.nominal),
+        }
+        self.is_unknown = kinds.each_ref().map(|kind| kind.is_unknown);
         for (faults, kind) in self.faults.iter_mut().zip(kinds) {
             let born = birth * kind.share;
             if born > 0.0 {
                 faults.enter(Fault {
                     log_weight: born.ln(),
-                    track: self.track.fork(&kind.noise),
+                    log_material: 0.0,
+                    track: self.track.enter(&self.context, &kind.noise),
                 });
             }
             for fault in faults.iter_mut() {
@@ -164,17 +191,21 @@ impl<const K: usize> Departure<K> {
             self.ended = Onsets::default();
             return;
         };
-        self.track = self.track.fork(&self.nominal);
+        let (context, nominal) = (self.context, self.nominal);
+        self.track = self.track.enter(&context, &nominal);
         self.track.diffuse(variance);
         let faults = self.faults.iter().filter_map(best);
         let likeliest = faults.max_by(|a, b| a.log_weight.total_cmp(&b.log_weight));
         let likeliest = likeliest.filter(|_| ends > 0.0);
-        if let Some(track) = likeliest.map(|fault| fault.track.fork(&self.nominal)) {
-            let log_weight = self.log_odds() + ends.ln();
-            self.ended.enter(Fault { log_weight, track });
+        if let Some(track) = likeliest.map(|fault| fault.track.enter(&context, &nominal)) {
+            self.ended.enter(Fault {
+                log_weight: self.log_odds() + ends.ln(),
+                log_material: 0.0,
+                track,
+            });
         }
         for ended in self.ended.iter_mut() {
-            ended.track.predict(step, &self.nominal);
+            ended.track.predict(step, &nominal);
         }
     }
 
@@ -195,10 +226,26 @@ impl<const K: usize> Departure<K> {
         };
         self.all_mut().for_each(take);
         self.ended.iter_mut().for_each(take);
+        self.cut_off();
         let gain = self.log_odds() - total(self.ended.iter()).max(0.0) - before;
         self.gain = if gain.is_finite() { gain } else { 0.0 };
         self.bound();
         Some(said)
+    }
+
+    /// Holds the nominal mode within its bound, and an unknown fault beyond it.
+    fn cut_off(&mut self) {
+        let bound = self.nominal.bound;
+        self.track.saturate(&bound);
+        for ended in self.ended.iter_mut() {
+            ended.track.saturate(&bound);
+        }
+        let unknown = self.faults.iter_mut().zip(self.is_unknown);
+        for fault in unknown.filter(|(_, is)| *is).flat_map(|(all, _)| all.iter_mut()) {
+            let log_material = fault.track.log_material(&bound);
+            fault.log_weight += log_material - fault.log_material;
+            fault.log_material = log_material;
+        }
     }
 
     /// Keeps the weights within bounds.
@@ -260,6 +307,7 @@ impl Onset for Fault {
         let share = (self.log_weight - log_weight).exp();
         Self {
             log_weight,
+            log_material: self.log_material * share + older.log_material * (1.0 - share),
             track: self.track.mixed(&older.track, share),
         }
     }
@@ -287,6 +335,7 @@ mod tests {
             deviation: Matrix3::identity() * deviation * deviation,
             length_m: 0.3,
             white: Vector3::repeat(1e-8),
+            bound: Vector3::repeat(f64::INFINITY),
         }
     }
 
@@ -301,6 +350,7 @@ mod tests {
             share: 0.6,
             step: STEP,
             noise: noise(0.25, 0.03),
+            is_unknown: false,
         };
         let slower = Kind {
             share: 0.4,
@@ -309,6 +359,7 @@ mod tests {
                 ..STEP
             },
             noise: noise(0.05, 0.03),
+            is_unknown: false,
         };
         [anything, slower]
     }
@@ -342,7 +393,7 @@ mod tests {
         let mut all: Vec<(usize, f64, Track)> = Vec::new();
         for pose in poses {
             for (kind, its) in kinds().iter().enumerate() {
-                all.push((kind, (BIRTH * its.share).ln(), nominal.fork(&its.noise)));
+                all.push((kind, (BIRTH * its.share).ln(), nominal.enter(&nominal.context(), &its.noise)));
             }
             nominal.predict(&STEP, &noise(0.001, 0.001));
             let healthy = nominal.update(*pose, VARIANCE).unwrap();

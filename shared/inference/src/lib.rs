@@ -34,6 +34,7 @@
 //! | [`risk`] | what losing track of a mode costs, for risk-sensitive proposals |
 //! | [`resample`], [`weights`], [`adaptive`] | four schemes, log-weights, number of particles |
 //! | [`gaussian`], [`track`], [`particles`] | Kalman filter, pose track, pose particles |
+//! | [`slow_state`] | what drifts within a tolerance, as a healthy robot does |
 //! | [`normals`] | standard normals, drawn ahead of their use |
 //! | [`onsets`] | components by the age of their onset, in bounded number |
 //! | [`bank`] | exact single faults: one hypothesis per (mode, onset) |
@@ -64,6 +65,7 @@ pub mod particles;
 pub mod proposal;
 pub mod resample;
 pub mod risk;
+pub mod slow_state;
 pub mod sequences;
 pub mod track;
 pub mod tree;

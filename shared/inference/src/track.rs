@@ -2,8 +2,9 @@
 //!
 //! State: x, y, yaw; three offsets that are constant within a run; three deviations that follow an
 //! Ornstein-Uhlenbeck process along the path. Offsets and deviations are per commanded metre, in
-//! the order yaw, forward, lateral. The extended Kalman filter linearises about the heading at half
-//! the turn.
+//! the order yaw, forward, lateral. A robot that slips forward turns less by the same share, so the
+//! yaw is that of the travel that remains, and what else it deviates by. The extended Kalman filter
+//! linearises about the heading at half the turn.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -25,6 +26,47 @@ pub struct MotionNoise {
     pub length_m: f64,
     /// Variance of white noise per metre travelled.
     pub white: Vector3<f64>,
+    /// Largest mean deviation per metre in this mode; infinite where there is no such bound.
+    pub bound: Vector3<f64>,
+}
+
+/// What is known of the deviations per metre of a healthy robot where it drives: slip, slope, a
+/// servo that stands off. It holds for a fault too, which adds to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Context {
+    /// Mean; order yaw, forward, lateral.
+    pub mean: Vector3<f64>,
+    /// Covariance.
+    pub covariance: Matrix3<f64>,
+}
+
+impl MotionNoise {
+    /// True where the deviations are those of a healthy robot.
+    #[must_use]
+    pub fn is_bounded(&self) -> bool {
+        self.bound.iter().all(|bound| bound.is_finite())
+    }
+}
+
+impl Default for Context {
+    /// No deviation, for certain.
+    fn default() -> Self {
+        Self {
+            mean: Vector3::zeros(),
+            covariance: Matrix3::zeros(),
+        }
+    }
+}
+
+impl Context {
+    /// Forgets over a travel of `travel_m`, as the ground changes.
+    pub fn fade(&mut self, travel_m: f64, noise: &MotionNoise) {
+        let fading = (-travel_m.abs() / noise.length_m).exp();
+        let square = fading * fading;
+        self.mean *= fading;
+        self.covariance =
+            self.covariance * square + (noise.offset + noise.deviation) * (1.0 - square);
+    }
 }
 
 /// One displacement.
@@ -70,7 +112,7 @@ impl Track {
             .covariance
             .fixed_view_mut::<3, 3>(0, 0)
             .copy_from(&covariance);
-        track.forget(noise);
+        track.begin(&Context::default(), noise);
         track
     }
 
@@ -92,27 +134,75 @@ impl Track {
         self.mean.fixed_rows::<3>(3) + self.mean.fixed_rows::<3>(6)
     }
 
-    /// The same pose under another mode: offsets and deviations start anew from `noise`.
+    /// What is known of the deviations.
     #[must_use]
-    pub fn fork(&self, noise: &MotionNoise) -> Self {
+    pub fn context(&self) -> Context {
+        let view = |r: usize, c: usize| -> Matrix3<f64> {
+            self.covariance.fixed_view::<3, 3>(r, c).into()
+        };
+        let across = view(3, 6);
+        Context {
+            mean: self.deviation(),
+            covariance: view(3, 3) + across + across.transpose() + view(6, 6),
+        }
+    }
+
+    /// The same pose in another mode, in a context. A fault's offsets add to it; in a mode with a
+    /// bound, a nominal one, it is what the deviations begin with.
+    #[must_use]
+    pub fn enter(&self, context: &Context, noise: &MotionNoise) -> Self {
         let mut track = *self;
-        track.forget(noise);
+        if noise.is_bounded() {
+            track.begin(&Context::default(), noise);
+            track.mean.fixed_rows_mut::<3>(6).copy_from(&context.mean);
+            track.set(6, 6, &context.covariance);
+        } else {
+            track.begin(context, noise);
+        }
         track
     }
 
-    fn forget(&mut self, noise: &MotionNoise) {
+    fn begin(&mut self, context: &Context, noise: &MotionNoise) {
         let pose = self.pose_covariance();
-        self.mean.fixed_rows_mut::<6>(3).fill(0.0);
+        self.mean.fixed_rows_mut::<3>(3).copy_from(&context.mean);
+        self.mean.fixed_rows_mut::<3>(6).fill(0.0);
         self.covariance.fill(0.0);
-        self.covariance
-            .fixed_view_mut::<3, 3>(0, 0)
-            .copy_from(&pose);
-        self.covariance
-            .fixed_view_mut::<3, 3>(3, 3)
-            .copy_from(&noise.offset);
-        self.covariance
-            .fixed_view_mut::<3, 3>(6, 6)
-            .copy_from(&noise.deviation);
+        self.set(0, 0, &pose);
+        self.set(3, 3, &(context.covariance + noise.offset));
+        self.set(6, 6, &noise.deviation);
+    }
+
+    /// Moves each mean deviation that is beyond its bound back onto it, and the rest of the state
+    /// as it correlates with it: a constrained Kalman filter by projection.
+    pub fn saturate(&mut self, bound: &Vector3<f64>) {
+        for i in 0..3 {
+            let deviation = self.mean[3 + i] + self.mean[6 + i];
+            let beyond = deviation - deviation.clamp(-bound[i], bound[i]);
+            if beyond == 0.0 {
+                continue;
+            }
+            let along = self.covariance.column(3 + i) + self.covariance.column(6 + i);
+            let variance = along[3 + i] + along[6 + i];
+            if variance > 0.0 {
+                self.mean -= along * (beyond / variance);
+            }
+        }
+    }
+
+    /// Natural logarithm of the probability that a deviation lies beyond its bound: a departure
+    /// within it is not material.
+    #[must_use]
+    pub fn log_material(&self, bound: &Vector3<f64>) -> f64 {
+        let Context { mean, covariance } = self.context();
+        let mut within = 0.0;
+        for i in 0..3 {
+            let sd = (2.0 * covariance[(i, i)]).sqrt().max(f64::MIN_POSITIVE);
+            let (near, far) = ((bound[i] - mean[i].abs()) / sd, (bound[i] + mean[i].abs()) / sd);
+            let beyond = 0.5 * (libm::erfc(near) + libm::erfc(far));
+            within += (-beyond.min(1.0)).ln_1p();
+        }
+        // 1 - the product of those within, exact where it is small.
+        (-within.exp_m1()).max(f64::MIN_POSITIVE).ln()
     }
 
     /// Puts the pose at `pose` with `variance`, keeping what is known of the deviations: the frame
@@ -153,8 +243,11 @@ impl Track {
     /// Moves by one displacement.
     pub fn predict(&mut self, step: &Displacement, noise: &MotionNoise) {
         let travel = step.travel_m;
-        let moved = (Vector3::from(step.per_metre) + self.deviation()) * travel;
-        let (turn, forward, lateral) = (moved[0], moved[1], moved[2]);
+        let deviation = self.deviation();
+        let moved = (Vector3::from(step.per_metre) + deviation) * travel;
+        let slipping = step.per_metre[0] * travel;
+        let turn = moved[0] + slipping * deviation[1];
+        let (forward, lateral) = (moved[1], moved[2]);
         let (sin, cos) = (self.mean[2] + 0.5 * turn).sin_cos();
         let (dx, dy) = (forward * cos - lateral * sin, forward * sin + lateral * cos);
         self.mean[0] += dx;
@@ -166,7 +259,8 @@ impl Track {
 
         let heading = Matrix3::new(1.0, 0.0, -dy, 0.0, 1.0, dx, 0.0, 0.0, 1.0);
         let body = Matrix3::new(-0.5 * dy, cos, -sin, 0.5 * dx, sin, cos, 1.0, 0.0, 0.0);
-        let by = body * travel;
+        let mut by = body * travel;
+        by.set_column(1, &(by.column(1) + body.column(0) * slipping));
         let view = |r: usize, c: usize| -> Matrix3<f64> {
             self.covariance.fixed_view::<3, 3>(r, c).into()
         };
@@ -244,12 +338,13 @@ mod tests {
             deviation: Matrix3::new(2e-3, -9e-4, 0.0, -9e-4, 6e-4, 0.0, 0.0, 0.0, 3e-6),
             length_m: 0.2,
             white: Vector3::new(1e-5, 2e-5, 1e-6),
+            bound: Vector3::repeat(f64::INFINITY),
         }
     }
 
     fn motion(state: &SVector<f64, N>, step: &Displacement) -> SVector<f64, N> {
         let (travel, f) = (step.travel_m, step.per_metre);
-        let turn = (f[0] + state[3] + state[6]) * travel;
+        let turn = (f[0] * (1.0 + state[4] + state[7]) + state[3] + state[6]) * travel;
         let forward = (f[1] + state[4] + state[7]) * travel;
         let lateral = (f[2] + state[5] + state[8]) * travel;
         let (sin, cos) = (state[2] + 0.5 * turn).sin_cos();
@@ -284,7 +379,8 @@ mod tests {
                 down[j] -= 1e-6;
                 (motion(&up, &step)[i] - motion(&down, &step)[i]) / 2e-6
             });
-            let turn = (0.5 + plain.mean[3] + plain.mean[6]) * 0.05;
+            let slip = plain.mean[4] + plain.mean[7];
+            let turn = (0.5 * (1.0 + slip) + plain.mean[3] + plain.mean[6]) * 0.05;
             let (sin, cos) = (plain.mean[2] + 0.5 * turn).sin_cos();
             let shift = motion(&plain.mean, &step) - jacobian * plain.mean;
             let moved = motion(&plain.mean, &step) - plain.mean;

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::Tolerance;
+
 /// What kind of motion the command vector means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -137,6 +139,9 @@ pub struct Description {
     /// Sensor noise; left out, or "estimate": a nominal model learns it from the log.
     #[serde(default, deserialize_with = "given_or_estimated")]
     pub noise: SensorNoise,
+    /// Healthy variation beside that of the runs learned from; left out: none.
+    #[serde(default)]
+    pub tolerance: Option<Tolerance>,
     /// Limits.
     pub limits: Limits,
 }
@@ -222,6 +227,13 @@ impl Description {
         let reach = |wheel: &Wheel| wheel.x.hypot(wheel.y);
         let reach_m = self.wheels.iter().map(reach).fold(0.0, f64::max);
         twist[0].hypot(twist[1]).hypot(reach_m * twist[2])
+    }
+
+    /// What is left of a steering angle's deviation (rad) beyond the tolerance, if there is one.
+    #[must_use]
+    pub fn beyond_steer(&self, apart_rad: f64) -> f64 {
+        let tolerance = self.tolerance.as_ref();
+        tolerance.map_or(apart_rad, |tolerance| tolerance.beyond_steer(apart_rad))
     }
 
     /// Index of the wheel called `name`.

@@ -19,6 +19,7 @@ pub mod nominal;
 pub mod period;
 mod robot_model;
 pub mod slip;
+pub mod tolerance;
 
 pub use alarm::{Alarm, AlarmError};
 pub use description::Description;
@@ -28,3 +29,4 @@ pub use frame_guard::FrameGuard;
 pub use fused_alarm::FusedAlarm;
 pub use injection::Injection;
 pub use robot_model::RobotModel;
+pub use tolerance::Tolerance;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use vigil_blocks::WHEELS;
 use vigil_robot::description::Kinematics;
-use vigil_robot::{AlarmError, Description, RobotModel};
+use vigil_robot::{AlarmError, Description, RobotModel, Tolerance};
 
 use crate::schema::{GraphFile, Service, Socket, Source};
 
@@ -378,6 +378,13 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
         }
     }
     command(robot, &mut report);
+    if let Some((key, value)) = robot.tolerance.as_ref().and_then(Tolerance::invalid) {
+        let allowed = "any value above 0 that a healthy robot can show";
+        report(
+            &format!("tolerance.{key}"),
+            format!("{value} is out of range: allowed is {allowed}"),
+        );
+    }
     let (noise, limits) = (&robot.noise, &robot.limits);
     let positive = [
         ("wheel_radius_m", robot.wheel_radius_m),

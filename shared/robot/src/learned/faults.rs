@@ -7,6 +7,7 @@ use vigil_inference::track::{Displacement, MotionNoise};
 
 use super::motion_modes::unknown_noise;
 use super::{Model, MotionModel, Observation};
+use crate::Description;
 
 /// Kinds of faults: anything, and each wheel stuck.
 pub const KINDS: usize = 1 + WHEELS;
@@ -17,16 +18,19 @@ const SHARE_ANYTHING: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub struct Faults {
     anything: MotionNoise,
+    /// Whether ground has a tolerance, within which a departure is no fault.
+    is_bounded: bool,
     learned: [Option<(MotionModel, MotionNoise)>; WHEELS],
 }
 
 impl Faults {
     /// The faults that a model knows.
     #[must_use]
-    pub fn new(model: &Model) -> Self {
+    pub fn new(model: &Model, robot: &Description) -> Self {
         let stuck = |wheel: usize| model.stuck(wheel).map(|stuck| stuck.motion);
         Self {
             anything: unknown_noise(model),
+            is_bounded: robot.tolerance.is_some(),
             learned: std::array::from_fn(|w| stuck(w).map(|motion| (motion, motion.noise()))),
         }
     }
@@ -45,14 +49,16 @@ impl Faults {
             share: anything,
             step: *step,
             noise: self.anything,
+            is_unknown: self.is_bounded,
         }; KINDS];
         for (kind, learned) in kinds[1..].iter_mut().zip(&self.learned) {
-            kind.share = 0.0;
+            (kind.share, kind.is_unknown) = (0.0, false);
             if let Some((motion, noise)) = learned {
                 *kind = Kind {
                     share: (1.0 - SHARE_ANYTHING) / known as f64,
                     step: observation.displacement(model, motion),
                     noise: *noise,
+                    is_unknown: false,
                 };
             }
         }

@@ -8,8 +8,10 @@
 //! | [`BodyLag`] | how the body follows a changing command, learned on the way |
 //! | [`observation`] | frames averaged into observations of about the learned interval |
 //! | [`motion_modes`] | the ways in which a robot may move: nominal, wheels stuck, unknown |
+//! | [`wheel_context`] | what ground and load make of the wheels' rates, learned on the way |
 //! | [`wheel_evidence`] | what the wheels say, for everything that each may be doing |
 //! | [`switching`] | the learned model as a hybrid system, for filters that take any |
+//! | [`Healthy`] | what is believed of the robot as long as it is healthy |
 //! | [`noise_scale`] | how much noisier the sensors are than the learned ones |
 //! | [`calibration`] | alarm thresholds for a stated mean time between false alarms |
 //! | [`form`] | what the detection filter's fault state says of a residual |
@@ -20,6 +22,7 @@ mod body_lag;
 pub mod calibration;
 mod compensation;
 mod faults;
+mod healthy;
 pub mod form;
 pub mod model;
 pub mod monitor;
@@ -31,12 +34,14 @@ mod provenance;
 mod reading;
 pub mod switching;
 pub mod troubles;
+pub mod wheel_context;
 pub mod wheel_evidence;
 pub mod wheels;
 
 pub use body_lag::BodyLag;
 pub use calibration::Calibration;
 pub use form::Form;
+pub use healthy::Healthy;
 pub use model::{Model, ModelError};
 pub use monitor::Monitor;
 pub use motion::{Curve, MotionModel};
@@ -46,5 +51,6 @@ pub use observation::{Intake, Observation, Observer};
 pub use reading::Reading;
 pub use switching::Switching;
 pub use troubles::Troubles;
+pub use wheel_context::WheelContext;
 pub use wheel_evidence::WheelEvidence;
 pub use wheels::{EncoderModel, EncoderState, RateModel};

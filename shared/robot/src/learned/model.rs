@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use vigil_blocks::WHEELS;
 use vigil_inference::departure;
+use vigil_inference::track::MotionNoise;
 
 use super::calibration::Calibration;
 use super::compensation;
@@ -11,6 +12,7 @@ use super::monitor::Channels;
 use super::motion::{Curve, MotionModel};
 pub use super::provenance::Provenance;
 use super::wheels::{EncoderModel, RateModel};
+use crate::Description;
 use crate::alarm::{self, AlarmError};
 pub use crate::model_file::EDITED;
 use crate::model_file::{self, ModelFile};
@@ -208,7 +210,7 @@ impl Model {
     ///
     /// # Errors
     /// [`ModelError::Robot`].
-    pub fn check_robot(&self, robot: &crate::Description) -> Result<(), ModelError> {
+    pub fn check_robot(&self, robot: &Description) -> Result<(), ModelError> {
         let names: Vec<&str> = robot
             .wheels
             .iter()
@@ -249,6 +251,14 @@ impl Model {
         let reachable = form.log_odds_max().min(departure::LOG_ODDS_MAX);
         let form = form.name();
         alarm::threshold(calibration, form, interval_h, fault_rate_1_h, reachable)
+    }
+
+    /// Noise of nominal motion on any ground that the robot's description allows for.
+    #[must_use]
+    pub fn nominal_noise(&self, robot: &Description) -> MotionNoise {
+        let noise = self.nominal.motion.noise();
+        let tolerance = robot.tolerance.as_ref();
+        tolerance.map_or(noise, |tolerance| tolerance.widened(&noise))
     }
 
     /// The model of `wheel` stuck.

@@ -21,8 +21,9 @@ use vigil_inference::track::Track;
 use super::faults::{Faults, KINDS};
 use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION};
 use super::noise_scale::{NoiseScales, SensorNoise};
+use super::wheel_context::{Beside, WheelContext};
 use super::wheels::{rolling_rate, steering_angle};
-use super::{Model, Observation, Troubles};
+use super::{Healthy, Model, Observation, Troubles};
 use crate::Description;
 use crate::alarm::ENDS_1_S;
 
@@ -83,6 +84,7 @@ pub struct Monitor {
     coasted: u32,
     departure: Departure<KINDS>,
     faults: Faults,
+    context: WheelContext,
     pose: Evidence<3>,
     wheels: [Evidence<1>; WHEELS],
     steer: [Evidence<1>; WHEELS],
@@ -139,8 +141,9 @@ impl Monitor {
             fault_rate_1_s: fault_rate_1_h / 3600.0,
             tracking: false,
             coasted: 0,
-            departure: Departure::new(model.nominal.motion.noise()),
-            faults: Faults::new(model),
+            departure: Departure::new(model.nominal_noise(robot)),
+            faults: Faults::new(model, robot),
+            context: WheelContext::new(robot.tolerance),
             pose: Evidence::new(form, BIAS_POSE),
             wheels: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
             steer: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
@@ -166,6 +169,7 @@ impl Monitor {
     pub fn reset(&mut self) {
         self.tracking = false;
         self.coasted = 0;
+        self.context = WheelContext::new(self.robot.tolerance);
         self.noise = SensorNoise::default();
         self.moved_s = 0.0;
         self.troubles = Troubles::default();
@@ -195,6 +199,17 @@ impl Monitor {
     #[must_use]
     pub const fn track(&self) -> &Track {
         self.departure.track()
+    }
+
+    /// What is believed of the robot as long as it is healthy; None before its first pose.
+    #[must_use]
+    pub fn healthy(&self) -> Option<Healthy> {
+        self.tracking.then(|| Healthy {
+            pose: self.track().pose(),
+            covariance: self.track().pose_covariance(),
+            context: *self.departure.context(),
+            wheels: self.context,
+        })
     }
 
     /// True once evidence counts: the track has settled, and the noise is known or the drive shows
@@ -230,7 +245,7 @@ impl Monitor {
         let scales = self.noise.scales();
         self.step_pose(observation, following, scales);
         if observation.moving && self.channels == Channels::PoseEncoders {
-            self.step_wheels(observation, scales);
+            self.step_wheels(observation, following, scales);
             self.step_steer(observation, scales);
         }
         self.sum_up();
@@ -302,7 +317,7 @@ impl Monitor {
         self.report.evidence += said.log_density;
     }
 
-    fn step_wheels(&mut self, observation: &Observation, scales: NoiseScales) {
+    fn step_wheels(&mut self, observation: &Observation, following: bool, scales: NoiseScales) {
         let learned = self.model.noise.wheel_rate_rad_s;
         let samples = observation.sample_variances(&self.model, learned, scales.wheels);
         let share = 1.0 / self.robot.wheels.len() as f64;
@@ -312,6 +327,8 @@ impl Monitor {
             observation.command,
             [observation.curvature, observation.speed],
         );
+        self.context.fade(observation.travel_m);
+        let mut all = [None; WHEELS];
         let wheels = self.robot.wheels.len();
         for (i, sample) in samples.into_iter().enumerate().take(wheels) {
             let reading = &observation.wheels[i];
@@ -324,10 +341,20 @@ impl Monitor {
             let (rate, variance) = self.model.nominal.rates[i].rate(rolling, command[0]);
             let noise = observation.mean_variance(sample, reading.plain);
             let variance = variance + behind * behind + noise;
-            let apart = reading.mean - rate;
+            all[i] = Some(Beside {
+                apart_rad_s: reading.mean - rate,
+                rolling_rad_s: rolling,
+                variance,
+            });
+            let (shift, uncertain) = self.context.shift(i, rolling);
+            let (apart, variance) = (reading.mean - rate - shift, variance + uncertain);
             self.wheels[i].step(&SVector::from([apart / variance.sqrt()]), birth);
             self.gains.wheels[i] = self.wheels[i].gain();
             self.report.evidence += log_normal(apart, variance);
+        }
+        // What a fault does is no context of the nominal mode.
+        if !following {
+            self.context.learn(&all);
         }
     }
 
@@ -365,7 +392,7 @@ impl Monitor {
             let behind = angle - steering_angle(&self.robot, i, observation.curvature);
             let noise = observation.mean_variance(sample, reading.plain);
             let variance = noise + extra * extra + behind * behind;
-            let apart = reading.mean - angle;
+            let apart = self.robot.beyond_steer(reading.mean - angle);
             self.steer[i].step(&SVector::from([apart / variance.sqrt()]), birth);
             self.gains.steer[i] = self.steer[i].gain();
             self.report.evidence += log_normal(apart, variance);

@@ -93,6 +93,12 @@ pub struct MotionMode {
 }
 
 impl MotionMode {
+    /// True if the robot moves as it should, from wherever its pose has jumped.
+    #[must_use]
+    pub fn is_nominal_motion(&self) -> bool {
+        self.moved == Moved::Nominal || self.jump != [0.0; 3]
+    }
+
     /// The noise with which this mode begins at a curvature (1/m) and speed (m/s): the run's offset
     /// also lies along the effect itself, as far as the ground is not known.
     #[must_use]
@@ -243,6 +249,7 @@ pub fn unknown_noise(model: &Model) -> MotionNoise {
         deviation: Matrix3::from_diagonal(&deviation.diagonal()) + nominal.deviation,
         length_m: UNKNOWN_LENGTH_M,
         white: nominal.white * 4.0,
+        bound: nominal.bound,
     }
 }
 
@@ -273,6 +280,7 @@ fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
                 deviation: sum.deviation + own.deviation,
                 length_m: sum.length_m.max(own.length_m),
                 white: sum.white + own.white,
+                bound: own.bound,
             },
         });
     }

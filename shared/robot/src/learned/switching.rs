@@ -13,10 +13,11 @@ use vigil_inference::gaussian::Gaussian;
 use vigil_inference::hybrid::{Conditional, Modes, Sampled};
 use vigil_inference::logspace::{log_add, log_normal};
 use vigil_inference::normals::normal;
-use vigil_inference::track::{Displacement, TRACK_DIMENSION, Track};
+use vigil_inference::track::{Context, Displacement, TRACK_DIMENSION, Track};
 
 use super::{
-    FaultRates, Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
+    FaultRates, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext, WheelEvidence,
+    motion_modes,
 };
 use crate::Description;
 
@@ -173,7 +174,10 @@ impl Switching {
         }
         let mut wheels = [0.0; MODES_MAX];
         if use_wheels && !observation.anchor {
-            let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise);
+            let evidence = {
+                let context = WheelContext::default();
+                WheelEvidence::new(&self.model, &self.robot, observation, noise, &context)
+            };
             for (sum, mode) in wheels.iter_mut().zip(&self.modes) {
                 *sum = self.weigh(mode, observation, &evidence);
             }
@@ -231,6 +235,13 @@ fn factor(covariance: Matrix3<f64>) -> Matrix3<f64> {
     Cholesky::new(covariance).map_or_else(diagonal, |factor| factor.l())
 }
 
+/// Yaw, forward and lateral displacement with an offset per metre: what slips does not turn.
+fn moved(step: &Displacement, offset: &Vector3<f64>) -> Vector3<f64> {
+    let mut per_metre = Vector3::from(step.per_metre) + offset;
+    per_metre[0] += step.per_metre[0] * offset[1];
+    per_metre * step.travel_m
+}
+
 /// `ln N(residual; 0, L Lᵀ)`.
 fn log_density(factor: &Matrix3<f64>, residual: &Vector3<f64>) -> f64 {
     let diagonal = factor.diagonal();
@@ -277,7 +288,7 @@ impl Sampled for Switching {
         }
         let white = mode.white * normal(rng) * step.travel_m.abs().sqrt();
         let lag = normal(rng).component_mul(&Vector3::from(step.extra).map(f64::sqrt));
-        let body = (Vector3::from(step.per_metre) + next.offset) * step.travel_m + white + lag;
+        let body = moved(step, &next.offset) + white + lag;
         let (sin, cos) = (state.pose[2] + 0.5 * body[0]).sin_cos();
         next.pose[0] += body[1] * cos - body[2] * sin;
         next.pose[1] += body[1] * sin + body[2] * cos;
@@ -318,7 +329,7 @@ impl Sampled for Switching {
             apart[0] * cos + apart[1] * sin,
             apart[1] * cos - apart[0] * sin,
         );
-        let expected = (Vector3::from(step.per_metre) + after.offset) * step.travel_m;
+        let expected = moved(step, &after.offset);
         offset + log_density(&factor(spread), &(body - expected))
     }
 
@@ -348,7 +359,7 @@ impl Conditional<TRACK_DIMENSION> for Switching {
     fn enter(&self, from: usize, to: usize, state: &mut Gaussian<TRACK_DIMENSION>) {
         if self.modes[from].moved != self.modes[to].moved {
             *state = Track::from(*state)
-                .fork(&self.modes[to].motion.noise)
+                .enter(&Context::default(), &self.modes[to].motion.noise)
                 .into();
         }
     }

@@ -4,7 +4,9 @@ use vigil_blocks::WHEELS;
 use vigil_inference::logspace::{log_add, log_normal};
 
 use super::wheels::{rolling_rate, steering_angle};
-use super::{EncoderState, Model, Moved, NoiseScales, Observation, RateModel};
+use super::{
+    EncoderState, Model, Moved, NoiseScales, Observation, RateModel, WheelContext,
+};
 use crate::Description;
 
 /// Ways in which an encoder breaks: zero, frozen, noise, dead (zero plus the sensor's noise).
@@ -47,6 +49,8 @@ pub struct WheelEvidence {
     pub steering: f64,
     /// Rate by rolling, and its variance by the lag of the body.
     rolling: [(f64, f64); WHEELS],
+    /// What the context adds to the model's rate, and its variance.
+    shift: [(f64, f64); WHEELS],
     sample_sd: [f64; WHEELS],
 }
 
@@ -62,13 +66,14 @@ pub struct Dragged {
 }
 
 impl WheelEvidence {
-    /// The evidence of an observation whose sensors are so noisy.
+    /// The evidence of an observation whose sensors are so noisy, in a context of the wheels.
     #[must_use]
     pub fn new(
         model: &Model,
         robot: &Description,
         observation: &Observation,
         noise: NoiseScales,
+        context: &WheelContext,
     ) -> Self {
         let learned = model.noise.wheel_rate_rad_s;
         let samples = observation.sample_variances(model, learned, noise.wheels);
@@ -80,6 +85,7 @@ impl WheelEvidence {
             any: [0.0; WHEELS],
             steering: steering(model, robot, observation, noise.steer),
             rolling: [(0.0, 0.0); WHEELS],
+            shift: [(0.0, 0.0); WHEELS],
             sample_sd,
         };
         let command = observation.command;
@@ -94,8 +100,11 @@ impl WheelEvidence {
             let lagged = rolling_rate(robot, i, observation.curvature, observation.speed);
             let behind = (rate - lagged) * (rate - lagged);
             evidence.rolling[i] = (rate, behind);
+            let (shift, uncertain) = context.shift(i, rate);
+            evidence.shift[i] = (shift, uncertain);
             let (mean, variance) = model.nominal.rates[i].rate(rate, command[0]);
-            evidence.healthy[i] = read(EncoderState::Turning(mean, variance + behind, TAIL));
+            let variance = variance + behind + uncertain;
+            evidence.healthy[i] = read(EncoderState::Turning(mean + shift, variance, TAIL));
             evidence.own_rate[i] = read(EncoderState::OwnRate);
             evidence.any[i] = read(EncoderState::Any);
             evidence.broken[i] = BREAKAGES.map(read);
@@ -149,7 +158,8 @@ impl WheelEvidence {
         let curvature = observation.command[0];
         let rate = |rates: &[RateModel]| rates[i].rate(rolling, curvature);
         let (nominal, _) = rate(&model.nominal.rates);
-        let (mut change, mut variance) = (0.0, behind);
+        let (shift, uncertain) = self.shift[i];
+        let (mut change, mut variance) = (0.0, behind + uncertain);
         let dragging = (0..WHEELS).filter(|&w| stuck >> w & 1 == 1);
         for stuck in dragging.filter_map(|w| model.stuck(w)) {
             let (with, its) = rate(&stuck.rates);
@@ -160,7 +170,7 @@ impl WheelEvidence {
             change *= TOGETHER;
         }
         Dragged {
-            rate_rad_s: nominal + change,
+            rate_rad_s: nominal + shift + change,
             change_rad_s: change,
             variance,
         }
@@ -235,7 +245,7 @@ fn steering(
         let sample = model.sample_variance(sd, observation.frame_s);
         let noise = observation.mean_variance(sample, reading.plain);
         let variance = noise + extra * extra + behind * behind;
-        let apart = reading.mean - angle;
+        let apart = robot.beyond_steer(reading.mean - angle);
         let wide = variance + STEER_ANY_RAD * STEER_ANY_RAD;
         let ratio = log_normal(apart, wide) - log_normal(apart, variance);
         sum += log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + ratio.min(30.0));

@@ -40,6 +40,7 @@ pub fn rover() -> Description {
             steer_rad: 0.003,
             current_a: 0.05,
         },
+        tolerance: None,
         limits: Limits {
             curvature_1_m: 1.2,
             speed_m_s: 0.5,

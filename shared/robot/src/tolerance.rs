@@ -1,0 +1,83 @@
+//! How far a healthy robot may be from its model: the ground under it, and small things about it.
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use vigil_inference::slow_state::Drift;
+use vigil_inference::track::MotionNoise;
+
+/// Healthy variation, in physical units. Each is the largest magnitude that is no fault: it is
+/// estimated under way up to there, and is a material departure beyond.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tolerance {
+    /// Yaw per metre travelled beside that of the model, rad/m.
+    pub yaw_rad_m: f64,
+    /// Part of the commanded travel that slips, is lost uphill or gained downhill, m/m.
+    pub forward_m_m: f64,
+    /// Travel to the side per metre, m/m: on a side slope.
+    pub lateral_m_m: f64,
+    /// Part of its rate by which every wheel falls behind under load.
+    pub wheel_ratio: f64,
+    /// Rate by which one wheel differs from the others, rad/s.
+    pub wheel_rate_rad_s: f64,
+    /// Angle at which a servo stands beside its command, rad.
+    pub steer_rad: f64,
+    /// Length over which all that changes, m.
+    pub length_m: f64,
+}
+
+impl Tolerance {
+    /// The noise of nominal motion where the ground is not the one learned on.
+    #[must_use]
+    pub fn widened(&self, noise: &MotionNoise) -> MotionNoise {
+        let bound = Vector3::new(self.yaw_rad_m, self.forward_m_m, self.lateral_m_m);
+        let sd = bound * 0.5;
+        MotionNoise {
+            deviation: noise.deviation + Matrix3::from_diagonal(&sd.component_mul(&sd)),
+            length_m: self.length_m,
+            bound,
+            ..*noise
+        }
+    }
+
+    /// How all wheels' rates drift together, relative to them.
+    #[must_use]
+    pub const fn wheels(&self) -> Drift {
+        Drift {
+            tolerance: self.wheel_ratio,
+            length_m: self.length_m,
+        }
+    }
+
+    /// How one wheel's rate drifts beside the others, rad/s.
+    #[must_use]
+    pub const fn wheel(&self) -> Drift {
+        Drift {
+            tolerance: self.wheel_rate_rad_s,
+            length_m: self.length_m,
+        }
+    }
+
+    /// What is left of a steering angle's deviation beyond the tolerance, rad. A servo gives way
+    /// as the scrub of the wheels demands, at once when the command changes: it has no slow state.
+    #[must_use]
+    pub fn beyond_steer(&self, apart_rad: f64) -> f64 {
+        apart_rad - apart_rad.clamp(-self.steer_rad, self.steer_rad)
+    }
+
+    /// The first value that is out of range, and its name.
+    #[must_use]
+    pub fn invalid(&self) -> Option<(&'static str, f64)> {
+        let all = [
+            ("yaw_rad_m", self.yaw_rad_m, 1.0),
+            ("forward_m_m", self.forward_m_m, 1.0),
+            ("lateral_m_m", self.lateral_m_m, 1.0),
+            ("wheel_ratio", self.wheel_ratio, 1.0),
+            ("wheel_rate_rad_s", self.wheel_rate_rad_s, 100.0),
+            ("steer_rad", self.steer_rad, 1.0),
+            ("length_m", self.length_m, 1e4),
+        ];
+        let wrong = all.into_iter().find(|&(_, value, most)| !(value > 0.0 && value <= most));
+        wrong.map(|(name, value, _)| (name, value))
+    }
+}
