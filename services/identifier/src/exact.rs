@@ -38,6 +38,11 @@ const ONSET_BLUR_NS: u64 = 150_000_000;
 /// An encoder that broke this short before its wheel is supposed to have stuck may never have been
 /// broken, s: a stuck wheel's reads the same, and the motion tells within about this time.
 const EXPLAINED_S: f64 = 2.0;
+/// Probability that a robot that may be thrown is, in an observation: after one in which it was not,
+/// and after one in which it was; and how far, x m, y m, yaw rad.
+const THROWN: f64 = 0.02;
+const THROWN_ON: f64 = 0.6;
+const THROW_SD: [f64; 3] = [0.02, 0.02, 0.1];
 /// Prior rate of faults while something is suspected, 1/s of motion. An alarm has been raised:
 /// the rate over a robot's life would make the filter slow without making it more often right.
 pub const BIRTH_1_S: f64 = 0.01;
@@ -55,6 +60,31 @@ pub struct State {
     pub offsets: RateOffsets,
     /// Part of the weight of the unknown: that its departure is material.
     pub log_material: f64,
+    /// In a mode that throws the robot: whether it was thrown in the last observation.
+    pub was_thrown: bool,
+}
+
+impl State {
+    /// Conditions on a measured pose; its log-density. If `is_thrown`, the robot may have been
+    /// thrown since the last one: the more probable of both is what happened.
+    fn take_pose(&mut self, pose: [f64; 3], variance: [f64; 3], is_thrown: bool) -> Option<f64> {
+        if !is_thrown {
+            return self.track.update(pose, variance);
+        }
+        let p = if self.was_thrown { THROWN_ON } else { THROWN };
+        let (before, mut thrown) = (self.track, self.track);
+        thrown.diffuse(THROW_SD.map(|sd| sd * sd));
+        let drives = self.track.update(pose, variance).map(|log| log + (1.0 - p).ln());
+        let flies = thrown.update(pose, variance).map(|log| log + p.ln());
+        self.was_thrown = flies > drives;
+        if self.was_thrown {
+            // A throw says nothing of how the robot drives.
+            self.track = before;
+            self.track.anchor(pose, variance);
+            return flies;
+        }
+        drives
+    }
 }
 
 /// The filter.
@@ -128,6 +158,7 @@ impl Exact {
             encoders: Encoders::healthy(t_ns),
             offsets: RateOffsets::default(),
             log_material: 0.0,
+            was_thrown: false,
         };
         self.bank.restart(NOMINAL, t_ns, state);
     }
@@ -169,7 +200,9 @@ impl Exact {
         let mut failed = false;
         if observation.pose_frames > 0 {
             for hypothesis in self.bank.hypotheses_mut() {
-                let gained = hypothesis.state.track.update(observation.pose, variance);
+                let is_thrown = self.modes[hypothesis.mode].is_thrown;
+                let state = &mut hypothesis.state;
+                let gained = state.take_pose(observation.pose, variance, is_thrown);
                 // Those that cannot take it are dropped, unless none can: then nothing changes.
                 failed |= gained.is_none();
                 hypothesis.log_weight += gained.unwrap_or(2.0 * FLOOR);
@@ -301,6 +334,7 @@ impl Exact {
             encoders,
             offsets: RateOffsets::default(),
             log_material: 0.0,
+            was_thrown: false,
         }
     }
 
@@ -343,6 +377,28 @@ impl Exact {
                 }
             }
         }
+        self.learn_context(observation, &evidence);
+    }
+
+    /// Learns the wheels' context from those that turn in the most probable hypothesis: what a fault
+    /// does to them is none.
+    fn learn_context(&mut self, observation: &Observation, evidence: &WheelEvidence) {
+        let Some(best) = self.bank.best(|_| true) else {
+            return;
+        };
+        let moved = self.modes[best.mode].moved;
+        let is_settled = !is_new(observation.t_ns, best.onset);
+        if moved == Moved::UnknownAny || moved.stuck().count_ones() > 1 || !is_settled {
+            return;
+        }
+        let mut beside = [None; WHEELS];
+        for (wheel, beside) in beside.iter_mut().enumerate().take(self.robot.wheels.len()) {
+            let is_whole = best.state.encoders.p_broken(wheel) < 0.5 && !moved.is_stuck(wheel);
+            if is_whole {
+                *beside = evidence.beside(&self.model, observation, moved.stuck(), wheel);
+            }
+        }
+        self.wheels.learn(&beside);
     }
 
     /// The wheels that turn in a mode with two stuck wheels, and how; none in another mode.

@@ -19,6 +19,11 @@ const UNKNOWN_LENGTH_M: f64 = 0.2;
 /// the factor's mean and deviation.
 const OTHER_GROUNDS: [(f64, f64, f64); 3] =
     [(0.08, 0.3, 0.12), (0.08, 0.65, 0.2), (0.04, 1.5, 0.35)];
+/// The same where the wheels' rates are read. They tell which wheel stands; the motion must tell only
+/// that it is dragged, and not how: on hard ground the robot is thrown, crabs and hops.
+const ANY_GROUND: [(f64, f64, f64); 1] = [(0.2, 0.6, 0.6)];
+/// Deviations of such motion beside its effect, coloured: yaw, forward, lateral.
+const ROUGH_SD: [f64; 3] = [0.15, 0.1, 0.05];
 /// By the pose alone, a wheel stuck on other ground looks like one that is dragged at, has sunk in
 /// or lost its tyre: how probable these are, given either.
 const DRAGGED_AT: f64 = 0.25;
@@ -90,6 +95,8 @@ pub struct MotionMode {
     pub kept_m_s: f64,
     /// Variance of a jump of the pose (x, y, yaw) at the onset.
     pub jump: [f64; 3],
+    /// Whether the robot is thrown now and then: a wheel that locks on hard ground grips and slides.
+    pub is_thrown: bool,
 }
 
 impl MotionMode {
@@ -177,9 +184,10 @@ pub fn motion_modes(
     rare: bool,
     read: bool,
 ) -> Vec<MotionMode> {
-    let grounds = match rare {
-        true => OTHER_GROUNDS.as_slice(),
-        false => &[],
+    let grounds = match (rare, read) {
+        (true, true) => ANY_GROUND.as_slice(),
+        (true, false) => OTHER_GROUNDS.as_slice(),
+        (false, _) => &[],
     };
     let learned = 1.0 - grounds.iter().map(|(share, ..)| share).sum::<f64>();
     let nominal = model.nominal.motion;
@@ -192,6 +200,7 @@ pub fn motion_modes(
         ground: (1.0, 0.0),
         kept_m_s: 0.0,
         jump: [0.0; 3],
+        is_thrown: false,
     }];
     let known = |w: usize| stuck >> w & 1 == 1 && model.stuck(w).is_some();
     let wheels = || (0..WHEELS).filter(|&w| known(w));
@@ -203,7 +212,7 @@ pub fn motion_modes(
         modes.extend(wheels().map(|w| MotionMode {
             share,
             p_unknown: if read { 0.0 } else { DRAGGED_AT },
-            ..on_other_ground(model, robot, w, (factor, sd))
+            ..on_other_ground(model, robot, w, (factor, sd), read)
         }));
     }
     if read {
@@ -219,6 +228,7 @@ pub fn motion_modes(
         ground: (1.0, 0.0),
         kept_m_s: 0.0,
         jump: [0.0; 3],
+        is_thrown: false,
     };
     modes.push(MotionMode {
         share: 1.0 - JUMP_SHARE,
@@ -293,6 +303,7 @@ fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
         ground: (1.0, 0.0),
         kept_m_s: 0.0,
         jump: [0.0; 3],
+        is_thrown: false,
     }
 }
 
@@ -304,6 +315,7 @@ fn on_other_ground(
     robot: &Description,
     wheel: usize,
     ground: (f64, f64),
+    is_thrown: bool,
 ) -> MotionMode {
     let nominal = &model.nominal.motion;
     let mode = stuck_mode(model, &[wheel]);
@@ -317,6 +329,10 @@ fn on_other_ground(
         }))
     };
     let (square, healthy) = (factor * factor + sd * sd, nominal.noise());
+    let diagonal = |sd: [f64; 3]| match is_thrown {
+        true => Matrix3::from_diagonal(&Vector3::from(sd.map(|sd| sd * sd))),
+        false => Matrix3::zeros(),
+    };
     MotionMode {
         motion: MotionModel {
             yaw: scaled(&mode.motion.yaw, &nominal.yaw, 0.0),
@@ -325,12 +341,13 @@ fn on_other_ground(
             ..mode.motion
         },
         noise: MotionNoise {
-            offset: mode.noise.offset * square + healthy.offset,
-            deviation: mode.noise.deviation * square + healthy.deviation,
+            offset: mode.noise.offset * square + healthy.offset + diagonal(UNKNOWN_SD),
+            deviation: mode.noise.deviation * square + healthy.deviation + diagonal(ROUGH_SD),
             ..mode.noise
         },
         ground,
         kept_m_s,
+        is_thrown,
         ..mode
     }
 }

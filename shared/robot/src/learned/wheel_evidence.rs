@@ -3,6 +3,7 @@
 use vigil_blocks::WHEELS;
 use vigil_inference::logspace::{log_add, log_normal};
 
+use super::wheel_context::Beside;
 use super::wheels::{rolling_rate, steering_angle};
 use super::{
     EncoderState, Model, Moved, NoiseScales, Observation, RateModel, WheelContext,
@@ -29,6 +30,8 @@ const TAIL_DRAGGED: f64 = 0.1;
 const TOGETHER: f64 = 1.4;
 /// Deviation of the change from that, relative to it.
 pub const TOGETHER_SD: f64 = 0.4;
+/// Deviation of the change that one dragging wheel makes on any ground, relative to that learned.
+const GROUND_SD: f64 = 0.5;
 /// Share of wheels that do anything, in the unknown.
 pub const ANYTHING: f64 = 0.2;
 /// Standard deviation of a steering angle that does anything, rad.
@@ -157,7 +160,7 @@ impl WheelEvidence {
         let (rolling, behind) = self.rolling[i];
         let curvature = observation.command[0];
         let rate = |rates: &[RateModel]| rates[i].rate(rolling, curvature);
-        let (nominal, _) = rate(&model.nominal.rates);
+        let (nominal, nominal_variance) = rate(&model.nominal.rates);
         let (shift, uncertain) = self.shift[i];
         let (mut change, mut variance) = (0.0, behind + uncertain);
         let dragging = (0..WHEELS).filter(|&w| stuck >> w & 1 == 1);
@@ -166,14 +169,36 @@ impl WheelEvidence {
             change += with - nominal;
             variance += its;
         }
-        if stuck.count_ones() > 1 {
-            change *= TOGETHER;
+        match stuck.count_ones() {
+            0 => variance += nominal_variance,
+            // The ground changes what one does, as learned; what several do is learned on the way.
+            1 => variance += GROUND_SD * GROUND_SD * change * change,
+            _ => change *= TOGETHER,
         }
         Dragged {
             rate_rad_s: nominal + shift + change,
             change_rad_s: change,
             variance,
         }
+    }
+
+    /// What wheel `i` reads beside the model's rate while the wheels `stuck` drag, if it was read.
+    #[must_use]
+    pub fn beside(
+        &self,
+        model: &Model,
+        observation: &Observation,
+        stuck: u32,
+        i: usize,
+    ) -> Option<Beside> {
+        let reading = &observation.wheels[i];
+        let (shift, uncertain) = self.shift[i];
+        let dragged = self.dragged(model, observation, stuck, i);
+        (reading.plain > 0).then(|| Beside {
+            apart_rad_s: reading.mean - (dragged.rate_rad_s - shift),
+            rolling_rad_s: self.rolling[i].0,
+            variance: dragged.variance - uncertain + self.sample_variance(i, reading.plain),
+        })
     }
 
     /// Wheel `i` turns at about this rate while others drag.
