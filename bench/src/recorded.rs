@@ -12,7 +12,7 @@ use vigil_inference::hybrid::Modes;
 use vigil_inference::track::TRACK_DIMENSION;
 use vigil_robot::Description;
 use vigil_robot::learned::{
-    FaultRates, Model, Moved, NoiseScales, Observation, Observer, Switching,
+    FaultRates, Healthy, Model, Moved, NoiseScales, Observation, Observer, Switching,
 };
 
 use crate::filters::{Kind, build};
