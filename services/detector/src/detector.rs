@@ -379,10 +379,14 @@ impl Detector {
             pose,
             wheels,
             steer,
+            outliers,
         } = self.watch.scales();
         belief.noise_scale = pose;
         belief.noise_scale_wheels = wheels;
         belief.noise_scale_steer = steer;
+        belief.outlier_rate = outliers.pose;
+        belief.outlier_rate_wheels = outliers.wheels;
+        belief.outlier_rate_steer = outliers.steer;
         let healthy = self.watch.healthy();
         belief.healthy = healthy.map_or_else(HealthyBelief::default, |it| it.to_block());
         belief.channel_log_odds = report.channels;

@@ -11,6 +11,7 @@
 
 use vigil_blocks::WHEELS;
 use vigil_inference::bank::{Bank, Hypothesis};
+use vigil_inference::outlier;
 use vigil_inference::track::{Context, Track};
 use vigil_robot::Description;
 use vigil_robot::learned::wheel_evidence::Dragged;
@@ -199,6 +200,9 @@ impl Exact {
         }
         let mut failed = false;
         if observation.pose_frames > 0 {
+            let tracks = self.bank.hypotheses().iter().map(|h| &h.state.track);
+            let rates = noise.outliers.pose;
+            let variance = outlier::trusted(tracks, observation.pose, variance, rates);
             for hypothesis in self.bank.hypotheses_mut() {
                 let is_thrown = self.modes[hypothesis.mode].is_thrown;
                 let state = &mut hypothesis.state;

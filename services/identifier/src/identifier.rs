@@ -9,7 +9,7 @@ use vigil_blocks::{
     DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock,
     SensorFrame,
 };
-use vigil_robot::learned::{Healthy, NoiseScales, Observation, Observer};
+use vigil_robot::learned::{Healthy, NoiseScales, Observation, Observer, OutlierRates};
 use vigil_setup::schema;
 
 use crate::assemble::Models;
@@ -230,6 +230,10 @@ impl Identifier {
                 true => scale,
                 false => 1.0,
             };
+            let rate = |rate: f64| match rate > 0.0 && rate < 0.5 {
+                true => rate,
+                false => OutlierRates::default().pose[0],
+            };
             self.detection = Detection {
                 alarm: belief.alarm != 0,
                 t_ns: belief.alarm_t_capture_ns,
@@ -238,6 +242,11 @@ impl Identifier {
                     pose: belief.noise_scale.map(sane),
                     wheels: belief.noise_scale_wheels.map(sane),
                     steer: belief.noise_scale_steer.map(sane),
+                    outliers: OutlierRates {
+                        pose: belief.outlier_rate.map(rate),
+                        wheels: belief.outlier_rate_wheels.map(rate),
+                        steer: belief.outlier_rate_steer.map(rate),
+                    },
                 },
             };
         }

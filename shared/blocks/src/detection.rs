@@ -60,7 +60,7 @@ pub struct HealthyBelief, size 288 {
 
 block! {
     /// Written by the detector every cycle.
-    pub struct DetectionBelief, size 872 {
+    pub struct DetectionBelief, size 1024 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -84,6 +84,12 @@ block! {
         pub noise_scale_wheels: [f64; WHEELS],
         /// The same for each steering angle.
         pub noise_scale_steer: [f64; WHEELS],
+        /// Estimated share of the samples of the pose (x, y, yaw) that are outliers.
+        pub outlier_rate: [f64; 3],
+        /// The same for each wheel's rate.
+        pub outlier_rate_wheels: [f64; WHEELS],
+        /// The same for each steering angle.
+        pub outlier_rate_steer: [f64; WHEELS],
         /// What an identification starts from.
         pub healthy: HealthyBelief,
         /// Log-odds of a fault seen by each channel alone (see [`Channel`]).

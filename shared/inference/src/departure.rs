@@ -18,6 +18,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::angle::wrap;
 use crate::logspace::log_add;
 use crate::onsets::{Onset, Onsets};
+use crate::outlier;
 use crate::track::{Context, Displacement, MotionNoise, Track};
 
 /// Log-odds beyond which more evidence changes nothing, but delays recovery.
@@ -207,6 +208,15 @@ impl<const K: usize> Departure<K> {
         for ended in self.ended.iter_mut() {
             ended.track.predict(step, &nominal);
         }
+    }
+
+    /// Variances of a measured pose as far as it can be trusted where such shares of the samples are
+    /// outliers.
+    #[must_use]
+    pub fn trusted(&self, pose: [f64; 3], variance: [f64; 3], rates: [f64; 3]) -> [f64; 3] {
+        let faults = self.faults.iter().flat_map(Onsets::iter);
+        let others = faults.chain(self.ended.iter()).map(|fault| &fault.track);
+        outlier::trusted(others.chain([&self.track]), pose, variance, rates)
     }
 
     /// Conditions on a measured pose (x, y, yaw) with independent noise of `variance`; it is

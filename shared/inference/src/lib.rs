@@ -36,6 +36,7 @@
 //! | [`gaussian`], [`track`], [`particles`] | Kalman filter, pose track, pose particles |
 //! | [`slow_state`] | what drifts within a tolerance, as a healthy robot does |
 //! | [`normals`] | standard normals, drawn ahead of their use |
+//! | [`outlier`] | measurements of which now and then one is far off |
 //! | [`onsets`] | components by the age of their onset, in bounded number |
 //! | [`bank`] | exact single faults: one hypothesis per (mode, onset) |
 //! | [`tree`] | the fault tree |
@@ -61,6 +62,7 @@ pub mod look_ahead;
 pub mod merged;
 pub mod normals;
 pub mod onsets;
+pub mod outlier;
 pub mod particles;
 pub mod proposal;
 pub mod resample;

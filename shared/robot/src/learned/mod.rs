@@ -46,7 +46,7 @@ pub use model::{Model, ModelError};
 pub use monitor::Monitor;
 pub use motion::{Curve, MotionModel};
 pub use motion_modes::{FaultRates, MotionMode, Moved, motion_modes};
-pub use noise_scale::NoiseScales;
+pub use noise_scale::{NoiseScales, OutlierRates};
 pub use observation::{Intake, Observation, Observer};
 pub use reading::Reading;
 pub use switching::Switching;

@@ -16,6 +16,7 @@ use vigil_blocks::{CHANNELS, Channel, WHEELS};
 use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
+use vigil_inference::outlier::tempered;
 use vigil_inference::track::Track;
 
 use super::faults::{Faults, KINDS};
@@ -283,6 +284,8 @@ impl Monitor {
         let kinds = self.faults.kinds(&self.model, observation, &step);
         self.departure.predict(&step, &kinds, birth, suspected);
         if measured {
+            let rates = scales.outliers.pose;
+            let variance = self.departure.trusted(observation.pose, variance, rates);
             self.weigh_pose(observation, variance);
         }
     }
@@ -348,7 +351,8 @@ impl Monitor {
             });
             let (shift, uncertain) = self.context.shift(i, rolling);
             let (apart, variance) = (reading.mean - rate - shift, variance + uncertain);
-            self.wheels[i].step(&SVector::from([apart / variance.sqrt()]), birth);
+            let whitened = tempered(apart / variance.sqrt(), scales.outliers.wheels[i]);
+            self.wheels[i].step(&SVector::from([whitened]), birth);
             self.gains.wheels[i] = self.wheels[i].gain();
             self.report.evidence += log_normal(apart, variance);
         }
@@ -393,7 +397,8 @@ impl Monitor {
             let noise = observation.mean_variance(sample, reading.plain);
             let variance = noise + extra * extra + behind * behind;
             let apart = self.robot.beyond_steer(reading.mean - angle);
-            self.steer[i].step(&SVector::from([apart / variance.sqrt()]), birth);
+            let whitened = tempered(apart / variance.sqrt(), scales.outliers.steer[i]);
+            self.steer[i].step(&SVector::from([whitened]), birth);
             self.gains.steer[i] = self.steer[i].gain();
             self.report.evidence += log_normal(apart, variance);
         }

@@ -9,6 +9,12 @@ use crate::Description;
 
 /// Squares above this many times the believed variance say nothing about noise (a jump, a fault).
 const CLIP: f64 = 9.0;
+/// Squares above this many times the mean one are of outliers.
+const OUTLIER: f64 = 25.0;
+/// Bounds of the rate of outliers: what is believed of a sensor that never had one, and what is no
+/// sensor any more.
+const OUTLIER_RATE_MIN: f64 = 1e-8;
+const OUTLIER_RATE_MAX: f64 = 0.1;
 /// Mean of a squared standard normal clipped at [`CLIP`].
 const CLIPPED_MEAN: f64 = 0.99;
 /// Bounds of the ratio.
@@ -32,6 +38,29 @@ pub struct NoiseScales {
     pub wheels: [f64; WHEELS],
     /// The steering angles.
     pub steer: [f64; WHEELS],
+    /// How often a sample of each channel is an outlier.
+    pub outliers: OutlierRates,
+}
+
+/// Share of the samples of each channel that are far off, one by one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutlierRates {
+    /// The pose: x, y, yaw.
+    pub pose: [f64; 3],
+    /// The wheels' encoders.
+    pub wheels: [f64; WHEELS],
+    /// The steering angles.
+    pub steer: [f64; WHEELS],
+}
+
+impl Default for OutlierRates {
+    fn default() -> Self {
+        Self {
+            pose: [OUTLIER_RATE_MIN; 3],
+            wheels: [OUTLIER_RATE_MIN; WHEELS],
+            steer: [OUTLIER_RATE_MIN; WHEELS],
+        }
+    }
 }
 
 impl Default for NoiseScales {
@@ -40,6 +69,7 @@ impl Default for NoiseScales {
             pose: [1.0; 3],
             wheels: [1.0; WHEELS],
             steer: [1.0; WHEELS],
+            outliers: OutlierRates::default(),
         }
     }
 }
@@ -50,6 +80,7 @@ impl Default for NoiseScales {
 pub struct NoiseScale {
     sum: f64,
     count: f64,
+    outliers: f64,
 }
 
 impl Default for NoiseScale {
@@ -57,6 +88,7 @@ impl Default for NoiseScale {
         Self {
             sum: PRIOR,
             count: PRIOR,
+            outliers: 0.0,
         }
     }
 }
@@ -70,9 +102,18 @@ impl NoiseScale {
             return;
         }
         let fading = 1.0 - 1.0 / MEMORY;
-        let largest = CLIP * (self.sum / self.count).max(RATIO_MIN);
+        let ratio = (self.sum / self.count).max(RATIO_MIN);
+        let largest = CLIP * ratio;
+        let is_outlier = normalised_square > OUTLIER * ratio;
+        self.outliers = self.outliers * fading + f64::from(u8::from(is_outlier));
         self.sum = self.sum * fading + normalised_square.clamp(0.0, largest) / CLIPPED_MEAN;
         self.count = self.count * fading + 1.0;
+    }
+
+    /// Share of the samples that are outliers: each shows in two differences or more.
+    #[must_use]
+    pub fn outlier_rate(&self) -> f64 {
+        (0.5 * self.outliers / self.count).clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX)
     }
 
     /// Ratio of the variances. It leans to the high side by its own uncertainty: false alarms come
@@ -105,10 +146,16 @@ impl SensorNoise {
     #[must_use]
     pub fn scales(&self) -> NoiseScales {
         let sd = |scale: &NoiseScale| scale.variance_ratio().sqrt();
+        let rate = NoiseScale::outlier_rate;
         NoiseScales {
             pose: self.pose.each_ref().map(sd),
             wheels: self.wheels.each_ref().map(sd),
             steer: self.steer.each_ref().map(sd),
+            outliers: OutlierRates {
+                pose: self.pose.each_ref().map(rate),
+                wheels: self.wheels.each_ref().map(rate),
+                steer: self.steer.each_ref().map(rate),
+            },
         }
     }
 

@@ -2,6 +2,7 @@
 
 use vigil_blocks::WHEELS;
 use vigil_inference::logspace::{log_add, log_normal};
+use vigil_inference::outlier::tempered;
 
 use super::wheel_context::Beside;
 use super::wheels::{rolling_rate, steering_angle};
@@ -86,7 +87,7 @@ impl WheelEvidence {
             broken: [[0.0; BREAKAGES.len()]; WHEELS],
             own_rate: [0.0; WHEELS],
             any: [0.0; WHEELS],
-            steering: steering(model, robot, observation, noise.steer),
+            steering: steering(model, robot, observation, &noise),
             rolling: [(0.0, 0.0); WHEELS],
             shift: [(0.0, 0.0); WHEELS],
             sample_sd,
@@ -255,8 +256,9 @@ fn steering(
     model: &Model,
     robot: &Description,
     observation: &Observation,
-    scales: [f64; WHEELS],
+    noise: &NoiseScales,
 ) -> f64 {
+    let (scales, outliers) = (noise.steer, noise.outliers.steer);
     let extra = model.nominal.steer_sd_rad;
     let mut sum = 0.0;
     for i in (0..robot.wheels.len().min(WHEELS)).filter(|&i| robot.wheels[i].steered) {
@@ -272,6 +274,7 @@ fn steering(
         let variance = noise + extra * extra + behind * behind;
         let apart = robot.beyond_steer(reading.mean - angle);
         let wide = variance + STEER_ANY_RAD * STEER_ANY_RAD;
+        let apart = tempered(apart / variance.sqrt(), outliers[i]) * variance.sqrt();
         let ratio = log_normal(apart, wide) - log_normal(apart, variance);
         sum += log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + ratio.min(30.0));
     }

@@ -1,0 +1,97 @@
+//! Measurements of which now and then one is far off: normal noise, contaminated.
+//!
+//! With a small probability a sample's noise has [`SPREAD`] times the standard deviation. What is an
+//! outlier under every hypothesis is evidence for none of them.
+
+use crate::logspace::{log_add, log_normal};
+use crate::track::Track;
+
+/// Standard deviations of an outlier over those of the noise.
+pub const SPREAD: f64 = 10.0;
+
+/// Log-odds that a residual of variance `spread`, `noise` of which is the sensor's, is an outlier
+/// where such come with the probability `rate`.
+fn log_odds(residual: f64, spread: f64, noise: f64, rate: f64) -> f64 {
+    let wide = spread + (SPREAD * SPREAD - 1.0) * noise;
+    rate.ln() + log_normal(residual, wide) - (-rate).ln_1p() - log_normal(residual, spread)
+}
+
+/// The whitened residual that has the log-density, relative to that of none, which `whitened` has
+/// where outliers come with the probability `rate`.
+#[must_use]
+pub fn tempered(whitened: f64, rate: f64) -> f64 {
+    let log_density = |residual: f64| {
+        let body = (-rate).ln_1p() + log_normal(residual, 1.0);
+        log_add(body, rate.ln() + log_normal(residual, SPREAD * SPREAD))
+    };
+    let square = 2.0 * (log_density(0.0) - log_density(whitened));
+    square.max(0.0).sqrt().copysign(whitened)
+}
+
+/// Variances of a measured pose (x, y, yaw) as far as it can be trusted: that of an axis grows by
+/// the probability that it is an outlier under the hypothesis which explains it best.
+#[must_use]
+pub fn trusted<'a>(
+    tracks: impl Iterator<Item = &'a Track>,
+    pose: [f64; 3],
+    variance: [f64; 3],
+    rates: [f64; 3],
+) -> [f64; 3] {
+    let mut least = [f64::INFINITY; 3];
+    for track in tracks {
+        let (apart, spread) = track.innovation(pose, variance);
+        for i in 0..3 {
+            let odds = log_odds(apart[i], spread[(i, i)], variance[i], rates[i]);
+            least[i] = least[i].min(odds);
+        }
+    }
+    std::array::from_fn(|i| {
+        let p = crate::logspace::probability(least[i]);
+        let trust = 1.0 - p + p / (SPREAD * SPREAD);
+        // Without a hypothesis, or a number, the measurement is what it is.
+        if least[i].is_finite() && trust > 0.0 {
+            variance[i] / trust
+        } else {
+            variance[i]
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::MotionNoise;
+    use nalgebra::{Matrix3, Vector3};
+
+    #[test]
+    fn small_residuals_stay_and_large_ones_say_little_more_than_the_rate() {
+        for rate in [1e-8, 1e-4, 0.01] {
+            assert!((tempered(1.0, rate) - 1.0).abs() < 0.02, "{rate}");
+            assert_eq!(tempered(-2.5, rate), -tempered(2.5, rate));
+            let (bound, twelve) = (-2.0 * (rate / SPREAD).ln(), tempered(12.0, rate));
+            assert!((twelve * twelve - bound - 1.44).abs() < 0.1, "{twelve}");
+        }
+        assert_eq!(tempered(f64::INFINITY, 0.01), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_pose_is_trusted_as_far_as_one_hypothesis_explains_it() {
+        let noise = MotionNoise {
+            offset: Matrix3::zeros(),
+            deviation: Matrix3::zeros(),
+            length_m: 1.0,
+            white: Vector3::zeros(),
+            bound: Vector3::repeat(f64::INFINITY),
+        };
+        let at = |x: f64| Track::new(Vector3::new(x, 0.0, 0.0), Matrix3::zeros(), &noise);
+        let (near, far) = (at(0.0), at(0.1));
+        let (pose, variance, rates) = ([0.1, 0.0, 0.0], [1e-4; 3], [0.01; 3]);
+        let alone = trusted([near].iter(), pose, variance, rates);
+        assert!(alone[0] > 50.0 * 1e-4 && alone[1] < 1.1e-4, "{alone:?}");
+        let both = trusted([near, far].iter(), pose, variance, rates);
+        assert!(both[0] < 1.1e-4, "{both:?}");
+        assert_eq!(trusted([].iter(), pose, variance, rates), variance);
+        let nothing = trusted([near].iter(), [f64::NAN; 3], variance, rates);
+        assert_eq!(nothing, variance);
+    }
+}
