@@ -144,6 +144,14 @@ impl BodyLag {
         }
     }
 
+    /// Forgets where the body was in the frames since the last observation: they are dropped.
+    pub fn drop_frames(&mut self) {
+        self.frames = 0;
+        for candidate in &mut self.candidates {
+            candidate.middles = [0.0; 2];
+        }
+    }
+
     /// Closes an observation of `interval_s`.
     pub fn complete(&mut self, interval_s: f64) -> Followed {
         let frames = f64::from(self.frames.max(1));

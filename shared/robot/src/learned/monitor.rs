@@ -45,6 +45,9 @@ const TROUBLE_LOG_ODDS: f64 = 40.0;
 const REPEATS_LOG_ODDS_MAX: f64 = 40.0;
 /// Diffusion of the pose per observation while following, in units of the measurement's deviation.
 const FOLLOWING: f64 = 0.1;
+/// Squared norm beyond which a single residual says no more for a deviation of any kind: it takes
+/// several to tell one from an outlier.
+const ANY_NORM_MAX: f64 = 12.0;
 /// Residuals beyond this many deviations mean a lost track.
 const LOST: f64 = 10.0;
 /// Time in motion after which evidence counts, s: once the noise is known, and at the latest.
@@ -314,6 +317,7 @@ impl Monitor {
             }
         };
         let birth = self.birth(observation.dt_s, SHARE_ANY);
+        let norm = norm.min(ANY_NORM_MAX);
         self.any
             .step(norm, 3.0 * TAU_SQUARED_PER_DIMENSION, birth, birth);
         self.gains.any = self.any.gain();

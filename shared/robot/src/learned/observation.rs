@@ -255,11 +255,11 @@ impl Observer {
         self.state.stale = 0;
         let jumped = is_stale || dt_s > GAP_S || frame.pose_reset_count != self.state.reset_count;
         if jumped {
-            // Poses before and after must not be averaged: drop what was collected.
+            // Frames before and after must not be averaged: drop what was collected.
             self.state.reset_count = frame.pose_reset_count;
             self.state.anchor = true;
-            self.state.sums.pose_frames = 0;
-            self.state.sums.pose = [0.0; 3];
+            self.state.sums = self.state.sums.next();
+            self.state.body.drop_frames();
         }
         invalid |= self.take_command(frame, dt_s.min(GAP_S), new_run);
         if self.state.sums.frames == 0 {
@@ -391,11 +391,7 @@ impl Observer {
         let state = &mut self.state;
         // An anchor without a pose is still to come.
         state.anchor = state.anchor && sums.pose_frames == 0;
-        state.sums = Sums {
-            wheels: sums.wheels.map(|reading| reading.next()),
-            steer: sums.steer.map(|reading| reading.next()),
-            ..Sums::default()
-        };
+        state.sums = sums.next();
     }
 
     /// Compares the measured displacement since the last observation with what each lag predicts.
@@ -425,6 +421,15 @@ impl Observer {
 }
 
 impl Sums {
+    /// Those of the next observation, empty.
+    fn next(&self) -> Self {
+        Self {
+            wheels: self.wheels.each_ref().map(Reading::next),
+            steer: self.steer.each_ref().map(Reading::next),
+            ..Self::default()
+        }
+    }
+
     /// Mean pose; the first one, which means nothing, without any.
     fn mean_pose(&self) -> [f64; 3] {
         let mut pose = self.first_pose;
