@@ -131,3 +131,65 @@ fn shares(outcome: &Outcome<'_>) -> String {
     };
     format!("{}, {}", share("detected"), share("standing_share_10s"))
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::path::Path;
+
+    use vigil_evaluation::scoring::field::{Onset, Run, Seen};
+
+    use super::*;
+    use crate::field::scenario::File;
+
+    /// A run whose departure was announced or not, and stood for so much of 40 s.
+    fn run(delay_s: Option<f64>, alarm_s: f64) -> Run {
+        let onset = Onset {
+            t_s: 10.0,
+            until_s: 60.0,
+            delay_s,
+            leaf: [None; 3],
+            side: [None; 3],
+        };
+        Run {
+            onsets: vec![onset],
+            from_10_s: Seen {
+                driven_s: 40.0,
+                alarm_s,
+                ..Seen::default()
+            },
+            ..Run::default()
+        }
+    }
+
+    #[test]
+    fn the_table_has_a_row_for_each_departure_and_a_column_for_each_size() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("field.toml");
+        let file = File::read(&path).unwrap();
+        let of = |name: &str, runs: Vec<Run>| {
+            let scenario = file.scenario.iter().find(|s| s.name == name).unwrap();
+            Outcome::new(scenario, "pose", runs)
+        };
+        let outcomes = [
+            of(
+                "departure/steer/3",
+                vec![run(Some(0.5), 40.0), run(Some(1.0), 36.0)],
+            ),
+            of(
+                "departure/steer/0.5",
+                vec![run(None, 0.0), run(Some(1.0), 2.0)],
+            ),
+            of("departure/tether/0.5", vec![run(None, 0.0)]),
+            of("healthy/random", vec![run(None, 0.0)]),
+        ];
+        let lines = table(&outcomes);
+        let wanted = [
+            "| departure | sensors | tolerance | runs | 0.5 | 3 |",
+            "|---|---|---|---|---|---|",
+            "| departure/steer | pose | 0.012 rad | 2 | 0.50, 0.03 | 1.00, 0.95 |",
+            "| departure/tether | pose | 18 N | 1 | 0.00, 0.00 |  |",
+        ];
+        assert_eq!(lines[2..], wanted);
+        assert!(table(&outcomes[3..]).is_empty());
+    }
+}

@@ -54,8 +54,8 @@ pub struct Scenario {
     /// `context`.
     #[serde(default)]
     pub each: Vec<String>,
-    /// One of these takes the place of `EACH` instead, run by run: what is asked is a figure over all
-    /// of them.
+    /// One of these takes the place of `EACH` instead, run by run: figures then are over all of
+    /// them.
     #[serde(default)]
     pub in_turn: Vec<String>,
     /// Sizes that take the place of `SIZE` in `faults`: a scenario of each.
