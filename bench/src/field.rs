@@ -7,6 +7,7 @@
 
 mod bar;
 mod course;
+mod departure;
 mod fault;
 mod frames;
 mod ground;
@@ -16,7 +17,14 @@ mod run;
 mod scenario;
 
 pub use bar::{Bar, Comparison};
+pub use departure::Departure;
 pub use recorded::{Library, Material, Source, library};
 pub use report::{Outcome, document, lines};
 pub use run::{Graph, Job, Scored, jobs, run, select};
 pub use scenario::{Draw, File, Frames, Scenario, World};
+
+/// Words and priors of a graph's faults.
+fn taxonomy(setup: &vigil_setup::Setup) -> vigil_evaluation::scoring::Taxonomy {
+    let words = vigil_evaluation::scoring::Taxonomy::new(&setup.tree, &setup.robot);
+    words.with_prior_unknown(setup.file.identifier.p_unknown)
+}

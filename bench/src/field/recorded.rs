@@ -27,7 +27,8 @@ const DRIVES: f64 = 0.005;
 #[serde(deny_unknown_fields)]
 pub struct Source {
     /// `left-out` (the third of the rover's learn runs that was left out), `grounds` (the rover on
-    /// other grounds), `kobuki`, `husky`.
+    /// other grounds), `mujoco` (what `examples/mujoco_rover/record.py` has written to
+    /// `$VIGIL_DATA/rover`), `kobuki`, `husky`.
     pub log: String,
     /// Only runs on this ground.
     pub ground: Option<String>,
@@ -74,6 +75,11 @@ pub fn library(root: &Path, scenarios: &[&Scenario]) -> Result<Library, Box<dyn 
     let data = PathBuf::from(data);
     let (mut library, mut read) = (Library::new(), BTreeMap::new());
     for (scenario, source) in named {
+        if let Some(missing) = source.missing(&data) {
+            let (name, file) = (&scenario.name, missing.display());
+            eprintln!("field: {name} is SKIPPED: {file} is not there");
+            continue;
+        }
         let key = (source.log.clone(), source.half);
         if !read.contains_key(&key) {
             read.insert(key.clone(), material(root, &data, source)?);
@@ -92,6 +98,12 @@ pub fn library(root: &Path, scenarios: &[&Scenario]) -> Result<Library, Box<dyn 
 }
 
 impl Source {
+    /// What may be missing and is: recordings that everybody makes for himself.
+    fn missing(&self, data: &Path) -> Option<PathBuf> {
+        let frames = data.join("rover/mujoco_frames.csv.gz");
+        (self.log == "mujoco" && !frames.is_file()).then_some(frames)
+    }
+
     fn takes(&self, case: &Case, taxonomy: &Taxonomy) -> bool {
         let of_fault = |(leaf, _): &(String, f64)| taxonomy.class_or_unmodelled(leaf).to_owned();
         let class = case.fault.as_ref().map_or("nominal".to_owned(), of_fault);
@@ -126,7 +138,7 @@ fn graph(root: &Path, name: &str) -> Result<Setup, Box<dyn Error>> {
 
 fn material(root: &Path, data: &Path, source: &Source) -> Result<Material, Box<dyn Error>> {
     match source.log.as_str() {
-        "left-out" | "grounds" => rover(root, data, &source.log),
+        "left-out" | "grounds" | "mujoco" => rover(root, data, &source.log),
         "kobuki" => {
             let log = real::log("kobuki_wheel_fault", "kobuki")?;
             let whole = log.runs.into_iter().next().ok_or("no run")?;
@@ -148,17 +160,20 @@ fn material(root: &Path, data: &Path, source: &Source) -> Result<Material, Box<d
             let runs = real::husky::runs(&folder, &robot)?;
             learned(root, robot, runs, source.half.unwrap_or(1))
         }
-        other => Err(format!("log '{other}': allowed are left-out, grounds, kobuki, husky").into()),
+        other => Err(format!(
+            "log '{other}': allowed are left-out, grounds, mujoco, kobuki, husky"
+        )
+        .into()),
     }
 }
 
 /// The rover with its shipped model, which was learned from the other runs alone.
 fn rover(root: &Path, data: &Path, log: &str) -> Result<Material, Box<dyn Error>> {
     let setup = graph(root, "rover")?;
-    let name = if log == "grounds" {
-        "grounds_dev"
-    } else {
-        "learn"
+    let name = match log {
+        "grounds" => "grounds_dev",
+        "mujoco" => "mujoco",
+        _ => "learn",
     };
     let at = |kind: &str| data.join("rover").join(format!("{name}_{kind}"));
     let runs = frames::read(&at("frames.csv.gz"), &setup.robot)?;
@@ -178,7 +193,7 @@ fn rover(root: &Path, data: &Path, log: &str) -> Result<Material, Box<dyn Error>
         });
     }
     Ok(Material {
-        taxonomy: Taxonomy::new(&setup.tree, &setup.robot),
+        taxonomy: super::taxonomy(&setup),
         setup,
         cases,
     })
@@ -206,7 +221,7 @@ fn learned(
     setup.robot = robot;
     Ok(Material {
         cases: cases.collect(),
-        taxonomy: Taxonomy::new(&setup.tree, &setup.robot),
+        taxonomy: super::taxonomy(&setup),
         setup,
     })
 }
@@ -230,6 +245,12 @@ impl Case {
             },
         });
         std::iter::once(begins).chain(breaks).collect()
+    }
+
+    /// Times of the first and the last frame, s.
+    fn span_s(&self) -> [f64; 2] {
+        let ends = [self.run.frames.first(), self.run.frames.last()];
+        ends.map(|frame| frame.map_or(0.0, |frame| frame.header.t_capture_ns as f64 * 1e-9))
     }
 
     /// Usual time between frames, s.
@@ -263,7 +284,7 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<Scored>, Box<dyn E
         let truth = case.truth(sensors, taxonomy);
         let mut watch = Watch {
             stages: Stages::new(setup, sensors, 1.0 / period_s, seed)?,
-            scorer: Scorer::new(&truth, taxonomy, seed),
+            scorer: Scorer::new(&truth, taxonomy, case.span_s(), seed),
         };
         let rate = (1.0 / period_s, 0.0);
         let mut rng = stream(job.scenario.first_seed + seed, 4);

@@ -4,10 +4,11 @@ use serde_json::{Value, json};
 use vigil_evaluation::scoring::field::{Figure, Run, figures};
 
 use super::bar::Bar;
+use super::departure;
 use super::scenario::Scenario;
 
 /// Figures that stand in the table even where no bar asks for them; the others are in the document.
-const SHOWN: [&str; 24] = [
+const SHOWN: [&str; 26] = [
     "detected",
     "delay_p50_s",
     "delay_p95_s",
@@ -32,6 +33,8 @@ const SHOWN: [&str; 24] = [
     "blind_stops_per_h",
     "help_latched",
     "contradiction_s",
+    "ece",
+    "log_score_2s",
 ];
 
 /// A scenario with one set of sensors.
@@ -98,9 +101,13 @@ impl<'a> Outcome<'a> {
             self.hours()
         );
         let is_asked = |name: &str| self.bars().any(|(bar, _)| bar.figure == name);
-        let shown = self.figures.iter().filter(|figure| {
-            is_asked(figure.name) || SHOWN.contains(&figure.name) && says_something(figure)
-        });
+        // Departures have a table of their own.
+        let is_one_of_many = self.scenario.departure.is_some();
+        let is_shown = |figure: &Figure| {
+            !is_one_of_many && SHOWN.contains(&figure.name) && says_something(figure)
+        };
+        let all = self.figures.iter();
+        let shown = all.filter(|figure| is_asked(figure.name) || is_shown(figure));
         let mut lines: Vec<String> = Vec::new();
         for figure in shown {
             let bars = self.bars().filter(|(bar, _)| bar.figure == figure.name);
@@ -172,6 +179,7 @@ pub fn lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
         "|---|---|---|---|---|---|---|---|---|---|".to_owned(),
     ];
     lines.extend(outcomes.iter().flat_map(Outcome::lines));
+    lines.extend(departure::table(outcomes));
     lines
 }
 

@@ -77,7 +77,7 @@ impl Graph {
         let model = setup.model.clone().with_faults();
         Ok(Self {
             model: model.ok_or("the rover's model has no faults")?,
-            taxonomy: Taxonomy::new(&setup.tree, &setup.robot),
+            taxonomy: super::taxonomy(&setup),
             setup,
         })
     }
@@ -122,8 +122,9 @@ impl Conditions {
         let mut rng = stream(seed, 2);
         let places = Places::draw(robot, run, &mut rng);
         let later_s = scenario.spread_s * rand::RngExt::random::<f64>(&mut rng);
-        let faults = fault::changes(&scenario.faults, &places, robot, later_s)?;
-        let context = fault::changes(&scenario.context, &places, robot, later_s)?;
+        let specs = |all: &[String]| scenario.specs(all, run);
+        let faults = fault::changes(&specs(&scenario.faults), &places, robot, later_s)?;
+        let context = fault::changes(&specs(&scenario.context), &places, robot, later_s)?;
         let mut changes: Vec<Injection> = faults.iter().chain(&context).copied().collect();
         changes.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
         Ok(Self {
@@ -190,7 +191,7 @@ fn drive(
     for ((sensors, _), truth) in sets.iter().zip(&truths) {
         watches.push(Watch {
             stages: Stages::new(&graph.setup, *sensors, rate_hz, seed)?,
-            scorer: Scorer::new(truth, &graph.taxonomy, seed),
+            scorer: Scorer::new(truth, &graph.taxonomy, [0.0, scenario.run_s], seed),
         });
     }
     let (simulator, segments) = (&conditions.simulator, &conditions.drive);

@@ -7,6 +7,7 @@ use rand::{Rng, RngExt};
 use serde::Deserialize;
 
 use super::bar::Bar;
+use super::departure::Departure;
 use super::recorded::Source;
 
 /// The file of all scenarios.
@@ -53,6 +54,13 @@ pub struct Scenario {
     /// `context`.
     #[serde(default)]
     pub each: Vec<String>,
+    /// One of these takes the place of `EACH` instead, run by run: figures then are over all of
+    /// them.
+    #[serde(default)]
+    pub in_turn: Vec<String>,
+    /// Sizes that take the place of `SIZE` in `faults`: a scenario of each.
+    #[serde(default)]
+    pub departure: Option<Departure>,
     /// Changes of health as `SPEC@T`, s: `stuck:W1@10`, `clear:W1@30`. `W1` to `W6` are different
     /// wheels, drawn for each run, `S1` a steered one, `SIDE` a side. A time may be a sum.
     #[serde(default)]
@@ -200,7 +208,8 @@ impl File {
         let mut table: toml::Table = toml::from_str(&text).map_err(|error| at(&error))?;
         vary(&mut table).map_err(|error| at(&error))?;
         let file: Self = table.try_into().map_err(|error| at(&error))?;
-        let scenario: Vec<Scenario> = file.scenario.iter().flat_map(Scenario::spread).collect();
+        let spread: Result<Vec<_>, String> = file.scenario.iter().map(Scenario::spread).collect();
+        let scenario = spread.map_err(|error| at(&error))?.concat();
         let mut names: Vec<&str> = scenario.iter().map(|s| s.name.as_str()).collect();
         names.sort_unstable();
         if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -269,9 +278,22 @@ fn put(table: &mut toml::Table, key: &str, value: toml::Value) {
 }
 
 impl Scenario {
-    fn spread(&self) -> Vec<Self> {
+    /// Changes of a run: one of `in_turn` in the place of `EACH`.
+    pub(super) fn specs(&self, specs: &[String], run: usize) -> Vec<String> {
+        let each = self.in_turn.get(run % self.in_turn.len().max(1));
+        let put = |spec: &String| match each {
+            Some(each) => spec.replace("EACH", each),
+            None => spec.clone(),
+        };
+        specs.iter().map(put).collect()
+    }
+
+    fn spread(&self) -> Result<Vec<Self>, String> {
+        if let Some(departure) = &self.departure {
+            return departure.spread(self);
+        }
         if self.each.is_empty() {
-            return vec![self.clone()];
+            return Ok(vec![self.clone()]);
         }
         let one = |each: &String| {
             let put = |specs: &[String]| -> Vec<String> {
@@ -289,7 +311,7 @@ impl Scenario {
                 ..self.clone()
             }
         };
-        self.each.iter().map(one).collect()
+        Ok(self.each.iter().map(one).collect())
     }
 }
 
@@ -331,6 +353,8 @@ mod tests {
             "alarm_cleared",
             "name_cleared",
             "delay",
+            "ece",
+            "log_score",
         ];
         let mut seeds = BTreeSet::new();
         for scenario in file.scenario.iter().filter(|s| s.recorded.is_none()) {
@@ -343,7 +367,8 @@ mod tests {
             course(&scenario.drive, range, scenario.run_s, rng).unwrap();
             let places = Places::draw(&rover.robot, 0, rng);
             for specs in [&scenario.faults, &scenario.context] {
-                changes(specs, &places, &rover.robot, 0.0).unwrap();
+                let specs = scenario.specs(specs, 0);
+                changes(&specs, &places, &rover.robot, 0.0).unwrap();
             }
             for bar in &scenario.bars {
                 let known = names.iter().any(|figure| figure.name == bar.figure);
@@ -375,6 +400,19 @@ mod tests {
         );
         assert_eq!(file.scenario[2].world.lag_s, Some(Draw::Always(0.2)));
         assert_eq!(file.scenario[2].faults, ["tether:10@1"]);
+    }
+
+    #[test]
+    fn a_departure_becomes_a_scenario_of_each_size() {
+        let (file, _) = shipped();
+        let named = |name: &str| file.scenario.iter().find(|s| s.name == name).unwrap();
+        let healthy = named("departure/encoder-gain/0.5");
+        assert_eq!(healthy.faults, ["encoder-scale:W1:1.008000@10"]);
+        let bars = |s: &Scenario| s.bars.iter().map(ToString::to_string).collect::<Vec<_>>();
+        assert_eq!(bars(healthy), ["detected <= 0"]);
+        assert!(named("departure/encoder-gain/1").bars.is_empty());
+        let faulty = bars(named("departure/encoder-gain/3"));
+        assert_eq!(faulty, ["detected >= 1", "standing_share_10s >= 0.99"]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 /// Sizes of each kind; `W` stands for a wheel, `S` for a steered one, `side` for a side: they
 /// change from cell to cell.
-const SPECS: [&str; 53] = [
+const SPECS: [&str; 55] = [
     "steer-jump:S:0.1",
     "steer-jump:S:0.2",
     "steer-jump:S:-0.3",
@@ -56,6 +56,8 @@ const SPECS: [&str; 53] = [
     "payload-shift:-0.08:0.1",
     "payload-shift:0.1:-0.15",
     "payload-shift:-0.1:0.15",
+    "encoder-bias:W:0.3",
+    "encoder-bias:W:0.6",
 ];
 const CURVATURES_1_M: [f64; 5] = [0.0, 0.3, -0.3, 0.7, -0.7];
 const SPEEDS_M_S: [f64; 3] = [0.1, 0.2, 0.3];

@@ -39,10 +39,9 @@ impl Encoders {
 
     /// The rates seen, before noise, of wheels that turn at `rate_rad_s`.
     pub(crate) fn scaled(&self, wheel: usize, rate_rad_s: f64, on: &Disturbed) -> f64 {
-        match on.at(DisturbanceKind::EncoderScale, wheel) {
-            Some(factor) => factor * rate_rad_s,
-            None => rate_rad_s,
-        }
+        let of = |kind, otherwise| on.at(kind, wheel).unwrap_or(otherwise);
+        let bias_rad_s = of(DisturbanceKind::EncoderBias, 0.0);
+        of(DisturbanceKind::EncoderScale, 1.0) * rate_rad_s + bias_rad_s
     }
 
     /// What the encoders report at `t_s` when timely, unbroken ones would report `healthy_rad_s`.

@@ -54,11 +54,12 @@ impl Pipeline {
         identifier: &schema::Identifier,
         seed: u64,
     ) -> Result<Self, PipelineError> {
+        let prior_unknown = identifier.p_unknown;
         let identifier = Identifier::new(models, identifier, detector.sensors, seed)?;
         Ok(Self::of(
             Detector::new(models.model, models.robot, detector, seed)?,
             Diagnoser::from(identifier),
-            models.tree,
+            Taxonomy::new(models.tree, models.robot).with_prior_unknown(prior_unknown),
             models.robot,
         ))
     }
@@ -76,7 +77,7 @@ impl Pipeline {
         Ok(Self::of(
             Detector::nominal(model, robot, detector)?,
             Diagnoser::from(Watcher::new(tree)),
-            tree,
+            Taxonomy::new(tree, robot),
             robot,
         ))
     }
@@ -84,11 +85,11 @@ impl Pipeline {
     fn of(
         detector: Detector,
         identifier: Diagnoser,
-        tree: &FaultTree,
+        taxonomy: Taxonomy,
         robot: &Description,
     ) -> Self {
         Self {
-            taxonomy: Taxonomy::new(tree, robot),
+            taxonomy,
             robot: robot.clone(),
             recoverer: None,
             detector,
@@ -177,6 +178,7 @@ impl Pipeline {
             p_left_stuck: stuck(Side::Left),
             p_right_stuck: stuck(Side::Right),
             p_nodes: belief.p[..(belief.node_count as usize).min(belief.p.len())].to_vec(),
+            is_identifying: belief.identifying != 0,
             reported: word(belief.reported),
             action: recovering.map_or_else(String::new, Recovering::name),
             drives: velocity.iter().any(|value| value.abs() >= DRIVES),

@@ -45,6 +45,7 @@ fn case(label: Label, end_s: f64, changes: &[(f64, bool, &str, f64)]) -> Case {
             mode: mode.into(),
             p_mode: p,
             p_nodes,
+            is_identifying: alarm,
             ..Verdict::default()
         }
     });
@@ -268,8 +269,8 @@ fn a_fault_that_the_tree_lacks_is_to_be_called_unknown() {
     );
     let calibration = &score.calibration["slope"];
     assert_eq!(calibration.confident_wrong, ratio(1, 2));
-    // -ln 0.8 and the floor of 1e-12.
-    let log_score = (-0.8_f64.ln() + 12.0 * 10.0_f64.ln()) / 2.0;
+    // -ln 0.8 and the floor of 1e-6.
+    let log_score = (-0.8_f64.ln() + 6.0 * 10.0_f64.ln()) / 2.0;
     assert!((calibration.log_score_nats.unwrap() - log_score).abs() < 1e-9);
 }
 
@@ -289,8 +290,8 @@ fn calibration_counts_an_abstract_node_above_the_truth_as_true() {
     assert_eq!(*calibration, score.calibration["all"]);
     assert_eq!(calibration.n, 3);
     assert_eq!(calibration.confident_wrong, ratio(1, 3));
-    // One claim a bin: |1 - 0.5|, |1 - 0.95|, |0 - 0.95|.
-    let error = (0.5 + 0.05 + 0.95) / 3.0;
+    // One claim in the bin from 0.5, two in the last, of which one is true.
+    let error = (0.5 + (1.9 - 1.0)) / 3.0;
     assert!((calibration.expected_calibration_error.unwrap() - error).abs() < 1e-12);
     let brier = (0.25 + 0.0025 + 0.9025) / 3.0;
     assert!((calibration.brier_score.unwrap() - brier).abs() < 1e-12);
@@ -298,25 +299,33 @@ fn calibration_counts_an_abstract_node_above_the_truth_as_true() {
     let bins: Vec<_> = bins
         .map(|bin| (bin.n, bin.p_mean, bin.is_true.right))
         .collect();
-    assert_eq!(bins, [(1, 0.5, 1), (1, 0.95, 1), (1, 0.95, 0)]);
-    let log_score = (-0.5_f64.ln() + 24.0 * 10.0_f64.ln()) / 3.0;
+    assert_eq!(bins, [(1, 0.5, 1), (2, 0.95, 1)]);
+    let log_score = (-0.5_f64.ln() + 12.0 * 10.0_f64.ln()) / 3.0;
     assert!((calibration.log_score_nats.unwrap() - log_score).abs() < 1e-9);
 }
 
 #[test]
-fn calibration_bins_hold_equally_many_claims() {
+fn calibration_bins_are_of_equal_width() {
     let mut claims = Claims::default();
     assert!(claims.expected_calibration_error().is_none());
-    // 30 claims in 15 bins of two: 0.8 in the upper half, one of each pair true; 0.5 in the lower
-    // half, where the pairs are right on average, but for the odd one in the middle bin.
-    for i in 0..15 {
-        claims.add(0.8, i % 2 == 0);
-        claims.add(0.5, i % 2 == 0);
+    // 0.05 and 0.0 with nothing true; 0.1 begins the next bin; 1.0 belongs to the last one.
+    for (p, is_true) in [
+        (0.05, false),
+        (0.0, false),
+        (0.1, true),
+        (0.95, true),
+        (1.0, true),
+        (0.99, false),
+    ] {
+        claims.add(p, is_true);
     }
-    // Sorted stably: fifteen claims of 0.5 (T F T F .. T), fifteen of 0.8 (T F .. T). Seven bins
-    // of 0.5 have no error; the middle one holds 0.5 T and 0.8 T: |2 - 1.3|; then F T pairs of 0.8:
-    // |1 - 1.6|, seven times.
-    let wanted = (0.7 + 7.0 * 0.6) / 30.0;
+    let bins: Vec<_> = claims
+        .bins()
+        .iter()
+        .map(|b| (b.n, b.p_min, b.p_max))
+        .collect();
+    assert_eq!(bins, [(2, 0.0, 0.05), (1, 0.1, 0.1), (3, 0.95, 1.0)]);
+    let wanted = (0.05 + 0.9 + (2.94 - 2.0)) / 6.0;
     assert!((claims.expected_calibration_error().unwrap() - wanted).abs() < 1e-12);
 }
 

@@ -53,6 +53,8 @@ pub enum DisturbanceKind {
     EncoderDelay,
     /// The centre of mass moves, m forward and m to the left.
     PayloadShift,
+    /// An encoder reports its rate and a constant more, rad/s.
+    EncoderBias,
 }
 
 /// Where a disturbance acts.
@@ -133,6 +135,7 @@ const SINKAGE: &[Parameter] = &[parameter("FACTOR", 1.0, 10.0, 3.0)];
 const RADIUS: &[Parameter] = &[parameter("FACTOR", 0.5, 1.0, 0.9)];
 const FRICTION: &[Parameter] = &[parameter("FACTOR", 0.1, 1.0, 0.4)];
 const RATE: &[Parameter] = &[parameter("FACTOR", -2.0, 3.0, 1.2)];
+const MORE: &[Parameter] = &[parameter("RAD_PER_S", -5.0, 5.0, 0.6)];
 const SHIFT: &[Parameter] = &[
     parameter("M_FORWARD", -0.1, 0.1, -0.08),
     parameter("M_LEFT", -0.15, 0.15, 0.1),
@@ -142,7 +145,7 @@ const SHIFT: &[Parameter] = &[
 pub const DELAY_MAX_S: f64 = 2.0;
 
 /// Every kind, in the order of the codes.
-pub const KINDS: [Kind; 18] = {
+pub const KINDS: [Kind; 19] = {
     use DisturbanceKind as D;
     use Place::{Rover, Side, SteeredWheel, Wheel};
     [
@@ -169,6 +172,7 @@ pub const KINDS: [Kind; 18] = {
         row(D::EncoderScale, "encoder-scale", Wheel, RATE),
         row(D::EncoderDelay, "encoder-delay", Wheel, DELAY),
         row(D::PayloadShift, "payload-shift", Rover, SHIFT),
+        row(D::EncoderBias, "encoder-bias", Wheel, MORE),
     ]
 };
 

@@ -66,7 +66,7 @@ fn disturbances_of_sensors_touch_their_own_channel_only_and_end_without_a_trace(
         (frame.pose, frame.valid) = (healthy.pose, healthy.valid);
     };
     let encoder: Undo = |frame, healthy| frame.wheel_rate[1] = healthy.wheel_rate[1];
-    let kinds: [(&str, Undo); 7] = [
+    let kinds: [(&str, Undo); 8] = [
         ("yaw-rate-bias:0.02", yaw),
         ("pose-drift:0.02", position),
         ("pose-delay:0.3", pose),
@@ -74,6 +74,7 @@ fn disturbances_of_sensors_touch_their_own_channel_only_and_end_without_a_trace(
         ("pose-scale:1.05", position),
         ("encoder-scale:LM:1.2", encoder),
         ("encoder-delay:LM:0.3", encoder),
+        ("encoder-bias:LM:0.6", encoder),
     ];
     for (spec, undo) in kinds {
         for [(healthy, true_healthy), (mut frame, truth)] in pairs(0.5, &[spec]) {
@@ -125,6 +126,9 @@ fn disturbed_sensors_are_off_by_what_was_asked_for() {
     for [(healthy, truth), (frame, _)] in with("encoder-scale:LM:1.2") {
         let added = frame.wheel_rate[1] - healthy.wheel_rate[1];
         assert_near(added, 0.2 * truth.wheel_rate_rad_s[1], 1e-9);
+    }
+    for [(healthy, _), (frame, _)] in with("encoder-bias:LM:0.6") {
+        assert_near(frame.wheel_rate[1] - healthy.wheel_rate[1], 0.6, 1e-12);
     }
     let late = with("encoder-delay:LM:0.3");
     for step in 6..100 {

@@ -69,8 +69,8 @@ pub fn calibration(report: &Report<'_>) -> Result<String, ChartError> {
         let tables = format!("<details><summary>as tables</summary>\n{tables}</details>\n");
         Ok(format!("{}{tables}", chart.svg()?))
     })?;
-    let about = "The probability that came with the name 2 s after the onset, in up to 15 bins of \
-                 equally many runs, against the share that was true, with 95 % bounds. An abstract \
+    let about = "The probability that came with the name 2 s after the onset, in ten bins of \
+                 equal width, against the share that was true, with 95 % bounds. An abstract \
                  node above the true leaf is true. Below the broken line names are less often true \
                  than they claim, above it more often.";
     let legend = legend(&names, drawn, &[("", false)]);

@@ -4,12 +4,36 @@ use serde::Serialize;
 
 use super::{Case, JUDGED_S, Ratio, Taxonomy, Verdict};
 
-/// Bins of the expected calibration error.
-const BINS: usize = 15;
+/// Bins of the expected calibration error, of equal width.
+const BINS: usize = 10;
 /// A claim above this probability is confident.
 const CONFIDENT_P: f64 = 0.9;
 /// Probabilities below this count as this, so that one mistake does not make a mean infinite.
-const P_MIN: f64 = 1e-12;
+const P_MIN: f64 = 1e-6;
+
+/// -ln p of what is true, nats: at most 13.8.
+#[must_use]
+pub fn log_score_nats(p_true: f64) -> f64 {
+    -p_true.clamp(P_MIN, 1.0).ln()
+}
+
+/// Expected calibration error of claims, each a probability and whether it came true (Naeini,
+/// Cooper and Hauskrecht 2015): mean over ten bins of equal width, 0 to 0.1 and so on, of
+/// |fraction true - mean probability|, weighted by the claims in each. `None` without a claim.
+#[must_use]
+pub fn expected_calibration_error(claims: impl Iterator<Item = (f64, bool)>) -> Option<f64> {
+    let (mut excess, mut n) = ([0.0_f64; BINS], 0_usize);
+    for (p, is_true) in claims {
+        excess[bin_of(p)] += f64::from(u8::from(is_true)) - p;
+        n += 1;
+    }
+    (n > 0).then(|| excess.iter().map(|sum| sum.abs()).sum::<f64>() / n as f64)
+}
+
+/// The bin of a probability; 1 is in the last one.
+fn bin_of(p: f64) -> usize {
+    ((p * BINS as f64) as usize).min(BINS - 1)
+}
 
 /// Claims: a mode was reported with a probability, and it was true or not.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -23,25 +47,21 @@ impl Claims {
         self.claims.push((p, is_true));
     }
 
-    /// Bins of equally many claims in order of their probability: 15, or fewer if there are fewer
-    /// claims.
+    /// The claims in ten bins of equal width, 0 to 0.1 and so on, the last with 1; without those
+    /// that are empty.
     #[must_use]
     pub fn bins(&self) -> Vec<Bin> {
-        let mut sorted = self.claims.clone();
-        sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let n = sorted.len();
-        let bins = BINS.min(n);
-        let cuts = (0..bins).map(|bin| bin * n / bins..(bin + 1) * n / bins);
-        cuts.filter_map(|cut| Bin::of(sorted.get(cut)?)).collect()
+        let mut bins = vec![Vec::new(); BINS];
+        for &claim in &self.claims {
+            bins[bin_of(claim.0)].push(claim);
+        }
+        bins.iter().filter_map(|bin| Bin::of(bin)).collect()
     }
 
-    /// Expected calibration error: mean over the bins of |fraction true - mean probability|,
-    /// weighted by the claims in each. `None` without a claim.
+    /// See [`expected_calibration_error`].
     #[must_use]
     pub fn expected_calibration_error(&self) -> Option<f64> {
-        let error = |bin: &Bin| (bin.is_true.right as f64 - bin.n as f64 * bin.p_mean).abs();
-        let n = self.claims.len();
-        (n > 0).then(|| self.bins().iter().map(error).sum::<f64>() / n as f64)
+        expected_calibration_error(self.claims.iter().copied())
     }
 
     /// Mean of (probability - 1 if true, 0 if not) squared. `None` without a claim.
@@ -70,15 +90,16 @@ pub struct Bin {
 }
 
 impl Bin {
-    /// Of claims in order of their probability; `None` without one.
+    /// `None` without a claim.
     fn of(claims: &[(f64, bool)]) -> Option<Self> {
         let mut is_true = Ratio::default();
         claims.iter().for_each(|claim| is_true.add(claim.1));
+        let p = || claims.iter().map(|claim| claim.0);
         Some(Self {
             n: claims.len(),
-            p_min: claims.first()?.0,
-            p_mean: claims.iter().map(|claim| claim.0).sum::<f64>() / claims.len() as f64,
-            p_max: claims.last()?.0,
+            p_min: p().reduce(f64::min)?,
+            p_mean: p().sum::<f64>() / claims.len() as f64,
+            p_max: p().reduce(f64::max)?,
             is_true,
         })
     }
@@ -99,12 +120,12 @@ pub(super) struct Judged {
 pub(super) fn judge(verdict: &Verdict, truth: &str, taxonomy: &Taxonomy) -> Judged {
     let is_true = taxonomy.covers(&verdict.mode, truth);
     let p = match taxonomy.index(truth) {
-        Some(index) => verdict.p_nodes.get(index).copied().unwrap_or(0.0),
-        None => verdict.p_unknown,
+        Some(index) => verdict.belief().node(index, taxonomy),
+        None => verdict.belief().unknown(taxonomy),
     };
     Judged {
         is_true,
-        log_score_nats: -p.clamp(P_MIN, 1.0).ln(),
+        log_score_nats: log_score_nats(p),
         is_confident_wrong: !is_true && verdict.p_mode > CONFIDENT_P,
     }
 }
@@ -114,14 +135,15 @@ pub(super) fn judge(verdict: &Verdict, truth: &str, taxonomy: &Taxonomy) -> Judg
 pub struct Calibration {
     /// Runs.
     pub n: usize,
-    /// Expected calibration error of `p_mode` (15 bins of equally many runs). An abstract node
-    /// above the true leaf is true.
+    /// Expected calibration error of `p_mode` in ten bins of equal width. An abstract node above
+    /// the true leaf is true.
     pub expected_calibration_error: Option<f64>,
     /// Mean squared error of `p_mode` as the probability that the name is true.
     pub brier_score: Option<f64>,
     /// The bins of the calibration error.
     pub reliability: Vec<Bin>,
-    /// Mean of -ln p(true mode), nats; the probability of unknown if the tree lacks the mode.
+    /// Mean of -ln p(true mode), nats; the probability of unknown if the tree lacks the mode. See
+    /// [`super::Belief`] for that before an alarm; less than 1e-6 counts as that.
     pub log_score_nats: Option<f64>,
     /// Runs in which something false was reported with more than 0.9 (`right` counts them).
     pub confident_wrong: Ratio,

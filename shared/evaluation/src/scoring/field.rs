@@ -10,6 +10,7 @@
 //!   fault the nominal mode;
 //! - *right side*: the right leaf, or a node of the true side; for what no model describes also
 //!   every abstract node;
+//! - *standing*: an alarm is up, from 10 s on, while a fault persists;
 //! - *from h seconds on*: driven time at least h after the last onset, while the fault persists;
 //! - *changes*: of `mode` and of the reported name; *settled* ones come 2 s after an onset or
 //!   later, while the fault persists, where there should be none;
@@ -19,23 +20,32 @@
 //! - *false alarm*: a rise while nothing is wrong; *action*: each entry into anything but going on,
 //!   but for stops by rule while no belief is usable, which are counted apart;
 //! - *latched*: a call for help that stands when a run ends without a fault;
+//! - *claim*: the most probable of nominal mode, leaves and unknown ([`Belief`]), and whether it is
+//!   true: one of the true leaves, or for what no model describes the unknown or its own leaf. Of
+//!   every run at [`CLAIMED_S`] after its first onset, while that fault persists, and at as many
+//!   instants before it (of a run without a fault: of all of it), drawn by the run's seed. Claims
+//!   make the expected calibration error;
+//! - *log score*: -ln p(what is true) 2 s after the first onset, no more than 13.8; several faults
+//!   at once have none, as no probability of just them is published;
 //! - *contradiction*: an alarm while the nominal mode has more than one half, or a reported fault
 //!   without alarm.
 //!
 //! All runs count; what is not seen is missed. While nothing valid comes in, `BLIND` is neither
-//! right nor wrong.
+//! right nor wrong, and claims nothing.
 
 #[cfg(test)]
 mod cases;
+mod claims;
 mod figures;
 mod recorded;
 mod run;
 
+pub use claims::{CLAIMED_S, Claim};
 pub use figures::{Figure, Worst, figures};
 pub use recorded::{Figures, SAFE_STOP, of_cases};
 pub use run::{Actions, Changes, End, Onset, Run, Scorer, Seen};
 
-use super::Taxonomy;
+use super::{Belief, Taxonomy};
 
 /// Reported without valid input.
 pub const BLIND: &str = "BLIND";
@@ -98,8 +108,8 @@ pub struct Moment<'a> {
     pub drives: bool,
     /// True while the alarm stands.
     pub alarm: bool,
-    /// Probability of the nominal mode.
-    pub p_nominal: f64,
+    /// What is believed.
+    pub belief: Belief<'a>,
     /// Memoryless mode.
     pub mode: &'a str,
     /// Its probability.
@@ -120,6 +130,36 @@ impl Truth {
     #[must_use]
     pub const fn is_healthy(&self) -> bool {
         matches!(self, Self::Healthy)
+    }
+
+    /// Probability of what is true; `None` of several faults at once.
+    fn p(&self, belief: &Belief<'_>, taxonomy: &Taxonomy) -> Option<f64> {
+        let of = |leaf: &String| Some(belief.node(taxonomy.index(leaf)?, taxonomy));
+        match self {
+            Self::Healthy => Some(belief.node(0, taxonomy)),
+            Self::Faults(leaves) => match leaves.as_slice() {
+                [leaf] => Some(of(leaf).unwrap_or(0.0)),
+                _ => None,
+            },
+            // Either is right, and they exclude each other.
+            Self::Unmodelled { own } => {
+                let own = own.as_ref().and_then(of).unwrap_or(0.0);
+                Some(belief.unknown(taxonomy) + own)
+            }
+        }
+    }
+
+    /// The most probable mode as a claim.
+    fn claim(&self, belief: &Belief<'_>, taxonomy: &Taxonomy) -> Claim {
+        let (top, p) = belief.top(taxonomy);
+        let name = top.and_then(|node| taxonomy.name(node));
+        let is = |leaf: &String| name == Some(leaf.as_str());
+        let is_true = match self {
+            Self::Healthy => top == Some(0),
+            Self::Faults(leaves) => leaves.iter().any(is),
+            Self::Unmodelled { own } => top.is_none() || own.as_ref().is_some_and(is),
+        };
+        Claim { p, is_true }
     }
 
     /// True if the name, with `set` where it is `MULTIPLE`, is the one to say.

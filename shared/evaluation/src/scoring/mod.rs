@@ -15,6 +15,7 @@
 //! - *isolation*: the time from the onset until the right leaf is named for good, of the runs
 //!   that end with it.
 
+mod belief;
 pub mod bounds;
 mod calibration;
 mod confusion;
@@ -31,7 +32,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-pub use calibration::{Bin, Calibration, Claims};
+pub use belief::Belief;
+pub use calibration::{Bin, Calibration, Claims, expected_calibration_error, log_score_nats};
 pub use confusion::{Coarse, Matrix};
 pub use contest::{Contest, Entrant, Row, Share, Shares, contest};
 pub use detection::{Detection, FalseAlarms, Rate};
@@ -79,6 +81,8 @@ pub struct Verdict {
     pub p_right_stuck: f64,
     /// Probability of every node of the tree, in its order.
     pub p_nodes: Vec<f64>,
+    /// False before an alarm: no leaf is looked at yet.
+    pub is_identifying: bool,
     /// Mode with hysteresis, named as `mode` is.
     pub reported: String,
     /// What the robot is told, and the wheel that it is about after a colon; empty if nothing is
@@ -86,6 +90,18 @@ pub struct Verdict {
     pub action: String,
     /// True if the robot is told to move.
     pub drives: bool,
+}
+
+impl Verdict {
+    /// Its belief.
+    #[must_use]
+    pub fn belief(&self) -> Belief<'_> {
+        Belief {
+            p_nodes: &self.p_nodes,
+            p_unknown: self.p_unknown,
+            is_identifying: self.is_identifying,
+        }
+    }
 }
 
 /// One run: what was true and what was reported.

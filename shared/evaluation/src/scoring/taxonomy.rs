@@ -14,10 +14,14 @@ pub enum Side {
     Right,
 }
 
+/// Prior probability of the unknown among all faults, unless another is given.
+const PRIOR_UNKNOWN: f64 = 0.01;
+
 /// What the nodes of a fault tree say about a fault.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Taxonomy {
     nodes: Vec<Node>,
+    prior_unknown: f64,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -67,7 +71,29 @@ impl Taxonomy {
             }
             (nodes[i].side, nodes[i].class) = (side, class);
         }
-        Self { nodes }
+        Self {
+            nodes,
+            prior_unknown: PRIOR_UNKNOWN,
+        }
+    }
+
+    /// With this prior probability of the unknown among all faults: `identifier.p_unknown`.
+    #[must_use]
+    pub fn with_prior_unknown(self, prior_unknown: f64) -> Self {
+        Self {
+            prior_unknown,
+            ..self
+        }
+    }
+
+    /// Prior share of one leaf among all faults; leaves are alike.
+    #[must_use]
+    pub fn leaf_share(&self) -> f64 {
+        let leaves = self.nodes.iter().filter(|node| node.is_leaf).count();
+        match leaves {
+            0 => 0.0,
+            n => (1.0 - self.prior_unknown) / n as f64,
+        }
     }
 
     fn node(&self, name: &str) -> Option<&Node> {

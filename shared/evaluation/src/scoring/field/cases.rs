@@ -39,6 +39,18 @@ fn fault(name: &str) -> Truth {
     Truth::Faults(vec![name.to_owned()])
 }
 
+/// Probabilities of the nodes: before an alarm, and of a wheel that is stuck on the right.
+const HEALTHY: [f64; 7] = [0.99, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+const FAULTY: [f64; 7] = [0.01, 0.01, 0.97, 0.01, 0.0, 0.97, 0.0];
+
+fn belief(p_nodes: &'static [f64], p_unknown: f64, is_identifying: bool) -> Belief<'static> {
+    Belief {
+        p_nodes,
+        p_unknown,
+        is_identifying,
+    }
+}
+
 /// What is said in a nominal moment.
 fn quiet(t_s: f64) -> Moment<'static> {
     Moment {
@@ -46,7 +58,7 @@ fn quiet(t_s: f64) -> Moment<'static> {
         dt_s: DT_S,
         drives: true,
         alarm: false,
-        p_nominal: 0.99,
+        belief: belief(&HEALTHY, 0.01, false),
         mode: "ND",
         p_mode: 0.99,
         set: "ND",
@@ -60,7 +72,7 @@ fn quiet(t_s: f64) -> Moment<'static> {
 fn said(t_s: f64, mode: &'static str) -> Moment<'static> {
     Moment {
         alarm: true,
-        p_nominal: 0.01,
+        belief: belief(&FAULTY, 0.01, true),
         mode,
         p_mode: 0.95,
         set: mode,
@@ -72,7 +84,7 @@ fn said(t_s: f64, mode: &'static str) -> Moment<'static> {
 /// Scores moments at every half second up to `end_s`.
 fn score(truth: &[Stretch], end_s: f64, moment: impl Fn(f64) -> Moment<'static>) -> Run {
     let taxonomy = taxonomy();
-    let mut scorer = Scorer::new(truth, &taxonomy, 7);
+    let mut scorer = Scorer::new(truth, &taxonomy, [0.0, end_s], 7);
     let mut t_s = 0.0;
     while t_s < end_s {
         scorer.take(&moment(t_s));
@@ -110,6 +122,7 @@ fn a_fault_that_is_named_at_once_and_kept_is_right_all_the_time() {
     near(run.from_2_s.driven_s, 58.0);
     near(run.from_2_s.leaf_s, 58.0);
     near(run.from_10_s.driven_s, 50.0);
+    near(run.from_10_s.alarm_s, 50.0);
     near(run.wrong_s, 0.5);
     near(run.healthy_driven_s, 10.0);
     assert_eq!(run.mode, Changes { all: 1, settled: 0 });
@@ -323,4 +336,79 @@ fn a_reported_fault_without_alarm_contradicts_and_blind_is_no_name() {
     near(run.blind_s, 2.0);
     near(run.healthy_wrong_s, 0.0);
     assert_eq!(run.reported, Changes { all: 4, settled: 0 });
+}
+
+#[test]
+fn a_belief_before_an_alarm_is_divided_by_the_priors() {
+    let taxonomy = taxonomy().with_prior_unknown(0.2);
+    // Four leaves have 0.2 each of what is not nominal, the unknown 0.2.
+    let before = belief(&[0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0.6, false);
+    near(before.node(0, &taxonomy), 0.4);
+    near(before.node(5, &taxonomy), 0.12);
+    near(before.unknown(&taxonomy), 0.12);
+    assert_eq!(before.top(&taxonomy), (Some(0), 0.4));
+    // After the alarm nothing is divided; abstract nodes are no modes.
+    let after = belief(&[0.1, 0.0, 0.5, 0.0, 0.0, 0.3, 0.0], 0.6, true);
+    near(after.node(5, &taxonomy), 0.3);
+    assert_eq!(after.top(&taxonomy), (None, 0.6));
+}
+
+#[test]
+fn claims_are_made_at_fixed_instants_of_the_first_fault_and_as_many_before() {
+    let mut truth = healthy_until(10.0, fault("RM_STUCK"));
+    truth.push(Stretch {
+        from_s: 14.0,
+        truth: Truth::Healthy,
+    });
+    let moment = |t_s: f64| match t_s {
+        t if t < 11.5 => quiet(t),
+        t => said(t, "RM_STUCK"),
+    };
+    // Five before the onset; at 0.5, 1 and 2 s; the fault is gone at 5 s.
+    let run = score(&truth, 30.0, moment);
+    let claim = |p, is_true| Claim { p, is_true };
+    let mut wanted = vec![claim(0.99, true); 5];
+    wanted.extend([claim(0.99, false), claim(0.99, false), claim(0.97, true)]);
+    assert_eq!(run.claims, wanted);
+    near(run.log_score_2_s_nats.unwrap(), -0.97_f64.ln());
+    // All are in the last bin: 6 true of 8, 7.9 claimed.
+    let found = figure(std::slice::from_ref(&run), "ece");
+    near(found.value.unwrap(), (7.9 - 6.0) / 8.0);
+    assert_eq!((found.n, found.lower_95), (8, None));
+
+    // A fault that is not seen: the leaf has a quarter of 0.99 * 0.01, and five claims are true.
+    let missed = score(&healthy_until(10.0, fault("RM_STUCK")), 30.0, quiet);
+    let p = 0.99 * 0.01 / 4.0_f64;
+    near(missed.log_score_2_s_nats.unwrap(), -p.ln());
+    let runs = [run, missed];
+    let mean = figure(&runs, "log_score_2s");
+    near(mean.value.unwrap(), -(p.ln() + 0.97_f64.ln()) / 2.0);
+    assert_eq!(mean.n, 2);
+    let found = figure(&runs, "ece");
+    near(found.value.unwrap(), (7.9 + 9.9 - 11.0) / 18.0);
+    assert!(found.lower_95.unwrap() < found.value.unwrap());
+}
+
+#[test]
+fn what_no_model_describes_claims_the_unknown_or_its_own_leaf() {
+    let own = |own: Option<&str>| Truth::Unmodelled {
+        own: own.map(str::to_owned),
+    };
+    let moment = move |t_s: f64| Moment {
+        belief: belief(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.2, 0.4], 0.3, true),
+        ..said(t_s, "RM_ENC")
+    };
+    let run = score(&healthy_until(0.0, own(Some("RM_ENC"))), 20.0, moment);
+    // The robot was never healthy: only the five claims after the onset.
+    let is_true: Vec<bool> = run.claims.iter().map(|claim| claim.is_true).collect();
+    assert_eq!(is_true, [true; 5]);
+    near(run.log_score_2_s_nats.unwrap(), -0.7_f64.ln());
+    let run = score(&healthy_until(0.0, own(None)), 20.0, moment);
+    assert!(run.claims.iter().all(|claim| !claim.is_true));
+    near(run.log_score_2_s_nats.unwrap(), -0.3_f64.ln());
+    // Several faults: either leaf is true, but of just both no probability is published.
+    let both = Truth::Faults(vec!["RM_STUCK".to_owned(), "RM_ENC".to_owned()]);
+    let run = score(&healthy_until(0.0, both), 20.0, moment);
+    assert!(run.claims.iter().all(|claim| claim.is_true));
+    assert_eq!(run.log_score_2_s_nats, None);
 }

@@ -1,12 +1,17 @@
 //! Many runs as figures: each with its bound and its worst run.
 
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 
 use super::{Onset, Run, Seen};
 use crate::scoring::bounds::{Bounds, Difference, binomial, poisson};
+use crate::scoring::expected_calibration_error;
 
 /// Times within which an alarm or a name should have fallen, s: with encoders, by the pose alone.
 const CLEARED_S: [f64; 2] = [3.0, 10.0];
+/// Sets of runs that are drawn for the bounds of a calibration error.
+const DRAWS: usize = 400;
 /// Time within which a fault should be announced, s.
 const SOON_S: f64 = 2.0;
 
@@ -28,7 +33,8 @@ pub struct Figure {
     /// Its value; missing where something never happened.
     pub value: Option<f64>,
     /// Bounds that cover the true value with 95 %: exact ones of counts and of shares of cases;
-    /// those of a mean over runs, by Student's distribution, for shares of time and times.
+    /// those of a mean over runs, by Student's distribution, for shares of time, times and log
+    /// scores; those of a bootstrap over runs for a calibration error.
     pub lower_95: Option<f64>,
     /// See `lower_95`.
     pub upper_95: Option<f64>,
@@ -74,6 +80,7 @@ pub fn figures(runs: &[Run]) -> Vec<Figure> {
     all.extend(of_time(runs));
     all.extend(of_ends(runs));
     all.extend(of_health(runs));
+    all.extend(of_claims(runs));
     all
 }
 
@@ -136,6 +143,7 @@ fn of_time(runs: &[Run]) -> Vec<Figure> {
         ),
         share_of_time("right_share_10s", runs, of(late, |s| s.leaf_s), true),
         share_of_time("right_side_share_10s", runs, of(late, |s| s.side_s), true),
+        share_of_time("standing_share_10s", runs, of(late, |s| s.alarm_s), true),
         share_of_time(
             "confident_wrong_share",
             runs,
@@ -228,6 +236,52 @@ fn of_health(runs: &[Run]) -> Vec<Figure> {
         rate("help_latched", runs, latched, one),
     ];
     found.into_iter().flatten().collect()
+}
+
+fn of_claims(runs: &[Run]) -> Vec<Figure> {
+    let mean_score = || {
+        let of = |run: &Run| run.log_score_2_s_nats;
+        let scores: Vec<f64> = runs.iter().filter_map(of).collect();
+        let n = scores.len();
+        let bounds = of_mean(&scores).map(|bounds| Bounds {
+            lower: bounds.lower.max(0.0),
+            ..bounds
+        });
+        let mean = scores.iter().sum::<f64>() / n.max(1) as f64;
+        let found = Figure::new("log_score_2s", mean, bounds, n);
+        (n > 0).then(|| found.with_worst(worst(runs, false, of)))
+    };
+    [calibration_error(runs), mean_score()]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// Expected calibration error of all claims. Bounds: the middle 95 % of those of [`DRAWS`] times as
+/// many runs drawn with replacement; few claims raise both of them, as chance adds to the error.
+fn calibration_error(runs: &[Run]) -> Option<Figure> {
+    let error = |runs: &mut dyn Iterator<Item = &Run>| {
+        let claims = runs.flat_map(|run| &run.claims);
+        expected_calibration_error(claims.map(|claim| (claim.p, claim.is_true)))
+    };
+    let value = error(&mut runs.iter())?;
+    let mut rng = Pcg64Mcg::seed_from_u64(DRAWS as u64);
+    let mut drawn = Vec::with_capacity(DRAWS);
+    for _ in 0..DRAWS {
+        let any = (0..runs.len()).filter_map(|_| runs.get(rng.random_range(0..runs.len())));
+        drawn.extend(error(&mut any.into_iter()));
+    }
+    drawn.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| drawn.get((share * drawn.len() as f64) as usize).copied();
+    let bounds = at(0.025).zip(at(0.975));
+    let bounds = bounds.map(|(lower, upper)| Bounds { lower, upper });
+    let n = runs.iter().map(|run| run.claims.len()).sum();
+    Some(Figure::new(
+        "ece",
+        value,
+        bounds.filter(|_| runs.len() > 1),
+        n,
+    ))
 }
 
 fn share_of_onsets(

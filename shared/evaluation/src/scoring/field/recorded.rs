@@ -51,7 +51,9 @@ fn score(case: &Case, taxonomy: &Taxonomy) -> Run {
     };
     let breaks = case.label.onset_s.map(|from_s| Stretch { from_s, truth });
     let truth: Vec<Stretch> = std::iter::once(begins).chain(breaks).collect();
-    let mut scorer = Scorer::new(&truth, taxonomy, u64::from(case.label.run));
+    let ends = [case.verdicts.first(), case.verdicts.last()];
+    let span_s = ends.map(|verdict| verdict.map_or(0.0, |verdict| verdict.t_s));
+    let mut scorer = Scorer::new(&truth, taxonomy, span_s, u64::from(case.label.run));
     let mut actions: Vec<&str> = Vec::new();
     let mut t_before_s = None;
     for verdict in &case.verdicts {
@@ -65,7 +67,7 @@ fn score(case: &Case, taxonomy: &Taxonomy) -> Run {
             dt_s: verdict.t_s - t_before_s.unwrap_or(verdict.t_s),
             drives: verdict.drives,
             alarm: verdict.alarm,
-            p_nominal: verdict.p_nodes.first().copied().unwrap_or(0.0),
+            belief: verdict.belief(),
             mode: &verdict.mode,
             p_mode: verdict.p_mode,
             set: &verdict.fault_set,

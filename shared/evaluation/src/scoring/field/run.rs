@@ -1,5 +1,6 @@
 //! One run, moment by moment.
 
+use super::claims::{Claim, Instants};
 use super::{BLIND, CONFIDENT, HELD_S, JUDGED_S, Moment, Stretch, Told, Truth};
 use crate::scoring::{TIME_SLACK_S, Taxonomy};
 
@@ -42,6 +43,8 @@ pub struct Seen {
     pub side_s: f64,
     /// With the right leaf as the reported name, s.
     pub reported_s: f64,
+    /// With an alarm, s.
+    pub alarm_s: f64,
     /// With a wrong leaf as `mode` whose probability is above 0.9, s.
     pub confident_wrong_s: f64,
 }
@@ -126,6 +129,10 @@ pub struct Run {
     pub actions_in_fault: Actions,
     /// A call for help stands at the end, and nothing is wrong.
     pub is_help_latched: bool,
+    /// Claims, in order of time.
+    pub claims: Vec<Claim>,
+    /// Log score 2 s after the first onset, nats.
+    pub log_score_2_s_nats: Option<f64>,
     /// Time of contradictions, s.
     pub contradiction_s: f64,
     /// Longest one, s.
@@ -152,6 +159,7 @@ pub struct Scorer<'a> {
     /// The stretch that holds now.
     at: usize,
     before: Option<Before>,
+    instants: Instants,
     contradiction_s: f64,
     /// Driven time after the last end at which alarm and name were down, and since when in time.
     down: [Option<(f64, f64)>; 2],
@@ -159,14 +167,16 @@ pub struct Scorer<'a> {
 }
 
 impl<'a> Scorer<'a> {
-    /// Against the truth, in order of time; the first stretch holds from the beginning.
+    /// Against the truth, in order of time, of a run from `span_s[0]` to `span_s[1]`; the first
+    /// stretch holds from the beginning.
     #[must_use]
-    pub fn new(truth: &'a [Stretch], taxonomy: &'a Taxonomy, seed: u64) -> Self {
+    pub fn new(truth: &'a [Stretch], taxonomy: &'a Taxonomy, span_s: [f64; 2], seed: u64) -> Self {
         let mut scorer = Self {
             truth,
             taxonomy,
             at: 0,
             before: None,
+            instants: Instants::new(truth, span_s, seed),
             contradiction_s: 0.0,
             down: [None; 2],
             run: Run {
@@ -205,6 +215,9 @@ impl<'a> Scorer<'a> {
         self.judge_onset(moment, &before);
         self.judge_end(moment);
         self.judge_names(moment);
+        let now = (self.at, self.now());
+        let (taxonomy, run) = (self.taxonomy, &mut self.run);
+        self.instants.take(moment, now, taxonomy, run);
         self.count(moment, &before, is_first);
         self.before = Some(Before {
             alarm: moment.alarm,
@@ -346,6 +359,7 @@ impl<'a> Scorer<'a> {
             seen.leaf_s += of(is_leaf);
             seen.side_s += of(truth.is_side(name, set, taxonomy));
             seen.reported_s += of(truth.is_leaf(moment.reported, set, taxonomy));
+            seen.alarm_s += of(moment.alarm);
             seen.confident_wrong_s += of(confident);
         }
     }
@@ -373,7 +387,8 @@ impl<'a> Scorer<'a> {
             }
         }
         let names = moment.reported != nominal && moment.reported != BLIND;
-        let contradicts = (moment.alarm && moment.p_nominal > 0.5) || (names && !moment.alarm);
+        let contradicts = (moment.alarm && moment.belief.node(0, self.taxonomy) > 0.5)
+            || (names && !moment.alarm);
         self.contradiction_s = match contradicts {
             true => self.contradiction_s + moment.dt_s,
             false => 0.0,
