@@ -14,14 +14,14 @@ use vigil_blocks::WHEELS;
 use vigil_inference::bank::{Bank, Hypothesis};
 use vigil_inference::track::Track;
 use vigil_robot::Description;
-use vigil_robot::learned::wheel_evidence::Dragged;
 use vigil_robot::learned::{
     FaultRates, Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
 };
 
-use crate::encoders::{Encoders, Likelihoods, OWN_RATE, SILENT, ZERO};
+use crate::encoders::Encoders;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
+use crate::prepared::{EXPLAINED_S, Prepared, Seen, age_s};
 use crate::rate_offsets::RateOffsets;
 use crate::sets::Sets;
 
@@ -35,9 +35,6 @@ const PER_RARE: usize = 8;
 const FLOOR: f64 = -30.0;
 /// So long after a supposed onset, ns, wheels may still read as before.
 const ONSET_BLUR_NS: u64 = 150_000_000;
-/// An encoder that broke this short before its wheel is supposed to have stuck may never have been
-/// broken, s: a stuck wheel's reads the same, and the motion tells within about this time.
-const EXPLAINED_S: f64 = 2.0;
 /// Prior rate of faults while something is suspected, 1/s of motion. An alarm has been raised:
 /// the rate over a robot's life would make the filter slow without making it more often right.
 pub const BIRTH_1_S: f64 = 0.01;
@@ -67,6 +64,8 @@ pub struct Exact {
     /// Of each wheel's encoder.
     births_1_s: [f64; WHEELS],
     bank: Bank<State>,
+    /// What the last observation says in each mode, where a hypothesis has asked.
+    prepared: Vec<Option<Prepared>>,
     sets: Sets,
     degenerate_count: u32,
 }
@@ -96,6 +95,7 @@ impl Exact {
             robot: robot.clone(),
             leaves: leaves.clone(),
             use_wheels,
+            prepared: vec![None; modes.len()],
             sets: Sets::new(&modes, robot.wheels.len().min(WHEELS)),
             modes,
             rates,
@@ -139,16 +139,18 @@ impl Exact {
             }
             return;
         }
+        let evidence = (self.use_wheels && observation.moving)
+            .then(|| WheelEvidence::new(&self.model, &self.robot, observation, noise));
         if observation.moving {
-            self.spawn(observation);
+            self.spawn(observation, evidence.as_ref());
         }
         self.predict(observation);
         // A robot at rest tells nothing: no fault appears, fades or is named.
         if !observation.moving {
             return;
         }
-        if self.use_wheels {
-            self.weigh_wheels(observation, noise);
+        if let Some(evidence) = &evidence {
+            self.weigh_wheels(observation, evidence);
         }
         let mut failed = false;
         if observation.pose_frames > 0 {
@@ -165,28 +167,42 @@ impl Exact {
     }
 
     fn predict(&mut self, observation: &Observation) {
-        for index in 0..self.modes.len() {
-            let mode = &self.modes[index];
+        for hypothesis in self.bank.hypotheses_mut() {
+            let mode = &self.modes[hypothesis.mode];
             let step = observation.displacement(&self.model, &mode.motion);
-            let all = self.bank.hypotheses_mut().iter_mut();
-            for hypothesis in all.filter(|hypothesis| hypothesis.mode == index) {
-                hypothesis.state.track.predict(&step, &mode.noise);
-            }
+            hypothesis.state.track.predict(&step, &mode.noise);
         }
     }
 
-    /// New hypotheses: one fault more, one less, or another one, from the most probable hypothesis
-    /// without a fault, the most probable one with a fault, and that with one stuck wheel.
-    fn spawn(&mut self, observation: &Observation) {
+    /// New hypotheses: a fault more, one less, or another one, or several wheels at once where
+    /// these read so; from the most probable hypothesis of each kind.
+    fn spawn(&mut self, observation: &Observation, evidence: Option<&WheelEvidence>) {
         let modes = &self.modes;
-        let best = |wanted: &dyn Fn(usize) -> bool| self.bank.best(wanted).copied();
+        let best = |wanted: &dyn Fn(Moved) -> bool| {
+            self.bank.best(|mode| wanted(modes[mode].moved)).copied()
+        };
         let sources = [
-            best(&|mode| mode == NOMINAL),
-            best(&|mode| modes[mode].moved.stuck().count_ones() == 1),
-            best(&|mode| modes[mode].moved.stuck().count_ones() != 1 && mode != NOMINAL),
+            best(&|moved| moved == Moved::Nominal),
+            best(&|moved| moved.stuck().count_ones() == 1),
+            best(&|moved| moved.stuck().count_ones() > 1),
+            best(&Moved::is_unknown),
         ];
         for from in sources.into_iter().flatten() {
+            let before = self.modes[from.mode].moved;
+            let read = evidence.map_or([before.stuck(); 3], |evidence| {
+                let seen = Seen {
+                    model: &self.model,
+                    robot: &self.robot,
+                    observation,
+                    evidence,
+                };
+                seen.changed_sets(before.stuck(), &from.state.encoders)
+            });
             for mode in 0..self.modes.len() {
+                let after = self.modes[mode].moved;
+                if changes_several(before, after) && !read.contains(&after.stuck()) {
+                    continue;
+                }
                 let log_weight = from.log_weight + self.p_change(&from, mode, observation).ln();
                 if log_weight <= FLOOR || log_weight.is_nan() {
                     continue;
@@ -209,7 +225,7 @@ impl Exact {
         let p = self.rates.rate_1_s(before, after) * observation.dt_s;
         let encoders = &from.state.encoders;
         let instead = match newly_stuck(before, after) {
-            Some(wheel) if p > 0.0 && before.stuck() & after.stuck() != 0 => {
+            Some(wheel) if p > 0.0 && before.stuck() != 0 && !changes_several(before, after) => {
                 let age_s = age_s(observation.t_first_ns, encoders.onset(wheel));
                 let was_last = age_s > 0.0 && age_s < 1.5 * observation.dt_s;
                 if was_last {
@@ -236,13 +252,14 @@ impl Exact {
             (Moved::UnknownAny, _) => Encoders::healthy(t_ns),
             _ => from.state.encoders,
         };
-        let sticks = newly_stuck(before, after);
-        if let Some(wheel) = sticks.filter(|&w| age_s(t_ns, encoders.onset(w)) < EXPLAINED_S) {
-            encoders.suppose_whole(wheel, t_ns);
-        }
         for wheel in 0..WHEELS {
             match (before.is_stuck(wheel), after.is_stuck(wheel)) {
-                (false, true) => encoders.stick(wheel),
+                (false, true) => {
+                    if age_s(t_ns, encoders.onset(wheel)) < EXPLAINED_S {
+                        encoders.suppose_whole(wheel, t_ns);
+                    }
+                    encoders.stick(wheel);
+                }
                 (true, false) => encoders.release(wheel),
                 _ => {}
             }
@@ -254,84 +271,28 @@ impl Exact {
         }
     }
 
-    /// Weighs by the wheels' readings. Each is evaluated once per motion mode, not per hypothesis.
-    fn weigh_wheels(&mut self, observation: &Observation, noise: NoiseScales) {
-        let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise);
+    /// Weighs by the wheels' readings.
+    fn weigh_wheels(&mut self, observation: &Observation, evidence: &WheelEvidence) {
         let births = self.births_1_s.map(|rate| rate * observation.dt_s);
         let death = self.rates.death_1_s * observation.dt_s;
-        let first_ns = observation.t_first_ns;
-        for mode in 0..self.modes.len() {
-            let both =
-                [false, true].map(|is_new| self.wheels_in(mode, observation, &evidence, is_new));
-            let dragged = self.dragged_in(mode, observation, &evidence);
-            let steering = match self.modes[mode].moved {
-                Moved::UnknownAny => evidence.steering,
-                _ => 0.0,
-            };
-            let stuck = self.modes[mode].moved.stuck();
-            let all = self.bank.hypotheses_mut().iter_mut();
-            for hypothesis in all.filter(|hypothesis| hypothesis.mode == mode) {
-                let is_new = is_new(observation.t_ns, hypothesis.onset);
-                let State {
-                    encoders, offsets, ..
-                } = &mut hypothesis.state;
-                let mut likelihoods = both[usize::from(is_new)];
-                let dragged = dragged.iter().flatten().filter(|_| !is_new);
-                for (wheel, dragged) in dragged.clone() {
-                    let model = &self.model;
-                    let log =
-                        offsets.log_likelihood(model, observation, &evidence, *wheel, dragged);
-                    likelihoods.replace_whole(*wheel, log);
-                }
-                let gained = encoders.step(&births, death, stuck, &likelihoods, first_ns);
-                hypothesis.log_weight += steering + gained;
-                for (wheel, dragged) in dragged {
-                    if encoders.p_broken(*wheel) < 0.5 {
-                        offsets.learn(observation, &evidence, *wheel, dragged);
-                    }
-                }
-            }
+        let seen = Seen {
+            model: &self.model,
+            robot: &self.robot,
+            observation,
+            evidence,
+        };
+        self.prepared.fill(None);
+        for hypothesis in self.bank.hypotheses_mut() {
+            let index = hypothesis.mode;
+            let prepare = || seen.prepared(&self.modes[index]);
+            let prepared = self.prepared[index].get_or_insert_with(prepare);
+            let is_new = is_new(observation.t_ns, hypothesis.onset);
+            let State {
+                encoders, offsets, ..
+            } = &mut hypothesis.state;
+            let gained = seen.weigh(prepared, (&births, death), is_new, encoders, offsets);
+            hypothesis.log_weight += gained;
         }
-    }
-
-    /// The wheels that turn in a mode with two stuck wheels, and how; none in another mode.
-    fn dragged_in(
-        &self,
-        mode: usize,
-        observation: &Observation,
-        evidence: &WheelEvidence,
-    ) -> [Option<(usize, Dragged)>; WHEELS] {
-        let stuck = self.modes[mode].moved.stuck();
-        std::array::from_fn(|wheel| {
-            let turns = wheel < self.robot.wheels.len() && stuck >> wheel & 1 == 0;
-            (turns && stuck.count_ones() > 1).then(|| {
-                let dragged = evidence.dragged(&self.model, observation, stuck, wheel);
-                (wheel, dragged)
-            })
-        })
-    }
-
-    /// What the wheels say in one motion mode, in general or at its onset.
-    fn wheels_in(
-        &self,
-        mode: usize,
-        observation: &Observation,
-        evidence: &WheelEvidence,
-        is_new: bool,
-    ) -> Likelihoods {
-        let moved = self.modes[mode].moved;
-        Likelihoods::new(self.robot.wheels.len(), |wheel, state| {
-            match (state, moved) {
-                (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
-                (0, _) => evidence.whole(&self.model, observation, moved, is_new, wheel),
-                (OWN_RATE, Moved::UnknownAny) => evidence.own_rate[wheel],
-                (OWN_RATE, _) => f64::NEG_INFINITY,
-                // What reads alike shares one likelihood, broken or not.
-                (SILENT, _) if moved.is_stuck(wheel) => evidence.broken[wheel][ZERO - 1],
-                (SILENT, _) => f64::NEG_INFINITY,
-                (broken, _) => evidence.broken[wheel][broken - 1],
-            }
-        })
     }
 
     /// Fills the probabilities of nodes, sets and unknown.
@@ -373,9 +334,11 @@ impl Exact {
     }
 }
 
-/// Time since an onset, s.
-fn age_s(t_ns: u64, onset_ns: u64) -> f64 {
-    t_ns.saturating_sub(onset_ns) as f64 * 1e-9
+/// True if more than one wheel sticks or turns again; not if a single stuck wheel was another one.
+fn changes_several(before: Moved, after: Moved) -> bool {
+    let (before, after) = (before.stuck(), after.stuck());
+    let is_another = before.count_ones() == 1 && after.count_ones() == 1;
+    (before ^ after).count_ones() > 1 && !is_another
 }
 
 /// The wheel that sticks besides those that do.

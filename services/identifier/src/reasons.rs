@@ -169,21 +169,22 @@ impl Reasons {
         let evidence = WheelEvidence::new(&self.model, &self.robot, observation, noise);
         let is_new = is_new(observation.t_ns, self.onset_ns);
         for lineage in followed {
-            let moved = self.modes[lineage.mode].moved;
+            let mode = &self.modes[lineage.mode];
+            let moved = mode.moved;
             for wheel in 0..self.robot.wheels.len().min(WHEELS) {
                 let is_broken = lineage.broken >> wheel & 1 == 1;
                 let is_dragged = moved.stuck().count_ones() > 1 && !moved.is_stuck(wheel);
                 lineage.heard[Channel::wheel_rate(wheel)] += if is_broken {
                     evidence.broken_anyhow(wheel)
                 } else if is_dragged && !is_new {
-                    let dragged = evidence.dragged(&self.model, observation, moved.stuck(), wheel);
+                    let dragged = evidence.dragged(&self.model, observation, mode, wheel);
                     let (model, offsets) = (&self.model, &mut lineage.offsets);
                     let heard =
                         offsets.log_likelihood(model, observation, &evidence, wheel, &dragged);
                     offsets.learn(observation, &evidence, wheel, &dragged);
                     heard
                 } else {
-                    evidence.whole(&self.model, observation, moved, is_new, wheel)
+                    evidence.whole(&self.model, observation, mode, is_new, wheel)
                 };
             }
             if moved == Moved::UnknownAny {

@@ -30,6 +30,7 @@ pub mod observation;
 mod provenance;
 mod reading;
 pub mod switching;
+mod together;
 pub mod troubles;
 pub mod wheel_evidence;
 pub mod wheels;

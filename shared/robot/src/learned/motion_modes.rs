@@ -4,7 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::WHEELS;
 use vigil_inference::track::MotionNoise;
 
-use super::{Curve, Model, MotionModel};
+use super::together::Together;
+use super::{Curve, Model, MotionModel, RateModel};
 use crate::Description;
 
 /// The unknown: standard deviation of its constant deviation per metre (yaw, forward, lateral).
@@ -24,15 +25,11 @@ const OTHER_GROUNDS: [(f64, f64, f64); 3] =
 const DRAGGED_AT: f64 = 0.25;
 /// Deviation of such an effect from one that is changed as a whole: yaw, forward, lateral.
 const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
-/// Two stuck wheels, of which nothing was learned together: their effects add up, and are more than
-/// their sum, as fewer wheels drive against more drag. Two that turn the robot the same way are on
-/// one side, where one wheel is left to drive; of two that turn it against each other each keeps
-/// its own turn. Factors of yaw, forward and lateral motion, in the middle of what the equilibrium
-/// of forces ([`crate::slip`]) gives for any two wheels in turns from 1 m on.
-const SAME_SIDE: [f64; 3] = [1.8, 1.8, 1.0];
-const EITHER_SIDE: [f64; 3] = [1.0, 1.4, 1.0];
-/// Deviation of each of the two effects from that.
-const BOTH_SD: f64 = 0.6;
+/// With several stuck wheels: deviation of each wheel's effect from what is expected.
+const TOGETHER_SD: f64 = 0.6;
+/// Wheels that stick at once, or turn again at once, do so from one cause, whichever they are: how
+/// often, beside one wheel.
+const AT_ONCE: f64 = 0.1;
 
 /// What moves the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,6 +87,8 @@ pub struct MotionMode {
     pub kept_m_s: f64,
     /// Variance of a jump of the pose (x, y, yaw) at the onset.
     pub jump: [f64; 3],
+    /// How the turning wheels' rates change beyond the sum of what each stuck wheel does to them.
+    pub beyond: [RateModel; WHEELS],
 }
 
 impl MotionMode {
@@ -104,7 +103,7 @@ impl MotionMode {
             let wheels = (0..WHEELS).filter(|w| stuck >> w & 1 == 1);
             let effects = wheels.filter_map(|w| model.stuck(w));
             let along = effects.fold(Matrix3::zeros(), |sum, stuck| {
-                let effect = (at(&stuck.motion) - at(&model.nominal.motion)) * BOTH_SD;
+                let effect = (at(&stuck.motion) - at(&model.nominal.motion)) * TOGETHER_SD;
                 sum + effect * effect.transpose()
             });
             return MotionNoise {
@@ -145,24 +144,23 @@ impl FaultRates {
     #[must_use]
     pub fn rate_1_s(&self, from: Moved, to: Moved) -> f64 {
         let (before, after) = (from.stuck(), to.stuck());
+        let (more, fewer) = ((after & !before).count_ones(), (before & !after).count_ones());
+        let at_once = if more.max(fewer) > 1 { AT_ONCE } else { 1.0 };
         match to {
             _ if from == to => 0.0,
-            Moved::Nominal if before.count_ones() <= 1 => self.death_1_s,
-            Moved::Nominal => 0.0,
             Moved::Unknown | Moved::UnknownAny => 0.5 * self.unknown_1_s,
-            Moved::Stuck(_) if after.count_ones() == 1 && before.count_ones() <= 1 => {
-                self.fault_1_s
-            }
-            Moved::Stuck(_) if before != 0 && before & after == before => self.fault_1_s,
-            Moved::Stuck(_) if before & after == after => self.death_1_s,
-            Moved::Stuck(_) => 0.0,
+            Moved::Stuck(_) if fewer == 0 => self.fault_1_s * at_once,
+            // Another wheel instead of the only one.
+            Moved::Stuck(_) if before.count_ones() == 1 && after.count_ones() == 1 => self.fault_1_s,
+            _ if more == 0 => self.death_1_s * at_once,
+            _ => 0.0,
         }
     }
 }
 
 /// The ways in which a robot may move whose wheels `stuck` (bits) may stick: nominal first, then
-/// single wheels, pairs if the wheels' rates are `read`, and both kinds of unknown; if `rare`,
-/// single wheels on other ground and a jump of the pose too.
+/// single wheels, sets of several if the wheels' rates are `read`, and both kinds of unknown; if
+/// `rare`, single wheels on other ground and a jump of the pose too.
 #[must_use]
 pub fn motion_modes(
     model: &Model,
@@ -186,12 +184,13 @@ pub fn motion_modes(
         ground: (1.0, 0.0),
         kept_m_s: 0.0,
         jump: [0.0; 3],
+        beyond: [RateModel::NONE; WHEELS],
     }];
     let known = |w: usize| stuck >> w & 1 == 1 && model.stuck(w).is_some();
     let wheels = || (0..WHEELS).filter(|&w| known(w));
     modes.extend(wheels().map(|w| MotionMode {
         share: learned,
-        ..stuck_mode(model, &[w])
+        ..stuck_mode(model, w)
     }));
     for &(share, factor, sd) in grounds {
         modes.extend(wheels().map(|w| MotionMode {
@@ -201,8 +200,13 @@ pub fn motion_modes(
         }));
     }
     if read {
-        let both = |a: usize| wheels().filter(move |&b| b > a).map(move |b| [a, b]);
-        modes.extend(wheels().flat_map(both).map(|both| stuck_mode(model, &both)));
+        let known = wheels().fold(0_u32, |bits, wheel| bits | 1 << wheel);
+        let several = (1..1 << WHEELS).filter(|set: &u32| set.count_ones() > 1 && set & !known == 0);
+        let together = Together::new(model, robot);
+        modes.extend(together.iter().flat_map(|together| {
+            let several = several.clone();
+            several.filter_map(|set| several_mode(model, together, set))
+        }));
     }
     let drives_on = |moved| MotionMode {
         moved,
@@ -213,6 +217,7 @@ pub fn motion_modes(
         ground: (1.0, 0.0),
         kept_m_s: 0.0,
         jump: [0.0; 3],
+        beyond: [RateModel::NONE; WHEELS],
     };
     modes.push(MotionMode {
         share: 1.0 - JUMP_SHARE,
@@ -246,46 +251,61 @@ pub fn unknown_noise(model: &Model) -> MotionNoise {
     }
 }
 
-/// Wheels stuck: one as learned, two as said at [`SAME_SIDE`].
-fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
-    let nominal = &model.nominal.motion;
-    let turn = |w: usize| {
-        let stuck = model.stuck(w).map_or(0.0, |s| s.motion.yaw.curvature[0]);
-        stuck - nominal.yaw.curvature[0]
-    };
-    let factors = match wheels {
-        &[a, b] if turn(a) * turn(b) > 0.0 => SAME_SIDE,
-        [_, _] => EITHER_SIDE,
-        _ => [1.0; 3],
-    };
-    let mut motion = *nominal;
-    let mut noise: Option<MotionNoise> = None;
-    for stuck in wheels.iter().filter_map(|&w| model.stuck(w)) {
-        let ([yaw, forward, lateral], with) = (factors, &stuck.motion);
-        motion.yaw = plus(&motion.yaw, &with.yaw, &nominal.yaw, yaw);
-        motion.forward = plus(&motion.forward, &with.forward, &nominal.forward, forward);
-        motion.lateral = plus(&motion.lateral, &with.lateral, &nominal.lateral, lateral);
-        let own = stuck.motion.noise();
-        noise = Some(match noise {
-            None => own,
-            Some(sum) => MotionNoise {
-                offset: sum.offset + own.offset,
-                deviation: sum.deviation + own.deviation,
-                length_m: sum.length_m.max(own.length_m),
-                white: sum.white + own.white,
-            },
-        });
-    }
+/// One wheel stuck, as learned.
+fn stuck_mode(model: &Model, wheel: usize) -> MotionMode {
+    let motion = model.stuck(wheel).map_or(model.nominal.motion, |stuck| stuck.motion);
     MotionMode {
+        moved: Moved::Stuck(1 << wheel),
         share: 1.0,
         p_unknown: 0.0,
-        moved: Moved::Stuck(wheels.iter().fold(0, |mask, w| mask | 1 << w)),
         motion,
-        noise: noise.unwrap_or_else(|| nominal.noise()),
+        noise: motion.noise(),
         ground: (1.0, 0.0),
         kept_m_s: 0.0,
         jump: [0.0; 3],
+        beyond: [RateModel::NONE; WHEELS],
     }
+}
+
+/// Several wheels stuck: the sum of what each does, and what they do [`Together`].
+fn several_mode(model: &Model, together: &Together, set: u32) -> Option<MotionMode> {
+    let nominal = &model.nominal.motion;
+    let beyond = together.beyond(set)?;
+    let mut motion = *nominal;
+    let [yaw, forward, lateral] = beyond.motion;
+    motion.yaw = plus(&motion.yaw, &yaw, &Curve::default());
+    motion.forward = plus(&motion.forward, &forward, &Curve::default());
+    motion.lateral = plus(&motion.lateral, &lateral, &Curve::default());
+    let mut noise = MotionNoise {
+        offset: Matrix3::zeros(),
+        deviation: Matrix3::zeros(),
+        length_m: 0.0,
+        white: Vector3::zeros(),
+    };
+    for stuck in (0..WHEELS).filter(|w| set >> w & 1 == 1) {
+        let with = &model.stuck(stuck)?.motion;
+        motion.yaw = plus(&motion.yaw, &with.yaw, &nominal.yaw);
+        motion.forward = plus(&motion.forward, &with.forward, &nominal.forward);
+        motion.lateral = plus(&motion.lateral, &with.lateral, &nominal.lateral);
+        let own = with.noise();
+        noise = MotionNoise {
+            offset: noise.offset + own.offset,
+            deviation: noise.deviation + own.deviation,
+            length_m: noise.length_m.max(own.length_m),
+            white: noise.white + own.white,
+        };
+    }
+    Some(MotionMode {
+        share: 1.0,
+        p_unknown: 0.0,
+        moved: Moved::Stuck(set),
+        motion,
+        noise,
+        ground: (1.0, 0.0),
+        kept_m_s: 0.0,
+        jump: [0.0; 3],
+        beyond: beyond.rates,
+    })
 }
 
 /// A wheel stuck on ground that changes its effect by one unknown factor: it is the shear of the
@@ -298,7 +318,7 @@ fn on_other_ground(
     ground: (f64, f64),
 ) -> MotionMode {
     let nominal = &model.nominal.motion;
-    let mode = stuck_mode(model, &[wheel]);
+    let mode = stuck_mode(model, wheel);
     let (factor, sd) = ground;
     let kept_m_s = yielding_m_s(model, robot, wheel);
     let scaled = |stuck: &Curve, nominal: &Curve, kept_m_s: f64| {
@@ -348,14 +368,10 @@ fn yielding_m_s(model: &Model, robot: &Description, wheel: usize) -> f64 {
     }
 }
 
-/// `base + factor (stuck - nominal)`; exactly `stuck` if that is all there is.
-fn plus(base: &Curve, stuck: &Curve, nominal: &Curve, factor: f64) -> Curve {
-    if base == nominal && factor == 1.0 {
-        return *stuck;
-    }
-    let (base, stuck, nominal) = (base.terms(), stuck.terms(), nominal.terms());
-    let terms = std::array::from_fn(|i| base[i] + factor * (stuck[i] - nominal[i]));
-    Curve::from_terms(terms)
+/// `base + with - without`.
+fn plus(base: &Curve, with: &Curve, without: &Curve) -> Curve {
+    let (base, with, without) = (base.terms(), with.terms(), without.terms());
+    Curve::from_terms(std::array::from_fn(|i| base[i] + with[i] - without[i]))
 }
 
 #[cfg(test)]
@@ -363,7 +379,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_change_is_one_fault_more_or_less_or_another_one() {
+    fn every_change_is_faults_more_or_less_or_another_one() {
         let rates = FaultRates {
             fault_1_s: 2.0,
             unknown_1_s: 6.0,
@@ -373,19 +389,22 @@ mod tests {
         let cases = [
             (Nominal, Nominal, 0.0),
             (Nominal, Stuck(1), 2.0),
-            (Nominal, Stuck(3), 0.0),
+            (Nominal, Stuck(3), 2.0 * AT_ONCE),
             (Nominal, UnknownAny, 3.0),
             (Stuck(1), Nominal, 5.0),
             (Stuck(1), Stuck(2), 2.0),
             (Stuck(1), Stuck(3), 2.0),
+            (Stuck(1), Stuck(7), 2.0 * AT_ONCE),
             (Stuck(4), Stuck(3), 0.0),
             (Stuck(3), Stuck(2), 5.0),
             (Stuck(3), Stuck(4), 0.0),
             (Stuck(3), Stuck(5), 0.0),
-            (Stuck(3), Nominal, 0.0),
+            (Stuck(3), Stuck(15), 2.0 * AT_ONCE),
+            (Stuck(7), Stuck(2), 5.0 * AT_ONCE),
+            (Stuck(3), Nominal, 5.0 * AT_ONCE),
             (Stuck(3), Unknown, 3.0),
             (Unknown, Stuck(2), 2.0),
-            (Unknown, Stuck(3), 0.0),
+            (Unknown, Stuck(3), 2.0 * AT_ONCE),
             (Unknown, Nominal, 5.0),
         ];
         for (from, to, expected) in cases {

@@ -4,7 +4,7 @@ use vigil_blocks::WHEELS;
 use vigil_inference::logspace::{log_add, log_normal};
 
 use super::wheels::{rolling_rate, steering_angle};
-use super::{EncoderState, Model, Moved, NoiseScales, Observation, RateModel};
+use super::{EncoderState, Model, MotionMode, Moved, NoiseScales, Observation, RateModel};
 use crate::Description;
 
 /// Ways in which an encoder breaks: zero, frozen, noise, dead (zero plus the sensor's noise).
@@ -22,10 +22,8 @@ pub const BREAKAGE_SHARES: [f64; BREAKAGES.len()] = [0.32, 0.32, 0.32, 0.04];
 /// Share of healthy wheels' rates in the tail: while all is well, and while another wheel drags.
 const TAIL: f64 = 0.02;
 const TAIL_DRAGGED: f64 = 0.1;
-/// Two dragging wheels change the rates of the others by more than the sum of what each does: by
-/// this factor, which lies in the middle of what the equilibrium of forces gives for any two.
-const TOGETHER: f64 = 1.4;
-/// Deviation of the change from that, relative to it.
+/// Several dragging wheels change the others' rates in a way of which nothing was learned: its
+/// deviation from what is expected, relative to it.
 pub const TOGETHER_SD: f64 = 0.4;
 /// Share of wheels that do anything, in the unknown.
 pub const ANYTHING: f64 = 0.2;
@@ -111,7 +109,7 @@ impl WheelEvidence {
         &self,
         model: &Model,
         observation: &Observation,
-        moved: Moved,
+        mode: &MotionMode,
         is_new: bool,
         i: usize,
     ) -> f64 {
@@ -119,10 +117,10 @@ impl WheelEvidence {
             true => log_add(a, b) - std::f64::consts::LN_2,
             false => a,
         };
-        match moved {
-            _ if moved.is_stuck(i) => either(self.standing(i), self.any[i]),
+        match mode.moved {
+            moved if moved.is_stuck(i) => either(self.standing(i), self.any[i]),
             Moved::Stuck(stuck) => {
-                let dragged = self.dragged(model, observation, stuck, i);
+                let dragged = self.dragged(model, observation, mode, i);
                 let sd = match stuck.count_ones() {
                     0 | 1 => 0.0,
                     _ => TOGETHER_SD * dragged.change_rad_s,
@@ -136,28 +134,26 @@ impl WheelEvidence {
         }
     }
 
-    /// How wheel `i` turns while the wheels `stuck` (bits, not i) drag.
+    /// How wheel `i`, which is not stuck, turns while others drag.
     #[must_use]
     pub fn dragged(
         &self,
         model: &Model,
         observation: &Observation,
-        stuck: u32,
+        mode: &MotionMode,
         i: usize,
     ) -> Dragged {
         let (rolling, behind) = self.rolling[i];
         let curvature = observation.command[0];
         let rate = |rates: &[RateModel]| rates[i].rate(rolling, curvature);
         let (nominal, _) = rate(&model.nominal.rates);
-        let (mut change, mut variance) = (0.0, behind);
-        let dragging = (0..WHEELS).filter(|&w| stuck >> w & 1 == 1);
+        let (beyond, _) = rate(&mode.beyond);
+        let (mut change, mut variance) = (beyond, behind);
+        let dragging = (0..WHEELS).filter(|&w| mode.moved.is_stuck(w));
         for stuck in dragging.filter_map(|w| model.stuck(w)) {
             let (with, its) = rate(&stuck.rates);
             change += with - nominal;
             variance += its;
-        }
-        if stuck.count_ones() > 1 {
-            change *= TOGETHER;
         }
         Dragged {
             rate_rad_s: nominal + change,
