@@ -122,6 +122,12 @@ impl Exact {
         self.degenerate_count
     }
 
+    /// The ways in which the robot may move.
+    #[must_use]
+    pub fn modes(&self) -> &[MotionMode] {
+        &self.modes
+    }
+
     /// The hypotheses, and what moves the robot under each.
     pub fn hypotheses(&self) -> impl ExactSizeIterator<Item = (Moved, &Hypothesis<State>)> {
         let all = self.bank.hypotheses().iter();
@@ -245,6 +251,10 @@ impl Exact {
         let (curvature, speed) = (observation.curvature, observation.speed);
         let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
         let mut track = from.state.track.fork(&noise);
+        if before.is_immobile() && after.is_immobile() {
+            // Another wheel changes nothing of a motion that is none.
+            track = from.state.track;
+        }
         track.diffuse(self.modes[mode].jump);
         let t_ns = observation.t_first_ns;
         let mut encoders = match (before, after) {

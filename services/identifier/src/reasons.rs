@@ -10,7 +10,7 @@ use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
 use vigil_inference::track::Track;
 use vigil_robot::Description;
 use vigil_robot::learned::{
-    Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
+    Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence,
 };
 
 use crate::exact::is_new;
@@ -53,13 +53,18 @@ pub struct Reasons {
 }
 
 impl Reasons {
-    /// No diagnosis yet.
+    /// No diagnosis yet, of a robot that may move in these ways.
     #[must_use]
-    pub fn new(model: &Model, robot: &Description, leaves: &Leaves, use_wheels: bool) -> Self {
+    pub fn new(
+        model: &Model,
+        robot: &Description,
+        modes: Vec<MotionMode>,
+        use_wheels: bool,
+    ) -> Self {
         Self {
             model: model.clone(),
             robot: robot.clone(),
-            modes: motion_modes(model, robot, leaves.stuck_wheels(), false, true),
+            modes,
             use_wheels,
             followed: None,
             onset_ns: 0,

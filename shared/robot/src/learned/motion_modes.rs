@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::WHEELS;
 use vigil_inference::track::MotionNoise;
 
-use super::together::Together;
+use super::together::{Together, is_immobile};
 use super::{Curve, Model, MotionModel, RateModel};
 use crate::Description;
 
@@ -25,8 +25,6 @@ const OTHER_GROUNDS: [(f64, f64, f64); 3] =
 const DRAGGED_AT: f64 = 0.25;
 /// Deviation of such an effect from one that is changed as a whole: yaw, forward, lateral.
 const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
-/// With several stuck wheels: deviation of each wheel's effect from what is expected.
-const TOGETHER_SD: f64 = 0.6;
 /// Wheels that stick at once, or turn again at once, do so from one cause, whichever they are: how
 /// often, beside one wheel.
 const AT_ONCE: f64 = 0.1;
@@ -55,6 +53,12 @@ impl Moved {
     #[must_use]
     pub const fn is_unknown(self) -> bool {
         matches!(self, Self::Unknown | Self::UnknownAny)
+    }
+
+    /// True if too many wheels are stuck for the robot to move.
+    #[must_use]
+    pub const fn is_immobile(self) -> bool {
+        is_immobile(self.stuck())
     }
 
     /// Bits of the stuck wheels.
@@ -98,19 +102,6 @@ impl MotionMode {
     pub fn noise_at(&self, model: &Model, curvature: f64, speed: f64) -> MotionNoise {
         let limit = model.command.curvature_max_1_m;
         let at = |motion: &MotionModel| Vector3::from(motion.per_metre(curvature, speed, limit));
-        let stuck = self.moved.stuck();
-        if stuck.count_ones() > 1 {
-            let wheels = (0..WHEELS).filter(|w| stuck >> w & 1 == 1);
-            let effects = wheels.filter_map(|w| model.stuck(w));
-            let along = effects.fold(Matrix3::zeros(), |sum, stuck| {
-                let effect = (at(&stuck.motion) - at(&model.nominal.motion)) * TOGETHER_SD;
-                sum + effect * effect.transpose()
-            });
-            return MotionNoise {
-                offset: self.noise.offset + along,
-                ..self.noise
-            };
-        }
         let (factor, sd) = self.ground;
         if sd <= 0.0 {
             return self.noise;
@@ -205,7 +196,7 @@ pub fn motion_modes(
         let together = Together::new(model, robot);
         modes.extend(together.iter().flat_map(|together| {
             let several = several.clone();
-            several.filter_map(|set| several_mode(model, together, set))
+            several.filter_map(|set| several_mode(together, set))
         }));
     }
     let drives_on = |moved| MotionMode {
@@ -267,44 +258,19 @@ fn stuck_mode(model: &Model, wheel: usize) -> MotionMode {
     }
 }
 
-/// Several wheels stuck: the sum of what each does, and what they do [`Together`].
-fn several_mode(model: &Model, together: &Together, set: u32) -> Option<MotionMode> {
-    let nominal = &model.nominal.motion;
-    let beyond = together.beyond(set)?;
-    let mut motion = *nominal;
-    let [yaw, forward, lateral] = beyond.motion;
-    motion.yaw = plus(&motion.yaw, &yaw, &Curve::default());
-    motion.forward = plus(&motion.forward, &forward, &Curve::default());
-    motion.lateral = plus(&motion.lateral, &lateral, &Curve::default());
-    let mut noise = MotionNoise {
-        offset: Matrix3::zeros(),
-        deviation: Matrix3::zeros(),
-        length_m: 0.0,
-        white: Vector3::zeros(),
-    };
-    for stuck in (0..WHEELS).filter(|w| set >> w & 1 == 1) {
-        let with = &model.stuck(stuck)?.motion;
-        motion.yaw = plus(&motion.yaw, &with.yaw, &nominal.yaw);
-        motion.forward = plus(&motion.forward, &with.forward, &nominal.forward);
-        motion.lateral = plus(&motion.lateral, &with.lateral, &nominal.lateral);
-        let own = with.noise();
-        noise = MotionNoise {
-            offset: noise.offset + own.offset,
-            deviation: noise.deviation + own.deviation,
-            length_m: noise.length_m.max(own.length_m),
-            white: noise.white + own.white,
-        };
-    }
+/// Several wheels stuck.
+fn several_mode(together: &Together<'_>, set: u32) -> Option<MotionMode> {
+    let several = together.several(set)?;
     Some(MotionMode {
         share: 1.0,
         p_unknown: 0.0,
         moved: Moved::Stuck(set),
-        motion,
-        noise,
+        motion: several.motion,
+        noise: several.noise,
         ground: (1.0, 0.0),
         kept_m_s: 0.0,
         jump: [0.0; 3],
-        beyond: beyond.rates,
+        beyond: several.beyond,
     })
 }
 
@@ -366,12 +332,6 @@ fn yielding_m_s(model: &Model, robot: &Description, wheel: usize) -> f64 {
     } else {
         0.0
     }
-}
-
-/// `base + with - without`.
-fn plus(base: &Curve, with: &Curve, without: &Curve) -> Curve {
-    let (base, with, without) = (base.terms(), with.terms(), without.terms());
-    Curve::from_terms(std::array::from_fn(|i| base[i] + with[i] - without[i]))
 }
 
 #[cfg(test)]
