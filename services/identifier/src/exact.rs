@@ -48,8 +48,10 @@ pub struct State {
     pub track: Track,
     /// Encoders; in the unknown, encoders or wheels.
     pub encoders: Encoders,
-    /// With two stuck wheels: what the other wheels' rates are off by.
+    /// With several stuck wheels: what the other wheels' rates are off by.
     pub offsets: RateOffsets,
+    /// Wheels, as bits, that may still read as before the onset.
+    pub fresh: u32,
 }
 
 /// The filter.
@@ -112,6 +114,7 @@ impl Exact {
             track,
             encoders: Encoders::healthy(t_ns),
             offsets: RateOffsets::default(),
+            fresh: 0,
         };
         self.bank.restart(NOMINAL, t_ns, state);
     }
@@ -251,9 +254,11 @@ impl Exact {
         let (curvature, speed) = (observation.curvature, observation.speed);
         let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
         let mut track = from.state.track.fork(&noise);
+        let mut fresh = !(before.stuck() & after.stuck());
         if before.is_immobile() && after.is_immobile() {
             // Another wheel changes nothing of a motion that is none.
             track = from.state.track;
+            fresh = before.stuck() ^ after.stuck();
         }
         track.diffuse(self.modes[mode].jump);
         let t_ns = observation.t_first_ns;
@@ -278,6 +283,7 @@ impl Exact {
             track,
             encoders,
             offsets: RateOffsets::default(),
+            fresh,
         }
     }
 
@@ -296,11 +302,16 @@ impl Exact {
             let index = hypothesis.mode;
             let prepare = || seen.prepared(&self.modes[index]);
             let prepared = self.prepared[index].get_or_insert_with(prepare);
-            let is_new = is_new(observation.t_ns, hypothesis.onset);
             let State {
-                encoders, offsets, ..
+                encoders,
+                offsets,
+                fresh,
+                ..
             } = &mut hypothesis.state;
-            let gained = seen.weigh(prepared, (&births, death), is_new, encoders, offsets);
+            if !is_new(observation.t_ns, hypothesis.onset) {
+                *fresh = 0;
+            }
+            let gained = seen.weigh(prepared, (&births, death), *fresh, encoders, offsets);
             hypothesis.log_weight += gained;
         }
     }

@@ -70,24 +70,28 @@ impl Seen<'_> {
         })
     }
 
-    /// Steps the encoders of a hypothesis in this mode, which is new or not, each with
-    /// these probabilities to break and to recover; returns the log-likelihood of the readings.
+    /// Steps the encoders of a hypothesis in this mode, each with these probabilities to break and
+    /// to recover; returns the log-likelihood of the readings. The wheels `fresh` (bits) have just
+    /// changed.
     pub fn weigh(
         &self,
         prepared: &Prepared,
         (births, death): (&[f64; WHEELS], f64),
-        is_new: bool,
+        fresh: u32,
         encoders: &mut Encoders,
         offsets: &mut RateOffsets,
     ) -> f64 {
         let (observation, evidence) = (self.observation, self.evidence);
-        let mut likelihoods = prepared.likelihoods[usize::from(is_new)];
+        let [general, at_onset] = &prepared.likelihoods;
+        let mut likelihoods = *general;
+        for wheel in (0..WHEELS).filter(|wheel| fresh >> wheel & 1 == 1) {
+            likelihoods.replace(wheel, at_onset);
+        }
         let dragged = prepared.dragged.iter().enumerate();
         let dragged = dragged.filter_map(|(wheel, dragged)| Some((wheel, dragged.as_ref()?)));
-        let dragged = dragged.filter(|_| !is_new);
+        let dragged = dragged.filter(|(wheel, _)| fresh >> wheel & 1 == 0);
         for (wheel, dragged) in dragged.clone() {
-            let log =
-                offsets.log_likelihood(self.model, observation, evidence, wheel, dragged);
+            let log = offsets.log_likelihood(self.model, observation, evidence, wheel, dragged);
             likelihoods.replace_whole(wheel, log);
         }
         let (stuck, t_ns) = (prepared.stuck, observation.t_first_ns);
@@ -117,14 +121,17 @@ impl Seen<'_> {
         [before | stood, before & !turned, (before | stood) & !turned]
     }
 
-    /// True if a wheel's readings are those of a standing one.
+    /// True if a wheel's readings may well be those of a standing one.
     fn stands(&self, wheel: usize) -> bool {
         let evidence = self.evidence;
         let silent = evidence.broken[wheel][ZERO - 1];
-        evidence.standing(wheel).max(silent) > evidence.any[wheel]
+        evidence.standing(wheel).max(silent) + DOUBT > evidence.any[wheel]
     }
 }
 
+/// Readings that a standing wheel makes less probable than that it does anything, by up to this
+/// much (natural logarithm), may still be its: one in a thousand lies so far out.
+const DOUBT: f64 = 2.0;
 /// An encoder that broke this short before its wheel is supposed to have stuck may never have been
 /// broken, s: a stuck wheel's reads the same, and the motion tells within about this time.
 pub const EXPLAINED_S: f64 = 2.0;

@@ -25,6 +25,8 @@ const TAIL_DRAGGED: f64 = 0.1;
 /// Several dragging wheels change the others' rates in a way of which nothing was learned: its
 /// deviation from what is expected, relative to it.
 pub const TOGETHER_SD: f64 = 0.4;
+/// Share of the observations at an onset that hold the very moment.
+const MOMENT: f64 = 0.2;
 /// Share of wheels that do anything, in the unknown.
 pub const ANYTHING: f64 = 0.2;
 /// Standard deviation of a steering angle that does anything, rad.
@@ -118,7 +120,11 @@ impl WheelEvidence {
             false => a,
         };
         match mode.moved {
-            moved if moved.is_stuck(i) => either(self.standing(i), self.any[i]),
+            moved if moved.is_stuck(i) && is_new => log_add(
+                (1.0 - MOMENT).ln() + self.standing(i),
+                MOMENT.ln() + self.any[i],
+            ),
+            moved if moved.is_stuck(i) => self.standing(i),
             Moved::Stuck(stuck) => {
                 let dragged = self.dragged(model, observation, mode, i);
                 let sd = match stuck.count_ones() {
