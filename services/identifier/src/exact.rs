@@ -190,12 +190,11 @@ impl Exact {
         let best = |wanted: &dyn Fn(Moved) -> bool| {
             self.bank.best(|mode| wanted(modes[mode].moved)).copied()
         };
-        let sources = [
-            best(&|moved| moved == Moved::Nominal),
-            best(&|moved| moved.stuck().count_ones() == 1),
-            best(&|moved| moved.stuck().count_ones() > 1),
-            best(&Moved::is_unknown),
-        ];
+        let sources: [_; WHEELS + 2] = std::array::from_fn(|count| match count {
+            0 => best(&|moved| moved == Moved::Nominal),
+            1..=WHEELS => best(&|moved| moved.stuck().count_ones() as usize == count),
+            _ => best(&Moved::is_unknown),
+        });
         for from in sources.into_iter().flatten() {
             let before = self.modes[from.mode].moved;
             let read = evidence.map_or([before.stuck(); 3], |evidence| {
@@ -254,12 +253,14 @@ impl Exact {
         let (curvature, speed) = (observation.curvature, observation.speed);
         let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
         let mut track = from.state.track.fork(&noise);
-        let mut fresh = !(before.stuck() & after.stuck());
         if before.is_immobile() && after.is_immobile() {
             // Another wheel changes nothing of a motion that is none.
             track = from.state.track;
-            fresh = before.stuck() ^ after.stuck();
         }
+        let fresh = match before.stuck() {
+            0 => u32::MAX,
+            stuck => stuck ^ after.stuck(),
+        };
         track.diffuse(self.modes[mode].jump);
         let t_ns = observation.t_first_ns;
         let mut encoders = match (before, after) {
