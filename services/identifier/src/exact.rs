@@ -12,7 +12,7 @@
 use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::WHEELS;
 use vigil_inference::bank::{Bank, Hypothesis};
-use vigil_inference::track::Track;
+use vigil_inference::track::{Displacement, Track};
 use vigil_robot::Description;
 use vigil_robot::learned::{
     FaultRates, Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence, motion_modes,
@@ -35,6 +35,10 @@ const PER_RARE: usize = 8;
 const FLOOR: f64 = -30.0;
 /// So long after a supposed onset, ns, wheels may still read as before.
 const ONSET_BLUR_NS: u64 = 150_000_000;
+/// Wheels that stick one after another, each so soon after the one before, s, have one cause: this
+/// many times the rate at which a wheel sticks by itself.
+const SOON_S: f64 = 1.0;
+const SOON: f64 = 20.0;
 /// Prior rate of faults while something is suspected, 1/s of motion. An alarm has been raised:
 /// the rate over a robot's life would make the filter slow without making it more often right.
 pub const BIRTH_1_S: f64 = 0.01;
@@ -244,7 +248,12 @@ impl Exact {
             }
             _ => 0.0,
         };
-        (p + instead) * self.modes[mode].share
+        let is_soon = age_s(observation.t_first_ns, from.onset) < SOON_S;
+        let soon = match newly_stuck(before, after) {
+            Some(_) if is_soon && before.stuck() != 0 => SOON,
+            _ => 1.0,
+        };
+        (p * soon + instead) * self.modes[mode].share
     }
 
     /// What becomes of a hypothesis when its mode changes.
@@ -256,6 +265,9 @@ impl Exact {
         if before.is_immobile() && after.is_immobile() {
             // Another wheel changes nothing of a motion that is none.
             track = from.state.track;
+        }
+        if before.stuck().count_ones().max(after.stuck().count_ones()) > 1 {
+            track.predict(&self.lagged(from, mode, observation), &noise);
         }
         let fresh = match before.stuck() {
             0 => u32::MAX,
@@ -285,6 +297,23 @@ impl Exact {
             encoders,
             offsets: RateOffsets::default(),
             fresh,
+        }
+    }
+
+    /// By how much more the robot moves at a change of its mode than it would if the new mode's
+    /// motion began at once: the body follows within the lag, as if the old one lasted so long.
+    fn lagged(&self, from: &Hypothesis<State>, to: usize, at: &Observation) -> Displacement {
+        let limit = self.model.command.curvature_max_1_m;
+        let motion = |mode: usize| {
+            let motion = &self.modes[mode].motion;
+            Vector3::from(motion.per_metre(at.curvature, at.speed, limit))
+        };
+        let apart = motion(from.mode) + from.state.track.deviation() - motion(to);
+        let travel_m = at.speed * self.model.command.lag_s;
+        Displacement {
+            per_metre: apart.into(),
+            travel_m,
+            extra: (apart * travel_m).map(|apart| apart * apart).into(),
         }
     }
 

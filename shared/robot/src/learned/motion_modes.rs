@@ -91,7 +91,8 @@ pub struct MotionMode {
     pub kept_m_s: f64,
     /// Variance of a jump of the pose (x, y, yaw) at the onset.
     pub jump: [f64; 3],
-    /// How the turning wheels' rates change beyond the sum of what each stuck wheel does to them.
+    /// How the turning wheels' rates change beyond the sum of what each stuck wheel does to them;
+    /// in all if the robot is immobile.
     pub beyond: [RateModel; WHEELS],
 }
 

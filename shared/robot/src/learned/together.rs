@@ -48,7 +48,8 @@ pub(super) struct Several {
     pub motion: MotionModel,
     /// The motion's noise.
     pub noise: MotionNoise,
-    /// How the turning wheels' rates change beyond the sum of what each stuck wheel does to them.
+    /// How the turning wheels' rates change beyond the sum of what each stuck wheel does to them;
+    /// in all if the robot is immobile.
     pub beyond: [RateModel; WHEELS],
 }
 
@@ -112,7 +113,8 @@ impl<'a> Together<'a> {
             motion: std::array::from_fn(|axis| motion[axis] - self.nominal.motion[axis]),
             rates: std::array::from_fn(|wheel| rates[wheel] - self.nominal.rates[wheel]),
         };
-        for wheel in (0..WHEELS).filter(|&wheel| stuck >> wheel & 1 == 1) {
+        let counted = if is_immobile(stuck) { 0 } else { stuck };
+        for wheel in (0..WHEELS).filter(|&wheel| counted >> wheel & 1 == 1) {
             let alone = self.alone[wheel].as_ref()?;
             for (sum, (with, without)) in side_by_side(&mut beyond, alone, &self.nominal) {
                 *sum -= with - without;

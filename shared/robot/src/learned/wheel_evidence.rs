@@ -153,18 +153,23 @@ impl WheelEvidence {
         let curvature = observation.command[0];
         let rate = |rates: &[RateModel]| rates[i].rate(rolling, curvature);
         let (nominal, _) = rate(&model.nominal.rates);
-        let (beyond, _) = rate(&mode.beyond);
-        let (mut change, mut variance) = (beyond, behind);
-        let dragging = (0..WHEELS).filter(|&w| mode.moved.is_stuck(w));
-        for stuck in dragging.filter_map(|w| model.stuck(w)) {
+        let (mut change, mut variance) = (rate(&mode.beyond).0, 0.0_f64);
+        let dragging = (0..WHEELS).filter(|&wheel| mode.moved.is_stuck(wheel));
+        for stuck in dragging.filter_map(|wheel| model.stuck(wheel)) {
             let (with, its) = rate(&stuck.rates);
-            change += with - nominal;
-            variance += its;
+            // What a wheel does alone, while the robot moves, says nothing of one that stands.
+            change += if mode.moved.is_immobile() {
+                0.0
+            } else {
+                with - nominal
+            };
+            // Not the sum: more stuck wheels must not always be the less likely ones.
+            variance = variance.max(its);
         }
         Dragged {
             rate_rad_s: nominal + change,
             change_rad_s: change,
-            variance,
+            variance: variance + behind,
         }
     }
 
