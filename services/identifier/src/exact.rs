@@ -1,10 +1,11 @@
-//! Bayes over sets of faults and the unknown, without sampling.
+//! Bayes over sets of faults and the unknown: a multiple-hypothesis filter, without sampling.
 //!
-//! Exact for a robot with two stuck wheels at most, but for onsets: hypotheses about them start
-//! from the most probable one of each kind, and the least probable are dropped.
+//! Exact are the weights of the hypotheses that it holds, and the encoders given the motion. Not
+//! every hypothesis is held: new ones start from the most probable one of each number of stuck
+//! wheels, several wheels at once only where they read so, and the least probable are dropped.
 //!
 //! The motion tells stuck wheels apart: one track per (motion mode, onset), a motion mode being
-//! nominal, one stuck wheel, two, or unknown. Broken encoders do not move the robot: given the
+//! nominal, any set of stuck wheels, or unknown. Broken encoders do not move the robot: given the
 //! motion, a small hidden Markov model per wheel says what its encoder does, any number of them at
 //! once. A stuck wheel's encoder reads zero with the sensor's noise. The unknown is nominal motion
 //! with a large constant deviation, and wheels that may do anything.
@@ -27,7 +28,7 @@ use crate::sets::Sets;
 
 /// Index of the nominal motion among the modes.
 const NOMINAL: usize = 0;
-/// Onset hypotheses kept per mode: fewer of two stuck wheels and of what is rare, as there are
+/// Onset hypotheses kept per mode: fewer of several stuck wheels and of what is rare, as there are
 /// many such modes.
 const PER_MODE: usize = 32;
 const PER_RARE: usize = 8;
@@ -387,9 +388,10 @@ impl Exact {
 
 /// True if more than one wheel sticks or turns again; not if a single stuck wheel was another one.
 fn changes_several(before: Moved, after: Moved) -> bool {
+    let is_unknown = after.is_unknown();
     let (before, after) = (before.stuck(), after.stuck());
     let is_another = before.count_ones() == 1 && after.count_ones() == 1;
-    (before ^ after).count_ones() > 1 && !is_another
+    (before ^ after).count_ones() > 1 && !is_another && !is_unknown
 }
 
 /// The wheel that sticks besides those that do.

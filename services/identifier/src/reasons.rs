@@ -9,9 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
 use vigil_inference::track::Track;
 use vigil_robot::Description;
-use vigil_robot::learned::{
-    Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence,
-};
+use vigil_robot::learned::{Model, MotionMode, Moved, NoiseScales, Observation, WheelEvidence};
 
 use crate::exact::is_new;
 use crate::modes::Leaves;

@@ -136,14 +136,19 @@ impl FaultRates {
     #[must_use]
     pub fn rate_1_s(&self, from: Moved, to: Moved) -> f64 {
         let (before, after) = (from.stuck(), to.stuck());
-        let (more, fewer) = ((after & !before).count_ones(), (before & !after).count_ones());
+        let (more, fewer) = (
+            (after & !before).count_ones(),
+            (before & !after).count_ones(),
+        );
         let at_once = if more.max(fewer) > 1 { AT_ONCE } else { 1.0 };
         match to {
             _ if from == to => 0.0,
             Moved::Unknown | Moved::UnknownAny => 0.5 * self.unknown_1_s,
             Moved::Stuck(_) if fewer == 0 => self.fault_1_s * at_once,
             // Another wheel instead of the only one.
-            Moved::Stuck(_) if before.count_ones() == 1 && after.count_ones() == 1 => self.fault_1_s,
+            Moved::Stuck(_) if before.count_ones() == 1 && after.count_ones() == 1 => {
+                self.fault_1_s
+            }
             _ if more == 0 => self.death_1_s * at_once,
             _ => 0.0,
         }
@@ -193,7 +198,8 @@ pub fn motion_modes(
     }
     if read {
         let known = wheels().fold(0_u32, |bits, wheel| bits | 1 << wheel);
-        let several = (1..1 << WHEELS).filter(|set: &u32| set.count_ones() > 1 && set & !known == 0);
+        let several =
+            (1..1 << WHEELS).filter(|set: &u32| set.count_ones() > 1 && set & !known == 0);
         let together = Together::new(model, robot);
         modes.extend(together.iter().flat_map(|together| {
             let several = several.clone();
@@ -245,7 +251,9 @@ pub fn unknown_noise(model: &Model) -> MotionNoise {
 
 /// One wheel stuck, as learned.
 fn stuck_mode(model: &Model, wheel: usize) -> MotionMode {
-    let motion = model.stuck(wheel).map_or(model.nominal.motion, |stuck| stuck.motion);
+    let motion = model
+        .stuck(wheel)
+        .map_or(model.nominal.motion, |stuck| stuck.motion);
     MotionMode {
         moved: Moved::Stuck(1 << wheel),
         share: 1.0,

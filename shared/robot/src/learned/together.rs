@@ -138,8 +138,9 @@ impl<'a> Together<'a> {
             [motion.yaw, motion.forward, motion.lateral] = [Curve::default(); 3];
             return Some(motion);
         }
-        let [yaw, forward, lateral] =
-            beyond.motion.map(|at_nodes| Curve::from_terms((self.to_curve * at_nodes).into()));
+        let [yaw, forward, lateral] = beyond
+            .motion
+            .map(|at_nodes| Curve::from_terms((self.to_curve * at_nodes).into()));
         motion.yaw = plus(&motion.yaw, &yaw, &Curve::default());
         motion.forward = plus(&motion.forward, &forward, &Curve::default());
         motion.lateral = plus(&motion.lateral, &lateral, &Curve::default());
@@ -166,7 +167,9 @@ impl<'a> Together<'a> {
         Some(MotionNoise {
             offset: Matrix3::from_diagonal(&floor) + uneven + self.of_soils(stuck, &soils)? * 0.5,
             deviation: nominal.deviation + uneven,
-            length_m: alone.fold(nominal.length_m, |length_m, alone| length_m.max(alone.length_m)),
+            length_m: alone.fold(nominal.length_m, |length_m, alone| {
+                length_m.max(alone.length_m)
+            }),
             white: nominal.white,
         })
     }
