@@ -231,30 +231,25 @@ impl Exact {
     }
 
     /// Probability that one observation changes `from` to another mode. An encoder that died in the
-    /// last observation may as well be a second wheel that stuck then: both are about equally
+    /// last observation may as well be another wheel that stuck then: both are about equally
     /// likely before the motion tells.
     fn p_change(&self, from: &Hypothesis<State>, mode: usize, observation: &Observation) -> f64 {
         let (before, after) = (self.modes[from.mode].moved, self.modes[mode].moved);
-        let p = self.rates.rate_1_s(before, after) * observation.dt_s;
-        let encoders = &from.state.encoders;
-        let instead = match newly_stuck(before, after) {
-            Some(wheel) if p > 0.0 && before.stuck() != 0 && !changes_several(before, after) => {
-                let age_s = age_s(observation.t_first_ns, encoders.onset(wheel));
-                let was_last = age_s > 0.0 && age_s < 1.5 * observation.dt_s;
-                if was_last {
-                    encoders.p_dead(wheel)
-                } else {
-                    0.0
-                }
+        let mut p = self.rates.rate_1_s(before, after) * observation.dt_s;
+        let joins = before.stuck() & after.stuck() != 0 && p > 0.0;
+        if let Some(wheel) = newly_stuck(before, after).filter(|_| joins) {
+            let t_ns = observation.t_first_ns;
+            if age_s(t_ns, from.onset) < SOON_S {
+                p *= SOON;
             }
-            _ => 0.0,
-        };
-        let is_soon = age_s(observation.t_first_ns, from.onset) < SOON_S;
-        let soon = match newly_stuck(before, after) {
-            Some(_) if is_soon && before.stuck() != 0 => SOON,
-            _ => 1.0,
-        };
-        (p * soon + instead) * self.modes[mode].share
+            let encoders = &from.state.encoders;
+            let age_s = age_s(t_ns, encoders.onset(wheel));
+            let was_last = age_s > 0.0 && age_s < 1.5 * observation.dt_s;
+            if was_last && !changes_several(before, after) {
+                p += encoders.p_dead(wheel);
+            }
+        }
+        p * self.modes[mode].share
     }
 
     /// What becomes of a hypothesis when its mode changes.
@@ -266,8 +261,7 @@ impl Exact {
         if before.is_immobile() && after.is_immobile() {
             // Another wheel changes nothing of a motion that is none.
             track = from.state.track;
-        }
-        if before.stuck().count_ones().max(after.stuck().count_ones()) > 1 {
+        } else if before.stuck().count_ones().max(after.stuck().count_ones()) > 1 {
             track.predict(&self.lagged(from, mode, observation), &noise);
         }
         let fresh = match before.stuck() {
