@@ -2,7 +2,7 @@
 //! appeared, and weighs every set of stuck wheels with every set of broken encoders.
 #![allow(clippy::unwrap_used)]
 
-mod recorded;
+use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -41,6 +41,13 @@ struct Faults {
     dead: u32,
 }
 
+/// A file of the project.
+fn path(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("../..")
+        .join(name)
+}
+
 struct Rig {
     robot: Description,
     model: Model,
@@ -51,8 +58,10 @@ struct Rig {
 
 impl Rig {
     fn new() -> Self {
-        let (robot, model) = (recorded::robot(), recorded::model());
-        let tree = vigil_setup::load_tree(&recorded::path("config/trees/rover.toml")).unwrap();
+        let robot = vigil_setup::load_robot(&path("config/robots/rover.toml")).unwrap();
+        let model = std::fs::read_to_string(path("config/models/rover.toml")).unwrap();
+        let model = Model::from_toml(&model).unwrap();
+        let tree = vigil_setup::load_tree(&path("config/trees/rover.toml")).unwrap();
         let modes = motion_modes(&model, &robot, SETS as u32 - 1, false, true);
         Self {
             leaves: Leaves::new(&tree, &model, &robot).unwrap(),
