@@ -197,14 +197,8 @@ pub fn motion_modes(
         }));
     }
     if read {
-        let known = wheels().fold(0_u32, |bits, wheel| bits | 1 << wheel);
-        let several =
-            (1..1 << WHEELS).filter(|set: &u32| set.count_ones() > 1 && set & !known == 0);
-        let together = Together::new(model, robot);
-        modes.extend(together.iter().flat_map(|together| {
-            let several = several.clone();
-            several.filter_map(|set| several_mode(together, set))
-        }));
+        let known = wheels().fold(0, |bits, wheel| bits | 1 << wheel);
+        modes.extend(several_modes(model, robot, known));
     }
     let drives_on = |moved| MotionMode {
         moved,
@@ -265,6 +259,16 @@ fn stuck_mode(model: &Model, wheel: usize) -> MotionMode {
         jump: [0.0; 3],
         beyond: [RateModel::NONE; WHEELS],
     }
+}
+
+/// All sets of two wheels and more among those known (bits); none without an equilibrium.
+fn several_modes(model: &Model, robot: &Description, known: u32) -> Vec<MotionMode> {
+    let Some(together) = Together::new(model, robot) else {
+        return Vec::new();
+    };
+    let sets = (1..=known).filter(|set| set.count_ones() > 1 && set & !known == 0);
+    sets.filter_map(|set| several_mode(&together, set))
+        .collect()
 }
 
 /// Several wheels stuck.
