@@ -56,6 +56,13 @@ impl Likelihoods {
         out
     }
 
+    /// Takes what another one says of a wheel.
+    pub fn replace(&mut self, wheel: usize, other: &Self) {
+        self.logs[wheel] = other.logs[wheel];
+        self.relative[wheel] = other.relative[wheel];
+        self.log_largest[wheel] = other.log_largest[wheel];
+    }
+
     /// Another log-likelihood of a whole encoder.
     pub fn replace_whole(&mut self, wheel: usize, log_likelihood: f64) {
         self.logs[wheel][0] = log_likelihood;

@@ -1,34 +1,36 @@
-//! Bayes over sets of faults and the unknown, without sampling.
+//! Bayes over sets of faults and the unknown: a multiple-hypothesis filter, without sampling.
 //!
-//! Exact for a robot with two stuck wheels at most, but for onsets: hypotheses about them start
-//! from the most probable one of each kind, and the least probable are dropped.
+//! Exact are the weights of the hypotheses that it holds, and the encoders given the motion. Not
+//! every hypothesis is held: new ones start from the most probable one of each number of stuck
+//! wheels, several wheels at once only where they read so, and the least probable are dropped.
 //!
 //! The motion tells stuck wheels apart: one track per (motion mode, onset), a motion mode being
-//! nominal, one stuck wheel, two, or unknown. Broken encoders do not move the robot: given the
+//! nominal, any set of stuck wheels, or unknown. Broken encoders do not move the robot: given the
 //! motion, a small hidden Markov model per wheel says what its encoder does, any number of them at
 //! once. A stuck wheel's encoder reads zero with the sensor's noise. The unknown is nominal motion
 //! with a large constant deviation, and wheels that may do anything.
 
+use nalgebra::Vector3;
 use vigil_blocks::WHEELS;
 use vigil_inference::bank::{Bank, Hypothesis};
 use vigil_inference::outlier;
-use vigil_inference::track::{Context, Track};
+use vigil_inference::track::{Context, Displacement, Track};
 use vigil_robot::Description;
-use vigil_robot::learned::wheel_evidence::Dragged;
 use vigil_robot::learned::{
     FaultRates, Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext,
     WheelEvidence, motion_modes,
 };
 
-use crate::encoders::{Encoders, Likelihoods, OWN_RATE, SILENT, ZERO};
+use crate::encoders::Encoders;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
+use crate::prepared::{EXPLAINED_S, Prepared, Seen, age_s};
 use crate::rate_offsets::RateOffsets;
 use crate::sets::Sets;
 
 /// Index of the nominal motion among the modes.
 const NOMINAL: usize = 0;
-/// Onset hypotheses kept per mode: fewer of two stuck wheels and of what is rare, as there are
+/// Onset hypotheses kept per mode: fewer of several stuck wheels and of what is rare, as there are
 /// many such modes.
 const PER_MODE: usize = 32;
 const PER_RARE: usize = 8;
@@ -36,14 +38,15 @@ const PER_RARE: usize = 8;
 const FLOOR: f64 = -30.0;
 /// So long after a supposed onset, ns, wheels may still read as before.
 const ONSET_BLUR_NS: u64 = 150_000_000;
-/// An encoder that broke this short before its wheel is supposed to have stuck may never have been
-/// broken, s: a stuck wheel's reads the same, and the motion tells within about this time.
-const EXPLAINED_S: f64 = 2.0;
 /// Probability that a robot that may be thrown is, in an observation: after one in which it was not,
 /// and after one in which it was; and how far, x m, y m, yaw rad.
 const THROWN: f64 = 0.02;
 const THROWN_ON: f64 = 0.6;
 const THROW_SD: [f64; 3] = [0.02, 0.02, 0.1];
+/// Wheels that stick one after another, each so soon after the one before, s, have one cause: this
+/// many times the rate at which a wheel sticks by itself.
+const SOON_S: f64 = 1.0;
+const SOON: f64 = 20.0;
 /// Prior rate of faults while something is suspected, 1/s of motion. An alarm has been raised:
 /// the rate over a robot's life would make the filter slow without making it more often right.
 pub const BIRTH_1_S: f64 = 0.01;
@@ -57,12 +60,14 @@ pub struct State {
     pub track: Track,
     /// Encoders; in the unknown, encoders or wheels.
     pub encoders: Encoders,
-    /// With two stuck wheels: what the other wheels' rates are off by.
+    /// With several stuck wheels: what the other wheels' rates are off by.
     pub offsets: RateOffsets,
     /// Part of the weight of the unknown: that its departure is material.
     pub log_material: f64,
     /// In a mode that throws the robot: whether it was thrown in the last observation.
     pub was_thrown: bool,
+    /// Wheels, as bits, that may still read as before the onset.
+    pub fresh: u32,
 }
 
 impl State {
@@ -103,6 +108,8 @@ pub struct Exact {
     /// Of the healthy robot, from before the faults; it fades as the robot drives on.
     context: Context,
     wheels: WheelContext,
+    /// What the last observation says in each mode, where a hypothesis has asked.
+    prepared: Vec<Option<Prepared>>,
     sets: Sets,
     degenerate_count: u32,
 }
@@ -140,6 +147,7 @@ impl Exact {
             robot: robot.clone(),
             leaves: leaves.clone(),
             use_wheels,
+            prepared: vec![None; modes.len()],
             sets: Sets::new(&modes, robot.wheels.len().min(WHEELS)),
             modes,
             rates,
@@ -160,6 +168,7 @@ impl Exact {
             offsets: RateOffsets::default(),
             log_material: 0.0,
             was_thrown: false,
+            fresh: 0,
         };
         self.bank.restart(NOMINAL, t_ns, state);
     }
@@ -168,6 +177,12 @@ impl Exact {
     #[must_use]
     pub const fn degenerate_count(&self) -> u32 {
         self.degenerate_count
+    }
+
+    /// The ways in which the robot may move.
+    #[must_use]
+    pub fn modes(&self) -> &[MotionMode] {
+        &self.modes
     }
 
     /// The hypotheses, and what moves the robot under each.
@@ -187,16 +202,22 @@ impl Exact {
             }
             return;
         }
+        self.context
+            .fade(observation.travel_m, &self.modes[NOMINAL].noise);
+        self.wheels.fade(observation.travel_m);
+        let (model, robot) = (&self.model, &self.robot);
+        let evidence = (self.use_wheels && observation.moving)
+            .then(|| WheelEvidence::new(model, robot, observation, noise, &self.wheels));
         if observation.moving {
-            self.spawn(observation);
+            self.spawn(observation, evidence.as_ref());
         }
         self.predict(observation);
         // A robot at rest tells nothing: no fault appears, fades or is named.
         if !observation.moving {
             return;
         }
-        if self.use_wheels {
-            self.weigh_wheels(observation, noise);
+        if let Some(evidence) = &evidence {
+            self.weigh_wheels(observation, evidence);
         }
         let mut failed = false;
         if observation.pose_frames > 0 {
@@ -244,31 +265,41 @@ impl Exact {
     }
 
     fn predict(&mut self, observation: &Observation) {
-        self.context
-            .fade(observation.travel_m, &self.modes[NOMINAL].noise);
-        self.wheels.fade(observation.travel_m);
-        for index in 0..self.modes.len() {
-            let mode = &self.modes[index];
+        for hypothesis in self.bank.hypotheses_mut() {
+            let mode = &self.modes[hypothesis.mode];
             let step = observation.displacement(&self.model, &mode.motion);
-            let all = self.bank.hypotheses_mut().iter_mut();
-            for hypothesis in all.filter(|hypothesis| hypothesis.mode == index) {
-                hypothesis.state.track.predict(&step, &mode.noise);
-            }
+            hypothesis.state.track.predict(&step, &mode.noise);
         }
     }
 
-    /// New hypotheses: one fault more, one less, or another one, from the most probable hypothesis
-    /// without a fault, the most probable one with a fault, and that with one stuck wheel.
-    fn spawn(&mut self, observation: &Observation) {
+    /// New hypotheses: a fault more, one less, or another one, or several wheels at once where
+    /// these read so; from the most probable hypothesis of each kind.
+    fn spawn(&mut self, observation: &Observation, evidence: Option<&WheelEvidence>) {
         let modes = &self.modes;
-        let best = |wanted: &dyn Fn(usize) -> bool| self.bank.best(wanted).copied();
-        let sources = [
-            best(&|mode| mode == NOMINAL),
-            best(&|mode| modes[mode].moved.stuck().count_ones() == 1),
-            best(&|mode| modes[mode].moved.stuck().count_ones() != 1 && mode != NOMINAL),
-        ];
+        let best = |wanted: &dyn Fn(Moved) -> bool| {
+            self.bank.best(|mode| wanted(modes[mode].moved)).copied()
+        };
+        let sources: [_; WHEELS + 2] = std::array::from_fn(|count| match count {
+            0 => best(&|moved| moved == Moved::Nominal),
+            1..=WHEELS => best(&|moved| moved.stuck().count_ones() as usize == count),
+            _ => best(&Moved::is_unknown),
+        });
         for from in sources.into_iter().flatten() {
+            let before = self.modes[from.mode].moved;
+            let read = evidence.map_or([before.stuck(); 3], |evidence| {
+                let seen = Seen {
+                    model: &self.model,
+                    robot: &self.robot,
+                    observation,
+                    evidence,
+                };
+                seen.changed_sets(before.stuck(), &from.state.encoders)
+            });
             for mode in 0..self.modes.len() {
+                let after = self.modes[mode].moved;
+                if changes_several(before, after) && !read.contains(&after.stuck()) {
+                    continue;
+                }
                 let log_weight = from.log_weight + self.p_change(&from, mode, observation).ln();
                 if log_weight <= FLOOR || log_weight.is_nan() {
                     continue;
@@ -284,25 +315,25 @@ impl Exact {
     }
 
     /// Probability that one observation changes `from` to another mode. An encoder that died in the
-    /// last observation may as well be a second wheel that stuck then: both are about equally
+    /// last observation may as well be another wheel that stuck then: both are about equally
     /// likely before the motion tells.
     fn p_change(&self, from: &Hypothesis<State>, mode: usize, observation: &Observation) -> f64 {
         let (before, after) = (self.modes[from.mode].moved, self.modes[mode].moved);
-        let p = self.rates.rate_1_s(before, after) * observation.dt_s;
-        let encoders = &from.state.encoders;
-        let instead = match newly_stuck(before, after) {
-            Some(wheel) if p > 0.0 && before.stuck() & after.stuck() != 0 => {
-                let age_s = age_s(observation.t_first_ns, encoders.onset(wheel));
-                let was_last = age_s > 0.0 && age_s < 1.5 * observation.dt_s;
-                if was_last {
-                    encoders.p_dead(wheel)
-                } else {
-                    0.0
-                }
+        let mut p = self.rates.rate_1_s(before, after) * observation.dt_s;
+        let joins = before.stuck() & after.stuck() != 0 && p > 0.0;
+        if let Some(wheel) = newly_stuck(before, after).filter(|_| joins) {
+            let t_ns = observation.t_first_ns;
+            if age_s(t_ns, from.onset) < SOON_S {
+                p *= SOON;
             }
-            _ => 0.0,
-        };
-        (p + instead) * self.modes[mode].share
+            let encoders = &from.state.encoders;
+            let age_s = age_s(t_ns, encoders.onset(wheel));
+            let was_last = age_s > 0.0 && age_s < 1.5 * observation.dt_s;
+            if was_last && !changes_several(before, after) {
+                p += encoders.p_dead(wheel);
+            }
+        }
+        p * self.modes[mode].share
     }
 
     /// What becomes of a hypothesis when its mode changes.
@@ -315,6 +346,16 @@ impl Exact {
             _ => self.context,
         };
         let mut track = from.state.track.enter(&context, &noise);
+        if before.is_immobile() && after.is_immobile() {
+            // Another wheel changes nothing of a motion that is none.
+            track = from.state.track;
+        } else if before.stuck().count_ones().max(after.stuck().count_ones()) > 1 {
+            track.predict(&self.lagged(from, mode, observation), &noise);
+        }
+        let fresh = match before.stuck() {
+            0 => u32::MAX,
+            stuck => stuck ^ after.stuck(),
+        };
         track.diffuse(self.modes[mode].jump);
         let t_ns = observation.t_first_ns;
         let mut encoders = match (before, after) {
@@ -322,13 +363,14 @@ impl Exact {
             (Moved::UnknownAny, _) => Encoders::healthy(t_ns),
             _ => from.state.encoders,
         };
-        let sticks = newly_stuck(before, after);
-        if let Some(wheel) = sticks.filter(|&w| age_s(t_ns, encoders.onset(w)) < EXPLAINED_S) {
-            encoders.suppose_whole(wheel, t_ns);
-        }
         for wheel in 0..WHEELS {
             match (before.is_stuck(wheel), after.is_stuck(wheel)) {
-                (false, true) => encoders.stick(wheel),
+                (false, true) => {
+                    if age_s(t_ns, encoders.onset(wheel)) < EXPLAINED_S {
+                        encoders.suppose_whole(wheel, t_ns);
+                    }
+                    encoders.stick(wheel);
+                }
                 (true, false) => encoders.release(wheel),
                 _ => {}
             }
@@ -339,49 +381,55 @@ impl Exact {
             offsets: RateOffsets::default(),
             log_material: 0.0,
             was_thrown: false,
+            fresh,
         }
     }
 
-    /// Weighs by the wheels' readings. Each is evaluated once per motion mode, not per hypothesis.
-    fn weigh_wheels(&mut self, observation: &Observation, noise: NoiseScales) {
-        let (model, robot) = (&self.model, &self.robot);
-        let evidence = WheelEvidence::new(model, robot, observation, noise, &self.wheels);
+    /// By how much more the robot moves at a change of its mode than it would if the new mode's
+    /// motion began at once: the body follows within the lag, as if the old one lasted so long.
+    fn lagged(&self, from: &Hypothesis<State>, to: usize, at: &Observation) -> Displacement {
+        let limit = self.model.command.curvature_max_1_m;
+        let motion = |mode: usize| {
+            let motion = &self.modes[mode].motion;
+            Vector3::from(motion.per_metre(at.curvature, at.speed, limit))
+        };
+        let apart = motion(from.mode) + from.state.track.deviation() - motion(to);
+        let travel_m = at.speed * self.model.command.lag_s;
+        Displacement {
+            per_metre: apart.into(),
+            travel_m,
+            extra: (apart * travel_m).map(|apart| apart * apart).into(),
+        }
+    }
+
+    /// Weighs by the wheels' readings.
+    fn weigh_wheels(&mut self, observation: &Observation, evidence: &WheelEvidence) {
         let births = self.births_1_s.map(|rate| rate * observation.dt_s);
         let death = self.rates.death_1_s * observation.dt_s;
-        let first_ns = observation.t_first_ns;
-        for mode in 0..self.modes.len() {
-            let both =
-                [false, true].map(|is_new| self.wheels_in(mode, observation, &evidence, is_new));
-            let dragged = self.dragged_in(mode, observation, &evidence);
-            let steering = match self.modes[mode].moved {
-                Moved::UnknownAny => evidence.steering,
-                _ => 0.0,
-            };
-            let stuck = self.modes[mode].moved.stuck();
-            let all = self.bank.hypotheses_mut().iter_mut();
-            for hypothesis in all.filter(|hypothesis| hypothesis.mode == mode) {
-                let is_new = is_new(observation.t_ns, hypothesis.onset);
-                let State {
-                    encoders, offsets, ..
-                } = &mut hypothesis.state;
-                let mut likelihoods = both[usize::from(is_new)];
-                let dragged = dragged.iter().flatten().filter(|_| !is_new);
-                for (wheel, dragged) in dragged.clone() {
-                    let model = &self.model;
-                    let log =
-                        offsets.log_likelihood(model, observation, &evidence, *wheel, dragged);
-                    likelihoods.replace_whole(*wheel, log);
-                }
-                let gained = encoders.step(&births, death, stuck, &likelihoods, first_ns);
-                hypothesis.log_weight += steering + gained;
-                for (wheel, dragged) in dragged {
-                    if encoders.p_broken(*wheel) < 0.5 {
-                        offsets.learn(observation, &evidence, *wheel, dragged);
-                    }
-                }
+        let seen = Seen {
+            model: &self.model,
+            robot: &self.robot,
+            observation,
+            evidence,
+        };
+        self.prepared.fill(None);
+        for hypothesis in self.bank.hypotheses_mut() {
+            let index = hypothesis.mode;
+            let prepare = || seen.prepared(&self.modes[index]);
+            let prepared = self.prepared[index].get_or_insert_with(prepare);
+            let State {
+                encoders,
+                offsets,
+                fresh,
+                ..
+            } = &mut hypothesis.state;
+            if !is_new(observation.t_ns, hypothesis.onset) {
+                *fresh = 0;
             }
+            let gained = seen.weigh(prepared, (&births, death), *fresh, encoders, offsets);
+            hypothesis.log_weight += gained;
         }
-        self.learn_context(observation, &evidence);
+        self.learn_context(observation, evidence);
     }
 
     /// Learns the wheels' context from those that turn in the most probable hypothesis: what a fault
@@ -399,50 +447,11 @@ impl Exact {
         for (wheel, beside) in beside.iter_mut().enumerate().take(self.robot.wheels.len()) {
             let is_whole = best.state.encoders.p_broken(wheel) < 0.5 && !moved.is_stuck(wheel);
             if is_whole {
-                *beside = evidence.beside(&self.model, observation, moved.stuck(), wheel);
+                let mode = &self.modes[best.mode];
+                *beside = evidence.beside(&self.model, observation, mode, wheel);
             }
         }
         self.wheels.learn(&beside);
-    }
-
-    /// The wheels that turn in a mode with two stuck wheels, and how; none in another mode.
-    fn dragged_in(
-        &self,
-        mode: usize,
-        observation: &Observation,
-        evidence: &WheelEvidence,
-    ) -> [Option<(usize, Dragged)>; WHEELS] {
-        let stuck = self.modes[mode].moved.stuck();
-        std::array::from_fn(|wheel| {
-            let turns = wheel < self.robot.wheels.len() && stuck >> wheel & 1 == 0;
-            (turns && stuck.count_ones() > 1).then(|| {
-                let dragged = evidence.dragged(&self.model, observation, stuck, wheel);
-                (wheel, dragged)
-            })
-        })
-    }
-
-    /// What the wheels say in one motion mode, in general or at its onset.
-    fn wheels_in(
-        &self,
-        mode: usize,
-        observation: &Observation,
-        evidence: &WheelEvidence,
-        is_new: bool,
-    ) -> Likelihoods {
-        let moved = self.modes[mode].moved;
-        Likelihoods::new(self.robot.wheels.len(), |wheel, state| {
-            match (state, moved) {
-                (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
-                (0, _) => evidence.whole(&self.model, observation, moved, is_new, wheel),
-                (OWN_RATE, Moved::UnknownAny) => evidence.own_rate[wheel],
-                (OWN_RATE, _) => f64::NEG_INFINITY,
-                // What reads alike shares one likelihood, broken or not.
-                (SILENT, _) if moved.is_stuck(wheel) => evidence.broken[wheel][ZERO - 1],
-                (SILENT, _) => f64::NEG_INFINITY,
-                (broken, _) => evidence.broken[wheel][broken - 1],
-            }
-        })
     }
 
     /// Fills the probabilities of nodes, sets and unknown.
@@ -484,9 +493,12 @@ impl Exact {
     }
 }
 
-/// Time since an onset, s.
-fn age_s(t_ns: u64, onset_ns: u64) -> f64 {
-    t_ns.saturating_sub(onset_ns) as f64 * 1e-9
+/// True if more than one wheel sticks or turns again; not if a single stuck wheel was another one.
+fn changes_several(before: Moved, after: Moved) -> bool {
+    let is_unknown = after.is_unknown();
+    let (before, after) = (before.stuck(), after.stuck());
+    let is_another = before.count_ones() == 1 && after.count_ones() == 1;
+    (before ^ after).count_ones() > 1 && !is_another && !is_unknown
 }
 
 /// The wheel that sticks besides those that do.

@@ -9,7 +9,9 @@ use vigil_blocks::{
     DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock,
     SensorFrame,
 };
-use vigil_robot::learned::{Healthy, NoiseScales, Observation, Observer, OutlierRates};
+use vigil_robot::learned::{
+    Healthy, NoiseScales, Observation, Observer, OutlierRates, motion_modes,
+};
 use vigil_setup::schema;
 
 use crate::assemble::Models;
@@ -126,21 +128,23 @@ impl Identifier {
         check(settings)?;
         let leaves = Leaves::new(tree, model, robot)?;
         let use_wheels = sensors == schema::Sensors::PoseEncoders;
-        let engine = match settings.filter {
+        let (engine, modes) = match settings.filter {
             schema::IdentifierFilter::Exact => {
                 let rates = fault_rates(&leaves, settings.p_unknown);
                 let filter = Exact::new(model, robot, &leaves, use_wheels, rates);
-                Engine::Exact(Box::new(filter))
+                let modes = filter.modes().to_vec();
+                (Engine::Exact(Box::new(filter)), modes)
             }
             _ => {
                 let filter = Generic::new(models, &leaves, settings, use_wheels, seed)?;
-                Engine::Generic(Box::new(filter))
+                let modes = motion_modes(model, robot, leaves.stuck_wheels(), false, false);
+                (Engine::Generic(Box::new(filter)), modes)
             }
         };
         let capacity = (settings.ring_s / model.interval_s).ceil().max(2.0) as usize;
         Ok(Self {
             engine,
-            reasons: Reasons::new(model, robot, &leaves, use_wheels),
+            reasons: Reasons::new(model, robot, modes, use_wheels),
             leaves,
             observer: Observer::new(model, robot),
             unsure: Healthy::unsure(model, robot),

@@ -12,6 +12,7 @@ mod generic;
 mod identifier;
 mod modes;
 mod posterior;
+mod prepared;
 mod rate_offsets;
 mod reasons;
 mod reported;

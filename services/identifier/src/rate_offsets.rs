@@ -1,6 +1,7 @@
-//! By how much more than expected two dragging wheels change the others' rates: learned on the way.
+//! By how much more than expected several dragging wheels change the others' rates: learned on the
+//! way.
 //!
-//! Nothing was learned of two wheels together, so that the expected rates are wrong by more than
+//! Nothing was learned of such wheels together, so that the expected rates are wrong by more than
 //! noise, and always alike. Taken as noise it would count again in every observation, and a true
 //! pair would lose to a dead encoder with time.
 

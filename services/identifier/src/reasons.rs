@@ -10,7 +10,6 @@ use vigil_inference::track::Track;
 use vigil_robot::Description;
 use vigil_robot::learned::{
     Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext, WheelEvidence,
-    motion_modes,
 };
 
 use crate::exact::is_new;
@@ -55,13 +54,18 @@ pub struct Reasons {
 }
 
 impl Reasons {
-    /// No diagnosis yet.
+    /// No diagnosis yet, of a robot that may move in these ways.
     #[must_use]
-    pub fn new(model: &Model, robot: &Description, leaves: &Leaves, use_wheels: bool) -> Self {
+    pub fn new(
+        model: &Model,
+        robot: &Description,
+        modes: Vec<MotionMode>,
+        use_wheels: bool,
+    ) -> Self {
         Self {
             model: model.clone(),
             robot: robot.clone(),
-            modes: motion_modes(model, robot, leaves.stuck_wheels(), false, true),
+            modes,
             use_wheels,
             wheels: WheelContext::default(),
             followed: None,
@@ -174,21 +178,22 @@ impl Reasons {
         let evidence = WheelEvidence::new(model, robot, observation, noise, &self.wheels);
         let is_new = is_new(observation.t_ns, self.onset_ns);
         for lineage in followed {
-            let moved = self.modes[lineage.mode].moved;
+            let mode = &self.modes[lineage.mode];
+            let moved = mode.moved;
             for wheel in 0..self.robot.wheels.len().min(WHEELS) {
                 let is_broken = lineage.broken >> wheel & 1 == 1;
                 let is_dragged = moved.stuck().count_ones() > 1 && !moved.is_stuck(wheel);
                 lineage.heard[Channel::wheel_rate(wheel)] += if is_broken {
                     evidence.broken_anyhow(wheel)
                 } else if is_dragged && !is_new {
-                    let dragged = evidence.dragged(&self.model, observation, moved.stuck(), wheel);
+                    let dragged = evidence.dragged(&self.model, observation, mode, wheel);
                     let (model, offsets) = (&self.model, &mut lineage.offsets);
                     let heard =
                         offsets.log_likelihood(model, observation, &evidence, wheel, &dragged);
                     offsets.learn(observation, &evidence, wheel, &dragged);
                     heard
                 } else {
-                    evidence.whole(&self.model, observation, moved, is_new, wheel)
+                    evidence.whole(&self.model, observation, mode, is_new, wheel)
                 };
             }
             if moved == Moved::UnknownAny {

@@ -14,8 +14,9 @@ pub const FLOOR: f64 = 1e-12;
 /// Sums over hypotheses.
 #[derive(Debug, Clone)]
 pub struct Sets {
-    /// Row i: motion mode i; column e: the encoders `e` (bits) are broken.
+    /// Row s: the wheels `s` (bits) are stuck; column e: the encoders `e` (bits) are broken.
     p: Vec<f64>,
+    /// What moves the robot in each motion mode.
     moved: Vec<Moved>,
     /// Per motion mode: what of it no fault describes.
     p_unknown: Vec<f64>,
@@ -25,12 +26,12 @@ pub struct Sets {
 }
 
 impl Sets {
-    /// Sets over motion modes and `wheels` encoders. Allocates all that it will need.
+    /// Sets over `wheels` wheels, stuck as in these modes, and their encoders. Allocates all that it will need.
     #[must_use]
     pub fn new(modes: &[MotionMode], wheels: usize) -> Self {
         let subsets = 1 << wheels;
         Self {
-            p: vec![0.0; modes.len() * subsets],
+            p: vec![0.0; subsets * subsets],
             moved: modes.iter().map(|mode| mode.moved).collect(),
             p_unknown: modes.iter().map(|mode| mode.p_unknown).collect(),
             wheels,
@@ -65,7 +66,8 @@ impl Sets {
             }
         }
         let subsets = self.products.len();
-        let row = &mut self.p[mode * subsets..(mode + 1) * subsets];
+        let stuck = self.moved[mode].stuck() as usize;
+        let row = &mut self.p[stuck * subsets..(stuck + 1) * subsets];
         for (sum, product) in row.iter_mut().zip(&self.products) {
             *sum += product;
         }
@@ -73,8 +75,7 @@ impl Sets {
 
     /// Nodes of a set; None if a fault of it is no leaf.
     fn nodes(&self, index: usize, leaves: &Leaves) -> Option<u64> {
-        let encoders = (index % self.products.len()) as u32;
-        let stuck = self.moved[index / self.products.len()].stuck();
+        let (stuck, encoders) = (index / self.products.len(), index % self.products.len());
         let mut nodes = 0_u64;
         for wheel in 0..self.wheels {
             if stuck >> wheel & 1 == 1 {
@@ -89,13 +90,11 @@ impl Sets {
 
     /// Normalises, and fills the probabilities of nodes, sets and unknown.
     pub fn posterior(&mut self, leaves: &Leaves, out: &mut Posterior) {
-        let subsets = self.products.len();
         let mut total = 0.0;
         for (index, p) in self.p.iter_mut().enumerate() {
-            let moved = self.moved[index / subsets];
-            let faults = moved.stuck().count_ones() + ((index % subsets) as u32).count_ones();
-            let possible = faults <= 1 && !moved.is_unknown();
-            *p = if p.is_finite() { *p } else { 0.0 }.max(if possible { FLOOR } else { 0.0 });
+            // An index has the bits of the stuck wheels and of the broken encoders.
+            let at_least = if index.count_ones() <= 1 { FLOOR } else { 0.0 };
+            *p = if p.is_finite() { *p } else { 0.0 }.max(at_least);
             total += *p;
         }
         self.unknown = if self.unknown.is_finite() {

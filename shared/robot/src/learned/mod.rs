@@ -33,6 +33,7 @@ pub mod observation;
 mod provenance;
 mod reading;
 pub mod switching;
+mod together;
 pub mod troubles;
 pub mod wheel_context;
 pub mod wheel_evidence;

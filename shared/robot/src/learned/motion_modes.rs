@@ -4,7 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::WHEELS;
 use vigil_inference::track::MotionNoise;
 
-use super::{Curve, Model, MotionModel};
+use super::together::{Together, is_immobile};
+use super::{Curve, Model, MotionModel, RateModel};
 use crate::Description;
 
 /// The unknown: standard deviation of its constant deviation per metre (yaw, forward, lateral).
@@ -29,15 +30,9 @@ const ROUGH_SD: [f64; 3] = [0.15, 0.1, 0.05];
 const DRAGGED_AT: f64 = 0.25;
 /// Deviation of such an effect from one that is changed as a whole: yaw, forward, lateral.
 const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
-/// Two stuck wheels, of which nothing was learned together: their effects add up, and are more than
-/// their sum, as fewer wheels drive against more drag. Two that turn the robot the same way are on
-/// one side, where one wheel is left to drive; of two that turn it against each other each keeps
-/// its own turn. Factors of yaw, forward and lateral motion, in the middle of what the equilibrium
-/// of forces ([`crate::slip`]) gives for any two wheels in turns from 1 m on.
-const SAME_SIDE: [f64; 3] = [1.8, 1.8, 1.0];
-const EITHER_SIDE: [f64; 3] = [1.0, 1.4, 1.0];
-/// Deviation of each of the two effects from that.
-const BOTH_SD: f64 = 0.6;
+/// Wheels that stick at once, or turn again at once, do so from one cause, whichever they are: how
+/// often, beside one wheel.
+const AT_ONCE: f64 = 0.1;
 
 /// What moves the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,6 +58,12 @@ impl Moved {
     #[must_use]
     pub const fn is_unknown(self) -> bool {
         matches!(self, Self::Unknown | Self::UnknownAny)
+    }
+
+    /// True if too many wheels are stuck for the robot to move.
+    #[must_use]
+    pub const fn is_immobile(self) -> bool {
+        is_immobile(self.stuck())
     }
 
     /// Bits of the stuck wheels.
@@ -97,6 +98,9 @@ pub struct MotionMode {
     pub jump: [f64; 3],
     /// Whether the robot is thrown now and then: a wheel that locks on hard ground grips and slides.
     pub is_thrown: bool,
+    /// How the turning wheels' rates change beyond the sum of what each stuck wheel does to them;
+    /// in all if the robot is immobile.
+    pub beyond: [RateModel; WHEELS],
 }
 
 impl MotionMode {
@@ -112,19 +116,6 @@ impl MotionMode {
     pub fn noise_at(&self, model: &Model, curvature: f64, speed: f64) -> MotionNoise {
         let limit = model.command.curvature_max_1_m;
         let at = |motion: &MotionModel| Vector3::from(motion.per_metre(curvature, speed, limit));
-        let stuck = self.moved.stuck();
-        if stuck.count_ones() > 1 {
-            let wheels = (0..WHEELS).filter(|w| stuck >> w & 1 == 1);
-            let effects = wheels.filter_map(|w| model.stuck(w));
-            let along = effects.fold(Matrix3::zeros(), |sum, stuck| {
-                let effect = (at(&stuck.motion) - at(&model.nominal.motion)) * BOTH_SD;
-                sum + effect * effect.transpose()
-            });
-            return MotionNoise {
-                offset: self.noise.offset + along,
-                ..self.noise
-            };
-        }
         let (factor, sd) = self.ground;
         if sd <= 0.0 {
             return self.noise;
@@ -158,24 +149,28 @@ impl FaultRates {
     #[must_use]
     pub fn rate_1_s(&self, from: Moved, to: Moved) -> f64 {
         let (before, after) = (from.stuck(), to.stuck());
+        let (more, fewer) = (
+            (after & !before).count_ones(),
+            (before & !after).count_ones(),
+        );
+        let at_once = if more.max(fewer) > 1 { AT_ONCE } else { 1.0 };
         match to {
             _ if from == to => 0.0,
-            Moved::Nominal if before.count_ones() <= 1 => self.death_1_s,
-            Moved::Nominal => 0.0,
             Moved::Unknown | Moved::UnknownAny => 0.5 * self.unknown_1_s,
-            Moved::Stuck(_) if after.count_ones() == 1 && before.count_ones() <= 1 => {
+            Moved::Stuck(_) if fewer == 0 => self.fault_1_s * at_once,
+            // Another wheel instead of the only one.
+            Moved::Stuck(_) if before.count_ones() == 1 && after.count_ones() == 1 => {
                 self.fault_1_s
             }
-            Moved::Stuck(_) if before != 0 && before & after == before => self.fault_1_s,
-            Moved::Stuck(_) if before & after == after => self.death_1_s,
-            Moved::Stuck(_) => 0.0,
+            _ if more == 0 => self.death_1_s * at_once,
+            _ => 0.0,
         }
     }
 }
 
 /// The ways in which a robot may move whose wheels `stuck` (bits) may stick: nominal first, then
-/// single wheels, pairs if the wheels' rates are `read`, and both kinds of unknown; if `rare`,
-/// single wheels on other ground and a jump of the pose too.
+/// single wheels, sets of several if the wheels' rates are `read`, and both kinds of unknown; if
+/// `rare`, single wheels on other ground and a jump of the pose too.
 #[must_use]
 pub fn motion_modes(
     model: &Model,
@@ -201,12 +196,13 @@ pub fn motion_modes(
         kept_m_s: 0.0,
         jump: [0.0; 3],
         is_thrown: false,
+        beyond: [RateModel::NONE; WHEELS],
     }];
     let known = |w: usize| stuck >> w & 1 == 1 && model.stuck(w).is_some();
     let wheels = || (0..WHEELS).filter(|&w| known(w));
     modes.extend(wheels().map(|w| MotionMode {
         share: learned,
-        ..stuck_mode(model, &[w])
+        ..stuck_mode(model, w)
     }));
     for &(share, factor, sd) in grounds {
         modes.extend(wheels().map(|w| MotionMode {
@@ -216,8 +212,8 @@ pub fn motion_modes(
         }));
     }
     if read {
-        let both = |a: usize| wheels().filter(move |&b| b > a).map(move |b| [a, b]);
-        modes.extend(wheels().flat_map(both).map(|both| stuck_mode(model, &both)));
+        let known = wheels().fold(0, |bits, wheel| bits | 1 << wheel);
+        modes.extend(several_modes(model, robot, known));
     }
     let drives_on = |moved| MotionMode {
         moved,
@@ -229,6 +225,7 @@ pub fn motion_modes(
         kept_m_s: 0.0,
         jump: [0.0; 3],
         is_thrown: false,
+        beyond: [RateModel::NONE; WHEELS],
     };
     modes.push(MotionMode {
         share: 1.0 - JUMP_SHARE,
@@ -263,48 +260,50 @@ pub fn unknown_noise(model: &Model) -> MotionNoise {
     }
 }
 
-/// Wheels stuck: one as learned, two as said at [`SAME_SIDE`].
-fn stuck_mode(model: &Model, wheels: &[usize]) -> MotionMode {
-    let nominal = &model.nominal.motion;
-    let turn = |w: usize| {
-        let stuck = model.stuck(w).map_or(0.0, |s| s.motion.yaw.curvature[0]);
-        stuck - nominal.yaw.curvature[0]
-    };
-    let factors = match wheels {
-        &[a, b] if turn(a) * turn(b) > 0.0 => SAME_SIDE,
-        [_, _] => EITHER_SIDE,
-        _ => [1.0; 3],
-    };
-    let mut motion = *nominal;
-    let mut noise: Option<MotionNoise> = None;
-    for stuck in wheels.iter().filter_map(|&w| model.stuck(w)) {
-        let ([yaw, forward, lateral], with) = (factors, &stuck.motion);
-        motion.yaw = plus(&motion.yaw, &with.yaw, &nominal.yaw, yaw);
-        motion.forward = plus(&motion.forward, &with.forward, &nominal.forward, forward);
-        motion.lateral = plus(&motion.lateral, &with.lateral, &nominal.lateral, lateral);
-        let own = stuck.motion.noise();
-        noise = Some(match noise {
-            None => own,
-            Some(sum) => MotionNoise {
-                offset: sum.offset + own.offset,
-                deviation: sum.deviation + own.deviation,
-                length_m: sum.length_m.max(own.length_m),
-                white: sum.white + own.white,
-                bound: own.bound,
-            },
-        });
-    }
+/// One wheel stuck, as learned.
+fn stuck_mode(model: &Model, wheel: usize) -> MotionMode {
+    let motion = model
+        .stuck(wheel)
+        .map_or(model.nominal.motion, |stuck| stuck.motion);
     MotionMode {
+        moved: Moved::Stuck(1 << wheel),
         share: 1.0,
         p_unknown: 0.0,
-        moved: Moved::Stuck(wheels.iter().fold(0, |mask, w| mask | 1 << w)),
         motion,
-        noise: noise.unwrap_or_else(|| nominal.noise()),
+        noise: motion.noise(),
         ground: (1.0, 0.0),
         kept_m_s: 0.0,
         jump: [0.0; 3],
         is_thrown: false,
+        beyond: [RateModel::NONE; WHEELS],
     }
+}
+
+/// All sets of two wheels and more among those known (bits); none without an equilibrium.
+fn several_modes(model: &Model, robot: &Description, known: u32) -> Vec<MotionMode> {
+    let Some(together) = Together::new(model, robot) else {
+        return Vec::new();
+    };
+    let sets = (1..=known).filter(|set| set.count_ones() > 1 && set & !known == 0);
+    sets.filter_map(|set| several_mode(&together, set))
+        .collect()
+}
+
+/// Several wheels stuck.
+fn several_mode(together: &Together<'_>, set: u32) -> Option<MotionMode> {
+    let several = together.several(set)?;
+    Some(MotionMode {
+        share: 1.0,
+        p_unknown: 0.0,
+        moved: Moved::Stuck(set),
+        motion: several.motion,
+        noise: several.noise,
+        ground: (1.0, 0.0),
+        kept_m_s: 0.0,
+        jump: [0.0; 3],
+        is_thrown: false,
+        beyond: several.beyond,
+    })
 }
 
 /// A wheel stuck on ground that changes its effect by one unknown factor: it is the shear of the
@@ -318,7 +317,7 @@ fn on_other_ground(
     is_thrown: bool,
 ) -> MotionMode {
     let nominal = &model.nominal.motion;
-    let mode = stuck_mode(model, &[wheel]);
+    let mode = stuck_mode(model, wheel);
     let (factor, sd) = ground;
     let kept_m_s = yielding_m_s(model, robot, wheel);
     let scaled = |stuck: &Curve, nominal: &Curve, kept_m_s: f64| {
@@ -373,22 +372,12 @@ fn yielding_m_s(model: &Model, robot: &Description, wheel: usize) -> f64 {
     }
 }
 
-/// `base + factor (stuck - nominal)`; exactly `stuck` if that is all there is.
-fn plus(base: &Curve, stuck: &Curve, nominal: &Curve, factor: f64) -> Curve {
-    if base == nominal && factor == 1.0 {
-        return *stuck;
-    }
-    let (base, stuck, nominal) = (base.terms(), stuck.terms(), nominal.terms());
-    let terms = std::array::from_fn(|i| base[i] + factor * (stuck[i] - nominal[i]));
-    Curve::from_terms(terms)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn every_change_is_one_fault_more_or_less_or_another_one() {
+    fn every_change_is_faults_more_or_less_or_another_one() {
         let rates = FaultRates {
             fault_1_s: 2.0,
             unknown_1_s: 6.0,
@@ -398,19 +387,22 @@ mod tests {
         let cases = [
             (Nominal, Nominal, 0.0),
             (Nominal, Stuck(1), 2.0),
-            (Nominal, Stuck(3), 0.0),
+            (Nominal, Stuck(3), 2.0 * AT_ONCE),
             (Nominal, UnknownAny, 3.0),
             (Stuck(1), Nominal, 5.0),
             (Stuck(1), Stuck(2), 2.0),
             (Stuck(1), Stuck(3), 2.0),
+            (Stuck(1), Stuck(7), 2.0 * AT_ONCE),
             (Stuck(4), Stuck(3), 0.0),
             (Stuck(3), Stuck(2), 5.0),
             (Stuck(3), Stuck(4), 0.0),
             (Stuck(3), Stuck(5), 0.0),
-            (Stuck(3), Nominal, 0.0),
+            (Stuck(3), Stuck(15), 2.0 * AT_ONCE),
+            (Stuck(7), Stuck(2), 5.0 * AT_ONCE),
+            (Stuck(3), Nominal, 5.0 * AT_ONCE),
             (Stuck(3), Unknown, 3.0),
             (Unknown, Stuck(2), 2.0),
-            (Unknown, Stuck(3), 0.0),
+            (Unknown, Stuck(3), 2.0 * AT_ONCE),
             (Unknown, Nominal, 5.0),
         ];
         for (from, to, expected) in cases {

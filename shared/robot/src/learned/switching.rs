@@ -193,7 +193,7 @@ impl Switching {
         let sum = |is_new| -> f64 {
             let whole = |wheel| match mode.broken {
                 Some(broken) if broken == wheel => evidence.broken_anyhow(wheel),
-                _ => evidence.whole(&self.model, observation, mode.moved, is_new, wheel),
+                _ => evidence.whole(&self.model, observation, &mode.motion, is_new, wheel),
             };
             (0..count).map(whole).sum()
         };

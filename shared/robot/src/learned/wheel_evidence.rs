@@ -7,7 +7,7 @@ use vigil_inference::outlier::tempered;
 use super::wheel_context::Beside;
 use super::wheels::{rolling_rate, steering_angle};
 use super::{
-    EncoderState, Model, Moved, NoiseScales, Observation, RateModel, WheelContext,
+    EncoderState, Model, MotionMode, Moved, NoiseScales, Observation, RateModel, WheelContext,
 };
 use crate::Description;
 
@@ -26,13 +26,13 @@ pub const BREAKAGE_SHARES: [f64; BREAKAGES.len()] = [0.32, 0.32, 0.32, 0.04];
 /// Share of healthy wheels' rates in the tail: while all is well, and while another wheel drags.
 const TAIL: f64 = 0.02;
 const TAIL_DRAGGED: f64 = 0.1;
-/// Two dragging wheels change the rates of the others by more than the sum of what each does: by
-/// this factor, which lies in the middle of what the equilibrium of forces gives for any two.
-const TOGETHER: f64 = 1.4;
-/// Deviation of the change from that, relative to it.
+/// Several dragging wheels change the others' rates in a way of which nothing was learned: its
+/// deviation from what is expected, relative to it.
 pub const TOGETHER_SD: f64 = 0.4;
 /// Deviation of the change that one dragging wheel makes on any ground, relative to that learned.
 const GROUND_SD: f64 = 0.5;
+/// Share of the observations at an onset that hold the very moment.
+const MOMENT: f64 = 0.2;
 /// Share of wheels that do anything, in the unknown.
 pub const ANYTHING: f64 = 0.2;
 /// Standard deviation of a steering angle that does anything, rad.
@@ -124,7 +124,7 @@ impl WheelEvidence {
         &self,
         model: &Model,
         observation: &Observation,
-        moved: Moved,
+        mode: &MotionMode,
         is_new: bool,
         i: usize,
     ) -> f64 {
@@ -132,10 +132,14 @@ impl WheelEvidence {
             true => log_add(a, b) - std::f64::consts::LN_2,
             false => a,
         };
-        match moved {
-            _ if moved.is_stuck(i) => either(self.standing(i), self.any[i]),
+        match mode.moved {
+            moved if moved.is_stuck(i) && is_new => log_add(
+                (1.0 - MOMENT).ln() + self.standing(i),
+                MOMENT.ln() + self.any[i],
+            ),
+            moved if moved.is_stuck(i) => self.standing(i),
             Moved::Stuck(stuck) => {
-                let dragged = self.dragged(model, observation, stuck, i);
+                let dragged = self.dragged(model, observation, mode, i);
                 let sd = match stuck.count_ones() {
                     0 | 1 => 0.0,
                     _ => TOGETHER_SD * dragged.change_rad_s,
@@ -149,13 +153,13 @@ impl WheelEvidence {
         }
     }
 
-    /// How wheel `i` turns while the wheels `stuck` (bits, not i) drag.
+    /// How wheel `i`, which is not stuck, turns while others drag.
     #[must_use]
     pub fn dragged(
         &self,
         model: &Model,
         observation: &Observation,
-        stuck: u32,
+        mode: &MotionMode,
         i: usize,
     ) -> Dragged {
         let (rolling, behind) = self.rolling[i];
@@ -163,38 +167,44 @@ impl WheelEvidence {
         let rate = |rates: &[RateModel]| rates[i].rate(rolling, curvature);
         let (nominal, nominal_variance) = rate(&model.nominal.rates);
         let (shift, uncertain) = self.shift[i];
-        let (mut change, mut variance) = (0.0, behind + uncertain);
-        let dragging = (0..WHEELS).filter(|&w| stuck >> w & 1 == 1);
-        for stuck in dragging.filter_map(|w| model.stuck(w)) {
+        let (mut change, mut variance) = (rate(&mode.beyond).0, 0.0_f64);
+        let dragging = (0..WHEELS).filter(|&wheel| mode.moved.is_stuck(wheel));
+        for stuck in dragging.filter_map(|wheel| model.stuck(wheel)) {
             let (with, its) = rate(&stuck.rates);
-            change += with - nominal;
-            variance += its;
+            // What a wheel does alone, while the robot moves, says nothing of one that stands.
+            change += if mode.moved.is_immobile() {
+                0.0
+            } else {
+                with - nominal
+            };
+            // Not the sum: more stuck wheels must not always be the less likely ones.
+            variance = variance.max(its);
         }
-        match stuck.count_ones() {
-            0 => variance += nominal_variance,
-            // The ground changes what one does, as learned; what several do is learned on the way.
+        match mode.moved.stuck().count_ones() {
+            0 => variance = nominal_variance,
+            // The ground changes what one does; what several do is learned on the way.
             1 => variance += GROUND_SD * GROUND_SD * change * change,
-            _ => change *= TOGETHER,
+            _ => {}
         }
         Dragged {
             rate_rad_s: nominal + shift + change,
             change_rad_s: change,
-            variance,
+            variance: variance + behind + uncertain,
         }
     }
 
-    /// What wheel `i` reads beside the model's rate while the wheels `stuck` drag, if it was read.
+    /// What wheel `i` reads beside the model's rate in a mode, if it was read.
     #[must_use]
     pub fn beside(
         &self,
         model: &Model,
         observation: &Observation,
-        stuck: u32,
+        mode: &MotionMode,
         i: usize,
     ) -> Option<Beside> {
         let reading = &observation.wheels[i];
         let (shift, uncertain) = self.shift[i];
-        let dragged = self.dragged(model, observation, stuck, i);
+        let dragged = self.dragged(model, observation, mode, i);
         (reading.plain > 0).then(|| Beside {
             apart_rad_s: reading.mean - (dragged.rate_rad_s - shift),
             rolling_rad_s: self.rolling[i].0,

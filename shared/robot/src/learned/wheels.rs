@@ -39,6 +39,13 @@ pub struct RateModel {
 }
 
 impl RateModel {
+    /// Changes nothing.
+    pub const NONE: Self = Self {
+        ratio: 0.0,
+        droop_rad_s: [0.0; 3],
+        rate_sd_rad_s: 0.0,
+    };
+
     /// Expected rate and its variance for a wheel that would roll at `rolling` rad/s.
     #[must_use]
     pub fn rate(&self, rolling: f64, curvature: f64) -> (f64, f64) {

@@ -1,4 +1,4 @@
-//! Two stuck wheels, of which nothing was learned, against the equilibrium of forces.
+//! Several stuck wheels, of which nothing was learned together, on soils that they do not know.
 #![allow(clippy::unwrap_used)]
 
 use std::path::PathBuf;
@@ -13,19 +13,25 @@ fn read(name: &str) -> String {
 }
 
 #[test]
-fn the_motion_of_every_pair_lies_within_what_its_mode_expects() {
+fn the_motion_of_every_set_lies_within_what_its_mode_expects() {
     const SPEED_M_S: f64 = 0.2;
-    const SOILS: [(f64, f64); 3] = [(0.65, 0.2), (0.6, 0.18), (0.7, 0.22)];
+    const SOILS: [(f64, f64); 5] = [
+        (0.65, 0.2),
+        (0.6, 0.18),
+        (0.7, 0.22),
+        (0.5, 0.25),
+        (0.8, 0.15),
+    ];
     let robot: Description = toml::from_str(&read("robots/rover.toml")).unwrap();
     let model = Model::from_toml(&read("models/rover.toml")).unwrap();
     let slip = SlipModel::new(&robot).unwrap();
     let modes = motion_modes(&model, &robot, 0b11_1111, false, true);
-    let pairs = modes.iter().filter(|mode| match mode.moved {
-        Moved::Stuck(wheels) => wheels.count_ones() == 2,
+    let several = modes.iter().filter(|mode| match mode.moved {
+        Moved::Stuck(wheels) => wheels.count_ones() > 1,
         _ => false,
     });
     let (mut count, mut squares, mut far) = (0_u32, 0.0_f64, Vec::new());
-    for mode in pairs {
+    for mode in several {
         let stuck = std::array::from_fn(|wheel| mode.moved.is_stuck(wheel));
         let turns = [-1.0, -0.5, -1.0 / 6.0, 0.0, 1.0 / 6.0, 0.5, 1.0];
         for (curvature, soil) in turns.iter().flat_map(|&k| SOILS.map(|soil| (k, soil))) {
@@ -54,11 +60,11 @@ fn the_motion_of_every_pair_lies_within_what_its_mode_expects() {
             }
         }
     }
-    // Beyond two deviations in a tenth at most: in turns of 1 m over a wheel on the outer side.
-    assert_eq!(count, 15 * 7 * 3 * 2);
-    assert!(far.len() * 10 <= count as usize, "{far:?}");
-    // Nor is the mode so wide that anything would fit.
+    assert_eq!(count, (64 - 1 - 6) * 7 * 5 * 2);
+    assert!(far.len() * 20 <= count as usize, "{far:?}");
+    // Nor is the mode so wide that anything would fit, though wide: the soil is unknown, and four
+    // stuck wheels and more stand exactly here.
     let rms = (squares / f64::from(count)).sqrt();
-    assert!(rms > 0.5, "{rms}");
+    assert!(rms > 0.15, "{rms}");
     assert!(far.iter().all(|(.., far)| far.abs() < 4.0), "{far:?}");
 }

@@ -1,0 +1,142 @@
+//! What one observation says of the wheels in one motion mode: prepared once for all hypotheses.
+
+use vigil_blocks::WHEELS;
+use vigil_robot::Description;
+use vigil_robot::learned::wheel_evidence::Dragged;
+use vigil_robot::learned::{Model, MotionMode, Moved, Observation, WheelEvidence};
+
+use crate::encoders::{Encoders, Likelihoods, OWN_RATE, SILENT, ZERO};
+use crate::rate_offsets::RateOffsets;
+
+/// Of one motion mode.
+#[derive(Debug, Clone, Copy)]
+pub struct Prepared {
+    /// In general, and at the mode's onset.
+    likelihoods: [Likelihoods; 2],
+    /// With several stuck wheels: those that turn, and how.
+    dragged: [Option<Dragged>; WHEELS],
+    steering: f64,
+    stuck: u32,
+}
+
+/// One observation and its wheels.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<'a> {
+    /// The model.
+    pub model: &'a Model,
+    /// Its robot.
+    pub robot: &'a Description,
+    /// The observation.
+    pub observation: &'a Observation,
+    /// What its wheels say.
+    pub evidence: &'a WheelEvidence,
+}
+
+impl Seen<'_> {
+    /// What the wheels say in one motion mode.
+    #[must_use]
+    pub fn prepared(&self, mode: &MotionMode) -> Prepared {
+        let stuck = mode.moved.stuck();
+        Prepared {
+            likelihoods: [false, true].map(|is_new| self.likelihoods(mode, is_new)),
+            dragged: std::array::from_fn(|wheel| {
+                let turns = wheel < self.robot.wheels.len() && stuck >> wheel & 1 == 0;
+                (turns && stuck.count_ones() > 1).then(|| {
+                    let (model, observation) = (self.model, self.observation);
+                    self.evidence.dragged(model, observation, mode, wheel)
+                })
+            }),
+            steering: match mode.moved {
+                Moved::UnknownAny => self.evidence.steering,
+                _ => 0.0,
+            },
+            stuck,
+        }
+    }
+
+    fn likelihoods(&self, mode: &MotionMode, is_new: bool) -> Likelihoods {
+        let (evidence, moved) = (self.evidence, mode.moved);
+        Likelihoods::new(self.robot.wheels.len(), |wheel, state| {
+            match (state, moved) {
+                (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
+                (0, _) => evidence.whole(self.model, self.observation, mode, is_new, wheel),
+                (OWN_RATE, Moved::UnknownAny) => evidence.own_rate[wheel],
+                (OWN_RATE, _) => f64::NEG_INFINITY,
+                // What reads alike shares one likelihood, broken or not.
+                (SILENT, _) if moved.is_stuck(wheel) => evidence.broken[wheel][ZERO - 1],
+                (SILENT, _) => f64::NEG_INFINITY,
+                (broken, _) => evidence.broken[wheel][broken - 1],
+            }
+        })
+    }
+
+    /// Steps the encoders of a hypothesis in this mode, each with these probabilities to break and
+    /// to recover; returns the log-likelihood of the readings. The wheels `fresh` (bits) have just
+    /// changed.
+    pub fn weigh(
+        &self,
+        prepared: &Prepared,
+        (births, death): (&[f64; WHEELS], f64),
+        fresh: u32,
+        encoders: &mut Encoders,
+        offsets: &mut RateOffsets,
+    ) -> f64 {
+        let (observation, evidence) = (self.observation, self.evidence);
+        let [general, at_onset] = &prepared.likelihoods;
+        let mut likelihoods = *general;
+        for wheel in (0..WHEELS).filter(|wheel| fresh >> wheel & 1 == 1) {
+            likelihoods.replace(wheel, at_onset);
+        }
+        let dragged = prepared.dragged.iter().enumerate();
+        let dragged = dragged.filter_map(|(wheel, dragged)| Some((wheel, dragged.as_ref()?)));
+        let dragged = dragged.filter(|(wheel, _)| fresh >> wheel & 1 == 0);
+        for (wheel, dragged) in dragged.clone() {
+            let log = offsets.log_likelihood(self.model, observation, evidence, wheel, dragged);
+            likelihoods.replace_whole(wheel, log);
+        }
+        let (stuck, t_ns) = (prepared.stuck, observation.t_first_ns);
+        let gained = encoders.step(births, death, stuck, &likelihoods, t_ns);
+        for (wheel, dragged) in dragged {
+            if encoders.p_broken(wheel) < 0.5 {
+                offsets.learn(observation, evidence, wheel, dragged);
+            }
+        }
+        prepared.steering + gained
+    }
+
+    /// Sets of stuck wheels that may have come of the set `before`, if several wheels stuck or
+    /// turned again at once, by what the wheels read: these stick besides, those turn again, both.
+    #[must_use]
+    pub fn changed_sets(&self, before: u32, encoders: &Encoders) -> [u32; 3] {
+        let (mut stood, mut turned) = (0, 0);
+        for wheel in 0..self.robot.wheels.len().min(WHEELS) {
+            let is_whole = encoders.p_broken(wheel) < 0.5;
+            let age_s = age_s(self.observation.t_first_ns, encoders.onset(wheel));
+            match (before >> wheel & 1 == 1, self.stands(wheel)) {
+                (false, true) if is_whole || age_s < EXPLAINED_S => stood |= 1 << wheel,
+                (true, false) if is_whole => turned |= 1 << wheel,
+                _ => {}
+            }
+        }
+        [before | stood, before & !turned, (before | stood) & !turned]
+    }
+
+    /// True if a wheel's readings may well be those of a standing one.
+    fn stands(&self, wheel: usize) -> bool {
+        let evidence = self.evidence;
+        let silent = evidence.broken[wheel][ZERO - 1];
+        evidence.standing(wheel).max(silent) + DOUBT > evidence.any[wheel]
+    }
+}
+
+/// Readings that a standing wheel makes less probable than that it does anything, by up to this
+/// much (natural logarithm), may still be its: one in a thousand lies so far out.
+const DOUBT: f64 = 2.0;
+/// An encoder that broke this short before its wheel is supposed to have stuck may never have been
+/// broken, s: a stuck wheel's reads the same, and the motion tells within about this time.
+pub const EXPLAINED_S: f64 = 2.0;
+
+/// Time since an onset, s.
+pub fn age_s(t_ns: u64, onset_ns: u64) -> f64 {
+    t_ns.saturating_sub(onset_ns) as f64 * 1e-9
+}
