@@ -1,8 +1,8 @@
 //! The detector's `step`: guard, observe, monitor, alarm, report.
 
 use vigil_blocks::{
-    Channel, DetectionBelief, Entry, HealthyBelief, PARTICLE_CAPACITY, ParticleBlock, Readiness, SensorFrame,
-    Symptoms, Valid,
+    Channel, DetectionBelief, Entry, HealthyBelief, PARTICLE_CAPACITY, ParticleBlock, Readiness,
+    SensorFrame, Symptoms, Valid,
 };
 use vigil_inference::ending::Ending;
 use vigil_inference::logspace::probability;

@@ -80,7 +80,10 @@ impl State {
         let p = if self.was_thrown { THROWN_ON } else { THROWN };
         let (before, mut thrown) = (self.track, self.track);
         thrown.diffuse(THROW_SD.map(|sd| sd * sd));
-        let drives = self.track.update(pose, variance).map(|log| log + (1.0 - p).ln());
+        let drives = self
+            .track
+            .update(pose, variance)
+            .map(|log| log + (1.0 - p).ln());
         let flies = thrown.update(pose, variance).map(|log| log + p.ln());
         self.was_thrown = flies > drives;
         if self.was_thrown {

@@ -146,8 +146,7 @@ impl Generic {
     pub fn restart(&mut self, healthy: &Healthy, t_ns: u64) {
         self.pending_m = 0.0;
         self.since_ns = [t_ns; MODES_MAX];
-        self.model_mut()
-            .start_at(healthy.pose, healthy.covariance);
+        self.model_mut().start_at(healthy.pose, healthy.covariance);
         match &mut self.kind {
             Kind::Sampled(filter) => filter.restart(self.seed),
             Kind::Hierarchical(filter) => filter.restart(self.seed),

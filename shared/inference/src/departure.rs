@@ -251,7 +251,10 @@ impl<const K: usize> Departure<K> {
             ended.track.saturate(&bound);
         }
         let unknown = self.faults.iter_mut().zip(self.is_unknown);
-        for fault in unknown.filter(|(_, is)| *is).flat_map(|(all, _)| all.iter_mut()) {
+        for fault in unknown
+            .filter(|(_, is)| *is)
+            .flat_map(|(all, _)| all.iter_mut())
+        {
             let log_material = fault.track.log_material(&bound);
             fault.log_weight += log_material - fault.log_material;
             fault.log_material = log_material;
@@ -403,7 +406,11 @@ mod tests {
         let mut all: Vec<(usize, f64, Track)> = Vec::new();
         for pose in poses {
             for (kind, its) in kinds().iter().enumerate() {
-                all.push((kind, (BIRTH * its.share).ln(), nominal.enter(&nominal.context(), &its.noise)));
+                all.push((
+                    kind,
+                    (BIRTH * its.share).ln(),
+                    nominal.enter(&nominal.context(), &its.noise),
+                ));
             }
             nominal.predict(&STEP, &noise(0.001, 0.001));
             let healthy = nominal.update(*pose, VARIANCE).unwrap();

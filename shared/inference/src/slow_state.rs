@@ -41,7 +41,8 @@ impl SlowState {
     pub fn fade(&mut self, travel_m: f64, drift: &Drift) {
         let fading = (-travel_m.abs() / drift.length_m).exp();
         self.mean *= fading;
-        self.variance = self.variance * fading * fading + drift.variance() * (1.0 - fading * fading);
+        self.variance =
+            self.variance * fading * fading + drift.variance() * (1.0 - fading * fading);
     }
 
     /// Takes a measurement of `scale` times the state, with the variance `noise`. One that is no

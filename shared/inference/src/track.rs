@@ -197,7 +197,10 @@ impl Track {
         let mut within = 0.0;
         for i in 0..3 {
             let sd = (2.0 * covariance[(i, i)]).sqrt().max(f64::MIN_POSITIVE);
-            let (near, far) = ((bound[i] - mean[i].abs()) / sd, (bound[i] + mean[i].abs()) / sd);
+            let (near, far) = (
+                (bound[i] - mean[i].abs()) / sd,
+                (bound[i] + mean[i].abs()) / sd,
+            );
             let beyond = 0.5 * (libm::erfc(near) + libm::erfc(far));
             within += (-beyond.min(1.0)).ln_1p();
         }

@@ -77,7 +77,9 @@ impl Tolerance {
             ("steer_rad", self.steer_rad, 1.0),
             ("length_m", self.length_m, 1e4),
         ];
-        let wrong = all.into_iter().find(|&(_, value, most)| !(value > 0.0 && value <= most));
+        let wrong = all
+            .into_iter()
+            .find(|&(_, value, most)| !(value > 0.0 && value <= most));
         wrong.map(|(name, value, _)| (name, value))
     }
 }

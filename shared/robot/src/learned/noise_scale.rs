@@ -9,11 +9,11 @@ use crate::Description;
 
 /// Squares above this many times the believed variance say nothing about noise (a jump, a fault).
 const CLIP: f64 = 9.0;
-/// Squares above this many times the mean one are of outliers.
-const OUTLIER: f64 = 25.0;
+/// Squares above this many times the mean one go to an outlier, or come from it.
+const FAR: f64 = 12.0;
 /// Bounds of the rate of outliers: what is believed of a sensor that never had one, and what is no
 /// sensor any more.
-const OUTLIER_RATE_MIN: f64 = 1e-8;
+const OUTLIER_RATE_MIN: f64 = 1e-10;
 const OUTLIER_RATE_MAX: f64 = 0.1;
 /// Mean of a squared standard normal clipped at [`CLIP`].
 const CLIPPED_MEAN: f64 = 0.99;
@@ -81,6 +81,7 @@ pub struct NoiseScale {
     sum: f64,
     count: f64,
     outliers: f64,
+    was_far: bool,
 }
 
 impl Default for NoiseScale {
@@ -89,6 +90,7 @@ impl Default for NoiseScale {
             sum: PRIOR,
             count: PRIOR,
             outliers: 0.0,
+            was_far: false,
         }
     }
 }
@@ -104,16 +106,19 @@ impl NoiseScale {
         let fading = 1.0 - 1.0 / MEMORY;
         let ratio = (self.sum / self.count).max(RATIO_MIN);
         let largest = CLIP * ratio;
-        let is_outlier = normalised_square > OUTLIER * ratio;
+        // There and back again: what stays there is no outlier.
+        let is_far = normalised_square > FAR * ratio;
+        let is_outlier = is_far && self.was_far;
+        self.was_far = is_far;
         self.outliers = self.outliers * fading + f64::from(u8::from(is_outlier));
         self.sum = self.sum * fading + normalised_square.clamp(0.0, largest) / CLIPPED_MEAN;
         self.count = self.count * fading + 1.0;
     }
 
-    /// Share of the samples that are outliers: each shows in two differences or more.
+    /// Share of the samples that are outliers.
     #[must_use]
     pub fn outlier_rate(&self) -> f64 {
-        (0.5 * self.outliers / self.count).clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX)
+        (self.outliers / self.count).clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX)
     }
 
     /// Ratio of the variances. It leans to the high side by its own uncertainty: false alarms come
