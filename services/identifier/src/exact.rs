@@ -129,12 +129,12 @@ impl Exact {
     ) -> Self {
         // A pose alone cannot tell two stuck wheels from one on another soil.
         let modes = motion_modes(model, robot, leaves.stuck_wheels(), true, use_wheels);
-        let on_any_ground = |mode: MotionMode| match mode.moved {
-            Moved::Nominal | Moved::Unknown if mode.is_nominal_motion() => MotionMode {
-                noise: model.nominal_noise(robot),
-                ..mode
-            },
-            _ => mode,
+        let on_any_ground = |mode: MotionMode| {
+            let noise = match mode.is_nominal_motion() {
+                true => model.nominal_noise(robot),
+                false => robot.drifting(mode.noise),
+            };
+            MotionMode { noise, ..mode }
         };
         let modes: Vec<MotionMode> = modes.into_iter().map(on_any_ground).collect();
         let is_leaf = leaves.encoder.map(|leaf| leaf.is_some());

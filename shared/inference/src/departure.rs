@@ -348,6 +348,7 @@ mod tests {
             deviation: Matrix3::identity() * deviation * deviation,
             length_m: 0.3,
             white: Vector3::repeat(1e-8),
+            drift: Vector3::zeros(),
             bound: Vector3::repeat(f64::INFINITY),
         }
     }

@@ -81,6 +81,7 @@ mod tests {
             deviation: Matrix3::zeros(),
             length_m: 1.0,
             white: Vector3::zeros(),
+            drift: Vector3::zeros(),
             bound: Vector3::repeat(f64::INFINITY),
         };
         let at = |x: f64| Track::new(Vector3::new(x, 0.0, 0.0), Matrix3::zeros(), &noise);

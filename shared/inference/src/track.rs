@@ -26,6 +26,8 @@ pub struct MotionNoise {
     pub length_m: f64,
     /// Variance of white noise per metre travelled.
     pub white: Vector3<f64>,
+    /// Variance by which the offsets drift per metre travelled.
+    pub drift: Vector3<f64>,
     /// Largest mean deviation per metre in this mode; infinite where there is no such bound.
     pub bound: Vector3<f64>,
 }
@@ -278,6 +280,8 @@ impl Track {
         let white = body * Matrix3::from_diagonal(&white) * body.transpose();
         let pose = heading * pp * heading.transpose() + mixed + mixed.transpose() + drift + white;
         let fresh = noise.deviation * (1.0 - fading * fading);
+        let drifted = oo + Matrix3::from_diagonal(&(noise.drift * travel.abs()));
+        self.set(3, 3, &drifted);
         self.set(0, 0, &pose);
         self.set(0, 3, &pose_offset);
         self.set(0, 6, &(pose_deviation * fading));
@@ -341,6 +345,7 @@ mod tests {
             deviation: Matrix3::new(2e-3, -9e-4, 0.0, -9e-4, 6e-4, 0.0, 0.0, 0.0, 3e-6),
             length_m: 0.2,
             white: Vector3::new(1e-5, 2e-5, 1e-6),
+            drift: Vector3::new(1e-4, 2e-4, 0.0),
             bound: Vector3::repeat(f64::INFINITY),
         }
     }
@@ -405,6 +410,8 @@ mod tests {
             let fading = (-0.05_f64 / 0.2).exp();
             let fresh = noise.deviation * (1.0 - fading * fading);
             q.fixed_view_mut::<3, 3>(6, 6).copy_from(&fresh);
+            q.fixed_view_mut::<3, 3>(3, 3)
+                .copy_from(&Matrix3::from_diagonal(&(noise.drift * 0.05)));
             plain.predict(&jacobian, &shift, &q);
             track.predict(&step, &noise);
             let z = [1.0 + 0.04 * f64::from(k), 2.0, 0.5 + 0.03 * f64::from(k)];

@@ -1,6 +1,7 @@
 //! Description of a robot, as read from `config/robots/*.toml`.
 
 use serde::{Deserialize, Serialize};
+use vigil_inference::track::MotionNoise;
 
 use crate::Tolerance;
 
@@ -227,6 +228,13 @@ impl Description {
         let reach = |wheel: &Wheel| wheel.x.hypot(wheel.y);
         let reach_m = self.wheels.iter().map(reach).fold(0.0, f64::max);
         twist[0].hypot(twist[1]).hypot(reach_m * twist[2])
+    }
+
+    /// The noise of a fault's motion, with the drift of the ground under it.
+    #[must_use]
+    pub fn drifting(&self, noise: MotionNoise) -> MotionNoise {
+        let tolerance = self.tolerance.as_ref();
+        tolerance.map_or(noise, |tolerance| tolerance.drifting(&noise))
     }
 
     /// What is left of a steering angle's deviation (rad) beyond the tolerance, if there is one.

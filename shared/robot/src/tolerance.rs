@@ -5,6 +5,9 @@ use serde::{Deserialize, Serialize};
 use vigil_inference::slow_state::Drift;
 use vigil_inference::track::MotionNoise;
 
+/// Standard deviation of the motion's healthy variation over its tolerance.
+const SHARE: f64 = 0.25;
+
 /// Healthy variation, in physical units. Each is the largest magnitude that is no fault: it is
 /// estimated under way up to there, and is a material departure beyond.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -31,11 +34,22 @@ impl Tolerance {
     #[must_use]
     pub fn widened(&self, noise: &MotionNoise) -> MotionNoise {
         let bound = Vector3::new(self.yaw_rad_m, self.forward_m_m, self.lateral_m_m);
-        let sd = bound * 0.5;
+        let sd = bound * SHARE;
         MotionNoise {
             deviation: noise.deviation + Matrix3::from_diagonal(&sd.component_mul(&sd)),
             length_m: self.length_m,
             bound,
+            ..*noise
+        }
+    }
+
+    /// The noise of a fault's motion where the ground under it changes as it does in health.
+    #[must_use]
+    pub fn drifting(&self, noise: &MotionNoise) -> MotionNoise {
+        let sd = SHARE * Vector3::new(self.yaw_rad_m, self.forward_m_m, self.lateral_m_m);
+        MotionNoise {
+            // That of the nominal deviations' Ornstein-Uhlenbeck process.
+            drift: sd.component_mul(&sd) * (2.0 / self.length_m),
             ..*noise
         }
     }

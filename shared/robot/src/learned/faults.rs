@@ -28,10 +28,11 @@ impl Faults {
     #[must_use]
     pub fn new(model: &Model, robot: &Description) -> Self {
         let stuck = |wheel: usize| model.stuck(wheel).map(|stuck| stuck.motion);
+        let drifting = |noise| robot.drifting(noise);
         Self {
-            anything: unknown_noise(model),
+            anything: drifting(unknown_noise(model)),
             is_bounded: robot.tolerance.is_some(),
-            learned: std::array::from_fn(|w| stuck(w).map(|motion| (motion, motion.noise()))),
+            learned: std::array::from_fn(|w| stuck(w).map(|motion| (motion, drifting(motion.noise())))),
         }
     }
 

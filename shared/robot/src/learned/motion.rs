@@ -111,6 +111,7 @@ impl MotionModel {
             deviation: covariance(self.deviation_sd, self.correlation),
             length_m: self.deviation_length_m,
             white: Vector3::from(self.white_sd.map(|sd| sd * sd)),
+            drift: Vector3::zeros(),
             bound: Vector3::repeat(f64::INFINITY),
         }
     }

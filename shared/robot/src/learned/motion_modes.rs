@@ -256,6 +256,7 @@ pub fn unknown_noise(model: &Model) -> MotionNoise {
         deviation: Matrix3::from_diagonal(&deviation.diagonal()) + nominal.deviation,
         length_m: UNKNOWN_LENGTH_M,
         white: nominal.white * 4.0,
+        drift: nominal.drift,
         bound: nominal.bound,
     }
 }

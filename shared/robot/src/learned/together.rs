@@ -171,6 +171,7 @@ impl<'a> Together<'a> {
                 length_m.max(alone.length_m)
             }),
             white: nominal.white,
+            drift: nominal.drift,
             bound: nominal.bound,
         })
     }
