@@ -180,8 +180,8 @@ VIGIL_ASSERT(offsetof(vigil_sensor_frame, steer) == 240);
 VIGIL_ASSERT(offsetof(vigil_sensor_frame, current) == 304);
 VIGIL_ASSERT(offsetof(vigil_sensor_frame, reserved) == 368);
 
-#define VIGIL_DETECTION_BELIEF_SCHEMA 0x4c5fa2c6d09bb964ull
-#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.4c5fa2c6d09bb964"
+#define VIGIL_DETECTION_BELIEF_SCHEMA 0x8b9b055629f2723eull
+#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.8b9b055629f2723e"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -205,6 +205,14 @@ typedef struct {
   double noise_scale_wheels[8];
   /* The same for each steering angle. */
   double noise_scale_steer[8];
+  /* Estimated share of the samples of the pose (x, y, yaw) that are outliers. */
+  double outlier_rate[3];
+  /* The same for each wheel's rate. */
+  double outlier_rate_wheels[8];
+  /* The same for each steering angle. */
+  double outlier_rate_steer[8];
+  /* What an identification starts from. */
+  vigil_healthy_belief healthy;
   /* Log-odds of a fault seen by each channel alone (see Channel). */
   double channel_log_odds[32];
   /* decision_seq of the last action that the robot obeyed, as the frame says it. */
@@ -232,7 +240,7 @@ typedef struct {
   /* Reserved, zero. */
   uint32_t reserved;
 } vigil_detection_belief;
-VIGIL_ASSERT(sizeof(vigil_detection_belief) == 584);
+VIGIL_ASSERT(sizeof(vigil_detection_belief) == 1024);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, cause) == 48);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, run_id) == 72);
@@ -244,19 +252,23 @@ VIGIL_ASSERT(offsetof(vigil_detection_belief, effective_sample_size) == 112);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale) == 120);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale_wheels) == 144);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale_steer) == 208);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, channel_log_odds) == 272);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, action_seq) == 528);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_t_capture_ns) == 536);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm) == 544);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_count) == 548);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, symptoms) == 552);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, invalid_count) == 556);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, degenerate_count) == 560);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, particle_count) == 564);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, action_outcome) == 568);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, blind) == 572);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, readiness) == 576);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, reserved) == 580);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, outlier_rate) == 272);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, outlier_rate_wheels) == 296);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, outlier_rate_steer) == 360);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, healthy) == 424);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, channel_log_odds) == 712);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, action_seq) == 968);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_t_capture_ns) == 976);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm) == 984);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_count) == 988);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, symptoms) == 992);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, invalid_count) == 996);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, degenerate_count) == 1000);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, particle_count) == 1004);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, action_outcome) == 1008);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, blind) == 1012);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, readiness) == 1016);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, reserved) == 1020);
 
 #define VIGIL_PARTICLE_BLOCK_SCHEMA 0x7d929f90c981a707ull
 #define VIGIL_PARTICLE_BLOCK_TYPE_NAME "vigil.ParticleBlock.v1.7d929f90c981a707"

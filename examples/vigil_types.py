@@ -196,8 +196,8 @@ assert SensorFrame.reserved.offset == 368
 
 
 class DetectionBelief(ctypes.LittleEndianStructure):
-    SCHEMA = 0x4C5FA2C6D09BB964
-    TYPE_NAME = "vigil.DetectionBelief.v1.4c5fa2c6d09bb964"
+    SCHEMA = 0x8B9B055629F2723E
+    TYPE_NAME = "vigil.DetectionBelief.v1.8b9b055629f2723e"
 
     @staticmethod
     def type_name():
@@ -226,6 +226,14 @@ class DetectionBelief(ctypes.LittleEndianStructure):
         ("noise_scale_wheels", ctypes.c_double * 8),
         # The same for each steering angle.
         ("noise_scale_steer", ctypes.c_double * 8),
+        # Estimated share of the samples of the pose (x, y, yaw) that are outliers.
+        ("outlier_rate", ctypes.c_double * 3),
+        # The same for each wheel's rate.
+        ("outlier_rate_wheels", ctypes.c_double * 8),
+        # The same for each steering angle.
+        ("outlier_rate_steer", ctypes.c_double * 8),
+        # What an identification starts from.
+        ("healthy", HealthyBelief),
         # Log-odds of a fault seen by each channel alone (see Channel).
         ("channel_log_odds", ctypes.c_double * 32),
         # decision_seq of the last action that the robot obeyed, as the frame says it.
@@ -255,7 +263,7 @@ class DetectionBelief(ctypes.LittleEndianStructure):
     ]
 
 
-assert ctypes.sizeof(DetectionBelief) == 584
+assert ctypes.sizeof(DetectionBelief) == 1024
 assert DetectionBelief.header.offset == 0
 assert DetectionBelief.cause.offset == 48
 assert DetectionBelief.run_id.offset == 72
@@ -267,19 +275,23 @@ assert DetectionBelief.effective_sample_size.offset == 112
 assert DetectionBelief.noise_scale.offset == 120
 assert DetectionBelief.noise_scale_wheels.offset == 144
 assert DetectionBelief.noise_scale_steer.offset == 208
-assert DetectionBelief.channel_log_odds.offset == 272
-assert DetectionBelief.action_seq.offset == 528
-assert DetectionBelief.alarm_t_capture_ns.offset == 536
-assert DetectionBelief.alarm.offset == 544
-assert DetectionBelief.alarm_count.offset == 548
-assert DetectionBelief.symptoms.offset == 552
-assert DetectionBelief.invalid_count.offset == 556
-assert DetectionBelief.degenerate_count.offset == 560
-assert DetectionBelief.particle_count.offset == 564
-assert DetectionBelief.action_outcome.offset == 568
-assert DetectionBelief.blind.offset == 572
-assert DetectionBelief.readiness.offset == 576
-assert DetectionBelief.reserved.offset == 580
+assert DetectionBelief.outlier_rate.offset == 272
+assert DetectionBelief.outlier_rate_wheels.offset == 296
+assert DetectionBelief.outlier_rate_steer.offset == 360
+assert DetectionBelief.healthy.offset == 424
+assert DetectionBelief.channel_log_odds.offset == 712
+assert DetectionBelief.action_seq.offset == 968
+assert DetectionBelief.alarm_t_capture_ns.offset == 976
+assert DetectionBelief.alarm.offset == 984
+assert DetectionBelief.alarm_count.offset == 988
+assert DetectionBelief.symptoms.offset == 992
+assert DetectionBelief.invalid_count.offset == 996
+assert DetectionBelief.degenerate_count.offset == 1000
+assert DetectionBelief.particle_count.offset == 1004
+assert DetectionBelief.action_outcome.offset == 1008
+assert DetectionBelief.blind.offset == 1012
+assert DetectionBelief.readiness.offset == 1016
+assert DetectionBelief.reserved.offset == 1020
 
 
 class ParticleBlock(ctypes.LittleEndianStructure):
