@@ -2,7 +2,8 @@
 //!
 //! State: x, y, yaw; three offsets that are constant within a run; three deviations that follow an
 //! Ornstein-Uhlenbeck process along the path. Offsets and deviations are per commanded metre, in
-//! the order yaw, forward, lateral. A robot that slips forward turns less by the same share, so the
+//! the order yaw, forward, lateral. Offsets turn with the robot; the deviations forward and lateral
+//! keep their direction on the ground, as a slope does. A robot that slips forward turns less by the same share, so the
 //! yaw is that of the travel that remains, and what else it deviates by. The extended Kalman filter
 //! linearises about the heading at half the turn.
 
@@ -259,8 +260,10 @@ impl Track {
         self.mean[1] += dy;
         self.mean[2] += turn;
         let fading = (-travel.abs() / noise.length_m).exp();
+        let (s, c) = turn.sin_cos();
+        let turned = Matrix3::new(1.0, 0.0, 0.0, 0.0, c, s, 0.0, -s, c) * fading;
         let old = self.mean.fixed_rows::<3>(6).into_owned();
-        self.mean.fixed_rows_mut::<3>(6).copy_from(&(old * fading));
+        self.mean.fixed_rows_mut::<3>(6).copy_from(&(turned * old));
 
         let heading = Matrix3::new(1.0, 0.0, -dy, 0.0, 1.0, dx, 0.0, 0.0, 1.0);
         let body = Matrix3::new(-0.5 * dy, cos, -sin, 0.5 * dx, sin, cos, 1.0, 0.0, 0.0);
@@ -284,9 +287,9 @@ impl Track {
         self.set(3, 3, &drifted);
         self.set(0, 0, &pose);
         self.set(0, 3, &pose_offset);
-        self.set(0, 6, &(pose_deviation * fading));
-        self.set(3, 6, &(od * fading));
-        self.set(6, 6, &(dd * (fading * fading) + fresh));
+        self.set(0, 6, &(pose_deviation * turned.transpose()));
+        self.set(3, 6, &(od * turned.transpose()));
+        self.set(6, 6, &(turned * dd * turned.transpose() + fresh));
     }
 
     fn set(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
@@ -360,8 +363,11 @@ mod tests {
         out[0] += forward * cos - lateral * sin;
         out[1] += forward * sin + lateral * cos;
         out[2] += turn;
+        let fading = (-travel / noise().length_m).exp();
+        let (s, c) = turn.sin_cos();
+        (out[7], out[8]) = (c * state[7] + s * state[8], c * state[8] - s * state[7]);
         for i in 6..N {
-            out[i] *= (-travel / noise().length_m).exp();
+            out[i] *= fading;
         }
         out
     }

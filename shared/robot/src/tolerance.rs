@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 use vigil_inference::slow_state::Drift;
 use vigil_inference::track::MotionNoise;
 
-/// Standard deviation of the motion's healthy variation over its tolerance.
-const SHARE: f64 = 0.25;
+/// Standard deviations of the motion's healthy variation over its tolerance.
+const OFFSET_SHARE: f64 = 0.25;
+const SLOPE_SHARE: f64 = 0.4;
 
 /// Healthy variation, in physical units. Each is the largest magnitude that is no fault: it is
 /// estimated under way up to there, and is a material departure beyond.
@@ -33,23 +34,41 @@ impl Tolerance {
     /// The noise of nominal motion where the ground is not the one learned on.
     #[must_use]
     pub fn widened(&self, noise: &MotionNoise) -> MotionNoise {
-        let bound = Vector3::new(self.yaw_rad_m, self.forward_m_m, self.lateral_m_m);
-        let sd = bound * SHARE;
+        let (offset, slope) = (self.offset_sd(), self.slope_sd());
         MotionNoise {
-            deviation: noise.deviation + Matrix3::from_diagonal(&sd.component_mul(&sd)),
+            offset: noise.offset + Matrix3::from_diagonal(&offset.component_mul(&offset)),
+            deviation: noise.deviation + Matrix3::from_diagonal(&slope.component_mul(&slope)),
             length_m: self.length_m,
-            bound,
+            drift: self.drift(),
+            bound: Vector3::new(self.yaw_rad_m, self.forward_m_m, self.lateral_m_m),
             ..*noise
         }
+    }
+
+    /// Of what turns with the robot: soil, load, servos; yaw, forward, lateral.
+    fn offset_sd(&self) -> Vector3<f64> {
+        let half = 0.5 * self.lateral_m_m;
+        Vector3::new(self.yaw_rad_m, self.forward_m_m, half) * OFFSET_SHARE
+    }
+
+    /// Of what keeps its direction on the ground: slopes, which act alike forward and to the side.
+    fn slope_sd(&self) -> Vector3<f64> {
+        Vector3::new(0.0, self.lateral_m_m, self.lateral_m_m) * SLOPE_SHARE
+    }
+
+    /// Variance by which what turns with the robot changes per metre.
+    fn drift(&self) -> Vector3<f64> {
+        let sd = self.offset_sd();
+        sd.component_mul(&sd) / self.length_m
     }
 
     /// The noise of a fault's motion where the ground under it changes as it does in health.
     #[must_use]
     pub fn drifting(&self, noise: &MotionNoise) -> MotionNoise {
-        let sd = SHARE * Vector3::new(self.yaw_rad_m, self.forward_m_m, self.lateral_m_m);
+        let slope = self.slope_sd();
         MotionNoise {
-            // That of the nominal deviations' Ornstein-Uhlenbeck process.
-            drift: sd.component_mul(&sd) * (2.0 / self.length_m),
+            // Turning on a slope, too, changes what a fault adds to.
+            drift: self.drift() + slope.component_mul(&slope) / self.length_m,
             ..*noise
         }
     }
