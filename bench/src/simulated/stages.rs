@@ -8,7 +8,7 @@ use vigil_blocks::{
 };
 use vigil_detector::Detector;
 use vigil_evaluation::scoring::field::{BLIND, Moment, Told};
-use vigil_evaluation::scoring::{MULTIPLE, UNKNOWN};
+use vigil_evaluation::scoring::{Belief, MULTIPLE, UNKNOWN};
 use vigil_identifier::{Diagnoser, Input};
 use vigil_setup::Setup;
 use vigil_setup::schema::Sensors;
@@ -123,7 +123,11 @@ impl Stages {
             dt_s,
             drives,
             alarm: fused_alarm(&self.detection, Some(action)),
-            p_nominal: belief.p[0],
+            belief: Belief {
+                p_nodes: &belief.p[..self.names.len().min(belief.p.len())],
+                p_unknown: belief.p_unknown,
+                is_identifying: belief.identifying != 0,
+            },
             mode: self.name(belief.mode),
             p_mode: belief.p_mode,
             set: &self.set.1,

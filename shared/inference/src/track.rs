@@ -1,11 +1,10 @@
 //! A Gaussian track of a planar pose whose motion per metre deviates from its model.
 //!
-//! State: x, y, yaw; three offsets that are constant within a run; three deviations that follow an
-//! Ornstein-Uhlenbeck process along the path. Offsets and deviations are per commanded metre, in
-//! the order yaw, forward, lateral. Offsets turn with the robot; the deviations forward and lateral
-//! keep their direction on the ground, as a slope does. A robot that slips forward turns less by the same share, so the
-//! yaw is that of the travel that remains, and what else it deviates by. The extended Kalman filter
-//! linearises about the heading at half the turn.
+//! State: x, y, yaw; three offsets that are constant within a run, or drift; three deviations that
+//! follow an Ornstein-Uhlenbeck process along the path. Both are per commanded metre, in the order
+//! yaw, forward, lateral. What an offset takes from the travel, as motors do that yield, it takes
+//! from the turn as well; a deviation does not, as a slope on which the robot slips. The extended
+//! Kalman filter linearises about the heading at half the turn.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -249,10 +248,9 @@ impl Track {
     /// Moves by one displacement.
     pub fn predict(&mut self, step: &Displacement, noise: &MotionNoise) {
         let travel = step.travel_m;
-        let deviation = self.deviation();
-        let moved = (Vector3::from(step.per_metre) + deviation) * travel;
+        let moved = (Vector3::from(step.per_metre) + self.deviation()) * travel;
         let slipping = step.per_metre[0] * travel;
-        let turn = moved[0] + slipping * deviation[1];
+        let turn = moved[0] + slipping * self.mean[4];
         let (forward, lateral) = (moved[1], moved[2]);
         let (sin, cos) = (self.mean[2] + 0.5 * turn).sin_cos();
         let (dx, dy) = (forward * cos - lateral * sin, forward * sin + lateral * cos);
@@ -260,14 +258,13 @@ impl Track {
         self.mean[1] += dy;
         self.mean[2] += turn;
         let fading = (-travel.abs() / noise.length_m).exp();
-        let (s, c) = turn.sin_cos();
-        let turned = Matrix3::new(1.0, 0.0, 0.0, 0.0, c, s, 0.0, -s, c) * fading;
         let old = self.mean.fixed_rows::<3>(6).into_owned();
-        self.mean.fixed_rows_mut::<3>(6).copy_from(&(turned * old));
+        self.mean.fixed_rows_mut::<3>(6).copy_from(&(old * fading));
 
         let heading = Matrix3::new(1.0, 0.0, -dy, 0.0, 1.0, dx, 0.0, 0.0, 1.0);
         let body = Matrix3::new(-0.5 * dy, cos, -sin, 0.5 * dx, sin, cos, 1.0, 0.0, 0.0);
-        let mut by = body * travel;
+        let by_deviation = body * travel;
+        let mut by = by_deviation;
         by.set_column(1, &(by.column(1) + body.column(0) * slipping));
         let view = |r: usize, c: usize| -> Matrix3<f64> {
             self.covariance.fixed_view::<3, 3>(r, c).into()
@@ -275,10 +272,14 @@ impl Track {
         let (pp, po, pd) = (view(0, 0), view(0, 3), view(0, 6));
         let (oo, od, dd) = (view(3, 3), view(3, 6), view(6, 6));
         // Rows of the new pose against the old offsets and deviations.
-        let pose_offset = heading * po + by * (oo + od.transpose());
-        let pose_deviation = heading * pd + by * (od + dd);
-        let mixed = heading * (po + pd) * by.transpose();
-        let drift = by * (oo + od + od.transpose() + dd) * by.transpose();
+        let pose_offset = heading * po + by * oo + by_deviation * od.transpose();
+        let pose_deviation = heading * pd + by * od + by_deviation * dd;
+        let mixed = heading * (po * by.transpose() + pd * by_deviation.transpose());
+        let across = by * od * by_deviation.transpose();
+        let drift = by * oo * by.transpose()
+            + across
+            + across.transpose()
+            + by_deviation * dd * by_deviation.transpose();
         let white = noise.white * travel.abs() + Vector3::from(step.extra);
         let white = body * Matrix3::from_diagonal(&white) * body.transpose();
         let pose = heading * pp * heading.transpose() + mixed + mixed.transpose() + drift + white;
@@ -287,9 +288,9 @@ impl Track {
         self.set(3, 3, &drifted);
         self.set(0, 0, &pose);
         self.set(0, 3, &pose_offset);
-        self.set(0, 6, &(pose_deviation * turned.transpose()));
-        self.set(3, 6, &(od * turned.transpose()));
-        self.set(6, 6, &(turned * dd * turned.transpose() + fresh));
+        self.set(0, 6, &(pose_deviation * fading));
+        self.set(3, 6, &(od * fading));
+        self.set(6, 6, &(dd * (fading * fading) + fresh));
     }
 
     fn set(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
@@ -355,7 +356,7 @@ mod tests {
 
     fn motion(state: &SVector<f64, N>, step: &Displacement) -> SVector<f64, N> {
         let (travel, f) = (step.travel_m, step.per_metre);
-        let turn = (f[0] * (1.0 + state[4] + state[7]) + state[3] + state[6]) * travel;
+        let turn = (f[0] * (1.0 + state[4]) + state[3] + state[6]) * travel;
         let forward = (f[1] + state[4] + state[7]) * travel;
         let lateral = (f[2] + state[5] + state[8]) * travel;
         let (sin, cos) = (state[2] + 0.5 * turn).sin_cos();
@@ -363,11 +364,8 @@ mod tests {
         out[0] += forward * cos - lateral * sin;
         out[1] += forward * sin + lateral * cos;
         out[2] += turn;
-        let fading = (-travel / noise().length_m).exp();
-        let (s, c) = turn.sin_cos();
-        (out[7], out[8]) = (c * state[7] + s * state[8], c * state[8] - s * state[7]);
         for i in 6..N {
-            out[i] *= fading;
+            out[i] *= (-travel / noise().length_m).exp();
         }
         out
     }
@@ -393,8 +391,7 @@ mod tests {
                 down[j] -= 1e-6;
                 (motion(&up, &step)[i] - motion(&down, &step)[i]) / 2e-6
             });
-            let slip = plain.mean[4] + plain.mean[7];
-            let turn = (0.5 * (1.0 + slip) + plain.mean[3] + plain.mean[6]) * 0.05;
+            let turn = (0.5 * (1.0 + plain.mean[4]) + plain.mean[3] + plain.mean[6]) * 0.05;
             let (sin, cos) = (plain.mean[2] + 0.5 * turn).sin_cos();
             let shift = motion(&plain.mean, &step) - jacobian * plain.mean;
             let moved = motion(&plain.mean, &step) - plain.mean;

@@ -45,18 +45,18 @@ impl Tolerance {
         }
     }
 
-    /// Of what turns with the robot: soil, load, servos; yaw, forward, lateral.
+    /// Of what the turn loses as the travel does: motors that yield. Yaw, forward, lateral.
     fn offset_sd(&self) -> Vector3<f64> {
         let half = 0.5 * self.lateral_m_m;
         Vector3::new(self.yaw_rad_m, self.forward_m_m, half) * OFFSET_SHARE
     }
 
-    /// Of what keeps its direction on the ground: slopes, which act alike forward and to the side.
+    /// Of what only shifts the robot: slopes, which act alike forward and to the side.
     fn slope_sd(&self) -> Vector3<f64> {
         Vector3::new(0.0, self.lateral_m_m, self.lateral_m_m) * SLOPE_SHARE
     }
 
-    /// Variance by which what turns with the robot changes per metre.
+    /// Variance by which the offsets change per metre.
     fn drift(&self) -> Vector3<f64> {
         let sd = self.offset_sd();
         sd.component_mul(&sd) / self.length_m
@@ -67,7 +67,7 @@ impl Tolerance {
     pub fn drifting(&self, noise: &MotionNoise) -> MotionNoise {
         let slope = self.slope_sd();
         MotionNoise {
-            // Turning on a slope, too, changes what a fault adds to.
+            // A slope, too, changes under a fault.
             drift: self.drift() + slope.component_mul(&slope) / self.length_m,
             ..*noise
         }

@@ -32,7 +32,9 @@ impl Faults {
         Self {
             anything: drifting(unknown_noise(model)),
             is_bounded: robot.tolerance.is_some(),
-            learned: std::array::from_fn(|w| stuck(w).map(|motion| (motion, drifting(motion.noise())))),
+            learned: std::array::from_fn(|w| {
+                stuck(w).map(|motion| (motion, drifting(motion.noise())))
+            }),
         }
     }
 
