@@ -69,15 +69,17 @@ fn by_the_pose_alone_every_form_finds_stuck_wheels_and_the_learned_bias_is_first
 
 #[test]
 fn by_the_encoders_every_form_finds_stuck_wheels_at_once() {
-    for form in FORMS {
+    // What one residual can say is bounded, as it may be an outlier: a window needs several.
+    for (form, most_s) in FORMS.into_iter().zip([0.15, 0.15, 0.3]) {
         let delay_s = delay_s(Sensors::PoseEncoders, form);
-        assert!(delay_s < 0.15, "{form:?}: {delay_s} s");
+        assert!(delay_s < most_s, "{form:?}: {delay_s} s");
     }
 }
 
 #[test]
 fn an_encoder_that_is_a_little_off_is_in_the_blind_spot_of_the_constant_only() {
-    // 0.035 rad/s: about .7 of a deviation per observation, λ = .5, of which τ² - d = .6 is blind.
+    // 0.035 rad/s beyond the tolerance of 0.06: about .7 of a deviation per observation, λ = .5, of
+    // which τ² - d = .6 is blind.
     let (runs, labels) = runs(&robot());
     let held_out = model().provenance.runs_held_out;
     let nominal = labels
@@ -89,7 +91,7 @@ fn an_encoder_that_is_a_little_off_is_in_the_blind_spot_of_the_constant_only() {
         let mut frames = run.frames.clone();
         for frame in &mut frames {
             if frame.header.t_capture_ns >= 2_000_000_000 {
-                frame.wheel_rate[2] += 0.035;
+                frame.wheel_rate[2] += 0.095;
             }
         }
         drives.push(frames);

@@ -13,8 +13,8 @@
 use nalgebra::Vector3;
 use vigil_blocks::WHEELS;
 use vigil_inference::bank::{Bank, Hypothesis};
-use vigil_inference::outlier;
-use vigil_inference::track::{Context, Displacement, Track};
+use vigil_inference::outlier::Trust;
+use vigil_inference::track::{Context, Displacement};
 use vigil_robot::Description;
 use vigil_robot::learned::{
     FaultRates, Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext,
@@ -27,6 +27,7 @@ use crate::posterior::Posterior;
 use crate::prepared::{EXPLAINED_S, Prepared, Seen, age_s};
 use crate::rate_offsets::RateOffsets;
 use crate::sets::Sets;
+use crate::state::State;
 
 /// Index of the nominal motion among the modes.
 const NOMINAL: usize = 0;
@@ -38,11 +39,6 @@ const PER_RARE: usize = 8;
 const FLOOR: f64 = -30.0;
 /// So long after a supposed onset, ns, wheels may still read as before.
 const ONSET_BLUR_NS: u64 = 150_000_000;
-/// Probability that a robot that may be thrown is, in an observation: after one in which it was not,
-/// and after one in which it was; and how far, x m, y m, yaw rad.
-const THROWN: f64 = 0.02;
-const THROWN_ON: f64 = 0.6;
-const THROW_SD: [f64; 3] = [0.02, 0.02, 0.1];
 /// Wheels that stick one after another, each so soon after the one before, s, have one cause: this
 /// many times the rate at which a wheel sticks by itself.
 const SOON_S: f64 = 1.0;
@@ -52,49 +48,6 @@ const SOON: f64 = 20.0;
 pub const BIRTH_1_S: f64 = 0.01;
 /// Rate at which faults vanish, 1/s of motion.
 pub const DEATH_1_S: f64 = 1.0 / 60.0;
-
-/// Continuous state of a hypothesis, and what its encoders do.
-#[derive(Debug, Clone, Copy)]
-pub struct State {
-    /// Pose and deviations.
-    pub track: Track,
-    /// Encoders; in the unknown, encoders or wheels.
-    pub encoders: Encoders,
-    /// With several stuck wheels: what the other wheels' rates are off by.
-    pub offsets: RateOffsets,
-    /// Part of the weight of the unknown: that its departure is material.
-    pub log_material: f64,
-    /// In a mode that throws the robot: whether it was thrown in the last observation.
-    pub was_thrown: bool,
-    /// Wheels, as bits, that may still read as before the onset.
-    pub fresh: u32,
-}
-
-impl State {
-    /// Conditions on a measured pose; its log-density. If `is_thrown`, the robot may have been
-    /// thrown since the last one: the more probable of both is what happened.
-    fn take_pose(&mut self, pose: [f64; 3], variance: [f64; 3], is_thrown: bool) -> Option<f64> {
-        if !is_thrown {
-            return self.track.update(pose, variance);
-        }
-        let p = if self.was_thrown { THROWN_ON } else { THROWN };
-        let (before, mut thrown) = (self.track, self.track);
-        thrown.diffuse(THROW_SD.map(|sd| sd * sd));
-        let drives = self
-            .track
-            .update(pose, variance)
-            .map(|log| log + (1.0 - p).ln());
-        let flies = thrown.update(pose, variance).map(|log| log + p.ln());
-        self.was_thrown = flies > drives;
-        if self.was_thrown {
-            // A throw says nothing of how the robot drives.
-            self.track = before;
-            self.track.anchor(pose, variance);
-            return flies;
-        }
-        drives
-    }
-}
 
 /// The filter.
 #[derive(Debug, Clone)]
@@ -111,6 +64,7 @@ pub struct Exact {
     /// Of the healthy robot, from before the faults; it fades as the robot drives on.
     context: Context,
     wheels: WheelContext,
+    trust: Trust,
     /// What the last observation says in each mode, where a hypothesis has asked.
     prepared: Vec<Option<Prepared>>,
     sets: Sets,
@@ -158,6 +112,7 @@ impl Exact {
             bank: Bank::new(&capacities),
             context: Context::default(),
             wheels: WheelContext::default(),
+            trust: Trust::default(),
             degenerate_count: 0,
         }
     }
@@ -226,7 +181,9 @@ impl Exact {
         if observation.pose_frames > 0 {
             let tracks = self.bank.hypotheses().iter().map(|h| &h.state.track);
             let rates = noise.outliers.pose;
-            let variance = outlier::trusted(tracks, observation.pose, variance, rates);
+            let variance = self
+                .trust
+                .variance(tracks, observation.pose, variance, rates);
             for hypothesis in self.bank.hypotheses_mut() {
                 let is_thrown = self.modes[hypothesis.mode].is_thrown;
                 let state = &mut hypothesis.state;

@@ -9,12 +9,11 @@ use vigil_blocks::{
     DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock,
     SensorFrame,
 };
-use vigil_robot::learned::{
-    Healthy, NoiseScales, Observation, Observer, OutlierRates, motion_modes,
-};
+use vigil_robot::learned::{Healthy, NoiseScales, Observation, Observer, motion_modes};
 use vigil_setup::schema;
 
 use crate::assemble::Models;
+use crate::detection::Detection;
 use crate::draw::copy;
 use crate::engine::Engine;
 use crate::exact::{BIRTH_1_S, DEATH_1_S, Exact, fault_rates};
@@ -98,15 +97,6 @@ pub struct Identifier {
     /// Motion in the last observation, s, until it has been reported.
     moved_s: f64,
     run_id: u64,
-}
-
-/// The last detection.
-#[derive(Debug, Clone, Copy, Default)]
-struct Detection {
-    alarm: bool,
-    t_ns: u64,
-    p_fault: f64,
-    noise: NoiseScales,
 }
 
 impl Identifier {
@@ -230,29 +220,7 @@ impl Identifier {
         }
         self.run_id = input.frame.run_id;
         if let Some((belief, _)) = input.detection {
-            let sane = |scale: f64| match scale > 0.1 && scale < 100.0 {
-                true => scale,
-                false => 1.0,
-            };
-            let rate = |rate: f64| match rate > 0.0 && rate < 0.5 {
-                true => rate,
-                false => OutlierRates::default().pose[0],
-            };
-            self.detection = Detection {
-                alarm: belief.alarm != 0,
-                t_ns: belief.alarm_t_capture_ns,
-                p_fault: belief.p_fault,
-                noise: NoiseScales {
-                    pose: belief.noise_scale.map(sane),
-                    wheels: belief.noise_scale_wheels.map(sane),
-                    steer: belief.noise_scale_steer.map(sane),
-                    outliers: OutlierRates {
-                        pose: belief.outlier_rate.map(rate),
-                        wheels: belief.outlier_rate_wheels.map(rate),
-                        steer: belief.outlier_rate_steer.map(rate),
-                    },
-                },
-            };
+            self.detection = Detection::of(belief);
         }
         if intake.complete {
             self.in_trouble = self.observer.observation().troubles.any(self.use_wheels);

@@ -4,6 +4,7 @@
 
 mod assemble;
 mod blindfold;
+mod detection;
 mod draw;
 mod encoders;
 mod engine;
@@ -18,6 +19,7 @@ mod reasons;
 mod reported;
 mod risk;
 mod sets;
+mod state;
 mod watcher;
 pub mod wiring;
 

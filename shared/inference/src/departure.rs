@@ -18,7 +18,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::angle::wrap;
 use crate::logspace::log_add;
 use crate::onsets::{Onset, Onsets};
-use crate::outlier;
+use crate::outlier::Trust;
 use crate::track::{Context, Displacement, MotionNoise, Track};
 
 /// Log-odds beyond which more evidence changes nothing, but delays recovery.
@@ -55,6 +55,7 @@ pub struct Departure<const K: usize> {
     track: Track,
     /// Of the nominal mode, from before a fault was suspected.
     context: Context,
+    trust: Trust,
     is_unknown: [bool; K],
     faults: [Onsets<Fault>; K],
     /// While a fault is suspected: nominal motion again, since one of some successive steps.
@@ -88,6 +89,7 @@ impl<const K: usize> Departure<K> {
         Self {
             track: Track::new(Vector3::zeros(), Matrix3::identity(), &nominal),
             context: Context::default(),
+            trust: Trust::default(),
             is_unknown: [false; K],
             faults: [Onsets::default(); K],
             ended: Onsets::default(),
@@ -212,11 +214,11 @@ impl<const K: usize> Departure<K> {
 
     /// Variances of a measured pose as far as it can be trusted where such shares of the samples are
     /// outliers.
-    #[must_use]
-    pub fn trusted(&self, pose: [f64; 3], variance: [f64; 3], rates: [f64; 3]) -> [f64; 3] {
+    pub fn trusted(&mut self, pose: [f64; 3], variance: [f64; 3], rates: [f64; 3]) -> [f64; 3] {
         let faults = self.faults.iter().flat_map(Onsets::iter);
         let others = faults.chain(self.ended.iter()).map(|fault| &fault.track);
-        outlier::trusted(others.chain([&self.track]), pose, variance, rates)
+        let all = others.chain([&self.track]);
+        self.trust.variance(all, pose, variance, rates)
     }
 
     /// Conditions on a measured pose (x, y, yaw) with independent noise of `variance`; it is

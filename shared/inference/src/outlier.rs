@@ -28,33 +28,49 @@ pub fn tempered(whitened: f64, rate: f64) -> f64 {
     square.max(0.0).sqrt().copysign(whitened)
 }
 
-/// Variances of a measured pose (x, y, yaw) as far as it can be trusted: that of an axis grows by
-/// the probability that it is an outlier under the hypothesis which explains it best.
-#[must_use]
-pub fn trusted<'a>(
-    tracks: impl Iterator<Item = &'a Track>,
-    pose: [f64; 3],
-    variance: [f64; 3],
-    rates: [f64; 3],
-) -> [f64; 3] {
-    let mut least = [f64::INFINITY; 3];
-    for track in tracks {
-        let (apart, spread) = track.innovation(pose, variance);
-        for i in 0..3 {
-            let odds = log_odds(apart[i], spread[(i, i)], variance[i], rates[i]);
-            least[i] = least[i].min(odds);
+/// Probability below which a run of outliers is none: the pose has jumped.
+const FLUKE: f64 = 1e-9;
+
+/// How far a measured pose can be trusted, axis by axis (x, y, yaw).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Trust {
+    /// Outliers in a row.
+    streak: [i32; 3],
+}
+
+impl Trust {
+    /// Variances of a measured pose: that of an axis grows by the probability that it is an
+    /// outlier, as `rates` say, under the hypothesis which explains it best. Where so many in a row
+    /// would be a fluke, it is none.
+    pub fn variance<'a>(
+        &mut self,
+        tracks: impl Iterator<Item = &'a Track>,
+        pose: [f64; 3],
+        variance: [f64; 3],
+        rates: [f64; 3],
+    ) -> [f64; 3] {
+        let mut least = [f64::INFINITY; 3];
+        for track in tracks {
+            let (apart, spread) = track.innovation(pose, variance);
+            for i in 0..3 {
+                let odds = log_odds(apart[i], spread[(i, i)], variance[i], rates[i]);
+                least[i] = least[i].min(odds);
+            }
         }
+        std::array::from_fn(|i| {
+            let is_fluke = rates[i].powi(self.streak[i].saturating_add(1)) < FLUKE;
+            // Without a hypothesis, or a number, the measurement is what it is.
+            let p = match least[i].is_finite() && !is_fluke {
+                true => crate::logspace::probability(least[i]),
+                false => 0.0,
+            };
+            self.streak[i] = match p > 0.5 {
+                true => self.streak[i].saturating_add(1),
+                false => 0,
+            };
+            variance[i] / (1.0 - p + p / (SPREAD * SPREAD))
+        })
     }
-    std::array::from_fn(|i| {
-        let p = crate::logspace::probability(least[i]);
-        let trust = 1.0 - p + p / (SPREAD * SPREAD);
-        // Without a hypothesis, or a number, the measurement is what it is.
-        if least[i].is_finite() && trust > 0.0 {
-            variance[i] / trust
-        } else {
-            variance[i]
-        }
-    })
 }
 
 #[cfg(test)]
@@ -87,12 +103,24 @@ mod tests {
         let at = |x: f64| Track::new(Vector3::new(x, 0.0, 0.0), Matrix3::zeros(), &noise);
         let (near, far) = (at(0.0), at(0.1));
         let (pose, variance, rates) = ([0.1, 0.0, 0.0], [1e-4; 3], [0.01; 3]);
-        let alone = trusted([near].iter(), pose, variance, rates);
+        let trusted = |tracks: &[Track], pose| {
+            Trust::default().variance(tracks.iter(), pose, variance, rates)
+        };
+        let alone = trusted(&[near], pose);
         assert!(alone[0] > 50.0 * 1e-4 && alone[1] < 1.1e-4, "{alone:?}");
-        let both = trusted([near, far].iter(), pose, variance, rates);
+        let both = trusted(&[near, far], pose);
         assert!(both[0] < 1.1e-4, "{both:?}");
-        assert_eq!(trusted([].iter(), pose, variance, rates), variance);
-        let nothing = trusted([near].iter(), [f64::NAN; 3], variance, rates);
+        assert_eq!(trusted(&[], pose), variance);
+        let nothing = trusted(&[near], [f64::NAN; 3]);
         assert_eq!(nothing, variance);
+        // A sensor that never had an outlier has none; one that has some has few in a row.
+        for (rate, believed_after) in [(1e-10, 0), (0.01, 4)] {
+            let mut trust = Trust::default();
+            let doubted = (0..20).filter(|_| {
+                let [x, ..] = trust.variance([near].iter(), [1.0, 0.0, 0.0], variance, [rate; 3]);
+                x > 50.0 * 1e-4
+            });
+            assert!((believed_after..=16).contains(&doubted.count()), "{rate}");
+        }
     }
 }

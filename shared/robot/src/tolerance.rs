@@ -68,7 +68,7 @@ impl Tolerance {
         let slope = self.slope_sd();
         MotionNoise {
             // A slope, too, changes under a fault.
-            drift: self.drift() + slope.component_mul(&slope) / self.length_m,
+            drift: noise.drift + self.drift() + slope.component_mul(&slope) / self.length_m,
             ..*noise
         }
     }

@@ -10,6 +10,9 @@ use crate::Description;
 
 /// The unknown: standard deviation of its constant deviation per metre (yaw, forward, lateral).
 const UNKNOWN_SD: [f64; 3] = [0.25, 0.2, 0.12];
+/// Share of its variance by which it drifts per metre: what pulls in one direction of the ground
+/// turns against the robot.
+const UNKNOWN_DRIFT_1_M: f64 = 0.1;
 /// Share of the unknown that only makes the pose jump, and how far: x m, y m, yaw rad. A sensor
 /// that begins to lag, a slip of the map.
 const JUMP_SHARE: f64 = 0.1;
@@ -256,7 +259,7 @@ pub fn unknown_noise(model: &Model) -> MotionNoise {
         deviation: Matrix3::from_diagonal(&deviation.diagonal()) + nominal.deviation,
         length_m: UNKNOWN_LENGTH_M,
         white: nominal.white * 4.0,
-        drift: nominal.drift,
+        drift: Vector3::from(UNKNOWN_SD.map(|sd| UNKNOWN_DRIFT_1_M * sd * sd)),
         bound: nominal.bound,
     }
 }
