@@ -7,17 +7,27 @@ mod recorded;
 use recorded::{model, robot, runs};
 use vigil_blocks::{DetectionBelief, Entry, ParticleBlock, SensorFrame};
 use vigil_detector::Detector;
+use vigil_robot::Description;
 use vigil_setup::schema::{self, Form, Sensors};
 
 const FORMS: [Form; 3] = [Form::LearnedBias, Form::Constant, Form::Windowed];
 
-fn detector(sensors: Sensors, form: Form) -> Detector {
+/// The same robot where nobody expects other ground: the paper's forms, which judge single
+/// residuals or half a second of them, take what the ground allows for as healthy.
+fn on_one_ground() -> Description {
+    Description {
+        tolerance: None,
+        ..robot()
+    }
+}
+
+fn detector(robot: &Description, sensors: Sensors, form: Form) -> Detector {
     let settings = schema::Detector {
         sensors,
         form,
         ..schema::Detector::default()
     };
-    Detector::new(&model(), &robot(), &settings, 1).unwrap()
+    Detector::new(&model(), robot, &settings, 1).unwrap()
 }
 
 /// Time of the first alarm, s.
@@ -36,7 +46,11 @@ fn alarm_s(detector: &Detector, frames: &[SensorFrame]) -> Option<f64> {
 /// alarm without a fault.
 fn delay_s(sensors: Sensors, form: Form) -> f64 {
     let (runs, labels) = runs(&robot());
-    let detector = detector(sensors, form);
+    let robot = match form {
+        Form::LearnedBias => robot(),
+        Form::Constant | Form::Windowed => on_one_ground(),
+    };
+    let detector = detector(&robot, sensors, form);
     let (mut delays_s, mut nominal) = (Vec::new(), 0);
     for run in model().provenance.runs_held_out {
         let label = labels.iter().find(|label| label.run == run).unwrap();
@@ -78,8 +92,7 @@ fn by_the_encoders_every_form_finds_stuck_wheels_at_once() {
 
 #[test]
 fn an_encoder_that_is_a_little_off_is_in_the_blind_spot_of_the_constant_only() {
-    // 0.035 rad/s beyond the tolerance of 0.06: about .7 of a deviation per observation, λ = .5, of
-    // which τ² - d = .6 is blind.
+    // 0.035 rad/s: about .7 of a deviation per observation, λ = .5, of which τ² - d = .6 is blind.
     let (runs, labels) = runs(&robot());
     let held_out = model().provenance.runs_held_out;
     let nominal = labels
@@ -91,14 +104,14 @@ fn an_encoder_that_is_a_little_off_is_in_the_blind_spot_of_the_constant_only() {
         let mut frames = run.frames.clone();
         for frame in &mut frames {
             if frame.header.t_capture_ns >= 2_000_000_000 {
-                frame.wheel_rate[2] += 0.095;
+                frame.wheel_rate[2] += 0.035;
             }
         }
         drives.push(frames);
     }
     assert_eq!(drives.len(), 20);
     let [learned, constant, windowed] = FORMS.map(|form| {
-        let detector = detector(Sensors::PoseEncoders, form);
+        let detector = detector(&on_one_ground(), Sensors::PoseEncoders, form);
         let found = |frames: &&Vec<SensorFrame>| alarm_s(&detector, frames).is_some();
         drives.iter().filter(found).count()
     });

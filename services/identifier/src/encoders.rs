@@ -17,8 +17,8 @@ pub const ZERO: usize = 1;
 const NOISE: usize = 3;
 /// State of a dead encoder, the last of the breakages.
 const DEAD: usize = BREAKAGES.len();
-/// Share of whole encoders that read exactly zero on a standing wheel.
-const SILENT_SHARE: f64 = 0.5;
+/// Share of whole encoders that read exactly zero on a standing wheel: most read noise there too.
+const SILENT_SHARE: f64 = 0.1;
 /// Share of wheels at a rate of their own among those that do anything, in the unknown.
 const ANYTHING_OWN_RATE: f64 = 0.7;
 

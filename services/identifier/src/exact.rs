@@ -84,8 +84,11 @@ impl Exact {
         // A pose alone cannot tell two stuck wheels from one on another soil.
         let modes = motion_modes(model, robot, leaves.stuck_wheels(), true, use_wheels);
         let on_any_ground = |mode: MotionMode| {
+            // That of several wheels holds every soil already.
+            let is_several = mode.moved.stuck().count_ones() > 1;
             let noise = match mode.is_nominal_motion() {
                 true => model.nominal_noise(robot),
+                false if is_several => mode.noise,
                 false => robot.drifting(mode.noise),
             };
             MotionMode { noise, ..mode }
@@ -392,8 +395,8 @@ impl Exact {
         self.learn_context(observation, evidence);
     }
 
-    /// Learns the wheels' context from those that turn in the most probable hypothesis: what a fault
-    /// does to them is none.
+    /// Learns the wheels' context from those that turn in the most probable hypothesis: what a
+    /// fault does to them is none.
     fn learn_context(&mut self, observation: &Observation, evidence: &WheelEvidence) {
         let Some(best) = self.bank.best(|_| true) else {
             return;

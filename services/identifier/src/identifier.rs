@@ -59,12 +59,12 @@ enum Phase {
 /// The identification filter at frame rate.
 ///
 /// Before an alarm it reports nominal with 1 - p(fault) and keeps a ring of observations, each
-/// with what the detector believed after it. An alarm starts the filter from what it believed at the
-/// beginning of the ring: the fault had not happened yet, and later beliefs of the robot as a
-/// healthy one follow a nominal model that no longer holds. The ring is
-/// worked off within about 0.1 s, a bounded number of observations per cycle; until then the
-/// report stays what it was. Then every observation is one update; cycles between observations
-/// repeat the belief, with predicted and present probability equal.
+/// with what the detector believed after it. An alarm starts the filter from what it believed at
+/// the beginning of the ring: the fault had not happened yet, and later beliefs of the robot as a
+/// healthy one follow a nominal model that no longer holds. The ring is worked off within about
+/// 0.1 s, a bounded number of observations per cycle; until then the report stays what it was. Then
+/// every observation is one update; cycles between observations repeat the belief, with predicted
+/// and present probability equal.
 #[derive(Debug, Clone)]
 pub struct Identifier {
     leaves: Leaves,

@@ -26,7 +26,8 @@ pub struct Sets {
 }
 
 impl Sets {
-    /// Sets over `wheels` wheels, stuck as in these modes, and their encoders. Allocates all that it will need.
+    /// Sets over `wheels` wheels, stuck as in these modes, and their encoders. Allocates all
+    /// that it will need.
     #[must_use]
     pub fn new(modes: &[MotionMode], wheels: usize) -> Self {
         let subsets = 1 << wheels;

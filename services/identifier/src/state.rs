@@ -5,8 +5,8 @@ use vigil_inference::track::Track;
 use crate::encoders::Encoders;
 use crate::rate_offsets::RateOffsets;
 
-/// Probability that a robot that may be thrown is, in an observation: after one in which it was not,
-/// and after one in which it was; and how far, x m, y m, yaw rad.
+/// Probability that a robot that may be thrown is, in an observation: after one in which it was
+/// not, and after one in which it was; and how far, x m, y m, yaw rad.
 const THROWN: f64 = 0.02;
 const THROWN_ON: f64 = 0.6;
 const THROW_SD: [f64; 3] = [0.02, 0.02, 0.1];

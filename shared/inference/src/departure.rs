@@ -212,8 +212,8 @@ impl<const K: usize> Departure<K> {
         }
     }
 
-    /// Variances of a measured pose as far as it can be trusted where such shares of the samples are
-    /// outliers.
+    /// Variances of a measured pose as far as it can be trusted where such shares of the samples
+    /// are outliers.
     pub fn trusted(&mut self, pose: [f64; 3], variance: [f64; 3], rates: [f64; 3]) -> [f64; 3] {
         let faults = self.faults.iter().flat_map(Onsets::iter);
         let others = faults.chain(self.ended.iter()).map(|fault| &fault.track);

@@ -1,7 +1,7 @@
 //! Measurements of which now and then one is far off: normal noise, contaminated.
 //!
-//! With a small probability a sample's noise has [`SPREAD`] times the standard deviation. What is an
-//! outlier under every hypothesis is evidence for none of them.
+//! With a small probability a sample's noise has [`SPREAD`] times the standard deviation. What is
+//! an outlier under every hypothesis is evidence for none of them.
 
 use crate::logspace::{log_add, log_normal};
 use crate::track::Track;

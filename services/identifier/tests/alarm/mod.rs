@@ -1,6 +1,6 @@
 //! A detection made by hand: an alarm between two instants, and particles around the pose.
 
-use vigil_blocks::{DetectionBelief, ParticleBlock, SensorFrame};
+use vigil_blocks::{DetectionBelief, HealthyBelief, ParticleBlock, SensorFrame};
 
 /// Detections for frames of a run: an alarm stands from `from_s` to `to_s`.
 pub struct Alarm {
@@ -33,6 +33,15 @@ impl Alarm {
         self.belief.alarm = u32::from(alarm);
         self.belief.alarm_t_capture_ns = if alarm { (self.from_s * 1e9) as u64 } else { 0 };
         self.belief.p_fault = if alarm { 0.999 } else { 1e-6 };
+        // On the ground learned on, and known well.
+        self.belief.healthy = HealthyBelief {
+            pose: frame.pose,
+            pose_covariance: [2.5e-5, 0.0, 0.0, 2.5e-5, 0.0, 2.5e-5],
+            deviation_covariance: [1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-6],
+            wheel_ratio: [0.0, 1e-6],
+            wheel_offset_variance: [1e-6; 8],
+            ..HealthyBelief::default()
+        };
         self.particles.count = 8;
         for i in 0..8 {
             let side = |bit: usize| if i & bit == 0 { -0.005_f32 } else { 0.005 };

@@ -23,8 +23,8 @@ const UNKNOWN_LENGTH_M: f64 = 0.2;
 /// the factor's mean and deviation.
 const OTHER_GROUNDS: [(f64, f64, f64); 3] =
     [(0.08, 0.3, 0.12), (0.08, 0.65, 0.2), (0.04, 1.5, 0.35)];
-/// The same where the wheels' rates are read. They tell which wheel stands; the motion must tell only
-/// that it is dragged, and not how: on hard ground the robot is thrown, crabs and hops.
+/// The same where the wheels' rates are read. They tell which wheel stands; the motion must tell
+/// only that it is dragged, and not how: on hard ground the robot is thrown, crabs and hops.
 const ANY_GROUND: [(f64, f64, f64); 1] = [(0.2, 0.6, 0.6)];
 /// Deviations of such motion beside its effect, coloured: yaw, forward, lateral.
 const ROUGH_SD: [f64; 3] = [0.15, 0.1, 0.05];

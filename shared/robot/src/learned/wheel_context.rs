@@ -2,7 +2,8 @@
 //!
 //! All wheels fall behind together by a share of their rates (a soft ground, a slope), and each
 //! differs a little from the others. The common share is found from the median over the wheels,
-//! which a broken encoder or a stuck wheel does not move; a wheel far off teaches nothing of itself.
+//! which a broken encoder or a stuck wheel does not move; a wheel far off teaches nothing of
+//! itself.
 
 use vigil_blocks::{HealthyBelief, WHEELS};
 use vigil_inference::slow_state::SlowState;
