@@ -108,6 +108,31 @@ VIGIL_ASSERT(offsetof(vigil_fault_set, leaves) == 0);
 VIGIL_ASSERT(offsetof(vigil_fault_set, p) == 8);
 
 typedef struct {
+  /* Pose: x m, y m, yaw rad. */
+  double pose[3];
+  /* Its covariance. */
+  double pose_covariance[6];
+  /* What the motion departs from its model by where the robot drives, per metre: yaw rad/m, forward, lateral. While a fault is suspected: from before it. */
+  double deviation[3];
+  /* Its covariance. */
+  double deviation_covariance[6];
+  /* Share of their rates that all wheels depart by together: mean and variance. */
+  double wheel_ratio[2];
+  /* Rate by which each wheel departs beside that, rad/s. */
+  double wheel_offset[8];
+  /* Its variance. */
+  double wheel_offset_variance[8];
+} vigil_healthy_belief;
+VIGIL_ASSERT(sizeof(vigil_healthy_belief) == 288);
+VIGIL_ASSERT(offsetof(vigil_healthy_belief, pose) == 0);
+VIGIL_ASSERT(offsetof(vigil_healthy_belief, pose_covariance) == 24);
+VIGIL_ASSERT(offsetof(vigil_healthy_belief, deviation) == 72);
+VIGIL_ASSERT(offsetof(vigil_healthy_belief, deviation_covariance) == 96);
+VIGIL_ASSERT(offsetof(vigil_healthy_belief, wheel_ratio) == 144);
+VIGIL_ASSERT(offsetof(vigil_healthy_belief, wheel_offset) == 160);
+VIGIL_ASSERT(offsetof(vigil_healthy_belief, wheel_offset_variance) == 224);
+
+typedef struct {
   /* When, CLOCK_MONOTONIC ns. */
   uint64_t t_ns;
   /* An EventKind. */

@@ -109,6 +109,35 @@ assert FaultSet.leaves.offset == 0
 assert FaultSet.p.offset == 8
 
 
+class HealthyBelief(ctypes.LittleEndianStructure):
+    _fields_ = [
+        # Pose: x m, y m, yaw rad.
+        ("pose", ctypes.c_double * 3),
+        # Its covariance.
+        ("pose_covariance", ctypes.c_double * 6),
+        # What the motion departs from its model by where the robot drives, per metre: yaw rad/m, forward, lateral. While a fault is suspected: from before it.
+        ("deviation", ctypes.c_double * 3),
+        # Its covariance.
+        ("deviation_covariance", ctypes.c_double * 6),
+        # Share of their rates that all wheels depart by together: mean and variance.
+        ("wheel_ratio", ctypes.c_double * 2),
+        # Rate by which each wheel departs beside that, rad/s.
+        ("wheel_offset", ctypes.c_double * 8),
+        # Its variance.
+        ("wheel_offset_variance", ctypes.c_double * 8),
+    ]
+
+
+assert ctypes.sizeof(HealthyBelief) == 288
+assert HealthyBelief.pose.offset == 0
+assert HealthyBelief.pose_covariance.offset == 24
+assert HealthyBelief.deviation.offset == 72
+assert HealthyBelief.deviation_covariance.offset == 96
+assert HealthyBelief.wheel_ratio.offset == 144
+assert HealthyBelief.wheel_offset.offset == 160
+assert HealthyBelief.wheel_offset_variance.offset == 224
+
+
 class Event(ctypes.LittleEndianStructure):
     _fields_ = [
         # When, CLOCK_MONOTONIC ns.

@@ -6,8 +6,8 @@ mod python;
 use vigil_blocks::layout::{Field, Layout};
 use vigil_blocks::{
     Action, ActionOutcome, Block, Cause, CauseKind, ControlMode, DetectionBelief, Event,
-    FaultBelief, FaultSet, Header, Health, ParticleBlock, RecoveryKind, SensorFrame, Symptoms,
-    Valid,
+    FaultBelief, FaultSet, Header, Health, HealthyBelief, ParticleBlock, RecoveryKind, SensorFrame,
+    Symptoms, Valid,
 };
 
 pub use c::header;
@@ -44,6 +44,7 @@ fn structs() -> Vec<Struct> {
         part::<Header>(),
         part::<Cause>(),
         part::<FaultSet>(),
+        part::<HealthyBelief>(),
         part::<Event>(),
         block::<SensorFrame>(),
         block::<DetectionBelief>(),

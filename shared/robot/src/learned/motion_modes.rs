@@ -99,7 +99,8 @@ pub struct MotionMode {
     pub kept_m_s: f64,
     /// Variance of a jump of the pose (x, y, yaw) at the onset.
     pub jump: [f64; 3],
-    /// Whether the robot is thrown now and then: a wheel that locks on hard ground grips and slides.
+    /// Whether the robot is thrown now and then: a wheel that locks on hard ground grips and
+    /// slides.
     pub is_thrown: bool,
     /// How the turning wheels' rates change beyond the sum of what each stuck wheel does to them;
     /// in all if the robot is immobile.
