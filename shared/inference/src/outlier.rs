@@ -49,6 +49,13 @@ impl Trust {
         variance: [f64; 3],
         rates: [f64; 3],
     ) -> [f64; 3] {
+        let is_fluke: [bool; 3] =
+            std::array::from_fn(|i| rates[i].powi(self.streak[i].saturating_add(1)) < FLUKE);
+        // The usual case of sensors that never had an outlier: no track needs to be asked.
+        if is_fluke == [true; 3] {
+            self.streak = [0; 3];
+            return variance;
+        }
         let mut least = [f64::INFINITY; 3];
         for track in tracks {
             let (apart, spread) = track.innovation(pose, variance);
@@ -58,9 +65,8 @@ impl Trust {
             }
         }
         std::array::from_fn(|i| {
-            let is_fluke = rates[i].powi(self.streak[i].saturating_add(1)) < FLUKE;
             // Without a hypothesis, or a number, the measurement is what it is.
-            let p = match least[i].is_finite() && !is_fluke {
+            let p = match least[i].is_finite() && !is_fluke[i] {
                 true => crate::logspace::probability(least[i]),
                 false => 0.0,
             };
