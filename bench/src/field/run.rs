@@ -128,7 +128,13 @@ impl Conditions {
         let mut changes: Vec<Injection> = faults.iter().chain(&context).copied().collect();
         changes.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
         Ok(Self {
-            ground: Ground::new(&scenario.world, &mut simulator, run, stream(seed, 3)),
+            ground: Ground::new(
+                &scenario.world,
+                &mut simulator,
+                (robot, graph.model.command.curvature_max_1_m),
+                run,
+                stream(seed, 3),
+            ),
             way: Way::new(
                 &scenario.frames,
                 robot,

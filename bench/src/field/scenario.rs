@@ -105,6 +105,9 @@ pub struct World {
     pub ground_each_m: Option<Draw>,
     /// They change over this length, m, alike left and right; default 0.5.
     pub ground_over_m: Option<Draw>,
+    /// Ground on which the robot departs by more than its tolerance is drawn again: there an alarm
+    /// is right.
+    pub within_tolerance: bool,
 }
 
 /// What becomes of the frames on their way.

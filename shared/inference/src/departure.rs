@@ -11,7 +11,8 @@
 //! track learns that as its context, up to a bound ([`MotionNoise::bound`]): what departs by more
 //! for good is never learned away. A fault of an unknown kind counts as far as its departure lies
 //! beyond the same bound, with the probability that it does: that is Bayes for a departure whose
-//! prior is cut off there.
+//! prior is cut off there. The ground may also change at once, so that what was learned of the old
+//! one holds no more: each such change is a healthy hypothesis of its own, within the bound.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -25,6 +26,10 @@ use crate::track::{Context, Displacement, MotionNoise, Track};
 pub const LOG_ODDS_MAX: f64 = 40.0;
 /// Components less probable than this, by their log-odds, are dropped.
 const LOG_ODDS_MIN: f64 = -30.0;
+/// The same for changes of the ground, against the ground that was.
+const CHANGE_MIN: f64 = -14.0;
+/// A change of the ground so much more probable than none has happened (natural logarithm).
+const CHANGED: f64 = 2.0;
 
 /// A fault that began at one of some successive steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +65,9 @@ pub struct Departure<const K: usize> {
     faults: [Onsets<Fault>; K],
     /// While a fault is suspected: nominal motion again, since one of some successive steps.
     ended: Onsets<Fault>,
+    /// Nominal motion on another ground since one of some successive steps.
+    changed: Onsets<Fault>,
+    is_suspected: bool,
     gain: f64,
 }
 
@@ -93,6 +101,8 @@ impl<const K: usize> Departure<K> {
             is_unknown: [false; K],
             faults: [Onsets::default(); K],
             ended: Onsets::default(),
+            changed: Onsets::default(),
+            is_suspected: false,
             nominal,
             gain: 0.0,
         }
@@ -108,11 +118,15 @@ impl<const K: usize> Departure<K> {
     /// Forgets what speaks for a fault, and keeps the track: that of the most probable end, if a
     /// fault was suspected.
     pub fn forget(&mut self) {
-        if let Some(track) = best(&self.ended).map(|ended| ended.track) {
+        let ends = [best(&self.ended), best(&self.changed)];
+        let likelier = |a: &&Fault, b: &&Fault| a.log_weight.total_cmp(&b.log_weight);
+        let likeliest = ends.into_iter().flatten().max_by(likelier);
+        if let Some(track) = likeliest.map(|ended| ended.track) {
             self.track = track;
         }
         self.faults = [Onsets::default(); K];
         self.ended = Onsets::default();
+        self.changed = Onsets::default();
     }
 
     /// Puts every track at this pose and keeps what is known of the motion: the frame of the
@@ -122,8 +136,8 @@ impl<const K: usize> Departure<K> {
         for fault in self.all_mut() {
             fault.track.anchor(pose, variance);
         }
-        for ended in self.ended.iter_mut() {
-            ended.track.anchor(pose, variance);
+        for healthy in self.ended.iter_mut().chain(self.changed.iter_mut()) {
+            healthy.track.anchor(pose, variance);
         }
     }
 
@@ -142,7 +156,22 @@ impl<const K: usize> Departure<K> {
     /// Natural log-odds of a fault.
     #[must_use]
     pub fn log_odds(&self) -> f64 {
+        self.log_faults() - self.log_healthy()
+    }
+
+    /// Weight of all faults over that of the nominal track.
+    fn log_faults(&self) -> f64 {
         total(self.faults.iter().flat_map(Onsets::iter))
+    }
+
+    /// Weight of nominal motion, on whatever ground, over that of the nominal track.
+    fn log_healthy(&self) -> f64 {
+        log_add(0.0, total(self.changed.iter()))
+    }
+
+    /// Log-odds of a fault that is there against one that has ended, or was none.
+    fn log_persists(&self) -> f64 {
+        self.log_faults() - total(self.ended.iter()).max(self.log_healthy())
     }
 
     /// What the last pose said for a fault that was there, and is: the logarithm of the
@@ -167,6 +196,7 @@ impl<const K: usize> Departure<K> {
         birth: f64,
         suspected: Option<Suspicion>,
     ) {
+        self.is_suspected = suspected.is_some();
         match suspected {
             None => self.context = self.track.context(),
             Some(_) => self.context.fade(step.travel_m, &self.nominal),
@@ -186,7 +216,24 @@ impl<const K: usize> Departure<K> {
             }
         }
         self.predict_end(step, suspected);
+        self.predict_change(step, birth > 0.0);
         self.track.predict(step, &self.nominal);
+    }
+
+    /// While a fault is suspected no change of the ground begins: it would explain every end.
+    fn predict_change(&mut self, step: &Displacement, counts: bool) {
+        let nominal = self.nominal;
+        let p = -(-nominal.changes_1_m * step.travel_m.abs()).exp_m1();
+        if counts && p > 0.0 && !self.is_suspected {
+            self.changed.enter(Fault {
+                log_weight: p.ln(),
+                log_material: 0.0,
+                track: self.track.renewed(&nominal),
+            });
+        }
+        for changed in self.changed.iter_mut() {
+            changed.track.predict(step, &nominal);
+        }
     }
 
     fn predict_end(&mut self, step: &Displacement, suspected: Option<Suspicion>) {
@@ -202,7 +249,7 @@ impl<const K: usize> Departure<K> {
         let likeliest = likeliest.filter(|_| ends > 0.0);
         if let Some(track) = likeliest.map(|fault| fault.track.enter(&context, &nominal)) {
             self.ended.enter(Fault {
-                log_weight: self.log_odds() + ends.ln(),
+                log_weight: self.log_faults() + ends.ln(),
                 log_material: 0.0,
                 track,
             });
@@ -216,7 +263,8 @@ impl<const K: usize> Departure<K> {
     /// are outliers.
     pub fn trusted(&mut self, pose: [f64; 3], variance: [f64; 3], rates: [f64; 3]) -> [f64; 3] {
         let faults = self.faults.iter().flat_map(Onsets::iter);
-        let others = faults.chain(self.ended.iter()).map(|fault| &fault.track);
+        let healthy = self.ended.iter().chain(self.changed.iter());
+        let others = faults.chain(healthy).map(|fault| &fault.track);
         let all = others.chain([&self.track]);
         self.trust.variance(all, pose, variance, rates)
     }
@@ -227,7 +275,7 @@ impl<const K: usize> Departure<K> {
         self.gain = 0.0;
         let said = self.residual(pose, variance)?;
         self.track.update(pose, variance)?;
-        let before = self.log_odds() - total(self.ended.iter()).max(0.0);
+        let before = self.log_persists();
         let take = |hypothesis: &mut Fault| {
             let gained = hypothesis.track.update(pose, variance);
             // What cannot take it is impossible.
@@ -238,9 +286,11 @@ impl<const K: usize> Departure<K> {
         };
         self.all_mut().for_each(take);
         self.ended.iter_mut().for_each(take);
+        self.changed.iter_mut().for_each(take);
         self.cut_off();
-        let gain = self.log_odds() - total(self.ended.iter()).max(0.0) - before;
+        let gain = self.log_persists() - before;
         self.gain = if gain.is_finite() { gain } else { 0.0 };
+        self.follow_ground();
         self.bound();
         Some(said)
     }
@@ -249,8 +299,8 @@ impl<const K: usize> Departure<K> {
     fn cut_off(&mut self) {
         let bound = self.nominal.bound;
         self.track.saturate(&bound);
-        for ended in self.ended.iter_mut() {
-            ended.track.saturate(&bound);
+        for healthy in self.ended.iter_mut().chain(self.changed.iter_mut()) {
+            healthy.track.saturate(&bound);
         }
         let unknown = self.faults.iter_mut().zip(self.is_unknown);
         for fault in unknown
@@ -261,6 +311,27 @@ impl<const K: usize> Departure<K> {
             fault.log_weight += log_material - fault.log_material;
             fault.log_material = log_material;
         }
+    }
+
+    /// Takes a change of the ground for granted once there is little doubt of it.
+    fn follow_ground(&mut self) {
+        if self.is_suspected {
+            return;
+        }
+        let Some(Fault {
+            log_weight, track, ..
+        }) = best(&self.changed).copied()
+        else {
+            return;
+        };
+        if log_weight < CHANGED {
+            return;
+        }
+        self.track = track;
+        for hypothesis in self.faults.iter_mut().flat_map(Onsets::iter_mut) {
+            hypothesis.log_weight -= log_weight;
+        }
+        self.changed = Onsets::default();
     }
 
     /// Keeps the weights within bounds.
@@ -277,9 +348,11 @@ impl<const K: usize> Departure<K> {
             }
             faults.retain(|fault| fault.log_weight > LOG_ODDS_MIN);
         }
-        for ended in self.ended.iter_mut() {
-            ended.log_weight -= excess;
+        for healthy in self.ended.iter_mut().chain(self.changed.iter_mut()) {
+            healthy.log_weight -= excess;
         }
+        let least = self.log_healthy() + CHANGE_MIN;
+        self.changed.retain(|changed| changed.log_weight > least);
         let likeliest = best(&self.ended).map_or(0.0, |ended| ended.log_weight);
         self.ended
             .retain(|ended| ended.log_weight > likeliest + LOG_ODDS_MIN);
@@ -329,165 +402,4 @@ impl Onset for Fault {
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-    use proptest::prelude::*;
-    use rand::{RngExt, SeedableRng};
-    use rand_distr::StandardNormal;
-    use rand_pcg::Pcg64Mcg;
-
-    const VARIANCE: [f64; 3] = [2.5e-5; 3];
-    const BIRTH: f64 = 1e-4;
-    const SUSPECTED: Suspicion = Suspicion {
-        variance: [2.5e-7; 3],
-        ends: 1e-3,
-    };
-
-    fn noise(offset: f64, deviation: f64) -> MotionNoise {
-        MotionNoise {
-            offset: Matrix3::identity() * offset * offset,
-            deviation: Matrix3::identity() * deviation * deviation,
-            length_m: 0.3,
-            white: Vector3::repeat(1e-8),
-            drift: Vector3::zeros(),
-            bound: Vector3::repeat(f64::INFINITY),
-        }
-    }
-
-    const STEP: Displacement = Displacement {
-        per_metre: [0.5, 1.0, 0.0],
-        travel_m: 0.01,
-        extra: [0.0; 3],
-    };
-
-    fn kinds() -> [Kind; 2] {
-        let anything = Kind {
-            share: 0.6,
-            step: STEP,
-            noise: noise(0.25, 0.03),
-            is_unknown: false,
-        };
-        let slower = Kind {
-            share: 0.4,
-            step: Displacement {
-                per_metre: [0.5, 0.9, 0.0],
-                ..STEP
-            },
-            noise: noise(0.05, 0.03),
-            is_unknown: false,
-        };
-        [anything, slower]
-    }
-
-    /// Poses measured on a path that turns by `apart` rad/m more from step `onset` on.
-    fn poses(apart: f64, onset: usize, steps: usize, seed: u64) -> Vec<[f64; 3]> {
-        let mut rng = Pcg64Mcg::seed_from_u64(seed);
-        let mut at = [0.0_f64; 3];
-        let drive = |step: usize| {
-            let turn = (0.5 + if step < onset { 0.0 } else { apart }) * 0.01;
-            let middle = at[2] + 0.5 * turn;
-            at = [
-                at[0] + 0.01 * middle.cos(),
-                at[1] + 0.01 * middle.sin(),
-                at[2] + turn,
-            ];
-            std::array::from_fn(|i| at[i] + 0.005 * rng.sample::<f64, _>(StandardNormal))
-        };
-        (0..steps).map(drive).collect()
-    }
-
-    fn filter() -> Departure<2> {
-        let mut filter = Departure::new(noise(0.001, 0.001));
-        filter.start([0.0; 3], [1e-4; 3]);
-        filter
-    }
-
-    /// The log-odds from one track per onset and kind, none merged.
-    fn every_onset(poses: &[[f64; 3]]) -> f64 {
-        let mut nominal = filter().track;
-        let mut all: Vec<(usize, f64, Track)> = Vec::new();
-        for pose in poses {
-            for (kind, its) in kinds().iter().enumerate() {
-                all.push((
-                    kind,
-                    (BIRTH * its.share).ln(),
-                    nominal.enter(&nominal.context(), &its.noise),
-                ));
-            }
-            nominal.predict(&STEP, &noise(0.001, 0.001));
-            let healthy = nominal.update(*pose, VARIANCE).unwrap();
-            for (kind, log_weight, track) in &mut all {
-                track.predict(&kinds()[*kind].step, &kinds()[*kind].noise);
-                *log_weight += track.update(*pose, VARIANCE).unwrap() - healthy;
-            }
-        }
-        let log_weights = all.iter().map(|(_, log_weight, _)| *log_weight);
-        log_weights.fold(f64::NEG_INFINITY, log_add)
-    }
-
-    #[test]
-    fn sharing_components_between_onsets_costs_little_against_every_onset() {
-        for (apart, onset, steps) in [(0.0, 0, 150), (0.2, 60, 68), (-0.1, 60, 71), (0.05, 20, 40)]
-        {
-            let poses = poses(apart, onset, steps, 7);
-            let mut filter = filter();
-            for pose in &poses {
-                filter.predict(&STEP, &kinds(), BIRTH, None);
-                filter.update(*pose, VARIANCE, true).unwrap();
-            }
-            let expected = every_onset(&poses);
-            assert!(expected < LOG_ODDS_MAX - 5.0, "{apart}: {expected}");
-            let found = filter.log_odds();
-            assert!(
-                (found - expected).abs() < 0.7,
-                "{apart}: {found}, {expected}"
-            );
-        }
-    }
-
-    #[test]
-    fn a_departure_is_seen_and_its_end_too() {
-        let mut filter = filter();
-        let (there, back) = (poses(0.2, 100, 300, 3), poses(0.0, 0, 300, 4));
-        let mut seen = None;
-        for (step, pose) in there.iter().enumerate() {
-            let follow = seen.map(|_| SUSPECTED);
-            filter.predict(&STEP, &kinds(), BIRTH, follow);
-            filter.update(*pose, VARIANCE, true).unwrap();
-            if seen.is_none() && filter.log_odds() > 3.0 {
-                seen = Some(step);
-            }
-        }
-        assert!((103..130).contains(&seen.unwrap()), "{seen:?}");
-        filter.anchor(back[0], VARIANCE);
-        for pose in &back[1..] {
-            filter.predict(&STEP, &kinds(), BIRTH, Some(SUSPECTED));
-            filter.update(*pose, VARIANCE, true).unwrap();
-        }
-        assert!(filter.log_odds() < -3.0, "{}", filter.log_odds());
-    }
-
-    #[test]
-    fn what_does_not_count_is_no_evidence() {
-        let mut filter = filter();
-        for pose in poses(0.3, 0, 100, 5) {
-            filter.predict(&STEP, &kinds(), 0.0, None);
-            filter.update(pose, VARIANCE, false).unwrap();
-        }
-        assert_eq!(filter.log_odds(), f64::NEG_INFINITY);
-    }
-
-    proptest! {
-        #[test]
-        fn no_pose_breaks_the_filter(values in prop::collection::vec(any::<[f64; 3]>(), 1..40)) {
-            let mut filter = filter();
-            for pose in values {
-                filter.predict(&STEP, &kinds(), BIRTH, None);
-                filter.update(pose, VARIANCE, true);
-                prop_assert!(!filter.log_odds().is_nan() && filter.log_odds() < 1e3);
-                prop_assert!(filter.track().pose().iter().all(|value| value.is_finite()));
-            }
-        }
-    }
-}
+mod tests;

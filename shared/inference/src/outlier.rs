@@ -39,8 +39,8 @@ pub struct Trust {
 }
 
 impl Trust {
-    /// Variances of a measured pose: that of an axis grows by the probability that it is an
-    /// outlier, as `rates` say, under the hypothesis which explains it best. Where so many in a row
+    /// Variances of a measured pose: that of an axis grows, up to the square of its residual, by the
+    /// probability that it is an outlier, as `rates` say, under the hypothesis which explains it best. Where so many in a row
     /// would be a fluke, it is none.
     pub fn variance<'a>(
         &mut self,
@@ -56,12 +56,13 @@ impl Trust {
             self.streak = [0; 3];
             return variance;
         }
-        let mut least = [f64::INFINITY; 3];
+        let (mut least, mut nearest) = ([f64::INFINITY; 3], [f64::INFINITY; 3]);
         for track in tracks {
             let (apart, spread) = track.innovation(pose, variance);
             for i in 0..3 {
                 let odds = log_odds(apart[i], spread[(i, i)], variance[i], rates[i]);
                 least[i] = least[i].min(odds);
+                nearest[i] = nearest[i].min(apart[i] * apart[i]);
             }
         }
         std::array::from_fn(|i| {
@@ -74,7 +75,12 @@ impl Trust {
                 true => self.streak[i].saturating_add(1),
                 false => 0,
             };
-            variance[i] / (1.0 - p + p / (SPREAD * SPREAD))
+            // An outlier has no largest size: one further off is noisier, not less likely.
+            let wide = (nearest[i] / variance[i]).max(SPREAD * SPREAD);
+            match wide.is_finite() {
+                true => variance[i] / (1.0 - p + p / wide),
+                false => variance[i],
+            }
         })
     }
 }
@@ -105,6 +111,7 @@ mod tests {
             white: Vector3::zeros(),
             drift: Vector3::zeros(),
             bound: Vector3::repeat(f64::INFINITY),
+            changes_1_m: 0.0,
         };
         let at = |x: f64| Track::new(Vector3::new(x, 0.0, 0.0), Matrix3::zeros(), &noise);
         let (near, far) = (at(0.0), at(0.1));

@@ -30,6 +30,8 @@ pub struct MotionNoise {
     pub drift: Vector3<f64>,
     /// Largest mean deviation per metre in this mode; infinite where there is no such bound.
     pub bound: Vector3<f64>,
+    /// Rate at which the ground changes at once, 1/m: nothing is known of the deviations then.
+    pub changes_1_m: f64,
 }
 
 /// What is known of the deviations per metre of a healthy robot where it drives: slip, slope, a
@@ -161,6 +163,14 @@ impl Track {
         } else {
             track.begin(context, noise);
         }
+        track
+    }
+
+    /// The same pose, where nothing is known of the deviations.
+    #[must_use]
+    pub fn renewed(&self, noise: &MotionNoise) -> Self {
+        let mut track = *self;
+        track.begin(&Context::default(), noise);
         track
     }
 
@@ -351,6 +361,7 @@ mod tests {
             white: Vector3::new(1e-5, 2e-5, 1e-6),
             drift: Vector3::new(1e-4, 2e-4, 0.0),
             bound: Vector3::repeat(f64::INFINITY),
+            changes_1_m: 0.0,
         }
     }
 

@@ -8,6 +8,8 @@ use vigil_inference::track::MotionNoise;
 /// Standard deviations of the motion's healthy variation over its tolerance.
 const OFFSET_SHARE: f64 = 0.25;
 const SLOPE_SHARE: f64 = 0.4;
+/// Share of the changes of ground that are sudden; the others come little by little.
+const SUDDEN_SHARE: f64 = 0.1;
 
 /// Healthy variation, in physical units. Each is the largest magnitude that is no fault: it is
 /// estimated under way up to there, and is a material departure beyond.
@@ -41,6 +43,7 @@ impl Tolerance {
             length_m: self.length_m,
             drift: self.drift(),
             bound: Vector3::new(self.yaw_rad_m, self.forward_m_m, self.lateral_m_m),
+            changes_1_m: SUDDEN_SHARE / self.length_m,
             ..*noise
         }
     }

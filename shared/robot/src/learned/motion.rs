@@ -113,6 +113,7 @@ impl MotionModel {
             white: Vector3::from(self.white_sd.map(|sd| sd * sd)),
             drift: Vector3::zeros(),
             bound: Vector3::repeat(f64::INFINITY),
+            changes_1_m: 0.0,
         }
     }
 

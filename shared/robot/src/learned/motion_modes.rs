@@ -262,6 +262,7 @@ pub fn unknown_noise(model: &Model) -> MotionNoise {
         white: nominal.white * 4.0,
         drift: Vector3::from(UNKNOWN_SD.map(|sd| UNKNOWN_DRIFT_1_M * sd * sd)),
         bound: nominal.bound,
+        changes_1_m: 0.0,
     }
 }
 

@@ -11,9 +11,9 @@ use crate::Description;
 const CLIP: f64 = 9.0;
 /// Squares above this many times the mean one go to an outlier, or come from it.
 const FAR: f64 = 12.0;
-/// Bounds of the rate of outliers: what is believed of a sensor that never had one, and what is no
-/// sensor any more.
-const OUTLIER_RATE_MIN: f64 = 1e-10;
+/// Bounds of the rate of outliers: what is believed of a sensor that never had one, of which no
+/// single sample is a fault, and what is no sensor any more.
+const OUTLIER_RATE_MIN: f64 = 1e-5;
 const OUTLIER_RATE_MAX: f64 = 0.1;
 /// Mean of a squared standard normal clipped at [`CLIP`].
 const CLIPPED_MEAN: f64 = 0.99;

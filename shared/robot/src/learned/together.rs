@@ -173,6 +173,7 @@ impl<'a> Together<'a> {
             white: nominal.white,
             drift: nominal.drift,
             bound: nominal.bound,
+            changes_1_m: 0.0,
         })
     }
 
