@@ -182,7 +182,8 @@ impl Exact {
         }
         let mut failed = false;
         if observation.pose_frames > 0 {
-            let tracks = self.bank.hypotheses().iter().map(|h| &h.state.track);
+            let all = self.bank.hypotheses().iter();
+            let tracks = all.map(|h| (&h.state.track, h.log_weight));
             let rates = noise.outliers.pose;
             let variance = self
                 .trust

@@ -264,8 +264,8 @@ impl<const K: usize> Departure<K> {
     pub fn trusted(&mut self, pose: [f64; 3], variance: [f64; 3], rates: [f64; 3]) -> [f64; 3] {
         let faults = self.faults.iter().flat_map(Onsets::iter);
         let healthy = self.ended.iter().chain(self.changed.iter());
-        let others = faults.chain(healthy).map(|fault| &fault.track);
-        let all = others.chain([&self.track]);
+        let others = faults.chain(healthy).map(|it| (&it.track, it.log_weight));
+        let all = others.chain([(&self.track, 0.0)]);
         self.trust.variance(all, pose, variance, rates)
     }
 

@@ -35,7 +35,7 @@ impl<C: Onset> Default for Onsets<C> {
 
 impl<C: Onset> Onsets<C> {
     /// The components there are.
-    pub fn iter(&self) -> impl Iterator<Item = &C> {
+    pub fn iter(&self) -> impl Iterator<Item = &C> + Clone {
         self.components.iter().flatten()
     }
 

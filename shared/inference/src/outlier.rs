@@ -9,11 +9,14 @@ use crate::track::Track;
 /// Standard deviations of an outlier over those of the noise.
 pub const SPREAD: f64 = 10.0;
 
-/// Log-odds that a residual of variance `spread`, `noise` of which is the sensor's, is an outlier
-/// where such come with the probability `rate`.
-fn log_odds(residual: f64, spread: f64, noise: f64, rate: f64) -> f64 {
+/// Logarithms of the densities of a residual of variance `spread`, `noise` of which is the sensor's:
+/// as it should be, and as an outlier, where such come with the probability `rate`.
+fn log_densities(residual: f64, spread: f64, noise: f64, rate: f64) -> (f64, f64) {
     let wide = spread + (SPREAD * SPREAD - 1.0) * noise;
-    rate.ln() + log_normal(residual, wide) - (-rate).ln_1p() - log_normal(residual, spread)
+    (
+        (-rate).ln_1p() + log_normal(residual, spread),
+        rate.ln() + log_normal(residual, wide),
+    )
 }
 
 /// The whitened residual that has the log-density, relative to that of none, which `whitened` has
@@ -30,6 +33,8 @@ pub fn tempered(whitened: f64, rate: f64) -> f64 {
 
 /// Probability below which a run of outliers is none: the pose has jumped.
 const FLUKE: f64 = 1e-9;
+/// Log-odds of an outlier under the most probable hypothesis below which none need be thought of.
+const UNLIKELY: f64 = -7.0;
 
 /// How far a measured pose can be trusted, axis by axis (x, y, yaw).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -40,35 +45,45 @@ pub struct Trust {
 
 impl Trust {
     /// Variances of a measured pose: that of an axis grows, up to the square of its residual, by the
-    /// probability that it is an outlier, as `rates` say, under the hypothesis which explains it best. Where so many in a row
-    /// would be a fluke, it is none.
+    /// probability that it is an outlier, as `rates` say, under weighted hypotheses (logarithms).
+    /// Where so many in a row would be a fluke, it is none.
     pub fn variance<'a>(
         &mut self,
-        tracks: impl Iterator<Item = &'a Track>,
+        hypotheses: impl Iterator<Item = (&'a Track, f64)> + Clone,
         pose: [f64; 3],
         variance: [f64; 3],
         rates: [f64; 3],
     ) -> [f64; 3] {
-        let is_fluke: [bool; 3] =
-            std::array::from_fn(|i| rates[i].powi(self.streak[i].saturating_add(1)) < FLUKE);
-        // The usual case of sensors that never had an outlier: no track needs to be asked.
-        if is_fluke == [true; 3] {
+        let said = |track: &Track| -> [(f64, (f64, f64)); 3] {
+            let (apart, spread) = track.innovation(pose, variance);
+            std::array::from_fn(|i| {
+                let densities = log_densities(apart[i], spread[(i, i)], variance[i], rates[i]);
+                (apart[i] * apart[i], densities)
+            })
+        };
+        let likeliest = hypotheses.clone().max_by(|(_, a), (_, b)| a.total_cmp(b));
+        let is_usual = likeliest.is_none_or(|(track, _)| {
+            let said = said(track);
+            said.iter().all(|(_, (usual, far))| far - usual < UNLIKELY)
+        });
+        if is_usual {
             self.streak = [0; 3];
             return variance;
         }
-        let (mut least, mut nearest) = ([f64::INFINITY; 3], [f64::INFINITY; 3]);
-        for track in tracks {
-            let (apart, spread) = track.innovation(pose, variance);
-            for i in 0..3 {
-                let odds = log_odds(apart[i], spread[(i, i)], variance[i], rates[i]);
-                least[i] = least[i].min(odds);
-                nearest[i] = nearest[i].min(apart[i] * apart[i]);
+        let (mut usual, mut far) = ([f64::NEG_INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let mut nearest = [f64::INFINITY; 3];
+        for (track, log_weight) in hypotheses {
+            for (i, (square, densities)) in said(track).into_iter().enumerate() {
+                usual[i] = usual[i].max(log_weight + densities.0);
+                far[i] = far[i].max(log_weight + densities.1);
+                nearest[i] = nearest[i].min(square);
             }
         }
         std::array::from_fn(|i| {
-            // Without a hypothesis, or a number, the measurement is what it is.
-            let p = match least[i].is_finite() && !is_fluke[i] {
-                true => crate::logspace::probability(least[i]),
+            let is_fluke = rates[i].powi(self.streak[i].saturating_add(1)) < FLUKE;
+            // Without a number, the measurement is what it is.
+            let p = match far[i].is_finite() && !is_fluke {
+                true => crate::logspace::probability(far[i] - usual[i]),
                 false => 0.0,
             };
             self.streak[i] = match p > 0.5 {
@@ -117,12 +132,17 @@ mod tests {
         let (near, far) = (at(0.0), at(0.1));
         let (pose, variance, rates) = ([0.1, 0.0, 0.0], [1e-4; 3], [0.01; 3]);
         let trusted = |tracks: &[Track], pose| {
-            Trust::default().variance(tracks.iter(), pose, variance, rates)
+            let equal = tracks.iter().map(|track| (track, 0.0));
+            Trust::default().variance(equal, pose, variance, rates)
         };
         let alone = trusted(&[near], pose);
         assert!(alone[0] > 50.0 * 1e-4 && alone[1] < 1.1e-4, "{alone:?}");
         let both = trusted(&[near, far], pose);
         assert!(both[0] < 1.1e-4, "{both:?}");
+        // What is hardly believed excuses nothing.
+        let unbelieved = [(&near, 0.0), (&far, -14.0)].into_iter();
+        let doubted = Trust::default().variance(unbelieved, pose, variance, rates);
+        assert!(doubted[0] > 50.0 * 1e-4, "{doubted:?}");
         assert_eq!(trusted(&[], pose), variance);
         let nothing = trusted(&[near], [f64::NAN; 3]);
         assert_eq!(nothing, variance);
@@ -130,7 +150,8 @@ mod tests {
         for (rate, believed_after) in [(1e-10, 0), (0.01, 4)] {
             let mut trust = Trust::default();
             let doubted = (0..20).filter(|_| {
-                let [x, ..] = trust.variance([near].iter(), [1.0, 0.0, 0.0], variance, [rate; 3]);
+                let alone = std::iter::once((&near, 0.0));
+                let [x, ..] = trust.variance(alone, [1.0, 0.0, 0.0], variance, [rate; 3]);
                 x > 50.0 * 1e-4
             });
             assert!((believed_after..=16).contains(&doubted.count()), "{rate}");
