@@ -167,6 +167,17 @@ impl Encoders {
         self.onset[wheel] = t_ns;
     }
 
+    /// Another wheel begins to drag, and changes the rate of this one: that its encoder was off by a
+    /// size, if it was not believed, is not taken up to explain that.
+    pub fn forget_doubted_size(&mut self, wheel: usize) {
+        let p = &mut self.p[wheel];
+        let sized: f64 = p[SIZED..OWN_RATE].iter().sum();
+        if sized < 0.5 {
+            p[0] += sized;
+            p[SIZED..OWN_RATE].fill(0.0);
+        }
+    }
+
     /// The wheel sticks: a whole encoder reads zero from now on, with noise or exactly.
     pub fn stick(&mut self, wheel: usize) {
         let p = &mut self.p[wheel];

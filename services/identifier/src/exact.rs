@@ -338,6 +338,9 @@ impl Exact {
             _ => from.state.encoders,
         };
         for wheel in 0..WHEELS {
+            if before.stuck() == 0 && after.stuck() != 0 {
+                encoders.forget_doubted_size(wheel);
+            }
             match (before.is_stuck(wheel), after.is_stuck(wheel)) {
                 (false, true) => {
                     if age_s(t_ns, encoders.onset(wheel)) < EXPLAINED_S {
