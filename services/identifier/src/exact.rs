@@ -24,7 +24,7 @@ use vigil_robot::learned::{
 use crate::encoders::Encoders;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
-use crate::prepared::{EXPLAINED_S, Prepared, Seen, age_s};
+use crate::prepared::{EXPLAINED_S, Prepared, Seen, age_s, changes_several, newly_stuck};
 use crate::rate_offsets::RateOffsets;
 use crate::sets::Sets;
 use crate::sizes::{Sight, Sizes};
@@ -389,18 +389,17 @@ impl Exact {
             observation,
             evidence,
         };
-        // With the rates of the most probable motion that has a name.
-        let named = self
-            .bank
-            .best(|mode| !self.modes[mode].moved.is_unknown())
-            .map(|best| (best.mode, best.state.encoders));
-        let (mode, encoders) =
-            named.unwrap_or_else(|| (NOMINAL, Encoders::healthy(observation.t_ns)));
+        let modes = &self.modes;
+        let named = self.bank.best(|mode| !modes[mode].moved.is_unknown());
+        let (mode, encoders) = match named {
+            Some(best) => (best.mode, best.state.encoders),
+            None => (NOMINAL, Encoders::healthy(observation.t_ns)),
+        };
         let sight = Sight {
             model: &self.model,
             observation,
             evidence,
-            mode: &self.modes[mode],
+            mode: &modes[mode],
             encoders: &encoders,
             births: &births,
         };
@@ -484,20 +483,6 @@ impl Exact {
         }
         0
     }
-}
-
-/// True if more than one wheel sticks or turns again; not if a single stuck wheel was another one.
-fn changes_several(before: Moved, after: Moved) -> bool {
-    let is_unknown = after.is_unknown();
-    let (before, after) = (before.stuck(), after.stuck());
-    let is_another = before.count_ones() == 1 && after.count_ones() == 1;
-    (before ^ after).count_ones() > 1 && !is_another && !is_unknown
-}
-
-/// The wheel that sticks besides those that do.
-fn newly_stuck(before: Moved, after: Moved) -> Option<usize> {
-    let new = after.stuck() & !before.stuck();
-    (new != 0).then(|| new.trailing_zeros() as usize)
 }
 
 /// True while a stuck wheel's encoder may read anything, and the others may still turn as before.

@@ -156,3 +156,17 @@ pub const EXPLAINED_S: f64 = 2.0;
 pub fn age_s(t_ns: u64, onset_ns: u64) -> f64 {
     t_ns.saturating_sub(onset_ns) as f64 * 1e-9
 }
+
+/// True if more than one wheel sticks or turns again; not if a single stuck wheel was another one.
+pub fn changes_several(before: Moved, after: Moved) -> bool {
+    let is_unknown = after.is_unknown();
+    let (before, after) = (before.stuck(), after.stuck());
+    let is_another = before.count_ones() == 1 && after.count_ones() == 1;
+    (before ^ after).count_ones() > 1 && !is_another && !is_unknown
+}
+
+/// The wheel that sticks besides those that do.
+pub fn newly_stuck(before: Moved, after: Moved) -> Option<usize> {
+    let new = after.stuck() & !before.stuck();
+    (new != 0).then(|| new.trailing_zeros() as usize)
+}

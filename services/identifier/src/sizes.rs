@@ -72,7 +72,7 @@ pub struct Sizes {
     late: Late,
 }
 
-/// One observation, in the motion that is most probable.
+/// One observation, with the rates of the most probable motion that has a name.
 #[derive(Debug, Clone, Copy)]
 pub struct Sight<'a> {
     /// The model.

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod alarm;
+#[allow(dead_code)]
 mod recorded;
 
 use vigil_blocks::{Entry, FaultBelief, ParticleBlock, SensorFrame, SizeKind};
