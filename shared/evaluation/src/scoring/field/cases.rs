@@ -402,6 +402,7 @@ fn claims_are_made_at_fixed_instants_of_the_first_fault_and_as_many_before() {
     truth.push(Stretch {
         from_s: 14.0,
         truth: Truth::Healthy,
+        size: None,
     });
     let moment = |t_s: f64| match t_s {
         t if t < 11.5 => quiet(t),
