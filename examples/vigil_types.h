@@ -55,6 +55,20 @@
 #define VIGIL_CONTROL_DUAL 2u
 #define VIGIL_CONTROL_FALLBACK 3u
 #define VIGIL_CONTROL_SAFE 4u
+#define VIGIL_SIZE_NONE 0u
+#define VIGIL_SIZE_GAIN 1u
+#define VIGIL_SIZE_BIAS_RAD_S 2u
+#define VIGIL_SIZE_DRIFT_RAD_S2 3u
+#define VIGIL_SIZE_DELAY_S 4u
+#define VIGIL_SIZE_ANGLE_RAD 5u
+#define VIGIL_SIZE_TORQUE_SHARE_LOST 6u
+#define VIGIL_SIZE_CURRENT_OFFSET_A 7u
+#define VIGIL_SIZE_RATE_BIAS_RAD_S 8u
+#define VIGIL_SIZE_ZERO 9u
+#define VIGIL_SIZE_FROZEN 10u
+#define VIGIL_SIZE_NOISE 11u
+#define VIGIL_SIZE_DEAD 12u
+#define VIGIL_SIZE_STUCK 13u
 #define VIGIL_CAUSE_FRAME 1u
 #define VIGIL_CAUSE_MISSED 2u
 #define VIGIL_DATAGRAM_SIZE 424u
@@ -331,8 +345,8 @@ VIGIL_ASSERT(offsetof(vigil_particle_block, yaw) == 49232);
 VIGIL_ASSERT(offsetof(vigil_particle_block, log_weight) == 65616);
 VIGIL_ASSERT(offsetof(vigil_particle_block, reserved_tail) == 82000);
 
-#define VIGIL_FAULT_BELIEF_SCHEMA 0x5ff34eae855a52adull
-#define VIGIL_FAULT_BELIEF_TYPE_NAME "vigil.FaultBelief.v1.5ff34eae855a52ad"
+#define VIGIL_FAULT_BELIEF_SCHEMA 0x70d08c3016f8de2full
+#define VIGIL_FAULT_BELIEF_TYPE_NAME "vigil.FaultBelief.v1.70d08c3016f8de2f"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -356,6 +370,10 @@ typedef struct {
   double entropy;
   /* Why this diagnosis and not the next best one: by channel, how much more the readings since the onset are expected under it than under runner_up, natural log-likelihood; see Channel. 0 while nothing is diagnosed. */
   double channel_evidence[32];
+  /* Expected size of each node's fault, given that it is present, in the unit of its size_kind; 0 without a size. */
+  double size[64];
+  /* Standard deviation of size, in the same unit. */
+  double size_sd[64];
   /* Probability of mode. */
   double p_mode;
   /* Capture time of the frame that raised the alarm, ns; 0 before an alarm. */
@@ -382,8 +400,10 @@ typedef struct {
   uint32_t identifying;
   /* Steps that met impossible or non-finite evidence and kept the prediction. */
   uint32_t degenerate_count;
+  /* In which way each node's component is most probably broken, given that it is: a SizeKind, which gives size its unit. */
+  uint32_t size_kind[64];
 } vigil_fault_belief;
-VIGIL_ASSERT(sizeof(vigil_fault_belief) == 1584);
+VIGIL_ASSERT(sizeof(vigil_fault_belief) == 2864);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, cause) == 48);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, run_id) == 72);
@@ -395,19 +415,22 @@ VIGIL_ASSERT(offsetof(vigil_fault_belief, p_unknown_predicted) == 1120);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, sets) == 1128);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, entropy) == 1256);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, channel_evidence) == 1264);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, p_mode) == 1520);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, alarm_t_capture_ns) == 1528);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, onset_t_capture_ns) == 1536);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, mode) == 1544);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, reported) == 1548);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, reported_change_count) == 1552);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, runner_up) == 1556);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, particle_limit) == 1560);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, mode_change_count) == 1564);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, node_count) == 1568);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, set_count) == 1572);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, identifying) == 1576);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, degenerate_count) == 1580);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, size) == 1520);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, size_sd) == 2032);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, p_mode) == 2544);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, alarm_t_capture_ns) == 2552);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, onset_t_capture_ns) == 2560);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, mode) == 2568);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, reported) == 2572);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, reported_change_count) == 2576);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, runner_up) == 2580);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, particle_limit) == 2584);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, mode_change_count) == 2588);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, node_count) == 2592);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, set_count) == 2596);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, identifying) == 2600);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, degenerate_count) == 2604);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, size_kind) == 2608);
 
 #define VIGIL_ACTION_SCHEMA 0x608fc64b66c4f8b7ull
 #define VIGIL_ACTION_TYPE_NAME "vigil.Action.v1.608fc64b66c4f8b7"

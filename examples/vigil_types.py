@@ -45,6 +45,20 @@ CONTROL_POLICY = 1
 CONTROL_DUAL = 2
 CONTROL_FALLBACK = 3
 CONTROL_SAFE = 4
+SIZE_NONE = 0
+SIZE_GAIN = 1
+SIZE_BIAS_RAD_S = 2
+SIZE_DRIFT_RAD_S2 = 3
+SIZE_DELAY_S = 4
+SIZE_ANGLE_RAD = 5
+SIZE_TORQUE_SHARE_LOST = 6
+SIZE_CURRENT_OFFSET_A = 7
+SIZE_RATE_BIAS_RAD_S = 8
+SIZE_ZERO = 9
+SIZE_FROZEN = 10
+SIZE_NOISE = 11
+SIZE_DEAD = 12
+SIZE_STUCK = 13
 CAUSE_FRAME = 1
 CAUSE_MISSED = 2
 
@@ -369,8 +383,8 @@ assert ParticleBlock.reserved_tail.offset == 82000
 
 
 class FaultBelief(ctypes.LittleEndianStructure):
-    SCHEMA = 0x5FF34EAE855A52AD
-    TYPE_NAME = "vigil.FaultBelief.v1.5ff34eae855a52ad"
+    SCHEMA = 0x70D08C3016F8DE2F
+    TYPE_NAME = "vigil.FaultBelief.v1.70d08c3016f8de2f"
 
     @staticmethod
     def type_name():
@@ -399,6 +413,10 @@ class FaultBelief(ctypes.LittleEndianStructure):
         ("entropy", ctypes.c_double),
         # Why this diagnosis and not the next best one: by channel, how much more the readings since the onset are expected under it than under runner_up, natural log-likelihood; see Channel. 0 while nothing is diagnosed.
         ("channel_evidence", ctypes.c_double * 32),
+        # Expected size of each node's fault, given that it is present, in the unit of its size_kind; 0 without a size.
+        ("size", ctypes.c_double * 64),
+        # Standard deviation of size, in the same unit.
+        ("size_sd", ctypes.c_double * 64),
         # Probability of mode.
         ("p_mode", ctypes.c_double),
         # Capture time of the frame that raised the alarm, ns; 0 before an alarm.
@@ -425,10 +443,12 @@ class FaultBelief(ctypes.LittleEndianStructure):
         ("identifying", ctypes.c_uint32),
         # Steps that met impossible or non-finite evidence and kept the prediction.
         ("degenerate_count", ctypes.c_uint32),
+        # In which way each node's component is most probably broken, given that it is: a SizeKind, which gives size its unit.
+        ("size_kind", ctypes.c_uint32 * 64),
     ]
 
 
-assert ctypes.sizeof(FaultBelief) == 1584
+assert ctypes.sizeof(FaultBelief) == 2864
 assert FaultBelief.header.offset == 0
 assert FaultBelief.cause.offset == 48
 assert FaultBelief.run_id.offset == 72
@@ -440,19 +460,22 @@ assert FaultBelief.p_unknown_predicted.offset == 1120
 assert FaultBelief.sets.offset == 1128
 assert FaultBelief.entropy.offset == 1256
 assert FaultBelief.channel_evidence.offset == 1264
-assert FaultBelief.p_mode.offset == 1520
-assert FaultBelief.alarm_t_capture_ns.offset == 1528
-assert FaultBelief.onset_t_capture_ns.offset == 1536
-assert FaultBelief.mode.offset == 1544
-assert FaultBelief.reported.offset == 1548
-assert FaultBelief.reported_change_count.offset == 1552
-assert FaultBelief.runner_up.offset == 1556
-assert FaultBelief.particle_limit.offset == 1560
-assert FaultBelief.mode_change_count.offset == 1564
-assert FaultBelief.node_count.offset == 1568
-assert FaultBelief.set_count.offset == 1572
-assert FaultBelief.identifying.offset == 1576
-assert FaultBelief.degenerate_count.offset == 1580
+assert FaultBelief.size.offset == 1520
+assert FaultBelief.size_sd.offset == 2032
+assert FaultBelief.p_mode.offset == 2544
+assert FaultBelief.alarm_t_capture_ns.offset == 2552
+assert FaultBelief.onset_t_capture_ns.offset == 2560
+assert FaultBelief.mode.offset == 2568
+assert FaultBelief.reported.offset == 2572
+assert FaultBelief.reported_change_count.offset == 2576
+assert FaultBelief.runner_up.offset == 2580
+assert FaultBelief.particle_limit.offset == 2584
+assert FaultBelief.mode_change_count.offset == 2588
+assert FaultBelief.node_count.offset == 2592
+assert FaultBelief.set_count.offset == 2596
+assert FaultBelief.identifying.offset == 2600
+assert FaultBelief.degenerate_count.offset == 2604
+assert FaultBelief.size_kind.offset == 2608
 
 
 class Action(ctypes.LittleEndianStructure):

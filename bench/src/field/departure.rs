@@ -150,6 +150,7 @@ mod tests {
             delay_s,
             leaf: [None; 3],
             side: [None; 3],
+            size: None,
         };
         Run {
             onsets: vec![onset],

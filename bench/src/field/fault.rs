@@ -1,13 +1,14 @@
 //! What breaks in a run, and what is therefore true.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rand::seq::SliceRandom;
 use rand::{Rng, RngExt};
-use vigil_evaluation::scoring::field::{Stretch, Truth};
+use vigil_blocks::SizeKind;
+use vigil_evaluation::scoring::field::{Size, Stretch, Truth};
 use vigil_inference::FaultTree;
 use vigil_robot::injection::Change;
-use vigil_robot::{Description, FaultKind, Injection};
+use vigil_robot::{Description, DisturbanceKind, FaultKind, Injection};
 use vigil_setup::schema::Sensors;
 
 /// The names that stand for drawn places in a run.
@@ -95,6 +96,8 @@ pub fn changes(
 struct Wrong {
     stuck: BTreeSet<usize>,
     encoders: BTreeSet<usize>,
+    /// Encoders that are off by a size: the wheel, and the last size of each.
+    sized: BTreeMap<usize, Size>,
     /// Kind and place of what no model describes.
     others: BTreeSet<(u32, usize)>,
 }
@@ -109,21 +112,32 @@ impl Wrong {
                 };
                 set.insert(fault.wheel);
             }
-            Change::Disturb(this) => {
-                self.others.insert((this.kind as u32, this.place));
-            }
+            Change::Disturb(this) => match size_of(this.kind, this.parameter[0]) {
+                Some(size) => {
+                    self.sized.insert(this.place, size);
+                }
+                None => {
+                    self.others.insert((this.kind as u32, this.place));
+                }
+            },
             Change::Clear(wheel) => {
                 self.stuck.remove(&wheel);
                 self.encoders.remove(&wheel);
+                self.sized.remove(&wheel);
                 self.others.retain(|(kind, place)| {
                     let at_wheel = vigil_robot::DisturbanceKind::from_wire(*kind)
                         .is_some_and(|kind| is_of_a_wheel(kind.row().place));
                     !(at_wheel && *place == wheel)
                 });
             }
-            Change::Calm(kind, at) => self.others.retain(|(other, place)| {
-                *other != kind as u32 || at.is_some_and(|at| at != *place)
-            }),
+            Change::Calm(kind, at) => {
+                let is_at = |place: usize| at.is_none_or(|at| at == place);
+                let way = size_of(kind, 0.0).map(|size| size.kind);
+                let calmed = |place: usize, size: &Size| way == Some(size.kind) && is_at(place);
+                self.sized.retain(|place, size| !calmed(*place, size));
+                self.others
+                    .retain(|(other, place)| *other != kind as u32 || !is_at(*place));
+            }
             Change::ClearAll => *self = Self::default(),
         }
     }
@@ -137,18 +151,12 @@ impl Wrong {
             let mut node = node.filter(|node| node.fault.as_deref() == Some(fault.as_str()));
             node.next().map(|node| node.name.clone())
         };
-        let others = self.others.iter().filter_map(|(kind, place)| {
-            let row = vigil_robot::DisturbanceKind::from_wire(*kind)?.row();
-            let is_encoder = row.name.starts_with("encoder");
-            (sees_encoders || !is_encoder).then_some((is_encoder, *place))
-        });
-        let others: Vec<(bool, usize)> = others.collect();
-        if let Some((is_encoder, wheel)) = others.first() {
-            let own = is_encoder.then(|| leaf("encoder", *wheel)).flatten();
-            return Truth::Unmodelled { own };
+        if !self.others.is_empty() {
+            return Truth::Unmodelled { own: None };
         }
         let stuck = self.stuck.iter().filter_map(|wheel| leaf("stuck", *wheel));
-        let encoders = self.encoders.iter().filter(|_| sees_encoders);
+        let broken: BTreeSet<&usize> = self.encoders.iter().chain(self.sized.keys()).collect();
+        let encoders = broken.into_iter().filter(|_| sees_encoders);
         let encoders = encoders.filter_map(|wheel| leaf("encoder", *wheel));
         let leaves: Vec<String> = stuck.chain(encoders).collect();
         match leaves.is_empty() {
@@ -156,6 +164,18 @@ impl Wrong {
             false => Truth::Faults(leaves),
         }
     }
+}
+
+/// In which way an encoder is off, and by how much; None of anything else.
+fn size_of(kind: DisturbanceKind, value: f64) -> Option<Size> {
+    let kind = match kind {
+        DisturbanceKind::EncoderScale => SizeKind::Gain,
+        DisturbanceKind::EncoderBias => SizeKind::BiasRadS,
+        DisturbanceKind::EncoderDrift => SizeKind::DriftRadS2,
+        DisturbanceKind::EncoderDelay => SizeKind::DelayS,
+        _ => return None,
+    };
+    Some(Size { kind, value })
 }
 
 const fn is_of_a_wheel(place: vigil_robot::disturbance::Place) -> bool {
@@ -175,6 +195,7 @@ pub fn truth(
     let mut stretches = vec![Stretch {
         from_s: 0.0,
         truth: Truth::Healthy,
+        size: None,
     }];
     for injection in changes {
         wrong.take(&injection.change);
@@ -183,7 +204,14 @@ pub fn truth(
         // What changes at one instant is one change.
         stretches.retain(|stretch| stretch.from_s < from_s || stretch.from_s <= 0.0);
         if stretches.last().is_some_and(|last| last.truth != truth) {
-            stretches.push(Stretch { from_s, truth });
+            let is_one = matches!(&truth, Truth::Faults(leaves) if leaves.len() == 1);
+            let size = wrong.sized.values().next().copied();
+            let size = size.filter(|_| is_one && wrong.encoders.is_empty());
+            stretches.push(Stretch {
+                from_s,
+                size: size.filter(|_| wrong.stuck.is_empty()),
+                truth,
+            });
         }
     }
     stretches

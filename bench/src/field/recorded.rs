@@ -231,6 +231,7 @@ impl Case {
         let begins = Stretch {
             from_s: f64::NEG_INFINITY,
             truth: Truth::Healthy,
+            size: None,
         };
         // By the pose alone nothing can be seen of an encoder.
         let sees = |leaf: &str| {
@@ -243,6 +244,7 @@ impl Case {
                 Some(_) => Truth::Faults(vec![leaf.clone()]),
                 None => Truth::Unmodelled { own: None },
             },
+            size: None,
         });
         std::iter::once(begins).chain(breaks).collect()
     }

@@ -4,10 +4,10 @@ use std::error::Error;
 
 use vigil_blocks::{
     Action, ControlMode, DetectionBelief, Entry, FaultBelief, MODE_BLIND, MODE_MULTIPLE,
-    MODE_UNKNOWN, ParticleBlock, RecoveryKind, SensorFrame,
+    MODE_UNKNOWN, ParticleBlock, RecoveryKind, SensorFrame, SizeKind,
 };
 use vigil_detector::Detector;
-use vigil_evaluation::scoring::field::{BLIND, Moment, Told};
+use vigil_evaluation::scoring::field::{BLIND, Moment, Size, Told};
 use vigil_evaluation::scoring::{Belief, MULTIPLE, UNKNOWN};
 use vigil_identifier::{Diagnoser, Input};
 use vigil_setup::Setup;
@@ -130,10 +130,21 @@ impl Stages {
             },
             mode: self.name(belief.mode),
             p_mode: belief.p_mode,
+            size: self.size(),
             set: &self.set.1,
             reported: self.name(belief.reported),
             told: told(action),
             action: u64::from(action.action) << 32 | u64::from(action.wheel),
+        }
+    }
+
+    /// Of the node that the mode names.
+    fn size(&self) -> Size {
+        let node = self.diagnosis.mode as usize;
+        let kind = self.diagnosis.size_kind.get(node).copied();
+        Size {
+            kind: SizeKind::from_wire(kind.unwrap_or_default()),
+            value: self.diagnosis.size.get(node).copied().unwrap_or(0.0),
         }
     }
 

@@ -3,14 +3,20 @@
 //! Given the motion, the wheels' readings do not depend on each other, so any number of broken
 //! encoders costs no more than one.
 
-use vigil_blocks::WHEELS;
+use vigil_blocks::{SizeKind, WHEELS};
 use vigil_robot::learned::wheel_evidence::{ANYTHING, BREAKAGE_SHARES, BREAKAGES};
 
-/// State of a whole encoder whose wheel turns at a rate of its own, in the unknown. The states
-/// before it are whole, and the breakages.
-pub const OWN_RATE: usize = 1 + BREAKAGES.len();
+use crate::sizes::{BIAS, DELAY, DRIFT, GAIN, SIZED_SHARES, WAYS};
+
+/// First of the states of an encoder that is off by a size; see [`crate::sizes`]. The states before
+/// it are whole, and the breakages.
+pub const SIZED: usize = 1 + BREAKAGES.len();
+/// State of a whole encoder whose wheel turns at a rate of its own, in the unknown.
+pub const OWN_RATE: usize = SIZED + WAYS;
 /// State of a whole encoder that reads exactly zero, as its wheel stands: many do, without noise.
-pub const SILENT: usize = 2 + BREAKAGES.len();
+pub const SILENT: usize = OWN_RATE + 1;
+/// State of a late encoder.
+pub const LATE: usize = SIZED + DELAY;
 /// State of an encoder that reads exactly zero, the first of the breakages.
 pub const ZERO: usize = 1;
 /// State of an encoder that reads noise, the third of the breakages.
@@ -28,7 +34,34 @@ const AGAINST_MAX: f64 = -80.0;
 
 /// States of an encoder: whole, broken in one way, whole on a wheel with a rate of its own, whole
 /// and silent on a standing wheel.
-pub const STATES: usize = 3 + BREAKAGES.len();
+pub const STATES: usize = SILENT + 1;
+
+/// Names of the ways to break, in the order of the states, and which of [`crate::sizes`] has one.
+pub const WAYS_TO_BREAK: [(SizeKind, Option<usize>); BREAKAGES.len() + WAYS] = [
+    (SizeKind::Zero, None),
+    (SizeKind::Frozen, None),
+    (SizeKind::Noise, None),
+    (SizeKind::Dead, None),
+    (SizeKind::Gain, Some(GAIN)),
+    (SizeKind::BiasRadS, Some(BIAS)),
+    (SizeKind::DriftRadS2, Some(DRIFT)),
+    (SizeKind::DelayS, Some(DELAY)),
+];
+
+/// Prior shares of the ways to break, in the order of the states.
+pub const SHARES: [f64; BREAKAGES.len() + WAYS] = {
+    let (mut shares, mut rest, mut i) = ([0.0; BREAKAGES.len() + WAYS], 1.0, 0);
+    while i < WAYS {
+        shares[BREAKAGES.len() + i] = SIZED_SHARES[i];
+        rest -= SIZED_SHARES[i];
+        i += 1;
+    }
+    while i < WAYS + BREAKAGES.len() {
+        shares[i - WAYS] = rest * BREAKAGE_SHARES[i - WAYS];
+        i += 1;
+    }
+    shares
+};
 
 /// Log-likelihoods of one observation's readings in each state, prepared for many hypotheses.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +71,8 @@ pub struct Likelihoods {
     relative: [[f64; STATES]; WHEELS],
     log_largest: [f64; WHEELS],
     wheels: usize,
+    /// Wheels, as bits, whose late encoder reads what a whole one does, whatever that is.
+    timely: u32,
 }
 
 impl Likelihoods {
@@ -48,12 +83,22 @@ impl Likelihoods {
             relative: [[1.0; STATES]; WHEELS],
             log_largest: [0.0; WHEELS],
             wheels: wheels.min(WHEELS),
+            timely: 0,
         };
         for wheel in 0..out.wheels {
             out.logs[wheel] = std::array::from_fn(|state| log_likelihood(wheel, state));
             out.scale(wheel);
         }
         out
+    }
+
+    /// The late encoders of these wheels (bits) read what whole ones do.
+    #[must_use]
+    pub const fn timely(self, wheels: u32) -> Self {
+        Self {
+            timely: wheels,
+            ..self
+        }
     }
 
     /// Takes what another one says of a wheel.
@@ -104,7 +149,7 @@ impl Encoders {
     pub fn unsure(t_ns: u64) -> Self {
         let mut p = [0.0; STATES];
         p[0] = 1.0 - ANYTHING;
-        for (p, share) in p[1..OWN_RATE].iter_mut().zip(BREAKAGE_SHARES) {
+        for (p, share) in p[1..OWN_RATE].iter_mut().zip(SHARES) {
             *p = ANYTHING * (1.0 - ANYTHING_OWN_RATE) * share;
         }
         p[OWN_RATE] = ANYTHING * ANYTHING_OWN_RATE;
@@ -120,6 +165,17 @@ impl Encoders {
         self.p[wheel] = [0.0; STATES];
         self.p[wheel][0] = 1.0;
         self.onset[wheel] = t_ns;
+    }
+
+    /// Another wheel begins to drag, and changes the rate of this one: that its encoder was off by a
+    /// size, if it was not believed, is not taken up to explain that.
+    pub fn forget_doubted_size(&mut self, wheel: usize) {
+        let p = &mut self.p[wheel];
+        let sized: f64 = p[SIZED..OWN_RATE].iter().sum();
+        if sized < 0.5 {
+            p[0] += sized;
+            p[SIZED..OWN_RATE].fill(0.0);
+        }
     }
 
     /// The wheel sticks: a whole encoder reads zero from now on, with noise or exactly.
@@ -138,8 +194,9 @@ impl Encoders {
     /// One observation: encoder w breaks with the probability `births[w]`, recovers with `death`;
     /// the wheels `stuck` (bits) stand. What an encoder on a standing wheel reads when it breaks to
     /// zero or freezes is what it read before: nobody could see it, so neither happens there, and
-    /// no prior moves the odds of what the readings cannot tell. Returns the log-evidence of all
-    /// readings.
+    /// no prior moves the odds of what the readings cannot tell. Nor does an encoder become late or
+    /// timely while nothing shows it. While a wheel drags, the others' rates are known too poorly
+    /// for an encoder to begin to be off by a size. Returns the log-evidence of all readings.
     pub fn step(
         &mut self,
         births: &[f64; WHEELS],
@@ -152,26 +209,26 @@ impl Encoders {
         let wheels = births.iter().enumerate().take(likelihoods.wheels);
         for (wheel, &birth) in wheels {
             let p = &mut self.p[wheel];
+            let is_timely = likelihoods.timely >> wheel & 1 == 1;
             if stuck >> wheel & 1 == 0 {
-                let (whole, broken) = (p[0], p[1..OWN_RATE].iter().sum::<f64>());
                 // The onset is that of the mass that came last in quantity.
-                if whole * birth > broken {
+                if p[0] * birth > p[1..OWN_RATE].iter().sum() {
                     self.onset[wheel] = t_ns;
                 }
-                p[0] = whole * (1.0 - birth) + broken * death;
-                for (p, share) in p[1..OWN_RATE].iter_mut().zip(BREAKAGE_SHARES) {
-                    *p = *p * (1.0 - death) + whole * birth * share;
-                }
+                exchange(p, (birth, death), stuck != 0, is_timely);
             } else {
-                let birth = birth * BREAKAGE_SHARES[NOISE - 1];
+                let birth = birth * SHARES[NOISE - 1];
                 let (noisy, silent, noise) = (p[0], p[SILENT], p[NOISE]);
                 let back = noise * death;
                 p[0] = noisy * (1.0 - birth) + back * (1.0 - SILENT_SHARE);
                 p[SILENT] = silent * (1.0 - birth) + back * SILENT_SHARE;
                 p[NOISE] = noise - back + (noisy + silent) * birth;
             }
-            let joint: [f64; STATES] =
-                std::array::from_fn(|state| p[state] * likelihoods.relative[wheel][state]);
+            let relative = &likelihoods.relative[wheel];
+            let mut joint: [f64; STATES] = std::array::from_fn(|state| p[state] * relative[state]);
+            if is_timely {
+                joint[LATE] = p[LATE] * relative[0];
+            }
             let total: f64 = joint.iter().sum();
             evidence += likelihoods.log_largest[wheel];
             product *= total;
@@ -195,10 +252,48 @@ impl Encoders {
         self.p[wheel][DEAD]
     }
 
+    /// Probability that this wheel's encoder is whole and its wheel turns.
+    #[must_use]
+    pub const fn p_whole(&self, wheel: usize) -> f64 {
+        self.p[wheel][0]
+    }
+
+    /// Probability that this wheel's encoder is off by a size in this way.
+    #[must_use]
+    pub const fn p_sized(&self, wheel: usize, way: usize) -> f64 {
+        self.p[wheel][SIZED + way]
+    }
+
+    /// Probabilities of the ways in which this wheel's encoder is broken, in the order of the
+    /// states.
+    #[must_use]
+    pub fn ways(&self, wheel: usize) -> &[f64] {
+        &self.p[wheel][1..OWN_RATE]
+    }
+
     /// Onset of this wheel's broken encoder, if it is broken.
     #[must_use]
     pub const fn onset(&self, wheel: usize) -> u64 {
         self.onset[wheel]
+    }
+}
+
+/// The encoder of a wheel that turns breaks and recovers; not so that its size would show only
+/// poorly, as others drag, nor so that nothing shows, as it `is_timely` either way.
+fn exchange(p: &mut [f64; STATES], (birth, death): (f64, f64), others_drag: bool, is_timely: bool) {
+    let whole = p[0];
+    for (i, share) in SHARES.into_iter().enumerate() {
+        let state = 1 + i;
+        if state == LATE && is_timely {
+            continue;
+        }
+        let born = match state >= SIZED && others_drag {
+            true => 0.0,
+            false => whole * birth * share,
+        };
+        let mended = p[state] * death;
+        p[state] += born - mended;
+        p[0] += mended - born;
     }
 }
 

@@ -8,6 +8,7 @@ use crate::draw::draw;
 use crate::exact::Exact;
 use crate::generic::Generic;
 use crate::modes::Leaves;
+use crate::node_sizes::NodeSizes;
 use crate::posterior::Posterior;
 
 /// The exact filter over sets of faults, or one of the library's over single faults.
@@ -49,6 +50,15 @@ impl Engine {
         match self {
             Self::Exact(filter) => filter.posterior(out),
             Self::Generic(filter) => filter.posterior(leaves, out),
+        }
+    }
+
+    /// In which way each leaf's component is broken, and by how much: the exact filter knows.
+    #[must_use]
+    pub fn sizes(&self, leaves: &Leaves, posterior: &Posterior) -> NodeSizes {
+        match self {
+            Self::Exact(filter) => NodeSizes::of(filter, leaves, posterior),
+            Self::Generic(_) => NodeSizes::default(),
         }
     }
 

@@ -24,9 +24,10 @@ use vigil_robot::learned::{
 use crate::encoders::Encoders;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
-use crate::prepared::{EXPLAINED_S, Prepared, Seen, age_s};
+use crate::prepared::{EXPLAINED_S, Prepared, Seen, age_s, changes_several, newly_stuck};
 use crate::rate_offsets::RateOffsets;
 use crate::sets::Sets;
+use crate::sizes::{Sight, Sizes};
 use crate::state::State;
 
 /// Index of the nominal motion among the modes.
@@ -64,6 +65,7 @@ pub struct Exact {
     /// Of the healthy robot, from before the faults; it fades as the robot drives on.
     context: Context,
     wheels: WheelContext,
+    sizes: Sizes,
     trust: Trust,
     /// What the last observation says in each mode, where a hypothesis has asked.
     prepared: Vec<Option<Prepared>>,
@@ -115,6 +117,7 @@ impl Exact {
             bank: Bank::new(&capacities),
             context: Context::default(),
             wheels: WheelContext::default(),
+            sizes: Sizes::new(robot),
             trust: Trust::default(),
             degenerate_count: 0,
         }
@@ -123,6 +126,7 @@ impl Exact {
     /// Starts from the nominal mode, as the detector knew it at `t_ns`.
     pub fn restart(&mut self, healthy: &Healthy, t_ns: u64) {
         (self.context, self.wheels) = (healthy.context, healthy.wheels);
+        self.sizes.clear();
         let state = State {
             track: healthy.track(&self.modes[NOMINAL].noise),
             encoders: Encoders::healthy(t_ns),
@@ -144,6 +148,12 @@ impl Exact {
     #[must_use]
     pub fn modes(&self) -> &[MotionMode] {
         &self.modes
+    }
+
+    /// Sizes of encoders' faults.
+    #[must_use]
+    pub const fn sizes(&self) -> &Sizes {
+        &self.sizes
     }
 
     /// The hypotheses, and what moves the robot under each.
@@ -175,6 +185,7 @@ impl Exact {
         self.predict(observation);
         // A robot at rest tells nothing: no fault appears, fades or is named.
         if !observation.moving {
+            self.sizes.rest(observation);
             return;
         }
         if let Some(evidence) = &evidence {
@@ -328,6 +339,9 @@ impl Exact {
             _ => from.state.encoders,
         };
         for wheel in 0..WHEELS {
+            if before.stuck() == 0 && after.stuck() != 0 {
+                encoders.forget_doubted_size(wheel);
+            }
             match (before.is_stuck(wheel), after.is_stuck(wheel)) {
                 (false, true) => {
                     if age_s(t_ns, encoders.onset(wheel)) < EXPLAINED_S {
@@ -376,10 +390,25 @@ impl Exact {
             observation,
             evidence,
         };
+        let modes = &self.modes;
+        let named = self.bank.best(|mode| !modes[mode].moved.is_unknown());
+        let (mode, encoders) = match named {
+            Some(best) => (best.mode, best.state.encoders),
+            None => (NOMINAL, Encoders::healthy(observation.t_ns)),
+        };
+        let sight = Sight {
+            model: &self.model,
+            observation,
+            evidence,
+            mode: &modes[mode],
+            encoders: &encoders,
+            births: &births,
+        };
+        let sized = self.sizes.take(&sight, self.robot.wheels.len().min(WHEELS));
         self.prepared.fill(None);
         for hypothesis in self.bank.hypotheses_mut() {
             let index = hypothesis.mode;
-            let prepare = || seen.prepared(&self.modes[index]);
+            let prepare = || seen.prepared(&self.modes[index], &sized);
             let prepared = self.prepared[index].get_or_insert_with(prepare);
             let State {
                 encoders,
@@ -455,20 +484,6 @@ impl Exact {
         }
         0
     }
-}
-
-/// True if more than one wheel sticks or turns again; not if a single stuck wheel was another one.
-fn changes_several(before: Moved, after: Moved) -> bool {
-    let is_unknown = after.is_unknown();
-    let (before, after) = (before.stuck(), after.stuck());
-    let is_another = before.count_ones() == 1 && after.count_ones() == 1;
-    (before ^ after).count_ones() > 1 && !is_another && !is_unknown
-}
-
-/// The wheel that sticks besides those that do.
-fn newly_stuck(before: Moved, after: Moved) -> Option<usize> {
-    let new = after.stuck() & !before.stuck();
-    (new != 0).then(|| new.trailing_zeros() as usize)
 }
 
 /// True while a stuck wheel's encoder may read anything, and the others may still turn as before.

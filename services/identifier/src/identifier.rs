@@ -19,6 +19,7 @@ use crate::engine::Engine;
 use crate::exact::{BIRTH_1_S, DEATH_1_S, Exact, fault_rates};
 use crate::generic::Generic;
 use crate::modes::{IdentifierError, Leaves};
+use crate::node_sizes::NodeSizes;
 use crate::posterior::Posterior;
 use crate::reasons::Reasons;
 use crate::reported::Reported;
@@ -90,6 +91,7 @@ pub struct Identifier {
     detection: Detection,
     posterior: Posterior,
     predicted: Posterior,
+    sizes: NodeSizes,
     reasons: Reasons,
     mode: u32,
     mode_changes: u32,
@@ -154,6 +156,7 @@ impl Identifier {
             detection: Detection::default(),
             posterior: Posterior::nominal(),
             predicted: Posterior::nominal(),
+            sizes: NodeSizes::default(),
             mode: 0,
             mode_changes: 0,
             reported: Reported::default(),
@@ -290,6 +293,7 @@ impl Identifier {
         let healthy = self.healthy(kept);
         self.engine.restart(&healthy, kept.observation.t_ns);
         self.phase = Phase::Identifying(start + 1);
+        self.sizes = NodeSizes::default();
         // What was unknown so far is now any of the faults, by their priors.
         self.predicted = self.predicted.divided(&self.leaves, self.p_unknown);
     }
@@ -319,6 +323,7 @@ impl Identifier {
             .predicted
             .predicted(&self.leaves, self.p_unknown, birth, death);
         self.engine.posterior(&self.leaves, &mut self.posterior);
+        self.sizes = self.engine.sizes(&self.leaves, &self.posterior);
         self.find_reasons(next, next + taken);
         self.updated = true;
     }
@@ -375,6 +380,10 @@ impl Identifier {
 
     fn report(&mut self, belief: &mut FaultBelief) {
         self.posterior.write(&self.leaves, belief);
+        match self.phase {
+            Phase::Identifying(_) => self.sizes.write(belief),
+            Phase::Watching => NodeSizes::default().write(belief),
+        }
         belief.p_predicted = self.predicted.nodes;
         belief.p_unknown_predicted = self.predicted.unknown;
         belief.run_id = self.run_id;

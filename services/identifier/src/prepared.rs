@@ -5,8 +5,9 @@ use vigil_robot::Description;
 use vigil_robot::learned::wheel_evidence::Dragged;
 use vigil_robot::learned::{Model, MotionMode, Moved, Observation, WheelEvidence};
 
-use crate::encoders::{Encoders, Likelihoods, OWN_RATE, SILENT, ZERO};
+use crate::encoders::{Encoders, Likelihoods, OWN_RATE, SILENT, SIZED, ZERO};
 use crate::rate_offsets::RateOffsets;
+use crate::sizes::{BIAS, DRIFT, Sized};
 
 /// Of one motion mode.
 #[derive(Debug, Clone, Copy)]
@@ -33,12 +34,13 @@ pub struct Seen<'a> {
 }
 
 impl Seen<'_> {
-    /// What the wheels say in one motion mode.
+    /// What the wheels say in one motion mode, `sized` being what they say of encoders that are off
+    /// by a size.
     #[must_use]
-    pub fn prepared(&self, mode: &MotionMode) -> Prepared {
+    pub fn prepared(&self, mode: &MotionMode, sized: &Sized) -> Prepared {
         let stuck = mode.moved.stuck();
         Prepared {
-            likelihoods: [false, true].map(|is_new| self.likelihoods(mode, is_new)),
+            likelihoods: [false, true].map(|is_new| self.likelihoods(mode, is_new, sized)),
             dragged: std::array::from_fn(|wheel| {
                 let turns = wheel < self.robot.wheels.len() && stuck >> wheel & 1 == 0;
                 (turns && stuck.count_ones() > 1).then(|| {
@@ -54,9 +56,9 @@ impl Seen<'_> {
         }
     }
 
-    fn likelihoods(&self, mode: &MotionMode, is_new: bool) -> Likelihoods {
+    fn likelihoods(&self, mode: &MotionMode, is_new: bool, off: &Sized) -> Likelihoods {
         let (evidence, moved) = (self.evidence, mode.moved);
-        Likelihoods::new(self.robot.wheels.len(), |wheel, state| {
+        let likelihoods = Likelihoods::new(self.robot.wheels.len(), |wheel, state| {
             match (state, moved) {
                 (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
                 (0, _) => evidence.whole(self.model, self.observation, mode, is_new, wheel),
@@ -65,9 +67,23 @@ impl Seen<'_> {
                 // What reads alike shares one likelihood, broken or not.
                 (SILENT, _) if moved.is_stuck(wheel) => evidence.broken[wheel][ZERO - 1],
                 (SILENT, _) => f64::NEG_INFINITY,
+                (sized, _) if sized >= SIZED => self.off(mode, wheel, sized - SIZED, off),
                 (broken, _) => evidence.broken[wheel][broken - 1],
             }
-        })
+        });
+        // Whatever it was late by: a wheel that stands reads as one that stood.
+        likelihoods.timely(!off.late | moved.stuck())
+    }
+
+    /// A wheel's readings by an encoder that is off in this way.
+    fn off(&self, mode: &MotionMode, wheel: usize, way: usize, said: &Sized) -> f64 {
+        let is_stuck = mode.moved.is_stuck(wheel);
+        match (is_stuck, way) {
+            (true, BIAS | DRIFT) => said.standing[wheel],
+            // Any gain makes nothing of nothing.
+            (true, _) => self.evidence.standing(wheel),
+            (false, _) => said.logs[wheel][way],
+        }
     }
 
     /// Steps the encoders of a hypothesis in this mode, each with these probabilities to break and
@@ -139,4 +155,18 @@ pub const EXPLAINED_S: f64 = 2.0;
 /// Time since an onset, s.
 pub fn age_s(t_ns: u64, onset_ns: u64) -> f64 {
     t_ns.saturating_sub(onset_ns) as f64 * 1e-9
+}
+
+/// True if more than one wheel sticks or turns again; not if a single stuck wheel was another one.
+pub fn changes_several(before: Moved, after: Moved) -> bool {
+    let is_unknown = after.is_unknown();
+    let (before, after) = (before.stuck(), after.stuck());
+    let is_another = before.count_ones() == 1 && after.count_ones() == 1;
+    (before ^ after).count_ones() > 1 && !is_another && !is_unknown
+}
+
+/// The wheel that sticks besides those that do.
+pub fn newly_stuck(before: Moved, after: Moved) -> Option<usize> {
+    let new = after.stuck() & !before.stuck();
+    (new != 0).then(|| new.trailing_zeros() as usize)
 }

@@ -13,6 +13,7 @@ use vigil_cycle::{
 
 use vigil_robot::{Description, FrameGuard};
 
+use crate::told_size::ToldSize;
 use crate::{Diagnoser, Input};
 
 /// Sensor frames that may wait for their detection: more than a queue of them holds by default.
@@ -40,6 +41,7 @@ pub struct IdentifierStage {
     told: u32,
     /// The mode that was told last. That nothing is seen, the detector tells.
     told_mode: u32,
+    size: ToldSize,
 }
 
 /// What the last belief said, for the timeline.
@@ -78,6 +80,7 @@ impl IdentifierStage {
             reported: Reported::default(),
             told: 0,
             told_mode: 0,
+            size: ToldSize::default(),
         })
     }
 
@@ -203,6 +206,7 @@ impl Stage for IdentifierStage {
             changes: belief.mode_change_count,
             reason: (channel as u32, evidence, belief.runner_up),
         };
+        self.size.take(belief);
         self.particles.block().cause = cause;
         let published_ns = self.belief.send(stamp, clock)?;
         // The particles have observers only: after the belief.
@@ -253,6 +257,9 @@ impl Stage for IdentifierStage {
                 let against = u64::from(runner_up);
                 health.event(now_ns, EventKind::Reason, channel, evidence, against);
             }
+        }
+        if let Some((what, size, sd)) = self.size.news() {
+            health.event(now_ns, EventKind::Size, what, size, sd.to_bits());
         }
     }
 }

@@ -6,7 +6,7 @@ use std::fmt;
 use serde::Serialize;
 use vigil_blocks::{
     Blindness, Channel, Event, EventKind, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN, Refusal,
-    Rejection,
+    Rejection, SizeKind,
 };
 use vigil_cycle::Supervision;
 use vigil_cycle::topic::ServiceName;
@@ -294,6 +294,11 @@ impl Namer {
                 let runner_up = self.mode(event.value as u32);
                 format!("{channel} says so by {evidence:.1} nat, against {runner_up}")
             }
+            EventKind::Size => {
+                let kind = SizeKind::from_wire(event.what >> 8);
+                let node = self.mode(event.what & 0xff);
+                format!("{node} {}", words::size(kind, event.p, event.value))
+            }
             EventKind::Action | EventKind::Obeys => {
                 let action = self.actions.get(event.what as usize);
                 let wheel = usize::try_from(event.value)
@@ -393,6 +398,7 @@ const fn kind_name(kind: EventKind) -> &'static str {
         EventKind::Latched => "latched",
         EventKind::Released => "released",
         EventKind::Publisher => "publisher",
+        EventKind::Size => "size",
     }
 }
 

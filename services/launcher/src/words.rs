@@ -1,6 +1,6 @@
 //! Words for what happens to a robot on its path.
 
-use vigil_blocks::{ActionOutcome, Blindness, Degraded, Event, RecoveryKind, Symptoms};
+use vigil_blocks::{ActionOutcome, Blindness, Degraded, Event, RecoveryKind, SizeKind, Symptoms};
 use vigil_cycle::Supervision;
 
 /// Symptoms, joined by `_` as in the decision model; `none` for the empty set.
@@ -11,6 +11,17 @@ pub fn symptoms(set: u32) -> String {
         "none".into()
     } else {
         present.join("_")
+    }
+}
+
+/// In which way a component is broken, and by how much: `gain 0.50 (sd 0.02)`. The standard
+/// deviation as an event carries it.
+pub fn size(kind: SizeKind, size: f64, sd_bits: u64) -> String {
+    let (way, sd) = (kind.word(), f64::from_bits(sd_bits));
+    match kind.unit() {
+        None => way.to_owned(),
+        Some("") => format!("{way} {size:.2} (sd {sd:.2})"),
+        Some(unit) => format!("{way} {size:.2} {unit} (sd {sd:.2})"),
     }
 }
 

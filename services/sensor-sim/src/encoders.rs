@@ -18,6 +18,8 @@ pub const NOISE_MAX_RAD_S: f64 = 8.0;
 pub(crate) struct Encoders {
     fault: [Option<FaultKind>; ROVER_WHEELS],
     last_rad_s: [Option<f64>; ROVER_WHEELS],
+    /// What drifts have added so far.
+    drifted_rad_s: [f64; ROVER_WHEELS],
     past: History<ROVER_WHEELS>,
     rng: Pcg64Mcg,
 }
@@ -28,6 +30,7 @@ impl Encoders {
             past: History::new(rate_hz),
             fault: [None; ROVER_WHEELS],
             last_rad_s: [None; ROVER_WHEELS],
+            drifted_rad_s: [0.0; ROVER_WHEELS],
             rng: Pcg64Mcg::seed_from_u64(seed),
         }
     }
@@ -37,11 +40,22 @@ impl Encoders {
         self.fault[wheel] = fault;
     }
 
+    /// A cycle passes.
+    pub(crate) fn advance(&mut self, dt_s: f64, on: &Disturbed) {
+        for (wheel, drifted) in self.drifted_rad_s.iter_mut().enumerate() {
+            *drifted = match on.at(DisturbanceKind::EncoderDrift, wheel) {
+                Some(rad_s2) => *drifted + rad_s2 * dt_s,
+                None => 0.0,
+            };
+        }
+    }
+
     /// The rates seen, before noise, of wheels that turn at `rate_rad_s`.
     pub(crate) fn scaled(&self, wheel: usize, rate_rad_s: f64, on: &Disturbed) -> f64 {
         let of = |kind, otherwise| on.at(kind, wheel).unwrap_or(otherwise);
         let bias_rad_s = of(DisturbanceKind::EncoderBias, 0.0);
-        of(DisturbanceKind::EncoderScale, 1.0) * rate_rad_s + bias_rad_s
+        let scaled = of(DisturbanceKind::EncoderScale, 1.0) * rate_rad_s;
+        scaled + bias_rad_s + self.drifted_rad_s[wheel]
     }
 
     /// What the encoders report at `t_s` when timely, unbroken ones would report `healthy_rad_s`.

@@ -150,6 +150,7 @@ impl World {
         let cycle_s = dt_s.min(CYCLE_MAX_S);
         self.elapsed_s += cycle_s;
         self.pose_sensor.advance(cycle_s, &self.disturbed);
+        self.encoders.advance(cycle_s, &self.disturbed);
         let parts = (cycle_s / STEP_MAX_S).ceil().max(1.0);
         let part_s = cycle_s / parts;
         for _ in 0..parts as u32 {

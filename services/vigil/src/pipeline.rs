@@ -2,7 +2,7 @@
 
 use vigil_blocks::{
     DetectionBelief, Entry, FaultBelief, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN, ParticleBlock,
-    SensorFrame,
+    SensorFrame, SizeKind,
 };
 use vigil_detector::{Detector, DetectorError};
 use vigil_evaluation::frames::Run;
@@ -160,6 +160,9 @@ impl Pipeline {
             .filter(|i| leaves >> i & 1 == 1)
             .map(name)
             .collect();
+        let kind = belief.size_kind.get(belief.mode as usize).copied();
+        let kind = SizeKind::from_wire(kind.unwrap_or_default());
+        let size = belief.size.get(belief.mode as usize).copied();
         let stuck = |side| any_of(belief, self.taxonomy.leaves("stuck", side));
         Verdict {
             t_s: frame.header.t_capture_ns as f64 / 1e9,
@@ -181,6 +184,8 @@ impl Pipeline {
             is_identifying: belief.identifying != 0,
             reported: word(belief.reported),
             action: recovering.map_or_else(String::new, Recovering::name),
+            size_kind: kind.word(),
+            size: size.filter(|_| kind.unit().is_some()),
             drives: velocity.iter().any(|value| value.abs() >= DRIVES),
         }
     }

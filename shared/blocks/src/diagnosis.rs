@@ -28,7 +28,7 @@ pub struct FaultSet, size 16 {
 block! {
     /// Written by the identifier every cycle. Before an alarm it reports nominal with
     /// probability 1 - p_fault and the rest as unknown.
-    pub struct FaultBelief, size 1584 {
+    pub struct FaultBelief, size 2864 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -54,6 +54,11 @@ block! {
         /// since the onset are expected under it than under `runner_up`, natural log-likelihood;
         /// see [`crate::Channel`]. 0 while nothing is diagnosed.
         pub channel_evidence: [f64; CHANNELS],
+        /// Expected size of each node's fault, given that it is present, in the unit of its
+        /// `size_kind`; 0 without a size.
+        pub size: [f64; FAULT_NODES],
+        /// Standard deviation of `size`, in the same unit.
+        pub size_sd: [f64; FAULT_NODES],
         /// Probability of `mode`.
         pub p_mode: f64,
         /// Capture time of the frame that raised the alarm, ns; 0 before an alarm.
@@ -81,5 +86,8 @@ block! {
         pub identifying: u32,
         /// Steps that met impossible or non-finite evidence and kept the prediction.
         pub degenerate_count: u32,
+        /// In which way each node's component is most probably broken, given that it is: a
+        /// [`crate::SizeKind`], which gives `size` its unit.
+        pub size_kind: [u32; FAULT_NODES],
     }
 }

@@ -101,6 +101,10 @@ pub enum EventKind {
     /// What frames say cannot be as the robot's description has it. `what`: a finding of the
     /// tests of a publisher + 256 x the index of a wheel; `p`: how far off.
     Publisher = 32,
+    /// In which way the diagnosed component is broken, once that is clear. `what`: node of the
+    /// fault tree + 256 x [`crate::SizeKind`]; `p`: the size; bits of `value`: its standard
+    /// deviation.
+    Size = 33,
 }
 
 impl EventKind {
@@ -140,6 +144,7 @@ impl EventKind {
             30 => Self::Latched,
             31 => Self::Released,
             32 => Self::Publisher,
+            33 => Self::Size,
             _ => return None,
         })
     }

@@ -30,6 +30,7 @@ pub mod layout;
 mod particles;
 mod rejection;
 mod sensor;
+mod size_kind;
 
 pub use action::{
     Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, Refusal, ValueKind,
@@ -48,3 +49,4 @@ pub use journal::Entry;
 pub use particles::{PARTICLE_CAPACITY, ParticleBlock};
 pub use rejection::{REJECTIONS, Rejection};
 pub use sensor::{ActionOutcome, COMMANDS, SensorFrame, Symptoms, Valid, WHEELS};
+pub use size_kind::SizeKind;

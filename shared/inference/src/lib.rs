@@ -68,6 +68,7 @@ pub mod proposal;
 pub mod resample;
 pub mod risk;
 pub mod sequences;
+pub mod size;
 pub mod slow_state;
 pub mod track;
 pub mod tree;

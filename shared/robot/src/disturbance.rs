@@ -55,6 +55,8 @@ pub enum DisturbanceKind {
     PayloadShift,
     /// An encoder reports its rate and a constant more, rad/s.
     EncoderBias,
+    /// An encoder reports an addition that grows from 0, rad/s per second.
+    EncoderDrift,
 }
 
 /// Where a disturbance acts.
@@ -136,6 +138,7 @@ const RADIUS: &[Parameter] = &[parameter("FACTOR", 0.5, 1.0, 0.9)];
 const FRICTION: &[Parameter] = &[parameter("FACTOR", 0.1, 1.0, 0.4)];
 const RATE: &[Parameter] = &[parameter("FACTOR", -2.0, 3.0, 1.2)];
 const MORE: &[Parameter] = &[parameter("RAD_PER_S", -5.0, 5.0, 0.6)];
+const GROWS: &[Parameter] = &[parameter("RAD_PER_S2", -0.5, 0.5, 0.05)];
 const SHIFT: &[Parameter] = &[
     parameter("M_FORWARD", -0.1, 0.1, -0.08),
     parameter("M_LEFT", -0.15, 0.15, 0.1),
@@ -145,7 +148,7 @@ const SHIFT: &[Parameter] = &[
 pub const DELAY_MAX_S: f64 = 2.0;
 
 /// Every kind, in the order of the codes.
-pub const KINDS: [Kind; 19] = {
+pub const KINDS: [Kind; 20] = {
     use DisturbanceKind as D;
     use Place::{Rover, Side, SteeredWheel, Wheel};
     [
@@ -173,6 +176,7 @@ pub const KINDS: [Kind; 19] = {
         row(D::EncoderDelay, "encoder-delay", Wheel, DELAY),
         row(D::PayloadShift, "payload-shift", Rover, SHIFT),
         row(D::EncoderBias, "encoder-bias", Wheel, MORE),
+        row(D::EncoderDrift, "encoder-drift", Wheel, GROWS),
     ]
 };
 

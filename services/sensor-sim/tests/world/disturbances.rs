@@ -66,7 +66,7 @@ fn disturbances_of_sensors_touch_their_own_channel_only_and_end_without_a_trace(
         (frame.pose, frame.valid) = (healthy.pose, healthy.valid);
     };
     let encoder: Undo = |frame, healthy| frame.wheel_rate[1] = healthy.wheel_rate[1];
-    let kinds: [(&str, Undo); 8] = [
+    let kinds: [(&str, Undo); 9] = [
         ("yaw-rate-bias:0.02", yaw),
         ("pose-drift:0.02", position),
         ("pose-delay:0.3", pose),
@@ -75,6 +75,7 @@ fn disturbances_of_sensors_touch_their_own_channel_only_and_end_without_a_trace(
         ("encoder-scale:LM:1.2", encoder),
         ("encoder-delay:LM:0.3", encoder),
         ("encoder-bias:LM:0.6", encoder),
+        ("encoder-drift:LM:0.05", encoder),
     ];
     for (spec, undo) in kinds {
         for [(healthy, true_healthy), (mut frame, truth)] in pairs(0.5, &[spec]) {
@@ -130,6 +131,13 @@ fn disturbed_sensors_are_off_by_what_was_asked_for() {
     for [(healthy, _), (frame, _)] in with("encoder-bias:LM:0.6") {
         assert_near(frame.wheel_rate[1] - healthy.wheel_rate[1], 0.6, 1e-12);
     }
+    let drifting = with("encoder-drift:LM:0.2");
+    let added = drifting
+        .iter()
+        .map(|[(healthy, _), (frame, _)]| frame.wheel_rate[1] - healthy.wheel_rate[1]);
+    let added: Vec<f64> = added.collect();
+    assert!((0.0..0.011).contains(&added[0]));
+    assert_near(added[99] - added[0], 0.2 * 99.0 * 0.05, 1e-9);
     let late = with("encoder-delay:LM:0.3");
     for step in 6..100 {
         assert_eq!(

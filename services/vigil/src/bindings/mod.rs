@@ -7,7 +7,7 @@ use vigil_blocks::layout::{Field, Layout};
 use vigil_blocks::{
     Action, ActionOutcome, Block, Cause, CauseKind, ControlMode, DetectionBelief, Event,
     FaultBelief, FaultSet, Header, Health, HealthyBelief, ParticleBlock, RecoveryKind, SensorFrame,
-    Symptoms, Valid,
+    SizeKind, Symptoms, Valid,
 };
 
 pub use c::header;
@@ -98,9 +98,23 @@ fn constants() -> Vec<(&'static str, String, u64)> {
         ("SAFE", ControlMode::Safe),
     ];
     all.extend(modes.map(|(name, value)| ("CONTROL", name.to_owned(), value as u64)));
+    let sizes = SizeKind::ALL.map(|kind| (format!("{kind:?}"), kind as u64));
+    all.extend(sizes.map(|(name, value)| ("SIZE", upper(&name), value)));
     let causes = [("FRAME", CauseKind::Frame), ("MISSED", CauseKind::Missed)];
     all.extend(causes.map(|(name, value)| ("CAUSE", name.to_owned(), value as u64)));
     all
+}
+
+/// `BiasRadS` as `BIAS_RAD_S`.
+fn upper(name: &str) -> String {
+    let mut out = String::new();
+    for letter in name.chars() {
+        if letter.is_ascii_uppercase() && !out.is_empty() {
+            out.push('_');
+        }
+        out.push(letter.to_ascii_uppercase());
+    }
+    out
 }
 
 /// Element type of a field and, of an array, how many of them: `[f64; WHEELS]` is eight `f64`.

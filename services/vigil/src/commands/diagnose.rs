@@ -21,7 +21,7 @@ pub struct Args {
 }
 
 /// Header of the verdicts.
-const COLUMNS: [&str; 13] = [
+const COLUMNS: [&str; 15] = [
     "run",
     "t",
     "p_fault",
@@ -35,6 +35,8 @@ const COLUMNS: [&str; 13] = [
     "reported",
     "reason",
     "action",
+    "size",
+    "size_kind",
 ];
 
 /// Writes the verdicts.
@@ -71,7 +73,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     Ok(Outcome::Done)
 }
 
-fn row(run: u32, verdict: &Verdict) -> [String; 13] {
+fn row(run: u32, verdict: &Verdict) -> [String; 15] {
     let p = |value: f64| format!("{value:.6}");
     [
         run.to_string(),
@@ -87,5 +89,7 @@ fn row(run: u32, verdict: &Verdict) -> [String; 13] {
         verdict.reported.clone(),
         String::new(),
         verdict.action.clone(),
+        verdict.size.map_or_else(String::new, p),
+        verdict.size_kind.to_owned(),
     ]
 }

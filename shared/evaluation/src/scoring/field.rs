@@ -10,6 +10,8 @@
 //!   fault the nominal mode;
 //! - *right side*: the right leaf, or a node of the true side; for what no model describes also
 //!   every abstract node;
+//! - *right size*: the right leaf, and the way in which it is said to be broken is the true one,
+//!   with a size within 20 % of the true one; where a fault has a size;
 //! - *standing*: an alarm is up, from 10 s on, while a fault persists;
 //! - *from h seconds on*: driven time at least h after the last onset, while the fault persists;
 //! - *changes*: of `mode` and of the reported name; *settled* ones come 2 s after an onset or
@@ -45,12 +47,18 @@ pub use figures::{Figure, Worst, figures};
 pub use recorded::{Figures, SAFE_STOP, of_cases};
 pub use run::{Actions, Changes, End, Onset, Run, Scorer, Seen};
 
+use vigil_blocks::SizeKind;
+
 use super::{Belief, Taxonomy};
 
 /// Reported without valid input.
 pub const BLIND: &str = "BLIND";
 /// Times after an onset at which the name is judged, s.
 pub const JUDGED_S: [f64; 3] = [2.0, 5.0, 10.0];
+/// Time after an onset at which the size is judged, s.
+pub const SIZED_S: f64 = 3.0;
+/// A size is right within this share of the true one.
+const SIZE_SHARE: f64 = 0.2;
 /// So long an alarm must be down, or a name be nominal, to have cleared, s.
 const HELD_S: f64 = 2.0;
 /// Probability above which a wrong name counts as confident.
@@ -77,6 +85,26 @@ pub struct Stretch {
     pub from_s: f64,
     /// What.
     pub truth: Truth,
+    /// How large it is, if it is one fault with a size.
+    pub size: Option<Size>,
+}
+
+/// In which way something is broken, and by how much.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Size {
+    /// The way.
+    pub kind: SizeKind,
+    /// The size, in its unit; 0 if the way has none.
+    pub value: f64,
+}
+
+impl Size {
+    /// True if `found` says the same, within 20 %.
+    #[must_use]
+    pub fn is(&self, found: &Self) -> bool {
+        let apart = (found.value - self.value).abs();
+        found.kind == self.kind && apart <= SIZE_SHARE * self.value.abs()
+    }
 }
 
 /// What a robot is told to do, as far as it is scored.
@@ -114,6 +142,8 @@ pub struct Moment<'a> {
     pub mode: &'a str,
     /// Its probability.
     pub p_mode: f64,
+    /// What is said of the size of the fault that `mode` names.
+    pub size: Size,
     /// Most probable set of leaves, joined by `+`.
     pub set: &'a str,
     /// Mode with hysteresis.

@@ -88,6 +88,10 @@ pub struct Verdict {
     /// What the robot is told, and the wheel that it is about after a colon; empty if nothing is
     /// decided.
     pub action: String,
+    /// In which way the component that `mode` names is broken, in a word; empty if none is told.
+    pub size_kind: &'static str,
+    /// By how much, in the unit of [`vigil_blocks::SizeKind`]; `None` if the way has no size.
+    pub size: Option<f64>,
     /// True if the robot is told to move.
     pub drives: bool,
 }

@@ -55,6 +55,8 @@ pub struct WheelEvidence {
     rolling: [(f64, f64); WHEELS],
     /// What the context adds to the model's rate, and its variance.
     shift: [(f64, f64); WHEELS],
+    /// Rate of a healthy wheel in nominal motion, rad/s, and its variance.
+    nominal: [(f64, f64); WHEELS],
     sample_sd: [f64; WHEELS],
 }
 
@@ -90,6 +92,7 @@ impl WheelEvidence {
             steering: steering(model, robot, observation, &noise),
             rolling: [(0.0, 0.0); WHEELS],
             shift: [(0.0, 0.0); WHEELS],
+            nominal: [(0.0, 0.0); WHEELS],
             sample_sd,
         };
         let command = observation.command;
@@ -108,6 +111,7 @@ impl WheelEvidence {
             evidence.shift[i] = (shift, uncertain);
             let (mean, variance) = model.nominal.rates[i].rate(rate, command[0]);
             let variance = variance + behind + uncertain;
+            evidence.nominal[i] = (mean + shift, variance);
             evidence.healthy[i] = read(EncoderState::Turning(mean + shift, variance, TAIL));
             evidence.own_rate[i] = read(EncoderState::OwnRate);
             evidence.any[i] = read(EncoderState::Any);
@@ -212,6 +216,45 @@ impl WheelEvidence {
         })
     }
 
+    /// Rate of wheel `i`, rad/s, and its variance, (rad/s)², as a mode has it turn; the share of
+    /// rates in the tail. One that is stuck in the mode is told as if it turned.
+    #[must_use]
+    pub fn rate(
+        &self,
+        model: &Model,
+        observation: &Observation,
+        mode: &MotionMode,
+        i: usize,
+    ) -> (f64, f64, f64) {
+        if mode.moved.stuck() == 0 || mode.moved.is_stuck(i) {
+            let (rate, variance) = self.nominal[i];
+            return (rate, variance, TAIL);
+        }
+        let dragged = self.dragged(model, observation, mode, i);
+        let sd = match mode.moved.stuck().count_ones() {
+            1 => 0.0,
+            _ => TOGETHER_SD * dragged.change_rad_s,
+        };
+        let variance = dragged.variance + sd * sd;
+        (dragged.rate_rad_s, variance, TAIL_DRAGGED)
+    }
+
+    /// Encoder `i` reads about this rate (rad/s), with this variance and share in the tail.
+    #[must_use]
+    pub fn reads(
+        &self,
+        model: &Model,
+        observation: &Observation,
+        i: usize,
+        (rate, variance, tail): (f64, f64, f64),
+    ) -> f64 {
+        let state = EncoderState::Turning(rate, variance, tail);
+        let reading = &observation.wheels[i];
+        model
+            .encoder
+            .log_likelihood(state, reading, self.sample_sd[i])
+    }
+
     /// Wheel `i` turns at about this rate while others drag.
     #[must_use]
     pub fn turning(
@@ -221,11 +264,7 @@ impl WheelEvidence {
         i: usize,
         (rate, variance): (f64, f64),
     ) -> f64 {
-        let state = EncoderState::Turning(rate, variance, TAIL_DRAGGED);
-        let reading = &observation.wheels[i];
-        model
-            .encoder
-            .log_likelihood(state, reading, self.sample_sd[i])
+        self.reads(model, observation, i, (rate, variance, TAIL_DRAGGED))
     }
 
     /// Wheel `i` stands and its encoder is whole. The very number that a dead encoder has: what

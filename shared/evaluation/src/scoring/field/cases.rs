@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
+use vigil_blocks::SizeKind;
 use vigil_inference::FaultTree;
 use vigil_inference::tree::Node;
 use vigil_robot::Description;
@@ -31,7 +32,11 @@ fn taxonomy() -> Taxonomy {
 }
 
 fn healthy_until(from_s: f64, truth: Truth) -> Vec<Stretch> {
-    let stretch = |from_s, truth| Stretch { from_s, truth };
+    let stretch = |from_s, truth| Stretch {
+        from_s,
+        truth,
+        size: None,
+    };
     vec![stretch(0.0, Truth::Healthy), stretch(from_s, truth)]
 }
 
@@ -61,6 +66,7 @@ fn quiet(t_s: f64) -> Moment<'static> {
         belief: belief(&HEALTHY, 0.01, false),
         mode: "ND",
         p_mode: 0.99,
+        size: Size::default(),
         set: "ND",
         reported: "ND",
         told: Told::GoOn,
@@ -211,6 +217,7 @@ fn a_second_fault_is_announced_by_a_new_name() {
     truth.push(Stretch {
         from_s: 15.0,
         truth: both,
+        size: None,
     });
     let run = score(&truth, 30.0, |t_s| match t_s {
         t if t < 5.0 => quiet(t),
@@ -233,6 +240,7 @@ fn clearing_is_counted_in_driven_seconds_and_may_never_happen() {
     let healthy = |from_s| Stretch {
         from_s,
         truth: Truth::Healthy,
+        size: None,
     };
     truth.push(healthy(10.0));
     let cleared = |alarm_s: f64, name_s: f64| {
@@ -284,6 +292,41 @@ fn what_no_model_describes_is_unknown_or_its_own_leaf() {
     near(run.from_2_s.leaf_s, 4.0);
     near(run.from_2_s.side_s, 6.0);
     near(run.from_2_s.confident_wrong_s, 1.0);
+}
+
+#[test]
+fn a_size_is_right_with_its_leaf_its_way_and_within_a_fifth() {
+    let gain = |value| Size {
+        kind: SizeKind::Gain,
+        value,
+    };
+    let mut truth = healthy_until(5.0, fault("RM_ENC"));
+    truth[1].size = Some(gain(0.5));
+    let right = |name, size| {
+        let run = score(&truth, 20.0, move |t_s| match t_s {
+            t if t < 6.0 => quiet(t),
+            // At 3 s and no later.
+            t if t > 8.0 => Moment {
+                size: gain(2.0),
+                ..said(t, name)
+            },
+            t => Moment {
+                size,
+                ..said(t, name)
+            },
+        });
+        run.onsets[0].size
+    };
+    let bias = Size {
+        kind: SizeKind::BiasRadS,
+        value: 0.5,
+    };
+    assert_eq!(right("RM_ENC", gain(0.41)), Some(true));
+    assert_eq!(right("RM_ENC", gain(0.61)), Some(false));
+    assert_eq!(right("RM_ENC", bias), Some(false));
+    assert_eq!(right("RM_STUCK", gain(0.5)), Some(false));
+    let run = score(&healthy_until(5.0, fault("RM_ENC")), 20.0, quiet);
+    assert_eq!(run.onsets[0].size, None);
 }
 
 #[test]
@@ -359,6 +402,7 @@ fn claims_are_made_at_fixed_instants_of_the_first_fault_and_as_many_before() {
     truth.push(Stretch {
         from_s: 14.0,
         truth: Truth::Healthy,
+        size: None,
     });
     let moment = |t_s: f64| match t_s {
         t if t < 11.5 => quiet(t),

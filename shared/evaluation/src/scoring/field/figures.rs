@@ -119,6 +119,7 @@ fn of_onsets(runs: &[Run]) -> Vec<Figure> {
         found.push(share_of_onsets(leaf, runs, is_leaf));
         found.push(share_of_onsets(side, runs, is_side));
     }
+    found.push(share_of_onsets("size_3s", runs, |onset| onset.size));
     found.into_iter().flatten().collect()
 }
 

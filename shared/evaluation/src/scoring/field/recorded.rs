@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Figure, Moment, Run, Scorer, Stretch, Told, Truth, figures};
+use super::{Figure, Moment, Run, Scorer, Size, Stretch, Told, Truth, figures};
 use crate::scoring::{Case, Taxonomy, Verdict};
 
 /// Name of a stop by rule, without a usable belief, among the actions of verdicts.
@@ -48,8 +48,13 @@ fn score(case: &Case, taxonomy: &Taxonomy) -> Run {
     let begins = Stretch {
         from_s: f64::NEG_INFINITY,
         truth: Truth::Healthy,
+        size: None,
     };
-    let breaks = case.label.onset_s.map(|from_s| Stretch { from_s, truth });
+    let breaks = case.label.onset_s.map(|from_s| Stretch {
+        from_s,
+        truth,
+        size: None,
+    });
     let truth: Vec<Stretch> = std::iter::once(begins).chain(breaks).collect();
     let ends = [case.verdicts.first(), case.verdicts.last()];
     let span_s = ends.map(|verdict| verdict.map_or(0.0, |verdict| verdict.t_s));
@@ -70,6 +75,8 @@ fn score(case: &Case, taxonomy: &Taxonomy) -> Run {
             belief: verdict.belief(),
             mode: &verdict.mode,
             p_mode: verdict.p_mode,
+            // No label has a size.
+            size: Size::default(),
             set: &verdict.fault_set,
             reported: &verdict.reported,
             told: told(verdict),

@@ -1,7 +1,7 @@
 //! One run, moment by moment.
 
 use super::claims::{Claim, Instants};
-use super::{BLIND, CONFIDENT, HELD_S, JUDGED_S, Moment, Stretch, Told, Truth};
+use super::{BLIND, CONFIDENT, HELD_S, JUDGED_S, Moment, SIZED_S, Stretch, Told, Truth};
 use crate::scoring::{TIME_SLACK_S, Taxonomy};
 
 /// One onset of a fault.
@@ -17,6 +17,8 @@ pub struct Onset {
     pub leaf: [Option<bool>; JUDGED_S.len()],
     /// Right side at the same times.
     pub side: [Option<bool>; JUDGED_S.len()],
+    /// Right leaf and size at [`SIZED_S`]; `None` without a size, or if it did not last so long.
+    pub size: Option<bool>,
 }
 
 /// The end of all faults.
@@ -261,6 +263,7 @@ impl<'a> Scorer<'a> {
                 delay_s: None,
                 leaf: [None; JUDGED_S.len()],
                 side: [None; JUDGED_S.len()],
+                size: None,
             });
         }
     }
@@ -277,6 +280,7 @@ impl<'a> Scorer<'a> {
             return;
         }
         let follows = self.follows_a_fault();
+        let size = self.truth.get(self.at).and_then(|stretch| stretch.size);
         let Some(onset) = self.run.onsets.last_mut() else {
             return;
         };
@@ -295,6 +299,11 @@ impl<'a> Scorer<'a> {
                 onset.leaf[i] = Some(truth.is_leaf(name, set, taxonomy));
                 onset.side[i] = Some(truth.is_side(name, set, taxonomy));
             }
+        }
+        let is_due = since_s + TIME_SLACK_S >= SIZED_S && onset.size.is_none();
+        if let Some(size) = size.filter(|_| is_due) {
+            let is_leaf = truth.is_leaf(moment.mode, moment.set, taxonomy);
+            onset.size = Some(is_leaf && size.is(&moment.size));
         }
     }
 

@@ -1,0 +1,77 @@
+//! In which way the component of each node is broken, and by how much.
+
+use vigil_blocks::{FAULT_NODES, FaultBelief, SizeKind, WHEELS};
+
+use crate::encoders::{STATES, WAYS_TO_BREAK};
+use crate::exact::Exact;
+use crate::modes::Leaves;
+use crate::posterior::Posterior;
+
+/// Of a fault that is less probable nothing is told.
+const TOLD_MIN: f64 = 0.01;
+
+/// What is told of each node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NodeSizes {
+    size: [f64; FAULT_NODES],
+    sd: [f64; FAULT_NODES],
+    kind: [u32; FAULT_NODES],
+}
+
+impl Default for NodeSizes {
+    fn default() -> Self {
+        Self {
+            size: [0.0; FAULT_NODES],
+            sd: [0.0; FAULT_NODES],
+            kind: [0; FAULT_NODES],
+        }
+    }
+}
+
+impl NodeSizes {
+    /// What a filter holds of the leaves that are probable enough.
+    #[must_use]
+    pub fn of(filter: &Exact, leaves: &Leaves, posterior: &Posterior) -> Self {
+        let mut out = Self::default();
+        let is_told = |node: &usize| posterior.nodes[*node] >= TOLD_MIN;
+        for node in leaves.stuck.into_iter().flatten().filter(is_told) {
+            out.kind[node] = SizeKind::Stuck as u32;
+        }
+        for (wheel, node) in leaves.encoder.into_iter().enumerate().take(WHEELS) {
+            if let Some(node) = node.filter(is_told) {
+                let (kind, (size, sd)) = broken(filter, wheel);
+                (out.size[node], out.sd[node], out.kind[node]) = (size, sd, kind as u32);
+            }
+        }
+        out
+    }
+
+    /// Writes them into a block.
+    pub const fn write(&self, belief: &mut FaultBelief) {
+        belief.size = self.size;
+        belief.size_sd = self.sd;
+        belief.size_kind = self.kind;
+    }
+}
+
+/// The most probable way in which an encoder is broken, its size and standard deviation.
+fn broken(filter: &Exact, wheel: usize) -> (SizeKind, (f64, f64)) {
+    let mut sums = [0.0; STATES];
+    for (moved, hypothesis) in filter.hypotheses() {
+        if moved.is_unknown() {
+            continue;
+        }
+        let p = hypothesis.log_weight.exp();
+        let ways = hypothesis.state.encoders.ways(wheel);
+        for (sum, way) in sums.iter_mut().zip(ways) {
+            *sum += p * way;
+        }
+    }
+    let all = WAYS_TO_BREAK.into_iter().zip(sums);
+    let best = all.max_by(|(_, a), (_, b)| a.total_cmp(b));
+    match best {
+        Some(((kind, Some(way)), _)) => (kind, filter.sizes().estimate(wheel, way)),
+        Some(((kind, None), _)) => (kind, (0.0, 0.0)),
+        None => (SizeKind::None, (0.0, 0.0)),
+    }
+}

@@ -1,0 +1,114 @@
+//! In which way a component is broken, and what the size of its fault is.
+
+/// The way in which a component is most probably broken: it gives the fault's size its unit.
+///
+/// A size is what a sensor's reading or an actuator does beside what it should. Some ways have no
+/// size: their name says all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[repr(u32)]
+pub enum SizeKind {
+    /// Nothing is said of the way or the size.
+    #[default]
+    None = 0,
+    /// A reading is this many times the true value (ratio; 1 is healthy).
+    Gain = 1,
+    /// A rate is read with this much added, rad/s.
+    BiasRadS = 2,
+    /// A rate is read with an addition that grows by this much each second, rad/s².
+    DriftRadS2 = 3,
+    /// A reading comes late by this much, s.
+    DelayS = 4,
+    /// A steered wheel stands off its commanded angle by this much, rad.
+    AngleRad = 5,
+    /// A motor lacks this share of its torque (0 to 1).
+    TorqueShareLost = 6,
+    /// A current is read with this much added, A.
+    CurrentOffsetA = 7,
+    /// A gyro reads this much more, rad/s.
+    RateBiasRadS = 8,
+    /// A sensor reports exactly zero; no size.
+    Zero = 9,
+    /// A sensor repeats its last value; no size.
+    Frozen = 10,
+    /// A sensor reports noise; no size.
+    Noise = 11,
+    /// A sensor reports nothing but its own noise about zero; no size.
+    Dead = 12,
+    /// An actuator stands still whatever it is told; no size.
+    Stuck = 13,
+}
+
+impl SizeKind {
+    /// Every kind, in the order of the codes.
+    pub const ALL: [Self; 14] = [
+        Self::None,
+        Self::Gain,
+        Self::BiasRadS,
+        Self::DriftRadS2,
+        Self::DelayS,
+        Self::AngleRad,
+        Self::TorqueShareLost,
+        Self::CurrentOffsetA,
+        Self::RateBiasRadS,
+        Self::Zero,
+        Self::Frozen,
+        Self::Noise,
+        Self::Dead,
+        Self::Stuck,
+    ];
+
+    /// The kind behind a block's code, [`Self::None`] for one that this version does not know.
+    #[must_use]
+    pub fn from_wire(code: u32) -> Self {
+        Self::ALL.get(code as usize).copied().unwrap_or_default()
+    }
+
+    /// One word for the way, empty for [`Self::None`].
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::None => "",
+            Self::Gain => "gain",
+            Self::BiasRadS => "bias",
+            Self::DriftRadS2 => "drift",
+            Self::DelayS => "delay",
+            Self::AngleRad => "angle",
+            Self::TorqueShareLost => "torque-loss",
+            Self::CurrentOffsetA => "current-offset",
+            Self::RateBiasRadS => "rate-bias",
+            Self::Zero => "zero",
+            Self::Frozen => "frozen",
+            Self::Noise => "noise",
+            Self::Dead => "dead",
+            Self::Stuck => "stuck",
+        }
+    }
+
+    /// Unit of the size, empty for a ratio; None if the way has no size.
+    #[must_use]
+    pub const fn unit(self) -> Option<&'static str> {
+        match self {
+            Self::Gain | Self::TorqueShareLost => Some(""),
+            Self::BiasRadS | Self::RateBiasRadS => Some("rad/s"),
+            Self::DriftRadS2 => Some("rad/s2"),
+            Self::DelayS => Some("s"),
+            Self::AngleRad => Some("rad"),
+            Self::CurrentOffsetA => Some("A"),
+            Self::None | Self::Zero | Self::Frozen | Self::Noise | Self::Dead | Self::Stuck => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::SizeKind;
+
+    #[test]
+    fn codes_are_the_places_in_the_list() {
+        for (code, kind) in SizeKind::ALL.into_iter().enumerate() {
+            assert_eq!(kind as usize, code);
+            assert_eq!(SizeKind::from_wire(code as u32), kind);
+        }
+        assert_eq!(SizeKind::from_wire(99), SizeKind::None);
+    }
+}

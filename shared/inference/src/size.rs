@@ -1,0 +1,256 @@
+//! The size of a fault, given that it is present: how far a sensor or an actuator is off.
+//!
+//! A reading is linear in the size and in an offset beside it, so that the size's belief stays
+//! Gaussian and the likelihood of a reading integrates over it (Rao-Blackwell). The prior has no
+//! mass where healthy ones are: a normal prior cut off there gives a normal posterior cut off there,
+//! and the evidence of the cut-off prior is that of the whole one times the ratio of the masses
+//! beyond, posterior to prior. [`Size::log_material`] is the posterior's.
+
+use libm::erfc;
+
+/// No mass is taken to be smaller: what can return must not be impossible.
+const MASS_MIN: f64 = 1e-12;
+
+/// What is believed of a size before any reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// Means of the size and of the offset beside it.
+    pub mean: [f64; 2],
+    /// Their standard deviations.
+    pub sd: [f64; 2],
+    /// By how much they wander from one reading to the next, as standard deviations.
+    pub wander: [f64; 2],
+    /// Sizes between these two are healthy: no fault has one.
+    pub healthy: [f64; 2],
+}
+
+/// Gaussian belief about a size and an offset beside it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Size {
+    mean: [f64; 2],
+    /// Variance of the size, covariance, variance of the offset.
+    covariance: [f64; 3],
+    log_material: f64,
+}
+
+impl Size {
+    /// What is known before any reading.
+    #[must_use]
+    pub fn new(prior: &Prior) -> Self {
+        let [size, offset] = prior.sd.map(|sd| sd * sd);
+        let mut this = Self {
+            mean: prior.mean,
+            covariance: [size, 0.0, offset],
+            log_material: 0.0,
+        };
+        this.cut_off(prior);
+        this
+    }
+
+    /// Expected size and its standard deviation.
+    #[must_use]
+    pub fn estimate(&self) -> (f64, f64) {
+        (self.mean[0], self.covariance[0].max(0.0).sqrt())
+    }
+
+    /// Expected offset and its variance.
+    #[must_use]
+    pub const fn offset(&self) -> (f64, f64) {
+        (self.mean[1], self.covariance[2])
+    }
+
+    /// Logarithm of the mass beyond what is healthy, as the prior's; see the module.
+    #[must_use]
+    pub const fn log_material(&self) -> f64 {
+        self.log_material
+    }
+
+    /// The offset grows by the size for `dt` (s, where the size is a rate), and both wander.
+    pub fn predict(&mut self, dt: f64, prior: &Prior) {
+        self.mean[1] += dt * self.mean[0];
+        let [size, both, offset] = self.covariance;
+        let [wander, beside] = prior.wander.map(|sd| sd * sd);
+        self.covariance = [
+            (size + wander).min(prior.sd[0] * prior.sd[0]),
+            both + dt * size,
+            offset + dt * (2.0 * both + dt * size) + beside,
+        ];
+    }
+
+    /// Mean and variance of `by[0]` times the size plus `by[1]` times the offset.
+    #[must_use]
+    pub fn expected(&self, by: [f64; 2]) -> (f64, f64) {
+        let [size, both, offset] = self.covariance;
+        (
+            by[0] * self.mean[0] + by[1] * self.mean[1],
+            by[0] * by[0] * size + 2.0 * by[0] * by[1] * both + by[1] * by[1] * offset,
+        )
+    }
+
+    /// Takes a reading of what [`Self::expected`] tells, with the variance `noise`. One that is no
+    /// number changes nothing.
+    pub fn update(&mut self, by: [f64; 2], reading: f64, noise: f64, prior: &Prior) {
+        let (expected, variance) = self.expected(by);
+        let (apart, total) = (reading - expected, variance + noise);
+        if !(apart.is_finite() && total > 0.0) {
+            return;
+        }
+        let [size, both, offset] = self.covariance;
+        let with = [by[0] * size + by[1] * both, by[0] * both + by[1] * offset];
+        let gain = with.map(|with| with / total);
+        self.mean = [
+            self.mean[0] + gain[0] * apart,
+            self.mean[1] + gain[1] * apart,
+        ];
+        self.covariance = [
+            size - gain[0] * with[0],
+            both - gain[0] * with[1],
+            offset - gain[1] * with[1],
+        ];
+        self.cut_off(prior);
+    }
+
+    /// The Gaussian with the first two moments of this one, taken with the probability `share`, and
+    /// another one.
+    #[must_use]
+    pub fn mixed(&self, other: &Self, share: f64, prior: &Prior) -> Self {
+        let rest = 1.0 - share;
+        let apart = [self.mean[0] - other.mean[0], self.mean[1] - other.mean[1]];
+        let spread = [
+            apart[0] * apart[0],
+            apart[0] * apart[1],
+            apart[1] * apart[1],
+        ];
+        let mut this = Self {
+            mean: std::array::from_fn(|i| share * self.mean[i] + rest * other.mean[i]),
+            covariance: std::array::from_fn(|i| {
+                share * self.covariance[i] + rest * other.covariance[i] + share * rest * spread[i]
+            }),
+            log_material: 0.0,
+        };
+        this.cut_off(prior);
+        this
+    }
+
+    fn cut_off(&mut self, prior: &Prior) {
+        let (mean, sd) = self.estimate();
+        let scale = sd.max(f64::MIN_POSITIVE) * std::f64::consts::SQRT_2;
+        let [low, high] = prior.healthy.map(|bound| (bound - mean) / scale);
+        let beyond = 0.5 * (erfc(-low) + erfc(high));
+        self.log_material = beyond.clamp(MASS_MIN, 1.0).ln();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::logspace::log_normal;
+
+    const PRIOR: Prior = Prior {
+        mean: [0.8, 0.0],
+        sd: [0.5, 0.0],
+        wander: [0.0, 0.0],
+        healthy: [0.85, 1.15],
+    };
+
+    /// Evidence, mean and deviation of a gain by summing over a grid of gains.
+    fn by_grid(rates: &[f64], readings: &[f64], noise: f64) -> (f64, f64, f64) {
+        let (step, mut sums, mut prior) = (1e-4, [0.0; 3], 0.0);
+        for i in -30_000..50_000 {
+            let gain = f64::from(i) * step;
+            if (PRIOR.healthy[0]..=PRIOR.healthy[1]).contains(&gain) {
+                continue;
+            }
+            let density = log_normal(gain - PRIOR.mean[0], PRIOR.sd[0] * PRIOR.sd[0]).exp();
+            prior += density * step;
+            let log: f64 = rates
+                .iter()
+                .zip(readings)
+                .map(|(rate, read)| log_normal(read - gain * rate, noise))
+                .sum();
+            let p = density * log.exp() * step;
+            for (sum, power) in sums.iter_mut().zip([1.0, gain, gain * gain]) {
+                *sum += p * power;
+            }
+        }
+        let [evidence, first, second] = sums;
+        let mean = first / evidence;
+        let variance = second / evidence - mean * mean;
+        ((evidence / prior).ln(), mean, variance.sqrt())
+    }
+
+    #[test]
+    fn evidence_and_size_are_those_of_a_grid_with_a_hole() {
+        let (rates, noise) = ([2.0, 2.5, 1.5, 3.0, 2.2], 0.01);
+        // A half, and a gain within what is healthy.
+        for gain in [0.5, 1.05] {
+            let readings = rates.map(|rate| gain * rate + 0.02 * (rate - 2.0));
+            let mut size = Size::new(&PRIOR);
+            let before = size.log_material();
+            let mut evidence = 0.0;
+            for (&rate, &read) in rates.iter().zip(&readings) {
+                let (expected, variance) = size.expected([rate, 0.0]);
+                evidence += log_normal(read - expected, variance + noise);
+                size.update([rate, 0.0], read, noise, &PRIOR);
+            }
+            evidence += size.log_material() - before;
+            let (by_grid, mean, sd) = by_grid(&rates, &readings, noise);
+            assert!((evidence - by_grid).abs() < 2e-3, "{evidence} {by_grid}");
+            if gain < 0.8 {
+                let (found, deviation) = size.estimate();
+                assert!((found - mean).abs() < 1e-4, "{found} {mean}");
+                assert!((deviation - sd).abs() < 1e-4, "{deviation} {sd}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_slope_is_that_of_weighted_least_squares() {
+        let prior = Prior {
+            mean: [0.0; 2],
+            sd: [1e3; 2],
+            wander: [0.0; 2],
+            healthy: [-1e-9, 1e-9],
+        };
+        let (dt, noise) = (0.05, 0.003);
+        let read = |k: usize| 0.3 + 0.07 * dt * k as f64 + 0.04 * ((k * 7 % 5) as f64 - 2.0);
+        let mut size = Size::new(&prior);
+        let mut sums = [0.0; 4];
+        for k in 0..60 {
+            if k > 0 {
+                size.predict(dt, &prior);
+            }
+            size.update([0.0, 1.0], read(k), noise, &prior);
+            let t = dt * k as f64;
+            for (sum, term) in sums.iter_mut().zip([t, t * t, read(k), t * read(k)]) {
+                *sum += term;
+            }
+        }
+        let [t, tt, y, ty] = sums.map(|sum| sum / 60.0);
+        let slope = (ty - t * y) / (tt - t * t);
+        let sd = (noise / (60.0 * (tt - t * t))).sqrt();
+        let (found, deviation) = size.estimate();
+        assert!((found - slope).abs() < 1e-5, "{found} {slope}");
+        assert!((deviation - sd).abs() < 1e-5, "{deviation} {sd}");
+    }
+
+    #[test]
+    fn a_mixture_has_the_moments_of_its_parts() {
+        let (mut one, two) = (Size::new(&PRIOR), Size::new(&PRIOR));
+        one.update([2.0, 0.0], 0.9, 0.04, &PRIOR);
+        let ((a, sa), (b, sb)) = (one.estimate(), two.estimate());
+        let mean = 0.3 * a + 0.7 * b;
+        let second = 0.3 * (sa * sa + a * a) + 0.7 * (sb * sb + b * b);
+        let (found, sd) = one.mixed(&two, 0.3, &PRIOR).estimate();
+        assert!((found - mean).abs() < 1e-12);
+        assert!((sd * sd - (second - mean * mean)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_no_number_teaches_nothing() {
+        let mut size = Size::new(&PRIOR);
+        size.update([2.0, 0.0], f64::NAN, 0.04, &PRIOR);
+        size.update([2.0, 0.0], f64::INFINITY, 0.04, &PRIOR);
+        assert_eq!(size, Size::new(&PRIOR));
+    }
+}
