@@ -11,6 +11,7 @@ mod departure;
 mod fault;
 mod frames;
 mod ground;
+mod healthy;
 mod recorded;
 mod report;
 mod run;
@@ -18,6 +19,7 @@ mod scenario;
 
 pub use bar::{Bar, Comparison};
 pub use departure::Departure;
+pub use healthy::record;
 pub use recorded::{Library, Material, Source, library};
 pub use report::{Outcome, document, lines};
 pub use run::{Graph, Job, Scored, jobs, run, select};

@@ -22,6 +22,9 @@ pub const SENSOR_SETS: [(Sensors, &str); 2] = [
     (Sensors::PoseEncoders, "pose+encoders"),
 ];
 
+/// The same, and everything that the frames hold.
+pub const ALL_SETS: [(Sensors, &str); 3] = [SENSOR_SETS[0], SENSOR_SETS[1], (Sensors::All, "all")];
+
 /// The rover as it ships.
 #[derive(Debug)]
 pub struct Rover {

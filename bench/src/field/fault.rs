@@ -143,6 +143,11 @@ impl Wrong {
     }
 
     fn truth(&self, tree: &FaultTree, robot: &Description, sensors: Sensors) -> Truth {
+        if sensors == Sensors::All
+            && let Some(leaves) = self.further(tree, robot)
+        {
+            return Truth::Faults(leaves);
+        }
         // By the pose alone nothing can be seen of an encoder: the robot is as good as healthy.
         let sees_encoders = sensors != Sensors::Pose;
         let leaf = |kind: &str, wheel: usize| {
@@ -151,7 +156,8 @@ impl Wrong {
             let mut node = node.filter(|node| node.fault.as_deref() == Some(fault.as_str()));
             node.next().map(|node| node.name.clone())
         };
-        if !self.others.is_empty() {
+        let is_seen = |&(kind, _): &(u32, usize)| sensors == Sensors::All || !is_further(kind);
+        if self.others.iter().any(is_seen) {
             return Truth::Unmodelled { own: None };
         }
         let stuck = self.stuck.iter().filter_map(|wheel| leaf("stuck", *wheel));
@@ -176,6 +182,37 @@ fn size_of(kind: DisturbanceKind, value: f64) -> Option<Size> {
         _ => return None,
     };
     Some(Size { kind, value })
+}
+
+impl Wrong {
+    /// The leaves of weak motors, current sensors and the gyro, if nothing else is wrong.
+    fn further(&self, tree: &FaultTree, robot: &Description) -> Option<Vec<String>> {
+        let leaf = |(kind, place): &(u32, usize)| {
+            use vigil_robot::DisturbanceKind as D;
+            let wheel = &robot.wheels.get(*place)?.name;
+            let fault = match D::from_wire(*kind)? {
+                D::TorqueLoss => format!("torque:{wheel}"),
+                D::CurrentBias | D::CurrentScale => format!("current:{wheel}"),
+                D::GyroBias | D::GyroScale => "gyro".to_owned(),
+                _ => return None,
+            };
+            let mut nodes = tree.nodes().iter();
+            let node = nodes.find(|node| node.fault.as_deref() == Some(fault.as_str()));
+            node.map(|node| node.name.clone())
+        };
+        let is_alone = self.stuck.is_empty() && self.encoders.is_empty();
+        let leaves: Option<Vec<String>> = self.others.iter().map(leaf).collect();
+        leaves.filter(|leaves| is_alone && !leaves.is_empty())
+    }
+}
+
+/// True of a kind that gyro and currents alone can show.
+fn is_further(kind: u32) -> bool {
+    use vigil_robot::DisturbanceKind as D;
+    matches!(
+        D::from_wire(kind),
+        Some(D::GyroBias | D::GyroScale | D::CurrentBias | D::CurrentScale)
+    )
 }
 
 const fn is_of_a_wheel(place: vigil_robot::disturbance::Place) -> bool {

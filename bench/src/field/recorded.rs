@@ -234,9 +234,7 @@ impl Case {
             size: None,
         };
         // By the pose alone nothing can be seen of an encoder.
-        let sees = |leaf: &str| {
-            sensors == Sensors::PoseEncoders || taxonomy.class(leaf) != Some("encoder")
-        };
+        let sees = |leaf: &str| sensors != Sensors::Pose || taxonomy.class(leaf) != Some("encoder");
         let fault = self.fault.as_ref().filter(|(leaf, _)| sees(leaf));
         let breaks = fault.map(|(leaf, from_s)| Stretch {
             from_s: *from_s,

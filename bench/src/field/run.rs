@@ -18,7 +18,7 @@ use super::frames::{Fate, Way};
 use super::ground::{Ground, stream};
 use super::recorded::{self, Library, Material};
 use super::scenario::{File, Scenario};
-use crate::simulated::{SENSOR_SETS, Stages};
+use crate::simulated::{ALL_SETS, Stages};
 
 /// Commanded speed from which a robot drives, m/s.
 const DRIVES_M_S: f64 = 0.005;
@@ -61,25 +61,39 @@ pub struct Graph {
     setup: Setup,
     model: Model,
     taxonomy: Taxonomy,
+    /// The same with every channel of the frames.
+    all: Box<(Setup, Taxonomy)>,
 }
 
 impl Graph {
-    /// Reads `config/rover.toml` below `root`.
+    /// Reads `config/rover.toml` and `config/rover-all.toml` below `root`.
     ///
     /// # Errors
     /// A configuration that is refused.
     pub fn read(root: &Path) -> Result<Self, Box<dyn Error>> {
-        let args = GraphArgs {
-            config: root.join("config/rover.toml"),
-            ..GraphArgs::default()
+        let load = |name: &str| {
+            let args = GraphArgs {
+                config: root.join("config").join(name),
+                ..GraphArgs::default()
+            };
+            args.load()
         };
-        let setup = args.load()?;
+        let (setup, all) = (load("rover.toml")?, load("rover-all.toml")?);
         let model = setup.model.clone().with_faults();
         Ok(Self {
             model: model.ok_or("the rover's model has no faults")?,
             taxonomy: super::taxonomy(&setup),
             setup,
+            all: Box::new((all.clone(), super::taxonomy(&all))),
         })
+    }
+
+    /// Setup and words for a set of sensors.
+    fn of(&self, sensors: Sensors) -> (&Setup, &Taxonomy) {
+        match sensors {
+            Sensors::All => (&self.all.0, &self.all.1),
+            _ => (&self.setup, &self.taxonomy),
+        }
     }
 }
 
@@ -162,7 +176,7 @@ pub fn run(graph: &Graph, library: &Library, job: &Job<'_>) -> Result<Vec<Scored
         return recorded::play(material, job).map_err(|error| named(error.to_string()));
     }
     let conditions = Conditions::draw(graph, job).map_err(named)?;
-    let sets = SENSOR_SETS.into_iter().filter(|(_, name)| {
+    let sets = ALL_SETS.into_iter().filter(|(_, name)| {
         let mut asked = job.scenario.sensors.iter();
         asked.any(|asked| asked == name)
     });
@@ -187,17 +201,18 @@ fn drive(
     conditions: &Conditions,
     sets: &[(Sensors, &'static str)],
 ) -> Result<Vec<Scored>, Box<dyn Error>> {
-    let Setup { robot, tree, .. } = &graph.setup;
+    let robot = &graph.setup.robot;
     let &Conditions { rate_hz, seed, .. } = conditions;
-    let truths = sets
-        .iter()
-        .map(|(sensors, _)| fault::truth(&conditions.faults, tree, robot, *sensors));
+    let truths = sets.iter().map(|(sensors, _)| {
+        let tree = &graph.of(*sensors).0.tree;
+        fault::truth(&conditions.faults, tree, robot, *sensors)
+    });
     let truths: Vec<Vec<Stretch>> = truths.collect();
     let mut watches = Vec::new();
     for ((sensors, _), truth) in sets.iter().zip(&truths) {
         watches.push(Watch {
-            stages: Stages::new(&graph.setup, *sensors, rate_hz, seed)?,
-            scorer: Scorer::new(truth, &graph.taxonomy, [0.0, scenario.run_s], seed),
+            stages: Stages::new(graph.of(*sensors).0, *sensors, rate_hz, seed)?,
+            scorer: Scorer::new(truth, graph.of(*sensors).1, [0.0, scenario.run_s], seed),
         });
     }
     let (simulator, segments) = (&conditions.simulator, &conditions.drive);

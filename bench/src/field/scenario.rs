@@ -26,7 +26,7 @@ pub struct Scenario {
     pub name: String,
     /// What it is about, in a sentence.
     pub about: String,
-    /// Sets of sensors: `pose`, `pose+encoders`; default both.
+    /// Sets of sensors: `pose`, `pose+encoders`, `all`; default the first two.
     #[serde(default = "both")]
     pub sensors: Vec<String>,
     /// Frames per second; default 20.

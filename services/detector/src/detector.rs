@@ -104,7 +104,10 @@ impl Detector {
             settings,
             sight,
             |particles| Watch::Faults {
-                observer: Box::new(Observer::new(model, robot)),
+                observer: Box::new(match channels {
+                    Channels::All => Observer::new(model, robot).with_further(),
+                    _ => Observer::new(model, robot),
+                }),
                 monitor: Box::new(Monitor::new(model, robot, channels, form, rate)),
                 cloud: Cloud::new(particles, seed),
             },
@@ -422,7 +425,9 @@ fn chosen(settings: &schema::Detector) -> (Channels, Form) {
 fn sight_of(robot: &Description, settings: &schema::Detector) -> Sight {
     let channels = match settings.sensors {
         schema::Sensors::Pose => Valid::POSE,
-        schema::Sensors::PoseEncoders => sight::all_channels(robot.wheels.len()),
+        schema::Sensors::PoseEncoders | schema::Sensors::All => {
+            sight::all_channels(robot.wheels.len())
+        }
     };
     let axes = 0..robot.command.len();
     Sight::new(channels, axes.fold(0, |bits, i| bits | Valid::command(i)))

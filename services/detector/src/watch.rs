@@ -60,7 +60,7 @@ impl Watch {
             } => {
                 observer.suspect(following);
                 let observation = observer.observation();
-                monitor.step(observation, following);
+                monitor.step_with(observation, observer.further(), following);
                 cloud.draw(monitor.track());
                 Observed {
                     t_ns: observation.t_ns,

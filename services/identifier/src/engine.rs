@@ -6,6 +6,7 @@ use vigil_robot::learned::{Healthy, NoiseScales, Observation};
 
 use crate::draw::draw;
 use crate::exact::Exact;
+use crate::further::Fusion;
 use crate::generic::Generic;
 use crate::modes::Leaves;
 use crate::node_sizes::NodeSizes;
@@ -45,10 +46,11 @@ impl Engine {
         }
     }
 
-    /// Fills the probabilities of nodes, sets and unknown.
-    pub fn posterior(&mut self, leaves: &Leaves, out: &mut Posterior) {
+    /// Fills the probabilities of nodes, sets and unknown; the exact filter by what further channels
+    /// say too.
+    pub fn posterior(&mut self, leaves: &Leaves, fusion: Option<&Fusion>, out: &mut Posterior) {
         match self {
-            Self::Exact(filter) => filter.posterior(out),
+            Self::Exact(filter) => filter.fused(fusion, out),
             Self::Generic(filter) => filter.posterior(leaves, out),
         }
     }

@@ -22,6 +22,7 @@ use vigil_robot::learned::{
 };
 
 use crate::encoders::Encoders;
+use crate::further::Fusion;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
 use crate::prepared::{EXPLAINED_S, Prepared, Seen, age_s, changes_several, newly_stuck};
@@ -449,13 +450,18 @@ impl Exact {
 
     /// Fills the probabilities of nodes, sets and unknown.
     pub fn posterior(&mut self, out: &mut Posterior) {
+        self.fused(None, out);
+    }
+
+    /// The same by what further channels say too.
+    pub fn fused(&mut self, fusion: Option<&Fusion>, out: &mut Posterior) {
         self.sets.clear();
         for hypothesis in self.bank.hypotheses() {
             let (p, encoders) = (hypothesis.log_weight.exp(), &hypothesis.state.encoders);
             self.sets
                 .add(hypothesis.mode, p, |wheel| encoders.p_broken(wheel));
         }
-        self.sets.posterior(&self.leaves, out);
+        self.sets.posterior(&self.leaves, fusion, out);
     }
 
     /// Most probable onset of the unknown, capture time ns; 0 if it was never supposed.

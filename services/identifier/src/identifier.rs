@@ -17,6 +17,7 @@ use crate::detection::Detection;
 use crate::draw::copy;
 use crate::engine::Engine;
 use crate::exact::{BIRTH_1_S, DEATH_1_S, Exact, fault_rates};
+use crate::further_stage::FurtherStage;
 use crate::generic::Generic;
 use crate::modes::{IdentifierError, Leaves};
 use crate::node_sizes::NodeSizes;
@@ -88,6 +89,8 @@ pub struct Identifier {
     /// Time of an observation, s.
     interval_s: f64,
     phase: Phase,
+    /// Gyro and currents, where they take part: a filter, and what the ring's observations hold.
+    further: Option<Box<FurtherStage>>,
     detection: Detection,
     posterior: Posterior,
     predicted: Posterior,
@@ -118,8 +121,8 @@ impl Identifier {
         } = *models;
         model.check_robot(robot)?;
         check(settings)?;
-        let leaves = Leaves::new(tree, model, robot)?;
-        let use_wheels = sensors == schema::Sensors::PoseEncoders;
+        let leaves = Leaves::of(tree, model, robot, sensors)?;
+        let use_wheels = sensors != schema::Sensors::Pose;
         let (engine, modes) = match settings.filter {
             schema::IdentifierFilter::Exact => {
                 let rates = fault_rates(&leaves, settings.p_unknown);
@@ -134,11 +137,15 @@ impl Identifier {
             }
         };
         let capacity = (settings.ring_s / model.interval_s).ceil().max(2.0) as usize;
+        let mut observer = Observer::new(model, robot);
+        let further = FurtherStage::new(models, &leaves, (sensors, settings), capacity);
+        if further.is_some() {
+            observer = observer.with_further();
+        }
         Ok(Self {
             engine,
             reasons: Reasons::new(model, robot, modes, use_wheels),
-            leaves,
-            observer: Observer::new(model, robot),
+            observer,
             unsure: Healthy::unsure(model, robot),
             p_unknown: settings.p_unknown,
             use_wheels,
@@ -147,12 +154,14 @@ impl Identifier {
             budget: settings.particles,
             drawn: Box::default(),
             updated: false,
+            leaves,
             seed,
             rng: Pcg64Mcg::seed_from_u64(seed),
             ring: VecDeque::with_capacity(capacity),
             capacity,
             interval_s: model.interval_s,
             phase: Phase::Watching,
+            further: further.map(Box::new),
             detection: Detection::default(),
             posterior: Posterior::nominal(),
             predicted: Posterior::nominal(),
@@ -213,6 +222,9 @@ impl Identifier {
         self.predicted = self.posterior;
         self.reasons.clear();
         self.reported.begin_run();
+        if let Some(further) = &mut self.further {
+            further.begin_run();
+        }
     }
 
     fn take(&mut self, input: &Input<'_>) {
@@ -255,6 +267,14 @@ impl Identifier {
 
     /// Adds the last observation to the ring; the oldest gives way.
     fn keep(&mut self, input: &Input<'_>) {
+        let healthy = input
+            .detection
+            .and_then(|(belief, _)| Healthy::from_block(&belief.healthy, self.unsure.wheels));
+        if let (Some(stage), Some(read)) = (&mut self.further, self.observer.further()) {
+            let healthy = healthy.as_ref().unwrap_or(&self.unsure);
+            let learns = !self.detection.alarm;
+            stage.keep(self.observer.observation(), read, healthy, learns);
+        }
         if self.ring.len() == self.capacity {
             self.ring.pop_front();
             if let Phase::Identifying(next) = self.phase {
@@ -265,9 +285,7 @@ impl Identifier {
         self.ring.push_back(Kept {
             observation: *self.observer.observation(),
             noise: self.detection.noise,
-            healthy: input
-                .detection
-                .and_then(|(belief, _)| Healthy::from_block(&belief.healthy, self.unsure.wheels)),
+            healthy,
         });
     }
 
@@ -292,6 +310,9 @@ impl Identifier {
         };
         let healthy = self.healthy(kept);
         self.engine.restart(&healthy, kept.observation.t_ns);
+        if let Some(further) = &mut self.further {
+            further.restart();
+        }
         self.phase = Phase::Identifying(start + 1);
         self.sizes = NodeSizes::default();
         // What was unknown so far is now any of the faults, by their priors.
@@ -307,6 +328,9 @@ impl Identifier {
         for i in next..next + taken {
             let Some(kept) = self.ring.get(i) else { break };
             self.engine.step(&kept.observation, kept.noise);
+            if let Some(further) = &mut self.further {
+                further.step(i, &kept.observation);
+            }
             moved_s += kept.observation.moved_s();
         }
         self.phase = Phase::Identifying(next + taken);
@@ -322,7 +346,9 @@ impl Identifier {
         self.predicted = self
             .predicted
             .predicted(&self.leaves, self.p_unknown, birth, death);
-        self.engine.posterior(&self.leaves, &mut self.posterior);
+        let fusion = self.further.as_ref().map(|further| further.fusion());
+        self.engine
+            .posterior(&self.leaves, fusion.as_ref(), &mut self.posterior);
         self.sizes = self.engine.sizes(&self.leaves, &self.posterior);
         self.find_reasons(next, next + taken);
         self.updated = true;
@@ -417,6 +443,9 @@ impl Identifier {
         belief.channel_evidence = self.reasons.channel_evidence();
         belief.degenerate_count = self.engine.degenerate_count();
         belief.particle_limit = self.budget as u32;
+        if let Some(further) = &self.further {
+            further.sizes(belief);
+        }
     }
 
     fn onset(&self) -> u64 {

@@ -9,6 +9,8 @@ mod draw;
 mod encoders;
 mod engine;
 mod exact;
+pub mod further;
+mod further_stage;
 mod generic;
 mod identifier;
 mod late;

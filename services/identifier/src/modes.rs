@@ -4,6 +4,7 @@ use vigil_blocks::{FAULT_NODES, WHEELS};
 use vigil_inference::FaultTree;
 use vigil_robot::learned::{Model, ModelError};
 use vigil_robot::{Description, Fault};
+use vigil_setup::schema::Sensors;
 
 /// Why an identifier was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -14,7 +15,8 @@ pub enum IdentifierError {
     /// A leaf's fault is none that the model knows.
     #[error(
         "leaf '{leaf}': fault '{fault}' is not in the model: expected stuck:WHEEL or \
-             encoder:WHEEL, WHEEL one of {wheels}"
+             encoder:WHEEL, and with sensors = \"all\" torque:WHEEL, current:WHEEL or gyro, \
+             WHEEL one of {wheels}"
     )]
     Leaf {
         /// Name of the leaf.
@@ -49,6 +51,12 @@ pub enum LeafFault {
     Stuck(usize),
     /// This wheel's encoder is broken.
     Encoder(usize),
+    /// This wheel's motor has lost torque.
+    Torque(usize),
+    /// This wheel's current sensor is broken.
+    Current(usize),
+    /// The gyro is broken.
+    Gyro,
 }
 
 /// The leaves of a tree, by fault.
@@ -58,6 +66,12 @@ pub struct Leaves {
     pub stuck: [Option<usize>; WHEELS],
     /// Node of each broken encoder.
     pub encoder: [Option<usize>; WHEELS],
+    /// Node of each motor that has lost torque.
+    pub torque: [Option<usize>; WHEELS],
+    /// Node of each broken current sensor.
+    pub current: [Option<usize>; WHEELS],
+    /// Node of the broken gyro.
+    pub gyro: Option<usize>,
     /// Number of leaves.
     pub count: usize,
     /// Depth of each node.
@@ -81,9 +95,25 @@ impl Leaves {
         model: &Model,
         robot: &Description,
     ) -> Result<Self, IdentifierError> {
+        Self::of(tree, model, robot, Sensors::PoseEncoders)
+    }
+
+    /// The same where these sensors take part: those of gyro and currents need them.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of(
+        tree: &FaultTree,
+        model: &Model,
+        robot: &Description,
+        sensors: Sensors,
+    ) -> Result<Self, IdentifierError> {
         let mut leaves = Self {
             stuck: [None; WHEELS],
             encoder: [None; WHEELS],
+            torque: [None; WHEELS],
+            current: [None; WHEELS],
+            gyro: None,
             count: 0,
             depths: [0; FAULT_NODES],
             below: [0; FAULT_NODES],
@@ -96,9 +126,12 @@ impl Leaves {
         for i in tree.leaves() {
             let node = &tree.nodes()[i];
             let fault = node.fault.as_deref().unwrap_or_default();
-            let place = match leaf_fault(fault, model, robot) {
+            let place = match leaf_fault(fault, model, robot, sensors) {
                 Some(LeafFault::Stuck(wheel)) => &mut leaves.stuck[wheel],
                 Some(LeafFault::Encoder(wheel)) => &mut leaves.encoder[wheel],
+                Some(LeafFault::Torque(wheel)) => &mut leaves.torque[wheel],
+                Some(LeafFault::Current(wheel)) => &mut leaves.current[wheel],
+                Some(LeafFault::Gyro) => &mut leaves.gyro,
                 None => {
                     return Err(IdentifierError::Leaf {
                         leaf: node.name.clone(),
@@ -147,12 +180,25 @@ fn bits(leaves: &[Option<usize>; WHEELS]) -> u32 {
     })
 }
 
-fn leaf_fault(text: &str, model: &Model, robot: &Description) -> Option<LeafFault> {
+fn leaf_fault(
+    text: &str,
+    model: &Model,
+    robot: &Description,
+    sensors: Sensors,
+) -> Option<LeafFault> {
+    let further = model.further.as_ref().filter(|_| sensors == Sensors::All);
+    let currents = further.and_then(|further| further.currents.as_ref());
+    if text == "gyro" {
+        let gyro = further.and_then(|further| further.yaw_rate);
+        return gyro.map(|_| LeafFault::Gyro);
+    }
     let (kind, wheel) = text.split_once(':')?;
     let wheel = Fault::wheel_of(wheel, robot).ok()?;
     match kind {
         "stuck" => model.stuck(wheel).map(|_| LeafFault::Stuck(wheel)),
         "encoder" => Some(LeafFault::Encoder(wheel)),
+        "torque" => currents.map(|_| LeafFault::Torque(wheel)),
+        "current" => currents.map(|_| LeafFault::Current(wheel)),
         _ => None,
     }
 }

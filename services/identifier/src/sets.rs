@@ -3,6 +3,7 @@
 use vigil_blocks::{FAULT_SETS, FaultSet};
 use vigil_robot::learned::{MotionMode, Moved};
 
+use crate::further::Fusion;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
 
@@ -89,8 +90,32 @@ impl Sets {
         Some(nodes)
     }
 
-    /// Normalises, and fills the probabilities of nodes, sets and unknown.
-    pub fn posterior(&mut self, leaves: &Leaves, out: &mut Posterior) {
+    /// Takes what further channels say of these sets.
+    fn fuse(&mut self, fusion: &Fusion) {
+        let subsets = self.products.len();
+        self.unknown = self.unknown * fusion.unknown.0 + self.p[0] * fusion.unknown.1;
+        for (stuck, row) in self.p.chunks_exact_mut(subsets).enumerate().skip(1) {
+            let wheels = (0..self.wheels).filter(|wheel| stuck >> wheel & 1 == 1);
+            let factor: f64 = wheels.map(|wheel| fusion.stuck[wheel]).sum();
+            let factor = factor / f64::from(stuck.count_ones());
+            for p in row {
+                *p *= factor;
+            }
+        }
+    }
+
+    /// Normalises, and fills the probabilities of nodes, sets and unknown, by what further channels
+    /// say too. What they alone tell of comes with any encoders broken.
+    pub fn posterior(&mut self, leaves: &Leaves, fusion: Option<&Fusion>, out: &mut Posterior) {
+        if let Some(fusion) = fusion {
+            self.fuse(fusion);
+        }
+        let further = fusion.map_or(&[][..], |fusion| &fusion.nodes[..fusion.count]);
+        // What only further channels tell is as probable as nominal motion is, and not its floor.
+        let subsets = self.products.len();
+        for (kept, p) in self.products.iter_mut().zip(&self.p[..subsets]) {
+            *kept = if p.is_finite() { *p } else { 0.0 };
+        }
         let mut total = 0.0;
         for (index, p) in self.p.iter_mut().enumerate() {
             // An index has the bits of the stuck wheels and of the broken encoders.
@@ -103,7 +128,9 @@ impl Sets {
         } else {
             FLOOR
         };
-        total += self.unknown;
+        let beside: f64 = further.iter().map(|(_, p)| p).sum();
+        let turning: f64 = self.products.iter().sum();
+        total += self.unknown + turning * beside;
         out.clear();
         out.unknown = self.unknown / total;
         out.entropy = entropy(out.unknown);
@@ -116,6 +143,18 @@ impl Sets {
                 continue;
             };
             out.add(FaultSet { leaves: nodes, p }, leaves);
+            let Some(turning) = self.products.get(index) else {
+                continue;
+            };
+            for (node, share) in further {
+                let set = FaultSet {
+                    leaves: nodes | 1 << node,
+                    p: turning * share / total,
+                };
+                if set.p > NEGLIGIBLE {
+                    out.add(set, leaves);
+                }
+            }
         }
     }
 }

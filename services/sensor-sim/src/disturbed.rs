@@ -49,6 +49,22 @@ impl Disturbed {
             .map(|p| p[0])
     }
 
+    /// What the gyro reports of a yaw rate with this noise, rad/s.
+    pub(crate) fn yaw_rate(&self, true_rad_s: f64, noise_rad_s: f64) -> f64 {
+        use DisturbanceKind as D;
+        let bias = |kind| self.at(kind, 0).unwrap_or(0.0);
+        let rate = true_rad_s + bias(D::YawRateBias) + bias(D::GyroBias) + noise_rad_s;
+        self.at(D::GyroScale, 0).map_or(rate, |gain| gain * rate)
+    }
+
+    /// What the current sensor of a wheel makes of a healthy reading, A.
+    pub(crate) fn current(&self, wheel: usize, healthy_a: f64) -> f64 {
+        use DisturbanceKind as D;
+        let current = healthy_a + self.at(D::CurrentBias, wheel).unwrap_or(0.0);
+        self.at(D::CurrentScale, wheel)
+            .map_or(current, |gain| gain * current)
+    }
+
     /// The state of body and wheels.
     pub(crate) fn condition(&self) -> Condition {
         use DisturbanceKind as D;

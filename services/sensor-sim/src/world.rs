@@ -195,8 +195,7 @@ impl World {
             frame.pose = pose;
             frame.valid |= Valid::POSE;
         }
-        let gyro_bias = on.at(DisturbanceKind::YawRateBias, 0).unwrap_or(0.0);
-        frame.yaw_rate = self.velocity[2] + gyro_bias + noise.draw(noise.yaw_rate_rad_s);
+        frame.yaw_rate = on.yaw_rate(self.velocity[2], noise.draw(noise.yaw_rate_rad_s));
         let [x, y, yaw] = self.planned_pose;
         frame.planned_pose = [x, y, wrap_angle(yaw)];
         frame.valid |= Valid::PLANNED_POSE | Valid::YAW_RATE;
@@ -208,7 +207,7 @@ impl World {
             let rate = self.encoders.scaled(i, self.motion.wheel_rate_rad_s[i], on);
             rates_rad_s[i] = rate + noise.draw(noise.wheel_rate_rad_s);
             let current = CURRENT_PER_TORQUE_A_N_M * self.motion.torque_n_m[i];
-            frame.current[i] = current + noise.draw(noise.current_a);
+            frame.current[i] = on.current(i, current + noise.draw(noise.current_a));
             frame.valid |= Valid::wheel_rate(i) | Valid::current(i);
             if kinematics.steered[i] {
                 let seen = on.at(DisturbanceKind::SteerJump, i).unwrap_or(0.0);

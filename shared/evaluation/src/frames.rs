@@ -3,7 +3,8 @@
 //! CSV, plain or gzip: `run, t` (s), the axes of the robot's command by their names (rover:
 //! `cmd_curv` 1/m, left positive, and `cmd_speed` m/s), and what the robot's description says is
 //! measured: `x, y` (m), `yaw` (rad, wrapped), `enc_<WHEEL>` (rad/s) for every wheel,
-//! `steer_<WHEEL>` (rad) for every steered wheel, `yaw_rate` (rad/s), `current_<WHEEL>` (A).
+//! `steer_<WHEEL>` (rad) for every steered wheel, `yaw_rate` (rad/s), `current_<WHEEL>` (A). Of a
+//! robot with fault models the last two are read where they are there, whatever it says.
 //! Columns are found by name, in any order; others are ignored. The rows of a run are contiguous
 //! and in order of time. Several runs may follow each other.
 
@@ -109,6 +110,18 @@ pub fn fields(robot: &Description) -> Vec<(String, Field)> {
     out
 }
 
+/// Gyro and currents of a robot whose model may know them and need not.
+#[must_use]
+pub fn further(robot: &Description) -> Vec<(String, Field)> {
+    if !robot.has_fault_models() {
+        return Vec::new();
+    }
+    let wheels = robot.wheels.iter().enumerate().take(WHEELS);
+    let currents = wheels.map(|(i, w)| (format!("current_{}", w.name), Field::Current(i)));
+    let gyro = ("yaw_rate".to_owned(), Field::YawRate);
+    std::iter::once(gyro).chain(currents).collect()
+}
+
 /// Positions of the columns.
 struct Columns {
     run: usize,
@@ -126,12 +139,18 @@ impl Columns {
             return Err(table.wrong("columns are missing".into()));
         };
         let fields = fields.into_iter().zip(at);
+        let fields = fields.map(|((name, field), &at)| (at, name, field));
+        let mut fields: Vec<(usize, String, Field)> = fields.collect();
+        for (name, field) in further(robot) {
+            let is_new = fields.iter().all(|(_, known, _)| *known != name);
+            if let (true, Some(at)) = (is_new, table.position(&name)) {
+                fields.push((at, name, field));
+            }
+        }
         Ok(Self {
             run: *run,
             t: *t,
-            fields: fields
-                .map(|((name, field), &at)| (at, name, field))
-                .collect(),
+            fields,
         })
     }
 

@@ -255,6 +255,13 @@ impl Track {
         }
     }
 
+    /// Turn that a displacement would make, rad.
+    #[must_use]
+    pub fn turn(&self, step: &Displacement) -> f64 {
+        let slipping = step.per_metre[0] * self.mean[4];
+        (step.per_metre[0] + self.deviation()[0] + slipping) * step.travel_m
+    }
+
     /// Moves by one displacement.
     pub fn predict(&mut self, step: &Displacement, noise: &MotionNoise) {
         let travel = step.travel_m;

@@ -57,6 +57,14 @@ pub enum DisturbanceKind {
     EncoderBias,
     /// An encoder reports an addition that grows from 0, rad/s per second.
     EncoderDrift,
+    /// The gyro alone reports a constant more, rad/s.
+    GyroBias,
+    /// The gyro reports what it would, noise included, scaled by a factor: 0 for a dead one.
+    GyroScale,
+    /// A current sensor reports a constant more, A.
+    CurrentBias,
+    /// A current sensor reports what it would, noise included, scaled by a factor: 0 for a dead one.
+    CurrentScale,
 }
 
 /// Where a disturbance acts.
@@ -139,6 +147,8 @@ const FRICTION: &[Parameter] = &[parameter("FACTOR", 0.1, 1.0, 0.4)];
 const RATE: &[Parameter] = &[parameter("FACTOR", -2.0, 3.0, 1.2)];
 const MORE: &[Parameter] = &[parameter("RAD_PER_S", -5.0, 5.0, 0.6)];
 const GROWS: &[Parameter] = &[parameter("RAD_PER_S2", -0.5, 0.5, 0.05)];
+const AMPERES: &[Parameter] = &[parameter("A", -10.0, 10.0, 0.5)];
+const GAIN: &[Parameter] = &[parameter("FACTOR", -2.0, 3.0, 0.0)];
 const SHIFT: &[Parameter] = &[
     parameter("M_FORWARD", -0.1, 0.1, -0.08),
     parameter("M_LEFT", -0.15, 0.15, 0.1),
@@ -148,7 +158,7 @@ const SHIFT: &[Parameter] = &[
 pub const DELAY_MAX_S: f64 = 2.0;
 
 /// Every kind, in the order of the codes.
-pub const KINDS: [Kind; 20] = {
+pub const KINDS: [Kind; 24] = {
     use DisturbanceKind as D;
     use Place::{Rover, Side, SteeredWheel, Wheel};
     [
@@ -177,6 +187,10 @@ pub const KINDS: [Kind; 20] = {
         row(D::PayloadShift, "payload-shift", Rover, SHIFT),
         row(D::EncoderBias, "encoder-bias", Wheel, MORE),
         row(D::EncoderDrift, "encoder-drift", Wheel, GROWS),
+        row(D::GyroBias, "gyro-bias", Rover, BIAS),
+        row(D::GyroScale, "gyro-scale", Rover, GAIN),
+        row(D::CurrentBias, "current-bias", Wheel, AMPERES),
+        row(D::CurrentScale, "current-scale", Wheel, GAIN),
     ]
 };
 

@@ -30,6 +30,23 @@ pub struct Tolerance {
     pub steer_rad: f64,
     /// Length over which all that changes, m.
     pub length_m: f64,
+    /// Of gyro and currents; left out: none.
+    #[serde(default)]
+    pub further: Option<FurtherTolerance>,
+}
+
+/// Healthy variation of gyro and currents.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FurtherTolerance {
+    /// Bias of the gyro, rad/s.
+    pub yaw_rate_rad_s: f64,
+    /// What slopes add to the current of every wheel, A.
+    pub current_a: f64,
+    /// By how much one wheel's current differs from the model on level ground, A, ..
+    pub current_wheel_a: f64,
+    /// .. and on slopes besides, as a share of what these add.
+    pub current_share: f64,
 }
 
 impl Tolerance {
@@ -113,8 +130,17 @@ impl Tolerance {
             ("steer_rad", self.steer_rad, 1.0),
             ("length_m", self.length_m, 1e4),
         ];
+        let further = self.further.map(|further| {
+            [
+                ("further.yaw_rate_rad_s", further.yaw_rate_rad_s, 10.0),
+                ("further.current_a", further.current_a, 1e3),
+                ("further.current_wheel_a", further.current_wheel_a, 1e3),
+                ("further.current_share", further.current_share, 1.0),
+            ]
+        });
         let wrong = all
             .into_iter()
+            .chain(further.into_iter().flatten())
             .find(|&(_, value, most)| !(value > 0.0 && value <= most));
         wrong.map(|(name, value, _)| (name, value))
     }

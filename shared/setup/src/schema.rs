@@ -215,7 +215,7 @@ pub struct Detector {
     pub false_alarm_interval_h: f64,
     /// Prior rate of faults, 1/h, above 0.
     pub fault_rate_1_h: f64,
-    /// Channels used: `pose` or `pose+encoders`.
+    /// Channels used: `pose`, `pose+encoders`, or `all`, which the frames hold and the model knows.
     pub sensors: Sensors,
     /// What a fault is taken for: `learned-bias`, `constant` or `windowed`. The model holds a
     /// calibration for each.
@@ -244,6 +244,9 @@ pub enum Sensors {
     #[default]
     #[serde(rename = "pose+encoders")]
     PoseEncoders,
+    /// Everything that the frames hold: yaw rate and motor currents too.
+    #[serde(rename = "all")]
+    All,
 }
 
 impl From<Sensors> for Channels {
@@ -251,6 +254,7 @@ impl From<Sensors> for Channels {
         match sensors {
             Sensors::Pose => Self::Pose,
             Sensors::PoseEncoders => Self::PoseEncoders,
+            Sensors::All => Self::All,
         }
     }
 }

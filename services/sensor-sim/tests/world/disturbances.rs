@@ -66,7 +66,13 @@ fn disturbances_of_sensors_touch_their_own_channel_only_and_end_without_a_trace(
         (frame.pose, frame.valid) = (healthy.pose, healthy.valid);
     };
     let encoder: Undo = |frame, healthy| frame.wheel_rate[1] = healthy.wheel_rate[1];
-    let kinds: [(&str, Undo); 9] = [
+    let gyro: Undo = |frame, healthy| frame.yaw_rate = healthy.yaw_rate;
+    let current: Undo = |frame, healthy| frame.current[1] = healthy.current[1];
+    let kinds: [(&str, Undo); 13] = [
+        ("gyro-bias:0.05", gyro),
+        ("gyro-scale:0", gyro),
+        ("current-bias:LM:0.5", current),
+        ("current-scale:LM:0", current),
         ("yaw-rate-bias:0.02", yaw),
         ("pose-drift:0.02", position),
         ("pose-delay:0.3", pose),
@@ -138,6 +144,23 @@ fn disturbed_sensors_are_off_by_what_was_asked_for() {
     let added: Vec<f64> = added.collect();
     assert!((0.0..0.011).contains(&added[0]));
     assert_near(added[99] - added[0], 0.2 * 99.0 * 0.05, 1e-9);
+    for [(healthy, _), (frame, _)] in with("gyro-bias:0.05") {
+        assert_near(frame.yaw_rate - healthy.yaw_rate, 0.05, 1e-12);
+    }
+    for [(healthy, _), (frame, _)] in with("current-bias:LM:0.5") {
+        assert_near(frame.current[1] - healthy.current[1], 0.5, 1e-12);
+    }
+    // What is dead reports exactly zero.
+    assert!(
+        with("gyro-scale")
+            .iter()
+            .all(|pair| pair[1].0.yaw_rate == 0.0)
+    );
+    assert!(
+        with("current-scale:LM")
+            .iter()
+            .all(|pair| pair[1].0.current[1] == 0.0)
+    );
     let late = with("encoder-delay:LM:0.3");
     for step in 6..100 {
         assert_eq!(

@@ -6,11 +6,13 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use vigil_evaluation::frames;
-use vigil_evaluation::labels;
+use vigil_evaluation::frames::{self, Run};
+use vigil_evaluation::labels::{self, Label};
+use vigil_evaluation::learning::further;
 use vigil_evaluation::learning::{self, Options, RESIDUAL_BAR, Report, Residual, View};
 use vigil_evaluation::learning_nominal;
 use vigil_evaluation::split::split;
+use vigil_robot::learned::Model;
 use vigil_robot::learned::model::Provenance;
 use vigil_robot::{Description, RobotModel};
 
@@ -33,6 +35,10 @@ pub struct Args {
     /// model is of nominal behaviour alone.
     #[arg(long, value_name = "R")]
     runs: Option<PathBuf>,
+    /// Frames of healthy runs that hold more channels, yaw rate or motor currents, of which a model
+    /// with faults learns then too (CSV). Left out: the healthy runs of --frames, if they do.
+    #[arg(long, value_name = "F", requires = "runs")]
+    more: Option<PathBuf>,
     /// Runs to learn from, by their ids, separated by commas; without labels only.
     #[arg(
         long,
@@ -179,6 +185,24 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
         software_version: env!("CARGO_PKG_VERSION").to_owned(),
         ..model.provenance
     };
+    match &args.more {
+        Some(more) => {
+            let runs = frames::read(more, &robot).map_err(CommandError::usage)?;
+            let all: Vec<&Run> = runs.iter().collect();
+            learn_further(&mut model, &all, more, &robot)?;
+        }
+        None => {
+            let is_healthy = |run: &&Run| {
+                let is_learned = model.provenance.runs_learned.contains(&run.id);
+                let mut labels = labels.iter().filter(|label| label.run == run.id);
+                is_learned && labels.all(Label::is_nominal)
+            };
+            let healthy: Vec<&Run> = runs.iter().filter(is_healthy).collect();
+            if further::is_in(&healthy) {
+                learn_further(&mut model, &healthy, frames_file, &robot)?;
+            }
+        }
+    }
     let model = model.sealed();
     let text = model.to_toml().map_err(CommandError::failure)?;
     write_whole(out, &text)
@@ -197,6 +221,17 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
     };
     printed.map_err(CommandError::failure)?;
     Ok(Outcome::Done)
+}
+
+/// Learns gyro and currents.
+fn learn_further(
+    model: &mut Model,
+    runs: &[&Run],
+    file: &Path,
+    robot: &Description,
+) -> Result<(), CommandError> {
+    further::learn(model, runs, &file_name(file), robot)
+        .map_err(|error| CommandError::usage(format!("{}: {error}", file.display())))
 }
 
 /// The last part of a path: where a file lay is of no interest to others.

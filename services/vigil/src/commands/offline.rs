@@ -21,7 +21,7 @@ use crate::recovery::Recoverer;
 const DECISION: &str = "config/rover.pomdp";
 
 /// Sets of channels, as `--sensors` names them.
-pub const SENSOR_SETS: [&str; 2] = ["pose", "pose+encoders"];
+pub const SENSOR_SETS: [&str; 3] = ["pose", "pose+encoders", "all"];
 
 /// Which robot.
 #[derive(Debug, clap::Args)]
@@ -48,7 +48,7 @@ pub struct FilterArgs {
     #[arg(long, value_name = "F")]
     pub frames: PathBuf,
     /// Channels that the filters may use: pose and command, or wheel rates and steering angles
-    /// too.
+    /// too, or everything that the frames hold and the model knows.
     #[arg(
         long,
         default_value = "pose+encoders",
@@ -171,7 +171,9 @@ impl FilterArgs {
             let channels = channels(set).into();
             model.calibration(channels, self.detector.into()).is_ok()
         };
-        SENSOR_SETS.into_iter().filter(has).collect()
+        // Few frames hold everything: this set is one for which one asks.
+        let asked = |set: &&str| *set != "all" || self.sensors == "all";
+        SENSOR_SETS.into_iter().filter(asked).filter(has).collect()
     }
 
     /// Detector and identifier with the settings given, but for channels and filter.
@@ -263,6 +265,7 @@ impl FilterArgs {
 fn channels(set: &str) -> Sensors {
     match set {
         "pose" => Sensors::Pose,
+        "all" => Sensors::All,
         _ => Sensors::PoseEncoders,
     }
 }

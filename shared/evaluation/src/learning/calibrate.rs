@@ -2,10 +2,10 @@
 
 use vigil_robot::Description;
 use vigil_robot::learned::monitor::{Channels, Monitor};
-use vigil_robot::learned::{Form, Model};
+use vigil_robot::learned::{Form, Model, Observer};
 
 use super::LearnError;
-use super::segments::{by_run, observations};
+use super::segments::by_run;
 use crate::frames::Run;
 use crate::labels::Label;
 use crate::maxima::{Maxima, WINDOW_S};
@@ -48,6 +48,33 @@ pub fn fit(
     Ok(())
 }
 
+/// The same for all channels together, over healthy runs that hold gyro and currents.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_further(
+    model: &mut Model,
+    runs: &[&Run],
+    robot: &Description,
+) -> Result<(), LearnError> {
+    let driving: Vec<_> = runs.iter().map(|run| (*run, f64::INFINITY)).collect();
+    model
+        .calibration
+        .retain(|c| c.sensors != Channels::All.name());
+    for form in Form::ALL {
+        let rate = FAULT_RATE_1_H;
+        let monitor = Monitor::new(model, robot, Channels::All, form, rate);
+        let mut maxima = maxima(monitor, &driving, robot, model);
+        let found_s = maxima.duration_s();
+        let needed_s = WINDOWS_MIN as f64 * WINDOW_S;
+        let fit = maxima.tail(Channels::All, form, rate);
+        model
+            .calibration
+            .push(fit.ok_or(LearnError::Exposure { found_s, needed_s })?);
+    }
+    Ok(())
+}
+
 /// Highest log-odds of each window of the runs, each up to its time in seconds.
 fn maxima(
     mut monitor: Monitor,
@@ -59,11 +86,16 @@ fn maxima(
     for (run, until_s) in driving {
         monitor.reset();
         maxima.begin();
-        for observation in observations(run, robot, model) {
+        let mut observer = Observer::new(model, robot).with_further();
+        for frame in &run.frames {
+            if !observer.push(frame).complete {
+                continue;
+            }
+            let observation = *observer.observation();
             if observation.t_ns as f64 * 1e-9 > *until_s {
                 break;
             }
-            monitor.step(&observation, false);
+            monitor.step_with(&observation, observer.further(), false);
             if !monitor.is_ready() {
                 monitor.forget_evidence();
                 continue;

@@ -6,6 +6,7 @@
 //! wheels are pooled by mirror symmetry. Runs left out take no part in any of it.
 
 mod calibrate;
+pub mod further;
 mod least_squares;
 mod mirrored;
 mod motion;
@@ -286,6 +287,7 @@ fn blank(robot: &Description, options: &Options) -> Model {
             rates,
         },
         stuck: Vec::new(),
+        further: None,
         calibration: Vec::new(),
     }
 }

@@ -16,13 +16,22 @@
 //! | [`calibration`] | alarm thresholds for a stated mean time between false alarms |
 //! | [`form`] | what the detection filter's fault state says of a residual |
 //! | [`troubles`] | silent sensors, and motion that nobody commanded |
+//! | [`further`] | gyro and motor currents: what was learned of them, and read |
+//! | [`current_effects`] | what a weak motor or a stuck wheel makes of all currents |
+//! | [`further_watch`] | gyro and currents beside what is expected of a healthy robot |
 //! | [`monitor`] | the detection filter over observations |
 
 mod body_lag;
 pub mod calibration;
+mod channels;
 mod compensation;
+mod current_context;
+pub mod current_effects;
 mod faults;
 pub mod form;
+pub mod further;
+mod further_evidence;
+pub mod further_watch;
 mod healthy;
 pub mod model;
 pub mod monitor;
@@ -42,6 +51,7 @@ pub mod wheels;
 pub use body_lag::BodyLag;
 pub use calibration::Calibration;
 pub use form::Form;
+pub use further::{Further, FurtherModel};
 pub use healthy::Healthy;
 pub use model::{Model, ModelError};
 pub use monitor::Monitor;

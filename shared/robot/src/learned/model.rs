@@ -8,6 +8,7 @@ use vigil_inference::track::MotionNoise;
 use super::calibration::Calibration;
 use super::compensation;
 use super::form::Form;
+use super::further::FurtherModel;
 use super::monitor::Channels;
 use super::motion::{Curve, MotionModel};
 pub use super::provenance::Provenance;
@@ -47,6 +48,9 @@ pub struct Model {
     pub nominal: NominalModel,
     /// One model per wheel that may be stuck.
     pub stuck: Vec<StuckModel>,
+    /// Gyro and currents, where the frames held them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub further: Option<FurtherModel>,
     /// Alarm thresholds, one per set of channels and form of the detection filter.
     pub calibration: Vec<Calibration>,
 }
@@ -339,6 +343,9 @@ impl ModelFile for Model {
             check_motion(&key, &stuck.motion)?;
             check_rates(&key, &stuck.rates, count)?;
         }
+        if let Some(further) = &self.further {
+            further.check(count)?;
+        }
         self.calibration.iter().try_for_each(check_calibration)
     }
 }
@@ -379,7 +386,11 @@ impl CommandModel {
     }
 }
 
-fn refuse<T>(key: &str, value: impl ToString, allowed: &'static str) -> Result<T, ModelError> {
+pub(super) fn refuse<T>(
+    key: &str,
+    value: impl ToString,
+    allowed: &'static str,
+) -> Result<T, ModelError> {
     Err(ModelError::Value {
         key: key.to_owned(),
         value: value.to_string(),
@@ -387,7 +398,7 @@ fn refuse<T>(key: &str, value: impl ToString, allowed: &'static str) -> Result<T
     })
 }
 
-fn check_range(key: &str, value: f64, low: f64, high: f64) -> Result<(), ModelError> {
+pub(super) fn check_range(key: &str, value: f64, low: f64, high: f64) -> Result<(), ModelError> {
     if value >= low && value <= high {
         return Ok(());
     }

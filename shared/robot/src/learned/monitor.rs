@@ -19,12 +19,15 @@ use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 use vigil_inference::outlier::tempered;
 use vigil_inference::track::Track;
 
+pub use super::channels::Channels;
 use super::faults::{Faults, KINDS};
 use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION};
+use super::further_evidence::FurtherEvidence;
+use super::further_watch::Turn;
 use super::noise_scale::{NoiseScales, SensorNoise};
 use super::wheel_context::{Beside, WheelContext};
 use super::wheels::{rolling_rate, steering_angle};
-use super::{Healthy, Model, Observation, Troubles};
+use super::{Further, Healthy, Model, Observation, Troubles};
 use crate::Description;
 use crate::alarm::ENDS_1_S;
 
@@ -56,26 +59,6 @@ const READY_LATEST_S: f64 = 5.0;
 /// Observations in a row without usable weights after which the pose starts anew.
 const COAST_MAX: u32 = 10;
 
-/// Which channels a monitor uses besides the pose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Channels {
-    /// Pose and command.
-    Pose,
-    /// Wheel rates and steering angles too.
-    PoseEncoders,
-}
-
-impl Channels {
-    /// Name, as calibrations carry it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Pose => "pose",
-            Self::PoseEncoders => "pose+encoders",
-        }
-    }
-}
-
 /// The detection filter.
 #[derive(Debug, Clone)]
 pub struct Monitor {
@@ -97,6 +80,7 @@ pub struct Monitor {
     noise: SensorNoise,
     moved_s: f64,
     troubles: Troubles,
+    further: Option<Box<FurtherEvidence>>,
     gains: Gains,
     report: Report,
 }
@@ -156,6 +140,10 @@ impl Monitor {
             noise: SensorNoise::default(),
             moved_s: 0.0,
             troubles: Troubles::default(),
+            further: match channels {
+                Channels::All => FurtherEvidence::new(model, robot, form).map(Box::new),
+                _ => None,
+            },
             gains: Gains::default(),
             report: Report {
                 log_odds: f64::NEG_INFINITY,
@@ -178,6 +166,9 @@ impl Monitor {
         self.moved_s = 0.0;
         self.troubles = Troubles::default();
         self.report.evidence = 0.0;
+        if let Some(further) = &mut self.further {
+            further.reset(&self.robot);
+        }
         self.forget_evidence();
     }
 
@@ -190,6 +181,9 @@ impl Monitor {
         self.repeats = [self.birth(self.model.interval_s, SHARE_REPEATS).ln(); WHEELS];
         self.any = Constant::default();
         self.gains = Gains::default();
+        if let Some(further) = &mut self.further {
+            further.forget();
+        }
         self.sum_up();
     }
 
@@ -220,8 +214,10 @@ impl Monitor {
     /// nothing of it for long; or something is the matter that needs no evidence.
     #[must_use]
     pub fn is_ready(&self) -> bool {
-        let use_wheels = self.channels == Channels::PoseEncoders;
-        let is_known = self.noise.is_known(use_wheels);
+        let use_wheels = self.channels.use_wheels();
+        let further = self.further.as_ref();
+        let is_known =
+            self.noise.is_known(use_wheels) && further.is_none_or(|further| further.is_known());
         let is_settled = self.moved_s >= READY_S;
         is_settled && (is_known || self.moved_s >= READY_LATEST_S) || self.troubles.any(use_wheels)
     }
@@ -240,6 +236,23 @@ impl Monitor {
     /// Takes one observation. While `following`, the pose track gives way to the measurement, so
     /// that the return of a robot to its nominal mode is seen after a fault has led it away.
     pub fn step(&mut self, observation: &Observation, following: bool) {
+        self.step_with(observation, None, following);
+    }
+
+    /// The same with what the observation holds of gyro and currents.
+    pub fn step_with(
+        &mut self,
+        observation: &Observation,
+        further: Option<&Further>,
+        following: bool,
+    ) {
+        if let (Some(mut evidence), Some(read)) = (self.further.take(), further) {
+            let turn = self.turn(observation);
+            let birth = |share| self.birth(observation.dt_s, share);
+            let (model, robot) = (&self.model, &self.robot);
+            evidence.step(model, robot, (observation, read), (turn, following), birth);
+            self.further = Some(evidence);
+        }
         self.report.evidence = 0.0;
         self.gains = Gains::default();
         self.troubles = observation.troubles;
@@ -248,11 +261,24 @@ impl Monitor {
         self.noise.update(&self.model, &self.robot, observation);
         let scales = self.noise.scales();
         self.step_pose(observation, following, scales);
-        if observation.moving && self.channels == Channels::PoseEncoders {
+        if observation.moving && self.channels.use_wheels() {
             self.step_wheels(observation, following, scales);
             self.step_steer(observation, scales);
         }
         self.sum_up();
+    }
+
+    /// What the track expects of the gyro.
+    fn turn(&self, observation: &Observation) -> Option<Turn> {
+        let is_known = self.tracking && !observation.anchor && observation.dt_s > 0.0;
+        is_known.then(|| {
+            let step = observation.displacement(&self.model, &self.model.nominal.motion);
+            let squared_s = observation.dt_s * observation.dt_s;
+            Turn {
+                rate_rad_s: self.track().turn(&step) / observation.dt_s,
+                variance: observation.turn_variance / squared_s,
+            }
+        })
     }
 
     fn step_pose(&mut self, observation: &Observation, following: bool, scales: NoiseScales) {
@@ -423,7 +449,7 @@ impl Monitor {
         let gains = &self.gains;
         enter(Channel::POSE, pose, gains.pose);
         enter(Channel::ANY, self.any.log_odds(), gains.any);
-        if self.channels == Channels::PoseEncoders {
+        if self.channels.use_wheels() {
             for i in 0..self.robot.wheels.len() {
                 let channel = Channel::wheel_rate(i);
                 enter(channel, self.wheels[i].log_odds(), gains.wheels[i]);
@@ -432,6 +458,9 @@ impl Monitor {
                     enter(Channel::steer(i), self.steer[i].log_odds(), gains.steer[i]);
                 }
             }
+        }
+        if let Some(further) = &self.further {
+            further.channels(enter);
         }
         let gain = log_sum_exp(&channels) - log_sum_exp(&before);
         self.report.gain = if gain.is_finite() { gain } else { 0.0 };
@@ -446,12 +475,12 @@ impl Monitor {
         if pose_silent || pose_moves {
             trouble(Channel::POSE);
         }
-        if self.channels == Channels::PoseEncoders {
+        if self.channels.use_wheels() {
             for wheel in (0..WHEELS).filter(|w| wheels_turn || wheels_silent >> w & 1 == 1) {
                 trouble(Channel::wheel_rate(wheel));
             }
         }
-        if self.troubles.any(self.channels == Channels::PoseEncoders) {
+        if self.troubles.any(self.channels.use_wheels()) {
             self.report.gain = TROUBLE_LOG_ODDS;
         }
         self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);

@@ -9,6 +9,7 @@ use vigil_blocks::{SensorFrame, Valid, WHEELS};
 use vigil_inference::angle::wrap;
 use vigil_inference::track::Displacement;
 
+use super::further::{Collector, Further};
 use super::troubles::{Limits, Troubles, Watchdog};
 use super::{BodyLag, Model, MotionModel, Reading};
 use crate::Description;
@@ -145,6 +146,8 @@ pub struct Observer {
     is_suspected: bool,
     state: State,
     observation: Observation,
+    /// Gyro and currents, where they are asked for.
+    further: Option<Box<Collector>>,
 }
 
 /// What carries over from frame to frame.
@@ -199,7 +202,21 @@ impl Observer {
             is_suspected: false,
             state: State::default(),
             observation: Observation::default(),
+            further: None,
         }
+    }
+
+    /// The same, which reads gyro and currents too.
+    #[must_use]
+    pub fn with_further(mut self) -> Self {
+        self.further = Some(Box::default());
+        self
+    }
+
+    /// What the last completed observation holds of gyro and currents, where these are read.
+    #[must_use]
+    pub fn further(&self) -> Option<&Further> {
+        self.further.as_deref().map(|collector| &collector.found)
     }
 
     /// The last completed observation.
@@ -217,6 +234,13 @@ impl Observer {
     /// Forgets everything: the next frame begins a new run.
     pub fn reset(&mut self) {
         self.state = State::default();
+        self.begin_further();
+    }
+
+    fn begin_further(&mut self) {
+        if let Some(further) = &mut self.further {
+            **further = Collector::default();
+        }
     }
 
     /// Takes a frame.
@@ -238,6 +262,7 @@ impl Observer {
                 started: true,
                 ..State::default()
             };
+            self.begin_further();
             self.state.reset_count = frame.pose_reset_count;
             self.state.anchor = true;
             let command = &self.model.command;
@@ -260,6 +285,9 @@ impl Observer {
             self.state.anchor = true;
             self.state.sums = self.state.sums.next();
             self.state.body.drop_frames();
+            if let Some(further) = &mut self.further {
+                further.drop_frames();
+            }
         }
         invalid |= self.take_command(frame, dt_s.min(GAP_S), new_run);
         if self.state.sums.frames == 0 {
@@ -269,10 +297,16 @@ impl Observer {
         self.state.sums.elapsed_s += dt_s;
         invalid |= self.take_pose(frame);
         invalid |= self.take_wheels(frame);
+        if let Some(further) = &mut self.further {
+            invalid |= further.take(frame, self.wheel_count);
+        }
         let enough = self.state.sums.elapsed_s + NEARLY * self.period_s() >= self.interval_s;
         let complete = new_run || enough || jumped;
         if complete {
             self.complete();
+            if let Some(further) = &mut self.further {
+                further.complete();
+            }
         }
         Intake {
             complete,

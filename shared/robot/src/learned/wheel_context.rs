@@ -154,6 +154,7 @@ mod tests {
         wheel_rate_rad_s: 0.04,
         steer_rad: 0.01,
         length_m: 4.0,
+        further: None,
     };
 
     fn read(apart: [f64; 6], rolling: f64) -> [Option<Beside>; WHEELS] {

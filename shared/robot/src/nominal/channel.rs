@@ -259,7 +259,7 @@ impl Channel {
     /// True if it belongs to a set of channels.
     #[must_use]
     pub fn is_among(&self, channels: Channels) -> bool {
-        channels == Channels::PoseEncoders || self.target.quantity.is_pose()
+        channels.use_wheels() || self.target.quantity.is_pose()
     }
 
     /// Its tail for a form of the detection filter.

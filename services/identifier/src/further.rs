@@ -1,0 +1,436 @@
+//! What gyro and currents say of faults: a hidden Markov model over single ones.
+//!
+//! Its states are a whole robot, a motor that has lost a share of its torque, a current sensor that
+//! is dead, scaled or off, a gyro that is dead or off, a stuck wheel, and what nobody knows. A size
+//! is a grid. Given the fault these channels depend neither on the pose nor on the encoders, which
+//! the filter over sets of faults weighs ([`crate::exact`]): probabilities of both are multiplied,
+//! over the prior that both contain. So hypotheses that say the same of a channel have one
+//! likelihood of it, and a broken encoder, a stuck wheel and a weak motor are told apart by what
+//! each makes of the currents.
+
+use vigil_blocks::{FaultBelief, SizeKind, WHEELS};
+use vigil_inference::logspace::{log_add, log_normal};
+use vigil_robot::Description;
+use vigil_robot::learned::current_effects::{CurrentEffects, SHARES, STUCK};
+use vigil_robot::learned::further_watch::{FurtherWatch, Residual, Residuals, Turn};
+use vigil_robot::learned::{Further, Healthy, Model, Observation, Reading};
+
+use crate::exact::{BIRTH_1_S, DEATH_1_S};
+use crate::modes::Leaves;
+
+/// Offsets of a broken current sensor, A, and factors.
+const OFFSETS_A: [f64; 12] = [
+    -2.0, -0.8, -0.4, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.4, 0.8, 2.0,
+];
+const GAINS: [f64; 4] = [-1.0, 0.0, 0.5, 2.0];
+/// Biases of a broken gyro, rad/s.
+const BIASES_RAD_S: [f64; 10] = [-0.4, -0.2, -0.1, -0.05, -0.025, 0.025, 0.05, 0.1, 0.2, 0.4];
+/// Deviation of a stuck wheel's effect on each current, relative, and at least, A.
+const STUCK_SD: f64 = 0.4;
+const STUCK_SD_MIN_A: f64 = 0.2;
+/// Deviations of currents and yaw rate in the unknown, A and rad/s, and the share of channels that
+/// have one.
+const UNKNOWN_A: f64 = 0.5;
+const UNKNOWN_RAD_S: f64 = 0.3;
+const ANYTHING: f64 = 0.3;
+/// Share of readings that nothing explains, and their deviation over the usual one.
+const OUTLIER: f64 = 1e-3;
+const OUTLIER_SD: f64 = 10.0;
+/// Probability that a dead sensor does not repeat itself.
+const REPEAT_FAILS: f64 = 0.01;
+/// One observation speaks for or against a state by this much at most (natural logarithm).
+const LOG_MAX: f64 = 30.0;
+/// These channels change odds by this factor at most: what nominal motion makes impossible they do
+/// not make likely.
+const RATIO_MAX: f64 = 1e9;
+/// No state is less probable: what can return must not be impossible.
+const FLOOR: f64 = 1e-14;
+
+/// What may be wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum State {
+    Whole,
+    /// A motor: wheel, index of the share lost.
+    Torque(usize, usize),
+    /// A current sensor repeats itself.
+    CurrentDead(usize),
+    /// It reads so much more, A.
+    CurrentOffset(usize, f64),
+    /// It reads this many times the current.
+    CurrentGain(usize, f64),
+    /// The gyro repeats itself.
+    GyroDead,
+    /// It reads so much more, rad/s.
+    GyroBias(f64),
+    /// A wheel is stuck: its leaf belongs to the other filter.
+    Stuck(usize),
+    Unknown,
+}
+
+/// How the probabilities of sets of faults change by these channels, and what they add.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fusion {
+    /// Factor of sets in which this wheel is stuck.
+    pub stuck: [f64; WHEELS],
+    /// Factor of the unknown, and its probability over that of none where the motion is nominal.
+    pub unknown: (f64, f64),
+    /// Nodes that only these channels tell, and their probability over that of none.
+    pub nodes: [(usize, f64); 2 * WHEELS + 1],
+    /// How many.
+    pub count: usize,
+}
+
+/// The filter.
+#[derive(Debug, Clone)]
+pub struct FurtherFilter {
+    watch: FurtherWatch,
+    effects: Option<CurrentEffects>,
+    states: Vec<State>,
+    /// Share of the births that each state has.
+    shares: Vec<f64>,
+    /// Leaf of each state, if it is one of these channels'.
+    nodes: Vec<Option<usize>>,
+    p: Vec<f64>,
+    /// The same without any evidence.
+    prior: Vec<f64>,
+    logs: Vec<f64>,
+}
+
+impl FurtherFilter {
+    /// A filter over the leaves of a tree; None if the model knows none of these channels.
+    #[must_use]
+    pub fn new(
+        model: &Model,
+        robot: &Description,
+        leaves: &Leaves,
+        p_unknown: f64,
+    ) -> Option<Self> {
+        let watch = FurtherWatch::new(model, robot)?;
+        let mut groups: Vec<(Vec<State>, Option<usize>)> = Vec::new();
+        for wheel in 0..watch.wheels() {
+            if let Some(node) = leaves.torque[wheel] {
+                let all = (0..SHARES.len()).map(|share| State::Torque(wheel, share));
+                groups.push((all.collect(), Some(node)));
+            }
+            if let Some(node) = leaves.current[wheel] {
+                let offsets = OFFSETS_A.map(|offset| State::CurrentOffset(wheel, offset));
+                let gains = GAINS.map(|gain| State::CurrentGain(wheel, gain));
+                let dead = std::iter::once(State::CurrentDead(wheel));
+                groups.push((dead.chain(offsets).chain(gains).collect(), Some(node)));
+            }
+            if leaves.stuck[wheel].is_some() {
+                groups.push((vec![State::Stuck(wheel)], None));
+            }
+        }
+        if let Some(node) = leaves.gyro {
+            let all = std::iter::once(State::GyroDead);
+            let biases = BIASES_RAD_S.map(State::GyroBias);
+            groups.push((all.chain(biases).collect(), Some(node)));
+        }
+        let mut filter = Self {
+            watch,
+            effects: CurrentEffects::new(model, robot),
+            states: vec![State::Whole, State::Unknown],
+            shares: vec![0.0, p_unknown],
+            nodes: vec![None, None],
+            p: Vec::new(),
+            prior: Vec::new(),
+            logs: Vec::new(),
+        };
+        let of_leaf = (1.0 - p_unknown) / leaves.count.max(1) as f64;
+        for (states, node) in groups {
+            let share = of_leaf / states.len().max(1) as f64;
+            for state in states {
+                filter.states.push(state);
+                filter.shares.push(share);
+                filter.nodes.push(node);
+            }
+        }
+        let count = filter.states.len();
+        (filter.p, filter.prior) = (vec![0.0; count], vec![0.0; count]);
+        filter.logs = vec![0.0; count];
+        filter.restart();
+        Some(filter)
+    }
+
+    /// A new run begins: everything is forgotten.
+    pub fn begin_run(&mut self, robot: &Description) {
+        self.watch.reset(robot);
+        self.restart();
+    }
+
+    /// Starts from a whole robot; the context stays.
+    pub fn restart(&mut self) {
+        for p in [&mut self.p, &mut self.prior] {
+            p.fill(0.0);
+            p[0] = 1.0;
+        }
+    }
+
+    /// What an observation holds beside what is expected of a healthy robot, learned from unless a
+    /// fault is suspected. None at rest.
+    pub fn look(
+        &mut self,
+        model: &Model,
+        robot: &Description,
+        seen: (&Observation, &Further),
+        healthy: &Healthy,
+        learns: bool,
+    ) -> Option<Residuals> {
+        let observation = seen.0;
+        let is_known = !observation.anchor && observation.dt_s > 0.0;
+        let turn = is_known.then(|| {
+            let step = observation.displacement(model, &model.nominal.motion);
+            let per_metre = step.per_metre[0] + healthy.context.mean[0];
+            let squared_s = observation.dt_s * observation.dt_s;
+            Turn {
+                rate_rad_s: per_metre * step.travel_m / observation.dt_s,
+                variance: observation.turn_variance / squared_s,
+            }
+        });
+        self.watch.take(model, robot, seen, turn, learns)
+    }
+
+    /// Takes an observation: the faults come and go, and its readings weigh them.
+    pub fn step(&mut self, observation: &Observation, further: &Further, residuals: &Residuals) {
+        let (birth, death) = (BIRTH_1_S * observation.dt_s, DEATH_1_S * observation.dt_s);
+        let born: f64 = birth * self.shares.iter().sum::<f64>();
+        for p in [&mut self.p, &mut self.prior] {
+            let whole = p[0];
+            p[0] = whole * (1.0 - born) + (1.0 - whole) * death;
+            for (p, share) in p.iter_mut().zip(&self.shares).skip(1) {
+                *p = *p * (1.0 - death) + whole * birth * share;
+            }
+        }
+        let mut largest = f64::NEG_INFINITY;
+        for at in 0..self.states.len() {
+            let log = self.log_ratio(self.states[at], observation, further, residuals);
+            let log = if log.is_finite() { log } else { 0.0 };
+            self.logs[at] = log.clamp(-LOG_MAX, LOG_MAX);
+            largest = largest.max(self.logs[at]);
+        }
+        let mut total = 0.0;
+        for (p, log) in self.p.iter_mut().zip(&self.logs) {
+            *p = (*p * (log - largest).exp()).max(FLOOR);
+            total += *p;
+        }
+        for p in &mut self.p {
+            *p /= total;
+        }
+    }
+
+    /// Log-likelihood of the readings in a state, over that of a whole robot.
+    fn log_ratio(
+        &self,
+        state: State,
+        observation: &Observation,
+        further: &Further,
+        residuals: &Residuals,
+    ) -> f64 {
+        let currents = &residuals.currents;
+        let alone = |wheel: usize, by: f64| {
+            let mut all = [0.0; WHEELS];
+            all[wheel] = by;
+            together(currents, &all, |_| 0.0)
+        };
+        let expected = |wheel: usize| currents[wheel].map_or(0.0, |residual| residual.expected);
+        match state {
+            State::Whole => 0.0,
+            State::Torque(wheel, share) => {
+                let by = self.effect(share, wheel, observation, expected(wheel));
+                together(currents, &by, |_| 0.0)
+            }
+            State::Stuck(wheel) => {
+                let by = self.effect(STUCK, wheel, observation, expected(wheel));
+                // How a robot turns on a stuck wheel the pose says.
+                let gyro = residuals.yaw_rate.map_or(0.0, |residual| {
+                    let wide = residual.variance + UNKNOWN_RAD_S * UNKNOWN_RAD_S;
+                    log_add(0.0, shifted(&residual, 0.0, wide)) - std::f64::consts::LN_2
+                });
+                let sd = |by: f64| (STUCK_SD * by).abs().max(STUCK_SD_MIN_A);
+                gyro + together(currents, &by, sd)
+            }
+            State::CurrentOffset(wheel, offset) => alone(wheel, offset),
+            State::CurrentGain(wheel, gain) => alone(wheel, (gain - 1.0) * expected(wheel)),
+            State::CurrentDead(wheel) => {
+                let learned = self.watch.model().currents.as_ref();
+                let healthy = learned.map_or(0.5, |learned| learned.repeat_rate);
+                dead(&further.currents[wheel], currents[wheel], healthy)
+            }
+            State::GyroDead => {
+                let learned = self.watch.model().yaw_rate;
+                let healthy = learned.map_or(0.5, |learned| learned.repeat_rate);
+                dead(&further.yaw_rate, residuals.yaw_rate, healthy)
+            }
+            State::GyroBias(bias) => residuals
+                .yaw_rate
+                .map_or(0.0, |residual| shifted(&residual, bias, residual.variance)),
+            State::Unknown => {
+                let gyro = residuals.yaw_rate.map(|residual| (residual, UNKNOWN_RAD_S));
+                let mean = mean(currents, |residual, _| residual.apart);
+                let currents = currents.iter().flatten().map(|residual| {
+                    let apart = residual.apart - mean;
+                    (Residual { apart, ..*residual }, UNKNOWN_A)
+                });
+                let anything = |(residual, sd): (Residual, f64)| {
+                    let wide = shifted(&residual, 0.0, residual.variance + sd * sd);
+                    log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + wide)
+                };
+                currents.chain(gyro).map(anything).sum()
+            }
+        }
+    }
+
+    /// What a fault of a wheel makes of all currents, A, where it would carry `expected_a`.
+    fn effect(
+        &self,
+        kind: usize,
+        wheel: usize,
+        observation: &Observation,
+        expected_a: f64,
+    ) -> [f64; WHEELS] {
+        let [curvature, speed] = observation.command;
+        let effects = self.effects.as_ref();
+        let relative = effects.map(|effects| effects.at(kind, wheel, curvature, speed));
+        relative.map_or([0.0; WHEELS], |effect| effect.map(|it| it * expected_a))
+    }
+
+    /// Writes of each leaf of these channels in which way it is most probably broken, and how
+    /// large the fault is then.
+    pub fn sizes(&self, belief: &mut FaultBelief) {
+        let mut begin = 0;
+        for group in self.nodes.chunk_by(|a, b| a == b) {
+            let states = begin..begin + group.len();
+            begin = states.end;
+            let Some(node) = group[0] else { continue };
+            let most = |kind: SizeKind| {
+                let its = states
+                    .clone()
+                    .filter(|&at| self.states[at].size().0 == kind);
+                its.fold([0.0; 3], |[p, first, second], at| {
+                    let (more, size) = (self.p[at], self.states[at].size().1);
+                    [p + more, first + more * size, second + more * size * size]
+                })
+            };
+            let kinds = states.clone().map(|at| self.states[at].size().0);
+            let Some(kind) = kinds.max_by(|a, b| most(*a)[0].total_cmp(&most(*b)[0])) else {
+                continue;
+            };
+            let [p, first, second] = most(kind);
+            let mean = first / p;
+            belief.size_kind[node] = kind as u32;
+            belief.size[node] = mean;
+            belief.size_sd[node] = (second / p - mean * mean).max(0.0).sqrt();
+        }
+    }
+
+    /// How probabilities of sets of faults change by these channels.
+    #[must_use]
+    pub fn fusion(&self) -> Fusion {
+        let bounded = |ratio: f64| ratio.clamp(1.0 / RATIO_MAX, RATIO_MAX);
+        let mut fusion = Fusion {
+            stuck: [1.0; WHEELS],
+            unknown: (1.0, 0.0),
+            nodes: [(0, 0.0); 2 * WHEELS + 1],
+            count: 0,
+        };
+        for (at, state) in self.states.iter().enumerate().skip(1) {
+            let odds = (self.p[at] / self.p[0]).min(RATIO_MAX);
+            let prior = self.prior[at] / self.prior[0];
+            let ratio = match prior > 0.0 {
+                true => bounded(odds / prior),
+                false => 1.0,
+            };
+            match (state, self.nodes[at]) {
+                (State::Stuck(wheel), _) => fusion.stuck[*wheel] = ratio,
+                (State::Unknown, _) => fusion.unknown = (0.5 + 0.5 * ratio, odds),
+                (_, Some(node)) => fusion.add(node, odds),
+                _ => {}
+            }
+        }
+        fusion
+    }
+}
+
+impl State {
+    /// In which way a component is broken, and by how much.
+    const fn size(self) -> (SizeKind, f64) {
+        match self {
+            Self::Torque(_, share) => (SizeKind::TorqueShareLost, SHARES[share]),
+            Self::CurrentOffset(_, offset_a) => (SizeKind::CurrentOffsetA, offset_a),
+            Self::CurrentGain(_, gain) => (SizeKind::Gain, gain),
+            Self::GyroBias(bias_rad_s) => (SizeKind::RateBiasRadS, bias_rad_s),
+            Self::CurrentDead(_) | Self::GyroDead => (SizeKind::Frozen, 0.0),
+            Self::Stuck(_) | Self::Whole | Self::Unknown => (SizeKind::None, 0.0),
+        }
+    }
+}
+
+impl Fusion {
+    fn add(&mut self, node: usize, p: f64) {
+        let known = self.nodes[..self.count].iter().position(|it| it.0 == node);
+        let at = known.unwrap_or(self.count);
+        let Some(place) = self.nodes.get_mut(at) else {
+            return;
+        };
+        *place = (node, if known.is_some() { place.1 } else { 0.0 } + p);
+        self.count = self.count.max(at + 1);
+    }
+}
+
+/// Mean over the currents that were read.
+fn mean(currents: &[Option<Residual>; WHEELS], of: impl Fn(&Residual, usize) -> f64) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (wheel, residual) in currents.iter().enumerate() {
+        if let Some(residual) = residual {
+            sum += of(residual, wheel);
+            count += 1.0;
+        }
+    }
+    sum / f64::max(count, 1.0)
+}
+
+/// Log-density of the currents if each departs by so much, known up to a deviation, over that of
+/// healthy ones. What all have in common is taken off: ground and load do that, too.
+fn together(
+    currents: &[Option<Residual>; WHEELS],
+    by: &[f64; WHEELS],
+    sd: impl Fn(f64) -> f64,
+) -> f64 {
+    let common = mean(currents, |residual, _| residual.apart);
+    let common_by = mean(currents, |_, wheel| by[wheel]);
+    let each = currents.iter().zip(by).filter_map(|(residual, &by)| {
+        let residual = (*residual)?;
+        let apart = residual.apart - common;
+        let residual = Residual { apart, ..residual };
+        let more = sd(by);
+        let variance = residual.variance + more * more;
+        Some(shifted(&residual, by - common_by, variance))
+    });
+    each.sum()
+}
+
+/// Log-density of a residual whose mean is `by` and whose variance is this, over that of a healthy
+/// one; now and then each is an outlier.
+fn shifted(residual: &Residual, by: f64, variance: f64) -> f64 {
+    let density = |apart: f64, variance: f64| {
+        let wide = variance * OUTLIER_SD * OUTLIER_SD;
+        log_add(
+            log_normal(apart, variance),
+            OUTLIER.ln() + log_normal(apart, wide),
+        )
+    };
+    density(residual.apart - by, variance) - density(residual.apart, residual.variance)
+}
+
+/// The same for a sensor that repeats itself, most often zero.
+fn dead(read: &Reading, residual: Option<Residual>, healthy: f64) -> f64 {
+    let repeats = f64::from(read.repeats) * ((1.0 - REPEAT_FAILS) / healthy).ln();
+    // The first sample of a dead sensor differs from the last of a living one.
+    let is_first = read.plain > 0 && read.zeros > 0 && read.plain == 1;
+    let expected = residual.map_or(0.0, |residual| residual.expected);
+    match residual {
+        Some(residual) if is_first => shifted(&residual, -expected, residual.variance) + repeats,
+        _ => repeats + f64::from(read.plain) * (REPEAT_FAILS / (1.0 - healthy)).ln(),
+    }
+}

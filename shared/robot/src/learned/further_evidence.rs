@@ -1,0 +1,184 @@
+//! The detection filter's evidence from gyro and currents.
+//!
+//! A current is held against what is expected of it, and against the other wheels: what a weak
+//! motor no longer carries the others carry, while ground and load change all of them. The gyro is
+//! held against the turn of the pose's track. Each has a learned departure of its own, and a flag
+//! of exact repeats.
+
+use nalgebra::SVector;
+use vigil_blocks::{Channel, WHEELS};
+use vigil_inference::logspace::log_add;
+use vigil_inference::outlier::tempered;
+
+use super::form::{Evidence, Form};
+use super::further::Further;
+use super::further_watch::{FurtherWatch, Residual, Turn};
+use super::{Model, Observation, Reading};
+use crate::Description;
+
+/// Shares of the prior beside those of the other channels: how a fault of these first shows.
+const SHARE_CURRENTS: f64 = 0.3;
+const SHARE_GYRO: f64 = 0.05;
+const SHARE_REPEATS: f64 = 0.05;
+/// Standard deviation of a fault's bias in units of the whitened residual: half the torque of one
+/// wheel moves its current by about half a deviation, a broken sensor by many.
+const BIAS_CURRENT: f64 = 1.0;
+const BIAS_GYRO: f64 = 3.0;
+/// Probability that a frozen sensor does not repeat itself.
+const REPEAT_FAILS: f64 = 0.01;
+/// Bound of the flag of exact repeats.
+const REPEATS_LOG_ODDS_MAX: f64 = 40.0;
+
+/// Index of the gyro, after the currents.
+const GYRO: usize = WHEELS;
+
+/// Evidence of gyro and currents.
+#[derive(Debug, Clone)]
+pub(super) struct FurtherEvidence {
+    watch: FurtherWatch,
+    form: Form,
+    currents: [Evidence<1>; WHEELS],
+    gyro: Evidence<1>,
+    /// Log-odds of exact repeats, and what the last observation said for them.
+    repeats: [(f64, f64); WHEELS + 1],
+    /// What the last observation said for a departure.
+    gains: [f64; WHEELS + 1],
+}
+
+impl FurtherEvidence {
+    /// Nothing seen yet; None if the model knows none of these channels.
+    pub fn new(model: &Model, robot: &Description, form: Form) -> Option<Self> {
+        let watch = FurtherWatch::new(model, robot)?;
+        Some(Self {
+            watch,
+            form,
+            currents: [Evidence::new(form, BIAS_CURRENT); WHEELS],
+            gyro: Evidence::new(form, BIAS_GYRO),
+            repeats: [(f64::NEG_INFINITY, 0.0); WHEELS + 1],
+            gains: [0.0; WHEELS + 1],
+        })
+    }
+
+    /// Forgets everything.
+    pub fn reset(&mut self, robot: &Description) {
+        self.watch.reset(robot);
+        self.forget();
+    }
+
+    /// Forgets what speaks for a fault.
+    pub fn forget(&mut self) {
+        self.currents = [Evidence::new(self.form, BIAS_CURRENT); WHEELS];
+        self.gyro = Evidence::new(self.form, BIAS_GYRO);
+        self.repeats = [(f64::NEG_INFINITY, 0.0); WHEELS + 1];
+        self.gains = [0.0; WHEELS + 1];
+    }
+
+    /// True once the channels' noise is known.
+    pub fn is_known(&self) -> bool {
+        self.watch.is_known()
+    }
+
+    /// Takes one observation, at rest too. `birth` gives the probability that a fault appears for a
+    /// share of the prior.
+    pub fn step(
+        &mut self,
+        model: &Model,
+        robot: &Description,
+        (observation, further): (&Observation, &Further),
+        (turn, following): (Option<Turn>, bool),
+        birth: impl Fn(f64) -> f64,
+    ) {
+        self.gains = [0.0; WHEELS + 1];
+        for (_, gain) in &mut self.repeats {
+            *gain = 0.0;
+        }
+        let seen = (observation, further);
+        let Some(residuals) = self.watch.take(model, robot, seen, turn, !following) else {
+            return;
+        };
+        let share = 1.0 / self.watch.wheels().max(1) as f64;
+        let currents = self.watch.model().currents.as_ref();
+        if let Some(healthy) = currents.map(|currents| currents.repeat_rate) {
+            for wheel in 0..self.watch.wheels() {
+                let birth = birth(SHARE_REPEATS * share);
+                self.update_repeats(wheel, &further.currents[wheel], healthy, birth);
+            }
+            self.weigh_currents(&residuals.currents, birth(SHARE_CURRENTS * share));
+        }
+        if let Some(gyro) = self.watch.model().yaw_rate {
+            let birth_repeats = birth(SHARE_REPEATS);
+            self.update_repeats(GYRO, &further.yaw_rate, gyro.repeat_rate, birth_repeats);
+        }
+        if let Some(residual) = residuals.yaw_rate {
+            let whitened = residual.apart / residual.variance.sqrt();
+            let whitened = tempered(whitened, residual.outlier_rate);
+            self.gyro
+                .step(&SVector::from([whitened]), birth(SHARE_GYRO));
+            self.gains[GYRO] = self.gyro.gain();
+        }
+    }
+
+    /// Each wheel's current against the mean of the others', beside what is expected of them.
+    fn weigh_currents(&mut self, all: &[Option<Residual>; WHEELS], birth: f64) {
+        let known = || all.iter().flatten();
+        let sums = known().fold((0.0, 0.0), |(apart, variance), it| {
+            (apart + it.apart, variance + it.variance)
+        });
+        let others = known().count().saturating_sub(1) as f64;
+        if others < 1.0 {
+            return;
+        }
+        for (wheel, residual) in all.iter().enumerate() {
+            let Some(residual) = residual else { continue };
+            let (apart, variance) = contrast((residual.apart, residual.variance), sums, others);
+            let whitened = tempered(apart / variance.sqrt(), residual.outlier_rate);
+            self.currents[wheel].step(&SVector::from([whitened]), birth);
+            self.gains[wheel] = self.currents[wheel].gain();
+        }
+    }
+
+    /// A frozen sensor repeats itself; a healthy one hardly ever does.
+    fn update_repeats(&mut self, at: usize, read: &Reading, healthy: f64, birth: f64) {
+        let seen = f64::from(read.repeats) * ((1.0 - REPEAT_FAILS) / healthy).ln()
+            + f64::from(read.plain) * (REPEAT_FAILS / (1.0 - healthy)).ln();
+        let before = log_add(self.repeats[at].0, birth.ln());
+        let after = (before + seen).clamp(birth.ln(), REPEATS_LOG_ODDS_MAX);
+        self.repeats[at] = (after, seen.max(after - before));
+    }
+
+    /// Log-odds and last gain of each channel: `(index, log_odds, gain)`; see [`Channel`].
+    pub fn channels(&self, mut enter: impl FnMut(usize, f64, f64)) {
+        for at in (0..self.watch.wheels()).chain([GYRO]) {
+            let (channel, evidence) = match at {
+                GYRO => (Channel::YAW_RATE, &self.gyro),
+                wheel => (Channel::current(wheel), &self.currents[wheel]),
+            };
+            enter(channel, evidence.log_odds(), self.gains[at]);
+            let (log_odds, gain) = self.repeats[at];
+            enter(channel, log_odds, gain);
+        }
+    }
+}
+
+/// One of several values less the mean of the others, and the variance of that difference, from
+/// the value and its variance, the sums over all, and how many others there are.
+fn contrast(own: (f64, f64), all: (f64, f64), others: f64) -> (f64, f64) {
+    let mean = (all.0 - own.0) / others;
+    (own.0 - mean, own.1 + (all.1 - own.1) / (others * others))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wheel_stands_out_by_itself_and_what_all_have_in_common_does_not() {
+        let values = [0.3 - 0.12, 0.3, 0.3, 0.3, 0.3, 0.3];
+        let all = (values.iter().sum(), 6.0 * 0.01);
+        let (apart, variance) = contrast((values[0], 0.01), all, 5.0);
+        assert!((apart + 0.12).abs() < 1e-12);
+        assert!((variance - 0.012).abs() < 1e-12);
+        let (apart, _) = contrast((values[1], 0.01), all, 5.0);
+        assert!((apart - 0.024).abs() < 1e-12);
+    }
+}
