@@ -113,6 +113,9 @@ mod tests {
         Leaves {
             stuck: [None; WHEELS],
             encoder: [None; WHEELS],
+            torque: [None; WHEELS],
+            current: [None; WHEELS],
+            gyro: None,
             count: 2,
             depths: [0; FAULT_NODES],
             below,
