@@ -45,11 +45,6 @@ const ONSET_BLUR_NS: u64 = 150_000_000;
 /// many times the rate at which a wheel sticks by itself.
 const SOON_S: f64 = 1.0;
 const SOON: f64 = 20.0;
-/// Prior rate of faults while something is suspected, 1/s of motion. An alarm has been raised:
-/// the rate over a robot's life would make the filter slow without making it more often right.
-pub const BIRTH_1_S: f64 = 0.01;
-/// Rate at which faults vanish, 1/s of motion.
-pub const DEATH_1_S: f64 = 1.0 / 60.0;
 
 /// The filter.
 #[derive(Debug, Clone)]
@@ -495,13 +490,4 @@ impl Exact {
 /// True while a stuck wheel's encoder may read anything, and the others may still turn as before.
 pub const fn is_new(t_ns: u64, onset_ns: u64) -> bool {
     t_ns.saturating_sub(onset_ns) < ONSET_BLUR_NS
-}
-
-/// Rates at which the leaves' faults come and go.
-pub fn fault_rates(leaves: &Leaves, p_unknown: f64) -> FaultRates {
-    FaultRates {
-        fault_1_s: BIRTH_1_S * (1.0 - p_unknown) / leaves.count.max(1) as f64,
-        unknown_1_s: BIRTH_1_S * p_unknown,
-        death_1_s: DEATH_1_S,
-    }
 }

@@ -15,8 +15,9 @@ use vigil_robot::learned::current_effects::{CurrentEffects, SHARES, STUCK};
 use vigil_robot::learned::further_watch::{FurtherWatch, Residual, Residuals, Turn};
 use vigil_robot::learned::{Further, Healthy, Model, Observation, Reading};
 
-use crate::exact::{BIRTH_1_S, DEATH_1_S};
+use crate::fault_rates::{BIRTH_1_S, DEATH_1_S};
 use crate::modes::Leaves;
+use crate::node_sizes::TOLD_MIN;
 
 /// Offsets of a broken current sensor, A, and factors.
 const OFFSETS_A: [f64; 12] = [
@@ -298,11 +299,14 @@ impl FurtherFilter {
     /// Writes of each leaf of these channels in which way it is most probably broken, and how
     /// large the fault is then.
     pub fn sizes(&self, belief: &mut FaultBelief) {
+        let told = belief.p.map(|p| p >= TOLD_MIN);
         let mut begin = 0;
         for group in self.nodes.chunk_by(|a, b| a == b) {
             let states = begin..begin + group.len();
             begin = states.end;
-            let Some(node) = group[0] else { continue };
+            let Some(node) = group[0].filter(|&node| told[node]) else {
+                continue;
+            };
             let most = |kind: SizeKind| {
                 let its = states
                     .clone()
@@ -318,9 +322,15 @@ impl FurtherFilter {
             };
             let [p, first, second] = most(kind);
             let mean = first / p;
+            if !mean.is_finite() {
+                continue;
+            }
+            // Sizes are tried on a grid: within a cell any is as good.
+            let cell = cell(kind, mean);
+            let variance = (second / p - mean * mean).max(0.0) + cell * cell / 12.0;
             belief.size_kind[node] = kind as u32;
             belief.size[node] = mean;
-            belief.size_sd[node] = (second / p - mean * mean).max(0.0).sqrt();
+            belief.size_sd[node] = variance.sqrt();
         }
     }
 
@@ -363,6 +373,17 @@ impl State {
             Self::CurrentDead(_) | Self::GyroDead => (SizeKind::Frozen, 0.0),
             Self::Stuck(_) | Self::Whole | Self::Unknown => (SizeKind::None, 0.0),
         }
+    }
+}
+
+/// Distance between the sizes that are tried about this one.
+fn cell(kind: SizeKind, size: f64) -> f64 {
+    match kind {
+        SizeKind::TorqueShareLost => 0.17,
+        SizeKind::Gain => 0.5,
+        // Each is twice the one before.
+        SizeKind::CurrentOffsetA | SizeKind::RateBiasRadS => 0.7 * size.abs(),
+        _ => 0.0,
     }
 }
 
@@ -427,7 +448,7 @@ fn shifted(residual: &Residual, by: f64, variance: f64) -> f64 {
 fn dead(read: &Reading, residual: Option<Residual>, healthy: f64) -> f64 {
     let repeats = f64::from(read.repeats) * ((1.0 - REPEAT_FAILS) / healthy).ln();
     // The first sample of a dead sensor differs from the last of a living one.
-    let is_first = read.plain > 0 && read.zeros > 0 && read.plain == 1;
+    let is_first = read.plain == 1 && read.zeros > 0;
     let expected = residual.map_or(0.0, |residual| residual.expected);
     match residual {
         Some(residual) if is_first => shifted(&residual, -expected, residual.variance) + repeats,

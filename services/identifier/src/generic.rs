@@ -24,7 +24,7 @@ use vigil_robot::learned::{Healthy, Moved, NoiseScales, Observation, Switching};
 use vigil_setup::schema::{self, IdentifierFilter};
 
 use crate::assemble::Models;
-use crate::exact::fault_rates;
+use crate::fault_rates::fault_rates;
 use crate::modes::{IdentifierError, Leaves};
 use crate::posterior::Posterior;
 use crate::risk::risks;

@@ -5,18 +5,17 @@ use std::collections::VecDeque;
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{
-    DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock,
-    SensorFrame,
-};
+use vigil_blocks::{DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, ParticleBlock, SensorFrame};
 use vigil_robot::learned::{Healthy, NoiseScales, Observation, Observer, motion_modes};
 use vigil_setup::schema;
 
 use crate::assemble::Models;
+use crate::check::{FURTHER_NEED_EXACT, check};
 use crate::detection::Detection;
 use crate::draw::copy;
 use crate::engine::Engine;
-use crate::exact::{BIRTH_1_S, DEATH_1_S, Exact, fault_rates};
+use crate::exact::Exact;
+use crate::fault_rates::{BIRTH_1_S, DEATH_1_S, fault_rates};
 use crate::further_stage::FurtherStage;
 use crate::generic::Generic;
 use crate::modes::{IdentifierError, Leaves};
@@ -129,6 +128,9 @@ impl Identifier {
                 let filter = Exact::new(model, robot, &leaves, use_wheels, rates);
                 let modes = filter.modes().to_vec();
                 (Engine::Exact(Box::new(filter)), modes)
+            }
+            _ if leaves.has_further() => {
+                return Err(IdentifierError::Build(FURTHER_NEED_EXACT.to_owned()));
             }
             _ => {
                 let filter = Generic::new(models, &leaves, settings, use_wheels, seed)?;
@@ -443,7 +445,8 @@ impl Identifier {
         belief.channel_evidence = self.reasons.channel_evidence();
         belief.degenerate_count = self.engine.degenerate_count();
         belief.particle_limit = self.budget as u32;
-        if let Some(further) = &self.further {
+        let is_identifying = self.phase != Phase::Watching && !self.is_catching_up();
+        if let Some(further) = self.further.as_ref().filter(|_| is_identifying) {
             further.sizes(belief);
         }
     }
@@ -455,13 +458,16 @@ impl Identifier {
         self.onset_of_leaf()
     }
 
-    /// Onset of the most probable leaf.
+    /// Onset of the most probable leaf; 0 of those of gyro and currents, which know none.
     fn onset_of_leaf(&self) -> u64 {
         let leaves = self
             .leaves
             .stuck
             .iter()
             .chain(&self.leaves.encoder)
+            .chain(&self.leaves.torque)
+            .chain(&self.leaves.current)
+            .chain([&self.leaves.gyro])
             .flatten();
         let p = &self.posterior.nodes;
         leaves
@@ -486,24 +492,4 @@ impl Identifier {
         }
         copy(&self.drawn, self.budget, out);
     }
-}
-
-fn check(settings: &schema::Identifier) -> Result<(), IdentifierError> {
-    let refuse = |key, value, allowed| {
-        Err(IdentifierError::Value {
-            key,
-            value,
-            allowed,
-        })
-    };
-    if !(32..=PARTICLE_CAPACITY).contains(&settings.particles) {
-        return refuse("particles", settings.particles as f64, "32 to 4096");
-    }
-    if !(0.5..=30.0).contains(&settings.ring_s) {
-        return refuse("ring_s", settings.ring_s, "0.5 to 30");
-    }
-    if !(0.0..=0.5).contains(&settings.p_unknown) {
-        return refuse("p_unknown", settings.p_unknown, "0 to 0.5");
-    }
-    Ok(())
 }

@@ -128,7 +128,10 @@ impl Late {
         let all = || self.p[wheel].iter().zip(DELAYS);
         let mean: f64 = all().map(|(p, delay)| p * delay).sum();
         let square: f64 = all().map(|(p, delay)| p * delay * delay).sum();
-        (mean, (square - mean * mean).max(0.0).sqrt())
+        // Between two delays of the grid any is as good.
+        let cell = 0.28 * mean;
+        let variance = (square - mean * mean).max(0.0) + cell * cell / 12.0;
+        (mean, variance.sqrt())
     }
 }
 

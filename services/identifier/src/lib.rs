@@ -4,11 +4,13 @@
 
 mod assemble;
 mod blindfold;
+mod check;
 mod detection;
 mod draw;
 mod encoders;
 mod engine;
 mod exact;
+mod fault_rates;
 pub mod further;
 mod further_stage;
 mod generic;

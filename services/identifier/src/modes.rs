@@ -85,6 +85,13 @@ pub struct Leaves {
 }
 
 impl Leaves {
+    /// Whether there are leaves that gyro and currents alone can show.
+    #[must_use]
+    pub fn has_further(&self) -> bool {
+        let mut nodes = self.torque.iter().chain(&self.current).chain([&self.gyro]);
+        nodes.any(Option::is_some)
+    }
+
     /// Reads the faults of the leaves.
     ///
     /// # Errors

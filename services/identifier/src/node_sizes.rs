@@ -8,7 +8,7 @@ use crate::modes::Leaves;
 use crate::posterior::Posterior;
 
 /// Of a fault that is less probable nothing is told.
-const TOLD_MIN: f64 = 0.01;
+pub const TOLD_MIN: f64 = 0.01;
 
 /// What is told of each node.
 #[derive(Debug, Clone, Copy, PartialEq)]

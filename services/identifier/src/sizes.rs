@@ -148,8 +148,11 @@ impl Sizes {
         self.late.clear();
     }
 
-    /// The robot stands: its wheels' rates are 0.
+    /// The robot stands: its wheels' rates are 0, and what drifts drifts on.
     pub fn rest(&mut self, observation: &Observation) {
+        for held in &mut self.held {
+            held[DRIFT].predict(observation.dt_s, &self.priors[DRIFT]);
+        }
         self.late.keep(observation.t_ns, [(0.0, 0.0); WHEELS]);
     }
 

@@ -26,14 +26,15 @@ use crate::track::{Context, Displacement, MotionNoise, Track};
 pub const LOG_ODDS_MAX: f64 = 40.0;
 /// Components less probable than this, by their log-odds, are dropped.
 const LOG_ODDS_MIN: f64 = -30.0;
-/// The same for changes of the ground, against the ground that was.
-const CHANGE_MIN: f64 = -14.0;
-/// A change of the ground so much more probable than none has happened (natural logarithm).
+/// A change of the ground is dropped once it is so much less probable than when it was supposed.
+const CHANGE_LOSES: f64 = 5.0;
+/// A change of the ground that is e² times as probable as none is taken for granted. Until then it
+/// counts by its weight; a wrong one costs what was learned of the ground, no alarm.
 const CHANGED: f64 = 2.0;
 
-/// A fault that began at one of some successive steps.
+/// A fault, its end, or a change of the ground that began at one of some successive steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Fault {
+struct Hypothesis {
     log_weight: f64,
     /// Part of the weight: that its departure is material.
     log_material: f64,
@@ -62,11 +63,13 @@ pub struct Departure<const K: usize> {
     context: Context,
     trust: Trust,
     is_unknown: [bool; K],
-    faults: [Onsets<Fault>; K],
+    faults: [Onsets<Hypothesis>; K],
     /// While a fault is suspected: nominal motion again, since one of some successive steps.
-    ended: Onsets<Fault>,
+    ended: Onsets<Hypothesis>,
     /// Nominal motion on another ground since one of some successive steps.
-    changed: Onsets<Fault>,
+    changed: Onsets<Hypothesis>,
+    /// Weight of a change when it is supposed.
+    log_change: f64,
     is_suspected: bool,
     gain: f64,
 }
@@ -102,6 +105,7 @@ impl<const K: usize> Departure<K> {
             faults: [Onsets::default(); K],
             ended: Onsets::default(),
             changed: Onsets::default(),
+            log_change: 0.0,
             is_suspected: false,
             nominal,
             gain: 0.0,
@@ -111,19 +115,24 @@ impl<const K: usize> Departure<K> {
     /// Starts from a pose (x, y, yaw) known with these variances, without a fault.
     pub fn start(&mut self, pose: [f64; 3], variance: [f64; 3]) {
         let covariance = Matrix3::from_diagonal(&Vector3::from(variance));
+        self.clear();
         self.track = Track::new(Vector3::from(pose), covariance, &self.nominal);
-        self.forget();
     }
 
     /// Forgets what speaks for a fault, and keeps the track: that of the most probable end, if a
     /// fault was suspected.
     pub fn forget(&mut self) {
-        let ends = [best(&self.ended), best(&self.changed)];
-        let likelier = |a: &&Fault, b: &&Fault| a.log_weight.total_cmp(&b.log_weight);
-        let likeliest = ends.into_iter().flatten().max_by(likelier);
-        if let Some(track) = likeliest.map(|ended| ended.track) {
+        // A change of the ground that is less probable than none has not happened.
+        let changed = best(&self.changed).filter(|changed| changed.log_weight > 0.0);
+        let healthy = [best(&self.ended), changed].into_iter().flatten();
+        let likeliest = healthy.max_by(|a, b| a.log_weight.total_cmp(&b.log_weight));
+        if let Some(track) = likeliest.map(|healthy| healthy.track) {
             self.track = track;
         }
+        self.clear();
+    }
+
+    fn clear(&mut self) {
         self.faults = [Onsets::default(); K];
         self.ended = Onsets::default();
         self.changed = Onsets::default();
@@ -181,7 +190,7 @@ impl<const K: usize> Departure<K> {
         self.gain
     }
 
-    fn all_mut(&mut self) -> impl Iterator<Item = &mut Fault> {
+    fn all_mut(&mut self) -> impl Iterator<Item = &mut Hypothesis> {
         self.faults.iter_mut().flat_map(Onsets::iter_mut)
     }
 
@@ -205,7 +214,7 @@ impl<const K: usize> Departure<K> {
         for (faults, kind) in self.faults.iter_mut().zip(kinds) {
             let born = birth * kind.share;
             if born > 0.0 {
-                faults.enter(Fault {
+                faults.enter(Hypothesis {
                     log_weight: born.ln(),
                     log_material: 0.0,
                     track: self.track.enter(&self.context, &kind.noise),
@@ -225,7 +234,8 @@ impl<const K: usize> Departure<K> {
         let nominal = self.nominal;
         let p = -(-nominal.changes_1_m * step.travel_m.abs()).exp_m1();
         if counts && p > 0.0 && !self.is_suspected {
-            self.changed.enter(Fault {
+            self.log_change = p.ln();
+            self.changed.enter(Hypothesis {
                 log_weight: p.ln(),
                 log_material: 0.0,
                 track: self.track.renewed(&nominal),
@@ -248,7 +258,7 @@ impl<const K: usize> Departure<K> {
         let likeliest = faults.max_by(|a, b| a.log_weight.total_cmp(&b.log_weight));
         let likeliest = likeliest.filter(|_| ends > 0.0);
         if let Some(track) = likeliest.map(|fault| fault.track.enter(&context, &nominal)) {
-            self.ended.enter(Fault {
+            self.ended.enter(Hypothesis {
                 log_weight: self.log_faults() + ends.ln(),
                 log_material: 0.0,
                 track,
@@ -276,7 +286,7 @@ impl<const K: usize> Departure<K> {
         let said = self.residual(pose, variance)?;
         self.track.update(pose, variance)?;
         let before = self.log_persists();
-        let take = |hypothesis: &mut Fault| {
+        let take = |hypothesis: &mut Hypothesis| {
             let gained = hypothesis.track.update(pose, variance);
             // What cannot take it is impossible.
             let gained = gained.map_or(f64::NEG_INFINITY, |gained| gained - said.log_density);
@@ -318,7 +328,7 @@ impl<const K: usize> Departure<K> {
         if self.is_suspected {
             return;
         }
-        let Some(Fault {
+        let Some(Hypothesis {
             log_weight, track, ..
         }) = best(&self.changed).copied()
         else {
@@ -351,7 +361,7 @@ impl<const K: usize> Departure<K> {
         for healthy in self.ended.iter_mut().chain(self.changed.iter_mut()) {
             healthy.log_weight -= excess;
         }
-        let least = self.log_healthy() + CHANGE_MIN;
+        let least = self.log_healthy() + self.log_change - CHANGE_LOSES;
         self.changed.retain(|changed| changed.log_weight > least);
         let likeliest = best(&self.ended).map_or(0.0, |ended| ended.log_weight);
         self.ended
@@ -374,18 +384,18 @@ impl<const K: usize> Departure<K> {
 }
 
 /// The most probable of some hypotheses.
-fn best(all: &Onsets<Fault>) -> Option<&Fault> {
+fn best(all: &Onsets<Hypothesis>) -> Option<&Hypothesis> {
     all.iter()
         .max_by(|a, b| a.log_weight.total_cmp(&b.log_weight))
 }
 
 /// Logarithm of the sum of their weights.
-fn total<'a>(all: impl Iterator<Item = &'a Fault>) -> f64 {
+fn total<'a>(all: impl Iterator<Item = &'a Hypothesis>) -> f64 {
     all.map(|fault| fault.log_weight)
         .fold(f64::NEG_INFINITY, log_add)
 }
 
-impl Onset for Fault {
+impl Onset for Hypothesis {
     /// Keeps the weight and the first two moments of both.
     fn merged(&self, older: &Self) -> Self {
         let log_weight = log_add(self.log_weight, older.log_weight);

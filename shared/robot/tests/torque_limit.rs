@@ -55,7 +55,7 @@ fn of_soil(slip: &SlipModel, drive: (f64, f64)) -> SMatrix<f64, 6, 6> {
 }
 
 #[test]
-fn half_a_motors_torque_is_hidden_by_noise_for_longer_than_two_seconds() {
+fn the_best_test_sees_half_a_motors_torque_by_three_to_four_deviations_in_two_seconds() {
     let text = include_str!("../../../config/robots/rover.toml");
     let robot: Description = toml::from_str(text).unwrap();
     let slip = SlipModel::new(&robot).unwrap();

@@ -246,7 +246,9 @@ impl Monitor {
         further: Option<&Further>,
         following: bool,
     ) {
-        if let (Some(mut evidence), Some(read)) = (self.further.take(), further) {
+        if let Some(read) = further
+            && let Some(mut evidence) = self.further.take()
+        {
             let turn = self.turn(observation);
             let birth = |share| self.birth(observation.dt_s, share);
             let (model, robot) = (&self.model, &self.robot);

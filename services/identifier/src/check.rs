@@ -1,0 +1,34 @@
+//! What an identifier refuses.
+
+use vigil_blocks::PARTICLE_CAPACITY;
+use vigil_setup::schema;
+
+use crate::modes::IdentifierError;
+
+/// Why another filter is refused.
+pub const FURTHER_NEED_EXACT: &str =
+    "leaves of torque, currents and gyro need the exact filter: identifier.filter = \"exact\"";
+
+/// Refuses settings out of range.
+///
+/// # Errors
+/// [`IdentifierError::Value`].
+pub fn check(settings: &schema::Identifier) -> Result<(), IdentifierError> {
+    let refuse = |key, value, allowed| {
+        Err(IdentifierError::Value {
+            key,
+            value,
+            allowed,
+        })
+    };
+    if !(32..=PARTICLE_CAPACITY).contains(&settings.particles) {
+        return refuse("particles", settings.particles as f64, "32 to 4096");
+    }
+    if !(0.5..=30.0).contains(&settings.ring_s) {
+        return refuse("ring_s", settings.ring_s, "0.5 to 30");
+    }
+    if !(0.0..=0.5).contains(&settings.p_unknown) {
+        return refuse("p_unknown", settings.p_unknown, "0 to 0.5");
+    }
+    Ok(())
+}
