@@ -356,6 +356,7 @@ mod tests {
             "alarm_cleared",
             "name_cleared",
             "delay",
+            "size",
             "ece",
             "log_score",
         ];
