@@ -2,7 +2,7 @@
 
 /// Sizes of each kind; `W` stands for a wheel, `S` for a steered one, `side` for a side: they
 /// change from cell to cell.
-const SPECS: [&str; 55] = [
+const SPECS: [&str; 56] = [
     "steer-jump:S:0.1",
     "steer-jump:S:0.2",
     "steer-jump:S:-0.3",

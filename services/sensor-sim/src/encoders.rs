@@ -55,7 +55,13 @@ impl Encoders {
         let of = |kind, otherwise| on.at(kind, wheel).unwrap_or(otherwise);
         let bias_rad_s = of(DisturbanceKind::EncoderBias, 0.0);
         let scaled = of(DisturbanceKind::EncoderScale, 1.0) * rate_rad_s;
-        scaled + bias_rad_s + self.drifted_rad_s[wheel]
+        let is_drifting = on.at(DisturbanceKind::EncoderDrift, wheel).is_some();
+        let drifted_rad_s = if is_drifting {
+            self.drifted_rad_s[wheel]
+        } else {
+            0.0
+        };
+        scaled + bias_rad_s + drifted_rad_s
     }
 
     /// What the encoders report at `t_s` when timely, unbroken ones would report `healthy_rad_s`.

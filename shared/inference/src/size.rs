@@ -157,7 +157,7 @@ mod tests {
     fn by_grid(rates: &[f64], readings: &[f64], noise: f64) -> (f64, f64, f64) {
         let (step, mut sums, mut prior) = (1e-4, [0.0; 3], 0.0);
         for i in -30_000..50_000 {
-            let gain = f64::from(i) * step;
+            let gain = (f64::from(i) + 0.5) * step;
             if (PRIOR.healthy[0]..=PRIOR.healthy[1]).contains(&gain) {
                 continue;
             }

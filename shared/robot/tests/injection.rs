@@ -65,7 +65,7 @@ fn kinds_stand_in_the_order_of_their_codes() {
         assert_eq!(DisturbanceKind::named(row.name), Some(row.kind));
     }
     assert_eq!(DisturbanceKind::from_wire(100), None);
-    assert_eq!(DisturbanceKind::from_wire(120), None);
+    assert_eq!(DisturbanceKind::from_wire(125), None);
 }
 
 #[test]

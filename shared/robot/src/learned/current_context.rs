@@ -173,8 +173,9 @@ mod tests {
             level.fade(0.01);
             level.learn(&read([-0.1, 0.02, 0.02, 0.02, 0.02, 0.02], [0.0; 6]));
         }
-        assert!(level.shift(0, 0.0).0 > -0.01);
-        assert!(level.shift(1, 0.0).0.abs() < 0.01);
+        // A fifth of what it lost at most is taken for its own, or for a slope.
+        assert!(level.shift(0, 0.0).0.abs() < 0.02);
+        assert!(level.shift(1, 0.0).0.abs() < 0.02);
     }
 
     #[test]
