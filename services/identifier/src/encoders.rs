@@ -48,16 +48,15 @@ pub const WAYS_TO_BREAK: [(SizeKind, Option<usize>); BREAKAGES.len() + WAYS] = [
     (SizeKind::DelayS, Some(DELAY)),
 ];
 
-/// Prior shares of the ways to break, in the order of the states.
+/// Prior rates of the ways to break, over that of an encoder which loses its wheel's rate, in the
+/// order of the states. Those of a size come on top: an encoder dies no less often for them.
 pub const SHARES: [f64; BREAKAGES.len() + WAYS] = {
-    let (mut shares, mut rest, mut i) = ([0.0; BREAKAGES.len() + WAYS], 1.0, 0);
-    while i < WAYS {
-        shares[BREAKAGES.len() + i] = SIZED_SHARES[i];
-        rest -= SIZED_SHARES[i];
-        i += 1;
-    }
-    while i < WAYS + BREAKAGES.len() {
-        shares[i - WAYS] = rest * BREAKAGE_SHARES[i - WAYS];
+    let (mut shares, mut i) = ([0.0; BREAKAGES.len() + WAYS], 0);
+    while i < BREAKAGES.len() + WAYS {
+        shares[i] = match i < BREAKAGES.len() {
+            true => BREAKAGE_SHARES[i],
+            false => SIZED_SHARES[i - BREAKAGES.len()],
+        };
         i += 1;
     }
     shares
@@ -150,7 +149,7 @@ impl Encoders {
         let mut p = [0.0; STATES];
         p[0] = 1.0 - ANYTHING;
         for (p, share) in p[1..OWN_RATE].iter_mut().zip(SHARES) {
-            *p = ANYTHING * (1.0 - ANYTHING_OWN_RATE) * share;
+            *p = ANYTHING * (1.0 - ANYTHING_OWN_RATE) * share / SHARES.iter().sum::<f64>();
         }
         p[OWN_RATE] = ANYTHING * ANYTHING_OWN_RATE;
         Self {
@@ -167,8 +166,8 @@ impl Encoders {
         self.onset[wheel] = t_ns;
     }
 
-    /// Another wheel begins to drag, and changes the rate of this one: that its encoder was off by a
-    /// size, if it was not believed, is not taken up to explain that.
+    /// Another wheel begins to drag, and changes the rate of this one: that its encoder was off by
+    /// a size, if it was not believed, is not taken up to explain that.
     pub fn forget_doubted_size(&mut self, wheel: usize) {
         let p = &mut self.p[wheel];
         let sized: f64 = p[SIZED..OWN_RATE].iter().sum();
@@ -304,7 +303,7 @@ mod tests {
     #[test]
     fn a_wheel_is_a_two_state_bayes_filter_when_every_breakage_reads_alike() {
         let likelihoods = Likelihoods::new(1, |_, state| if state == 0 { -3.0 } else { -1.0 });
-        let (births, death) = ([0.1; WHEELS], 0.2);
+        let (births, death) = ([0.1 / SHARES.iter().sum::<f64>(); WHEELS], 0.2);
         let mut encoders = Encoders::healthy(0);
         let (mut whole, mut broken) = (1.0_f64, 0.0_f64);
         for step in 1..=5 {

@@ -46,7 +46,7 @@ impl Engine {
         }
     }
 
-    /// Fills the probabilities of nodes, sets and unknown; the exact filter by what further channels
+    /// Fills the probabilities of nodes, sets and unknown; the exact filter by what more channels
     /// say too.
     pub fn posterior(&mut self, leaves: &Leaves, fusion: Option<&Fusion>, out: &mut Posterior) {
         match self {

@@ -1,4 +1,5 @@
-//! When the size of a diagnosed fault is told in the timeline: once it is clear, and when it changes.
+//! When the size of a diagnosed fault is told in the timeline: once it is clear, and when it
+//! changes.
 
 use vigil_blocks::{FaultBelief, SizeKind};
 

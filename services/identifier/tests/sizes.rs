@@ -12,7 +12,7 @@ use vigil_setup::schema;
 /// When the encoder of LM breaks, s after the first frame.
 const ONSET_S: f64 = 3.0;
 const LM: usize = 1;
-/// A healthy run that the model has not seen, at a constant speed: a gain and a bias read alike, and
+/// A healthy run that the model has not seen, at one speed: a gain and a bias read alike, and
 /// the sizes below are those of which the prior knows what they are.
 const RUN: u32 = 2;
 

@@ -9,7 +9,7 @@ use crate::track::Track;
 /// Standard deviations of an outlier over those of the noise.
 pub const SPREAD: f64 = 10.0;
 
-/// Logarithms of the densities of a residual of variance `spread`, `noise` of which is the sensor's:
+/// Logarithms of the densities of a residual of variance `spread`, `noise` of it the sensor's:
 /// as it should be, and as an outlier, where such come with the probability `rate`.
 fn log_densities(residual: f64, spread: f64, noise: f64, rate: f64) -> (f64, f64) {
     let wide = spread + (SPREAD * SPREAD - 1.0) * noise;
@@ -44,7 +44,7 @@ pub struct Trust {
 }
 
 impl Trust {
-    /// Variances of a measured pose: that of an axis grows, up to the square of its residual, by the
+    /// Variances of a measured pose: that of an axis grows, up to its squared residual, by the
     /// probability that it is an outlier, as `rates` say, under weighted hypotheses (logarithms).
     /// Where so many in a row would be a fluke, it is none.
     pub fn variance<'a>(

@@ -2,7 +2,7 @@
 //!
 //! A reading is linear in the size and in an offset beside it, so that the size's belief stays
 //! Gaussian and the likelihood of a reading integrates over it (Rao-Blackwell). The prior has no
-//! mass where healthy ones are: a normal prior cut off there gives a normal posterior cut off there,
+//! mass where healthy ones are: a normal prior cut off there gives a posterior cut off there,
 //! and the evidence of the cut-off prior is that of the whole one times the ratio of the masses
 //! beyond, posterior to prior. [`Size::log_material`] is the posterior's.
 

@@ -63,7 +63,7 @@ pub enum DisturbanceKind {
     GyroScale,
     /// A current sensor reports a constant more, A.
     CurrentBias,
-    /// A current sensor reports what it would, noise included, scaled by a factor: 0 for a dead one.
+    /// A current sensor reports what it would, noise included, scaled: by 0 for a dead one.
     CurrentScale,
 }
 

@@ -185,23 +185,16 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
         software_version: env!("CARGO_PKG_VERSION").to_owned(),
         ..model.provenance
     };
+    let healthy = healthy_of(&runs, &labels, &model);
     match &args.more {
         Some(more) => {
             let runs = frames::read(more, &robot).map_err(CommandError::usage)?;
-            let all: Vec<&Run> = runs.iter().collect();
-            learn_further(&mut model, &all, more, &robot)?;
+            learn_further(&mut model, &runs.iter().collect::<Vec<_>>(), more, &robot)?;
         }
-        None => {
-            let is_healthy = |run: &&Run| {
-                let is_learned = model.provenance.runs_learned.contains(&run.id);
-                let mut labels = labels.iter().filter(|label| label.run == run.id);
-                is_learned && labels.all(Label::is_nominal)
-            };
-            let healthy: Vec<&Run> = runs.iter().filter(is_healthy).collect();
-            if further::is_in(&healthy) {
-                learn_further(&mut model, &healthy, frames_file, &robot)?;
-            }
+        None if further::is_in(&healthy) => {
+            learn_further(&mut model, &healthy, frames_file, &robot)?;
         }
+        None => {}
     }
     let model = model.sealed();
     let text = model.to_toml().map_err(CommandError::failure)?;
@@ -221,6 +214,16 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
     };
     printed.map_err(CommandError::failure)?;
     Ok(Outcome::Done)
+}
+
+/// The runs without a fault that a model was learned from.
+fn healthy_of<'a>(runs: &'a [Run], labels: &[Label], model: &Model) -> Vec<&'a Run> {
+    let is_healthy = |run: &&Run| {
+        let is_learned = model.provenance.runs_learned.contains(&run.id);
+        let mut labels = labels.iter().filter(|label| label.run == run.id);
+        is_learned && labels.all(Label::is_nominal)
+    };
+    runs.iter().filter(is_healthy).collect()
 }
 
 /// Learns gyro and currents.
