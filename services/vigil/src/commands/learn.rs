@@ -212,8 +212,9 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
     } else {
         output::line(&table(&report, out))
     };
-    printed.map_err(CommandError::failure)?;
-    Ok(Outcome::Done)
+    printed
+        .map_err(CommandError::failure)
+        .map(|()| Outcome::Done)
 }
 
 /// The runs without a fault that a model was learned from.
