@@ -144,12 +144,20 @@ fn print_view<V: Serialize + Display>(
     Ok(Outcome::Done)
 }
 
-fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, CommandError> {
+/// Refuses a file to write into a folder that is not there.
+fn check_folder(out: &Path) -> Result<(), CommandError> {
     let folder = out.parent().filter(|f| !f.as_os_str().is_empty());
-    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-        let refused = format!("--out: there is no folder {}", folder.display());
-        return Err(CommandError::usage(refused));
+    match folder.filter(|folder| !folder.is_dir()) {
+        Some(folder) => {
+            let refused = format!("--out: there is no folder {}", folder.display());
+            Err(CommandError::usage(refused))
+        }
+        None => Ok(()),
     }
+}
+
+fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, CommandError> {
+    check_folder(out)?;
     let robot = args.robot.load()?;
     let Some(labels_file) = &args.runs else {
         if robot.has_fault_models() {
