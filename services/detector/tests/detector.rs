@@ -150,7 +150,7 @@ fn a_jump_of_the_pose_frame_is_no_fault() {
     let alarm_s = Bench::new(schema::Sensors::PoseEncoders)
         .alarm_s(&frames)
         .unwrap();
-    assert!((7.0..7.2).contains(&alarm_s));
+    assert!((7.0..7.2).contains(&alarm_s), "{alarm_s}");
 }
 
 #[test]
