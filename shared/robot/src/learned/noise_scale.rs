@@ -81,7 +81,7 @@ pub struct NoiseScale {
     sum: f64,
     count: f64,
     outliers: f64,
-    was_far: bool,
+    far_in_a_row: u32,
 }
 
 impl Default for NoiseScale {
@@ -90,26 +90,31 @@ impl Default for NoiseScale {
             sum: PRIOR,
             count: PRIOR,
             outliers: 0.0,
-            was_far: false,
+            far_in_a_row: 0,
         }
     }
 }
 
 impl NoiseScale {
-    /// Takes the square of a difference divided by its variance under the learned noise. What is
+    /// Takes the square of a difference of some order, divided by its variance under the learned
+    /// noise. What is
     /// too large is told by the noise as it is believed to be: so the estimate is right at every
     /// ratio, and not only near 1.
-    pub fn push(&mut self, normalised_square: f64) {
+    pub fn push(&mut self, normalised_square: f64, order: u32) {
         if normalised_square.is_nan() {
             return;
         }
         let fading = 1.0 - 1.0 / MEMORY;
         let ratio = (self.sum / self.count).max(RATIO_MIN);
         let largest = CLIP * ratio;
-        // There and back again: what stays there is no outlier.
+        // There and back again: what stays there is far in one difference less, and no outlier.
         let is_far = normalised_square > FAR * ratio;
-        let is_outlier = is_far && self.was_far;
-        self.was_far = is_far;
+        self.far_in_a_row = if is_far {
+            self.far_in_a_row.saturating_add(1)
+        } else {
+            0
+        };
+        let is_outlier = self.far_in_a_row > order;
         self.outliers = self.outliers * fading + f64::from(u8::from(is_outlier));
         self.sum = self.sum * fading + normalised_square.clamp(0.0, largest) / CLIPPED_MEAN;
         self.count = self.count * fading + 1.0;
@@ -194,7 +199,7 @@ impl SensorNoise {
             let [a, b, c] = all.map(|o| o.pose_variance(model, [1.0; 3]));
             for i in 0..a.len() {
                 let bend = up[i] - down[i];
-                self.pose[i].push(bend * bend / (a[i] + 4.0 * b[i] + c[i]));
+                self.pose[i].push(bend * bend / (a[i] + 4.0 * b[i] + c[i]), 2);
             }
         }
         let surge = (now.command[1] - last.command[1]).abs();
@@ -243,7 +248,7 @@ fn push_step(
     let sample = model.sample_variance(sd, now.frame_s);
     let step = now_read.mean - last_read.mean - expected;
     let variance = now.mean_variance(sample, now_read.plain);
-    scale.push(step * step / (2.0 * variance));
+    scale.push(step * step / (2.0 * variance), 1);
 }
 
 #[cfg(test)]
@@ -259,17 +264,36 @@ mod tests {
             let mut scale = NoiseScale::default();
             for i in 0..3000 {
                 let x: f64 = rng.sample(StandardNormal);
-                scale.push(if i % 100 == 0 {
-                    f64::INFINITY
-                } else {
-                    x * x * ratio
-                });
+                let square = match i % 100 == 0 {
+                    true => f64::INFINITY,
+                    false => x * x * ratio,
+                };
+                scale.push(square, 1);
             }
             let found = scale.variance_ratio();
             assert!(
                 found > 0.95 * ratio && found < 1.3 * ratio,
                 "{ratio}: {found}"
             );
+        }
+    }
+
+    #[test]
+    fn an_impulse_is_an_outlier_and_a_step_is_none_in_differences_of_either_order() {
+        // Squares of the differences that an impulse and a step leave.
+        for (order, impulse, step) in [
+            (1, [400.0, 400.0, 0.0], [400.0, 0.0, 0.0]),
+            (2, [400.0, 1600.0, 400.0], [400.0, 400.0, 0.0]),
+        ] {
+            let rate = |seen: [f64; 3]| {
+                let mut scale = NoiseScale::default();
+                for square in [1.0; 50].into_iter().chain(seen).chain([1.0; 50]) {
+                    scale.push(square, order);
+                }
+                scale.outlier_rate()
+            };
+            assert!((0.005..0.02).contains(&rate(impulse)), "{order}");
+            assert_eq!(rate(step), OUTLIER_RATE_MIN, "{order}");
         }
     }
 }
