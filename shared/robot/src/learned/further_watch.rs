@@ -264,7 +264,7 @@ impl FurtherWatch {
             }
             let step = is.mean - was.mean;
             let variance = now.mean_variance(model.sample_variance(sd, now.frame_s), is.plain);
-            self.noise[at].push(step * step / (2.0 * variance));
+            self.noise[at].push(step * step / (2.0 * variance), 1);
             self.seen[at] = self.seen[at].saturating_add(1);
         };
         let current = self.model.currents.as_ref().map_or(0.0, |all| all.noise_a);

@@ -97,9 +97,8 @@ impl Default for NoiseScale {
 
 impl NoiseScale {
     /// Takes the square of a difference of some order, divided by its variance under the learned
-    /// noise. What is
-    /// too large is told by the noise as it is believed to be: so the estimate is right at every
-    /// ratio, and not only near 1.
+    /// noise. What is too large is told by the noise as it is believed to be: so the estimate is
+    /// right at every ratio, and not only near 1.
     pub fn push(&mut self, normalised_square: f64, order: u32) {
         if normalised_square.is_nan() {
             return;
