@@ -381,7 +381,8 @@ mod tests {
             }
             seeds.insert(scenario.first_seed);
         }
-        let disturbed = file.scenario.iter().flat_map(|s| &s.faults);
+        let disturbed = file.scenario.iter();
+        let disturbed = disturbed.flat_map(|s| s.faults.iter().chain(&s.in_turn));
         let disturbed: BTreeSet<&str> = disturbed.filter_map(|s| s.split(':').next()).collect();
         assert!(KINDS.iter().all(|row| disturbed.contains(row.name)));
         assert!(seeds.len() > 40);
