@@ -14,6 +14,7 @@ use vigil_robot::Description;
 use vigil_robot::learned::{
     FaultRates, Healthy, Model, Moved, NoiseScales, Observation, Observer, Switching,
 };
+use vigil_setup::schema::Sensors;
 
 use crate::filters::{Kind, build};
 use crate::matched::{Outcome, Trace, in_parallel, log_odds, threshold};
@@ -63,7 +64,7 @@ impl Recorded {
             nominal: Vec::new(),
             stuck: Vec::new(),
             encoders: Vec::new(),
-            leaves: Leaves::new(&tree, &model, &robot)?,
+            leaves: Leaves::new(&tree, &model, &robot, Sensors::PoseEncoders)?,
             tree,
             decision,
             robot,
@@ -199,7 +200,7 @@ impl Recorded {
         let mut posterior = Posterior::nominal();
         for (t, observation) in run.observations[..steps].iter().enumerate() {
             filter.step(observation, NoiseScales::default());
-            filter.posterior(&mut posterior);
+            filter.posterior(None, &mut posterior);
             let p = posterior.nodes[0];
             trace.log_odds.push(((1.0 - p) / p).ln());
             if t == run.onset + JUDGED {

@@ -50,7 +50,7 @@ impl Engine {
     /// say too.
     pub fn posterior(&mut self, leaves: &Leaves, fusion: Option<&Fusion>, out: &mut Posterior) {
         match self {
-            Self::Exact(filter) => filter.fused(fusion, out),
+            Self::Exact(filter) => filter.posterior(fusion, out),
             Self::Generic(filter) => filter.posterior(leaves, out),
         }
     }

@@ -443,13 +443,9 @@ impl Exact {
         self.wheels.learn(&beside);
     }
 
-    /// Fills the probabilities of nodes, sets and unknown.
-    pub fn posterior(&mut self, out: &mut Posterior) {
-        self.fused(None, out);
-    }
-
-    /// The same by what further channels say too.
-    pub fn fused(&mut self, fusion: Option<&Fusion>, out: &mut Posterior) {
+    /// Fills the probabilities of nodes, sets and unknown, by what further channels say too where
+    /// there are any.
+    pub fn posterior(&mut self, fusion: Option<&Fusion>, out: &mut Posterior) {
         self.sets.clear();
         for hypothesis in self.bank.hypotheses() {
             let (p, encoders) = (hypothesis.log_weight.exp(), &hypothesis.state.encoders);

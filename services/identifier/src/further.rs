@@ -13,7 +13,7 @@ use vigil_inference::logspace::{log_add, log_normal};
 use vigil_robot::Description;
 use vigil_robot::learned::current_effects::{CurrentEffects, SHARES, STUCK};
 use vigil_robot::learned::further_watch::{FurtherWatch, Residual, Residuals, Turn};
-use vigil_robot::learned::{Further, Healthy, Model, Observation, Reading};
+use vigil_robot::learned::{Further, Healthy, Model, Observation, Reading, repeats};
 
 use crate::fault_rates::{BIRTH_1_S, DEATH_1_S};
 use crate::modes::Leaves;
@@ -37,8 +37,6 @@ const ANYTHING: f64 = 0.3;
 /// Share of readings that nothing explains, and their deviation over the usual one.
 const OUTLIER: f64 = 1e-3;
 const OUTLIER_SD: f64 = 10.0;
-/// Probability that a dead sensor does not repeat itself.
-const REPEAT_FAILS: f64 = 0.01;
 /// One observation speaks for or against a state by this much at most (natural logarithm).
 const LOG_MAX: f64 = 30.0;
 /// These channels change odds by this factor at most: what nominal motion makes impossible they do
@@ -178,16 +176,8 @@ impl FurtherFilter {
         healthy: &Healthy,
         learns: bool,
     ) -> Option<Residuals> {
-        let observation = seen.0;
-        let is_known = !observation.anchor && observation.dt_s > 0.0;
-        let turn = is_known.then(|| {
-            let step = observation.displacement(model, &model.nominal.motion);
-            let per_metre = step.per_metre[0] + healthy.context.mean[0];
-            let squared_s = observation.dt_s * observation.dt_s;
-            Turn {
-                rate_rad_s: per_metre * step.travel_m / observation.dt_s,
-                variance: observation.turn_variance / squared_s,
-            }
+        let turn = Turn::expected(model, seen.0, |step| {
+            (step.per_metre[0] + healthy.context.mean[0]) * step.travel_m
         });
         self.watch.take(model, robot, seen, turn, learns)
     }
@@ -446,12 +436,14 @@ fn shifted(residual: &Residual, by: f64, variance: f64) -> f64 {
 
 /// The same for a sensor that repeats itself, most often zero.
 fn dead(read: &Reading, residual: Option<Residual>, healthy: f64) -> f64 {
-    let repeats = f64::from(read.repeats) * ((1.0 - REPEAT_FAILS) / healthy).ln();
     // The first sample of a dead sensor differs from the last of a living one.
     let is_first = read.plain == 1 && read.zeros > 0;
-    let expected = residual.map_or(0.0, |residual| residual.expected);
-    match residual {
-        Some(residual) if is_first => shifted(&residual, -expected, residual.variance) + repeats,
-        _ => repeats + f64::from(read.plain) * (REPEAT_FAILS / (1.0 - healthy)).ln(),
+    match residual.filter(|_| is_first) {
+        Some(residual) => {
+            let repeats = Reading { plain: 0, ..*read };
+            shifted(&residual, -residual.expected, residual.variance)
+                + repeats::log_ratio(&repeats, healthy)
+        }
+        None => repeats::log_ratio(read, healthy),
     }
 }

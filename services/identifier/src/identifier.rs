@@ -120,7 +120,7 @@ impl Identifier {
         } = *models;
         model.check_robot(robot)?;
         check(settings)?;
-        let leaves = Leaves::of(tree, model, robot, sensors)?;
+        let leaves = Leaves::new(tree, model, robot, sensors)?;
         let use_wheels = sensors != schema::Sensors::Pose;
         let (engine, modes) = match settings.filter {
             schema::IdentifierFilter::Exact => {

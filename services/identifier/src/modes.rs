@@ -92,24 +92,12 @@ impl Leaves {
         nodes.any(Option::is_some)
     }
 
-    /// Reads the faults of the leaves.
+    /// Reads the faults of the leaves; those of gyro and currents need these sensors.
     ///
     /// # Errors
     /// [`IdentifierError::Leaf`] for a fault that the model does not know,
     /// [`IdentifierError::Twice`] for one that appears twice.
     pub fn new(
-        tree: &FaultTree,
-        model: &Model,
-        robot: &Description,
-    ) -> Result<Self, IdentifierError> {
-        Self::of(tree, model, robot, Sensors::PoseEncoders)
-    }
-
-    /// The same where these sensors take part: those of gyro and currents need them.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn of(
         tree: &FaultTree,
         model: &Model,
         robot: &Description,

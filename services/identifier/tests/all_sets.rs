@@ -18,6 +18,7 @@ use vigil_robot::learned::{
     WheelContext, WheelEvidence, motion_modes,
 };
 use vigil_robot::slip::{Condition, Situation, SlipModel, Soil};
+use vigil_setup::schema::Sensors;
 
 const WHEELS: usize = 6;
 const SETS: usize = 1 << WHEELS;
@@ -68,7 +69,7 @@ impl Rig {
         let tree = vigil_setup::load_tree(&path("config/trees/rover.toml")).unwrap();
         let modes = motion_modes(&model, &robot, SETS as u32 - 1, false, true);
         Self {
-            leaves: Leaves::new(&tree, &model, &robot).unwrap(),
+            leaves: Leaves::new(&tree, &model, &robot, Sensors::PoseEncoders).unwrap(),
             slip: SlipModel::new(&robot).unwrap(),
             modes: (0..SETS as u32)
                 .map(|set| {
@@ -175,7 +176,7 @@ impl Rig {
         for observation in rest {
             filter.step(observation, NoiseScales::default());
         }
-        filter.posterior(&mut posterior);
+        filter.posterior(None, &mut posterior);
         posterior.sets[0].leaves
     }
 

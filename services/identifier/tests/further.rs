@@ -37,7 +37,7 @@ impl Rover {
     }
 
     fn filter(&self) -> FurtherFilter {
-        let leaves = Leaves::of(&self.tree, &self.model, &self.robot, Sensors::All).unwrap();
+        let leaves = Leaves::new(&self.tree, &self.model, &self.robot, Sensors::All).unwrap();
         FurtherFilter::new(&self.model, &self.robot, &leaves, 0.01).unwrap()
     }
 

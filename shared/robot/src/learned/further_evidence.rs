@@ -7,13 +7,13 @@
 
 use nalgebra::SVector;
 use vigil_blocks::{Channel, WHEELS};
-use vigil_inference::logspace::log_add;
 use vigil_inference::outlier::tempered;
 
 use super::form::{Evidence, Form};
 use super::further::Further;
-use super::further_watch::{FurtherWatch, Residual, Turn};
-use super::{Model, Observation, Reading};
+use super::further_watch::{FurtherWatch, GYRO, Residual, Turn};
+use super::repeats::Repeats;
+use super::{Model, Observation};
 use crate::Description;
 
 /// Shares of the prior beside those of the other channels: how a fault of these first shows.
@@ -24,13 +24,6 @@ const SHARE_REPEATS: f64 = 0.05;
 /// wheel moves its current by about half a deviation, a broken sensor by many.
 const BIAS_CURRENT: f64 = 1.0;
 const BIAS_GYRO: f64 = 3.0;
-/// Probability that a frozen sensor does not repeat itself.
-const REPEAT_FAILS: f64 = 0.01;
-/// Bound of the flag of exact repeats.
-const REPEATS_LOG_ODDS_MAX: f64 = 40.0;
-
-/// Index of the gyro, after the currents.
-const GYRO: usize = WHEELS;
 
 /// Evidence of gyro and currents.
 #[derive(Debug, Clone)]
@@ -39,8 +32,7 @@ pub(super) struct FurtherEvidence {
     form: Form,
     currents: [Evidence<1>; WHEELS],
     gyro: Evidence<1>,
-    /// Log-odds of exact repeats, and what the last observation said for them.
-    repeats: [(f64, f64); WHEELS + 1],
+    repeats: [Repeats; WHEELS + 1],
     /// What the last observation said for a departure.
     gains: [f64; WHEELS + 1],
 }
@@ -54,7 +46,7 @@ impl FurtherEvidence {
             form,
             currents: [Evidence::new(form, BIAS_CURRENT); WHEELS],
             gyro: Evidence::new(form, BIAS_GYRO),
-            repeats: [(f64::NEG_INFINITY, 0.0); WHEELS + 1],
+            repeats: [Repeats::default(); WHEELS + 1],
             gains: [0.0; WHEELS + 1],
         })
     }
@@ -69,7 +61,7 @@ impl FurtherEvidence {
     pub fn forget(&mut self) {
         self.currents = [Evidence::new(self.form, BIAS_CURRENT); WHEELS];
         self.gyro = Evidence::new(self.form, BIAS_GYRO);
-        self.repeats = [(f64::NEG_INFINITY, 0.0); WHEELS + 1];
+        self.repeats = [Repeats::default(); WHEELS + 1];
         self.gains = [0.0; WHEELS + 1];
     }
 
@@ -89,9 +81,9 @@ impl FurtherEvidence {
         birth: impl Fn(f64) -> f64,
     ) {
         self.gains = [0.0; WHEELS + 1];
-        for (_, gain) in &mut self.repeats {
-            *gain = 0.0;
-        }
+        self.repeats
+            .iter_mut()
+            .for_each(|repeats| repeats.gain = 0.0);
         let seen = (observation, further);
         let Some(residuals) = self.watch.take(model, robot, seen, turn, !following) else {
             return;
@@ -101,13 +93,13 @@ impl FurtherEvidence {
         if let Some(healthy) = currents.map(|currents| currents.repeat_rate) {
             for wheel in 0..self.watch.wheels() {
                 let birth = birth(SHARE_REPEATS * share);
-                self.update_repeats(wheel, &further.currents[wheel], healthy, birth);
+                self.repeats[wheel].step(&further.currents[wheel], healthy, birth);
             }
             self.weigh_currents(&residuals.currents, birth(SHARE_CURRENTS * share));
         }
         if let Some(gyro) = self.watch.model().yaw_rate {
             let birth_repeats = birth(SHARE_REPEATS);
-            self.update_repeats(GYRO, &further.yaw_rate, gyro.repeat_rate, birth_repeats);
+            self.repeats[GYRO].step(&further.yaw_rate, gyro.repeat_rate, birth_repeats);
         }
         if let Some(residual) = residuals.yaw_rate {
             let whitened = residual.apart / residual.variance.sqrt();
@@ -137,15 +129,6 @@ impl FurtherEvidence {
         }
     }
 
-    /// A frozen sensor repeats itself; a healthy one hardly ever does.
-    fn update_repeats(&mut self, at: usize, read: &Reading, healthy: f64, birth: f64) {
-        let seen = f64::from(read.repeats) * ((1.0 - REPEAT_FAILS) / healthy).ln()
-            + f64::from(read.plain) * (REPEAT_FAILS / (1.0 - healthy)).ln();
-        let before = log_add(self.repeats[at].0, birth.ln());
-        let after = (before + seen).clamp(birth.ln(), REPEATS_LOG_ODDS_MAX);
-        self.repeats[at] = (after, seen.max(after - before));
-    }
-
     /// Log-odds and last gain of each channel: `(index, log_odds, gain)`; see [`Channel`].
     pub fn channels(&self, mut enter: impl FnMut(usize, f64, f64)) {
         for at in (0..self.watch.wheels()).chain([GYRO]) {
@@ -154,8 +137,8 @@ impl FurtherEvidence {
                 wheel => (Channel::current(wheel), &self.currents[wheel]),
             };
             enter(channel, evidence.log_odds(), self.gains[at]);
-            let (log_odds, gain) = self.repeats[at];
-            enter(channel, log_odds, gain);
+            let repeats = &self.repeats[at];
+            enter(channel, repeats.log_odds, repeats.gain);
         }
     }
 }

@@ -5,20 +5,14 @@
 
 use vigil_blocks::WHEELS;
 use vigil_inference::slow_state::{Drift, SlowState};
+use vigil_inference::track::Displacement;
 
 use super::current_context::{CurrentBeside, CurrentContext};
 use super::further::{Further, FurtherModel};
-use super::noise_scale::NoiseScale;
+use super::noise_scale::{NoiseScale, STEADY_COMMAND};
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Model, Observation, Reading};
 use crate::Description;
-
-/// Samples of a channel after which its noise counts as known.
-const KNOWN: f64 = 25.0;
-/// Difference of commanded and lagged curvature, 1/m, and changes of the command, up to which a
-/// drive counts as steady.
-const STEADY_1_M: f64 = 0.1;
-const STEADY: f64 = 1e-3;
 
 /// What the pose's track says of the gyro.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +21,25 @@ pub struct Turn {
     pub rate_rad_s: f64,
     /// Its variance by the lag of the body, (rad/s)².
     pub variance: f64,
+}
+
+impl Turn {
+    /// What a track says that turns by so much, rad, in a displacement; None where it starts anew.
+    #[must_use]
+    pub fn expected(
+        model: &Model,
+        observation: &Observation,
+        turned_rad: impl FnOnce(&Displacement) -> f64,
+    ) -> Option<Self> {
+        let is_known = !observation.anchor && observation.dt_s > 0.0;
+        is_known.then(|| {
+            let step = observation.displacement(model, &model.nominal.motion);
+            Self {
+                rate_rad_s: turned_rad(&step) / observation.dt_s,
+                variance: observation.turn_variance / (observation.dt_s * observation.dt_s),
+            }
+        })
+    }
 }
 
 /// One channel beside what is expected of it, in its own unit.
@@ -51,8 +64,8 @@ pub struct Residuals {
     pub yaw_rate: Option<Residual>,
 }
 
-/// Index of the gyro among the noise scales, after the currents.
-const GYRO: usize = WHEELS;
+/// Index of the gyro among these channels, after the currents.
+pub(super) const GYRO: usize = WHEELS;
 
 /// Follows gyro and currents.
 #[derive(Debug, Clone)]
@@ -63,7 +76,6 @@ pub struct FurtherWatch {
     bias: SlowState,
     bias_drift: Option<Drift>,
     noise: [NoiseScale; WHEELS + 1],
-    seen: [u32; WHEELS + 1],
     last: Option<(Observation, Further)>,
     turn_before: Option<f64>,
 }
@@ -86,7 +98,6 @@ impl FurtherWatch {
             bias: SlowState::default(),
             bias_drift,
             noise: [NoiseScale::default(); WHEELS + 1],
-            seen: [0; WHEELS + 1],
             last: None,
             turn_before: None,
         };
@@ -101,7 +112,6 @@ impl FurtherWatch {
         let drift = self.bias_drift.as_ref();
         self.bias = drift.map_or_else(SlowState::default, SlowState::new);
         self.noise = [NoiseScale::default(); WHEELS + 1];
-        self.seen = [0; WHEELS + 1];
         (self.last, self.turn_before) = (None, None);
     }
 
@@ -121,8 +131,8 @@ impl FurtherWatch {
     /// shows none.
     #[must_use]
     pub fn is_known(&self) -> bool {
-        let is_known = |at: usize| f64::from(self.seen[at]) >= KNOWN;
-        self.model.currents.is_none() || (0..self.wheels).any(is_known)
+        let mut currents = self.noise[..self.wheels].iter();
+        self.model.currents.is_none() || currents.any(NoiseScale::is_known)
     }
 
     /// Takes one observation; it `learns` from it unless a fault is suspected. None at rest.
@@ -251,32 +261,21 @@ impl FurtherWatch {
         (last, before): (&Observation, &Further),
         (now, further): (&Observation, &Further),
     ) {
-        let is_steady = |o: &Observation| {
-            o.moving && (o.command[0] - o.curvature).abs() < STEADY_1_M && o.dt_s > 0.0
-        };
         let change = |axis: usize| (now.command[axis] - last.command[axis]).abs();
-        if !(is_steady(now) && is_steady(last) && change(0) < STEADY && change(1) < STEADY) {
+        let is_same = change(0) < STEADY_COMMAND && change(1) < STEADY_COMMAND;
+        if !(now.is_steady() && last.is_steady() && is_same) {
             return;
         }
-        let mut push = |at: usize, sd: f64, was: &Reading, is: &Reading| {
-            if sd <= 0.0 || was.plain != is.plain || is.plain == 0 {
-                return;
-            }
-            let step = is.mean - was.mean;
-            let variance = now.mean_variance(model.sample_variance(sd, now.frame_s), is.plain);
-            self.noise[at].push(step * step / (2.0 * variance), 1);
-            self.seen[at] = self.seen[at].saturating_add(1);
-        };
         let current = self.model.currents.as_ref().map_or(0.0, |all| all.noise_a);
-        for wheel in 0..self.wheels {
-            push(
-                wheel,
-                current,
-                &before.currents[wheel],
-                &further.currents[wheel],
-            );
-        }
         let gyro = self.model.yaw_rate.map_or(0.0, |gyro| gyro.noise_rad_s);
-        push(GYRO, gyro, &before.yaw_rate, &further.yaw_rate);
+        for at in (0..self.wheels).chain([GYRO]) {
+            let (sd, readings) = match at {
+                GYRO => (gyro, [&before.yaw_rate, &further.yaw_rate]),
+                wheel => (current, [&before.currents[wheel], &further.currents[wheel]]),
+            };
+            if sd > 0.0 {
+                self.noise[at].push_step(model, now, sd, readings, 0.0);
+            }
+        }
     }
 }

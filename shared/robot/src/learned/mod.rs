@@ -19,6 +19,7 @@
 //! | [`further`] | gyro and motor currents: what was learned of them, and read |
 //! | [`current_effects`] | what a weak motor or a stuck wheel makes of all currents |
 //! | [`further_watch`] | gyro and currents beside what is expected of a healthy robot |
+//! | [`repeats`] | whether a sensor repeats itself exactly |
 //! | [`monitor`] | the detection filter over observations |
 
 mod body_lag;
@@ -41,6 +42,7 @@ pub mod noise_scale;
 pub mod observation;
 mod provenance;
 mod reading;
+pub mod repeats;
 pub mod switching;
 mod together;
 pub mod troubles;

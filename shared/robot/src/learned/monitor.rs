@@ -17,7 +17,7 @@ use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 use vigil_inference::outlier::tempered;
-use vigil_inference::track::Track;
+use vigil_inference::track::{Displacement, Track};
 
 pub use super::channels::Channels;
 use super::faults::{Faults, KINDS};
@@ -25,6 +25,7 @@ use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION};
 use super::further_evidence::FurtherEvidence;
 use super::further_watch::Turn;
 use super::noise_scale::{NoiseScales, SensorNoise};
+use super::repeats::Repeats;
 use super::wheel_context::{Beside, WheelContext};
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Further, Healthy, Model, Observation, Troubles};
@@ -40,12 +41,8 @@ const SHARE_ANY: f64 = 0.05;
 /// Standard deviation of a fault's bias in units of the whitened residual.
 const BIAS_POSE: f64 = 1.0;
 const BIAS_CHANNEL: f64 = 3.0;
-/// Probability that a frozen encoder does not repeat itself.
-const REPEAT_FAILS: f64 = 0.01;
 /// Log-odds of a channel that is silent, or moves when it should stand.
 const TROUBLE_LOG_ODDS: f64 = 40.0;
-/// Bound of the flag of exact repeats.
-const REPEATS_LOG_ODDS_MAX: f64 = 40.0;
 /// Diffusion of the pose per observation while following, in units of the measurement's deviation.
 const FOLLOWING: f64 = 0.1;
 /// Squared norm beyond which a single residual says no more for a deviation of any kind: it takes
@@ -75,7 +72,7 @@ pub struct Monitor {
     pose: Evidence<3>,
     wheels: [Evidence<1>; WHEELS],
     steer: [Evidence<1>; WHEELS],
-    repeats: [f64; WHEELS],
+    repeats: [Repeats; WHEELS],
     any: Constant,
     noise: SensorNoise,
     moved_s: f64,
@@ -91,7 +88,6 @@ struct Gains {
     pose: f64,
     any: f64,
     wheels: [f64; WHEELS],
-    repeats: [f64; WHEELS],
     steer: [f64; WHEELS],
 }
 
@@ -135,7 +131,7 @@ impl Monitor {
             pose: Evidence::new(form, BIAS_POSE),
             wheels: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
             steer: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
-            repeats: [0.0; WHEELS],
+            repeats: [Repeats::default(); WHEELS],
             any: Constant::default(),
             noise: SensorNoise::default(),
             moved_s: 0.0,
@@ -178,7 +174,7 @@ impl Monitor {
         self.pose = Evidence::new(self.form, BIAS_POSE);
         self.wheels = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
         self.steer = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
-        self.repeats = [self.birth(self.model.interval_s, SHARE_REPEATS).ln(); WHEELS];
+        self.repeats = [Repeats::default(); WHEELS];
         self.any = Constant::default();
         self.gains = Gains::default();
         if let Some(further) = &mut self.further {
@@ -249,7 +245,11 @@ impl Monitor {
         if let Some(read) = further
             && let Some(mut evidence) = self.further.take()
         {
-            let turn = self.turn(observation);
+            let turned = |step: &Displacement| self.track().turn(step);
+            let turn = match self.tracking {
+                true => Turn::expected(&self.model, observation, turned),
+                false => None,
+            };
             let birth = |share| self.birth(observation.dt_s, share);
             let (model, robot) = (&self.model, &self.robot);
             evidence.step(model, robot, (observation, read), (turn, following), birth);
@@ -257,6 +257,9 @@ impl Monitor {
         }
         self.report.evidence = 0.0;
         self.gains = Gains::default();
+        self.repeats
+            .iter_mut()
+            .for_each(|repeats| repeats.gain = 0.0);
         self.troubles = observation.troubles;
         // A robot at rest shows nothing of its noise.
         self.moved_s += observation.moved_s();
@@ -268,19 +271,6 @@ impl Monitor {
             self.step_steer(observation, scales);
         }
         self.sum_up();
-    }
-
-    /// What the track expects of the gyro.
-    fn turn(&self, observation: &Observation) -> Option<Turn> {
-        let is_known = self.tracking && !observation.anchor && observation.dt_s > 0.0;
-        is_known.then(|| {
-            let step = observation.displacement(&self.model, &self.model.nominal.motion);
-            let squared_s = observation.dt_s * observation.dt_s;
-            Turn {
-                rate_rad_s: self.track().turn(&step) / observation.dt_s,
-                variance: observation.turn_variance / squared_s,
-            }
-        })
     }
 
     fn step_pose(&mut self, observation: &Observation, following: bool, scales: NoiseScales) {
@@ -367,7 +357,8 @@ impl Monitor {
         let wheels = self.robot.wheels.len();
         for (i, sample) in samples.into_iter().enumerate().take(wheels) {
             let reading = &observation.wheels[i];
-            self.update_repeats(i, reading.plain, reading.repeats, birth_repeats);
+            let healthy = self.model.encoder.repeat_rate;
+            self.repeats[i].step(reading, healthy, birth_repeats);
             if reading.plain == 0 {
                 continue;
             }
@@ -392,18 +383,6 @@ impl Monitor {
         if !following {
             self.context.learn(&all);
         }
-    }
-
-    /// A frozen encoder repeats itself; a healthy one hardly ever does.
-    fn update_repeats(&mut self, wheel: usize, plain: u32, repeats: u32, birth: f64) {
-        let healthy = self.model.encoder.repeat_rate;
-        let seen = f64::from(repeats) * ((1.0 - REPEAT_FAILS) / healthy).ln()
-            + f64::from(plain) * (REPEAT_FAILS / (1.0 - healthy)).ln();
-        let before = log_add(self.repeats[wheel], birth.ln());
-        let after = (before + seen).clamp(birth.ln(), REPEATS_LOG_ODDS_MAX);
-        self.repeats[wheel] = after;
-        // At the lower bound there is nothing to lose: a gain below what was lost is none.
-        self.gains.repeats[wheel] = seen.max(after - before);
     }
 
     fn step_steer(&mut self, observation: &Observation, scales: NoiseScales) {
@@ -455,7 +434,7 @@ impl Monitor {
             for i in 0..self.robot.wheels.len() {
                 let channel = Channel::wheel_rate(i);
                 enter(channel, self.wheels[i].log_odds(), gains.wheels[i]);
-                enter(channel, self.repeats[i], gains.repeats[i]);
+                enter(channel, self.repeats[i].log_odds, self.repeats[i].gain);
                 if self.robot.wheels[i].steered {
                     enter(Channel::steer(i), self.steer[i].log_odds(), gains.steer[i]);
                 }

@@ -119,6 +119,31 @@ impl NoiseScale {
         self.count = self.count * fading + 1.0;
     }
 
+    /// Takes the first difference of a channel whose samples have the learned standard deviation
+    /// `sd`, of which `expected` is no noise.
+    pub fn push_step(
+        &mut self,
+        model: &Model,
+        now: &Observation,
+        sd: f64,
+        [last_read, now_read]: [&Reading; 2],
+        expected: f64,
+    ) {
+        if last_read.plain != now_read.plain || now_read.plain == 0 {
+            return;
+        }
+        let sample = model.sample_variance(sd, now.frame_s);
+        let step = now_read.mean - last_read.mean - expected;
+        let variance = now.mean_variance(sample, now_read.plain);
+        self.push(step * step / (2.0 * variance), 1);
+    }
+
+    /// True once the noise has been seen often enough.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        self.count >= PRIOR + KNOWN
+    }
+
     /// Share of the samples that are outliers.
     #[must_use]
     pub fn outlier_rate(&self) -> f64 {
@@ -136,10 +161,8 @@ impl NoiseScale {
 
 /// Samples of a channel after which its noise counts as known.
 const KNOWN: f64 = 25.0;
-/// Difference of commanded and lagged curvature, 1/m, and change of speed, m/s, up to which a drive
-/// counts as steady: further apart, the motion is not known well enough to tell it from noise.
-const STEADY_1_M: f64 = 0.1;
-const STEADY_M_S: f64 = 1e-3;
+/// Change of the command (speed, m/s, or curvature, 1/m) up to which it counts as the same.
+pub(super) const STEADY_COMMAND: f64 = 1e-3;
 
 /// How noisy the sensors are, from differences between successive observations.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -172,7 +195,7 @@ impl SensorNoise {
     /// enough: a broken encoder shows none.
     #[must_use]
     pub fn is_known(&self, use_wheels: bool) -> bool {
-        let is_known = |scale: &NoiseScale| scale.count >= PRIOR + KNOWN;
+        let is_known = NoiseScale::is_known;
         self.pose.iter().all(is_known) && (!use_wheels || self.wheels.iter().any(is_known))
     }
 
@@ -185,11 +208,8 @@ impl SensorNoise {
             return;
         };
         let all = [&before, &last, now];
-        let is_steady = |o: &&Observation| {
-            o.moving && (o.command[0] - o.curvature).abs() < STEADY_1_M && o.dt_s > 0.0
-        };
         let is_even = |o: &&Observation| (o.dt_s - now.dt_s).abs() < 0.2 * now.dt_s;
-        let steady = all.iter().all(is_steady) && all.iter().all(is_even);
+        let steady = all.iter().all(|o| o.is_steady()) && all.iter().all(is_even);
         if !steady || now.anchor || last.anchor {
             return;
         }
@@ -202,7 +222,7 @@ impl SensorNoise {
             }
         }
         let surge = (now.command[1] - last.command[1]).abs();
-        if surge < STEADY_M_S {
+        if surge < STEADY_COMMAND {
             let count = robot.wheels.len().min(WHEELS);
             let (rate, angle) = (model.noise.wheel_rate_rad_s, model.noise.steer_rad);
             let turns = |o: &Observation, i| rolling_rate(robot, i, o.command[0], o.command[1]);
@@ -210,10 +230,10 @@ impl SensorNoise {
             for i in 0..count {
                 let expected = turns(now, i) - turns(&last, i);
                 let readings = [&last.wheels[i], &now.wheels[i]];
-                push_step(&mut self.wheels[i], model, now, rate, readings, expected);
+                self.wheels[i].push_step(model, now, rate, readings, expected);
                 let expected = steers(now, i) - steers(&last, i);
                 let readings = [&last.steer[i], &now.steer[i]];
-                push_step(&mut self.steer[i], model, now, angle, readings, expected);
+                self.steer[i].push_step(model, now, angle, readings, expected);
             }
         }
     }
@@ -229,25 +249,6 @@ fn apart(model: &Model, last: &Observation, now: &Observation) -> [f64; 3] {
         now.pose[1] - last.pose[1] - (sin * forward + cos * left),
         wrap(wrap(now.pose[2] - last.pose[2]) - turn),
     ]
-}
-
-/// First difference of a channel whose samples have the learned standard deviation `sd`, of which
-/// `expected` is no noise.
-fn push_step(
-    scale: &mut NoiseScale,
-    model: &Model,
-    now: &Observation,
-    sd: f64,
-    [last_read, now_read]: [&Reading; 2],
-    expected: f64,
-) {
-    if last_read.plain != now_read.plain || now_read.plain == 0 {
-        return;
-    }
-    let sample = model.sample_variance(sd, now.frame_s);
-    let step = now_read.mean - last_read.mean - expected;
-    let variance = now.mean_variance(sample, now_read.plain);
-    scale.push(step * step / (2.0 * variance), 1);
 }
 
 #[cfg(test)]

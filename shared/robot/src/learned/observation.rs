@@ -26,6 +26,8 @@ const POSITION_MAX_M: f64 = 1e7;
 const STALE_MAX: u32 = 10;
 /// Part of a frame that may lack to an interval: frames are never exactly periodic.
 const NEARLY: f64 = 0.4;
+/// Difference of commanded and lagged curvature up to which a drive counts as steady, 1/m.
+const STEADY_1_M: f64 = 0.1;
 /// Part of the speed at which a robot counts as standing that is no command to creep.
 const STANDS: f64 = 0.1;
 
@@ -100,6 +102,12 @@ impl Observation {
     #[must_use]
     pub const fn moved_s(&self) -> f64 {
         if self.moving { self.dt_s } else { 0.0 }
+    }
+
+    /// True where the body follows the command closely enough to tell noise from motion.
+    #[must_use]
+    pub fn is_steady(&self) -> bool {
+        self.moving && (self.command[0] - self.curvature).abs() < STEADY_1_M && self.dt_s > 0.0
     }
 
     /// The displacement to this observation that a motion model expects.
