@@ -137,6 +137,7 @@ impl Recorded {
         let rates = FaultRates {
             fault_1_s: all_1_s * (1.0 - UNKNOWN) / faults,
             unknown_1_s: all_1_s * UNKNOWN,
+            further: 1.0,
             death_1_s: DEATH_1_S,
         };
         let switching = Switching::new(&self.model, &self.robot, wheels, encoders, &rates);

@@ -6,7 +6,6 @@ use vigil_blocks::{
 };
 use vigil_inference::ending::Ending;
 use vigil_inference::logspace::probability;
-use vigil_robot::alarm::{APPEARS_AGAIN_1_S, ENDS_1_S};
 use vigil_robot::learned::monitor::Channels;
 use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
 use vigil_robot::meaning::Finding;
@@ -100,6 +99,7 @@ impl Detector {
         let sight = sight_of(robot, settings);
         Self::watching(
             model.interval_s,
+            robot,
             alarm_log_odds,
             settings,
             sight,
@@ -129,17 +129,23 @@ impl Detector {
         let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
         let sight = sight_of(robot, settings);
-        Self::watching(model.interval_s, alarm_log_odds, settings, sight, |_| {
-            Watch::Nominal {
+        Self::watching(
+            model.interval_s,
+            robot,
+            alarm_log_odds,
+            settings,
+            sight,
+            |_| Watch::Nominal {
                 observer: Box::new(nominal::Observer::new(robot)),
                 monitor: Box::new(nominal::Monitor::new(model, channels, form, rate)),
                 last: Observed::default(),
-            }
-        })
+            },
+        )
     }
 
     fn watching(
         interval_s: f64,
+        robot: &Description,
         alarm_log_odds: f64,
         settings: &schema::Detector,
         sight: Sight,
@@ -155,7 +161,7 @@ impl Detector {
             watch,
             fault_rate_1_s: settings.fault_rate_1_h / 3600.0,
             alarm: Alarm::new(alarm_log_odds),
-            ending: Ending::new(APPEARS_AGAIN_1_S, ENDS_1_S),
+            ending: Ending::new(robot.fault_prior.again_1_s, robot.fault_prior.mended_1_s),
             particles,
             armed: false,
             moving: false,

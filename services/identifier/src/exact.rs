@@ -13,7 +13,7 @@
 use nalgebra::Vector3;
 use vigil_blocks::WHEELS;
 use vigil_inference::bank::{Bank, Hypothesis};
-use vigil_inference::outlier::Trust;
+use vigil_inference::outlier::{Trust, unvouched};
 use vigil_inference::track::{Context, Displacement};
 use vigil_robot::Description;
 use vigil_robot::learned::{
@@ -164,7 +164,8 @@ impl Exact {
         if observation.anchor {
             if observation.pose_frames > 0 {
                 for hypothesis in self.bank.hypotheses_mut() {
-                    hypothesis.state.track.anchor(observation.pose, variance);
+                    let track = &mut hypothesis.state.track;
+                    track.anchor(observation.pose, unvouched(variance));
                 }
             }
             return;
@@ -378,7 +379,6 @@ impl Exact {
 
     /// Weighs by the wheels' readings.
     fn weigh_wheels(&mut self, observation: &Observation, evidence: &WheelEvidence) {
-        let births = self.births_1_s.map(|rate| rate * observation.dt_s);
         let death = self.rates.death_1_s * observation.dt_s;
         let seen = Seen {
             model: &self.model,
@@ -398,12 +398,14 @@ impl Exact {
             evidence,
             mode: &modes[mode],
             encoders: &encoders,
-            births: &births,
+            births: &self.births_1_s.map(|rate| rate * observation.dt_s),
         };
         let sized = self.sizes.take(&sight, self.robot.wheels.len().min(WHEELS));
         self.prepared.fill(None);
         for hypothesis in self.bank.hypotheses_mut() {
             let index = hypothesis.mode;
+            let order = self.rates.order(self.modes[index].moved);
+            let births = self.births_1_s.map(|rate| rate * observation.dt_s * order);
             let prepare = || seen.prepared(&self.modes[index], &sized);
             let prepared = self.prepared[index].get_or_insert_with(prepare);
             let State {

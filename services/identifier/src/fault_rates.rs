@@ -1,20 +1,17 @@
-//! How often faults come and go while something is suspected.
+//! How often the faults of the leaves come and go.
 
+use vigil_robot::FaultPrior;
 use vigil_robot::learned::FaultRates;
 
 use crate::modes::Leaves;
 
-/// Prior rate of faults while something is suspected, 1/s of motion. An alarm has been raised:
-/// the rate over a robot's life would make the filter slow without making it more often right.
-pub const BIRTH_1_S: f64 = 0.01;
-/// Rate at which faults vanish, 1/s of motion.
-pub const DEATH_1_S: f64 = 1.0 / 60.0;
-
-/// Rates at which the leaves' faults come and go.
-pub fn fault_rates(leaves: &Leaves, p_unknown: f64) -> FaultRates {
+/// Rates of each leaf's fault and of the unknown, while something is suspected.
+pub fn fault_rates(prior: &FaultPrior, leaves: &Leaves, p_unknown: f64) -> FaultRates {
+    let first_1_s = prior.suspected_1_s;
     FaultRates {
-        fault_1_s: BIRTH_1_S * (1.0 - p_unknown) / leaves.count.max(1) as f64,
-        unknown_1_s: BIRTH_1_S * p_unknown,
-        death_1_s: DEATH_1_S,
+        fault_1_s: first_1_s * (1.0 - p_unknown) / leaves.count.max(1) as f64,
+        unknown_1_s: first_1_s * p_unknown,
+        further: (prior.further_1_s / first_1_s).min(1.0),
+        death_1_s: prior.mended_1_s,
     }
 }

@@ -10,12 +10,11 @@
 
 use vigil_blocks::{FaultBelief, SizeKind, WHEELS};
 use vigil_inference::logspace::{log_add, log_normal};
-use vigil_robot::Description;
 use vigil_robot::learned::current_effects::{CurrentEffects, SHARES, STUCK};
 use vigil_robot::learned::further_watch::{FurtherWatch, Residual, Residuals, Turn};
 use vigil_robot::learned::{Further, Healthy, Model, Observation, Reading, repeats};
+use vigil_robot::{Description, FaultPrior};
 
-use crate::fault_rates::{BIRTH_1_S, DEATH_1_S};
 use crate::modes::Leaves;
 use crate::node_sizes::TOLD_MIN;
 
@@ -83,6 +82,7 @@ pub struct Fusion {
 #[derive(Debug, Clone)]
 pub struct FurtherFilter {
     watch: FurtherWatch,
+    rates: FaultPrior,
     effects: Option<CurrentEffects>,
     states: Vec<State>,
     /// Share of the births that each state has.
@@ -128,6 +128,7 @@ impl FurtherFilter {
         }
         let mut filter = Self {
             watch,
+            rates: robot.fault_prior,
             effects: CurrentEffects::new(model, robot),
             states: vec![State::Whole, State::Unknown],
             shares: vec![0.0, p_unknown],
@@ -184,7 +185,10 @@ impl FurtherFilter {
 
     /// Takes an observation: the faults come and go, and its readings weigh them.
     pub fn step(&mut self, observation: &Observation, further: &Further, residuals: &Residuals) {
-        let (birth, death) = (BIRTH_1_S * observation.dt_s, DEATH_1_S * observation.dt_s);
+        let (birth, death) = (
+            self.rates.suspected_1_s * observation.dt_s,
+            self.rates.mended_1_s * observation.dt_s,
+        );
         let born: f64 = birth * self.shares.iter().sum::<f64>();
         for p in [&mut self.p, &mut self.prior] {
             let whole = p[0];

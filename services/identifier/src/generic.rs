@@ -85,7 +85,7 @@ impl Generic {
         } else {
             0
         };
-        let rates = fault_rates(leaves, settings.p_unknown);
+        let rates = fault_rates(&models.robot.fault_prior, leaves, settings.p_unknown);
         let (model, robot) = (models.model, models.robot);
         let switching = Switching::new(model, robot, leaves.stuck_wheels(), encoders, &rates);
         let meanings: Vec<Meaning> = (0..switching.modes())

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, ParticleBlock, SensorFrame};
+use vigil_robot::FaultPrior;
 use vigil_robot::learned::{Healthy, NoiseScales, Observation, Observer, motion_modes};
 use vigil_setup::schema;
 
@@ -15,7 +16,7 @@ use crate::detection::Detection;
 use crate::draw::copy;
 use crate::engine::Engine;
 use crate::exact::Exact;
-use crate::fault_rates::{BIRTH_1_S, DEATH_1_S, fault_rates};
+use crate::fault_rates::fault_rates;
 use crate::further_stage::FurtherStage;
 use crate::generic::Generic;
 use crate::modes::{IdentifierError, Leaves};
@@ -74,6 +75,7 @@ pub struct Identifier {
     /// What is known of a healthy robot of which the detector says nothing.
     unsure: Healthy,
     p_unknown: f64,
+    prior: FaultPrior,
     use_wheels: bool,
     /// Sensors are silent, or the robot moves though it should stand: nothing can be identified.
     in_trouble: bool,
@@ -124,7 +126,7 @@ impl Identifier {
         let use_wheels = sensors != schema::Sensors::Pose;
         let (engine, modes) = match settings.filter {
             schema::IdentifierFilter::Exact => {
-                let rates = fault_rates(&leaves, settings.p_unknown);
+                let rates = fault_rates(&robot.fault_prior, &leaves, settings.p_unknown);
                 let filter = Exact::new(model, robot, &leaves, use_wheels, rates);
                 let modes = filter.modes().to_vec();
                 (Engine::Exact(Box::new(filter)), modes)
@@ -150,6 +152,7 @@ impl Identifier {
             observer,
             unsure: Healthy::unsure(model, robot),
             p_unknown: settings.p_unknown,
+            prior: robot.fault_prior,
             use_wheels,
             in_trouble: false,
             particles: settings.particles,
@@ -344,7 +347,8 @@ impl Identifier {
         if taken == 0 {
             return;
         }
-        let (birth, death) = (BIRTH_1_S * moved_s, DEATH_1_S * moved_s);
+        let prior = &self.prior;
+        let (birth, death) = (prior.suspected_1_s * moved_s, prior.mended_1_s * moved_s);
         self.predicted = self
             .predicted
             .predicted(&self.leaves, self.p_unknown, birth, death);

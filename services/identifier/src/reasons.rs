@@ -6,6 +6,7 @@
 //! moment ago, and owes its past to the best.
 
 use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
+use vigil_inference::outlier::unvouched;
 use vigil_inference::track::Track;
 use vigil_robot::Description;
 use vigil_robot::learned::{
@@ -151,7 +152,7 @@ impl Reasons {
                 let step = observation.displacement(&self.model, &mode.motion);
                 track.predict(&step, &mode.noise);
             } else if observation.pose_frames > 0 {
-                track.anchor(observation.pose, variance);
+                track.anchor(observation.pose, unvouched(variance));
             }
         }
         if observation.moving && !observation.anchor {

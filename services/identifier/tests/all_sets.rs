@@ -163,6 +163,7 @@ impl Rig {
         let rates = FaultRates {
             fault_1_s: 8e-4,
             unknown_1_s: 5e-4,
+            further: 1.0,
             death_1_s: 1.0 / 60.0,
         };
         let mut filter = Exact::new(&self.model, &self.robot, &self.leaves, true, rates);

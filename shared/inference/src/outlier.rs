@@ -31,10 +31,18 @@ pub fn tempered(whitened: f64, rate: f64) -> f64 {
     square.max(0.0).sqrt().copysign(whitened)
 }
 
+/// Probability, at least, that an outlier follows an outlier: what disturbs a sensor lasts.
+const AGAIN: f64 = 0.01;
 /// Probability below which a run of outliers is none: the pose has jumped.
 const FLUKE: f64 = 1e-9;
 /// Log-odds of an outlier under the most probable hypothesis below which none need be thought of.
 const UNLIKELY: f64 = -7.0;
+
+/// Variances of a pose to start from, of which no other one tells whether it is an outlier.
+#[must_use]
+pub fn unvouched(variance: [f64; 3]) -> [f64; 3] {
+    variance.map(|variance| SPREAD * SPREAD * variance)
+}
 
 /// How far a measured pose can be trusted, axis by axis (x, y, yaw).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -54,10 +62,14 @@ impl Trust {
         variance: [f64; 3],
         rates: [f64; 3],
     ) -> [f64; 3] {
+        let again: [f64; 3] = std::array::from_fn(|i| match self.streak[i] {
+            0 => rates[i],
+            _ => rates[i].max(AGAIN),
+        });
         let said = |track: &Track| -> [(f64, (f64, f64)); 3] {
             let (apart, spread) = track.innovation(pose, variance);
             std::array::from_fn(|i| {
-                let densities = log_densities(apart[i], spread[(i, i)], variance[i], rates[i]);
+                let densities = log_densities(apart[i], spread[(i, i)], variance[i], again[i]);
                 (apart[i] * apart[i], densities)
             })
         };
@@ -80,7 +92,7 @@ impl Trust {
             }
         }
         std::array::from_fn(|i| {
-            let is_fluke = rates[i].powi(self.streak[i].saturating_add(1)) < FLUKE;
+            let is_fluke = rates[i] * rates[i].max(AGAIN).powi(self.streak[i]) < FLUKE;
             // Without a number, the measurement is what it is.
             let p = match far[i].is_finite() {
                 true => crate::logspace::probability(far[i] - usual[i]),

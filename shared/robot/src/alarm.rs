@@ -11,11 +11,6 @@ const CLEAR_S: f64 = 1.0;
 /// Slack when that time is compared, s: it is a sum of short intervals.
 const TIME_SLACK_S: f64 = 1e-6;
 
-/// Rate at which the fault that an alarm stands for comes again once it has ended, 1/s of motion.
-pub const APPEARS_AGAIN_1_S: f64 = 1e-3;
-/// Rate at which it ends, 1/s of motion.
-pub const ENDS_1_S: f64 = 1.0 / 60.0;
-
 /// An alarm that rises above a threshold and falls once the log-odds have been low for a second.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alarm {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use vigil_inference::track::MotionNoise;
 
-use crate::Tolerance;
+use crate::{FaultPrior, Tolerance};
 
 /// What kind of motion the command vector means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -143,6 +143,9 @@ pub struct Description {
     /// Healthy variation beside that of the runs learned from; left out: none.
     #[serde(default)]
     pub tolerance: Option<Tolerance>,
+    /// How often faults come and go; left out: as usual.
+    #[serde(default)]
+    pub fault_prior: FaultPrior,
     /// Limits.
     pub limits: Limits,
 }

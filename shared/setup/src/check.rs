@@ -385,6 +385,12 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
             format!("{value} is out of range: allowed is {allowed}"),
         );
     }
+    if let Some((key, value)) = robot.fault_prior.invalid() {
+        report(
+            &format!("fault_prior.{key}"),
+            format!("{value} is out of range: allowed is above 0 to 1"),
+        );
+    }
     let (noise, limits) = (&robot.noise, &robot.limits);
     let positive = [
         ("wheel_radius_m", robot.wheel_radius_m),

@@ -79,11 +79,49 @@ pub struct BodyLag {
     between: [f64; 2],
     /// Variances of `apart` over the candidates.
     coherent: [f64; 2],
+    late: Late,
     window: Window,
     /// Displacement per metre of travel beyond the model, by ground or a fault: m/m and rad/m.
     slip: [f64; 2],
     /// Mean square by which the fitting candidates miss, over that expected, less 1.
     misfit: f64,
+}
+
+/// What is not known of the body because the command changed at some instant between two frames:
+/// after a gap it may be about to follow, or have followed long ago. Standard deviations.
+#[derive(Debug, Clone, Copy, Default)]
+struct Late {
+    /// Of yaw rate, rad/s, and speed, m/s.
+    rates: [f64; 2],
+    /// Of turn, rad, and travel, m, that have come of it, fading.
+    moved: [f64; 2],
+    /// The same when an observation was completed last.
+    told: [f64; 2],
+}
+
+impl Late {
+    /// Lets `dt_s` pass, in which the rates that the command asks for changed by so much.
+    fn advance(&mut self, changes: [f64; 2], dt_s: f64, lag_s: f64) {
+        let stays = (-dt_s / lag_s).exp();
+        for (i, change) in changes.into_iter().enumerate() {
+            self.moved[i] += self.rates[i] * lag_s * (1.0 - stays);
+            // Between none of it and all that the lag allows, alike.
+            let new = change * (1.0 - stays) / 12.0_f64.sqrt();
+            self.rates[i] = (self.rates[i] * stays).hypot(new);
+        }
+    }
+
+    /// Growth of the variances of travel and turn over an observation.
+    fn complete(&mut self, fading: f64) -> [f64; 2] {
+        let grown = |i: usize| {
+            let told = fading * self.told[i];
+            (self.moved[i] * self.moved[i] - told * told).max(0.0)
+        };
+        let grown = [grown(1), grown(0)];
+        self.moved = self.moved.map(|moved| fading * moved);
+        self.told = self.moved;
+        grown
+    }
 }
 
 /// What was measured since a window began.
@@ -127,6 +165,11 @@ impl BodyLag {
         self.between[1] +=
             (swing_rad * swing_rad + middle[0] * middle[0] * surge_m * surge_m) / 12.0;
         let target = [middle[0] * middle[1], middle[1]];
+        let turns = command[0] * command[1] - self.command[0] * self.command[1];
+        let lag_s = self.candidates.iter().zip(LAGS_S);
+        let lag_s = lag_s.map(|(candidate, lag_s)| candidate.p * lag_s).sum();
+        self.late
+            .advance([turns, command[1] - self.command[1]], dt_s, lag_s);
         self.command = command;
         self.frames += 1;
         for (candidate, lag_s) in self.candidates.iter_mut().zip(LAGS_S) {
@@ -183,12 +226,13 @@ impl BodyLag {
             squares.sum()
         });
         let grown: [f64; 2] = std::array::from_fn(|i| (coherent[i] - self.coherent[i]).max(0.0));
+        let late = self.late.complete(fading);
         let followed = Followed {
             travel_m,
             turn_rad,
             speed_m_s,
-            travel_variance: self.between[0] + COHERENCE * grown[0],
-            turn_variance: self.between[1] + COHERENCE * grown[1],
+            travel_variance: self.between[0] + COHERENCE * (grown[0] + late[0]),
+            turn_variance: self.between[1] + COHERENCE * (grown[1] + late[1]),
         };
         for (sum, between) in self.window.between.iter_mut().zip(self.between) {
             *sum += between;

@@ -16,7 +16,7 @@ use vigil_blocks::{CHANNELS, Channel, WHEELS};
 use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
-use vigil_inference::outlier::tempered;
+use vigil_inference::outlier::{tempered, unvouched};
 use vigil_inference::track::{Displacement, Track};
 
 pub use super::channels::Channels;
@@ -30,7 +30,6 @@ use super::wheel_context::{Beside, WheelContext};
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Further, Healthy, Model, Observation, Troubles};
 use crate::Description;
-use crate::alarm::ENDS_1_S;
 
 /// Shares of the prior: how a fault first shows.
 const SHARE_POSE: f64 = 0.5;
@@ -48,6 +47,8 @@ const FOLLOWING: f64 = 0.1;
 /// Squared norm beyond which a single residual says no more for a deviation of any kind: it takes
 /// several to tell one from an outlier.
 const ANY_NORM_MAX: f64 = 12.0;
+/// Deviation of what a broken channel reads if it reads anything, in units of the residual's.
+const ANYTHING: f64 = 10.0;
 /// Residuals beyond this many deviations mean a lost track.
 const LOST: f64 = 10.0;
 /// Time in motion after which evidence counts, s: once the noise is known, and at the latest.
@@ -278,14 +279,14 @@ impl Monitor {
         let measured = observation.pose_frames > 0;
         if !self.tracking {
             if measured {
-                self.departure.start(observation.pose, variance);
+                self.departure.start(observation.pose, unvouched(variance));
                 self.tracking = true;
             }
             return;
         }
         if observation.anchor || self.coasted >= COAST_MAX {
             if measured {
-                self.departure.anchor(observation.pose, variance);
+                self.departure.anchor(observation.pose, unvouched(variance));
                 self.coasted = 0;
             }
             return;
@@ -300,7 +301,7 @@ impl Monitor {
         let suspected = following.then(|| Suspicion {
             variance: variance.map(|variance| FOLLOWING * FOLLOWING * variance),
             // At rest no fault ends.
-            ends: ENDS_1_S * observation.moved_s(),
+            ends: self.robot.fault_prior.mended_1_s * observation.moved_s(),
         });
         let kinds = self.faults.kinds(&self.model, observation, &step);
         self.departure.predict(&step, &kinds, birth, suspected);
@@ -376,7 +377,7 @@ impl Monitor {
             let (apart, variance) = (reading.mean - rate - shift, variance + uncertain);
             let whitened = tempered(apart / variance.sqrt(), scales.outliers.wheels[i]);
             self.wheels[i].step(&SVector::from([whitened]), birth);
-            self.gains.wheels[i] = self.wheels[i].gain();
+            self.gains.wheels[i] = with_anything(self.wheels[i].gain(), apart * apart / variance);
             self.report.evidence += log_normal(apart, variance);
         }
         // What a fault does is no context of the nominal mode.
@@ -467,6 +468,14 @@ impl Monitor {
         self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);
         self.report.channels = channels.map(|value| value.max(LOG_ODDS_MIN));
     }
+}
+
+/// What a reading says for a fault that either is a bias as learned, or makes the channel read
+/// anything: the logarithm of the likelihoods' ratio. `square` is that of the whitened residual.
+fn with_anything(gain: f64, square: f64) -> f64 {
+    let wide = 1.0 + ANYTHING * ANYTHING;
+    let anything = 0.5 * (square * (1.0 - 1.0 / wide) - wide.ln());
+    log_add(gain, anything) - std::f64::consts::LN_2
 }
 
 /// Log-odds below this are reported as this: no evidence for a fault at all.

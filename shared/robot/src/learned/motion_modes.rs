@@ -144,11 +144,23 @@ pub struct FaultRates {
     pub fault_1_s: f64,
     /// Rate at which something unknown happens, 1/s.
     pub unknown_1_s: f64,
+    /// Rate of a further fault of a robot that has one, over that of the first.
+    pub further: f64,
     /// Rate at which a fault vanishes, 1/s.
     pub death_1_s: f64,
 }
 
 impl FaultRates {
+    /// How much rarer than the first fault one is in a robot that moves like this.
+    #[must_use]
+    pub fn order(&self, from: Moved) -> f64 {
+        if from == Moved::Nominal {
+            1.0
+        } else {
+            self.further
+        }
+    }
+
     /// Rate at which `from` becomes `to`, 1/s; 0 if it takes several steps.
     #[must_use]
     pub fn rate_1_s(&self, from: Moved, to: Moved) -> f64 {
@@ -158,13 +170,14 @@ impl FaultRates {
             (before & !after).count_ones(),
         );
         let at_once = if more.max(fewer) > 1 { AT_ONCE } else { 1.0 };
+        let order = self.order(from);
         match to {
             _ if from == to => 0.0,
-            Moved::Unknown | Moved::UnknownAny => 0.5 * self.unknown_1_s,
-            Moved::Stuck(_) if fewer == 0 => self.fault_1_s * at_once,
+            Moved::Unknown | Moved::UnknownAny => 0.5 * self.unknown_1_s * order,
+            Moved::Stuck(_) if fewer == 0 => self.fault_1_s * at_once * order,
             // Another wheel instead of the only one.
             Moved::Stuck(_) if before.count_ones() == 1 && after.count_ones() == 1 => {
-                self.fault_1_s
+                self.fault_1_s * order
             }
             _ if more == 0 => self.death_1_s * at_once,
             _ => 0.0,
@@ -387,6 +400,7 @@ mod tests {
         let rates = FaultRates {
             fault_1_s: 2.0,
             unknown_1_s: 6.0,
+            further: 1.0,
             death_1_s: 5.0,
         };
         use Moved::{Nominal, Stuck, Unknown, UnknownAny};

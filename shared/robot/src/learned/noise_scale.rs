@@ -22,7 +22,9 @@ const RATIO_MIN: f64 = 0.1;
 /// A channel five times as noisy as learned is no healthy one: what is beyond is evidence.
 const RATIO_MAX: f64 = 25.0;
 /// Samples that the learned scale of 1 counts for.
-const PRIOR: f64 = 20.0;
+const PRIOR: f64 = 5.0;
+/// Ratio that is believed of a channel of which nothing was seen: a healthy one is hardly noisier.
+const UNSEEN: f64 = 16.0;
 /// Standard errors of the estimate by which it leans to the high side.
 const LEAN: f64 = 1.0;
 /// Samples over which the estimate forgets.
@@ -155,7 +157,9 @@ impl NoiseScale {
     #[must_use]
     pub fn variance_ratio(&self) -> f64 {
         let lean = 1.0 + LEAN * (3.9 / self.count).sqrt();
-        (self.sum / self.count * lean).clamp(RATIO_MIN, RATIO_MAX)
+        let ratio = self.sum / self.count * lean;
+        let unseen = ((PRIOR + KNOWN - self.count) / KNOWN).clamp(0.0, 1.0);
+        (ratio + unseen * (UNSEEN - ratio).max(0.0)).clamp(RATIO_MIN, RATIO_MAX)
     }
 }
 
@@ -178,15 +182,14 @@ impl SensorNoise {
     #[must_use]
     pub fn scales(&self) -> NoiseScales {
         let sd = |scale: &NoiseScale| scale.variance_ratio().sqrt();
-        let rate = NoiseScale::outlier_rate;
         NoiseScales {
             pose: self.pose.each_ref().map(sd),
             wheels: self.wheels.each_ref().map(sd),
             steer: self.steer.each_ref().map(sd),
             outliers: OutlierRates {
-                pose: self.pose.each_ref().map(rate),
-                wheels: self.wheels.each_ref().map(rate),
-                steer: self.steer.each_ref().map(rate),
+                pose: outlier_rates(&self.pose),
+                wheels: outlier_rates(&self.wheels),
+                steer: outlier_rates(&self.steer),
             },
         }
     }
@@ -237,6 +240,15 @@ impl SensorNoise {
             }
         }
     }
+}
+
+/// Outlier rates of channels of one kind: at least what the others have on average, but for the one
+/// that has most, which may be broken.
+fn outlier_rates<const N: usize>(all: &[NoiseScale; N]) -> [f64; N] {
+    let rates = all.each_ref().map(NoiseScale::outlier_rate);
+    let most = rates.iter().copied().fold(0.0, f64::max);
+    let usual = (rates.iter().sum::<f64>() - most) / (N - 1) as f64;
+    rates.map(|rate| rate.max(usual))
 }
 
 /// Displacement from one measured pose to the next (x, y, yaw), less that of the nominal motion.

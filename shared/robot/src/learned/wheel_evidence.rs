@@ -113,7 +113,8 @@ impl WheelEvidence {
             let variance = variance + behind + uncertain;
             evidence.nominal[i] = (mean + shift, variance);
             evidence.healthy[i] = read(EncoderState::Turning(mean + shift, variance, TAIL));
-            evidence.own_rate[i] = read(EncoderState::OwnRate);
+            // As uncertain by a change of the command as a wheel that follows it.
+            evidence.own_rate[i] = read(EncoderState::OwnRate(behind));
             evidence.any[i] = read(EncoderState::Any);
             evidence.broken[i] = BREAKAGES.map(read);
         }

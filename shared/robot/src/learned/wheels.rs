@@ -94,8 +94,9 @@ pub enum EncoderState {
     /// The encoder reports zero plus the sensor's noise: its wheel stands, or it is dead.
     Standing,
     /// A smooth rate of its own: that of the observation before, or nearly so. A wheel that slips
-    /// or is driven, a scaled or late encoder.
-    OwnRate,
+    /// or is driven, a scaled or late encoder. With the variance, (rad/s)², by which a change of the
+    /// command may have changed it.
+    OwnRate(f64),
     /// Anything.
     Any,
 }
@@ -140,10 +141,10 @@ impl EncoderModel {
                 let standing = self.common(reading, 0.0, variance, sample_sd);
                 log_add(standing, OUTLIER.ln() + noise)
             }
-            EncoderState::OwnRate => match reading.before {
+            EncoderState::OwnRate(changed) => match reading.before {
                 Some((before, count)) => {
                     let sample = sample_sd * sample_sd / f64::from(count);
-                    let variance = OWN_RATE_SD_RAD_S * OWN_RATE_SD_RAD_S + sample;
+                    let variance = OWN_RATE_SD_RAD_S * OWN_RATE_SD_RAD_S + changed + sample;
                     let smooth = self.common(reading, before, variance, sample_sd);
                     log_add(smooth, OUTLIER.ln() + noise)
                 }
@@ -234,7 +235,7 @@ mod tests {
     #[test]
     fn a_smooth_rate_of_its_own_is_neither_noise_nor_turning_as_commanded() {
         let states = [
-            EncoderState::OwnRate,
+            EncoderState::OwnRate(0.0),
             EncoderState::Turning(2.0, 4e-4, 0.02),
             EncoderState::Noise,
             EncoderState::Standing,
@@ -253,7 +254,7 @@ mod tests {
         // Without an observation before there is nothing to be near to.
         let first = reading(&[1.6]);
         let of = |state| model().log_likelihood(state, &first, 0.05);
-        assert_eq!(of(EncoderState::OwnRate), of(EncoderState::Noise));
+        assert_eq!(of(EncoderState::OwnRate(0.0)), of(EncoderState::Noise));
     }
 
     #[test]

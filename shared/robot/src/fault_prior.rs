@@ -1,0 +1,48 @@
+//! How often faults come and go, before anything is read.
+
+use serde::{Deserialize, Serialize};
+
+/// Prior rates of faults, per second of motion: a robot at rest neither breaks nor mends unseen.
+/// Assumed, as no log is long enough to learn them; they decide only while the readings do not.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FaultPrior {
+    /// The first fault, once the detector suspects one, 1/s. The rate over a robot's life would make
+    /// the diagnosis slow without making it more often right.
+    pub suspected_1_s: f64,
+    /// A further fault of a robot that has one, 1/s.
+    pub further_1_s: f64,
+    /// That a fault mends, 1/s.
+    pub mended_1_s: f64,
+    /// That the fault of an alarm comes again once it has ended, 1/s.
+    pub again_1_s: f64,
+}
+
+impl Default for FaultPrior {
+    fn default() -> Self {
+        Self {
+            suspected_1_s: 0.01,
+            // One an hour.
+            further_1_s: 1.0 / 3600.0,
+            // Five minutes: loose contacts and stones, not repairs.
+            mended_1_s: 1.0 / 300.0,
+            // An intermittent fault, in a quarter of an hour.
+            again_1_s: 1e-3,
+        }
+    }
+}
+
+impl FaultPrior {
+    /// The first rate that is out of range, and its name.
+    #[must_use]
+    pub fn invalid(&self) -> Option<(&'static str, f64)> {
+        let all = [
+            ("suspected_1_s", self.suspected_1_s),
+            ("further_1_s", self.further_1_s),
+            ("mended_1_s", self.mended_1_s),
+            ("again_1_s", self.again_1_s),
+        ];
+        all.into_iter()
+            .find(|&(_, rate)| !(rate > 0.0 && rate <= 1.0))
+    }
+}
