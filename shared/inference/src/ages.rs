@@ -17,8 +17,9 @@
 
 use nalgebra::SVector;
 
-use crate::logspace::log_add;
+use crate::logspace::{log_add, probability};
 use crate::onsets::{Onset, Onsets};
+use crate::outlier::SPREAD;
 
 /// Log-odds beyond which more evidence changes nothing.
 pub const LOG_ODDS_MAX: f64 = 700.0;
@@ -79,10 +80,17 @@ impl<const D: usize> Ages<D> {
     /// One step with the whitened residual and the probability `birth` that a fault appears in it.
     /// A residual that is not finite is no evidence.
     pub fn step(&mut self, residual: &SVector<f64, D>, birth: f64) {
-        let nominal = residual.norm_squared();
-        if !nominal.is_finite() {
+        self.step_with_outliers(residual, birth, 0.0);
+    }
+
+    /// The same of a residual that is an outlier with the probability `rate`, whether the fault is
+    /// there or not: it is evidence only as far as one state explains it and the other does not.
+    pub fn step_with_outliers(&mut self, residual: &SVector<f64, D>, birth: f64, rate: f64) {
+        let norm = residual.norm();
+        if !norm.is_finite() {
             return;
         }
+        let (nominal, _) = contaminated(norm * norm, rate);
         self.components.enter(Component {
             log_weight: birth.ln(),
             bias: SVector::zeros(),
@@ -92,7 +100,7 @@ impl<const D: usize> Ages<D> {
         let stays = (-birth).ln_1p();
         let mut highest = f64::NEG_INFINITY;
         for component in self.components.iter_mut() {
-            component.take(residual, nominal);
+            component.take(residual, nominal, rate);
             component.log_weight -= stays;
             highest = highest.max(component.log_weight);
         }
@@ -110,14 +118,27 @@ impl<const D: usize> Ages<D> {
     }
 }
 
+/// Of a squared whitened residual that is an outlier with the probability `rate`: the square that
+/// has its density where there are no outliers, and the variance of its noise by that.
+fn contaminated(square: f64, rate: f64) -> (f64, f64) {
+    if rate <= 0.0 {
+        return (square, 1.0);
+    }
+    let wide = SPREAD * SPREAD;
+    let usual = (-rate).ln_1p() - 0.5 * square;
+    let far = rate.ln() - SPREAD.ln() - 0.5 * square / wide;
+    let p = probability(far - usual);
+    (-2.0 * log_add(usual, far), 1.0 / (1.0 - p + p / wide))
+}
+
 impl<const D: usize> Component<D> {
     /// Conditions on a residual: the weight's ratio to the nominal density, then the bias.
-    fn take(&mut self, residual: &SVector<f64, D>, nominal: f64) {
+    fn take(&mut self, residual: &SVector<f64, D>, nominal: f64, rate: f64) {
         let spread = 1.0 + self.variance;
         let deviation = residual - self.bias;
-        self.log_weight += 0.5 * (nominal - deviation.norm_squared() / spread)
-            - 0.5 * self.dimensions * spread.ln();
-        let gain = self.variance / spread;
+        let (own, variance) = contaminated(deviation.norm_squared() / spread, rate);
+        self.log_weight += 0.5 * (nominal - own) - 0.5 * self.dimensions * spread.ln();
+        let gain = self.variance / (self.variance + variance);
         self.bias += gain * deviation;
         self.variance *= 1.0 - gain;
     }

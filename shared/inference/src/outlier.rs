@@ -38,10 +38,11 @@ const FLUKE: f64 = 1e-9;
 /// Log-odds of an outlier under the most probable hypothesis below which none need be thought of.
 const UNLIKELY: f64 = -7.0;
 
-/// Variances of a pose to start from, of which no other one tells whether it is an outlier.
+/// Variances of a pose to start from, of which no other one tells whether it is an outlier: between
+/// those of one that is none and of one, so that the next may be one as well.
 #[must_use]
 pub fn unvouched(variance: [f64; 3]) -> [f64; 3] {
-    variance.map(|variance| SPREAD * SPREAD * variance)
+    variance.map(|variance| SPREAD * variance)
 }
 
 /// How far a measured pose can be trusted, axis by axis (x, y, yaw).

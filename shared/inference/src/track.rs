@@ -3,8 +3,9 @@
 //! State: x, y, yaw; three offsets that are constant within a run, or drift; three deviations that
 //! follow an Ornstein-Uhlenbeck process along the path. Both are per commanded metre, in the order
 //! yaw, forward, lateral. What an offset takes from the travel, as motors do that yield, it takes
-//! from the turn as well; a deviation does not, as a slope on which the robot slips. The extended
-//! Kalman filter linearises about the heading at half the turn.
+//! from the turn as well. A deviation does not, as a slope on which the robot slips, and it turns
+//! round when the robot drives the other way. The extended Kalman filter linearises about the
+//! heading at half the turn.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -89,16 +90,26 @@ pub struct Displacement {
 pub struct Track {
     mean: SVector<f64, N>,
     covariance: SMatrix<f64, N, N>,
+    /// Direction of the last displacement: 1 forwards, -1 backwards, 0 none yet.
+    direction: f64,
 }
 
 impl From<Gaussian<N>> for Track {
     fn from(Gaussian { mean, covariance }: Gaussian<N>) -> Self {
-        Self { mean, covariance }
+        Self {
+            mean,
+            covariance,
+            direction: 0.0,
+        }
     }
 }
 
 impl From<Track> for Gaussian<N> {
-    fn from(Track { mean, covariance }: Track) -> Self {
+    fn from(
+        Track {
+            mean, covariance, ..
+        }: Track,
+    ) -> Self {
         Self { mean, covariance }
     }
 }
@@ -110,6 +121,7 @@ impl Track {
         let mut track = Self {
             mean: SVector::zeros(),
             covariance: SMatrix::zeros(),
+            direction: 0.0,
         };
         track.mean.fixed_rows_mut::<3>(0).copy_from(&pose);
         track
@@ -252,6 +264,7 @@ impl Track {
             covariance: self.covariance * share
                 + other.covariance * rest
                 + apart * apart.transpose() * (share * rest),
+            direction: self.direction,
         }
     }
 
@@ -265,6 +278,7 @@ impl Track {
     /// Moves by one displacement.
     pub fn predict(&mut self, step: &Displacement, noise: &MotionNoise) {
         let travel = step.travel_m;
+        self.face(travel);
         let moved = (Vector3::from(step.per_metre) + self.deviation()) * travel;
         let slipping = step.per_metre[0] * travel;
         let turn = moved[0] + slipping * self.mean[4];
@@ -308,6 +322,21 @@ impl Track {
         self.set(0, 6, &(pose_deviation * fading));
         self.set(3, 6, &(od * fading));
         self.set(6, 6, &(dd * (fading * fading) + fresh));
+    }
+
+    /// A slope pulls in one direction of the ground: per metre it turns round with the direction of
+    /// travel, as what the motors yield does not.
+    fn face(&mut self, travel_m: f64) {
+        if travel_m == 0.0 {
+            return;
+        }
+        let is_back = self.direction * travel_m < 0.0;
+        self.direction = travel_m.signum();
+        for i in [N - 2, N - 1].into_iter().filter(|_| is_back) {
+            self.mean[i] = -self.mean[i];
+            self.covariance.row_mut(i).neg_mut();
+            self.covariance.column_mut(i).neg_mut();
+        }
     }
 
     fn set(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {

@@ -3,6 +3,7 @@
 use nalgebra::SVector;
 use vigil_inference::ages::{self, Ages};
 use vigil_inference::constant::Constant;
+use vigil_inference::outlier::tempered;
 use vigil_inference::windowed::Windowed;
 
 /// Constant of the paper's forms per dimension: above 1, or nominal residuals are evidence.
@@ -87,11 +88,16 @@ impl<const D: usize> Evidence<D> {
         }
     }
 
-    /// Takes a whitened residual; `birth` is the probability that a fault appears with it.
-    pub(crate) fn step(&mut self, residual: &SVector<f64, D>, birth: f64) {
+    /// Takes a whitened residual; `birth` is the probability that a fault appears with it, and
+    /// `rate` that it is an outlier.
+    pub(crate) fn step(&mut self, residual: &SVector<f64, D>, birth: f64, rate: f64) {
         let tau_squared = TAU_SQUARED_PER_DIMENSION * D as f64;
+        if let Self::LearnedBias(filter) = self {
+            return filter.step_with_outliers(residual, birth, rate);
+        }
+        let residual = &residual.map(|residual| tempered(residual, rate));
         match self {
-            Self::LearnedBias(filter) => filter.step(residual, birth),
+            Self::LearnedBias(_) => {}
             Self::Constant(filter) => {
                 filter.step(residual.norm_squared(), tau_squared, birth, VANISHES);
             }
@@ -108,7 +114,7 @@ mod tests {
     fn after(form: Form, residual: f64) -> f64 {
         let mut evidence = Evidence::<1>::new(form, 1.0);
         for _ in 0..200 {
-            evidence.step(&SVector::from([residual]), 1e-6);
+            evidence.step(&SVector::from([residual]), 1e-6, 0.0);
         }
         evidence.log_odds()
     }

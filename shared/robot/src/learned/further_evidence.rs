@@ -7,7 +7,6 @@
 
 use nalgebra::SVector;
 use vigil_blocks::{Channel, WHEELS};
-use vigil_inference::outlier::tempered;
 
 use super::form::{Evidence, Form};
 use super::further::Further;
@@ -102,10 +101,9 @@ impl FurtherEvidence {
             self.repeats[GYRO].step(&further.yaw_rate, gyro.repeat_rate, birth_repeats);
         }
         if let Some(residual) = residuals.yaw_rate {
-            let whitened = residual.apart / residual.variance.sqrt();
-            let whitened = tempered(whitened, residual.outlier_rate);
-            self.gyro
-                .step(&SVector::from([whitened]), birth(SHARE_GYRO));
+            let whitened = SVector::from([residual.apart / residual.variance.sqrt()]);
+            let birth = birth(SHARE_GYRO);
+            self.gyro.step(&whitened, birth, residual.outlier_rate);
             self.gains[GYRO] = self.gyro.gain();
         }
     }
@@ -123,8 +121,8 @@ impl FurtherEvidence {
         for (wheel, residual) in all.iter().enumerate() {
             let Some(residual) = residual else { continue };
             let (apart, variance) = contrast((residual.apart, residual.variance), sums, others);
-            let whitened = tempered(apart / variance.sqrt(), residual.outlier_rate);
-            self.currents[wheel].step(&SVector::from([whitened]), birth);
+            let whitened = SVector::from([apart / variance.sqrt()]);
+            self.currents[wheel].step(&whitened, birth, residual.outlier_rate);
             self.gains[wheel] = self.currents[wheel].gain();
         }
     }

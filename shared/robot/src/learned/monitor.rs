@@ -16,7 +16,7 @@ use vigil_blocks::{CHANNELS, Channel, WHEELS};
 use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
-use vigil_inference::outlier::{tempered, unvouched};
+use vigil_inference::outlier::unvouched;
 use vigil_inference::track::{Displacement, Track};
 
 pub use super::channels::Channels;
@@ -39,7 +39,7 @@ const SHARE_STEER: f64 = 0.05;
 const SHARE_ANY: f64 = 0.05;
 /// Standard deviation of a fault's bias in units of the whitened residual.
 const BIAS_POSE: f64 = 1.0;
-const BIAS_CHANNEL: f64 = 3.0;
+const BIAS_CHANNEL: f64 = 30.0;
 /// Log-odds of a channel that is silent, or moves when it should stand.
 const TROUBLE_LOG_ODDS: f64 = 40.0;
 /// Diffusion of the pose per observation while following, in units of the measurement's deviation.
@@ -331,7 +331,7 @@ impl Monitor {
             Form::LearnedBias => self.departure.gain(),
             Form::Constant | Form::Windowed => {
                 let birth = self.birth(observation.dt_s, SHARE_POSE);
-                self.pose.step(&said.residual, birth);
+                self.pose.step(&said.residual, birth, 0.0);
                 self.pose.gain()
             }
         };
@@ -375,8 +375,8 @@ impl Monitor {
             });
             let (shift, uncertain) = self.context.shift(i, rolling);
             let (apart, variance) = (reading.mean - rate - shift, variance + uncertain);
-            let whitened = tempered(apart / variance.sqrt(), scales.outliers.wheels[i]);
-            self.wheels[i].step(&SVector::from([whitened]), birth);
+            let whitened = SVector::from([apart / variance.sqrt()]);
+            self.wheels[i].step(&whitened, birth, scales.outliers.wheels[i]);
             self.gains.wheels[i] = with_anything(self.wheels[i].gain(), apart * apart / variance);
             self.report.evidence += log_normal(apart, variance);
         }
@@ -409,8 +409,8 @@ impl Monitor {
             let noise = observation.mean_variance(sample, reading.plain);
             let variance = noise + extra * extra + behind * behind;
             let apart = self.robot.beyond_steer(reading.mean - angle);
-            let whitened = tempered(apart / variance.sqrt(), scales.outliers.steer[i]);
-            self.steer[i].step(&SVector::from([whitened]), birth);
+            let whitened = SVector::from([apart / variance.sqrt()]);
+            self.steer[i].step(&whitened, birth, scales.outliers.steer[i]);
             self.gains.steer[i] = self.steer[i].gain();
             self.report.evidence += log_normal(apart, variance);
         }

@@ -15,6 +15,9 @@ const FAR: f64 = 12.0;
 /// single sample is a fault, and what is no sensor any more.
 const OUTLIER_RATE_MIN: f64 = 1e-5;
 const OUTLIER_RATE_MAX: f64 = 0.1;
+/// Rate of outliers that is reckoned with before any sample was seen, and how many it counts for.
+const EXPECTED_RATE: f64 = 0.01;
+const EXPECTED: f64 = 0.05;
 /// Mean of a squared standard normal clipped at [`CLIP`].
 const CLIPPED_MEAN: f64 = 0.99;
 /// Bounds of the ratio.
@@ -242,13 +245,17 @@ impl SensorNoise {
     }
 }
 
-/// Outlier rates of channels of one kind: at least what the others have on average, but for the one
+/// Outlier rates of channels of one kind: at least what was seen of all together, but for the one
 /// that has most, which may be broken.
 fn outlier_rates<const N: usize>(all: &[NoiseScale; N]) -> [f64; N] {
-    let rates = all.each_ref().map(NoiseScale::outlier_rate);
-    let most = rates.iter().copied().fold(0.0, f64::max);
-    let usual = (rates.iter().sum::<f64>() - most) / (N - 1) as f64;
-    rates.map(|rate| rate.max(usual))
+    let most = |a: &&NoiseScale, b: &&NoiseScale| a.outliers.total_cmp(&b.outliers);
+    let most = all.iter().max_by(most).copied().unwrap_or_default();
+    let sum = |of: fn(&NoiseScale) -> f64| all.iter().map(of).sum::<f64>() - of(&most);
+    let (outliers, count) = (sum(|scale| scale.outliers), sum(|scale| scale.count));
+    let usual = (outliers + EXPECTED) / (count + EXPECTED / EXPECTED_RATE);
+    let bounded = |rate: f64| rate.clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX);
+    all.each_ref()
+        .map(|scale| bounded(scale.outlier_rate().max(usual)))
 }
 
 /// Displacement from one measured pose to the next (x, y, yaw), less that of the nominal motion.

@@ -28,6 +28,9 @@ const STALE_MAX: u32 = 10;
 const NEARLY: f64 = 0.4;
 /// Difference of commanded and lagged curvature up to which a drive counts as steady, 1/m.
 const STEADY_1_M: f64 = 0.1;
+/// Deviation of the pose of a robot that creeps or rests, an observation, over that of the sensor:
+/// its track follows the measured pose, and learns no slope from it.
+const RESTS: f64 = 0.1;
 /// Part of the speed at which a robot counts as standing that is no command to creep.
 const STANDS: f64 = 0.1;
 
@@ -117,8 +120,19 @@ impl Observation {
         Displacement {
             per_metre: motion.per_metre(self.curvature, self.speed, limit),
             travel_m: self.travel_m,
-            extra: self.lag_variance(),
+            extra: match self.moving {
+                true => self.lag_variance(),
+                false => self.resting_variance(model),
+            },
         }
+    }
+
+    /// The same of a robot that creeps or rests: per metre it slides by anything, on a slope.
+    fn resting_variance(&self, model: &Model) -> [f64; 3] {
+        let [position, yaw] = [model.noise.position_m, model.noise.yaw_rad].map(|sd| RESTS * sd);
+        let lag = self.lag_variance();
+        let rests = [yaw * yaw, position * position, position * position];
+        std::array::from_fn(|i| lag[i] + rests[i])
     }
 
     /// Variance of the yaw, forward and lateral displacement beyond the motion model: how the body

@@ -54,6 +54,7 @@ pub struct Watchdog {
     wheels_heard: u32,
     stopped_s: f64,
     rest: Option<[f64; 3]>,
+    rested_s: f64,
     pose_moving_s: f64,
     wheels_turning_s: f64,
 }
@@ -101,13 +102,22 @@ impl Watchdog {
 
     /// True if a pose is away from where the robot rests, which follows it slowly.
     fn moves(&mut self, pose: [f64; 3], dt_s: f64, limits: &Limits) -> bool {
+        if self.rest.is_none() {
+            self.rested_s = 0.0;
+        }
+        // The mean of the first poses: one alone may be an outlier.
+        self.rested_s = (self.rested_s + dt_s).min(WANDERING_S);
         let rest = self.rest.get_or_insert(pose);
         let apart = [
             pose[0] - rest[0],
             pose[1] - rest[1],
             wrap(pose[2] - rest[2]),
         ];
-        let share = (dt_s / WANDERING_S).min(1.0);
+        let share = if dt_s > 0.0 {
+            dt_s / self.rested_s
+        } else {
+            0.0
+        };
         for (rest, apart) in rest.iter_mut().zip(apart) {
             *rest += share * apart;
         }
