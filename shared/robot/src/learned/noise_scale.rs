@@ -17,7 +17,7 @@ const OUTLIER_RATE_MIN: f64 = 1e-5;
 const OUTLIER_RATE_MAX: f64 = 0.1;
 /// Rate of outliers that is reckoned with before any sample was seen, and how many it counts for.
 const EXPECTED_RATE: f64 = 0.01;
-const EXPECTED: f64 = 0.05;
+const EXPECTED: f64 = 0.002;
 /// Mean of a squared standard normal clipped at [`CLIP`].
 const CLIPPED_MEAN: f64 = 0.99;
 /// Bounds of the ratio.
@@ -25,9 +25,7 @@ const RATIO_MIN: f64 = 0.1;
 /// A channel five times as noisy as learned is no healthy one: what is beyond is evidence.
 const RATIO_MAX: f64 = 25.0;
 /// Samples that the learned scale of 1 counts for.
-const PRIOR: f64 = 5.0;
-/// Ratio that is believed of a channel of which nothing was seen: a healthy one is hardly noisier.
-const UNSEEN: f64 = 16.0;
+const PRIOR: f64 = 20.0;
 /// Standard errors of the estimate by which it leans to the high side.
 const LEAN: f64 = 1.0;
 /// Samples over which the estimate forgets.
@@ -160,9 +158,7 @@ impl NoiseScale {
     #[must_use]
     pub fn variance_ratio(&self) -> f64 {
         let lean = 1.0 + LEAN * (3.9 / self.count).sqrt();
-        let ratio = self.sum / self.count * lean;
-        let unseen = ((PRIOR + KNOWN - self.count) / KNOWN).clamp(0.0, 1.0);
-        (ratio + unseen * (UNSEEN - ratio).max(0.0)).clamp(RATIO_MIN, RATIO_MAX)
+        (self.sum / self.count * lean).clamp(RATIO_MIN, RATIO_MAX)
     }
 }
 
@@ -171,9 +167,15 @@ const KNOWN: f64 = 25.0;
 /// Change of the command (speed, m/s, or curvature, 1/m) up to which it counts as the same.
 pub(super) const STEADY_COMMAND: f64 = 1e-3;
 
+/// Time in motion after which a channel whose noise was hardly seen counts as this many times as
+/// noisy as learned, in variance: no healthy one is noisier, and no drive shows its noise.
+const UNSEEN_S: f64 = 5.0;
+const UNSEEN: f64 = 16.0;
+
 /// How noisy the sensors are, from differences between successive observations.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SensorNoise {
+    moved_s: f64,
     pose: [NoiseScale; 3],
     wheels: [NoiseScale; WHEELS],
     steer: [NoiseScale; WHEELS],
@@ -184,7 +186,14 @@ impl SensorNoise {
     /// The ratios at present.
     #[must_use]
     pub fn scales(&self) -> NoiseScales {
-        let sd = |scale: &NoiseScale| scale.variance_ratio().sqrt();
+        let sd = |scale: &NoiseScale| {
+            let unseen = match self.moved_s < UNSEEN_S {
+                true => 0.0,
+                false => ((PRIOR + KNOWN - scale.count) / KNOWN).clamp(0.0, 1.0),
+            };
+            let ratio = scale.variance_ratio();
+            (ratio + unseen * (UNSEEN - ratio).max(0.0)).sqrt()
+        };
         NoiseScales {
             pose: self.pose.each_ref().map(sd),
             wheels: self.wheels.each_ref().map(sd),
@@ -208,6 +217,7 @@ impl SensorNoise {
     /// Second differences of the pose and first differences of wheel rates and steering angles,
     /// less what the nominal motion makes of them: neither a curve nor a fault that persists shows.
     pub fn update(&mut self, model: &Model, robot: &Description, now: &Observation) {
+        self.moved_s += now.moved_s();
         let [before, last] = self.history;
         self.history = [last, Some(*now)];
         let (Some(before), Some(last)) = (before, last) else {
