@@ -20,7 +20,7 @@ use vigil_inference::proposal::Proposal;
 use vigil_inference::resample::Resampling;
 use vigil_inference::track::TRACK_DIMENSION;
 use vigil_robot::learned::switching::{MODES_MAX, Seen};
-use vigil_robot::learned::{Healthy, Moved, NoiseScales, Observation, Switching};
+use vigil_robot::learned::{FaultRates, Healthy, Moved, NoiseScales, Observation, Switching};
 use vigil_setup::schema::{self, IdentifierFilter};
 
 use crate::assemble::Models;
@@ -85,7 +85,11 @@ impl Generic {
         } else {
             0
         };
-        let rates = fault_rates(&models.robot.fault_prior, leaves, settings.p_unknown);
+        let rates = FaultRates {
+            // Samples that took the wrong name come off it by another fault alone.
+            further: 1.0,
+            ..fault_rates(&models.robot.fault_prior, leaves, settings.p_unknown)
+        };
         let (model, robot) = (models.model, models.robot);
         let switching = Switching::new(model, robot, leaves.stuck_wheels(), encoders, &rates);
         let meanings: Vec<Meaning> = (0..switching.modes())

@@ -106,7 +106,11 @@ impl Watchdog {
             self.rested_s = 0.0;
         }
         // The mean of the first poses: one alone may be an outlier.
-        self.rested_s = (self.rested_s + dt_s).min(WANDERING_S);
+        self.rested_s += dt_s;
+        let over_s = match self.rested_s < LASTING_S {
+            true => self.rested_s,
+            false => WANDERING_S,
+        };
         let rest = self.rest.get_or_insert(pose);
         let apart = [
             pose[0] - rest[0],
@@ -114,7 +118,7 @@ impl Watchdog {
             wrap(pose[2] - rest[2]),
         ];
         let share = if dt_s > 0.0 {
-            dt_s / self.rested_s
+            (dt_s / over_s).min(1.0)
         } else {
             0.0
         };

@@ -41,6 +41,7 @@ pub fn rover() -> Description {
             current_a: 0.05,
         },
         tolerance: None,
+        fault_prior: vigil_robot::FaultPrior::default(),
         limits: Limits {
             curvature_1_m: 1.2,
             speed_m_s: 0.5,
