@@ -1,9 +1,11 @@
 //! Starts and ends graphs.
 
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -83,6 +85,8 @@ pub fn launch(config: &Path, name: &str, options: &[&str]) -> Output {
 /// A running graph; stopped, with all its services, when dropped.
 pub struct Running {
     launcher: Option<Child>,
+    /// What the launcher prints, read as it comes: a full pipe would hold it up.
+    printed: Option<JoinHandle<String>>,
     pub setup: Setup,
 }
 
@@ -99,13 +103,19 @@ impl Running {
             graph: Some(graph.clone()),
             ..GraphArgs::default()
         };
-        let launcher = binary("vigil-launcher")
+        let mut launcher = binary("vigil-launcher")
             .args(["--json", "--graph", &graph, "--config"])
             .arg(&args.config)
             .args(options)
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
+        let mut stdout = launcher.stdout.take().unwrap();
+        let printed = std::thread::spawn(move || {
+            let mut text = String::new();
+            stdout.read_to_string(&mut text).unwrap();
+            text
+        });
         let setup = GraphArgs {
             config: root().join(&args.config),
             ..args
@@ -114,6 +124,7 @@ impl Running {
         .unwrap();
         Self {
             launcher: Some(launcher),
+            printed: Some(printed),
             setup,
         }
     }
@@ -141,7 +152,7 @@ impl Running {
     /// Waits for the end and reads the summary.
     pub fn finish(mut self) -> Summary {
         let output = wait(self.launcher.take().unwrap());
-        let text = String::from_utf8(output.stdout).unwrap();
+        let text = self.printed.take().unwrap().join().unwrap();
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
         // A graph that was blind for a while has had a failure; a restart may take that long.
         let was_blind = json["blind"] != serde_json::json!({});

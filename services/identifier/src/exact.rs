@@ -123,6 +123,7 @@ impl Exact {
     pub fn restart(&mut self, healthy: &Healthy, t_ns: u64) {
         (self.context, self.wheels) = (healthy.context, healthy.wheels);
         self.sizes.clear();
+        self.trust = Trust::default();
         let state = State {
             track: healthy.track(&self.modes[NOMINAL].noise),
             encoders: Encoders::healthy(t_ns),
@@ -404,8 +405,8 @@ impl Exact {
         self.prepared.fill(None);
         for hypothesis in self.bank.hypotheses_mut() {
             let index = hypothesis.mode;
-            let order = self.rates.order(self.modes[index].moved);
-            let births = self.births_1_s.map(|rate| rate * observation.dt_s * order);
+            let factor = self.rates.factor(self.modes[index].moved);
+            let births = self.births_1_s.map(|rate| rate * observation.dt_s * factor);
             let prepare = || seen.prepared(&self.modes[index], &sized);
             let prepared = self.prepared[index].get_or_insert_with(prepare);
             let State {

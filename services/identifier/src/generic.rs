@@ -19,6 +19,7 @@ use vigil_inference::particles::factor;
 use vigil_inference::proposal::Proposal;
 use vigil_inference::resample::Resampling;
 use vigil_inference::track::TRACK_DIMENSION;
+use vigil_robot::Description;
 use vigil_robot::learned::switching::{MODES_MAX, Seen};
 use vigil_robot::learned::{FaultRates, Healthy, Moved, NoiseScales, Observation, Switching};
 use vigil_setup::schema::{self, IdentifierFilter};
@@ -68,6 +69,15 @@ pub struct Generic {
     degenerate_count: u32,
 }
 
+/// A particle in a wrong mode reaches the right one only by a change of fault: that is not rarer
+/// than a first one.
+fn rates(robot: &Description, leaves: &Leaves, p_unknown: f64) -> FaultRates {
+    FaultRates {
+        further: 1.0,
+        ..fault_rates(&robot.fault_prior, leaves, p_unknown)
+    }
+}
+
 impl Generic {
     /// A filter over the leaves of a tree.
     ///
@@ -85,11 +95,7 @@ impl Generic {
         } else {
             0
         };
-        let rates = FaultRates {
-            // Samples that took the wrong name come off it by another fault alone.
-            further: 1.0,
-            ..fault_rates(&models.robot.fault_prior, leaves, settings.p_unknown)
-        };
+        let rates = rates(models.robot, leaves, settings.p_unknown);
         let (model, robot) = (models.model, models.robot);
         let switching = Switching::new(model, robot, leaves.stuck_wheels(), encoders, &rates);
         let meanings: Vec<Meaning> = (0..switching.modes())

@@ -86,11 +86,11 @@ impl<const D: usize> Ages<D> {
     /// The same of a residual that is an outlier with the probability `rate`, whether the fault is
     /// there or not: it is evidence only as far as one state explains it and the other does not.
     pub fn step_with_outliers(&mut self, residual: &SVector<f64, D>, birth: f64, rate: f64) {
-        let norm = residual.norm();
-        if !norm.is_finite() {
+        let square = residual.norm_squared();
+        if !square.is_finite() {
             return;
         }
-        let (nominal, _) = contaminated(norm * norm, rate);
+        let (nominal, _) = contaminated(square, 1.0, rate, self.dimensions);
         self.components.enter(Component {
             log_weight: birth.ln(),
             bias: SVector::zeros(),
@@ -118,17 +118,19 @@ impl<const D: usize> Ages<D> {
     }
 }
 
-/// Of a squared whitened residual that is an outlier with the probability `rate`: the square that
-/// has its density where there are no outliers, and the variance of its noise by that.
-fn contaminated(square: f64, rate: f64) -> (f64, f64) {
-    if rate <= 0.0 {
+/// Of the square of a residual over its variance `spread`, 1 of which is the noise's, that is an
+/// outlier with the probability `rate`: the square that has its density where there are no
+/// outliers, and the variance of the noise by that.
+fn contaminated(square: f64, spread: f64, rate: f64, dimensions: f64) -> (f64, f64) {
+    if rate <= 0.0 || !square.is_finite() {
         return (square, 1.0);
     }
-    let wide = SPREAD * SPREAD;
+    let outlier = SPREAD * SPREAD;
+    let wide = 1.0 + (outlier - 1.0) / spread;
     let usual = (-rate).ln_1p() - 0.5 * square;
-    let far = rate.ln() - SPREAD.ln() - 0.5 * square / wide;
+    let far = rate.ln() - 0.5 * (dimensions * wide.ln() + square / wide);
     let p = probability(far - usual);
-    (-2.0 * log_add(usual, far), 1.0 / (1.0 - p + p / wide))
+    (-2.0 * log_add(usual, far), 1.0 / (1.0 - p + p / outlier))
 }
 
 impl<const D: usize> Component<D> {
@@ -136,7 +138,8 @@ impl<const D: usize> Component<D> {
     fn take(&mut self, residual: &SVector<f64, D>, nominal: f64, rate: f64) {
         let spread = 1.0 + self.variance;
         let deviation = residual - self.bias;
-        let (own, variance) = contaminated(deviation.norm_squared() / spread, rate);
+        let square = deviation.norm_squared() / spread;
+        let (own, variance) = contaminated(square, spread, rate, self.dimensions);
         self.log_weight += 0.5 * (nominal - own) - 0.5 * self.dimensions * spread.ln();
         let gain = self.variance / (self.variance + variance);
         self.bias += gain * deviation;

@@ -116,6 +116,7 @@ impl<const K: usize> Departure<K> {
     pub fn start(&mut self, pose: [f64; 3], variance: [f64; 3]) {
         let covariance = Matrix3::from_diagonal(&Vector3::from(variance));
         self.clear();
+        self.trust = Trust::default();
         self.track = Track::new(Vector3::from(pose), covariance, &self.nominal);
     }
 

@@ -23,6 +23,9 @@ fn log_densities(residual: f64, spread: f64, noise: f64, rate: f64) -> (f64, f64
 /// where outliers come with the probability `rate`.
 #[must_use]
 pub fn tempered(whitened: f64, rate: f64) -> f64 {
+    if whitened.is_nan() {
+        return whitened;
+    }
     let log_density = |residual: f64| {
         let body = (-rate).ln_1p() + log_normal(residual, 1.0);
         log_add(body, rate.ln() + log_normal(residual, SPREAD * SPREAD))
@@ -34,12 +37,12 @@ pub fn tempered(whitened: f64, rate: f64) -> f64 {
 /// Probability, at least, that an outlier follows an outlier: what disturbs a sensor lasts.
 const AGAIN: f64 = 0.01;
 /// Probability below which a run of outliers is none: the pose has jumped.
-const FLUKE: f64 = 1e-9;
+const FLUKE: f64 = 5e-10;
 /// Log-odds of an outlier under the most probable hypothesis below which none need be thought of.
 const UNLIKELY: f64 = -7.0;
 
-/// Variances of a pose to start from, of which no other one tells whether it is an outlier: between
-/// those of one that is none and of one, so that the next may be one as well.
+/// Variances of the first pose of a track. No earlier pose tells whether it is an outlier, so it is
+/// taken as noisier than a good one and less noisy than an outlier: the next pose can correct it.
 #[must_use]
 pub fn unvouched(variance: [f64; 3]) -> [f64; 3] {
     variance.map(|variance| SPREAD * variance)
@@ -161,7 +164,7 @@ mod tests {
         let nothing = trusted(&[near], [f64::NAN; 3]);
         assert_eq!(nothing, variance);
         // A sensor that never had an outlier has none; one that has some has few in a row.
-        for (rate, believed_after) in [(1e-10, 0), (0.01, 4)] {
+        for (rate, believed_after) in [(1e-10, 0), (1e-5, 3), (0.01, 4)] {
             let mut trust = Trust::default();
             let doubted = (0..20).filter(|_| {
                 let alone = std::iter::once((&near, 0.0));

@@ -43,6 +43,8 @@ pub struct Context {
     pub mean: Vector3<f64>,
     /// Covariance.
     pub covariance: Matrix3<f64>,
+    /// Direction of travel for which they hold: 1 forwards, -1 backwards, 0 any.
+    direction: f64,
 }
 
 impl MotionNoise {
@@ -59,19 +61,47 @@ impl Default for Context {
         Self {
             mean: Vector3::zeros(),
             covariance: Matrix3::zeros(),
+            direction: 0.0,
         }
     }
 }
 
 impl Context {
-    /// Forgets over a travel of `travel_m`, as the ground changes.
+    /// Of deviations with this mean and covariance, in the direction that the robot drives in.
+    #[must_use]
+    pub const fn new(mean: Vector3<f64>, covariance: Matrix3<f64>) -> Self {
+        Self {
+            mean,
+            covariance,
+            direction: 0.0,
+        }
+    }
+
+    /// Forgets over a travel of `travel_m`, as the ground changes. A slope turns round with the
+    /// direction of travel.
     pub fn fade(&mut self, travel_m: f64, noise: &MotionNoise) {
+        if turns_round(&mut self.direction, travel_m) {
+            for i in [1, 2] {
+                self.mean[i] = -self.mean[i];
+                self.covariance.row_mut(i).neg_mut();
+                self.covariance.column_mut(i).neg_mut();
+            }
+        }
         let fading = (-travel_m.abs() / noise.length_m).exp();
         let square = fading * fading;
         self.mean *= fading;
         self.covariance =
             self.covariance * square + (noise.offset + noise.deviation) * (1.0 - square);
     }
+}
+
+/// True if a travel of `travel_m` goes the other way than the `direction` before, which it becomes.
+fn turns_round(direction: &mut f64, travel_m: f64) -> bool {
+    let turns = *direction * travel_m < 0.0;
+    if travel_m != 0.0 {
+        *direction = travel_m.signum();
+    }
+    turns
 }
 
 /// One displacement.
@@ -160,11 +190,13 @@ impl Track {
         Context {
             mean: self.deviation(),
             covariance: view(3, 3) + across + across.transpose() + view(6, 6),
+            direction: self.direction,
         }
     }
 
-    /// The same pose in another mode, in a context. A fault's offsets add to it; in a mode with a
-    /// bound, a nominal one, it is what the deviations begin with.
+    /// The same pose in another mode, in a context. A fault's offsets add to it, which do not turn
+    /// round with the direction of travel; in a mode with a bound, a nominal one, it is what the
+    /// deviations begin with.
     #[must_use]
     pub fn enter(&self, context: &Context, noise: &MotionNoise) -> Self {
         let mut track = *self;
@@ -217,7 +249,9 @@ impl Track {
     /// within it is not material.
     #[must_use]
     pub fn log_material(&self, bound: &Vector3<f64>) -> f64 {
-        let Context { mean, covariance } = self.context();
+        let Context {
+            mean, covariance, ..
+        } = self.context();
         let mut within = 0.0;
         for i in 0..3 {
             let sd = (2.0 * covariance[(i, i)]).sqrt().max(f64::MIN_POSITIVE);
@@ -327,12 +361,8 @@ impl Track {
     /// A slope pulls in one direction of the ground: per metre it turns round with the direction of
     /// travel, as what the motors yield does not.
     fn face(&mut self, travel_m: f64) {
-        if travel_m == 0.0 {
-            return;
-        }
-        let is_back = self.direction * travel_m < 0.0;
-        self.direction = travel_m.signum();
-        for i in [N - 2, N - 1].into_iter().filter(|_| is_back) {
+        let turns = turns_round(&mut self.direction, travel_m);
+        for i in [N - 2, N - 1].into_iter().filter(|_| turns) {
             self.mean[i] = -self.mean[i];
             self.covariance.row_mut(i).neg_mut();
             self.covariance.column_mut(i).neg_mut();
@@ -385,124 +415,4 @@ impl Track {
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    fn noise() -> MotionNoise {
-        MotionNoise {
-            offset: Matrix3::new(4e-4, -1e-4, 0.0, -1e-4, 1e-4, 0.0, 0.0, 0.0, 1e-6),
-            deviation: Matrix3::new(2e-3, -9e-4, 0.0, -9e-4, 6e-4, 0.0, 0.0, 0.0, 3e-6),
-            length_m: 0.2,
-            white: Vector3::new(1e-5, 2e-5, 1e-6),
-            drift: Vector3::new(1e-4, 2e-4, 0.0),
-            bound: Vector3::repeat(f64::INFINITY),
-            changes_1_m: 0.0,
-        }
-    }
-
-    fn motion(state: &SVector<f64, N>, step: &Displacement) -> SVector<f64, N> {
-        let (travel, f) = (step.travel_m, step.per_metre);
-        let turn = (f[0] * (1.0 + state[4]) + state[3] + state[6]) * travel;
-        let forward = (f[1] + state[4] + state[7]) * travel;
-        let lateral = (f[2] + state[5] + state[8]) * travel;
-        let (sin, cos) = (state[2] + 0.5 * turn).sin_cos();
-        let mut out = *state;
-        out[0] += forward * cos - lateral * sin;
-        out[1] += forward * sin + lateral * cos;
-        out[2] += turn;
-        for i in 6..N {
-            out[i] *= (-travel / noise().length_m).exp();
-        }
-        out
-    }
-
-    #[test]
-    fn the_track_equals_a_plain_extended_kalman_filter() {
-        let noise = noise();
-        let start = Matrix3::from_diagonal(&Vector3::new(1e-4, 2e-4, 3e-4));
-        let mut track = Track::new(Vector3::new(1.0, 2.0, 0.5), start, &noise);
-        let mut plain = Gaussian {
-            mean: track.mean,
-            covariance: track.covariance,
-        };
-        let step = Displacement {
-            per_metre: [0.5, 0.9, 0.02],
-            travel_m: 0.05,
-            extra: [1e-6, 0.0, 0.0],
-        };
-        for k in 0..40 {
-            let jacobian = SMatrix::<f64, N, N>::from_fn(|i, j| {
-                let (mut up, mut down) = (plain.mean, plain.mean);
-                up[j] += 1e-6;
-                down[j] -= 1e-6;
-                (motion(&up, &step)[i] - motion(&down, &step)[i]) / 2e-6
-            });
-            let turn = (0.5 * (1.0 + plain.mean[4]) + plain.mean[3] + plain.mean[6]) * 0.05;
-            let (sin, cos) = (plain.mean[2] + 0.5 * turn).sin_cos();
-            let shift = motion(&plain.mean, &step) - jacobian * plain.mean;
-            let moved = motion(&plain.mean, &step) - plain.mean;
-            let body = Matrix3::new(
-                -0.5 * moved[1],
-                cos,
-                -sin,
-                0.5 * moved[0],
-                sin,
-                cos,
-                1.0,
-                0.0,
-                0.0,
-            );
-            let white = Matrix3::from_diagonal(&(noise.white * 0.05 + Vector3::from(step.extra)));
-            let mut q = SMatrix::<f64, N, N>::zeros();
-            q.fixed_view_mut::<3, 3>(0, 0)
-                .copy_from(&(body * white * body.transpose()));
-            let fading = (-0.05_f64 / 0.2).exp();
-            let fresh = noise.deviation * (1.0 - fading * fading);
-            q.fixed_view_mut::<3, 3>(6, 6).copy_from(&fresh);
-            q.fixed_view_mut::<3, 3>(3, 3)
-                .copy_from(&Matrix3::from_diagonal(&(noise.drift * 0.05)));
-            plain.predict(&jacobian, &shift, &q);
-            track.predict(&step, &noise);
-            let z = [1.0 + 0.04 * f64::from(k), 2.0, 0.5 + 0.03 * f64::from(k)];
-            let (apart, _) = track.innovation(z, [2.5e-5; 3]);
-            let observe = SMatrix::<f64, 3, N>::identity();
-            let r = Matrix3::identity() * 2.5e-5;
-            let expected = plain.update(&apart, &observe, &r).unwrap();
-            let found = track.update(z, [2.5e-5; 3]).unwrap();
-            assert!(
-                (expected - found).abs() < 1e-5 * (1.0 + expected.abs()),
-                "{k}"
-            );
-        }
-        assert!((plain.mean - track.mean).abs().max() < 1e-6);
-        assert!((plain.covariance - track.covariance).abs().max() < 1e-8);
-    }
-
-    #[test]
-    fn a_mixture_keeps_the_first_two_moments() {
-        let one = Track::new(Vector3::new(1.0, 0.0, 0.2), Matrix3::identity(), &noise());
-        let other = Track::new(
-            Vector3::new(2.0, 0.5, 0.0),
-            Matrix3::identity() * 3.0,
-            &noise(),
-        );
-        let mixed = one.mixed(&other, 0.25);
-        assert!((mixed.pose() - Vector3::new(1.75, 0.375, 0.05)).abs().max() < 1e-12);
-        // E[x²] - E[x]²: .25 (1 + 1) + .75 (3 + 4) - 1.75².
-        assert!((mixed.pose_covariance()[(0, 0)] - (0.5 + 5.25 - 3.0625)).abs() < 1e-12);
-        let mut wider = one;
-        wider.diffuse([0.5, 0.0, 0.0]);
-        assert!((wider.pose_covariance()[(0, 0)] - 1.5).abs() < 1e-12);
-    }
-
-    #[test]
-    fn impossible_measurements_change_nothing() {
-        let before = Track::new(Vector3::zeros(), Matrix3::identity(), &noise());
-        for bad in [f64::NAN, f64::INFINITY, 1e308] {
-            let mut track = before;
-            assert!(track.update([bad, 0.0, 0.0], [1e-4; 3]).is_none());
-            assert_eq!(track, before);
-        }
-    }
-}
+mod tests;

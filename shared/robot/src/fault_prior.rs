@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FaultPrior {
-    /// The first fault, once the detector suspects one, 1/s. The rate over a robot's life would make
-    /// the diagnosis slow without making it more often right.
+    /// The first fault, once the detector suspects one, 1/s. The rate over a robot's life would
+    /// make the diagnosis slow without making it more often right.
     pub suspected_1_s: f64,
-    /// A further fault of a robot that has one, 1/s.
+    /// A further fault of a robot whose motion shows one, 1/s; as often as the first at most.
     pub further_1_s: f64,
     /// That a fault mends, 1/s.
     pub mended_1_s: f64,
@@ -44,5 +44,23 @@ impl FaultPrior {
         ];
         all.into_iter()
             .find(|&(_, rate)| !(rate > 0.0 && rate <= 1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_that_is_none_is_told_by_its_name() {
+        assert_eq!(FaultPrior::default().invalid(), None);
+        for rate in [0.0, -1.0, 1.1, f64::NAN] {
+            let prior = FaultPrior {
+                mended_1_s: rate,
+                ..FaultPrior::default()
+            };
+            let found = prior.invalid().map(|(name, _)| name);
+            assert_eq!(found, Some("mended_1_s"), "{rate}");
+        }
     }
 }

@@ -95,7 +95,7 @@ struct Late {
     rates: [f64; 2],
     /// Of turn, rad, and travel, m, that have come of it, fading.
     moved: [f64; 2],
-    /// The same when an observation was completed last.
+    /// What was left of that when an observation was completed last.
     told: [f64; 2],
 }
 
@@ -114,7 +114,7 @@ impl Late {
     /// Growth of the variances of travel and turn over an observation.
     fn complete(&mut self, fading: f64) -> [f64; 2] {
         let grown = |i: usize| {
-            let told = fading * self.told[i];
+            let told = self.told[i];
             (self.moved[i] * self.moved[i] - told * told).max(0.0)
         };
         let grown = [grown(1), grown(0)];
@@ -376,6 +376,18 @@ mod tests {
             assert!(near, "{true_s}: {lag_s}");
             assert!(worst < 4.0, "{true_s}: {worst}");
         }
+    }
+
+    #[test]
+    fn after_a_gap_the_body_is_unsure_of_what_it_still_follows_and_then_sure_again() {
+        let mut late = Late::default();
+        // The speed changed in a gap of half a second; then nothing happens.
+        late.advance([0.0, 0.2], 0.5, 0.1);
+        late.advance([0.0; 2], 0.05, 0.1);
+        let [travel, turn] = late.complete(0.98);
+        assert!(travel > 0.0 && turn == 0.0);
+        late.rates = [0.0; 2];
+        assert_eq!(late.complete(0.98), [0.0; 2]);
     }
 
     #[test]

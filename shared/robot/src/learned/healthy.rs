@@ -35,10 +35,7 @@ impl Healthy {
         Self {
             pose: Vector3::zeros(),
             covariance: Matrix3::identity() * UNSURE_M * UNSURE_M,
-            context: Context {
-                mean: Vector3::zeros(),
-                covariance: noise.offset + noise.deviation,
-            },
+            context: Context::new(Vector3::zeros(), noise.offset + noise.deviation),
             wheels: WheelContext::new(robot.tolerance),
         }
     }
@@ -62,10 +59,10 @@ impl Healthy {
     #[must_use]
     pub fn from_block(block: &HealthyBelief, wheels: WheelContext) -> Option<Self> {
         let covariance = symmetric(&block.pose_covariance)?;
-        let context = Context {
-            mean: Vector3::from(block.deviation),
-            covariance: symmetric(&block.deviation_covariance)?,
-        };
+        let context = Context::new(
+            Vector3::from(block.deviation),
+            symmetric(&block.deviation_covariance)?,
+        );
         let pose = Vector3::from(block.pose);
         let is_finite = |vector: &Vector3<f64>| vector.iter().all(|value| value.is_finite());
         if !(is_finite(&pose) && is_finite(&context.mean) && covariance[(0, 0)] > 0.0) {
@@ -109,10 +106,10 @@ mod tests {
         Healthy {
             pose: Vector3::new(1.0, -2.0, 0.3),
             covariance: Matrix3::new(4e-4, 1e-5, 2e-5, 1e-5, 3e-4, -1e-5, 2e-5, -1e-5, 1e-4),
-            context: Context {
-                mean: Vector3::new(0.01, -0.03, 0.002),
-                covariance: Matrix3::from_diagonal(&Vector3::new(1e-5, 2e-5, 3e-5)),
-            },
+            context: Context::new(
+                Vector3::new(0.01, -0.03, 0.002),
+                Matrix3::from_diagonal(&Vector3::new(1e-5, 2e-5, 3e-5)),
+            ),
             wheels: WheelContext::default(),
         }
     }

@@ -151,9 +151,9 @@ pub struct FaultRates {
 }
 
 impl FaultRates {
-    /// How much rarer than the first fault one is in a robot that moves like this.
+    /// Factor on the rates of faults in a robot that moves like this: 1 if it is nominal.
     #[must_use]
-    pub fn order(&self, from: Moved) -> f64 {
+    pub fn factor(&self, from: Moved) -> f64 {
         if from == Moved::Nominal {
             1.0
         } else {
@@ -170,14 +170,14 @@ impl FaultRates {
             (before & !after).count_ones(),
         );
         let at_once = if more.max(fewer) > 1 { AT_ONCE } else { 1.0 };
-        let order = self.order(from);
+        let factor = self.factor(from);
         match to {
             _ if from == to => 0.0,
-            Moved::Unknown | Moved::UnknownAny => 0.5 * self.unknown_1_s * order,
-            Moved::Stuck(_) if fewer == 0 => self.fault_1_s * at_once * order,
+            Moved::Unknown | Moved::UnknownAny => 0.5 * self.unknown_1_s * factor,
+            Moved::Stuck(_) if fewer == 0 => self.fault_1_s * at_once * factor,
             // Another wheel instead of the only one.
             Moved::Stuck(_) if before.count_ones() == 1 && after.count_ones() == 1 => {
-                self.fault_1_s * order
+                self.fault_1_s * factor
             }
             _ if more == 0 => self.death_1_s * at_once,
             _ => 0.0,

@@ -15,8 +15,7 @@ const FAR: f64 = 12.0;
 /// single sample is a fault, and what is no sensor any more.
 const OUTLIER_RATE_MIN: f64 = 1e-5;
 const OUTLIER_RATE_MAX: f64 = 0.1;
-/// Rate of outliers that is reckoned with before any sample was seen, and how many it counts for.
-const EXPECTED_RATE: f64 = 0.01;
+/// Outliers that count as seen before any sample.
 const EXPECTED: f64 = 0.002;
 /// Mean of a squared standard normal clipped at [`CLIP`].
 const CLIPPED_MEAN: f64 = 0.99;
@@ -167,9 +166,9 @@ const KNOWN: f64 = 25.0;
 /// Change of the command (speed, m/s, or curvature, 1/m) up to which it counts as the same.
 pub(super) const STEADY_COMMAND: f64 = 1e-3;
 
-/// Time in motion after which a channel whose noise was hardly seen counts as this many times as
-/// noisy as learned, in variance: no healthy one is noisier, and no drive shows its noise.
+/// Time in motion after which a channel's noise should have been seen, s.
 const UNSEEN_S: f64 = 5.0;
+/// Ratio of the variances that is assumed where it was not: too noisy is safer than too quiet.
 const UNSEEN: f64 = 16.0;
 
 /// How noisy the sensors are, from differences between successive observations.
@@ -262,7 +261,7 @@ fn outlier_rates<const N: usize>(all: &[NoiseScale; N]) -> [f64; N] {
     let most = all.iter().max_by(most).copied().unwrap_or_default();
     let sum = |of: fn(&NoiseScale) -> f64| all.iter().map(of).sum::<f64>() - of(&most);
     let (outliers, count) = (sum(|scale| scale.outliers), sum(|scale| scale.count));
-    let usual = (outliers + EXPECTED) / (count + EXPECTED / EXPECTED_RATE);
+    let usual = (outliers + EXPECTED) / count;
     let bounded = |rate: f64| rate.clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX);
     all.each_ref()
         .map(|scale| bounded(scale.outlier_rate().max(usual)))
@@ -305,6 +304,20 @@ mod tests {
                 "{ratio}: {found}"
             );
         }
+    }
+
+    #[test]
+    fn one_channel_with_outliers_may_be_broken_and_two_warn_the_others() {
+        let expected = EXPECTED / (2.0 * PRIOR);
+        let mut all = [NoiseScale::default(); 3];
+        assert_eq!(outlier_rates(&all), [expected; 3]);
+        for square in [1.0, 400.0, 400.0, 1.0] {
+            all[0].push(square, 1);
+        }
+        let [own, other, _] = outlier_rates(&all);
+        assert!(own > 0.01 && other < 2.0 * expected, "{own} {other}");
+        all[1] = all[0];
+        assert!(outlier_rates(&all)[2] > 0.01);
     }
 
     #[test]

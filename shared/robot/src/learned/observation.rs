@@ -28,8 +28,8 @@ const STALE_MAX: u32 = 10;
 const NEARLY: f64 = 0.4;
 /// Difference of commanded and lagged curvature up to which a drive counts as steady, 1/m.
 const STEADY_1_M: f64 = 0.1;
-/// Deviation of the pose of a robot that creeps or rests, an observation, over that of the sensor:
-/// its track follows the measured pose, and learns no slope from it.
+/// Random motion of a robot that creeps or rests, per observation and axis, as a share of the pose
+/// sensor's deviation: its track follows the measured pose, and learns no slope from it.
 const RESTS: f64 = 0.1;
 /// Part of the speed at which a robot counts as standing that is no command to creep.
 const STANDS: f64 = 0.1;
@@ -127,19 +127,19 @@ impl Observation {
         }
     }
 
-    /// The same of a robot that creeps or rests: per metre it slides by anything, on a slope.
-    fn resting_variance(&self, model: &Model) -> [f64; 3] {
-        let [position, yaw] = [model.noise.position_m, model.noise.yaw_rad].map(|sd| RESTS * sd);
-        let lag = self.lag_variance();
-        let rests = [yaw * yaw, position * position, position * position];
-        std::array::from_fn(|i| lag[i] + rests[i])
-    }
-
     /// Variance of the yaw, forward and lateral displacement beyond the motion model: how the body
     /// follows a changing command is known only roughly.
     #[must_use]
     pub const fn lag_variance(&self) -> [f64; 3] {
         [self.turn_variance, self.travel_variance, 0.0]
+    }
+
+    /// The same of a robot that creeps or rests, which slides on a slope.
+    fn resting_variance(&self, model: &Model) -> [f64; 3] {
+        let [yaw, forward, lateral] = self.lag_variance();
+        let square = |sd: f64| RESTS * RESTS * sd * sd;
+        let [turns, slides] = [model.noise.yaw_rad, model.noise.position_m].map(square);
+        [yaw + turns, forward + slides, lateral + slides]
     }
 }
 

@@ -13,6 +13,7 @@ use vigil_inference::gaussian::Gaussian;
 use vigil_inference::hybrid::{Conditional, Modes, Sampled};
 use vigil_inference::logspace::{log_add, log_normal};
 use vigil_inference::normals::normal;
+use vigil_inference::outlier::unvouched;
 use vigil_inference::track::{Context, Displacement, TRACK_DIMENSION, Track};
 
 use super::{
@@ -168,7 +169,8 @@ impl Switching {
         let variance = observation.pose_variance(&self.model, noise.pose);
         let is_measured = observation.pose_frames > 0;
         let pose = is_measured.then_some((observation.pose, variance));
-        self.anchor = pose.filter(|_| observation.anchor);
+        let anchor = pose.filter(|_| observation.anchor);
+        self.anchor = anchor.map(|(pose, variance)| (pose, unvouched(variance)));
         for (step, mode) in self.steps.iter_mut().zip(&self.modes) {
             *step = observation.displacement(&self.model, &mode.motion.motion);
         }

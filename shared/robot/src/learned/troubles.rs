@@ -19,6 +19,8 @@ const WANDER_M: f64 = 0.05;
 const WANDER_RAD: f64 = 0.1;
 /// Time over which a slow wandering of the pose is taken for the map's, s.
 const WANDERING_S: f64 = 10.0;
+/// Poses whose mean is where the robot rests.
+const REST_POSES: u32 = 6;
 /// Deviations of the pose's noise that are no motion.
 const NOISE_SD: f64 = 6.0;
 /// A standing robot's wheels turn slower than this, rad/s.
@@ -54,7 +56,7 @@ pub struct Watchdog {
     wheels_heard: u32,
     stopped_s: f64,
     rest: Option<[f64; 3]>,
-    rested_s: f64,
+    rest_poses: u32,
     pose_moving_s: f64,
     wheels_turning_s: f64,
 }
@@ -87,7 +89,7 @@ impl Watchdog {
         let turns = at_rest && 2 * turning > heard;
         self.wheels_turning_s = lasting(self.wheels_turning_s, turns);
         if observation.anchor || !at_rest {
-            (self.rest, self.pose_moving_s) = (None, 0.0);
+            (self.rest, self.rest_poses, self.pose_moving_s) = (None, 0, 0.0);
         } else if observation.pose_frames > 0 {
             let moves = self.moves(observation.pose, dt_s, limits);
             self.pose_moving_s = lasting(self.pose_moving_s, moves);
@@ -102,30 +104,25 @@ impl Watchdog {
 
     /// True if a pose is away from where the robot rests, which follows it slowly.
     fn moves(&mut self, pose: [f64; 3], dt_s: f64, limits: &Limits) -> bool {
-        if self.rest.is_none() {
-            self.rested_s = 0.0;
-        }
         // The mean of the first poses: one alone may be an outlier.
-        self.rested_s += dt_s;
-        let over_s = match self.rested_s < LASTING_S {
-            true => self.rested_s,
-            false => WANDERING_S,
-        };
+        self.rest_poses = (self.rest_poses + 1).min(REST_POSES);
+        let is_found = self.rest_poses == REST_POSES;
         let rest = self.rest.get_or_insert(pose);
         let apart = [
             pose[0] - rest[0],
             pose[1] - rest[1],
             wrap(pose[2] - rest[2]),
         ];
-        let share = if dt_s > 0.0 {
-            (dt_s / over_s).min(1.0)
-        } else {
-            0.0
+        let share = match is_found {
+            true => (dt_s / WANDERING_S).min(1.0),
+            false => 1.0 / f64::from(self.rest_poses),
         };
         for (rest, apart) in rest.iter_mut().zip(apart) {
             *rest += share * apart;
         }
-        apart[0].hypot(apart[1]) > limits.position_m || apart[2].abs() > limits.yaw_rad
+        let is_apart =
+            apart[0].hypot(apart[1]) > limits.position_m || apart[2].abs() > limits.yaw_rad;
+        is_found && is_apart
     }
 }
 

@@ -94,8 +94,8 @@ pub enum EncoderState {
     /// The encoder reports zero plus the sensor's noise: its wheel stands, or it is dead.
     Standing,
     /// A smooth rate of its own: that of the observation before, or nearly so. A wheel that slips
-    /// or is driven, a scaled or late encoder. With the variance, (rad/s)², by which a change of the
-    /// command may have changed it.
+    /// or is driven, a scaled or late encoder. With the variance, (rad/s)², by which a change of
+    /// the command may have changed it.
     OwnRate(f64),
     /// Anything.
     Any,
