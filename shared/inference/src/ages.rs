@@ -90,7 +90,7 @@ impl<const D: usize> Ages<D> {
         if !square.is_finite() {
             return;
         }
-        let (nominal, _) = contaminated(square, 1.0, rate, self.dimensions);
+        let (nominal, _) = contaminated(square, rate, self.dimensions);
         self.components.enter(Component {
             log_weight: birth.ln(),
             bias: SVector::zeros(),
@@ -118,19 +118,19 @@ impl<const D: usize> Ages<D> {
     }
 }
 
-/// Of the square of a residual over its variance `spread`, 1 of which is the noise's, that is an
-/// outlier with the probability `rate`: the square that has its density where there are no
-/// outliers, and the variance of the noise by that.
-fn contaminated(square: f64, spread: f64, rate: f64, dimensions: f64) -> (f64, f64) {
+/// Of the square of a whitened residual that is an outlier with the probability `rate`: the square
+/// that has its density where there are no outliers, and the variance of the noise by that. An
+/// outlier has ten times the deviation of the whole residual: a bias that is not known yet widens
+/// it, so that a channel that reads anything keeps its evidence.
+fn contaminated(square: f64, rate: f64, dimensions: f64) -> (f64, f64) {
     if rate <= 0.0 || !square.is_finite() {
         return (square, 1.0);
     }
-    let outlier = SPREAD * SPREAD;
-    let wide = 1.0 + (outlier - 1.0) / spread;
+    let wide = SPREAD * SPREAD;
     let usual = (-rate).ln_1p() - 0.5 * square;
-    let far = rate.ln() - 0.5 * (dimensions * wide.ln() + square / wide);
+    let far = rate.ln() - dimensions * SPREAD.ln() - 0.5 * square / wide;
     let p = probability(far - usual);
-    (-2.0 * log_add(usual, far), 1.0 / (1.0 - p + p / outlier))
+    (-2.0 * log_add(usual, far), 1.0 / (1.0 - p + p / wide))
 }
 
 impl<const D: usize> Component<D> {
@@ -139,7 +139,7 @@ impl<const D: usize> Component<D> {
         let spread = 1.0 + self.variance;
         let deviation = residual - self.bias;
         let square = deviation.norm_squared() / spread;
-        let (own, variance) = contaminated(square, spread, rate, self.dimensions);
+        let (own, variance) = contaminated(square, rate, self.dimensions);
         self.log_weight += 0.5 * (nominal - own) - 0.5 * self.dimensions * spread.ln();
         let gain = self.variance / (self.variance + variance);
         self.bias += gain * deviation;

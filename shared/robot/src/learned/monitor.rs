@@ -16,7 +16,7 @@ use vigil_blocks::{CHANNELS, Channel, WHEELS};
 use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
-use vigil_inference::outlier::{tempered, unvouched};
+use vigil_inference::outlier::unvouched;
 use vigil_inference::track::{Displacement, Track};
 
 pub use super::channels::Channels;
@@ -377,11 +377,7 @@ impl Monitor {
             let (apart, variance) = (reading.mean - rate - shift, variance + uncertain);
             let whitened = SVector::from([apart / variance.sqrt()]);
             self.wheels[i].step(&whitened, birth, scales.outliers.wheels[i]);
-            self.gains.wheels[i] = with_anything(
-                self.wheels[i].gain(),
-                whitened[0],
-                scales.outliers.wheels[i],
-            );
+            self.gains.wheels[i] = with_anything(self.wheels[i].gain(), whitened[0] * whitened[0]);
             self.report.evidence += log_normal(apart, variance);
         }
         // What a fault does is no context of the nominal mode.
@@ -475,12 +471,11 @@ impl Monitor {
 }
 
 /// What a reading says for a fault that either is a bias as learned, or makes the channel read
-/// anything: the logarithm of the likelihoods' ratio. The whitened residual is an outlier with the
-/// probability `rate`.
-fn with_anything(gain: f64, whitened: f64, rate: f64) -> f64 {
+/// anything: the logarithm of the likelihoods' ratio. `square` is that of the whitened residual;
+/// where a fault is known to have been, an outlier rather is the fault's than the sensor's.
+fn with_anything(gain: f64, square: f64) -> f64 {
     let wide = 1.0 + ANYTHING * ANYTHING;
-    let nominal = tempered(whitened, rate).powi(2);
-    let anything = 0.5 * (nominal - whitened * whitened / wide - wide.ln());
+    let anything = 0.5 * (square * (1.0 - 1.0 / wide) - wide.ln());
     log_add(gain, anything) - std::f64::consts::LN_2
 }
 
