@@ -187,8 +187,8 @@ mod tests {
         let wanted = [
             "| departure | sensors | tolerance | runs | 0.5 | 3 |",
             "|---|---|---|---|---|---|",
-            "| departure/steer | pose | 0.012 rad | 2 | 0.50, 0.03 | 1.00, 0.95 |",
-            "| departure/tether | pose | 18 N | 1 | 0.00, 0.00 |  |",
+            "| departure/steer | pose | 0.014 rad | 2 | 0.50, 0.03 | 1.00, 0.95 |",
+            "| departure/tether | pose | 24 N | 1 | 0.00, 0.00 |  |",
         ];
         assert_eq!(lines[2..], wanted);
         assert!(table(&outcomes[3..]).is_empty());

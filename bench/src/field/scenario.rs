@@ -412,7 +412,7 @@ mod tests {
         let (file, _) = shipped();
         let named = |name: &str| file.scenario.iter().find(|s| s.name == name).unwrap();
         let healthy = named("departure/encoder-gain/0.5");
-        assert_eq!(healthy.faults, ["encoder-scale:W1:1.008000@10"]);
+        assert_eq!(healthy.faults, ["encoder-scale:W1:1.012000@10"]);
         let bars = |s: &Scenario| s.bars.iter().map(ToString::to_string).collect::<Vec<_>>();
         assert_eq!(bars(healthy), ["detected <= 0"]);
         assert!(named("departure/encoder-gain/1").bars.is_empty());

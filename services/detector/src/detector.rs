@@ -96,13 +96,11 @@ impl Detector {
         let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
         let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
-        let sight = sight_of(robot, settings);
         Self::watching(
             model.interval_s,
             robot,
             alarm_log_odds,
             settings,
-            sight,
             |particles| Watch::Faults {
                 observer: Box::new(match channels {
                     Channels::All => Observer::new(model, robot).with_further(),
@@ -128,19 +126,13 @@ impl Detector {
         let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
         let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
-        let sight = sight_of(robot, settings);
-        Self::watching(
-            model.interval_s,
-            robot,
-            alarm_log_odds,
-            settings,
-            sight,
-            |_| Watch::Nominal {
+        Self::watching(model.interval_s, robot, alarm_log_odds, settings, |_| {
+            Watch::Nominal {
                 observer: Box::new(nominal::Observer::new(robot)),
                 monitor: Box::new(nominal::Monitor::new(model, channels, form, rate)),
                 last: Observed::default(),
-            },
-        )
+            }
+        })
     }
 
     fn watching(
@@ -148,7 +140,6 @@ impl Detector {
         robot: &Description,
         alarm_log_odds: f64,
         settings: &schema::Detector,
-        sight: Sight,
         watch: impl FnOnce(usize) -> Watch,
     ) -> Result<Self, DetectorError> {
         if !(1..=PARTICLE_CAPACITY).contains(&settings.particles) {
@@ -165,7 +156,7 @@ impl Detector {
             particles,
             armed: false,
             moving: false,
-            sight,
+            sight: sight_of(robot, settings),
             publisher: None,
             period_s: interval_s,
             t_last_ns: 0,

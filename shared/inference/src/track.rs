@@ -82,9 +82,7 @@ impl Context {
     pub fn fade(&mut self, travel_m: f64, noise: &MotionNoise) {
         if turns_round(&mut self.direction, travel_m) {
             for i in [1, 2] {
-                self.mean[i] = -self.mean[i];
-                self.covariance.row_mut(i).neg_mut();
-                self.covariance.column_mut(i).neg_mut();
+                reverse(&mut self.mean, &mut self.covariance, i);
             }
         }
         let fading = (-travel_m.abs() / noise.length_m).exp();
@@ -102,6 +100,17 @@ fn turns_round(direction: &mut f64, travel_m: f64) -> bool {
         *direction = travel_m.signum();
     }
     turns
+}
+
+/// Changes the sign of one component of a Gaussian.
+fn reverse<const D: usize>(
+    mean: &mut SVector<f64, D>,
+    covariance: &mut SMatrix<f64, D, D>,
+    i: usize,
+) {
+    mean[i] = -mean[i];
+    covariance.row_mut(i).neg_mut();
+    covariance.column_mut(i).neg_mut();
 }
 
 /// One displacement.
@@ -363,9 +372,7 @@ impl Track {
     fn face(&mut self, travel_m: f64) {
         let turns = turns_round(&mut self.direction, travel_m);
         for i in [N - 2, N - 1].into_iter().filter(|_| turns) {
-            self.mean[i] = -self.mean[i];
-            self.covariance.row_mut(i).neg_mut();
-            self.covariance.column_mut(i).neg_mut();
+            reverse(&mut self.mean, &mut self.covariance, i);
         }
     }
 

@@ -134,7 +134,7 @@ const fn row(
 
 const ANGLE: &[Parameter] = &[parameter("RAD", -0.6, 0.6, 0.2)];
 const SLOPE: &[Parameter] = &[parameter("RAD", -0.3, 0.3, 0.15)];
-const PULL: &[Parameter] = &[parameter("N", 0.0, 60.0, 20.0)];
+const PULL: &[Parameter] = &[parameter("N", 0.0, 100.0, 20.0)];
 const LOSS: &[Parameter] = &[parameter("SHARE", 0.0, 1.0, 0.5)];
 const BIAS: &[Parameter] = &[parameter("RAD_PER_S", -0.5, 0.5, 0.02)];
 const DRIFT: &[Parameter] = &[parameter("M_PER_S", -0.5, 0.5, 0.02)];

@@ -89,8 +89,8 @@ fn a_disturbance_has_the_values_given_and_defaults_for_the_rest() {
 #[test]
 fn what_is_wrong_is_named_with_what_is_allowed() {
     for (spec, expected) in [
-        ("tether:61", "tether: N is 61: allowed is 0 to 60"),
-        ("tether:nan", "tether: N is NaN: allowed is 0 to 60"),
+        ("tether:101", "tether: N is 101: allowed is 0 to 100"),
+        ("tether:nan", "tether: N is NaN: allowed is 0 to 100"),
         (
             "tether:strong",
             "'tether:strong' does not have the form tether[:N]",

@@ -155,6 +155,12 @@ impl BodyLag {
         }
     }
 
+    /// Mean of the time constant, s.
+    fn lag_s(&self) -> f64 {
+        let all = self.candidates.iter().zip(LAGS_S);
+        all.map(|(candidate, lag_s)| candidate.p * lag_s).sum()
+    }
+
     /// Takes the command of the next frame, `dt_s` after the one before.
     pub fn advance(&mut self, command: [f64; 2], dt_s: f64) {
         // The command changed at some instant since the last frame.
@@ -166,10 +172,8 @@ impl BodyLag {
             (swing_rad * swing_rad + middle[0] * middle[0] * surge_m * surge_m) / 12.0;
         let target = [middle[0] * middle[1], middle[1]];
         let turns = command[0] * command[1] - self.command[0] * self.command[1];
-        let lag_s = self.candidates.iter().zip(LAGS_S);
-        let lag_s = lag_s.map(|(candidate, lag_s)| candidate.p * lag_s).sum();
-        self.late
-            .advance([turns, command[1] - self.command[1]], dt_s, lag_s);
+        let changes = [turns, command[1] - self.command[1]];
+        self.late.advance(changes, dt_s, self.lag_s());
         self.command = command;
         self.frames += 1;
         for (candidate, lag_s) in self.candidates.iter_mut().zip(LAGS_S) {
@@ -332,12 +336,6 @@ impl BodyLag {
 mod tests {
     use super::*;
 
-    /// Mean of the time constant, s.
-    fn lag_s(bank: &BodyLag) -> f64 {
-        let all = bank.candidates.iter().zip(LAGS_S);
-        all.map(|(candidate, lag_s)| candidate.p * lag_s).sum()
-    }
-
     /// A body with the lag `true_s` whose speed is commanded to and fro every 2 s; the bank's mean
     /// lag after `changes`, and the largest travel error in deviations of the last two changes.
     fn drive(true_s: f64, changes: usize) -> (f64, f64) {
@@ -365,7 +363,7 @@ mod tests {
                 bank.learn(measured, [1e-5, 1e-5], [0.97, 0.0], false);
             }
         }
-        (lag_s(&bank), worst)
+        (bank.lag_s(), worst)
     }
 
     #[test]
@@ -394,7 +392,7 @@ mod tests {
     fn a_constant_command_teaches_nothing_whatever_the_robot_does() {
         let mut bank = BodyLag::new(0.1, 0.5);
         bank.begin([0.2, 0.2]);
-        let before = lag_s(&bank);
+        let before = bank.lag_s();
         for _ in 0..10_000 {
             bank.advance([0.2, 0.2], 0.01);
             let followed = bank.complete(0.01);
@@ -402,6 +400,6 @@ mod tests {
             let measured = [0.66 * followed.travel_m, followed.turn_rad + 1e-3];
             bank.learn(measured, [1e-8, 1e-8], [1.0, 0.0], true);
         }
-        assert!((lag_s(&bank) - before).abs() < 1e-9);
+        assert!((bank.lag_s() - before).abs() < 1e-9);
     }
 }

@@ -24,7 +24,7 @@ use super::faults::{Faults, KINDS};
 use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION};
 use super::further_evidence::FurtherEvidence;
 use super::further_watch::Turn;
-use super::noise_scale::{NoiseScales, SensorNoise};
+use super::noise_scale::{NoiseScales, SensorNoise, UNSEEN_S};
 use super::repeats::Repeats;
 use super::wheel_context::{Beside, WheelContext};
 use super::wheels::{rolling_rate, steering_angle};
@@ -51,9 +51,9 @@ const ANY_NORM_MAX: f64 = 12.0;
 const ANYTHING: f64 = 10.0;
 /// Residuals beyond this many deviations mean a lost track.
 const LOST: f64 = 10.0;
-/// Time in motion after which evidence counts, s: once the noise is known, and at the latest.
+/// Time in motion after which evidence counts if the noise is known, s; otherwise it does after
+/// [`UNSEEN_S`].
 const READY_S: f64 = 1.0;
-const READY_LATEST_S: f64 = 5.0;
 /// Observations in a row without usable weights after which the pose starts anew.
 const COAST_MAX: u32 = 10;
 
@@ -76,7 +76,6 @@ pub struct Monitor {
     repeats: [Repeats; WHEELS],
     any: Constant,
     noise: SensorNoise,
-    moved_s: f64,
     troubles: Troubles,
     further: Option<Box<FurtherEvidence>>,
     gains: Gains,
@@ -135,7 +134,6 @@ impl Monitor {
             repeats: [Repeats::default(); WHEELS],
             any: Constant::default(),
             noise: SensorNoise::default(),
-            moved_s: 0.0,
             troubles: Troubles::default(),
             further: match channels {
                 Channels::All => FurtherEvidence::new(model, robot, form).map(Box::new),
@@ -160,7 +158,6 @@ impl Monitor {
         self.coasted = 0;
         self.context = WheelContext::new(self.robot.tolerance);
         self.noise = SensorNoise::default();
-        self.moved_s = 0.0;
         self.troubles = Troubles::default();
         self.report.evidence = 0.0;
         if let Some(further) = &mut self.further {
@@ -215,8 +212,8 @@ impl Monitor {
         let further = self.further.as_ref();
         let is_known =
             self.noise.is_known(use_wheels) && further.is_none_or(|further| further.is_known());
-        let is_settled = self.moved_s >= READY_S;
-        is_settled && (is_known || self.moved_s >= READY_LATEST_S) || self.troubles.any(use_wheels)
+        let moved_s = self.noise.moved_s();
+        moved_s >= READY_S && (is_known || moved_s >= UNSEEN_S) || self.troubles.any(use_wheels)
     }
 
     /// How noisy the sensors are.
@@ -262,8 +259,6 @@ impl Monitor {
             .iter_mut()
             .for_each(|repeats| repeats.gain = 0.0);
         self.troubles = observation.troubles;
-        // A robot at rest shows nothing of its noise.
-        self.moved_s += observation.moved_s();
         self.noise.update(&self.model, &self.robot, observation);
         let scales = self.noise.scales();
         self.step_pose(observation, following, scales);

@@ -167,7 +167,7 @@ const KNOWN: f64 = 25.0;
 pub(super) const STEADY_COMMAND: f64 = 1e-3;
 
 /// Time in motion after which a channel's noise should have been seen, s.
-const UNSEEN_S: f64 = 5.0;
+pub(super) const UNSEEN_S: f64 = 5.0;
 /// Ratio of the variances that is assumed where it was not: too noisy is safer than too quiet.
 const UNSEEN: f64 = 16.0;
 
@@ -205,6 +205,12 @@ impl SensorNoise {
         }
     }
 
+    /// Time in motion so far, s.
+    #[must_use]
+    pub const fn moved_s(&self) -> f64 {
+        self.moved_s
+    }
+
     /// True once the noise of the pose, and of a wheel if they are used, has been seen often
     /// enough: a broken encoder shows none.
     #[must_use]
@@ -216,6 +222,7 @@ impl SensorNoise {
     /// Second differences of the pose and first differences of wheel rates and steering angles,
     /// less what the nominal motion makes of them: neither a curve nor a fault that persists shows.
     pub fn update(&mut self, model: &Model, robot: &Description, now: &Observation) {
+        // A robot at rest shows nothing of its noise.
         self.moved_s += now.moved_s();
         let [before, last] = self.history;
         self.history = [last, Some(*now)];
