@@ -99,7 +99,7 @@ struct Wrong {
     /// Encoders that are off by a size: the wheel, and the last size of each.
     sized: BTreeMap<usize, Size>,
     /// Kind and place of what no model describes.
-    others: BTreeSet<(u32, usize)>,
+    others: BTreeSet<(DisturbanceKind, usize)>,
 }
 
 impl Wrong {
@@ -117,18 +117,15 @@ impl Wrong {
                     self.sized.insert(this.place, size);
                 }
                 None => {
-                    self.others.insert((this.kind as u32, this.place));
+                    self.others.insert((this.kind, this.place));
                 }
             },
             Change::Clear(wheel) => {
                 self.stuck.remove(&wheel);
                 self.encoders.remove(&wheel);
                 self.sized.remove(&wheel);
-                self.others.retain(|(kind, place)| {
-                    let at_wheel = vigil_robot::DisturbanceKind::from_wire(*kind)
-                        .is_some_and(|kind| is_of_a_wheel(kind.row().place));
-                    !(at_wheel && *place == wheel)
-                });
+                self.others
+                    .retain(|(kind, place)| !(is_of_a_wheel(kind.row().place) && *place == wheel));
             }
             Change::Calm(kind, at) => {
                 let is_at = |place: usize| at.is_none_or(|at| at == place);
@@ -136,30 +133,26 @@ impl Wrong {
                 let calmed = |place: usize, size: &Size| way == Some(size.kind) && is_at(place);
                 self.sized.retain(|place, size| !calmed(*place, size));
                 self.others
-                    .retain(|(other, place)| *other != kind as u32 || !is_at(*place));
+                    .retain(|(other, place)| *other != kind || !is_at(*place));
             }
             Change::ClearAll => *self = Self::default(),
         }
     }
 
     fn truth(&self, tree: &FaultTree, robot: &Description, sensors: Sensors) -> Truth {
-        if sensors == Sensors::All
-            && let Some(leaves) = self.further(tree, robot)
-        {
-            return Truth::Faults(leaves);
-        }
         // By the pose alone nothing can be seen of an encoder: the robot is as good as healthy.
         let sees_encoders = sensors != Sensors::Pose;
-        let leaf = |kind: &str, wheel: usize| {
-            let fault = format!("{kind}:{}", robot.wheels[wheel].name);
-            let node = tree.nodes().iter();
-            let mut node = node.filter(|node| node.fault.as_deref() == Some(fault.as_str()));
-            node.next().map(|node| node.name.clone())
+        let is_seen = |&&(kind, _): &&(DisturbanceKind, usize)| match seen_by(kind) {
+            SeenBy::Pose => true,
+            SeenBy::Wheels => sees_encoders,
+            SeenBy::All => sensors == Sensors::All,
         };
-        let is_seen = |&(kind, _): &(u32, usize)| sensors == Sensors::All || !is_further(kind);
-        if self.others.iter().any(is_seen) {
-            return Truth::Unmodelled { own: None };
+        let others: Vec<_> = self.others.iter().filter(is_seen).collect();
+        if !others.is_empty() {
+            return self.others_truth(&others, tree, robot);
         }
+        let leaf =
+            |kind: &str, wheel: usize| leaf(tree, &format!("{kind}:{}", robot.wheels[wheel].name));
         let stuck = self.stuck.iter().filter_map(|wheel| leaf("stuck", *wheel));
         let broken: BTreeSet<&usize> = self.encoders.iter().chain(self.sized.keys()).collect();
         let encoders = broken.into_iter().filter(|_| sees_encoders);
@@ -185,34 +178,76 @@ fn size_of(kind: DisturbanceKind, value: f64) -> Option<Size> {
 }
 
 impl Wrong {
-    /// The leaves of weak motors, current sensors and the gyro, if nothing else is wrong.
-    fn further(&self, tree: &FaultTree, robot: &Description) -> Option<Vec<String>> {
-        let leaf = |(kind, place): &(u32, usize)| {
-            use vigil_robot::DisturbanceKind as D;
-            let wheel = &robot.wheels.get(*place)?.name;
-            let fault = match D::from_wire(*kind)? {
-                D::TorqueLoss => format!("torque:{wheel}"),
-                D::CurrentBias | D::CurrentScale => format!("current:{wheel}"),
-                D::GyroBias | D::GyroScale => "gyro".to_owned(),
-                _ => return None,
-            };
-            let mut nodes = tree.nodes().iter();
-            let node = nodes.find(|node| node.fault.as_deref() == Some(fault.as_str()));
-            node.map(|node| node.name.clone())
-        };
-        let is_alone = self.stuck.is_empty() && self.encoders.is_empty();
-        let leaves: Option<Vec<String>> = self.others.iter().map(leaf).collect();
-        leaves.filter(|leaves| is_alone && !leaves.is_empty())
+    /// What is true while these are on: their leaves if the tree has them all and nothing else is
+    /// wrong.
+    fn others_truth(
+        &self,
+        others: &[&(DisturbanceKind, usize)],
+        tree: &FaultTree,
+        robot: &Description,
+    ) -> Truth {
+        let is_alone = self.stuck.is_empty() && self.encoders.is_empty() && self.sized.is_empty();
+        let leaf_of = |fault: Option<String>| fault.and_then(|fault| leaf(tree, &fault));
+        let named = others.iter().map(|it| leaf_of(fault_of(it.0, it.1, robot)));
+        match named.collect::<Option<Vec<String>>>() {
+            Some(leaves) if is_alone => Truth::Faults(leaves),
+            _ => Truth::Unmodelled {
+                own: match others {
+                    [(kind, place)] if is_alone => leaf_of(kin_of(*kind, *place, robot)),
+                    _ => None,
+                },
+            },
+        }
     }
 }
 
-/// True of a kind that gyro and currents alone can show.
-fn is_further(kind: u32) -> bool {
-    use vigil_robot::DisturbanceKind as D;
-    matches!(
-        D::from_wire(kind),
-        Some(D::GyroBias | D::GyroScale | D::CurrentBias | D::CurrentScale)
-    )
+/// Name of the leaf of a fault, if the tree has one.
+fn leaf(tree: &FaultTree, fault: &str) -> Option<String> {
+    let mut nodes = tree.nodes().iter();
+    let node = nodes.find(|node| node.fault.as_deref() == Some(fault));
+    node.map(|node| node.name.clone())
+}
+
+/// The fault, in a tree's words, that this is.
+fn fault_of(kind: DisturbanceKind, place: usize, robot: &Description) -> Option<String> {
+    use DisturbanceKind as D;
+    let wheel = &robot.wheels.get(place)?.name;
+    Some(match kind {
+        D::TorqueLoss => format!("torque:{wheel}"),
+        D::CurrentBias | D::CurrentScale => format!("current:{wheel}"),
+        D::SteerJump | D::SteerHeld | D::SteerBias => format!("steer:{wheel}"),
+        D::GyroBias | D::GyroScale => "gyro".to_owned(),
+        D::PoseJump | D::PoseHeld => "pose".to_owned(),
+        _ => return None,
+    })
+}
+
+/// The fault as which this may be named though nothing shows that it is: unknown is right, too.
+fn kin_of(kind: DisturbanceKind, place: usize, robot: &Description) -> Option<String> {
+    use DisturbanceKind as D;
+    match kind {
+        D::SteerOffsetHidden => Some(format!("steer:{}", robot.wheels.get(place)?.name)),
+        D::PoseDrift | D::PoseDelay | D::PoseDrop | D::PoseScale | D::YawRateBias => {
+            Some("pose".to_owned())
+        }
+        _ => None,
+    }
+}
+
+/// Sensors that are needed to see a disturbance at all.
+enum SeenBy {
+    Pose,
+    Wheels,
+    All,
+}
+
+const fn seen_by(kind: DisturbanceKind) -> SeenBy {
+    use DisturbanceKind as D;
+    match kind {
+        D::GyroBias | D::GyroScale | D::CurrentBias | D::CurrentScale => SeenBy::All,
+        D::SteerBias => SeenBy::Wheels,
+        _ => SeenBy::Pose,
+    }
 }
 
 const fn is_of_a_wheel(place: vigil_robot::disturbance::Place) -> bool {

@@ -2,7 +2,7 @@
 
 /// Sizes of each kind; `W` stands for a wheel, `S` for a steered one, `side` for a side: they
 /// change from cell to cell.
-const SPECS: [&str; 56] = [
+const SPECS: [&str; 60] = [
     "steer-jump:S:0.1",
     "steer-jump:S:0.2",
     "steer-jump:S:-0.3",
@@ -59,6 +59,10 @@ const SPECS: [&str; 56] = [
     "encoder-bias:W:0.3",
     "encoder-bias:W:0.6",
     "encoder-drift:W:0.05",
+    "steer-held:S:0.2",
+    "steer-bias:S:0.1",
+    "pose-jump:0.2",
+    "pose-held:60",
 ];
 const CURVATURES_1_M: [f64; 5] = [0.0, 0.3, -0.3, 0.7, -0.7];
 const SPEEDS_M_S: [f64; 3] = [0.1, 0.2, 0.3];

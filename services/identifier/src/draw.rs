@@ -52,7 +52,11 @@ fn mode(leaves: &Leaves, moved: Moved, encoders: &Encoders, rng: &mut Pcg64Mcg) 
     if moved.is_unknown() {
         return MODE_UNKNOWN;
     }
-    let mut nodes = 0_u64;
+    let mut nodes = match moved {
+        Moved::Steer(wheel) => leaves.steer[wheel].map_or(0, |leaf| 1 << leaf),
+        Moved::Pose => leaves.pose.map_or(0, |leaf| 1 << leaf),
+        _ => 0_u64,
+    };
     for wheel in 0..WHEELS {
         if let Some(leaf) = leaves.stuck[wheel].filter(|_| moved.is_stuck(wheel)) {
             nodes |= 1 << leaf;

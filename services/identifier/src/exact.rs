@@ -16,9 +16,10 @@ use vigil_inference::bank::{Bank, Hypothesis};
 use vigil_inference::outlier::{Trust, unvouched};
 use vigil_inference::track::{Context, Displacement};
 use vigil_robot::Description;
+use vigil_robot::learned::wheels::steering_angle;
 use vigil_robot::learned::{
     FaultRates, Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext,
-    WheelEvidence, motion_modes,
+    WheelEvidence, motion_modes, steer_modes,
 };
 
 use crate::encoders::Encoders;
@@ -27,6 +28,7 @@ use crate::modes::Leaves;
 use crate::posterior::Posterior;
 use crate::prepared::{EXPLAINED_S, Prepared, Seen, age_s, changes_several, newly_stuck};
 use crate::rate_offsets::RateOffsets;
+use crate::servo::{Servo, ServoPrior};
 use crate::sets::Sets;
 use crate::sizes::{Sight, Sizes};
 use crate::state::State;
@@ -62,6 +64,7 @@ pub struct Exact {
     context: Context,
     wheels: WheelContext,
     sizes: Sizes,
+    servo: ServoPrior,
     trust: Trust,
     /// What the last observation says in each mode, where a hypothesis has asked.
     prepared: Vec<Option<Prepared>>,
@@ -80,7 +83,13 @@ impl Exact {
         rates: FaultRates,
     ) -> Self {
         // A pose alone cannot tell two stuck wheels from one on another soil.
-        let modes = motion_modes(model, robot, leaves.stuck_wheels(), true, use_wheels);
+        let mut modes = motion_modes(model, robot, leaves.stuck_wheels(), true, use_wheels);
+        modes.extend(steer_modes(model, leaves.steered_wheels()));
+        for mode in modes.iter_mut().filter(|mode| mode.jump != [0.0; 3]) {
+            if leaves.pose.is_some() {
+                (mode.moved, mode.share, mode.p_unknown) = (Moved::Pose, 1.0, 0.0);
+            }
+        }
         let on_any_ground = |mode: MotionMode| {
             // That of several wheels holds every soil already.
             let is_several = mode.moved.stuck().count_ones() > 1;
@@ -114,6 +123,7 @@ impl Exact {
             context: Context::default(),
             wheels: WheelContext::default(),
             sizes: Sizes::new(robot),
+            servo: ServoPrior::new(robot),
             trust: Trust::default(),
             degenerate_count: 0,
         }
@@ -128,6 +138,8 @@ impl Exact {
             track: healthy.track(&self.modes[NOMINAL].noise),
             encoders: Encoders::healthy(t_ns),
             offsets: RateOffsets::default(),
+            servo: None,
+            jump_m: 0.0,
             log_material: 0.0,
             was_thrown: false,
             fresh: 0,
@@ -198,9 +210,15 @@ impl Exact {
                 .trust
                 .variance(tracks, observation.pose, variance, rates);
             for hypothesis in self.bank.hypotheses_mut() {
-                let is_thrown = self.modes[hypothesis.mode].is_thrown;
+                let MotionMode {
+                    moved, is_thrown, ..
+                } = self.modes[hypothesis.mode];
                 let state = &mut hypothesis.state;
+                let before = state.track.pose();
                 let gained = state.take_pose(observation.pose, variance, is_thrown);
+                if moved == Moved::Pose && hypothesis.onset == observation.t_first_ns {
+                    state.jump_m = (state.track.pose() - before).xy().norm();
+                }
                 // Those that cannot take it are dropped, unless none can: then nothing changes.
                 failed |= gained.is_none();
                 hypothesis.log_weight += gained.unwrap_or(2.0 * FLOOR);
@@ -252,9 +270,11 @@ impl Exact {
         let best = |wanted: &dyn Fn(Moved) -> bool| {
             self.bank.best(|mode| wanted(modes[mode].moved)).copied()
         };
-        let sources: [_; WHEELS + 2] = std::array::from_fn(|count| match count {
+        const NEXT: usize = WHEELS + 1;
+        let sources: [_; WHEELS + 3] = std::array::from_fn(|count| match count {
             0 => best(&|moved| moved == Moved::Nominal),
             1..=WHEELS => best(&|moved| moved.stuck().count_ones() as usize == count),
+            NEXT => best(&|moved| matches!(moved, Moved::Steer(_) | Moved::Pose)),
             _ => best(&Moved::is_unknown),
         });
         for from in sources.into_iter().flatten() {
@@ -355,6 +375,14 @@ impl Exact {
             track,
             encoders,
             offsets: RateOffsets::default(),
+            servo: match after {
+                Moved::Steer(wheel) => {
+                    let angle = steering_angle(&self.robot, wheel, observation.command[0]);
+                    Some(Servo::new(&self.servo, angle))
+                }
+                _ => None,
+            },
+            jump_m: 0.0,
             log_material: 0.0,
             was_thrown: false,
             fresh,
@@ -412,6 +440,7 @@ impl Exact {
             let State {
                 encoders,
                 offsets,
+                servo,
                 fresh,
                 ..
             } = &mut hypothesis.state;
@@ -420,6 +449,11 @@ impl Exact {
             }
             let gained = seen.weigh(prepared, (&births, death), *fresh, encoders, offsets);
             hypothesis.log_weight += gained;
+            if let (Moved::Steer(wheel), Some(servo)) = (self.modes[index].moved, servo)
+                && let Some(reading) = &evidence.steer[wheel]
+            {
+                hypothesis.log_weight += servo.step(&self.servo, reading);
+            }
         }
         self.learn_context(observation, evidence);
     }
@@ -432,7 +466,8 @@ impl Exact {
         };
         let moved = self.modes[best.mode].moved;
         let is_settled = !is_new(observation.t_ns, best.onset);
-        if moved == Moved::UnknownAny || moved.stuck().count_ones() > 1 || !is_settled {
+        let is_off = matches!(moved, Moved::UnknownAny | Moved::Steer(_));
+        if is_off || moved.stuck().count_ones() > 1 || !is_settled {
             return;
         }
         let mut beside = [None; WHEELS];
@@ -458,6 +493,12 @@ impl Exact {
         self.sets.posterior(&self.leaves, fusion, out);
     }
 
+    /// The most probable hypothesis under which the robot is moved so.
+    #[must_use]
+    pub fn best(&self, moved: Moved) -> Option<&Hypothesis<State>> {
+        self.bank.best(|mode| self.modes[mode].moved == moved)
+    }
+
     /// Most probable onset of the unknown, capture time ns; 0 if it was never supposed.
     #[must_use]
     pub fn onset_unknown(&self) -> u64 {
@@ -474,6 +515,13 @@ impl Exact {
                 .bank
                 .best(|mode| self.modes[mode].moved.is_stuck(wheel));
             return best.map_or(0, |best| best.onset);
+        }
+        if let Some(wheel) = wheel(&self.leaves.steer) {
+            let best = self.best(Moved::Steer(wheel));
+            return best.map_or(0, |best| best.onset);
+        }
+        if self.leaves.pose == Some(node) {
+            return self.best(Moved::Pose).map_or(0, |best| best.onset);
         }
         if let Some(wheel) = wheel(&self.leaves.encoder) {
             let known = self.bank.hypotheses().iter();

@@ -24,13 +24,12 @@ use crate::node_sizes::NodeSizes;
 use crate::posterior::Posterior;
 use crate::reasons::Reasons;
 use crate::reported::Reported;
+use crate::trouble::believed;
 
 /// A ring is worked off in about this time after an alarm, s.
 const CATCH_UP_S: f64 = 0.1;
 /// Observations since which the reasons of a diagnosis are looked for, at most.
 const REASONS_MAX: usize = 20;
-/// Probability that something unknown is wrong while sensors are silent or the robot runs away.
-const TROUBLE: f64 = 1.0 - 1e-6;
 
 /// What the identifier takes each cycle.
 #[derive(Debug, Clone, Copy)]
@@ -131,7 +130,7 @@ impl Identifier {
                 let modes = filter.modes().to_vec();
                 (Engine::Exact(Box::new(filter)), modes)
             }
-            _ if leaves.has_further() => {
+            _ if leaves.need_exact() => {
                 return Err(IdentifierError::Build(FURTHER_NEED_EXACT.to_owned()));
             }
             _ => {
@@ -249,7 +248,8 @@ impl Identifier {
         }
         if self.in_trouble {
             self.phase = Phase::Watching;
-            self.posterior = Posterior::watching(TROUBLE);
+            let troubles = &self.observer.observation().troubles;
+            (self.posterior, self.sizes) = believed(troubles, self.use_wheels, &self.leaves);
             self.reasons.clear();
             return;
         }
@@ -414,6 +414,7 @@ impl Identifier {
         self.posterior.write(&self.leaves, belief);
         match self.phase {
             Phase::Identifying(_) => self.sizes.write(belief),
+            Phase::Watching if self.in_trouble => self.sizes.write(belief),
             Phase::Watching => NodeSizes::default().write(belief),
         }
         belief.p_predicted = self.predicted.nodes;
@@ -469,9 +470,10 @@ impl Identifier {
             .stuck
             .iter()
             .chain(&self.leaves.encoder)
+            .chain(&self.leaves.steer)
             .chain(&self.leaves.torque)
             .chain(&self.leaves.current)
-            .chain([&self.leaves.gyro])
+            .chain([&self.leaves.gyro, &self.leaves.pose])
             .flatten();
         let p = &self.posterior.nodes;
         leaves

@@ -24,10 +24,12 @@ mod rate_offsets;
 mod reasons;
 mod reported;
 mod risk;
+mod servo;
 mod sets;
 mod sizes;
 mod state;
 mod told_size;
+mod trouble;
 mod watcher;
 pub mod wiring;
 

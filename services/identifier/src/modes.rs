@@ -15,8 +15,8 @@ pub enum IdentifierError {
     /// A leaf's fault is none that the model knows.
     #[error(
         "leaf '{leaf}': fault '{fault}' is not in the model: expected stuck:WHEEL or \
-             encoder:WHEEL, and with sensors = \"all\" torque:WHEEL, current:WHEEL or gyro, \
-             WHEEL one of {wheels}"
+             encoder:WHEEL, pose, steer:WHEEL of a steered one whose angle is read, and with \
+             sensors = \"all\" torque:WHEEL, current:WHEEL or gyro, WHEEL one of {wheels}"
     )]
     Leaf {
         /// Name of the leaf.
@@ -51,12 +51,16 @@ pub enum LeafFault {
     Stuck(usize),
     /// This wheel's encoder is broken.
     Encoder(usize),
+    /// This wheel's steering servo does not do as it is told.
+    Steer(usize),
     /// This wheel's motor has lost torque.
     Torque(usize),
     /// This wheel's current sensor is broken.
     Current(usize),
     /// The gyro is broken.
     Gyro,
+    /// The pose is wrong.
+    Pose,
 }
 
 /// The leaves of a tree, by fault.
@@ -66,12 +70,16 @@ pub struct Leaves {
     pub stuck: [Option<usize>; WHEELS],
     /// Node of each broken encoder.
     pub encoder: [Option<usize>; WHEELS],
+    /// Node of each steering servo that does not do as it is told.
+    pub steer: [Option<usize>; WHEELS],
     /// Node of each motor that has lost torque.
     pub torque: [Option<usize>; WHEELS],
     /// Node of each broken current sensor.
     pub current: [Option<usize>; WHEELS],
     /// Node of the broken gyro.
     pub gyro: Option<usize>,
+    /// Node of the wrong pose.
+    pub pose: Option<usize>,
     /// Number of leaves.
     pub count: usize,
     /// Depth of each node.
@@ -85,11 +93,12 @@ pub struct Leaves {
 }
 
 impl Leaves {
-    /// Whether there are leaves that gyro and currents alone can show.
+    /// Whether there are leaves of which the paper's filters know nothing: of steering servos and
+    /// pose, and those that gyro and currents alone can show.
     #[must_use]
-    pub fn has_further(&self) -> bool {
-        let mut nodes = self.torque.iter().chain(&self.current).chain([&self.gyro]);
-        nodes.any(Option::is_some)
+    pub fn need_exact(&self) -> bool {
+        let wheels = self.steer.iter().chain(&self.torque).chain(&self.current);
+        wheels.chain([&self.gyro, &self.pose]).any(Option::is_some)
     }
 
     /// Reads the faults of the leaves; those of gyro and currents need these sensors.
@@ -106,9 +115,11 @@ impl Leaves {
         let mut leaves = Self {
             stuck: [None; WHEELS],
             encoder: [None; WHEELS],
+            steer: [None; WHEELS],
             torque: [None; WHEELS],
             current: [None; WHEELS],
             gyro: None,
+            pose: None,
             count: 0,
             depths: [0; FAULT_NODES],
             below: [0; FAULT_NODES],
@@ -124,9 +135,11 @@ impl Leaves {
             let place = match leaf_fault(fault, model, robot, sensors) {
                 Some(LeafFault::Stuck(wheel)) => &mut leaves.stuck[wheel],
                 Some(LeafFault::Encoder(wheel)) => &mut leaves.encoder[wheel],
+                Some(LeafFault::Steer(wheel)) => &mut leaves.steer[wheel],
                 Some(LeafFault::Torque(wheel)) => &mut leaves.torque[wheel],
                 Some(LeafFault::Current(wheel)) => &mut leaves.current[wheel],
                 Some(LeafFault::Gyro) => &mut leaves.gyro,
+                Some(LeafFault::Pose) => &mut leaves.pose,
                 None => {
                     return Err(IdentifierError::Leaf {
                         leaf: node.name.clone(),
@@ -161,6 +174,12 @@ impl Leaves {
         bits(&self.stuck)
     }
 
+    /// Wheels whose steering servos may not do as they are told, as bits.
+    #[must_use]
+    pub fn steered_wheels(&self) -> u32 {
+        bits(&self.steer)
+    }
+
     /// Wheels whose encoders may be broken, as bits.
     #[must_use]
     pub fn encoder_wheels(&self) -> u32 {
@@ -183,6 +202,9 @@ fn leaf_fault(
 ) -> Option<LeafFault> {
     let further = model.further.as_ref().filter(|_| sensors == Sensors::All);
     let currents = further.and_then(|further| further.currents.as_ref());
+    if text == "pose" {
+        return Some(LeafFault::Pose);
+    }
     if text == "gyro" {
         let gyro = further.and_then(|further| further.yaw_rate);
         return gyro.map(|_| LeafFault::Gyro);
@@ -192,6 +214,10 @@ fn leaf_fault(
     match kind {
         "stuck" => model.stuck(wheel).map(|_| LeafFault::Stuck(wheel)),
         "encoder" => Some(LeafFault::Encoder(wheel)),
+        "steer" => {
+            let is_read = robot.wheels[wheel].steered && sensors != Sensors::Pose;
+            is_read.then_some(LeafFault::Steer(wheel))
+        }
         "torque" => currents.map(|_| LeafFault::Torque(wheel)),
         "current" => currents.map(|_| LeafFault::Current(wheel)),
         _ => None,

@@ -2,6 +2,8 @@
 
 use vigil_blocks::{FAULT_NODES, FaultBelief, SizeKind, WHEELS};
 
+use vigil_robot::learned::Moved;
+
 use crate::encoders::{STATES, WAYS_TO_BREAK};
 use crate::exact::Exact;
 use crate::modes::Leaves;
@@ -9,6 +11,9 @@ use crate::posterior::Posterior;
 
 /// Of a fault that is less probable nothing is told.
 pub const TOLD_MIN: f64 = 0.01;
+
+/// Deviation of a jump that is seen once, m.
+const JUMP_SD_M: f64 = 0.01;
 
 /// What is told of each node.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,7 +48,25 @@ impl NodeSizes {
                 (out.size[node], out.sd[node], out.kind[node]) = (size, sd, kind as u32);
             }
         }
+        for (wheel, node) in leaves.steer.into_iter().enumerate() {
+            let servo = filter
+                .best(Moved::Steer(wheel))
+                .and_then(|best| best.state.servo);
+            if let Some((node, servo)) = node.filter(is_told).zip(servo) {
+                let (kind, (size, sd)) = servo.size();
+                (out.size[node], out.sd[node], out.kind[node]) = (size, sd, kind as u32);
+            }
+        }
+        if let Some((node, best)) = leaves.pose.filter(is_told).zip(filter.best(Moved::Pose)) {
+            (out.size[node], out.sd[node]) = (best.state.jump_m, JUMP_SD_M);
+            out.kind[node] = SizeKind::JumpM as u32;
+        }
         out
+    }
+
+    /// Tells of a node in which way it is broken, without a size.
+    pub const fn tell(&mut self, node: usize, kind: SizeKind) {
+        self.kind[node] = kind as u32;
     }
 
     /// Writes them into a block.

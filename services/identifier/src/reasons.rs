@@ -9,6 +9,7 @@ use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
 use vigil_inference::outlier::unvouched;
 use vigil_inference::track::Track;
 use vigil_robot::Description;
+use vigil_robot::learned::wheels::steering_angle;
 use vigil_robot::learned::{
     Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext, WheelEvidence,
 };
@@ -17,6 +18,7 @@ use crate::exact::is_new;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
 use crate::rate_offsets::RateOffsets;
+use crate::servo::{Servo, ServoPrior};
 
 /// What a diagnosis may say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,6 +38,7 @@ struct Lineage {
     broken: u32,
     track: Track,
     offsets: RateOffsets,
+    servo: Option<Servo>,
     /// Log-likelihood of the readings, by channel.
     heard: [f64; CHANNELS],
 }
@@ -47,6 +50,7 @@ pub struct Reasons {
     robot: Description,
     modes: Vec<MotionMode>,
     use_wheels: bool,
+    servo: ServoPrior,
     /// Of the wheels, from before the onset.
     wheels: WheelContext,
     followed: Option<[Lineage; 2]>,
@@ -68,6 +72,7 @@ impl Reasons {
             robot: robot.clone(),
             modes,
             use_wheels,
+            servo: ServoPrior::new(robot),
             wheels: WheelContext::default(),
             followed: None,
             onset_ns: 0,
@@ -88,8 +93,7 @@ impl Reasons {
     }
 
     /// By channel: how much more the readings since the onset are expected under the diagnosis than
-    /// under its rival, natural log-likelihood. The steering angles, which are weighed together,
-    /// stand at the first wheel's.
+    /// under its rival, natural log-likelihood.
     #[must_use]
     pub fn channel_evidence(&self) -> [f64; CHANNELS] {
         self.followed.map_or([0.0; CHANNELS], |[named, rival]| {
@@ -121,10 +125,17 @@ impl Reasons {
         let lineage = |explanation| {
             let (moved, broken) = match explanation {
                 Explanation::Unknown => (Moved::UnknownAny, 0),
-                Explanation::Leaves(set) => match wheels(&leaves.stuck, set) {
-                    0 => (Moved::Nominal, wheels(&leaves.encoder, set)),
-                    stuck => (Moved::Stuck(stuck), wheels(&leaves.encoder, set)),
-                },
+                Explanation::Leaves(set) => {
+                    let (stuck, askew) = (wheels(&leaves.stuck, set), wheels(&leaves.steer, set));
+                    let jumped = leaves.pose.is_some_and(|pose| set >> pose & 1 == 1);
+                    let moved = match (stuck, askew) {
+                        (0, 0) if jumped => Moved::Pose,
+                        (0, 0) => Moved::Nominal,
+                        (0, askew) => Moved::Steer(askew.trailing_zeros() as usize),
+                        (stuck, _) => Moved::Stuck(stuck),
+                    };
+                    (moved, wheels(&leaves.encoder, set))
+                }
             };
             let mode = self.modes.iter().position(|mode| mode.moved == moved)?;
             let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
@@ -133,6 +144,13 @@ impl Reasons {
                 broken,
                 track: healthy.track(&noise),
                 offsets: RateOffsets::default(),
+                servo: match moved {
+                    Moved::Steer(wheel) => {
+                        let angle = steering_angle(&self.robot, wheel, curvature);
+                        Some(Servo::new(&self.servo, angle))
+                    }
+                    _ => None,
+                },
                 heard: [0.0; CHANNELS],
             })
         };
@@ -197,8 +215,15 @@ impl Reasons {
                     evidence.whole(&self.model, observation, mode, is_new, wheel)
                 };
             }
-            if moved == Moved::UnknownAny {
-                lineage.heard[Channel::steer(0)] += evidence.steering;
+            for (wheel, reading) in evidence.steer.iter().enumerate() {
+                let Some(reading) = reading else { continue };
+                lineage.heard[Channel::steer(wheel)] += match (moved, &mut lineage.servo) {
+                    (Moved::UnknownAny, _) => reading.log_ratio_unsure(),
+                    (Moved::Steer(askew), Some(servo)) if askew == wheel => {
+                        servo.step(&self.servo, reading)
+                    }
+                    _ => 0.0,
+                };
             }
         }
     }

@@ -113,9 +113,11 @@ mod tests {
         Leaves {
             stuck: [None; WHEELS],
             encoder: [None; WHEELS],
+            steer: [None; WHEELS],
             torque: [None; WHEELS],
             current: [None; WHEELS],
             gyro: None,
+            pose: None,
             count: 2,
             depths: [0; FAULT_NODES],
             below,

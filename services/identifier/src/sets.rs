@@ -1,6 +1,6 @@
 //! Probabilities of all sets of faults, from hypotheses about motion and encoders.
 
-use vigil_blocks::{FAULT_SETS, FaultSet};
+use vigil_blocks::{FAULT_SETS, FaultSet, WHEELS};
 use vigil_robot::learned::{MotionMode, Moved};
 
 use crate::further::Fusion;
@@ -9,13 +9,16 @@ use crate::posterior::Posterior;
 
 /// Hypotheses less probable than this are not divided among sets.
 const NEGLIGIBLE: f64 = 1e-13;
+/// Row of a pose that has jumped, after those of the steering servos.
+const POSE: usize = WHEELS;
 /// No set of one fault at most is reported less probable: what can return must not be impossible.
 pub const FLOOR: f64 = 1e-12;
 
 /// Sums over hypotheses.
 #[derive(Debug, Clone)]
 pub struct Sets {
-    /// Row s: the wheels `s` (bits) are stuck; column e: the encoders `e` (bits) are broken.
+    /// Row s: the wheels `s` (bits) are stuck; after these rows one per wheel whose steering servo
+    /// does not do as it is told, and one for a pose that has jumped. Column e: the encoders `e` (bits) are broken.
     p: Vec<f64>,
     /// What moves the robot in each motion mode.
     moved: Vec<Moved>,
@@ -32,8 +35,15 @@ impl Sets {
     #[must_use]
     pub fn new(modes: &[MotionMode], wheels: usize) -> Self {
         let subsets = 1 << wheels;
+        let is_other = |mode: &MotionMode| matches!(mode.moved, Moved::Steer(_) | Moved::Pose);
+        let others = if modes.iter().any(is_other) {
+            POSE + 1
+        } else {
+            0
+        };
+        let rows = subsets + others;
         Self {
-            p: vec![0.0; subsets * subsets],
+            p: vec![0.0; rows * subsets],
             moved: modes.iter().map(|mode| mode.moved).collect(),
             p_unknown: modes.iter().map(|mode| mode.p_unknown).collect(),
             wheels,
@@ -68,8 +78,12 @@ impl Sets {
             }
         }
         let subsets = self.products.len();
-        let stuck = self.moved[mode].stuck() as usize;
-        let row = &mut self.p[stuck * subsets..(stuck + 1) * subsets];
+        let row = match self.moved[mode] {
+            Moved::Steer(wheel) => subsets + wheel,
+            Moved::Pose => subsets + POSE,
+            moved => moved.stuck() as usize,
+        };
+        let row = &mut self.p[row * subsets..(row + 1) * subsets];
         for (sum, product) in row.iter_mut().zip(&self.products) {
             *sum += product;
         }
@@ -77,8 +91,13 @@ impl Sets {
 
     /// Nodes of a set; None if a fault of it is no leaf.
     fn nodes(&self, index: usize, leaves: &Leaves) -> Option<u64> {
-        let (stuck, encoders) = (index / self.products.len(), index % self.products.len());
-        let mut nodes = 0_u64;
+        let subsets = self.products.len();
+        let (row, encoders) = (index / subsets, index % subsets);
+        let (stuck, mut nodes) = match row.checked_sub(subsets) {
+            Some(POSE) => (0, 1 << leaves.pose?),
+            Some(askew) => (0, 1 << leaves.steer[askew]?),
+            None => (row, 0_u64),
+        };
         for wheel in 0..self.wheels {
             if stuck >> wheel & 1 == 1 {
                 nodes |= 1 << leaves.stuck[wheel]?;
@@ -94,13 +113,18 @@ impl Sets {
     fn fuse(&mut self, fusion: &Fusion) {
         let subsets = self.products.len();
         self.unknown = self.unknown * fusion.unknown.0 + self.p[0] * fusion.unknown.1;
-        for (stuck, row) in self.p.chunks_exact_mut(subsets).enumerate().skip(1) {
+        let (stuck, askew) = self.p.split_at_mut(subsets * subsets);
+        for (stuck, row) in stuck.chunks_exact_mut(subsets).enumerate().skip(1) {
             let wheels = (0..self.wheels).filter(|wheel| stuck >> wheel & 1 == 1);
             let factor: f64 = wheels.map(|wheel| fusion.stuck[wheel]).sum();
             let factor = factor / f64::from(stuck.count_ones());
             for p in row {
                 *p *= factor;
             }
+        }
+        // What a wheel that stands askew makes of currents and turn is not known.
+        for p in askew.iter_mut().take(POSE * subsets) {
+            *p *= fusion.unknown.0;
         }
     }
 
@@ -118,8 +142,11 @@ impl Sets {
         }
         let mut total = 0.0;
         for (index, p) in self.p.iter_mut().enumerate() {
-            // An index has the bits of the stuck wheels and of the broken encoders.
-            let at_least = if index.count_ones() <= 1 { FLOOR } else { 0.0 };
+            let at_least = if faults(index, subsets) <= 1 {
+                FLOOR
+            } else {
+                0.0
+            };
             *p = if p.is_finite() { *p } else { 0.0 }.max(at_least);
             total += *p;
         }
@@ -157,6 +184,13 @@ impl Sets {
             }
         }
     }
+}
+
+/// Faults of a set: those of its row, and its broken encoders.
+const fn faults(index: usize, subsets: usize) -> u32 {
+    let (row, encoders) = (index / subsets, index % subsets);
+    let others = if row < subsets { row.count_ones() } else { 1 };
+    others + encoders.count_ones()
 }
 
 /// `-p ln p`; 0 for 0.

@@ -4,6 +4,7 @@ use vigil_inference::track::Track;
 
 use crate::encoders::Encoders;
 use crate::rate_offsets::RateOffsets;
+use crate::servo::Servo;
 
 /// Probability that a robot that may be thrown is, in an observation: after one in which it was
 /// not, and after one in which it was; and how far, x m, y m, yaw rad.
@@ -19,6 +20,10 @@ pub struct State {
     pub encoders: Encoders,
     /// With several stuck wheels: what the other wheels' rates are off by.
     pub offsets: RateOffsets,
+    /// The steering servo that does not do as it is told.
+    pub servo: Option<Servo>,
+    /// How far the pose has jumped, m.
+    pub jump_m: f64,
     /// Part of the weight of the unknown: that its departure is material.
     pub log_material: f64,
     /// In a mode that throws the robot: whether it was thrown in the last observation.

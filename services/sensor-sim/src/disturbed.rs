@@ -65,6 +65,14 @@ impl Disturbed {
             .map_or(current, |gain| gain * current)
     }
 
+    /// What the steering sensor of a wheel reports of a commanded angle, without noise, rad.
+    pub(crate) fn steer(&self, wheel: usize, commanded_rad: f64) -> f64 {
+        use DisturbanceKind as D;
+        let more = |kind| self.at(kind, wheel).unwrap_or(0.0);
+        let servo_rad = self.at(D::SteerHeld, wheel).unwrap_or(commanded_rad);
+        servo_rad + more(D::SteerJump) + more(D::SteerBias)
+    }
+
     /// The state of body and wheels.
     pub(crate) fn condition(&self) -> Condition {
         use DisturbanceKind as D;
@@ -74,6 +82,7 @@ impl Disturbed {
             wheels: std::array::from_fn(|i| {
                 let of = |kind, otherwise| self.at(kind, i).unwrap_or(otherwise);
                 WheelCondition {
+                    steer_held_rad: self.at(D::SteerHeld, i),
                     steer_offset_rad: of(D::SteerJump, 0.0) + of(D::SteerOffsetHidden, 0.0),
                     torque_share: 1.0 - of(D::TorqueLoss, 0.0),
                     radius_share: of(D::Puncture, 1.0),

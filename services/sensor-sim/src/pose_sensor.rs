@@ -7,7 +7,8 @@ use vigil_robot::{Disturbance, DisturbanceKind};
 use crate::disturbed::Disturbed;
 use crate::history::History;
 
-/// What the pose sensor makes of the true pose: it scales, drifts, is late, and misses.
+/// What the pose sensor makes of the true pose: it scales, drifts, jumps, is late, repeats itself,
+/// and misses.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseSensor {
     /// Position from which distances are scaled, m.
@@ -16,6 +17,10 @@ pub(crate) struct PoseSensor {
     drift_heading_rad: f64,
     drift_m: f64,
     yaw_drift_rad: f64,
+    /// Direction of the jump, rad.
+    jump_heading_rad: f64,
+    /// Since when it repeats a pose, s, and which.
+    held: Option<(f64, [f64; 3])>,
     past: History<3>,
     rng: Pcg64Mcg,
 }
@@ -27,6 +32,8 @@ impl PoseSensor {
             drift_heading_rad: 0.0,
             drift_m: 0.0,
             yaw_drift_rad: 0.0,
+            jump_heading_rad: 0.0,
+            held: None,
             past: History::new(rate_hz),
             rng: Pcg64Mcg::seed_from_u64(seed),
         }
@@ -41,6 +48,10 @@ impl PoseSensor {
                 self.drift_m = 0.0;
             }
             DisturbanceKind::YawRateBias => self.yaw_drift_rad = 0.0,
+            DisturbanceKind::PoseJump => {
+                self.jump_heading_rad = pose[2] + std::f64::consts::FRAC_PI_2;
+            }
+            DisturbanceKind::PoseHeld => self.held = None,
             _ => {}
         }
     }
@@ -63,6 +74,11 @@ impl PoseSensor {
             x += self.drift_m * cos;
             y += self.drift_m * sin;
         }
+        if let Some(jump_m) = on.at(DisturbanceKind::PoseJump, 0) {
+            let (sin, cos) = self.jump_heading_rad.sin_cos();
+            x += jump_m * cos;
+            y += jump_m * sin;
+        }
         if on.at(DisturbanceKind::YawRateBias, 0).is_some() {
             yaw += self.yaw_drift_rad;
         }
@@ -82,9 +98,15 @@ impl PoseSensor {
         if share > 0.0 && self.rng.random::<f64>() < share {
             return None;
         }
-        match on.at(DisturbanceKind::PoseDelay, 0) {
-            Some(delay_s) => Some(self.past.before(t_s, delay_s)),
-            None => Some(reading),
-        }
+        let pose = match on.at(DisturbanceKind::PoseDelay, 0) {
+            Some(delay_s) => self.past.before(t_s, delay_s),
+            None => reading,
+        };
+        let Some(hold_s) = on.at(DisturbanceKind::PoseHeld, 0) else {
+            return Some(pose);
+        };
+        let held = self.held.filter(|(since_s, _)| t_s - since_s < hold_s);
+        let (_, pose) = *self.held.insert(held.unwrap_or((t_s, pose)));
+        Some(pose)
     }
 }

@@ -210,8 +210,7 @@ impl World {
             frame.current[i] = on.current(i, current + noise.draw(noise.current_a));
             frame.valid |= Valid::wheel_rate(i) | Valid::current(i);
             if kinematics.steered[i] {
-                let seen = on.at(DisturbanceKind::SteerJump, i).unwrap_or(0.0);
-                frame.steer[i] = steer + seen + noise.draw(noise.steer_rad);
+                frame.steer[i] = on.steer(i, steer) + noise.draw(noise.steer_rad);
                 frame.valid |= Valid::steer(i);
             }
         }

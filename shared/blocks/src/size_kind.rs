@@ -36,11 +36,15 @@ pub enum SizeKind {
     Dead = 12,
     /// An actuator stands still whatever it is told; no size.
     Stuck = 13,
+    /// A steered wheel stands at this angle whatever it is told, rad.
+    HeldAtRad = 14,
+    /// A pose has jumped by this much, m.
+    JumpM = 15,
 }
 
 impl SizeKind {
     /// Every kind, in the order of the codes.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 16] = [
         Self::None,
         Self::Gain,
         Self::BiasRadS,
@@ -55,6 +59,8 @@ impl SizeKind {
         Self::Noise,
         Self::Dead,
         Self::Stuck,
+        Self::HeldAtRad,
+        Self::JumpM,
     ];
 
     /// The kind behind a block's code, [`Self::None`] for one that this version does not know.
@@ -81,6 +87,8 @@ impl SizeKind {
             Self::Noise => "noise",
             Self::Dead => "dead",
             Self::Stuck => "stuck",
+            Self::HeldAtRad => "held",
+            Self::JumpM => "jump",
         }
     }
 
@@ -92,8 +100,9 @@ impl SizeKind {
             Self::BiasRadS | Self::RateBiasRadS => Some("rad/s"),
             Self::DriftRadS2 => Some("rad/s2"),
             Self::DelayS => Some("s"),
-            Self::AngleRad => Some("rad"),
+            Self::AngleRad | Self::HeldAtRad => Some("rad"),
             Self::CurrentOffsetA => Some("A"),
+            Self::JumpM => Some("m"),
             Self::None | Self::Zero | Self::Frozen | Self::Noise | Self::Dead | Self::Stuck => None,
         }
     }

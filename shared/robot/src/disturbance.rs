@@ -14,7 +14,7 @@ pub const PARAMETERS: usize = 2;
 const FIRST_CODE: u32 = 101;
 
 /// Kind of a disturbance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u32)]
 pub enum DisturbanceKind {
     /// A steering servo slips: the wheel and its sensor turn by an angle, rad.
@@ -65,6 +65,14 @@ pub enum DisturbanceKind {
     CurrentBias,
     /// A current sensor reports what it would, noise included, scaled: by 0 for a dead one.
     CurrentScale,
+    /// A steering servo stands at an angle whatever it is told, rad; its sensor sees it.
+    SteerHeld,
+    /// A steering sensor alone reports an angle more, rad.
+    SteerBias,
+    /// The pose jumps, m, to the left of the heading at the onset.
+    PoseJump,
+    /// The pose is reported anew only every so many seconds, and repeated in between.
+    PoseHeld,
 }
 
 /// Where a disturbance acts.
@@ -134,11 +142,13 @@ const fn row(
 
 const ANGLE: &[Parameter] = &[parameter("RAD", -0.6, 0.6, 0.2)];
 const SLOPE: &[Parameter] = &[parameter("RAD", -0.3, 0.3, 0.15)];
-const PULL: &[Parameter] = &[parameter("N", 0.0, 100.0, 20.0)];
+const PULL: &[Parameter] = &[parameter("N", 0.0, 80.0, 20.0)];
 const LOSS: &[Parameter] = &[parameter("SHARE", 0.0, 1.0, 0.5)];
 const BIAS: &[Parameter] = &[parameter("RAD_PER_S", -0.5, 0.5, 0.02)];
 const DRIFT: &[Parameter] = &[parameter("M_PER_S", -0.5, 0.5, 0.02)];
 const DELAY: &[Parameter] = &[parameter("S", 0.0, DELAY_MAX_S, 0.3)];
+const JUMP: &[Parameter] = &[parameter("M", -5.0, 5.0, 0.3)];
+const HOLD: &[Parameter] = &[parameter("S", 0.0, 3600.0, 60.0)];
 const DROP: &[Parameter] = &[parameter("SHARE", 0.0, 1.0, 1.0)];
 const SCALE: &[Parameter] = &[parameter("FACTOR", 0.5, 2.0, 1.05)];
 const SINKAGE: &[Parameter] = &[parameter("FACTOR", 1.0, 10.0, 3.0)];
@@ -158,7 +168,7 @@ const SHIFT: &[Parameter] = &[
 pub const DELAY_MAX_S: f64 = 2.0;
 
 /// Every kind, in the order of the codes.
-pub const KINDS: [Kind; 24] = {
+pub const KINDS: [Kind; 28] = {
     use DisturbanceKind as D;
     use Place::{Rover, Side, SteeredWheel, Wheel};
     [
@@ -191,6 +201,10 @@ pub const KINDS: [Kind; 24] = {
         row(D::GyroScale, "gyro-scale", Rover, GAIN),
         row(D::CurrentBias, "current-bias", Wheel, AMPERES),
         row(D::CurrentScale, "current-scale", Wheel, GAIN),
+        row(D::SteerHeld, "steer-held", SteeredWheel, ANGLE),
+        row(D::SteerBias, "steer-bias", SteeredWheel, ANGLE),
+        row(D::PoseJump, "pose-jump", Rover, JUMP),
+        row(D::PoseHeld, "pose-held", Rover, HOLD),
     ]
 };
 

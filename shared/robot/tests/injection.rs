@@ -65,7 +65,7 @@ fn kinds_stand_in_the_order_of_their_codes() {
         assert_eq!(DisturbanceKind::named(row.name), Some(row.kind));
     }
     assert_eq!(DisturbanceKind::from_wire(100), None);
-    assert_eq!(DisturbanceKind::from_wire(125), None);
+    assert_eq!(DisturbanceKind::from_wire(129), None);
 }
 
 #[test]
@@ -89,8 +89,8 @@ fn a_disturbance_has_the_values_given_and_defaults_for_the_rest() {
 #[test]
 fn what_is_wrong_is_named_with_what_is_allowed() {
     for (spec, expected) in [
-        ("tether:101", "tether: N is 101: allowed is 0 to 100"),
-        ("tether:nan", "tether: N is NaN: allowed is 0 to 100"),
+        ("tether:81", "tether: N is 81: allowed is 0 to 80"),
+        ("tether:nan", "tether: N is NaN: allowed is 0 to 80"),
         (
             "tether:strong",
             "'tether:strong' does not have the form tether[:N]",

@@ -364,5 +364,5 @@ fn places_and_parameters_that_do_not_exist_are_refused() {
     let found = refused(&mut world, DisturbanceKind::SoilSoft, 2, 0.5);
     assert!(found.contains("place 2"), "{found}");
     let found = refused(&mut world, DisturbanceKind::Tether, 0, f64::NAN);
-    assert_eq!(found, "tether: N is NaN: allowed is 0 to 100");
+    assert_eq!(found, "tether: N is NaN: allowed is 0 to 80");
 }

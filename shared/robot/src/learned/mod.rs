@@ -7,7 +7,8 @@
 //! | [`wheels`] | wheel rates and steering angles, and what an encoder says about its wheel |
 //! | [`BodyLag`] | how the body follows a changing command, learned on the way |
 //! | [`observation`] | frames averaged into observations of about the learned interval |
-//! | [`motion_modes`] | the ways in which a robot may move: nominal, wheels stuck, unknown |
+//! | [`motion_modes`] | the ways in which a robot may move: nominal, wheels stuck, a servo off, unknown |
+//! | [`steer_reading`] | what a steering angle says of its servo |
 //! | [`wheel_context`] | what ground and load make of the wheels' rates, learned on the way |
 //! | [`wheel_evidence`] | what the wheels say, for everything that each may be doing |
 //! | [`switching`] | the learned model as a hybrid system, for filters that take any |
@@ -43,6 +44,7 @@ pub mod observation;
 mod provenance;
 mod reading;
 pub mod repeats;
+pub mod steer_reading;
 pub mod switching;
 mod together;
 pub mod troubles;
@@ -58,10 +60,11 @@ pub use healthy::Healthy;
 pub use model::{Model, ModelError};
 pub use monitor::Monitor;
 pub use motion::{Curve, MotionModel};
-pub use motion_modes::{FaultRates, MotionMode, Moved, motion_modes};
+pub use motion_modes::{FaultRates, MotionMode, Moved, motion_modes, steer_modes};
 pub use noise_scale::{NoiseScales, OutlierRates};
 pub use observation::{Intake, Observation, Observer};
 pub use reading::Reading;
+pub use steer_reading::SteerReading;
 pub use switching::Switching;
 pub use troubles::Troubles;
 pub use wheel_context::WheelContext;

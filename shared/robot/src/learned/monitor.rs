@@ -445,11 +445,12 @@ impl Monitor {
             |channel: usize| channels[channel] = channels[channel].max(TROUBLE_LOG_ODDS);
         let Troubles {
             pose_silent,
+            pose_frozen,
             pose_moves,
             wheels_turn,
             wheels_silent,
         } = self.troubles;
-        if pose_silent || pose_moves {
+        if pose_silent || pose_frozen || pose_moves {
             trouble(Channel::POSE);
         }
         if self.channels.use_wheels() {

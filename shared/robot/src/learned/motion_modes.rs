@@ -44,6 +44,11 @@ pub enum Moved {
     Nominal,
     /// These wheels are stuck: bit w is wheel w.
     Stuck(u32),
+    /// This wheel's steering servo does not do as it is told; what that makes of the motion is not
+    /// known.
+    Steer(usize),
+    /// The pose has jumped; the robot moves as commanded.
+    Pose,
     /// A large constant deviation; wheels turn as commanded.
     Unknown,
     /// A large constant deviation; wheels and steering may do anything.
@@ -174,6 +179,9 @@ impl FaultRates {
         match to {
             _ if from == to => 0.0,
             Moved::Unknown | Moved::UnknownAny => 0.5 * self.unknown_1_s * factor,
+            // One servo or the pose, of a robot whose wheels turn.
+            Moved::Steer(_) | Moved::Pose if before == 0 => self.fault_1_s * factor,
+            Moved::Steer(_) | Moved::Pose => 0.0,
             Moved::Stuck(_) if fewer == 0 => self.fault_1_s * at_once * factor,
             // Another wheel instead of the only one.
             Moved::Stuck(_) if before.count_ones() == 1 && after.count_ones() == 1 => {
@@ -232,32 +240,43 @@ pub fn motion_modes(
         let known = wheels().fold(0, |bits, wheel| bits | 1 << wheel);
         modes.extend(several_modes(model, robot, known));
     }
-    let drives_on = |moved| MotionMode {
+    modes.push(MotionMode {
+        share: 1.0 - JUMP_SHARE,
+        ..drives_on(model, Moved::Unknown)
+    });
+    modes.push(drives_on(model, Moved::UnknownAny));
+    if rare {
+        modes.push(MotionMode {
+            share: JUMP_SHARE,
+            noise: nominal.noise(),
+            jump: JUMP_SD.map(|sd| sd * sd),
+            ..drives_on(model, Moved::Unknown)
+        });
+    }
+    modes
+}
+
+/// The ways in which the robot moves while the steering servo of one of these wheels (bits) does
+/// not do as it is told.
+pub fn steer_modes(model: &Model, steered: u32) -> impl Iterator<Item = MotionMode> {
+    let wheels = (0..WHEELS).filter(move |wheel| steered >> wheel & 1 == 1);
+    wheels.map(|wheel| drives_on(model, Moved::Steer(wheel)))
+}
+
+/// Nominal motion with a large constant deviation.
+fn drives_on(model: &Model, moved: Moved) -> MotionMode {
+    MotionMode {
         moved,
         share: 1.0,
-        p_unknown: 1.0,
-        motion: nominal,
+        p_unknown: if moved.is_unknown() { 1.0 } else { 0.0 },
+        motion: model.nominal.motion,
         noise: unknown_noise(model),
         ground: (1.0, 0.0),
         kept_m_s: 0.0,
         jump: [0.0; 3],
         is_thrown: false,
         beyond: [RateModel::NONE; WHEELS],
-    };
-    modes.push(MotionMode {
-        share: 1.0 - JUMP_SHARE,
-        ..drives_on(Moved::Unknown)
-    });
-    modes.push(drives_on(Moved::UnknownAny));
-    if rare {
-        modes.push(MotionMode {
-            share: JUMP_SHARE,
-            noise: nominal.noise(),
-            jump: JUMP_SD.map(|sd| sd * sd),
-            ..drives_on(Moved::Unknown)
-        });
     }
-    modes
 }
 
 /// Noise of nominal motion with a large constant deviation: what is not known about a fault.

@@ -90,9 +90,9 @@ enum Family {
 impl Mode {
     const fn family(&self) -> Family {
         match self.moved {
-            Moved::Nominal => Family::Nominal,
+            Moved::Nominal | Moved::Pose => Family::Nominal,
             Moved::Stuck(_) => Family::Stuck,
-            Moved::Unknown | Moved::UnknownAny => Family::Unknown,
+            Moved::Steer(_) | Moved::Unknown | Moved::UnknownAny => Family::Unknown,
         }
     }
 }
@@ -205,7 +205,7 @@ impl Switching {
                 AT_ONSET.ln() + sum(true),
             ),
             Moved::UnknownAny => sum(false) + evidence.steering,
-            Moved::Nominal | Moved::Unknown => sum(false),
+            Moved::Nominal | Moved::Pose | Moved::Unknown | Moved::Steer(_) => sum(false),
         }
     }
 }

@@ -10,6 +10,12 @@ use super::{Model, Observation};
 
 /// A channel that says nothing for so long is silent, s. Slower sensors are not supported.
 const SILENT_S: f64 = 2.0;
+/// A pose that repeats itself exactly for so long in motion is frozen, s: if in this run it has
+/// changed so often, and never stood for a quarter as long.
+const FROZEN_S: f64 = 1.0;
+const CHANGES: u32 = 40;
+/// Two poses less apart are the same, m and rad: means of equal numbers differ in the last bit.
+const SAME: f64 = 1e-12;
 /// Time for which the robot is commanded to stand before it is expected to, s.
 const STOPPED_S: f64 = 1.0;
 /// Motion at rest counts when it lasts so long, s: no single reading decides.
@@ -31,6 +37,8 @@ const TURNING_RAD_S: f64 = 0.3;
 pub struct Troubles {
     /// No pose for a while.
     pub pose_silent: bool,
+    /// The pose repeats itself exactly while the robot moves, as it never did before.
+    pub pose_frozen: bool,
     /// Wheels whose rates used to come and do not any more, as bits.
     pub wheels_silent: u32,
     /// The pose moves, and most wheels turn, though the robot is commanded to stand.
@@ -43,7 +51,7 @@ impl Troubles {
     /// True if anything is the matter with what is used: the pose, and the wheels if they are.
     #[must_use]
     pub const fn any(&self, use_wheels: bool) -> bool {
-        let pose = self.pose_silent || self.pose_moves;
+        let pose = self.pose_silent || self.pose_frozen || self.pose_moves;
         pose || use_wheels && (self.wheels_silent != 0 || self.wheels_turn)
     }
 }
@@ -52,6 +60,10 @@ impl Troubles {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Watchdog {
     pose_silent_s: f64,
+    last_pose: Option<[f64; 3]>,
+    pose_held_s: f64,
+    pose_held_before_s: f64,
+    pose_changes: u32,
     wheels_silent_s: [f64; WHEELS],
     wheels_heard: u32,
     stopped_s: f64,
@@ -73,6 +85,7 @@ impl Watchdog {
         let dt_s = observation.dt_s;
         let lasting = |so_far_s: f64, holds: bool| if holds { so_far_s + dt_s } else { 0.0 };
         self.pose_silent_s = lasting(self.pose_silent_s, observation.pose_frames == 0);
+        let pose_frozen = self.freezes(observation);
         let mut wheels_silent = 0;
         let (mut heard, mut turning) = (0, 0);
         for (wheel, reading) in observation.wheels.iter().enumerate() {
@@ -96,10 +109,40 @@ impl Watchdog {
         }
         Troubles {
             pose_silent: self.pose_silent_s >= SILENT_S,
+            pose_frozen,
             wheels_silent,
             pose_moves: self.pose_moving_s >= LASTING_S,
             wheels_turn: self.wheels_turning_s >= LASTING_S,
         }
+    }
+
+    /// True if the pose is frozen.
+    fn freezes(&mut self, observation: &Observation) -> bool {
+        if observation.pose_frames == 0 {
+            return self.is_frozen();
+        }
+        let pose = observation.pose;
+        let is_same = self.last_pose.replace(pose).is_some_and(|last| {
+            let mut pairs = pose.into_iter().zip(last);
+            pairs.all(|(now, before)| (now - before).abs() <= SAME)
+        });
+        let before_s = self.pose_held_s;
+        self.pose_held_s = match is_same {
+            true => before_s + observation.moved_s(),
+            false => 0.0,
+        };
+        let was_frozen = before_s >= FROZEN_S && self.pose_changes >= CHANGES;
+        if !is_same && !was_frozen {
+            self.pose_changes = self.pose_changes.saturating_add(1);
+            self.pose_held_before_s = self.pose_held_before_s.max(before_s);
+        }
+        self.is_frozen()
+    }
+
+    fn is_frozen(&self) -> bool {
+        let usually_changes =
+            self.pose_changes >= CHANGES && self.pose_held_before_s <= 0.25 * FROZEN_S;
+        usually_changes && self.pose_held_s >= FROZEN_S
     }
 
     /// True if a pose is away from where the robot rests, which follows it slowly.
@@ -192,6 +235,23 @@ mod tests {
         // The third wheel never read anything: it is not there.
         assert_eq!((troubles.wheels_silent, troubles.any(false)), (2, true));
         assert_eq!(watchdog.step(&good, false, &LIMITS), Troubles::default());
+    }
+
+    #[test]
+    fn a_pose_that_freezes_is_noticed_after_a_second_and_a_slow_one_is_none() {
+        let drives = |k: u32| Observation {
+            moving: true,
+            ..observation(0.01 * f64::from(k), &[2.5; 6])
+        };
+        for (hold, frozen) in [(1, true), (20, false), (100, false)] {
+            let mut watchdog = Watchdog::default();
+            let slow = |k: u32| drives(k / hold * hold);
+            assert_eq!(first(&mut watchdog, false, slow, |t| t.any(true)), None);
+            let held = |_| drives(9999);
+            let found = first(&mut watchdog, false, held, |t| t.pose_frozen);
+            assert_eq!(found, frozen.then_some(21), "one pose in {hold}");
+            assert!(!watchdog.step(&drives(0), false, &LIMITS).pose_frozen);
+        }
     }
 
     #[test]

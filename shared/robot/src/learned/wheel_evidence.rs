@@ -1,11 +1,11 @@
 //! What the wheels of one observation say, for everything that each may be doing.
 
 use vigil_blocks::WHEELS;
-use vigil_inference::logspace::{log_add, log_normal};
-use vigil_inference::outlier::tempered;
+use vigil_inference::logspace::log_add;
 
+use super::steer_reading::SteerReading;
 use super::wheel_context::Beside;
-use super::wheels::{rolling_rate, steering_angle};
+use super::wheels::rolling_rate;
 use super::{
     EncoderState, Model, MotionMode, Moved, NoiseScales, Observation, RateModel, WheelContext,
 };
@@ -35,8 +35,6 @@ const GROUND_SD: f64 = 0.5;
 const MOMENT: f64 = 0.2;
 /// Share of wheels that do anything, in the unknown.
 pub const ANYTHING: f64 = 0.2;
-/// Standard deviation of a steering angle that does anything, rad.
-const STEER_ANY_RAD: f64 = 0.3;
 
 /// Natural log-likelihoods of one observation's wheel readings; comparable within a wheel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,6 +49,8 @@ pub struct WheelEvidence {
     pub any: [f64; WHEELS],
     /// Steering angles that may be anything, relative to angles as commanded.
     pub steering: f64,
+    /// Steering angles, where they are read.
+    pub steer: [Option<SteerReading>; WHEELS],
     /// Rate by rolling, and its variance by the lag of the body.
     rolling: [(f64, f64); WHEELS],
     /// What the context adds to the model's rate, and its variance.
@@ -84,12 +84,15 @@ impl WheelEvidence {
         let learned = model.noise.wheel_rate_rad_s;
         let samples = observation.sample_variances(model, learned, noise.wheels);
         let sample_sd = samples.map(f64::sqrt);
+        let steer = SteerReading::all(model, robot, observation, &noise);
+        let unsure = steer.iter().flatten().map(SteerReading::log_ratio_unsure);
         let mut evidence = Self {
             healthy: [0.0; WHEELS],
             broken: [[0.0; BREAKAGES.len()]; WHEELS],
             own_rate: [0.0; WHEELS],
             any: [0.0; WHEELS],
-            steering: steering(model, robot, observation, &noise),
+            steering: unsure.sum(),
+            steer,
             rolling: [(0.0, 0.0); WHEELS],
             shift: [(0.0, 0.0); WHEELS],
             nominal: [(0.0, 0.0); WHEELS],
@@ -154,7 +157,9 @@ impl WheelEvidence {
                 either(dragged, self.healthy[i])
             }
             Moved::UnknownAny => self.unsure(i),
-            Moved::Nominal | Moved::Unknown => self.healthy[i],
+            // A wheel that stands askew rolls as it can.
+            Moved::Steer(askew) if askew == i => self.unsure(i),
+            Moved::Nominal | Moved::Unknown | Moved::Steer(_) | Moved::Pose => self.healthy[i],
         }
     }
 
@@ -298,35 +303,4 @@ impl WheelEvidence {
             log_add(sum, share.ln() + log_p)
         })
     }
-}
-
-/// What the steering angles say for the unknown: relative to angles as commanded, which every named
-/// mode has.
-fn steering(
-    model: &Model,
-    robot: &Description,
-    observation: &Observation,
-    noise: &NoiseScales,
-) -> f64 {
-    let (scales, outliers) = (noise.steer, noise.outliers.steer);
-    let extra = model.nominal.steer_sd_rad;
-    let mut sum = 0.0;
-    for i in (0..robot.wheels.len().min(WHEELS)).filter(|&i| robot.wheels[i].steered) {
-        let reading = &observation.steer[i];
-        if reading.plain == 0 {
-            continue;
-        }
-        let angle = steering_angle(robot, i, observation.command[0]);
-        let behind = angle - steering_angle(robot, i, observation.curvature);
-        let sd = model.noise.steer_rad * scales[i];
-        let sample = model.sample_variance(sd, observation.frame_s);
-        let noise = observation.mean_variance(sample, reading.plain);
-        let variance = noise + extra * extra + behind * behind;
-        let apart = robot.beyond_steer(reading.mean - angle);
-        let wide = variance + STEER_ANY_RAD * STEER_ANY_RAD;
-        let apart = tempered(apart / variance.sqrt(), outliers[i]) * variance.sqrt();
-        let ratio = log_normal(apart, wide) - log_normal(apart, variance);
-        sum += log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + ratio.min(30.0));
-    }
-    sum
 }

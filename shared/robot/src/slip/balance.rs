@@ -39,7 +39,8 @@ impl<'a> Balance<'a> {
         let condition = &situation.condition;
         let contacts = std::array::from_fn(|i| {
             let wheel = &condition.wheels[i];
-            let (sin, cos) = (targets.steer_rad[i] + wheel.steer_offset_rad).sin_cos();
+            let servo_rad = wheel.steer_held_rad.unwrap_or(targets.steer_rad[i]);
+            let (sin, cos) = (servo_rad + wheel.steer_offset_rad).sin_cos();
             Contact {
                 heading: (cos, sin),
                 radius_m: model.kinematics.wheel_radius_m * wheel.radius_share,

@@ -11,7 +11,9 @@ const RESISTANCE_SMOOTHING_M_S: f64 = 0.01;
 /// One wheel. The default is as built.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WheelCondition {
-    /// Angle beyond the commanded steering, rad.
+    /// Angle at which the servo stands whatever it is told, rad.
+    pub steer_held_rad: Option<f64>,
+    /// Angle beyond that or the commanded steering, rad.
     pub steer_offset_rad: f64,
     /// Share of the motor's gain and torque limit that is left, 0..1.
     pub torque_share: f64,
@@ -27,6 +29,7 @@ pub struct WheelCondition {
 impl Default for WheelCondition {
     fn default() -> Self {
         Self {
+            steer_held_rad: None,
             steer_offset_rad: 0.0,
             torque_share: 1.0,
             radius_share: 1.0,
@@ -68,7 +71,8 @@ impl Condition {
         ];
         whole.iter().all(|value| value.is_finite())
             && self.wheels.iter().all(|wheel| {
-                wheel.steer_offset_rad.is_finite()
+                wheel.steer_held_rad.is_none_or(f64::is_finite)
+                    && wheel.steer_offset_rad.is_finite()
                     && (0.0..=1.0).contains(&wheel.torque_share)
                     && wheel.radius_share.is_finite()
                     && wheel.radius_share > 0.0

@@ -1,0 +1,86 @@
+//! What a steering angle of one observation says of its servo.
+
+use vigil_blocks::WHEELS;
+use vigil_inference::logspace::{log_add, log_normal};
+use vigil_inference::outlier::tempered;
+
+use super::wheels::steering_angle;
+use super::{Model, NoiseScales, Observation};
+use crate::Description;
+
+/// Standard deviation of a steering angle that does anything, rad.
+const ANY_RAD: f64 = 0.3;
+/// Share of servos that do anything, in the unknown.
+const ANYTHING: f64 = 0.2;
+/// An angle that does anything is at most so much more likely than one as commanded (natural
+/// logarithm): a single reading decides nothing.
+const RATIO_MAX: f64 = 30.0;
+
+/// A steering angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SteerReading {
+    /// As read, rad.
+    pub read_rad: f64,
+    /// As commanded, rad.
+    pub commanded_rad: f64,
+    /// Variance of what is read about the servo's angle, by noise and lag, rad².
+    pub variance: f64,
+    /// Beyond the tolerance of the commanded angle, rad.
+    beyond_rad: f64,
+    outlier_rate: f64,
+}
+
+impl SteerReading {
+    /// Those of an observation whose sensors are so noisy; None of a wheel that is not steered or
+    /// was not read.
+    #[must_use]
+    pub fn all(
+        model: &Model,
+        robot: &Description,
+        observation: &Observation,
+        noise: &NoiseScales,
+    ) -> [Option<Self>; WHEELS] {
+        let extra = model.nominal.steer_sd_rad;
+        std::array::from_fn(|wheel| {
+            let is_steered = robot.wheels.get(wheel).is_some_and(|wheel| wheel.steered);
+            let reading = &observation.steer[wheel];
+            if !is_steered || reading.plain == 0 {
+                return None;
+            }
+            let commanded_rad = steering_angle(robot, wheel, observation.command[0]);
+            let behind = commanded_rad - steering_angle(robot, wheel, observation.curvature);
+            let sd = model.noise.steer_rad * noise.steer[wheel];
+            let sample = model.sample_variance(sd, observation.frame_s);
+            let noise_variance = observation.mean_variance(sample, reading.plain);
+            Some(Self {
+                read_rad: reading.mean,
+                commanded_rad,
+                variance: noise_variance + extra * extra + behind * behind,
+                beyond_rad: robot.beyond_steer(reading.mean - commanded_rad),
+                outlier_rate: noise.outliers.steer[wheel],
+            })
+        })
+    }
+
+    /// Log-density of the reading if the servo stands at `angle_rad`, known up to a variance, over
+    /// that if it stands as commanded.
+    #[must_use]
+    pub fn log_ratio(&self, angle_rad: f64, variance: f64) -> f64 {
+        let density = |apart_rad: f64, variance: f64| {
+            let sd = variance.sqrt();
+            log_normal(tempered(apart_rad / sd, self.outlier_rate) * sd, variance)
+        };
+        let off = density(self.read_rad - angle_rad, self.variance + variance);
+        off - density(self.beyond_rad, self.variance)
+    }
+
+    /// The same if it may do anything, or be as commanded, as in the unknown.
+    #[must_use]
+    pub fn log_ratio_unsure(&self) -> f64 {
+        let sd = self.variance.sqrt();
+        let apart = tempered(self.beyond_rad / sd, self.outlier_rate) * sd;
+        let wide = self.variance + ANY_RAD * ANY_RAD;
+        let ratio = log_normal(apart, wide) - log_normal(apart, self.variance);
+        log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + ratio.min(RATIO_MAX))
+    }
+}
