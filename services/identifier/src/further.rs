@@ -70,6 +70,9 @@ enum State {
 pub struct Fusion {
     /// Factor of sets in which this wheel is stuck.
     pub stuck: [f64; WHEELS],
+    /// Factor of sets in which a wheel stands askew: it may load any motor by any amount, so that it
+    /// explains as much as the best of the faults that these channels know.
+    pub askew: f64,
     /// Factor of the unknown, and its probability over that of none where the motion is nominal.
     pub unknown: (f64, f64),
     /// Nodes that only these channels tell, and their probability over that of none.
@@ -334,6 +337,7 @@ impl FurtherFilter {
         let bounded = |ratio: f64| ratio.clamp(1.0 / RATIO_MAX, RATIO_MAX);
         let mut fusion = Fusion {
             stuck: [1.0; WHEELS],
+            askew: 1.0,
             unknown: (1.0, 0.0),
             nodes: [(0, 0.0); 2 * WHEELS + 1],
             count: 0,
@@ -345,6 +349,7 @@ impl FurtherFilter {
                 true => bounded(odds / prior),
                 false => 1.0,
             };
+            fusion.askew = fusion.askew.max(ratio);
             match (state, self.nodes[at]) {
                 (State::Stuck(wheel), _) => fusion.stuck[*wheel] = ratio,
                 (State::Unknown, _) => fusion.unknown = (0.5 + 0.5 * ratio, odds),

@@ -14,7 +14,7 @@ use crate::sizes::{BIAS, DRIFT, Sized};
 pub struct Prepared {
     /// In general, and at the mode's onset.
     likelihoods: [Likelihoods; 2],
-    /// With several stuck wheels: those that turn, and how.
+    /// Wheels that turn in a way of which nothing was learned, and how they may.
     dragged: [Option<Dragged>; WHEELS],
     steering: f64,
     stuck: u32,
@@ -42,8 +42,8 @@ impl Seen<'_> {
         Prepared {
             likelihoods: [false, true].map(|is_new| self.likelihoods(mode, is_new, sized)),
             dragged: std::array::from_fn(|wheel| {
-                let turns = wheel < self.robot.wheels.len() && stuck >> wheel & 1 == 0;
-                (turns && stuck.count_ones() > 1).then(|| {
+                let is_wheel = wheel < self.robot.wheels.len();
+                (is_wheel && mode.turns_anyhow(wheel)).then(|| {
                     let (model, observation) = (self.model, self.observation);
                     self.evidence.dragged(model, observation, mode, wheel)
                 })

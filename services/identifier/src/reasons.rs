@@ -201,10 +201,9 @@ impl Reasons {
             let moved = mode.moved;
             for wheel in 0..self.robot.wheels.len().min(WHEELS) {
                 let is_broken = lineage.broken >> wheel & 1 == 1;
-                let is_dragged = moved.stuck().count_ones() > 1 && !moved.is_stuck(wheel);
                 lineage.heard[Channel::wheel_rate(wheel)] += if is_broken {
                     evidence.broken_anyhow(wheel)
-                } else if is_dragged && !is_new {
+                } else if mode.turns_anyhow(wheel) && !is_new {
                     let dragged = evidence.dragged(&self.model, observation, mode, wheel);
                     let (model, offsets) = (&self.model, &mut lineage.offsets);
                     let heard =

@@ -122,9 +122,8 @@ impl Sets {
                 *p *= factor;
             }
         }
-        // What a wheel that stands askew makes of currents and turn is not known.
         for p in askew.iter_mut().take(POSE * subsets) {
-            *p *= fusion.unknown.0;
+            *p *= fusion.askew;
         }
     }
 

@@ -119,6 +119,16 @@ impl MotionMode {
         self.moved == Moved::Nominal || self.jump != [0.0; 3]
     }
 
+    /// True if this wheel turns in a way of which nothing was learned before.
+    #[must_use]
+    pub fn turns_anyhow(&self, wheel: usize) -> bool {
+        match self.moved {
+            Moved::Stuck(stuck) => stuck.count_ones() > 1 && !self.moved.is_stuck(wheel),
+            Moved::Steer(askew) => askew == wheel,
+            _ => false,
+        }
+    }
+
     /// The noise with which this mode begins at a curvature (1/m) and speed (m/s): the run's offset
     /// also lies along the effect itself, as far as the ground is not known.
     #[must_use]

@@ -31,6 +31,8 @@ const TAIL_DRAGGED: f64 = 0.1;
 pub const TOGETHER_SD: f64 = 0.4;
 /// Deviation of the change that one dragging wheel makes on any ground, relative to that learned.
 const GROUND_SD: f64 = 0.5;
+/// What a wheel that stands askew may change of its own rate, relative to it.
+const ASKEW: f64 = 0.25;
 /// Share of the observations at an onset that hold the very moment.
 const MOMENT: f64 = 0.2;
 /// Share of wheels that do anything, in the unknown.
@@ -196,9 +198,15 @@ impl WheelEvidence {
             1 => variance += GROUND_SD * GROUND_SD * change * change,
             _ => {}
         }
+        // A wheel that stands askew is turned by the ground, too.
+        let askew = if mode.moved == Moved::Steer(i) {
+            ASKEW * nominal
+        } else {
+            0.0
+        };
         Dragged {
             rate_rad_s: nominal + shift + change,
-            change_rad_s: change,
+            change_rad_s: change + askew,
             variance: variance + behind + uncertain,
         }
     }
