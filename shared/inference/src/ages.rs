@@ -24,6 +24,43 @@ use crate::outlier::SPREAD;
 /// Log-odds beyond which more evidence changes nothing.
 pub const LOG_ODDS_MAX: f64 = 700.0;
 
+/// A whitened residual.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Whitened<const D: usize> {
+    /// The residual over its standard deviation.
+    pub value: SVector<f64, D>,
+    /// By how much a bias of one unit moves it: 1 at the usual noise, less where more is uncertain.
+    pub exposure: f64,
+    /// Probability that it is an outlier, whether the fault is there or not: it is evidence only as
+    /// far as one state explains it and the other does not.
+    pub outlier_rate: f64,
+}
+
+impl<const D: usize> Whitened<D> {
+    /// One with no more than the usual noise, and no outlier.
+    #[must_use]
+    pub const fn usual(value: SVector<f64, D>) -> Self {
+        Self {
+            value,
+            exposure: 1.0,
+            outlier_rate: 0.0,
+        }
+    }
+}
+
+impl Whitened<1> {
+    /// A residual of this variance, of which the part `passing` is there for the moment only.
+    #[must_use]
+    pub fn of(apart: f64, variance: f64, passing: f64, outlier_rate: f64) -> Self {
+        let usual = (variance - passing).max(0.0);
+        Self {
+            value: SVector::from([apart / variance.sqrt()]),
+            exposure: (usual / variance).sqrt(),
+            outlier_rate,
+        }
+    }
+}
+
 /// A fault that began at one of some successive steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Component<const D: usize> {
@@ -80,17 +117,16 @@ impl<const D: usize> Ages<D> {
     /// One step with the whitened residual and the probability `birth` that a fault appears in it.
     /// A residual that is not finite is no evidence.
     pub fn step(&mut self, residual: &SVector<f64, D>, birth: f64) {
-        self.step_with_outliers(residual, birth, 0.0);
+        self.take(&Whitened::usual(*residual), birth);
     }
 
-    /// The same of a residual that is an outlier with the probability `rate`, whether the fault is
-    /// there or not: it is evidence only as far as one state explains it and the other does not.
-    pub fn step_with_outliers(&mut self, residual: &SVector<f64, D>, birth: f64, rate: f64) {
-        let square = residual.norm_squared();
-        if !square.is_finite() {
+    /// The same of a residual that is not like the others.
+    pub fn take(&mut self, residual: &Whitened<D>, birth: f64) {
+        let square = residual.value.norm_squared();
+        if !(square.is_finite() && residual.exposure.is_finite()) {
             return;
         }
-        let (nominal, _) = contaminated(square, rate, self.dimensions);
+        let (nominal, _) = contaminated(square, residual.outlier_rate, self.dimensions);
         self.components.enter(Component {
             log_weight: birth.ln(),
             bias: SVector::zeros(),
@@ -100,7 +136,7 @@ impl<const D: usize> Ages<D> {
         let stays = (-birth).ln_1p();
         let mut highest = f64::NEG_INFINITY;
         for component in self.components.iter_mut() {
-            component.take(residual, nominal, rate);
+            component.take(residual, nominal);
             component.log_weight -= stays;
             highest = highest.max(component.log_weight);
         }
@@ -135,15 +171,17 @@ fn contaminated(square: f64, rate: f64, dimensions: f64) -> (f64, f64) {
 
 impl<const D: usize> Component<D> {
     /// Conditions on a residual: the weight's ratio to the nominal density, then the bias.
-    fn take(&mut self, residual: &SVector<f64, D>, nominal: f64, rate: f64) {
-        let spread = 1.0 + self.variance;
-        let deviation = residual - self.bias;
+    fn take(&mut self, residual: &Whitened<D>, nominal: f64) {
+        let exposure = residual.exposure;
+        let shown = exposure * exposure * self.variance;
+        let spread = 1.0 + shown;
+        let deviation = residual.value - self.bias * exposure;
         let square = deviation.norm_squared() / spread;
-        let (own, variance) = contaminated(square, rate, self.dimensions);
+        let (own, variance) = contaminated(square, residual.outlier_rate, self.dimensions);
         self.log_weight += 0.5 * (nominal - own) - 0.5 * self.dimensions * spread.ln();
-        let gain = self.variance / (self.variance + variance);
+        let gain = exposure * self.variance / (shown + variance);
         self.bias += gain * deviation;
-        self.variance *= 1.0 - gain;
+        self.variance *= 1.0 - gain * exposure;
     }
 }
 
@@ -231,6 +269,31 @@ mod tests {
             assert!((short.log_odds() - long.log_odds()).abs() < 1e-9);
         }
         assert!(short.log_odds() > 5.0);
+    }
+
+    #[test]
+    fn a_bias_stays_one_where_much_is_uncertain() {
+        // A bias of 20 usual deviations, and residuals of noise 1; in a tenth of them ten times as
+        // much is uncertain, so that the bias shows as two deviations.
+        let mut filter = Ages::<1>::new(30.0);
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
+        let mut against = 0.0_f64;
+        for step in 0..500 {
+            let exposure = if step % 10 == 9 { 0.1 } else { 1.0 };
+            let noise: f64 = rng.sample(StandardNormal);
+            let residual = Whitened {
+                value: SVector::from([20.0 * exposure + noise]),
+                exposure,
+                outlier_rate: 1e-6,
+            };
+            filter.take(&residual, 1e-6);
+            against = against.min(filter.gain());
+        }
+        assert!(filter.log_odds() > 600.0);
+        assert!(
+            against > -5.0,
+            "a single reading speaks against it: {against}"
+        );
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! How a group of channels turns its whitened residuals into evidence for a fault.
 
-use nalgebra::SVector;
-use vigil_inference::ages::{self, Ages};
+use vigil_inference::ages::{self, Ages, Whitened};
 use vigil_inference::constant::Constant;
 use vigil_inference::outlier::tempered;
 use vigil_inference::windowed::Windowed;
@@ -88,14 +87,14 @@ impl<const D: usize> Evidence<D> {
         }
     }
 
-    /// Takes a whitened residual; `birth` is the probability that a fault appears with it, and
-    /// `rate` that it is an outlier.
-    pub(crate) fn step(&mut self, residual: &SVector<f64, D>, birth: f64, rate: f64) {
+    /// Takes a residual; `birth` is the probability that a fault appears with it.
+    pub(crate) fn step(&mut self, residual: &Whitened<D>, birth: f64) {
         let tau_squared = TAU_SQUARED_PER_DIMENSION * D as f64;
         if let Self::LearnedBias(filter) = self {
-            return filter.step_with_outliers(residual, birth, rate);
+            return filter.take(residual, birth);
         }
-        let residual = &residual.map(|residual| tempered(residual, rate));
+        let rate = residual.outlier_rate;
+        let residual = &residual.value.map(|value| tempered(value, rate));
         match self {
             Self::LearnedBias(_) => {}
             Self::Constant(filter) => {
@@ -114,7 +113,7 @@ mod tests {
     fn after(form: Form, residual: f64) -> f64 {
         let mut evidence = Evidence::<1>::new(form, 1.0);
         for _ in 0..200 {
-            evidence.step(&SVector::from([residual]), 1e-6, 0.0);
+            evidence.step(&Whitened::of(residual, 1.0, 0.0, 0.0), 1e-6);
         }
         evidence.log_odds()
     }

@@ -5,8 +5,8 @@
 //! held against the turn of the pose's track. Each has a learned departure of its own, and a flag
 //! of exact repeats.
 
-use nalgebra::SVector;
 use vigil_blocks::{Channel, WHEELS};
+use vigil_inference::ages::Whitened;
 
 use super::form::{Evidence, Form};
 use super::further::Further;
@@ -101,9 +101,16 @@ impl FurtherEvidence {
             self.repeats[GYRO].step(&further.yaw_rate, gyro.repeat_rate, birth_repeats);
         }
         if let Some(residual) = residuals.yaw_rate {
-            let whitened = SVector::from([residual.apart / residual.variance.sqrt()]);
+            let Residual {
+                apart,
+                variance,
+                passing,
+                outlier_rate,
+                ..
+            } = residual;
+            let whitened = Whitened::of(apart, variance, passing, outlier_rate);
             let birth = birth(SHARE_GYRO);
-            self.gyro.step(&whitened, birth, residual.outlier_rate);
+            self.gyro.step(&whitened, birth);
             self.gains[GYRO] = self.gyro.gain();
         }
     }
@@ -121,8 +128,9 @@ impl FurtherEvidence {
         for (wheel, residual) in all.iter().enumerate() {
             let Some(residual) = residual else { continue };
             let (apart, variance) = contrast((residual.apart, residual.variance), sums, others);
-            let whitened = SVector::from([apart / variance.sqrt()]);
-            self.currents[wheel].step(&whitened, birth, residual.outlier_rate);
+            let rate = residual.outlier_rate;
+            let whitened = Whitened::of(apart, variance, residual.passing, rate);
+            self.currents[wheel].step(&whitened, birth);
             self.gains[wheel] = self.currents[wheel].gain();
         }
     }

@@ -11,8 +11,8 @@
 //! The belief about the pose is as good as Gaussian, so no particles are needed to find the
 //! residuals: 256 of them were too few to tell a misjudged first heading from a fault.
 
-use nalgebra::SVector;
 use vigil_blocks::{CHANNELS, Channel, WHEELS};
+use vigil_inference::ages::Whitened;
 use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
@@ -326,7 +326,7 @@ impl Monitor {
             Form::LearnedBias => self.departure.gain(),
             Form::Constant | Form::Windowed => {
                 let birth = self.birth(observation.dt_s, SHARE_POSE);
-                self.pose.step(&said.residual, birth, 0.0);
+                self.pose.step(&Whitened::usual(said.residual), birth);
                 self.pose.gain()
             }
         };
@@ -370,9 +370,11 @@ impl Monitor {
             });
             let (shift, uncertain) = self.context.shift(i, rolling);
             let (apart, variance) = (reading.mean - rate - shift, variance + uncertain);
-            let whitened = SVector::from([apart / variance.sqrt()]);
-            self.wheels[i].step(&whitened, birth, scales.outliers.wheels[i]);
-            self.gains.wheels[i] = with_anything(self.wheels[i].gain(), whitened[0] * whitened[0]);
+            let rate = scales.outliers.wheels[i];
+            let whitened = Whitened::of(apart, variance, behind * behind, rate);
+            self.wheels[i].step(&whitened, birth);
+            let square = whitened.value.norm_squared();
+            self.gains.wheels[i] = with_anything(self.wheels[i].gain(), square);
             self.report.evidence += log_normal(apart, variance);
         }
         // What a fault does is no context of the nominal mode.
@@ -404,8 +406,9 @@ impl Monitor {
             let noise = observation.mean_variance(sample, reading.plain);
             let variance = noise + extra * extra + behind * behind;
             let apart = self.robot.beyond_steer(reading.mean - angle);
-            let whitened = SVector::from([apart / variance.sqrt()]);
-            self.steer[i].step(&whitened, birth, scales.outliers.steer[i]);
+            let rate = scales.outliers.steer[i];
+            let whitened = Whitened::of(apart, variance, behind * behind, rate);
+            self.steer[i].step(&whitened, birth);
             self.gains.steer[i] = self.steer[i].gain();
             self.report.evidence += log_normal(apart, variance);
         }

@@ -20,6 +20,7 @@
 
 use nalgebra::SVector;
 use vigil_blocks::{CHANNELS, Channel as Slot, WHEELS};
+use vigil_inference::ages::Whitened;
 use vigil_inference::constant::Constant;
 use vigil_inference::logspace::{log_add, log_normal};
 
@@ -78,7 +79,8 @@ impl Watched {
         }
         self.absent_s += now.dt_s;
         if self.absent_s > ABSENT_S {
-            self.absent.step(&SVector::from([CLIP]), birth, 0.0);
+            self.absent
+                .step(&Whitened::usual(SVector::from([CLIP])), birth);
             self.gains[1] = self.absent.gain();
         }
     }
@@ -93,7 +95,8 @@ impl Watched {
         let velocity = velocity.and_then(|drift| self.channel.target.quantity.of_pose(drift));
         if let Some(velocity) = velocity.filter(|_| self.channel.rest_sd > 0.0) {
             let whitened = (velocity / self.channel.rest_sd).clamp(-CLIP, CLIP);
-            self.rest.step(&SVector::from([whitened]), birth, 0.0);
+            self.rest
+                .step(&Whitened::usual(SVector::from([whitened])), birth);
             self.gains[2] = self.rest.gain();
         }
     }
@@ -119,7 +122,8 @@ impl Watched {
             log_add(self.bias.log_odds(), birth.ln()),
             log_add(self.scatter.log_odds(), birth.ln()),
         );
-        self.bias.step(&SVector::from([whitened]), birth, 0.0);
+        self.bias
+            .step(&Whitened::usual(SVector::from([whitened])), birth);
         let square = whitened * whitened / self.channel.scatter;
         self.scatter
             .step(square, TAU_SQUARED_PER_DIMENSION, birth, birth);
