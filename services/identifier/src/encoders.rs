@@ -245,6 +245,21 @@ impl Encoders {
         self.p[wheel][1..OWN_RATE].iter().sum::<f64>().min(1.0)
     }
 
+    /// Probability, at most, that any encoder is broken.
+    #[must_use]
+    pub fn p_any_broken(&self) -> f64 {
+        let all: f64 = (0..WHEELS).map(|wheel| self.p_broken(wheel)).sum();
+        all.min(1.0)
+    }
+
+    /// Of each wheel: probability, at most, that the encoder of another one is broken.
+    #[must_use]
+    pub fn p_other_broken(&self) -> [f64; WHEELS] {
+        let p: [f64; WHEELS] = std::array::from_fn(|wheel| self.p_broken(wheel));
+        let all: f64 = p.iter().sum();
+        p.map(|own| (all - own).clamp(0.0, 1.0))
+    }
+
     /// Probability that this wheel's encoder is dead: that it reads what a standing wheel's does.
     #[must_use]
     pub const fn p_dead(&self, wheel: usize) -> f64 {

@@ -166,26 +166,28 @@ pub struct FaultRates {
 }
 
 impl FaultRates {
-    /// Factor on the rates of faults in a robot that moves like this: 1 if it is nominal.
+    /// Factor on the rates of faults in a robot that moves like this, and has another fault
+    /// besides with this probability: 1 if there is none.
     #[must_use]
-    pub fn factor(&self, from: Moved) -> f64 {
+    pub fn factor(&self, from: Moved, p_other: f64) -> f64 {
         if from == Moved::Nominal {
-            1.0
+            1.0 - p_other * (1.0 - self.further)
         } else {
             self.further
         }
     }
 
-    /// Rate at which `from` becomes `to`, 1/s; 0 if it takes several steps.
+    /// Rate at which `from`, beside which there is another fault with the probability `p_other`,
+    /// becomes `to`, 1/s; 0 if it takes several steps.
     #[must_use]
-    pub fn rate_1_s(&self, from: Moved, to: Moved) -> f64 {
+    pub fn rate_1_s(&self, from: Moved, to: Moved, p_other: f64) -> f64 {
         let (before, after) = (from.stuck(), to.stuck());
         let (more, fewer) = (
             (after & !before).count_ones(),
             (before & !after).count_ones(),
         );
         let at_once = if more.max(fewer) > 1 { AT_ONCE } else { 1.0 };
-        let factor = self.factor(from);
+        let factor = self.factor(from, p_other);
         match to {
             _ if from == to => 0.0,
             Moved::Unknown | Moved::UnknownAny => 0.5 * self.unknown_1_s * factor,
@@ -455,7 +457,8 @@ mod tests {
             (Unknown, Nominal, 5.0),
         ];
         for (from, to, expected) in cases {
-            assert_eq!(rates.rate_1_s(from, to), expected, "{from:?} to {to:?}");
+            let found = rates.rate_1_s(from, to, 0.0);
+            assert_eq!(found, expected, "{from:?} to {to:?}");
         }
     }
 }

@@ -220,7 +220,7 @@ fn transitions(modes: &[Mode], rates: &FaultRates, interval_s: f64) -> Vec<f64> 
                 _ if std::ptr::eq(from, to) => 0.0,
                 (_, Some(_)) => rates.fault_1_s,
                 (Some(_), None) if to.moved == Moved::Nominal => rates.death_1_s,
-                _ => rates.rate_1_s(from.moved, to.moved),
+                _ => rates.rate_1_s(from.moved, to.moved, 0.0),
             };
             table.push(rate * interval_s);
         }
