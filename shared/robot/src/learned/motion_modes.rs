@@ -19,13 +19,35 @@ const JUMP_SHARE: f64 = 0.1;
 const JUMP_SD: [f64; 3] = [0.1, 0.1, 0.1];
 /// Correlation length of the unknown's coloured deviations, m.
 const UNKNOWN_LENGTH_M: f64 = 0.2;
-/// Ground other than that learned from changes a stuck wheel's effect by one factor: how probable,
-/// the factor's mean and deviation.
-const OTHER_GROUNDS: [(f64, f64, f64); 3] =
-    [(0.08, 0.3, 0.12), (0.08, 0.65, 0.2), (0.04, 1.5, 0.35)];
-/// The same where the wheels' rates are read. They tell which wheel stands; the motion must tell
-/// only that it is dragged, and not how: on hard ground the robot is thrown, crabs and hops.
-const ANY_GROUND: [(f64, f64, f64); 1] = [(0.2, 0.6, 0.6)];
+/// Ground other than that learned from. It changes a stuck wheel's effect by one factor.
+struct OtherGround {
+    /// How probable.
+    share: f64,
+    /// Mean of the factor, and its deviation.
+    factor: (f64, f64),
+    /// Whether a dragged wheel throws the robot: on hard ground it grips and slides, and the robot
+    /// crabs and hops.
+    throws: bool,
+}
+
+const fn ground(share: f64, factor: (f64, f64), throws: bool) -> OtherGround {
+    OtherGround {
+        share,
+        factor,
+        throws,
+    }
+}
+
+/// By the pose alone.
+const OTHER_GROUNDS: [OtherGround; 4] = [
+    ground(0.08, (0.3, 0.12), false),
+    ground(0.08, (0.65, 0.2), false),
+    ground(0.04, (1.5, 0.35), false),
+    ground(0.04, (0.6, 0.6), true),
+];
+/// Where the wheels' rates are read: these tell which wheel stands, and the motion only that it is
+/// dragged, and not how.
+const ANY_GROUND: [OtherGround; 1] = [ground(0.2, (0.6, 0.6), true)];
 /// Deviations of such motion beside its effect, coloured: yaw, forward, lateral.
 const ROUGH_SD: [f64; 3] = [0.15, 0.1, 0.05];
 /// By the pose alone, a wheel stuck on other ground looks like one that is dragged at, has sunk in
@@ -221,7 +243,7 @@ pub fn motion_modes(
         (true, false) => OTHER_GROUNDS.as_slice(),
         (false, _) => &[],
     };
-    let learned = 1.0 - grounds.iter().map(|(share, ..)| share).sum::<f64>();
+    let learned = 1.0 - grounds.iter().map(|ground| ground.share).sum::<f64>();
     let nominal = model.nominal.motion;
     let mut modes = vec![MotionMode {
         moved: Moved::Nominal,
@@ -241,11 +263,11 @@ pub fn motion_modes(
         share: learned,
         ..stuck_mode(model, w)
     }));
-    for &(share, factor, sd) in grounds {
+    for ground in grounds {
         modes.extend(wheels().map(|w| MotionMode {
-            share,
+            share: ground.share,
             p_unknown: if read { 0.0 } else { DRAGGED_AT },
-            ..on_other_ground(model, robot, w, (factor, sd), read)
+            ..on_other_ground(model, robot, w, ground.factor, ground.throws)
         }));
     }
     if read {
