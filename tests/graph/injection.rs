@@ -1,6 +1,6 @@
 //! The main job: a wheel sticks, the graph says so and acts.
 
-use crate::harness::{Running, Summary, binary, eventually, machine};
+use crate::harness::{Running, Summary, binary, eventually, machine, root};
 
 /// What must hold when RM sticks in a running graph.
 fn assert_told_and_obeyed(summary: &Summary) {
@@ -66,6 +66,26 @@ fn a_stuck_wheel_is_named_at_1_khz_too() {
         "stuck:RM@3",
     ];
     assert_told_and_obeyed(&Running::start("khz", &options).finish());
+}
+
+#[test]
+fn with_every_channel_a_servo_that_slips_is_named_with_its_angle() {
+    let _machine = machine();
+    let config = root().join("config/rover-all.toml");
+    let options = ["--duration", "9", "--inject", "steer-jump:RF:0.2@3"];
+    let summary = Running::start_with(config, "servo", &options).finish();
+    let diagnoses = summary.events("diagnosis");
+    assert_eq!(diagnoses.last().unwrap().1, "RF_STEER", "{diagnoses:?}");
+    let sizes = summary.events("size");
+    let (_, size) = sizes.last().expect("the angle is told");
+    assert!(size.contains("RF_STEER"), "{sizes:?}");
+    let actions = summary.events("action");
+    assert!(
+        actions
+            .iter()
+            .any(|(_, action)| action.starts_with("slow_down")),
+        "{actions:?}"
+    );
 }
 
 #[test]

@@ -76,7 +76,6 @@ impl Rover {
         let residual = |apart: f64, sd: f64, expected: f64| Residual {
             apart,
             variance: sd * sd,
-            passing: 0.0,
             expected,
             outlier_rate: 1e-10,
         };

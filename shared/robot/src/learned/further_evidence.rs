@@ -101,14 +101,7 @@ impl FurtherEvidence {
             self.repeats[GYRO].step(&further.yaw_rate, gyro.repeat_rate, birth_repeats);
         }
         if let Some(residual) = residuals.yaw_rate {
-            let Residual {
-                apart,
-                variance,
-                passing,
-                outlier_rate,
-                ..
-            } = residual;
-            let whitened = Whitened::of(apart, variance, passing, outlier_rate);
+            let whitened = whitened(residual.apart, residual.variance, residual.outlier_rate);
             let birth = birth(SHARE_GYRO);
             self.gyro.step(&whitened, birth);
             self.gains[GYRO] = self.gyro.gain();
@@ -128,8 +121,7 @@ impl FurtherEvidence {
         for (wheel, residual) in all.iter().enumerate() {
             let Some(residual) = residual else { continue };
             let (apart, variance) = contrast((residual.apart, residual.variance), sums, others);
-            let rate = residual.outlier_rate;
-            let whitened = Whitened::of(apart, variance, residual.passing, rate);
+            let whitened = whitened(apart, variance, residual.outlier_rate);
             self.currents[wheel].step(&whitened, birth);
             self.gains[wheel] = self.currents[wheel].gain();
         }
@@ -147,6 +139,12 @@ impl FurtherEvidence {
             enter(channel, repeats.log_odds, repeats.gain);
         }
     }
+}
+
+/// A bias is taken to show in full in whatever variance: what these channels do while the command
+/// changes is modelled too coarsely to learn from it how large a bias is.
+fn whitened(apart: f64, variance: f64, outlier_rate: f64) -> Whitened<1> {
+    Whitened::of(apart, variance, 0.0, outlier_rate)
 }
 
 /// One of several values less the mean of the others, and the variance of that difference, from

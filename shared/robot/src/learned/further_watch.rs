@@ -49,8 +49,6 @@ pub struct Residual {
     pub apart: f64,
     /// Variance of that.
     pub variance: f64,
-    /// Part of it that is there for the moment only, as the command changes.
-    pub passing: f64,
     /// What is expected.
     pub expected: f64,
     /// Share of the channel's samples that are outliers.
@@ -200,7 +198,6 @@ impl FurtherWatch {
             out[wheel] = Some(Residual {
                 apart: beside.apart_a - shift,
                 variance: beside.variance + uncertain,
-                passing: behind * behind,
                 expected: expected + shift,
                 outlier_rate: self.noise[wheel].outlier_rate(),
             });
@@ -234,7 +231,6 @@ impl FurtherWatch {
         let residual = Residual {
             apart: apart - self.bias.mean,
             variance: variance + self.bias.variance,
-            passing: turn.variance + changes * changes,
             expected: turn.rate_rad_s + self.bias.mean,
             outlier_rate: self.noise[GYRO].outlier_rate(),
         };
