@@ -25,7 +25,7 @@ use crate::encoders::Encoders;
 use crate::further::Fusion;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
-use crate::prepared::{EXPLAINED_S, Prepared, Seen, age_s, changes_several, newly_stuck};
+use crate::prepared::{EXPLAINED_S, Prepared, Seen, age_s, changes_several, is_new, newly_stuck};
 use crate::rate_offsets::RateOffsets;
 use crate::sets::Sets;
 use crate::sizes::{Sight, Sizes};
@@ -39,8 +39,6 @@ const PER_MODE: usize = 32;
 const PER_RARE: usize = 8;
 /// Hypotheses less probable than this are dropped (natural logarithm).
 const FLOOR: f64 = -30.0;
-/// So long after a supposed onset, ns, wheels may still read as before.
-const ONSET_BLUR_NS: u64 = 150_000_000;
 /// Wheels that stick one after another, each so soon after the one before, s, have one cause: this
 /// many times the rate at which a wheel sticks by itself.
 const SOON_S: f64 = 1.0;
@@ -58,6 +56,8 @@ pub struct Exact {
     /// Of each wheel's encoder.
     births_1_s: [f64; WHEELS],
     bank: Bank<State>,
+    /// Hypotheses kept from one observation to the next, at most.
+    limit: usize,
     /// Of the healthy robot, from before the faults; it fades as the robot drives on.
     context: Context,
     wheels: WheelContext,
@@ -111,12 +111,24 @@ impl Exact {
             rates,
             births_1_s: is_leaf.map(|leaf| if leaf { rates.fault_1_s } else { 0.0 }),
             bank: Bank::new(&capacities),
+            limit: capacities.iter().sum(),
             context: Context::default(),
             wheels: WheelContext::default(),
             sizes: Sizes::new(robot),
             trust: Trust::default(),
             degenerate_count: 0,
         }
+    }
+
+    /// Most hypotheses kept.
+    #[must_use]
+    pub const fn limit(&self) -> usize {
+        self.limit
+    }
+
+    /// From the next observation on at most `count` hypotheses, the most probable: fewer cost less.
+    pub const fn set_limit(&mut self, count: usize) {
+        self.limit = count;
     }
 
     /// Starts from the nominal mode, as the detector knew it at `t_ns`.
@@ -210,6 +222,7 @@ impl Exact {
         if self.bank.normalise(FLOOR).is_none() || failed {
             self.degenerate_count = self.degenerate_count.saturating_add(1);
         }
+        self.bank.keep(self.limit);
     }
 
     /// Holds healthy motion within the tolerance, and unknown motion beyond it.
@@ -484,9 +497,4 @@ impl Exact {
         }
         0
     }
-}
-
-/// True while a stuck wheel's encoder may read anything, and the others may still turn as before.
-pub const fn is_new(t_ns: u64, onset_ns: u64) -> bool {
-    t_ns.saturating_sub(onset_ns) < ONSET_BLUR_NS
 }
