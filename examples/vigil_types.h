@@ -392,7 +392,7 @@ typedef struct {
   uint32_t reported_change_count;
   /* The next best explanation that is not the best and one more fault: a node's index (0 is nominal), MODE_UNKNOWN or MODE_MULTIPLE. */
   uint32_t runner_up;
-  /* Particles or hypotheses allowed at present; fewer than configured while the time is short. */
+  /* Particles or hypotheses allowed at present; fewer than configured while time is short. */
   uint32_t particle_limit;
   /* Changes of mode so far. */
   uint32_t mode_change_count;

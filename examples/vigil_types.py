@@ -439,7 +439,7 @@ class FaultBelief(ctypes.LittleEndianStructure):
         ("reported_change_count", ctypes.c_uint32),
         # The next best explanation that is not the best and one more fault: a node's index (0 is nominal), MODE_UNKNOWN or MODE_MULTIPLE.
         ("runner_up", ctypes.c_uint32),
-        # Particles or hypotheses allowed at present; fewer than configured while the time is short.
+        # Particles or hypotheses allowed at present; fewer than configured while time is short.
         ("particle_limit", ctypes.c_uint32),
         # Changes of mode so far.
         ("mode_change_count", ctypes.c_uint32),

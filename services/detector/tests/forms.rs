@@ -125,7 +125,6 @@ fn an_alarm_that_could_never_rise_is_refused() {
         sensors: Sensors::Pose,
         false_alarm_interval_h: 1e4,
         fault_rate_1_h: 3600.0,
-        ..schema::Detector::default()
     };
     let build = |form| Detector::new(&model(), &robot(), &settings(form)).map(|_| ());
     assert!(build(Form::LearnedBias).is_ok());

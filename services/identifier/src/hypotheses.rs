@@ -126,10 +126,8 @@ fn stuck_leaves(moved: Moved, leaves: &Leaves) -> Option<u64> {
     if moved.is_unknown() {
         return None;
     }
-    let wheels = (0..WHEELS).filter(|&wheel| moved.is_stuck(wheel));
-    wheels.fold(Some(0), |bits, wheel| {
-        Some(bits? | 1 << leaves.stuck[wheel]?)
-    })
+    let mut wheels = (0..WHEELS).filter(|&wheel| moved.is_stuck(wheel));
+    wheels.try_fold(0, |bits, wheel| Some(bits | 1 << leaves.stuck[wheel]?))
 }
 
 /// Fills in the sets of broken encoders that are no less probable than `least`; how many.
@@ -146,7 +144,8 @@ fn broken(
         let Some(leaf) = leaves.encoder[wheel].filter(|_| p_broken > 0.0) else {
             continue;
         };
-        for i in 0..count {
+        let before = count;
+        for i in 0..before {
             let without = sets[i];
             sets[i].share = without.share * (1.0 - p_broken);
             let share = without.share * p_broken;

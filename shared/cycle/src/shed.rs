@@ -4,8 +4,8 @@
 //! input came so late that the deadline is nearer. Single ones are the machine's (a processor
 //! taken away for a while lengthens whatever runs), so a few in one window are needed, and the
 //! shortest of them says what the work itself costs. The allowance then falls in proportion to what
-//! was in use, and returns step by step once long windows stay far below what they have. A cycle that
-//! worked on no particle is no warning: shedding would not help.
+//! was in use, and returns step by step once long windows stay far below what they have. A cycle
+//! that worked on no particle is no warning: shedding would not help.
 
 use crate::deadline::Schedule;
 

@@ -116,8 +116,8 @@ impl<T: Copy> Bank<T> {
         Some(evidence)
     }
 
-    /// Keeps the `count` most probable hypotheses, at least one, in their order; of equally probable
-    /// ones the first. The others' weight is gone: the next normalisation divides it.
+    /// Keeps the `count` most probable hypotheses, at least one, in their order; of those equally
+    /// probable the first. The others' weight is gone: the next normalisation divides it.
     pub fn keep(&mut self, count: usize) {
         let count = count.max(1);
         if self.hypotheses.len() <= count {
