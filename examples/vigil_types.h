@@ -130,6 +130,8 @@ typedef struct {
   double deviation[3];
   /* Its covariance. */
   double deviation_covariance[6];
+  /* Direction of travel that the deviation is of: 1 forwards, -1 backwards, 0 any. */
+  double direction;
   /* Share of their rates that all wheels depart by together: mean and variance. */
   double wheel_ratio[2];
   /* Rate by which each wheel departs beside that, rad/s. */
@@ -137,14 +139,40 @@ typedef struct {
   /* Its variance. */
   double wheel_offset_variance[8];
 } vigil_healthy_belief;
-VIGIL_ASSERT(sizeof(vigil_healthy_belief) == 288);
+VIGIL_ASSERT(sizeof(vigil_healthy_belief) == 296);
 VIGIL_ASSERT(offsetof(vigil_healthy_belief, pose) == 0);
 VIGIL_ASSERT(offsetof(vigil_healthy_belief, pose_covariance) == 24);
 VIGIL_ASSERT(offsetof(vigil_healthy_belief, deviation) == 72);
 VIGIL_ASSERT(offsetof(vigil_healthy_belief, deviation_covariance) == 96);
-VIGIL_ASSERT(offsetof(vigil_healthy_belief, wheel_ratio) == 144);
-VIGIL_ASSERT(offsetof(vigil_healthy_belief, wheel_offset) == 160);
-VIGIL_ASSERT(offsetof(vigil_healthy_belief, wheel_offset_variance) == 224);
+VIGIL_ASSERT(offsetof(vigil_healthy_belief, direction) == 144);
+VIGIL_ASSERT(offsetof(vigil_healthy_belief, wheel_ratio) == 152);
+VIGIL_ASSERT(offsetof(vigil_healthy_belief, wheel_offset) == 168);
+VIGIL_ASSERT(offsetof(vigil_healthy_belief, wheel_offset_variance) == 232);
+
+typedef struct {
+  /* Set of faults: bit i is node i of the fault tree (always a leaf); 0 is none, or unknown. */
+  uint64_t leaves;
+  /* Since when it holds, capture time ns; 0 for nominal, and where no alarm stands. */
+  uint64_t onset_t_capture_ns;
+  /* Mean pose: x m, y m, yaw rad (not wrapped). Zero where no pose is tracked. */
+  double pose[3];
+  /* Its covariance: upper triangle, row by row; zero for a sampled particle. */
+  double pose_covariance[6];
+  /* Natural logarithm of its probability. */
+  double log_weight;
+  /* Index into the fault tree's nodes (0 is nominal), MODE_UNKNOWN or MODE_MULTIPLE. */
+  uint32_t mode;
+  /* Reserved, zero. */
+  uint32_t reserved;
+} vigil_weighted_hypothesis;
+VIGIL_ASSERT(sizeof(vigil_weighted_hypothesis) == 104);
+VIGIL_ASSERT(offsetof(vigil_weighted_hypothesis, leaves) == 0);
+VIGIL_ASSERT(offsetof(vigil_weighted_hypothesis, onset_t_capture_ns) == 8);
+VIGIL_ASSERT(offsetof(vigil_weighted_hypothesis, pose) == 16);
+VIGIL_ASSERT(offsetof(vigil_weighted_hypothesis, pose_covariance) == 40);
+VIGIL_ASSERT(offsetof(vigil_weighted_hypothesis, log_weight) == 88);
+VIGIL_ASSERT(offsetof(vigil_weighted_hypothesis, mode) == 96);
+VIGIL_ASSERT(offsetof(vigil_weighted_hypothesis, reserved) == 100);
 
 typedef struct {
   /* When, CLOCK_MONOTONIC ns. */
@@ -219,8 +247,8 @@ VIGIL_ASSERT(offsetof(vigil_sensor_frame, steer) == 240);
 VIGIL_ASSERT(offsetof(vigil_sensor_frame, current) == 304);
 VIGIL_ASSERT(offsetof(vigil_sensor_frame, reserved) == 368);
 
-#define VIGIL_DETECTION_BELIEF_SCHEMA 0x8b9b055629f2723eull
-#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.8b9b055629f2723e"
+#define VIGIL_DETECTION_BELIEF_SCHEMA 0x1ebb57d56d932a4bull
+#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.1ebb57d56d932a4b"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -236,8 +264,6 @@ typedef struct {
   double alarm_log_odds;
   /* Log-likelihood of this frame under the nominal mode, natural logarithm. */
   double evidence;
-  /* Effective sample size of the particles, before resampling. */
-  double effective_sample_size;
   /* Estimated ratio of the noise of the pose (x, y, yaw) to the learned one (standard deviations). */
   double noise_scale[3];
   /* The same for each wheel's rate. */
@@ -250,8 +276,6 @@ typedef struct {
   double outlier_rate_wheels[8];
   /* The same for each steering angle. */
   double outlier_rate_steer[8];
-  /* What an identification starts from. */
-  vigil_healthy_belief healthy;
   /* Log-odds of a fault seen by each channel alone (see Channel). */
   double channel_log_odds[32];
   /* decision_seq of the last action that the robot obeyed, as the frame says it. */
@@ -268,18 +292,14 @@ typedef struct {
   uint32_t invalid_count;
   /* Steps whose weights degenerated (coasted, or re-initialised). */
   uint32_t degenerate_count;
-  /* Particles in use. */
-  uint32_t particle_count;
   /* Outcome of that action, as the frame says it: an ActionOutcome. */
   uint32_t action_outcome;
   /* Why the detector sees nothing: a Blindness; 0 while it sees. */
   uint32_t blind;
   /* Whether an alarm could rise now: a Readiness. */
   uint32_t readiness;
-  /* Reserved, zero. */
-  uint32_t reserved;
 } vigil_detection_belief;
-VIGIL_ASSERT(sizeof(vigil_detection_belief) == 1024);
+VIGIL_ASSERT(sizeof(vigil_detection_belief) == 720);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, cause) == 48);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, run_id) == 72);
@@ -287,63 +307,47 @@ VIGIL_ASSERT(offsetof(vigil_detection_belief, p_fault) == 80);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, log_odds) == 88);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_log_odds) == 96);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, evidence) == 104);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, effective_sample_size) == 112);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale) == 120);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale_wheels) == 144);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale_steer) == 208);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, outlier_rate) == 272);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, outlier_rate_wheels) == 296);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, outlier_rate_steer) == 360);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, healthy) == 424);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, channel_log_odds) == 712);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, action_seq) == 968);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_t_capture_ns) == 976);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm) == 984);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_count) == 988);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, symptoms) == 992);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, invalid_count) == 996);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, degenerate_count) == 1000);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, particle_count) == 1004);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, action_outcome) == 1008);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, blind) == 1012);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, readiness) == 1016);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, reserved) == 1020);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale) == 112);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale_wheels) == 136);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, noise_scale_steer) == 200);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, outlier_rate) == 264);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, outlier_rate_wheels) == 288);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, outlier_rate_steer) == 352);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, channel_log_odds) == 416);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, action_seq) == 672);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_t_capture_ns) == 680);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm) == 688);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_count) == 692);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, symptoms) == 696);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, invalid_count) == 700);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, degenerate_count) == 704);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, action_outcome) == 708);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, blind) == 712);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, readiness) == 716);
 
-#define VIGIL_PARTICLE_BLOCK_SCHEMA 0x7d929f90c981a707ull
-#define VIGIL_PARTICLE_BLOCK_TYPE_NAME "vigil.ParticleBlock.v1.7d929f90c981a707"
+#define VIGIL_PARTICLE_BLOCK_SCHEMA 0x60e41525a1aef4b2ull
+#define VIGIL_PARTICLE_BLOCK_TYPE_NAME "vigil.ParticleBlock.v1.60e41525a1aef4b2"
 typedef struct {
   /* Common header. */
   vigil_header header;
-  /* The journal entry behind these particles. */
+  /* The journal entry behind these hypotheses. */
   vigil_cause cause;
-  /* Particles in use; the rest of the arrays is unspecified. */
+  /* Hypotheses in use; the rest of the array is unspecified. */
   uint32_t count;
   /* Reserved, zero. */
   uint32_t reserved;
-  /* Mode of each particle: index into the fault tree's nodes (0 is nominal). */
-  uint32_t mode[4096];
-  /* x, m. */
-  float x[4096];
-  /* y, m. */
-  float y[4096];
-  /* Yaw, rad. */
-  float yaw[4096];
-  /* Natural logarithm of the normalised weight. */
-  float log_weight[4096];
-  /* Reserved, zero. */
-  uint64_t reserved_tail[2];
+  /* What an identification starts from; zero while one is under way. */
+  vigil_healthy_belief healthy;
+  /* The hypotheses. */
+  vigil_weighted_hypothesis hypotheses[1024];
 } vigil_particle_block;
-VIGIL_ASSERT(sizeof(vigil_particle_block) == 82016);
+VIGIL_ASSERT(sizeof(vigil_particle_block) == 106872);
 VIGIL_ASSERT(offsetof(vigil_particle_block, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_particle_block, cause) == 48);
 VIGIL_ASSERT(offsetof(vigil_particle_block, count) == 72);
 VIGIL_ASSERT(offsetof(vigil_particle_block, reserved) == 76);
-VIGIL_ASSERT(offsetof(vigil_particle_block, mode) == 80);
-VIGIL_ASSERT(offsetof(vigil_particle_block, x) == 16464);
-VIGIL_ASSERT(offsetof(vigil_particle_block, y) == 32848);
-VIGIL_ASSERT(offsetof(vigil_particle_block, yaw) == 49232);
-VIGIL_ASSERT(offsetof(vigil_particle_block, log_weight) == 65616);
-VIGIL_ASSERT(offsetof(vigil_particle_block, reserved_tail) == 82000);
+VIGIL_ASSERT(offsetof(vigil_particle_block, healthy) == 80);
+VIGIL_ASSERT(offsetof(vigil_particle_block, hypotheses) == 376);
 
 #define VIGIL_FAULT_BELIEF_SCHEMA 0x70d08c3016f8de2full
 #define VIGIL_FAULT_BELIEF_TYPE_NAME "vigil.FaultBelief.v1.70d08c3016f8de2f"
@@ -388,7 +392,7 @@ typedef struct {
   uint32_t reported_change_count;
   /* The next best explanation that is not the best and one more fault: a node's index (0 is nominal), MODE_UNKNOWN or MODE_MULTIPLE. */
   uint32_t runner_up;
-  /* Particles allowed at present; fewer than configured while the time is short. */
+  /* Particles or hypotheses allowed at present; fewer than configured while time is short. */
   uint32_t particle_limit;
   /* Changes of mode so far. */
   uint32_t mode_change_count;
@@ -587,9 +591,9 @@ typedef struct {
   uint64_t answered_epoch;
   /* See answered_epoch. */
   uint64_t answered_seq;
-  /* Particles that the time allows at present; 0 without particles. */
+  /* Hypotheses or particles that the time allows at present; 0 without any to shed. */
   uint32_t particles;
-  /* Particles configured. */
+  /* Hypotheses or particles configured. */
   uint32_t particles_configured;
   /* Events so far; event number n is at events[n % EVENTS]. */
   uint64_t event_count;

@@ -133,6 +133,8 @@ class HealthyBelief(ctypes.LittleEndianStructure):
         ("deviation", ctypes.c_double * 3),
         # Its covariance.
         ("deviation_covariance", ctypes.c_double * 6),
+        # Direction of travel that the deviation is of: 1 forwards, -1 backwards, 0 any.
+        ("direction", ctypes.c_double),
         # Share of their rates that all wheels depart by together: mean and variance.
         ("wheel_ratio", ctypes.c_double * 2),
         # Rate by which each wheel departs beside that, rad/s.
@@ -142,14 +144,44 @@ class HealthyBelief(ctypes.LittleEndianStructure):
     ]
 
 
-assert ctypes.sizeof(HealthyBelief) == 288
+assert ctypes.sizeof(HealthyBelief) == 296
 assert HealthyBelief.pose.offset == 0
 assert HealthyBelief.pose_covariance.offset == 24
 assert HealthyBelief.deviation.offset == 72
 assert HealthyBelief.deviation_covariance.offset == 96
-assert HealthyBelief.wheel_ratio.offset == 144
-assert HealthyBelief.wheel_offset.offset == 160
-assert HealthyBelief.wheel_offset_variance.offset == 224
+assert HealthyBelief.direction.offset == 144
+assert HealthyBelief.wheel_ratio.offset == 152
+assert HealthyBelief.wheel_offset.offset == 168
+assert HealthyBelief.wheel_offset_variance.offset == 232
+
+
+class WeightedHypothesis(ctypes.LittleEndianStructure):
+    _fields_ = [
+        # Set of faults: bit i is node i of the fault tree (always a leaf); 0 is none, or unknown.
+        ("leaves", ctypes.c_uint64),
+        # Since when it holds, capture time ns; 0 for nominal, and where no alarm stands.
+        ("onset_t_capture_ns", ctypes.c_uint64),
+        # Mean pose: x m, y m, yaw rad (not wrapped). Zero where no pose is tracked.
+        ("pose", ctypes.c_double * 3),
+        # Its covariance: upper triangle, row by row; zero for a sampled particle.
+        ("pose_covariance", ctypes.c_double * 6),
+        # Natural logarithm of its probability.
+        ("log_weight", ctypes.c_double),
+        # Index into the fault tree's nodes (0 is nominal), MODE_UNKNOWN or MODE_MULTIPLE.
+        ("mode", ctypes.c_uint32),
+        # Reserved, zero.
+        ("reserved", ctypes.c_uint32),
+    ]
+
+
+assert ctypes.sizeof(WeightedHypothesis) == 104
+assert WeightedHypothesis.leaves.offset == 0
+assert WeightedHypothesis.onset_t_capture_ns.offset == 8
+assert WeightedHypothesis.pose.offset == 16
+assert WeightedHypothesis.pose_covariance.offset == 40
+assert WeightedHypothesis.log_weight.offset == 88
+assert WeightedHypothesis.mode.offset == 96
+assert WeightedHypothesis.reserved.offset == 100
 
 
 class Event(ctypes.LittleEndianStructure):
@@ -239,8 +271,8 @@ assert SensorFrame.reserved.offset == 368
 
 
 class DetectionBelief(ctypes.LittleEndianStructure):
-    SCHEMA = 0x8B9B055629F2723E
-    TYPE_NAME = "vigil.DetectionBelief.v1.8b9b055629f2723e"
+    SCHEMA = 0x1EBB57D56D932A4B
+    TYPE_NAME = "vigil.DetectionBelief.v1.1ebb57d56d932a4b"
 
     @staticmethod
     def type_name():
@@ -261,8 +293,6 @@ class DetectionBelief(ctypes.LittleEndianStructure):
         ("alarm_log_odds", ctypes.c_double),
         # Log-likelihood of this frame under the nominal mode, natural logarithm.
         ("evidence", ctypes.c_double),
-        # Effective sample size of the particles, before resampling.
-        ("effective_sample_size", ctypes.c_double),
         # Estimated ratio of the noise of the pose (x, y, yaw) to the learned one (standard deviations).
         ("noise_scale", ctypes.c_double * 3),
         # The same for each wheel's rate.
@@ -275,8 +305,6 @@ class DetectionBelief(ctypes.LittleEndianStructure):
         ("outlier_rate_wheels", ctypes.c_double * 8),
         # The same for each steering angle.
         ("outlier_rate_steer", ctypes.c_double * 8),
-        # What an identification starts from.
-        ("healthy", HealthyBelief),
         # Log-odds of a fault seen by each channel alone (see Channel).
         ("channel_log_odds", ctypes.c_double * 32),
         # decision_seq of the last action that the robot obeyed, as the frame says it.
@@ -293,20 +321,16 @@ class DetectionBelief(ctypes.LittleEndianStructure):
         ("invalid_count", ctypes.c_uint32),
         # Steps whose weights degenerated (coasted, or re-initialised).
         ("degenerate_count", ctypes.c_uint32),
-        # Particles in use.
-        ("particle_count", ctypes.c_uint32),
         # Outcome of that action, as the frame says it: an ActionOutcome.
         ("action_outcome", ctypes.c_uint32),
         # Why the detector sees nothing: a Blindness; 0 while it sees.
         ("blind", ctypes.c_uint32),
         # Whether an alarm could rise now: a Readiness.
         ("readiness", ctypes.c_uint32),
-        # Reserved, zero.
-        ("reserved", ctypes.c_uint32),
     ]
 
 
-assert ctypes.sizeof(DetectionBelief) == 1024
+assert ctypes.sizeof(DetectionBelief) == 720
 assert DetectionBelief.header.offset == 0
 assert DetectionBelief.cause.offset == 48
 assert DetectionBelief.run_id.offset == 72
@@ -314,32 +338,28 @@ assert DetectionBelief.p_fault.offset == 80
 assert DetectionBelief.log_odds.offset == 88
 assert DetectionBelief.alarm_log_odds.offset == 96
 assert DetectionBelief.evidence.offset == 104
-assert DetectionBelief.effective_sample_size.offset == 112
-assert DetectionBelief.noise_scale.offset == 120
-assert DetectionBelief.noise_scale_wheels.offset == 144
-assert DetectionBelief.noise_scale_steer.offset == 208
-assert DetectionBelief.outlier_rate.offset == 272
-assert DetectionBelief.outlier_rate_wheels.offset == 296
-assert DetectionBelief.outlier_rate_steer.offset == 360
-assert DetectionBelief.healthy.offset == 424
-assert DetectionBelief.channel_log_odds.offset == 712
-assert DetectionBelief.action_seq.offset == 968
-assert DetectionBelief.alarm_t_capture_ns.offset == 976
-assert DetectionBelief.alarm.offset == 984
-assert DetectionBelief.alarm_count.offset == 988
-assert DetectionBelief.symptoms.offset == 992
-assert DetectionBelief.invalid_count.offset == 996
-assert DetectionBelief.degenerate_count.offset == 1000
-assert DetectionBelief.particle_count.offset == 1004
-assert DetectionBelief.action_outcome.offset == 1008
-assert DetectionBelief.blind.offset == 1012
-assert DetectionBelief.readiness.offset == 1016
-assert DetectionBelief.reserved.offset == 1020
+assert DetectionBelief.noise_scale.offset == 112
+assert DetectionBelief.noise_scale_wheels.offset == 136
+assert DetectionBelief.noise_scale_steer.offset == 200
+assert DetectionBelief.outlier_rate.offset == 264
+assert DetectionBelief.outlier_rate_wheels.offset == 288
+assert DetectionBelief.outlier_rate_steer.offset == 352
+assert DetectionBelief.channel_log_odds.offset == 416
+assert DetectionBelief.action_seq.offset == 672
+assert DetectionBelief.alarm_t_capture_ns.offset == 680
+assert DetectionBelief.alarm.offset == 688
+assert DetectionBelief.alarm_count.offset == 692
+assert DetectionBelief.symptoms.offset == 696
+assert DetectionBelief.invalid_count.offset == 700
+assert DetectionBelief.degenerate_count.offset == 704
+assert DetectionBelief.action_outcome.offset == 708
+assert DetectionBelief.blind.offset == 712
+assert DetectionBelief.readiness.offset == 716
 
 
 class ParticleBlock(ctypes.LittleEndianStructure):
-    SCHEMA = 0x7D929F90C981A707
-    TYPE_NAME = "vigil.ParticleBlock.v1.7d929f90c981a707"
+    SCHEMA = 0x60E41525A1AEF4B2
+    TYPE_NAME = "vigil.ParticleBlock.v1.60e41525a1aef4b2"
 
     @staticmethod
     def type_name():
@@ -348,38 +368,26 @@ class ParticleBlock(ctypes.LittleEndianStructure):
     _fields_ = [
         # Common header.
         ("header", Header),
-        # The journal entry behind these particles.
+        # The journal entry behind these hypotheses.
         ("cause", Cause),
-        # Particles in use; the rest of the arrays is unspecified.
+        # Hypotheses in use; the rest of the array is unspecified.
         ("count", ctypes.c_uint32),
         # Reserved, zero.
         ("reserved", ctypes.c_uint32),
-        # Mode of each particle: index into the fault tree's nodes (0 is nominal).
-        ("mode", ctypes.c_uint32 * 4096),
-        # x, m.
-        ("x", ctypes.c_float * 4096),
-        # y, m.
-        ("y", ctypes.c_float * 4096),
-        # Yaw, rad.
-        ("yaw", ctypes.c_float * 4096),
-        # Natural logarithm of the normalised weight.
-        ("log_weight", ctypes.c_float * 4096),
-        # Reserved, zero.
-        ("reserved_tail", ctypes.c_uint64 * 2),
+        # What an identification starts from; zero while one is under way.
+        ("healthy", HealthyBelief),
+        # The hypotheses.
+        ("hypotheses", WeightedHypothesis * 1024),
     ]
 
 
-assert ctypes.sizeof(ParticleBlock) == 82016
+assert ctypes.sizeof(ParticleBlock) == 106872
 assert ParticleBlock.header.offset == 0
 assert ParticleBlock.cause.offset == 48
 assert ParticleBlock.count.offset == 72
 assert ParticleBlock.reserved.offset == 76
-assert ParticleBlock.mode.offset == 80
-assert ParticleBlock.x.offset == 16464
-assert ParticleBlock.y.offset == 32848
-assert ParticleBlock.yaw.offset == 49232
-assert ParticleBlock.log_weight.offset == 65616
-assert ParticleBlock.reserved_tail.offset == 82000
+assert ParticleBlock.healthy.offset == 80
+assert ParticleBlock.hypotheses.offset == 376
 
 
 class FaultBelief(ctypes.LittleEndianStructure):
@@ -431,7 +439,7 @@ class FaultBelief(ctypes.LittleEndianStructure):
         ("reported_change_count", ctypes.c_uint32),
         # The next best explanation that is not the best and one more fault: a node's index (0 is nominal), MODE_UNKNOWN or MODE_MULTIPLE.
         ("runner_up", ctypes.c_uint32),
-        # Particles allowed at present; fewer than configured while the time is short.
+        # Particles or hypotheses allowed at present; fewer than configured while time is short.
         ("particle_limit", ctypes.c_uint32),
         # Changes of mode so far.
         ("mode_change_count", ctypes.c_uint32),
@@ -648,9 +656,9 @@ class Health(ctypes.LittleEndianStructure):
         ("answered_epoch", ctypes.c_uint64),
         # See answered_epoch.
         ("answered_seq", ctypes.c_uint64),
-        # Particles that the time allows at present; 0 without particles.
+        # Hypotheses or particles that the time allows at present; 0 without any to shed.
         ("particles", ctypes.c_uint32),
-        # Particles configured.
+        # Hypotheses or particles configured.
         ("particles_configured", ctypes.c_uint32),
         # Events so far; event number n is at events[n % EVENTS].
         ("event_count", ctypes.c_uint64),

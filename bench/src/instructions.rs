@@ -1,5 +1,5 @@
 //! The four services over the in-process bus under the virtual clock: what the step of each takes
-//! from the processor, and what is done ahead of it.
+//! from the processor.
 //!
 //! Counted by callgrind between entry and return of the functions named in [`STEPS`]: instructions
 //! do not depend on what else the machine does.
@@ -20,15 +20,13 @@ use vigil_sensor_sim::{Assembled, SimulatorSource};
 use vigil_setup::{GraphArgs, Setup};
 use vigil_supervisor::SupervisorStage;
 
-/// Each service and the functions that are its step, or the work that it does ahead of one, as
-/// callgrind names them.
-pub const STEPS: [(&str, &[&str]); 5] = [
+/// Each service and the functions that are its step, as callgrind names them.
+pub const STEPS: [(&str, &[&str]); 4] = [
     (
         "sensor-sim",
         &["*Simulation::step*", "*Simulation::measure*"],
     ),
     ("detector", &["*detector::Detector::step*"]),
-    ("detector, ahead", &["*detector::Detector::prepare*"]),
     ("identifier", &["*watcher::Diagnoser::step*"]),
     ("supervisor", &["*supervisor::Supervisor::step*"]),
 ];

@@ -17,7 +17,7 @@ use vigil_bench::latency::load::{Load, Running};
 use vigil_bench::latency::stalls::{self, Origin, Stall, Told};
 use vigil_setup::schema::Source;
 
-/// Particles of detector and identifier.
+/// Most hypotheses of the identifier.
 const PARTICLES: usize = 1000;
 
 /// Makes stalls of known origin and reads what the latency report says of them.

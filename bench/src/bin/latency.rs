@@ -48,7 +48,7 @@ struct Args {
     /// Time of each run of the graph, s.
     #[arg(long, value_name = "S", default_value_t = 20.0)]
     seconds: f64,
-    /// Particles of detector and identifier.
+    /// Most hypotheses of the identifier, or its particles, 32 to 1024.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     particles: usize,
     /// The hierarchical filter identifies, and a wheel sticks at the beginning: every particle is

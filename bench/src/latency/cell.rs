@@ -63,7 +63,7 @@ pub struct Spec {
     pub scheduling: Scheduling,
     /// Time of the graph's run, s.
     pub seconds: f64,
-    /// Particles of detector and identifier.
+    /// Most hypotheses of the identifier, or its particles.
     pub particles: usize,
     /// True if a filter of particles identifies and a wheel sticks at the beginning: then every
     /// particle is stepped in every cycle.

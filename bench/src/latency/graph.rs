@@ -22,7 +22,7 @@ use super::cycles::{STAGE_NAMES, STAGES};
 pub struct Change {
     /// Rate of the schedule, Hz.
     pub rate_hz: f64,
-    /// Particles of detector and identifier.
+    /// Most hypotheses of the identifier, or its particles.
     pub particles: usize,
     /// True for `SCHED_FIFO` where permitted, false for `SCHED_OTHER`.
     pub is_fifo: bool,
@@ -78,7 +78,6 @@ impl Prepared {
             change.source.to_string().into(),
         )?;
         let particles = i64::try_from(change.particles)?;
-        set(&mut file, "detector", "particles", particles.into())?;
         set(&mut file, "identifier", "particles", particles.into())?;
         if change.is_faulty {
             set(&mut file, "identifier", "filter", "hierarchical".into())?;

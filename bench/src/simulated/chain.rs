@@ -66,7 +66,7 @@ impl Chain {
         };
         let names = tree.nodes().iter().map(|node| node.name.clone());
         Ok(Self {
-            detector: Detector::new(model, robot, &detector, seed)?,
+            detector: Detector::new(model, robot, &detector)?,
             identifier: Identifier::new(&models, &identifier, sensors, seed)?,
             names: names.collect(),
             detection: Box::default(),

@@ -13,9 +13,7 @@ use crate::{Detector, DetectorError};
 pub fn assemble(setup: &Setup) -> Result<Detector, DetectorError> {
     let file = &setup.file;
     let detector = match &setup.model {
-        RobotModel::Faults(model) => {
-            Detector::new(model, &setup.robot, &file.detector, file.graph.seed)
-        }
+        RobotModel::Faults(model) => Detector::new(model, &setup.robot, &file.detector),
         RobotModel::Nominal(model) => Detector::nominal(model, &setup.robot, &file.detector),
     }?;
     // Recorded frames come at the recording's pace, times the speed.

@@ -1,11 +1,11 @@
 //! The detector's `step`: guard, observe, monitor, alarm, report.
 
 use vigil_blocks::{
-    Channel, DetectionBelief, Entry, HealthyBelief, PARTICLE_CAPACITY, ParticleBlock, Readiness,
-    SensorFrame, Symptoms, Valid,
+    Channel, DetectionBelief, Entry, HealthyBelief, MODE_UNKNOWN, ParticleBlock, Readiness,
+    SensorFrame, Symptoms, Valid, WeightedHypothesis,
 };
 use vigil_inference::ending::Ending;
-use vigil_inference::logspace::probability;
+use vigil_inference::logspace::{log_add, probability};
 use vigil_robot::learned::monitor::Channels;
 use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
 use vigil_robot::meaning::Finding;
@@ -13,7 +13,6 @@ use vigil_robot::nominal;
 use vigil_robot::{Alarm, AlarmError, Description};
 use vigil_setup::schema;
 
-use crate::cloud::Cloud;
 use crate::monitors::Monitors;
 use crate::publisher::Publisher;
 use crate::sight::{self, Sight};
@@ -28,9 +27,6 @@ pub enum DetectorError {
     /// The model does not fit.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Too few or too many particles.
-    #[error("detector.particles: {0} is not allowed: 1 to {PARTICLE_CAPACITY}")]
-    Particles(usize),
     /// A rate or an interval is not positive and finite.
     #[error("detector.{key}: {value} is not allowed: a positive finite number")]
     Value {
@@ -47,7 +43,7 @@ pub enum DetectorError {
 /// The detection filter at frame rate.
 ///
 /// A step that completes an observation (about every learned interval, 50 ms) updates the belief;
-/// the steps between repeat it. Equal entries and seeds give bit-identical beliefs.
+/// the steps between repeat it. Equal entries give bit-identical beliefs.
 #[derive(Debug, Clone)]
 pub struct Detector {
     watch: Watch,
@@ -57,7 +53,6 @@ pub struct Detector {
     ending: Ending,
     /// Of a fault now.
     log_odds: f64,
-    particles: usize,
     armed: bool,
     /// Whether the last observation was of a robot in motion.
     moving: bool,
@@ -89,27 +84,27 @@ impl Detector {
         model: &Model,
         robot: &Description,
         settings: &schema::Detector,
-        seed: u64,
     ) -> Result<Self, DetectorError> {
         model.check_robot(robot)?;
         let (channels, form) = chosen(settings);
         let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
         let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
-        Self::watching(
-            model.interval_s,
+        let watch = Watch::Faults {
+            observer: Box::new(match channels {
+                Channels::All => Observer::new(model, robot).with_further(),
+                _ => Observer::new(model, robot),
+            }),
+            monitor: Box::new(Monitor::new(model, robot, channels, form, rate)),
+        };
+        let interval_s = model.interval_s;
+        Ok(Self::watching(
+            interval_s,
             robot,
             alarm_log_odds,
             settings,
-            |particles| Watch::Faults {
-                observer: Box::new(match channels {
-                    Channels::All => Observer::new(model, robot).with_further(),
-                    _ => Observer::new(model, robot),
-                }),
-                monitor: Box::new(Monitor::new(model, robot, channels, form, rate)),
-                cloud: Cloud::new(particles, seed),
-            },
-        )
+            watch,
+        ))
     }
 
     /// A detector for a robot of which only the nominal behaviour is known.
@@ -126,13 +121,19 @@ impl Detector {
         let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
         let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
-        Self::watching(model.interval_s, robot, alarm_log_odds, settings, |_| {
-            Watch::Nominal {
-                observer: Box::new(nominal::Observer::new(robot)),
-                monitor: Box::new(nominal::Monitor::new(model, channels, form, rate)),
-                last: Observed::default(),
-            }
-        })
+        let watch = Watch::Nominal {
+            observer: Box::new(nominal::Observer::new(robot)),
+            monitor: Box::new(nominal::Monitor::new(model, channels, form, rate)),
+            last: Observed::default(),
+        };
+        let interval_s = model.interval_s;
+        Ok(Self::watching(
+            interval_s,
+            robot,
+            alarm_log_odds,
+            settings,
+            watch,
+        ))
     }
 
     fn watching(
@@ -140,20 +141,14 @@ impl Detector {
         robot: &Description,
         alarm_log_odds: f64,
         settings: &schema::Detector,
-        watch: impl FnOnce(usize) -> Watch,
-    ) -> Result<Self, DetectorError> {
-        if !(1..=PARTICLE_CAPACITY).contains(&settings.particles) {
-            return Err(DetectorError::Particles(settings.particles));
-        }
-        let particles = settings.particles;
-        let watch = watch(particles);
-        Ok(Self {
+        watch: Watch,
+    ) -> Self {
+        Self {
             log_odds: watch.report().log_odds,
             watch,
             fault_rate_1_s: settings.fault_rate_1_h / 3600.0,
             alarm: Alarm::new(alarm_log_odds),
             ending: Ending::new(robot.fault_prior.again_1_s, robot.fault_prior.mended_1_s),
-            particles,
             armed: false,
             moving: false,
             sight: sight_of(robot, settings),
@@ -168,7 +163,7 @@ impl Detector {
             external: 0,
             monitors: None,
             obeyed: (0, 0),
-        })
+        }
     }
 
     /// The same detector with monitors of the pose against the planned pose, whose symptoms take
@@ -206,12 +201,6 @@ impl Detector {
         self.monitors.is_some()
     }
 
-    /// Particles configured; 0 for a robot without fault models, which needs none.
-    #[must_use]
-    pub fn particles(&self) -> u32 {
-        self.watch.cloud().map_or(0, |_| self.particles as u32)
-    }
-
     /// Log-odds at which the alarm rises.
     #[must_use]
     pub const fn alarm_log_odds(&self) -> f64 {
@@ -225,7 +214,7 @@ impl Detector {
         self.armed
     }
 
-    /// Takes one entry of the journal and fills the belief and the particles (headers and causes
+    /// Takes one entry of the journal and fills the belief and the hypotheses (headers and causes
     /// are the caller's).
     // Never merged into its caller, so that its instructions can be counted.
     #[inline(never)]
@@ -233,7 +222,7 @@ impl Detector {
         &mut self,
         entry: Entry<&SensorFrame>,
         belief: &mut DetectionBelief,
-        particles: &mut ParticleBlock,
+        hypotheses: &mut ParticleBlock,
     ) {
         let mut missed = 0;
         match entry {
@@ -252,24 +241,15 @@ impl Detector {
                 }
                 missed = count;
             }
-            Entry::Budget(count) => {
-                let count = (count as usize).clamp(1, self.particles);
-                self.watch.resize(count);
-            }
+            // Its cost is that of one track: there is nothing to shed.
+            Entry::Budget(_) => {}
             Entry::Reset => {
                 self.watch.reset_observer();
                 self.begin_run();
             }
         }
         self.report(missed, belief);
-        self.publish(particles);
-    }
-
-    /// Does ahead of the next step what does not depend on its entry. Changes no result.
-    // Never merged into its caller, so that its instructions can be counted.
-    #[inline(never)]
-    pub fn prepare(&mut self) {
-        self.watch.draw_ahead();
+        self.publish(belief.log_odds, hypotheses);
     }
 
     fn begin_run(&mut self) {
@@ -373,8 +353,6 @@ impl Detector {
         } else {
             0.0
         };
-        // Drawn anew after every observation: all of equal weight.
-        belief.effective_sample_size = self.watch.cloud().map_or(0, Cloud::len) as f64;
         let NoiseScales {
             pose,
             wheels,
@@ -387,8 +365,6 @@ impl Detector {
         belief.outlier_rate = outliers.pose;
         belief.outlier_rate_wheels = outliers.wheels;
         belief.outlier_rate_steer = outliers.steer;
-        let healthy = self.watch.healthy();
-        belief.healthy = healthy.map_or_else(HealthyBelief::default, |it| it.to_block());
         belief.channel_log_odds = report.channels;
         belief.alarm_t_capture_ns = self.alarm_t_ns;
         belief.alarm = u32::from(self.alarm.stands());
@@ -403,14 +379,26 @@ impl Detector {
             (true, false) => Readiness::NotExcited,
         } as u32;
         belief.degenerate_count = report.degenerate_count;
-        belief.particle_count = self.watch.cloud().map_or(0, Cloud::len) as u32;
     }
 
-    fn publish(&self, block: &mut ParticleBlock) {
-        match self.watch.cloud() {
-            Some(cloud) => cloud.publish(block),
-            None => block.count = 0,
-        }
+    /// Nominal or unknown, at these odds; where a pose is tracked, it is the healthy robot's.
+    fn publish(&self, log_odds: f64, block: &mut ParticleBlock) {
+        let healthy = self.watch.healthy();
+        block.healthy = healthy.map_or_else(HealthyBelief::default, |it| it.to_block());
+        let nominal = WeightedHypothesis {
+            pose: block.healthy.pose,
+            pose_covariance: block.healthy.pose_covariance,
+            log_weight: -log_add(0.0, log_odds),
+            ..WeightedHypothesis::default()
+        };
+        let unknown = WeightedHypothesis {
+            onset_t_capture_ns: self.alarm_t_ns,
+            log_weight: -log_add(0.0, -log_odds),
+            mode: MODE_UNKNOWN,
+            ..nominal
+        };
+        block.hypotheses[..2].copy_from_slice(&[nominal, unknown]);
+        block.count = 2;
     }
 }
 

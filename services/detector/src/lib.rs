@@ -3,7 +3,6 @@
 //! [`Detector`] is a pure function of journal entries; [`wiring`] connects it to its ports.
 
 mod assemble;
-mod cloud;
 mod detector;
 mod monitors;
 mod pace;

@@ -5,8 +5,6 @@ use vigil_robot::learned::monitor::Report;
 use vigil_robot::learned::{Healthy, Intake, Monitor, NoiseScales, Observer};
 use vigil_robot::nominal;
 
-use crate::cloud::Cloud;
-
 /// What the detector must know of an observation.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Observed {
@@ -27,8 +25,6 @@ pub(crate) enum Watch {
         observer: Box<Observer>,
         /// Detection filter.
         monitor: Box<Monitor>,
-        /// Drawn from its belief about the pose.
-        cloud: Cloud,
     },
     /// Of a nominal model.
     Nominal {
@@ -53,15 +49,10 @@ impl Watch {
     /// Takes the observation that the last frame completed.
     pub fn step(&mut self, following: bool) -> Observed {
         match self {
-            Self::Faults {
-                observer,
-                monitor,
-                cloud,
-            } => {
+            Self::Faults { observer, monitor } => {
                 observer.suspect(following);
                 let observation = observer.observation();
                 monitor.step_with(observation, observer.further(), following);
-                cloud.draw(monitor.track());
                 Observed {
                     t_ns: observation.t_ns,
                     dt_s: observation.dt_s,
@@ -97,10 +88,7 @@ impl Watch {
     /// Forgets the run.
     pub fn reset(&mut self) {
         match self {
-            Self::Faults { monitor, cloud, .. } => {
-                monitor.reset();
-                cloud.reset();
-            }
+            Self::Faults { monitor, .. } => monitor.reset(),
             Self::Nominal { monitor, .. } => monitor.reset(),
         }
     }
@@ -110,20 +98,6 @@ impl Watch {
         match self {
             Self::Faults { monitor, .. } => monitor.forget_evidence(),
             Self::Nominal { monitor, .. } => monitor.forget_evidence(),
-        }
-    }
-
-    /// Changes the number of particles, where there are any.
-    pub fn resize(&mut self, particles: usize) {
-        if let Self::Faults { cloud, .. } = self {
-            cloud.resize(particles);
-        }
-    }
-
-    /// Draws the numbers for the next particles, where there are any.
-    pub fn draw_ahead(&mut self) {
-        if let Self::Faults { cloud, .. } = self {
-            cloud.draw_ahead();
         }
     }
 
@@ -155,14 +129,6 @@ impl Watch {
     pub fn healthy(&self) -> Option<Healthy> {
         match self {
             Self::Faults { monitor, .. } => monitor.healthy(),
-            Self::Nominal { .. } => None,
-        }
-    }
-
-    /// The pose particles, where there are any.
-    pub fn cloud(&self) -> Option<&Cloud> {
-        match self {
-            Self::Faults { cloud, .. } => Some(cloud),
             Self::Nominal { .. } => None,
         }
     }

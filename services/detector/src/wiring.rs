@@ -14,7 +14,7 @@ use crate::Detector;
 /// A robot at rest is told of after so long, ns: one that turns round does not count.
 const REST_NS: u64 = 1_000_000_000;
 
-/// The detector as a stage of the graph: sensor frames in, belief and particles out.
+/// The detector as a stage of the graph: sensor frames in, belief and hypotheses out.
 pub struct DetectorStage {
     detector: Detector,
     guard: FrameGuard,
@@ -22,7 +22,7 @@ pub struct DetectorStage {
     epoch: u64,
     frames: Box<dyn Receiver<SensorFrame>>,
     belief: Box<dyn Sender<DetectionBelief>>,
-    particles: Box<dyn Sender<ParticleBlock>>,
+    hypotheses: Box<dyn Sender<ParticleBlock>>,
     alarm: bool,
     alarm_told: bool,
     p_fault: f64,
@@ -93,7 +93,7 @@ impl DetectorStage {
             epoch: 0,
             frames: graph.receiver(Topic::Sensor)?,
             belief: graph.sender(Topic::Detection)?,
-            particles: graph.sender(Topic::DetectionParticles)?,
+            hypotheses: graph.sender(Topic::DetectionParticles)?,
             alarm: false,
             alarm_told: false,
             p_fault: 0.0,
@@ -118,21 +118,21 @@ impl Stage for DetectorStage {
             if !intake.admit::<SensorFrame>(&frame.header, content) {
                 self.detector.refuse();
             } else {
-                let (belief, particles) = (self.belief.block(), self.particles.block());
+                let (belief, hypotheses) = (self.belief.block(), self.hypotheses.block());
                 let before = std::mem::replace(&mut self.epoch, frame.header.epoch);
                 if before != 0 && before != self.epoch {
                     // A publisher that starts anew may have another clock.
-                    self.detector.step(Entry::Reset, belief, particles);
+                    self.detector.step(Entry::Reset, belief, hypotheses);
                 }
-                self.detector.step(Entry::Frame(&frame), belief, particles);
+                self.detector.step(Entry::Frame(&frame), belief, hypotheses);
                 intake.stepped(&frame.header, (frame.header.epoch, frame.header.seq));
             }
         }
     }
 
     fn miss(&mut self, count: u32) {
-        let (belief, particles) = (self.belief.block(), self.particles.block());
-        self.detector.step(Entry::Missed(count), belief, particles);
+        let (belief, hypotheses) = (self.belief.block(), self.hypotheses.block());
+        self.detector.step(Entry::Missed(count), belief, hypotheses);
     }
 
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
@@ -141,25 +141,15 @@ impl Stage for DetectorStage {
         (self.alarm, self.p_fault) = (belief.alarm != 0, belief.p_fault);
         self.symptoms = belief.symptoms;
         (self.watch.blind, self.watch.readiness) = (belief.blind, belief.readiness);
-        self.particles.block().cause = cause;
-        // Particles first: they are there when the belief wakes the identifier.
-        self.particles.send(stamp, clock)?;
+        self.hypotheses.block().cause = cause;
+        // Hypotheses first: they are there when the belief wakes the identifier.
+        self.hypotheses.send(stamp, clock)?;
         self.belief.send(stamp, clock)
     }
 
     fn prepare(&mut self) -> Result<(), PortError> {
-        self.detector.prepare();
         self.belief.prepare()?;
-        self.particles.prepare()
-    }
-
-    fn particles(&self) -> u32 {
-        self.detector.particles()
-    }
-
-    fn limit(&mut self, particles: u32) {
-        let (belief, cloud) = (self.belief.block(), self.particles.block());
-        self.detector.step(Entry::Budget(particles), belief, cloud);
+        self.hypotheses.prepare()
     }
 
     fn writer(&self) -> Writer {

@@ -15,19 +15,15 @@ static ALLOCATOR: CountingAllocator = CountingAllocator;
 fn steady_cycles_allocate_nothing() {
     let (frames, _) = recorded::unseen("RM_STUCK", "stuck");
     let (model, robot) = (recorded::model(), recorded::robot());
-    let mut detector = Detector::new(&model, &robot, &schema::Detector::default(), 1).unwrap();
+    let mut detector = Detector::new(&model, &robot, &schema::Detector::default()).unwrap();
     let mut belief = DetectionBelief::default();
-    let mut particles: Box<ParticleBlock> = Box::default();
+    let mut hypotheses: Box<ParticleBlock> = Box::default();
     let before = allocations();
-    for (i, frame) in frames.iter().enumerate() {
-        detector.step(Entry::Frame(frame), &mut belief, &mut particles);
-        detector.step(Entry::Missed(1), &mut belief, &mut particles);
-        if i % 40 == 0 {
-            let budget = if i % 80 == 0 { 64 } else { 256 };
-            detector.step(Entry::Budget(budget), &mut belief, &mut particles);
-        }
+    for frame in &frames {
+        detector.step(Entry::Frame(frame), &mut belief, &mut hypotheses);
+        detector.step(Entry::Missed(1), &mut belief, &mut hypotheses);
     }
-    detector.step(Entry::Reset, &mut belief, &mut particles);
+    detector.step(Entry::Reset, &mut belief, &mut hypotheses);
     assert_eq!(allocations() - before, 0);
     // It did detect.
     assert_eq!(belief.alarm_count, 1);

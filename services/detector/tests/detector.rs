@@ -5,8 +5,10 @@ mod recorded;
 
 use proptest::prelude::*;
 use recorded::{model, robot, unseen};
-use vigil_blocks::{Channel, DetectionBelief, Entry, ParticleBlock, SensorFrame};
+use vigil_blocks::{Channel, DetectionBelief, Entry, MODE_UNKNOWN, ParticleBlock, SensorFrame};
 use vigil_detector::Detector;
+use vigil_robot::learned::monitor::Channels;
+use vigil_robot::learned::{Form, Healthy, Monitor, Observer, triangle};
 use vigil_setup::schema;
 
 /// Capture time, s.
@@ -17,7 +19,7 @@ fn time_s(frame: &SensorFrame) -> f64 {
 struct Bench {
     detector: Detector,
     belief: DetectionBelief,
-    particles: Box<ParticleBlock>,
+    hypotheses: Box<ParticleBlock>,
 }
 
 impl Bench {
@@ -26,17 +28,17 @@ impl Bench {
             sensors,
             ..schema::Detector::default()
         };
-        let detector = Detector::new(&model(), &robot(), &settings, 1).unwrap();
+        let detector = Detector::new(&model(), &robot(), &settings).unwrap();
         Self {
             detector,
             belief: DetectionBelief::default(),
-            particles: Box::default(),
+            hypotheses: Box::default(),
         }
     }
 
     fn step(&mut self, frame: &SensorFrame) -> &DetectionBelief {
         self.detector
-            .step(Entry::Frame(frame), &mut self.belief, &mut self.particles);
+            .step(Entry::Frame(frame), &mut self.belief, &mut self.hypotheses);
         &self.belief
     }
 
@@ -165,7 +167,7 @@ fn misses_predict_and_change_nothing() {
         with.step(frame);
         let p_fault = with.belief.p_fault;
         with.detector
-            .step(Entry::Missed(50), &mut with.belief, &mut with.particles);
+            .step(Entry::Missed(50), &mut with.belief, &mut with.hypotheses);
         assert!(with.belief.p_fault > p_fault && with.belief.p_fault < p_fault + 0.01);
     }
     with.step(frames.last().unwrap());
@@ -190,26 +192,45 @@ fn equal_input_and_seed_give_equal_bits_and_a_new_run_starts_anew() {
         let belief = bench.step(&frame);
         assert_eq!(belief.log_odds.to_bits(), before.log_odds.to_bits());
         assert_eq!(belief.alarm, before.alarm);
-        assert_eq!(belief.effective_sample_size, before.effective_sample_size);
     }
 }
 
 #[test]
-fn fewer_particles_are_used_on_demand() {
+fn an_identification_starts_from_what_the_detector_believes_bit_for_bit() {
     let (frames, _) = unseen("ND", "");
+    let (model, robot) = (model(), robot());
+    let rate_1_h = schema::Detector::default().fault_rate_1_h;
+    let channels = Channels::PoseEncoders;
+    let mut monitor = Monitor::new(&model, &robot, channels, Form::LearnedBias, rate_1_h);
+    let mut observer = Observer::new(&model, &robot);
     let mut bench = Bench::new(schema::Sensors::PoseEncoders);
-    for (i, frame) in frames.iter().enumerate() {
-        if i == 100 {
-            bench
-                .detector
-                .step(Entry::Budget(64), &mut bench.belief, &mut bench.particles);
-            assert_eq!(
-                (bench.particles.count, bench.belief.particle_count),
-                (64, 64)
-            );
+    let mut compared = 0;
+    for frame in &frames {
+        let belief = *bench.step(frame);
+        if observer.push(frame).complete {
+            observer.suspect(false);
+            monitor.step_with(observer.observation(), observer.further(), false);
         }
-        assert_eq!(bench.step(frame).alarm, 0);
+        let block = &bench.hypotheses;
+        let wheels = Healthy::unsure(&model, &robot).wheels;
+        let read = Healthy::from_block(&block.healthy, wheels);
+        // Bit for bit, but for what rounding sets apart within a symmetric covariance.
+        let part = |healthy: Healthy| healthy.to_block();
+        assert_eq!(read.map(part), monitor.healthy().map(part));
+        assert_eq!(belief.alarm, 0);
+        let [nominal, unknown] = block.used() else {
+            panic!("{} hypotheses", block.count);
+        };
+        assert_eq!((nominal.mode, unknown.mode), (0, MODE_UNKNOWN));
+        assert!((unknown.log_weight.exp() - belief.p_fault).abs() < 1e-12);
+        assert!((nominal.log_weight.exp() + unknown.log_weight.exp() - 1.0).abs() < 1e-12);
+        if let Some(healthy) = monitor.healthy() {
+            assert_eq!(nominal.pose, <[f64; 3]>::from(healthy.pose));
+            assert_eq!(nominal.pose_covariance, triangle(&healthy.covariance));
+            compared += 1;
+        }
     }
+    assert!(compared > 200, "{compared}");
 }
 
 fn hostile() -> impl Strategy<Value = f64> {
@@ -286,12 +307,12 @@ proptest! {
             let belief = bench.step(&frame);
             prop_assert!((0.0..=1.0).contains(&belief.p_fault));
             prop_assert!(belief.log_odds.is_finite() && belief.evidence.is_finite());
-            prop_assert!(belief.effective_sample_size.is_finite());
             prop_assert!(belief.noise_scale.iter().all(|scale| scale.is_finite()));
             prop_assert!(belief.channel_log_odds.iter().all(|value| value.is_finite()));
-            let count = bench.particles.count as usize;
-            prop_assert!(bench.particles.x[..count].iter().all(|x| x.is_finite()));
-            prop_assert!(bench.particles.log_weight[..count].iter().all(|w| !w.is_nan()));
+            for hypothesis in bench.hypotheses.used() {
+                prop_assert!(hypothesis.pose.iter().all(|value| value.is_finite()));
+                prop_assert!(hypothesis.log_weight.is_finite());
+            }
         }
     }
 }

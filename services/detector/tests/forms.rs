@@ -27,16 +27,16 @@ fn detector(robot: &Description, sensors: Sensors, form: Form) -> Detector {
         form,
         ..schema::Detector::default()
     };
-    Detector::new(&model(), robot, &settings, 1).unwrap()
+    Detector::new(&model(), robot, &settings).unwrap()
 }
 
 /// Time of the first alarm, s.
 fn alarm_s(detector: &Detector, frames: &[SensorFrame]) -> Option<f64> {
     let mut detector = detector.clone();
     let mut belief = DetectionBelief::default();
-    let mut particles = Box::<ParticleBlock>::default();
+    let mut hypotheses = Box::<ParticleBlock>::default();
     let alarm = frames.iter().find(|frame| {
-        detector.step(Entry::Frame(frame), &mut belief, &mut particles);
+        detector.step(Entry::Frame(frame), &mut belief, &mut hypotheses);
         belief.alarm != 0
     });
     alarm.map(|frame| frame.header.t_capture_ns as f64 * 1e-9)
@@ -125,9 +125,8 @@ fn an_alarm_that_could_never_rise_is_refused() {
         sensors: Sensors::Pose,
         false_alarm_interval_h: 1e4,
         fault_rate_1_h: 3600.0,
-        ..schema::Detector::default()
     };
-    let build = |form| Detector::new(&model(), &robot(), &settings(form), 1).map(|_| ());
+    let build = |form| Detector::new(&model(), &robot(), &settings(form)).map(|_| ());
     assert!(build(Form::LearnedBias).is_ok());
     let error = build(Form::Constant).unwrap_err().to_string();
     assert!(
@@ -145,7 +144,7 @@ fn an_alarm_above_the_bound_of_the_poses_log_odds_is_refused_with_that_bound() {
             .calibration
             .iter_mut()
             .for_each(|c| c.level_log_odds = level);
-        Detector::new(&model, &robot(), &settings, 1).map(|detector| detector.alarm_log_odds())
+        Detector::new(&model, &robot(), &settings).map(|detector| detector.alarm_log_odds())
     };
     let above = build(0.0).unwrap();
     assert!(build(39.9 - above).is_ok_and(|alarm| (alarm - 39.9).abs() < 1e-6));

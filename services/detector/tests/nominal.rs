@@ -6,7 +6,9 @@ use std::path::PathBuf;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{Channel, DetectionBelief, Entry, ParticleBlock, SensorFrame, Valid};
+use vigil_blocks::{
+    Channel, DetectionBelief, Entry, HealthyBelief, ParticleBlock, SensorFrame, Valid,
+};
 use vigil_cycle::allocation::{CountingAllocator, allocations};
 use vigil_detector::Detector;
 use vigil_evaluation::frames::Run;
@@ -75,35 +77,37 @@ fn frame(i: u64, stuck_s: f64) -> SensorFrame {
 fn a_stuck_wheel_alarms_within_a_second_and_nothing_is_allocated() {
     let mut detector = detector();
     let mut belief = DetectionBelief::default();
-    let mut particles: Box<ParticleBlock> = Box::default();
+    let mut hypotheses: Box<ParticleBlock> = Box::default();
     let before = allocations();
     let mut alarm_s = None;
     for i in 0..1500 {
-        detector.step(Entry::Frame(&frame(i, 20.0)), &mut belief, &mut particles);
-        detector.step(Entry::Missed(1), &mut belief, &mut particles);
+        detector.step(Entry::Frame(&frame(i, 20.0)), &mut belief, &mut hypotheses);
+        detector.step(Entry::Missed(1), &mut belief, &mut hypotheses);
         if belief.alarm != 0 && alarm_s.is_none() {
             alarm_s = Some(i as f64 / RATE_HZ);
             let channels = belief.channel_log_odds;
             assert!(channels[Channel::wheel_rate(0)] > channels[Channel::wheel_rate(1)]);
         }
     }
-    detector.step(Entry::Budget(64), &mut belief, &mut particles);
-    detector.step(Entry::Reset, &mut belief, &mut particles);
+    detector.step(Entry::Reset, &mut belief, &mut hypotheses);
     assert_eq!(allocations() - before, 0);
     let alarm_s = alarm_s.unwrap();
     assert!((20.0..21.0).contains(&alarm_s), "{alarm_s}");
-    assert_eq!(particles.count, 0);
+    // Without a pose: nominal or unknown, and nothing to start an identification from.
+    assert_eq!(hypotheses.count, 2);
+    assert_eq!(hypotheses.healthy, HealthyBelief::default());
+    assert_eq!(hypotheses.hypotheses[1].pose_covariance, [0.0; 6]);
 }
 
 #[test]
 fn equal_frames_give_equal_beliefs_also_after_a_reset() {
     let mut detector = detector();
-    let mut particles: Box<ParticleBlock> = Box::default();
+    let mut hypotheses: Box<ParticleBlock> = Box::default();
     let mut run = |detector: &mut Detector| {
         let mut told = Vec::new();
         for i in 0..500 {
             let mut belief = DetectionBelief::default();
-            detector.step(Entry::Frame(&frame(i, 8.0)), &mut belief, &mut particles);
+            detector.step(Entry::Frame(&frame(i, 8.0)), &mut belief, &mut hypotheses);
             told.push((belief.log_odds.to_bits(), belief.alarm));
         }
         told

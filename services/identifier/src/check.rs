@@ -21,8 +21,9 @@ pub fn check(settings: &schema::Identifier) -> Result<(), IdentifierError> {
             allowed,
         })
     };
-    if !(32..=PARTICLE_CAPACITY).contains(&settings.particles) {
-        return refuse("particles", settings.particles as f64, "32 to 4096");
+    let particles = settings.particles.unwrap_or(schema::PARTICLES);
+    if !(32..=PARTICLE_CAPACITY).contains(&particles) {
+        return refuse("particles", particles as f64, "32 to 1024");
     }
     if !(0.5..=30.0).contains(&settings.ring_s) {
         return refuse("ring_s", settings.ring_s, "0.5 to 30");

@@ -1,13 +1,11 @@
 //! The filter that an identification runs on.
 
-use rand_pcg::Pcg64Mcg;
-use vigil_blocks::ParticleBlock;
 use vigil_robot::learned::{Healthy, NoiseScales, Observation};
 
-use crate::draw::draw;
 use crate::exact::Exact;
 use crate::further::Fusion;
 use crate::generic::Generic;
+use crate::hypotheses::{Ranked, add_exact};
 use crate::modes::Leaves;
 use crate::node_sizes::NodeSizes;
 use crate::posterior::Posterior;
@@ -30,11 +28,29 @@ impl Engine {
         }
     }
 
-    /// From the next observation on at most `count` particles; those of the exact filter are only
-    /// drawn for observers, by [`Self::draw`].
-    pub fn limit(&mut self, count: usize) {
-        if let Self::Generic(filter) = self {
-            filter.limit(count);
+    /// Most hypotheses or particles.
+    #[must_use]
+    pub const fn limit(&self) -> usize {
+        match self {
+            Self::Exact(filter) => filter.limit(),
+            Self::Generic(filter) => filter.limit(),
+        }
+    }
+
+    /// From the next observation on at most `count` hypotheses or particles.
+    pub fn set_limit(&mut self, count: usize) {
+        match self {
+            Self::Exact(filter) => filter.set_limit(count),
+            Self::Generic(filter) => filter.set_limit(count),
+        }
+    }
+
+    /// Hypotheses or particles at present.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Exact(filter) => filter.hypotheses().len(),
+            Self::Generic(filter) => filter.count(),
         }
     }
 
@@ -91,11 +107,11 @@ impl Engine {
         }
     }
 
-    /// Fills `out` with at most `count` particles.
-    pub fn draw(&self, leaves: &Leaves, count: usize, rng: &mut Pcg64Mcg, out: &mut ParticleBlock) {
+    /// Adds the hypotheses, or the particles.
+    pub fn hypotheses(&self, leaves: &Leaves, out: &mut Ranked) {
         match self {
-            Self::Exact(filter) => draw(filter, leaves, count, rng, out),
-            Self::Generic(filter) => filter.draw(count, rng, out),
+            Self::Exact(filter) => add_exact(filter, leaves, out),
+            Self::Generic(filter) => filter.hypotheses(out),
         }
     }
 }

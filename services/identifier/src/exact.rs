@@ -26,7 +26,7 @@ use crate::encoders::Encoders;
 use crate::further::Fusion;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
-use crate::prepared::{Prepared, Seen};
+use crate::prepared::{Prepared, Seen, is_new};
 use crate::rate_offsets::RateOffsets;
 use crate::servo::ServoPrior;
 use crate::sets::Sets;
@@ -41,8 +41,6 @@ const PER_MODE: usize = 32;
 const PER_RARE: usize = 8;
 /// Hypotheses less probable than this are dropped (natural logarithm).
 const FLOOR: f64 = -30.0;
-/// So long after a supposed onset, ns, wheels may still read as before.
-const ONSET_BLUR_NS: u64 = 150_000_000;
 /// The filter.
 #[derive(Debug, Clone)]
 pub struct Exact {
@@ -55,6 +53,8 @@ pub struct Exact {
     /// Of each wheel's encoder.
     births_1_s: [f64; WHEELS],
     bank: Bank<State>,
+    /// Hypotheses kept from one observation to the next, at most.
+    limit: usize,
     /// Of the healthy robot, from before the faults; it fades as the robot drives on.
     context: Context,
     wheels: WheelContext,
@@ -115,6 +115,7 @@ impl Exact {
             rates,
             births_1_s: is_leaf.map(|leaf| if leaf { rates.fault_1_s } else { 0.0 }),
             bank: Bank::new(&capacities),
+            limit: capacities.iter().sum(),
             context: Context::default(),
             wheels: WheelContext::default(),
             sizes: Sizes::new(robot),
@@ -122,6 +123,17 @@ impl Exact {
             trust: Trust::default(),
             degenerate_count: 0,
         }
+    }
+
+    /// Most hypotheses kept.
+    #[must_use]
+    pub const fn limit(&self) -> usize {
+        self.limit
+    }
+
+    /// From the next observation on at most `count` hypotheses, the most probable: fewer cost less.
+    pub const fn set_limit(&mut self, count: usize) {
+        self.limit = count;
     }
 
     /// Starts from the nominal mode, as the detector knew it at `t_ns`.
@@ -223,6 +235,7 @@ impl Exact {
         if self.bank.normalise(FLOOR).is_none() || failed {
             self.degenerate_count = self.degenerate_count.saturating_add(1);
         }
+        self.bank.keep(self.limit);
     }
 
     /// Holds healthy motion within the tolerance, and unknown motion beyond it.
@@ -389,9 +402,4 @@ impl Exact {
         }
         0
     }
-}
-
-/// True while a stuck wheel's encoder may read anything, and the others may still turn as before.
-pub const fn is_new(t_ns: u64, onset_ns: u64) -> bool {
-    t_ns.saturating_sub(onset_ns) < ONSET_BLUR_NS
 }

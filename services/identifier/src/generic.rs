@@ -1,12 +1,9 @@
 //! The library's filters over single faults, by name.
 
 use nalgebra::Vector3;
-use rand::RngExt;
-use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{FaultSet, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock, WHEELS};
+use vigil_blocks::{FaultSet, MODE_UNKNOWN, WHEELS, WeightedHypothesis};
 use vigil_inference::FaultTree;
 use vigil_inference::adaptive::Adaptive;
-use vigil_inference::angle::wrap;
 use vigil_inference::bootstrap::ParticleFilter;
 use vigil_inference::filter::Filter;
 use vigil_inference::gaussian::Gaussian;
@@ -14,18 +11,19 @@ use vigil_inference::hierarchical::Hierarchical;
 use vigil_inference::hybrid::Modes;
 use vigil_inference::look_ahead::LookAhead;
 use vigil_inference::merged::Merged;
-use vigil_inference::normals::normal;
-use vigil_inference::particles::factor;
 use vigil_inference::proposal::Proposal;
 use vigil_inference::resample::Resampling;
 use vigil_inference::track::TRACK_DIMENSION;
 use vigil_robot::Description;
 use vigil_robot::learned::switching::{MODES_MAX, Seen};
-use vigil_robot::learned::{FaultRates, Healthy, Moved, NoiseScales, Observation, Switching};
+use vigil_robot::learned::{
+    FaultRates, Healthy, Moved, NoiseScales, Observation, Switching, triangle,
+};
 use vigil_setup::schema::{self, IdentifierFilter};
 
 use crate::assemble::Models;
 use crate::fault_rates::fault_rates;
+use crate::hypotheses::Ranked;
 use crate::modes::{IdentifierError, Leaves};
 use crate::posterior::Posterior;
 use crate::risk::risks;
@@ -63,6 +61,7 @@ pub struct Generic {
     meanings: Vec<Meaning>,
     use_wheels: bool,
     seed: u64,
+    limit: usize,
     /// Travel while the robot counted as standing, m.
     pending_m: f64,
     since_ns: [u64; MODES_MAX],
@@ -102,7 +101,7 @@ impl Generic {
             .map(|mode| meaning(&switching, mode, leaves))
             .collect();
         let resampling = Resampling::default();
-        let count = settings.particles;
+        let count = settings.particles.unwrap_or(schema::PARTICLES);
         let sampled =
             |proposal, model| ParticleFilter::new(model, proposal, resampling, count, seed);
         let refuse = |error: &dyn std::fmt::Display| IdentifierError::Build(error.to_string());
@@ -146,6 +145,7 @@ impl Generic {
             meanings,
             use_wheels,
             seed,
+            limit: count,
             pending_m: 0.0,
             since_ns: [0; MODES_MAX],
             degenerate_count: 0,
@@ -165,8 +165,26 @@ impl Generic {
         }
     }
 
+    /// Most particles.
+    #[must_use]
+    pub const fn limit(&self) -> usize {
+        self.limit
+    }
+
+    /// Particles at present, as [`Self::limit`] counts them.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        match &self.kind {
+            Kind::Sampled(filter) => filter.count(),
+            Kind::Hierarchical(filter) => filter.particles().count(),
+            Kind::LookAhead(filter) => LOOK_AHEAD_SHARE * filter.particles().count(),
+            Kind::Merged(_) => 0,
+        }
+    }
+
     /// From the next observation on at most `count` particles.
-    pub fn limit(&mut self, count: usize) {
+    pub fn set_limit(&mut self, count: usize) {
+        self.limit = count;
         match &mut self.kind {
             Kind::Sampled(filter) => filter.limit(count),
             Kind::Hierarchical(filter) => filter.limit(count),
@@ -279,56 +297,62 @@ impl Generic {
             .map_or(0, |mode| self.since_ns[mode])
     }
 
-    /// Fills `out` with at most `count` particles; of more, evenly chosen ones (after resampling
-    /// they lie in order).
-    pub fn draw(&self, count: usize, rng: &mut Pcg64Mcg, out: &mut ParticleBlock) {
-        let count = count.min(PARTICLE_CAPACITY);
-        out.count = 0;
+    /// Adds the particles with their weights, or each mode's Gaussian.
+    pub fn hypotheses(&self, out: &mut Ranked) {
         match &self.kind {
             Kind::Sampled(filter) => {
-                let stride = filter.count().div_ceil(count.max(1)).max(1);
-                for (mode, state, weight) in filter.particles().step_by(stride) {
-                    self.push(out, state.pose, mode, weight);
+                let total: f64 = filter.particles().map(|(_, _, weight)| weight).sum();
+                for (mode, state, weight) in filter.particles() {
+                    self.push(out, (state.pose, [0.0; 6]), mode, weight / total);
                 }
             }
             Kind::Hierarchical(filter) => {
-                let stride = filter.particles().count().div_ceil(count.max(1)).max(1);
-                for (state, shares, weight) in filter.particles().step_by(stride) {
-                    self.push(out, state.pose, pick(shares, rng), weight);
+                for (state, shares, weight) in filter.particles() {
+                    for (mode, &share) in shares.iter().enumerate() {
+                        self.push(out, (state.pose, [0.0; 6]), mode, weight * share);
+                    }
                 }
             }
             Kind::LookAhead(filter) => {
-                let stride = filter.particles().count().div_ceil(count.max(1)).max(1);
-                for (mode, state) in filter.particles().step_by(stride) {
-                    self.push(out, scatter(state, rng), mode, 1.0);
+                let weight = 1.0 / filter.particles().count() as f64;
+                for (mode, state) in filter.particles() {
+                    self.push(out, pose(state), mode, weight);
                 }
             }
             Kind::Merged(filter) => {
-                for _ in 0..count {
-                    let mode = pick(filter.posterior(), rng);
-                    self.push(out, scatter(&filter.states()[mode], rng), mode, 1.0);
+                let states = filter.states().iter().zip(filter.posterior());
+                for (mode, (state, &weight)) in states.enumerate() {
+                    self.push(out, pose(state), mode, weight);
                 }
             }
         }
-        let used = out.count as usize;
-        let total: f32 = out.log_weight[..used].iter().sum();
-        for weight in &mut out.log_weight[..used] {
-            *weight = (*weight / total).max(f32::MIN_POSITIVE).ln();
-        }
     }
 
-    /// Adds a particle; its weight is not yet a logarithm.
-    fn push(&self, out: &mut ParticleBlock, pose: Vector3<f64>, mode: usize, weight: f64) {
-        let slot = out.count as usize;
-        out.x[slot] = pose[0] as f32;
-        out.y[slot] = pose[1] as f32;
-        out.yaw[slot] = wrap(pose[2]) as f32;
-        out.mode[slot] = match self.meanings[mode] {
-            Meaning::Node(node) => node as u32,
-            Meaning::Unknown => MODE_UNKNOWN,
+    /// Adds one, unless it is impossible.
+    fn push(
+        &self,
+        out: &mut Ranked,
+        (pose, covariance): (Vector3<f64>, [f64; 6]),
+        mode: usize,
+        weight: f64,
+    ) {
+        if weight.is_nan() || weight <= 0.0 {
+            return;
+        }
+        let (leaves, index) = match self.meanings[mode] {
+            Meaning::Node(0) => (0, 0),
+            Meaning::Node(node) => (1 << node, node as u32),
+            Meaning::Unknown => (0, MODE_UNKNOWN),
         };
-        out.log_weight[slot] = weight as f32;
-        out.count += 1;
+        out.push(WeightedHypothesis {
+            leaves,
+            onset_t_capture_ns: if index == 0 { 0 } else { self.since_ns[mode] },
+            pose: pose.into(),
+            pose_covariance: covariance,
+            log_weight: weight.ln(),
+            mode: index,
+            ..WeightedHypothesis::default()
+        });
     }
 }
 
@@ -372,18 +396,8 @@ fn abstract_nodes(tree: &FaultTree, leaves: &Leaves, meanings: &[Meaning]) -> Ve
     nodes
 }
 
-/// Index drawn by probabilities that sum to 1.
-fn pick(p: &[f64], rng: &mut Pcg64Mcg) -> usize {
-    let mut left = rng.random::<f64>();
-    let drawn = p.iter().position(|p| {
-        left -= p;
-        left < 0.0
-    });
-    drawn.unwrap_or(0)
-}
-
-/// A pose drawn from a track.
-fn scatter(state: &Gaussian<TRACK_DIMENSION>, rng: &mut Pcg64Mcg) -> Vector3<f64> {
-    let factor = factor(state.covariance.fixed_view::<3, 3>(0, 0).into());
-    state.mean.fixed_rows::<3>(0) + factor * normal(rng)
+/// Moments of the pose of a track.
+fn pose(state: &Gaussian<TRACK_DIMENSION>) -> (Vector3<f64>, [f64; 6]) {
+    let covariance = state.covariance.fixed_view::<3, 3>(0, 0).into();
+    (state.mean.fixed_rows::<3>(0).into(), triangle(&covariance))
 }

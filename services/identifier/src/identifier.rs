@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 
 use nalgebra::Vector3;
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, ParticleBlock, SensorFrame};
+use vigil_blocks::{
+    DetectionBelief, Entry, FaultBelief, HealthyBelief, MODE_UNKNOWN, ParticleBlock, SensorFrame,
+};
 use vigil_robot::FaultPrior;
 use vigil_robot::learned::{Healthy, NoiseScales, Observation, Observer, motion_modes};
 use vigil_setup::schema;
@@ -13,12 +13,12 @@ use vigil_setup::schema;
 use crate::assemble::Models;
 use crate::check::{FURTHER_NEED_EXACT, check};
 use crate::detection::Detection;
-use crate::draw::copy;
 use crate::engine::Engine;
 use crate::exact::Exact;
 use crate::fault_rates::fault_rates;
 use crate::further_stage::FurtherStage;
 use crate::generic::Generic;
+use crate::hypotheses::{Ranked, copy};
 use crate::modes::{IdentifierError, Leaves};
 use crate::node_sizes::NodeSizes;
 use crate::posterior::Posterior;
@@ -36,7 +36,7 @@ const REASONS_MAX: usize = 20;
 pub struct Input<'a> {
     /// The sensor frame.
     pub frame: &'a SensorFrame,
-    /// The detector's belief and particles of the same frame, if they are known.
+    /// The detector's belief and hypotheses of the same frame, if they are known.
     pub detection: Option<(&'a DetectionBelief, &'a ParticleBlock)>,
 }
 
@@ -78,12 +78,12 @@ pub struct Identifier {
     use_wheels: bool,
     /// Sensors are silent, or the robot moves though it should stand: nothing can be identified.
     in_trouble: bool,
+    /// Most hypotheses or particles of the engine, without a budget.
     particles: usize,
-    budget: usize,
-    drawn: Box<ParticleBlock>,
+    ranked: Ranked,
+    /// The hypotheses after the last observation.
+    told: Box<ParticleBlock>,
     updated: bool,
-    seed: u64,
-    rng: Pcg64Mcg,
     ring: VecDeque<Kept>,
     capacity: usize,
     /// Time of an observation, s.
@@ -126,7 +126,8 @@ impl Identifier {
         let (engine, modes) = match settings.filter {
             schema::IdentifierFilter::Exact => {
                 let rates = fault_rates(&robot.fault_prior, &leaves, settings.p_unknown);
-                let filter = Exact::new(model, robot, &leaves, use_wheels, rates);
+                let mut filter = Exact::new(model, robot, &leaves, use_wheels, rates);
+                filter.set_limit(settings.particles.unwrap_or(filter.limit()));
                 let modes = filter.modes().to_vec();
                 (Engine::Exact(Box::new(filter)), modes)
             }
@@ -146,6 +147,7 @@ impl Identifier {
             observer = observer.with_further();
         }
         Ok(Self {
+            particles: engine.limit(),
             engine,
             reasons: Reasons::new(model, robot, modes, use_wheels),
             observer,
@@ -154,13 +156,10 @@ impl Identifier {
             prior: robot.fault_prior,
             use_wheels,
             in_trouble: false,
-            particles: settings.particles,
-            budget: settings.particles,
-            drawn: Box::default(),
+            ranked: Ranked::new(),
+            told: Box::default(),
             updated: false,
             leaves,
-            seed,
-            rng: Pcg64Mcg::seed_from_u64(seed),
             ring: VecDeque::with_capacity(capacity),
             capacity,
             interval_s: model.interval_s,
@@ -178,19 +177,28 @@ impl Identifier {
         })
     }
 
-    /// Particles configured.
+    /// Most hypotheses of the exact filter, or particles of a sampled one, without a budget.
     #[must_use]
     pub const fn particles(&self) -> u32 {
         self.particles as u32
     }
 
-    /// Takes one entry of the journal and fills the belief and the particles (headers and causes
+    /// Hypotheses or particles that an observation costs at present; 0 while nothing is identified.
+    #[must_use]
+    pub fn particles_in_use(&self) -> u32 {
+        match self.phase {
+            Phase::Watching => 0,
+            Phase::Identifying(_) => self.engine.count() as u32,
+        }
+    }
+
+    /// Takes one entry of the journal and fills the belief and the hypotheses (headers and causes
     /// are the caller's).
     pub fn step(
         &mut self,
         entry: Entry<Input<'_>>,
         belief: &mut FaultBelief,
-        particles: &mut ParticleBlock,
+        hypotheses: &mut ParticleBlock,
     ) {
         self.predicted = self.posterior;
         self.updated = false;
@@ -203,8 +211,8 @@ impl Identifier {
             // The state stays at the last frame: what is told is its prediction.
             Entry::Missed(_) => {}
             Entry::Budget(count) => {
-                self.budget = (count as usize).clamp(1, self.particles);
-                self.engine.limit(self.budget);
+                let count = (count as usize).clamp(1, self.particles);
+                self.engine.set_limit(count);
             }
             Entry::Reset => {
                 self.observer.reset();
@@ -212,13 +220,13 @@ impl Identifier {
             }
         }
         self.report(belief);
-        self.publish(detected, particles);
+        self.publish(detected, hypotheses);
     }
 
     fn begin_run(&mut self) {
-        self.rng = Pcg64Mcg::seed_from_u64(self.seed);
         self.ring.clear();
-        self.drawn.count = 0;
+        self.told.count = 0;
+        self.told.healthy = HealthyBelief::default();
         self.phase = Phase::Watching;
         self.in_trouble = false;
         self.detection = Detection::default();
@@ -274,7 +282,7 @@ impl Identifier {
     fn keep(&mut self, input: &Input<'_>) {
         let healthy = input
             .detection
-            .and_then(|(belief, _)| Healthy::from_block(&belief.healthy, self.unsure.wheels));
+            .and_then(|(_, block)| Healthy::from_block(&block.healthy, self.unsure.wheels));
         if let (Some(stage), Some(read)) = (&mut self.further, self.observer.further()) {
             let healthy = healthy.as_ref().unwrap_or(&self.unsure);
             let learns = !self.detection.alarm;
@@ -449,7 +457,7 @@ impl Identifier {
         belief.runner_up = self.reasons.runner_up();
         belief.channel_evidence = self.reasons.channel_evidence();
         belief.degenerate_count = self.engine.degenerate_count();
-        belief.particle_limit = self.budget as u32;
+        belief.particle_limit = self.engine.limit() as u32;
         let is_identifying = self.phase != Phase::Watching && !self.is_catching_up();
         if let Some(further) = self.further.as_ref().filter(|_| is_identifying) {
             further.sizes(belief);
@@ -465,37 +473,22 @@ impl Identifier {
 
     /// Onset of the most probable leaf; 0 of those of gyro and currents, which know none.
     fn onset_of_leaf(&self) -> u64 {
-        let leaves = self
-            .leaves
-            .stuck
-            .iter()
-            .chain(&self.leaves.encoder)
-            .chain(&self.leaves.steer)
-            .chain(&self.leaves.torque)
-            .chain(&self.leaves.current)
-            .chain([&self.leaves.gyro, &self.leaves.pose])
-            .flatten();
         let p = &self.posterior.nodes;
-        leaves
-            .max_by(|&&a, &&b| p[a].total_cmp(&p[b]))
-            .map_or(0, |&node| self.engine.onset(node))
+        let most = self.leaves.all().max_by(|&a, &b| p[a].total_cmp(&p[b]));
+        most.map_or(0, |node| self.engine.onset(node))
     }
 
-    /// Particles of the identification are drawn once per observation; before one, the detector's
-    /// are passed on.
+    /// Hypotheses of the identification change with an observation; before one, the detector's are
+    /// repeated.
     fn publish(&mut self, detected: Option<&ParticleBlock>, out: &mut ParticleBlock) {
-        if self.phase != Phase::Watching && !self.is_catching_up() {
-            if self.updated {
-                let (leaves, count) = (&self.leaves, self.budget);
-                self.engine
-                    .draw(leaves, count, &mut self.rng, &mut self.drawn);
+        if self.phase == Phase::Watching || self.is_catching_up() {
+            if let Some(block) = detected {
+                copy(block, &mut self.told);
             }
-            copy(&self.drawn, self.budget, out);
-            return;
+        } else if self.updated {
+            self.engine.hypotheses(&self.leaves, &mut self.ranked);
+            self.ranked.drain(&mut self.told);
         }
-        if let Some(block) = detected {
-            copy(block, self.budget, &mut self.drawn);
-        }
-        copy(&self.drawn, self.budget, out);
+        copy(&self.told, out);
     }
 }

@@ -101,6 +101,16 @@ impl Leaves {
         wheels.chain([&self.gyro, &self.pose]).any(Option::is_some)
     }
 
+    /// The nodes of all leaves.
+    pub fn all(&self) -> impl Iterator<Item = usize> {
+        let of_motion = self.stuck.iter().chain(&self.encoder).chain(&self.steer);
+        let further = self.torque.iter().chain(&self.current);
+        of_motion
+            .chain(further)
+            .chain([&self.gyro, &self.pose])
+            .filter_map(|&leaf| leaf)
+    }
+
     /// Reads the faults of the leaves; those of gyro and currents need these sensors.
     ///
     /// # Errors

@@ -152,6 +152,14 @@ const DOUBT: f64 = 2.0;
 /// broken, s: a stuck wheel's reads the same, and the motion tells within about this time.
 pub const EXPLAINED_S: f64 = 2.0;
 
+/// So long after a supposed onset, ns, wheels may still read as before.
+const ONSET_BLUR_NS: u64 = 150_000_000;
+
+/// True while a stuck wheel's encoder may read anything, and the others may still turn as before.
+pub const fn is_new(t_ns: u64, onset_ns: u64) -> bool {
+    t_ns.saturating_sub(onset_ns) < ONSET_BLUR_NS
+}
+
 /// Time since an onset, s.
 pub fn age_s(t_ns: u64, onset_ns: u64) -> f64 {
     t_ns.saturating_sub(onset_ns) as f64 * 1e-9

@@ -14,9 +14,9 @@ use vigil_robot::learned::{
     Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext, WheelEvidence,
 };
 
-use crate::exact::is_new;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
+use crate::prepared::is_new;
 use crate::rate_offsets::RateOffsets;
 use crate::servo::{Servo, ServoPrior};
 

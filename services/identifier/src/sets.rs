@@ -8,7 +8,7 @@ use crate::modes::Leaves;
 use crate::posterior::Posterior;
 
 /// Hypotheses less probable than this are not divided among sets.
-const NEGLIGIBLE: f64 = 1e-13;
+pub const NEGLIGIBLE: f64 = 1e-13;
 /// Row of a pose that has jumped, after those of the steering servos.
 const POSE: usize = WHEELS;
 /// No set of one fault at most is reported less probable: what can return must not be impossible.

@@ -31,13 +31,13 @@ impl Watcher {
         }
     }
 
-    /// Takes one entry of the journal and fills the belief and the particles (headers and causes
-    /// are the caller's).
+    /// Takes one entry of the journal and fills the belief (headers and causes are the
+    /// caller's); hypotheses it has none.
     pub fn step(
         &mut self,
         entry: Entry<Input<'_>>,
         belief: &mut FaultBelief,
-        particles: &mut ParticleBlock,
+        hypotheses: &mut ParticleBlock,
     ) {
         let mut predicted = self.posterior;
         match entry {
@@ -54,7 +54,7 @@ impl Watcher {
             Entry::Reset => self.begin_run(),
             Entry::Missed(_) | Entry::Budget(_) => {}
         }
-        particles.count = 0;
+        hypotheses.count = 0;
         self.report(&predicted, belief);
     }
 
@@ -115,11 +115,20 @@ enum Of {
 }
 
 impl Diagnoser {
-    /// Particles configured; 0 without any.
+    /// See [`Identifier::particles`]; 0 without any.
     #[must_use]
     pub fn particles(&self) -> u32 {
         match &self.of {
             Of::Identifier(identifier) => identifier.particles(),
+            Of::Watcher(_) => 0,
+        }
+    }
+
+    /// See [`Identifier::particles_in_use`].
+    #[must_use]
+    pub fn particles_in_use(&self) -> u32 {
+        match &self.of {
+            Of::Identifier(identifier) => identifier.particles_in_use(),
             Of::Watcher(_) => 0,
         }
     }
@@ -131,7 +140,7 @@ impl Diagnoser {
         &mut self,
         entry: Entry<Input<'_>>,
         belief: &mut FaultBelief,
-        particles: &mut ParticleBlock,
+        hypotheses: &mut ParticleBlock,
     ) {
         if let Entry::Frame(Input {
             detection: Some((detection, _)),
@@ -141,8 +150,8 @@ impl Diagnoser {
             self.look(detection);
         }
         match &mut self.of {
-            Of::Identifier(identifier) => identifier.step(entry, belief, particles),
-            Of::Watcher(watcher) => watcher.step(entry, belief, particles),
+            Of::Identifier(identifier) => identifier.step(entry, belief, hypotheses),
+            Of::Watcher(watcher) => watcher.step(entry, belief, hypotheses),
         }
         self.blindfold.cover(belief);
     }

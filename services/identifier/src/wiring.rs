@@ -36,7 +36,7 @@ pub struct IdentifierStage {
     /// Epoch and sequence number of the last detection that was taken.
     detection: (u64, u64),
     belief: Box<dyn Sender<FaultBelief>>,
-    particles: Box<dyn Sender<ParticleBlock>>,
+    hypotheses: Box<dyn Sender<ParticleBlock>>,
     reported: Reported,
     told: u32,
     /// The mode that was told last. That nothing is seen, the detector tells.
@@ -76,7 +76,7 @@ impl IdentifierStage {
             pending: VecDeque::with_capacity(PENDING_MAX),
             detection: (0, 0),
             belief: graph.sender(Topic::Diagnosis)?,
-            particles: graph.sender(Topic::DiagnosisParticles)?,
+            hypotheses: graph.sender(Topic::DiagnosisParticles)?,
             reported: Reported::default(),
             told: 0,
             told_mode: 0,
@@ -128,16 +128,16 @@ impl IdentifierStage {
                 break;
             }
         }
-        let particles = self.detected.held().filter(|p| p.cause == detection.cause);
+        let detected = self.detected.held().filter(|p| p.cause == detection.cause);
         // Frames before those that it has folded, it has refused, by its own clock.
         let refused = (last + 1).saturating_sub(count);
         for (i, frame) in self.pending.drain(..=last).enumerate().skip(refused) {
-            let detection = particles.filter(|_| i == last).map(|p| (detection, p));
+            let detection = detected.filter(|_| i == last).map(|p| (detection, p));
             let input = Input {
                 frame: &frame,
                 detection,
             };
-            let (belief, out) = (self.belief.block(), self.particles.block());
+            let (belief, out) = (self.belief.block(), self.hypotheses.block());
             let before = std::mem::replace(&mut self.epoch, frame.header.epoch);
             if before != 0 && before != self.epoch {
                 self.identifier.step(Entry::Reset, belief, out);
@@ -188,9 +188,8 @@ impl Stage for IdentifierStage {
     }
 
     fn miss(&mut self, count: u32) {
-        let (belief, particles) = (self.belief.block(), self.particles.block());
-        self.identifier
-            .step(Entry::Missed(count), belief, particles);
+        let (belief, out) = (self.belief.block(), self.hypotheses.block());
+        self.identifier.step(Entry::Missed(count), belief, out);
     }
 
     fn publish(&mut self, cause: Cause, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
@@ -207,26 +206,29 @@ impl Stage for IdentifierStage {
             reason: (channel as u32, evidence, belief.runner_up),
         };
         self.size.take(belief);
-        self.particles.block().cause = cause;
+        self.hypotheses.block().cause = cause;
         let published_ns = self.belief.send(stamp, clock)?;
-        // The particles have observers only: after the belief.
-        self.particles.send(stamp, clock)?;
+        // The hypotheses have observers only: after the belief.
+        self.hypotheses.send(stamp, clock)?;
         Ok(published_ns)
     }
 
     fn prepare(&mut self) -> Result<(), PortError> {
         self.belief.prepare()?;
-        self.particles.prepare()
+        self.hypotheses.prepare()
     }
 
     fn particles(&self) -> u32 {
         self.identifier.particles()
     }
 
+    fn particles_in_use(&self) -> u32 {
+        self.identifier.particles_in_use()
+    }
+
     fn limit(&mut self, particles: u32) {
-        let (belief, drawn) = (self.belief.block(), self.particles.block());
-        self.identifier
-            .step(Entry::Budget(particles), belief, drawn);
+        let (belief, out) = (self.belief.block(), self.hypotheses.block());
+        self.identifier.step(Entry::Budget(particles), belief, out);
     }
 
     fn has_input(&self) -> bool {

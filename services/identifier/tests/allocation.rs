@@ -33,23 +33,23 @@ fn steady_cycles_of_every_filter_allocate_nothing() {
         let sensors = schema::Sensors::PoseEncoders;
         let mut identifier = Identifier::new(&models, &settings, sensors, 1).unwrap();
         let mut belief = FaultBelief::default();
-        let mut particles: Box<ParticleBlock> = Box::default();
+        let mut hypotheses: Box<ParticleBlock> = Box::default();
         let mut alarm = alarm::Alarm::between(label.onset_s.unwrap() + 0.5, 99.0);
         let before = allocations();
         for (cycle, frame) in frames.iter().enumerate() {
             if cycle % 100 == 0 {
-                // Fewer particles, and all of them again.
-                let count = [64, settings.particles as u32][cycle / 100 % 2];
-                identifier.step(Entry::Budget(count), &mut belief, &mut particles);
+                // Fewer hypotheses or particles, and all of them again.
+                let count = [64, identifier.particles()][cycle / 100 % 2];
+                identifier.step(Entry::Budget(count), &mut belief, &mut hypotheses);
                 assert_eq!(belief.particle_limit, count);
             }
             alarm.set(frame);
-            let detection = Some((&alarm.belief, &*alarm.particles));
+            let detection = Some((&alarm.belief, &*alarm.hypotheses));
             let entry = Entry::Frame(Input { frame, detection });
-            identifier.step(entry, &mut belief, &mut particles);
-            identifier.step(Entry::Missed(1), &mut belief, &mut particles);
+            identifier.step(entry, &mut belief, &mut hypotheses);
+            identifier.step(Entry::Missed(1), &mut belief, &mut hypotheses);
         }
-        identifier.step(Entry::Budget(64), &mut belief, &mut particles);
+        identifier.step(Entry::Budget(64), &mut belief, &mut hypotheses);
         assert_eq!(allocations() - before, 0, "{filter}");
         // It did identify. Few samples of the prior find a rare fault: they may name another.
         let leaf = tree.index("RM_STUCK").unwrap();

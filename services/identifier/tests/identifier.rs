@@ -27,7 +27,7 @@ struct Bench {
     tree: FaultTree,
     alarm: Alarm,
     belief: FaultBelief,
-    particles: Box<ParticleBlock>,
+    hypotheses: Box<ParticleBlock>,
 }
 
 impl Bench {
@@ -63,16 +63,16 @@ impl Bench {
             tree,
             alarm,
             belief,
-            particles: Box::default(),
+            hypotheses: Box::default(),
         }
     }
 
     fn step(&mut self, frame: &SensorFrame) -> &FaultBelief {
         self.alarm.set(frame);
-        let detection = Some((&self.alarm.belief, &*self.alarm.particles));
+        let detection = Some((&self.alarm.belief, &*self.alarm.hypotheses));
         let entry = Entry::Frame(Input { frame, detection });
         self.identifier
-            .step(entry, &mut self.belief, &mut self.particles);
+            .step(entry, &mut self.belief, &mut self.hypotheses);
         self.check();
         &self.belief
     }
@@ -104,9 +104,12 @@ impl Bench {
         assert!(b.channel_evidence.iter().all(|value| value.is_finite()));
         assert!(b.entropy.is_finite() && b.entropy >= 0.0 && (0.0..=1.0).contains(&b.p_mode));
         assert!(b.sets[..b.set_count as usize].is_sorted_by(|x, y| x.p >= y.p));
-        let count = self.particles.count as usize;
-        assert!(self.particles.x[..count].iter().all(|x| x.is_finite()));
-        assert!(self.particles.yaw[..count].iter().all(|x| x.is_finite()));
+        let used = self.hypotheses.used();
+        assert!(used.is_sorted_by(|x, y| x.log_weight >= y.log_weight));
+        for hypothesis in used {
+            assert!(hypothesis.pose.iter().all(|value| value.is_finite()));
+            assert!(hypothesis.log_weight.is_finite());
+        }
     }
 
     fn mode(&self) -> &str {
@@ -149,13 +152,11 @@ fn each_fault_is_named_soon_after_the_alarm_and_to_the_end() {
         );
         let node = bench.tree.index(mode).unwrap();
         assert_eq!(bench.belief.sets[0].leaves, 1 << node);
-        let count = bench.particles.count as usize;
-        assert_eq!(count, 256);
-        let named = bench.particles.mode[..count]
-            .iter()
-            .filter(|&&m| m as usize == node)
-            .count();
-        assert!((named as f64 / 256.0 - bench.belief.p[node]).abs() < 0.05);
+        assert_eq!(bench.hypotheses.used()[0].leaves, 1 << node);
+        let used = bench.hypotheses.used().iter();
+        let named = used.filter(|hypothesis| hypothesis.leaves >> node & 1 == 1);
+        let p: f64 = named.map(|hypothesis| hypothesis.log_weight.exp()).sum();
+        assert!((p - bench.belief.p[node]).abs() < 1e-9, "{p}");
     }
 }
 
@@ -251,7 +252,7 @@ fn between_observations_no_evidence_counts_twice() {
         let told = *bench.step(frame);
         bench
             .identifier
-            .step(Entry::Missed(3), &mut bench.belief, &mut bench.particles);
+            .step(Entry::Missed(3), &mut bench.belief, &mut bench.hypotheses);
         bench.check();
         let belief = &bench.belief;
         assert_eq!((belief.p, belief.p_unknown), (told.p, told.p_unknown));
@@ -281,16 +282,7 @@ fn equal_input_and_seed_give_equal_bits_whatever_came_before() {
             b_told.mode_change_count = a_told.mode_change_count;
             b_told.reported_change_count = a_told.reported_change_count;
             assert_eq!(a_told, b_told, "{filter}");
-            // What lies beyond the particles in use is unspecified.
-            let used = |bench: &Bench| {
-                let (p, n) = (&bench.particles, bench.particles.count as usize);
-                (
-                    p.mode[..n].to_vec(),
-                    p.x[..n].to_vec(),
-                    p.log_weight[..n].to_vec(),
-                )
-            };
-            assert!(used(&a) == used(&b), "{filter}");
+            assert!(a.hypotheses.used() == b.hypotheses.used(), "{filter}");
         }
     }
 }
@@ -465,9 +457,9 @@ proptest! {
             bench.alarm.belief.noise_scale = [noise_scale; 3];
             bench.alarm.belief.noise_scale_wheels = [noise_scale; 8];
             bench.alarm.belief.noise_scale_steer = [noise_scale; 8];
-            let detection = (i % 4 != 0).then_some((&bench.alarm.belief, &*bench.alarm.particles));
+            let detection = (i % 4 != 0).then_some((&bench.alarm.belief, &*bench.alarm.hypotheses));
             let entry = Entry::Frame(Input { frame: &frame, detection });
-            bench.identifier.step(entry, &mut bench.belief, &mut bench.particles);
+            bench.identifier.step(entry, &mut bench.belief, &mut bench.hypotheses);
             bench.check();
         }
     }

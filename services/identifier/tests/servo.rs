@@ -51,7 +51,7 @@ fn belief(mut change: impl FnMut(&mut SensorFrame)) -> (FaultBelief, [usize; 2])
         if time_s(frame) - start_s >= ONSET_S {
             change(frame);
         }
-        let detection = Some((&alarm.belief, &*alarm.particles));
+        let detection = Some((&alarm.belief, &*alarm.hypotheses));
         let entry = Entry::Frame(Input { frame, detection });
         identifier.step(entry, &mut belief, &mut particles);
     }

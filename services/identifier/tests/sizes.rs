@@ -40,7 +40,7 @@ fn belief(read: impl Fn(f64, f64) -> f64) -> (FaultBelief, usize) {
     let sensors = schema::Sensors::PoseEncoders;
     let mut identifier = Identifier::new(&models, &settings, sensors, 1).unwrap();
     let mut belief = FaultBelief::default();
-    let mut particles: Box<ParticleBlock> = Box::default();
+    let mut hypotheses: Box<ParticleBlock> = Box::default();
     let mut alarm = alarm::Alarm::between(start_s + ONSET_S + 0.5, f64::INFINITY);
     for frame in &mut frames {
         let since_s = time_s(frame) - start_s - ONSET_S;
@@ -48,9 +48,9 @@ fn belief(read: impl Fn(f64, f64) -> f64) -> (FaultBelief, usize) {
             frame.wheel_rate[LM] = read(frame.wheel_rate[LM], since_s);
         }
         alarm.set(frame);
-        let detection = Some((&alarm.belief, &*alarm.particles));
+        let detection = Some((&alarm.belief, &*alarm.hypotheses));
         let entry = Entry::Frame(Input { frame, detection });
-        identifier.step(entry, &mut belief, &mut particles);
+        identifier.step(entry, &mut belief, &mut hypotheses);
     }
     (belief, tree.index("LM_ENC").unwrap())
 }

@@ -38,9 +38,9 @@ pub struct Pipeline {
     identifier: Diagnoser,
     taxonomy: Taxonomy,
     detection: Box<DetectionBelief>,
-    detection_particles: Box<ParticleBlock>,
+    detected: Box<ParticleBlock>,
     diagnosis: Box<FaultBelief>,
-    diagnosis_particles: Box<ParticleBlock>,
+    diagnosed: Box<ParticleBlock>,
 }
 
 impl Pipeline {
@@ -57,7 +57,7 @@ impl Pipeline {
         let prior_unknown = identifier.p_unknown;
         let identifier = Identifier::new(models, identifier, detector.sensors, seed)?;
         Ok(Self::of(
-            Detector::new(models.model, models.robot, detector, seed)?,
+            Detector::new(models.model, models.robot, detector)?,
             Diagnoser::from(identifier),
             Taxonomy::new(models.tree, models.robot).with_prior_unknown(prior_unknown),
             models.robot,
@@ -95,9 +95,9 @@ impl Pipeline {
             detector,
             identifier,
             detection: Box::default(),
-            detection_particles: Box::default(),
+            detected: Box::default(),
             diagnosis: Box::default(),
-            diagnosis_particles: Box::default(),
+            diagnosed: Box::default(),
         }
     }
 
@@ -105,6 +105,11 @@ impl Pipeline {
     pub fn recovering(mut self, recoverer: Option<Recoverer>) -> Self {
         self.recoverer = recoverer;
         self
+    }
+
+    /// Most hypotheses of the identifier, or particles of a sampled one; 0 without any.
+    pub fn particles(&self) -> u32 {
+        self.identifier.particles()
     }
 
     /// Log-odds at which the detector's alarm rises, nats.
@@ -124,14 +129,14 @@ impl Pipeline {
         let mut identifier = self.identifier.clone();
         let mut recovering = self.recoverer.as_ref().and_then(Recoverer::begin);
         for frame in &run.frames {
-            let (detection, particles) = (&mut *self.detection, &mut *self.detection_particles);
-            detector.step(Entry::Frame(frame), detection, particles);
+            let (detection, detected) = (&mut *self.detection, &mut *self.detected);
+            detector.step(Entry::Frame(frame), detection, detected);
             let input = Input {
                 frame,
-                detection: Some((detection, particles)),
+                detection: Some((detection, detected)),
             };
-            let (diagnosis, particles) = (&mut *self.diagnosis, &mut *self.diagnosis_particles);
-            identifier.step(Entry::Frame(input), diagnosis, particles);
+            let (diagnosis, diagnosed) = (&mut *self.diagnosis, &mut *self.diagnosed);
+            identifier.step(Entry::Frame(input), diagnosis, diagnosed);
             (detection.header, diagnosis.header) = (frame.header, frame.header);
             if let Some(recovering) = &mut recovering {
                 recovering.take(detection, diagnosis);

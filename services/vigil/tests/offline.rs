@@ -285,7 +285,7 @@ fn wrong_input_is_refused_with_its_name_and_exit_code_2() {
         ),
         (
             [&diagnose[..], &["--model", &model, "--particles", "31"]].concat(),
-            "32..=4096",
+            "32..=1024",
         ),
     ];
     for (arguments, wanted) in cases {

@@ -1,7 +1,6 @@
 //! The detector's belief: is something wrong?
 
 use crate::block::block;
-use crate::layout::part;
 use crate::{Cause, Header, WHEELS};
 
 /// Capacity of the per-channel evidence.
@@ -36,31 +35,9 @@ impl Channel {
     }
 }
 
-part! {
-/// What the detector believes of the robot as long as it is healthy. Zero where it tracks no pose.
-/// Covariances hold the upper triangle, row by row.
-pub struct HealthyBelief, size 288 {
-    /// Pose: x m, y m, yaw rad.
-    pub pose: [f64; 3],
-    /// Its covariance.
-    pub pose_covariance: [f64; 6],
-    /// What the motion departs from its model by where the robot drives, per metre: yaw rad/m,
-    /// forward, lateral. While a fault is suspected: from before it.
-    pub deviation: [f64; 3],
-    /// Its covariance.
-    pub deviation_covariance: [f64; 6],
-    /// Share of their rates that all wheels depart by together: mean and variance.
-    pub wheel_ratio: [f64; 2],
-    /// Rate by which each wheel departs beside that, rad/s.
-    pub wheel_offset: [f64; WHEELS],
-    /// Its variance.
-    pub wheel_offset_variance: [f64; WHEELS],
-}
-}
-
 block! {
     /// Written by the detector every cycle.
-    pub struct DetectionBelief, size 1024 {
+    pub struct DetectionBelief, size 720 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -75,8 +52,6 @@ block! {
         pub alarm_log_odds: f64,
         /// Log-likelihood of this frame under the nominal mode, natural logarithm.
         pub evidence: f64,
-        /// Effective sample size of the particles, before resampling.
-        pub effective_sample_size: f64,
         /// Estimated ratio of the noise of the pose (x, y, yaw) to the learned one (standard
         /// deviations).
         pub noise_scale: [f64; 3],
@@ -90,8 +65,6 @@ block! {
         pub outlier_rate_wheels: [f64; WHEELS],
         /// The same for each steering angle.
         pub outlier_rate_steer: [f64; WHEELS],
-        /// What an identification starts from.
-        pub healthy: HealthyBelief,
         /// Log-odds of a fault seen by each channel alone (see [`Channel`]).
         pub channel_log_odds: [f64; CHANNELS],
         /// `decision_seq` of the last action that the robot obeyed, as the frame says it.
@@ -108,16 +81,12 @@ block! {
         pub invalid_count: u32,
         /// Steps whose weights degenerated (coasted, or re-initialised).
         pub degenerate_count: u32,
-        /// Particles in use.
-        pub particle_count: u32,
         /// Outcome of that action, as the frame says it: an [`crate::ActionOutcome`].
         pub action_outcome: u32,
         /// Why the detector sees nothing: a [`Blindness`]; 0 while it sees.
         pub blind: u32,
         /// Whether an alarm could rise now: a [`Readiness`].
         pub readiness: u32,
-        /// Reserved, zero.
-        pub reserved: u32,
     }
 }
 

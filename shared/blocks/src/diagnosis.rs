@@ -74,7 +74,7 @@ block! {
         /// The next best explanation that is not the best and one more fault: a node's index (0 is
         /// nominal), [`MODE_UNKNOWN`] or [`MODE_MULTIPLE`].
         pub runner_up: u32,
-        /// Particles allowed at present; fewer than configured while the time is short.
+        /// Particles or hypotheses allowed at present; fewer than configured while time is short.
         pub particle_limit: u32,
         /// Changes of `mode` so far.
         pub mode_change_count: u32,

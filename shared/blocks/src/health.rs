@@ -75,7 +75,8 @@ pub enum EventKind {
     Goal = 20,
     /// The degraded mode changed, other than by an input. `what`: bits of [`Degraded`].
     Degraded = 21,
-    /// The time allows another number of particles. `what`: that number; `value`: the configured.
+    /// The time allows another number of hypotheses or particles. `what`: that number; `value`: the
+    /// configured.
     Particles = 22,
     /// The launcher's watchdog finds a service failed. `what`: 1 start-up, 2 alive, 3 deadline, 4
     /// logical.
@@ -215,9 +216,9 @@ block! {
         pub answered_epoch: u64,
         /// See `answered_epoch`.
         pub answered_seq: u64,
-        /// Particles that the time allows at present; 0 without particles.
+        /// Hypotheses or particles that the time allows at present; 0 without any to shed.
         pub particles: u32,
-        /// Particles configured.
+        /// Hypotheses or particles configured.
         pub particles_configured: u32,
         /// Events so far; event number n is at `events[n % EVENTS]`.
         pub event_count: u64,
@@ -235,7 +236,7 @@ impl Degraded {
     pub const INPUT_LOST: u32 = 1;
     /// Its own deadlines are missed, and `on_miss = "degrade"`.
     pub const LATE: u32 = 2;
-    /// It works with fewer particles than configured.
+    /// It works with fewer hypotheses or particles than configured.
     pub const FEWER_PARTICLES: u32 = 4;
     /// Its source sends what cannot be trusted: all that it sends is refused until that ends.
     pub const QUARANTINE: u32 = 8;

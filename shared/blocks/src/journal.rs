@@ -9,7 +9,7 @@ pub enum Entry<I> {
     /// The deadline passed this many times without input: publish a prediction. The filter's state
     /// stays at the last frame, so that a late frame is folded in exactly.
     Missed(u32),
-    /// From now on use at most this many particles.
+    /// From now on use at most this many particles or hypotheses.
     Budget(u32),
     /// Forget everything: a new run begins.
     Reset,

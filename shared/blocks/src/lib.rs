@@ -11,7 +11,7 @@
 //! |---|---|---|
 //! | [`SensorFrame`] | sensor-sim or an external publisher | what the robot measured and did |
 //! | [`DetectionBelief`] | detector | is something wrong? |
-//! | [`ParticleBlock`] | detector, identifier | the filter's particles |
+//! | [`ParticleBlock`] | detector, identifier | the filter's hypotheses, or its particles |
 //! | [`FaultBelief`] | identifier | what is wrong? |
 //! | [`Action`] | supervisor | what to do about it |
 //! | [`Health`] | each service | cycle, deadline and input accounting, recent events |
@@ -39,14 +39,14 @@ pub use block::{Block, fnv1a};
 #[doc(hidden)]
 pub use block::{ascii, name_with_hash};
 pub use control::{Control, ControlCommand};
-pub use detection::{Blindness, CHANNELS, Channel, DetectionBelief, HealthyBelief, Readiness};
+pub use detection::{Blindness, CHANNELS, Channel, DetectionBelief, Readiness};
 pub use diagnosis::{
     FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
 };
 pub use header::{Cause, CauseKind, Header};
 pub use health::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
 pub use journal::Entry;
-pub use particles::{PARTICLE_CAPACITY, ParticleBlock};
+pub use particles::{HealthyBelief, PARTICLE_CAPACITY, ParticleBlock, WeightedHypothesis};
 pub use rejection::{REJECTIONS, Rejection};
 pub use sensor::{ActionOutcome, COMMANDS, SensorFrame, Symptoms, Valid, WHEELS};
 pub use size_kind::SizeKind;

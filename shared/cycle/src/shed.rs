@@ -1,10 +1,11 @@
-//! Fewer particles before a missed deadline.
+//! Fewer hypotheses or particles before a missed deadline; both are called particles here.
 //!
 //! A cycle that takes nearly all the time that it has is a warning: its budget, or less if its
 //! input came so late that the deadline is nearer. Single ones are the machine's (a processor
 //! taken away for a while lengthens whatever runs), so a few in one window are needed, and the
-//! shortest of them says what the work itself costs. The allowance then falls in proportion, and
-//! returns step by step once long windows stay far below what they have.
+//! shortest of them says what the work itself costs. The allowance then falls in proportion to what
+//! was in use, and returns step by step once long windows stay far below what they have. A cycle
+//! that worked on no particle is no warning: shedding would not help.
 
 use crate::deadline::Schedule;
 
@@ -85,17 +86,19 @@ impl Shedder {
     }
 
     /// Takes the time of a cycle from wake-up to publication, and how long after its instant of the
-    /// schedule it was woken, ns; the new allowance if it changes.
-    pub fn take(&mut self, cycle_ns: u64, woken_after_ns: u64) -> Option<u32> {
+    /// schedule it was woken, ns, and the particles that it worked on; the new allowance if it
+    /// changes.
+    pub fn take(&mut self, cycle_ns: u64, woken_after_ns: u64, in_use: u32) -> Option<u32> {
         let share = self.share(cycle_ns, woken_after_ns);
         self.cycles += 1;
         self.without_room += u32::from(share > ROOM);
-        if share > WARNING {
+        if share > WARNING && in_use > 0 {
             self.warnings += 1;
             self.shortest = self.shortest.min(share);
         }
         if self.warnings == WARNINGS {
-            let fewer = (f64::from(self.allowed) * AIM / self.shortest) as u32;
+            let in_use = self.allowed.min(in_use);
+            let fewer = (f64::from(in_use) * AIM / self.shortest) as u32;
             self.begin_window();
             self.calm_windows = 0;
             return self.allow(fewer.max(PARTICLES_MIN));
@@ -144,7 +147,8 @@ mod tests {
     /// Runs `cycles` cycles that cost `ns_a_particle` for each; returns the allowance at the end.
     fn run(shedder: &mut Shedder, cycles: u32, ns_a_particle: u64) -> u32 {
         for _ in 0..cycles {
-            shedder.take(ns_a_particle * u64::from(shedder.allowed()), 0);
+            let in_use = shedder.allowed();
+            shedder.take(ns_a_particle * u64::from(in_use), 0, in_use);
         }
         shedder.allowed()
     }
@@ -167,7 +171,7 @@ mod tests {
         let mut shedder = of(1000, 1_000_000);
         for cycle in 0..100_000 {
             let cycle_ns = if cycle % 200 == 0 { 20_000_000 } else { 50_000 };
-            assert_eq!(shedder.take(cycle_ns, 0), None, "cycle {cycle}");
+            assert_eq!(shedder.take(cycle_ns, 0, 1000), None, "cycle {cycle}");
         }
     }
 
@@ -178,7 +182,7 @@ mod tests {
             let mut shedder = of(1000, period_ns);
             let found = (0..10 * each).find_map(|cycle: u32| {
                 let is_heavy = cycle.is_multiple_of(each);
-                shedder.take(if is_heavy { 480_000 } else { 5_000 }, 0)
+                shedder.take(if is_heavy { 480_000 } else { 5_000 }, 0, 1000)
             });
             assert_eq!(found, Some(520), "{period_ns} ns");
         }
@@ -194,8 +198,9 @@ mod tests {
         let run = |cycle_ns: u64, woken_after_ns: u64| {
             let mut shedder = Shedder::new(1000, schedule);
             for _ in 0..2000 {
-                let allowed = u64::from(shedder.allowed());
-                shedder.take(cycle_ns * allowed / 1000, woken_after_ns);
+                let allowed = shedder.allowed();
+                let cycle_ns = cycle_ns * u64::from(allowed) / 1000;
+                shedder.take(cycle_ns, woken_after_ns, allowed);
             }
             shedder.allowed()
         };
@@ -203,6 +208,15 @@ mod tests {
         assert_eq!([run(520_000, 0), run(520_000, 230_000)], [1000, 500]);
         // Woken after the deadline: held up by something else, whatever it computes.
         assert_eq!([run(200_000, 900_000), run(200_000, u64::MAX)], [1000; 2]);
+    }
+
+    #[test]
+    fn what_is_shed_is_what_was_in_use() {
+        let mut shedder = of(1000, 1_000_000);
+        let mut take =
+            |cycles: u32, in_use: u32| (0..cycles).find_map(|_| shedder.take(450_000, 0, in_use));
+        assert_eq!(take(5000, 0), None, "no particle has cost anything");
+        assert_eq!(take(10, 200), Some(111));
     }
 
     #[test]

@@ -45,9 +45,14 @@ pub trait Stage {
     /// The transport's.
     fn prepare(&mut self) -> Result<(), PortError>;
 
-    /// Particles that this stage is configured for; 0 if it has none.
+    /// Hypotheses or particles that this stage is configured for; 0 if it has none to shed.
     fn particles(&self) -> u32 {
         0
+    }
+
+    /// Those that the last cycle may have worked on; 0 if it worked on none.
+    fn particles_in_use(&self) -> u32 {
+        self.particles()
     }
 
     /// From now on at most `particles`: the time allows no more.
@@ -247,7 +252,7 @@ impl StageCycle {
         self
     }
 
-    /// The same cycle, which sheds particles of the stage before its budget is spent.
+    /// The same cycle, which sheds hypotheses or particles of the stage before its budget is spent.
     #[must_use]
     pub fn with_shedder(mut self, shedder: Shedder) -> Self {
         self.shedder = Some(shedder);
@@ -420,7 +425,8 @@ impl StageCycle {
             return;
         };
         let cycle_ns = self.health.view().last_cycle_ns;
-        if let Some(particles) = shedder.take(cycle_ns, self.woken_after_ns) {
+        let in_use = stage.particles_in_use();
+        if let Some(particles) = shedder.take(cycle_ns, self.woken_after_ns, in_use) {
             stage.limit(particles);
         }
         let (allowed, configured) = (shedder.allowed(), shedder.configured());

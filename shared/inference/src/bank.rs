@@ -116,6 +116,29 @@ impl<T: Copy> Bank<T> {
         Some(evidence)
     }
 
+    /// Keeps the `count` most probable hypotheses, at least one, in their order; of those equally
+    /// probable the first. The others' weight is gone: the next normalisation divides it.
+    pub fn keep(&mut self, count: usize) {
+        let count = count.max(1);
+        if self.hypotheses.len() <= count {
+            return;
+        }
+        self.scratch.clear();
+        let weights = self.hypotheses.iter().map(|other| other.log_weight);
+        self.scratch.extend(weights);
+        let (_, &mut least, _) = self
+            .scratch
+            .select_nth_unstable_by(count - 1, |a, b| b.total_cmp(a));
+        let is_above = |weight: f64| weight.total_cmp(&least).is_gt();
+        let above = self.scratch.iter().filter(|&&weight| is_above(weight));
+        let mut equal = count - above.count();
+        self.hypotheses.retain(|other| {
+            let is_equal = other.log_weight.total_cmp(&least).is_eq() && equal > 0;
+            equal -= usize::from(is_equal);
+            is_equal || is_above(other.log_weight)
+        });
+    }
+
     /// Fills `log_p[mode]` with the logarithm of each mode's weight, minus infinity where there is
     /// none.
     pub fn modes(&self, log_p: &mut [f64]) {
@@ -167,6 +190,28 @@ mod tests {
         bank.add(hypothesis(1, 99, 1e-30));
         bank.normalise(-30.0).unwrap();
         assert!(bank.hypotheses().iter().all(|other| other.onset != 99));
+    }
+
+    #[test]
+    fn a_limit_keeps_the_most_probable_in_their_order() {
+        let mut bank = Bank::new(&[8; 2]);
+        bank.restart(0, 0, ());
+        for (onset, p) in (1..).zip([0.1, 0.3, 0.2, 0.1, 0.3, 0.05]) {
+            bank.add(hypothesis(1, onset, p));
+        }
+        let onsets = |bank: &Bank<()>| -> Vec<u64> {
+            let all = bank.hypotheses().iter();
+            all.map(|hypothesis| hypothesis.onset).collect()
+        };
+        bank.keep(7);
+        assert_eq!(onsets(&bank), [0, 1, 2, 3, 4, 5, 6]);
+        // Of two that are equally probable, the first.
+        bank.keep(5);
+        assert_eq!(onsets(&bank), [0, 1, 2, 3, 5]);
+        bank.keep(2);
+        assert_eq!(onsets(&bank), [0, 2]);
+        bank.keep(0);
+        assert_eq!(onsets(&bank), [0]);
     }
 
     #[test]

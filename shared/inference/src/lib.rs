@@ -33,9 +33,8 @@
 //! | [`windowed`] | the same on sums over overlapping windows: a smaller blind spot |
 //! | [`risk`] | what losing track of a mode costs, for risk-sensitive proposals |
 //! | [`resample`], [`weights`], [`adaptive`] | four schemes, log-weights, number of particles |
-//! | [`gaussian`], [`track`], [`particles`] | Kalman filter, pose track, pose particles |
+//! | [`gaussian`], [`track`] | Kalman filter, pose track |
 //! | [`slow_state`] | what drifts within a tolerance, as a healthy robot does |
-//! | [`normals`] | standard normals, drawn ahead of their use |
 //! | [`outlier`] | measurements of which now and then one is far off |
 //! | [`onsets`] | components by the age of their onset, in bounded number |
 //! | [`bank`] | exact single faults: one hypothesis per (mode, onset) |
@@ -60,10 +59,8 @@ pub mod lanes;
 pub mod logspace;
 pub mod look_ahead;
 pub mod merged;
-pub mod normals;
 pub mod onsets;
 pub mod outlier;
-pub mod particles;
 pub mod proposal;
 pub mod resample;
 pub mod risk;

@@ -77,6 +77,18 @@ impl Context {
         }
     }
 
+    /// The same, of deviations in this direction of travel: see [`Self::direction`].
+    #[must_use]
+    pub const fn facing(self, direction: f64) -> Self {
+        Self { direction, ..self }
+    }
+
+    /// Direction of travel for which they hold: 1 forwards, -1 backwards, 0 any.
+    #[must_use]
+    pub const fn direction(&self) -> f64 {
+        self.direction
+    }
+
     /// Forgets over a travel of `travel_m`, as the ground changes. A slope turns round with the
     /// direction of travel.
     pub fn fade(&mut self, travel_m: f64, noise: &MotionNoise) {
@@ -201,6 +213,12 @@ impl Track {
             covariance: view(3, 3) + across + across.transpose() + view(6, 6),
             direction: self.direction,
         }
+    }
+
+    /// The same, whose last displacement went in this direction: 1 forwards, -1 backwards, 0 none.
+    #[must_use]
+    pub const fn facing(self, direction: f64) -> Self {
+        Self { direction, ..self }
     }
 
     /// The same pose in another mode, in a context. A fault's offsets add to it, which do not turn

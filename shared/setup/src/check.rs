@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use vigil_blocks::WHEELS;
+use vigil_blocks::{PARTICLE_CAPACITY, WHEELS};
 use vigil_robot::description::Kinematics;
 use vigil_robot::{AlarmError, Description, RobotModel, Tolerance};
 
-use crate::schema::{GraphFile, Service, Socket, Source};
+use crate::schema::{GraphFile, PARTICLES, Service, Socket, Source};
 
 mod navigation;
 mod supervisor;
@@ -106,12 +106,6 @@ fn simulator_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64
 
 fn filter_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
     range(
-        "detector.particles",
-        file.detector.particles as f64,
-        32.0,
-        4096.0,
-    );
-    range(
         "detector.false_alarm_interval_h",
         file.detector.false_alarm_interval_h,
         0.01,
@@ -123,11 +117,12 @@ fn filter_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) 
         1e-9,
         3600.0,
     );
+    let particles = file.identifier.particles.unwrap_or(PARTICLES);
     range(
         "identifier.particles",
-        file.identifier.particles as f64,
+        particles as f64,
         32.0,
-        4096.0,
+        PARTICLE_CAPACITY as f64,
     );
     range("identifier.ring_s", file.identifier.ring_s, 0.5, 30.0);
     range("identifier.p_unknown", file.identifier.p_unknown, 0.0, 0.5);

@@ -122,8 +122,8 @@ pub struct Service {
     /// consecutive stages: each must leave time to the next.
     pub deadline_percent: f64,
     /// Compute budget of one cycle, as a percentage of the period, 1 to 100, default 80; no more
-    /// than the deadline, if that is shorter. A filter that nears it works with fewer particles
-    /// until there is room again.
+    /// than the deadline, if that is shorter. An identifier that nears it works with fewer
+    /// hypotheses or particles until there is room again.
     #[serde(default = "eighty")]
     pub budget_percent: f64,
     /// What follows a missed deadline, which is always counted: `count` nothing; `predict` (the
@@ -207,9 +207,6 @@ impl Default for Simulator {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Detector {
-    /// Particles drawn from the belief about the pose for those who read them, 32 to 4096; they
-    /// influence no belief.
-    pub particles: usize,
     /// Mean time between false alarms to which the alarm threshold is set, h, 0.01 to 10000. The
     /// model holds the calibration from nominal runs.
     pub false_alarm_interval_h: f64,
@@ -225,7 +222,6 @@ pub struct Detector {
 impl Default for Detector {
     fn default() -> Self {
         Self {
-            particles: 256,
             false_alarm_interval_h: 24.0,
             fault_rate_1_h: 1.0,
             sensors: Sensors::PoseEncoders,
@@ -283,6 +279,9 @@ impl From<Form> for learned::Form {
     }
 }
 
+/// Particles of a sampled identification filter, if the configuration does not say.
+pub const PARTICLES: usize = 256;
+
 /// The identification filter.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -290,9 +289,10 @@ pub struct Identifier {
     /// Filter: `exact` (sets of faults), or one of those over single faults: `bootstrap`, `raised`,
     /// `adaptive`, `risk-sensitive`, `hierarchical`, `look-ahead`, `imm`.
     pub filter: IdentifierFilter,
-    /// Particles of the filter, 32 to 4096; `look-ahead` has an eighth of them. Those of `exact`
-    /// and `imm`, which have none of their own, are drawn from the belief for observers.
-    pub particles: usize,
+    /// Particles of a sampled filter, 32 to 1024, default 256; `look-ahead` has an eighth of them,
+    /// `imm` none. Of `exact`: the most hypotheses kept from one observation to the next, the most
+    /// probable ones; default as many as its tables hold, which drops none.
+    pub particles: Option<usize>,
     /// Kept frames from which an identification starts, s, 0.5 to 30.
     pub ring_s: f64,
     /// Prior probability that a fault is one that no model describes, 0 to 0.5.
@@ -344,7 +344,7 @@ impl Default for Identifier {
     fn default() -> Self {
         Self {
             filter: IdentifierFilter::Exact,
-            particles: 256,
+            particles: None,
             ring_s: 3.0,
             p_unknown: 0.01,
         }

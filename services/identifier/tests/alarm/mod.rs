@@ -1,13 +1,15 @@
-//! A detection made by hand: an alarm between two instants, and particles around the pose.
+//! A detection made by hand: an alarm between two instants, and a healthy robot at the pose.
 
-use vigil_blocks::{DetectionBelief, HealthyBelief, ParticleBlock, SensorFrame};
+use vigil_blocks::{
+    DetectionBelief, HealthyBelief, ParticleBlock, SensorFrame, WeightedHypothesis,
+};
 
 /// Detections for frames of a run: an alarm stands from `from_s` to `to_s`.
 pub struct Alarm {
     pub from_s: f64,
     pub to_s: f64,
     pub belief: DetectionBelief,
-    pub particles: Box<ParticleBlock>,
+    pub hypotheses: Box<ParticleBlock>,
 }
 
 impl Alarm {
@@ -22,11 +24,11 @@ impl Alarm {
             from_s,
             to_s,
             belief,
-            particles: Box::default(),
+            hypotheses: Box::default(),
         }
     }
 
-    /// Sets belief and particles for a frame: eight corners a noise away from its pose.
+    /// Sets belief and hypotheses for a frame.
     pub fn set(&mut self, frame: &SensorFrame) {
         let t_s = frame.header.t_capture_ns as f64 * 1e-9;
         let alarm = (self.from_s..self.to_s).contains(&t_s);
@@ -34,7 +36,7 @@ impl Alarm {
         self.belief.alarm_t_capture_ns = if alarm { (self.from_s * 1e9) as u64 } else { 0 };
         self.belief.p_fault = if alarm { 0.999 } else { 1e-6 };
         // On the ground learned on, and known well.
-        self.belief.healthy = HealthyBelief {
+        self.hypotheses.healthy = HealthyBelief {
             pose: frame.pose,
             pose_covariance: [2.5e-5, 0.0, 0.0, 2.5e-5, 0.0, 2.5e-5],
             deviation_covariance: [1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-6],
@@ -42,13 +44,10 @@ impl Alarm {
             wheel_offset_variance: [1e-6; 8],
             ..HealthyBelief::default()
         };
-        self.particles.count = 8;
-        for i in 0..8 {
-            let side = |bit: usize| if i & bit == 0 { -0.005_f32 } else { 0.005 };
-            self.particles.x[i] = frame.pose[0] as f32 + side(1);
-            self.particles.y[i] = frame.pose[1] as f32 + side(2);
-            self.particles.yaw[i] = frame.pose[2] as f32 + side(4);
-            self.particles.log_weight[i] = -(8.0_f32).ln();
-        }
+        self.hypotheses.count = 1;
+        self.hypotheses.hypotheses[0] = WeightedHypothesis {
+            pose: frame.pose,
+            ..WeightedHypothesis::default()
+        };
     }
 }

@@ -7,7 +7,7 @@ use vigil_blocks::layout::{Field, Layout};
 use vigil_blocks::{
     Action, ActionOutcome, Block, Cause, CauseKind, ControlMode, DetectionBelief, Event,
     FaultBelief, FaultSet, Header, Health, HealthyBelief, ParticleBlock, RecoveryKind, SensorFrame,
-    SizeKind, Symptoms, Valid,
+    SizeKind, Symptoms, Valid, WeightedHypothesis,
 };
 
 pub use c::header;
@@ -45,6 +45,7 @@ fn structs() -> Vec<Struct> {
         part::<Cause>(),
         part::<FaultSet>(),
         part::<HealthyBelief>(),
+        part::<WeightedHypothesis>(),
         part::<Event>(),
         block::<SensorFrame>(),
         block::<DetectionBelief>(),

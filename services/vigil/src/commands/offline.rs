@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::PossibleValuesParser;
 use serde::Serialize;
+use vigil_blocks::PARTICLE_CAPACITY;
 use vigil_decision::Pomdp;
 use vigil_evaluation::frames::{self, Run};
 use vigil_identifier::Models;
@@ -62,14 +63,14 @@ pub struct FilterArgs {
     /// Identification filter.
     #[arg(long, value_name = "NAME", value_enum, default_value_t)]
     pub identifier: IdentifierFilter,
-    /// Particles of detector and identifier, 32 to 4096.
+    /// Particles of a sampled identification filter, 32 to 1024, default 256; of the exact one the
+    /// most hypotheses, by default all.
     #[arg(
         long,
         value_name = "N",
-        default_value_t = 256,
-        value_parser = clap::value_parser!(u16).range(32..=4096)
+        value_parser = clap::value_parser!(u16).range(32..=PARTICLE_CAPACITY as i64)
     )]
-    particles: u16,
+    particles: Option<u16>,
     /// Seed of the filters.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
@@ -97,8 +98,8 @@ pub struct Used {
     pub detector: String,
     /// Identification filter; `none` on a model of nominal behaviour alone.
     pub identifier: String,
-    /// Particles.
-    pub particles: u16,
+    /// Most hypotheses of the identification filter, or its particles.
+    pub particles: u32,
     /// Seed.
     pub seed: u64,
 }
@@ -143,7 +144,7 @@ impl FilterArgs {
             sensors: self.sensors.clone(),
             detector: self.detector.to_string(),
             identifier,
-            particles: self.particles,
+            particles: pipeline.particles(),
             seed: self.seed,
         };
         Ok(Prepared {
@@ -186,7 +187,6 @@ impl FilterArgs {
         filter: IdentifierFilter,
     ) -> Result<Pipeline, CommandError> {
         let detector = schema::Detector {
-            particles: self.particles.into(),
             sensors: channels(sensors),
             form: self.detector,
             ..schema::Detector::default()
@@ -204,7 +204,7 @@ impl FilterArgs {
         };
         let identifier = schema::Identifier {
             filter,
-            particles: self.particles.into(),
+            particles: self.particles.map(usize::from),
             ..schema::Identifier::default()
         };
         let needs_decision = identifier.filter == IdentifierFilter::RiskSensitive;

@@ -40,7 +40,7 @@ impl Healthy {
         }
     }
 
-    /// The block's part, bit for bit.
+    /// The block's part, bit for bit; of covariances the upper triangle.
     #[must_use]
     pub fn to_block(&self) -> HealthyBelief {
         let mut block = HealthyBelief {
@@ -48,6 +48,7 @@ impl Healthy {
             pose_covariance: triangle(&self.covariance),
             deviation: self.context.mean.into(),
             deviation_covariance: triangle(&self.context.covariance),
+            direction: self.context.direction(),
             ..HealthyBelief::default()
         };
         self.wheels.write(&mut block);
@@ -62,10 +63,12 @@ impl Healthy {
         let context = Context::new(
             Vector3::from(block.deviation),
             symmetric(&block.deviation_covariance)?,
-        );
+        )
+        .facing(block.direction);
         let pose = Vector3::from(block.pose);
         let is_finite = |vector: &Vector3<f64>| vector.iter().all(|value| value.is_finite());
-        if !(is_finite(&pose) && is_finite(&context.mean) && covariance[(0, 0)] > 0.0) {
+        let is_sane = [-1.0, 0.0, 1.0].contains(&block.direction) && covariance[(0, 0)] > 0.0;
+        if !(is_finite(&pose) && is_finite(&context.mean) && is_sane) {
             return None;
         }
         Some(Self {
@@ -79,11 +82,15 @@ impl Healthy {
     /// The track of a mode with this noise that begins here.
     #[must_use]
     pub fn track(&self, noise: &MotionNoise) -> Track {
-        Track::new(self.pose, self.covariance, noise).enter(&self.context, noise)
+        Track::new(self.pose, self.covariance, noise)
+            .enter(&self.context, noise)
+            .facing(self.context.direction())
     }
 }
 
-fn triangle(matrix: &Matrix3<f64>) -> [f64; 6] {
+/// The upper triangle of a covariance, row by row: as blocks hold it.
+#[must_use]
+pub fn triangle(matrix: &Matrix3<f64>) -> [f64; 6] {
     let at = |i, j| matrix[(i, j)];
     [at(0, 0), at(0, 1), at(0, 2), at(1, 1), at(1, 2), at(2, 2)]
 }
@@ -109,7 +116,8 @@ mod tests {
             context: Context::new(
                 Vector3::new(0.01, -0.03, 0.002),
                 Matrix3::from_diagonal(&Vector3::new(1e-5, 2e-5, 3e-5)),
-            ),
+            )
+            .facing(-1.0),
             wheels: WheelContext::default(),
         }
     }
@@ -127,6 +135,9 @@ mod tests {
         for bad in [f64::NAN, f64::INFINITY, -1.0, 1e9] {
             let mut block = healthy().to_block();
             block.pose_covariance[3] = bad;
+            assert_eq!(Healthy::from_block(&block, wheels), None);
+            let mut block = healthy().to_block();
+            block.direction = bad * 0.5;
             assert_eq!(Healthy::from_block(&block, wheels), None);
             let mut block = healthy().to_block();
             block.wheel_offset_variance[2] = bad;

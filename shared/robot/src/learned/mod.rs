@@ -56,7 +56,7 @@ pub use body_lag::BodyLag;
 pub use calibration::Calibration;
 pub use form::Form;
 pub use further::{Further, FurtherModel};
-pub use healthy::Healthy;
+pub use healthy::{Healthy, triangle};
 pub use model::{Model, ModelError};
 pub use monitor::Monitor;
 pub use motion::{Curve, MotionModel};

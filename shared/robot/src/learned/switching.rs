@@ -6,13 +6,14 @@
 //! of the motion become white noise of the same power at low frequencies.
 
 use nalgebra::{Cholesky, Matrix3, Vector3};
+use rand::RngExt;
+use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::WHEELS;
 use vigil_inference::angle::wrap;
 use vigil_inference::gaussian::Gaussian;
 use vigil_inference::hybrid::{Conditional, Modes, Sampled};
 use vigil_inference::logspace::{log_add, log_normal};
-use vigil_inference::normals::normal;
 use vigil_inference::outlier::unvouched;
 use vigil_inference::track::{Context, Displacement, TRACK_DIMENSION, Track};
 
@@ -384,4 +385,9 @@ impl Conditional<TRACK_DIMENSION> for Switching {
         *state = track.into();
         Some(pose + z.wheels[mode])
     }
+}
+
+/// Three standard normals.
+fn normal(rng: &mut Pcg64Mcg) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| rng.sample(StandardNormal))
 }
