@@ -13,7 +13,8 @@
 
 use vigil_blocks::{Blindness, SensorFrame, Valid};
 
-/// Without a valid frame for so long, s, the detector is blind.
+/// Without a valid frame for so long, s, the detector is blind. As long as an alarm takes to clear
+/// (`alarm::CLEAR_S`).
 const BLIND_S: f64 = 1.0;
 /// Slack when that time is compared, s: it is a sum of periods.
 const SLACK_S: f64 = 1e-6;
@@ -23,7 +24,7 @@ const SEEN_S: f64 = 0.2;
 const PAUSE_S: f64 = 0.5;
 /// .. so much time, s.
 const FRAME_MAX_S: f64 = 0.1;
-/// A clock that runs faster or slower than this is no clock.
+/// A clock that runs faster or slower than this is no clock. Jitter of a whole period passes.
 const RATE_MAX: f64 = 2.0;
 
 /// What carries over from the frame before.

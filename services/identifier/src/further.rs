@@ -36,10 +36,11 @@ const ANYTHING: f64 = 0.3;
 /// Share of readings that nothing explains, and their deviation over the usual one.
 const OUTLIER: f64 = 1e-3;
 const OUTLIER_SD: f64 = 10.0;
-/// One observation speaks for or against a state by this much at most (natural logarithm).
+/// One observation speaks for or against a state by this much at most (natural logarithm). Less
+/// than the e^32 of [`FLOOR`]: no single one lifts a state from nothing.
 const LOG_MAX: f64 = 30.0;
 /// These channels change odds by this factor at most: what nominal motion makes impossible they do
-/// not make likely.
+/// not make likely. Times `sets::FLOOR` it is 1e-3.
 const RATIO_MAX: f64 = 1e9;
 /// No state is less probable: what can return must not be impossible.
 const FLOOR: f64 = 1e-14;

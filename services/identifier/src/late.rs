@@ -7,6 +7,7 @@
 use vigil_blocks::WHEELS;
 
 /// Delays, s: each a third longer than the one before, up to the longest that is looked for.
+/// Shorter is within the body's lag.
 pub const DELAYS: [f64; 11] = [
     0.12, 0.16, 0.21, 0.28, 0.37, 0.5, 0.66, 0.88, 1.17, 1.55, 2.0,
 ];
@@ -14,7 +15,8 @@ pub const DELAYS: [f64; 11] = [
 const KEPT: usize = 64;
 /// Rates that are no further apart are alike, rad/s.
 const ALIKE_RAD_S: f64 = 0.05;
-/// Probability with which a delay becomes any other from one observation to the next.
+/// Probability with which a delay becomes any other from one observation to the next. Once in 1.4 h
+/// of 50 ms: nothing is forgotten within a fault.
 const CHANGES: f64 = 1e-5;
 /// Prior probability of each delay.
 const EVEN: f64 = 1.0 / DELAYS.len() as f64;

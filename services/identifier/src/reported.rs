@@ -5,7 +5,8 @@ use vigil_blocks::{MODE_MULTIPLE, MODE_UNKNOWN};
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
 
-/// A held name is given up for another one when its own probability is below this.
+/// A held name is given up for another one when its own probability is below this. A rival needs
+/// half; with 0.2 left to a third, two alike do not swap.
 const HELD_MIN: f64 = 0.3;
 /// A held name is given up for the nominal mode when that has been more probable than this ..
 const NOMINAL_MIN: f64 = 0.9;

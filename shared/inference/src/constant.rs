@@ -11,6 +11,7 @@
 use crate::logspace::log_add;
 
 /// Bound of the log-odds: with a constant likelihood they fall only slowly after a fault has gone.
+/// As `departure::LOG_ODDS_MAX`.
 const LOG_ODDS_MAX: f64 = 40.0;
 
 /// Two states, nominal and fault, with a constant likelihood in the fault state.

@@ -4,9 +4,11 @@ use vigil_inference::logspace::log_add;
 
 use super::Reading;
 
-/// Probability that a frozen sensor does not repeat itself.
+/// Probability that a frozen sensor does not repeat itself. A changed sample costs 4.6 nats, a
+/// repeat gains 7 where one in 1,700 repeats by chance.
 const FAILS: f64 = 0.01;
-/// Bound of the log-odds: so far a sensor that lives again has to come back.
+/// Bound of the log-odds: so far a sensor that lives again has to come back. As
+/// `departure::LOG_ODDS_MAX`.
 const LOG_ODDS_MAX: f64 = 40.0;
 
 /// Log-likelihood of a reading of a frozen sensor, over that of a healthy one, which repeats itself

@@ -106,9 +106,11 @@ impl EncoderState {
     pub const TAIL_SD_RAD_S: f64 = 0.2;
 }
 
-/// Probability that a broken encoder does not do what its fault says in one sample.
+/// Probability that a broken encoder does not do what its fault says in one sample. Chosen: one
+/// costs 4.6 nats and its density.
 const EXCEPTION: f64 = 0.01;
-/// Share of readings that nothing explains (a fault in the middle of an observation).
+/// Share of readings that nothing explains (a fault in the middle of an observation). One
+/// observation in 50 s holds a fault's very moment: 6.9 nats.
 const OUTLIER: f64 = 1e-3;
 /// Deviation of a standing wheel's rate from zero, rad/s.
 const STANDING_SD_RAD_S: f64 = 0.02;

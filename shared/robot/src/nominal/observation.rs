@@ -8,7 +8,8 @@ use crate::learned::Intake;
 
 /// Observations that a prediction may look back, the newest included.
 pub const DEPTH: usize = 5;
-/// A pause between frames longer than this breaks the record, s.
+/// A pause between frames longer than this breaks the record, s. As far as a prediction looks back:
+/// five observations of 0.1 s.
 const GAP_S: f64 = 0.5;
 /// So many frames in a row that are not newer than the last one taken mean that the clock was set
 /// back: the next is taken, as after a gap.
@@ -17,10 +18,9 @@ const STALE_MAX: u32 = 10;
 const NEARLY: f64 = 0.5;
 /// Readings beyond so many times the robot's limits are garbage.
 const GARBAGE: f64 = 10.0;
-/// Change of a command's axis, relative to its limit, after which the robot has to settle anew.
+/// Change of a command's axis, relative to its limit, after which the robot has to settle anew. A
+/// tenth is beyond the jitter of a planner's command.
 const CHANGE: f64 = 0.1;
-/// Commanded or driven speed below which a robot stands, m/s.
-pub const STANDING_M_S: f64 = 0.02;
 
 /// What was measured over one interval.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -276,11 +276,12 @@ impl Observer {
         }
         let twist = self.robot.twist(&now.command);
         now.path_speed_m_s = self.robot.path_speed_m_s(twist);
-        let rolls = |rate: &f64| rate.abs() * self.robot.wheel_radius_m > STANDING_M_S;
-        now.moving = now.path_speed_m_s > STANDING_M_S || now.wheels.iter().flatten().any(rolls);
+        let standing_m_s = self.robot.body.standing_m_s;
+        let rolls = |rate: &f64| rate.abs() * self.robot.wheel_radius_m > standing_m_s;
+        now.moving = now.path_speed_m_s > standing_m_s || now.wheels.iter().flatten().any(rolls);
         let moved = self.moved(twist);
         now.has_pose = moved.is_some();
-        if now.path_speed_m_s < STANDING_M_S {
+        if now.path_speed_m_s < standing_m_s {
             now.drift = moved.map(|moved| moved.map(|value| value / now.dt_s));
             now.rest_s = last.map_or(0.0, |last| last.rest_s) + now.dt_s;
         } else {
@@ -307,7 +308,7 @@ impl Observer {
     fn moved(&self, twist: [f64; 3]) -> Option<[f64; 3]> {
         let (from, to) = (self.pose_before?, self.pose?);
         let turn = wrap(to[2] - from[2]);
-        let along = if twist[0].hypot(twist[1]) > STANDING_M_S {
+        let along = if twist[0].hypot(twist[1]) > self.robot.body.standing_m_s {
             twist[1].atan2(twist[0])
         } else {
             0.0
