@@ -6,12 +6,9 @@
 //! pair would lose to a dead encoder with time.
 
 use vigil_blocks::WHEELS;
+use vigil_robot::learned::wheel_context::FAR_SD;
 use vigil_robot::learned::wheel_evidence::{Dragged, TOGETHER_SD};
 use vigil_robot::learned::{Model, Observation, WheelEvidence};
-
-/// A reading this many standard deviations off says nothing about the offset. One good reading in
-/// 16,000 does.
-const FAR_SD: f64 = 4.0;
 
 /// Deviation by which the offset drifts from one observation to the next: the ground changes. It
 /// reaches [`TOGETHER_SD`] in 1600 of them, 80 s: a tolerance's length, 8 m, at 0.1 m/s.

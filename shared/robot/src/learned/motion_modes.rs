@@ -9,15 +9,16 @@ use super::{Curve, Model, MotionModel, RateModel};
 use crate::Description;
 
 /// The unknown: standard deviation of its constant deviation per metre (yaw, forward, lateral).
+/// Chosen: 1.5 and 2 times the learned effects of the rover's stuck wheels; aside, 0.6 of ahead.
 const UNKNOWN_SD: [f64; 3] = [0.25, 0.2, 0.12];
 /// Share of its variance by which it drifts per metre: what pulls in one direction of the ground
-/// turns against the robot.
+/// turns against the robot. Chosen: most of it within the length of a tolerance, 8 m.
 const UNKNOWN_DRIFT_1_M: f64 = 0.1;
-/// Share of the unknown that only makes the pose jump, and how far: x m, y m, yaw rad. A sensor
-/// that begins to lag, a slip of the map. Chosen: one unknown in ten, 2.3 nats.
+/// Share of the unknown that only makes the pose jump, and how far, in deviations of its noise: a
+/// sensor that begins to lag, a slip of the map. Chosen: one unknown in ten, 2.3 nats.
 const JUMP_SHARE: f64 = 0.1;
-const JUMP_SD: [f64; 3] = [0.1, 0.1, 0.1];
-/// Correlation length of the unknown's coloured deviations, m.
+const JUMP_SD: f64 = 20.0;
+/// Correlation length of the unknown's coloured deviations, m: stuck wheels have 0.12 to 0.16 m.
 const UNKNOWN_LENGTH_M: f64 = 0.2;
 /// Ground other than that learned from changes a stuck wheel's effect by one factor: how probable,
 /// the factor's mean and deviation. Chosen: 0.1 to 2.2 within two deviations, a fifth in all.
@@ -262,7 +263,7 @@ pub fn motion_modes(
         modes.push(MotionMode {
             share: JUMP_SHARE,
             noise: nominal.noise(),
-            jump: JUMP_SD.map(|sd| sd * sd),
+            jump: jump_sd(robot).map(|sd| sd * sd),
             ..drives_on(model, Moved::Unknown)
         });
     }
@@ -309,6 +310,12 @@ pub fn unknown_noise(model: &Model) -> MotionNoise {
         bound: nominal.bound,
         changes_1_m: 0.0,
     }
+}
+
+/// Deviations of a jump of the pose: x m, y m, yaw rad.
+fn jump_sd(robot: &Description) -> [f64; 3] {
+    let noise = &robot.noise;
+    [noise.position_m, noise.position_m, noise.yaw_rad].map(|sd| JUMP_SD * sd)
 }
 
 /// One wheel stuck, as learned.

@@ -23,7 +23,7 @@ const FRAME_UNKNOWN_S: f64 = 1e-3;
 const POSITION_MAX_M: f64 = 1e7;
 /// So many frames in a row that are not newer than the last one taken mean that the clock was set
 /// back: the next is taken, as after a gap.
-const STALE_MAX: u32 = 10;
+pub(crate) const STALE_MAX: u32 = 10;
 /// Part of a frame that may lack to an interval: frames are never exactly periodic.
 const NEARLY: f64 = 0.4;
 /// Difference of commanded and lagged curvature up to which a drive counts as steady, 1/m.

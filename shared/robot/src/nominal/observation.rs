@@ -4,20 +4,17 @@ use vigil_blocks::{COMMANDS, SensorFrame, Valid, WHEELS};
 use vigil_inference::angle::wrap;
 
 use crate::Description;
+use crate::frame_guard::BEYOND_LIMITS;
 use crate::learned::Intake;
+use crate::learned::observation::STALE_MAX;
 
 /// Observations that a prediction may look back, the newest included.
 pub const DEPTH: usize = 5;
 /// A pause between frames longer than this breaks the record, s. As far as a prediction looks back:
 /// five observations of 0.1 s.
 const GAP_S: f64 = 0.5;
-/// So many frames in a row that are not newer than the last one taken mean that the clock was set
-/// back: the next is taken, as after a gap.
-const STALE_MAX: u32 = 10;
 /// A frame that comes this part of a period early still completes an observation.
 const NEARLY: f64 = 0.5;
-/// Readings beyond so many times the robot's limits are garbage.
-const GARBAGE: f64 = 10.0;
 /// Change of a command's axis, relative to its limit, after which the robot has to settle anew. A
 /// tenth is beyond the jitter of a planner's command.
 const CHANGE: f64 = 0.1;
@@ -239,14 +236,14 @@ impl Observer {
         };
         for (i, axis) in self.robot.command.iter().enumerate().take(COMMANDS) {
             let (bit, value) = (Valid::command(i), frame.command[i]);
-            push(&mut self.command[i], bit, value, GARBAGE * axis.limit);
+            push(&mut self.command[i], bit, value, BEYOND_LIMITS * axis.limit);
         }
         let limits = &self.robot.limits;
-        let largest = GARBAGE * limits.yaw_rate_rad_s;
+        let largest = BEYOND_LIMITS * limits.yaw_rate_rad_s;
         push(&mut self.yaw_rate, Valid::YAW_RATE, frame.yaw_rate, largest);
         for i in 0..self.robot.wheels.len().min(WHEELS) {
             let (rate, current) = (frame.wheel_rate[i], frame.current[i]);
-            let largest = GARBAGE * limits.wheel_rate_rad_s;
+            let largest = BEYOND_LIMITS * limits.wheel_rate_rad_s;
             push(&mut self.wheels[i], Valid::wheel_rate(i), rate, largest);
             push(&mut self.currents[i], Valid::current(i), current, 1e4);
         }
