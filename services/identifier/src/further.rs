@@ -410,9 +410,10 @@ impl State {
 /// Distance between the sizes that are tried about this one.
 fn cell(kind: SizeKind, size: f64) -> f64 {
     match kind {
+        // Mean spacing of the shares.
         SizeKind::TorqueShareLost => 0.17,
         SizeKind::Gain => 0.5,
-        // Each is twice the one before.
+        // Each is twice the one before: sqrt 2 - 1 / sqrt 2.
         SizeKind::CurrentOffsetA | SizeKind::RateBiasRadS => 0.7 * size.abs(),
         _ => 0.0,
     }

@@ -11,9 +11,10 @@ use vigil_blocks::WHEELS;
 pub const DELAYS: [f64; 11] = [
     0.12, 0.16, 0.21, 0.28, 0.37, 0.5, 0.66, 0.88, 1.17, 1.55, 2.0,
 ];
-/// Observations that are kept: those of the longest delay, and some.
+/// Observations that are kept: those of the longest delay, and some, where `interval_s` is 0.032 s
+/// and more; with a shorter one the longest delays go unseen.
 const KEPT: usize = 64;
-/// Rates that are no further apart are alike, rad/s.
+/// Rates that are no further apart are alike, rad/s: one sample's noise of the rover's encoders.
 const ALIKE_RAD_S: f64 = 0.05;
 /// Probability with which a delay becomes any other from one observation to the next. Once in 1.4 h
 /// of 50 ms: nothing is forgotten within a fault.
@@ -131,6 +132,7 @@ impl Late {
         let mean: f64 = all().map(|(p, delay)| p * delay).sum();
         let square: f64 = all().map(|(p, delay)| p * delay * delay).sum();
         // Between two delays of the grid any is as good.
+        // Of a grid whose steps are a third: sqrt 1.33 - 1 / sqrt 1.33 of a delay.
         let cell = 0.28 * mean;
         let variance = (square - mean * mean).max(0.0) + cell * cell / 12.0;
         (mean, variance.sqrt())

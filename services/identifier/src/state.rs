@@ -11,6 +11,7 @@ use crate::servo::Servo;
 /// dragging, for 2.5 observations on average.
 const THROWN: f64 = 0.02;
 const THROWN_ON: f64 = 0.6;
+/// Chosen: a hop by a quarter of the rover's wheel radius.
 const THROW_SD: [f64; 3] = [0.02, 0.02, 0.1];
 /// Continuous state of a hypothesis, and what its encoders do.
 #[derive(Debug, Clone, Copy)]

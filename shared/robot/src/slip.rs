@@ -30,7 +30,8 @@ use crate::kinematics::{Ackermann6, GeometryError, ROVER_WHEELS, WheelTargets};
 
 /// Standard gravity as the weight of the reference rover assumes it, m/s².
 pub const GRAVITY_M_S2: f64 = 9.81;
-/// From this many stuck wheels on the rover cannot move: the free wheels spin in place.
+/// From this many stuck wheels on the rover cannot move: the free wheels spin in place. True of six
+/// wheels on the rover's ground.
 pub const IMMOBILE_STUCK: usize = 4;
 
 /// Drive motors: torque = `gain` (commanded rate - rate), limited; bearing friction against it.

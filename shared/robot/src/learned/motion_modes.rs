@@ -28,7 +28,8 @@ const OTHER_GROUNDS: [(f64, f64, f64); 3] =
 /// only that it is dragged, and not how: on hard ground the robot is thrown, crabs and hops.
 /// Chosen: from none of it to nearly twice.
 const ANY_GROUND: [(f64, f64, f64); 1] = [(0.2, 0.6, 0.6)];
-/// Deviations of such motion beside its effect, coloured: yaw, forward, lateral.
+/// Deviations of such motion beside its effect, coloured: yaw, forward, lateral. Chosen: about half
+/// of the unknown's.
 const ROUGH_SD: [f64; 3] = [0.15, 0.1, 0.05];
 /// By the pose alone, a wheel stuck on other ground looks like one that is dragged at, has sunk in
 /// or lost its tyre: how probable these are, given either. Chosen: a named wheel stays the
@@ -305,6 +306,7 @@ pub fn unknown_noise(model: &Model) -> MotionNoise {
         offset: Matrix3::from_diagonal(&Vector3::from(UNKNOWN_SD.map(|sd| sd * sd))),
         deviation: Matrix3::from_diagonal(&deviation.diagonal()) + nominal.deviation,
         length_m: UNKNOWN_LENGTH_M,
+        // Twice the deviation of nominal driving.
         white: nominal.white * 4.0,
         drift: Vector3::from(UNKNOWN_SD.map(|sd| UNKNOWN_DRIFT_1_M * sd * sd)),
         bound: nominal.bound,

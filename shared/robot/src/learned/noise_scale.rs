@@ -163,6 +163,7 @@ impl NoiseScale {
     /// from noise taken as smaller than it is.
     #[must_use]
     pub fn variance_ratio(&self) -> f64 {
+        // Second differences are correlated by -2/3 and 1/6: 2 (1 + 2 (4/9 + 1/36)) = 3.9.
         let lean = 1.0 + LEAN * (3.9 / self.count).sqrt();
         (self.sum / self.count * lean).clamp(RATIO_MIN, RATIO_MAX)
     }
@@ -171,7 +172,8 @@ impl NoiseScale {
 /// Samples of a channel after which its noise counts as known. With the prior's, the variance is
 /// known within sqrt(3.9 / 45) = 29 %.
 const KNOWN: f64 = 25.0;
-/// Change of the command (speed, m/s, or curvature, 1/m) up to which it counts as the same.
+/// Change of the command (speed, m/s, or curvature, 1/m) up to which it counts as the same: chosen,
+/// a thousandth of the most.
 pub(super) const STEADY_COMMAND: f64 = 1e-3;
 
 /// Time in motion after which a channel's noise should have been seen, s. Five times as long as it

@@ -30,7 +30,8 @@ const SOILS: [(f64, f64); 4] = [(0.8, 1.0), (1.25, 1.0), (1.0, 0.6), (1.0, 1.7)]
 /// Change of the friction under one wheel by which its effect is found, relative. A difference
 /// quotient: the step divides out.
 const FRICTION_STEP: f64 = 0.08;
-/// Deviation of the motion per metre that nothing here explains: yaw, forward, lateral.
+/// Deviation of the motion per metre that nothing here explains: yaw, forward, lateral. Chosen: a
+/// fifth to a twelfth of the unknown's.
 const FLOOR_SD: [f64; 3] = [0.05, 0.03, 0.01];
 
 type Nodes = SVector<f64, NODES>;

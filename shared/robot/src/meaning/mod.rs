@@ -24,7 +24,8 @@ use wheels::Wheels;
 /// A ratio within this factor of 1 is nothing: ground and faults do as much. The least factor of a
 /// unit is that of feet, 3.3.
 const RATIO_MAX: f64 = 3.0;
-/// Curvature from which turns are judged, 1/m: below it a fault turns a robot as much.
+/// Curvature from which turns are judged, 1/m: below it a fault turns a robot as much (up to 0.32
+/// rad/m by a stuck wheel of the rover).
 const TURNING_1_M: f64 = 0.3;
 /// Commanded turn from which they are, rad. Forty deviations of a yaw noise of 5 mrad.
 const TURN_MIN_RAD: f64 = 0.2;
@@ -36,9 +37,10 @@ const TURN_UNIT: f64 = 8.0;
 /// A pause in the frames beyond which the motion counts as interrupted, s. Six periods of a sensor
 /// of 20 Hz.
 const PAUSE_S: f64 = 0.3;
-/// A command must have stood so long before a frame counts, s: a body needs time to follow.
+/// A command must have stood so long before a frame counts, s: three lags of [`crate::Body`].
 const SETTLED_S: f64 = 0.3;
-/// Change of the commanded velocity that begins this anew, m/s and rad/s.
+/// Change of the commanded velocity that begins this anew, m/s and rad/s: chosen, a tenth of the
+/// rover's fastest.
 const CHANGE: f64 = 0.05;
 /// Tests there may be: travel, turn, gyro, unit, and by wheel sign, steering, side.
 const TESTS: usize = 4 + 3 * vigil_blocks::WHEELS;

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::kinematics::{Ackermann6, GeometryError, ROVER_WHEELS};
 
-/// Smallest load left on a wheel, N: a wheel never quite leaves the ground here.
+/// Smallest load left on a wheel, N: a wheel never quite leaves the ground here. 1.4 % of the
+/// rover's weight.
 pub const LOAD_MIN_N: f64 = 2.0;
 /// Traction per unit of load up to which load is shifted, either way. At 0.97 (its lever over its
 /// height) the reference bogie would tip over; soils below this friction never come here.
