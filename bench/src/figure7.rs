@@ -92,7 +92,7 @@ fn situation(curvature_1_m: f64, speed_m_s: f64, stuck: Option<usize>) -> Situat
         curvature_1_m,
         speed_m_s,
         stuck: std::array::from_fn(|i| Some(i) == stuck),
-        soil: Soil::default(),
+        soil: Soil::uniform(0.65, 0.2),
         condition: Condition::default(),
     }
 }

@@ -21,15 +21,17 @@ use vigil_blocks::{SensorFrame, Symptoms, Valid};
 use vigil_inference::angle::wrap;
 use vigil_setup::schema;
 
-/// A robot that stays within this distance stands, m.
+/// A robot that stays within this distance stands, m: twenty deviations of a pose of 5 mm.
 const STILL_M: f64 = 0.1;
-/// Distance between kept places, m.
+/// Distance between kept places, m: chosen, so that [`PLACES`] hold 32 m of the way.
 const SPACING_M: f64 = 0.25;
-/// Without a frame with both poses for this long, ns, what was seen last is no longer so.
+/// Without a frame with both poses for this long, ns, what was seen last is no longer so. As
+/// `sight::BLIND_S`.
 const SILENT_NS: u64 = 1_000_000_000;
-/// A loop or a spin ends so long after its last sign, ns.
+/// A loop or a spin ends so long after its last sign, ns. Chosen: much shorter, and one loop would
+/// fire twice.
 const LASTS_NS: u64 = 10_000_000_000;
-/// A turn by this much more is a sign of a spin, rad.
+/// A turn by this much more is a sign of a spin, rad. Twenty deviations of a yaw of 5 mrad.
 const TURN_STEP_RAD: f64 = 0.1;
 /// Kept places.
 const PLACES: usize = 128;

@@ -2,14 +2,18 @@
 
 use vigil_robot::meaning::{Finding, Kind};
 
-/// Time that is judged at once, s, and how often in a row it must be found wrong.
+/// Time that is judged at once, s, and how often in a row it must be found wrong. As long as
+/// blindness takes.
 const WINDOW_S: f64 = 1.0;
 const WINDOWS: u32 = 2;
-/// Share of the deadlines of one window that may pass before their frames come.
+/// Share of the deadlines of one window that may pass before their frames come. Three in ten; the
+/// odd late frame is the machine's.
 const LATE_MAX: f64 = 0.3;
 /// Frames this much closer together or further apart than the graph's period are of another rate.
+/// No jitter's mean over a second is half a period.
 const RATE_MAX: f64 = 1.5;
-/// A pause beyond this, in periods, is a gap and says nothing of the rate.
+/// A pause beyond this, in periods, is a gap and says nothing of the rate. Five frames lost in a
+/// row.
 const GAP_PERIODS: f64 = 6.0;
 
 /// Counts frames and missed deadlines by the journal.

@@ -13,17 +13,18 @@
 
 use vigil_blocks::{Blindness, SensorFrame, Valid};
 
-/// Without a valid frame for so long, s, the detector is blind.
+/// Without a valid frame for so long, s, the detector is blind. As long as an alarm takes to clear
+/// (`alarm::CLEAR_S`).
 const BLIND_S: f64 = 1.0;
 /// Slack when that time is compared, s: it is a sum of periods.
 const SLACK_S: f64 = 1e-6;
-/// It sees again after valid frames for so long, s, ..
+/// It sees again after valid frames for so long (two of the longest count), s, ..
 const SEEN_S: f64 = 0.2;
-/// .. with no longer pause between them than this, s. One frame shows at most ..
+/// .. with no longer pause between them than this, s: half of what blinds. One frame shows at most ..
 const PAUSE_S: f64 = 0.5;
-/// .. so much time, s.
+/// .. so much time, s: no single one ends blindness.
 const FRAME_MAX_S: f64 = 0.1;
-/// A clock that runs faster or slower than this is no clock.
+/// A clock that runs faster or slower than this is no clock. Jitter of a whole period passes.
 const RATE_MAX: f64 = 2.0;
 
 /// What carries over from the frame before.

@@ -24,12 +24,14 @@ const NOISE: usize = 3;
 /// State of a dead encoder, the last of the breakages.
 const DEAD: usize = BREAKAGES.len();
 /// Share of whole encoders that read exactly zero on a standing wheel: most read noise there too.
+/// Chosen: a silent stuck wheel waits 2.3 nats longer, a noisy one gains 0.1.
 const SILENT_SHARE: f64 = 0.1;
-/// Share of wheels at a rate of their own among those that do anything, in the unknown.
+/// Share of wheels at a rate of their own among those that do anything, in the unknown. Chosen: in
+/// the unknown rather the wheel's doing than its encoder's, by 0.8 nats.
 const ANYTHING_OWN_RATE: f64 = 0.7;
 
 /// An observation speaks against a state of one encoder by this much at most (natural logarithm):
-/// the product over all wheels stays a number.
+/// the product over all wheels stays a number. Eight wheels: e^-640, where a double ends at e^-708.
 const AGAINST_MAX: f64 = -80.0;
 
 /// States of an encoder: whole, broken in one way, whole on a wheel with a rate of its own, whole

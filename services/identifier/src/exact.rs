@@ -36,10 +36,10 @@ use crate::state::State;
 /// Index of the nominal motion among the modes.
 const NOMINAL: usize = 0;
 /// Onset hypotheses kept per mode: fewer of several stuck wheels and of what is rare, as there are
-/// many such modes.
+/// many such modes. The last 1.6 s and 0.4 s, one an observation.
 const PER_MODE: usize = 32;
 const PER_RARE: usize = 8;
-/// Hypotheses less probable than this are dropped (natural logarithm).
+/// Hypotheses less probable than this are dropped (natural logarithm): 1e-13, as of sets.
 const FLOOR: f64 = -30.0;
 /// The filter.
 #[derive(Debug, Clone)]

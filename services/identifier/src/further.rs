@@ -10,36 +10,40 @@
 
 use vigil_blocks::{FaultBelief, SizeKind, WHEELS};
 use vigil_inference::logspace::{log_add, log_normal};
+use vigil_inference::outlier::SPREAD;
 use vigil_robot::learned::current_effects::{CurrentEffects, SHARES, STUCK};
 use vigil_robot::learned::further_watch::{FurtherWatch, Residual, Residuals, Turn};
+use vigil_robot::learned::wheel_evidence::TOGETHER_SD;
 use vigil_robot::learned::{Further, Healthy, Model, Observation, Reading, repeats};
 use vigil_robot::{Description, FaultPrior};
 
 use crate::modes::Leaves;
 use crate::node_sizes::TOLD_MIN;
 
-/// Offsets of a broken current sensor, A, and factors.
-const OFFSETS_A: [f64; 12] = [
-    -2.0, -0.8, -0.4, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.4, 0.8, 2.0,
+/// Offsets of a broken current sensor, in deviations of its noise: each twice the one before, as a
+/// size is told to a factor. The least lies within what a slope does to one wheel.
+const OFFSETS: [f64; 12] = [
+    -40.0, -16.0, -8.0, -4.0, -2.0, -1.0, 1.0, 2.0, 4.0, 8.0, 16.0, 40.0,
 ];
+/// Its factors: reversed, none, half, double.
 const GAINS: [f64; 4] = [-1.0, 0.0, 0.5, 2.0];
-/// Biases of a broken gyro, rad/s.
-const BIASES_RAD_S: [f64; 10] = [-0.4, -0.2, -0.1, -0.05, -0.025, 0.025, 0.05, 0.1, 0.2, 0.4];
-/// Deviation of a stuck wheel's effect on each current, relative, and at least, A.
-const STUCK_SD: f64 = 0.4;
-const STUCK_SD_MIN_A: f64 = 0.2;
-/// Deviations of currents and yaw rate in the unknown, A and rad/s, and the share of channels that
-/// have one.
-const UNKNOWN_A: f64 = 0.5;
-const UNKNOWN_RAD_S: f64 = 0.3;
+/// Biases of a broken gyro, in deviations of its noise. The least is 2.5 tolerances of the rover.
+const BIASES: [f64; 10] = [-40.0, -20.0, -10.0, -5.0, -2.5, 2.5, 5.0, 10.0, 20.0, 40.0];
+/// Least deviation of a stuck wheel's effect on a current, in deviations of the sensor's noise.
+const STUCK_SD_MIN: f64 = 4.0;
+/// Deviation of a current in the unknown, in those of its sensor's noise: beyond what slopes add.
+const UNKNOWN_CURRENT: f64 = 10.0;
+/// That of the yaw rate, as a share of the fastest turn that may be commanded.
+const UNKNOWN_TURN: f64 = 0.5;
+/// Share of channels that have one: two of seven, as what is unknown moves some and not all.
 const ANYTHING: f64 = 0.3;
-/// Share of readings that nothing explains, and their deviation over the usual one.
+/// Share of readings that nothing explains: one observation in 50 s.
 const OUTLIER: f64 = 1e-3;
-const OUTLIER_SD: f64 = 10.0;
-/// One observation speaks for or against a state by this much at most (natural logarithm).
+/// One observation speaks for or against a state by this much at most (natural logarithm). Less
+/// than the e^32 of [`FLOOR`]: no single one lifts a state from nothing.
 const LOG_MAX: f64 = 30.0;
 /// These channels change odds by this factor at most: what nominal motion makes impossible they do
-/// not make likely.
+/// not make likely. Times `sets::FLOOR` it is 1e-3.
 const RATIO_MAX: f64 = 1e9;
 /// No state is less probable: what can return must not be impossible.
 const FLOOR: f64 = 1e-14;
@@ -81,11 +85,34 @@ pub struct Fusion {
     pub count: usize,
 }
 
+/// Deviations of what is known badly.
+#[derive(Debug, Clone, Copy)]
+struct Wide {
+    /// Currents beside a stuck wheel, A.
+    stuck_a: f64,
+    /// Currents in the unknown, A.
+    current_a: f64,
+    /// Yaw rate in the unknown, rad/s.
+    turn_rad_s: f64,
+}
+
+impl Wide {
+    fn new(robot: &Description) -> Self {
+        let (noise, limits) = (&robot.noise, &robot.limits);
+        Self {
+            stuck_a: STUCK_SD_MIN * noise.current_a,
+            current_a: UNKNOWN_CURRENT * noise.current_a,
+            turn_rad_s: UNKNOWN_TURN * limits.curvature_1_m * limits.speed_m_s,
+        }
+    }
+}
+
 /// The filter.
 #[derive(Debug, Clone)]
 pub struct FurtherFilter {
     watch: FurtherWatch,
     rates: FaultPrior,
+    wide: Wide,
     effects: Option<CurrentEffects>,
     states: Vec<State>,
     /// Share of the births that each state has.
@@ -115,7 +142,8 @@ impl FurtherFilter {
                 groups.push((all.collect(), Some(node)));
             }
             if let Some(node) = leaves.current[wheel] {
-                let offsets = OFFSETS_A.map(|offset| State::CurrentOffset(wheel, offset));
+                let offset = |by: f64| State::CurrentOffset(wheel, by * robot.noise.current_a);
+                let offsets = OFFSETS.map(offset);
                 let gains = GAINS.map(|gain| State::CurrentGain(wheel, gain));
                 let dead = std::iter::once(State::CurrentDead(wheel));
                 groups.push((dead.chain(offsets).chain(gains).collect(), Some(node)));
@@ -126,12 +154,14 @@ impl FurtherFilter {
         }
         if let Some(node) = leaves.gyro {
             let all = std::iter::once(State::GyroDead);
-            let biases = BIASES_RAD_S.map(State::GyroBias);
+            let bias = |by: f64| State::GyroBias(by * robot.noise.yaw_rate_rad_s);
+            let biases = BIASES.map(bias);
             groups.push((all.chain(biases).collect(), Some(node)));
         }
         let mut filter = Self {
             watch,
             rates: robot.fault_prior,
+            wide: Wide::new(robot),
             effects: CurrentEffects::new(model, robot),
             states: vec![State::Whole, State::Unknown],
             shares: vec![0.0, p_unknown],
@@ -242,10 +272,10 @@ impl FurtherFilter {
                 let by = self.effect(STUCK, wheel, observation, expected(wheel));
                 // How a robot turns on a stuck wheel the pose says.
                 let gyro = residuals.yaw_rate.map_or(0.0, |residual| {
-                    let wide = residual.variance + UNKNOWN_RAD_S * UNKNOWN_RAD_S;
+                    let wide = residual.variance + self.wide.turn_rad_s * self.wide.turn_rad_s;
                     log_add(0.0, shifted(&residual, 0.0, wide)) - std::f64::consts::LN_2
                 });
-                let sd = |by: f64| (STUCK_SD * by).abs().max(STUCK_SD_MIN_A);
+                let sd = |by: f64| (TOGETHER_SD * by).abs().max(self.wide.stuck_a);
                 gyro + together(currents, &by, sd)
             }
             State::CurrentOffset(wheel, offset) => alone(wheel, offset),
@@ -264,11 +294,13 @@ impl FurtherFilter {
                 .yaw_rate
                 .map_or(0.0, |residual| shifted(&residual, bias, residual.variance)),
             State::Unknown => {
-                let gyro = residuals.yaw_rate.map(|residual| (residual, UNKNOWN_RAD_S));
+                let gyro = residuals
+                    .yaw_rate
+                    .map(|residual| (residual, self.wide.turn_rad_s));
                 let mean = mean(currents, |residual, _| residual.apart);
                 let currents = currents.iter().flatten().map(|residual| {
                     let apart = residual.apart - mean;
-                    (Residual { apart, ..*residual }, UNKNOWN_A)
+                    (Residual { apart, ..*residual }, self.wide.current_a)
                 });
                 let anything = |(residual, sd): (Residual, f64)| {
                     let wide = shifted(&residual, 0.0, residual.variance + sd * sd);
@@ -378,9 +410,10 @@ impl State {
 /// Distance between the sizes that are tried about this one.
 fn cell(kind: SizeKind, size: f64) -> f64 {
     match kind {
+        // Mean spacing of the shares.
         SizeKind::TorqueShareLost => 0.17,
         SizeKind::Gain => 0.5,
-        // Each is twice the one before.
+        // Each is twice the one before: sqrt 2 - 1 / sqrt 2.
         SizeKind::CurrentOffsetA | SizeKind::RateBiasRadS => 0.7 * size.abs(),
         _ => 0.0,
     }
@@ -434,7 +467,7 @@ fn together(
 /// one; now and then each is an outlier.
 fn shifted(residual: &Residual, by: f64, variance: f64) -> f64 {
     let density = |apart: f64, variance: f64| {
-        let wide = variance * OUTLIER_SD * OUTLIER_SD;
+        let wide = variance * SPREAD * SPREAD;
         log_add(
             log_normal(apart, variance),
             OUTLIER.ln() + log_normal(apart, wide),

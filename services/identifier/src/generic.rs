@@ -29,13 +29,16 @@ use crate::posterior::Posterior;
 use crate::risk::risks;
 use crate::sets::{FLOOR, entropy};
 
-/// Share of the draws that leave a mode in the raised proposals.
+/// Share of the draws that leave a mode in the raised proposals. Half at most doubles a weight's
+/// spread.
 const RAISED: f64 = 0.5;
 /// Each particle of the look-ahead filter tries every mode: there are fewer of them.
 const LOOK_AHEAD_SHARE: usize = 8;
-/// KLD-sampling: distance, quantile (99 %), and least number of particles.
+/// KLD-sampling: distance, quantile (99 %), and least number of particles. The distance is Fox's
+/// (2003); 32 are no fewer than the modes.
 const ADAPTIVE: (f64, f64, usize) = (0.05, 2.326, 32);
-/// A fault began when its probability was last below this.
+/// A fault began when its probability was last below this. Chosen: later than the birth, before it
+/// has a name at 0.5.
 const ONSET: f64 = 0.1;
 
 /// A filter and its model.

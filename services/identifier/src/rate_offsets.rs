@@ -6,13 +6,12 @@
 //! pair would lose to a dead encoder with time.
 
 use vigil_blocks::WHEELS;
+use vigil_robot::learned::wheel_context::FAR_SD;
 use vigil_robot::learned::wheel_evidence::{Dragged, TOGETHER_SD};
 use vigil_robot::learned::{Model, Observation, WheelEvidence};
 
-/// A reading this many standard deviations off says nothing about the offset.
-const FAR_SD: f64 = 4.0;
-
-/// Deviation by which the offset drifts from one observation to the next: the ground changes.
+/// Deviation by which the offset drifts from one observation to the next: the ground changes. It
+/// reaches [`TOGETHER_SD`] in 1600 of them, 80 s: a tolerance's length, 8 m, at 0.1 m/s.
 const DRIFT_SD: f64 = 0.01;
 
 /// Gaussian beliefs about the offsets relative to the expected change, one per wheel: a scalar

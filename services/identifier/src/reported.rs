@@ -5,11 +5,13 @@ use vigil_blocks::{MODE_MULTIPLE, MODE_UNKNOWN};
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
 
-/// A held name is given up for another one when its own probability is below this.
+/// A held name is given up for another one when its own probability is below this. A rival needs
+/// half; with 0.2 left to a third, two alike do not swap.
 const HELD_MIN: f64 = 0.3;
-/// A held name is given up for the nominal mode when that has been more probable than this ..
+/// A held name is given up for the nominal mode when that has been more probable than this (nine to
+/// one: it is given up later than it is taken) ..
 const NOMINAL_MIN: f64 = 0.9;
-/// .. for this long, s of motion.
+/// .. for this long, s of motion: as long as an alarm takes to clear.
 const NOMINAL_S: f64 = 1.0;
 /// Slack when that time is compared, s: it is a sum of short intervals.
 const SLACK_S: f64 = 1e-6;

@@ -11,13 +11,14 @@ use vigil_inference::size::{Prior, Size};
 use vigil_robot::Description;
 use vigil_robot::learned::SteerReading;
 
-/// Deviation of either angle before any reading, rad.
+/// Deviation of either angle before any reading, rad: half of what a servo turns.
 const SD_RAD: f64 = 0.3;
-/// Tolerance of a robot that declares none, rad.
+/// Tolerance of a robot that declares none, rad: three deviations of a sensor's noise.
 const UNDECLARED_RAD: f64 = 0.01;
 /// A reading this many standard deviations off teaches nothing.
 const FAR_SD: f64 = 4.0;
-/// Deviation by which an angle wanders from one reading to the next, over the tolerance.
+/// Deviation by which an angle wanders from one reading to the next, over the tolerance: by about
+/// one tolerance in two minutes.
 const WANDERS: f64 = 0.02;
 
 /// What is believed of one servo.

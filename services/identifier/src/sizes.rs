@@ -9,6 +9,8 @@
 use vigil_blocks::WHEELS;
 use vigil_inference::logspace::log_add;
 use vigil_inference::size::{Prior, Size};
+use vigil_robot::learned::wheel_context::FAR_SD;
+use vigil_robot::learned::wheels::STANDING_SD_RAD_S;
 use vigil_robot::learned::{Model, MotionMode, Observation, WheelEvidence};
 use vigil_robot::{Description, Tolerance};
 
@@ -25,31 +27,33 @@ pub const BIAS: usize = 1;
 pub const DRIFT: usize = 2;
 /// See [`GAIN`].
 pub const DELAY: usize = 3;
-/// Prior shares among all ways in which an encoder breaks.
+/// Prior shares among all ways in which an encoder breaks. Chosen: together a third of the
+/// breakages; a gain costs 1 nat beside a freeze.
 pub const SIZED_SHARES: [f64; WAYS] = [0.12, 0.12, 0.04, 0.08];
 
-/// Gain of a broken encoder: mean and deviation. Lost pulses are commoner than pulses too many.
+/// Gain of a broken encoder: mean and deviation. Lost pulses are commoner than pulses too many. Two
+/// deviations span all pulses lost to two thirds too many.
 const GAIN_PRIOR: (f64, f64) = (0.75, 0.45);
-/// Deviation of a bias, rad/s.
-const BIAS_SD_RAD_S: f64 = 0.6;
-/// Deviation of a drift, rad/s², and of the bias that it has reached when it is first looked for.
-const DRIFT_SD_RAD_S2: f64 = 0.15;
-const DRIFTED_SD_RAD_S: f64 = 0.3;
+/// Deviation of a bias, in tolerances of one wheel's rate; the same of a drift per second, and of
+/// the bias that it has reached when it is first looked for. Chosen: three times the least bias.
+const BIAS_SD: f64 = 10.0;
+const DRIFT_SD_1_S: f64 = 2.5;
+const DRIFTED_SD: f64 = 5.0;
 /// A gain is one beyond this many tolerances of the wheels' ratio, a bias beyond so many of one
-/// wheel's rate: what load and ground make of a rate is no encoder's fault.
+/// wheel's rate: what load and ground make of a rate is no encoder's fault. Chosen: smaller sizes
+/// differ from load by nothing, larger ones are named later.
 const RATIOS: f64 = 2.0;
 const RATES: f64 = 3.0;
-/// A drift is one if it passes the tolerance of a rate within this time, s.
+/// A drift is one if it passes the tolerance of a rate within this time, s. Chosen: a slower one is
+/// taken up as load.
 const DRIFTS_S: f64 = 5.0;
 /// Tolerances of a robot that declares none: share of the rate, and rad/s.
 const UNDECLARED: (f64, f64) = (0.08, 0.06);
-/// Deviation by which gain and bias (rad/s) wander from one reading to the next.
+/// Deviation by which a gain wanders from one reading to the next: 0.035 in a minute of 20 Hz, less
+/// than half a tolerance.
 const GAIN_WANDERS: f64 = 0.001;
-const BIAS_WANDERS_RAD_S: f64 = 0.002;
-/// A reading this many standard deviations off teaches nothing.
-const FAR_SD: f64 = 4.0;
-/// Deviation of a standing wheel's rate, rad/s.
-const STANDING_SD_RAD_S: f64 = 0.02;
+/// That of a bias, as a part of the tolerance of a rate: in a minute it wanders by one.
+const BIAS_WANDERS: f64 = 30.0;
 
 /// What the last observation says of each wheel's encoder, if it is broken in each way.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,14 +126,14 @@ impl Sizes {
             },
             Prior {
                 mean: [0.0; 2],
-                sd: [BIAS_SD_RAD_S, 0.0],
-                wander: [BIAS_WANDERS_RAD_S, 0.0],
+                sd: [BIAS_SD * rate, 0.0],
+                wander: [rate / BIAS_WANDERS, 0.0],
                 healthy: [-bias, bias],
             },
             Prior {
                 mean: [0.0; 2],
-                sd: [DRIFT_SD_RAD_S2, DRIFTED_SD_RAD_S],
-                wander: [0.0, BIAS_WANDERS_RAD_S],
+                sd: [DRIFT_SD_1_S * rate, DRIFTED_SD * rate],
+                wander: [0.0, rate / BIAS_WANDERS],
                 healthy: [-drift, drift],
             },
         ];

@@ -5,9 +5,9 @@ use vigil_blocks::{FaultBelief, SizeKind};
 
 /// A size is clear when its standard deviation is this share of it or less.
 const CLEAR: f64 = 0.1;
-/// .. and the way has been the same for so many cycles.
+/// .. and the way has been the same for so many cycles: 0.2 s at 100 Hz.
 const CYCLES: u32 = 20;
-/// It is told anew when it has changed by more than this share.
+/// It is told anew when it has changed by more than this share. Two deviations of a clear one.
 const CHANGED: f64 = 0.2;
 
 /// What is said of a component: node of the fault tree, way, size and standard deviation.

@@ -4,7 +4,7 @@ use vigil_blocks::{ActionOutcome, SensorFrame, Valid};
 use vigil_robot::disturbance::{KINDS, Place, SIDES};
 use vigil_robot::injection::Change;
 use vigil_robot::kinematics::{ROVER_WHEELS, advance, wrap_angle};
-use vigil_robot::slip::{Condition, Situation, SlipModel, Soil, Solution};
+use vigil_robot::slip::{Condition, Situation, SlipModel, Solution};
 use vigil_robot::{Description, Disturbance, DisturbanceKind, Fault, FaultKind};
 use vigil_setup::schema::{DriveSegment, Simulator};
 
@@ -95,7 +95,7 @@ impl World {
             curvature_1_m: 0.0,
             speed_m_s: 0.0,
             stuck: [false; ROVER_WHEELS],
-            soil: Soil::default(),
+            soil: model.soil(),
             condition: Condition::default(),
         };
         let Ok(motion) = model.solve(&rest, None) else {

@@ -1,5 +1,6 @@
 //! Data sets, learning of models, scoring, reports. Reads files; knows no transport and no clock.
 
+pub mod bounds;
 pub mod cases;
 mod correlation;
 mod data_hash;

@@ -21,7 +21,7 @@ use crate::logspace::{log_add, probability};
 use crate::onsets::{Onset, Onsets};
 use crate::outlier::SPREAD;
 
-/// Log-odds beyond which more evidence changes nothing.
+/// Log-odds beyond which more evidence changes nothing. The exponential of more is no double.
 pub const LOG_ODDS_MAX: f64 = 700.0;
 
 /// A whitened residual.

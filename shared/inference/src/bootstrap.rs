@@ -17,7 +17,8 @@ use crate::proposal::Proposal;
 use crate::resample::Resampling;
 use crate::weights::Weights;
 
-/// Steps without a usable observation after which the continuous states are drawn anew.
+/// Steps without a usable observation after which the continuous states are drawn anew. Chosen: a
+/// quarter of a second of 50 ms observations.
 const COASTED_MAX: u32 = 5;
 
 /// A particle filter over the modes and states of `M`. All buffers are made once.

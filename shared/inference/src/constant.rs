@@ -8,10 +8,8 @@
 //! and only luck raises an alarm. [`crate::windowed`] makes the blind spot smaller,
 //! [`crate::ages`] has none.
 
+use crate::departure::LOG_ODDS_MAX;
 use crate::logspace::log_add;
-
-/// Bound of the log-odds: with a constant likelihood they fall only slowly after a fault has gone.
-const LOG_ODDS_MAX: f64 = 40.0;
 
 /// Two states, nominal and fault, with a constant likelihood in the fault state.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -22,11 +22,14 @@ use crate::onsets::{Onset, Onsets};
 use crate::outlier::Trust;
 use crate::track::{Context, Displacement, MotionNoise, Track};
 
-/// Log-odds beyond which more evidence changes nothing, but delays recovery.
+/// Log-odds beyond which more evidence changes nothing, but delays recovery. An alarm above it is
+/// refused; each nat more must be lost again when a fault ends.
 pub const LOG_ODDS_MAX: f64 = 40.0;
-/// Components less probable than this, by their log-odds, are dropped.
+/// Components less probable than this, by their log-odds, are dropped. 1e-13: of no weight beside a
+/// birth of 1e-5 in an observation.
 const LOG_ODDS_MIN: f64 = -30.0;
 /// A change of the ground is dropped once it is so much less probable than when it was supposed.
+/// e^5 = 150: the next observation supposes one anew with more weight.
 const CHANGE_LOSES: f64 = 5.0;
 /// A change of the ground that is e² times as probable as none is taken for granted. Until then it
 /// counts by its weight; a wrong one costs what was learned of the ground, no alarm.

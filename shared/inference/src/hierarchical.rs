@@ -29,7 +29,7 @@ use crate::hybrid::{Modes, Sampled};
 use crate::resample::Resampling;
 use crate::weights::Weights;
 
-/// Largest share below a node at which it is split, and below which it is merged again.
+/// Largest share below a node for a split, and for a merge: ten times the rest, no toggling.
 const SPLIT: f64 = 0.999;
 const MERGE: f64 = 0.99;
 /// A node whose mass is less than this many particles' is merged: nothing is told apart there.

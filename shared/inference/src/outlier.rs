@@ -6,7 +6,8 @@
 use crate::logspace::{log_add, log_normal};
 use crate::track::Track;
 
-/// Standard deviations of an outlier over those of the noise.
+/// Standard deviations of an outlier over those of the noise. Beyond three of them, thirty of the
+/// noise, a sample is evidence again.
 pub const SPREAD: f64 = 10.0;
 
 /// Logarithms of the densities of a residual of variance `spread`, `noise` of it the sensor's:
@@ -34,11 +35,14 @@ pub fn tempered(whitened: f64, rate: f64) -> f64 {
     square.max(0.0).sqrt().copysign(whitened)
 }
 
-/// Probability, at least, that an outlier follows an outlier: what disturbs a sensor lasts.
+/// Probability, at least, that an outlier follows an outlier: what disturbs a sensor lasts. Chosen:
+/// one in a hundred, as a broken sensor's exception.
 const AGAIN: f64 = 0.01;
-/// Probability below which a run of outliers is none: the pose has jumped.
+/// Probability below which a run of outliers is none: the pose has jumped. The fourth in a row at
+/// the least rate (1e-5 x 0.01^3), the tenth at the largest (0.1^10).
 const FLUKE: f64 = 5e-10;
 /// Log-odds of an outlier under the most probable hypothesis below which none need be thought of.
+/// Chosen: one in 1,100 changes no belief and saves most of the work.
 const UNLIKELY: f64 = -7.0;
 
 /// Variances of the first pose of a track. No earlier pose tells whether it is an outlier, so it is

@@ -36,6 +36,7 @@ impl Default for Resampling {
     fn default() -> Self {
         Self {
             scheme: Scheme::Systematic,
+            // The customary one: resampling adds noise, too.
             threshold: 0.5,
         }
     }

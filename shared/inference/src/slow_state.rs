@@ -13,6 +13,7 @@ pub struct Drift {
 }
 
 impl Drift {
+    /// A tolerance is two deviations: 95 % of healthy states lie within.
     fn variance(&self) -> f64 {
         0.25 * self.tolerance * self.tolerance
     }

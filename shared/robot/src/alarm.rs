@@ -2,11 +2,12 @@
 
 use crate::learned::{Calibration, ModelError};
 
-/// An alarm falls when the log-odds have stayed this far below those that raise it ..
+/// An alarm falls when the log-odds have stayed this far below those that raise it (e^5 = 150: no
+/// wander toggles it) ..
 const CLEAR_BELOW: f64 = 5.0;
-/// .. and below these odds, whatever the threshold ..
+/// .. and below these odds (1.8 %), whatever the threshold ..
 const CLEAR_LOG_ODDS: f64 = -4.0;
-/// .. for this long, s.
+/// .. for this long, s: twenty 50 ms observations in a row.
 const CLEAR_S: f64 = 1.0;
 /// Slack when that time is compared, s: it is a sum of short intervals.
 const TIME_SLACK_S: f64 = 1e-6;

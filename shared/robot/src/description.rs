@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 use vigil_inference::track::MotionNoise;
 
-use crate::{FaultPrior, Tolerance};
+use crate::slip::{Ground, Motor, RockerBogie};
+use crate::{Body, FaultPrior, Tolerance};
 
 /// What kind of motion the command vector means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -143,6 +144,18 @@ pub struct Description {
     /// Healthy variation beside that of the runs learned from; left out: none.
     #[serde(default)]
     pub tolerance: Option<Tolerance>,
+    /// Drive motors; an `ackermann6` needs them, and the two below.
+    #[serde(default)]
+    pub motor: Option<Motor>,
+    /// Linkage that carries the wheels.
+    #[serde(default)]
+    pub linkage: Option<RockerBogie>,
+    /// Ground that its equilibria are solved on.
+    #[serde(default)]
+    pub ground: Option<Ground>,
+    /// How the body follows its command; left out: as that of a small robot.
+    #[serde(default)]
+    pub body: Body,
     /// How often faults come and go; left out: as usual.
     #[serde(default)]
     pub fault_prior: FaultPrior,

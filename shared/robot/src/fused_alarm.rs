@@ -10,9 +10,11 @@
 const NOMINAL: f64 = 0.5;
 /// .. and ends it after so much motion, s: which includes being all but certain for so long.
 const NOMINAL_S: f64 = 1.0;
-/// An alarm that a nominal diagnosis has ended stands again once that is below this.
+/// An alarm that a nominal diagnosis has ended stands again once that is below this. Chosen: 0.2
+/// below what ends it, so that a diagnosis at even odds does not toggle it.
 const DOUBTED: f64 = 0.3;
-/// A set of faults that has grown is believed after so much motion, s.
+/// A set of faults that has grown is believed after so much motion, s. Four 50 ms observations
+/// agree.
 const GROWN_S: f64 = 0.2;
 /// Slack when times are compared, s: they are sums of short intervals.
 const SLACK_S: f64 = 1e-6;

@@ -71,6 +71,14 @@ pub enum GeometryError {
         /// Height of the bogie's pivot, m.
         bogie: f64,
     },
+    /// A table is missing.
+    #[error("{robot} has no table [{table}]: the equilibrium of its wheels needs it")]
+    Table {
+        /// Name of the robot.
+        robot: String,
+        /// Which.
+        table: &'static str,
+    },
     /// A length or the mass is not a positive, finite number.
     #[error("{robot}: {quantity} is {found}: allowed is any finite number{allowed}")]
     Quantity {

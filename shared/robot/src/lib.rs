@@ -5,6 +5,7 @@
 //! ([`learned`]), or its nominal behaviour alone ([`nominal`]).
 
 pub mod alarm;
+mod body;
 pub mod description;
 pub mod disturbance;
 pub mod fault;
@@ -23,6 +24,7 @@ pub mod slip;
 pub mod tolerance;
 
 pub use alarm::{Alarm, AlarmError};
+pub use body::Body;
 pub use description::Description;
 pub use disturbance::{Disturbance, DisturbanceKind};
 pub use fault::{Fault, FaultKind};

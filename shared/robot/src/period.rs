@@ -1,10 +1,12 @@
 //! The period of a sensor's frames, from the times at which they were captured.
 
-/// Intervals remembered.
+/// Intervals remembered. Chosen: the low third, ten of them, holds the period whatever befalls the
+/// others.
 const MEMORY: usize = 31;
 /// Intervals after which one is judged by the others, and the part of the period below which it is
-/// none.
+/// none. The low quantile then stands on its third smallest.
 const KNOWN: usize = 8;
+/// A frame sent twice follows at once; no jitter is four fifths of a period.
 const DOUBLE: f64 = 0.2;
 
 /// A low quantile of the last intervals between frames. Frames that are lost, late or come in

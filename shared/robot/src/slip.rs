@@ -23,16 +23,20 @@ pub use condition::{Condition, WheelCondition};
 pub use loads::RockerBogie;
 pub use solver::Unknowns;
 
+use serde::{Deserialize, Serialize};
+
 use crate::Description;
 use crate::kinematics::{Ackermann6, GeometryError, ROVER_WHEELS, WheelTargets};
 
 /// Standard gravity as the weight of the reference rover assumes it, m/s².
 pub const GRAVITY_M_S2: f64 = 9.81;
-/// From this many stuck wheels on the rover cannot move: the free wheels spin in place.
+/// From this many stuck wheels on the rover cannot move: the free wheels spin in place. True of six
+/// wheels on the rover's ground.
 pub const IMMOBILE_STUCK: usize = 4;
 
 /// Drive motors: torque = `gain` (commanded rate - rate), limited; bearing friction against it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Motor {
     /// Gain of the rate controller, N m s/rad.
     pub gain_n_m_s: f64,
@@ -44,19 +48,17 @@ pub struct Motor {
     pub viscous_friction_n_m_s: f64,
 }
 
-impl Default for Motor {
-    /// The reference rover's motors.
-    fn default() -> Self {
-        Self {
-            gain_n_m_s: 6.0,
-            torque_max_n_m: 6.0,
-            dry_friction_n_m: 0.02,
-            viscous_friction_n_m_s: 0.02,
-        }
-    }
-}
-
 impl Motor {
+    /// Its quantities, all of which are above 0.
+    const fn quantities(&self) -> [(&'static str, f64); 4] {
+        [
+            ("motor.gain_n_m_s", self.gain_n_m_s),
+            ("motor.torque_max_n_m", self.torque_max_n_m),
+            ("motor.dry_friction_n_m", self.dry_friction_n_m),
+            ("motor.viscous_friction_n_m_s", self.viscous_friction_n_m_s),
+        ]
+    }
+
     /// Torque of a motor of which `share` is left, N m.
     fn torque(&self, share: f64, commanded_rad_s: f64, rate_rad_s: f64) -> f64 {
         let limit = share * self.torque_max_n_m;
@@ -84,11 +86,15 @@ impl Soil {
     }
 }
 
-impl Default for Soil {
-    /// The reference soil.
-    fn default() -> Self {
-        Self::uniform(0.65, 0.20)
-    }
+/// The ground on which a robot's equilibria are solved: that of the runs which its model learned
+/// from.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ground {
+    /// Friction coefficient.
+    pub friction: f64,
+    /// Shear modulus: relative slip at which 63 % of the friction is reached.
+    pub shear_modulus: f64,
 }
 
 /// What to solve for.
@@ -164,44 +170,49 @@ pub struct SlipModel {
     /// Wheels of the left and of the right side: front, middle, rear.
     sides: [[usize; 3]; 2],
     motor: Motor,
+    soil: Soil,
     weight_n: f64,
 }
 
 impl SlipModel {
-    /// The model of `robot` on the reference linkage and motors.
+    /// The model of `robot`.
     ///
     /// # Errors
-    /// [`GeometryError`] if the robot is not a six-wheel rocker-bogie rover.
+    /// [`GeometryError`] if the robot is not a six-wheel rocker-bogie rover, or its description
+    /// lacks a table.
     pub fn new(robot: &Description) -> Result<Self, GeometryError> {
-        Self::with_parts(robot, RockerBogie::default(), Motor::default())
-    }
-
-    /// The model of `robot` on a linkage and motors of its own.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn with_parts(
-        robot: &Description,
-        linkage: RockerBogie,
-        motor: Motor,
-    ) -> Result<Self, GeometryError> {
         let kinematics = Ackermann6::new(robot)?;
-        if !(robot.mass_kg.is_finite() && robot.mass_kg > 0.0) {
-            return Err(GeometryError::Quantity {
-                robot: robot.name.clone(),
-                quantity: "mass_kg",
-                found: robot.mass_kg,
-                allowed: " above 0",
-            });
-        }
+        let without = |table| GeometryError::Table {
+            robot: robot.name.clone(),
+            table,
+        };
+        let linkage = robot.linkage.ok_or_else(|| without("linkage"))?;
+        let motor = robot.motor.ok_or_else(|| without("motor"))?;
+        let ground = robot.ground.ok_or_else(|| without("ground"))?;
+        check_above_0(robot, &[("mass_kg", robot.mass_kg)])?;
+        check_above_0(
+            robot,
+            &[
+                ("ground.friction", ground.friction),
+                ("ground.shear_modulus", ground.shear_modulus),
+            ],
+        )?;
+        check_above_0(robot, &motor.quantities())?;
         let sides = linkage.sides(&robot.name, &kinematics)?;
         Ok(Self {
             kinematics,
             linkage,
             sides,
             motor,
+            soil: Soil::uniform(ground.friction, ground.shear_modulus),
             weight_n: robot.mass_kg * GRAVITY_M_S2,
         })
+    }
+
+    /// The ground of the robot's description under every wheel.
+    #[must_use]
+    pub const fn soil(&self) -> Soil {
+        self.soil
     }
 
     /// The ideal kinematics behind the model.
@@ -309,6 +320,19 @@ impl SlipModel {
             let drive = (gain * commanded.abs() - resistance).max(0.0);
             (drive / (gain + motor.viscous_friction_n_m_s)).copysign(commanded)
         })
+    }
+}
+
+fn check_above_0(robot: &Description, all: &[(&'static str, f64)]) -> Result<(), GeometryError> {
+    let is_wrong = |value: f64| !(value.is_finite() && value > 0.0);
+    match all.iter().find(|(_, value)| is_wrong(*value)) {
+        Some(&(quantity, found)) => Err(GeometryError::Quantity {
+            robot: robot.name.clone(),
+            quantity,
+            found,
+            allowed: " above 0",
+        }),
+        None => Ok(()),
     }
 }
 

@@ -16,7 +16,7 @@ fn situation(condition: Condition) -> Situation {
         curvature_1_m: 0.5,
         speed_m_s: 0.2,
         stuck: [false; 6],
-        soil: Soil::default(),
+        soil: Soil::uniform(0.65, 0.2),
         condition,
     }
 }

@@ -4,9 +4,7 @@
 mod rover;
 
 use rover::rover;
-use vigil_robot::slip::{
-    Condition, Motor, RockerBogie, Situation, SlipError, SlipModel, Soil, Solution,
-};
+use vigil_robot::slip::{Condition, Situation, SlipError, SlipModel, Soil, Solution};
 
 const LM: usize = 1;
 /// Left and right wheels exchanged, front to rear kept.
@@ -21,7 +19,7 @@ fn situation(curvature_1_m: f64, speed_m_s: f64, stuck: &[usize]) -> Situation {
         curvature_1_m,
         speed_m_s,
         stuck: std::array::from_fn(|i| stuck.contains(&i)),
-        soil: Soil::default(),
+        soil: Soil::uniform(0.65, 0.2),
         condition: Condition::default(),
     }
 }
@@ -344,13 +342,18 @@ fn other_robots_are_refused_with_a_reason() {
         error.contains("left") && error.contains("-0.175"),
         "{error}"
     );
-    let high = RockerBogie {
-        bogie_z_m: 0.25,
-        ..RockerBogie::default()
-    };
-    let refused = SlipModel::with_parts(&rover(), high, Motor::default());
-    let error = refused.unwrap_err().to_string();
+    let mut high = rover();
+    high.linkage.as_mut().unwrap().bogie_z_m = 0.25;
+    let error = SlipModel::new(&high).unwrap_err().to_string();
     assert!(error.contains("0.25 m (bogie)"), "{error}");
+    let mut motorless = rover();
+    motorless.motor = None;
+    let error = SlipModel::new(&motorless).unwrap_err().to_string();
+    assert!(error.contains("no table [motor]"), "{error}");
+    let mut weak = rover();
+    weak.motor.as_mut().unwrap().torque_max_n_m = 0.0;
+    let error = SlipModel::new(&weak).unwrap_err().to_string();
+    assert!(error.contains("motor.torque_max_n_m is 0"), "{error}");
     let mut weightless = rover();
     weightless.mass_kg = f64::NAN;
     let error = SlipModel::new(&weightless).unwrap_err().to_string();

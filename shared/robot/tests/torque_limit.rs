@@ -44,7 +44,7 @@ fn of_soil(slip: &SlipModel, drive: (f64, f64)) -> SMatrix<f64, 6, 6> {
     let mut sum = SMatrix::zeros();
     for wheel in 0..6 {
         let with = |factor: f64| {
-            let mut soil = Soil::default();
+            let mut soil = Soil::uniform(0.65, 0.2);
             soil.friction[wheel] *= factor;
             currents(slip, drive, soil, (0, 0.0))
         };
@@ -79,9 +79,9 @@ fn the_best_test_sees_half_a_motors_torque_by_three_to_four_deviations_in_two_se
                 let kept = 2.0 / lengths * (1.0 - (1.0 - (-lengths).exp()) / lengths);
                 let noise = SMatrix::<f64, 6, 6>::identity() * (sample * sample / samples);
                 let inverse = (soil * kept + noise).try_inverse().unwrap();
-                let healthy = currents(&slip, drive, Soil::default(), (0, 0.0));
+                let healthy = currents(&slip, drive, Soil::uniform(0.65, 0.2), (0, 0.0));
                 for wheel in 0..6 {
-                    let weak = currents(&slip, drive, Soil::default(), (wheel, *lost));
+                    let weak = currents(&slip, drive, Soil::uniform(0.65, 0.2), (wheel, *lost));
                     let moved = weak - healthy;
                     // The others carry most of what it does not, in tight turns least.
                     assert!(moved.sum().abs() < 0.5 * moved[wheel].abs());

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use vigil_blocks::{PARTICLE_CAPACITY, WHEELS};
 use vigil_robot::description::Kinematics;
+use vigil_robot::kinematics::GeometryError;
+use vigil_robot::slip::SlipModel;
 use vigil_robot::{AlarmError, Description, RobotModel, Tolerance};
 
 use crate::schema::{GraphFile, PARTICLES, Service, Socket, Source};
@@ -379,6 +381,19 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
             &format!("tolerance.{key}"),
             format!("{value} is out of range: allowed is {allowed}"),
         );
+    }
+    if let Some((key, value)) = robot.body.invalid() {
+        let message = format!("{value} is out of range: allowed is 0 or more, a factor from 1");
+        report(&format!("body.{key}"), message);
+    }
+    match SlipModel::new(robot) {
+        Err(error @ GeometryError::Table { table, .. }) if robot.has_fault_models() => {
+            report(table, error.to_string());
+        }
+        Err(error @ GeometryError::Quantity { quantity, .. }) if quantity.contains('.') => {
+            report(quantity, error.to_string());
+        }
+        _ => {}
     }
     if let Some((key, value)) = robot.fault_prior.invalid() {
         report(

@@ -15,7 +15,7 @@ use crate::servo::Servo;
 use crate::state::State;
 
 /// Wheels that stick one after another, each so soon after the one before, s, have one cause: this
-/// many times the rate at which a wheel sticks by itself.
+/// many times the rate at which a wheel sticks by itself. Chosen, not measured.
 const SOON_S: f64 = 1.0;
 const SOON: f64 = 20.0;
 

@@ -36,7 +36,7 @@ fn a_stuck_wheel_settles_at_the_models_equilibrium_and_mends() {
             curvature_1_m: 0.5,
             speed_m_s: 0.2,
             stuck,
-            soil: Soil::default(),
+            soil: Soil::uniform(0.65, 0.2),
             condition: Condition::default(),
         };
         model.solve(&situation, None).unwrap()

@@ -181,7 +181,7 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
         .collect();
     let held_out = split(&with_frames, args.test_fraction, args.seed);
     let options = Options::default();
-    let (mut model, report) = learning::learn(&runs, &labels, &held_out, &robot, &options)
+    let (mut model, mut report) = learning::learn(&runs, &labels, &held_out, &robot, &options)
         .map_err(|error| CommandError::usage(format!("{}: {error}", frames_file.display())))?;
     let terrain = labels::terrain(labels_file, &model.provenance.runs_learned);
     model.provenance = Provenance {
@@ -205,6 +205,7 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
         None => {}
     }
     let model = model.sealed();
+    report.bounds = learning::bounds::of(&model, &robot);
     let text = model.to_toml().map_err(CommandError::failure)?;
     write_whole(out, &text)
         .map_err(|error| CommandError::failure(format!("{}: {error}", out.display())))?;
@@ -358,5 +359,10 @@ fn table(report: &Report, out: &Path) -> String {
             mode.mode
         )
     }));
+    let bounds = report.bounds.lines();
+    if !bounds.is_empty() {
+        lines.push(String::new());
+        lines.extend(bounds);
+    }
     lines.join("\n")
 }

@@ -6,6 +6,7 @@ use vigil_robot::learned::further::{CurrentModel, CurrentsModel, YawRateModel};
 use vigil_robot::learned::wheels::rolling_rate;
 use vigil_robot::learned::{Further, FurtherModel, Model, Observation, Observer, Reading};
 
+use super::bounds::{REPEAT_RATE, current_sd};
 use super::least_squares::LeastSquares;
 use super::segments::SETTLE_S;
 use super::{LearnError, calibrate};
@@ -14,10 +15,6 @@ use crate::frames::Run;
 
 /// Observations averaged before the spread by the ground is found.
 const WINDOW: usize = 20;
-/// A current is never known better than this share of its sensor's noise.
-const SD_SHARE_MIN: f64 = 0.02;
-/// A repeat rate below this cannot be told from none.
-const REPEAT_RATE_MIN: f64 = 1e-4;
 /// Samples that a channel needs.
 const SAMPLES_MIN: f64 = 200.0;
 /// Mode of these runs, in messages.
@@ -100,7 +97,7 @@ fn noise(seen: &[Vec<Seen>], model: &Model, of: impl Fn(&Further) -> &Reading) -
         sum += (is.mean - was.mean).powi(2) * scale / 2.0;
         count += 1.0;
     }
-    let repeat_rate = ((repeats + 1.0) / (samples + 2.0)).max(REPEAT_RATE_MIN);
+    let repeat_rate = (repeats + 1.0) / (samples + 2.0);
     (count >= SAMPLES_MIN && sum > 0.0).then(|| [f64::sqrt(sum / count), repeat_rate])
 }
 
@@ -108,7 +105,7 @@ fn gyro(seen: &[Vec<Seen>], model: &Model) -> Option<YawRateModel> {
     let [noise_rad_s, repeat_rate] = noise(seen, model, |further| &further.yaw_rate)?;
     Some(YawRateModel {
         noise_rad_s,
-        repeat_rate,
+        repeat_rate: REPEAT_RATE.hold(repeat_rate),
     })
 }
 
@@ -130,7 +127,7 @@ fn currents(
     let one = |wheel| current(seen, robot, wheel, noise_a);
     Ok(Some(CurrentsModel {
         noise_a,
-        repeat_rate,
+        repeat_rate: REPEAT_RATE.hold(repeat_rate),
         wheels: (0..wheels).map(one).collect::<Result<_, _>>()?,
     }))
 }
@@ -173,6 +170,6 @@ fn current(
     Ok(CurrentModel {
         dry_a: [terms[0], terms[1], terms[2]],
         viscous_a_s_rad: terms[3],
-        sd_a: variance.max(0.0).sqrt().max(SD_SHARE_MIN * noise_a),
+        sd_a: current_sd(noise_a).hold(variance.max(0.0).sqrt()),
     })
 }

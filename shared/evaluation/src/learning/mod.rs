@@ -5,6 +5,7 @@
 //! tail of the detector's nominal log-odds, from which alarm thresholds follow. Left and right
 //! wheels are pooled by mirror symmetry. Runs left out take no part in any of it.
 
+pub mod bounds;
 mod calibrate;
 pub mod further;
 mod least_squares;
@@ -269,11 +270,11 @@ fn blank(robot: &Description, options: &Options) -> Model {
             steer_rad: noise.steer_rad,
         },
         command: CommandModel {
-            lag_s: 0.1,
-            lag_uncertainty: 2.0,
+            lag_s: robot.body.lag_s,
+            lag_uncertainty: robot.body.lag_uncertainty,
             curvature_max_1_m: robot.limits.curvature_1_m,
             speed_range_m_s: [0.0, robot.limits.speed_m_s],
-            standing_m_s: 0.02,
+            standing_m_s: robot.body.standing_m_s,
         },
         encoder: EncoderModel {
             repeat_rate: 1e-3,

@@ -7,10 +7,12 @@ use vigil_inference::angle::wrap;
 use vigil_inference::track::{Displacement, Track};
 use vigil_robot::learned::{Curve, Model, MotionModel, Observation};
 
+use super::bounds::{CORRELATION_MAX, DEVIATION_SD, LATERAL_SD, LENGTH_M, OFFSET_SD, WHITE_SD};
 use super::least_squares::LeastSquares;
 use super::segments::Segment;
 use super::simplex::minimise;
 use super::{LearnError, Options, SPEEDS_MIN};
+use crate::bounds::Limits;
 
 /// Length of the window over which a displacement is measured, s.
 const WINDOW_S: f64 = 2.0;
@@ -20,12 +22,11 @@ const END: usize = 5;
 const CURVATURES_MIN: usize = 5;
 /// Curvature below which a robot drives straight ahead, 1/m.
 const STRAIGHT_1_M: f64 = 0.02;
-/// Soil scatter per metre assumed for weighting windows against sensor noise.
+/// Soil scatter per metre assumed for weighting windows against sensor noise: it moves no mean.
 const SCATTER: f64 = 0.02;
-/// Noise of the lateral motion, which no stuck wheel changes much, as a fraction of the forward's.
+/// Noise of the lateral motion, which no stuck wheel changes much, as a fraction of the forward's:
+/// chosen, as that of the rover's effects (0.013 beside 0.10 m/m).
 const LATERAL: f64 = 0.15;
-/// No robot repeats its own motion better than to a thousandth, and no fit knows it better.
-const OFFSET_SD_MIN: f64 = 1e-3;
 /// Segments to which the noise is fitted at most: more add time, not precision.
 const SEGMENTS_MAX: usize = 120;
 
@@ -231,20 +232,19 @@ fn fit_noise(
 }
 
 fn with_noise(motion: &MotionModel, x: &[f64; 7]) -> MotionModel {
-    let bounded = |value: f64, low: f64, high: f64| value.exp().clamp(low, high);
-    let offset = |x: f64| bounded(x, OFFSET_SD_MIN, 1.0);
-    let (offset_yaw, offset_forward) = (offset(x[0]), offset(x[1]));
-    let (yaw, forward) = (bounded(x[2], 2e-4, 2.0), bounded(x[3], 2e-4, 2.0));
-    let white = bounded(x[6], 1e-4, 0.1);
+    let bounded = |value: f64, limits: &Limits| limits.hold(value.exp());
+    let (offset_yaw, offset_forward) = (bounded(x[0], &OFFSET_SD), bounded(x[1], &OFFSET_SD));
+    let (yaw, forward) = (bounded(x[2], &DEVIATION_SD), bounded(x[3], &DEVIATION_SD));
+    let white = bounded(x[6], &WHITE_SD);
     MotionModel {
         offset_sd: [
             offset_yaw,
             offset_forward,
-            (LATERAL * offset_forward).max(OFFSET_SD_MIN),
+            OFFSET_SD.hold(LATERAL * offset_forward),
         ],
-        deviation_sd: [yaw, forward, (LATERAL * forward).max(3e-4)],
-        deviation_length_m: bounded(x[4], 0.03, 3.0),
-        correlation: 0.98 * x[5].tanh(),
+        deviation_sd: [yaw, forward, LATERAL_SD.hold(LATERAL * forward)],
+        deviation_length_m: bounded(x[4], &LENGTH_M),
+        correlation: CORRELATION_MAX * x[5].tanh(),
         white_sd: [white, white, white],
         ..*motion
     }

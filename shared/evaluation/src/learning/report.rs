@@ -5,8 +5,10 @@ use vigil_robot::Description;
 use vigil_robot::learned::{Model, MotionModel};
 
 use super::LearnError;
+use super::bounds;
 use super::motion::{Predicted, follow};
 use super::segments::{Segment, Segments};
+use crate::bounds::Bounds;
 use crate::frames::Run;
 use crate::labels::Label;
 
@@ -79,6 +81,8 @@ pub struct Report {
     pub exposure_h: f64,
     /// Error by mode, on the runs left out; empty if none were.
     pub modes: Vec<ModeError>,
+    /// Numbers of the model that stand on a bound set by hand, or were not learned.
+    pub bounds: Bounds,
 }
 
 /// Errors on the `tested` runs.
@@ -113,6 +117,7 @@ pub fn report(
         runs_held_out: tested.len(),
         exposure_h: exposure.fold(f64::INFINITY, f64::min),
         modes,
+        bounds: bounds::of(model, robot),
     })
 }
 

@@ -5,12 +5,8 @@ use vigil_robot::Description;
 use vigil_robot::learned::{Model, Observation};
 
 use super::LearnError;
+use super::bounds::{BROKEN_SD, CLIP, REPEAT_RATE};
 use super::segments::Segments;
-
-/// Differences beyond this many deviations of the description's noise are no noise.
-const CLIP: f64 = 8.0;
-/// A repeat rate below this cannot be told from none.
-const REPEAT_RATE_MIN: f64 = 1e-4;
 
 /// Fits sensor noise, command range, repeat rate and a broken encoder's noise.
 ///
@@ -113,7 +109,7 @@ fn fit_encoder(model: &mut Model, segments: &Segments, robot: &Description) {
         }
     }
     if samples > 0.0 {
-        model.encoder.repeat_rate = ((repeats + 1.0) / (samples + 2.0)).max(REPEAT_RATE_MIN);
+        model.encoder.repeat_rate = REPEAT_RATE.hold((repeats + 1.0) / (samples + 2.0));
     }
     let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
     for (wheel, segment) in &segments.noisy {
@@ -131,6 +127,7 @@ fn fit_encoder(model: &mut Model, segments: &Segments, robot: &Description) {
     if count > 10.0 {
         let mean = sum / count;
         model.encoder.broken_mean_rad_s = mean;
-        model.encoder.broken_sd_rad_s = (squares / count - mean * mean).max(1e-4).sqrt();
+        let variance = squares / count - mean * mean;
+        model.encoder.broken_sd_rad_s = BROKEN_SD.hold(variance.max(0.0).sqrt());
     }
 }

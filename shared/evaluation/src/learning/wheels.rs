@@ -5,15 +5,14 @@ use vigil_robot::learned::wheels::{CREEPING_RAD_S, rolling_rate};
 use vigil_robot::learned::{Observation, RateModel};
 
 use super::LearnError;
+use super::bounds::{RATE_SD, RATE_SD_UNREAD};
 use super::least_squares::LeastSquares;
 use super::segments::Segment;
 
 /// Observations averaged before the fit.
 const WINDOW: usize = 20;
-/// A rate is never known better than this, rad/s.
-const RATE_SD_MIN_RAD_S: f64 = 0.008;
 /// How far from 1 a ratio is expected to be: with speeds close together, ratio and droop are all
-/// but the same, and this decides.
+/// but the same, and this decides. Chosen: radii of wheels are built to some percent.
 const RATIO_SD: f64 = 0.02;
 
 /// Fits every wheel's rate: a ratio to rolling, and a droop that is a quadratic in the curvature. A
@@ -46,13 +45,13 @@ fn fit_wheel(
         return Ok(RateModel {
             ratio: 1.0,
             droop_rad_s: [0.0; 3],
-            rate_sd_rad_s: 0.1,
+            rate_sd_rad_s: RATE_SD_UNREAD,
         });
     }
     let mut fit = LeastSquares::<4>::default();
     fit.push([1.0, 0.0, 0.0, 0.0], 1.0, 1.0 / (RATIO_SD * RATIO_SD));
     for window in &windows {
-        let floor = RATE_SD_MIN_RAD_S * RATE_SD_MIN_RAD_S;
+        let floor = RATE_SD.least.0 * RATE_SD.least.0;
         fit.push(window.basis(), window.rate, 1.0 / (window.variance + floor));
     }
     let singular = || LearnError::Singular {
@@ -71,7 +70,7 @@ fn fit_wheel(
     Ok(RateModel {
         ratio: terms[0],
         droop_rad_s: [terms[1], terms[2], terms[3]],
-        rate_sd_rad_s: variance.max(0.0).sqrt().max(RATE_SD_MIN_RAD_S),
+        rate_sd_rad_s: RATE_SD.hold(variance.max(0.0).sqrt()),
     })
 }
 

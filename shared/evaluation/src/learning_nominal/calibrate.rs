@@ -3,11 +3,14 @@
 use vigil_robot::Description;
 use vigil_robot::learned::Calibration;
 use vigil_robot::learned::Form;
+use vigil_robot::learned::calibration::SLOPE_UNKNOWN;
 use vigil_robot::learned::monitor::Channels;
 use vigil_robot::nominal::channel::FAULT_RATE_1_H;
 use vigil_robot::nominal::{Joint, Model, Monitor, Tail};
 
 use super::record::Record;
+use crate::bounds::Bounds;
+use crate::learning::bounds::SLOPE_LIMIT;
 use crate::maxima::Maxima;
 
 /// Adds the tail of each channel for each form, then that of all channels of a set together, then,
@@ -48,6 +51,27 @@ pub(super) fn fit(model: &mut Model, records: &[Record], robot: &Description) {
             let mut maxima = maxima(monitor, records, reported);
             let found = maxima.high_tail(channels, form, FAULT_RATE_1_H);
             model.calibration.push(found);
+        }
+    }
+}
+
+/// Tells which slopes stand on a bound, or were not learned.
+pub(super) fn tell(bounds: &mut Bounds, model: &Model) {
+    let channels = model.channel.iter().enumerate();
+    let tails = channels.flat_map(|(i, channel)| {
+        let tails = channel.tails.iter().enumerate();
+        tails.map(move |(k, tail)| (format!("channel[{i}].tails[{k}].slope"), tail.slope))
+    });
+    let joint = model.joint.iter().enumerate();
+    let joint = joint.map(|(i, joint)| (format!("joint[{i}].tail.slope"), joint.tail.slope));
+    let all = model.calibration.iter().enumerate();
+    let all = all.map(|(i, found)| (format!("calibration[{i}].tail_slope"), found.tail_slope));
+    for (key, slope) in tails.chain(joint).chain(all) {
+        if slope == SLOPE_UNKNOWN {
+            let number = (SLOPE_LIMIT.number, key);
+            bounds.given(true, number, slope, "the log is too short to show a tail");
+        } else {
+            bounds.look(&SLOPE_LIMIT, key, slope);
         }
     }
 }

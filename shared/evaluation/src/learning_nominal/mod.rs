@@ -166,17 +166,20 @@ pub fn learn(
         let name = report::name(target, &model.wheels);
         let untold = &untold[usize::from(target.quantity.is_pose())];
         terms.retain(|term| !untold.contains(term));
-        let trial = fit(&model, target, &terms, &train, &name)?;
+        let (trial, _) = fit(&model, target, &terms, &train, &name)?;
         let ratio = noise::whitened_rms(&trial, &test, &model);
-        let mut channel = fit(&model, target, &terms, &all, &name)?;
+        let (mut channel, drift_sd) = fit(&model, target, &terms, &all, &name)?;
         channel.held_out_ratio = ratio;
         let widen = model.widened * ratio.max(1.0);
         channel.variance = channel.variance.map(|variance| variance * widen * widen);
         channel.rest_sd *= widen;
         report.add(&name, &channel, widen);
+        let key = format!("channel[{}]", model.channel.len());
+        noise::tell(&mut report.bounds, &key, &channel, &all, (widen, drift_sd));
         model.channel.push(channel);
     }
     calibrate::fit(&mut model, &records, robot);
+    calibrate::tell(&mut report.bounds, &model);
     report.finish(&model);
     Ok((model.sealed(), report))
 }
@@ -229,14 +232,14 @@ fn whole(records: &[Record]) -> Vec<Part<'_>> {
     records.iter().map(Record::whole).collect()
 }
 
-/// Fits weights and noise of one channel.
+/// Fits weights and noise of one channel; with the drift of its offset that the log shows.
 fn fit(
     model: &Model,
     target: Target,
     terms: &[Term],
     records: &[Part<'_>],
     name: &str,
-) -> Result<Channel, NominalError> {
+) -> Result<(Channel, f64), NominalError> {
     let mut channel = Channel {
         target,
         terms: terms.to_vec(),
@@ -251,8 +254,8 @@ fn fit(
         tails: Vec::new(),
     };
     regression::fit(&mut channel, records, &model.sizes(), name)?;
-    noise::fit(&mut channel, records, model);
-    Ok(channel)
+    let drift_sd = noise::fit(&mut channel, records, model);
+    Ok((channel, drift_sd))
 }
 
 /// Factor on the deviations of a short log: two standard errors of a deviation from so many

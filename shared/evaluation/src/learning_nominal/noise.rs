@@ -5,19 +5,37 @@ use vigil_robot::nominal::channel::REST_S;
 use vigil_robot::nominal::{Channel, History, Model, Residual, Track};
 
 use super::record::Part;
+use crate::bounds::{Bounds, Limits};
 
 /// Motion before an observation counts, s, and how long the command must be steady for a pose.
 pub(super) const MOVING_S: f64 = 0.5;
 pub(super) const SETTLED_S: f64 = 1.0;
-/// Part of the runs whose scatter counts as usual, and the largest scatter.
+/// Part of the runs whose scatter counts as usual, and the bounds of the scatter.
 const USUAL: f64 = 0.95;
-const SCATTER_MAX: f64 = 10.0;
+const SCATTER: Limits = Limits {
+    number: "channel.scatter",
+    least: (1.0, "no run is quieter than the learned noise"),
+    most: (
+        10.0,
+        "a run noisier than three deviations all along is no healthy one",
+    ),
+};
 /// Time in which an offset may change as much as from run to run, s.
 const DRIFT_S: f64 = 60.0;
 /// Rounds of the fit of the variance.
 const STEPS: usize = 60;
 /// Bounds of the correlation.
-const CORRELATION: (f64, f64) = (-0.45, 0.97);
+const CORRELATION: Limits = Limits {
+    number: "channel.correlation",
+    least: (
+        -0.45,
+        "differences of white noise have -0.5, and then no mean is left to tell",
+    ),
+    most: (
+        0.97,
+        "residuals that last longer than 33 observations are an offset's drift",
+    ),
+};
 /// Length of the pieces whose means tell the scatter of an offset where there is one run,
 /// observations.
 const PIECE: usize = 100;
@@ -28,7 +46,7 @@ const FLOOR: f64 = 1e-3;
 
 /// The fastest motion in the log at rest counts as so many deviations.
 const REST_SDS: f64 = 3.0;
-/// Least deviation of a velocity at rest, m/s or rad/s.
+/// Least deviation of a velocity at rest, m/s or rad/s: chosen, below what any pose tells.
 const REST_SD_MIN: f64 = 1e-3;
 
 /// Drifts tried, per observation, relative to the residual's deviation.
@@ -59,8 +77,9 @@ fn residuals(channel: &Channel, record: &[&History], model: &Model) -> Vec<(Resi
     out
 }
 
-/// Fits variance, correlation, offset and drift.
-pub(super) fn fit(channel: &mut Channel, records: &[Part<'_>], model: &Model) {
+/// Fits variance, correlation, offset and drift. Returns the drift that the log shows, which the
+/// channel's may not reach.
+pub(super) fn fit(channel: &mut Channel, records: &[Part<'_>], model: &Model) -> f64 {
     let several = records.len() > 1;
     let of = |record: &Part<'_>| residuals(channel, &record.histories, model);
     let whole: Vec<Vec<(Residual, bool)>> = records.iter().map(of).collect();
@@ -82,8 +101,7 @@ pub(super) fn fit(channel: &mut Channel, records: &[Part<'_>], model: &Model) {
         }
     }
     channel.variance = variance(&squares);
-    let floor = FLOOR * usual_size(channel, records);
-    channel.variance[0] = channel.variance[0].max(floor * floor).max(1e-12);
+    channel.variance[0] = channel.variance[0].max(variance_min(channel, records));
     channel.correlation = correlation(channel, &squares);
     let within = mean(
         squares
@@ -100,9 +118,47 @@ pub(super) fn fit(channel: &mut Channel, records: &[Part<'_>], model: &Model) {
     // In a minute, an offset may change as much as from run to run, and no more: a faster one would
     // explain a fault away.
     let limit = channel.offset_sd * (model.interval_s / DRIFT_S).sqrt();
-    channel.drift_sd = drift(channel, &whole).min(limit);
+    let drift_sd = drift(channel, &whole);
+    channel.drift_sd = drift_sd.min(limit);
     channel.scatter = scatter(channel, &whole, length);
     channel.rest_sd = rest_sd(channel, records, &whole);
+    drift_sd
+}
+
+/// Least constant part of a channel's variance.
+fn variance_min(channel: &Channel, records: &[Part<'_>]) -> f64 {
+    let floor = FLOOR * usual_size(channel, records);
+    (floor * floor).max(1e-12)
+}
+
+/// Tells which numbers of the channel at `key`, whose deviations were widened by `widen`, stand on
+/// a bound; `drift_sd`: what [`fit`] returned.
+pub(super) fn tell(
+    bounds: &mut Bounds,
+    key: &str,
+    channel: &Channel,
+    records: &[Part<'_>],
+    (widen, drift_sd): (f64, f64),
+) {
+    let mut look = |limits: &Limits, field: &str, value: f64| {
+        bounds.look(limits, format!("{key}.{field}"), value);
+    };
+    let least = variance_min(channel, records) * widen * widen;
+    let why = "a thousandth of the channel's size: a rounding is no fault";
+    let variance = Limits::least("channel.variance[0]", least, why);
+    look(&variance, "variance[0]", channel.variance[0]);
+    look(&CORRELATION, "correlation", channel.correlation);
+    look(&SCATTER, "scatter", channel.scatter);
+    if drift_sd > channel.drift_sd {
+        let why = "a mean may change in a minute as much as from run to run";
+        let most = Limits::most("channel.drift_sd", channel.drift_sd, why);
+        look(&most, "drift_sd", channel.drift_sd);
+    }
+    if channel.target.quantity.is_pose() {
+        let why = "no pose tells a slower motion at rest";
+        let rest = Limits::least("channel.rest_sd", REST_SD_MIN * widen, why);
+        look(&rest, "rest_sd", channel.rest_sd);
+    }
 }
 
 /// Deviation of the velocity that a pose shows at rest: that of its residuals in motion, which have
@@ -142,9 +198,7 @@ fn scatter(channel: &Channel, records: &[Vec<(Residual, bool)>], length: usize) 
     let at = (USUAL * squares.len().saturating_sub(1) as f64).round() as usize;
     squares
         .get(at)
-        .copied()
-        .unwrap_or(1.0)
-        .clamp(1.0, SCATTER_MAX)
+        .map_or(SCATTER.least.0, |&found| SCATTER.hold(found))
 }
 
 fn at(channel: &Channel, basis: [f64; 3]) -> f64 {
@@ -195,7 +249,7 @@ fn correlation(channel: &Channel, squares: &[(f64, [f64; 3], bool)]) -> f64 {
         along += if follows { normal * before } else { 0.0 };
         before = normal;
     }
-    (along / all).clamp(CORRELATION.0, CORRELATION.1)
+    CORRELATION.hold(along / all)
 }
 
 /// The drift of the offset under which all residuals are most likely.

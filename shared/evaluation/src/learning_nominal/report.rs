@@ -8,6 +8,7 @@ use vigil_robot::nominal::{Channel, Model, Quantity, Target, Term};
 
 use super::LONG_ENOUGH_S;
 use super::view::word;
+use crate::bounds::Bounds;
 use crate::learning::RESIDUAL_BAR;
 
 /// Deviation of a pose's velocity at rest from which it is told, m/s or rad/s.
@@ -47,6 +48,8 @@ pub struct Report {
     pub channels: Vec<ChannelError>,
     /// What the user must know.
     pub warnings: Vec<String>,
+    /// Numbers of the model that stand on a bound set by hand.
+    pub bounds: Bounds,
 }
 
 impl Report {
@@ -86,6 +89,7 @@ impl Report {
             exposure_s: model.exposure_s,
             channels: Vec::new(),
             warnings,
+            bounds: Bounds::default(),
         }
     }
 
@@ -216,6 +220,10 @@ impl fmt::Display for Report {
                 channel.widened
             )?;
         }
-        Ok(())
+        let lines = self.bounds.lines();
+        if !lines.is_empty() {
+            writeln!(f)?;
+        }
+        lines.iter().try_for_each(|line| writeln!(f, "{line}"))
     }
 }

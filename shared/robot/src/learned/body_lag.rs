@@ -10,29 +10,35 @@
 const LAGS_S: [f64; LAGS] = [0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5];
 /// Number of candidates.
 const LAGS: usize = 7;
-/// No candidate becomes less probable than this: a load may change.
+/// No candidate becomes less probable than this: a load may change. It comes back from it in four
+/// windows: 3 nats each, ln 1e4 = 9.2.
 const P_MIN: f64 = 1e-4;
 /// Observations whose displacements are compared as one: over a single one the noise of the pose
-/// hides what a lag does, and more of them are as likely to hold a change of the ground.
+/// hides what a lag does, and more of them are as likely to hold a change of the ground. One second
+/// of 50 ms: twice the longest lag.
 const WINDOW: u32 = 20;
 /// One window changes the odds of two candidates by this much at most, nat: it may hold an outlier.
+/// e^3 = 20 leaves a rival of even odds a twentieth.
 const GAIN_MAX: f64 = 3.0;
 /// How far a displacement per metre changes with the command beyond its model, m/m and rad/m: in
 /// health, and while a fault is suspected. No lag is learned from that.
 const SLIP_SD: [f64; 2] = [0.03, 0.1];
-/// Part of a window's slip that enters the running estimate of it.
+/// Part of a window's slip that enters the running estimate of it. Chosen: followed within three
+/// windows, 3 s.
 const SLIP_SHARE: f64 = 0.3;
 /// Part of a window's misfit that enters the running estimate of how noisy the measurement is, and
-/// how many times that it may be.
+/// how many times that it may be. Chosen: slower than slip, ten windows; clipped at three
+/// deviations.
 const MISFIT_SHARE: f64 = 0.1;
 const MISFIT_CLIP: f64 = 9.0;
 /// A window with less travel than this says nothing on slip, m.
 const TRAVEL_MIN_M: f64 = 0.02;
-/// Time for which an error of the prediction counts as one with those before, s: about as long as
-/// a change of the command and its correction by the pose take.
+/// Time for which an error of the prediction counts as one with those before, s: about as long as a
+/// change of the command and its correction by the pose take. Six of the longest lags.
 const COHERENT_S: f64 = 3.0;
 /// Factor on the growth of its variance: a filter takes it for white noise and averages it, which
-/// an error of one sign does not do.
+/// an error of one sign does not do. Errors of one sign over n observations add up to n times the
+/// variance: chosen, three.
 const COHERENCE: f64 = 3.0;
 
 /// Commanded motion between two observations, from middle to middle, as the body follows it.

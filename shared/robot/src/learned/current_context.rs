@@ -10,12 +10,11 @@
 use vigil_blocks::WHEELS;
 use vigil_inference::slow_state::{Drift, SlowState};
 
+use super::wheel_context::FAR_SD;
 use crate::tolerance::FurtherTolerance;
 
-/// Length within which slopes come and go, m.
+/// Length within which slopes come and go, m: chosen, a quarter of that of other ground.
 const SLOPE_LENGTH_M: f64 = 2.0;
-/// Deviations from the median beyond which a wheel teaches nothing.
-const FAR_SD: f64 = 4.0;
 
 /// One wheel's current beside the model's.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,7 +5,8 @@ use vigil_inference::constant::Constant;
 use vigil_inference::outlier::tempered;
 use vigil_inference::windowed::Windowed;
 
-/// Constant of the paper's forms per dimension: above 1, or nominal residuals are evidence.
+/// Constant of the paper's forms per dimension: above 1, or nominal residuals are evidence. Health
+/// loses (1.6 - 1) / 2 = 0.3 nats an observation and dimension.
 pub const TAU_SQUARED_PER_DIMENSION: f64 = 1.6;
 /// Observations in a window: half a second. Longer ones see smaller faults, and fall more slowly.
 const WINDOW: usize = 10;

@@ -6,11 +6,11 @@ use vigil_blocks::{SensorFrame, Valid, WHEELS};
 
 use super::Reading;
 use super::model::{ModelError, check_range, refuse};
+use crate::frame_guard::CURRENT_MAX_A;
 
 /// Below this rate the dry friction of a bearing turns round, rad/s.
 const DRY_RAD_S: f64 = 0.05;
-/// Currents and yaw rates beyond these are no measurement, A and rad/s.
-const CURRENT_MAX_A: f64 = 1e4;
+/// Yaw rates beyond this are no measurement, rad/s.
 const YAW_RATE_MAX_RAD_S: f64 = 1e3;
 
 /// What was learned of the further channels: those that the frames held.

@@ -15,7 +15,8 @@ use super::repeats::Repeats;
 use super::{Model, Observation};
 use crate::Description;
 
-/// Shares of the prior beside those of the other channels: how a fault of these first shows.
+/// Shares of the prior beside those of the other channels: how a fault of these first shows. A
+/// share counts by its logarithm only: half as much is 0.7 nats later.
 const SHARE_CURRENTS: f64 = 0.3;
 const SHARE_GYRO: f64 = 0.05;
 const SHARE_REPEATS: f64 = 0.05;

@@ -7,7 +7,7 @@ use vigil_inference::track::{Context, MotionNoise, Track};
 use super::{Model, WheelContext};
 use crate::Description;
 
-/// Deviation of a pose of which nothing but a measurement is known, m and rad.
+/// Deviation of a pose of which nothing but a measurement is known, m and rad: twice its noise.
 const UNSURE_M: f64 = 0.01;
 
 /// Variances of a pose or a deviation that no healthy track has.

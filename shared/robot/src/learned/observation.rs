@@ -15,7 +15,7 @@ use super::{BodyLag, Model, MotionModel, Reading};
 use crate::Description;
 use crate::period::FramePeriod;
 
-/// A gap in the frames beyond which the pose starts anew, s.
+/// A gap in the frames beyond which the pose starts anew, s: chosen, twenty observations.
 const GAP_S: f64 = 1.0;
 /// Period assumed of a run's first frame, s: as noisy as at the highest rate.
 const FRAME_UNKNOWN_S: f64 = 1e-3;
@@ -23,15 +23,15 @@ const FRAME_UNKNOWN_S: f64 = 1e-3;
 const POSITION_MAX_M: f64 = 1e7;
 /// So many frames in a row that are not newer than the last one taken mean that the clock was set
 /// back: the next is taken, as after a gap.
-const STALE_MAX: u32 = 10;
-/// Part of a frame that may lack to an interval: frames are never exactly periodic.
+pub(crate) const STALE_MAX: u32 = 10;
+/// Part of a frame that may lack to an interval, below half a one: frames are not quite periodic.
 const NEARLY: f64 = 0.4;
-/// Difference of commanded and lagged curvature up to which a drive counts as steady, 1/m.
+/// Difference of commanded and lagged curvature up to which a drive is steady, 1/m: 0.1 of the most.
 const STEADY_1_M: f64 = 0.1;
 /// Random motion of a robot that creeps or rests, per observation and axis, as a share of the pose
 /// sensor's deviation: its track follows the measured pose, and learns no slope from it.
 const RESTS: f64 = 0.1;
-/// Part of the speed at which a robot counts as standing that is no command to creep.
+/// Part of the speed at which a robot counts as standing that is no command to creep: chosen.
 const STANDS: f64 = 0.1;
 
 /// Frames averaged over about the learned interval.

@@ -4,14 +4,13 @@ use vigil_blocks::WHEELS;
 use vigil_inference::logspace::{log_add, log_normal};
 use vigil_inference::outlier::tempered;
 
+use super::wheel_evidence::ANYTHING;
 use super::wheels::steering_angle;
 use super::{Model, NoiseScales, Observation};
 use crate::Description;
 
-/// Standard deviation of a steering angle that does anything, rad.
+/// Standard deviation of a steering angle that does anything, rad: half of what a servo turns.
 const ANY_RAD: f64 = 0.3;
-/// Share of servos that do anything, in the unknown.
-const ANYTHING: f64 = 0.2;
 /// An angle that does anything is at most so much more likely than one as commanded (natural
 /// logarithm): a single reading decides nothing.
 const RATIO_MAX: f64 = 30.0;

@@ -25,8 +25,8 @@ use crate::Description;
 
 /// Most modes that there can be: nominal, stuck wheels, broken encoders, unknown.
 pub const MODES_MAX: usize = 2 * WHEELS + 3;
-/// Share of observations in which wheels may still read as before an onset: the state does not
-/// hold when its mode began.
+/// Share of observations in which wheels may still read as before an onset: the state does not hold
+/// when its mode began. 0.15 s of an onset in the ring's 3 s.
 const AT_ONSET: f64 = 0.05;
 /// Variance below which a motion has no density worth comparing.
 const VARIANCE_MIN: f64 = 1e-14;

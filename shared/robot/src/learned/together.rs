@@ -23,12 +23,15 @@ const SPEEDS: usize = 3;
 const NODES: usize = TURNS.len() * SPEEDS;
 /// Terms of a wheel's droop.
 const DROOP: usize = 3;
-/// Soils that the robot may drive on, relative to the reference soil: friction, shear modulus. Two
-/// pairs, each one deviation up and one down.
+/// Soils that the robot may drive on, relative to the described ground: friction, shear modulus. Two
+/// pairs, each one deviation up and one down. Chosen: a quarter of the friction, two thirds of the
+/// modulus.
 const SOILS: [(f64, f64); 4] = [(0.8, 1.0), (1.25, 1.0), (1.0, 0.6), (1.0, 1.7)];
-/// Change of the friction under one wheel by which its effect is found, relative.
+/// Change of the friction under one wheel by which its effect is found, relative. A difference
+/// quotient: the step divides out.
 const FRICTION_STEP: f64 = 0.08;
-/// Deviation of the motion per metre that nothing here explains: yaw, forward, lateral.
+/// Deviation of the motion per metre that nothing here explains: yaw, forward, lateral. Chosen: a
+/// fifth to a twelfth of the unknown's.
 const FLOOR_SD: [f64; 3] = [0.05, 0.03, 0.01];
 
 type Nodes = SVector<f64, NODES>;
@@ -159,7 +162,7 @@ impl<'a> Together<'a> {
         let floor = Vector3::from(FLOOR_SD.map(|sd| sd * sd));
         let uneven = self.of_uneven_ground(stuck)? * self.unevenness;
         let soils = SOILS.map(|(friction, modulus)| {
-            let soil = Soil::default();
+            let soil = self.slip.soil();
             Soil::uniform(soil.friction[0] * friction, soil.shear_modulus * modulus)
         });
         let alone = self.model.stuck.iter().map(|stuck| stuck.motion.noise());
@@ -180,7 +183,7 @@ impl<'a> Together<'a> {
     /// Covariance of the motion per metre by friction that differs from wheel to wheel.
     fn of_uneven_ground(&self, stuck: u32) -> Option<Matrix3<f64>> {
         let soils: [Soil; ROVER_WHEELS] = std::array::from_fn(|wheel| {
-            let mut soil = Soil::default();
+            let mut soil = self.slip.soil();
             soil.friction[wheel] *= 1.0 + FRICTION_STEP;
             soil
         });
@@ -192,7 +195,7 @@ impl<'a> Together<'a> {
         let mut sum = Matrix3::zeros();
         for turn in TURNS_NOISE {
             let node = self.nodes[turn * SPEEDS + SPEEDS / 2];
-            let (reference, _, start) = solve(&self.slip, node, stuck, Soil::default(), None)?;
+            let (reference, _, start) = solve(&self.slip, node, stuck, self.slip.soil(), None)?;
             for soil in soils {
                 let (motion, ..) = solve(&self.slip, node, stuck, *soil, Some(&start))?;
                 let change = motion - reference;
@@ -225,14 +228,14 @@ fn side_by_side<'a>(
     sums.zip(with.zip(without.motion.iter().chain(&without.rates)))
 }
 
-/// The reference soil at all nodes.
+/// The described ground at all nodes.
 fn equilibrium(slip: &SlipModel, nodes: &[(f64, f64); NODES], stuck: u32) -> Option<Equilibrium> {
     let mut found = Equilibrium {
         motion: [SVector::zeros(); 3],
         rates: [SVector::zeros(); WHEELS],
     };
     for (index, &node) in nodes.iter().enumerate() {
-        let (motion, rates, _) = solve(slip, node, stuck, Soil::default(), None)?;
+        let (motion, rates, _) = solve(slip, node, stuck, slip.soil(), None)?;
         for (at_nodes, value) in found.motion.iter_mut().zip(&motion) {
             at_nodes[index] = *value;
         }

@@ -8,7 +8,7 @@ use vigil_inference::angle::wrap;
 
 use super::{Model, Observation};
 
-/// A channel that says nothing for so long is silent, s. Slower sensors are not supported.
+/// A channel that says nothing for so long is silent, s: chosen. Slower sensors are not supported.
 const SILENT_S: f64 = 2.0;
 /// A pose that repeats itself exactly for so long in motion is frozen, s: if in this run it has
 /// changed so often, and never stood for a quarter as long.
@@ -16,20 +16,25 @@ const FROZEN_S: f64 = 1.0;
 const CHANGES: u32 = 40;
 /// Two poses less apart are the same, m and rad: means of equal numbers differ in the last bit.
 const SAME: f64 = 1e-12;
-/// Time for which the robot is commanded to stand before it is expected to, s.
+/// Time for which the robot is commanded to stand before it is expected to, s: twice the longest
+/// lag.
 const STOPPED_S: f64 = 1.0;
-/// Motion at rest counts when it lasts so long, s: no single reading decides.
+/// Motion at rest counts when it lasts so long, s: no single reading decides. Six 50 ms
+/// observations.
 const LASTING_S: f64 = 0.3;
-/// How far a standing robot's pose may wander within [`WANDERING_S`], m and rad, besides its noise.
+/// How far a standing robot's pose may wander within [`WANDERING_S`], m and rad, besides its noise:
+/// ten and twenty deviations of it.
 const WANDER_M: f64 = 0.05;
 const WANDER_RAD: f64 = 0.1;
-/// Time over which a slow wandering of the pose is taken for the map's, s.
+/// Time over which a slow wandering of the pose is taken for the map's, s. 0.05 m in it are 5 mm/s:
+/// slower is the map's, faster the robot's.
 const WANDERING_S: f64 = 10.0;
-/// Poses whose mean is where the robot rests.
+/// Poses whose mean is where the robot rests. 0.3 s of 50 ms: their mean has 0.4 of the noise.
 const REST_POSES: u32 = 6;
-/// Deviations of the pose's noise that are no motion.
+/// Deviations of the pose's noise that are no motion. By chance 2 in 1e9: once in ten months at 20
+/// Hz.
 const NOISE_SD: f64 = 6.0;
-/// A standing robot's wheels turn slower than this, rad/s.
+/// A standing robot's wheels turn slower than this, rad/s: six deviations of their noise.
 const TURNING_RAD_S: f64 = 0.3;
 
 /// What is the matter.

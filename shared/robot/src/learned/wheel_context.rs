@@ -10,12 +10,14 @@ use vigil_inference::slow_state::SlowState;
 
 use crate::Tolerance;
 
-/// Rates below this one tell little of a share of them, rad/s.
-const TURNS_RAD_S: f64 = 0.3;
+/// Rates below so many tolerances of one wheel's rate tell little of a share of them: that tolerance
+/// is a fifth of them, and more.
+const TURNS: f64 = 5.0;
 /// Variance of the median of normal values over that of their mean.
 const MEDIAN: f64 = std::f64::consts::FRAC_PI_2;
-/// Deviations from what is expected beyond which a wheel teaches nothing of itself.
-const FAR_SD: f64 = 4.0;
+/// Deviations from what is expected beyond which a reading teaches nothing: one healthy one in
+/// 16,000 lies so far out.
+pub const FAR_SD: f64 = 4.0;
 /// A variance that no state has, (rad/s)².
 const VARIANCE_MAX: f64 = 1e6;
 
@@ -122,8 +124,10 @@ impl WheelContext {
     /// Median over the wheels that turn of the share by which they fall behind, and its variance.
     fn median_ratio(&self, wheels: &[Option<Beside>; WHEELS]) -> Option<(f64, f64)> {
         let (mut ratios, mut count, mut variance) = ([0.0; WHEELS], 0, 0.0);
+        let rate = |tolerance: Tolerance| tolerance.wheel_rate_rad_s;
+        let least_rad_s = TURNS * self.tolerance.map_or(0.0, rate);
         for (beside, offset) in wheels.iter().zip(&self.offsets) {
-            let turns = beside.filter(|beside| beside.rolling_rad_s.abs() >= TURNS_RAD_S);
+            let turns = beside.filter(|beside| beside.rolling_rad_s.abs() >= least_rad_s);
             let Some(beside) = turns else { continue };
             ratios[count] = (beside.apart_rad_s - offset.mean) / beside.rolling_rad_s;
             variance += beside.variance / (beside.rolling_rad_s * beside.rolling_rad_s);

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use vigil_inference::logspace::{log_add, log_normal};
 
 use super::Reading;
+use super::repeats::FAILS;
 use crate::Description;
 
 /// Rate (rad/s) that rolling without slip demands of `wheel` at a curvature (1/m) and speed (m/s):
@@ -59,10 +60,12 @@ impl RateModel {
     }
 }
 
-/// Below this rate a wheel carries less than its load at speed, rad/s.
+/// Below this rate a wheel carries less than its load at speed, rad/s: four fifths of that of a wheel
+/// of the rover at the speed at which it counts as standing.
 pub const CREEPING_RAD_S: f64 = 0.2;
 
-/// Deviation of a healthy wheel that no model explains, rad/s.
+/// Deviation of a healthy wheel that no model explains, rad/s: a fifth of an encoder's noise. It
+/// comes on top of the learned one, which the learner bounds below by 0.008 rad/s.
 const RATE_FLOOR_RAD_S: f64 = 0.01;
 
 /// What encoders do in health and when broken.
@@ -102,17 +105,16 @@ pub enum EncoderState {
 }
 
 impl EncoderState {
-    /// Standard deviation of the tail of a turning wheel's rate, rad/s.
+    /// Standard deviation of the tail of a turning wheel's rate, rad/s: four times an encoder's noise.
     pub const TAIL_SD_RAD_S: f64 = 0.2;
 }
 
-/// Probability that a broken encoder does not do what its fault says in one sample.
-const EXCEPTION: f64 = 0.01;
-/// Share of readings that nothing explains (a fault in the middle of an observation).
+/// Share of readings that nothing explains (a fault in the middle of an observation). One
+/// observation in 50 s holds a fault's very moment: 6.9 nats.
 const OUTLIER: f64 = 1e-3;
-/// Deviation of a standing wheel's rate from zero, rad/s.
-const STANDING_SD_RAD_S: f64 = 0.02;
-/// Deviation of a rate of its own from one observation to the next, rad/s.
+/// Deviation of a standing wheel's rate from zero, rad/s: chosen, below half of an encoder's noise.
+pub const STANDING_SD_RAD_S: f64 = 0.02;
+/// Deviation of a rate of its own from one observation to the next, rad/s: an encoder's noise.
 const OWN_RATE_SD_RAD_S: f64 = 0.05;
 
 impl EncoderModel {
@@ -123,8 +125,9 @@ impl EncoderModel {
         let (plain, repeats) = (f64::from(reading.plain), f64::from(reading.repeats));
         let (zeros, count) = (f64::from(reading.zeros), f64::from(reading.count()));
         let noise = self.independent(reading, self.broken_mean_rad_s, self.broken_sd_rad_s);
-        let hit = (1.0 - EXCEPTION).ln();
-        let miss = (EXCEPTION * self.resolution_rad_s / (4.0 * self.broken_sd_rad_s)).ln();
+        let hit = (1.0 - FAILS).ln();
+        // A value drawn evenly over two deviations either way of a broken encoder's.
+        let miss = (FAILS * self.resolution_rad_s / (4.0 * self.broken_sd_rad_s)).ln();
         match state {
             EncoderState::Turning(rate, variance, tail) => {
                 let sharp = self.common(reading, rate, variance, sample_sd);

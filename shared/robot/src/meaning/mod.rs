@@ -21,22 +21,26 @@ pub use finding::{Finding, Kind};
 use pose::Poses;
 use wheels::Wheels;
 
-/// Speed from which a robot counts as commanded to move, m/s.
-const MOVING_M_S: f64 = 0.02;
-/// A ratio within this factor of 1 is nothing: ground and faults do as much.
+/// A ratio within this factor of 1 is nothing: ground and faults do as much. The least factor of a
+/// unit is that of feet, 3.3.
 const RATIO_MAX: f64 = 3.0;
-/// Curvature from which turns are judged, 1/m: below it a fault turns a robot as much.
+/// Curvature from which turns are judged, 1/m: below it a fault turns a robot as much (up to 0.32
+/// rad/m by a stuck wheel of the rover).
 const TURNING_1_M: f64 = 0.3;
-/// Commanded turn from which they are, rad.
+/// Commanded turn from which they are, rad. Forty deviations of a yaw noise of 5 mrad.
 const TURN_MIN_RAD: f64 = 0.2;
-/// Ratios of turns: a sign is wrong below, a unit above.
+/// Ratios of turns: a sign is wrong below, a unit above. A wrong sign reads -1: half-way to none
+/// leaves room for ground.
 const TURN_REVERSED: f64 = -0.5;
+/// Between a right one, 1, and degrees, 57, in the geometric mean.
 const TURN_UNIT: f64 = 8.0;
-/// A pause in the frames beyond which the motion counts as interrupted, s.
+/// A pause in the frames beyond which the motion counts as interrupted, s. Six periods of a sensor
+/// of 20 Hz.
 const PAUSE_S: f64 = 0.3;
-/// A command must have stood so long before a frame counts, s: a body needs time to follow.
+/// A command must have stood so long before a frame counts, s: three lags of [`crate::Body`].
 const SETTLED_S: f64 = 0.3;
-/// Change of the commanded velocity that begins this anew, m/s and rad/s.
+/// Change of the commanded velocity that begins this anew, m/s and rad/s: chosen, a tenth of the
+/// rover's fastest.
 const CHANGE: f64 = 0.05;
 /// Tests there may be: travel, turn, gyro, unit, and by wheel sign, steering, side.
 const TESTS: usize = 4 + 3 * vigil_blocks::WHEELS;
@@ -160,7 +164,7 @@ impl Meaning {
         let twist = self.robot.twist(&frame.command);
         let mut axes = 0..self.robot.command.len();
         let is_told = axes.all(|i| frame.has(Valid::command(i)));
-        let moves = is_told && self.robot.path_speed_m_s(twist) >= MOVING_M_S;
+        let moves = is_told && self.robot.path_speed_m_s(twist) >= self.robot.body.standing_m_s;
         let is_broken = !moves || !(f64::MIN_POSITIVE..=PAUSE_S).contains(&dt_s);
         let mut changes = self.twist.iter().zip(twist).map(|(a, b)| (a - b).abs());
         let is_changed = changes.any(|change| change > CHANGE);
@@ -182,7 +186,8 @@ impl Meaning {
     }
 
     fn add(&mut self, frame: &SensorFrame, twist: [f64; 3], dt_s: f64) {
-        self.poses.take(frame, twist, dt_s);
+        let standing_m_s = self.robot.body.standing_m_s;
+        self.poses.take(frame, twist, dt_s, standing_m_s);
         let turns = twist[2].abs() >= TURNING_1_M * twist[0].hypot(twist[1]);
         if turns && frame.has(Valid::YAW_RATE) {
             self.gyro[0] += frame.yaw_rate * twist[2] * dt_s;

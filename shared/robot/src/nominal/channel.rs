@@ -10,7 +10,8 @@ use crate::learned::monitor::Channels;
 /// Rate at which a wheel's sense of turning counts as half decided, rad/s: friction changes its
 /// sign with it.
 const SENSE_RAD_S: f64 = 0.5;
-/// Rest after which a robot has stopped, s: motion then was not commanded.
+/// Rest after which a robot has stopped, s: motion then was not commanded. Chosen: as long as a
+/// robot may take to stop.
 pub const REST_S: f64 = 1.0;
 /// Prior fault rate at which log-odds are collected and tempered, 1/h.
 pub const FAULT_RATE_1_H: f64 = 1.0;

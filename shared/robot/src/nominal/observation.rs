@@ -4,23 +4,20 @@ use vigil_blocks::{COMMANDS, SensorFrame, Valid, WHEELS};
 use vigil_inference::angle::wrap;
 
 use crate::Description;
+use crate::frame_guard::BEYOND_LIMITS;
 use crate::learned::Intake;
+use crate::learned::observation::STALE_MAX;
 
 /// Observations that a prediction may look back, the newest included.
 pub const DEPTH: usize = 5;
-/// A pause between frames longer than this breaks the record, s.
+/// A pause between frames longer than this breaks the record, s. As far as a prediction looks back:
+/// five observations of 0.1 s.
 const GAP_S: f64 = 0.5;
-/// So many frames in a row that are not newer than the last one taken mean that the clock was set
-/// back: the next is taken, as after a gap.
-const STALE_MAX: u32 = 10;
 /// A frame that comes this part of a period early still completes an observation.
 const NEARLY: f64 = 0.5;
-/// Readings beyond so many times the robot's limits are garbage.
-const GARBAGE: f64 = 10.0;
-/// Change of a command's axis, relative to its limit, after which the robot has to settle anew.
+/// Change of a command's axis, relative to its limit, after which the robot has to settle anew. A
+/// tenth is beyond the jitter of a planner's command.
 const CHANGE: f64 = 0.1;
-/// Commanded or driven speed below which a robot stands, m/s.
-pub const STANDING_M_S: f64 = 0.02;
 
 /// What was measured over one interval.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -239,14 +236,14 @@ impl Observer {
         };
         for (i, axis) in self.robot.command.iter().enumerate().take(COMMANDS) {
             let (bit, value) = (Valid::command(i), frame.command[i]);
-            push(&mut self.command[i], bit, value, GARBAGE * axis.limit);
+            push(&mut self.command[i], bit, value, BEYOND_LIMITS * axis.limit);
         }
         let limits = &self.robot.limits;
-        let largest = GARBAGE * limits.yaw_rate_rad_s;
+        let largest = BEYOND_LIMITS * limits.yaw_rate_rad_s;
         push(&mut self.yaw_rate, Valid::YAW_RATE, frame.yaw_rate, largest);
         for i in 0..self.robot.wheels.len().min(WHEELS) {
             let (rate, current) = (frame.wheel_rate[i], frame.current[i]);
-            let largest = GARBAGE * limits.wheel_rate_rad_s;
+            let largest = BEYOND_LIMITS * limits.wheel_rate_rad_s;
             push(&mut self.wheels[i], Valid::wheel_rate(i), rate, largest);
             push(&mut self.currents[i], Valid::current(i), current, 1e4);
         }
@@ -276,11 +273,12 @@ impl Observer {
         }
         let twist = self.robot.twist(&now.command);
         now.path_speed_m_s = self.robot.path_speed_m_s(twist);
-        let rolls = |rate: &f64| rate.abs() * self.robot.wheel_radius_m > STANDING_M_S;
-        now.moving = now.path_speed_m_s > STANDING_M_S || now.wheels.iter().flatten().any(rolls);
+        let standing_m_s = self.robot.body.standing_m_s;
+        let rolls = |rate: &f64| rate.abs() * self.robot.wheel_radius_m > standing_m_s;
+        now.moving = now.path_speed_m_s > standing_m_s || now.wheels.iter().flatten().any(rolls);
         let moved = self.moved(twist);
         now.has_pose = moved.is_some();
-        if now.path_speed_m_s < STANDING_M_S {
+        if now.path_speed_m_s < standing_m_s {
             now.drift = moved.map(|moved| moved.map(|value| value / now.dt_s));
             now.rest_s = last.map_or(0.0, |last| last.rest_s) + now.dt_s;
         } else {
@@ -307,7 +305,7 @@ impl Observer {
     fn moved(&self, twist: [f64; 3]) -> Option<[f64; 3]> {
         let (from, to) = (self.pose_before?, self.pose?);
         let turn = wrap(to[2] - from[2]);
-        let along = if twist[0].hypot(twist[1]) > STANDING_M_S {
+        let along = if twist[0].hypot(twist[1]) > self.robot.body.standing_m_s {
             twist[1].atan2(twist[0])
         } else {
             0.0

@@ -8,9 +8,11 @@
 
 use super::channel::Channel;
 
-/// Least part of a variance that is white: a filter must not believe that it knows everything.
+/// Least part of a variance that is white: a filter must not believe that it knows everything. A
+/// twentieth: its own account is at most 20 times as sure as one residual.
 const WHITE_MIN: f64 = 0.05;
-/// Growth of the offset's variance per observation while following, as part of the residual's.
+/// Growth of the offset's variance per observation while following, as part of the residual's. A
+/// steady gain of 0.1: followed within ten observations.
 const FOLLOWING: f64 = 0.01;
 
 /// Filter of one channel.

@@ -4,16 +4,20 @@
 //! pivot, the bogie on the middle and the rear wheel; the differential leaves each rocker free to
 //! turn. Traction at the ground acts below the pivots and therefore shifts load between wheels.
 
+use serde::{Deserialize, Serialize};
+
 use crate::kinematics::{Ackermann6, GeometryError, ROVER_WHEELS};
 
-/// Smallest load left on a wheel, N: a wheel never quite leaves the ground here.
+/// Smallest load left on a wheel, N: a wheel never quite leaves the ground here. 1.4 % of the
+/// rover's weight.
 pub const LOAD_MIN_N: f64 = 2.0;
 /// Traction per unit of load up to which load is shifted, either way. At 0.97 (its lever over its
 /// height) the reference bogie would tip over; soils below this friction never come here.
 pub const TRACTION_MAX: f64 = 0.85;
 
 /// Pivots of the linkage, m, in `base_link` (z up from the ground); the same on both sides.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct RockerBogie {
     /// Rocker pivot, forward.
     pub rocker_x_m: f64,
@@ -23,18 +27,6 @@ pub struct RockerBogie {
     pub bogie_x_m: f64,
     /// Bogie pivot, height.
     pub bogie_z_m: f64,
-}
-
-impl Default for RockerBogie {
-    /// The reference rover's pivots.
-    fn default() -> Self {
-        Self {
-            rocker_x_m: 0.0,
-            rocker_z_m: 0.28,
-            bogie_x_m: -0.175,
-            bogie_z_m: 0.18,
-        }
-    }
 }
 
 impl RockerBogie {

@@ -2,6 +2,7 @@
 
 use vigil_robot::Description;
 use vigil_robot::description::{Kinematics, Limits, SensorNoise, Wheel};
+use vigil_robot::slip::{Ground, Motor, RockerBogie};
 
 /// Its description.
 pub fn rover() -> Description {
@@ -41,6 +42,23 @@ pub fn rover() -> Description {
             current_a: 0.05,
         },
         tolerance: None,
+        motor: Some(Motor {
+            gain_n_m_s: 6.0,
+            torque_max_n_m: 6.0,
+            dry_friction_n_m: 0.02,
+            viscous_friction_n_m_s: 0.02,
+        }),
+        linkage: Some(RockerBogie {
+            rocker_x_m: 0.0,
+            rocker_z_m: 0.28,
+            bogie_x_m: -0.175,
+            bogie_z_m: 0.18,
+        }),
+        ground: Some(Ground {
+            friction: 0.65,
+            shear_modulus: 0.2,
+        }),
+        body: vigil_robot::Body::default(),
         fault_prior: vigil_robot::FaultPrior::default(),
         limits: Limits {
             curvature_1_m: 1.2,
