@@ -37,8 +37,7 @@ pub const TOGETHER_SD: f64 = 0.4;
 /// Chosen: two deviations span none of it to twice.
 const GROUND_SD: f64 = 0.5;
 /// What a wheel that stands askew may change of its own rate, relative to it: with [`TOGETHER_SD`]
-/// a tenth is one deviation. Chosen: at 0.3 rad its rolling loses a twentieth, its grip the rest. Chosen: the cosine of
-/// 40 degrees lacks a quarter.
+/// a tenth is one deviation. Chosen: askew by 0.3 rad, rolling alone loses a twentieth.
 const ASKEW: f64 = 0.25;
 /// Share of the observations at an onset that hold the very moment. Of three to four within the
 /// onset's 0.15 s, one does (a quarter, and some).
