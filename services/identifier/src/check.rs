@@ -7,7 +7,7 @@ use crate::modes::IdentifierError;
 
 /// Why another filter is refused.
 pub const FURTHER_NEED_EXACT: &str =
-    "leaves of torque, currents and gyro need the exact filter: identifier.filter = \"exact\"";
+    "leaves steer, pose, torque, current and gyro need identifier.filter = \"exact\"";
 
 /// Refuses settings out of range.
 ///

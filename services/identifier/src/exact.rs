@@ -85,6 +85,10 @@ impl Exact {
                 (mode.moved, mode.share, mode.p_unknown) = (Moved::Pose, 1.0, 0.0);
             }
         }
+        let mut unknown = modes.iter_mut().filter(|mode| mode.moved == Moved::Unknown);
+        if let (Some(alone), None) = (unknown.next(), unknown.next()) {
+            alone.share = 1.0;
+        }
         let on_any_ground = |mode: MotionMode| {
             // That of several wheels holds every soil already.
             let is_several = mode.moved.stuck().count_ones() > 1;
@@ -146,7 +150,7 @@ impl Exact {
             encoders: Encoders::healthy(t_ns),
             offsets: RateOffsets::default(),
             servo: None,
-            jump_m: 0.0,
+            jump_m: None,
             log_material: 0.0,
             was_thrown: false,
             fresh: 0,
@@ -223,8 +227,9 @@ impl Exact {
                 let state = &mut hypothesis.state;
                 let before = state.track.pose();
                 let gained = state.take_pose(observation.pose, variance, is_thrown);
-                if moved == Moved::Pose && hypothesis.onset == observation.t_first_ns {
-                    state.jump_m = (state.track.pose() - before).xy().norm();
+                if moved == Moved::Pose && state.jump_m.is_none() {
+                    let jump_m = (state.track.pose() - before).xy().norm();
+                    state.jump_m = Some((jump_m, (variance[0] + variance[1]).sqrt()));
                 }
                 // Those that cannot take it are dropped, unless none can: then nothing changes.
                 failed |= gained.is_none();

@@ -74,8 +74,8 @@ enum State {
 pub struct Fusion {
     /// Factor of sets in which this wheel is stuck.
     pub stuck: [f64; WHEELS],
-    /// Factor of sets in which a wheel stands askew: it may load any motor by any amount, so that it
-    /// explains as much as the best of the faults that these channels know.
+    /// Factor of sets in which a servo is off: its wheel may load any motor by any amount, as likely
+    /// as any fault of a motor or its sensor does, or by nothing that shows.
     pub askew: f64,
     /// Factor of the unknown, and its probability over that of none where the motion is nominal.
     pub unknown: (f64, f64),
@@ -374,6 +374,8 @@ impl FurtherFilter {
             nodes: [(0, 0.0); 2 * WHEELS + 1],
             count: 0,
         };
+        // Prior, and the same times what these channels say.
+        let mut loads = [0.0; 2];
         for (at, state) in self.states.iter().enumerate().skip(1) {
             let odds = (self.p[at] / self.p[0]).min(RATIO_MAX);
             let prior = self.prior[at] / self.prior[0];
@@ -381,13 +383,19 @@ impl FurtherFilter {
                 true => bounded(odds / prior),
                 false => 1.0,
             };
-            fusion.askew = fusion.askew.max(ratio);
+            let is_load = matches!(state, State::Torque(..) | State::CurrentOffset(..));
+            if is_load {
+                loads = [loads[0] + prior, loads[1] + prior * ratio];
+            }
             match (state, self.nodes[at]) {
                 (State::Stuck(wheel), _) => fusion.stuck[*wheel] = ratio,
                 (State::Unknown, _) => fusion.unknown = (0.5 + 0.5 * ratio, odds),
                 (_, Some(node)) => fusion.add(node, odds),
                 _ => {}
             }
+        }
+        if loads[0] > 0.0 {
+            fusion.askew = 0.5 + 0.5 * loads[1] / loads[0];
         }
         fusion
     }

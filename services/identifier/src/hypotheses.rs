@@ -181,7 +181,11 @@ pub fn copy(from: &ParticleBlock, to: &mut ParticleBlock) {
     };
     to.hypotheses[..count].copy_from_slice(&used[..count]);
     to.count = count as u32;
-    to.healthy = from.healthy;
+    to.healthy = if count > 0 {
+        from.healthy
+    } else {
+        HealthyBelief::default()
+    };
 }
 
 #[cfg(test)]

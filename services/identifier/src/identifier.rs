@@ -84,6 +84,7 @@ pub struct Identifier {
     /// The hypotheses after the last observation.
     told: Box<ParticleBlock>,
     updated: bool,
+    tells_own: bool,
     ring: VecDeque<Kept>,
     capacity: usize,
     /// Time of an observation, s.
@@ -159,6 +160,7 @@ impl Identifier {
             ranked: Ranked::new(),
             told: Box::default(),
             updated: false,
+            tells_own: false,
             leaves,
             ring: VecDeque::with_capacity(capacity),
             capacity,
@@ -393,7 +395,8 @@ impl Identifier {
         };
         let healthy = self.healthy(kept);
         let (posterior, leaves) = (&self.posterior, &self.leaves);
-        let drive = (kept.observation.curvature, kept.observation.speed);
+        let at = &kept.observation;
+        let drive = (at.curvature, at.speed, at.command[0]);
         self.reasons
             .begin(posterior, leaves, &healthy, drive, onset_ns);
         self.follow(start + 1, end);
@@ -478,16 +481,19 @@ impl Identifier {
         most.map_or(0, |node| self.engine.onset(node))
     }
 
-    /// Hypotheses of the identification change with an observation; before one, the detector's are
-    /// repeated.
+    /// Without an identification, in troubles too, the detector's hypotheses are repeated.
     fn publish(&mut self, detected: Option<&ParticleBlock>, out: &mut ParticleBlock) {
         if self.phase == Phase::Watching || self.is_catching_up() {
             if let Some(block) = detected {
                 copy(block, &mut self.told);
+            } else if self.tells_own {
+                self.told.count = 0;
             }
+            self.tells_own = false;
         } else if self.updated {
             self.engine.hypotheses(&self.leaves, &mut self.ranked);
             self.ranked.drain(&mut self.told);
+            self.tells_own = true;
         }
         copy(&self.told, out);
     }

@@ -14,9 +14,9 @@ pub enum IdentifierError {
     Model(#[from] ModelError),
     /// A leaf's fault is none that the model knows.
     #[error(
-        "leaf '{leaf}': fault '{fault}' is not in the model: expected stuck:WHEEL or \
-             encoder:WHEEL, pose, steer:WHEEL of a steered one whose angle is read, and with \
-             sensors = \"all\" torque:WHEEL, current:WHEEL or gyro, WHEEL one of {wheels}"
+        "leaf '{leaf}': fault '{fault}' is not in the model: expected stuck:WHEEL, encoder:WHEEL \
+         or pose; steer:WHEEL of a steered wheel, where encoders take part; with sensors = \"all\" \
+         torque:WHEEL, current:WHEEL or gyro; WHEEL is one of {wheels}"
     )]
     Leaf {
         /// Name of the leaf.
@@ -93,6 +93,24 @@ pub struct Leaves {
 }
 
 impl Leaves {
+    /// Of a tree without any.
+    pub(crate) const fn none() -> Self {
+        Self {
+            stuck: [None; WHEELS],
+            encoder: [None; WHEELS],
+            steer: [None; WHEELS],
+            torque: [None; WHEELS],
+            current: [None; WHEELS],
+            gyro: None,
+            pose: None,
+            count: 0,
+            depths: [0; FAULT_NODES],
+            below: [0; FAULT_NODES],
+            nodes: 0,
+            hash: 0,
+        }
+    }
+
     /// Whether there are leaves of which the paper's filters know nothing: of steering servos and
     /// pose, and those that gyro and currents alone can show.
     #[must_use]
@@ -123,18 +141,9 @@ impl Leaves {
         sensors: Sensors,
     ) -> Result<Self, IdentifierError> {
         let mut leaves = Self {
-            stuck: [None; WHEELS],
-            encoder: [None; WHEELS],
-            steer: [None; WHEELS],
-            torque: [None; WHEELS],
-            current: [None; WHEELS],
-            gyro: None,
-            pose: None,
-            count: 0,
-            depths: [0; FAULT_NODES],
-            below: [0; FAULT_NODES],
             nodes: tree.nodes().len(),
             hash: tree.hash(),
+            ..Self::none()
         };
         for i in 0..tree.nodes().len() {
             leaves.depths[i] = tree.depth(i);

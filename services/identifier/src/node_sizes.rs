@@ -12,9 +12,6 @@ use crate::posterior::Posterior;
 /// Of a fault that is less probable nothing is told.
 pub const TOLD_MIN: f64 = 0.01;
 
-/// Deviation of a jump that is seen once, m.
-const JUMP_SD_M: f64 = 0.01;
-
 /// What is told of each node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NodeSizes {
@@ -58,7 +55,8 @@ impl NodeSizes {
             }
         }
         if let Some((node, best)) = leaves.pose.filter(is_told).zip(filter.best(Moved::Pose)) {
-            (out.size[node], out.sd[node]) = (best.state.jump_m, JUMP_SD_M);
+            let jump_m = best.state.jump_m.unwrap_or_default();
+            (out.size[node], out.sd[node]) = jump_m;
             out.kind[node] = SizeKind::JumpM as u32;
         }
         out

@@ -105,13 +105,13 @@ impl Reasons {
     }
 
     /// Begins to follow the diagnosis of `posterior` and its rival from before `onset_ns`, while
-    /// the robot drives at this curvature (1/m) and speed (m/s).
+    /// the robot drives at this curvature (1/m) and speed (m/s), and is told this curvature.
     pub fn begin(
         &mut self,
         posterior: &Posterior,
         leaves: &Leaves,
         healthy: &Healthy,
-        (curvature, speed): (f64, f64),
+        (curvature, speed, commanded_1_m): (f64, f64, f64),
         onset_ns: u64,
     ) {
         let (named, rival) = contenders(posterior);
@@ -146,7 +146,7 @@ impl Reasons {
                 offsets: RateOffsets::default(),
                 servo: match moved {
                     Moved::Steer(wheel) => {
-                        let angle = steering_angle(&self.robot, wheel, curvature);
+                        let angle = steering_angle(&self.robot, wheel, commanded_1_m);
                         Some(Servo::new(&self.servo, angle))
                     }
                     _ => None,

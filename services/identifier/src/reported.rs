@@ -106,25 +106,17 @@ impl Reported {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use vigil_blocks::{FAULT_NODES, FaultSet, WHEELS};
+    use vigil_blocks::{FAULT_NODES, FaultSet};
 
     /// Leaves 3 and 4, both below node 2.
     fn leaves() -> Leaves {
         let mut below = [0; FAULT_NODES];
         (below[3], below[4], below[2]) = (1 << 3, 1 << 4, 1 << 3 | 1 << 4);
         Leaves {
-            stuck: [None; WHEELS],
-            encoder: [None; WHEELS],
-            steer: [None; WHEELS],
-            torque: [None; WHEELS],
-            current: [None; WHEELS],
-            gyro: None,
-            pose: None,
             count: 2,
-            depths: [0; FAULT_NODES],
             below,
             nodes: 5,
-            hash: 0,
+            ..Leaves::none()
         }
     }
 

@@ -87,11 +87,13 @@ impl Servo {
             }
             log + size.log_material() - before
         };
-        let offset = heard(&mut self.offset, &prior.offset, reading.commanded_rad);
-        let held = heard(&mut self.held, &prior.held, 0.0);
+        let (mut at_offset, mut at_held) = (self.offset, self.held);
+        let offset = heard(&mut at_offset, &prior.offset, reading.commanded_rad);
+        let held = heard(&mut at_held, &prior.held, 0.0);
         if !(offset.is_finite() && held.is_finite()) {
             return 0.0;
         }
+        (self.offset, self.held) = (at_offset, at_held);
         let p_held = probability(self.log_held);
         self.log_held += held - offset;
         log_add((1.0 - p_held).ln() + offset, p_held.ln() + held)

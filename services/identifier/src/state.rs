@@ -24,8 +24,8 @@ pub struct State {
     pub offsets: RateOffsets,
     /// The steering servo that does not do as it is told.
     pub servo: Option<Servo>,
-    /// How far the pose has jumped, m.
-    pub jump_m: f64,
+    /// How far the pose has jumped, and the deviation of that, m, once it was measured since.
+    pub jump_m: Option<(f64, f64)>,
     /// Part of the weight of the unknown: that its departure is material.
     pub log_material: f64,
     /// In a mode that throws the robot: whether it was thrown in the last observation.

@@ -427,7 +427,8 @@ pub struct TreeNode {
     pub name: String,
     /// Name of the parent; none for children of the root.
     pub parent: Option<String>,
-    /// For a leaf: `stuck:WHEEL` or `encoder:WHEEL`.
+    /// For a leaf: `stuck:WHEEL`, `encoder:WHEEL`, `steer:WHEEL`, `torque:WHEEL`, `current:WHEEL`,
+    /// `gyro` or `pose`.
     pub fault: Option<String>,
 }
 

@@ -140,7 +140,7 @@ impl Exact {
                 }
                 _ => None,
             },
-            jump_m: 0.0,
+            jump_m: None,
             log_material: 0.0,
             was_thrown: false,
             fresh,

@@ -454,6 +454,7 @@ impl Monitor {
             pose_moves,
             wheels_turn,
             wheels_silent,
+            wheels_stand: _,
         } = self.troubles;
         if pose_silent || pose_frozen || pose_moves {
             trouble(Channel::POSE);

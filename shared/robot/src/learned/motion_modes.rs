@@ -468,13 +468,19 @@ mod tests {
             further: 1.0,
             death_1_s: 5.0,
         };
-        use Moved::{Nominal, Stuck, Unknown, UnknownAny};
+        use Moved::{Nominal, Pose, Steer, Stuck, Unknown, UnknownAny};
         let cases = [
             (Nominal, Nominal, 0.0),
             (Nominal, Stuck(1), 2.0),
             (Nominal, Stuck(3), 2.0 * AT_ONCE),
             (Nominal, UnknownAny, 3.0),
             (Stuck(1), Nominal, 5.0),
+            (Nominal, Steer(0), 2.0),
+            (Nominal, Pose, 2.0),
+            (Steer(0), Nominal, 5.0),
+            (Steer(0), Stuck(1), 2.0),
+            (Stuck(1), Steer(0), 0.0),
+            (Pose, UnknownAny, 3.0),
             (Stuck(1), Stuck(2), 2.0),
             (Stuck(1), Stuck(3), 2.0),
             (Stuck(1), Stuck(7), 2.0 * AT_ONCE),

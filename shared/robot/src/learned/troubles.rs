@@ -14,8 +14,9 @@ const SILENT_S: f64 = 2.0;
 /// changed so often, and never stood for a quarter as long.
 const FROZEN_S: f64 = 1.0;
 const CHANGES: u32 = 40;
-/// Two poses less apart are the same, m and rad: means of equal numbers differ in the last bit.
-const SAME: f64 = 1e-12;
+/// Two poses less apart, relative to their size, are the same: means of equal numbers differ in the
+/// last bits.
+const SAME: f64 = 4.0 * f64::EPSILON;
 /// Time for which the robot is commanded to stand before it is expected to, s: twice the longest
 /// lag.
 const STOPPED_S: f64 = 1.0;
@@ -50,6 +51,8 @@ pub struct Troubles {
     pub pose_moves: bool,
     /// As `pose_moves`, for the wheels.
     pub wheels_turn: bool,
+    /// Most wheels are read, and stand.
+    pub wheels_stand: bool,
 }
 
 impl Troubles {
@@ -105,6 +108,7 @@ impl Watchdog {
         self.stopped_s = lasting(self.stopped_s, is_stopped);
         let at_rest = self.stopped_s >= STOPPED_S;
         let turns = at_rest && 2 * turning > heard;
+        let wheels_stand = 2 * heard > self.wheels_heard.count_ones() && 2 * turning <= heard;
         self.wheels_turning_s = lasting(self.wheels_turning_s, turns);
         if observation.anchor || !at_rest {
             (self.rest, self.rest_poses, self.pose_moving_s) = (None, 0, 0.0);
@@ -118,6 +122,7 @@ impl Watchdog {
             wheels_silent,
             pose_moves: self.pose_moving_s >= LASTING_S,
             wheels_turn: self.wheels_turning_s >= LASTING_S,
+            wheels_stand: wheels_stand && self.stopped_s >= STOPPED_S,
         }
     }
 
@@ -129,7 +134,7 @@ impl Watchdog {
         let pose = observation.pose;
         let is_same = self.last_pose.replace(pose).is_some_and(|last| {
             let mut pairs = pose.into_iter().zip(last);
-            pairs.all(|(now, before)| (now - before).abs() <= SAME)
+            pairs.all(|(now, before)| (now - before).abs() <= SAME * now.abs().max(1.0))
         });
         let before_s = self.pose_held_s;
         self.pose_held_s = match is_same {
