@@ -20,7 +20,8 @@ const BLIND_S: f64 = 1.0;
 const SLACK_S: f64 = 1e-6;
 /// It sees again after valid frames for so long (two of the longest count), s, ..
 const SEEN_S: f64 = 0.2;
-/// .. with no longer pause between them than this, s: half of what blinds. One frame shows at most ..
+/// .. with no longer pause between them than this, s: half of what blinds. One frame shows at most
+/// ..
 const PAUSE_S: f64 = 0.5;
 /// .. so much time, s: no single one ends blindness.
 const FRAME_MAX_S: f64 = 0.1;

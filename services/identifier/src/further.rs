@@ -74,8 +74,8 @@ enum State {
 pub struct Fusion {
     /// Factor of sets in which this wheel is stuck.
     pub stuck: [f64; WHEELS],
-    /// Factor of sets in which a servo is off: its wheel may load any motor by any amount, as likely
-    /// as any fault of a motor or its sensor does, or by nothing that shows.
+    /// Factor of sets in which a servo is off: its wheel may load any motor by any amount, as
+    /// likely as any fault of a motor or its sensor does, or by nothing that shows.
     pub askew: f64,
     /// Factor of the unknown, and its probability over that of none where the motion is nominal.
     pub unknown: (f64, f64),

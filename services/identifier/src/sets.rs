@@ -18,7 +18,8 @@ pub const FLOOR: f64 = 1e-12;
 #[derive(Debug, Clone)]
 pub struct Sets {
     /// Row s: the wheels `s` (bits) are stuck; after these rows one per wheel whose steering servo
-    /// does not do as it is told, and one for a pose that has jumped. Column e: the encoders `e` (bits) are broken.
+    /// does not do as it is told, and one for a pose that has jumped. Column e: the encoders `e`
+    /// (bits) are broken.
     p: Vec<f64>,
     /// What moves the robot in each motion mode.
     moved: Vec<Moved>,

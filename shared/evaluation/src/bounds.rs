@@ -89,7 +89,8 @@ impl Bounds {
     /// Notes a number if it stands on one of its bounds.
     pub fn look(&mut self, limits: &Limits, key: String, value: f64) {
         let ((least, why_least), (most, why_most)) = (limits.least, limits.most);
-        let near = |bound: f64| (value - bound).abs() <= ROUNDING * bound.abs();
+        let near =
+            |bound: f64| bound.is_finite() && (value - bound).abs() <= ROUNDING * bound.abs();
         self.looked_at.push(limits.number);
         let (bound, held, why) = if value <= least || near(least) {
             (least, Held::Least, why_least)

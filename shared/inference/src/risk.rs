@@ -32,7 +32,8 @@ pub struct Tracking {
 impl Default for Tracking {
     fn default() -> Self {
         Self {
-            // Taken, not measured: once in 50 steps; half-way between the worst and the mean action.
+            // Taken, not measured: once in 50 steps; half-way between the worst and the mean
+            // action.
             flip: 0.02,
             pessimism: 0.5,
             risk_min: 1e-3,

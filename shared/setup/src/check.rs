@@ -401,6 +401,11 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
             format!("{value} is out of range: allowed is above 0 to 1"),
         );
     }
+    positive(robot, &mut report);
+}
+
+/// Quantities that must be above 0.
+fn positive(robot: &Description, report: &mut impl FnMut(&str, String)) {
     let (noise, limits) = (&robot.noise, &robot.limits);
     let positive = [
         ("wheel_radius_m", robot.wheel_radius_m),

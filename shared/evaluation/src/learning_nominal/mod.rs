@@ -19,7 +19,7 @@ mod view;
 use vigil_robot::Description;
 use vigil_robot::learned::model::Provenance;
 use vigil_robot::nominal::model::{KIND, VERSION};
-use vigil_robot::nominal::{Channel, Model, Target, Term};
+use vigil_robot::nominal::{Channel, Model, Range, Target, Term};
 
 use crate::data_hash::data_hash;
 use crate::frames::Run;
@@ -127,31 +127,14 @@ pub fn learn(
     let tests = record::all(&left_out, until_s, robot);
     let command = excitation::ranges(&records, robot)?;
     let exposure_s = records.iter().map(|record| record.moving_s()).sum();
-    let mut model = Model {
-        kind: KIND.to_owned(),
-        version: VERSION,
-        hash: String::new(),
-        robot: robot.name.clone(),
-        wheels: robot
-            .wheels
-            .iter()
-            .map(|wheel| wheel.name.clone())
-            .collect(),
-        interval_s: robot.interval_s,
-        exposure_s,
-        widened: widening(exposure_s, robot.interval_s),
-        provenance: Provenance {
-            data_hash: data_hash(&learned, until_s),
-            runs_learned: learned.iter().map(|run| run.id).collect(),
-            runs_held_out: left_out.iter().map(|run| run.id).collect(),
-            until_s: until_s.is_finite().then_some(until_s),
-            ..Provenance::default()
-        },
-        command,
-        channel: Vec::new(),
-        joint: Vec::new(),
-        calibration: Vec::new(),
+    let provenance = Provenance {
+        data_hash: data_hash(&learned, until_s),
+        runs_learned: learned.iter().map(|run| run.id).collect(),
+        runs_held_out: left_out.iter().map(|run| run.id).collect(),
+        until_s: until_s.is_finite().then_some(until_s),
+        ..Provenance::default()
     };
+    let mut model = blank(robot, exposure_s, command, provenance);
     let mut report = Report::new(&model, runs.len() - left_out.len(), left_out.len());
     report.warnings.extend(doubt);
     let targets = terms::targets(robot);
@@ -182,6 +165,34 @@ pub fn learn(
     calibrate::tell(&mut report.bounds, &model);
     report.finish(&model);
     Ok((model.sealed(), report))
+}
+
+/// A model of which nothing but the command is known.
+fn blank(
+    robot: &Description,
+    exposure_s: f64,
+    command: Vec<Range>,
+    provenance: Provenance,
+) -> Model {
+    Model {
+        kind: KIND.to_owned(),
+        version: VERSION,
+        hash: String::new(),
+        robot: robot.name.clone(),
+        wheels: robot
+            .wheels
+            .iter()
+            .map(|wheel| wheel.name.clone())
+            .collect(),
+        interval_s: robot.interval_s,
+        exposure_s,
+        widened: widening(exposure_s, robot.interval_s),
+        provenance,
+        command,
+        channel: Vec::new(),
+        joint: Vec::new(),
+        calibration: Vec::new(),
+    }
 }
 
 /// What is doubtful about a few of the runs, as on ground that lets a robot slip; where half of

@@ -7,7 +7,7 @@
 //! | [`wheels`] | wheel rates and steering angles, and what an encoder says about its wheel |
 //! | [`BodyLag`] | how the body follows a changing command, learned on the way |
 //! | [`observation`] | frames averaged into observations of about the learned interval |
-//! | [`motion_modes`] | the ways in which a robot may move: nominal, wheels stuck, a servo off, unknown |
+//! | [`motion_modes`] | how a robot may move: nominal, wheels stuck, servo off, unknown |
 //! | [`steer_reading`] | what a steering angle says of its servo |
 //! | [`wheel_context`] | what ground and load make of the wheels' rates, learned on the way |
 //! | [`wheel_evidence`] | what the wheels say, for everything that each may be doing |

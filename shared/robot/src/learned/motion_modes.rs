@@ -20,8 +20,8 @@ const JUMP_SHARE: f64 = 0.1;
 const JUMP_SD: f64 = 20.0;
 /// Correlation length of the unknown's coloured deviations, m: stuck wheels have 0.12 to 0.16 m.
 const UNKNOWN_LENGTH_M: f64 = 0.2;
-/// Ground other than that learned from. It changes a stuck wheel's effect by one factor. Chosen: 0.1
-/// to 2.2 within two deviations, a fifth in all.
+/// Ground other than that learned from. It changes a stuck wheel's effect by one factor. Chosen:
+/// 0.1 to 2.2 within two deviations, a fifth in all.
 struct OtherGround {
     /// How probable.
     share: f64,

@@ -23,9 +23,9 @@ const SPEEDS: usize = 3;
 const NODES: usize = TURNS.len() * SPEEDS;
 /// Terms of a wheel's droop.
 const DROOP: usize = 3;
-/// Soils that the robot may drive on, relative to the described ground: friction, shear modulus. Two
-/// pairs, each one deviation up and one down. Chosen: a quarter of the friction, two thirds of the
-/// modulus.
+/// Soils that the robot may drive on, relative to the described ground: friction, shear modulus.
+/// Two pairs, each one deviation up and one down. Chosen: a quarter of the friction, two thirds of
+/// the modulus.
 const SOILS: [(f64, f64); 4] = [(0.8, 1.0), (1.25, 1.0), (1.0, 0.6), (1.0, 1.7)];
 /// Change of the friction under one wheel by which its effect is found, relative. A difference
 /// quotient: the step divides out.

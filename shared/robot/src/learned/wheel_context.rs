@@ -10,8 +10,8 @@ use vigil_inference::slow_state::SlowState;
 
 use crate::Tolerance;
 
-/// Rates below so many tolerances of one wheel's rate tell little of a share of them: that tolerance
-/// is a fifth of them, and more.
+/// Rates below so many tolerances of one wheel's rate tell little of a share of them: that
+/// tolerance is a fifth of them, and more.
 const TURNS: f64 = 5.0;
 /// Variance of the median of normal values over that of their mean.
 const MEDIAN: f64 = std::f64::consts::FRAC_PI_2;

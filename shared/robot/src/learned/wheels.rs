@@ -60,8 +60,8 @@ impl RateModel {
     }
 }
 
-/// Below this rate a wheel carries less than its load at speed, rad/s: four fifths of that of a wheel
-/// of the rover at the speed at which it counts as standing.
+/// Below this rate a wheel carries less than its load at speed, rad/s: four fifths of that of a
+/// wheel of the rover at the speed at which it counts as standing.
 pub const CREEPING_RAD_S: f64 = 0.2;
 
 /// Deviation of a healthy wheel that no model explains, rad/s: a fifth of an encoder's noise. It
@@ -105,7 +105,8 @@ pub enum EncoderState {
 }
 
 impl EncoderState {
-    /// Standard deviation of the tail of a turning wheel's rate, rad/s: four times an encoder's noise.
+    /// Standard deviation of the tail of a turning wheel's rate, rad/s: four times an encoder's
+    /// noise.
     pub const TAIL_SD_RAD_S: f64 = 0.2;
 }
 

@@ -8,8 +8,8 @@ use super::{Finding, Judged, Kind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M};
 /// Length of a stretch, s: a path is nearly straight over it, and noise hardly counts. At 0.2 m/s
 /// it is 0.1 m, twenty deviations of a pose of 5 mm.
 const STRETCH_S: f64 = 0.5;
-/// Stretches from which the pose is judged, and commanded travel, m (twenty deviations of 5 mm). Weighed by [`FORGET`], three
-/// count 2.31.
+/// Stretches from which the pose is judged, and commanded travel, m (twenty deviations of 5 mm).
+/// Weighed by [`FORGET`], three count 2.31.
 const STRETCHES_MIN: f64 = 2.3;
 const TRAVEL_MIN_M: f64 = 0.1;
 /// Weight of a stretch beside the next: exchanged axes show in some headings, and not in others.

@@ -12,8 +12,8 @@ use crate::learned::wheels::{rolling_rate, steering_angle};
 /// Twenty frames at 20 Hz, and forty deviations of a rate's noise of 0.05 rad/s.
 const TIME_MIN_S: f64 = 1.0;
 const ROLLED_MIN_RAD: f64 = 2.0;
-/// Ratios from here to its inverse are of a channel of the other sign (-1, by a factor of 2.5 either
-/// way for slip and gains), if ..
+/// Ratios from here to its inverse are of a channel of the other sign (-1, by a factor of 2.5
+/// either way for slip and gains), if ..
 const REVERSED: f64 = -0.4;
 /// .. and only if, the channel follows the command by this square of a correlation: 0.77, which no
 /// noise reaches.
