@@ -69,10 +69,9 @@ fn disturbances_of_sensors_touch_their_own_channel_only_and_end_without_a_trace(
     let gyro: Undo = |frame, healthy| frame.yaw_rate = healthy.yaw_rate;
     let current: Undo = |frame, healthy| frame.current[1] = healthy.current[1];
     let steer: Undo = |frame, healthy| frame.steer[0] = healthy.steer[0];
-    let kinds: [(&str, Undo); 16] = [
+    let kinds: [(&str, Undo); 15] = [
         ("steer-bias:LF:0.1", steer),
         ("pose-jump:0.3", position),
-        ("pose-held:0.5", pose),
         ("gyro-bias:0.05", gyro),
         ("gyro-scale:0", gyro),
         ("current-bias:LM:0.5", current),
