@@ -20,15 +20,13 @@ const JUMP_SHARE: f64 = 0.1;
 const JUMP_SD: f64 = 20.0;
 /// Correlation length of the unknown's coloured deviations, m: stuck wheels have 0.12 to 0.16 m.
 const UNKNOWN_LENGTH_M: f64 = 0.2;
-/// Ground other than that learned from. It changes a stuck wheel's effect by one factor. Chosen:
-/// 0.1 to 2.2 within two deviations, a fifth in all.
+/// Ground not learned from. Chosen: a fifth, of 0.1 to 2.2 times a stuck wheel's effect.
 struct OtherGround {
     /// How probable.
     share: f64,
-    /// Mean of the factor, and its deviation.
+    /// Mean of the factor by which it changes that effect, and its deviation.
     factor: (f64, f64),
-    /// Whether a dragged wheel throws the robot: on hard ground it grips and slides, and the robot
-    /// crabs and hops.
+    /// Whether a dragged wheel throws the robot: on hard ground it grips and slides.
     throws: bool,
 }
 
@@ -71,8 +69,7 @@ pub enum Moved {
     Nominal,
     /// These wheels are stuck: bit w is wheel w.
     Stuck(u32),
-    /// This wheel's steering servo does not do as it is told; what that makes of the motion is not
-    /// known.
+    /// This wheel's steering servo does not do as it is told, and moves the robot somehow.
     Steer(usize),
     /// The pose has jumped; the robot moves as commanded.
     Pose,
@@ -295,8 +292,7 @@ pub fn motion_modes(
     modes
 }
 
-/// The ways in which the robot moves while the steering servo of one of these wheels (bits) does
-/// not do as it is told.
+/// How the robot moves while a steering servo does not do as it is told, of these wheels (bits).
 pub fn steer_modes(model: &Model, steered: u32) -> impl Iterator<Item = MotionMode> {
     let wheels = (0..WHEELS).filter(move |wheel| steered >> wheel & 1 == 1);
     wheels.map(|wheel| drives_on(model, Moved::Steer(wheel)))

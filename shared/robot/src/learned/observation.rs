@@ -26,8 +26,7 @@ const POSITION_MAX_M: f64 = 1e7;
 pub(crate) const STALE_MAX: u32 = 10;
 /// Part of a frame that may lack to an interval, below half a one: frames are not quite periodic.
 const NEARLY: f64 = 0.4;
-/// Difference of commanded and lagged curvature up to which a drive is steady, 1/m: 0.1 of the
-/// most.
+/// Commanded and lagged curvature of a steady drive differ by this at most, 1/m: 0.1 of the most.
 const STEADY_1_M: f64 = 0.1;
 /// Random motion of a robot that creeps or rests, per observation and axis, as a share of the pose
 /// sensor's deviation: its track follows the measured pose, and learns no slope from it.
