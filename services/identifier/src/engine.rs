@@ -30,7 +30,7 @@ impl Engine {
 
     /// Most hypotheses or particles.
     #[must_use]
-    pub const fn limit(&self) -> usize {
+    pub fn limit(&self) -> usize {
         match self {
             Self::Exact(filter) => filter.limit(),
             Self::Generic(filter) => filter.limit(),

@@ -53,8 +53,6 @@ pub struct Exact {
     /// Of each wheel's encoder.
     births_1_s: [f64; WHEELS],
     bank: Bank<State>,
-    /// Hypotheses kept from one observation to the next, at most.
-    limit: usize,
     /// Of the healthy robot, from before the faults; it fades as the robot drives on.
     context: Context,
     wheels: WheelContext,
@@ -119,7 +117,6 @@ impl Exact {
             rates,
             births_1_s: is_leaf.map(|leaf| if leaf { rates.fault_1_s } else { 0.0 }),
             bank: Bank::new(&capacities),
-            limit: capacities.iter().sum(),
             context: Context::default(),
             wheels: WheelContext::default(),
             sizes: Sizes::new(robot),
@@ -131,13 +128,13 @@ impl Exact {
 
     /// Most hypotheses kept.
     #[must_use]
-    pub const fn limit(&self) -> usize {
-        self.limit
+    pub fn limit(&self) -> usize {
+        self.bank.limit()
     }
 
     /// From the next observation on at most `count` hypotheses, the most probable: fewer cost less.
-    pub const fn set_limit(&mut self, count: usize) {
-        self.limit = count;
+    pub fn set_limit(&mut self, count: usize) {
+        self.bank.set_limit(count);
     }
 
     /// Starts from the nominal mode, as the detector knew it at `t_ns`.
@@ -240,7 +237,6 @@ impl Exact {
         if self.bank.normalise(FLOOR).is_none() || failed {
             self.degenerate_count = self.degenerate_count.saturating_add(1);
         }
-        self.bank.keep(self.limit);
     }
 
     /// Holds healthy motion within the tolerance, and unknown motion beyond it.

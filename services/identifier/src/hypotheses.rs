@@ -85,6 +85,7 @@ struct Broken {
 /// Adds the hypotheses of the exact filter: each with every set of broken encoders that is not
 /// negligible.
 pub fn add_exact(exact: &Exact, leaves: &Leaves, out: &mut Ranked) {
+    let mut sets = [Broken::default(); 1 << WHEELS];
     for (moved, hypothesis) in exact.hypotheses() {
         let track = &hypothesis.state.track;
         let p_unknown = exact.modes()[hypothesis.mode].p_unknown;
@@ -103,7 +104,6 @@ pub fn add_exact(exact: &Exact, leaves: &Leaves, out: &mut Ranked) {
             continue;
         };
         let least = NEGLIGIBLE / hypothesis.log_weight.exp();
-        let mut sets = [Broken::default(); 1 << WHEELS];
         let count = broken(&hypothesis.state.encoders, leaves, least, &mut sets);
         let moved_ns = if moved == 0 { 0 } else { hypothesis.onset };
         for set in &sets[..count] {
@@ -140,7 +140,10 @@ fn broken(
     least: f64,
     sets: &mut [Broken; 1 << WHEELS],
 ) -> usize {
-    sets[0].share = 1.0;
+    sets[0] = Broken {
+        share: 1.0,
+        ..Broken::default()
+    };
     let mut count = 1;
     for wheel in 0..WHEELS {
         let p_broken = encoders.p_broken(wheel);

@@ -128,7 +128,7 @@ impl Identifier {
             schema::IdentifierFilter::Exact => {
                 let rates = fault_rates(&robot.fault_prior, &leaves, settings.p_unknown);
                 let mut filter = Exact::new(model, robot, &leaves, use_wheels, rates);
-                filter.set_limit(settings.particles.unwrap_or(filter.limit()));
+                filter.set_limit(settings.particles.unwrap_or(usize::MAX));
                 let modes = filter.modes().to_vec();
                 (Engine::Exact(Box::new(filter)), modes)
             }

@@ -26,6 +26,7 @@ pub struct Bank<T> {
     hypotheses: Vec<Hypothesis<T>>,
     scratch: Vec<f64>,
     capacities: Vec<usize>,
+    limit: usize,
 }
 
 impl<T: Copy> Bank<T> {
@@ -37,7 +38,19 @@ impl<T: Copy> Bank<T> {
             hypotheses: Vec::with_capacity(capacity),
             scratch: Vec::with_capacity(capacity),
             capacities: capacities.to_vec(),
+            limit: usize::MAX,
         }
+    }
+
+    /// Most hypotheses that a normalisation leaves.
+    #[must_use]
+    pub fn limit(&self) -> usize {
+        self.limit.min(self.capacities.iter().sum())
+    }
+
+    /// From the next normalisation on the `count` most probable hypotheses stay, at least one.
+    pub fn set_limit(&mut self, count: usize) {
+        self.limit = count.max(1);
     }
 
     /// Forgets everything and starts from one hypothesis.
@@ -95,8 +108,8 @@ impl<T: Copy> Bank<T> {
         }
     }
 
-    /// Drops hypotheses whose log-weight is below `floor`, or not a number, and normalises the
-    /// others. Returns the logarithm of the sum before, or None, unchanged, if nothing is possible.
+    /// Drops hypotheses whose log-weight is below `floor`, or not a number, normalises the others,
+    /// and keeps as many as the limit allows. Returns the logarithm of the sum before, or None, unchanged, if nothing is possible.
     pub fn normalise(&mut self, floor: f64) -> Option<f64> {
         self.scratch.clear();
         for hypothesis in &mut self.hypotheses {
@@ -113,13 +126,14 @@ impl<T: Copy> Bank<T> {
             hypothesis.log_weight -= evidence;
             hypothesis.log_weight >= floor
         });
+        self.keep();
         Some(evidence)
     }
 
-    /// Keeps the `count` most probable hypotheses, at least one, in their order; of those equally
-    /// probable the first. The others' weight is gone: the next normalisation divides it.
-    pub fn keep(&mut self, count: usize) {
-        let count = count.max(1);
+    /// Keeps the most probable hypotheses up to the limit, in their order; of those equally probable
+    /// the first. The others' weight is gone: the next normalisation divides it.
+    fn keep(&mut self) {
+        let count = self.limit;
         if self.hypotheses.len() <= count {
             return;
         }
@@ -203,15 +217,19 @@ mod tests {
             let all = bank.hypotheses().iter();
             all.map(|hypothesis| hypothesis.onset).collect()
         };
-        bank.keep(7);
-        assert_eq!(onsets(&bank), [0, 1, 2, 3, 4, 5, 6]);
+        let mut keep = |count: usize| {
+            bank.set_limit(count);
+            bank.normalise(-30.0).unwrap();
+            onsets(&bank)
+        };
+        assert_eq!(keep(7), [0, 1, 2, 3, 4, 5, 6]);
         // Of two that are equally probable, the first.
-        bank.keep(5);
-        assert_eq!(onsets(&bank), [0, 1, 2, 3, 5]);
-        bank.keep(2);
-        assert_eq!(onsets(&bank), [0, 2]);
-        bank.keep(0);
-        assert_eq!(onsets(&bank), [0]);
+        assert_eq!(keep(5), [0, 1, 2, 3, 5]);
+        assert_eq!(keep(2), [0, 2]);
+        assert_eq!(keep(0), [0]);
+        assert_eq!(bank.limit(), 1);
+        bank.set_limit(usize::MAX);
+        assert_eq!(bank.limit(), 16);
     }
 
     #[test]
