@@ -9,10 +9,8 @@ use vigil_blocks::SizeKind;
 use vigil_inference::logspace::{log_add, probability};
 use vigil_inference::size::{Prior, Size};
 use vigil_robot::Description;
-use vigil_robot::learned::SteerReading;
+use vigil_robot::learned::{ANY_ANGLE_SD_RAD, SteerReading};
 
-/// Deviation of either angle before any reading, rad: half of what a servo turns.
-const SD_RAD: f64 = 0.3;
 /// Tolerance of a robot that declares none, rad: three deviations of a sensor's noise.
 const UNDECLARED_RAD: f64 = 0.01;
 /// A reading this many standard deviations off teaches nothing.
@@ -47,7 +45,7 @@ impl ServoPrior {
         let healthy_rad = tolerance.map_or(UNDECLARED_RAD, |tolerance| tolerance.steer_rad);
         let prior = |healthy: [f64; 2]| Prior {
             mean: [0.0; 2],
-            sd: [SD_RAD, 0.0],
+            sd: [ANY_ANGLE_SD_RAD, 0.0],
             wander: [WANDERS * healthy_rad, 0.0],
             healthy,
         };

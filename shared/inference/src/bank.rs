@@ -109,7 +109,8 @@ impl<T: Copy> Bank<T> {
     }
 
     /// Drops hypotheses whose log-weight is below `floor`, or not a number, normalises the others,
-    /// and keeps as many as the limit allows. Returns the logarithm of the sum before, or None, unchanged, if nothing is possible.
+    /// and keeps as many as the limit allows. Returns the logarithm of the sum before, or None,
+    /// unchanged, if nothing is possible.
     pub fn normalise(&mut self, floor: f64) -> Option<f64> {
         self.scratch.clear();
         for hypothesis in &mut self.hypotheses {

@@ -64,7 +64,7 @@ pub use motion_modes::{FaultRates, MotionMode, Moved, motion_modes, steer_modes}
 pub use noise_scale::{NoiseScales, OutlierRates};
 pub use observation::{Intake, Observation, Observer};
 pub use reading::Reading;
-pub use steer_reading::SteerReading;
+pub use steer_reading::{ANY_ANGLE_SD_RAD, SteerReading};
 pub use switching::Switching;
 pub use troubles::Troubles;
 pub use wheel_context::WheelContext;

@@ -9,8 +9,8 @@ use super::wheels::steering_angle;
 use super::{Model, NoiseScales, Observation};
 use crate::Description;
 
-/// Standard deviation of a steering angle that does anything, rad: half of what a servo turns.
-const ANY_RAD: f64 = 0.3;
+/// Standard deviation of a steering angle of which nothing is known, rad: half of what a servo turns.
+pub const ANY_ANGLE_SD_RAD: f64 = 0.3;
 /// An angle that does anything is at most so much more likely than one as commanded (natural
 /// logarithm): a single reading decides nothing.
 const RATIO_MAX: f64 = 30.0;
@@ -78,7 +78,7 @@ impl SteerReading {
     pub fn log_ratio_unsure(&self) -> f64 {
         let sd = self.variance.sqrt();
         let apart = tempered(self.beyond_rad / sd, self.outlier_rate) * sd;
-        let wide = self.variance + ANY_RAD * ANY_RAD;
+        let wide = self.variance + ANY_ANGLE_SD_RAD * ANY_ANGLE_SD_RAD;
         let ratio = log_normal(apart, wide) - log_normal(apart, self.variance);
         log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + ratio.min(RATIO_MAX))
     }
