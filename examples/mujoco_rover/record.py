@@ -4,7 +4,8 @@ pip install mujoco==4.0.0
 python3 record.py OUT [--runs 12] [--seconds 600] [--seed 1]
 Writes OUT/mujoco_frames.csv.gz and OUT/mujoco_runs.csv. Every 3 to 10 s the rover is told another curvature and
 speed, out of the range that its shipped model was learned on. `scripts/bench field --only recorded/mujoco` judges the
-runs, if OUT is $VIGIL_DATA/rover.
+runs, if OUT is $VIGIL_DATA/rover: pose and encoders by the shipped model; with gyro and currents every second run,
+by what the others teach of these.
 """
 
 import argparse
@@ -14,27 +15,28 @@ import math
 import pathlib
 
 import numpy
-from rover import NOISE, NOISE_HZ, STEERED, WHEELS, Rover
+from rover import EFFORT_NOISE, NOISE, NOISE_HZ, STEERED, WHEELS, Rover
 
 HZ = 20.0
 COMMAND_S, CURVATURE_1_M, SPEED_M_S = (3.0, 10.0), (-1.0, 1.0), (0.11, 0.29)
 FRAMES = ["run", "t", "x", "y", "yaw", *(f"enc_{w}" for w in WHEELS), *(f"steer_{WHEELS[i]}" for i in STEERED)]
-FRAMES += ["cmd_curv", "cmd_speed"]
+FRAMES += ["yaw_rate", *(f"current_{w}" for w in WHEELS), "cmd_curv", "cmd_speed"]
 RUNS = ["run", "mode", "kind", "wheel", "onset_s", "cmd_curv", "cmd_speed", "dur_s", "terrain"]
 
 
 def frames(run, seconds, random):
     """Rows of one run."""
-    rover, noise, until_s = Rover(), NOISE * math.sqrt(HZ / NOISE_HZ), 0.0
+    rover, root, until_s = Rover(), math.sqrt(HZ / NOISE_HZ), 0.0
     for k in range(1, round(seconds * HZ) + 1):
         if k / HZ > until_s:
             until_s += random.uniform(*COMMAND_S)
             curvature, speed = random.uniform(*CURVATURE_1_M), random.uniform(*SPEED_M_S)
         rover.drive(curvature, speed, 1.0 / HZ)
-        sensed = rover.state() + noise * random.standard_normal(15)
+        sensed = rover.state() + root * NOISE * random.standard_normal(15)
+        effort = rover.effort() + root * EFFORT_NOISE * random.standard_normal(7)
         sensed[2] = math.remainder(sensed[2], math.tau)
         steer = sensed[9:][STEERED]
-        values = [f"{value:.5f}" for value in (*sensed[:9], *steer, *rover.command)]
+        values = [f"{value:.5f}" for value in (*sensed[:9], *steer, *effort, *rover.command)]
         yield [run, f"{k / HZ:.2f}", *values]
 
 

@@ -22,6 +22,9 @@ DRIVE = [(8.0, 0.5, 0.2), (6.0, 0.0, 0.2), (8.0, -0.4, 0.2), (6.0, 0.0, 0.25)]
 # a second of samples tells as much at any rate.
 NOISE_HZ = 20.0
 NOISE = numpy.array([0.005, 0.005, 0.005, *6 * [0.05], 0.003, 0.0, 0.003, 0.003, 0.0, 0.003])
+# The same of Rover.effort().
+EFFORT_NOISE = numpy.array([0.01, *6 * [0.05]])
+CURRENT_A_N_M = 2.0
 
 
 def ackermann(curvature, speed):
@@ -109,3 +112,9 @@ class Rover:
         angles[STEERED] = self.data.qpos[self.steers]
         yaw = math.atan2(body.xmat[3], body.xmat[0])
         return numpy.array([*body.xpos[:2], yaw, *self.data.qvel[self.rolls], *angles])
+
+    def effort(self):
+        """What gyro and motors measure: the body's rate about its own vertical axis, rad/s, and six currents, A."""
+        body = self.data.body("rover")
+        rate = numpy.dot(body.cvel[:3], body.xmat.reshape(3, 3)[:, 2])
+        return numpy.array([rate, *CURRENT_A_N_M * self.data.actuator_force[:6]])

@@ -1,0 +1,17 @@
+//! Tests of the identifier.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+use vigil_cycle::allocation::CountingAllocator;
+
+mod alarm;
+mod all_sets;
+mod allocation;
+mod further;
+mod hypotheses;
+mod identifier;
+mod recorded;
+mod servo;
+mod sizes;
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;

@@ -1,0 +1,93 @@
+//! A steering servo that does not do as it is told, and a pose that is wrong, on a recorded healthy
+//! run whose readings are changed.
+use crate::alarm;
+use crate::recorded;
+use vigil_blocks::{Entry, FaultBelief, ParticleBlock, SensorFrame, SizeKind};
+use vigil_identifier::{Identifier, Input, Models};
+use vigil_setup::schema;
+
+/// When it breaks, s after the first frame.
+const ONSET_S: f64 = 3.0;
+const RF: usize = 3;
+/// A healthy run that the model has not seen, whose command changes.
+const RUN: u32 = 2;
+
+fn time_s(frame: &SensorFrame) -> f64 {
+    frame.header.t_capture_ns as f64 * 1e-9
+}
+
+/// The belief at the end of the run when `change` has acted on each frame from the onset on; the
+/// alarm rises a third of a second later.
+fn belief(mut change: impl FnMut(&mut SensorFrame)) -> (FaultBelief, [usize; 2]) {
+    let robot = recorded::robot();
+    let (runs, _) = recorded::runs(&robot);
+    let mut frames = runs
+        .iter()
+        .find(|run| run.id == RUN)
+        .unwrap()
+        .frames
+        .clone();
+    let start_s = time_s(&frames[0]);
+    let tree = vigil_setup::load_tree(&recorded::path("config/trees/rover-all.toml")).unwrap();
+    let model = recorded::model();
+    let models = Models {
+        model: &model,
+        robot: &robot,
+        tree: &tree,
+        decision: None,
+    };
+    let settings = schema::Identifier::default();
+    let sensors = schema::Sensors::All;
+    let mut identifier = Identifier::new(&models, &settings, sensors, 1).unwrap();
+    let mut belief = FaultBelief::default();
+    let mut particles: Box<ParticleBlock> = Box::default();
+    let mut alarm = alarm::Alarm::between(start_s + ONSET_S + 0.3, f64::INFINITY);
+    for frame in &mut frames {
+        alarm.set(frame);
+        if time_s(frame) - start_s >= ONSET_S {
+            change(frame);
+        }
+        let detection = Some((&alarm.belief, &*alarm.hypotheses));
+        let entry = Entry::Frame(Input { frame, detection });
+        identifier.step(entry, &mut belief, &mut particles);
+    }
+    (
+        belief,
+        ["RF_STEER", "POSE"].map(|leaf| tree.index(leaf).unwrap()),
+    )
+}
+
+fn check(change: impl FnMut(&mut SensorFrame), kind: SizeKind, size: f64) {
+    let (belief, [servo, pose]) = belief(change);
+    let leaf = if kind == SizeKind::JumpM { pose } else { servo };
+    assert_eq!(belief.mode as usize, leaf, "{kind:?} {size}");
+    let found = (belief.size[leaf], belief.size_sd[leaf]);
+    assert_eq!(
+        SizeKind::from_wire(belief.size_kind[leaf]),
+        kind,
+        "{found:?}"
+    );
+    assert!((found.0 - size).abs() < 0.1 * size.abs(), "{found:?}");
+}
+
+#[test]
+fn a_servo_that_slipped_is_named_with_its_angle() {
+    for angle_rad in [0.2, -0.1, 0.04] {
+        check(
+            |frame| frame.steer[RF] += angle_rad,
+            SizeKind::AngleRad,
+            angle_rad,
+        );
+    }
+}
+
+#[test]
+fn a_pose_that_jumped_is_named_with_its_distance() {
+    check(|frame| frame.pose[1] += 0.3, SizeKind::JumpM, 0.3);
+}
+
+#[test]
+fn a_servo_within_its_tolerance_is_none() {
+    let (belief, [servo, _]) = belief(|frame| frame.steer[RF] += 0.007);
+    assert!(belief.p[servo] < 0.05, "{}", belief.p[servo]);
+}

@@ -1,0 +1,17 @@
+//! Tests of the evaluation: readers, learners, scores, report.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+mod derived;
+mod filters;
+mod hierarchy;
+mod import;
+mod learning;
+mod learning_nominal;
+mod look_ahead;
+mod nominal_sensing;
+mod reader;
+mod refusals;
+mod report;
+mod rover;
+mod scoring;
+mod trade_off;

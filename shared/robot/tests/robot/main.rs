@@ -1,0 +1,12 @@
+//! Tests of the robot's models.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+mod condition;
+mod frame_guard;
+mod injection;
+mod learned;
+mod nominal;
+mod rover;
+mod slip;
+mod stuck_sets;
+mod torque_limit;
