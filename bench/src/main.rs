@@ -1,5 +1,5 @@
-//! Measures: one question a subcommand, archived under `bench/runs/`. `scripts/bench` builds what it
-//! needs and starts it.
+//! Measures: one question a subcommand, archived under `bench/runs/`. `scripts/bench` builds what
+//! it needs and starts it.
 
 mod questions;
 

@@ -57,8 +57,8 @@ pub struct Args {
     load: Load,
 }
 
-/// Is a bad observer of the graph of this file: opens every topic, takes what it may hold, and never
-/// lets go. It leaves a file in `folder` once it holds a frame.
+/// Is a bad observer of the graph of this file: opens every topic, takes what it may hold, and
+/// never lets go. It leaves a file in `folder` once it holds a frame.
 pub fn observe(config: &Path, folder: &Path) -> Result<(), Box<dyn Error>> {
     let setup = GraphArgs {
         config: config.to_owned(),

@@ -1,7 +1,7 @@
 //! How fast is a belief update?
 //!
-//! The sparse tracker beside a plain dense loop, on the same trajectories, in turn. Reads the public
-//! POMDP files that VIGIL_DATA names.
+//! The sparse tracker beside a plain dense loop, on the same trajectories, in turn. Reads the
+//! public POMDP files that VIGIL_DATA names.
 
 use std::error::Error;
 use std::hint::black_box;
