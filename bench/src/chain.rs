@@ -28,7 +28,7 @@ const WAIT: Duration = Duration::from_millis(100);
 /// Time for all stages to be ready before the first cycle, ns.
 const START_NS: u64 = 400_000_000;
 
-/// First argument of a process that is a stage of a chain.
+/// The word with which the program is a stage of a chain.
 pub const STAGE_WORD: &str = "chain-stage";
 
 /// What hands over what, where and how often.
@@ -223,8 +223,8 @@ fn said(child: &mut Child) -> String {
 ///
 /// # Errors
 /// A wrong argument, or the system's.
-pub fn be_stage(argument: Option<&String>) -> Result<(), Box<dyn Error>> {
-    let role: Role = serde_json::from_str(argument.ok_or("no role is given")?)?;
+pub fn be_stage(role: &str) -> Result<(), Box<dyn Error>> {
+    let role: Role = serde_json::from_str(role)?;
     signal::install();
     role.place();
     let (carrier, sizes) = (role.chain.carrier, role.chain.sizes);

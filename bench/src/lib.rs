@@ -1,5 +1,5 @@
-//! What measuring programs share: the archive, the facts about the machine, the yardstick and
-//! the filters that are compared.
+//! What the questions share: the archive, the facts about the machine, the yardstick and the
+//! filters that are compared.
 
 use std::error::Error;
 use std::path::Path;
@@ -19,7 +19,6 @@ pub mod matched;
 pub mod missions;
 pub mod naive;
 pub mod noncentrality;
-pub mod options;
 pub mod pairs;
 pub mod pomdp_learning;
 pub mod rare;
@@ -30,7 +29,7 @@ pub mod simulated;
 pub mod speed;
 pub mod unmodelled;
 
-/// What a program of this name ends with: 0, or 1 and the reason.
+/// What the question of this name ends with: 0, or 1 and the reason.
 pub fn ended(name: &str, result: Result<(), Box<dyn Error>>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -8,7 +8,8 @@ use serde_json::Value;
 
 #[test]
 fn a_stopped_stage_is_vigils_own_and_a_kept_core_the_machines() {
-    let output = Command::new(env!("CARGO_BIN_EXE_attribution"))
+    let output = Command::new(env!("CARGO_BIN_EXE_vigil-bench"))
+        .arg("attribution")
         .args(["--rate", "100", "--stalls", "4", "--length-us", "60000"])
         .args(["--load", "idle", "--json"])
         .output()

@@ -10,7 +10,8 @@ const CARRIERS: [&str; 5] = ["futex", "shared-memory", "datagram", "pipe", "queu
 
 #[test]
 fn every_carrier_hands_blocks_through_four_stages() {
-    let output = Command::new(env!("CARGO_BIN_EXE_peers"))
+    let output = Command::new(env!("CARGO_BIN_EXE_vigil-bench"))
+        .arg("peers")
         .args(["--rate", "100", "--seconds", "1.5", "--rounds", "1"])
         .args(["--bytes", "4096", "--load", "idle", "--json"])
         .output()
@@ -33,7 +34,8 @@ fn every_carrier_hands_blocks_through_four_stages() {
 
 #[test]
 fn what_a_carrier_cannot_do_is_a_row_with_its_reason() {
-    let output = Command::new(env!("CARGO_BIN_EXE_peers"))
+    let output = Command::new(env!("CARGO_BIN_EXE_vigil-bench"))
+        .arg("peers")
         .args(["--rate", "100", "--seconds", "1", "--rounds", "1"])
         .args(["--bytes", "1000", "--load", "idle", "--json"])
         .output()

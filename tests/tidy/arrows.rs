@@ -69,7 +69,7 @@ fn allowed(manifest: &Manifest) -> Option<Vec<&'static str>> {
     if let Some((_, shared)) = ALLOWED.iter().find(|(name, _)| *name == package) {
         return Some(shared.to_vec());
     }
-    // The operator's tool, the measuring programs and the tests stand outside the graph.
+    // The operator's tool, the measuring program and the tests stand outside the graph.
     if ["vigil", "vigil-bench", "vigil-tests"].contains(&package) {
         return Some([SHARED, SERVICES].concat());
     }

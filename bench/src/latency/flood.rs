@@ -2,7 +2,7 @@
 //! and never has a frame for them.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::Duration;
 
 use vigil_blocks::SensorFrame;
@@ -10,20 +10,19 @@ use vigil_cycle::port::Link;
 use vigil_cycle::{Topic, signal};
 use vigil_setup::GraphArgs;
 
-/// First argument of a process that is a flood.
-pub const FLOOD_WORD: &str = "flood";
+/// The word with which the program is a flood.
+pub const FLOOD_WORD: &str = "sensor-flood";
 
 /// Wake-ups between two looks at whether the graph still runs.
 const BATCH: usize = 1000;
 
-/// Is a flood on the graph whose file is the argument after [`FLOOD_WORD`], whenever it runs.
+/// Is a flood on the graph of this file, whenever it runs.
 ///
 /// # Errors
-/// A wrong argument, or the transport's.
-pub fn be_flood(config: Option<&String>) -> Result<(), Box<dyn Error>> {
-    let config = PathBuf::from(config.ok_or("no graph file is given")?);
+/// Those of the file and the transport.
+pub fn be_flood(config: &Path) -> Result<(), Box<dyn Error>> {
     let domain = GraphArgs {
-        config,
+        config: config.to_owned(),
         ..GraphArgs::default()
     }
     .load()?

@@ -1,5 +1,5 @@
 //! The yardstick, small: navigation missions under the escalation policy, learned from a wrong
-//! model. `bench/src/bin/pomdp-learning.rs` is the same with 10,000.
+//! model. `scripts/bench pomdp-learning` is the same with 10,000.
 
 use vigil_decision::learning::{Record, Settings, check, learn};
 use vigil_decision::navigation::{self, Parameters, QUIET};

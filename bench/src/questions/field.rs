@@ -5,23 +5,21 @@
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use clap::Parser;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::field::{
-    File, Graph, Job, Library, Outcome, Scenario, Scored, document, jobs, library, lines, run,
+    self, File, Graph, Job, Library, Outcome, Scenario, Scored, document, jobs, library, lines,
     select,
 };
 use vigil_bench::machine;
 use vigil_bench::matched::in_parallel;
 
 /// Does the diagnosis hold in the field?
-#[derive(Debug, Parser)]
-struct Args {
+#[derive(Debug, clap::Args)]
+pub struct Args {
     /// Only scenarios whose names begin with one of these.
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     only: Vec<String>,
@@ -48,17 +46,8 @@ struct Args {
     scenarios: Option<PathBuf>,
 }
 
-fn main() -> ExitCode {
-    let args = Args::parse();
-    match answer(&args) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
-        Err(error) => vigil_bench::ended("field", Err(error)),
-    }
-}
-
-/// True unless a bar that was to be checked is not met.
-fn answer(args: &Args) -> Result<bool, Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if cfg!(debug_assertions) {
         return Err("a debug build takes hours: use scripts/bench".into());
     }
@@ -70,7 +59,7 @@ fn answer(args: &Args) -> Result<bool, Box<dyn Error>> {
         for scenario in scenarios {
             println!("{}: {}", scenario.name, scenario.about);
         }
-        return Ok(true);
+        return Ok(());
     }
     let began = Instant::now();
     let graph = Graph::read(&here.join(".."))?;
@@ -85,7 +74,10 @@ fn answer(args: &Args) -> Result<bool, Box<dyn Error>> {
         true => println!("{document:#}"),
         false => show(args, &outcomes, &document)?,
     }
-    Ok(is_met || !args.check)
+    if args.check && !is_met {
+        return Err("a bar is not met".into());
+    }
+    Ok(())
 }
 
 fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), Box<dyn Error>> {
@@ -132,7 +124,7 @@ fn measure<'a>(
     let all = jobs(scenarios, scale, library);
     let (done, began) = (AtomicUsize::new(0), Instant::now());
     let one = |job: &Job<'_>| {
-        let found = run(graph, library, job);
+        let found = field::run(graph, library, job);
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         let (all, name, wall_s) = (all.len(), &job.scenario.name, began.elapsed().as_secs());
         if done.is_multiple_of((all / 100).max(1)) || done == all {

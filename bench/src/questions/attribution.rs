@@ -5,13 +5,10 @@
 
 use std::error::Error;
 use std::path::Path;
-use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::Parser;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
-use vigil_bench::latency::flood::{FLOOD_WORD, be_flood};
 use vigil_bench::latency::graph::{Change, Prepared};
 use vigil_bench::latency::load::{Load, Running};
 use vigil_bench::latency::stalls::{self, Origin, Stall, Told};
@@ -21,9 +18,8 @@ use vigil_setup::schema::Source;
 const PARTICLES: usize = 1000;
 
 /// Makes stalls of known origin and reads what the latency report says of them.
-#[derive(Debug, Parser)]
-#[command(name = "scripts/bench attribution")]
-struct Args {
+#[derive(Debug, clap::Args)]
+pub struct Args {
     /// Rate of the schedule, Hz.
     #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
     rate: f64,
@@ -42,16 +38,8 @@ struct Args {
     json: bool,
 }
 
-fn main() -> ExitCode {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    if words.first().is_some_and(|word| word == FLOOD_WORD) {
-        return vigil_bench::ended("flood", be_flood(words.get(1)));
-    }
-    let args = Args::parse();
-    vigil_bench::ended("attribution", run(&args))
-}
-
-fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let rows = vigil_bench::in_folder("attribution", |folder| measure(args, folder))?;
     if args.json {
         println!("{:#}", Value::from(rows));

@@ -2,9 +2,8 @@
 
 use std::error::Error;
 use std::path::Path;
-use std::process::{Command, ExitCode, Stdio};
+use std::process::{Command, Stdio};
 
-use clap::Parser;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::latency::graph::{Change, Prepared, root};
@@ -21,9 +20,8 @@ const AROUND_S: f64 = 4.0;
 const AFTER_FRAMES: u32 = 20;
 
 /// Runs the graph with a publisher in Python.
-#[derive(Debug, Parser)]
-#[command(name = "scripts/bench publishers")]
-struct Args {
+#[derive(Debug, clap::Args)]
+pub struct Args {
     /// Rates, Hz; separated by commas.
     #[arg(long, value_name = "HZ", value_delimiter = ',', default_values_t = [100.0, 1000.0])]
     rate: Vec<f64>,
@@ -38,11 +36,8 @@ struct Args {
     python: String,
 }
 
-fn main() -> ExitCode {
-    vigil_bench::ended("publishers", run(&Args::parse()))
-}
-
-fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if !root().join(&args.python).exists() {
         return Err(format!("there is no {}: scripts/test makes one", args.python).into());
     }

@@ -5,16 +5,13 @@
 
 use std::error::Error;
 use std::path::Path;
-use std::process::ExitCode;
 
-use clap::Parser;
 use serde_json::Value;
 use vigil_bench::archive::Archive;
 use vigil_bench::latency::cell::{Cell, Scheduling, Spec};
-use vigil_bench::latency::flood::{FLOOD_WORD, be_flood};
 use vigil_bench::latency::load::Load;
 use vigil_bench::latency::{files, page, system};
-use vigil_bench::{chain, machine};
+use vigil_bench::machine;
 
 /// Shortest run, s: the first two seconds are warm-up.
 const SECONDS_MIN: f64 = 4.0;
@@ -33,9 +30,8 @@ const LOADS: [Load; 8] = [
 ];
 
 /// Measures the latency from the schedule to the action.
-#[derive(Debug, Parser)]
-#[command(name = "scripts/bench latency")]
-struct Args {
+#[derive(Debug, clap::Args)]
+pub struct Args {
     /// Rates of the schedule, Hz; separated by commas.
     #[arg(long, value_name = "HZ", value_delimiter = ',')]
     rate: Vec<f64>,
@@ -67,19 +63,8 @@ struct Args {
     json: bool,
 }
 
-fn main() -> ExitCode {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    if words.first().is_some_and(|word| word == chain::STAGE_WORD) {
-        return vigil_bench::ended("chain", chain::be_stage(words.get(1)));
-    }
-    if words.first().is_some_and(|word| word == FLOOD_WORD) {
-        return vigil_bench::ended("flood", be_flood(words.get(1)));
-    }
-    let args = Args::parse();
-    vigil_bench::ended("latency", run(&args))
-}
-
-fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if args.seconds.is_nan() || args.seconds < SECONDS_MIN {
         return Err(format!(
             "--seconds {}: allowed is {SECONDS_MIN} or more",
@@ -170,7 +155,8 @@ fn print_one(specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
 fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new(&archive_name(args, specs))?;
     let words: Vec<String> = std::env::args().skip(1).collect();
-    archive.say(&format!("`scripts/bench latency {}`\n", words.join(" ")));
+    let command = format!("scripts/bench {}", words.join(" "));
+    archive.say(&format!("`{command}`\n"));
     archive.say(
         "Times in us; every latency from the schedule, hand-over and floor without compute; \
          folded are instants that only a later one's answer ended. Own, by stage: instants that \
@@ -201,10 +187,7 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
         let name = page::names(&cells).pop().unwrap_or_default();
         files::write(&cells[cells.len() - 1], &archive.folder().join(name))?;
     }
-    facts.push((
-        "command".into(),
-        format!("scripts/bench latency {}", words.join(" ")),
-    ));
+    facts.push(("command".into(), command));
     let html = page::html("Latency from the schedule to the action", &facts, &cells)?;
     archive.store_text("report.html", &html)?;
     let all: Vec<Value> = cells.iter().map(Cell::json).collect();

@@ -1,11 +1,8 @@
-//! Does the guard find every kind of bad frame by its right cause, and let pass what is the
-//! filters'?
+//! Does the guard find every bad frame by its right cause, and let pass what is the filters'?
 
 use std::error::Error;
 use std::path::Path;
-use std::process::ExitCode;
 
-use clap::Parser;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde_json::json;
@@ -17,9 +14,8 @@ use vigil_bench::simulated::Rover;
 use vigil_evaluation::frames;
 
 /// Injects faults into a stream of frames, and counts what is found.
-#[derive(Debug, Parser)]
-#[command(name = "scripts/bench guard")]
-struct Args {
+#[derive(Debug, clap::Args)]
+pub struct Args {
     /// Injections of each kind.
     #[arg(long, value_name = "N", default_value_t = 300)]
     injections: usize,
@@ -37,12 +33,8 @@ struct Row {
     found: Share,
 }
 
-fn main() -> ExitCode {
-    let args = Args::parse();
-    vigil_bench::ended("guard", run(&args))
-}
-
-fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let rover = Rover::read(&root)?;
     let recording = root.join("tests/data/rover/learn_frames.csv.gz");

@@ -1,6 +1,4 @@
-//! How long the exact belief over all 4096 sets of twelve faults takes per step.
-
-#![allow(missing_docs)]
+//! How long does the exact belief over all 4096 sets of twelve faults take per step?
 
 use std::error::Error;
 use std::hint::black_box;
@@ -16,7 +14,8 @@ use vigil_inference::fault_sets::{Component, FaultSets};
 const WHEELS: usize = 6;
 const STEPS: usize = 10_000;
 
-fn main() -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run() -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new("fault-sets")?;
     let component = Component {
         prior: 0.0,

@@ -1,5 +1,7 @@
-//! How fast is the look-ahead filter on a linear 13-mode model? The lanes at each level and the
-//! generic filter, on the same model and the same observations, in turn.
+//! How fast is the look-ahead filter on a linear 13-mode model?
+//!
+//! The lanes at each level and the generic filter, on the same model and the same observations, in
+//! turn.
 
 use std::error::Error;
 use std::hint::black_box;
@@ -34,7 +36,8 @@ const DRIVES: [(&str, bool); 2] = [("faults come and go", true), ("nominal", fal
 /// Of so many particles of the generic filter the belief is the yardstick.
 const YARDSTICK: usize = 10_000;
 
-fn main() -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run() -> Result<(), Box<dyn Error>> {
     if cfg!(debug_assertions) {
         return Err("a debug build measures nothing: use scripts/bench".into());
     }

@@ -1,7 +1,6 @@
-//! Which filter is worth its time: distance to the exact belief, delay and misses at rare faults,
-//! nanoseconds per particle.
-
-#![allow(missing_docs)]
+//! Which filter is worth its time?
+//!
+//! Distance to the exact belief, delay and misses at rare faults, nanoseconds per particle.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -53,7 +52,8 @@ const PAIRS: [(Kind, Kind); 4] = [
     (Kind::RaisedHierarchical, Kind::Fine),
 ];
 
-fn main() -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run() -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new("filters")?;
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/data/filters");
     archive

@@ -1,6 +1,4 @@
-//! How long detection takes at equal false-alarm rate, by size of the fault, against the bound.
-
-#![allow(missing_docs)]
+//! How long does detection take at equal false-alarm rate, by size of the fault, beside the bound?
 
 use std::error::Error;
 use std::hint::black_box;
@@ -248,7 +246,8 @@ const DETECTORS: [Detector; 6] = [
     Detector::Windowed40 { tau_squared: 5.0 },
 ];
 
-fn main() -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run() -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new("detection")?;
     archive.say("White residual of 3 dimensions; mean delay in steps at one false alarm in 10000");
     archive.say("steps, and its ratio to the bound 2 ln(10000) / size (Lorden; asymptotic). 2000");

@@ -1,12 +1,9 @@
 //! What is Vigil worth? Missions with random faults: with it, without, and with plainer rules.
 //!
-//! `--missions N` (1000), the first of seed `--first-seed S` (1; tuning takes others than what is
-//! archived), `--rate HZ` (100); `--json`: the document only, nothing is archived. Exit: 1 if Vigil
-//! does not win on the mission reward against going on and against the escalation.
+//! Exit: 1 if Vigil does not win on the mission reward against going on and against the escalation.
 
 use std::error::Error;
 use std::path::Path;
-use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -15,27 +12,35 @@ use vigil_bench::archive::Archive;
 use vigil_bench::machine;
 use vigil_bench::matched::in_parallel;
 use vigil_bench::missions::{self, Mission, Plan, Shipped};
-use vigil_bench::options::Options;
+
+use super::from_zero;
 
 /// Missions between two lines of progress.
 const PROGRESS: usize = 25;
 
-fn main() -> ExitCode {
-    vigil_bench::ended("missions", run())
+/// Which missions.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Missions.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    missions: u64,
+    /// Seed of the first; tuning takes others than what is archived.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    first_seed: u64,
+    /// Rate of the frames, Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = from_zero)]
+    rate: f64,
+    /// Print one JSON document, archive nothing.
+    #[arg(long)]
+    json: bool,
 }
 
-fn run() -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if cfg!(debug_assertions) {
         return Err("a debug build takes hours: use scripts/bench".into());
     }
-    let known = [
-        ("--missions", 1000.0),
-        ("--first-seed", 1.0),
-        ("--rate", 100.0),
-    ];
-    let options = Options::parse(&known)?;
-    let [count, first] = ["--missions", "--first-seed"].map(|key| options.number(key) as u64);
-    let rate_hz = options.number("--rate");
+    let (count, first, rate_hz) = (args.missions, args.first_seed, args.rate);
     let shipped = Shipped::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."), rate_hz)?;
     let plans: Vec<Plan> = (first..first + count).map(Plan::new).collect();
     let (began, done) = (Instant::now(), AtomicUsize::new(0));
@@ -55,7 +60,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     document["machine"] = machine::facts();
     document["wall_s"] = json!(wall_s);
     document["rate_hz"] = json!(rate_hz);
-    if options.is_json {
+    if args.json {
         println!("{document:#}");
         return won(&driven);
     }

@@ -1,7 +1,6 @@
-//! Real robots through the same detector: a Kobuki with taped wheels and a Robotino that runs onto
-//! another ground, each learned from its own log, with one rule for the alarm.
-
-#![allow(missing_docs)]
+//! Does one detector serve real robots, each learned from its own log, with one rule for the alarm?
+//!
+//! A Kobuki with taped wheels and a Robotino that runs onto another ground.
 
 use std::error::Error;
 
@@ -46,7 +45,8 @@ const NOTES: [&str; 6] = [
      built: these are not blind figures.",
 ];
 
-fn main() -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run() -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new("robots")?;
     let kobuki = real::kobuki::measure()?;
     for line in kobuki.lines() {

@@ -1,5 +1,7 @@
-//! How fast is a belief update? The sparse tracker beside a plain dense loop, on the same
-//! trajectories, in turn. Reads the public POMDP files that VIGIL_DATA names.
+//! How fast is a belief update?
+//!
+//! The sparse tracker beside a plain dense loop, on the same trajectories, in turn. Reads the
+//! public POMDP files that VIGIL_DATA names.
 
 use std::error::Error;
 use std::hint::black_box;
@@ -12,6 +14,8 @@ use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::quantile;
 use vigil_decision::{Evidence, Pomdp, Tracker};
+
+use super::Json;
 
 const FILES: [&str; 16] = [
     "tiger.95",
@@ -38,7 +42,8 @@ const ROUNDS: usize = 40;
 /// Readings of the clock alone.
 const READINGS: usize = 10_000;
 
-fn main() -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Json) -> Result<(), Box<dyn Error>> {
     if cfg!(debug_assertions) {
         return Err("a debug build measures nothing: use scripts/bench".into());
     }
@@ -52,9 +57,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         rows.push(measure(name, &text)?);
     }
     let clock = clock_ns();
+    let document = json!({ "steps": STEPS, "rounds": ROUNDS, "clock_ns": clock, "rows": rows });
+    if args.json {
+        println!("{document:#}");
+        return Ok(());
+    }
     let mut archive = Archive::new("pomdp-update")?;
     say(&mut archive, &rows, clock);
-    let document = json!({ "steps": STEPS, "rounds": ROUNDS, "clock_ns": clock, "rows": rows });
     archive.store("pomdp-update.json", &document)?;
     println!("archived in {}", archive.close()?.display());
     Ok(())

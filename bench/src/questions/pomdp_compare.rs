@@ -1,9 +1,6 @@
-//! Do the heuristics earn on public models what another implementation says, and what are they
-//! worth on the navigation model, how fast?
+//! Do the heuristics earn what another implementation says, and what are they worth, how fast?
 //!
-//! Options: `--episodes N` (default 3000), `--json`. The models are read from `VIGIL_DATA`.
-
-#![allow(missing_docs)]
+//! The first on public models, which are read from `VIGIL_DATA`, the rest on the navigation model.
 
 // The values that the tests hold the heuristics to.
 #[path = "../../../shared/decision/tests/public/heuristics.rs"]
@@ -17,12 +14,11 @@ use std::time::Instant;
 use heuristics::{HEURISTICS, POLICIES, half_width};
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
-use vigil_bench::options::Options;
 use vigil_bench::quantile;
 use vigil_decision::navigation::{ACTIONS, ENDS, QUIET};
 use vigil_decision::policy::{Base, Dual, PolicyKind, PolicyName};
 use vigil_decision::simulation::{
-    Agent, Escalation, Paired, PolicyAgent, Random, Rules, Summary, World, horizon, run,
+    self, Agent, Escalation, Paired, PolicyAgent, Random, Rules, Summary, World, horizon,
 };
 use vigil_decision::solver::{self, Found};
 use vigil_decision::{Budget, PointBased, Pomdp, Tracker, mdp};
@@ -38,9 +34,20 @@ const DECISIONS: usize = 200_000;
 
 type Failure = Box<dyn Error>;
 
-fn main() -> Result<(), Failure> {
-    let options = Options::parse(&[("--episodes", 3000.0)])?;
-    let episodes = (options.number("--episodes") as u64).max(500);
+/// How much is simulated.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Missions of each policy, at least 500.
+    #[arg(long, value_name = "N", default_value_t = 3000)]
+    episodes: u64,
+    /// Print one JSON document, archive nothing.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let episodes = args.episodes.max(500);
     let data = std::env::var_os("VIGIL_DATA").ok_or("VIGIL_DATA: not set; it holds pomdp/*")?;
     let navigation = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/navigation.pomdp");
     let navigation = Pomdp::parse(&std::fs::read_to_string(navigation)?)?;
@@ -58,7 +65,7 @@ fn main() -> Result<(), Failure> {
         "upper": upper,
         "decision_times": times,
     });
-    if options.is_json {
+    if args.json {
         println!("{raw:#}");
         return Ok(());
     }
@@ -86,7 +93,7 @@ fn rewards(model: &Pomdp, agent: &mut dyn Agent, ends: bool, episodes: u64) -> V
         steps_max: horizon(model.discount(), 2000),
         is_end: model.actions().iter().map(is_end).collect(),
     };
-    let mission = |episode| run(model, agent, &rules, (SEED, episode)).discounted;
+    let mission = |episode| simulation::run(model, agent, &rules, (SEED, episode)).discounted;
     (0..episodes).map(mission).collect()
 }
 

@@ -2,12 +2,11 @@
 //!
 //! Draws the paths in a 6 m left turn (`figure7.svg`) and tabulates the change of heading rate for
 //! radii from 1 to 10 m, left and right, beside recorded runs of an independent physics engine.
-//! `--json` prints the document and archives nothing. Exit: 1 if a sign is not the paper's.
+//! It fails if a sign is not the paper's.
 
 use std::error::Error;
 use std::fs;
 use std::path::Path;
-use std::process::ExitCode;
 
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
@@ -16,27 +15,14 @@ use vigil_bench::{machine, quantile};
 use vigil_evaluation::{frames, labels};
 use vigil_robot::slip::SlipModel;
 
+use super::Json;
+
 /// Radius of the figure, m, and metres commanded in it.
 const FIGURE_RADIUS_M: f64 = 6.0;
 const FIGURE_LENGTH_M: f64 = 9.0;
 
-fn main() -> ExitCode {
-    match run() {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
-        Err(error) => {
-            eprintln!("figure7: {error}");
-            ExitCode::from(1)
-        }
-    }
-}
-
-fn run() -> Result<bool, Box<dyn Error>> {
-    let options: Vec<String> = std::env::args().skip(1).collect();
-    let is_json = options == ["--json"];
-    if !is_json && !options.is_empty() {
-        return Err(format!("{options:?}: the only option is --json").into());
-    }
+/// Answers the question.
+pub fn run(args: &Json) -> Result<(), Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let robot = vigil_setup::load_robot(&root.join("config/robots/rover.toml"))?;
     let model = SlipModel::new(&robot)?;
@@ -58,9 +44,9 @@ fn run() -> Result<bool, Box<dyn Error>> {
         "signs_right": signs_right,
         "cells": cells.iter().map(Cell::json).collect::<Vec<Value>>(),
     });
-    if is_json {
+    if args.json {
         println!("{document:#}");
-        return Ok(signs_right);
+        return judged(signs_right);
     }
     let mut archive = Archive::new("figure7")?;
     archive.store("figure7.json", &document)?;
@@ -69,7 +55,14 @@ fn run() -> Result<bool, Box<dyn Error>> {
     let folder = archive.close()?;
     fs::write(folder.join("figure7.svg"), svg)?;
     println!("archived in {}", folder.display());
-    Ok(signs_right)
+    judged(signs_right)
+}
+
+fn judged(signs_right: bool) -> Result<(), Box<dyn Error>> {
+    match signs_right {
+        true => Ok(()),
+        false => Err("a stuck wheel does not bend every path as the paper says".into()),
+    }
 }
 
 fn figure(model: &SlipModel, names: &[String]) -> Result<String, Box<dyn Error>> {

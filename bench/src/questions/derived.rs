@@ -2,14 +2,13 @@
 //!
 //! On the runs that the shipped model was not learned from, with default settings and the noise
 //! not told: as recorded, with the sensors' noise doubled, and with encoders that die to noise in
-//! nominal runs, beside the stuck wheels, which read the same. `--json` prints the document instead
-//! of archiving it.
+//! nominal runs, beside the stuck wheels, which read the same.
 
 use std::error::Error;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::Command;
 
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
@@ -17,6 +16,8 @@ use vigil_evaluation::derived::{Labelled, dead_encoder, noisier, write_frames, w
 use vigil_evaluation::{frames, labels};
 use vigil_robot::Description;
 use vigil_robot::learned::Model;
+
+use super::Json;
 
 const MODEL: &str = "config/models/rover.toml";
 /// How much noisier the sensors are made.
@@ -29,16 +30,8 @@ const SEED: u64 = 1;
 /// Ids of runs with a dead encoder: above all recorded ones.
 const FIRST_ID: u32 = 10_000;
 
-fn main() -> ExitCode {
-    vigil_bench::ended("derived", run())
-}
-
-fn run() -> Result<(), Box<dyn Error>> {
-    let options: Vec<String> = std::env::args().skip(1).collect();
-    let is_json = options == ["--json"];
-    if !is_json && !options.is_empty() {
-        return Err(format!("{options:?}: the only option is --json").into());
-    }
+/// Answers the question.
+pub fn run(args: &Json) -> Result<(), Box<dyn Error>> {
     let robot = vigil_setup::load_robot(&root().join("config/robots/rover.toml"))?;
     let model = vigil_setup::load_model(&root().join(MODEL), Some(&robot))?;
     let model = model
@@ -53,7 +46,7 @@ fn run() -> Result<(), Box<dyn Error>> {
         "factor": FACTOR, "dead_sd_rad_s": DEAD_SD_RAD_S, "onset_s": ONSET_S, "seed": SEED,
         "sets": sets,
     });
-    if is_json {
+    if args.json {
         println!("{document:#}");
         return Ok(());
     }

@@ -1,19 +1,13 @@
 //! Is what no model contains detected, and called unknown? And what does nominal driving raise?
-//!
-//! `--seeds N` worlds per cell (2), the first of them `--first-seed S` (1; tuning takes
-//! 10000000 or more, and so no run that is archived), `--hours H` of nominal driving (24),
-//! `--json`: the document only, nothing is archived.
 
 use std::error::Error;
 use std::path::Path;
-use std::process::ExitCode;
 use std::time::Instant;
 
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::machine;
 use vigil_bench::matched::in_parallel;
-use vigil_bench::options::Options;
 use vigil_bench::shares::poisson_upper;
 use vigil_bench::simulated::{Rover, SENSOR_SETS};
 use vigil_bench::unmodelled::{
@@ -21,28 +15,42 @@ use vigil_bench::unmodelled::{
     excluded, totals,
 };
 
+use super::from_zero;
+
 /// Rates at which frames come: all cells at the first, every fourth at the second. Four shares no
 /// factor with the turns and speeds of a size, so that all of them come up.
 const RATES_HZ: [f64; 2] = [20.0, 100.0];
 const EVERY: usize = 4;
 
-fn main() -> ExitCode {
-    vigil_bench::ended("unmodelled", run())
+/// How much is driven.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Worlds per cell.
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    seeds: u64,
+    /// Nominal driving, h.
+    #[arg(long, value_name = "H", default_value_t = 24.0, value_parser = from_zero)]
+    hours: f64,
+    /// Seed of the first; tuning takes 10000000 or more, and so no run that is archived.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    first_seed: u64,
+    /// Print one JSON document, archive nothing.
+    #[arg(long)]
+    json: bool,
 }
 
-fn run() -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if cfg!(debug_assertions) {
         return Err("a debug build takes hours: use scripts/bench".into());
     }
-    let options = Options::parse(&[("--seeds", 2.0), ("--hours", 24.0), ("--first-seed", 1.0)])?;
     let rover = Rover::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))?;
     let began = Instant::now();
-    let [seeds, first_seed] = ["--seeds", "--first-seed"].map(|key| options.number(key) as u64);
-    let runs = disturbed(&rover, seeds, first_seed)?;
+    let runs = disturbed(&rover, args.seeds, args.first_seed)?;
     let disturbed_s = began.elapsed().as_secs_f64();
     eprintln!("{} runs in {disturbed_s:.0} s", runs.len());
     let began = Instant::now();
-    let nominal = nominal(&rover, options.number("--hours"), first_seed)?;
+    let nominal = nominal(&rover, args.hours, args.first_seed)?;
     let nominal_s = began.elapsed().as_secs_f64();
     let mut document = json!({
         "machine": machine::facts(), "noncentrality_min": NONCENTRALITY_MIN,
@@ -57,7 +65,7 @@ fn run() -> Result<(), Box<dyn Error>> {
             .into();
     }
     document["nominal"] = nominal_json(&nominal);
-    if options.is_json {
+    if args.json {
         println!("{document:#}");
         return Ok(());
     }

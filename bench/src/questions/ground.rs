@@ -1,11 +1,7 @@
 //! Does a model that was learned on one soil fail honestly on stiffer ones?
-//!
-//! `--seeds N` worlds per cell (2), the first of them `--first-seed S` (1; tuning takes 100000
-//! or more, and so no run that is archived); `--json`: the document only, nothing is archived.
 
 use std::error::Error;
 use std::path::Path;
-use std::process::ExitCode;
 use std::time::Instant;
 
 use serde_json::{Value, json};
@@ -13,7 +9,6 @@ use vigil_bench::archive::Archive;
 use vigil_bench::ground::{self, Figures, Run, STIFFER, figures};
 use vigil_bench::machine;
 use vigil_bench::matched::in_parallel;
-use vigil_bench::options::Options;
 use vigil_bench::shares::Share;
 use vigil_bench::simulated::{Rover, SENSOR_SETS};
 use vigil_evaluation::scoring::Taxonomy;
@@ -21,19 +16,28 @@ use vigil_evaluation::scoring::Taxonomy;
 /// Types of faults: first word of the specification.
 const TYPES: [&str; 2] = ["stuck", "encoder"];
 
-fn main() -> ExitCode {
-    vigil_bench::ended("ground", run())
+/// Worlds of every cell.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Worlds per cell.
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    seeds: u64,
+    /// Seed of the first; tuning takes 100000 or more, and so no run that is archived.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    first_seed: u64,
+    /// Print one JSON document, archive nothing.
+    #[arg(long)]
+    json: bool,
 }
 
-fn run() -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if cfg!(debug_assertions) {
         return Err("a debug build takes hours: use scripts/bench".into());
     }
-    let options = Options::parse(&[("--seeds", 2.0), ("--first-seed", 1.0)])?;
     let rover = Rover::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))?;
     let taxonomy = Taxonomy::new(&rover.tree, &rover.robot);
-    let [seeds, first_seed] = ["--seeds", "--first-seed"].map(|key| options.number(key) as u64);
-    let jobs = ground::jobs(&rover, seeds, first_seed);
+    let jobs = ground::jobs(&rover, args.seeds, args.first_seed);
     let began = Instant::now();
     let drive = |job: &_| ground::drive(&rover, &taxonomy, job).map_err(|e| e.to_string());
     let runs: Result<Vec<Vec<Run>>, String> = in_parallel(&jobs, drive).into_iter().collect();
@@ -42,7 +46,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let document = json!({
         "machine": machine::facts(), "wall_s": wall_s, "soils": soils_json(&runs),
     });
-    if options.is_json {
+    if args.json {
         println!("{document:#}");
         return Ok(());
     }

@@ -2,22 +2,18 @@
 //!
 //! Every pair of wheels in every turn, at once and one 2 s after the other, on the soil learned
 //! from, with encoders; and every pair again whose second wheel turns on while its encoder dies to
-//! zero with the sensor's noise, as a stuck wheel's reads. `--seeds N` worlds per cell (1), the
-//! first of them `--first-seed S` (1; tuning takes 100000 or more, and so no run that is archived);
-//! `--json`: the document only, nothing is archived.
+//! zero with the sensor's noise, as a stuck wheel's reads.
 //!
 //! The simulator's physics also told what to expect of two wheels (`SAME_SIDE` in the learned
 //! robot's motion modes): there are no recordings of two, so this is no independent judge.
 
 use std::error::Error;
 use std::path::Path;
-use std::process::ExitCode;
 
 use serde_json::json;
 use vigil_bench::archive::Archive;
 use vigil_bench::machine;
 use vigil_bench::matched::in_parallel;
-use vigil_bench::options::Options;
 use vigil_bench::shares::Share;
 use vigil_bench::simulated::{Chain, Conditions, Rover, constant};
 use vigil_robot::Injection;
@@ -44,18 +40,27 @@ struct Run {
     said: [String; JUDGED_S.len()],
 }
 
-fn main() -> ExitCode {
-    vigil_bench::ended("two-wheels", run())
+/// Worlds of every cell.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Worlds per cell.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seeds: u64,
+    /// Seed of the first; tuning takes 100000 or more, and so no run that is archived.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    first_seed: u64,
+    /// Print one JSON document, archive nothing.
+    #[arg(long)]
+    json: bool,
 }
 
-fn run() -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if cfg!(debug_assertions) {
         return Err("a debug build takes hours: use scripts/bench".into());
     }
-    let options = Options::parse(&[("--seeds", 1.0), ("--first-seed", 1.0)])?;
-    let [seeds, first_seed] = ["--seeds", "--first-seed"].map(|key| options.number(key) as u64);
     let rover = Rover::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))?;
-    let jobs = jobs(&rover, seeds, first_seed);
+    let jobs = jobs(&rover, args.seeds, args.first_seed);
     let drive = |job: &Run| drive(&rover, job.clone()).map_err(|error| error.to_string());
     let runs: Result<Vec<Run>, String> = in_parallel(&jobs, drive).into_iter().collect();
     let runs = runs?;
@@ -75,7 +80,7 @@ fn run() -> Result<(), Box<dyn Error>> {
             json!({ "second": second, "apart_s": apart_s, "judged_s": JUDGED_S, "named": named })
         });
     let document = json!({ "machine": machine::facts(), "runs": rows.collect::<Vec<_>>() });
-    if options.is_json {
+    if args.json {
         println!("{document:#}");
         return Ok(());
     }

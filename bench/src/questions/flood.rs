@@ -1,4 +1,4 @@
-//! What a flood of frames costs: nothing is wanted if it is a stranger's.
+//! What does a flood of frames cost? That of a stranger should cost nothing.
 //!
 //! A publisher sends frames to the graph's UDP socket on its schedule; in one half of each pair
 //! another process sends good frames as fast as it can: to the graph's Unix socket, or to the same
@@ -9,13 +9,13 @@ use std::error::Error;
 use std::net::UdpSocket;
 use std::os::unix::net::UnixDatagram;
 use std::path::Path;
-use std::process::{Child, Command, ExitCode, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use clap::{Parser, ValueEnum};
+use clap::ValueEnum;
 use vigil_bench::latency::graph::{Change, Prepared, root};
 use vigil_bench::latency::halves::{self, Half};
 use vigil_bench::latency::load::{Load, Running};
@@ -25,8 +25,8 @@ use vigil_cycle::{Clock, Monotonic, clock, signal};
 use vigil_evaluation::frames;
 use vigil_setup::schema::Source;
 
-/// First argument of the process that is the flood.
-const FLOOD_WORD: &str = "flood";
+/// The word with which the program is the flood.
+pub const FLOOD_WORD: &str = "frame-flood";
 /// Where the publisher runs: below the graph, above ordinary processes.
 const PUBLISHER: Wanted = Wanted {
     core: 0,
@@ -47,9 +47,8 @@ enum Through {
 }
 
 /// Measures in interleaved pairs.
-#[derive(Debug, Parser)]
-#[command(name = "scripts/bench flood")]
-struct Args {
+#[derive(Debug, clap::Args)]
+pub struct Args {
     /// Pairs.
     #[arg(long, value_name = "N", default_value_t = 10)]
     pairs: usize,
@@ -67,18 +66,8 @@ struct Args {
     through: Through,
 }
 
-fn main() -> ExitCode {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    if let [word, address] = words.as_slice()
-        && word == FLOOD_WORD
-    {
-        return vigil_bench::ended("flood", flood(address));
-    }
-    vigil_bench::ended("flood", run(&Args::parse()))
-}
-
 /// Sends good frames to `address` as fast as it can.
-fn flood(address: &str) -> Result<(), Box<dyn Error>> {
+pub fn be_flood(address: &str) -> Result<(), Box<dyn Error>> {
     let udp = UdpSocket::bind("127.0.0.1:0")?;
     let unix = UnixDatagram::unbound()?;
     // One that waits for room is no flood.
@@ -103,7 +92,8 @@ fn flood(address: &str) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let pairs = vigil_bench::in_folder("flood", |folder| measure(args, folder))?;
     let (n, seconds, rate, load) = (args.pairs, args.seconds, args.rate, args.load.name());
     let (through, flood) = match args.through {

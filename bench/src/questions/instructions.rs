@@ -6,9 +6,8 @@
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::Path;
-use std::process::{Command, ExitCode, Stdio};
+use std::process::{Command, Stdio};
 
-use clap::Parser;
 use serde::Deserialize;
 use serde_json::json;
 use vigil_bench::archive::Archive;
@@ -16,13 +15,12 @@ use vigil_bench::instructions::{InProcess, STEPS};
 
 /// Cycles that are counted: a wheel sticks after 300 of them.
 const CYCLES: u64 = 600;
-/// First argument of the process that is counted.
-const RUN_WORD: &str = "run-cycles";
+/// The word with which the program is the process that is counted.
+pub const RUN_WORD: &str = "run-cycles";
 
 /// Counts the instructions of each service's step.
-#[derive(Debug, Parser)]
-#[command(name = "scripts/bench instructions")]
-struct Args {
+#[derive(Debug, clap::Args)]
+pub struct Args {
     /// Only compare with the budgets, archive nothing.
     #[arg(long)]
     check: bool,
@@ -32,16 +30,8 @@ struct Args {
 #[derive(Debug, Deserialize)]
 struct Budgets(BTreeMap<String, BTreeMap<String, u64>>);
 
-fn main() -> ExitCode {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    if words.first().is_some_and(|word| word == RUN_WORD) {
-        return vigil_bench::ended("instructions", run_cycles());
-    }
-    let args = Args::parse();
-    vigil_bench::ended("instructions", run(&args))
-}
-
-fn run_cycles() -> Result<(), Box<dyn Error>> {
+/// Runs the cycles that are counted.
+pub fn run_cycles() -> Result<(), Box<dyn Error>> {
     let mut graph = InProcess::new()?;
     graph.run(CYCLES)?;
     if graph.cycles() + 5 < CYCLES {
@@ -50,7 +40,8 @@ fn run_cycles() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let profile = if cfg!(debug_assertions) {
         "dev"
     } else {

@@ -1,8 +1,6 @@
 //! How good and how fast are the bounds and the point-based solver on the public models?
 //!
-//! Reads the public models from `$VIGIL_DATA/pomdp`, and those of `config/`. `--json` prints the
-//! document instead of archiving it; `--share N` gives the searches N percent of their time (for a
-//! quick look).
+//! Reads the public models from `$VIGIL_DATA/pomdp`, and those of `config/`.
 
 // The values that the tests hold the bounds to.
 #[path = "../../../shared/decision/tests/public/bounds.rs"]
@@ -10,16 +8,16 @@ mod reference;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use reference::BOUNDS;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::machine;
-use vigil_bench::options::Options as Given;
 use vigil_cycle::clock::process_cpu_s;
 use vigil_decision::solver::{Answer, Method, Options, Progress, bound};
 use vigil_decision::{Budget, Pomdp};
+
+use super::from_zero;
 
 /// File, gap that the search shall reach, and the processor time that it has, s.
 type Row = (&'static str, f64, f64);
@@ -59,17 +57,24 @@ const METHODS: [Method; 5] = [
     Method::Mdp,
 ];
 
-fn main() -> ExitCode {
-    vigil_bench::ended("pomdp-bounds", run())
+/// For how long the searches go on.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Share of their time that the searches have, %: less for a quick look.
+    #[arg(long, value_name = "N", default_value_t = 100.0, value_parser = from_zero)]
+    share: f64,
+    /// Print one JSON document, archive nothing.
+    #[arg(long)]
+    json: bool,
 }
 
-fn run() -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if cfg!(debug_assertions) {
         return Err("a debug build measures nothing: use scripts/bench".into());
     }
-    let given = Given::parse(&[("--share", 100.0)])?;
     let data = std::env::var_os("VIGIL_DATA").ok_or("VIGIL_DATA is not set: no public models")?;
-    let share = 0.01 * given.number("--share");
+    let share = 0.01 * args.share;
     let mut lines = vec![
         "Bounds of the optimal value at the start belief; times are processor time. `off`: the"
             .into(),
@@ -104,7 +109,7 @@ fn run() -> Result<(), Box<dyn Error>> {
         rows.push(json!({"file": row.0, "bounds": bounds, "search": search}));
     }
     let document = json!({ "machine": machine::facts(), "share": share, "rows": rows });
-    if given.is_json {
+    if args.json {
         println!("{document:#}");
         return Ok(());
     }

@@ -1,5 +1,4 @@
-//! Do slow, stopped or dead observers disturb the graph? And what does its own instrumentation
-//! cost?
+//! Do slow, stopped or dead observers disturb the graph, and what does its instrumentation cost?
 //!
 //! Interleaved pairs: halves of one run with and without three bad observers (one that never drains
 //! what it holds, one that is stopped, ones that are killed again and again), or runs with and
@@ -8,12 +7,11 @@
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitCode, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use clap::{Parser, ValueEnum};
+use clap::ValueEnum;
 use vigil_bench::latency::cycles::STAGES;
-use vigil_bench::latency::flood::{FLOOD_WORD, be_flood};
 use vigil_bench::latency::graph::{Change, Prepared};
 use vigil_bench::latency::halves::{self, Half};
 use vigil_bench::latency::load::{Load, Running};
@@ -24,8 +22,8 @@ use vigil_cycle::{Graph, Topic, signal};
 use vigil_setup::schema::Source;
 use vigil_setup::{GraphArgs, Setup};
 
-/// First argument of a process that is a bad observer.
-const OBSERVE_WORD: &str = "observe";
+/// The word with which the program is a bad observer.
+pub const OBSERVE_WORD: &str = "observe";
 /// Interval at which an observer of the last kind is killed and another started.
 const KILL_EVERY: Duration = Duration::from_secs(2);
 
@@ -40,9 +38,8 @@ enum Difference {
 }
 
 /// Measures in interleaved pairs.
-#[derive(Debug, Parser)]
-#[command(name = "scripts/bench observers")]
-struct Args {
+#[derive(Debug, clap::Args)]
+pub struct Args {
     /// What the halves of a pair differ in.
     #[arg(long, default_value = "observers")]
     difference: Difference,
@@ -60,24 +57,11 @@ struct Args {
     load: Load,
 }
 
-fn main() -> ExitCode {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    if words.first().is_some_and(|word| word == OBSERVE_WORD) {
-        return vigil_bench::ended("observer", observe(words.get(1), words.get(2)));
-    }
-    if words.first().is_some_and(|word| word == FLOOD_WORD) {
-        return vigil_bench::ended("flood", be_flood(words.get(1)));
-    }
-    let args = Args::parse();
-    vigil_bench::ended("observers", run(&args))
-}
-
-/// Is a bad observer: opens every topic, takes what it may hold, and never lets go.
-fn observe(config: Option<&String>, folder: Option<&String>) -> Result<(), Box<dyn Error>> {
-    let config = PathBuf::from(config.ok_or("no graph file is given")?);
-    let folder = PathBuf::from(folder.ok_or("no folder is given")?);
+/// Is a bad observer of the graph of this file: opens every topic, takes what it may hold, and
+/// never lets go. It leaves a file in `folder` once it holds a frame.
+pub fn observe(config: &Path, folder: &Path) -> Result<(), Box<dyn Error>> {
     let setup = GraphArgs {
-        config,
+        config: config.to_owned(),
         ..GraphArgs::default()
     }
     .load()?;
@@ -111,7 +95,8 @@ fn graph_of(setup: &Setup, name: &str) -> Result<Graph, Box<dyn Error>> {
     Ok(Graph::SharedMemory(Link::join(&domain, name)?))
 }
 
-fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let pairs = vigil_bench::in_folder("observers", |folder| measure(args, folder))?;
     let name = match args.difference {
         Difference::Observers => "observers",

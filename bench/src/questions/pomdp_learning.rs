@@ -1,31 +1,42 @@
-//! Is a model that was learned from missions of the escalation policy as good as the true one, and
-//! does a robot that learns on the way improve from a wrong prior?
+//! Is a model learned from missions as good as the true one, and does learning on the way help?
 //!
-//! Options: `--missions N` recorded ones (default 10000), `--prior-strength K` (default 50),
-//! `--learners N` (default 24), `--lifetime N` missions of each (default 300), `--json`.
-
-#![allow(missing_docs)]
+//! The recorded missions are those of the escalation policy; who learns on the way begins with a
+//! wrong prior.
 
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
-use vigil_bench::options::Options;
 use vigil_bench::pomdp_learning::{Failure, Models, curve, offline, online};
 
-fn main() -> Result<(), Failure> {
-    let options = Options::parse(&[
-        ("--missions", 10_000.0),
-        ("--prior-strength", 50.0),
-        ("--learners", 24.0),
-        ("--lifetime", 300.0),
-    ])?;
-    let count = |name: &str| (options.number(name) as u64).max(2);
+use super::from_zero;
+
+/// How much is learned from, and how much is believed before.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Recorded missions.
+    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    missions: u64,
+    /// Strength of the prior.
+    #[arg(long, value_name = "K", default_value_t = 50.0, value_parser = from_zero)]
+    prior_strength: f64,
+    /// Robots that learn on the way.
+    #[arg(long, value_name = "N", default_value_t = 24)]
+    learners: u64,
+    /// Missions of each of them.
+    #[arg(long, value_name = "N", default_value_t = 300)]
+    lifetime: u64,
+    /// Print one JSON document, archive nothing.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Failure> {
     let models = Models::read()?;
-    let strength = options.number("--prior-strength");
-    let offline = offline::measure(&models, count("--missions"), strength)?;
-    let (learners, lifetime) = (count("--learners"), count("--lifetime"));
+    let offline = offline::measure(&models, args.missions.max(2), args.prior_strength)?;
+    let (learners, lifetime) = (args.learners.max(2), args.lifetime.max(2));
     let online = online::measure(&models.truth, &models.misled, learners, lifetime)?;
     let raw = json!({"offline": offline, "online": online});
-    if options.is_json {
+    if args.json {
         println!("{raw:#}");
         return Ok(());
     }

@@ -1,15 +1,16 @@
-//! Where does zero-copy pay? The same chain of four stages over Vigil's ports, a bare futex, Unix
-//! datagrams, pipes and a queue within one process, at four sizes of block.
+//! Where does zero-copy pay?
+//!
+//! The same chain of four stages over Vigil's ports, a bare futex, Unix datagrams, pipes and a
+//! queue within one process, at four sizes of block.
 
 use std::error::Error;
 use std::path::Path;
-use std::process::ExitCode;
 
-use clap::{Parser, ValueEnum};
+use clap::ValueEnum;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
+use vigil_bench::chain::Chain;
 use vigil_bench::chain::carriers::Carrier;
-use vigil_bench::chain::{self, Chain};
 use vigil_bench::latency::cell::us;
 use vigil_bench::latency::cycles::{STAGES, Spectra, join};
 use vigil_bench::latency::load::{Load, Running};
@@ -20,9 +21,8 @@ const SIZES: [usize; 4] = [64, 4 << 10, 64 << 10, 1 << 20];
 const WARM_UP_NS: u64 = 500_000_000;
 
 /// Compares ways of handing blocks on.
-#[derive(Debug, Parser)]
-#[command(name = "scripts/bench peers")]
-struct Args {
+#[derive(Debug, clap::Args)]
+pub struct Args {
     /// Rate of the schedule, Hz.
     #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
     rate: f64,
@@ -46,16 +46,8 @@ struct Args {
 /// Cores and priorities as in the default graph.
 const PLACED: [(usize, u8); STAGES] = [(0, 55), (0, 52), (1, 51), (1, 53)];
 
-fn main() -> ExitCode {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    if words.first().is_some_and(|word| word == chain::STAGE_WORD) {
-        return vigil_bench::ended("chain", chain::be_stage(words.get(1)));
-    }
-    let args = Args::parse();
-    vigil_bench::ended("peers", run(&args))
-}
-
-fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+/// Answers the question.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let mut cores: Vec<usize> = PLACED.map(|(core, _)| core).to_vec();
     cores.dedup();
     let rows = vigil_bench::in_folder("peers", |folder| {

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::Command;
 
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
@@ -14,20 +14,8 @@ const FRAMES: &str = "tests/data/rover/learn_frames.csv.gz";
 const LABELS: &str = "tests/data/rover/learn_runs.csv";
 const MODEL: &str = "config/models/rover.toml";
 
-fn main() -> ExitCode {
-    match run() {
-        Ok(folder) => {
-            println!("archived in {}", folder.display());
-            ExitCode::SUCCESS
-        }
-        Err(error) => {
-            eprintln!("first-light: {error}");
-            ExitCode::from(1)
-        }
-    }
-}
-
-fn run() -> Result<PathBuf, Box<dyn Error>> {
+/// Answers the question.
+pub fn run() -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new("first-light")?;
     for rate in ["100", "1000"] {
         let options = [
@@ -55,7 +43,8 @@ fn run() -> Result<PathBuf, Box<dyn Error>> {
     for sensors in ["pose+encoders", "pose"] {
         evaluate(&mut archive, sensors)?;
     }
-    Ok(archive.close()?)
+    println!("archived in {}", archive.close()?.display());
+    Ok(())
 }
 
 /// Runs `scripts/up`, stores and returns its document.
