@@ -3,7 +3,7 @@
 //! Reads the public models from `$VIGIL_DATA/pomdp`, and those of `config/`.
 
 // The values that the tests hold the bounds to.
-#[path = "../../../shared/decision/tests/public/bounds.rs"]
+#[path = "../../../shared/decision/tests/decision/public/bounds.rs"]
 mod reference;
 
 use std::error::Error;

@@ -3,7 +3,7 @@
 //! The first on public models, which are read from `VIGIL_DATA`, the rest on the navigation model.
 
 // The values that the tests hold the heuristics to.
-#[path = "../../../shared/decision/tests/public/heuristics.rs"]
+#[path = "../../../shared/decision/tests/decision/public/heuristics.rs"]
 mod heuristics;
 
 use std::error::Error;

@@ -1,9 +1,11 @@
 //! A steady cycle of the detector allocates nothing.
-use crate::recorded;
+
 use vigil_blocks::{DetectionBelief, Entry, ParticleBlock};
 use vigil_cycle::allocation::allocations;
 use vigil_detector::Detector;
 use vigil_setup::schema;
+
+use crate::recorded;
 
 #[test]
 fn steady_cycles_allocate_nothing() {

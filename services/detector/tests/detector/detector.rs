@@ -1,11 +1,13 @@
 //! The detector on recorded runs that its model has not seen, and on garbage.
-use crate::recorded::{model, robot, unseen};
+
 use proptest::prelude::*;
 use vigil_blocks::{Channel, DetectionBelief, Entry, MODE_UNKNOWN, ParticleBlock, SensorFrame};
 use vigil_detector::Detector;
 use vigil_robot::learned::monitor::Channels;
 use vigil_robot::learned::{Form, Healthy, Monitor, Observer, triangle};
 use vigil_setup::schema;
+
+use crate::recorded::{model, robot, unseen};
 
 /// Capture time, s.
 fn time_s(frame: &SensorFrame) -> f64 {

@@ -1,10 +1,11 @@
 //! The forms of detection, each calibrated, on recorded runs that the model has not seen.
-#[expect(dead_code, reason = "other tests take single runs")]
-use crate::recorded::{model, robot, runs};
+
 use vigil_blocks::{DetectionBelief, Entry, ParticleBlock, SensorFrame};
 use vigil_detector::Detector;
 use vigil_robot::Description;
 use vigil_setup::schema::{self, Form, Sensors};
+
+use crate::recorded::{model, robot, runs};
 
 const FORMS: [Form; 3] = [Form::LearnedBias, Form::Constant, Form::Windowed];
 

@@ -1,9 +1,10 @@
 //! The tests of a publisher over recorded runs: silent on all of them, faulty or not, and loud once
 //! the motion shows what is wrong.
 
-use crate::recorded::{model, path, robot, runs, unseen};
 use vigil_blocks::SensorFrame;
 use vigil_robot::meaning::{Kind, Meaning};
+
+use crate::recorded::{model, path, robot, runs, unseen};
 
 /// All that is found in a run, and when, s after the first motion.
 fn found(frames: &[SensorFrame], spoil: impl Fn(&mut SensorFrame)) -> Vec<(Kind, f64)> {

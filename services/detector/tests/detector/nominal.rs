@@ -1,4 +1,5 @@
 //! The detector on a nominal model, learned from frames made from a Kobuki's geometry.
+
 use std::path::PathBuf;
 
 use rand::{RngExt, SeedableRng};

@@ -1,5 +1,6 @@
 //! The identifier's filter against an oracle that leaves nothing out: it is told when the faults
 //! appeared, and weighs every set of stuck wheels with every set of broken encoders.
+
 use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};

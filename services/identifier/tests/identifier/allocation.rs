@@ -1,11 +1,13 @@
 //! A steady cycle of the identifier allocates nothing.
-use crate::alarm;
-use crate::recorded;
+
 use clap::ValueEnum;
 use vigil_blocks::{Entry, FaultBelief, ParticleBlock};
 use vigil_cycle::allocation::allocations;
 use vigil_identifier::{Identifier, Input, Models};
 use vigil_setup::schema;
+
+use crate::alarm;
+use crate::recorded;
 
 #[test]
 fn steady_cycles_of_every_filter_allocate_nothing() {

@@ -1,4 +1,5 @@
 //! What gyro and currents say of faults, on readings of which the answer is known.
+
 use std::path::Path;
 
 use vigil_blocks::WHEELS;

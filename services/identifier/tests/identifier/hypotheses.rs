@@ -1,10 +1,12 @@
 //! What the identifier takes of the detector's block, what it keeps, and what it sheds.
-use crate::alarm::Alarm;
-use crate::recorded;
+
 use vigil_blocks::{Entry, FaultBelief, HealthyBelief, ParticleBlock, SensorFrame};
 use vigil_identifier::{Identifier, Input, Models};
 use vigil_inference::FaultTree;
 use vigil_setup::schema;
+
+use crate::alarm::Alarm;
+use crate::recorded;
 
 /// The exact filter on a run whose wheel RM sticks.
 struct Bench {

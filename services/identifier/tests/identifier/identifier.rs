@@ -1,6 +1,5 @@
 //! The identifier on recorded runs that its model has not seen, and on garbage.
-use crate::alarm::Alarm;
-use crate::recorded::{model, path, robot, unseen};
+
 use clap::ValueEnum;
 use proptest::prelude::*;
 use vigil_blocks::{Entry, FaultBelief, MODE_MULTIPLE, MODE_UNKNOWN, ParticleBlock, SensorFrame};
@@ -8,6 +7,9 @@ use vigil_identifier::{Identifier, IdentifierError, Input, Models};
 use vigil_inference::FaultTree;
 use vigil_inference::tree::Node;
 use vigil_setup::schema;
+
+use crate::alarm::Alarm;
+use crate::recorded::{model, path, robot, unseen};
 
 fn time_s(frame: &SensorFrame) -> f64 {
     frame.header.t_capture_ns as f64 * 1e-9

@@ -1,10 +1,12 @@
 //! A steering servo that does not do as it is told, and a pose that is wrong, on a recorded healthy
 //! run whose readings are changed.
-use crate::alarm;
-use crate::recorded;
+
 use vigil_blocks::{Entry, FaultBelief, ParticleBlock, SensorFrame, SizeKind};
 use vigil_identifier::{Identifier, Input, Models};
 use vigil_setup::schema;
+
+use crate::alarm;
+use crate::recorded;
 
 /// When it breaks, s after the first frame.
 const ONSET_S: f64 = 3.0;

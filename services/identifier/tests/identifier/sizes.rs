@@ -1,9 +1,11 @@
 //! How far an encoder is off, on recorded healthy runs whose readings are changed by a known size.
-use crate::alarm;
-use crate::recorded;
+
 use vigil_blocks::{Entry, FaultBelief, ParticleBlock, SensorFrame, SizeKind};
 use vigil_identifier::{Identifier, Input, Models};
 use vigil_setup::schema;
+
+use crate::alarm;
+use crate::recorded;
 
 /// When the encoder of LM breaks, s after the first frame.
 const ONSET_S: f64 = 3.0;

@@ -4,8 +4,6 @@ use vigil_blocks::{Action, ActionOutcome, RecoveryKind, SensorFrame, Symptoms};
 use vigil_sensor_sim::{Happening, Navigator, Obedience, Simulation, World};
 use vigil_setup::schema::{Navigation, Obstacle, Trouble, TroubleKind};
 
-use crate::rover::{even_soil, robot};
-
 /// A straight corridor of 8 m, 2.4 m wide, changed.
 fn corridor(change: impl FnOnce(&mut Navigation)) -> Navigation {
     let text = "path = [[0.0, 0.0], [8.0, 0.0]]\n\
@@ -112,6 +110,8 @@ const fn ended(kind: RecoveryKind, outcome: ActionOutcome) -> Happening {
 
 use ActionOutcome::{Failed, Succeeded};
 use RecoveryKind::{CallForHelp, GiveUp, GoOn, GoThrough, MoveAway, NewPath, Relocalise, Stop};
+
+use crate::rover::{even_soil, robot};
 
 #[test]
 fn a_free_path_is_followed_with_the_plan_to_the_goal() {

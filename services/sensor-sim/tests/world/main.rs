@@ -1,4 +1,5 @@
 //! The simulated rover as its users see it.
+
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod corridor;

@@ -1,12 +1,13 @@
 //! The shipped decision model behind the supervisor: what it does in which situation.
 
-use crate::world::{CYCLE_NS, World, config, model};
 use proptest::prelude::*;
 use vigil_blocks::{ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
 use vigil_cycle::allocation::allocations;
 use vigil_decision::{Policy, Pomdp, QMdp, mdp};
 use vigil_setup::schema::GraphFile;
 use vigil_supervisor::{Compensation, Inputs, Supervisor};
+
+use crate::world::{CYCLE_NS, World, config, model};
 
 #[test]
 fn every_certain_state_has_the_action_that_a_driver_would_expect() {

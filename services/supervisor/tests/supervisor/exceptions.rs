@@ -1,11 +1,12 @@
 //! The navigation model behind the supervisor: epochs, and what does not fit.
 
-use crate::told::{CYCLE_NS, FP, MODEL, Told, assert_near, build, settings, tracked};
 use vigil_blocks::{ActionOutcome, Entry, RecoveryKind, Symptoms};
 use vigil_cycle::allocation::allocations;
 use vigil_decision::{Pomdp, Tracker};
 use vigil_setup::schema::Supervisor as Settings;
 use vigil_supervisor::Inputs;
+
+use crate::told::{CYCLE_NS, FP, MODEL, Told, assert_near, build, settings, tracked};
 
 const NP: usize = 1;
 const GO: usize = 3;

@@ -1,9 +1,10 @@
 //! The navigation model behind the supervisor: what identifier and detector say about hardware.
 
-use crate::told::{CYCLE_NS, FP, MODEL, Told, assert_near, build, settings, tracked};
 use vigil_blocks::{ActionOutcome, ControlMode, Entry, RecoveryKind, Symptoms};
 use vigil_decision::{Pomdp, Tracker};
 use vigil_supervisor::Inputs;
+
+use crate::told::{CYCLE_NS, FP, MODEL, Told, assert_near, build, settings, tracked};
 
 #[test]
 fn the_identifiers_evidence_counts_once() {

@@ -1,4 +1,5 @@
 //! Tests of the supervisor.
+
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use vigil_cycle::allocation::CountingAllocator;

@@ -1,12 +1,13 @@
 //! The policies that the settings offer, and what is published about their decisions.
 
-use crate::world::{CYCLE_NS, World, config, model};
 use vigil_blocks::{ControlMode, DetectionBelief, Entry, RecoveryKind, ValueKind};
 use vigil_cycle::allocation::allocations;
 use vigil_decision::policy::{Base, Dual, PolicyName, normalised_entropy};
 use vigil_decision::{Pomdp, mdp};
 use vigil_setup::schema::{Gate, GraphFile, Supervisor as Settings};
 use vigil_supervisor::{Inputs, Supervisor};
+
+use crate::world::{CYCLE_NS, World, config, model};
 
 fn names() -> impl Iterator<Item = String> {
     let prefixes = ["", "dm-", "adm-"];

@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::Path;
 
-use crate::world::{CYCLE_NS, config};
 use tempfile::TempDir;
 use vigil_blocks::{
     Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind, Symptoms, ValueKind,
@@ -15,6 +14,8 @@ use vigil_decision::{AlphaVectors, Budget, Pomdp};
 use vigil_setup::schema::GraphFile;
 use vigil_setup::{Setup, load_graph};
 use vigil_supervisor::{Inputs, Supervisor, assemble};
+
+use crate::world::{CYCLE_NS, config};
 
 fn model(name: &str) -> Pomdp {
     Pomdp::parse(&fs::read_to_string(config().join(name)).unwrap()).unwrap()

@@ -1,4 +1,5 @@
 //! Tests of the commands, each a process of its own.
+
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 mod model;

@@ -1,4 +1,5 @@
 //! A learned model as a user sees it, and recordings that a user should not trust.
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,5 +1,6 @@
 //! `vigil evaluate` on a robot of which only the nominal behaviour is known: what it says, and what
 //! it refuses.
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};

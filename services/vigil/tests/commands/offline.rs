@@ -1,4 +1,5 @@
 //! The offline commands as a user runs them: `learn`, `evaluate`, `diagnose`.
+
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};

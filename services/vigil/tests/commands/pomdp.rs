@@ -1,4 +1,5 @@
 //! `vigil pomdp info | track | convert` as a user runs them.
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,4 +1,5 @@
 //! `vigil pomdp compare` and `vigil pomdp generate` as a user sees them.
+
 use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Output};

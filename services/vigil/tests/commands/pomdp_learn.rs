@@ -1,4 +1,5 @@
 //! `vigil pomdp simulate`, `learn` and `picture` as a user sees them.
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,4 +1,5 @@
 //! `vigil pomdp solve` as a user runs it.
+
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,4 +1,5 @@
 //! `vigil evaluate --report --filters`: the page and the document say the same.
+
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
 //! The page "Your robot in 30 minutes", followed word by word on the Kobuki's data.
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

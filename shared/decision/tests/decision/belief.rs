@@ -1,7 +1,8 @@
 //! The tracker against a plain dense reference, on every public file.
 
-use crate::public;
 use vigil_decision::{Evidence, Pomdp, Tracker};
+
+use crate::public;
 
 /// Uniform numbers in [0, 1), enough for drawing trajectories.
 struct Numbers(u64);

@@ -1,10 +1,11 @@
 //! Bounds against the reference values of public models, and against each other.
 
-use crate::public;
-use crate::public::bounds::BOUNDS;
 use vigil_decision::bounds::{SolveError, blind, fib, mdp, tib};
 use vigil_decision::solver::{Method, Options, bound};
 use vigil_decision::{Budget, Pomdp};
+
+use crate::public;
+use crate::public::bounds::BOUNDS;
 
 /// Blind, TIB, FIB, Q-MDP, MDP at the start belief; TIB is NaN where its tables are too large.
 fn all(model: &Pomdp) -> [f64; 5] {

@@ -1,6 +1,5 @@
 //! Dual control against brute force over all observations, and its guards.
 
-use crate::public::TIGER;
 use proptest::prelude::*;
 use vigil_decision::mdp::{self, Solution};
 use vigil_decision::policy::{
@@ -8,6 +7,8 @@ use vigil_decision::policy::{
     PolicyName, normalised_entropy,
 };
 use vigil_decision::{Choice, Control, Policy, Pomdp};
+
+use crate::public::TIGER;
 
 /// Four faults, of which the first two have one remedy; `look` shows a little, `restart` makes the
 /// state certain at a price, and none of the rest shows anything.

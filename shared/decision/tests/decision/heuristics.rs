@@ -1,10 +1,11 @@
 //! Rewards of the heuristics on public models, against an independent simulation.
 
-use crate::public;
-use crate::public::heuristics::{HEURISTICS, POLICIES, half_width};
 use vigil_decision::mdp;
 use vigil_decision::policy::{Dual, PolicyName};
 use vigil_decision::simulation::{PolicyAgent, Rules, Summary, horizon, run};
+
+use crate::public;
+use crate::public::heuristics::{HEURISTICS, POLICIES, half_width};
 
 const EPISODES: u64 = 500;
 

@@ -1,11 +1,12 @@
 //! Learning from recorded missions: against enumeration, and what must hold for any data.
 
-use crate::recorded::missions;
 use proptest::prelude::*;
 use vigil_decision::Pomdp;
 use vigil_decision::learning::{
     Iteration, LearnError, Learned, LearnedRow, Record, RecordError, Settings, Table, learn,
 };
+
+use crate::recorded::missions;
 
 /// Three states, one of them never seen by mistake; wear cannot be undone by use.
 const WEAR: &str = include_str!("recorded/wear.pomdp");

@@ -1,10 +1,11 @@
 //! Do credible intervals of learned probabilities hold what they promise?
 
-use crate::recorded::missions;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use vigil_decision::Pomdp;
 use vigil_decision::learning::{Learned, Posterior, Settings, learn};
+
+use crate::recorded::missions;
 
 const HAND: &str = include_str!("recorded/wear.pomdp");
 /// Visits that the prior counts as.

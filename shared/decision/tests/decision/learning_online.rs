@@ -1,10 +1,11 @@
 //! The check before deployment, and learning on the way.
 
-use crate::recorded::missions;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use vigil_decision::Pomdp;
 use vigil_decision::learning::{LearnError, Posterior, Record, check};
+
+use crate::recorded::missions;
 
 const LAMP: &str = "
 discount: 0.8 values: reward states: on off

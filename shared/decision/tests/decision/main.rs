@@ -1,4 +1,5 @@
 //! Tests of the library of decision models.
+
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 mod belief;

@@ -1,12 +1,13 @@
 //! The point-based policy: what it says every action is worth.
 
-use crate::public::TIGER;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vigil_decision::policy::{Measure, PolicyKind};
 use vigil_decision::solver::{Options, solve};
 use vigil_decision::{AlphaVectors, Budget, PointBased, Policy, Pomdp, mdp};
+
+use crate::public::TIGER;
 
 const NAVIGATION: &str = include_str!("../../../../config/navigation.pomdp");
 const ROVER: &str = include_str!("../../../../config/rover.pomdp");

@@ -1,9 +1,10 @@
 //! The graph of a policy.
 
-use crate::public::TIGER;
 use vigil_decision::policy::{Base, Decider};
 use vigil_decision::policy_graph::{Limits, PolicyGraph};
 use vigil_decision::{Pomdp, Tracker, mdp};
+
+use crate::public::TIGER;
 
 fn graph(nodes_max: usize) -> (Pomdp, PolicyGraph) {
     let model = Pomdp::parse(TIGER).unwrap();

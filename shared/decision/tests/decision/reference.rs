@@ -1,10 +1,11 @@
 //! Against exact answers worked by hand, and the reference values of public models.
 
+use vigil_decision::policy::{choose, choose_among};
+use vigil_decision::{ActionVoting, Evidence, MostLikelyState, Policy, Pomdp, QMdp, Tracker, mdp};
+
 use crate::public;
 use crate::public::TIGER;
 use crate::public::bounds::BOUNDS;
-use vigil_decision::policy::{choose, choose_among};
-use vigil_decision::{ActionVoting, Evidence, MostLikelyState, Policy, Pomdp, QMdp, Tracker, mdp};
 
 #[test]
 fn tiger_beliefs_are_exact() {

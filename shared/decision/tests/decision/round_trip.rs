@@ -1,8 +1,9 @@
 //! What is written reads back to the same model, bit by bit: public files and invented models.
 
-use crate::public;
 use proptest::prelude::*;
 use vigil_decision::Pomdp;
+
+use crate::public;
 
 /// Every number of two models, by bits.
 fn assert_same(one: &Pomdp, other: &Pomdp) {

@@ -1,15 +1,16 @@
 //! The point-based solver against exact answers, itself, simulation, and public models.
 
-use crate::public;
 use std::fmt::Write as _;
 
-use crate::public::TIGER;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vigil_decision::bounds::{blind, fib, tib};
 use vigil_decision::solver::{Ended, Found, Options, Progress, solve};
 use vigil_decision::{Budget, Evidence, PointBased, Policy, Pomdp, Tracker};
+
+use crate::public;
+use crate::public::TIGER;
 
 /// A dense model from weights; `order` permutes its states.
 #[derive(Debug, Clone)]

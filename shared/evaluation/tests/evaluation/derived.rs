@@ -1,10 +1,12 @@
 //! Runs made from recorded ones.
-use crate::rover;
+
 use vigil_evaluation::derived::{dead_encoder, noisier, write_frames, write_labels};
 use vigil_evaluation::frames::{self, Run};
 use vigil_evaluation::labels::{self, Label};
 use vigil_robot::learned::Model;
 use vigil_robot::learned::model::Noise;
+
+use crate::rover;
 
 fn recorded() -> (Vec<Run>, Vec<Label>, Noise) {
     let robot = rover::robot();

@@ -1,4 +1,5 @@
 //! Every filter against the cases with exact answers (tests/data/filters).
+
 use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};

@@ -1,4 +1,5 @@
 //! The hierarchical filter's tree: which are refused, and when its nodes are split.
+
 use std::path::PathBuf;
 
 use rand::SeedableRng;

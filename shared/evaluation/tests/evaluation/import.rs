@@ -1,4 +1,5 @@
 //! Foreign logs become frames: clocks, counters, units, delays, and what is refused.
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;

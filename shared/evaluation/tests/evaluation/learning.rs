@@ -1,4 +1,5 @@
 //! Learning from the recorded rover runs.
+
 use std::path::PathBuf;
 
 use vigil_evaluation::frames::{self, Run};

@@ -1,4 +1,5 @@
 //! A nominal model of a synthetic robot: what it finds, what it refuses, what it then detects.
+
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;

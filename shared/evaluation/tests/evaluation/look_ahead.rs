@@ -1,4 +1,5 @@
 //! The look-ahead filter on lanes against the cases with exact answers (tests/data/filters).
+
 use std::path::PathBuf;
 
 use nalgebra::Vector3;

@@ -1,4 +1,5 @@
 //! Tests of the evaluation: readers, learners, scores, report.
+
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 mod derived;

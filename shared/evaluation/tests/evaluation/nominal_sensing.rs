@@ -1,4 +1,5 @@
 //! What a learned nominal model says of a robot that moves unasked, and of silent sensors.
+
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;

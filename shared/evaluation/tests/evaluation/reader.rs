@@ -1,13 +1,15 @@
 //! Recorded frames and labels: what is read, what is refused and in which words.
+
 use std::io::Write;
 
-use crate::rover::{path, robot};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use proptest::prelude::*;
 use tempfile::NamedTempFile;
 use vigil_blocks::Valid;
 use vigil_evaluation::{frames, labels};
+
+use crate::rover::{path, robot};
 
 const HEADER: &str = "run,t,x,y,yaw,enc_LF,enc_LM,enc_LR,enc_RF,enc_RM,enc_RR,steer_LF,steer_LR,\
                       steer_RF,steer_RR,cmd_curv,cmd_speed";

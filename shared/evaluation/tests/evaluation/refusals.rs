@@ -1,12 +1,14 @@
 //! Recorded runs whose columns are made to mean something else, or that lack what a fit needs, are
 //! refused with the run and the figure.
-use crate::rover;
+
 use vigil_blocks::SensorFrame;
 use vigil_evaluation::frames::{self, Run};
 use vigil_evaluation::labels::{self, Label};
 use vigil_evaluation::learning::{Options, learn};
 use vigil_evaluation::plausible::doubt;
 use vigil_robot::Description;
+
+use crate::rover;
 
 struct Data {
     robot: Description,

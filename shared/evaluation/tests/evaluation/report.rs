@@ -1,9 +1,11 @@
 //! The page, and filters beside each other, from hand-made verdicts.
-use crate::rover::{robot, tree};
+
 use roxmltree::{Document, ParsingOptions};
 use vigil_evaluation::labels::Label;
 use vigil_evaluation::report::{Report, SensorSet};
 use vigil_evaluation::scoring::{Case, Entrant, Taxonomy, Verdict, contest, score};
+
+use crate::rover::{robot, tree};
 
 /// A run with a verdict every 0.1 s to 15 s that names `mode` with `p` from `since_s` on.
 fn case(run: u32, truth: &str, mode: &str, since_s: f64, p: f64) -> Case {

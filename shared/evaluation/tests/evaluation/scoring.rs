@@ -1,9 +1,11 @@
 //! Scores of hand-made verdicts.
-use crate::rover::{robot, tree};
+
 use vigil_evaluation::labels::Label;
 use vigil_evaluation::scoring::{Case, Claims, Ratio, Score, Side, Taxonomy, Verdict, score};
 use vigil_inference::FaultTree;
 use vigil_inference::tree::Node;
+
+use crate::rover::{robot, tree};
 
 /// Threshold of the hand-made verdicts' alarms, which have log-odds of 20 while they stand, -20
 /// otherwise.

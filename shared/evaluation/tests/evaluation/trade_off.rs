@@ -1,7 +1,9 @@
 //! Delay against false alarms, from hand-made log-odds.
-use crate::rover::{robot, tree};
+
 use vigil_evaluation::labels::Label;
 use vigil_evaluation::scoring::{Case, Point, Taxonomy, TradeOff, Verdict, score};
+
+use crate::rover::{robot, tree};
 
 /// A run with a verdict every 0.1 s from 0.1 s on; the log-odds hold from the times given on.
 fn case(run: u32, mode: &str, onset_s: Option<f64>, end_s: f64, log_odds: &[(f64, f64)]) -> Case {

@@ -1,7 +1,9 @@
 //! The slip model on a rover that is not as built: forces and moments recomputed from the solution.
-use crate::rover::rover;
+
 use vigil_robot::slip::shear::Contact;
 use vigil_robot::slip::{Condition, Situation, SlipModel, Soil, WheelCondition};
+
+use crate::rover::rover;
 
 const X: [f64; 6] = [0.35, 0.0, -0.35, 0.35, 0.0, -0.35];
 const Y: [f64; 6] = [0.30, 0.30, 0.30, -0.30, -0.30, -0.30];

@@ -1,5 +1,6 @@
 //! The content check of frames lets pass everything that a robot and its faults can say, and
 //! nothing else.
+
 use std::path::Path;
 
 use proptest::prelude::*;

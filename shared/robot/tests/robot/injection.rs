@@ -1,9 +1,11 @@
 //! The text and the numbers of faults and disturbances.
-use crate::rover;
+
 use vigil_blocks::Event;
 use vigil_robot::disturbance::{Disturbance, KINDS, Place};
 use vigil_robot::injection::{Change, Wire};
 use vigil_robot::{Description, DisturbanceKind, Injection};
+
+use crate::rover;
 
 /// A rover of which only the first two wheels are left.
 fn rover() -> Description {

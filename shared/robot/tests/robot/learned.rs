@@ -1,4 +1,5 @@
 //! The shipped model, and observations of a robot that drives as commanded.
+
 use std::path::PathBuf;
 
 use vigil_blocks::{SensorFrame, Valid};

@@ -1,4 +1,5 @@
 //! A nominal model's file and what its detection filter says.
+
 use std::path::PathBuf;
 
 use nalgebra::SVector;

@@ -1,6 +1,8 @@
 //! The slip model against its reference values, its symmetries and its convergence.
-use crate::rover::rover;
+
 use vigil_robot::slip::{Condition, Situation, SlipError, SlipModel, Soil, Solution};
+
+use crate::rover::rover;
 
 const LM: usize = 1;
 /// Left and right wheels exchanged, front to rear kept.

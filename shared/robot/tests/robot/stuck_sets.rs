@@ -1,4 +1,5 @@
 //! Several stuck wheels, of which nothing was learned together, on soils that they do not know.
+
 use std::path::PathBuf;
 
 use vigil_robot::Description;

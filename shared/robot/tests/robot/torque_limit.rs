@@ -4,6 +4,7 @@
 //! scatter with the soil; the current sensors' noise is the description's. From both follows the
 //! noncentrality of the best test there is: of one that knows the wheel, the share lost and the
 //! instant. No filter notices what this test does not.
+
 use nalgebra::{SMatrix, SVector};
 use vigil_robot::Description;
 use vigil_robot::slip::{Condition, Situation, SlipModel, Soil};
