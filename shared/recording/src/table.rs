@@ -229,6 +229,7 @@ pub fn quoted(text: &str) -> String {
     shown.replace(char::is_control, "?")
 }
 
+/// The refusal of a row, which counts from 1 without the header.
 pub fn wrong_row(path: &Path, row: u64, message: String) -> TableError {
     TableError::Row {
         path: path.to_path_buf(),
