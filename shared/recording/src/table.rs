@@ -99,11 +99,17 @@ pub struct Table {
 
 impl Table {
     /// Opens a file; compression is recognised by its content.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or without a header.
     pub fn open(path: &Path) -> Result<Self, TableError> {
         Self::open_as(path, Layout::default())
     }
 
     /// Opens a file of another layout.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
     pub fn open_as(path: &Path, layout: Layout) -> Result<Self, TableError> {
         let io = |error| TableError::Io {
             path: path.to_path_buf(),
@@ -152,6 +158,9 @@ impl Table {
     }
 
     /// Positions of the columns, each of which must exist, and once.
+    ///
+    /// # Errors
+    /// Columns that are missing, or stand twice.
     pub fn require(&self, names: &[String]) -> Result<Vec<usize>, TableError> {
         let missing: Vec<&str> = names
             .iter()
@@ -179,6 +188,9 @@ impl Table {
     }
 
     /// Reads the next row; false at the end.
+    ///
+    /// # Errors
+    /// A row that is no row of this table.
     pub fn advance(&mut self) -> Result<bool, TableError> {
         self.row += 1;
         self.reader
@@ -192,6 +204,9 @@ impl Table {
     }
 
     /// A finite number of the present row.
+    ///
+    /// # Errors
+    /// Text that is none.
     pub fn number(&self, column: usize) -> Result<f64, TableError> {
         let text = self.text(column);
         match text.parse::<f64>() {
@@ -204,6 +219,9 @@ impl Table {
     }
 
     /// A whole number of the present row.
+    ///
+    /// # Errors
+    /// Text that is none.
     pub fn whole(&self, column: usize) -> Result<u32, TableError> {
         let text = self.text(column);
         text.parse().map_err(|_| {
