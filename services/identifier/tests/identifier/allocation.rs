@@ -1,7 +1,7 @@
 //! A steady cycle of the identifier allocates nothing.
 
 use clap::ValueEnum;
-use vigil_blocks::{Entry, FaultBelief, ParticleBlock};
+use vigil_blocks::{Entry, FaultBelief, ParticleBlock, Valid};
 use vigil_cycle::allocation::allocations;
 use vigil_identifier::{Identifier, Input, Models};
 use vigil_setup::schema;
@@ -55,4 +55,41 @@ fn steady_cycles_of_every_filter_allocate_nothing() {
             "{filter}"
         );
     }
+}
+
+#[test]
+fn steady_cycles_with_every_channel_allocate_nothing() {
+    const RF: usize = 3;
+    let (mut frames, label) = recorded::unseen("RM_STUCK", "stuck");
+    let tree = vigil_setup::load_tree(&recorded::path("config/trees/rover-all.toml")).unwrap();
+    let (model, robot) = (recorded::model(), recorded::robot());
+    let models = Models {
+        model: &model,
+        robot: &robot,
+        tree: &tree,
+        decision: None,
+    };
+    let settings = schema::Identifier::default();
+    let mut identifier = Identifier::new(&models, &settings, schema::Sensors::All, 1).unwrap();
+    let mut belief = FaultBelief::default();
+    let mut hypotheses: Box<ParticleBlock> = Box::default();
+    let onset_s = label.onset_s.unwrap();
+    let mut alarm = alarm::Alarm::between(onset_s + 0.5, 99.0);
+    let before = allocations();
+    for frame in &mut frames {
+        // A servo slips, and the pose is silent for a while.
+        let t_s = frame.header.t_capture_ns as f64 * 1e-9;
+        if t_s > onset_s + 3.0 {
+            frame.steer[RF] += 0.2;
+        }
+        if t_s > onset_s + 5.0 && t_s < onset_s + 6.0 {
+            frame.valid &= !Valid::POSE;
+        }
+        alarm.set(frame);
+        let detection = Some((&alarm.belief, &*alarm.hypotheses));
+        let entry = Entry::Frame(Input { frame, detection });
+        identifier.step(entry, &mut belief, &mut hypotheses);
+    }
+    assert_eq!(allocations() - before, 0);
+    assert!(belief.mode != 0);
 }

@@ -84,6 +84,18 @@ fn a_servo_that_slipped_is_named_with_its_angle() {
 }
 
 #[test]
+fn a_servo_that_stands_at_an_angle_is_named_with_it() {
+    for angle_rad in [0.3, -0.15] {
+        let mut k = 0.0_f64;
+        let stands = |frame: &mut SensorFrame| {
+            k += 1.0;
+            frame.steer[RF] = angle_rad + 0.003 * k.sin();
+        };
+        check(stands, SizeKind::HeldAtRad, angle_rad);
+    }
+}
+
+#[test]
 fn a_pose_that_jumped_is_named_with_its_distance() {
     check(|frame| frame.pose[1] += 0.3, SizeKind::JumpM, 0.3);
 }

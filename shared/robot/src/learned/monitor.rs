@@ -27,8 +27,8 @@ use super::further_watch::Turn;
 use super::noise_scale::{NoiseScales, SensorNoise, UNSEEN_S};
 use super::repeats::Repeats;
 use super::wheel_context::{Beside, WheelContext};
-use super::wheels::{rolling_rate, steering_angle};
-use super::{Further, Healthy, Model, Observation, Troubles};
+use super::wheels::rolling_rate;
+use super::{Further, Healthy, Model, Observation, SteerReading, Troubles};
 use crate::Description;
 
 /// Shares of the prior: how a fault first shows. Chosen: one counts by its logarithm only, half as
@@ -386,33 +386,17 @@ impl Monitor {
     }
 
     fn step_steer(&mut self, observation: &Observation, scales: NoiseScales) {
-        let learned = self.model.noise.steer_rad;
-        let samples = observation.sample_variances(&self.model, learned, scales.steer);
-        let extra = self.model.nominal.steer_sd_rad;
-        let steered = self
-            .robot
-            .wheels
-            .iter()
-            .filter(|wheel| wheel.steered)
-            .count()
-            .max(1);
-        let birth = self.birth(observation.dt_s, SHARE_STEER / steered as f64);
-        let wheels = self.robot.wheels.len();
-        for (i, sample) in samples.into_iter().enumerate().take(wheels) {
-            let reading = &observation.steer[i];
-            if !self.robot.wheels[i].steered || reading.plain == 0 {
+        let steered = self.robot.wheels.iter().filter(|wheel| wheel.steered);
+        let share = SHARE_STEER / steered.count().max(1) as f64;
+        let birth = self.birth(observation.dt_s, share);
+        let readings = SteerReading::all(&self.model, &self.robot, observation, &scales);
+        for (i, reading) in readings.iter().enumerate() {
+            let Some(reading) = reading else {
                 continue;
-            }
-            let angle = steering_angle(&self.robot, i, observation.command[0]);
-            let behind = angle - steering_angle(&self.robot, i, observation.curvature);
-            let noise = observation.mean_variance(sample, reading.plain);
-            let variance = noise + extra * extra + behind * behind;
-            let apart = self.robot.beyond_steer(reading.mean - angle);
-            let rate = scales.outliers.steer[i];
-            let whitened = Whitened::of(apart, variance, behind * behind, rate);
-            self.steer[i].step(&whitened, birth);
+            };
+            self.steer[i].step(&reading.whitened(), birth);
             self.gains.steer[i] = self.steer[i].gain();
-            self.report.evidence += log_normal(apart, variance);
+            self.report.evidence += log_normal(reading.beyond_rad, reading.variance);
         }
     }
 

@@ -1,6 +1,7 @@
 //! What a steering angle of one observation says of its servo.
 
 use vigil_blocks::WHEELS;
+use vigil_inference::ages::Whitened;
 use vigil_inference::logspace::{log_add, log_normal};
 use vigil_inference::outlier::tempered;
 
@@ -25,7 +26,9 @@ pub struct SteerReading {
     /// Variance of what is read about the servo's angle, by noise and lag, rad².
     pub variance: f64,
     /// Beyond the tolerance of the commanded angle, rad.
-    beyond_rad: f64,
+    pub beyond_rad: f64,
+    /// Part of the variance that is there while the servo turns, rad².
+    passing: f64,
     outlier_rate: f64,
 }
 
@@ -55,10 +58,22 @@ impl SteerReading {
                 read_rad: reading.mean,
                 commanded_rad,
                 variance: noise_variance + extra * extra + behind * behind,
+                passing: behind * behind,
                 beyond_rad: robot.beyond_steer(reading.mean - commanded_rad),
                 outlier_rate: noise.outliers.steer[wheel],
             })
         })
+    }
+
+    /// What it is off by, as evidence of a bias.
+    #[must_use]
+    pub fn whitened(&self) -> Whitened<1> {
+        Whitened::of(
+            self.beyond_rad,
+            self.variance,
+            self.passing,
+            self.outlier_rate,
+        )
     }
 
     /// Log-density of the reading if the servo stands at `angle_rad`, known up to a variance, over
