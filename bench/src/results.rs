@@ -147,8 +147,9 @@ impl Run {
             dropped.push(name);
             let names = dropped.join(", ");
             self.remarks.truncate(before);
-            self.remarks
-                .push(format!("too large for this file, with the raw data: {names}"));
+            self.remarks.push(format!(
+                "too large for this file, with the raw data: {names}"
+            ));
         }
         let whole = std::mem::take(&mut self.summary);
         let around = self.text().len() + BYTES_OF_A_REMARK;

@@ -347,7 +347,7 @@ fn say_times(archive: &mut Archive, rows: &[Value]) {
     archive.say(
         "Time on config/navigation.pomdp, ns (p50, p99, p99.9), two clock readings included. dm-X \
          and adm-X with\nK = 0 and no guard: every step looks ahead. The tail holds what else ran \
-         on this core (load: machine.json).\n",
+         on this core.\n",
     );
     archive.say("| policy | decision | update and decision |");
     archive.say("|---|---|---|");

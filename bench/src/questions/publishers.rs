@@ -73,9 +73,7 @@ fn tell(args: &Args, rows: &[Value], archive: &mut Archive) {
     for row in rows {
         let n = |key: &str| row[key].to_string();
         let us = |of: &str, q: &str| format!("{:.0}", row[of][q].as_f64().unwrap_or(f64::NAN));
-        let tail = |of: &str, n: &Value| {
-            percentile(0.99, n.as_u64().unwrap_or(0), us(of, "p99"))
-        };
+        let tail = |of: &str, n: &Value| percentile(0.99, n.as_u64().unwrap_or(0), us(of, "p99"));
         archive.say(&format!(
             "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
             n("rate_hz"),

@@ -139,7 +139,7 @@ mod tests {
         );
         let text = page(&[new, old]);
         let wanted = "\n## latency\n\n`scripts/bench latency`\n\n2026-11-22, `16-cores`: processor \
-                      not known, 2 cores. Commit: ab12.\nThe file: \
+                      not known, 2 cores.\nCommit: ab12.\nThe file: \
                       [2026-11-22-16-cores/latency.json]\
                       (results/2026-11-22-16-cores/latency.json).\n\nNew.\n### Part\n";
         assert_eq!(text.strip_prefix(HEAD).unwrap(), wanted);
