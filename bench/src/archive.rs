@@ -1,25 +1,31 @@
-//! An archived run: `bench/runs/<date>-<host>/<question>/` with raw data and a summary.
+//! Archives a measurement: its result in `bench/results/`, its raw data in `target/bench/`.
 
 use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 use std::process::Command;
 
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use crate::machine;
+use crate::results::{Raw, Run, SCHEMA_VERSION};
 
-/// Folder of one archived run.
+/// Where results lie, from the project's folder.
+const RESULTS: &str = "bench/results";
+/// Where raw data lie, from the project's folder: not kept in git.
+const RAW: &str = "target/bench";
+
+/// A measurement that is being archived.
 #[derive(Debug)]
 pub struct Archive {
-    folder: PathBuf,
-    summary: String,
+    run: Run,
+    host: String,
 }
 
 impl Archive {
-    /// Makes the folder for `question` and stores the machine's facts in it. It is made anew: what
-    /// an earlier run of the same day has left in it goes, so that no summary lies beside data of
-    /// another run.
+    /// Makes the folder of raw data for `question` and reads the machine's facts. It is made anew:
+    /// what an earlier measurement has left in it goes, so that no result lies beside data of
+    /// another one.
     ///
     /// # Errors
     /// The file system's, and a `question` that is no name of a folder.
@@ -28,33 +34,43 @@ impl Archive {
             let text = format!("archive '{question}': allowed is the name of one folder");
             return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
         }
-        let date = output(Command::new("date").args(["-u", "+%Y-%m-%d"]));
-        let host = output(&mut Command::new("hostname"));
-        let runs = Path::new(env!("CARGO_MANIFEST_DIR")).join("runs");
-        let folder = runs.join(format!("{date}-{host}")).join(question);
+        let folder = root().join(RAW).join(question);
         if fs::exists(&folder)? {
             fs::remove_dir_all(&folder)?;
         }
         fs::create_dir_all(&folder)?;
-        let facts = machine::facts();
-        fs::write(folder.join("machine.json"), format!("{facts:#}\n"))?;
-        let commit = machine::commit_in_words(&facts);
-        let summary = format!("# {question}, {date}\n\n{commit} Machine: `machine.json`.\n\n");
-        Ok(Self { folder, summary })
+        let words: Vec<String> = std::env::args().skip(1).collect();
+        let mut machine = machine::facts();
+        let commit = machine.as_object_mut().and_then(|of| of.remove("commit"));
+        let run = Run {
+            schema_version: SCHEMA_VERSION,
+            question: question.to_owned(),
+            command: format!("scripts/bench {}", words.join(" ")),
+            commit: commit.and_then(|it| it.as_str().map(str::to_owned)),
+            date: output(Command::new("date").args(["-u", "+%Y-%m-%d"])),
+            machine,
+            summary: Vec::new(),
+            remarks: Vec::new(),
+            figures: Map::new(),
+            raw: Vec::new(),
+        };
+        let host = output(&mut Command::new("hostname"));
+        Ok(Self { run, host })
     }
 
-    /// Where it lies.
+    /// Where its raw data lie.
     #[must_use]
-    pub fn folder(&self) -> &Path {
-        &self.folder
+    pub fn folder(&self) -> PathBuf {
+        root().join(RAW).join(&self.run.question)
     }
 
-    /// Stores raw data.
+    /// Stores data; they are figures of the result, too, if that stays small with them.
     ///
     /// # Errors
     /// The file system's.
-    pub fn store(&self, name: &str, data: &Value) -> io::Result<()> {
-        fs::write(self.folder.join(name), format!("{data:#}\n"))
+    pub fn store(&mut self, name: &str, data: &Value) -> io::Result<()> {
+        self.run.figures.insert(name.to_owned(), data.clone());
+        fs::write(self.folder().join(name), format!("{data:#}\n"))
     }
 
     /// Stores raw data as text.
@@ -62,24 +78,45 @@ impl Archive {
     /// # Errors
     /// The file system's.
     pub fn store_text(&self, name: &str, text: &str) -> io::Result<()> {
-        fs::write(self.folder.join(name), text)
+        fs::write(self.folder().join(name), text)
     }
 
-    /// Adds a line to the summary, and shows it.
-    pub fn say(&mut self, line: &str) {
-        println!("{line}");
-        self.summary.push_str(line);
-        self.summary.push('\n');
+    /// Adds lines to the summary, and shows them.
+    pub fn say(&mut self, lines: &str) {
+        println!("{lines}");
+        let lines = lines.split('\n').map(str::to_owned);
+        self.run.summary.extend(lines);
     }
 
-    /// Writes the summary; returns the folder.
+    /// Writes the result, and says where it and the raw data lie.
     ///
     /// # Errors
     /// The file system's.
-    pub fn close(self) -> io::Result<PathBuf> {
-        fs::write(self.folder.join("README.md"), self.summary)?;
-        Ok(self.folder)
+    pub fn close(mut self) -> io::Result<()> {
+        let summary = self.run.summary.join("\n");
+        self.store_text("summary.md", &format!("{summary}\n"))?;
+        self.run.raw = Raw::of(&self.folder())?;
+        let Self { mut run, host } = self;
+        run.shrink();
+        let folder = format!("{RESULTS}/{}-{host}", run.date);
+        fs::create_dir_all(root().join(&folder))?;
+        let path = format!("{folder}/{}.json", run.question);
+        fs::write(root().join(&path), run.text())?;
+        println!("\nresult: {path}; `scripts/bench page` brings it into bench/README.md");
+        println!("raw data: {RAW}/{}/", run.question);
+        Ok(())
     }
+}
+
+/// The project's folder.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Where results lie.
+#[must_use]
+pub fn results() -> PathBuf {
+    root().join(RESULTS)
 }
 
 /// True for the name of one folder: what an archive clears must not lie elsewhere.

@@ -21,7 +21,7 @@ pub use bar::{Bar, Comparison};
 pub use departure::Departure;
 pub use healthy::record;
 pub use recorded::{Library, Material, Source, library};
-pub use report::{Outcome, document, lines};
+pub use report::{Outcome, barred_lines, document, lines};
 pub use run::{Graph, Job, Scored, jobs, run, select};
 pub use scenario::{Draw, File, Frames, Scenario, World};
 

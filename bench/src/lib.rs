@@ -24,6 +24,7 @@ pub mod pomdp_learning;
 pub mod rare;
 pub mod real;
 pub mod recorded;
+pub mod results;
 pub mod shares;
 pub mod simulated;
 pub mod speed;
@@ -55,6 +56,23 @@ pub fn in_folder<T>(
     result
 }
 
+/// True if `n` samples are enough to speak of their percentile `q`: of 99 none lies beyond the p99.
+#[must_use]
+pub fn has_percentile(q: f64, n: u64) -> bool {
+    // A billionth for the rounding of `1 - q`.
+    (1.0 - q) * n as f64 >= 1.0 - 1e-9
+}
+
+/// Text of the percentile `q` of `n` samples, or `-` if these are too few for it.
+#[must_use]
+pub fn percentile(q: f64, n: u64, text: impl Into<String>) -> String {
+    if has_percentile(q, n) {
+        text.into()
+    } else {
+        "-".into()
+    }
+}
+
 /// The value below which the share `q` of `values` lies; sorts them. NaN if there are none.
 pub fn quantile(values: &mut [f64], q: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
@@ -63,4 +81,19 @@ pub fn quantile(values: &mut [f64], q: f64) -> f64 {
         .get(at.min(values.len().saturating_sub(1)))
         .copied()
         .unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_percentile_needs_a_sample_beyond_it() {
+        for (q, least) in [(0.9, 10), (0.99, 100), (0.999, 1000), (0.9999, 10_000)] {
+            assert_eq!(percentile(q, least, "1.5"), "1.5", "{q}");
+            assert_eq!(percentile(q, least - 1, "1.5"), "-", "{q}");
+        }
+        assert_eq!(percentile(0.5, 2, "1.5"), "1.5");
+        assert_eq!(percentile(0.99, 0, "NaN"), "-");
+    }
 }

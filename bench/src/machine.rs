@@ -36,25 +36,27 @@ pub fn facts() -> Value {
     })
 }
 
-/// A tracked file that differs from the commit; empty if none does. Archived runs do not count:
-/// they change with each run, and no run depends on them.
+/// A tracked file that differs from the commit; empty if none does. Results do not count: they
+/// change with each measurement, and none depends on them.
 fn changed() -> String {
     let status = ["status", "--porcelain", "-uno", "--"];
     let mut command = Command::new("git");
-    output(
-        command
-            .args(status)
-            .args([":/", ":(top,exclude)bench/runs"]),
-    )
+    output(command.args(status).args([
+        ":/",
+        ":(top,exclude)bench/results",
+        ":(top,exclude)bench/README.md",
+    ]))
 }
 
 /// Which commit was measured, for a summary: a sentence.
 #[must_use]
-pub fn commit_in_words(facts: &Value) -> String {
-    match (facts["commit"].as_str(), &facts["uncommitted_changes"]) {
+pub fn commit_in_words(commit: Option<&str>, facts: &Value) -> String {
+    match (commit, &facts["uncommitted_changes"]) {
         (None | Some(""), _) => "Commit: not known.".into(),
-        (Some(commit), Value::Bool(false)) => format!("Commit: {commit}."),
-        (Some(commit), _) => format!("Commit: {commit}, with changes that are not in it."),
+        (Some(commit), Value::Bool(true)) => {
+            format!("Commit: {commit}, with changes that are not in it.")
+        }
+        (Some(commit), _) => format!("Commit: {commit}."),
     }
 }
 
@@ -69,7 +71,7 @@ mod tests {
     #[test]
     fn a_summary_says_which_commit_and_what_it_does_not_hold() {
         let said = |commit: &str, is_changed: bool| {
-            commit_in_words(&json!({ "commit": commit, "uncommitted_changes": is_changed }))
+            commit_in_words(Some(commit), &json!({ "uncommitted_changes": is_changed }))
         };
         assert_eq!(said("ab12", false), "Commit: ab12.");
         assert_eq!(
@@ -77,6 +79,6 @@ mod tests {
             "Commit: ab12, with changes that are not in it."
         );
         assert_eq!(said("", false), "Commit: not known.");
-        assert_eq!(commit_in_words(&json!({})), "Commit: not known.");
+        assert_eq!(commit_in_words(None, &json!({})), "Commit: not known.");
     }
 }

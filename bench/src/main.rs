@@ -1,5 +1,5 @@
-//! Measures: one question a subcommand, archived under `bench/runs/`. `scripts/bench` builds what
-//! it needs and starts it.
+//! Measures: one question a subcommand, its result in `bench/results/`. `scripts/bench` builds
+//! what it needs and starts it.
 
 mod questions;
 
@@ -8,11 +8,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use vigil_bench::{chain, latency::flood as sensor_flood};
+use vigil_bench::results::{self, Kept};
+use vigil_bench::{archive, chain, latency::flood as sensor_flood};
 
 use questions::*;
 
-/// Answers a question by measuring, and archives what was found under bench/runs/
+/// Answers a question by measuring, and keeps what was found in bench/results/
 #[derive(Debug, Parser)]
 #[command(
     bin_name = "scripts/bench",
@@ -90,6 +91,8 @@ enum Question {
     TwoWheels(two_wheels::Args),
     /// Is what no model contains detected, and called unknown? And what does nominal driving raise?
     Unmodelled(unmodelled::Args),
+    /// Writes bench/README.md anew from the results
+    Page,
     #[command(flatten)]
     Role(Role),
 }
@@ -139,6 +142,7 @@ impl Question {
             Self::Rover13(args) => rover13::run(args),
             Self::TwoWheels(args) => two_wheels::run(args),
             Self::Unmodelled(args) => unmodelled::run(args),
+            Self::Page => write_page(),
             Self::Role(role) => role.play(),
         }
     }
@@ -154,6 +158,14 @@ impl Role {
             Self::RunCycles => instructions::run_cycles(),
         }
     }
+}
+
+/// Writes the page of results.
+fn write_page() -> Result<(), Box<dyn Error>> {
+    let folder = archive::results();
+    let page = results::page(&Kept::all(&folder)?);
+    std::fs::write(folder.with_file_name("README.md"), page)?;
+    Ok(())
 }
 
 fn main() -> ExitCode {
@@ -180,7 +192,7 @@ mod tests {
         program.clone().debug_assert();
         let asked: BTreeMap<String, String> = program
             .get_subcommands()
-            .filter(|question| !question.is_hide_set())
+            .filter(|question| !question.is_hide_set() && question.get_name() != "page")
             .map(|question| {
                 let help = question.get_about().unwrap().to_string();
                 (question.get_name().to_owned(), help)

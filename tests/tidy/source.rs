@@ -99,15 +99,8 @@ pub fn workspace() -> &'static [Source] {
     })
 }
 
-/// Directories that hold nothing of ours, or raw records of runs.
-const SKIPPED: [&str; 6] = [
-    "target",
-    ".git",
-    ".venv",
-    ".cache",
-    "__pycache__",
-    "bench/runs",
-];
+/// Directories that hold nothing of ours.
+const SKIPPED: [&str; 5] = ["target", ".git", ".venv", ".cache", "__pycache__"];
 
 fn collect(root: &Path, folder: &Path, sources: &mut Vec<Source>) {
     let entries = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));

@@ -37,6 +37,8 @@ const SHOWN: [&str; 26] = [
     "log_score_2s",
 ];
 
+const NOT_MET: &str = "NOT met";
+
 /// A scenario with one set of sensors.
 #[derive(Debug, Clone)]
 pub struct Outcome<'a> {
@@ -140,7 +142,7 @@ fn says_something(figure: &Figure) -> bool {
 fn verdict(bar: &Bar, met: Option<bool>) -> String {
     let word = match met {
         Some(true) => "met",
-        Some(false) => "NOT met",
+        Some(false) => NOT_MET,
         None => "no case",
     };
     format!("{bar}: {word}")
@@ -170,15 +172,28 @@ fn number(value: f64) -> String {
     }
 }
 
+const HEAD: [&str; 2] = [
+    "| scenario | sensors | runs | h | figure | value | 95 % | n | worst (seed) | bar |",
+    "|---|---|---|---|---|---|---|---|---|---|",
+];
+
 /// The table.
 #[must_use]
 pub fn lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
-    let mut lines = vec![
-        "| scenario | sensors | runs | h | figure | value | 95 % | n | worst (seed) | bar |"
-            .to_owned(),
-        "|---|---|---|---|---|---|---|---|---|---|".to_owned(),
-    ];
+    let mut lines = HEAD.map(str::to_owned).to_vec();
     lines.extend(outcomes.iter().flat_map(Outcome::lines));
+    lines.extend(departure::table(outcomes));
+    lines
+}
+
+/// The rows of the table that have a bar, first those that do not meet it.
+#[must_use]
+pub fn barred_lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
+    let rows = outcomes.iter().flat_map(Outcome::lines);
+    let mut rows: Vec<String> = rows.filter(|row| !row.ends_with("|  |")).collect();
+    rows.sort_by_key(|row| !row.contains(NOT_MET));
+    let mut lines = HEAD.map(str::to_owned).to_vec();
+    lines.extend(rows);
     lines.extend(departure::table(outcomes));
     lines
 }

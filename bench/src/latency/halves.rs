@@ -19,6 +19,7 @@ use super::cycles::{Cycle, of_stage};
 use super::graph::Prepared;
 use crate::archive::Archive;
 use crate::pairs::median_ratio;
+use crate::{has_percentile, percentile};
 
 /// Actions at the start of a run that do not count, s.
 const WARM_UP_S: f64 = 2.0;
@@ -253,14 +254,16 @@ pub fn archive(name: &str, about: &str, pairs: &[[Half; 2]]) -> Result<(), Box<d
          |---|---|---|---|---|---|---|",
     );
     let at = |half: &Half, q: f64| half.end_to_end.histogram().value_at_quantile(q) as f64 * 1e-3;
+    let n = |half: &Half| half.end_to_end.histogram().len();
+    let tail = |half: &Half| percentile(0.99, n(half), format!("{:.1}", at(half, 0.99)));
     for (i, [without, with]) in pairs.iter().enumerate() {
         archive.say(&format!(
-            "| {} | {:.1} | {:.1} | {:.1} | {:.1} | {}, {} | {}, {} |",
+            "| {} | {:.1} | {:.1} | {} | {} | {}, {} | {}, {} |",
             i + 1,
             at(without, 0.5),
             at(with, 0.5),
-            at(without, 0.99),
-            at(with, 0.99),
+            tail(without),
+            tail(with),
             without.ours,
             without.machine,
             with.ours,
@@ -268,7 +271,13 @@ pub fn archive(name: &str, about: &str, pairs: &[[Half; 2]]) -> Result<(), Box<d
         ));
     }
     archive.say("");
-    for q in [0.5, 0.99] {
+    let has = |q: f64| {
+        pairs
+            .iter()
+            .flatten()
+            .all(|half| has_percentile(q, n(half)))
+    };
+    for q in [0.5, 0.99].into_iter().filter(|q| has(*q)) {
         let ratios: Vec<f64> = pairs.iter().map(|[a, b]| at(b, q) / at(a, q)).collect();
         let differences: Vec<f64> = pairs.iter().map(|[a, b]| at(b, q) - at(a, q)).collect();
         let (ratio, difference) = (median_ratio(&ratios), median_ratio(&differences));
@@ -301,6 +310,6 @@ pub fn archive(name: &str, about: &str, pairs: &[[Half; 2]]) -> Result<(), Box<d
         .iter()
         .map(|[a, b]| json!({ "without": half(a), "with": half(b) }));
     archive.store("pairs.json", &raw.collect::<Value>())?;
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }

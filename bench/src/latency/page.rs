@@ -11,6 +11,7 @@ use vigil_evaluation::report::page::{beside, escaped, key, page, section};
 use super::attribution::Miss;
 use super::cell::Cell;
 use super::parts::{self, Part};
+use crate::percentile;
 
 /// Colours: end to end, hand-over, the floor's hand-over, compute, the machine's misses, ours.
 const WHOLE: usize = 1;
@@ -134,16 +135,16 @@ fn table(cells: &[Cell]) -> String {
             cell.cycles.len().to_string(),
             cell.folded().to_string(),
             us(whole.p50_ns),
-            us(whole.p99_ns),
-            us(whole.p999_ns),
+            percentile(0.99, whole.n, us(whole.p99_ns)),
+            percentile(0.999, whole.n, us(whole.p999_ns)),
             us(whole.max_ns),
             us(compute.p50_ns),
             us(hand.p50_ns),
-            us(hand.p99_ns),
+            percentile(0.99, hand.n, us(hand.p99_ns)),
             us(floor.p50_ns),
-            us(floor.p99_ns),
+            percentile(0.99, floor.n, us(floor.p99_ns)),
             format!("{p50:.2}"),
-            format!("{p99:.2}"),
+            percentile(0.99, hand.n.min(floor.n), format!("{p99:.2}")),
             ours.to_string(),
             machine.to_string(),
             cell.not_one_stall().to_string(),

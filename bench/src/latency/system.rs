@@ -70,7 +70,7 @@ fn load_average() -> String {
     text.trim().to_owned()
 }
 
-/// What a reader of latencies must know of this machine, beyond `machine.json`.
+/// What a reader of latencies must know of this machine, beyond `machine::facts`.
 #[must_use]
 pub fn facts() -> Value {
     let read = |path: &str| {

@@ -120,6 +120,6 @@ fn archive(args: &Args, rows: &[Value]) -> Result<(), Box<dyn Error>> {
         ));
     }
     archive.store("stalls.json", &Value::from(rows.to_vec()))?;
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }

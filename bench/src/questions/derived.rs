@@ -58,7 +58,7 @@ pub fn run(args: &Json) -> Result<(), Box<dyn Error>> {
             lines(score).iter().for_each(|line| archive.say(line));
         }
     }
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }
 

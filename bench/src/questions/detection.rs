@@ -276,6 +276,6 @@ pub fn run() -> Result<(), Box<dyn Error>> {
         }
     }
     archive.store("detection.json", &json!(raw))?;
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }

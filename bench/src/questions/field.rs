@@ -11,8 +11,8 @@ use std::time::Instant;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::field::{
-    self, File, Graph, Job, Library, Outcome, Scenario, Scored, document, jobs, library, lines,
-    select,
+    self, File, Graph, Job, Library, Outcome, Scenario, Scored, barred_lines, document, jobs,
+    library, lines, select,
 };
 use vigil_bench::machine;
 use vigil_bench::matched::in_parallel;
@@ -95,12 +95,15 @@ fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), B
     }
     let mut archive = Archive::new("field")?;
     archive.store("field.json", document)?;
+    let table = lines(outcomes);
+    archive.store_text("table.md", &format!("{}\n", table.join("\n")))?;
     if args.raw {
         archive.store("runs.json", &raw(outcomes))?;
     }
-    lines(outcomes).iter().for_each(|line| archive.say(line));
-    archive.say(&format!("\n{last}"));
-    println!("archived in {}", archive.close()?.display());
+    archive.say(&format!("{last} Every figure: `table.md`.\n"));
+    let barred = barred_lines(outcomes);
+    barred.iter().for_each(|line| archive.say(line));
+    archive.close()?;
     Ok(())
 }
 

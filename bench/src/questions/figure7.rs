@@ -5,7 +5,6 @@
 //! It fails if a sign is not the paper's.
 
 use std::error::Error;
-use std::fs;
 use std::path::Path;
 
 use serde_json::{Value, json};
@@ -52,9 +51,8 @@ pub fn run(args: &Json) -> Result<(), Box<dyn Error>> {
     archive.store("figure7.json", &document)?;
     report(&mut archive, &cells, &names);
     let svg = figure(&model, &names)?;
-    let folder = archive.close()?;
-    fs::write(folder.join("figure7.svg"), svg)?;
-    println!("archived in {}", folder.display());
+    archive.store_text("figure7.svg", &svg)?;
+    archive.close()?;
     judged(signs_right)
 }
 
@@ -76,7 +74,6 @@ fn figure(model: &SlipModel, names: &[String]) -> Result<String, Box<dyn Error>>
 }
 
 fn report(archive: &mut Archive, cells: &[Cell], names: &[String]) {
-    archive.say("![paths](figure7.svg)\n");
     archive.say("Change of heading rate, %: slip model / recorded runs of an independent physics");
     archive
         .say("engine (mean ± standard error; `-` where there are none), and the ratio of both.\n");

@@ -9,6 +9,7 @@ use std::process::Command;
 
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
+use vigil_bench::percentile;
 
 const FRAMES: &str = "tests/data/rover/learn_frames.csv.gz";
 const LABELS: &str = "tests/data/rover/learn_runs.csv";
@@ -43,7 +44,7 @@ pub fn run() -> Result<(), Box<dyn Error>> {
     for sensors in ["pose+encoders", "pose"] {
         evaluate(&mut archive, sensors)?;
     }
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }
 
@@ -107,9 +108,15 @@ fn say_stuck(archive: &mut Archive, summary: &Value) {
 
 fn say_latency(archive: &mut Archive, summary: &Value) {
     let e = &summary["end_to_end_us"];
+    let n = e["n"].as_u64().unwrap_or(0);
+    let tail = |q: f64, key: &str| percentile(q, n, e[key].to_string());
     archive.say(&format!(
-        "- end to end, us: p50 {}, p90 {}, p99 {}, p99.9 {}, max {} (n = {})",
-        e["p50"], e["p90"], e["p99"], e["p999"], e["max"], e["n"]
+        "- end to end, us: p50 {}, p90 {}, p99 {}, p99.9 {}, max {} (n = {n})",
+        e["p50"],
+        tail(0.9, "p90"),
+        tail(0.99, "p99"),
+        tail(0.999, "p999"),
+        e["max"],
     ));
     let empty = serde_json::Map::new();
     for (name, service) in summary["services"].as_object().unwrap_or(&empty) {

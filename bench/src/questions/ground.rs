@@ -59,7 +59,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     )?;
     report(&mut archive, &runs);
     archive.say(&format!("\nWall time {wall_s:.0} s."));
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }
 

@@ -136,6 +136,6 @@ fn report(args: &Args, rows: &[Row], (past, refused): (u64, u64)) -> Result<(), 
         "\nNumbers that are not finite past the guard: {past}. Good frames refused: {refused}."
     ));
     archive.store("guard.json", &document)?;
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }

@@ -77,7 +77,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         ));
         lines.iter().for_each(|line| archive.say(line));
         archive.store("instructions.json", &json!({ profile: counts }))?;
-        println!("archived in {}", archive.close()?.display());
+        archive.close()?;
     }
     if over.is_empty() {
         return Ok(());

@@ -11,7 +11,8 @@ use vigil_bench::archive::Archive;
 use vigil_bench::latency::cell::{Cell, Scheduling, Spec};
 use vigil_bench::latency::load::Load;
 use vigil_bench::latency::{files, page, system};
-use vigil_bench::machine;
+use vigil_bench::{machine, percentile};
+use vigil_cycle::latency::Percentiles;
 
 /// Shortest run, s: the first two seconds are warm-up.
 const SECONDS_MIN: f64 = 4.0;
@@ -175,8 +176,9 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
         let cell = match spec.run(folder) {
             Ok(cell) => cell,
             Err(error) => {
+                let why = error.to_string().trim().replace('\n', "; ");
                 archive.say(&format!(
-                    "| {} | not measured: {error} | | | | | | | | | | | | | | |",
+                    "| {} | not measured: {why} | | | | | | | | | | | | | | |",
                     spec.name()
                 ));
                 continue;
@@ -192,8 +194,7 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
     archive.store_text("report.html", &html)?;
     let all: Vec<Value> = cells.iter().map(Cell::json).collect();
     archive.store("cells.json", &Value::from(all))?;
-    let folder = archive.close()?;
-    println!("archived in {}", folder.display());
+    archive.close()?;
     let unmeasured = specs.len() - cells.len();
     if unmeasured > 0 {
         return Err(format!("{unmeasured} cells were not measured").into());
@@ -206,6 +207,10 @@ fn line(cell: &Cell) -> String {
     let whole = cell.graph.end_to_end.percentiles();
     let hand_over = cell.graph.hand_over.percentiles();
     let floor = cell.floor.hand_over.percentiles();
+    let tail = |q: f64, of: &Percentiles| {
+        let ns = if q < 0.999 { of.p99_ns } else { of.p999_ns };
+        percentile(q, of.n, us(ns))
+    };
     let (ours, machine) = cell.missed();
     format!(
         "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {ours} | {machine} | {} | {} | \
@@ -214,13 +219,13 @@ fn line(cell: &Cell) -> String {
         cell.cycles.len(),
         cell.folded(),
         us(whole.p50_ns),
-        us(whole.p99_ns),
-        us(whole.p999_ns),
+        tail(0.99, &whole),
+        tail(0.999, &whole),
         us(whole.max_ns),
         us(hand_over.p50_ns),
-        us(hand_over.p99_ns),
+        tail(0.99, &hand_over),
         us(floor.p50_ns),
-        us(floor.p99_ns),
+        tail(0.99, &floor),
         cell.not_one_stall(),
         cell.machine_over_canary()
             .map_or_else(|| "-".into(), |times| format!("{times:.2}")),

@@ -14,7 +14,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
-use vigil_bench::quantile;
+use vigil_bench::{percentile, quantile};
 use vigil_evaluation::cases::Planar;
 use vigil_inference::filter::Filter;
 use vigil_inference::lanes::Level;
@@ -58,7 +58,7 @@ pub fn run() -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new("look-ahead")?;
     say(&mut archive, &rows);
     archive.store("look-ahead.json", &json!({ "steps": STEPS, "rows": rows }))?;
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }
 
@@ -217,14 +217,16 @@ fn say(archive: &mut Archive, rows: &[Value]) {
     archive.say("|---|---|---|---|---|---|---|---|---|---|");
     for row in rows {
         let number = |key: &str| row[key].as_f64().unwrap_or(f64::NAN);
+        let samples = row["samples"].as_u64().unwrap_or(0);
+        let tail = |q: f64, key: &str| percentile(q, samples, format!("{:.2}", number(key)));
         archive.say(&format!(
-            "| {} | {} | {} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} | {:.4} | {} |",
+            "| {} | {} | {} | {:.2} | {} | {} | {:.1} | {:.1} | {:.4} | {} |",
             row["drive"].as_str().unwrap_or_default(),
             row["filter"].as_str().unwrap_or_default(),
             row["particles"],
             number("step_us_p50"),
-            number("step_us_p99"),
-            number("step_us_p999"),
+            tail(0.99, "step_us_p99"),
+            tail(0.999, "step_us_p999"),
             number("ns_per_particle_p50"),
             number("ratio"),
             number("l1_to_generic_10000"),

@@ -72,7 +72,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     }
     missions::say(&mut archive, &driven, rate_hz);
     archive.say(&format!("\nWall time {wall_s:.0} s."));
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     won(&driven)
 }
 

@@ -14,6 +14,7 @@ use vigil_bench::chain::carriers::Carrier;
 use vigil_bench::latency::cell::us;
 use vigil_bench::latency::cycles::{STAGES, Spectra, join};
 use vigil_bench::latency::load::{Load, Running};
+use vigil_bench::percentile;
 
 /// Sizes of block, bytes.
 const SIZES: [usize; 4] = [64, 4 << 10, 64 << 10, 1 << 20];
@@ -139,7 +140,7 @@ fn archive(args: &Args, rows: &[Value]) -> Result<(), Box<dyn Error>> {
         }
     }
     archive.store("peers.json", &Value::from(rows.to_vec()))?;
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }
 
@@ -155,13 +156,17 @@ fn line(size: usize, name: &str, runs: &[&Value]) -> String {
         let [least, most] = ends.map(|value| value.copied().unwrap_or(f64::NAN));
         format!("{median:.1} ({least:.1} to {most:.1})")
     };
+    let tail = |part: &str| {
+        let n = runs.iter().filter_map(|run| run[part]["n"].as_u64());
+        percentile(0.99, n.min().unwrap_or(0), of(part, "p99"))
+    };
     let sum = |key: &str| -> u64 { runs.iter().filter_map(|run| run[key].as_u64()).sum() };
     format!(
         "| {size} | {name} | {} | {} | {} | {} | {} of {} |",
         of("hand_over_us", "p50"),
-        of("hand_over_us", "p99"),
+        tail("hand_over_us"),
         of("end_to_end_us", "p50"),
-        of("end_to_end_us", "p99"),
+        tail("end_to_end_us"),
         sum("folded"),
         sum("cycles"),
     )

@@ -118,7 +118,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     for line in lines.iter().chain(&searches) {
         archive.say(line);
     }
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }
 

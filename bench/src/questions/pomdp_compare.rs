@@ -14,7 +14,7 @@ use std::time::Instant;
 use heuristics::{HEURISTICS, POLICIES, half_width};
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
-use vigil_bench::quantile;
+use vigil_bench::{percentile, quantile};
 use vigil_decision::navigation::{ACTIONS, ENDS, QUIET};
 use vigil_decision::policy::{Base, Dual, PolicyKind, PolicyName};
 use vigil_decision::simulation::{
@@ -82,7 +82,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     say_missions(&mut archive, &missions, upper, episodes);
     say_times(&mut archive, &times);
     archive.store("pomdp-compare.json", &raw)?;
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }
 
@@ -347,14 +347,16 @@ fn say_times(archive: &mut Archive, rows: &[Value]) {
     archive.say(
         "Time on config/navigation.pomdp, ns (p50, p99, p99.9), two clock readings included. dm-X \
          and adm-X with\nK = 0 and no guard: every step looks ahead. The tail holds what else ran \
-         on this core (load: machine.json).\n",
+         on this core.\n",
     );
     archive.say("| policy | decision | update and decision |");
     archive.say("|---|---|---|");
     for row in rows {
+        let n = row["n"].as_u64().unwrap_or(0);
         let times = |key: &str| {
             let of = |i: usize| row[key][i].as_f64().unwrap_or(f64::NAN);
-            format!("{:.0}, {:.0}, {:.0}", of(0), of(1), of(2))
+            let tail = |i: usize, q: f64| percentile(q, n, format!("{:.0}", of(i)));
+            format!("{:.0}, {}, {}", of(0), tail(1, 0.99), tail(2, 0.999))
         };
         archive.say(&format!(
             "| {} | {} | {} |",

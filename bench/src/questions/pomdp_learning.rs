@@ -45,7 +45,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     say_online(&mut archive, &online);
     archive.store("pomdp-learning.json", &raw)?;
     archive.store_text("learning-curve.svg", &curve::draw(&online)?)?;
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }
 

@@ -65,6 +65,6 @@ pub fn run() -> Result<(), Box<dyn Error>> {
     for line in NOTES {
         archive.say(line);
     }
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }

@@ -26,6 +26,6 @@ pub fn run(args: &Json) -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new("rover13")?;
     archive.store("rover13.json", &document)?;
     speed::report(&mut archive, &rows);
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }

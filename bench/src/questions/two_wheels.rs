@@ -101,7 +101,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
             late.long()
         ));
     }
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }
 

@@ -81,7 +81,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     archive.say(&format!(
         "\nWall time: disturbances {disturbed_s:.0} s, nominal driving {nominal_s:.0} s."
     ));
-    println!("archived in {}", archive.close()?.display());
+    archive.close()?;
     Ok(())
 }
 

@@ -1,0 +1,189 @@
+//! The page of results: of each question what was found last.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use super::Kept;
+use super::shorten::shortened;
+use crate::machine;
+
+/// Lines of a question at most.
+const LINES_MAX: usize = 40;
+/// Columns of a line that can be broken.
+const COLUMNS_MAX: usize = 120;
+
+const HEAD: &str = "# Results
+
+Of each question what was measured last: written by `scripts/bench page` from `results/`, not by hand. How to read it
+stands in [docs/measurements.md](../docs/measurements.md). A result is one file,
+`results/<date>-<machine>/<question>.json`: the lines that are shown here, all of them if they are not too many, the
+command, the commit, the facts about the machine, figures for programs, and size and CRC-32 of the raw data. These lie
+in `target/bench/<question>/` where it was measured. `-` for a percentile: there are too few samples for it.
+";
+
+/// The page, Markdown.
+#[must_use]
+pub fn page(results: &[Kept]) -> String {
+    let mut newest = BTreeMap::new();
+    let mut in_order: Vec<&Kept> = results.iter().collect();
+    in_order.sort_by_key(|kept| (&kept.run.date, &kept.path));
+    for kept in in_order {
+        newest.insert(&kept.run.question, kept);
+    }
+    let mut text = HEAD.to_owned();
+    for kept in newest.values() {
+        text.push_str(&section(kept));
+    }
+    text
+}
+
+fn section(Kept { path, run }: &Kept) -> String {
+    let command = format!("`{}`", run.command);
+    let is_said = |line: &&String| line.is_empty() || **line == command;
+    let whole = run.summary.iter().skip_while(is_said);
+    let mut whole: Vec<String> = whole.cloned().collect();
+    while whole.last().is_some_and(String::is_empty) {
+        whole.pop();
+    }
+    let lines = shortened(&whole, |lines| wrapped(lines).len() <= LINES_MAX);
+    let folder = path.split('/').next().unwrap_or_default();
+    let name = folder.strip_prefix(&format!("{}-", run.date));
+    let processor = run.machine["processor"]
+        .as_str()
+        .unwrap_or("processor not known");
+    let command = if run.command.is_empty() {
+        "Command: not known.".to_owned()
+    } else {
+        command
+    };
+    let all = if lines == whole && run.remarks.is_empty() {
+        "The file"
+    } else {
+        "More"
+    };
+    let mut text = format!(
+        "\n## {}\n\n{command}\n\n{}, `{}`: {processor}, {} cores.\n{}\n{all}: [{path}](results/{path}).\n\n",
+        run.question,
+        run.date,
+        name.unwrap_or(folder),
+        run.machine["cores"],
+        machine::commit_in_words(run.commit.as_deref(), &run.machine),
+    );
+    for line in wrapped(&lines) {
+        let _ = writeln!(text, "{line}");
+    }
+    text
+}
+
+/// The lines as they stand in the page: headings one level lower, long ones broken, but for tables
+/// and what is quoted as it is.
+fn wrapped(lines: &[String]) -> Vec<String> {
+    let mut is_quoted = false;
+    let mut all = Vec::new();
+    for line in lines {
+        let is_fence = line.starts_with("```");
+        is_quoted ^= is_fence;
+        if is_quoted || is_fence || line.starts_with('|') {
+            all.push(line.clone());
+        } else if line.starts_with('#') {
+            all.push(format!("#{line}"));
+        } else {
+            all.extend(broken(line));
+        }
+    }
+    all
+}
+
+/// A line, broken between words.
+fn broken(line: &str) -> Vec<String> {
+    let indent = if line.starts_with("- ") { "  " } else { "" };
+    let mut lines = vec![String::new()];
+    for (at, word) in line.split(' ').enumerate() {
+        let last = lines.len() - 1;
+        let columns = lines[last].chars().count() + 1 + word.chars().count();
+        // At the beginning of a line these would mean something.
+        let is_mark = word.starts_with(['-', '+', '*', '#', '|', '>', '=']);
+        if columns > COLUMNS_MAX && !is_mark && at > 0 {
+            lines.push(format!("{indent}{word}"));
+            continue;
+        }
+        if at > 0 {
+            lines[last].push(' ');
+        }
+        lines[last].push_str(word);
+    }
+    lines
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::tests::empty;
+    use super::*;
+
+    fn kept(folder: &str, date: &str, summary: &[&str]) -> Kept {
+        let mut run = empty("latency");
+        run.date = date.into();
+        run.summary = summary.iter().map(|line| (*line).to_owned()).collect();
+        let path = format!("{folder}/latency.json");
+        Kept { path, run }
+    }
+
+    #[test]
+    fn of_each_question_the_newest_result_is_shown() {
+        let old = kept("2026-11-21-vm", "2026-11-21", &["Old."]);
+        let new = kept(
+            "2026-11-22-16-cores",
+            "2026-11-22",
+            &["", "New.", "## Part", ""],
+        );
+        let text = page(&[new, old]);
+        let wanted = "\n## latency\n\n`scripts/bench latency`\n\n2026-11-22, `16-cores`: processor \
+                      not known, 2 cores.\nCommit: ab12.\nThe file: \
+                      [2026-11-22-16-cores/latency.json]\
+                      (results/2026-11-22-16-cores/latency.json).\n\nNew.\n### Part\n";
+        assert_eq!(text.strip_prefix(HEAD).unwrap(), wanted);
+    }
+
+    #[test]
+    fn long_lines_are_broken_and_long_tables_cut() {
+        let long = format!("- {}- b", "a ".repeat(58));
+        let whole = ["| a |", "|---|"].into_iter().chain([long.as_str(); 2]);
+        let rows = std::iter::repeat_n("| 1 |", 50);
+        let summary: Vec<&str> = whole
+            .clone()
+            .take(2)
+            .chain(rows)
+            .chain(whole.skip(2))
+            .collect();
+        let text = page(&[kept("2026-11-22-vm", "2026-11-22", &summary)]);
+        assert!(
+            text.lines()
+                .all(|line| line.chars().count() <= COLUMNS_MAX + 3)
+        );
+        assert_eq!(text.matches("| 1 |").count(), 34, "{text}");
+        assert!(text.contains("\nMore: ") && text.contains("\n... 16 more rows\n"));
+        assert_eq!(broken("a b"), ["a b"]);
+        assert_eq!(broken(&format!("- {} c", "x".repeat(117))).len(), 2);
+    }
+
+    #[test]
+    fn the_committed_page_is_what_the_results_make() {
+        let folder = crate::archive::results();
+        let results = Kept::all(&folder).unwrap();
+        let committed = std::fs::read_to_string(folder.join("../README.md")).unwrap();
+        assert!(
+            page(&results) == committed,
+            "bench/README.md is not of these results: run `scripts/bench page`"
+        );
+        for kept in results {
+            let bytes = kept.run.text().len();
+            assert!(
+                bytes <= super::super::BYTES_MAX,
+                "{}: {bytes} bytes",
+                kept.path
+            );
+            assert!(kept.path.ends_with(&format!("/{}.json", kept.run.question)));
+        }
+    }
+}
