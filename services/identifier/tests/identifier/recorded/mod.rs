@@ -41,3 +41,10 @@ pub fn unseen(mode: &str, kind: &str) -> (Vec<SensorFrame>, Label) {
     let run = runs.into_iter().find(|run| run.id == label.run).unwrap();
     (run.frames, label)
 }
+
+/// A healthy run of 20 s with every channel, whose command changes.
+pub fn healthy(id: u32) -> Vec<SensorFrame> {
+    let file = path("tests/data/rover/healthy_frames.csv.gz");
+    let runs = frames::read(&file, &robot()).unwrap();
+    runs.into_iter().find(|run| run.id == id).unwrap().frames
+}
