@@ -161,8 +161,8 @@ mod tests {
             text.lines()
                 .all(|line| line.chars().count() <= COLUMNS_MAX + 3)
         );
-        assert_eq!(text.matches("| 1 |").count(), 34, "{text}");
-        assert!(text.contains("\nMore: ") && text.contains("\n... 16 more rows\n"));
+        assert_eq!(text.matches("| 1 |").count(), 32, "{text}");
+        assert!(text.contains("\nMore: ") && text.contains("\n... 18 more rows\n"));
         assert_eq!(broken("a b"), ["a b"]);
         assert_eq!(broken(&format!("- {} c", "x".repeat(117))).len(), 2);
     }
