@@ -14,11 +14,13 @@ const COLUMNS_MAX: usize = 120;
 
 const HEAD: &str = "# Results
 
-Of each question what was measured last: written by `scripts/bench page` from `results/`, not by hand. How to read it
-stands in [docs/measurements.md](../docs/measurements.md). A result is one file,
-`results/<date>-<machine>/<question>.json`: the lines that are shown here, all of them if they are not too many, the
-command, the commit, the facts about the machine, figures for programs, and size and CRC-32 of the raw data. These lie
-in `target/bench/<question>/` where it was measured. `-` for a percentile: there are too few samples for it.
+Of each question what was measured last: written by `scripts/bench page` from `results/`, not by
+hand. How to read it stands in [docs/measurements.md](../docs/measurements.md).
+
+A result is one file, `results/<date>-<machine>/<question>.json`. It holds the lines that are shown
+here, all of them if they are not too many, the command, the commit, facts about the machine,
+figures for programs, and size and CRC-32 of the raw data. These lie in `target/bench/<question>/`
+where it was measured. `-` for a percentile: there are too few samples for it.
 ";
 
 /// The page, Markdown.
@@ -62,7 +64,8 @@ fn section(Kept { path, run }: &Kept) -> String {
         "More"
     };
     let mut text = format!(
-        "\n## {}\n\n{command}\n\n{}, `{}`: {processor}, {} cores.\n{}\n{all}: [{path}](results/{path}).\n\n",
+        "\n## {}\n\n{command}\n\n{}, `{}`: {processor}, {} cores.\n{}\n\
+         {all}: [{path}](results/{path}).\n\n",
         run.question,
         run.date,
         name.unwrap_or(folder),
