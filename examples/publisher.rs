@@ -5,7 +5,7 @@ use std::{error::Error, path::Path};
 
 use vigil_blocks::SensorFrame;
 use vigil_cycle::{Clock, Graph, Monotonic, Stamp, Topic, clock, port::Link};
-use vigil_evaluation::frames;
+use vigil_recording::frames;
 use vigil_setup::GraphArgs;
 
 fn main() -> Result<(), Box<dyn Error>> {

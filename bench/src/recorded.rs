@@ -4,12 +4,12 @@ use std::error::Error;
 use std::path::Path;
 
 use vigil_decision::Pomdp;
-use vigil_evaluation::frames::{self, Run};
-use vigil_evaluation::labels::{self, Label};
 use vigil_identifier::{Exact, Leaves, Posterior, risks};
 use vigil_inference::FaultTree;
 use vigil_inference::hybrid::Modes;
 use vigil_inference::track::TRACK_DIMENSION;
+use vigil_recording::frames::{self, Run};
+use vigil_recording::labels::{self, Label};
 use vigil_robot::Description;
 use vigil_robot::learned::{
     FaultRates, Healthy, Model, Moved, NoiseScales, Observation, Observer, Switching,

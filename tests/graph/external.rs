@@ -5,7 +5,7 @@ use std::fs;
 use vigil_blocks::SensorFrame;
 use vigil_cycle::clock::sleep_until;
 use vigil_cycle::{Clock, Monotonic, Stamp, Topic};
-use vigil_evaluation::frames;
+use vigil_recording::frames;
 
 use crate::harness::{Running, config_with, launch, machine, root, unique};
 

@@ -7,6 +7,7 @@ const SHARED: &[&str] = &[
     "vigil-setup",
     "vigil-cycle",
     "vigil-evaluation",
+    "vigil-recording",
     "vigil-robot",
     "vigil-inference",
     "vigil-decision",
@@ -41,8 +42,17 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
-        "vigil-evaluation",
+        "vigil-recording",
         &["vigil-robot", "vigil-inference", "vigil-blocks"],
+    ),
+    (
+        "vigil-evaluation",
+        &[
+            "vigil-recording",
+            "vigil-robot",
+            "vigil-inference",
+            "vigil-blocks",
+        ],
     ),
 ];
 
@@ -143,8 +153,8 @@ fn arrows_between_crates_point_one_way() {
     assert!(manifests.len() >= SHARED.len() + SERVICES.len());
     crate::demand_none(
         "Move what you need to the room that may hold it, or pass it in as data: services -> \
-         {setup, cycle, evaluation} -> robot -> inference -> blocks, \
-         setup -> cycle, decision -> blocks.",
+         {setup, cycle, recording} -> robot -> inference -> blocks, \
+         setup -> cycle, decision -> blocks; evaluation -> recording.",
         &arrow_violations(&manifests),
     );
 }

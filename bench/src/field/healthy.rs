@@ -8,7 +8,7 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use vigil_blocks::SensorFrame;
-use vigil_evaluation::frames::{Field, fields, further};
+use vigil_recording::frames::{Field, fields, further};
 use vigil_sensor_sim::{EffectiveCommand, World};
 use vigil_setup::schema::Simulator;
 

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use vigil_evaluation::learning::further;
+use vigil_evaluation::learning_nominal;
 use vigil_evaluation::scoring::Taxonomy;
 use vigil_evaluation::scoring::field::{Scorer, Stretch, Truth};
-use vigil_evaluation::{frames, labels, learning_nominal};
+use vigil_recording::{frames, labels};
 use vigil_robot::RobotModel;
 use vigil_setup::schema::Sensors;
 use vigil_setup::{GraphArgs, Setup, load_robot};

@@ -1,8 +1,8 @@
 //! Heading rates of recorded runs.
 
 use serde_json::{Value, json};
-use vigil_evaluation::frames::Run;
-use vigil_evaluation::labels::Label;
+use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
 use vigil_robot::kinematics::wrap_angle;
 
 /// Time after the onset until the motion is steady, s.

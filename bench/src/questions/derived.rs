@@ -13,7 +13,7 @@ use std::process::Command;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_evaluation::derived::{Labelled, dead_encoder, noisier, write_frames, write_labels};
-use vigil_evaluation::{frames, labels};
+use vigil_recording::{frames, labels};
 use vigil_robot::Description;
 use vigil_robot::learned::Model;
 

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::figure7::{self, Cell, Measured, RADII_M, RATIO_MAX};
 use vigil_bench::{machine, quantile};
-use vigil_evaluation::{frames, labels};
+use vigil_recording::{frames, labels};
 use vigil_robot::slip::SlipModel;
 
 use super::Json;

@@ -22,7 +22,7 @@ use vigil_bench::latency::load::{Load, Running};
 use vigil_blocks::{Block, SensorFrame, datagram};
 use vigil_cycle::placement::{self, Wanted};
 use vigil_cycle::{Clock, Monotonic, clock, signal};
-use vigil_evaluation::frames;
+use vigil_recording::frames;
 use vigil_setup::schema::Source;
 
 /// The word with which the program is the flood.

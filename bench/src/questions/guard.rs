@@ -11,7 +11,7 @@ use vigil_bench::guard::{faults, sensors, stream::Stream};
 use vigil_bench::matched::in_parallel;
 use vigil_bench::shares::Share;
 use vigil_bench::simulated::Rover;
-use vigil_evaluation::frames;
+use vigil_recording::frames;
 
 /// Injects faults into a stream of frames, and counts what is found.
 #[derive(Debug, clap::Args)]

@@ -6,7 +6,7 @@
 //! the least squares.
 
 use nalgebra::{DMatrix, DVector};
-use vigil_evaluation::frames::Run;
+use vigil_recording::frames::Run;
 use vigil_robot::Description;
 
 /// Step of the line's place, m.

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use vigil_blocks::{SensorFrame, Valid};
-use vigil_evaluation::frames::Run;
+use vigil_recording::frames::Run;
 use vigil_robot::Description;
 
 /// Half the distance between the wheels' centres, m.

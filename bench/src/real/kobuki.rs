@@ -3,8 +3,8 @@
 use std::error::Error;
 
 use serde::Serialize;
-use vigil_evaluation::frames::Run;
 use vigil_evaluation::learning_nominal::{self, Report};
+use vigil_recording::frames::Run;
 use vigil_robot::learned::Form;
 use vigil_robot::learned::monitor::Channels;
 use vigil_robot::nominal::{Model, Monitor, Observation, Observer};

@@ -11,8 +11,8 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use vigil_evaluation::frames::Run;
 use vigil_evaluation::import::{LogDescription, import};
+use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_setup::load_robot;
 

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use vigil_cycle::KeepAwake;
 use vigil_cycle::topic::ServiceName;
-use vigil_evaluation::frames;
+use vigil_recording::frames;
 use vigil_robot::Injection;
 use vigil_setup::schema::Source;
 use vigil_setup::{GraphArgs, Setup};

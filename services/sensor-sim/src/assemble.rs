@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use vigil_evaluation::frames;
+use vigil_recording::frames;
 use vigil_robot::Injection;
 use vigil_setup::Setup;
 use vigil_setup::schema::Source;

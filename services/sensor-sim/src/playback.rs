@@ -1,7 +1,7 @@
 //! Recorded frames, one run after the other.
 
 use vigil_blocks::SensorFrame;
-use vigil_evaluation::frames::Run;
+use vigil_recording::frames::Run;
 
 /// Why runs cannot be played back.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -5,11 +5,11 @@ use vigil_blocks::{
     SensorFrame, SizeKind,
 };
 use vigil_detector::{Detector, DetectorError};
-use vigil_evaluation::frames::Run;
 use vigil_evaluation::scoring::field::BLIND;
 use vigil_evaluation::scoring::{MULTIPLE, Side, Taxonomy, UNKNOWN, Verdict};
 use vigil_identifier::{Diagnoser, Identifier, IdentifierError, Input, Models, Watcher};
 use vigil_inference::FaultTree;
+use vigil_recording::frames::Run;
 use vigil_robot::{Description, nominal};
 use vigil_setup::schema;
 use vigil_supervisor::fused_alarm;

@@ -2,7 +2,7 @@
 
 use vigil_blocks::{SensorFrame, Valid, WHEELS, fnv1a};
 
-use crate::frames::Run;
+use vigil_recording::frames::Run;
 
 /// Hash of what the frames up to `until_s` hold: ids of the runs, times, poses, commands, wheel
 /// rates, and yaw rates and motor currents where they were measured.

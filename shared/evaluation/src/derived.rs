@@ -13,8 +13,8 @@ use vigil_inference::angle::wrap;
 use vigil_robot::Description;
 use vigil_robot::learned::model::Noise;
 
-use crate::frames::Run;
-use crate::labels::Label;
+use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
 
 /// Grid on which derived values lie, as the recorded ones do: parts of a unit.
 const PER_UNIT: f64 = 1e4;
@@ -111,7 +111,7 @@ fn generator(run: u32, seed: u64) -> Pcg64Mcg {
     Pcg64Mcg::seed_from_u64(seed ^ u64::from(run).rotate_left(32))
 }
 
-/// Writes runs as [`crate::frames::read`] reads them.
+/// Writes runs as [`vigil_recording::frames::read`] reads them.
 ///
 /// # Errors
 /// The writer's.
@@ -146,7 +146,7 @@ pub fn write_frames<'a>(
     Ok(())
 }
 
-/// Writes labels as [`crate::labels::read`] reads them.
+/// Writes labels as [`vigil_recording::labels::read`] reads them.
 ///
 /// # Errors
 /// The writer's.

@@ -5,9 +5,7 @@ pub mod cases;
 mod correlation;
 mod data_hash;
 pub mod derived;
-pub mod frames;
 pub mod import;
-pub mod labels;
 pub mod learning;
 pub mod learning_nominal;
 mod maxima;
@@ -16,6 +14,5 @@ pub mod plausible;
 pub mod report;
 pub mod scoring;
 pub mod split;
-mod table;
 
 pub use data_hash::data_hash;

@@ -16,8 +16,8 @@ use vigil_blocks::{SensorFrame, Valid};
 use vigil_robot::Description;
 use vigil_robot::description::Kinematics;
 
-use crate::frames::Run;
 use chords::Chord;
+use vigil_recording::frames::Run;
 
 /// Speed from which a robot counts as commanded to move, m/s.
 const MOVING_M_S: f64 = 0.02;

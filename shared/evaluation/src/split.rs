@@ -6,7 +6,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
 
-use crate::labels::Label;
+use vigil_recording::labels::Label;
 
 /// Ids of the runs to leave out: about `test_fraction` of every mode and kind, drawn with `seed`,
 /// in rising order. The same labels and seed give the same ids.

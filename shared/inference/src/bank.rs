@@ -131,8 +131,8 @@ impl<T: Copy> Bank<T> {
         Some(evidence)
     }
 
-    /// Keeps the most probable hypotheses up to the limit, in their order; of those equally probable
-    /// the first. The others' weight is gone: the next normalisation divides it.
+    /// Keeps the most probable hypotheses up to the limit, in their order; of those equally
+    /// probable the first. The others' weight is gone: the next normalisation divides it.
     fn keep(&mut self) {
         let count = self.limit;
         if self.hypotheses.len() <= count {

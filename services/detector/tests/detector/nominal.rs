@@ -10,8 +10,8 @@ use vigil_blocks::{
 };
 use vigil_cycle::allocation::allocations;
 use vigil_detector::Detector;
-use vigil_evaluation::frames::Run;
 use vigil_evaluation::learning_nominal::learn;
+use vigil_recording::frames::Run;
 use vigil_robot::{Description, RobotModel};
 use vigil_setup::schema;
 

@@ -11,8 +11,8 @@ use crate::recorded;
 /// When it breaks, s after the first frame.
 const ONSET_S: f64 = 3.0;
 const RF: usize = 3;
-/// A healthy run that the model has not seen, whose command changes.
-const RUN: u32 = 2;
+/// A healthy run in which the rover turns left, after 8 s right.
+const RUN: u32 = 0;
 
 fn time_s(frame: &SensorFrame) -> f64 {
     frame.header.t_capture_ns as f64 * 1e-9
@@ -22,13 +22,7 @@ fn time_s(frame: &SensorFrame) -> f64 {
 /// alarm rises a third of a second later.
 fn belief(mut change: impl FnMut(&mut SensorFrame)) -> (FaultBelief, [usize; 2]) {
     let robot = recorded::robot();
-    let (runs, _) = recorded::runs(&robot);
-    let mut frames = runs
-        .iter()
-        .find(|run| run.id == RUN)
-        .unwrap()
-        .frames
-        .clone();
+    let mut frames = recorded::healthy(RUN);
     let start_s = time_s(&frames[0]);
     let tree = vigil_setup::load_tree(&recorded::path("config/trees/rover-all.toml")).unwrap();
     let model = recorded::model();

@@ -11,7 +11,7 @@ use vigil_cycle::Topic;
 use vigil_cycle::domain::shared_memory_free_bytes;
 use vigil_cycle::placement::{self, Placement, Wanted};
 use vigil_cycle::topic::ServiceName;
-use vigil_evaluation::frames;
+use vigil_recording::frames;
 use vigil_setup::schema::Source;
 use vigil_setup::{GraphArgs, Setup};
 

@@ -10,10 +10,10 @@ use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde::Serialize;
 use vigil_evaluation::data_hash;
-use vigil_evaluation::frames::Run;
-use vigil_evaluation::labels::{self, Label};
 use vigil_evaluation::plausible;
 use vigil_evaluation::report::{Report, SensorSet};
+use vigil_recording::frames::Run;
+use vigil_recording::labels::{self, Label};
 use vigil_robot::RobotModel;
 use vigil_setup::schema::IdentifierFilter;
 

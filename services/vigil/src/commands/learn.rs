@@ -6,12 +6,12 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use vigil_evaluation::frames::{self, Run};
-use vigil_evaluation::labels::{self, Label};
 use vigil_evaluation::learning::further;
 use vigil_evaluation::learning::{self, Options, RESIDUAL_BAR, Report, Residual, View};
 use vigil_evaluation::learning_nominal;
 use vigil_evaluation::split::split;
+use vigil_recording::frames::{self, Run};
+use vigil_recording::labels::{self, Label};
 use vigil_robot::learned::Model;
 use vigil_robot::learned::model::Provenance;
 use vigil_robot::{Description, RobotModel};

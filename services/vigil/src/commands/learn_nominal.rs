@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use serde::Serialize;
-use vigil_evaluation::frames::Run;
 use vigil_evaluation::learning_nominal::{self, Report};
 use vigil_evaluation::split::split_runs;
+use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::learned::model::Provenance;
 

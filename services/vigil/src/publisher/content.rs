@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use vigil_blocks::SensorFrame;
-use vigil_evaluation::frames::{Field, Run, fields};
 use vigil_evaluation::plausible;
+use vigil_recording::frames::{Field, Run, fields};
 use vigil_robot::Description;
 use vigil_robot::meaning::Meaning;
 
@@ -205,7 +205,7 @@ mod tests {
         let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
         let robot = vigil_setup::load_robot(&root.join("config/robots/rover.toml")).unwrap();
         let path = root.join("tests/data/rover/learn_frames.csv.gz");
-        let runs = vigil_evaluation::frames::read(&path, &robot).unwrap();
+        let runs = vigil_recording::frames::read(&path, &robot).unwrap();
         let arrived = |frame: &SensorFrame| Arrived {
             now_ns: frame.header.t_capture_ns,
             frame: *frame,

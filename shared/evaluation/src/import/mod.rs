@@ -36,8 +36,8 @@ use vigil_blocks::SensorFrame;
 use vigil_robot::Description;
 pub use write::write;
 
-use crate::frames::{Field, Run, fields};
-use crate::table::TableError;
+use vigil_recording::frames::{Field, Run, fields};
+use vigil_recording::table::TableError;
 
 /// Why a log was refused.
 #[derive(Debug, thiserror::Error)]
@@ -89,7 +89,7 @@ impl ImportError {
 }
 
 impl Imported {
-    /// The runs as frames, as [`crate::frames::read`] would read them from the written file, but
+    /// The runs as frames, as [`vigil_recording::frames::read`] would read them from the written file, but
     /// for its rounding and its checks.
     #[must_use]
     pub fn frames(&self, robot: &Description) -> Vec<Run> {

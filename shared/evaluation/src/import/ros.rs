@@ -18,7 +18,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::ImportError;
-use crate::table::wrong_row;
+use vigil_recording::table::wrong_row;
 
 /// Largest file that is read, bytes.
 const FILE_BYTES_MAX: u64 = 4 << 30;

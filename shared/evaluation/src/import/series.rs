@@ -8,7 +8,7 @@ use vigil_inference::angle::wrap;
 use super::ImportError;
 use super::description::{ChannelSource, Clock, LogDescription, Source};
 use super::ros::{self, Lacking};
-use crate::table::{Layout, Table};
+use vigil_recording::table::{Layout, Table};
 
 /// Columns of one source that are needed, with their rows.
 pub(super) struct SourceTable {
@@ -51,7 +51,7 @@ impl SourceTable {
     }
 
     fn wrong(&self, row: usize, message: String) -> ImportError {
-        crate::table::wrong_row(&self.path, row as u64 + 1, message).into()
+        vigil_recording::table::wrong_row(&self.path, row as u64 + 1, message).into()
     }
 }
 
@@ -295,7 +295,7 @@ impl Series {
     /// An error about the sample with this index, where it stands in its file.
     pub fn wrong(&self, at: usize, message: String) -> ImportError {
         let row = self.row.get(at).copied().unwrap_or(0);
-        crate::table::wrong_row(&self.path, row as u64, message).into()
+        vigil_recording::table::wrong_row(&self.path, row as u64, message).into()
     }
 
     /// Moves all samples to earlier times, s.

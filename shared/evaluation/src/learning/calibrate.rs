@@ -6,9 +6,9 @@ use vigil_robot::learned::{Form, Model, Observer};
 
 use super::LearnError;
 use super::segments::by_run;
-use crate::frames::Run;
-use crate::labels::Label;
 use crate::maxima::{Maxima, WINDOW_S};
+use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
 
 /// Prior rate under which the log-odds are collected, 1/h.
 const FAULT_RATE_1_H: f64 = 1.0;

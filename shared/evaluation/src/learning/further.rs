@@ -11,7 +11,7 @@ use super::least_squares::LeastSquares;
 use super::segments::SETTLE_S;
 use super::{LearnError, calibrate};
 use crate::data_hash::data_hash;
-use crate::frames::Run;
+use vigil_recording::frames::Run;
 
 /// Observations averaged before the spread by the ground is found.
 const WINDOW: usize = 20;

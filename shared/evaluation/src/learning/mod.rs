@@ -27,12 +27,12 @@ use vigil_robot::learned::model::{
 use vigil_robot::learned::{Curve, EncoderModel, MotionModel, RateModel};
 
 use crate::data_hash::data_hash;
-use crate::frames::Run;
-use crate::labels::Label;
 use crate::plausible::{self, Doubtful};
 pub use report::{ModeError, RESIDUAL_BAR, Report, Residual};
 use segments::Segments;
 pub use view::View;
+use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
 
 /// How to learn.
 #[derive(Debug, Clone, Copy, PartialEq)]

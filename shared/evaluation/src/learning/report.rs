@@ -9,8 +9,8 @@ use super::bounds;
 use super::motion::{Predicted, follow};
 use super::segments::{Segment, Segments};
 use crate::bounds::Bounds;
-use crate::frames::Run;
-use crate::labels::Label;
+use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
 
 /// A track is judged from this time on after its start, s: before, its innovations tell how well
 /// its own beginning was measured, whatever the model.

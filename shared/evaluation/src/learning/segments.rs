@@ -6,8 +6,8 @@ use vigil_robot::Description;
 use vigil_robot::learned::{Model, Observation, Observer};
 
 use super::LearnError;
-use crate::frames::Run;
-use crate::labels::Label;
+use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
 
 /// After an onset, and after the start of a run, the motion settles for so long, s.
 pub const SETTLE_S: f64 = 0.5;

@@ -22,11 +22,11 @@ use vigil_robot::nominal::model::{KIND, VERSION};
 use vigil_robot::nominal::{Channel, Model, Range, Target, Term};
 
 use crate::data_hash::data_hash;
-use crate::frames::Run;
 use crate::plausible::{self, Doubtful};
 use record::{Part, Record};
 pub use report::{ChannelError, Report};
 pub use view::View;
+use vigil_recording::frames::Run;
 
 /// Logs shorter than this are learned from with a warning and wider deviations, s.
 const LONG_ENOUGH_S: f64 = 600.0;

@@ -3,7 +3,7 @@
 use vigil_robot::Description;
 use vigil_robot::nominal::{History, Observer};
 
-use crate::frames::Run;
+use vigil_recording::frames::Run;
 
 /// One run.
 #[derive(Debug, Clone)]

@@ -42,7 +42,7 @@ pub use ratio::{Ratio, Spread};
 pub use taxonomy::{Side, Taxonomy};
 pub use trade_off::{Found, Point, TradeOff};
 
-use crate::labels::Label;
+use vigil_recording::labels::Label;
 
 /// Reported when no modelled fault explains the data.
 pub const UNKNOWN: &str = "UNKNOWN";

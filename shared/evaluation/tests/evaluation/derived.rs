@@ -1,8 +1,8 @@
 //! Runs made from recorded ones.
 
 use vigil_evaluation::derived::{dead_encoder, noisier, write_frames, write_labels};
-use vigil_evaluation::frames::{self, Run};
-use vigil_evaluation::labels::{self, Label};
+use vigil_recording::frames::{self, Run};
+use vigil_recording::labels::{self, Label};
 use vigil_robot::learned::Model;
 use vigil_robot::learned::model::Noise;
 

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use vigil_evaluation::frames::{self, Run};
-use vigil_evaluation::labels::{self, Label};
 use vigil_evaluation::learning::{LearnError, Options, learn};
 use vigil_evaluation::split::split;
+use vigil_recording::frames::{self, Run};
+use vigil_recording::labels::{self, Label};
 use vigil_robot::Description;
 use vigil_robot::learned::Model;
 

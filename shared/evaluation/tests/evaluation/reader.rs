@@ -7,7 +7,7 @@ use flate2::write::GzEncoder;
 use proptest::prelude::*;
 use tempfile::NamedTempFile;
 use vigil_blocks::Valid;
-use vigil_evaluation::{frames, labels};
+use vigil_recording::{frames, labels};
 
 use crate::rover::{path, robot};
 

@@ -2,10 +2,10 @@
 //! refused with the run and the figure.
 
 use vigil_blocks::SensorFrame;
-use vigil_evaluation::frames::{self, Run};
-use vigil_evaluation::labels::{self, Label};
 use vigil_evaluation::learning::{Options, learn};
 use vigil_evaluation::plausible::doubt;
+use vigil_recording::frames::{self, Run};
+use vigil_recording::labels::{self, Label};
 use vigil_robot::Description;
 
 use crate::rover;

@@ -1,9 +1,9 @@
 //! The page, and filters beside each other, from hand-made verdicts.
 
 use roxmltree::{Document, ParsingOptions};
-use vigil_evaluation::labels::Label;
 use vigil_evaluation::report::{Report, SensorSet};
 use vigil_evaluation::scoring::{Case, Entrant, Taxonomy, Verdict, contest, score};
+use vigil_recording::labels::Label;
 
 use crate::rover::{robot, tree};
 

@@ -1,7 +1,7 @@
 //! Delay against false alarms, from hand-made log-odds.
 
-use vigil_evaluation::labels::Label;
 use vigil_evaluation::scoring::{Case, Point, Taxonomy, TradeOff, Verdict, score};
+use vigil_recording::labels::Label;
 
 use crate::rover::{robot, tree};
 

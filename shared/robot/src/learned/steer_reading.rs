@@ -10,7 +10,8 @@ use super::wheels::steering_angle;
 use super::{Model, NoiseScales, Observation};
 use crate::Description;
 
-/// Standard deviation of a steering angle of which nothing is known, rad: half of what a servo turns.
+/// Standard deviation of a steering angle of which nothing is known, rad: half of what a servo
+/// turns.
 pub const ANY_ANGLE_SD_RAD: f64 = 0.3;
 /// An angle that does anything is at most so much more likely than one as commanded (natural
 /// logarithm): a single reading decides nothing.

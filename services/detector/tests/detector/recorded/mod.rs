@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use vigil_blocks::SensorFrame;
-use vigil_evaluation::frames::{self, Run};
-use vigil_evaluation::labels::{self, Label};
+use vigil_recording::frames::{self, Run};
+use vigil_recording::labels::{self, Label};
 use vigil_robot::Description;
 use vigil_robot::learned::Model;
 

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use vigil_blocks::SensorFrame;
-use vigil_evaluation::frames::{self, Run};
-use vigil_evaluation::labels::{self, Label};
+use vigil_recording::frames::{self, Run};
+use vigil_recording::labels::{self, Label};
 use vigil_robot::Description;
 use vigil_robot::learned::Model;
 
@@ -40,4 +40,11 @@ pub fn unseen(mode: &str, kind: &str) -> (Vec<SensorFrame>, Label) {
     let label = labels.iter().find(is_wanted).unwrap().clone();
     let run = runs.into_iter().find(|run| run.id == label.run).unwrap();
     (run.frames, label)
+}
+
+/// A healthy run of 20 s with every channel, whose command changes.
+pub fn healthy(id: u32) -> Vec<SensorFrame> {
+    let file = path("tests/data/rover/healthy_frames.csv.gz");
+    let runs = frames::read(&file, &robot()).unwrap();
+    runs.into_iter().find(|run| run.id == id).unwrap().frames
 }

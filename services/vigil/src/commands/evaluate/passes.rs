@@ -2,9 +2,9 @@
 
 use std::cell::Cell;
 
-use vigil_evaluation::frames::Run;
-use vigil_evaluation::labels::Label;
 use vigil_evaluation::scoring::{self, Case, Contest, Entrant, Score, Taxonomy};
+use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
 use vigil_setup::schema::IdentifierFilter;
 
 use super::Args;

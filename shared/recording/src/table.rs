@@ -72,7 +72,7 @@ impl<R: Read> Read for Limited<R> {
 
 /// How a table is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Layout {
+pub struct Layout {
     /// Separator of columns.
     pub delimiter: u8,
     /// Rows before the one that names the columns.
@@ -89,7 +89,7 @@ impl Default for Layout {
 }
 
 /// An open table: its header is read.
-pub(crate) struct Table {
+pub struct Table {
     path: PathBuf,
     reader: csv::Reader<Box<dyn Read>>,
     columns: Vec<String>,
@@ -99,12 +99,18 @@ pub(crate) struct Table {
 
 impl Table {
     /// Opens a file; compression is recognised by its content.
-    pub(crate) fn open(path: &Path) -> Result<Self, TableError> {
+    ///
+    /// # Errors
+    /// A file that cannot be read, or without a header.
+    pub fn open(path: &Path) -> Result<Self, TableError> {
         Self::open_as(path, Layout::default())
     }
 
     /// Opens a file of another layout.
-    pub(crate) fn open_as(path: &Path, layout: Layout) -> Result<Self, TableError> {
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_as(path: &Path, layout: Layout) -> Result<Self, TableError> {
         let io = |error| TableError::Io {
             path: path.to_path_buf(),
             error,
@@ -128,7 +134,7 @@ impl Table {
 
     /// Reads the header of `content`; `path` only names it.
     #[cfg(test)]
-    pub(crate) fn new(path: &Path, content: Box<dyn Read>) -> Result<Self, TableError> {
+    pub fn new(path: &Path, content: Box<dyn Read>) -> Result<Self, TableError> {
         Self::delimited(path, content, b',')
     }
 
@@ -152,7 +158,10 @@ impl Table {
     }
 
     /// Positions of the columns, each of which must exist, and once.
-    pub(crate) fn require(&self, names: &[String]) -> Result<Vec<usize>, TableError> {
+    ///
+    /// # Errors
+    /// Columns that are missing, or stand twice.
+    pub fn require(&self, names: &[String]) -> Result<Vec<usize>, TableError> {
         let missing: Vec<&str> = names
             .iter()
             .filter(|n| self.position(n).is_none())
@@ -174,12 +183,15 @@ impl Table {
     }
 
     /// Position of a column, if it exists.
-    pub(crate) fn position(&self, name: &str) -> Option<usize> {
+    pub fn position(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column == name)
     }
 
     /// Reads the next row; false at the end.
-    pub(crate) fn advance(&mut self) -> Result<bool, TableError> {
+    ///
+    /// # Errors
+    /// A row that is no row of this table.
+    pub fn advance(&mut self) -> Result<bool, TableError> {
         self.row += 1;
         self.reader
             .read_record(&mut self.record)
@@ -187,12 +199,15 @@ impl Table {
     }
 
     /// Text of a field of the present row.
-    pub(crate) fn text(&self, column: usize) -> &str {
+    pub fn text(&self, column: usize) -> &str {
         self.record.get(column).unwrap_or("")
     }
 
     /// A finite number of the present row.
-    pub(crate) fn number(&self, column: usize) -> Result<f64, TableError> {
+    ///
+    /// # Errors
+    /// Text that is none.
+    pub fn number(&self, column: usize) -> Result<f64, TableError> {
         let text = self.text(column);
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
@@ -204,7 +219,10 @@ impl Table {
     }
 
     /// A whole number of the present row.
-    pub(crate) fn whole(&self, column: usize) -> Result<u32, TableError> {
+    ///
+    /// # Errors
+    /// Text that is none.
+    pub fn whole(&self, column: usize) -> Result<u32, TableError> {
         let text = self.text(column);
         text.parse().map_err(|_| {
             let (name, text) = (&self.columns[column], quoted(text));
@@ -215,13 +233,13 @@ impl Table {
     }
 
     /// An error about the present row.
-    pub(crate) fn wrong(&self, message: String) -> TableError {
+    pub fn wrong(&self, message: String) -> TableError {
         wrong_row(&self.path, self.row, message)
     }
 }
 
 /// Text from a file as a message may show it on a terminal: short, without control characters.
-pub(crate) fn quoted(text: &str) -> String {
+pub fn quoted(text: &str) -> String {
     let mut shown: String = text.chars().take(QUOTED_CHARS_MAX).collect();
     if shown.len() < text.len() {
         shown.push_str("...");
@@ -229,7 +247,8 @@ pub(crate) fn quoted(text: &str) -> String {
     shown.replace(char::is_control, "?")
 }
 
-pub(crate) fn wrong_row(path: &Path, row: u64, message: String) -> TableError {
+/// The refusal of a row, which counts from 1 without the header.
+pub fn wrong_row(path: &Path, row: u64, message: String) -> TableError {
     TableError::Row {
         path: path.to_path_buf(),
         row,
