@@ -306,10 +306,8 @@ pub fn archive(name: &str, about: &str, pairs: &[[Half; 2]]) -> Result<(), Box<d
             "machine": half.machine },
         })
     };
-    let raw = pairs
-        .iter()
-        .map(|[a, b]| json!({ "without": half(a), "with": half(b) }));
-    archive.store("pairs.json", &raw.collect::<Value>())?;
+    let pair = |[a, b]: &[Half; 2]| json!({ "without": half(a), "with": half(b) });
+    archive.store("pairs.json", &pairs.iter().map(pair).collect::<Value>())?;
     archive.close()?;
     Ok(())
 }

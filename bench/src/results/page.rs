@@ -14,11 +14,13 @@ const COLUMNS_MAX: usize = 120;
 
 const HEAD: &str = "# Results
 
-Of each question what was measured last: written by `scripts/bench page` from `results/`, not by hand. How to read it
-stands in [docs/measurements.md](../docs/measurements.md). A result is one file,
-`results/<date>-<machine>/<question>.json`: the lines that are shown here, all of them if they are not too many, the
-command, the commit, the facts about the machine, figures for programs, and size and CRC-32 of the raw data. These lie
-in `target/bench/<question>/` where it was measured. `-` for a percentile: there are too few samples for it.
+Of each question what was measured last: written by `scripts/bench page` from `results/`, not by
+hand. How to read it stands in [docs/measurements.md](../docs/measurements.md).
+
+A result is one file, `results/<date>-<machine>/<question>.json`. It holds the lines that are shown
+here, all of them if they are not too many, the command, the commit, facts about the machine,
+figures for programs, and size and CRC-32 of the raw data. These lie in `target/bench/<question>/`
+where it was measured. `-` for a percentile: there are too few samples for it.
 ";
 
 /// The page, Markdown.
@@ -62,7 +64,8 @@ fn section(Kept { path, run }: &Kept) -> String {
         "More"
     };
     let mut text = format!(
-        "\n## {}\n\n{command}\n\n{}, `{}`: {processor}, {} cores.\n{}\n{all}: [{path}](results/{path}).\n\n",
+        "\n## {}\n\n{command}\n\n{}, `{}`: {processor}, {} cores.\n{}\n\
+         {all}: [{path}](results/{path}).\n\n",
         run.question,
         run.date,
         name.unwrap_or(folder),
@@ -161,8 +164,8 @@ mod tests {
             text.lines()
                 .all(|line| line.chars().count() <= COLUMNS_MAX + 3)
         );
-        assert_eq!(text.matches("| 1 |").count(), 34, "{text}");
-        assert!(text.contains("\nMore: ") && text.contains("\n... 16 more rows\n"));
+        assert_eq!(text.matches("| 1 |").count(), 32, "{text}");
+        assert!(text.contains("\nMore: ") && text.contains("\n... 18 more rows\n"));
         assert_eq!(broken("a b"), ["a b"]);
         assert_eq!(broken(&format!("- {} c", "x".repeat(117))).len(), 2);
     }

@@ -89,8 +89,8 @@ impl ImportError {
 }
 
 impl Imported {
-    /// The runs as frames, as [`vigil_recording::frames::read`] would read them from the written file, but
-    /// for its rounding and its checks.
+    /// The runs as frames, as [`vigil_recording::frames::read`] would read them from the written
+    /// file, but for its rounding and its checks.
     #[must_use]
     pub fn frames(&self, robot: &Description) -> Vec<Run> {
         let fields = fields(robot);
