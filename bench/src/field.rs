@@ -16,6 +16,7 @@ mod recorded;
 mod report;
 mod run;
 mod scenario;
+mod timeline;
 
 pub use bar::{Bar, Comparison};
 pub use departure::Departure;

@@ -18,6 +18,7 @@ use super::frames::{Fate, Way};
 use super::ground::stream;
 use super::run::{Job, Scored, Watch};
 use super::scenario::Scenario;
+use super::timeline::Timeline;
 use crate::real;
 use crate::simulated::{SENSOR_SETS, Stages};
 
@@ -317,6 +318,7 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<Scored>, Box<dyn E
         let mut watch = Watch {
             stages: Stages::new(setup, sensors, 1.0 / period_s, seed)?,
             scorer: Scorer::new(&truth, taxonomy, case.span_s(), seed),
+            timeline: Timeline::of(job, seed, name),
         };
         let rate = (1.0 / period_s, 0.0);
         let mut rng = stream(job.scenario.first_seed + seed, 4);
@@ -334,6 +336,9 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<Scored>, Box<dyn E
             let dt_s = t_s - t_before_s.unwrap_or(t_s);
             let moment = watch.stages.moment(t_s, dt_s, drives);
             watch.scorer.take(&moment);
+            if let Some(timeline) = &mut watch.timeline {
+                timeline.take(&moment, &watch.stages, &frame.command);
+            }
             t_before_s = Some(t_s);
         }
         scored.push(Scored {

@@ -18,6 +18,7 @@ use super::frames::{Fate, Way};
 use super::ground::{Ground, stream};
 use super::recorded::{self, Library, Material};
 use super::scenario::{File, Scenario};
+use super::timeline::Timeline;
 use crate::simulated::{ALL_SETS, Stages};
 
 /// Commanded speed from which a robot drives, m/s.
@@ -30,6 +31,8 @@ pub struct Job<'a> {
     pub scenario: &'a Scenario,
     /// Number of the run, from 0.
     pub run: usize,
+    /// Print whatever changes.
+    pub timeline: bool,
 }
 
 /// What a run brought with one set of sensors.
@@ -42,17 +45,31 @@ pub struct Scored {
 }
 
 /// Every run of the scenarios; `scale` multiplies their number, at least one each stays. Recorded
-/// runs are all played, whatever the scale, and none without their files.
+/// runs are all played, whatever the scale, and none without their files. Of a `timeline` only the
+/// run with its number.
 #[must_use]
-pub fn jobs<'a>(scenarios: &[&'a Scenario], scale: f64, library: &Library) -> Vec<Job<'a>> {
+pub fn jobs<'a>(
+    scenarios: &[&'a Scenario],
+    scale: f64,
+    library: &Library,
+    timeline: Option<usize>,
+) -> Vec<Job<'a>> {
     let runs = |scenario: &Scenario| match &scenario.recorded {
         Some(_) => library.get(&scenario.name).map_or(0, Material::len),
         None => (scenario.runs as f64 * scale).round().max(1.0) as usize,
     };
-    let all = scenarios
-        .iter()
-        .flat_map(|scenario| (0..runs(scenario)).map(|run| Job { scenario, run }));
-    all.collect()
+    let of = |scenario| match timeline {
+        Some(run) => run..run + 1,
+        None => 0..runs(scenario),
+    };
+    let job = |scenario, run| Job {
+        scenario,
+        run,
+        timeline: timeline.is_some(),
+    };
+    let all = scenarios.iter();
+    all.flat_map(|scenario| of(scenario).map(move |run| job(scenario, run)))
+        .collect()
 }
 
 /// The rover's graph as it ships.
@@ -112,7 +129,7 @@ struct Conditions {
 
 impl Conditions {
     fn draw(graph: &Graph, job: &Job<'_>) -> Result<Self, String> {
-        let Job { scenario, run } = *job;
+        let Job { scenario, run, .. } = *job;
         let seed = scenario.first_seed + run as u64;
         let (robot, rng) = (&graph.setup.robot, &mut stream(seed, 0));
         let rate_hz = scenario.rate_hz.of(run, rng);
@@ -188,7 +205,7 @@ pub fn run(graph: &Graph, library: &Library, job: &Job<'_>) -> Result<Vec<Scored
     };
     let mut scored = Vec::new();
     for group in groups {
-        let found = drive(graph, job.scenario, &conditions, group);
+        let found = drive(graph, job, &conditions, group);
         scored.extend(found.map_err(|error| named(error.to_string()))?);
     }
     Ok(scored)
@@ -197,11 +214,11 @@ pub fn run(graph: &Graph, library: &Library, job: &Job<'_>) -> Result<Vec<Scored
 /// One world, and the stages that watch it.
 fn drive(
     graph: &Graph,
-    scenario: &Scenario,
+    job: &Job<'_>,
     conditions: &Conditions,
     sets: &[(Sensors, &'static str)],
 ) -> Result<Vec<Scored>, Box<dyn Error>> {
-    let robot = &graph.setup.robot;
+    let (robot, scenario) = (&graph.setup.robot, job.scenario);
     let &Conditions { rate_hz, seed, .. } = conditions;
     let truths = sets.iter().map(|(sensors, _)| {
         let tree = &graph.of(*sensors).0.tree;
@@ -209,10 +226,11 @@ fn drive(
     });
     let truths: Vec<Vec<Stretch>> = truths.collect();
     let mut watches = Vec::new();
-    for ((sensors, _), truth) in sets.iter().zip(&truths) {
+    for ((sensors, name), truth) in sets.iter().zip(&truths) {
         watches.push(Watch {
             stages: Stages::new(graph.of(*sensors).0, *sensors, rate_hz, seed)?,
             scorer: Scorer::new(truth, graph.of(*sensors).1, [0.0, scenario.run_s], seed),
+            timeline: Timeline::of(job, seed, name),
         });
     }
     let (simulator, segments) = (&conditions.simulator, &conditions.drive);
@@ -248,6 +266,9 @@ fn drive(
             watch.deliver(&frame, fate, held.as_ref());
             let moment = watch.stages.moment(t_s, dt_s, drives);
             watch.scorer.take(&moment);
+            if let Some(timeline) = &mut watch.timeline {
+                timeline.take(&moment, &watch.stages, &frame.command);
+            }
         }
         held = (fate == Fate::Overtaken).then_some(frame);
     }
@@ -264,6 +285,7 @@ fn drive(
 pub(super) struct Watch<'a> {
     pub(super) stages: Stages,
     pub(super) scorer: Scorer<'a>,
+    pub(super) timeline: Option<Timeline>,
 }
 
 impl Watch<'_> {

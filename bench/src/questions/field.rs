@@ -26,6 +26,9 @@ pub struct Args {
     /// Factor on the number of runs; at least one of each scenario stays.
     #[arg(long, value_name = "F", default_value_t = 1.0)]
     scale: f64,
+    /// Of each scenario only the run with this number, and print whatever changes in it.
+    #[arg(long, value_name = "RUN")]
+    timeline: Option<usize>,
     /// Only say which scenarios there are.
     #[arg(long)]
     list: bool,
@@ -64,7 +67,8 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let began = Instant::now();
     let graph = Graph::read(&here.join(".."))?;
     let library = library(&here.join(".."), &scenarios)?;
-    let outcomes = measure(&graph, &library, &scenarios, args.scale)?;
+    let all = jobs(&scenarios, args.scale, &library, args.timeline);
+    let outcomes = measure(&graph, &library, &scenarios, &all)?;
     let wall_s = began.elapsed().as_secs_f64();
     let document = document(&outcomes, machine::facts(), wall_s, args.scale);
     let is_met = outcomes
@@ -122,9 +126,8 @@ fn measure<'a>(
     graph: &Graph,
     library: &Library,
     scenarios: &[&'a Scenario],
-    scale: f64,
+    all: &[Job<'a>],
 ) -> Result<Vec<Outcome<'a>>, Box<dyn Error>> {
-    let all = jobs(scenarios, scale, library);
     let (done, began) = (AtomicUsize::new(0), Instant::now());
     let one = |job: &Job<'_>| {
         let found = field::run(graph, library, job);
@@ -135,7 +138,7 @@ fn measure<'a>(
         }
         found
     };
-    let found: Result<Vec<Vec<Scored>>, String> = in_parallel(&all, one).into_iter().collect();
+    let found: Result<Vec<Vec<Scored>>, String> = in_parallel(all, one).into_iter().collect();
     let found = found?;
     let mut outcomes = Vec::new();
     for scenario in scenarios {

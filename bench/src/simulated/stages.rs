@@ -138,6 +138,18 @@ impl Stages {
         }
     }
 
+    /// Each node that a probability belongs to, by name.
+    pub fn named<'a>(&'a self, p_nodes: &'a [f64]) -> impl Iterator<Item = (&'a str, f64)> {
+        let names = self.names.iter().map(String::as_str);
+        names.zip(p_nodes.iter().copied())
+    }
+
+    /// The detector's log-odds by channel; see [`vigil_blocks::Channel`].
+    #[must_use]
+    pub const fn channel_log_odds(&self) -> &[f64] {
+        &self.detection.channel_log_odds
+    }
+
     /// Of the node that the mode names.
     fn size(&self) -> Size {
         let node = self.diagnosis.mode as usize;

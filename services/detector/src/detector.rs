@@ -1,11 +1,11 @@
 //! The detector's `step`: guard, observe, monitor, alarm, report.
 
 use vigil_blocks::{
-    Channel, DetectionBelief, Entry, HealthyBelief, MODE_UNKNOWN, ParticleBlock, Readiness,
+    CHANNELS, Channel, DetectionBelief, Entry, HealthyBelief, MODE_UNKNOWN, ParticleBlock, Readiness,
     SensorFrame, Symptoms, Valid, WeightedHypothesis,
 };
 use vigil_inference::ending::Ending;
-use vigil_inference::logspace::{log_add, probability};
+use vigil_inference::logspace::{log_add, log_sum_exp, probability};
 use vigil_robot::learned::monitor::Channels;
 use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
 use vigil_robot::meaning::Finding;
@@ -49,8 +49,8 @@ pub struct Detector {
     watch: Watch,
     fault_rate_1_s: f64,
     alarm: Alarm,
-    /// While an alarm stands: is its fault still there?
-    ending: Ending,
+    /// While an alarm stands: is a fault still there, in each channel?
+    endings: [Ending; CHANNELS],
     /// Of a fault now.
     log_odds: f64,
     armed: bool,
@@ -148,7 +148,10 @@ impl Detector {
             watch,
             fault_rate_1_s: settings.fault_rate_1_h / 3600.0,
             alarm: Alarm::new(alarm_log_odds),
-            ending: Ending::new(robot.fault_prior.again_1_s, robot.fault_prior.mended_1_s),
+            endings: [Ending::new(
+                robot.fault_prior.again_1_s,
+                robot.fault_prior.mended_1_s,
+            ); CHANNELS],
             armed: false,
             moving: false,
             sight: sight_of(robot, settings),
@@ -301,7 +304,7 @@ impl Detector {
         if self.armed && self.alarm.take(self.log_odds, observation.dt_s, moving) {
             self.alarm_t_ns = observation.t_ns.max(1);
             self.alarm_count = self.alarm_count.saturating_add(1);
-            self.ending.begin();
+            self.endings.iter_mut().for_each(Ending::begin);
         } else if !self.alarm.stands() {
             self.alarm_t_ns = 0;
         }
@@ -320,17 +323,23 @@ impl Detector {
         };
     }
 
-    /// Log-odds of a fault now: while an alarm stands, no more than those that its fault has not
-    /// ended.
+    /// Log-odds of a fault now: while an alarm stands, in no channel more than those that its fault
+    /// has not ended there.
     fn weigh_end(&mut self, observation: &Observed) {
         let report = self.watch.report();
         self.log_odds = report.log_odds;
-        if self.alarm.stands() {
-            if observation.moving {
-                self.ending.step(report.gain, observation.dt_s);
-            }
-            self.log_odds = self.log_odds.min(self.ending.log_odds());
+        if !self.alarm.stands() {
+            return;
         }
+        let (mut channels, gains) = (report.channels, report.gains);
+        let endings = self.endings.iter_mut().zip(gains);
+        for (log_odds, (ending, gain)) in channels.iter_mut().zip(endings) {
+            if observation.moving {
+                ending.step(gain, observation.dt_s);
+            }
+            *log_odds = log_odds.min(ending.log_odds());
+        }
+        self.log_odds = log_sum_exp(&channels);
     }
 
     fn report(&self, missed: u32, belief: &mut DetectionBelief) {

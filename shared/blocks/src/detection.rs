@@ -15,7 +15,8 @@ impl Channel {
     pub const POSE: usize = 0;
     /// Yaw rate.
     pub const YAW_RATE: usize = 1;
-    /// Deviation of any kind, without a constant direction (the paper's constant likelihood).
+    /// Deviation of any kind: without a constant direction (the paper's constant likelihood), or
+    /// in all channels of a robot with a nominal model at once.
     pub const ANY: usize = 2;
 
     /// Wheel rate of wheel `i`.

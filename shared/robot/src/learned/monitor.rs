@@ -100,9 +100,9 @@ pub struct Report {
     pub log_odds: f64,
     /// The same by each channel alone; see [`Channel`].
     pub channels: [f64; CHANNELS],
-    /// What the observation said for a fault that was there, and is: the logarithm of the
-    /// likelihoods' ratio; 0 where nothing is evidence.
-    pub gain: f64,
+    /// What the observation said in each channel for a fault that was there, and is: the logarithm
+    /// of the likelihoods' ratio; 0 where nothing is evidence.
+    pub gains: [f64; CHANNELS],
     /// Log-likelihood of the observation under the nominal mode.
     pub evidence: f64,
     /// Observations that the track could not take.
@@ -145,7 +145,7 @@ impl Monitor {
             report: Report {
                 log_odds: f64::NEG_INFINITY,
                 channels: [f64::NEG_INFINITY; CHANNELS],
-                gain: 0.0,
+                gains: [0.0; CHANNELS],
                 evidence: 0.0,
                 degenerate_count: 0,
             },
@@ -428,10 +428,13 @@ impl Monitor {
         if let Some(further) = &self.further {
             further.channels(enter);
         }
-        let gain = log_sum_exp(&channels) - log_sum_exp(&before);
-        self.report.gain = if gain.is_finite() { gain } else { 0.0 };
-        let mut trouble =
-            |channel: usize| channels[channel] = channels[channel].max(TROUBLE_LOG_ODDS);
+        let said = |channel: usize| channels[channel] - before[channel];
+        let said = std::array::from_fn(said);
+        self.report.gains = said.map(|gain: f64| if gain.is_finite() { gain } else { 0.0 });
+        let mut trouble = |channel: usize| {
+            channels[channel] = channels[channel].max(TROUBLE_LOG_ODDS);
+            self.report.gains[channel] = TROUBLE_LOG_ODDS;
+        };
         let Troubles {
             pose_silent,
             pose_frozen,
@@ -447,9 +450,6 @@ impl Monitor {
             for wheel in (0..WHEELS).filter(|w| wheels_turn || wheels_silent >> w & 1 == 1) {
                 trouble(Channel::wheel_rate(wheel));
             }
-        }
-        if self.troubles.any(self.channels.use_wheels()) {
-            self.report.gain = TROUBLE_LOG_ODDS;
         }
         self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);
         self.report.channels = channels.map(|value| value.max(LOG_ODDS_MIN));

@@ -22,7 +22,7 @@ use nalgebra::SVector;
 use vigil_blocks::{CHANNELS, Channel as Slot, WHEELS};
 use vigil_inference::ages::Whitened;
 use vigil_inference::constant::Constant;
-use vigil_inference::logspace::{log_add, log_normal};
+use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 
 use super::channel::{Channel, FAULT_RATE_1_H, Quantity, REST_S, Tail};
 use super::joint::Together;
@@ -187,7 +187,7 @@ impl Monitor {
             report: Report {
                 log_odds: f64::NEG_INFINITY,
                 channels: [f64::NEG_INFINITY; CHANNELS],
-                gain: 0.0,
+                gains: [0.0; CHANNELS],
                 evidence: 0.0,
                 degenerate_count: 0,
             },
@@ -313,7 +313,12 @@ impl Monitor {
 
     fn sum_up(&mut self) {
         let mut channels = [f64::NEG_INFINITY; CHANNELS];
-        let mut sums = [f64::NEG_INFINITY; 2];
+        // The same before the observation.
+        let mut before = channels;
+        let mut enter = |slot: usize, [now, then]: [f64; 2]| {
+            channels[slot] = log_add(channels[slot], now + self.prior_log_odds);
+            before[slot] = log_add(before[slot], then + self.prior_log_odds);
+        };
         for watched in &self.watched {
             let target = watched.channel.target;
             let wheel = target.wheel.min(WHEELS - 1);
@@ -323,18 +328,17 @@ impl Monitor {
                 Quantity::Current => Slot::current(wheel),
                 _ => Slot::POSE,
             };
-            let odds = watched.log_odds().map(|odds| odds + self.prior_log_odds);
-            channels[slot] = log_add(channels[slot], odds[0]);
-            sums = std::array::from_fn(|i| log_add(sums[i], odds[i]));
+            enter(slot, watched.log_odds());
         }
         if let (Some(together), Some(tail)) = (&self.together, &self.joint) {
             let odds = together.log_odds();
             let odds = [odds, odds - together.gain()].map(|odds| tail.tempered(odds));
-            sums = std::array::from_fn(|i| log_add(sums[i], odds[i] + self.prior_log_odds));
+            enter(Slot::ANY, odds);
         }
-        let gain = sums[0] - sums[1];
-        self.report.gain = if gain.is_finite() { gain } else { 0.0 };
-        self.report.log_odds = sums[0].max(LOG_ODDS_MIN);
+        let said = |slot: usize| channels[slot] - before[slot];
+        let said = std::array::from_fn(said);
+        self.report.gains = said.map(|gain: f64| if gain.is_finite() { gain } else { 0.0 });
+        self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);
         self.report.channels = channels.map(|value| value.max(LOG_ODDS_MIN));
     }
 }
