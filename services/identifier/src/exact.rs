@@ -112,7 +112,7 @@ impl Exact {
             leaves: leaves.clone(),
             use_wheels,
             prepared: vec![None; modes.len()],
-            sets: Sets::new(&modes, robot.wheels.len().min(WHEELS)),
+            sets: Sets::new(&modes, leaves, robot.wheels.len().min(WHEELS)),
             modes,
             rates,
             births_1_s: is_leaf.map(|leaf| if leaf { rates.fault_1_s } else { 0.0 }),
@@ -173,10 +173,10 @@ impl Exact {
         &self.sizes
     }
 
-    /// The hypotheses, and what moves the robot under each.
-    pub fn hypotheses(&self) -> impl ExactSizeIterator<Item = (Moved, &Hypothesis<State>)> {
+    /// The hypotheses, and how the robot moves under each.
+    pub fn hypotheses(&self) -> impl ExactSizeIterator<Item = (&MotionMode, &Hypothesis<State>)> {
         let all = self.bank.hypotheses().iter();
-        all.map(|hypothesis| (self.modes[hypothesis.mode].moved, hypothesis))
+        all.map(|hypothesis| (&self.modes[hypothesis.mode], hypothesis))
     }
 
     /// Takes one observation.

@@ -86,9 +86,8 @@ struct Broken {
 /// negligible.
 pub fn add_exact(exact: &Exact, leaves: &Leaves, out: &mut Ranked) {
     let mut sets = [Broken::default(); 1 << WHEELS];
-    for (moved, hypothesis) in exact.hypotheses() {
-        let track = &hypothesis.state.track;
-        let p_unknown = exact.modes()[hypothesis.mode].p_unknown;
+    for (motion, hypothesis) in exact.hypotheses() {
+        let (track, p_unknown) = (&hypothesis.state.track, motion.p_unknown);
         let unknown = WeightedHypothesis {
             onset_t_capture_ns: hypothesis.onset,
             pose: track.pose().into(),
@@ -100,22 +99,24 @@ pub fn add_exact(exact: &Exact, leaves: &Leaves, out: &mut Ranked) {
         if p_unknown > 0.0 {
             out.push(unknown);
         }
-        let Some(moved) = moved_leaves(moved, leaves) else {
-            continue;
-        };
         let least = NEGLIGIBLE / hypothesis.log_weight.exp();
         let count = broken(&hypothesis.state.encoders, leaves, least, &mut sets);
-        let moved_ns = if moved == 0 { 0 } else { hypothesis.onset };
-        for set in &sets[..count] {
-            let share = set.share * (1.0 - p_unknown);
-            if share >= least {
-                out.push(WeightedHypothesis {
-                    leaves: moved | set.leaves,
-                    onset_t_capture_ns: moved_ns.max(set.onset_ns),
-                    log_weight: hypothesis.log_weight + share.ln(),
-                    mode: mode(moved | set.leaves),
-                    ..unknown
-                });
+        for (moved, likely) in leaves.likely(motion) {
+            let Some(moved) = moved_leaves(moved, leaves) else {
+                continue;
+            };
+            let moved_ns = if moved == 0 { 0 } else { hypothesis.onset };
+            for set in &sets[..count] {
+                let share = set.share * likely * (1.0 - p_unknown);
+                if share >= least {
+                    out.push(WeightedHypothesis {
+                        leaves: moved | set.leaves,
+                        onset_t_capture_ns: moved_ns.max(set.onset_ns),
+                        log_weight: hypothesis.log_weight + share.ln(),
+                        mode: mode(moved | set.leaves),
+                        ..unknown
+                    });
+                }
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use vigil_blocks::{FAULT_NODES, WHEELS};
 use vigil_inference::FaultTree;
-use vigil_robot::learned::{Model, ModelError};
+use vigil_robot::learned::{Model, ModelError, MotionMode, Moved};
 use vigil_robot::{Description, Fault};
 use vigil_setup::schema::Sensors;
 
@@ -127,6 +127,42 @@ impl Leaves {
             .chain(further)
             .chain([&self.gyro, &self.pose])
             .filter_map(|&leaf| leaf)
+    }
+
+    /// The other wheels (bits) whose stuck leaves lie with this wheel's below the deepest abstract
+    /// node above it: those of its side.
+    #[must_use]
+    pub fn beside(&self, wheel: usize) -> u32 {
+        let Some(leaf) = self.stuck[wheel] else {
+            return 0;
+        };
+        let abstracts = self.below[1..self.nodes.max(1)].iter();
+        let above = abstracts.filter(|below| *below >> leaf & 1 == 1 && below.count_ones() > 1);
+        let Some(side) = above.min_by_key(|below| below.count_ones()) else {
+            return 0;
+        };
+        let is_beside = |other: usize| {
+            other != wheel && self.stuck[other].is_some_and(|leaf| side >> leaf & 1 == 1)
+        };
+        (0..WHEELS)
+            .filter(|&other| is_beside(other))
+            .fold(0, |bits, other| bits | 1 << other)
+    }
+
+    /// The wheels of which one moves the robot in this mode, and how probable each is.
+    pub fn likely(&self, mode: &MotionMode) -> impl Iterator<Item = (Moved, f64)> + use<> {
+        let alike = match mode.moved {
+            Moved::Stuck(one) if mode.p_alike > 0.0 => self.beside(one.trailing_zeros() as usize),
+            _ => 0,
+        };
+        let count = f64::from(alike.count_ones());
+        let (own, other) = match alike {
+            0 => (1.0, 0.0),
+            _ => (1.0 - mode.p_alike, mode.p_alike / count),
+        };
+        let others = (0..WHEELS).filter(move |wheel| alike >> wheel & 1 == 1);
+        let others = others.map(move |wheel| (Moved::Stuck(1 << wheel), other));
+        std::iter::once((mode.moved, own)).chain(others)
     }
 
     /// Reads the faults of the leaves; those of gyro and currents need these sensors.

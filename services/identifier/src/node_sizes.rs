@@ -2,7 +2,7 @@
 
 use vigil_blocks::{FAULT_NODES, FaultBelief, SizeKind, WHEELS};
 
-use vigil_robot::learned::Moved;
+use vigil_robot::learned::{MotionMode, Moved};
 
 use crate::encoders::{STATES, WAYS_TO_BREAK};
 use crate::exact::Exact;
@@ -78,7 +78,7 @@ impl NodeSizes {
 /// The most probable way in which an encoder is broken, its size and standard deviation.
 fn broken(filter: &Exact, wheel: usize) -> (SizeKind, (f64, f64)) {
     let mut sums = [0.0; STATES];
-    for (moved, hypothesis) in filter.hypotheses() {
+    for (MotionMode { moved, .. }, hypothesis) in filter.hypotheses() {
         if moved.is_unknown() {
             continue;
         }

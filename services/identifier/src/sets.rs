@@ -21,8 +21,9 @@ pub struct Sets {
     /// does not do as it is told, and one for a pose that has jumped. Column e: the encoders `e`
     /// (bits) are broken.
     p: Vec<f64>,
-    /// What moves the robot in each motion mode.
-    moved: Vec<Moved>,
+    /// What may move the robot in each motion mode, and how probable each is; see
+    /// [`Leaves::likely`].
+    likely: Vec<Vec<(Moved, f64)>>,
     /// Per motion mode: what of it no fault describes.
     p_unknown: Vec<f64>,
     wheels: usize,
@@ -34,7 +35,7 @@ impl Sets {
     /// Sets over `wheels` wheels, stuck as in these modes, and their encoders. Allocates all
     /// that it will need.
     #[must_use]
-    pub fn new(modes: &[MotionMode], wheels: usize) -> Self {
+    pub fn new(modes: &[MotionMode], leaves: &Leaves, wheels: usize) -> Self {
         let subsets = 1 << wheels;
         let is_other = |mode: &MotionMode| matches!(mode.moved, Moved::Steer(_) | Moved::Pose);
         let others = if modes.iter().any(is_other) {
@@ -45,7 +46,7 @@ impl Sets {
         let rows = subsets + others;
         Self {
             p: vec![0.0; rows * subsets],
-            moved: modes.iter().map(|mode| mode.moved).collect(),
+            likely: modes.iter().map(|m| leaves.likely(m).collect()).collect(),
             p_unknown: modes.iter().map(|mode| mode.p_unknown).collect(),
             wheels,
             unknown: 0.0,
@@ -66,7 +67,8 @@ impl Sets {
         }
         let p_unknown = self.p_unknown[mode];
         self.unknown += p * p_unknown;
-        if self.moved[mode].is_unknown() {
+        let likely = &self.likely[mode];
+        if likely.iter().any(|(moved, _)| moved.is_unknown()) {
             return;
         }
         self.products[0] = p * (1.0 - p_unknown);
@@ -79,14 +81,16 @@ impl Sets {
             }
         }
         let subsets = self.products.len();
-        let row = match self.moved[mode] {
-            Moved::Steer(wheel) => subsets + wheel,
-            Moved::Pose => subsets + POSE,
-            moved => moved.stuck() as usize,
-        };
-        let row = &mut self.p[row * subsets..(row + 1) * subsets];
-        for (sum, product) in row.iter_mut().zip(&self.products) {
-            *sum += product;
+        for (moved, share) in likely {
+            let row = match moved {
+                Moved::Steer(wheel) => subsets + wheel,
+                Moved::Pose => subsets + POSE,
+                moved => moved.stuck() as usize,
+            };
+            let row = &mut self.p[row * subsets..(row + 1) * subsets];
+            for (sum, product) in row.iter_mut().zip(&self.products) {
+                *sum += share * product;
+            }
         }
     }
 

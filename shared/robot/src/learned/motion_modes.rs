@@ -52,9 +52,11 @@ const ANY_GROUND: [OtherGround; 1] = [ground(0.2, (0.6, 0.6), true)];
 /// of the unknown's.
 const ROUGH_SD: [f64; 3] = [0.15, 0.1, 0.05];
 /// By the pose alone, a wheel stuck on other ground looks like one that is dragged at, has sunk in
-/// or lost its tyre: how probable these are, given either. Chosen: a named wheel stays the
-/// likelier.
+/// or lost its tyre: how probable these are, given either. Chosen: a stuck wheel stays the likelier ..
 const DRAGGED_AT: f64 = 0.25;
+/// .. and what one wheel does on one ground, another wheel of its side does on another. Chosen: with
+/// [`DRAGGED_AT`] below half is left for the wheel, so that the side is named.
+const P_ALIKE: f64 = 0.4;
 /// Deviation of such an effect from one that is changed as a whole: yaw, forward, lateral. Chosen:
 /// aside it is small and known worst.
 const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
@@ -117,6 +119,8 @@ pub struct MotionMode {
     pub share: f64,
     /// Probability that something moves the robot in this way that no fault describes.
     pub p_unknown: f64,
+    /// Probability that another wheel of the same side moves the robot so, where one does.
+    pub p_alike: f64,
     /// Displacement per commanded metre.
     pub motion: MotionModel,
     /// Its noise.
@@ -251,6 +255,7 @@ pub fn motion_modes(
         moved: Moved::Nominal,
         share: 1.0,
         p_unknown: 0.0,
+        p_alike: 0.0,
         motion: nominal,
         noise: nominal.noise(),
         ground: (1.0, 0.0),
@@ -269,6 +274,7 @@ pub fn motion_modes(
         modes.extend(wheels().map(|w| MotionMode {
             share: ground.share,
             p_unknown: if read { 0.0 } else { DRAGGED_AT },
+            p_alike: if read { 0.0 } else { P_ALIKE },
             ..on_other_ground(model, robot, w, ground.factor, ground.throws)
         }));
     }
@@ -304,6 +310,7 @@ fn drives_on(model: &Model, moved: Moved) -> MotionMode {
         moved,
         share: 1.0,
         p_unknown: if moved.is_unknown() { 1.0 } else { 0.0 },
+        p_alike: 0.0,
         motion: model.nominal.motion,
         noise: unknown_noise(model),
         ground: (1.0, 0.0),
@@ -349,6 +356,7 @@ fn stuck_mode(model: &Model, wheel: usize) -> MotionMode {
         moved: Moved::Stuck(1 << wheel),
         share: 1.0,
         p_unknown: 0.0,
+        p_alike: 0.0,
         motion,
         noise: motion.noise(),
         ground: (1.0, 0.0),
@@ -375,6 +383,7 @@ fn several_mode(together: &Together<'_>, set: u32) -> Option<MotionMode> {
     Some(MotionMode {
         share: 1.0,
         p_unknown: 0.0,
+        p_alike: 0.0,
         moved: Moved::Stuck(set),
         motion: several.motion,
         noise: several.noise,
