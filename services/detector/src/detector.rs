@@ -1,8 +1,8 @@
 //! The detector's `step`: guard, observe, monitor, alarm, report.
 
 use vigil_blocks::{
-    CHANNELS, Channel, DetectionBelief, Entry, HealthyBelief, MODE_UNKNOWN, ParticleBlock, Readiness,
-    SensorFrame, Symptoms, Valid, WeightedHypothesis,
+    CHANNELS, Channel, DetectionBelief, Entry, HealthyBelief, MODE_UNKNOWN, ParticleBlock,
+    Readiness, SensorFrame, Symptoms, Valid, WeightedHypothesis,
 };
 use vigil_inference::ending::Ending;
 use vigil_inference::logspace::{log_add, log_sum_exp, probability};
@@ -148,10 +148,8 @@ impl Detector {
             watch,
             fault_rate_1_s: settings.fault_rate_1_h / 3600.0,
             alarm: Alarm::new(alarm_log_odds),
-            endings: [Ending::new(
-                robot.fault_prior.again_1_s,
-                robot.fault_prior.mended_1_s,
-            ); CHANNELS],
+            endings: [Ending::new(robot.fault_prior.again_1_s, robot.fault_prior.mended_1_s);
+                CHANNELS],
             armed: false,
             moving: false,
             sight: sight_of(robot, settings),

@@ -22,7 +22,7 @@ pub const ZERO: usize = 1;
 /// State of an encoder that reads noise, the third of the breakages.
 const NOISE: usize = 3;
 /// State of a dead encoder, the last of the breakages.
-const DEAD: usize = BREAKAGES.len();
+pub const DEAD: usize = BREAKAGES.len();
 /// Share of whole encoders that read exactly zero on a standing wheel: most read noise there too.
 /// Chosen: a silent stuck wheel waits 2.3 nats longer, a noisy one gains 0.1.
 const SILENT_SHARE: f64 = 0.1;

@@ -18,10 +18,11 @@ use vigil_inference::outlier::{Trust, unvouched};
 use vigil_inference::track::Context;
 use vigil_robot::Description;
 use vigil_robot::learned::{
-    FaultRates, Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext,
-    WheelEvidence, motion_modes, steer_modes,
+    FaultRates, Healthy, Model, MotionMode, Moved, NoiseScales, Observation, SteerReading,
+    WheelContext, WheelEvidence, motion_modes, steer_modes,
 };
 
+use crate::angles::Angles;
 use crate::encoders::Encoders;
 use crate::further::Fusion;
 use crate::modes::Leaves;
@@ -146,6 +147,7 @@ impl Exact {
             track: healthy.track(&self.modes[NOMINAL].noise),
             encoders: Encoders::healthy(t_ns),
             offsets: RateOffsets::default(),
+            angles: Angles::default(),
             servo: None,
             jump_m: None,
             log_material: 0.0,
@@ -311,6 +313,7 @@ impl Exact {
             let State {
                 encoders,
                 offsets,
+                angles,
                 servo,
                 fresh,
                 ..
@@ -320,6 +323,11 @@ impl Exact {
             }
             let gained = seen.weigh(prepared, (&births, death), *fresh, encoders, offsets);
             hypothesis.log_weight += gained;
+            if self.modes[index].moved == Moved::UnknownAny {
+                let changes = rates.fault_1_s * observation.dt_s;
+                let ratios = |reading: Option<SteerReading>| Some(reading?.log_ratio_any());
+                hypothesis.log_weight += angles.step(&evidence.steer.map(ratios), changes);
+            }
             if let (Moved::Steer(wheel), Some(servo)) = (self.modes[index].moved, servo)
                 && let Some(reading) = &evidence.steer[wheel]
             {

@@ -2,6 +2,7 @@
 //!
 //! [`Identifier`] is a pure function of journal entries; [`wiring`] connects it to its ports.
 
+mod angles;
 mod assemble;
 mod blindfold;
 mod check;

@@ -5,7 +5,7 @@ use vigil_robot::Description;
 use vigil_robot::learned::wheel_evidence::Dragged;
 use vigil_robot::learned::{Model, MotionMode, Moved, Observation, WheelEvidence};
 
-use crate::encoders::{Encoders, Likelihoods, OWN_RATE, SILENT, SIZED, ZERO};
+use crate::encoders::{DEAD, Encoders, Likelihoods, OWN_RATE, SILENT, SIZED, ZERO};
 use crate::rate_offsets::RateOffsets;
 use crate::sizes::{BIAS, DRIFT, Sized};
 
@@ -16,7 +16,6 @@ pub struct Prepared {
     likelihoods: [Likelihoods; 2],
     /// Wheels that turn in a way of which nothing was learned, and how they may.
     dragged: [Option<Dragged>; WHEELS],
-    steering: f64,
     stuck: u32,
 }
 
@@ -48,10 +47,6 @@ impl Seen<'_> {
                     self.evidence.dragged(model, observation, mode, wheel)
                 })
             }),
-            steering: match mode.moved {
-                Moved::UnknownAny => self.evidence.steering,
-                _ => 0.0,
-            },
             stuck,
         }
     }
@@ -63,6 +58,9 @@ impl Seen<'_> {
                 (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
                 (0, _) => evidence.whole(self.model, self.observation, mode, is_new, wheel),
                 (OWN_RATE, Moved::UnknownAny) => evidence.own_rate[wheel],
+                // A wheel that reads as if it stood, stands, or only its encoder is dead: no more is
+                // unknown.
+                (ZERO | DEAD, Moved::UnknownAny) => f64::NEG_INFINITY,
                 (OWN_RATE, _) => f64::NEG_INFINITY,
                 // What reads alike shares one likelihood, broken or not.
                 (SILENT, _) if moved.is_stuck(wheel) => evidence.broken[wheel][ZERO - 1],
@@ -117,7 +115,7 @@ impl Seen<'_> {
                 offsets.learn(observation, evidence, wheel, dragged);
             }
         }
-        prepared.steering + gained
+        gained
     }
 
     /// Sets of stuck wheels that may have come of the set `before`, if several wheels stuck or

@@ -2,6 +2,7 @@
 
 use vigil_inference::track::Track;
 
+use crate::angles::Angles;
 use crate::encoders::Encoders;
 use crate::rate_offsets::RateOffsets;
 use crate::servo::Servo;
@@ -22,6 +23,8 @@ pub struct State {
     pub encoders: Encoders,
     /// With several stuck wheels: what the other wheels' rates are off by.
     pub offsets: RateOffsets,
+    /// In the unknown: which steering angles are as commanded.
+    pub angles: Angles,
     /// The steering servo that does not do as it is told.
     pub servo: Option<Servo>,
     /// How far the pose has jumped, and the deviation of that, m, once it was measured since.

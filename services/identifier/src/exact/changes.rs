@@ -8,6 +8,7 @@ use vigil_robot::learned::wheels::steering_angle;
 use vigil_robot::learned::{Moved, Observation, WheelEvidence};
 
 use super::{Exact, FLOOR};
+use crate::angles::Angles;
 use crate::encoders::Encoders;
 use crate::prepared::{EXPLAINED_S, Seen, age_s, changes_several, newly_stuck};
 use crate::rate_offsets::RateOffsets;
@@ -133,6 +134,7 @@ impl Exact {
             track,
             encoders,
             offsets: RateOffsets::default(),
+            angles: Angles::default(),
             servo: match after {
                 Moved::Steer(wheel) => {
                     let angle = steering_angle(&self.robot, wheel, observation.command[0]);

@@ -89,13 +89,19 @@ impl SteerReading {
         off - density(self.beyond_rad, self.variance)
     }
 
-    /// The same if it may do anything, or be as commanded, as in the unknown.
+    /// The same if it may be anything; finite.
     #[must_use]
-    pub fn log_ratio_unsure(&self) -> f64 {
+    pub fn log_ratio_any(&self) -> f64 {
         let sd = self.variance.sqrt();
         let apart = tempered(self.beyond_rad / sd, self.outlier_rate) * sd;
         let wide = self.variance + ANY_ANGLE_SD_RAD * ANY_ANGLE_SD_RAD;
         let ratio = log_normal(apart, wide) - log_normal(apart, self.variance);
-        log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + ratio.min(RATIO_MAX))
+        ratio.min(RATIO_MAX)
+    }
+
+    /// The same if it may be anything or as commanded, whatever it was before.
+    #[must_use]
+    pub fn log_ratio_unsure(&self) -> f64 {
+        log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + self.log_ratio_any())
     }
 }
