@@ -16,9 +16,9 @@ use std::path::{Path, PathBuf};
 use byteorder::{BigEndian, LittleEndian};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use vigil_recording::table::wrong_row;
 
 use super::ImportError;
-use vigil_recording::table::wrong_row;
 
 /// Largest file that is read, bytes.
 const FILE_BYTES_MAX: u64 = 4 << 30;

@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use vigil_inference::angle::wrap;
+use vigil_recording::table::{Layout, Table};
 
 use super::ImportError;
 use super::description::{ChannelSource, Clock, LogDescription, Source};
 use super::ros::{self, Lacking};
-use vigil_recording::table::{Layout, Table};
 
 /// Columns of one source that are needed, with their rows.
 pub(super) struct SourceTable {

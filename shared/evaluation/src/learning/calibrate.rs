@@ -1,5 +1,7 @@
 //! The tail of the detector's nominal log-odds.
 
+use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
 use vigil_robot::Description;
 use vigil_robot::learned::monitor::{Channels, Monitor};
 use vigil_robot::learned::{Form, Model, Observer};
@@ -7,8 +9,6 @@ use vigil_robot::learned::{Form, Model, Observer};
 use super::LearnError;
 use super::segments::by_run;
 use crate::maxima::{Maxima, WINDOW_S};
-use vigil_recording::frames::Run;
-use vigil_recording::labels::Label;
 
 /// Prior rate under which the log-odds are collected, 1/h.
 const FAULT_RATE_1_H: f64 = 1.0;

@@ -1,6 +1,7 @@
 //! Gyro and motor currents, learned from healthy runs that hold them.
 
 use vigil_blocks::WHEELS;
+use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::learned::further::{CurrentModel, CurrentsModel, YawRateModel};
 use vigil_robot::learned::wheels::rolling_rate;
@@ -11,7 +12,6 @@ use super::least_squares::LeastSquares;
 use super::segments::SETTLE_S;
 use super::{LearnError, calibrate};
 use crate::data_hash::data_hash;
-use vigil_recording::frames::Run;
 
 /// Observations averaged before the spread by the ground is found.
 const WINDOW: usize = 20;

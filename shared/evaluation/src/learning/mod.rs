@@ -20,6 +20,8 @@ mod wheels;
 
 use std::collections::BTreeSet;
 
+use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
 use vigil_robot::Description;
 use vigil_robot::learned::model::{
     CommandModel, Model, Noise, NominalModel, Provenance, StuckModel, VERSION,
@@ -31,8 +33,6 @@ use crate::plausible::{self, Doubtful};
 pub use report::{ModeError, RESIDUAL_BAR, Report, Residual};
 use segments::Segments;
 pub use view::View;
-use vigil_recording::frames::Run;
-use vigil_recording::labels::Label;
 
 /// How to learn.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,8 @@
 //! The model's error on runs that it has not seen.
 
 use serde::Serialize;
+use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
 use vigil_robot::Description;
 use vigil_robot::learned::{Model, MotionModel};
 
@@ -9,8 +11,6 @@ use super::bounds;
 use super::motion::{Predicted, follow};
 use super::segments::{Segment, Segments};
 use crate::bounds::Bounds;
-use vigil_recording::frames::Run;
-use vigil_recording::labels::Label;
 
 /// A track is judged from this time on after its start, s: before, its innovations tell how well
 /// its own beginning was measured, whatever the model.

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
 use vigil_robot::Description;
 use vigil_robot::learned::{Model, Observation, Observer};
 
 use super::LearnError;
-use vigil_recording::frames::Run;
-use vigil_recording::labels::Label;
 
 /// After an onset, and after the start of a run, the motion settles for so long, s.
 pub const SETTLE_S: f64 = 0.5;

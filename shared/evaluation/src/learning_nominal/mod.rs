@@ -16,6 +16,7 @@ mod terms;
 mod told;
 mod view;
 
+use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::learned::model::Provenance;
 use vigil_robot::nominal::model::{KIND, VERSION};
@@ -26,7 +27,6 @@ use crate::plausible::{self, Doubtful};
 use record::{Part, Record};
 pub use report::{ChannelError, Report};
 pub use view::View;
-use vigil_recording::frames::Run;
 
 /// Logs shorter than this are learned from with a warning and wider deviations, s.
 const LONG_ENOUGH_S: f64 = 600.0;
