@@ -18,8 +18,8 @@ use vigil_inference::outlier::{Trust, unvouched};
 use vigil_inference::track::Context;
 use vigil_robot::Description;
 use vigil_robot::learned::{
-    FaultRates, Healthy, Model, MotionMode, Moved, NoiseScales, Observation, SteerReading,
-    WheelContext, WheelEvidence, motion_modes, steer_modes,
+    FaultRates, Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext,
+    WheelEvidence, motion_modes, steer_modes,
 };
 
 use crate::angles::Angles;
@@ -325,8 +325,7 @@ impl Exact {
             hypothesis.log_weight += gained;
             if self.modes[index].moved == Moved::UnknownAny {
                 let changes = rates.fault_1_s * observation.dt_s;
-                let ratios = |reading: Option<SteerReading>| Some(reading?.log_ratio_any());
-                hypothesis.log_weight += angles.step(&evidence.steer.map(ratios), changes);
+                hypothesis.log_weight += angles.step(&evidence.steer, changes);
             }
             if let (Moved::Steer(wheel), Some(servo)) = (self.modes[index].moved, servo)
                 && let Some(reading) = &evidence.steer[wheel]

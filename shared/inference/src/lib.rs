@@ -43,6 +43,7 @@
 
 pub mod adaptive;
 pub mod ages;
+pub mod alternative;
 pub mod angle;
 pub mod bank;
 pub mod bootstrap;

@@ -13,6 +13,7 @@
 
 use vigil_blocks::{CHANNELS, Channel, WHEELS};
 use vigil_inference::ages::Whitened;
+use vigil_inference::alternative::Alternative;
 use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
@@ -51,6 +52,9 @@ const FOLLOWING: f64 = 0.1;
 const ANY_NORM_MAX: f64 = 12.0;
 /// Deviation of what a broken channel reads if it reads anything, in units of the residual's.
 const ANYTHING: f64 = 10.0;
+/// Probability that a broken channel begins or ceases to read anything, an observation. Chosen:
+/// once in 2.5 s; each observation of one that does not costs 0.02 nats.
+const WAY_CHANGES: f64 = 0.02;
 /// Residuals beyond this many deviations mean a lost track: an outlier's own.
 const LOST: f64 = 10.0;
 /// Time in motion after which evidence counts if the noise is known, s: twenty observations;
@@ -74,6 +78,8 @@ pub struct Monitor {
     context: WheelContext,
     pose: Evidence<3>,
     wheels: [Evidence<1>; WHEELS],
+    /// Of a broken one: off by a bias, or reading anything.
+    anything: [Alternative; WHEELS],
     steer: [Evidence<1>; WHEELS],
     repeats: [Repeats; WHEELS],
     any: Constant,
@@ -132,6 +138,7 @@ impl Monitor {
             context: WheelContext::new(robot.tolerance),
             pose: Evidence::new(form, BIAS_CHANNEL),
             wheels: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
+            anything: [Alternative::new(0.5); WHEELS],
             steer: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
             repeats: [Repeats::default(); WHEELS],
             any: Constant::default(),
@@ -173,6 +180,7 @@ impl Monitor {
         self.departure.forget();
         self.pose = Evidence::new(self.form, BIAS_CHANNEL);
         self.wheels = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
+        self.anything = [Alternative::new(0.5); WHEELS];
         self.steer = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
         self.repeats = [Repeats::default(); WHEELS];
         self.any = Constant::default();
@@ -376,7 +384,9 @@ impl Monitor {
             let whitened = Whitened::of(apart, variance, behind * behind, rate);
             self.wheels[i].step(&whitened, birth);
             let square = whitened.value.norm_squared();
-            self.gains.wheels[i] = with_anything(self.wheels[i].gain(), square);
+            let gain = self.wheels[i].gain();
+            let anything = self.anything[i].step(anything(square) - gain, WAY_CHANGES);
+            self.gains.wheels[i] = gain + anything;
             self.report.evidence += log_normal(apart, variance);
         }
         // What a fault does is no context of the nominal mode.
@@ -456,13 +466,11 @@ impl Monitor {
     }
 }
 
-/// What a reading says for a fault that either is a bias as learned, or makes the channel read
-/// anything: the logarithm of the likelihoods' ratio. `square` is that of the whitened residual;
-/// where a fault is known to have been, an outlier rather is the fault's than the sensor's.
-fn with_anything(gain: f64, square: f64) -> f64 {
+/// By how much more likely a channel whose deviation is this square is if it is broken so that it
+/// reads anything (natural logarithm).
+fn anything(square: f64) -> f64 {
     let wide = 1.0 + ANYTHING * ANYTHING;
-    let anything = 0.5 * (square * (1.0 - 1.0 / wide) - wide.ln());
-    log_add(gain, anything) - std::f64::consts::LN_2
+    0.5 * (square * (1.0 - 1.0 / wide) - wide.ln())
 }
 
 /// Log-odds below this are reported as this: no evidence for a fault at all.

@@ -1,0 +1,51 @@
+//! A fault that lasts keeps alarm and name: two minutes of what `scripts/bench field` drives for ten.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use vigil_bench::field::{File, Graph, Library, Outcome, Scenario, jobs, run};
+
+/// A figure of the first run of a scenario of `field.toml`, cut short.
+fn figure(graph: &Graph, file: &File, (name, sensors): (&str, &'static str), figure: &str) -> f64 {
+    let found = file.scenario.iter().find(|all| all.name == name).unwrap();
+    let scenario = Scenario {
+        run_s: 130.0,
+        sensors: vec![sensors.to_owned()],
+        ..found.clone()
+    };
+    let all = [&scenario];
+    let library = Library::default();
+    let first = &jobs(&all, 0.0, &library, None)[0];
+    let scored = run(graph, &library, first).unwrap();
+    let outcome = Outcome::new(&scenario, sensors, vec![scored[0].run.clone()]);
+    let mut figures = outcome.figures.iter();
+    figures
+        .find(|one| one.name == figure)
+        .unwrap()
+        .value
+        .unwrap()
+}
+
+#[test]
+fn what_no_model_describes_stays_unknown_with_encoders() {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let graph = Graph::read(&here.join("..")).unwrap();
+    let file = File::read(&here.join("field.toml")).unwrap();
+    // The first shows in the motion alone, the second in the motion and one wheel's rate.
+    for kind in ["tether", "puncture"] {
+        let name = format!("long/unmodelled/{kind}");
+        let of = (name.as_str(), "pose+encoders");
+        let right = figure(&graph, &file, of, "right_share");
+        assert!(right >= 0.99, "{kind}: {right}");
+    }
+}
+
+#[test]
+fn by_the_pose_alone_no_single_wheel_is_named_for_what_holds_the_robot() {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let graph = Graph::read(&here.join("..")).unwrap();
+    let file = File::read(&here.join("field.toml")).unwrap();
+    let of = ("long/unmodelled/tether", "pose");
+    let right = figure(&graph, &file, of, "right_side_share");
+    assert!(right >= 0.9, "{right}");
+}
