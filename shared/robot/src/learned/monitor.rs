@@ -466,8 +466,9 @@ impl Monitor {
     }
 }
 
-/// By how much more likely a channel whose deviation is this square is if it is broken so that it
-/// reads anything (natural logarithm).
+/// By how much more likely the square of a whitened residual is from a channel that reads anything
+/// than from a whole one (natural logarithm). Where a fault is known to have been, an outlier rather
+/// is the fault's than the sensor's.
 fn anything(square: f64) -> f64 {
     let wide = 1.0 + ANYTHING * ANYTHING;
     0.5 * (square * (1.0 - 1.0 / wide) - wide.ln())
