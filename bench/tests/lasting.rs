@@ -1,4 +1,5 @@
-//! A fault that lasts keeps alarm and name: two minutes of what `scripts/bench field` drives for ten.
+//! A fault that lasts keeps alarm and name: two minutes of what `scripts/bench field` drives for
+//! ten.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -41,7 +42,7 @@ fn what_no_model_describes_stays_unknown_with_encoders() {
 }
 
 #[test]
-fn by_the_pose_alone_no_single_wheel_is_named_for_what_holds_the_robot() {
+fn by_the_pose_alone_what_holds_the_robot_is_seldom_called_one_wheel() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let graph = Graph::read(&here.join("..")).unwrap();
     let file = File::read(&here.join("field.toml")).unwrap();

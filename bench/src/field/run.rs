@@ -59,7 +59,7 @@ pub fn jobs<'a>(
         None => (scenario.runs as f64 * scale).round().max(1.0) as usize,
     };
     let of = |scenario| match timeline {
-        Some(run) => run..run + 1,
+        Some(run) => run.min(runs(scenario))..(run + 1).min(runs(scenario)),
         None => 0..runs(scenario),
     };
     let job = |scenario, run| Job {

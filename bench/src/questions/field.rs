@@ -27,7 +27,7 @@ pub struct Args {
     #[arg(long, value_name = "F", default_value_t = 1.0)]
     scale: f64,
     /// Of each scenario only the run with this number, and print whatever changes in it.
-    #[arg(long, value_name = "RUN")]
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["archive", "scale"])]
     timeline: Option<usize>,
     /// Only say which scenarios there are.
     #[arg(long)]
@@ -68,6 +68,9 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let graph = Graph::read(&here.join(".."))?;
     let library = library(&here.join(".."), &scenarios)?;
     let all = jobs(&scenarios, args.scale, &library, args.timeline);
+    if all.is_empty() {
+        return Err("no scenario has such a run, or its recordings are not there".into());
+    }
     let outcomes = measure(&graph, &library, &scenarios, &all)?;
     let wall_s = began.elapsed().as_secs_f64();
     let document = document(&outcomes, machine::facts(), wall_s, args.scale);
@@ -85,7 +88,10 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
 }
 
 fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), Box<dyn Error>> {
-    let is_whole = args.only.is_empty() && args.scale == 1.0 && args.scenarios.is_none();
+    let is_whole = args.timeline.is_none()
+        && args.only.is_empty()
+        && args.scale == 1.0
+        && args.scenarios.is_none();
     let last = format!(
         "{} of {} bars are met, in {:.0} s.",
         document["bars_met"],

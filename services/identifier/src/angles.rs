@@ -1,4 +1,5 @@
-//! Which steering angles are as commanded, in the unknown where wheels and steering may do anything.
+//! Which steering angles are as commanded, in the unknown where wheels and steering may do
+//! anything.
 
 use vigil_blocks::WHEELS;
 use vigil_inference::alternative::Alternative;

@@ -19,6 +19,8 @@ pub const SILENT: usize = OWN_RATE + 1;
 pub const LATE: usize = SIZED + DELAY;
 /// State of an encoder that reads exactly zero, the first of the breakages.
 pub const ZERO: usize = 1;
+/// State of an encoder that repeats itself exactly, the second of the breakages.
+pub const FROZEN: usize = 2;
 /// State of an encoder that reads noise, the third of the breakages.
 const NOISE: usize = 3;
 /// State of a dead encoder, the last of the breakages.

@@ -83,7 +83,7 @@ struct Broken {
 }
 
 /// Adds the hypotheses of the exact filter: each with every set of broken encoders that is not
-/// negligible.
+/// negligible, for each wheel that may move the robot so.
 pub fn add_exact(exact: &Exact, leaves: &Leaves, out: &mut Ranked) {
     let mut sets = [Broken::default(); 1 << WHEELS];
     for (motion, hypothesis) in exact.hypotheses() {
@@ -101,13 +101,13 @@ pub fn add_exact(exact: &Exact, leaves: &Leaves, out: &mut Ranked) {
         }
         let least = NEGLIGIBLE / hypothesis.log_weight.exp();
         let count = broken(&hypothesis.state.encoders, leaves, least, &mut sets);
-        for (moved, likely) in leaves.likely(motion) {
+        for (moved, share) in leaves.shares(motion) {
             let Some(moved) = moved_leaves(moved, leaves) else {
                 continue;
             };
             let moved_ns = if moved == 0 { 0 } else { hypothesis.onset };
             for set in &sets[..count] {
-                let share = set.share * likely * (1.0 - p_unknown);
+                let share = set.share * share * (1.0 - p_unknown);
                 if share >= least {
                     out.push(WeightedHypothesis {
                         leaves: moved | set.leaves,

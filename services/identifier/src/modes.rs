@@ -80,6 +80,8 @@ pub struct Leaves {
     pub gyro: Option<usize>,
     /// Node of the wrong pose.
     pub pose: Option<usize>,
+    /// Of each wheel: the others (bits) for which its side can be named.
+    same_side: [u32; WHEELS],
     /// Number of leaves.
     pub count: usize,
     /// Depth of each node.
@@ -103,6 +105,7 @@ impl Leaves {
             current: [None; WHEELS],
             gyro: None,
             pose: None,
+            same_side: [0; WHEELS],
             count: 0,
             depths: [0; FAULT_NODES],
             below: [0; FAULT_NODES],
@@ -129,30 +132,12 @@ impl Leaves {
             .filter_map(|&leaf| leaf)
     }
 
-    /// The other wheels (bits) whose stuck leaves lie with this wheel's below the deepest abstract
-    /// node above it: those of its side.
-    #[must_use]
-    pub fn beside(&self, wheel: usize) -> u32 {
-        let Some(leaf) = self.stuck[wheel] else {
-            return 0;
-        };
-        let abstracts = self.below[1..self.nodes.max(1)].iter();
-        let above = abstracts.filter(|below| *below >> leaf & 1 == 1 && below.count_ones() > 1);
-        let Some(side) = above.min_by_key(|below| below.count_ones()) else {
-            return 0;
-        };
-        let is_beside = |other: usize| {
-            other != wheel && self.stuck[other].is_some_and(|leaf| side >> leaf & 1 == 1)
-        };
-        (0..WHEELS)
-            .filter(|&other| is_beside(other))
-            .fold(0, |bits, other| bits | 1 << other)
-    }
-
-    /// The wheels of which one moves the robot in this mode, and how probable each is.
-    pub fn likely(&self, mode: &MotionMode) -> impl Iterator<Item = (Moved, f64)> + use<> {
+    /// What may move the robot in a mode, and how probable each is.
+    pub fn shares(&self, mode: &MotionMode) -> impl Iterator<Item = (Moved, f64)> + use<> {
         let alike = match mode.moved {
-            Moved::Stuck(one) if mode.p_alike > 0.0 => self.beside(one.trailing_zeros() as usize),
+            Moved::Stuck(one) if mode.p_alike > 0.0 => {
+                self.same_side[one.trailing_zeros() as usize]
+            }
             _ => 0,
         };
         let count = f64::from(alike.count_ones());
@@ -163,6 +148,28 @@ impl Leaves {
         let others = (0..WHEELS).filter(move |wheel| alike >> wheel & 1 == 1);
         let others = others.map(move |wheel| (Moved::Stuck(1 << wheel), other));
         std::iter::once((mode.moved, own)).chain(others)
+    }
+
+    /// The other wheels (bits) on the side of `wheel` whose stuck leaves are below an abstract node
+    /// above its own: that node can be named for all of them.
+    fn beside(&self, robot: &Description, wheel: usize) -> u32 {
+        let Some(leaf) = self.stuck[wheel] else {
+            return 0;
+        };
+        let is_beside = |other: usize| {
+            let is_same_side = robot.wheels[other].y * robot.wheels[wheel].y > 0.0;
+            let both = |other: usize| 1_u64 << leaf | 1 << other;
+            let abstracts = &self.below[1..self.nodes];
+            let holds = |leaf: usize| {
+                abstracts
+                    .iter()
+                    .any(|below| below & both(leaf) == both(leaf))
+            };
+            other != wheel && is_same_side && self.stuck[other].is_some_and(holds)
+        };
+        let wheels = 0..robot.wheels.len().min(WHEELS);
+        let others = wheels.filter(|&other| is_beside(other));
+        others.fold(0, |bits, other| bits | 1 << other)
     }
 
     /// Reads the faults of the leaves; those of gyro and currents need these sensors.
@@ -212,6 +219,9 @@ impl Leaves {
             for at in above {
                 leaves.below[at] |= 1 << i;
             }
+        }
+        for wheel in 0..robot.wheels.len().min(WHEELS) {
+            leaves.same_side[wheel] = leaves.beside(robot, wheel);
         }
         Ok(leaves)
     }

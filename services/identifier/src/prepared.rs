@@ -5,7 +5,7 @@ use vigil_robot::Description;
 use vigil_robot::learned::wheel_evidence::Dragged;
 use vigil_robot::learned::{Model, MotionMode, Moved, Observation, WheelEvidence};
 
-use crate::encoders::{DEAD, Encoders, Likelihoods, OWN_RATE, SILENT, SIZED, ZERO};
+use crate::encoders::{DEAD, Encoders, FROZEN, Likelihoods, OWN_RATE, SILENT, SIZED, ZERO};
 use crate::rate_offsets::RateOffsets;
 use crate::sizes::{BIAS, DRIFT, Sized};
 
@@ -58,9 +58,9 @@ impl Seen<'_> {
                 (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
                 (0, _) => evidence.whole(self.model, self.observation, mode, is_new, wheel),
                 (OWN_RATE, Moved::UnknownAny) => evidence.own_rate[wheel],
-                // A wheel that reads as if it stood, stands, or only its encoder is dead: no more is
-                // unknown.
+                // A wheel that reads as if it stood stands, or its encoder alone is dead.
                 (ZERO | DEAD, Moved::UnknownAny) => f64::NEG_INFINITY,
+                (FROZEN, Moved::UnknownAny) if self.reads_zero(wheel) => f64::NEG_INFINITY,
                 (OWN_RATE, _) => f64::NEG_INFINITY,
                 // What reads alike shares one likelihood, broken or not.
                 (SILENT, _) if moved.is_stuck(wheel) => evidence.broken[wheel][ZERO - 1],
@@ -133,6 +133,12 @@ impl Seen<'_> {
             }
         }
         [before | stood, before & !turned, (before | stood) & !turned]
+    }
+
+    /// True if a wheel's readings are exactly zero, which one that repeats itself reads as well.
+    fn reads_zero(&self, wheel: usize) -> bool {
+        let broken = &self.evidence.broken[wheel];
+        broken[ZERO - 1] >= broken[FROZEN - 1]
     }
 
     /// True if a wheel's readings may well be those of a standing one.

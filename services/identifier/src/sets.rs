@@ -21,9 +21,8 @@ pub struct Sets {
     /// does not do as it is told, and one for a pose that has jumped. Column e: the encoders `e`
     /// (bits) are broken.
     p: Vec<f64>,
-    /// What may move the robot in each motion mode, and how probable each is; see
-    /// [`Leaves::likely`].
-    likely: Vec<Vec<(Moved, f64)>>,
+    /// Of each motion mode: [`Leaves::shares`].
+    shares: Vec<Vec<(Moved, f64)>>,
     /// Per motion mode: what of it no fault describes.
     p_unknown: Vec<f64>,
     wheels: usize,
@@ -46,7 +45,7 @@ impl Sets {
         let rows = subsets + others;
         Self {
             p: vec![0.0; rows * subsets],
-            likely: modes.iter().map(|m| leaves.likely(m).collect()).collect(),
+            shares: modes.iter().map(|m| leaves.shares(m).collect()).collect(),
             p_unknown: modes.iter().map(|mode| mode.p_unknown).collect(),
             wheels,
             unknown: 0.0,
@@ -67,8 +66,8 @@ impl Sets {
         }
         let p_unknown = self.p_unknown[mode];
         self.unknown += p * p_unknown;
-        let likely = &self.likely[mode];
-        if likely.iter().any(|(moved, _)| moved.is_unknown()) {
+        let shares = &self.shares[mode];
+        if shares.iter().any(|(moved, _)| moved.is_unknown()) {
             return;
         }
         self.products[0] = p * (1.0 - p_unknown);
@@ -81,7 +80,7 @@ impl Sets {
             }
         }
         let subsets = self.products.len();
-        for (moved, share) in likely {
+        for (moved, share) in shares {
             let row = match moved {
                 Moved::Steer(wheel) => subsets + wheel,
                 Moved::Pose => subsets + POSE,

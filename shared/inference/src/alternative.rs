@@ -1,7 +1,7 @@
 //! Which of two explanations holds, when either may: a two-state Markov chain.
 //!
-//! Mixing both anew with every reading would cost the one that holds the logarithm of its share each
-//! time; here it costs that once.
+//! Mixing both anew with every reading would cost the one that holds the logarithm of its share
+//! each time; here it costs that once.
 
 use crate::logspace::{log_add, probability};
 
@@ -19,12 +19,14 @@ impl Alternative {
     }
 
     /// Takes a reading that is so much more likely by the second explanation than by the first
-    /// (natural logarithm); before it the explanations change places with the probability `changes`,
-    /// which is not 0. Returns how much more likely it is than by the first alone.
+    /// (natural logarithm); before it the explanations change places with the probability
+    /// `changes`. Returns how much more likely it is than by the first alone.
     pub fn step(&mut self, log_ratio: f64, changes: f64) -> f64 {
         if log_ratio.is_nan() {
             return 0.0;
         }
+        // Neither becomes impossible.
+        let changes = changes.clamp(1e-12, 0.5);
         let before = self.p + changes * (1.0 - 2.0 * self.p);
         let (first, second) = ((-before).ln_1p(), before.ln() + log_ratio);
         self.p = probability(second - first);
@@ -70,7 +72,7 @@ mod tests {
 
     #[test]
     fn no_reading_makes_it_less_than_a_number() {
-        for ratio in [f64::NAN, 1e300, -1e300, f64::NEG_INFINITY] {
+        for ratio in [f64::NAN, 1e300, -1e300, f64::INFINITY, f64::NEG_INFINITY] {
             let mut either = Alternative::new(0.5);
             for _ in 0..10 {
                 assert!(!either.step(ratio, 1e-3).is_nan());

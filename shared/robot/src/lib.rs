@@ -6,6 +6,7 @@
 
 pub mod alarm;
 mod body;
+mod channel_odds;
 pub mod description;
 pub mod disturbance;
 pub mod fault;

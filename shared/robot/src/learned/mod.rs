@@ -8,6 +8,7 @@
 //! | [`BodyLag`] | how the body follows a changing command, learned on the way |
 //! | [`observation`] | frames averaged into observations of about the learned interval |
 //! | [`motion_modes`] | how a robot may move: nominal, wheels stuck, servo off, unknown |
+//! | [`FaultRates`] | how often faults come and go |
 //! | [`steer_reading`] | what a steering angle says of its servo |
 //! | [`wheel_context`] | what ground and load make of the wheels' rates, learned on the way |
 //! | [`wheel_evidence`] | what the wheels say, for everything that each may be doing |
@@ -29,6 +30,7 @@ mod channels;
 mod compensation;
 mod current_context;
 pub mod current_effects;
+mod fault_rates;
 mod faults;
 pub mod form;
 pub mod further;
@@ -54,13 +56,14 @@ pub mod wheels;
 
 pub use body_lag::BodyLag;
 pub use calibration::Calibration;
+pub use fault_rates::FaultRates;
 pub use form::Form;
 pub use further::{Further, FurtherModel};
 pub use healthy::{Healthy, triangle};
 pub use model::{Model, ModelError};
 pub use monitor::Monitor;
 pub use motion::{Curve, MotionModel};
-pub use motion_modes::{FaultRates, MotionMode, Moved, motion_modes, steer_modes};
+pub use motion_modes::{MotionMode, Moved, motion_modes, steer_modes};
 pub use noise_scale::{NoiseScales, OutlierRates};
 pub use observation::{Intake, Observation, Observer};
 pub use reading::Reading;

@@ -16,7 +16,7 @@ use vigil_inference::ages::Whitened;
 use vigil_inference::alternative::Alternative;
 use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
-use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
+use vigil_inference::logspace::{log_normal, log_sum_exp};
 use vigil_inference::outlier::unvouched;
 use vigil_inference::track::{Displacement, Track};
 
@@ -31,6 +31,7 @@ use super::wheel_context::{Beside, WheelContext};
 use super::wheels::rolling_rate;
 use super::{Further, Healthy, Model, Observation, SteerReading, Troubles};
 use crate::Description;
+use crate::channel_odds::ChannelOdds;
 
 /// Shares of the prior: how a fault first shows. Chosen: one counts by its logarithm only, half as
 /// much is 0.7 nats later.
@@ -385,8 +386,8 @@ impl Monitor {
             self.wheels[i].step(&whitened, birth);
             let square = whitened.value.norm_squared();
             let gain = self.wheels[i].gain();
-            let anything = self.anything[i].step(anything(square) - gain, WAY_CHANGES);
-            self.gains.wheels[i] = gain + anything;
+            let either = &mut self.anything[i];
+            self.gains.wheels[i] = gain + either.step(log_ratio_any(square) - gain, WAY_CHANGES);
             self.report.evidence += log_normal(apart, variance);
         }
         // What a fault does is no context of the nominal mode.
@@ -411,12 +412,9 @@ impl Monitor {
     }
 
     fn sum_up(&mut self) {
-        let mut channels = [f64::NEG_INFINITY; CHANNELS];
-        // The same before the observation.
-        let mut before = channels;
+        let mut odds = ChannelOdds::none();
         let mut enter = |channel: usize, log_odds: f64, gain: f64| {
-            channels[channel] = log_add(channels[channel], log_odds);
-            before[channel] = log_add(before[channel], log_odds - gain);
+            odds.enter(channel, log_odds, log_odds - gain);
         };
         let pose = match self.form {
             Form::LearnedBias => self.departure.log_odds(),
@@ -438,9 +436,8 @@ impl Monitor {
         if let Some(further) = &self.further {
             further.channels(enter);
         }
-        let said = |channel: usize| channels[channel] - before[channel];
-        let said = std::array::from_fn(said);
-        self.report.gains = said.map(|gain: f64| if gain.is_finite() { gain } else { 0.0 });
+        let mut channels = odds.by_channel();
+        self.report.gains = odds.gains();
         let mut trouble = |channel: usize| {
             channels[channel] = channels[channel].max(TROUBLE_LOG_ODDS);
             self.report.gains[channel] = TROUBLE_LOG_ODDS;
@@ -469,7 +466,7 @@ impl Monitor {
 /// By how much more likely the square of a whitened residual is from a channel that reads anything
 /// than from a whole one (natural logarithm). Where a fault is known to have been, an outlier rather
 /// is the fault's than the sensor's.
-fn anything(square: f64) -> f64 {
+fn log_ratio_any(square: f64) -> f64 {
     let wide = 1.0 + ANYTHING * ANYTHING;
     0.5 * (square * (1.0 - 1.0 / wide) - wide.ln())
 }

@@ -52,18 +52,14 @@ const ANY_GROUND: [OtherGround; 1] = [ground(0.2, (0.6, 0.6), true)];
 /// of the unknown's.
 const ROUGH_SD: [f64; 3] = [0.15, 0.1, 0.05];
 /// By the pose alone, a wheel stuck on other ground looks like one that is dragged at, has sunk in
-/// or lost its tyre: how probable these are, given either. Chosen: a stuck wheel stays the likelier ..
+/// or lost its tyre: how probable these are, given either. Chosen: a stuck wheel stays likelier ..
 const DRAGGED_AT: f64 = 0.25;
-/// .. and what one wheel does on one ground, another wheel of its side does on another. Chosen: with
-/// [`DRAGGED_AT`] below half is left for the wheel, so that the side is named.
+/// .. and what one wheel does on one ground, another wheel of its side does on another. Chosen:
+/// with [`DRAGGED_AT`] below half is left for the wheel, so that the side is named.
 const P_ALIKE: f64 = 0.4;
 /// Deviation of such an effect from one that is changed as a whole: yaw, forward, lateral. Chosen:
 /// aside it is small and known worst.
 const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
-/// Wheels that stick at once, or turn again at once, do so from one cause, whichever they are: how
-/// often, beside one wheel. Chosen: one cause in ten, 2.3 nats.
-const AT_ONCE: f64 = 0.1;
-
 /// What moves the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Moved {
@@ -176,59 +172,6 @@ impl MotionMode {
                 + along * along.transpose()
                 + Matrix3::from_diagonal(&shape.component_mul(&shape)),
             ..self.noise
-        }
-    }
-}
-
-/// How often faults come and go, per second of motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FaultRates {
-    /// Rate at which one modelled fault appears, 1/s.
-    pub fault_1_s: f64,
-    /// Rate at which something unknown happens, 1/s.
-    pub unknown_1_s: f64,
-    /// Rate of a further fault of a robot that has one, over that of the first.
-    pub further: f64,
-    /// Rate at which a fault vanishes, 1/s.
-    pub death_1_s: f64,
-}
-
-impl FaultRates {
-    /// Factor on the rates of faults in a robot that moves like this, and has another fault
-    /// besides with this probability: 1 if there is none.
-    #[must_use]
-    pub fn factor(&self, from: Moved, p_other: f64) -> f64 {
-        if from == Moved::Nominal {
-            1.0 - p_other * (1.0 - self.further)
-        } else {
-            self.further
-        }
-    }
-
-    /// Rate at which `from`, beside which there is another fault with the probability `p_other`,
-    /// becomes `to`, 1/s; 0 if it takes several steps.
-    #[must_use]
-    pub fn rate_1_s(&self, from: Moved, to: Moved, p_other: f64) -> f64 {
-        let (before, after) = (from.stuck(), to.stuck());
-        let (more, fewer) = (
-            (after & !before).count_ones(),
-            (before & !after).count_ones(),
-        );
-        let at_once = if more.max(fewer) > 1 { AT_ONCE } else { 1.0 };
-        let factor = self.factor(from, p_other);
-        match to {
-            _ if from == to => 0.0,
-            Moved::Unknown | Moved::UnknownAny => 0.5 * self.unknown_1_s * factor,
-            // One servo or the pose, of a robot whose wheels turn.
-            Moved::Steer(_) | Moved::Pose if before == 0 => self.fault_1_s * factor,
-            Moved::Steer(_) | Moved::Pose => 0.0,
-            Moved::Stuck(_) if fewer == 0 => self.fault_1_s * at_once * factor,
-            // Another wheel instead of the only one.
-            Moved::Stuck(_) if before.count_ones() == 1 && after.count_ones() == 1 => {
-                self.fault_1_s * factor
-            }
-            _ if more == 0 => self.death_1_s * at_once,
-            _ => 0.0,
         }
     }
 }
@@ -458,52 +401,5 @@ fn yielding_m_s(model: &Model, robot: &Description, wheel: usize) -> f64 {
         sum / count * robot.wheel_radius_m
     } else {
         0.0
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_change_is_faults_more_or_less_or_another_one() {
-        let rates = FaultRates {
-            fault_1_s: 2.0,
-            unknown_1_s: 6.0,
-            further: 1.0,
-            death_1_s: 5.0,
-        };
-        use Moved::{Nominal, Pose, Steer, Stuck, Unknown, UnknownAny};
-        let cases = [
-            (Nominal, Nominal, 0.0),
-            (Nominal, Stuck(1), 2.0),
-            (Nominal, Stuck(3), 2.0 * AT_ONCE),
-            (Nominal, UnknownAny, 3.0),
-            (Stuck(1), Nominal, 5.0),
-            (Nominal, Steer(0), 2.0),
-            (Nominal, Pose, 2.0),
-            (Steer(0), Nominal, 5.0),
-            (Steer(0), Stuck(1), 2.0),
-            (Stuck(1), Steer(0), 0.0),
-            (Pose, UnknownAny, 3.0),
-            (Stuck(1), Stuck(2), 2.0),
-            (Stuck(1), Stuck(3), 2.0),
-            (Stuck(1), Stuck(7), 2.0 * AT_ONCE),
-            (Stuck(4), Stuck(3), 0.0),
-            (Stuck(3), Stuck(2), 5.0),
-            (Stuck(3), Stuck(4), 0.0),
-            (Stuck(3), Stuck(5), 0.0),
-            (Stuck(3), Stuck(15), 2.0 * AT_ONCE),
-            (Stuck(7), Stuck(2), 5.0 * AT_ONCE),
-            (Stuck(3), Nominal, 5.0 * AT_ONCE),
-            (Stuck(3), Unknown, 3.0),
-            (Unknown, Stuck(2), 2.0),
-            (Unknown, Stuck(3), 2.0 * AT_ONCE),
-            (Unknown, Nominal, 5.0),
-        ];
-        for (from, to, expected) in cases {
-            let found = rates.rate_1_s(from, to, 0.0);
-            assert_eq!(found, expected, "{from:?} to {to:?}");
-        }
     }
 }

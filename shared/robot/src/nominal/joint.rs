@@ -72,10 +72,15 @@ impl Together {
         }
     }
 
-    /// It is complete: an observation that lacks a channel says nothing here.
+    /// True if the observation holds every channel: one that lacks any says nothing here.
+    pub const fn is_complete(&self) -> bool {
+        self.found == self.channels
+    }
+
+    /// The observation ends.
     pub fn step(&mut self, birth: f64) {
         self.gain = 0.0;
-        if self.found == self.channels {
+        if self.is_complete() {
             self.bias.step(&self.whitened, birth);
             self.gain = self.bias.gain();
         }

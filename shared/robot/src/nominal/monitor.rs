@@ -29,6 +29,7 @@ use super::joint::Together;
 use super::model::Model;
 use super::observation::{History, Observation};
 use super::track::Track;
+use crate::channel_odds::ChannelOdds;
 use crate::learned::Form;
 use crate::learned::form::{Evidence, TAU_SQUARED_PER_DIMENSION};
 use crate::learned::monitor::{Channels, Report};
@@ -312,12 +313,13 @@ impl Monitor {
     }
 
     fn sum_up(&mut self) {
-        let mut channels = [f64::NEG_INFINITY; CHANNELS];
-        // The same before the observation.
-        let mut before = channels;
-        let mut enter = |slot: usize, [now, then]: [f64; 2]| {
-            channels[slot] = log_add(channels[slot], now + self.prior_log_odds);
-            before[slot] = log_add(before[slot], then + self.prior_log_odds);
+        let mut odds = ChannelOdds::none();
+        let mut enter = |slot: usize, [now, before]: [f64; 2]| {
+            odds.enter(
+                slot,
+                now + self.prior_log_odds,
+                before + self.prior_log_odds,
+            );
         };
         for watched in &self.watched {
             let target = watched.channel.target;
@@ -330,14 +332,19 @@ impl Monitor {
             };
             enter(slot, watched.log_odds());
         }
+        let each = odds.gain();
         if let (Some(together), Some(tail)) = (&self.together, &self.joint) {
-            let odds = together.log_odds();
-            let odds = [odds, odds - together.gain()].map(|odds| tail.tempered(odds));
-            enter(Slot::ANY, odds);
+            let all = together.log_odds();
+            let [now, before] = [all, all - together.gain()].map(|all| tail.tempered(all));
+            let prior = self.prior_log_odds;
+            odds.enter(Slot::ANY, now + prior, before + prior);
         }
-        let said = |slot: usize| channels[slot] - before[slot];
-        let said = std::array::from_fn(said);
-        self.report.gains = said.map(|gain: f64| if gain.is_finite() { gain } else { 0.0 });
+        let channels = odds.by_channel();
+        self.report.gains = odds.gains();
+        if !self.together.as_ref().is_some_and(Together::is_complete) {
+            // Where not all were read, an end shows in those that were.
+            self.report.gains[Slot::ANY] = each;
+        }
         self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);
         self.report.channels = channels.map(|value| value.max(LOG_ODDS_MIN));
     }

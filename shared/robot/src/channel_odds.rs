@@ -1,0 +1,66 @@
+//! Log-odds of a fault by channel, as they are and as they were before the last observation.
+
+use vigil_blocks::CHANNELS;
+use vigil_inference::logspace::{log_add, log_sum_exp};
+
+/// Sums over whatever shows a fault; a fault enters by one of them. Channels: [`vigil_blocks::Channel`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ChannelOdds {
+    now: [f64; CHANNELS],
+    before: [f64; CHANNELS],
+}
+
+impl ChannelOdds {
+    /// Nothing shows a fault.
+    pub(crate) const fn none() -> Self {
+        Self {
+            now: [f64::NEG_INFINITY; CHANNELS],
+            before: [f64::NEG_INFINITY; CHANNELS],
+        }
+    }
+
+    /// Adds what shows in a channel.
+    pub(crate) fn enter(&mut self, channel: usize, now: f64, before: f64) {
+        self.now[channel] = log_add(self.now[channel], now);
+        self.before[channel] = log_add(self.before[channel], before);
+    }
+
+    /// Log-odds by channel.
+    pub(crate) const fn by_channel(&self) -> [f64; CHANNELS] {
+        self.now
+    }
+
+    /// What the observation said in each channel for a fault that was there, and is.
+    pub(crate) fn gains(&self) -> [f64; CHANNELS] {
+        std::array::from_fn(|channel| finite(self.now[channel] - self.before[channel]))
+    }
+
+    /// The same of all channels together.
+    pub(crate) fn gain(&self) -> f64 {
+        finite(log_sum_exp(&self.now) - log_sum_exp(&self.before))
+    }
+}
+
+/// A gain; 0 where nothing shows anything.
+const fn finite(gain: f64) -> f64 {
+    if gain.is_finite() { gain } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gain_is_of_its_channel_and_none_where_nothing_shows() {
+        let mut odds = ChannelOdds::none();
+        assert_eq!((odds.gains(), odds.gain()), ([0.0; CHANNELS], 0.0));
+        odds.enter(3, 2.0, 1.0);
+        odds.enter(5, -1.0, -0.5);
+        let gains = odds.gains();
+        assert!((gains[3] - 1.0).abs() < 1e-12 && (gains[5] + 0.5).abs() < 1e-12);
+        assert_eq!(gains[0], 0.0);
+        let total =
+            f64::ln(2.0_f64.exp() + f64::exp(-1.0)) - f64::ln(1.0_f64.exp() + f64::exp(-0.5));
+        assert!((odds.gain() - total).abs() < 1e-12);
+    }
+}
