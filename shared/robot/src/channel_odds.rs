@@ -3,7 +3,8 @@
 use vigil_blocks::CHANNELS;
 use vigil_inference::logspace::{log_add, log_sum_exp};
 
-/// Sums over whatever shows a fault; a fault enters by one of them. Channels: [`vigil_blocks::Channel`].
+/// Sums over whatever shows a fault, which enters by one of them. Channels:
+/// [`vigil_blocks::Channel`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ChannelOdds {
     now: [f64; CHANNELS],

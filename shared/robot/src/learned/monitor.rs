@@ -464,8 +464,8 @@ impl Monitor {
 }
 
 /// By how much more likely the square of a whitened residual is from a channel that reads anything
-/// than from a whole one (natural logarithm). Where a fault is known to have been, an outlier rather
-/// is the fault's than the sensor's.
+/// than from a whole one (natural logarithm). Where a fault is known to have been, an outlier is
+/// rather the fault's than the sensor's.
 fn log_ratio_any(square: f64) -> f64 {
     let wide = 1.0 + ANYTHING * ANYTHING;
     0.5 * (square * (1.0 - 1.0 / wide) - wide.ln())
