@@ -324,6 +324,10 @@ impl Detector {
     /// Log-odds of a fault now: while an alarm stands, in no channel more than those that its fault
     /// has not ended there.
     fn weigh_end(&mut self, observation: &Observed) {
+        // At rest no fault ends, and none becomes more certain.
+        if self.alarm.stands() && !observation.moving {
+            return;
+        }
         let report = self.watch.report();
         self.log_odds = report.log_odds;
         if !self.alarm.stands() {
@@ -332,9 +336,7 @@ impl Detector {
         let (mut channels, gains) = (report.channels, report.gains);
         let endings = self.endings.iter_mut().zip(gains);
         for (log_odds, (ending, gain)) in channels.iter_mut().zip(endings) {
-            if observation.moving {
-                ending.step(gain, observation.dt_s);
-            }
+            ending.step(gain, observation.dt_s);
             *log_odds = log_odds.min(ending.log_odds());
         }
         self.log_odds = log_sum_exp(&channels);

@@ -126,7 +126,7 @@ fn a_standing_robot_is_no_evidence() {
         let belief = bench.step(&frame);
         if t_s > 5.1 {
             assert!(belief.alarm != 0, "the alarm fell at {t_s} s");
-            assert!((belief.log_odds - last).abs() < 1e-9);
+            assert_eq!(belief.log_odds, last);
         }
         last = belief.log_odds;
     }
