@@ -81,7 +81,7 @@ pub struct Leaves {
     /// Node of the wrong pose.
     pub pose: Option<usize>,
     /// Of each wheel: the others (bits) for which its side can be named.
-    same_side: [u32; WHEELS],
+    pub same_side: [u32; WHEELS],
     /// Number of leaves.
     pub count: usize,
     /// Depth of each node.
