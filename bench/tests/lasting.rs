@@ -7,7 +7,10 @@ use std::path::Path;
 use vigil_bench::field::{File, Graph, Library, Outcome, Scenario, jobs, run};
 
 /// A figure of the first run of a scenario of `field.toml`, cut short.
-fn figure(graph: &Graph, file: &File, (name, sensors): (&str, &'static str), figure: &str) -> f64 {
+fn figure(name: &str, sensors: &'static str, figure: &str) -> f64 {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let graph = Graph::read(&here.join("..")).unwrap();
+    let file = File::read(&here.join("field.toml")).unwrap();
     let found = file.scenario.iter().find(|all| all.name == name).unwrap();
     let scenario = Scenario {
         run_s: 130.0,
@@ -17,7 +20,7 @@ fn figure(graph: &Graph, file: &File, (name, sensors): (&str, &'static str), fig
     let all = [&scenario];
     let library = Library::default();
     let first = &jobs(&all, 0.0, &library, None)[0];
-    let scored = run(graph, &library, first).unwrap();
+    let scored = run(&graph, &library, first).unwrap();
     let outcome = Outcome::new(&scenario, sensors, vec![scored[0].run.clone()]);
     let mut figures = outcome.figures.iter();
     figures
@@ -29,24 +32,16 @@ fn figure(graph: &Graph, file: &File, (name, sensors): (&str, &'static str), fig
 
 #[test]
 fn what_no_model_describes_stays_unknown_with_encoders() {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let graph = Graph::read(&here.join("..")).unwrap();
-    let file = File::read(&here.join("field.toml")).unwrap();
     // The first shows in the motion alone, the second in the motion and one wheel's rate.
     for kind in ["tether", "puncture"] {
         let name = format!("long/unmodelled/{kind}");
-        let of = (name.as_str(), "pose+encoders");
-        let right = figure(&graph, &file, of, "right_share");
+        let right = figure(&name, "pose+encoders", "right_share");
         assert!(right >= 0.99, "{kind}: {right}");
     }
 }
 
 #[test]
 fn by_the_pose_alone_what_holds_the_robot_is_seldom_called_one_wheel() {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let graph = Graph::read(&here.join("..")).unwrap();
-    let file = File::read(&here.join("field.toml")).unwrap();
-    let of = ("long/unmodelled/tether", "pose");
-    let right = figure(&graph, &file, of, "right_side_share");
+    let right = figure("long/unmodelled/tether", "pose", "right_side_share");
     assert!(right >= 0.9, "{right}");
 }

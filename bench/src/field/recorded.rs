@@ -318,7 +318,7 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<Scored>, Box<dyn E
         let mut watch = Watch {
             stages: Stages::new(setup, sensors, 1.0 / period_s, seed)?,
             scorer: Scorer::new(&truth, taxonomy, case.span_s(), seed),
-            timeline: Timeline::of(job, seed, name),
+            timeline: Timeline::asked_for(job, seed, name),
         };
         let rate = (1.0 / period_s, 0.0);
         let mut rng = stream(job.scenario.first_seed + seed, 4);
@@ -334,11 +334,7 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<Scored>, Box<dyn E
             let velocity = setup.robot.twist(&frame.command);
             let drives = velocity.iter().any(|value| value.abs() >= DRIVES);
             let dt_s = t_s - t_before_s.unwrap_or(t_s);
-            let moment = watch.stages.moment(t_s, dt_s, drives);
-            watch.scorer.take(&moment);
-            if let Some(timeline) = &mut watch.timeline {
-                timeline.take(&moment, &watch.stages, &frame.command);
-            }
+            watch.score((t_s, dt_s), drives, frame);
             t_before_s = Some(t_s);
         }
         scored.push(Scored {

@@ -58,17 +58,14 @@ pub fn jobs<'a>(
         Some(_) => library.get(&scenario.name).map_or(0, Material::len),
         None => (scenario.runs as f64 * scale).round().max(1.0) as usize,
     };
-    let of = |scenario| match timeline {
-        Some(run) => run.min(runs(scenario))..(run + 1).min(runs(scenario)),
-        None => 0..runs(scenario),
-    };
-    let job = |scenario, run| Job {
-        scenario,
-        run,
-        timeline: timeline.is_some(),
-    };
-    let all = scenarios.iter();
-    all.flat_map(|scenario| of(scenario).map(move |run| job(scenario, run)))
+    let all = scenarios.iter().flat_map(|scenario| {
+        (0..runs(scenario)).map(|run| Job {
+            scenario,
+            run,
+            timeline: timeline.is_some(),
+        })
+    });
+    all.filter(|job| timeline.is_none_or(|run| run == job.run))
         .collect()
 }
 
@@ -230,7 +227,7 @@ fn drive(
         watches.push(Watch {
             stages: Stages::new(graph.of(*sensors).0, *sensors, rate_hz, seed)?,
             scorer: Scorer::new(truth, graph.of(*sensors).1, [0.0, scenario.run_s], seed),
-            timeline: Timeline::of(job, seed, name),
+            timeline: Timeline::asked_for(job, seed, name),
         });
     }
     let (simulator, segments) = (&conditions.simulator, &conditions.drive);
@@ -264,11 +261,7 @@ fn drive(
         let fate = way.fate(t_s);
         for watch in &mut watches {
             watch.deliver(&frame, fate, held.as_ref());
-            let moment = watch.stages.moment(t_s, dt_s, drives);
-            watch.scorer.take(&moment);
-            if let Some(timeline) = &mut watch.timeline {
-                timeline.take(&moment, &watch.stages, &frame.command);
-            }
+            watch.score((t_s, dt_s), drives, &frame);
         }
         held = (fate == Fate::Overtaken).then_some(frame);
     }
@@ -289,6 +282,15 @@ pub(super) struct Watch<'a> {
 }
 
 impl Watch<'_> {
+    /// Scores what is said after a frame, `dt_s` after what was scored before.
+    pub(super) fn score(&mut self, (t_s, dt_s): (f64, f64), drives: bool, frame: &SensorFrame) {
+        let moment = self.stages.moment(t_s, dt_s, drives);
+        self.scorer.take(&moment);
+        if let Some(timeline) = &mut self.timeline {
+            timeline.take(&moment, &self.stages, &frame.command);
+        }
+    }
+
     /// What comes of a frame; `held` is one that this one has overtaken.
     pub(super) fn deliver(&mut self, frame: &SensorFrame, fate: Fate, held: Option<&SensorFrame>) {
         let stages = &mut self.stages;

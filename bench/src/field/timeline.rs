@@ -16,7 +16,7 @@ pub(super) struct Timeline {
 
 impl Timeline {
     /// Of a run with these sensors, if it is asked for.
-    pub(super) fn of(job: &Job<'_>, seed: u64, sensors: &str) -> Option<Self> {
+    pub(super) fn asked_for(job: &Job<'_>, seed: u64, sensors: &str) -> Option<Self> {
         job.timeline.then(|| Self {
             head: format!("{} {seed} {sensors}", job.scenario.name),
             said: String::new(),
@@ -34,8 +34,10 @@ impl Timeline {
             return;
         }
         let mut line = format!("{} {:.2} s: {said}, p", self.head, moment.t_s);
-        let named = stages.named(moment.belief.p_nodes);
-        for (name, p) in highest(named).chain([("UNKNOWN", moment.belief.p_unknown)]) {
+        let nodes = stages
+            .node_names()
+            .zip(moment.belief.p_nodes.iter().copied());
+        for (name, p) in highest(nodes).chain([("UNKNOWN", moment.belief.p_unknown)]) {
             let _ = write!(line, " {name} {p:.3}");
         }
         line.push_str(", log-odds by channel");

@@ -138,10 +138,9 @@ impl Stages {
         }
     }
 
-    /// Each node that a probability belongs to, by name.
-    pub fn named<'a>(&'a self, p_nodes: &'a [f64]) -> impl Iterator<Item = (&'a str, f64)> {
-        let names = self.names.iter().map(String::as_str);
-        names.zip(p_nodes.iter().copied())
+    /// Names of the fault tree's nodes, in their order.
+    pub fn node_names(&self) -> impl Iterator<Item = &str> {
+        self.names.iter().map(String::as_str)
     }
 
     /// The detector's log-odds by channel; see [`vigil_blocks::Channel`].

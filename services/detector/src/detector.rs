@@ -324,13 +324,13 @@ impl Detector {
     /// Log-odds of a fault now: while an alarm stands, in no channel more than those that its fault
     /// has not ended there.
     fn weigh_end(&mut self, observation: &Observed) {
-        // At rest no fault ends, and none becomes more certain.
-        if self.alarm.stands() && !observation.moving {
+        let report = self.watch.report();
+        if !self.alarm.stands() {
+            self.log_odds = report.log_odds;
             return;
         }
-        let report = self.watch.report();
-        self.log_odds = report.log_odds;
-        if !self.alarm.stands() {
+        // At rest no fault ends, and none becomes more certain.
+        if !observation.moving {
             return;
         }
         let (mut channels, gains) = (report.channels, report.gains);

@@ -156,19 +156,15 @@ impl Leaves {
         let Some(leaf) = self.stuck[wheel] else {
             return 0;
         };
-        let is_beside = |other: usize| {
+        let above = self.below[1..self.nodes].iter();
+        let above = above.filter(|below| *below >> leaf & 1 == 1);
+        let near = above.fold(0, |all, below| all | below);
+        let is_beside = |&other: &usize| {
             let is_same_side = robot.wheels[other].y * robot.wheels[wheel].y > 0.0;
-            let both = |other: usize| 1_u64 << leaf | 1 << other;
-            let abstracts = &self.below[1..self.nodes];
-            let holds = |leaf: usize| {
-                abstracts
-                    .iter()
-                    .any(|below| below & both(leaf) == both(leaf))
-            };
-            other != wheel && is_same_side && self.stuck[other].is_some_and(holds)
+            let is_near = self.stuck[other].is_some_and(|leaf| near >> leaf & 1 == 1);
+            other != wheel && is_same_side && is_near
         };
-        let wheels = 0..robot.wheels.len().min(WHEELS);
-        let others = wheels.filter(|&other| is_beside(other));
+        let others = (0..robot.wheels.len().min(WHEELS)).filter(is_beside);
         others.fold(0, |bits, other| bits | 1 << other)
     }
 

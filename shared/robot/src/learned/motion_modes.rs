@@ -60,6 +60,7 @@ const P_ALIKE: f64 = 0.4;
 /// Deviation of such an effect from one that is changed as a whole: yaw, forward, lateral. Chosen:
 /// aside it is small and known worst.
 const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
+
 /// What moves the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Moved {

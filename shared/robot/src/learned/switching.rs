@@ -205,7 +205,7 @@ impl Switching {
                 (1.0 - AT_ONSET).ln() + sum(false),
                 AT_ONSET.ln() + sum(true),
             ),
-            Moved::UnknownAny => sum(false) + evidence.steering,
+            Moved::UnknownAny => sum(false) + evidence.steering(),
             Moved::Nominal | Moved::Pose | Moved::Unknown | Moved::Steer(_) => sum(false),
         }
     }

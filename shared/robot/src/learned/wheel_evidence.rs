@@ -57,8 +57,6 @@ pub struct WheelEvidence {
     pub own_rate: [f64; WHEELS],
     /// It does anything.
     pub any: [f64; WHEELS],
-    /// Steering angles that may be anything, relative to angles as commanded.
-    pub steering: f64,
     /// Steering angles, where they are read.
     pub steer: [Option<SteerReading>; WHEELS],
     /// Rate by rolling, and its variance by the lag of the body.
@@ -95,13 +93,11 @@ impl WheelEvidence {
         let samples = observation.sample_variances(model, learned, noise.wheels);
         let sample_sd = samples.map(f64::sqrt);
         let steer = SteerReading::all(model, robot, observation, &noise);
-        let unsure = steer.iter().flatten().map(SteerReading::log_ratio_unsure);
         let mut evidence = Self {
             healthy: [0.0; WHEELS],
             broken: [[0.0; BREAKAGES.len()]; WHEELS],
             own_rate: [0.0; WHEELS],
             any: [0.0; WHEELS],
-            steering: unsure.sum(),
             steer,
             rolling: [(0.0, 0.0); WHEELS],
             shift: [(0.0, 0.0); WHEELS],
@@ -301,6 +297,13 @@ impl WheelEvidence {
     pub fn sample_variance(&self, wheel: usize, plain: u32) -> f64 {
         let sample_sd = self.sample_sd[wheel];
         sample_sd * sample_sd / f64::from(plain.max(1))
+    }
+
+    /// Steering angles that may be anything, relative to angles as commanded.
+    #[must_use]
+    pub fn steering(&self) -> f64 {
+        let read = self.steer.iter().flatten();
+        read.map(SteerReading::log_ratio_unsure).sum()
     }
 
     /// Wheel `i` may do anything or turn as it should, as in the unknown.
