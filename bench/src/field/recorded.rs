@@ -20,7 +20,7 @@ use super::run::{Job, Scored, Watch};
 use super::scenario::Scenario;
 use super::timeline::Timeline;
 use crate::real;
-use crate::simulated::{SENSOR_SETS, Stages};
+use crate::simulated::{ALL_SETS, Stages};
 
 /// Velocity from which a robot counts as driving, m/s and rad/s.
 const DRIVES: f64 = 0.005;
@@ -308,7 +308,7 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<Scored>, Box<dyn E
     } = material;
     let case = cases.get(job.run).ok_or("there is no such run")?;
     let mut scored = Vec::new();
-    for (sensors, name) in SENSOR_SETS {
+    for (sensors, name) in ALL_SETS {
         if !job.scenario.sensors.iter().any(|asked| asked == name) {
             continue;
         }
@@ -341,6 +341,14 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<Scored>, Box<dyn E
             sensors: name,
             run: watch.scorer.finish(),
         });
+    }
+    if scored.is_empty() {
+        let sets = &job.scenario.sensors;
+        return Err(format!(
+            "{}: no set of sensors is called {sets:?}",
+            job.scenario.name
+        )
+        .into());
     }
     Ok(scored)
 }

@@ -201,17 +201,15 @@ pub fn barred_lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
 /// Everything as data.
 #[must_use]
 pub fn document(outcomes: &[Outcome<'_>], machine: Value, wall_s: f64, scale: f64) -> Value {
-    let (mut bars, mut met) = (0, 0);
-    for is_met in outcomes
+    let met: Vec<Option<bool>> = outcomes
         .iter()
-        .flat_map(|o| o.bars().filter_map(|(_, met)| met))
-    {
-        bars += 1;
-        met += usize::from(is_met);
-    }
+        .flat_map(|o| o.bars().map(|(_, met)| met))
+        .collect();
+    let (bars, without) = (met.iter().flatten(), met.iter().filter(|met| met.is_none()));
     let results: Vec<Value> = outcomes.iter().map(Outcome::json).collect();
     json!({
         "schema_version": 1, "machine": machine, "wall_s": wall_s, "scale": scale,
-        "bars": bars, "bars_met": met, "results": results,
+        "bars": bars.clone().count(), "bars_met": bars.filter(|met| **met).count(),
+        "bars_without_case": without.count(), "results": results,
     })
 }

@@ -74,9 +74,10 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let outcomes = measure(&graph, &library, &scenarios, &all)?;
     let wall_s = began.elapsed().as_secs_f64();
     let document = document(&outcomes, machine::facts(), wall_s, args.scale);
+    // What never happened meets nothing.
     let is_met = outcomes
         .iter()
-        .all(|o| o.bars().all(|(_, met)| met != Some(false)));
+        .all(|o| o.bars().all(|(_, met)| met == Some(true)));
     match args.json {
         true => println!("{document:#}"),
         false => show(args, &outcomes, &document)?,
@@ -93,9 +94,10 @@ fn show(args: &Args, outcomes: &[Outcome<'_>], document: &Value) -> Result<(), B
         && args.scale == 1.0
         && args.scenarios.is_none();
     let last = format!(
-        "{} of {} bars are met, in {:.0} s.",
+        "{} of {} bars are met, {} had no case; in {:.0} s.",
         document["bars_met"],
         document["bars"],
+        document["bars_without_case"],
         document["wall_s"].as_f64().unwrap_or(f64::NAN)
     );
     if !(is_whole || args.archive) {

@@ -8,10 +8,10 @@ use crate::posterior::Posterior;
 /// A held name is given up for another one when its own probability is below this. A rival needs
 /// half; with 0.2 left to a third, two alike do not swap.
 const HELD_MIN: f64 = 0.3;
-/// A held name is given up for the nominal mode when that has been more probable than this (nine to
-/// one: it is given up later than it is taken) ..
-const NOMINAL_MIN: f64 = 0.9;
-/// .. for this long, s of motion: as long as an alarm takes to clear.
+/// A held name is given up for the nominal mode when that has been more probable than this ..
+const NOMINAL_MIN: f64 = 0.5;
+/// .. for this long, s of motion: when the alarm falls, so that the two contradict each other for
+/// no longer (`vigil_robot::FusedAlarm`).
 const NOMINAL_S: f64 = 1.0;
 /// Slack when that time is compared, s: it is a sum of short intervals.
 const SLACK_S: f64 = 1e-6;
@@ -141,7 +141,7 @@ mod tests {
             reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), &leaves, 0.1);
         }
         // A moment of doubt begins the second anew; time at rest does not count.
-        reported.take((0, 0.85), &belief(0.85, 0.0, 0.15), &leaves, 0.1);
+        reported.take((MODE_UNKNOWN, 0.55), &belief(0.45, 0.0, 0.55), &leaves, 0.1);
         for _ in 0..9 {
             reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), &leaves, 0.1);
             reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), &leaves, 0.0);

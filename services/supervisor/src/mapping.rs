@@ -215,18 +215,26 @@ pub(crate) fn actions(
                 .get(name)
                 .ok_or_else(|| SupervisorError::NoAction(name.clone()))?;
             let kind = RecoveryKind::from(action.kind);
-            let stands = matches!(
-                kind,
-                RecoveryKind::Stop
-                    | RecoveryKind::CallForHelp
-                    | RecoveryKind::NewPath
-                    | RecoveryKind::Relocalise
-                    | RecoveryKind::GiveUp
-            );
-            let speed_scale = action.speed_scale.unwrap_or(if stands { 0.0 } else { 1.0 });
+            let speed_scale = action
+                .speed_scale
+                .unwrap_or_else(|| usual_speed_scale(kind));
             Ok(ActionMeaning { kind, speed_scale })
         })
         .collect()
+}
+
+/// Factor of the speed where the settings name none: that of the configurations in `config/`.
+const fn usual_speed_scale(kind: RecoveryKind) -> f64 {
+    match kind {
+        RecoveryKind::Stop
+        | RecoveryKind::CallForHelp
+        | RecoveryKind::NewPath
+        | RecoveryKind::Relocalise
+        | RecoveryKind::GiveUp => 0.0,
+        RecoveryKind::SlowDown => 0.5,
+        RecoveryKind::Compensate => 0.7,
+        _ => 1.0,
+    }
 }
 
 /// Checks that every wheel whose stuck motor is a state can be compensated, if an action does so.

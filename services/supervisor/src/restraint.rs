@@ -120,12 +120,14 @@ impl Restraint {
         }
         self.epochs = self.epochs.saturating_add(u32::from(timed));
         let speed = |action: usize| meanings.get(action).map_or(0.0, |m| m.speed_scale);
-        let faster = speed(choice.action) > speed(current);
-        let needed = match self.has_left && goes_on(meanings, choice.action) {
+        // Going on at the same speed gives up what was done about a fault, too.
+        let resumes = self.has_left && goes_on(meanings, choice.action) && choice.action != current;
+        let needed = match resumes {
             true => self.hold_epochs,
-            false => HOLD_EPOCHS,
+            false if speed(choice.action) > speed(current) => HOLD_EPOCHS,
+            false => 0,
         };
-        if faster && self.epochs < needed {
+        if self.epochs < needed {
             return Choice {
                 action: current,
                 margin: 0.0,

@@ -4,10 +4,7 @@
 use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
-use rand::{RngExt, SeedableRng};
-use rand_distr::{Distribution, StandardNormal};
-use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::SensorFrame;
 use vigil_identifier::{Exact, Leaves, Posterior};
 use vigil_inference::track::Track;
 use vigil_robot::Description;
@@ -16,30 +13,16 @@ use vigil_robot::learned::{
     FaultRates, Healthy, Model, MotionMode, Moved, NoiseScales, Observation, Observer,
     WheelContext, WheelEvidence, motion_modes,
 };
-use vigil_robot::slip::{Condition, Situation, SlipModel, Soil};
+use vigil_robot::slip::SlipModel;
 use vigil_setup::schema::Sensors;
 
-const WHEELS: usize = 6;
+use crate::driven::{Faults, SETTLED_S, WHEELS, drive};
+
 const SETS: usize = 1 << WHEELS;
-const RATE_HZ: f64 = 20.0;
-const ONSET_S: f64 = 2.0;
 const END_S: f64 = 6.0;
-/// The oracle begins when the body has followed the change, with the pose that is true then.
-const SETTLED_S: f64 = ONSET_S + 0.6;
-const LAG_S: f64 = 0.1;
-const POSE_SD: f64 = 0.005;
-const RATE_SD: f64 = 0.05;
-const STEER_SD: f64 = 0.003;
 /// Prior of several stuck wheels beside that of one, and of each broken encoder.
 const P_AT_ONCE: f64 = 0.1;
 const P_ENCODER: f64 = 1e-4;
-
-/// The wheels that stick and the one whose encoder dies, as bits.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Faults {
-    stuck: u32,
-    dead: u32,
-}
 
 /// A file of the project.
 fn path(name: &str) -> PathBuf {
@@ -86,66 +69,6 @@ impl Rig {
             robot,
             model,
         }
-    }
-
-    /// Frames of a drive, and the true pose at [`SETTLED_S`].
-    fn drive(&self, faults: Faults, seed: u64) -> (Vec<SensorFrame>, [f64; 3]) {
-        let mut rng = Pcg64Mcg::seed_from_u64(seed);
-        let (curvature, speed) = (rng.random_range(-0.9..0.9), rng.random_range(0.12..0.28));
-        let targets = self.slip.kinematics().targets(curvature, speed);
-        let motion = |set: u32| {
-            let situation = Situation {
-                curvature_1_m: curvature,
-                speed_m_s: speed,
-                stuck: std::array::from_fn(|wheel| set >> wheel & 1 == 1),
-                soil: Soil::uniform(0.63, 0.21),
-                condition: Condition::default(),
-            };
-            self.slip.solve(&situation, None).unwrap()
-        };
-        let motions = [motion(0), motion(faults.stuck)];
-        let mut velocity = motions[0].velocity;
-        let (mut pose, mut settled) = ([0.0_f64; 3], [0.0; 3]);
-        let mut noise = |sd: f64| -> f64 {
-            let drawn: f64 = StandardNormal.sample(&mut rng);
-            sd * drawn
-        };
-        let frame = |k: usize| {
-            let t_s = k as f64 / RATE_HZ;
-            let faulty = t_s >= ONSET_S;
-            let now = &motions[usize::from(faulty)];
-            let keep = (-1.0 / (RATE_HZ * LAG_S)).exp();
-            for (velocity, target) in velocity.iter_mut().zip(now.velocity) {
-                *velocity = target + (*velocity - target) * keep;
-            }
-            let [forward, lateral, yaw] = velocity.map(|v| v / RATE_HZ);
-            let (sin, cos) = (pose[2] + 0.5 * yaw).sin_cos();
-            pose[0] += forward * cos - lateral * sin;
-            pose[1] += forward * sin + lateral * cos;
-            pose[2] += yaw;
-            if t_s < SETTLED_S {
-                settled = pose;
-            }
-            let mut frame = SensorFrame::default();
-            frame.header.t_capture_ns = (k as u64 + 1) * 50_000_000;
-            frame.run_id = 1;
-            frame.valid = Valid::POSE | Valid::command(0) | Valid::command(1);
-            (frame.command[0], frame.command[1]) = (curvature, speed);
-            frame.pose = pose.map(|value| value + noise(POSE_SD));
-            for wheel in 0..WHEELS {
-                let silent = faulty && faults.dead >> wheel & 1 == 1;
-                let read = now.wheel_rate_rad_s[wheel] + noise(RATE_SD);
-                frame.wheel_rate[wheel] = if silent { 0.0 } else { read };
-                frame.steer[wheel] = targets.steer_rad[wheel] + noise(STEER_SD);
-                frame.valid |= Valid::wheel_rate(wheel);
-                if self.robot.wheels[wheel].steered {
-                    frame.valid |= Valid::steer(wheel);
-                }
-            }
-            frame
-        };
-        let frames = (0..(END_S * RATE_HZ) as usize).map(frame).collect();
-        (frames, settled)
     }
 
     fn observations(&self, frames: &[SensorFrame]) -> Vec<Observation> {
@@ -275,7 +198,7 @@ fn the_filter_finds_what_the_best_of_all_sets_is() {
     });
     let (mut sure, mut wrong) = (0, Vec::new());
     for (seed, faults) in stuck.chain(with_encoder).enumerate() {
-        let (frames, settled) = rig.drive(faults, 900 + seed as u64);
+        let (frames, settled) = drive(&rig.robot, &rig.slip, faults, (900 + seed as u64, END_S));
         let observations = rig.observations(&frames);
         let (best, p) = rig.best_of_all(&observations, settled);
         if p < 0.9 {

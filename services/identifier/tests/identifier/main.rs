@@ -7,6 +7,8 @@ use vigil_cycle::allocation::CountingAllocator;
 mod alarm;
 mod all_sets;
 mod allocation;
+mod an_hour;
+mod driven;
 mod further;
 mod hypotheses;
 mod identifier;

@@ -22,6 +22,7 @@
 //! | [`current_effects`] | what a weak motor or a stuck wheel makes of all currents |
 //! | [`further_watch`] | gyro and currents beside what is expected of a healthy robot |
 //! | [`repeats`] | whether a sensor repeats itself exactly |
+//! | [`past_rates`] | the rates that the wheels had some moments ago |
 //! | [`monitor`] | the detection filter over observations |
 
 mod body_lag;
@@ -37,12 +38,14 @@ pub mod further;
 mod further_evidence;
 pub mod further_watch;
 mod healthy;
+mod lateness;
 pub mod model;
 pub mod monitor;
 pub mod motion;
 pub mod motion_modes;
 pub mod noise_scale;
 pub mod observation;
+pub mod past_rates;
 mod provenance;
 mod reading;
 pub mod repeats;

@@ -5,7 +5,7 @@
 //! its predictive density, per group of channels: pose (3), each wheel rate, each steering angle.
 //! Per group the fault state takes one [`Form`]: it learns an unknown constant departure, of the
 //! motion or of the channel, or has a constant likelihood. An encoder that repeats itself exactly
-//! has a flag of its own; over the pose stands the paper's constant likelihood besides
+//! has a flag of its own, and one that is late another; over the pose stands the paper's constant likelihood besides
 //! ([`Constant`]). The groups' odds add up: a fault enters by one of them.
 //!
 //! The belief about the pose is as good as Gaussian, so no particles are needed to find the
@@ -25,6 +25,7 @@ use super::faults::{Faults, KINDS};
 use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION};
 use super::further_evidence::FurtherEvidence;
 use super::further_watch::Turn;
+use super::lateness::{Lateness, Timely};
 use super::noise_scale::{NoiseScales, SensorNoise, UNSEEN_S};
 use super::repeats::Repeats;
 use super::wheel_context::{Beside, WheelContext};
@@ -36,7 +37,8 @@ use crate::channel_odds::ChannelOdds;
 /// Shares of the prior: how a fault first shows. Chosen: one counts by its logarithm only, half as
 /// much is 0.7 nats later.
 const SHARE_POSE: f64 = 0.5;
-const SHARE_WHEELS: f64 = 0.3;
+const SHARE_WHEELS: f64 = 0.28;
+const SHARE_LATE: f64 = 0.02;
 const SHARE_REPEATS: f64 = 0.1;
 const SHARE_STEER: f64 = 0.05;
 const SHARE_ANY: f64 = 0.05;
@@ -83,6 +85,7 @@ pub struct Monitor {
     anything: [Alternative; WHEELS],
     steer: [Evidence<1>; WHEELS],
     repeats: [Repeats; WHEELS],
+    late: Lateness,
     any: Constant,
     noise: SensorNoise,
     troubles: Troubles,
@@ -137,11 +140,12 @@ impl Monitor {
             departure: Departure::new(model.nominal_noise(robot)),
             faults: Faults::new(model, robot),
             context: WheelContext::new(robot.tolerance),
-            pose: Evidence::new(form, BIAS_CHANNEL),
-            wheels: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
+            pose: Evidence::bounded(form, BIAS_CHANNEL),
+            wheels: [Evidence::bounded(form, BIAS_CHANNEL); WHEELS],
             anything: [Alternative::new(0.5); WHEELS],
-            steer: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
+            steer: [Evidence::bounded(form, BIAS_CHANNEL); WHEELS],
             repeats: [Repeats::default(); WHEELS],
+            late: Lateness::default(),
             any: Constant::default(),
             noise: SensorNoise::default(),
             troubles: Troubles::default(),
@@ -166,6 +170,7 @@ impl Monitor {
     pub fn reset(&mut self) {
         self.tracking = false;
         self.coasted = 0;
+        self.late = Lateness::default();
         self.context = WheelContext::new(self.robot.tolerance);
         self.noise = SensorNoise::default();
         self.troubles = Troubles::default();
@@ -179,11 +184,12 @@ impl Monitor {
     /// Forgets what speaks for a fault, and keeps the track.
     pub fn forget_evidence(&mut self) {
         self.departure.forget();
-        self.pose = Evidence::new(self.form, BIAS_CHANNEL);
-        self.wheels = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
+        self.pose = Evidence::bounded(self.form, BIAS_CHANNEL);
+        self.wheels = [Evidence::bounded(self.form, BIAS_CHANNEL); WHEELS];
         self.anything = [Alternative::new(0.5); WHEELS];
-        self.steer = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
+        self.steer = [Evidence::bounded(self.form, BIAS_CHANNEL); WHEELS];
         self.repeats = [Repeats::default(); WHEELS];
+        self.late.forget();
         self.any = Constant::default();
         self.gains = Gains::default();
         if let Some(further) = &mut self.further {
@@ -276,6 +282,9 @@ impl Monitor {
         if observation.moving && self.channels.use_wheels() {
             self.step_wheels(observation, following, scales);
             self.step_steer(observation, scales);
+        } else if self.channels.use_wheels() {
+            let stands = ([(0.0, 0.0); WHEELS], [None; WHEELS]);
+            self.late.step(observation.t_ns, stands.0, &stands.1, 0.0);
         }
         self.sum_up();
     }
@@ -360,29 +369,39 @@ impl Monitor {
             [observation.curvature, observation.speed],
         );
         self.context.fade(observation.travel_m);
-        let mut all = [None; WHEELS];
+        let (mut all, mut timely) = ([None; WHEELS], [None; WHEELS]);
+        let mut rates = [(0.0, 0.0); WHEELS];
         let wheels = self.robot.wheels.len();
         for (i, sample) in samples.into_iter().enumerate().take(wheels) {
             let reading = &observation.wheels[i];
             let healthy = self.model.encoder.repeat_rate;
             self.repeats[i].step(reading, healthy, birth_repeats);
-            if reading.plain == 0 {
-                continue;
-            }
             let rolling = rolling_rate(&self.robot, i, command[0], command[1]);
             let behind = rolling - rolling_rate(&self.robot, i, lagged[0], lagged[1]);
             let (rate, variance) = self.model.nominal.rates[i].rate(rolling, command[0]);
+            let (shift, uncertain) = self.context.shift(i, rolling);
+            let variance = variance + behind * behind;
+            rates[i] = (rate + shift, variance + uncertain);
+            if reading.plain == 0 {
+                continue;
+            }
             let noise = observation.mean_variance(sample, reading.plain);
-            let variance = variance + behind * behind + noise;
+            let variance = variance + noise;
             all[i] = Some(Beside {
                 apart_rad_s: reading.mean - rate,
                 rolling_rad_s: rolling,
                 variance,
             });
-            let (shift, uncertain) = self.context.shift(i, rolling);
             let (apart, variance) = (reading.mean - rate - shift, variance + uncertain);
-            let rate = scales.outliers.wheels[i];
-            let whitened = Whitened::of(apart, variance, behind * behind, rate);
+            let outlier_rate = scales.outliers.wheels[i];
+            let whitened = Whitened::of(apart, variance, behind * behind, outlier_rate);
+            timely[i] = Some(Timely {
+                read_rad_s: reading.mean,
+                apart_rad_s: apart,
+                variance,
+                noise,
+                outlier_rate,
+            });
             self.wheels[i].step(&whitened, birth);
             let square = whitened.value.norm_squared();
             let gain = self.wheels[i].gain();
@@ -394,6 +413,8 @@ impl Monitor {
         if !following {
             self.context.learn(&all);
         }
+        let birth = self.birth(observation.dt_s, SHARE_LATE * share);
+        self.late.step(observation.t_ns, rates, &timely, birth);
     }
 
     fn step_steer(&mut self, observation: &Observation, scales: NoiseScales) {
@@ -428,6 +449,8 @@ impl Monitor {
                 let channel = Channel::wheel_rate(i);
                 enter(channel, self.wheels[i].log_odds(), gains.wheels[i]);
                 enter(channel, self.repeats[i].log_odds, self.repeats[i].gain);
+                let (late, gain) = self.late.odds(i);
+                enter(channel, late, gain);
                 if self.robot.wheels[i].steered {
                     enter(Channel::steer(i), self.steer[i].log_odds(), gains.steer[i]);
                 }

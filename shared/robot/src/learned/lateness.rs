@@ -1,0 +1,207 @@
+//! Odds that an encoder is late, for the detector: it reads what its wheel did a moment ago.
+//!
+//! Such a fault shows only while the rate changes, and is no constant bias: what one change says
+//! for it must last until the next. Each delay of a grid is a fault of its own, whose odds are
+//! exact: `(odds + birth) x likelihood ratio` (Shiryaev).
+
+use vigil_blocks::WHEELS;
+use vigil_inference::departure::LOG_ODDS_MAX;
+use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
+use vigil_inference::outlier::SPREAD;
+
+use super::past_rates::{DELAYS_S, PastRates, Rates};
+
+/// A wheel's reading beside what a timely encoder reads.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Timely {
+    /// Mean rate that was read, rad/s.
+    pub read_rad_s: f64,
+    /// How far it is from what is expected now, rad/s, and its variance in all, (rad/s)².
+    pub apart_rad_s: f64,
+    pub variance: f64,
+    /// Variance of the reading about the wheel's rate, (rad/s)².
+    pub noise: f64,
+    /// Probability that it is an outlier.
+    pub outlier_rate: f64,
+}
+
+impl Timely {
+    /// Log-density of a reading so far from what is expected. An outlier is as far out as it is
+    /// for a timely encoder, whatever explains the rest.
+    fn log_density(&self, apart: f64, variance: f64) -> f64 {
+        let far = log_normal(apart, SPREAD * SPREAD * self.variance);
+        log_add(
+            (-self.outlier_rate).ln_1p() + log_normal(apart, variance),
+            self.outlier_rate.ln() + far,
+        )
+    }
+}
+
+/// Log-odds that a wheel's encoder is late, by each delay and in all, and what the last reading
+/// said for that.
+#[derive(Debug, Clone, Copy)]
+struct Odds {
+    delays: [f64; DELAYS_S.len()],
+    all: f64,
+    gain: f64,
+}
+
+const NONE: Odds = Odds {
+    delays: [f64::NEG_INFINITY; DELAYS_S.len()],
+    all: f64::NEG_INFINITY,
+    gain: 0.0,
+};
+
+/// Of all encoders.
+#[derive(Debug, Clone)]
+pub(super) struct Lateness {
+    past: PastRates,
+    wheels: [Odds; WHEELS],
+}
+
+impl Default for Lateness {
+    fn default() -> Self {
+        Self {
+            past: PastRates::default(),
+            wheels: [NONE; WHEELS],
+        }
+    }
+}
+
+impl Lateness {
+    /// Forgets what speaks for a fault, and keeps the rates.
+    pub const fn forget(&mut self) {
+        self.wheels = [NONE; WHEELS];
+    }
+
+    /// Log-odds that a wheel's encoder is late, and what the last observation said for that.
+    pub const fn odds(&self, wheel: usize) -> (f64, f64) {
+        (self.wheels[wheel].all, self.wheels[wheel].gain)
+    }
+
+    /// Takes readings of wheels that turn at `rates`, or stand, at `t_ns`; `birth` is the
+    /// probability that an encoder has become late since the last ones. By delays that nothing
+    /// shows it does not.
+    pub fn step(
+        &mut self,
+        t_ns: u64,
+        rates: Rates,
+        readings: &[Option<Timely>; WHEELS],
+        birth: f64,
+    ) {
+        self.past.keep(t_ns, rates);
+        let born = birth.ln() - (DELAYS_S.len() as f64).ln();
+        for (wheel, reading) in readings.iter().enumerate() {
+            self.wheels[wheel].gain = 0.0;
+            if let Some(reading) = reading {
+                self.wheels[wheel].step(wheel, reading, &self.past, born);
+            }
+        }
+    }
+}
+
+impl Odds {
+    fn step(&mut self, wheel: usize, reading: &Timely, past: &PastRates, born: f64) {
+        let then = past.then(wheel);
+        let shows = then.map(|then| past.differs(wheel, then));
+        if !shows.contains(&true) {
+            return;
+        }
+        let timely = reading.log_density(reading.apart_rad_s, reading.variance);
+        let mut before = self.delays;
+        for (i, (rate, variance)) in then.into_iter().enumerate().filter(|(i, _)| shows[*i]) {
+            before[i] = log_add(before[i], born);
+            let late = reading.log_density(reading.read_rad_s - rate, variance + reading.noise);
+            let said = if late.is_finite() { late - timely } else { 0.0 };
+            self.delays[i] = (before[i] + said).min(LOG_ODDS_MAX);
+        }
+        self.all = log_sum_exp(&self.delays);
+        self.gain = self.all - log_sum_exp(&before);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_NS: u64 = 50_000_000;
+    const NOISE: f64 = 0.0025;
+    const WIDTH: f64 = 1e-4;
+
+    fn reading(read: f64, expected: f64) -> Timely {
+        Timely {
+            read_rad_s: read,
+            apart_rad_s: read - expected,
+            variance: NOISE + WIDTH,
+            noise: NOISE,
+            outlier_rate: 1e-5,
+        }
+    }
+
+    /// Log-odds after 20 s of rates that change every two seconds, read so late.
+    fn after(delay_s: f64) -> f64 {
+        let rate = |t_s: f64| [1.5, 2.6, 1.9, 3.1][(0.5 * t_s.max(0.0)) as usize % 4];
+        let mut late = Lateness::default();
+        for k in 1..400_u64 {
+            let t_s = k as f64 * 0.05;
+            // Deterministic noise of about one deviation.
+            let noise = 0.05 * (17.0 * t_s).sin();
+            let mut readings = [None; WHEELS];
+            readings[2] = Some(reading(rate(t_s - delay_s) + noise, rate(t_s)));
+            late.step(k * PERIOD_NS, [(rate(t_s), WIDTH); WHEELS], &readings, 1e-6);
+        }
+        assert!(late.odds(0).0 == f64::NEG_INFINITY);
+        late.odds(2).0
+    }
+
+    #[test]
+    fn a_late_encoder_is_seen_whether_its_delay_is_on_the_grid_or_not() {
+        for delay_s in [0.28, 0.6, 1.0, 1.55] {
+            let late = after(delay_s);
+            assert!(late > 30.0, "{delay_s}: {late}");
+        }
+        let timely = after(0.0);
+        assert!(timely < -10.0, "{timely}");
+    }
+
+    #[test]
+    fn what_a_change_said_lasts_while_the_rate_is_constant() {
+        let mut late = Lateness::default();
+        let mut at = |k: u64, read: f64, rate: f64| {
+            let mut readings = [None; WHEELS];
+            readings[0] = Some(reading(read, rate));
+            late.step(k * PERIOD_NS, [(rate, WIDTH); WHEELS], &readings, 1e-6);
+            late.odds(0)
+        };
+        (0..50).for_each(|k| drop(at(k, 1.5, 1.5)));
+        // It turns faster, and reads so 0.5 s later.
+        (50..60).for_each(|k| drop(at(k, 1.5, 2.5)));
+        (60..120).for_each(|k| drop(at(k, 2.5, 2.5)));
+        let (odds, _) = at(120, 2.5, 2.5);
+        assert!(odds > 20.0, "{odds}");
+        for k in 121..2000 {
+            assert_eq!(at(k, 2.5, 2.5), (odds, 0.0));
+        }
+    }
+
+    #[test]
+    fn one_reading_is_the_likelihood_ratio() {
+        let mut late = Lateness::default();
+        late.step(0, [(2.0, WIDTH); WHEELS], &[None; WHEELS], 1e-6);
+        let mut readings = [None; WHEELS];
+        readings[0] = Some(Timely {
+            outlier_rate: 0.0,
+            ..reading(2.9, 3.0)
+        });
+        late.step(5_000_000_000, [(3.0, WIDTH); WHEELS], &readings, 1e-6);
+        // All delays lie between the two instants: the rate then was interpolated.
+        let rates = DELAYS_S.map(|delay_s| 3.0 - delay_s / 5.0);
+        let ratio = |rate: f64| {
+            let [late, timely] = [rate, 3.0].map(|rate| log_normal(2.9 - rate, NOISE + WIDTH));
+            1e-6 / DELAYS_S.len() as f64 * (late - timely).exp()
+        };
+        let shown = rates.into_iter().filter(|rate| 3.0 - rate > 0.05);
+        let expected: f64 = shown.map(ratio).sum();
+        assert!((late.odds(0).0 - expected.ln()).abs() < 1e-9);
+    }
+}
