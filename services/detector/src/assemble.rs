@@ -1,8 +1,8 @@
 //! From the configuration to a detector.
 
-use vigil_robot::RobotModel;
+use vigil_robot::{Description, Measured, RobotModel};
 use vigil_setup::Setup;
-use vigil_setup::schema::Source;
+use vigil_setup::schema::{Sensors, Source};
 
 use crate::{Detector, DetectorError};
 
@@ -19,6 +19,28 @@ pub fn assemble(setup: &Setup) -> Result<Detector, DetectorError> {
     // Recorded frames come at the recording's pace, times the speed.
     let live = file.sensor.source != Source::Playback;
     let period_s = setup.period_ns() as f64 * 1e-9;
-    let detector = detector.in_graph(&setup.robot, period_s, live);
+    let looked_at = Description {
+        measured: looked_at(setup),
+        ..setup.robot.clone()
+    };
+    let detector = detector.in_graph(&looked_at, period_s, live);
     Ok(detector.with_monitors(file.monitors.as_ref()))
+}
+
+/// What of the robot's channels the detector looks at: what is wrong with the others hides nothing.
+fn looked_at(setup: &Setup) -> Measured {
+    let measured = setup.robot.measured;
+    let RobotModel::Faults(model) = &setup.model else {
+        return measured;
+    };
+    let further = model.further.as_ref();
+    let further = further.filter(|_| setup.file.detector.sensors == Sensors::All);
+    let use_wheels = setup.file.detector.sensors != Sensors::Pose;
+    Measured {
+        pose: measured.pose,
+        wheel_rates: use_wheels && measured.wheel_rates,
+        steer: use_wheels && measured.steer,
+        yaw_rate: further.is_some_and(|further| further.yaw_rate.is_some()),
+        currents: further.is_some_and(|further| further.currents.is_some()),
+    }
 }

@@ -25,6 +25,10 @@ const SEEN_S: f64 = 0.2;
 const PAUSE_S: f64 = 0.5;
 /// .. so much time, s: no single one ends blindness.
 const FRAME_MAX_S: f64 = 0.1;
+/// A run shorter than this, s, shows nothing: the filters begin anew with each, and count evidence
+/// after a second of motion. So many in a row, and the detector is blind until one lasts.
+const SHORT_S: f64 = 2.0;
+const SHORT_RUNS: u32 = 3;
 /// A clock that runs faster or slower than this is no clock. Jitter of a whole period passes.
 const RATE_MAX: f64 = 2.0;
 
@@ -56,6 +60,10 @@ pub struct Sight {
     refused: bool,
     /// Of valid frames, without a pause, s.
     seen_s: f64,
+    /// Of this run, s; how many before it were short, and how long they were together, s.
+    run_s: f64,
+    short_runs: u32,
+    short_s: f64,
     blind: Option<Blindness>,
     is_doubtful: bool,
 }
@@ -76,6 +84,9 @@ impl Sight {
             by_cause: [0.0; Blindness::ALL.len()],
             refused: false,
             seen_s: 0.0,
+            run_s: 0.0,
+            short_runs: 0,
+            short_s: 0.0,
             blind: None,
             is_doubtful: false,
         }
@@ -94,6 +105,9 @@ impl Sight {
     #[must_use]
     pub const fn blind(&self) -> Option<Blindness> {
         match self.blind {
+            None if self.short_runs >= SHORT_RUNS && self.short_s >= BLIND_S => {
+                Some(Blindness::Run)
+            }
             None if self.is_doubtful => Some(Blindness::Meaning),
             blind => blind,
         }
@@ -121,6 +135,16 @@ impl Sight {
             s if s <= 0.0 => self.period_s.unwrap_or(captured_s),
             s => s,
         };
+        if now.run_id != last.run_id {
+            let is_short = self.run_s < SHORT_S;
+            self.short_runs = self.short_runs.saturating_add(u32::from(is_short));
+            self.short_s += self.run_s;
+            self.run_s = 0.0;
+        }
+        self.run_s += scheduled_s.clamp(0.0, BLIND_S);
+        if self.run_s >= SHORT_S {
+            (self.short_runs, self.short_s) = (0, 0.0);
+        }
         let is_clock = captured_s <= RATE_MAX * scheduled_s && scheduled_s <= RATE_MAX * captured_s;
         let cause = if now.epoch != last.epoch {
             Blindness::Epoch
@@ -261,6 +285,24 @@ mod tests {
     }
 
     #[test]
+    fn runs_too_short_to_show_anything_are_blindness_until_one_lasts() {
+        let (at_s, cause) = lost(|k, f| f.run_id = k / 20).unwrap();
+        assert!(cause == Blindness::Run && at_s < 2.0, "{at_s}");
+        assert_eq!(lost(|k, f| f.run_id = k.min(110) / 50), None);
+        let mut sight = sight();
+        let mut blind = Vec::new();
+        for k in 0..500 {
+            let run_id = k.min(200) / 20;
+            sight.take(&SensorFrame { run_id, ..frame(k) });
+            blind.push(sight.blind().is_some());
+        }
+        assert!(
+            blind[150] && blind[290] && !blind[310],
+            "seen after two seconds"
+        );
+    }
+
+    #[test]
     fn jitter_other_rates_and_a_clock_of_its_own_are_no_blindness() {
         // Capture a tenth fast, from another origin; jitter of half a period; bursts of ten.
         assert_eq!(
@@ -273,7 +315,7 @@ mod tests {
         assert_eq!(lost(|k, f| f.header.t_schedule_ns = burst(k)), None);
         // No schedule at all; one run after the other; no command now and then.
         assert_eq!(lost(|_, f| f.header.t_schedule_ns = 0), None);
-        assert_eq!(lost(|k, f| f.run_id = k / 20), None);
+        assert_eq!(lost(|k, f| f.run_id = k / 150), None);
         assert_eq!(
             lost(|k, f| f.valid = if k % 9 == 0 { f.valid } else { 0 }),
             None

@@ -47,12 +47,12 @@ impl Watch {
     }
 
     /// Takes the observation that the last frame completed.
-    pub fn step(&mut self, following: bool) -> Observed {
+    pub fn step(&mut self, suspected: bool) -> Observed {
         match self {
             Self::Faults { observer, monitor } => {
-                observer.suspect(following);
+                observer.suspect(suspected);
                 let observation = observer.observation();
-                monitor.step_with(observation, observer.further(), following);
+                monitor.step_with(observation, observer.further(), suspected);
                 Observed {
                     t_ns: observation.t_ns,
                     dt_s: observation.dt_s,
@@ -64,7 +64,7 @@ impl Watch {
                 monitor,
                 last,
             } => {
-                monitor.step(observer.history(), following);
+                monitor.step(observer.history(), suspected);
                 if let Some(now) = observer.history().ago(0) {
                     *last = Observed {
                         t_ns: now.t_ns,

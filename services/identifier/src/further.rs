@@ -17,6 +17,7 @@ use vigil_robot::learned::wheel_evidence::TOGETHER_SD;
 use vigil_robot::learned::{Further, Healthy, Model, Observation, Reading, repeats};
 use vigil_robot::{Description, FaultPrior};
 
+use crate::further_state::State;
 use crate::modes::Leaves;
 use crate::node_sizes::TOLD_MIN;
 
@@ -27,8 +28,8 @@ const OFFSETS: [f64; 12] = [
 ];
 /// Its factors: reversed, none, half, double.
 const GAINS: [f64; 4] = [-1.0, 0.0, 0.5, 2.0];
-/// Biases of a broken gyro, in deviations of its noise. The least is 2.5 tolerances of the rover.
-const BIASES: [f64; 10] = [-40.0, -20.0, -10.0, -5.0, -2.5, 2.5, 5.0, 10.0, 20.0, 40.0];
+/// Biases of a broken gyro, in deviations of its noise. The least is two tolerances of the rover.
+const BIASES: [f64; 10] = [-40.0, -20.0, -10.0, -5.0, -2.0, 2.0, 5.0, 10.0, 20.0, 40.0];
 /// Least deviation of a stuck wheel's effect on a current, in deviations of the sensor's noise.
 const STUCK_SD_MIN: f64 = 4.0;
 /// Deviation of a current in the unknown, in those of its sensor's noise: beyond what slopes add.
@@ -47,27 +48,6 @@ const LOG_MAX: f64 = 30.0;
 const RATIO_MAX: f64 = 1e9;
 /// No state is less probable: what can return must not be impossible.
 const FLOOR: f64 = 1e-14;
-
-/// What may be wrong.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum State {
-    Whole,
-    /// A motor: wheel, index of the share lost.
-    Torque(usize, usize),
-    /// A current sensor repeats itself.
-    CurrentDead(usize),
-    /// It reads so much more, A.
-    CurrentOffset(usize, f64),
-    /// It reads this many times the current.
-    CurrentGain(usize, f64),
-    /// The gyro repeats itself.
-    GyroDead,
-    /// It reads so much more, rad/s.
-    GyroBias(f64),
-    /// A wheel is stuck: its leaf belongs to the other filter.
-    Stuck(usize),
-    Unknown,
-}
 
 /// How the probabilities of sets of faults change by these channels, and what they add.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -222,13 +202,16 @@ impl FurtherFilter {
             self.rates.suspected_1_s * observation.dt_s,
             self.rates.mended_1_s * observation.dt_s,
         );
-        let born: f64 = birth * self.shares.iter().sum::<f64>();
         for p in [&mut self.p, &mut self.prior] {
-            let whole = p[0];
-            p[0] = whole * (1.0 - born) + (1.0 - whole) * death;
-            for (p, share) in p.iter_mut().zip(&self.shares).skip(1) {
-                *p = *p * (1.0 - death) + whole * birth * share;
+            let (whole, mut changed) = (p[0], 0.0);
+            let faults = p.iter_mut().zip(&self.shares).zip(&self.states).skip(1);
+            // What nothing shows does not change.
+            for ((p, share), _) in faults.filter(|(_, state)| state.is_read(residuals)) {
+                let gained = whole * birth * share - *p * death;
+                *p += gained;
+                changed += gained;
             }
+            p[0] -= changed;
         }
         let mut largest = f64::NEG_INFINITY;
         for at in 0..self.states.len() {
@@ -398,20 +381,6 @@ impl FurtherFilter {
             fusion.askew = 0.5 + 0.5 * loads[1] / loads[0];
         }
         fusion
-    }
-}
-
-impl State {
-    /// In which way a component is broken, and by how much.
-    const fn size(self) -> (SizeKind, f64) {
-        match self {
-            Self::Torque(_, share) => (SizeKind::TorqueShareLost, SHARES[share]),
-            Self::CurrentOffset(_, offset_a) => (SizeKind::CurrentOffsetA, offset_a),
-            Self::CurrentGain(_, gain) => (SizeKind::Gain, gain),
-            Self::GyroBias(bias_rad_s) => (SizeKind::RateBiasRadS, bias_rad_s),
-            Self::CurrentDead(_) | Self::GyroDead => (SizeKind::Frozen, 0.0),
-            Self::Stuck(_) | Self::Whole | Self::Unknown => (SizeKind::None, 0.0),
-        }
     }
 }
 

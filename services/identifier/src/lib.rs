@@ -13,6 +13,7 @@ mod exact;
 mod fault_rates;
 pub mod further;
 mod further_stage;
+mod further_state;
 mod generic;
 mod hypotheses;
 mod identifier;

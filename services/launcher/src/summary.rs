@@ -160,9 +160,16 @@ impl Summary {
         }
     }
 
-    /// True if the run itself failed, or nothing was seen for a part of it.
+    /// True if the run itself failed, or nothing was seen for a part of it, or for all of it.
     pub fn failed(&self) -> bool {
-        matches!(self.ended, Ended::GaveUp | Ended::NeverReady) || !self.blind.is_empty()
+        matches!(self.ended, Ended::GaveUp | Ended::NeverReady)
+            || !self.blind.is_empty()
+            || self.saw_nothing()
+    }
+
+    /// True if no cycle ran through all services.
+    fn saw_nothing(&self) -> bool {
+        self.duration_s <= 0.0
     }
 }
 
@@ -258,6 +265,12 @@ impl fmt::Display for Summary {
             writeln!(
                 f,
                 "  latencies of a restarted service are those since its last start"
+            )?;
+        }
+        if self.saw_nothing() {
+            writeln!(
+                f,
+                "  no cycle ran through all services: no frame came, or none was good"
             )?;
         }
         for (name, causes) in &self.blind {

@@ -21,8 +21,7 @@ use crate::logspace::{log_add, probability};
 use crate::onsets::{Onset, Onsets};
 use crate::outlier::SPREAD;
 
-/// Log-odds beyond which more evidence changes nothing, unless [`Ages::up_to`] says less. The
-/// exponential of more is no double.
+/// Log-odds beyond which more evidence changes nothing. The exponential of more is no double.
 pub const LOG_ODDS_MAX: f64 = 700.0;
 
 /// A whitened residual.
@@ -78,7 +77,6 @@ pub struct Ages<const D: usize> {
     components: Onsets<Component<D>>,
     prior_variance: f64,
     dimensions: f64,
-    log_odds_max: f64,
     log_odds: f64,
     gain: f64,
 }
@@ -98,19 +96,8 @@ impl<const D: usize> Ages<D> {
             components: Onsets::default(),
             prior_variance: bias_sd * bias_sd,
             dimensions: dimensions.min(D) as f64,
-            log_odds_max: LOG_ODDS_MAX,
             log_odds: f64::NEG_INFINITY,
             gain: 0.0,
-        }
-    }
-
-    /// The same, of log-odds up to this: what more evidence would add must be lost again before
-    /// another explanation of the residuals counts.
-    #[must_use]
-    pub const fn up_to(self, log_odds_max: f64) -> Self {
-        Self {
-            log_odds_max,
-            ..self
         }
     }
 
@@ -157,7 +144,7 @@ impl<const D: usize> Ages<D> {
         let log_weights = self.components.iter().map(|component| component.log_weight);
         self.log_odds = log_weights.fold(f64::NEG_INFINITY, log_add);
         self.gain = self.log_odds - before;
-        let excess = (highest - self.log_odds_max).max(0.0);
+        let excess = (highest - LOG_ODDS_MAX).max(0.0);
         if excess > 0.0 {
             for component in self.components.iter_mut() {
                 component.log_weight -= excess;

@@ -26,7 +26,7 @@ pub mod tolerance;
 
 pub use alarm::{Alarm, AlarmError};
 pub use body::Body;
-pub use description::Description;
+pub use description::{Description, Measured};
 pub use disturbance::{Disturbance, DisturbanceKind};
 pub use fault::{Fault, FaultKind};
 pub use fault_prior::FaultPrior;

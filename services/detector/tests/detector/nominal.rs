@@ -129,3 +129,32 @@ fn a_model_of_another_robot_is_refused() {
         "{message}"
     );
 }
+
+#[test]
+fn a_constant_fault_keeps_its_alarm_for_ten_minutes_and_its_end_is_seen() {
+    let mut detector = detector();
+    let mut belief = DetectionBelief::default();
+    let mut hypotheses: Box<ParticleBlock> = Box::default();
+    // A gyro that is off by six deviations of an observation, then whole again.
+    let (from_s, to_s, end_s) = (20.0, 620.0, 640.0);
+    let (mut raised_s, mut fallen_s) = (None, None);
+    for i in 0..(end_s * RATE_HZ) as u64 {
+        let t_s = i as f64 / RATE_HZ;
+        let mut frame = frame(i, f64::INFINITY);
+        frame.yaw_rate += match (from_s..to_s).contains(&t_s) {
+            true => 0.055,
+            false => 0.0,
+        };
+        detector.step(Entry::Frame(&frame), &mut belief, &mut hypotheses);
+        match (raised_s, belief.alarm) {
+            (None, 1) => raised_s = Some(t_s),
+            (Some(_), 0) if fallen_s.is_none() => fallen_s = Some(t_s),
+            _ => {}
+        }
+    }
+    let raised_s = raised_s.unwrap();
+    assert!((from_s..from_s + 3.0).contains(&raised_s), "{raised_s}");
+    let fallen_s = fallen_s.unwrap();
+    assert!((to_s..to_s + 10.0).contains(&fallen_s), "{fallen_s}");
+    assert_eq!((belief.alarm, belief.alarm_count), (0, 1));
+}

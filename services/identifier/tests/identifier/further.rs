@@ -116,9 +116,10 @@ fn channels_that_are_not_read_move_no_odds() {
     for factor in fusion.stuck[..6].iter().chain([&fusion.unknown.0]) {
         assert!((factor - 1.0).abs() < 1e-6, "{factor}");
     }
-    // Leaves are alike.
-    let [torque, gyro] = ["LM_TORQUE", "GYRO"].map(|leaf| rover.odds(&fusion, leaf));
-    assert!((torque / gyro - 1.0).abs() < 1e-9);
+    // No leaf becomes likely while nothing shows it.
+    for odds in ["LM_TORQUE", "GYRO"].map(|leaf| rover.odds(&fusion, leaf)) {
+        assert!(odds < 1e-6, "{odds}");
+    }
 }
 
 #[test]

@@ -2,7 +2,6 @@
 
 use vigil_inference::ages::{self, Ages, Whitened};
 use vigil_inference::constant::Constant;
-use vigil_inference::departure::LOG_ODDS_MAX;
 use vigil_inference::outlier::tempered;
 use vigil_inference::windowed::Windowed;
 
@@ -68,15 +67,6 @@ impl<const D: usize> Evidence<D> {
             Form::LearnedBias => Self::LearnedBias(Ages::new(bias_sd)),
             Form::Constant => Self::Constant(Constant::default()),
             Form::Windowed => Self::Windowed(Windowed::default()),
-        }
-    }
-
-    /// The same of log-odds up to [`LOG_ODDS_MAX`], as all of a learned model are: no kind of
-    /// evidence outweighs what the others say later.
-    pub(crate) fn bounded(form: Form, bias_sd: f64) -> Self {
-        match form {
-            Form::LearnedBias => Self::LearnedBias(Ages::new(bias_sd).up_to(LOG_ODDS_MAX)),
-            Form::Constant | Form::Windowed => Self::new(form, bias_sd),
         }
     }
 

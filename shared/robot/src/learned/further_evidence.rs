@@ -44,8 +44,8 @@ impl FurtherEvidence {
         Some(Self {
             watch,
             form,
-            currents: [Evidence::bounded(form, BIAS_CURRENT); WHEELS],
-            gyro: Evidence::bounded(form, BIAS_GYRO),
+            currents: [Evidence::new(form, BIAS_CURRENT); WHEELS],
+            gyro: Evidence::new(form, BIAS_GYRO),
             repeats: [Repeats::default(); WHEELS + 1],
             gains: [0.0; WHEELS + 1],
         })
@@ -59,8 +59,8 @@ impl FurtherEvidence {
 
     /// Forgets what speaks for a fault.
     pub fn forget(&mut self) {
-        self.currents = [Evidence::bounded(self.form, BIAS_CURRENT); WHEELS];
-        self.gyro = Evidence::bounded(self.form, BIAS_GYRO);
+        self.currents = [Evidence::new(self.form, BIAS_CURRENT); WHEELS];
+        self.gyro = Evidence::new(self.form, BIAS_GYRO);
         self.repeats = [Repeats::default(); WHEELS + 1];
         self.gains = [0.0; WHEELS + 1];
     }

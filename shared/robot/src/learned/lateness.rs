@@ -5,7 +5,7 @@
 //! exact: `(odds + birth) x likelihood ratio` (Shiryaev).
 
 use vigil_blocks::WHEELS;
-use vigil_inference::departure::LOG_ODDS_MAX;
+use vigil_inference::ages::LOG_ODDS_MAX;
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 use vigil_inference::outlier::SPREAD;
 

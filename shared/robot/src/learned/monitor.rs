@@ -140,10 +140,10 @@ impl Monitor {
             departure: Departure::new(model.nominal_noise(robot)),
             faults: Faults::new(model, robot),
             context: WheelContext::new(robot.tolerance),
-            pose: Evidence::bounded(form, BIAS_CHANNEL),
-            wheels: [Evidence::bounded(form, BIAS_CHANNEL); WHEELS],
+            pose: Evidence::new(form, BIAS_CHANNEL),
+            wheels: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
             anything: [Alternative::new(0.5); WHEELS],
-            steer: [Evidence::bounded(form, BIAS_CHANNEL); WHEELS],
+            steer: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
             repeats: [Repeats::default(); WHEELS],
             late: Lateness::default(),
             any: Constant::default(),
@@ -184,10 +184,10 @@ impl Monitor {
     /// Forgets what speaks for a fault, and keeps the track.
     pub fn forget_evidence(&mut self) {
         self.departure.forget();
-        self.pose = Evidence::bounded(self.form, BIAS_CHANNEL);
-        self.wheels = [Evidence::bounded(self.form, BIAS_CHANNEL); WHEELS];
+        self.pose = Evidence::new(self.form, BIAS_CHANNEL);
+        self.wheels = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
         self.anything = [Alternative::new(0.5); WHEELS];
-        self.steer = [Evidence::bounded(self.form, BIAS_CHANNEL); WHEELS];
+        self.steer = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
         self.repeats = [Repeats::default(); WHEELS];
         self.late.forget();
         self.any = Constant::default();

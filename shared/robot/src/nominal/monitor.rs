@@ -252,9 +252,9 @@ impl Monitor {
         self.extrapolated
     }
 
-    /// Takes the newest observation of `history`. While `following`, offsets give way; see
-    /// [`Track::step`].
-    pub fn step(&mut self, history: &History, following: bool) {
+    /// Takes the newest observation of `history`. While a fault is `suspected`, nothing is learned
+    /// of the run's own offsets.
+    pub fn step(&mut self, history: &History, suspected: bool) {
         self.report.evidence = 0.0;
         for watched in &mut self.watched {
             watched.gains = [0.0; 3];
@@ -288,7 +288,7 @@ impl Monitor {
                 continue;
             };
             let variance = widening * residual.variance;
-            let (apart, spread) = track.step(channel, residual.apart, variance, following);
+            let (apart, spread) = track.step(channel, residual.apart, variance, suspected);
             let whitened = (apart / spread.sqrt()).clamp(-CLIP, CLIP);
             watched.take(whitened, birth);
             if let Some(together) = &mut self.together {

@@ -11,9 +11,6 @@ use super::channel::Channel;
 /// Least part of a variance that is white: a filter must not believe that it knows everything. A
 /// twentieth: its own account is at most 20 times as sure as one residual.
 const WHITE_MIN: f64 = 0.05;
-/// Growth of the offset's variance per observation while following, as part of the residual's. A
-/// steady gain of 0.1: followed within ten observations.
-const FOLLOWING: f64 = 0.01;
 
 /// Filter of one channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,15 +36,14 @@ impl Track {
         self.carried = false;
     }
 
-    /// Takes a residual with its variance; returns the innovation and its variance. While
-    /// `following`, the offset gives way, so that the return of a robot to its nominal mode, or
-    /// its getting used to another ground, is seen.
+    /// Takes a residual with its variance; returns the innovation and its variance. While the
+    /// offset is `held`, nothing is learned of it: what a fault does is none of the run's own.
     pub fn step(
         &mut self,
         channel: &Channel,
         residual: f64,
         variance: f64,
-        following: bool,
+        held: bool,
     ) -> (f64, f64) {
         if !self.carried {
             // Nothing is known of the last error but its variance.
@@ -59,40 +55,49 @@ impl Track {
             };
             self.carried = true;
         }
-        self.covariance[0] += channel.drift_sd * channel.drift_sd;
-        if following {
-            self.covariance[0] += FOLLOWING * variance;
+        if !held {
+            self.covariance[0] += channel.drift_sd * channel.drift_sd;
         }
         if channel.correlation < 0.0 {
-            self.taken_back(-channel.correlation, residual, variance)
+            self.taken_back(-channel.correlation, residual, variance, held)
         } else {
-            self.decaying(channel.correlation, residual, variance)
+            self.decaying(channel.correlation, residual, variance, held)
         }
     }
 
-    fn taken_back(&mut self, part: f64, residual: f64, variance: f64) -> (f64, f64) {
+    fn taken_back(&mut self, part: f64, residual: f64, variance: f64, held: bool) -> (f64, f64) {
         let [offset, cross, error] = self.covariance;
         let new = part * variance;
         let white = ((1.0 - 2.0 * part) * variance).max(WHITE_MIN * variance);
         let spread = offset - 2.0 * cross + error + new + white;
         let apart = residual - (self.mean[0] - self.mean[1]);
-        // Gains of the offset and of the error that this residual makes.
-        let gains = [(offset - cross) / spread, new / spread];
+        // Gains of the offset and of the error that this residual makes. Where the first is held
+        // at 0, the covariances are those of a filter that considers its error (Schmidt).
+        let gains = [learned(offset - cross, held) / spread, new / spread];
         self.mean = [self.mean[0] + gains[0] * apart, gains[1] * apart];
         self.covariance = [
             offset - gains[0] * gains[0] * spread,
-            -gains[0] * gains[1] * spread,
+            -gains[1] * (offset - cross),
             new - gains[1] * gains[1] * spread,
         ];
         (apart, spread)
     }
 
-    fn decaying(&mut self, correlation: f64, residual: f64, variance: f64) -> (f64, f64) {
+    fn decaying(
+        &mut self,
+        correlation: f64,
+        residual: f64,
+        variance: f64,
+        held: bool,
+    ) -> (f64, f64) {
         let [offset, cross, coloured] = self.covariance;
         let white = WHITE_MIN * variance;
         let spread = offset + 2.0 * cross + coloured + white;
         let apart = residual - (self.mean[0] + self.mean[1]);
-        let gains = [(offset + cross) / spread, (cross + coloured) / spread];
+        let gains = [
+            learned(offset + cross, held) / spread,
+            (cross + coloured) / spread,
+        ];
         let rest = coloured - gains[1] * gains[1] * spread;
         let new = variance * (1.0 - correlation * correlation);
         self.mean = [
@@ -101,11 +106,16 @@ impl Track {
         ];
         self.covariance = [
             offset - gains[0] * gains[0] * spread,
-            correlation * (cross - gains[0] * gains[1] * spread),
+            correlation * (cross - gains[1] * (offset + cross)),
             correlation * correlation * rest + new,
         ];
         (apart, spread)
     }
+}
+
+/// What a residual teaches of the offset.
+const fn learned(covariance: f64, held: bool) -> f64 {
+    if held { 0.0 } else { covariance }
 }
 
 #[cfg(test)]
@@ -174,18 +184,30 @@ mod tests {
     }
 
     #[test]
-    fn an_offset_is_learned_and_gives_way_only_while_following() {
-        let channel = channel(0.0, 3.0);
-        let mut track = Track::new(&channel);
-        for _ in 0..200 {
-            track.step(&channel, 2.0, 1.0, false);
+    fn an_offset_is_learned_and_keeps_its_value_while_it_is_held() {
+        for correlation in [-0.3, 0.0, 0.6] {
+            let drifting = Channel {
+                drift_sd: 0.1,
+                ..channel(correlation, 3.0)
+            };
+            let mut track = Track::new(&drifting);
+            for _ in 0..200 {
+                track.step(&drifting, 2.0, 1.0, false);
+            }
+            let learned = track;
+            assert!((track.mean[0] - 2.0).abs() < 0.2, "{:?}", track.mean);
+            for _ in 0..20_000 {
+                track.step(&drifting, 8.0, 1.0, true);
+            }
+            let [mean, variance] = [track.mean[0], track.covariance[0]];
+            assert_eq!([mean, variance], [learned.mean[0], learned.covariance[0]]);
+            // It is learned again afterwards, and its covariance is one.
+            for _ in 0..200 {
+                track.step(&drifting, 3.0, 1.0, false);
+            }
+            assert!((track.mean[0] - 3.0).abs() < 0.2, "{:?}", track.mean);
+            let [offset, cross, error] = track.covariance;
+            assert!(offset * error > cross * cross && offset > 0.0);
         }
-        let (kept, _) = track.step(&channel, 8.0, 1.0, false);
-        assert!((kept - 6.0).abs() < 0.1, "{kept}");
-        for _ in 0..200 {
-            track.step(&channel, 8.0, 1.0, true);
-        }
-        let (followed, _) = track.step(&channel, 8.0, 1.0, true);
-        assert!(followed.abs() < 0.1, "{followed}");
     }
 }

@@ -1,0 +1,55 @@
+//! What gyro and currents may show.
+
+use vigil_blocks::SizeKind;
+use vigil_robot::learned::current_effects::SHARES;
+use vigil_robot::learned::further_watch::Residuals;
+
+/// What may be wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum State {
+    Whole,
+    /// A motor: wheel, index of the share lost.
+    Torque(usize, usize),
+    /// A current sensor repeats itself.
+    CurrentDead(usize),
+    /// It reads so much more, A.
+    CurrentOffset(usize, f64),
+    /// It reads this many times the current.
+    CurrentGain(usize, f64),
+    /// The gyro repeats itself.
+    GyroDead,
+    /// It reads so much more, rad/s.
+    GyroBias(f64),
+    /// A wheel is stuck: its leaf belongs to the other filter.
+    Stuck(usize),
+    Unknown,
+}
+
+impl State {
+    /// In which way a component is broken, and by how much.
+    pub(crate) const fn size(self) -> (SizeKind, f64) {
+        match self {
+            Self::Torque(_, share) => (SizeKind::TorqueShareLost, SHARES[share]),
+            Self::CurrentOffset(_, offset_a) => (SizeKind::CurrentOffsetA, offset_a),
+            Self::CurrentGain(_, gain) => (SizeKind::Gain, gain),
+            Self::GyroBias(bias_rad_s) => (SizeKind::RateBiasRadS, bias_rad_s),
+            Self::CurrentDead(_) | Self::GyroDead => (SizeKind::Frozen, 0.0),
+            Self::Stuck(_) | Self::Whole | Self::Unknown => (SizeKind::None, 0.0),
+        }
+    }
+
+    /// True if the observation holds a channel that shows it.
+    pub(crate) fn is_read(self, residuals: &Residuals) -> bool {
+        let currents = &residuals.currents;
+        match self {
+            // A motor's load is carried by the others.
+            Self::Whole | Self::Unknown | Self::Torque(..) | Self::Stuck(_) => {
+                residuals.yaw_rate.is_some() || currents.iter().any(Option::is_some)
+            }
+            Self::CurrentDead(wheel)
+            | Self::CurrentOffset(wheel, _)
+            | Self::CurrentGain(wheel, _) => currents[wheel].is_some(),
+            Self::GyroDead | Self::GyroBias(_) => residuals.yaw_rate.is_some(),
+        }
+    }
+}
