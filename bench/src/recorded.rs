@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::Path;
 
 use vigil_decision::Pomdp;
-use vigil_identifier::{Exact, Leaves, Posterior, risks};
+use vigil_identifier::{Leaves, MultipleHypothesis, Posterior, risks};
 use vigil_inference::FaultTree;
 use vigil_inference::hybrid::Modes;
 use vigil_inference::track::TRACK_DIMENSION;
@@ -21,7 +21,7 @@ use crate::matched::{Outcome, Trace, in_parallel, log_odds, threshold};
 use crate::simulated::Rover;
 
 /// The live default, as tables name it.
-pub const EXACT: &str = "sets of faults (live default)";
+pub const DEFAULT: &str = "sets of faults (live default)";
 /// Share of nominal stretches with a false alarm.
 const FALSE_ALARMS: f64 = 0.05;
 /// Steps after the onset at which leaf and side are judged: 2 s.
@@ -172,23 +172,30 @@ impl Recorded {
         };
         let mut outcomes = in_parallel(wanted, outcome);
         let traces = |runs: &[&Prepared], until_onset: bool| -> Vec<Trace> {
-            let follow = |run: &&Prepared| self.follow_exact(run, rates, with_wheels, until_onset);
+            let follow =
+                |run: &&Prepared| self.follow_default(run, rates, with_wheels, until_onset);
             in_parallel(runs, follow)
         };
         let threshold = threshold(&traces(&nominal, true), FALSE_ALARMS);
-        outcomes.push(Outcome::of(EXACT, None, threshold, &traces(&faulty, false)));
+        outcomes.push(Outcome::of(
+            DEFAULT,
+            None,
+            threshold,
+            &traces(&faulty, false),
+        ));
         outcomes
     }
 
     /// The identifier's own filter over sets of faults.
-    fn follow_exact(
+    fn follow_default(
         &self,
         run: &Prepared,
         rates: FaultRates,
         with_wheels: bool,
         until_onset: bool,
     ) -> Trace {
-        let mut filter = Exact::new(&self.model, &self.robot, &self.leaves, with_wheels, rates);
+        let mut filter =
+            MultipleHypothesis::new(&self.model, &self.robot, &self.leaves, with_wheels, rates);
         if let Some(first) = run.observations.first() {
             let start = Healthy {
                 pose: first.pose.into(),

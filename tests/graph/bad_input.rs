@@ -83,9 +83,9 @@ const BAD: [(&str, &str, &str, &[&str]); 13] = [
     ),
     (
         "rover.toml",
-        "filter = \"exact\"",
+        "filter = \"multiple-hypothesis\"",
         "filter = \"x\"",
-        &["unknown variant `x`", "exact"],
+        &["unknown variant `x`", "multiple-hypothesis"],
     ),
     (
         "robots/rover.toml",

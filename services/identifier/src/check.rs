@@ -6,8 +6,8 @@ use vigil_setup::schema;
 use crate::modes::IdentifierError;
 
 /// Why another filter is refused.
-pub const FURTHER_NEED_EXACT: &str =
-    "leaves steer, pose, torque, current and gyro need identifier.filter = \"exact\"";
+pub const FURTHER_NEED_HYPOTHESES: &str =
+    "leaves steer, pose, torque, current and gyro need identifier.filter = \"multiple-hypothesis\"";
 
 /// Refuses settings out of range.
 ///

@@ -2,19 +2,19 @@
 
 use vigil_robot::learned::{Healthy, NoiseScales, Observation};
 
-use crate::exact::Exact;
 use crate::further::Fusion;
 use crate::generic::Generic;
-use crate::hypotheses::{Ranked, add_exact};
+use crate::hypotheses::{Ranked, add_hypotheses};
 use crate::modes::Leaves;
+use crate::multiple_hypothesis::MultipleHypothesis;
 use crate::node_sizes::NodeSizes;
 use crate::posterior::Posterior;
 
-/// The exact filter over sets of faults, or one of the library's over single faults.
+/// The multiple-hypothesis filter over sets of faults, or one of the library's over single faults.
 #[derive(Debug, Clone)]
 pub enum Engine {
     /// Sets of faults.
-    Exact(Box<Exact>),
+    MultipleHypothesis(Box<MultipleHypothesis>),
     /// Single faults.
     Generic(Box<Generic>),
 }
@@ -23,7 +23,7 @@ impl Engine {
     /// Starts from the nominal mode, as the detector knew it at `t_ns`.
     pub fn restart(&mut self, healthy: &Healthy, t_ns: u64) {
         match self {
-            Self::Exact(filter) => filter.restart(healthy, t_ns),
+            Self::MultipleHypothesis(filter) => filter.restart(healthy, t_ns),
             Self::Generic(filter) => filter.restart(healthy, t_ns),
         }
     }
@@ -32,7 +32,7 @@ impl Engine {
     #[must_use]
     pub fn limit(&self) -> usize {
         match self {
-            Self::Exact(filter) => filter.limit(),
+            Self::MultipleHypothesis(filter) => filter.limit(),
             Self::Generic(filter) => filter.limit(),
         }
     }
@@ -40,7 +40,7 @@ impl Engine {
     /// From the next observation on at most `count` hypotheses or particles.
     pub fn set_limit(&mut self, count: usize) {
         match self {
-            Self::Exact(filter) => filter.set_limit(count),
+            Self::MultipleHypothesis(filter) => filter.set_limit(count),
             Self::Generic(filter) => filter.set_limit(count),
         }
     }
@@ -49,7 +49,7 @@ impl Engine {
     #[must_use]
     pub fn count(&self) -> usize {
         match self {
-            Self::Exact(filter) => filter.hypotheses().len(),
+            Self::MultipleHypothesis(filter) => filter.hypotheses().len(),
             Self::Generic(filter) => filter.count(),
         }
     }
@@ -57,25 +57,25 @@ impl Engine {
     /// Takes one observation.
     pub fn step(&mut self, observation: &Observation, noise: NoiseScales) {
         match self {
-            Self::Exact(filter) => filter.step(observation, noise),
+            Self::MultipleHypothesis(filter) => filter.step(observation, noise),
             Self::Generic(filter) => filter.step(observation, noise),
         }
     }
 
-    /// Fills the probabilities of nodes, sets and unknown; the exact filter by what more channels
+    /// Fills the probabilities of nodes, sets and unknown; the first by what more channels
     /// say too.
     pub fn posterior(&mut self, leaves: &Leaves, fusion: Option<&Fusion>, out: &mut Posterior) {
         match self {
-            Self::Exact(filter) => filter.posterior(fusion, out),
+            Self::MultipleHypothesis(filter) => filter.posterior(fusion, out),
             Self::Generic(filter) => filter.posterior(leaves, out),
         }
     }
 
-    /// In which way each leaf's component is broken, and by how much: the exact filter knows.
+    /// In which way each leaf's component is broken, and by how much: the first filter knows.
     #[must_use]
     pub fn sizes(&self, leaves: &Leaves, posterior: &Posterior) -> NodeSizes {
         match self {
-            Self::Exact(filter) => NodeSizes::of(filter, leaves, posterior),
+            Self::MultipleHypothesis(filter) => NodeSizes::of(filter, leaves, posterior),
             Self::Generic(_) => NodeSizes::default(),
         }
     }
@@ -84,7 +84,7 @@ impl Engine {
     #[must_use]
     pub fn onset(&self, node: usize) -> u64 {
         match self {
-            Self::Exact(filter) => filter.onset(node),
+            Self::MultipleHypothesis(filter) => filter.onset(node),
             Self::Generic(filter) => filter.onset(node),
         }
     }
@@ -93,7 +93,7 @@ impl Engine {
     #[must_use]
     pub fn onset_unknown(&self) -> u64 {
         match self {
-            Self::Exact(filter) => filter.onset_unknown(),
+            Self::MultipleHypothesis(filter) => filter.onset_unknown(),
             Self::Generic(filter) => filter.onset_unknown(),
         }
     }
@@ -102,7 +102,7 @@ impl Engine {
     #[must_use]
     pub const fn degenerate_count(&self) -> u32 {
         match self {
-            Self::Exact(filter) => filter.degenerate_count(),
+            Self::MultipleHypothesis(filter) => filter.degenerate_count(),
             Self::Generic(filter) => filter.degenerate_count(),
         }
     }
@@ -110,7 +110,7 @@ impl Engine {
     /// Adds the hypotheses, or the particles.
     pub fn hypotheses(&self, leaves: &Leaves, out: &mut Ranked) {
         match self {
-            Self::Exact(filter) => add_exact(filter, leaves, out),
+            Self::MultipleHypothesis(filter) => add_hypotheses(filter, leaves, out),
             Self::Generic(filter) => filter.hypotheses(out),
         }
     }

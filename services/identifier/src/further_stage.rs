@@ -33,8 +33,8 @@ impl FurtherStage {
         capacity: usize,
     ) -> Option<Self> {
         let (model, robot, p_unknown) = (models.model, models.robot, settings.p_unknown);
-        let is_exact = settings.filter == schema::IdentifierFilter::Exact;
-        if sensors != schema::Sensors::All || !is_exact {
+        let holds_sets = settings.filter == schema::IdentifierFilter::MultipleHypothesis;
+        if sensors != schema::Sensors::All || !holds_sets {
             return None;
         }
         Some(Self {

@@ -7,8 +7,8 @@ use vigil_blocks::{
 use vigil_robot::learned::{Moved, triangle};
 
 use crate::encoders::Encoders;
-use crate::exact::Exact;
 use crate::modes::Leaves;
+use crate::multiple_hypothesis::MultipleHypothesis;
 use crate::sets::NEGLIGIBLE;
 
 /// Hypotheses that are collected before the least probable go.
@@ -82,11 +82,11 @@ struct Broken {
     share: f64,
 }
 
-/// Adds the hypotheses of the exact filter: each with every set of broken encoders that is not
+/// Adds those of the multiple-hypothesis filter: each with every set of broken encoders that is not
 /// negligible, for each wheel that may move the robot so.
-pub fn add_exact(exact: &Exact, leaves: &Leaves, out: &mut Ranked) {
+pub fn add_hypotheses(filter: &MultipleHypothesis, leaves: &Leaves, out: &mut Ranked) {
     let mut sets = [Broken::default(); 1 << WHEELS];
-    for (motion, hypothesis) in exact.hypotheses() {
+    for (motion, hypothesis) in filter.hypotheses() {
         let (track, p_unknown) = (&hypothesis.state.track, motion.p_unknown);
         let unknown = WeightedHypothesis {
             onset_t_capture_ns: hypothesis.onset,

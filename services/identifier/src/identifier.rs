@@ -11,15 +11,15 @@ use vigil_robot::learned::{Healthy, NoiseScales, Observation, Observer, motion_m
 use vigil_setup::schema;
 
 use crate::assemble::Models;
-use crate::check::{FURTHER_NEED_EXACT, check};
+use crate::check::{FURTHER_NEED_HYPOTHESES, check};
 use crate::detection::Detection;
 use crate::engine::Engine;
-use crate::exact::Exact;
 use crate::fault_rates::fault_rates;
 use crate::further_stage::FurtherStage;
 use crate::generic::Generic;
 use crate::hypotheses::{Ranked, copy};
 use crate::modes::{IdentifierError, Leaves};
+use crate::multiple_hypothesis::MultipleHypothesis;
 use crate::node_sizes::NodeSizes;
 use crate::posterior::Posterior;
 use crate::reasons::Reasons;
@@ -125,15 +125,15 @@ impl Identifier {
         let leaves = Leaves::new(tree, model, robot, sensors)?;
         let use_wheels = sensors != schema::Sensors::Pose;
         let (engine, modes) = match settings.filter {
-            schema::IdentifierFilter::Exact => {
+            schema::IdentifierFilter::MultipleHypothesis => {
                 let rates = fault_rates(&robot.fault_prior, &leaves, settings.p_unknown);
-                let mut filter = Exact::new(model, robot, &leaves, use_wheels, rates);
+                let mut filter = MultipleHypothesis::new(model, robot, &leaves, use_wheels, rates);
                 filter.set_limit(settings.particles.unwrap_or(usize::MAX));
                 let modes = filter.modes().to_vec();
-                (Engine::Exact(Box::new(filter)), modes)
+                (Engine::MultipleHypothesis(Box::new(filter)), modes)
             }
-            _ if leaves.need_exact() => {
-                return Err(IdentifierError::Build(FURTHER_NEED_EXACT.to_owned()));
+            _ if leaves.need_hypotheses() => {
+                return Err(IdentifierError::Build(FURTHER_NEED_HYPOTHESES.to_owned()));
             }
             _ => {
                 let filter = Generic::new(models, &leaves, settings, use_wheels, seed)?;
@@ -179,7 +179,7 @@ impl Identifier {
         })
     }
 
-    /// Most hypotheses of the exact filter, or particles of a sampled one, without a budget.
+    /// Most hypotheses of the multiple-hypothesis filter, or particles of a sampled one, without a budget.
     #[must_use]
     pub const fn particles(&self) -> u32 {
         self.particles as u32

@@ -117,7 +117,7 @@ impl Leaves {
     /// Whether there are leaves of which the paper's filters know nothing: of steering servos and
     /// pose, and those that gyro and currents alone can show.
     #[must_use]
-    pub fn need_exact(&self) -> bool {
+    pub fn need_hypotheses(&self) -> bool {
         let wheels = self.steer.iter().chain(&self.torque).chain(&self.current);
         wheels.chain([&self.gyro, &self.pose]).any(Option::is_some)
     }

@@ -5,8 +5,8 @@ use vigil_blocks::{FAULT_NODES, FaultBelief, SizeKind, WHEELS};
 use vigil_robot::learned::{MotionMode, Moved};
 
 use crate::encoders::{STATES, WAYS_TO_BREAK};
-use crate::exact::Exact;
 use crate::modes::Leaves;
+use crate::multiple_hypothesis::MultipleHypothesis;
 use crate::posterior::Posterior;
 
 /// Of a fault that is less probable nothing is told.
@@ -33,7 +33,7 @@ impl Default for NodeSizes {
 impl NodeSizes {
     /// What a filter holds of the leaves that are probable enough.
     #[must_use]
-    pub fn of(filter: &Exact, leaves: &Leaves, posterior: &Posterior) -> Self {
+    pub fn of(filter: &MultipleHypothesis, leaves: &Leaves, posterior: &Posterior) -> Self {
         let mut out = Self::default();
         let is_told = |node: &usize| posterior.nodes[*node] >= TOLD_MIN;
         for node in leaves.stuck.into_iter().flatten().filter(is_told) {
@@ -76,7 +76,7 @@ impl NodeSizes {
 }
 
 /// The most probable way in which an encoder is broken, its size and standard deviation.
-fn broken(filter: &Exact, wheel: usize) -> (SizeKind, (f64, f64)) {
+fn broken(filter: &MultipleHypothesis, wheel: usize) -> (SizeKind, (f64, f64)) {
     let mut sums = [0.0; STATES];
     for (MotionMode { moved, .. }, hypothesis) in filter.hypotheses() {
         if moved.is_unknown() {

@@ -286,12 +286,12 @@ pub const PARTICLES: usize = 256;
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Identifier {
-    /// Filter: `exact` (sets of faults), or one of those over single faults: `bootstrap`, `raised`,
-    /// `adaptive`, `risk-sensitive`, `hierarchical`, `look-ahead`, `imm`.
+    /// Filter: `multiple-hypothesis` (sets of faults), or one of those over single faults:
+    /// `bootstrap`, `raised`, `adaptive`, `risk-sensitive`, `hierarchical`, `look-ahead`, `imm`.
     pub filter: IdentifierFilter,
     /// Particles of a sampled filter, 32 to 1024, default 256; `look-ahead` has an eighth of them,
-    /// `imm` none. Of `exact`: the most hypotheses kept from one observation to the next, the most
-    /// probable ones; default as many as its tables hold, which drops none.
+    /// `imm` none. Of `multiple-hypothesis`: the most hypotheses kept from one observation to the
+    /// next, the most probable ones; default as many as its tables hold, which drops none.
     pub particles: Option<usize>,
     /// Kept frames from which an identification starts, s, 0.5 to 30.
     pub ring_s: f64,
@@ -303,9 +303,11 @@ pub struct Identifier {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum IdentifierFilter {
-    /// All sets of faults and their onsets.
+    /// Sets of faults and their onsets; `exact` in earlier configurations.
     #[default]
-    Exact,
+    #[serde(alias = "exact")]
+    #[value(alias = "exact")]
+    MultipleHypothesis,
     /// The classical particle filter: the model's own transitions.
     Bootstrap,
     /// Faults are tried more often than they occur, and weights pay for it.
@@ -343,7 +345,7 @@ fn write_name(value: &impl ValueEnum, f: &mut fmt::Formatter<'_>) -> fmt::Result
 impl Default for Identifier {
     fn default() -> Self {
         Self {
-            filter: IdentifierFilter::Exact,
+            filter: IdentifierFilter::MultipleHypothesis,
             particles: None,
             ring_s: 3.0,
             p_unknown: 0.01,

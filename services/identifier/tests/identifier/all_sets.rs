@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::SensorFrame;
-use vigil_identifier::{Exact, Leaves, Posterior};
+use vigil_identifier::{Leaves, MultipleHypothesis, Posterior};
 use vigil_inference::track::Track;
 use vigil_robot::Description;
 use vigil_robot::learned::wheel_evidence::{BREAKAGE_SHARES, BREAKAGES};
@@ -88,7 +88,8 @@ impl Rig {
             further: 1.0,
             death_1_s: 1.0 / 60.0,
         };
-        let mut filter = Exact::new(&self.model, &self.robot, &self.leaves, true, rates);
+        let mut filter =
+            MultipleHypothesis::new(&self.model, &self.robot, &self.leaves, true, rates);
         let (first, rest) = observations.split_first().unwrap();
         let start = Healthy {
             pose: first.pose.into(),

@@ -8,7 +8,7 @@ use vigil_setup::schema;
 use crate::alarm::Alarm;
 use crate::recorded;
 
-/// The exact filter on a run whose wheel RM sticks.
+/// The default filter on a run whose wheel RM sticks.
 struct Bench {
     identifier: Identifier,
     frames: Vec<SensorFrame>,

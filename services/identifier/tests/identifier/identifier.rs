@@ -29,7 +29,7 @@ struct Bench {
 
 impl Bench {
     fn new(sensors: schema::Sensors, alarm: Alarm) -> Self {
-        Self::with(schema::IdentifierFilter::Exact, sensors, alarm)
+        Self::with(schema::IdentifierFilter::MultipleHypothesis, sensors, alarm)
     }
 
     fn with(filter: schema::IdentifierFilter, sensors: schema::Sensors, alarm: Alarm) -> Self {
@@ -341,9 +341,9 @@ fn deep_tree() -> FaultTree {
 
 #[test]
 fn a_tree_may_have_any_depth() {
-    use schema::IdentifierFilter::{Exact, Hierarchical};
+    use schema::IdentifierFilter::{Hierarchical, MultipleHypothesis};
     let (frames, label) = unseen("LM_STUCK", "stuck");
-    for filter in [Exact, Hierarchical] {
+    for filter in [MultipleHypothesis, Hierarchical] {
         let alarm = Alarm::between(label.onset_s.unwrap() + 0.1, 99.0);
         let sensors = schema::Sensors::PoseEncoders;
         let mut bench = Bench::over(deep_tree(), filter, sensors, alarm);

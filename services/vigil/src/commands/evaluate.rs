@@ -39,7 +39,7 @@ pub struct Args {
     /// --sensors says. For a model of nominal behaviour alone: detection, by the sets it knows.
     #[arg(long, value_name = "OUT")]
     report: Option<PathBuf>,
-    /// Also compare these identification filters with `exact` on the same runs, for both sets of
+    /// Also compare these identification filters with `multiple-hypothesis` on the same runs, for both sets of
     /// channels. A model of nominal behaviour alone names no faults: refused there.
     #[arg(
         long,
@@ -71,7 +71,7 @@ enum Part {
 }
 
 impl Args {
-    /// Filters to compare, `exact` first; none if none were asked for.
+    /// Filters to compare, `multiple-hypothesis` first; none if none were asked for.
     fn entrants(&self) -> Vec<IdentifierFilter> {
         if self.filters.is_empty() {
             return Vec::new();
@@ -83,8 +83,8 @@ impl Args {
                 .any(|asked| *asked == name || asked == "all")
         };
         let variants = IdentifierFilter::value_variants().iter().copied();
-        let others = variants.filter(|f| *f != IdentifierFilter::Exact && asked(f));
-        [IdentifierFilter::Exact]
+        let others = variants.filter(|f| *f != IdentifierFilter::MultipleHypothesis && asked(f));
+        [IdentifierFilter::MultipleHypothesis]
             .into_iter()
             .chain(others)
             .collect()

@@ -157,7 +157,7 @@ fn check_filters(page: &Document<'_>, document: &Value) {
     for set in ["pose", "pose+encoders"] {
         let filters = document["filters"][set]["stuck"].as_array().unwrap();
         let names: Vec<&Value> = filters.iter().map(|row| &row["filter"]).collect();
-        assert_eq!(names, ["exact", "imm"]);
+        assert_eq!(names, ["multiple-hypothesis", "imm"]);
         assert!(filters[0]["leaf"]["after_2_s"]["difference"].is_null());
         let leaf = &filters[1]["leaf"]["after_2_s"];
         let p = |value: &Value, key: &str| 100.0 * value[key].as_f64().unwrap();

@@ -60,7 +60,7 @@ fn the_page_is_well_formed_and_loads_nothing() {
     let taxonomy = Taxonomy::new(&tree(), &robot());
     let (good, bad) = (cases("RM_STUCK"), cases("LM_STUCK"));
     let scores = [&good, &bad].map(|cases| score(cases, &taxonomy, 10.0));
-    let entrants = [("exact", &good), ("imm", &bad)];
+    let entrants = [("multiple-hypothesis", &good), ("imm", &bad)];
     let entrants = entrants.map(|(name, cases)| Entrant::new(name, cases, &taxonomy));
     let contest = contest(&entrants);
     let set = |name, i: usize, cases| SensorSet {
@@ -129,7 +129,11 @@ fn the_page_is_well_formed_and_loads_nothing() {
 fn filters_are_compared_run_by_run_with_the_first() {
     let taxonomy = Taxonomy::new(&tree(), &robot());
     let (good, bad) = (cases("RM_STUCK"), cases("LM_STUCK"));
-    let entrants = [("exact", &good), ("imm", &bad), ("raised", &good)];
+    let entrants = [
+        ("multiple-hypothesis", &good),
+        ("imm", &bad),
+        ("raised", &good),
+    ];
     let entrants = entrants.map(|(name, cases)| Entrant::new(name, cases, &taxonomy));
     let contest = contest(&entrants);
     assert_eq!(

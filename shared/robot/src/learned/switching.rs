@@ -1,7 +1,7 @@
 //! The learned model as a hybrid system, for the filters that take any: one fault at a time.
 //!
 //! Modes: nominal, each stuck wheel, each broken encoder (in any way), two kinds of unknown. The
-//! exact filter over sets of faults does better on this robot; this is what the other filters of
+//! filter over sets of faults does better on this robot; this is what the other filters of
 //! the library are run on, live and in comparisons. Where they only sample, the coloured deviations
 //! of the motion become white noise of the same power at low frequencies.
 

@@ -1,8 +1,8 @@
 //! Bayes over sets of faults and the unknown: a multiple-hypothesis filter, without sampling.
 //!
-//! Exact are the weights of the hypotheses that it holds, and the encoders given the motion. Not
-//! every hypothesis is held: new ones start from the most probable one of each number of stuck
-//! wheels, several wheels at once only where they read so, and the least probable are dropped.
+//! Encoders are weighed exactly, given the motion. Not every hypothesis about the motion is held:
+//! new ones start from the most probable one of each number of stuck wheels, several wheels at once
+//! only where they read so, and the least probable are dropped.
 //!
 //! The motion tells stuck wheels apart: one track per (motion mode, onset), a motion mode being
 //! nominal, any set of stuck wheels, or unknown. Broken encoders do not move the robot: given the
@@ -44,7 +44,7 @@ const PER_RARE: usize = 8;
 const FLOOR: f64 = -30.0;
 /// The filter.
 #[derive(Debug, Clone)]
-pub struct Exact {
+pub struct MultipleHypothesis {
     model: Model,
     robot: Description,
     leaves: Leaves,
@@ -66,7 +66,7 @@ pub struct Exact {
     degenerate_count: u32,
 }
 
-impl Exact {
+impl MultipleHypothesis {
     /// A filter over the leaves of a tree, whose faults come and go with these rates.
     #[must_use]
     pub fn new(

@@ -7,7 +7,7 @@ use vigil_inference::track::Displacement;
 use vigil_robot::learned::wheels::steering_angle;
 use vigil_robot::learned::{Moved, Observation, WheelEvidence};
 
-use super::{Exact, FLOOR};
+use super::{FLOOR, MultipleHypothesis};
 use crate::angles::Angles;
 use crate::encoders::Encoders;
 use crate::prepared::{EXPLAINED_S, Seen, age_s, changes_several, newly_stuck};
@@ -20,7 +20,7 @@ use crate::state::State;
 const SOON_S: f64 = 1.0;
 const SOON: f64 = 20.0;
 
-impl Exact {
+impl MultipleHypothesis {
     /// New hypotheses: a fault more, one less, or another one, or several wheels at once where
     /// these read so; from the most probable hypothesis of each kind.
     pub(super) fn spawn(&mut self, observation: &Observation, evidence: Option<&WheelEvidence>) {
