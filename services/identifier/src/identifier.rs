@@ -179,7 +179,7 @@ impl Identifier {
         })
     }
 
-    /// Most hypotheses of the multiple-hypothesis filter, or particles of a sampled one, without a budget.
+    /// Most hypotheses of the default filter, or particles of a sampled one, without a budget.
     #[must_use]
     pub const fn particles(&self) -> u32 {
         self.particles as u32

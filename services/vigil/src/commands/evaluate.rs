@@ -39,8 +39,8 @@ pub struct Args {
     /// --sensors says. For a model of nominal behaviour alone: detection, by the sets it knows.
     #[arg(long, value_name = "OUT")]
     report: Option<PathBuf>,
-    /// Also compare these identification filters with `multiple-hypothesis` on the same runs, for both sets of
-    /// channels. A model of nominal behaviour alone names no faults: refused there.
+    /// Also compare these identification filters with `multiple-hypothesis` on the same runs, for
+    /// both sets of channels. A model of nominal behaviour alone names no faults: refused there.
     #[arg(
         long,
         value_name = "LIST",

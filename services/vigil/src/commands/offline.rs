@@ -63,8 +63,8 @@ pub struct FilterArgs {
     /// Identification filter.
     #[arg(long, value_name = "NAME", value_enum, default_value_t)]
     pub identifier: IdentifierFilter,
-    /// Particles of a sampled identification filter, 32 to 1024, default 256; of `multiple-hypothesis` the
-    /// most hypotheses, by default all.
+    /// Particles of a sampled identification filter, 32 to 1024, default 256; of
+    /// `multiple-hypothesis` the most hypotheses, by default all.
     #[arg(
         long,
         value_name = "N",
