@@ -18,7 +18,8 @@ use crate::publisher::Publisher;
 use crate::sight::{self, Sight};
 use crate::watch::{Observed, Watch};
 
-/// Without monitors, pose log-odds beyond which the detector reports an error in position.
+/// Without monitors, pose log-odds beyond which the detector reports an error in position: even
+/// odds, as the planner weighs the symptom by its own model.
 const SYMPTOM_LOG_ODDS: f64 = 0.0;
 
 /// Why a detector was refused.

@@ -21,9 +21,14 @@ impl Angles {
     /// Takes the angles that were read, each of which begins or ceases to be as commanded with the
     /// probability `changes`; log-density over that of angles as commanded.
     pub fn step(&mut self, readings: &[Option<SteerReading>; WHEELS], changes: f64) -> f64 {
-        let angles = self.0.iter_mut().zip(readings);
-        let read = angles.filter_map(|(angle, reading)| Some((angle, reading.as_ref()?)));
-        read.map(|(angle, reading)| angle.step(reading.log_ratio_any(), changes))
+        let read = readings.iter().enumerate();
+        let read = read.filter_map(|(wheel, reading)| Some((wheel, reading.as_ref()?)));
+        read.map(|(wheel, reading)| self.step_one(wheel, reading, changes))
             .sum()
+    }
+
+    /// The same of one wheel's angle.
+    pub fn step_one(&mut self, wheel: usize, reading: &SteerReading, changes: f64) -> f64 {
+        self.0[wheel].step(reading.log_ratio_any(), changes)
     }
 }

@@ -26,15 +26,17 @@ use crate::node_sizes::TOLD_MIN;
 const OFFSETS: [f64; 12] = [
     -40.0, -16.0, -8.0, -4.0, -2.0, -1.0, 1.0, 2.0, 4.0, 8.0, 16.0, 40.0,
 ];
-/// Its factors: reversed, none, half, double.
+/// Its factors: reversed, none, half, double. What lies between is told to a factor of two.
 const GAINS: [f64; 4] = [-1.0, 0.0, 0.5, 2.0];
 /// Biases of a broken gyro, in deviations of its noise. The least is two tolerances of the rover.
 const BIASES: [f64; 10] = [-40.0, -20.0, -10.0, -5.0, -2.0, 2.0, 5.0, 10.0, 20.0, 40.0];
-/// Least deviation of a stuck wheel's effect on a current, in deviations of the sensor's noise.
+/// Least deviation of a stuck wheel's effect on a current, in deviations of the sensor's noise: as
+/// far as a healthy reading goes. An effect that is known to be small is no better known.
 const STUCK_SD_MIN: f64 = 4.0;
 /// Deviation of a current in the unknown, in those of its sensor's noise: beyond what slopes add.
 const UNKNOWN_CURRENT: f64 = 10.0;
-/// That of the yaw rate, as a share of the fastest turn that may be commanded.
+/// That of the yaw rate, as a share of the fastest turn that may be commanded: two deviations are
+/// any turn that the robot can make.
 const UNKNOWN_TURN: f64 = 0.5;
 /// Share of channels that have one: two of seven, as what is unknown moves some and not all.
 const ANYTHING: f64 = 0.3;

@@ -26,7 +26,8 @@ use crate::reasons::Reasons;
 use crate::reported::Reported;
 use crate::trouble::believed;
 
-/// A ring is worked off in about this time after an alarm, s.
+/// A ring is worked off in about this time after an alarm, s: two observations, so that no cycle
+/// computes for long and the name is late by no more than these.
 const CATCH_UP_S: f64 = 0.1;
 /// Observations since which the reasons of a diagnosis are looked for, at most.
 const REASONS_MAX: usize = 20;

@@ -9,7 +9,7 @@ use crate::modes::Leaves;
 use crate::multiple_hypothesis::MultipleHypothesis;
 use crate::posterior::Posterior;
 
-/// Of a fault that is less probable nothing is told.
+/// Of a fault that is less probable nothing is told: at the odds of a masked one a size is noise.
 pub const TOLD_MIN: f64 = 0.01;
 
 /// What is told of each node.

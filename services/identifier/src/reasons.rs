@@ -6,19 +6,27 @@
 //! moment ago, and owes its past to the best.
 
 use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
+use vigil_inference::alternative::Alternative;
+use vigil_inference::logspace::log_add;
 use vigil_inference::outlier::unvouched;
 use vigil_inference::track::Track;
 use vigil_robot::Description;
+use vigil_robot::learned::wheel_evidence::ANYTHING;
 use vigil_robot::learned::wheels::steering_angle;
 use vigil_robot::learned::{
     Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext, WheelEvidence,
 };
 
+use crate::angles::Angles;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
 use crate::prepared::is_new;
 use crate::rate_offsets::RateOffsets;
 use crate::servo::{Servo, ServoPrior};
+
+/// Probability that in the unknown a wheel or an angle begins or ceases to do anything, an
+/// observation: once in 1.4 h of 50 ms.
+const CHANGES: f64 = 1e-5;
 
 /// What a diagnosis may say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +47,9 @@ struct Lineage {
     track: Track,
     offsets: RateOffsets,
     servo: Option<Servo>,
+    /// In the unknown: which wheels and which angles do anything.
+    anything: [Alternative; WHEELS],
+    angles: Angles,
     /// Log-likelihood of the readings, by channel.
     heard: [f64; CHANNELS],
 }
@@ -151,6 +162,8 @@ impl Reasons {
                     }
                     _ => None,
                 },
+                anything: [Alternative::new(ANYTHING); WHEELS],
+                angles: Angles::default(),
                 heard: [0.0; CHANNELS],
             })
         };
@@ -202,7 +215,13 @@ impl Reasons {
             for wheel in 0..self.robot.wheels.len().min(WHEELS) {
                 let is_broken = lineage.broken >> wheel & 1 == 1;
                 lineage.heard[Channel::wheel_rate(wheel)] += if is_broken {
-                    evidence.broken_anyhow(wheel)
+                    // In any way, also by a size: then it reads a smooth rate of its own.
+                    let ways = [evidence.broken_anyhow(wheel), evidence.own_rate[wheel]];
+                    log_add(ways[0], ways[1]) - std::f64::consts::LN_2
+                } else if moved == Moved::UnknownAny {
+                    let healthy = evidence.healthy[wheel];
+                    let ratio = evidence.any[wheel] - healthy;
+                    healthy + lineage.anything[wheel].step(ratio, CHANGES)
                 } else if mode.turns_anyhow(wheel) && !is_new {
                     let dragged = evidence.dragged(&self.model, observation, mode, wheel);
                     let (model, offsets) = (&self.model, &mut lineage.offsets);
@@ -217,7 +236,7 @@ impl Reasons {
             for (wheel, reading) in evidence.steer.iter().enumerate() {
                 let Some(reading) = reading else { continue };
                 lineage.heard[Channel::steer(wheel)] += match (moved, &mut lineage.servo) {
-                    (Moved::UnknownAny, _) => reading.log_ratio_unsure(),
+                    (Moved::UnknownAny, _) => lineage.angles.step_one(wheel, reading, CHANGES),
                     (Moved::Steer(askew), Some(servo)) if askew == wheel => {
                         servo.step(&self.servo, reading)
                     }

@@ -7,7 +7,7 @@ use crate::further::Fusion;
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
 
-/// Hypotheses less probable than this are not divided among sets.
+/// Hypotheses less probable than this are not divided among sets: a tenth of [`FLOOR`].
 pub const NEGLIGIBLE: f64 = 1e-13;
 /// Row of a pose that has jumped, after those of the steering servos.
 const POSE: usize = WHEELS;

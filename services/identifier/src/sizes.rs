@@ -47,7 +47,7 @@ const RATES: f64 = 3.0;
 /// A drift is one if it passes the tolerance of a rate within this time, s. Chosen: a slower one is
 /// taken up as load.
 const DRIFTS_S: f64 = 5.0;
-/// Tolerances of a robot that declares none: share of the rate, and rad/s.
+/// Tolerances of a robot that declares none: share of the rate, and rad/s. The rover's.
 const UNDECLARED: (f64, f64) = (0.08, 0.06);
 /// Deviation by which a gain wanders from one reading to the next: 0.035 in a minute of 20 Hz, less
 /// than half a tolerance.

@@ -3,9 +3,10 @@
 
 use vigil_blocks::{FaultBelief, SizeKind};
 
-/// A size is clear when its standard deviation is this share of it or less.
+/// A size is clear when its standard deviation is this share of it or less: two are a fifth, as
+/// well as a size need be known.
 const CLEAR: f64 = 0.1;
-/// .. and the way has been the same for so many cycles: 0.2 s at 100 Hz.
+/// .. and the way has been the same for so many cycles: 0.2 s at 100 Hz, four observations.
 const CYCLES: u32 = 20;
 /// It is told anew when it has changed by more than this share. Two deviations of a clear one.
 const CHANGED: f64 = 0.2;

@@ -9,7 +9,7 @@ use crate::node_sizes::NodeSizes;
 use crate::posterior::Posterior;
 use crate::sets::entropy;
 
-/// Probability that something is wrong.
+/// Probability that something is wrong: what is seen needs no filter, and nothing is certain.
 const TROUBLE: f64 = 1.0 - 1e-6;
 /// Share of that which is the pose's where it walks while the wheels stand: a robot that slides or
 /// is pushed reads alike, and is rarer.

@@ -4,10 +4,11 @@ use vigil_setup::Setup;
 
 use crate::{Compensation, Supervisor, SupervisorError};
 
-/// Without any belief the robot stops after this long, ns, and not before so many misses.
+/// Without any belief the robot stops after this long, ns (two observations, 2 cm at 0.2 m/s), and
+/// not before so many misses: a single late cycle at a low rate is none.
 const BLIND_NS: u64 = 100_000_000;
 const BLIND_MISSES_MIN: u64 = 5;
-/// An action is valid for this long at least, ns.
+/// An action is valid for this long at least, ns: two cycles at 100 Hz.
 const VALIDITY_NS_MIN: f64 = 20e6;
 
 /// The supervisor that a configuration describes.

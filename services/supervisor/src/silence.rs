@@ -1,6 +1,6 @@
 //! Stages that are not heard.
 
-/// Diagnoses missed in a row after which a stage counts as lost.
+/// Diagnoses missed in a row after which a stage counts as lost: as a service's input does.
 const LOST_AFTER_MISSES: u32 = 3;
 /// Bit of `Action::lost_stages`: the identifier is lost.
 const IDENTIFIER_LOST: u32 = 1;

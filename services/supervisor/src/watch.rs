@@ -8,11 +8,12 @@ use vigil_robot::fused_alarm::{FusedAlarm, Said};
 
 use crate::supervisor::Inputs;
 
-/// Detections in a row without a diagnosis after which the identifier counts as lost.
+/// Detections in a row without a diagnosis after which the identifier counts as lost: as a
+/// service's input does.
 const LOST_AFTER: u32 = 3;
-/// A set of faults is reported from this probability on.
+/// A set of faults is reported from this probability on: more likely than not, as every name.
 const REPORTED: f64 = 0.5;
-/// Frames further apart than this, s, do not show what was between them.
+/// Frames further apart than this, s, do not show what was between them: ten observations.
 const STEP_MAX_S: f64 = 0.5;
 
 /// What decisions depend on besides beliefs.

@@ -31,7 +31,8 @@ const SUM_MIN: f64 = 1e-20;
 /// precision does not tell particles apart to half a unit.
 const LOG2_HOPELESS: f32 = -4e6;
 
-/// Coasted steps in a row after which the poses are drawn anew around the measured one.
+/// Coasted steps in a row after which the poses are drawn anew around the measured one. As
+/// `bootstrap::COASTED_MAX`.
 const COASTED_MAX: u32 = 5;
 
 /// A particle filter for a [`PlanarModel`]: single precision, 16 lanes, made for speed. All

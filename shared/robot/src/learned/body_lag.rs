@@ -21,7 +21,8 @@ const WINDOW: u32 = 20;
 /// e^3 = 20 leaves a rival of even odds a twentieth.
 const GAIN_MAX: f64 = 3.0;
 /// How far a displacement per metre changes with the command beyond its model, m/m and rad/m: in
-/// health, and while a fault is suspected. No lag is learned from that.
+/// health (the rover's tolerance), and while a fault is suspected (half of what a stuck wheel does).
+/// No lag is learned from that.
 const SLIP_SD: [f64; 2] = [0.03, 0.1];
 /// Part of a window's slip that enters the running estimate of it. Chosen: followed within three
 /// windows, 3 s.
@@ -31,7 +32,7 @@ const SLIP_SHARE: f64 = 0.3;
 /// deviations.
 const MISFIT_SHARE: f64 = 0.1;
 const MISFIT_CLIP: f64 = 9.0;
-/// A window with less travel than this says nothing on slip, m.
+/// A window with less travel than this says nothing on slip, m: four deviations of a pose of 5 mm.
 const TRAVEL_MIN_M: f64 = 0.02;
 /// Time for which an error of the prediction counts as one with those before, s: about as long as a
 /// change of the command and its correction by the pose take. Six of the longest lags.

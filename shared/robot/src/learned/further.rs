@@ -8,7 +8,7 @@ use super::Reading;
 use super::model::{ModelError, check_range, refuse};
 use crate::frame_guard::CURRENT_MAX_A;
 
-/// Below this rate the dry friction of a bearing turns round, rad/s.
+/// Below this rate the dry friction of a bearing turns round, rad/s: an encoder's noise.
 const DRY_RAD_S: f64 = 0.05;
 /// Yaw rates beyond this are no measurement, rad/s.
 const YAW_RATE_MAX_RAD_S: f64 = 1e3;

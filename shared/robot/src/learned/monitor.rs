@@ -53,7 +53,8 @@ const FOLLOWING: f64 = 0.1;
 /// Squared norm beyond which a single residual says no more for a deviation of any kind: it takes
 /// several to tell one from an outlier, as each gives 3.6 nats at most.
 const ANY_NORM_MAX: f64 = 12.0;
-/// Deviation of what a broken channel reads if it reads anything, in units of the residual's.
+/// Deviation of what a broken channel reads if it reads anything, in units of the residual's: that
+/// of an outlier.
 const ANYTHING: f64 = 10.0;
 /// Probability that a broken channel begins or ceases to read anything, an observation. Chosen:
 /// once in 2.5 s; each observation of one that does not costs 0.02 nats.

@@ -20,7 +20,8 @@ pub struct Curve {
 impl Curve {
     /// Number of terms.
     pub const TERMS: usize = 6;
-    /// Speeds below this one count as this one where a speed divides, m/s.
+    /// Speeds below this one count as this one where a speed divides, m/s: half of the slowest that
+    /// was learned from.
     pub const SPEED_FLOOR_M_S: f64 = 0.05;
 
     /// `by_m_s / |v|`: what changes the speed by the same at every speed, per commanded metre.

@@ -15,7 +15,8 @@ const UNKNOWN_SD: [f64; 3] = [0.25, 0.2, 0.12];
 /// turns against the robot. Chosen: most of it within the length of a tolerance, 8 m.
 const UNKNOWN_DRIFT_1_M: f64 = 0.1;
 /// Share of the unknown that only makes the pose jump, and how far, in deviations of its noise: a
-/// sensor that begins to lag, a slip of the map. Chosen: one unknown in ten, 2.3 nats.
+/// sensor that begins to lag, a slip of the map. Chosen: one unknown in ten, 2.3 nats; 0.1 m where
+/// the noise is 5 mm.
 const JUMP_SHARE: f64 = 0.1;
 const JUMP_SD: f64 = 20.0;
 /// Correlation length of the unknown's coloured deviations, m: stuck wheels have 0.12 to 0.16 m.
@@ -38,7 +39,8 @@ const fn ground(share: f64, factor: (f64, f64), throws: bool) -> OtherGround {
     }
 }
 
-/// By the pose alone.
+/// By the pose alone: harder, somewhat harder, softer, and hard enough to throw the robot. Chosen
+/// so that neighbours overlap within two deviations from none of the effect to twice.
 const OTHER_GROUNDS: [OtherGround; 4] = [
     ground(0.08, (0.3, 0.12), false),
     ground(0.08, (0.65, 0.2), false),

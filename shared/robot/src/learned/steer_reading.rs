@@ -14,7 +14,7 @@ use crate::Description;
 /// turns.
 pub const ANY_ANGLE_SD_RAD: f64 = 0.3;
 /// An angle that does anything is at most so much more likely than one as commanded (natural
-/// logarithm): a single reading decides nothing.
+/// logarithm): three times what an alarm needs, so that later readings can take it back.
 const RATIO_MAX: f64 = 30.0;
 
 /// A steering angle.

@@ -30,7 +30,7 @@ pub const MODES_MAX: usize = 2 * WHEELS + 3;
 const AT_ONSET: f64 = 0.05;
 /// Variance below which a motion has no density worth comparing.
 const VARIANCE_MIN: f64 = 1e-14;
-/// Side of the cells in which poses need not be told apart, m and rad.
+/// Side of the cells in which poses need not be told apart, m and rad: four deviations of a pose.
 const CELL: f64 = 0.02;
 
 /// One mode.

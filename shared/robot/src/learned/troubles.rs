@@ -11,7 +11,7 @@ use super::{Model, Observation};
 /// A channel that says nothing for so long is silent, s: chosen. Slower sensors are not supported.
 const SILENT_S: f64 = 2.0;
 /// A pose that repeats itself exactly for so long in motion is frozen, s: if in this run it has
-/// changed so often, and never stood for a quarter as long.
+/// changed so often (two seconds of 50 ms), and never stood for a quarter as long.
 const FROZEN_S: f64 = 1.0;
 const CHANGES: u32 = 40;
 /// Two poses less apart, relative to their size, are the same: means of equal numbers differ in the

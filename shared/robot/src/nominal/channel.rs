@@ -8,7 +8,7 @@ use crate::learned::Form;
 use crate::learned::monitor::Channels;
 
 /// Rate at which a wheel's sense of turning counts as half decided, rad/s: friction changes its
-/// sign with it.
+/// sign with it. A few deviations of a coarse encoder.
 const SENSE_RAD_S: f64 = 0.5;
 /// Rest after which a robot has stopped, s: motion then was not commanded. Chosen: as long as a
 /// robot may take to stop.
