@@ -3,8 +3,8 @@
 //! Its states are a whole robot, a motor that has lost a share of its torque, a current sensor that
 //! is dead, scaled or off, a gyro that is dead or off, a stuck wheel, and what nobody knows. A size
 //! is a grid. Given the fault these channels depend neither on the pose nor on the encoders, which
-//! the filter over sets of faults weighs ([`crate::multiple_hypothesis`]): probabilities of both are
-//! multiplied, over the prior that both contain. So hypotheses that say the same of a channel have one
+//! the other filter weighs ([`crate::multiple_hypothesis`]): probabilities of both are multiplied,
+//! over the prior that both contain. So hypotheses that say the same of a channel have one
 //! likelihood of it, and a broken encoder, a stuck wheel and a weak motor are told apart by what
 //! each makes of the currents.
 

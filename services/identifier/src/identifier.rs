@@ -26,8 +26,7 @@ use crate::reasons::Reasons;
 use crate::reported::Reported;
 use crate::trouble::believed;
 
-/// A ring is worked off in about this time after an alarm, s: two observations, so that no cycle
-/// computes for long and the name is late by no more than these.
+/// A ring is worked off in about this time after an alarm, s: the name is two observations late.
 const CATCH_UP_S: f64 = 0.1;
 /// Observations since which the reasons of a diagnosis are looked for, at most.
 const REASONS_MAX: usize = 20;

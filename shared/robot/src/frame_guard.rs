@@ -22,8 +22,8 @@ pub const YAW_MAX_RAD: f64 = 1e3;
 pub const STEER_MAX_RAD: f64 = PI;
 /// Largest motor current, A.
 pub const CURRENT_MAX_A: f64 = 1e4;
-/// Commands, wheel rates and yaw rates may exceed the robot's limits by this factor: a broken sensor
-/// must get through to the filters, a wrong unit (57, 60, 1000) must not.
+/// Commands, wheel rates and yaw rates may exceed the robot's limits by this factor: a broken
+/// sensor must get through to the filters, a wrong unit (57, 60, 1000) must not.
 pub const BEYOND_LIMITS: f64 = 10.0;
 /// Largest magnitude of a command on an axis that the robot's description does not know.
 pub const COMMAND_MAX: f64 = 1e6;

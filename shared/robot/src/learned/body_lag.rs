@@ -21,8 +21,8 @@ const WINDOW: u32 = 20;
 /// e^3 = 20 leaves a rival of even odds a twentieth.
 const GAIN_MAX: f64 = 3.0;
 /// How far a displacement per metre changes with the command beyond its model, m/m and rad/m: in
-/// health (the rover's tolerance), and while a fault is suspected (half of what a stuck wheel does).
-/// No lag is learned from that.
+/// health, and while a fault is suspected: half of the rover's tolerance, and three times as much.
+/// Chosen. No lag is learned from that.
 const SLIP_SD: [f64; 2] = [0.03, 0.1];
 /// Part of a window's slip that enters the running estimate of it. Chosen: followed within three
 /// windows, 3 s.

@@ -21,8 +21,8 @@ const SHARE_CURRENTS: f64 = 0.3;
 const SHARE_GYRO: f64 = 0.05;
 const SHARE_REPEATS: f64 = 0.05;
 /// Standard deviation of a fault's bias in units of the whitened residual: half the torque of one
-/// wheel moves its current by about half a deviation, a broken sensor by many; a gyro's bias of a
-/// tolerance by three.
+/// wheel moves its current by about half a deviation, a broken sensor by many.
+/// Chosen: it enters by its logarithm only.
 const BIAS_CURRENT: f64 = 1.0;
 const BIAS_GYRO: f64 = 3.0;
 

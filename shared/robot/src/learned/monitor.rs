@@ -5,8 +5,9 @@
 //! its predictive density, per group of channels: pose (3), each wheel rate, each steering angle.
 //! Per group the fault state takes one [`Form`]: it learns an unknown constant departure, of the
 //! motion or of the channel, or has a constant likelihood. An encoder that repeats itself exactly
-//! has a flag of its own, and one that is late another; over the pose stands the paper's constant likelihood besides
-//! ([`Constant`]). The groups' odds add up: a fault enters by one of them.
+//! has a flag of its own, and one that is late another (`lateness.rs`); over the pose stands
+//! the paper's constant likelihood besides ([`Constant`]). The groups' odds add up: a fault enters
+//! by one of them.
 //!
 //! The belief about the pose is as good as Gaussian, so no particles are needed to find the
 //! residuals: 256 of them were too few to tell a misjudged first heading from a fault.
