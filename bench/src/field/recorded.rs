@@ -5,7 +5,6 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use vigil_evaluation::learning::further;
 use vigil_evaluation::learning_nominal;
 use vigil_evaluation::scoring::Taxonomy;
 use vigil_evaluation::scoring::field::{Scorer, Stretch, Truth};
@@ -141,13 +140,7 @@ fn graph(root: &Path, name: &str) -> Result<Setup, Box<dyn Error>> {
 
 fn material(root: &Path, data: &Path, source: &Source) -> Result<Material, Box<dyn Error>> {
     match source.log.as_str() {
-        "left-out" | "grounds" | "mujoco" => {
-            let material = rover(root, data, &source.log)?;
-            match source.half {
-                Some(judged) => with_every_channel(root, material, judged),
-                None => Ok(material),
-            }
-        }
+        "left-out" | "grounds" | "mujoco" => rover(root, data, &source.log),
         "kobuki" => {
             let log = real::log("kobuki_wheel_fault", "kobuki")?;
             let whole = log.runs.into_iter().next().ok_or("no run")?;
@@ -201,30 +194,6 @@ fn rover(root: &Path, data: &Path, log: &str) -> Result<Material, Box<dyn Error>
             run,
         });
     }
-    Ok(Material {
-        taxonomy: super::taxonomy(&setup),
-        setup,
-        cases,
-    })
-}
-
-/// The same runs with gyro and currents, which are learned from every second one; the others are
-/// judged.
-fn with_every_channel(
-    root: &Path,
-    material: Material,
-    judged: usize,
-) -> Result<Material, Box<dyn Error>> {
-    let mut setup = graph(root, "rover-all")?;
-    let (cases, others): (Vec<Case>, Vec<Case>) = material
-        .cases
-        .into_iter()
-        .partition(|case| case.run.id as usize % 2 == judged);
-    let others: Vec<&frames::Run> = others.iter().map(|case| &case.run).collect();
-    let model = setup.model.clone().with_faults();
-    let mut model = model.ok_or("the rover's model has no faults")?;
-    further::learn(&mut model, &others, "every second run", &setup.robot)?;
-    setup.model = RobotModel::Faults(Box::new(model.sealed()));
     Ok(Material {
         taxonomy: super::taxonomy(&setup),
         setup,
@@ -341,14 +310,6 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<Scored>, Box<dyn E
             sensors: name,
             run: watch.scorer.finish(),
         });
-    }
-    if scored.is_empty() {
-        let sets = &job.scenario.sensors;
-        return Err(format!(
-            "{}: no set of sensors is called {sets:?}",
-            job.scenario.name
-        )
-        .into());
     }
     Ok(scored)
 }

@@ -9,6 +9,7 @@ use serde::Deserialize;
 use super::bar::Bar;
 use super::departure::Departure;
 use super::recorded::Source;
+use crate::simulated::ALL_SETS;
 
 /// The file of all scenarios.
 #[derive(Debug, Clone, Deserialize)]
@@ -215,6 +216,14 @@ impl File {
         let scenario = spread.map_err(|error| at(&error))?.concat();
         let mut names: Vec<&str> = scenario.iter().map(|s| s.name.as_str()).collect();
         names.sort_unstable();
+        let known = |name: &str| ALL_SETS.iter().any(|(_, set)| *set == name);
+        for Scenario { name, sensors, .. } in &scenario {
+            if let Some(other) = sensors.iter().find(|set| !known(set)) {
+                let allowed = ALL_SETS.map(|(_, set)| set).join(", ");
+                let error = format!("scenario '{name}': sensors '{other}': allowed are {allowed}");
+                return Err(at(&error).into());
+            }
+        }
         if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
             return Err(at(&format!("scenario '{}' appears twice", twice[0])).into());
         }

@@ -74,10 +74,12 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let outcomes = measure(&graph, &library, &scenarios, &all)?;
     let wall_s = began.elapsed().as_secs_f64();
     let document = document(&outcomes, machine::facts(), wall_s, args.scale);
-    // What never happened meets nothing.
-    let is_met = outcomes
+    // What never happened meets nothing, nor does what could not be driven.
+    let is_whole = scenarios
         .iter()
-        .all(|o| o.bars().all(|(_, met)| met == Some(true)));
+        .all(|scenario| outcomes.iter().any(|o| o.scenario.name == scenario.name));
+    let mut bars = outcomes.iter().flat_map(Outcome::bars);
+    let is_met = is_whole && bars.all(|(_, met)| met == Some(true));
     match args.json {
         true => println!("{document:#}"),
         false => show(args, &outcomes, &document)?,

@@ -30,17 +30,24 @@ pub fn assemble(setup: &Setup) -> Result<Detector, DetectorError> {
 /// What of the robot's channels the detector looks at: what is wrong with the others hides nothing.
 fn looked_at(setup: &Setup) -> Measured {
     let measured = setup.robot.measured;
+    let sensors = setup.file.detector.sensors;
+    if sensors == Sensors::Pose {
+        return Measured {
+            pose: measured.pose,
+            wheel_rates: false,
+            steer: false,
+            yaw_rate: false,
+            currents: false,
+        };
+    }
     let RobotModel::Faults(model) = &setup.model else {
         return measured;
     };
-    let further = model.further.as_ref();
-    let further = further.filter(|_| setup.file.detector.sensors == Sensors::All);
-    let use_wheels = setup.file.detector.sensors != Sensors::Pose;
+    // The rover's description leaves out what only some of its graphs use.
+    let further = model.further.as_ref().filter(|_| sensors == Sensors::All);
     Measured {
-        pose: measured.pose,
-        wheel_rates: use_wheels && measured.wheel_rates,
-        steer: use_wheels && measured.steer,
         yaw_rate: further.is_some_and(|further| further.yaw_rate.is_some()),
         currents: further.is_some_and(|further| further.currents.is_some()),
+        ..measured
     }
 }

@@ -29,7 +29,7 @@ const OFFSETS: [f64; 12] = [
 /// Its factors: reversed, none, half, double. What lies between is told to a factor of two.
 const GAINS: [f64; 4] = [-1.0, 0.0, 0.5, 2.0];
 /// Biases of a broken gyro, in deviations of its noise. The least is two tolerances of the rover.
-const BIASES: [f64; 10] = [-40.0, -20.0, -10.0, -5.0, -2.0, 2.0, 5.0, 10.0, 20.0, 40.0];
+const BIASES: [f64; 10] = [-40.0, -16.0, -8.0, -4.0, -2.0, 2.0, 4.0, 8.0, 16.0, 40.0];
 /// Least deviation of a stuck wheel's effect on a current, in deviations of the sensor's noise: as
 /// far as a healthy reading goes. An effect that is known to be small is no better known.
 const STUCK_SD_MIN: f64 = 4.0;
@@ -208,7 +208,7 @@ impl FurtherFilter {
             let (whole, mut changed) = (p[0], 0.0);
             let faults = p.iter_mut().zip(&self.shares).zip(&self.states).skip(1);
             // What nothing shows does not change.
-            for ((p, share), _) in faults.filter(|(_, state)| state.is_read(residuals)) {
+            for ((p, share), _) in faults.filter(|(_, state)| state.is_read(further)) {
                 let gained = whole * birth * share - *p * death;
                 *p += gained;
                 changed += gained;
@@ -392,7 +392,7 @@ fn cell(kind: SizeKind, size: f64) -> f64 {
         // Mean spacing of the shares.
         SizeKind::TorqueShareLost => 0.17,
         SizeKind::Gain => 0.5,
-        // Each is twice the one before: sqrt 2 - 1 / sqrt 2.
+        // Each is about twice the one before: sqrt 2 - 1 / sqrt 2.
         SizeKind::CurrentOffsetA | SizeKind::RateBiasRadS => 0.7 * size.abs(),
         _ => 0.0,
     }

@@ -1,8 +1,8 @@
 //! What gyro and currents may show.
 
-use vigil_blocks::SizeKind;
+use vigil_blocks::{SizeKind, WHEELS};
+use vigil_robot::learned::Further;
 use vigil_robot::learned::current_effects::SHARES;
-use vigil_robot::learned::further_watch::Residuals;
 
 /// What may be wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,18 +38,19 @@ impl State {
         }
     }
 
-    /// True if the observation holds a channel that shows it.
-    pub(crate) fn is_read(self, residuals: &Residuals) -> bool {
-        let currents = &residuals.currents;
+    /// True if the observation holds a channel that shows it. A dead sensor is read: it repeats
+    /// itself.
+    pub(crate) fn is_read(self, further: &Further) -> bool {
+        let gyro = further.yaw_rate.count() > 0;
+        let current = |wheel: usize| further.currents[wheel].count() > 0;
         match self {
             // A motor's load is carried by the others.
-            Self::Whole | Self::Unknown | Self::Torque(..) | Self::Stuck(_) => {
-                residuals.yaw_rate.is_some() || currents.iter().any(Option::is_some)
-            }
+            Self::Torque(..) => (0..WHEELS).any(current),
+            Self::Whole | Self::Unknown | Self::Stuck(_) => gyro || (0..WHEELS).any(current),
             Self::CurrentDead(wheel)
             | Self::CurrentOffset(wheel, _)
-            | Self::CurrentGain(wheel, _) => currents[wheel].is_some(),
-            Self::GyroDead | Self::GyroBias(_) => residuals.yaw_rate.is_some(),
+            | Self::CurrentGain(wheel, _) => current(wheel),
+            Self::GyroDead | Self::GyroBias(_) => gyro,
         }
     }
 }

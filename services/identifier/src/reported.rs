@@ -1,6 +1,7 @@
 //! The reported mode: the memoryless one with the one hysteresis.
 
 use vigil_blocks::{MODE_MULTIPLE, MODE_UNKNOWN};
+use vigil_robot::fused_alarm;
 
 use crate::modes::Leaves;
 use crate::posterior::Posterior;
@@ -8,11 +9,6 @@ use crate::posterior::Posterior;
 /// A held name is given up for another one when its own probability is below this. A rival needs
 /// half; with 0.2 left to a third, two alike do not swap.
 const HELD_MIN: f64 = 0.3;
-/// A held name is given up for the nominal mode when that has been more probable than this ..
-const NOMINAL_MIN: f64 = 0.5;
-/// .. for this long, s of motion: when the alarm falls, so that the two contradict each other for
-/// no longer (`vigil_robot::FusedAlarm`).
-const NOMINAL_S: f64 = 1.0;
 /// Slack when that time is compared, s: it is a sum of short intervals.
 const SLACK_S: f64 = 1e-6;
 
@@ -52,14 +48,15 @@ impl Reported {
         leaves: &Leaves,
         moved_s: f64,
     ) {
-        let is_nominal = mode == 0 && p_mode > NOMINAL_MIN;
+        // As the alarm falls: the two contradict each other for no longer.
+        let is_nominal = mode == 0 && p_mode > fused_alarm::NOMINAL;
         self.nominal_s = if is_nominal {
             self.nominal_s + moved_s
         } else {
             0.0
         };
         let gives_way = if mode == 0 {
-            self.nominal_s >= NOMINAL_S - SLACK_S
+            self.nominal_s >= fused_alarm::NOMINAL_S - SLACK_S
         } else {
             // What holds with the held name is no rival of it, but says more.
             let implied = if self.is_implied_by(mode, leaves) {
@@ -138,16 +135,16 @@ mod tests {
         reported.take((MODE_UNKNOWN, 0.8), &belief(0.0, 0.2, 0.8), &leaves, 0.05);
         assert_eq!((reported.name(), reported.changes()), (MODE_UNKNOWN, 2));
         for _ in 0..9 {
-            reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), &leaves, 0.1);
+            reported.take((0, 0.55), &belief(0.55, 0.0, 0.45), &leaves, 0.1);
         }
         // A moment of doubt begins the second anew; time at rest does not count.
         reported.take((MODE_UNKNOWN, 0.55), &belief(0.45, 0.0, 0.55), &leaves, 0.1);
         for _ in 0..9 {
-            reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), &leaves, 0.1);
-            reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), &leaves, 0.0);
+            reported.take((0, 0.55), &belief(0.55, 0.0, 0.45), &leaves, 0.1);
+            reported.take((0, 0.55), &belief(0.55, 0.0, 0.45), &leaves, 0.0);
         }
         assert_eq!(reported.name(), MODE_UNKNOWN);
-        reported.take((0, 0.95), &belief(0.95, 0.0, 0.05), &leaves, 0.1);
+        reported.take((0, 0.55), &belief(0.55, 0.0, 0.45), &leaves, 0.1);
         assert_eq!((reported.name(), reported.changes()), (0, 3));
     }
 

@@ -1,8 +1,6 @@
 //! Diagnosis of a robot whose faults nobody has modelled: nominal, or unknown.
 
-use vigil_blocks::{
-    DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, ParticleBlock, Readiness,
-};
+use vigil_blocks::{DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, ParticleBlock, Readiness};
 use vigil_inference::FaultTree;
 
 use crate::blindfold::Blindfold;

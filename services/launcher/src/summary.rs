@@ -267,19 +267,7 @@ impl fmt::Display for Summary {
                 "  latencies of a restarted service are those since its last start"
             )?;
         }
-        if self.saw_nothing() {
-            writeln!(
-                f,
-                "  no cycle ran through all services: no frame came, or none was good"
-            )?;
-        }
-        for (name, causes) in &self.blind {
-            let causes = causes
-                .iter()
-                .map(|(cause, s)| format!("{s:.1} s ({cause})"));
-            let causes = causes.collect::<Vec<_>>().join(", ");
-            writeln!(f, "  {name} was blind: {causes}")?;
-        }
+        self.unseen(f)?;
         writeln!(f, "  timeline:")?;
         for event in &self.events {
             writeln!(f, "  {event}")?;
@@ -296,6 +284,24 @@ impl Summary {
         ServiceName::ALL
             .iter()
             .filter_map(|name| self.services.get(name.as_str()).map(|s| (name.as_str(), s)))
+    }
+
+    /// Says openly what was not seen.
+    fn unseen(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.saw_nothing() {
+            writeln!(
+                f,
+                "  no cycle ran through all services: no frame came, or none was good"
+            )?;
+        }
+        for (name, causes) in &self.blind {
+            let causes = causes
+                .iter()
+                .map(|(cause, s)| format!("{s:.1} s ({cause})"));
+            let causes = causes.collect::<Vec<_>>().join(", ");
+            writeln!(f, "  {name} was blind: {causes}")?;
+        }
+        Ok(())
     }
 
     /// Says openly which services share a core, and what was not permitted.

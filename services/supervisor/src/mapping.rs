@@ -223,17 +223,22 @@ pub(crate) fn actions(
         .collect()
 }
 
-/// Factor of the speed where the settings name none: that of the configurations in `config/`.
+/// Factor of the speed where the settings name none. Who slows down or compensates does so as the
+/// configurations in `config/` say.
 const fn usual_speed_scale(kind: RecoveryKind) -> f64 {
     match kind {
-        RecoveryKind::Stop
+        RecoveryKind::None
+        | RecoveryKind::Stop
         | RecoveryKind::CallForHelp
         | RecoveryKind::NewPath
         | RecoveryKind::Relocalise
         | RecoveryKind::GiveUp => 0.0,
         RecoveryKind::SlowDown => 0.5,
         RecoveryKind::Compensate => 0.7,
-        _ => 1.0,
+        RecoveryKind::GoOn
+        | RecoveryKind::IgnoreEncoder
+        | RecoveryKind::GoThrough
+        | RecoveryKind::MoveAway => 1.0,
     }
 }
 

@@ -6,10 +6,10 @@
 //! motion at most: then the identifier's word counts, until it takes that back or the detector
 //! raises another alarm.
 
-/// A diagnosis that is nominal by more than this contradicts an alarm ..
-const NOMINAL: f64 = 0.5;
-/// .. and ends it after so much motion, s: which includes being all but certain for so long.
-const NOMINAL_S: f64 = 1.0;
+/// A diagnosis that is nominal by more than this contradicts an alarm, and a name ..
+pub const NOMINAL: f64 = 0.5;
+/// .. and ends both after so much motion, s.
+pub const NOMINAL_S: f64 = 1.0;
 /// An alarm that a nominal diagnosis has ended stands again once that is below this. Chosen: 0.2
 /// below what ends it, so that a diagnosis at even odds does not toggle it.
 const DOUBTED: f64 = 0.3;

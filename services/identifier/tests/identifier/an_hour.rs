@@ -13,8 +13,8 @@ use crate::recorded::{model, path, robot};
 
 const END_S: f64 = 3600.0;
 
-/// Drives for an hour; from five seconds after the fault on its set keeps a probability of .9, and
-/// no encoder of a wheel that stands more than the odds at which a masked fault comes and goes.
+/// Drives for an hour. From five seconds after the fault on, its set keeps a probability of .9. The
+/// encoder of a wheel that stands is broken with 1 % at most: nothing shows it.
 fn keeps_its_name(faults: Faults, seed: u64) {
     let (model, robot): (_, Description) = (model(), robot());
     let tree = vigil_setup::load_tree(&path("config/trees/rover.toml")).unwrap();

@@ -116,9 +116,44 @@ fn channels_that_are_not_read_move_no_odds() {
     for factor in fusion.stuck[..6].iter().chain([&fusion.unknown.0]) {
         assert!((factor - 1.0).abs() < 1e-6, "{factor}");
     }
-    // No leaf becomes likely while nothing shows it.
-    for odds in ["LM_TORQUE", "GYRO"].map(|leaf| rover.odds(&fusion, leaf)) {
-        assert!(odds < 1e-6, "{odds}");
+    // No leaf becomes likely while nothing shows it; a channel that is read shows its own alone.
+    let zero = Residual {
+        apart: 0.0,
+        variance: 1.0,
+        expected: 0.0,
+        outlier_rate: 1e-10,
+    };
+    let read = Reading {
+        plain: 1,
+        ..Reading::default()
+    };
+    for (further, hidden) in [
+        (Further::default(), ["LM_TORQUE", "GYRO"].as_slice()),
+        (
+            Further {
+                yaw_rate: read,
+                ..Further::default()
+            },
+            &["LM_TORQUE", "LM_CURRENT"],
+        ),
+        (
+            Further {
+                currents: [read; WHEELS],
+                ..Further::default()
+            },
+            &["GYRO"],
+        ),
+    ] {
+        let mut filter = rover.filter();
+        let residuals = Residuals {
+            currents: further.currents.map(|it| (it.plain > 0).then_some(zero)),
+            yaw_rate: (further.yaw_rate.plain > 0).then_some(zero),
+        };
+        (0..2000).for_each(|_| filter.step(&observation, &further, &residuals));
+        for leaf in hidden {
+            let odds = rover.odds(&filter.fusion(), leaf);
+            assert!(odds < 1e-6, "{leaf}: {odds}");
+        }
     }
 }
 

@@ -98,6 +98,19 @@ fn a_cleared_fault_lets_the_rover_go_on_after_a_while() {
 }
 
 #[test]
+fn who_ignores_an_encoder_goes_on_as_before_after_a_while_too() {
+    let mut world = World::new();
+    world.rest(50, true, &[("RM_ENC", 1.0)]);
+    assert_eq!(world.kind(), RecoveryKind::IgnoreEncoder);
+    assert_eq!(world.action.speed_scale, 1.0);
+    let nominal = [("ND", 0.998), ("RM_ENC", 0.001), ("UNKNOWN", 0.001)];
+    world.rest(180, false, &nominal);
+    assert_eq!(world.kind(), RecoveryKind::IgnoreEncoder);
+    world.rest(40, false, &nominal);
+    assert_eq!(world.kind(), RecoveryKind::GoOn);
+}
+
+#[test]
 fn help_is_called_only_when_the_unknown_lasts() {
     let mut world = World::new();
     let unknown = [("UNKNOWN", 0.99), ("ND", 0.01)];

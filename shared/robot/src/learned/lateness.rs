@@ -1,8 +1,8 @@
 //! Odds that an encoder is late, for the detector: it reads what its wheel did a moment ago.
 //!
 //! Such a fault shows only while the rate changes, and is no constant bias: what one change says
-//! for it must last until the next. Each delay of a grid is a fault of its own, whose odds are
-//! exact: `(odds + birth) x likelihood ratio` (Shiryaev).
+//! for it must last until the next. Each delay of a grid is a fault of its own with the odds
+//! `(odds + birth) x likelihood ratio` (Shiryaev), where a reading shows it.
 
 use vigil_blocks::WHEELS;
 use vigil_inference::ages::LOG_ODDS_MAX;
@@ -79,9 +79,15 @@ impl Lateness {
         (self.wheels[wheel].all, self.wheels[wheel].gain)
     }
 
-    /// Takes readings of wheels that turn at `rates`, or stand, at `t_ns`; `birth` is the
-    /// probability that an encoder has become late since the last ones. By delays that nothing
-    /// shows it does not.
+    /// The wheels stand at `t_ns`.
+    pub fn rest(&mut self, t_ns: u64) {
+        self.past.keep(t_ns, [(0.0, 0.0); WHEELS]);
+        self.wheels.iter_mut().for_each(|odds| odds.gain = 0.0);
+    }
+
+    /// Takes readings of wheels that turn at `rates` at `t_ns`; `birth` is the
+    /// probability that an encoder has become late since the last ones. A delay at which the rate
+    /// was the same gains nothing.
     pub fn step(
         &mut self,
         t_ns: u64,
@@ -112,11 +118,14 @@ impl Odds {
         for (i, (rate, variance)) in then.into_iter().enumerate().filter(|(i, _)| shows[*i]) {
             before[i] = log_add(before[i], born);
             let late = reading.log_density(reading.read_rad_s - rate, variance + reading.noise);
-            let said = if late.is_finite() { late - timely } else { 0.0 };
-            self.delays[i] = (before[i] + said).min(LOG_ODDS_MAX);
+            let said = late - timely;
+            self.delays[i] = before[i] + if said.is_finite() { said } else { 0.0 };
         }
         self.all = log_sum_exp(&self.delays);
         self.gain = self.all - log_sum_exp(&before);
+        let excess = (self.all - LOG_ODDS_MAX).max(0.0);
+        self.delays.iter_mut().for_each(|odds| *odds -= excess);
+        self.all -= excess;
     }
 }
 
@@ -173,15 +182,36 @@ mod tests {
             late.step(k * PERIOD_NS, [(rate, WIDTH); WHEELS], &readings, 1e-6);
             late.odds(0)
         };
-        (0..50).for_each(|k| drop(at(k, 1.5, 1.5)));
         // It turns faster, and reads so 0.5 s later.
-        (50..60).for_each(|k| drop(at(k, 1.5, 2.5)));
-        (60..120).for_each(|k| drop(at(k, 2.5, 2.5)));
+        for (from, to, read, rate) in [(0, 50, 1.5, 1.5), (50, 60, 1.5, 2.5), (60, 120, 2.5, 2.5)] {
+            (from..to).for_each(|k| {
+                at(k, read, rate);
+            });
+        }
         let (odds, _) = at(120, 2.5, 2.5);
         assert!(odds > 20.0, "{odds}");
         for k in 121..2000 {
             assert_eq!(at(k, 2.5, 2.5), (odds, 0.0));
         }
+    }
+
+    #[test]
+    fn at_its_bound_each_change_still_speaks_for_it() {
+        let mut late = Lateness::default();
+        let (mut gained, mut most) = (0.0, 0.0_f64);
+        for k in 1..12_000_u64 {
+            let rate = |k: u64| [1.5, 2.5, 2.0][(k / 60 % 3) as usize];
+            let mut readings = [None; WHEELS];
+            readings[0] = Some(reading(rate(k.saturating_sub(10)), rate(k)));
+            late.step(k * PERIOD_NS, [(rate(k), WIDTH); WHEELS], &readings, 1e-6);
+            most = most.max(late.odds(0).0);
+            if k > 6_000 {
+                gained += late.odds(0).1;
+            }
+        }
+        // 100 changes, each of which shows in ten readings.
+        assert!(gained > 1e3, "{gained}");
+        assert!(most <= LOG_ODDS_MAX);
     }
 
     #[test]

@@ -285,8 +285,7 @@ impl Monitor {
             self.step_wheels(observation, following, scales);
             self.step_steer(observation, scales);
         } else if self.channels.use_wheels() {
-            let stands = ([(0.0, 0.0); WHEELS], [None; WHEELS]);
-            self.late.step(observation.t_ns, stands.0, &stands.1, 0.0);
+            self.late.rest(observation.t_ns);
         }
         self.sum_up();
     }

@@ -48,8 +48,11 @@ impl PastRates {
         self.count = 0;
     }
 
-    /// Keeps the rates at `t_ns`.
+    /// Keeps the rates at `t_ns`; where the clock was set back, forgets those before.
     pub fn keep(&mut self, t_ns: u64, rates: Rates) {
+        if t_ns < self.past[self.last].0 {
+            self.clear();
+        }
         self.last = (self.last + 1) % KEPT;
         self.past[self.last] = (t_ns, rates);
         self.count = (self.count + 1).min(KEPT);
@@ -101,12 +104,14 @@ mod tests {
     #[test]
     fn rates_between_two_instants_are_interpolated() {
         let mut rates = PastRates::default();
-        for k in 0..60_u64 {
+        for k in 0..200_u64 {
             rates.keep(k * 50_000_000, [(k as f64, 0.0); WHEELS]);
         }
         for (then, delay_s) in rates.then(0).into_iter().zip(DELAYS_S) {
-            assert!((then.0 - (59.0 - delay_s / 0.05)).abs() < 1e-6);
+            assert!((then.0 - (199.0 - delay_s / 0.05)).abs() < 1e-6);
             assert!(rates.differs(0, then));
         }
+        rates.keep(1, [(7.0, 0.0); WHEELS]);
+        assert!(rates.then(0).iter().all(|then| *then == (7.0, 0.0)));
     }
 }

@@ -110,8 +110,8 @@ pub enum Gate {
 pub struct RecoveryAction {
     /// Kind of the recovery.
     pub kind: Recovery,
-    /// Factor on the commanded speed, 0 to 1; default 1 (0 for what is done
-    /// standing: `stop`, `call_for_help`, `new_path`, `relocalise`, `give_up`).
+    /// Factor on the commanded speed, 0 to 1; default 1, 0.5 to `slow_down`, 0.7 to `compensate`, 0
+    /// for what is done standing: `stop`, `call_for_help`, `new_path`, `relocalise`, `give_up`.
     pub speed_scale: Option<f64>,
 }
 
