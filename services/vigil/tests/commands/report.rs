@@ -236,8 +236,8 @@ fn a_page_that_cannot_be_written_and_a_filter_that_does_not_exist_are_refused_fi
         (["--report", &missing], "--report: there is no folder"),
         (["--report", &place], "is a folder, a file is wanted"),
         (
-            ["--filters", "exact,kalman"],
-            "possible values: exact, bootstrap",
+            ["--filters", "multiple-hypothesis,kalman"],
+            "possible values: multiple-hypothesis, bootstrap",
         ),
     ] {
         let output = evaluate(&[&["--frames", "none.csv"][..], &option].concat());
