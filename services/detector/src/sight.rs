@@ -144,7 +144,12 @@ impl Sight {
             }
             self.run_s = 0.0;
         }
-        self.run_s += scheduled_s.clamp(0.0, BLIND_S);
+        // A recording may be played faster than it was made.
+        let run_s = match self.judges_clock {
+            true => scheduled_s,
+            false => captured_s,
+        };
+        self.run_s += run_s.clamp(0.0, BLIND_S);
         if self.run_s >= SHORT_S {
             (self.short_runs, self.short_s) = (0, 0.0);
         }
@@ -295,6 +300,15 @@ mod tests {
         assert_eq!(lost(|k, f| f.run_id = k.min(110) / 50), None);
         // Quick restarts after a long run are no second yet.
         assert_eq!(lost(|k, f| f.run_id = (k.clamp(250, 259) - 250) / 3), None);
+        // Twenty times as fast, ten seconds of a recording are half a second.
+        let mut recorded = Sight::new(all_channels(2), COMMAND).in_graph(PERIOD_S, false);
+        for k in 0..500 {
+            let mut frame = frame(k);
+            frame.run_id = k / 25;
+            frame.header.t_capture_ns += 19 * k * PERIOD_NS;
+            recorded.take(&frame);
+            assert_eq!(recorded.blind(), None, "frame {k}");
+        }
         let mut sight = sight();
         let mut blind = Vec::new();
         for k in 0..500 {

@@ -110,9 +110,7 @@ impl Generic {
         let refuse = |error: &dyn std::fmt::Display| IdentifierError::Build(error.to_string());
         let raised = |model: &Switching| Proposal::raised(model, RAISED).map_err(|e| refuse(&e));
         let kind = match settings.filter {
-            IdentifierFilter::MultipleHypothesis => {
-                return Err(refuse(&"multiple-hypothesis is not one of these filters"));
-            }
+            IdentifierFilter::MultipleHypothesis => return Err(refuse(&"not one of these")),
             IdentifierFilter::Bootstrap => {
                 Kind::Sampled(sampled(Proposal::prior(&switching), switching))
             }
