@@ -19,7 +19,7 @@ use super::run::{Job, Scored, Watch};
 use super::scenario::Scenario;
 use super::timeline::Timeline;
 use crate::real;
-use crate::simulated::{ALL_SETS, Stages};
+use crate::simulated::Stages;
 
 /// Velocity from which a robot counts as driving, m/s and rad/s.
 const DRIVES: f64 = 0.005;
@@ -277,10 +277,7 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<Scored>, Box<dyn E
     } = material;
     let case = cases.get(job.run).ok_or("there is no such run")?;
     let mut scored = Vec::new();
-    for (sensors, name) in ALL_SETS {
-        if !job.scenario.sensors.iter().any(|asked| asked == name) {
-            continue;
-        }
+    for (sensors, name) in job.scenario.sets() {
         let period_s = case.period_s();
         let seed = u64::from(case.run.id);
         let truth = case.truth(sensors, taxonomy);

@@ -19,7 +19,7 @@ use super::ground::{Ground, stream};
 use super::recorded::{self, Library, Material};
 use super::scenario::{File, Scenario};
 use super::timeline::Timeline;
-use crate::simulated::{ALL_SETS, Stages};
+use crate::simulated::Stages;
 
 /// Commanded speed from which a robot drives, m/s.
 const DRIVES_M_S: f64 = 0.005;
@@ -190,11 +190,7 @@ pub fn run(graph: &Graph, library: &Library, job: &Job<'_>) -> Result<Vec<Scored
         return recorded::play(material, job).map_err(|error| named(error.to_string()));
     }
     let conditions = Conditions::draw(graph, job).map_err(named)?;
-    let sets = ALL_SETS.into_iter().filter(|(_, name)| {
-        let mut asked = job.scenario.sensors.iter();
-        asked.any(|asked| asked == name)
-    });
-    let sets: Vec<(Sensors, &'static str)> = sets.collect();
+    let sets: Vec<(Sensors, &'static str)> = job.scenario.sets().collect();
     // A world that obeys is another one for each set.
     let groups: Vec<&[(Sensors, &'static str)]> = match job.scenario.obeys {
         true => sets.chunks(1).collect(),

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use rand::{Rng, RngExt};
 use serde::Deserialize;
+use vigil_setup::schema::Sensors;
 
 use super::bar::Bar;
 use super::departure::Departure;
@@ -216,16 +217,16 @@ impl File {
         let scenario = spread.map_err(|error| at(&error))?.concat();
         let mut names: Vec<&str> = scenario.iter().map(|s| s.name.as_str()).collect();
         names.sort_unstable();
-        let known = |name: &str| ALL_SETS.iter().any(|(_, set)| *set == name);
+        if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(at(&format!("scenario '{}' appears twice", twice[0])).into());
+        }
+        let allowed = ALL_SETS.map(|(_, set)| set);
         for Scenario { name, sensors, .. } in &scenario {
-            if let Some(other) = sensors.iter().find(|set| !known(set)) {
-                let allowed = ALL_SETS.map(|(_, set)| set).join(", ");
+            if let Some(other) = sensors.iter().find(|set| !allowed.contains(&set.as_str())) {
+                let allowed = allowed.join(", ");
                 let error = format!("scenario '{name}': sensors '{other}': allowed are {allowed}");
                 return Err(at(&error).into());
             }
-        }
-        if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(at(&format!("scenario '{}' appears twice", twice[0])).into());
         }
         Ok(Self { scenario })
     }
@@ -290,6 +291,12 @@ fn put(table: &mut toml::Table, key: &str, value: toml::Value) {
 }
 
 impl Scenario {
+    /// The sets of sensors, and their names.
+    pub(super) fn sets(&self) -> impl Iterator<Item = (Sensors, &'static str)> {
+        let asked = |name: &str| self.sensors.iter().any(|asked| asked == name);
+        ALL_SETS.into_iter().filter(move |(_, name)| asked(name))
+    }
+
     /// Changes of a run: one of `in_turn` in the place of `EACH`.
     pub(super) fn specs(&self, specs: &[String], run: usize) -> Vec<String> {
         let each = self.in_turn.get(run % self.in_turn.len().max(1));

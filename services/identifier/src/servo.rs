@@ -9,12 +9,11 @@ use vigil_blocks::SizeKind;
 use vigil_inference::logspace::{log_add, probability};
 use vigil_inference::size::{Prior, Size};
 use vigil_robot::Description;
+use vigil_robot::learned::wheel_context::FAR_SD;
 use vigil_robot::learned::{ANY_ANGLE_SD_RAD, SteerReading};
 
 /// Tolerance of a robot that declares none, rad: three deviations of a sensor's noise.
 const UNDECLARED_RAD: f64 = 0.01;
-/// A reading this many standard deviations off teaches nothing: one healthy one in 16,000.
-const FAR_SD: f64 = 4.0;
 /// Deviation by which an angle wanders from one reading to the next, over the tolerance: by about
 /// one tolerance in two minutes.
 const WANDERS: f64 = 0.02;

@@ -29,15 +29,15 @@ use crate::mapping::StateMeaning;
 
 /// One cycle can change the odds of a state by this factor at most, as a logarithm: e^20 is beyond
 /// any odds that a decision turns on.
-const LOG_RATIO_MAX: f64 = 20.0;
+pub(crate) const LOG_RATIO_MAX: f64 = 20.0;
 /// An epoch can change them by this factor at most: below it, a double still holds both sides.
-const LOG_EPOCH_MAX: f64 = 300.0;
+pub(crate) const LOG_EPOCH_MAX: f64 = 300.0;
 /// The tracked belief may differ from the identifier's by this much (half the sum of absolute
 /// differences), which changes no value by more than a twentieth of its range; beyond it, it is
 /// taken over.
-const DRIFT_MAX: f64 = 0.05;
+pub(crate) const DRIFT_MAX: f64 = 0.05;
 /// A probability may exceed 1 by this much, for rounding.
-const P_TOLERANCE: f64 = 1e-6;
+pub(crate) const P_TOLERANCE: f64 = 1e-6;
 
 /// Evidence gathered since the last epoch.
 #[derive(Debug, Clone)]

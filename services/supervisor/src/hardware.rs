@@ -32,14 +32,8 @@
 use vigil_blocks::{DetectionBelief, FaultBelief};
 use vigil_decision::Pomdp;
 
-/// One cycle can change the odds by this factor at most, as a logarithm. As in `evidence.rs`.
-const LOG_RATIO_MAX: f64 = 20.0;
-/// An epoch can change them by this factor at most: below it, a double still holds both sides.
-const LOG_EPOCH_MAX: f64 = 300.0;
-/// The tracked belief may be below the identifier's by this much. As in `evidence.rs`.
-const DRIFT_MAX: f64 = 0.05;
-/// A probability may exceed 1 by this much, for rounding.
-const P_TOLERANCE: f64 = 1e-6;
+use crate::evidence::{DRIFT_MAX, LOG_EPOCH_MAX, LOG_RATIO_MAX, P_TOLERANCE};
+
 /// Something is wrong above this probability: more likely than not.
 const WRONG_MIN: f64 = 0.5;
 /// An action mends a state if it leads out of it by this much more than the least that any does:

@@ -123,7 +123,11 @@ impl Rig {
                 let log_p = log_p + motion + prior.ln();
                 sum.push(log_p);
                 if log_p > best.1 {
-                    best = (self.nodes(set, encoders), log_p);
+                    let faults = Faults {
+                        stuck: set as u32,
+                        dead: encoders as u32,
+                    };
+                    best = (faults.nodes(&self.leaves), log_p);
                 }
             }
         }
@@ -174,17 +178,6 @@ impl Rig {
             std::array::from_fn(|wheel| [whole[wheel], any(broken[wheel])]),
         )
     }
-
-    fn nodes(&self, stuck: usize, encoders: usize) -> u64 {
-        let bits = |set: usize, nodes: &[Option<usize>]| -> u64 {
-            let inside = nodes
-                .iter()
-                .enumerate()
-                .filter(|(wheel, _)| set >> wheel & 1 == 1);
-            inside.map(|(_, node)| 1 << node.unwrap()).sum()
-        };
-        bits(stuck, &self.leaves.stuck) | bits(encoders, &self.leaves.encoder)
-    }
 }
 
 #[test]
@@ -212,11 +205,7 @@ fn the_filter_finds_what_the_best_of_all_sets_is() {
                 "{faults:?}: {found:#b}, best of all {best:#b} ({p:.3})"
             ));
         }
-        assert_eq!(
-            best,
-            rig.nodes(faults.stuck as usize, faults.dead as usize),
-            "{faults:?}"
-        );
+        assert_eq!(best, faults.nodes(&rig.leaves), "{faults:?}");
     }
     assert!(sure >= 75, "{sure}");
     assert!(wrong.len() <= 1, "{}", wrong.join("\n"));

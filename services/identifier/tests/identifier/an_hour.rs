@@ -32,11 +32,7 @@ fn keeps_its_name(faults: Faults, seed: u64) {
     let (frames, _) = drive(&robot, &slip, faults, (seed, END_S));
     let mut alarm = Alarm::between(ONSET_S + 0.1, f64::INFINITY);
     let (mut belief, mut hypotheses) = (FaultBelief::default(), Box::<ParticleBlock>::default());
-    let bits = |set: u32, nodes: &[Option<usize>]| -> u64 {
-        let inside = (0..WHEELS).filter(|wheel| set >> wheel & 1 == 1);
-        inside.map(|wheel| 1 << nodes[wheel].unwrap()).sum()
-    };
-    let truth = bits(faults.stuck, &leaves.stuck) | bits(faults.dead, &leaves.encoder);
+    let truth = faults.nodes(&leaves);
     for frame in &frames {
         alarm.set(frame);
         let detection = Some((&alarm.belief, &*alarm.hypotheses));

@@ -4,6 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{SensorFrame, Valid};
+use vigil_identifier::Leaves;
 use vigil_robot::Description;
 use vigil_robot::slip::{Condition, Situation, SlipModel, Soil};
 
@@ -22,6 +23,17 @@ const STEER_SD: f64 = 0.003;
 pub struct Faults {
     pub stuck: u32,
     pub dead: u32,
+}
+
+impl Faults {
+    /// The nodes of these faults, as bits.
+    pub fn nodes(self, leaves: &Leaves) -> u64 {
+        let bits = |set: u32, nodes: &[Option<usize>]| -> u64 {
+            let inside = (0..WHEELS).filter(|wheel| set >> wheel & 1 == 1);
+            inside.map(|wheel| 1 << nodes[wheel].unwrap()).sum()
+        };
+        bits(self.stuck, &leaves.stuck) | bits(self.dead, &leaves.encoder)
+    }
 }
 
 /// Frames of a drive at 20 Hz with one command, and the true pose at [`SETTLED_S`].
