@@ -213,32 +213,57 @@ impl MultipleHypothesis {
         }
         let mut failed = false;
         if observation.pose_frames > 0 {
-            let all = self.bank.hypotheses().iter();
-            let tracks = all.map(|h| (&h.state.track, h.log_weight));
-            let rates = noise.outliers.pose;
-            let variance = self
-                .trust
-                .variance(tracks, observation.pose, variance, rates);
-            for hypothesis in self.bank.hypotheses_mut() {
-                let MotionMode {
-                    moved, is_thrown, ..
-                } = self.modes[hypothesis.mode];
-                let state = &mut hypothesis.state;
-                let before = state.track.pose();
-                let gained = state.take_pose(observation.pose, variance, is_thrown);
-                if moved == Moved::Pose && state.jump_m.is_none() {
-                    let jump_m = (state.track.pose() - before).xy().norm();
-                    state.jump_m = Some((jump_m, (variance[0] + variance[1]).sqrt()));
-                }
-                // Those that cannot take it are dropped, unless none can: then nothing changes.
-                failed |= gained.is_none();
-                hypothesis.log_weight += gained.unwrap_or(2.0 * FLOOR);
-            }
+            failed = self.weigh_pose(observation, variance, noise);
             self.cut_off();
         }
         if self.bank.normalise(FLOOR).is_none() || failed {
             self.degenerate_count = self.degenerate_count.saturating_add(1);
         }
+    }
+
+    /// Weighs by a measured pose; true if a hypothesis could not take it.
+    fn weigh_pose(
+        &mut self,
+        observation: &Observation,
+        variance: [f64; 3],
+        noise: NoiseScales,
+    ) -> bool {
+        let modes = &self.modes;
+        // A jump that begins with this pose explains whatever it reads, as an outlier does: the
+        // next pose tells which it was.
+        let begins = |hypothesis: &Hypothesis<State>| {
+            let jumps = modes[hypothesis.mode].jump != [0.0; 3];
+            jumps && hypothesis.onset == observation.t_first_ns
+        };
+        let all = self.bank.hypotheses().iter().filter(|h| !begins(h));
+        let tracks = all.map(|h| (&h.state.track, h.log_weight));
+        let rates = noise.outliers.pose;
+        let trusted = self
+            .trust
+            .variance(tracks, observation.pose, variance, rates);
+        let mut failed = false;
+        for hypothesis in self.bank.hypotheses_mut() {
+            let begins = begins(hypothesis);
+            let MotionMode {
+                moved, is_thrown, ..
+            } = modes[hypothesis.mode];
+            let state = &mut hypothesis.state;
+            let before = state.track;
+            let gained = state.take_pose(observation.pose, trusted, is_thrown);
+            if begins && gained.is_some() {
+                // Where it has jumped to it is as good as any.
+                state.track = before;
+                failed |= state.track.update(observation.pose, variance).is_none();
+            }
+            if moved == Moved::Pose && state.jump_m.is_none() {
+                let jump_m = (state.track.pose() - before.pose()).xy().norm();
+                state.jump_m = Some((jump_m, (variance[0] + variance[1]).sqrt()));
+            }
+            // Those that cannot take it are dropped, unless none can: then nothing changes.
+            failed |= gained.is_none();
+            hypothesis.log_weight += gained.unwrap_or(2.0 * FLOOR);
+        }
+        failed
     }
 
     /// Holds healthy motion within the tolerance, and unknown motion beyond it.

@@ -95,6 +95,19 @@ fn a_pose_that_jumped_is_named_with_its_distance() {
 }
 
 #[test]
+fn a_single_pose_that_is_far_off_is_no_jump() {
+    for apart_m in [0.05, 0.15, -0.5] {
+        let mut count = 0;
+        let (belief, [_, pose]) = belief(|frame| {
+            count += 1;
+            frame.pose[1] += if count == 1 { apart_m } else { 0.0 };
+        });
+        let (p, p_unknown) = (belief.p[pose], belief.p_unknown);
+        assert!(p < 0.05 && p_unknown < 0.05, "{apart_m}: {p} {p_unknown}");
+    }
+}
+
+#[test]
 fn a_servo_within_its_tolerance_is_none() {
     let (belief, [servo, _]) = belief(|frame| frame.steer[RF] += 0.007);
     assert!(belief.p[servo] < 0.05, "{}", belief.p[servo]);

@@ -138,13 +138,13 @@ impl NoiseScale {
         [last_read, now_read]: [&Reading; 2],
         expected: f64,
     ) {
-        if last_read.plain != now_read.plain || now_read.plain == 0 {
+        if last_read.plain == 0 || now_read.plain == 0 {
             return;
         }
         let sample = model.sample_variance(sd, now.frame_s);
         let step = now_read.mean - last_read.mean - expected;
-        let variance = now.mean_variance(sample, now_read.plain);
-        self.push(step * step / (2.0 * variance), 1);
+        let variance = |read: &Reading| now.mean_variance(sample, read.plain);
+        self.push(step * step / (variance(last_read) + variance(now_read)), 1);
     }
 
     /// True once the noise has been seen often enough.
@@ -242,17 +242,19 @@ impl SensorNoise {
             return;
         };
         let all = [&before, &last, now];
-        let is_even = |o: &&Observation| (o.dt_s - now.dt_s).abs() < 0.2 * now.dt_s;
-        let steady = all.iter().all(|o| o.is_steady()) && all.iter().all(is_even);
-        if !steady || now.anchor || last.anchor {
+        if !all.iter().all(|o| o.is_steady()) || now.anchor || last.anchor {
             return;
         }
         if all.iter().all(|o| o.pose_frames > 0) {
             let (up, down) = (apart(model, &last, now), apart(model, &before, &last));
             let [a, b, c] = all.map(|o| o.pose_variance(model, [1.0; 3]));
+            // Of intervals as long as they are: what departs at a constant rate leaves nothing.
+            let longer = now.dt_s / last.dt_s;
+            let (first, middle) = (longer * longer, (1.0 + longer) * (1.0 + longer));
             for i in 0..a.len() {
-                let bend = up[i] - down[i];
-                self.pose[i].push(bend * bend / (a[i] + 4.0 * b[i] + c[i]), 2);
+                let bend = up[i] - longer * down[i];
+                let variance = first * a[i] + middle * b[i] + c[i];
+                self.pose[i].push(bend * bend / variance, 2);
             }
         }
         let surge = (now.command[1] - last.command[1]).abs();

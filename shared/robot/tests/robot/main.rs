@@ -6,6 +6,7 @@ mod condition;
 mod frame_guard;
 mod injection;
 mod learned;
+mod noise;
 mod nominal;
 mod rover;
 mod slip;

@@ -1,0 +1,91 @@
+//! How noisy the sensors are is known however unevenly their frames come.
+
+use std::path::PathBuf;
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+use vigil_blocks::{SensorFrame, Valid};
+use vigil_robot::Description;
+use vigil_robot::learned::noise_scale::SensorNoise;
+use vigil_robot::learned::wheels::rolling_rate;
+use vigil_robot::learned::{Model, NoiseScales, Observer};
+
+/// Factor on the learned noise of every sensor.
+const NOISIER: f64 = 1.6;
+const OUTLIERS: f64 = 0.01;
+/// Of an outlier, in deviations of the learned noise.
+const FAR: f64 = 20.0;
+const WHEELS: usize = 6;
+
+fn read(name: &str) -> String {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
+    std::fs::read_to_string(root.join(name)).unwrap()
+}
+
+/// What is believed after a minute on a circle, at 20 Hz: each frame comes within a share of its
+/// period, and a share of them not at all.
+fn scales(jitter: f64, loss: f64) -> NoiseScales {
+    let robot: Description = toml::from_str(&read("robots/rover.toml")).unwrap();
+    let model = Model::from_toml(&read("models/rover.toml")).unwrap();
+    let mut observer = Observer::new(&model, &robot);
+    let mut noise = SensorNoise::default();
+    let mut rng = Pcg64Mcg::seed_from_u64(7);
+    let (curvature, speed) = (0.5, 0.2);
+    for k in 0..1200_u32 {
+        let t_s = 0.05 * (f64::from(k) + jitter * (rng.random::<f64>() - 0.5)) + 1.0;
+        let mut normal = |sd: f64| NOISIER * sd * rng.sample::<f64, _>(StandardNormal);
+        let mut frame = SensorFrame {
+            run_id: 1,
+            ..SensorFrame::default()
+        };
+        frame.header.t_capture_ns = (t_s * 1e9).round() as u64;
+        frame.command = [curvature, speed, 0.0, 0.0];
+        let yaw = curvature * speed * t_s;
+        let pose = [yaw.sin() / curvature, (1.0 - yaw.cos()) / curvature, yaw];
+        let sd = [
+            model.noise.position_m,
+            model.noise.position_m,
+            model.noise.yaw_rad,
+        ];
+        frame.pose = std::array::from_fn(|i| pose[i] + normal(sd[i]));
+        for wheel in 0..WHEELS {
+            let rate = rolling_rate(&robot, wheel, curvature, speed);
+            frame.wheel_rate[wheel] = rate + normal(model.noise.wheel_rate_rad_s);
+        }
+        for wheel in 0..WHEELS {
+            if rng.random::<f64>() < OUTLIERS {
+                frame.wheel_rate[wheel] += FAR * model.noise.wheel_rate_rad_s;
+            }
+        }
+        frame.valid = Valid::POSE | Valid::command(0) | Valid::command(1) | 0x3f00;
+        if rng.random::<f64>() >= loss && observer.push(&frame).complete {
+            noise.update(&model, &robot, observer.observation());
+        }
+    }
+    noise.scales()
+}
+
+#[test]
+fn noise_and_outliers_are_known_however_unevenly_frames_come() {
+    for (jitter, loss) in [(0.0, 0.0), (0.5, 0.0), (0.9, 0.0), (0.0, 0.3), (0.9, 0.3)] {
+        let scales = scales(jitter, loss);
+        let wheels = &scales.wheels[..WHEELS];
+        // Outliers, clipped, and its own uncertainty make it lean to the high side.
+        for scale in scales.pose.iter().chain(wheels) {
+            let is_near = (0.85 * NOISIER..1.4 * NOISIER).contains(scale);
+            assert!(is_near, "{jitter} {loss}: {scales:?}");
+        }
+        for rate in &scales.outliers.wheels[..WHEELS] {
+            let is_near = (0.3 * OUTLIERS..2.5 * OUTLIERS).contains(rate);
+            assert!(is_near, "{jitter} {loss}: {scales:?}");
+        }
+        assert!(
+            scales
+                .outliers
+                .pose
+                .iter()
+                .all(|rate| *rate < 0.2 * OUTLIERS)
+        );
+    }
+}
