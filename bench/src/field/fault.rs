@@ -214,9 +214,9 @@ fn fault_of(kind: DisturbanceKind, place: usize, robot: &Description) -> Option<
     let wheel = &robot.wheels.get(place)?.name;
     Some(match kind {
         D::TorqueLoss => format!("torque:{wheel}"),
-        D::CurrentBias | D::CurrentScale => format!("current:{wheel}"),
+        D::CurrentBias | D::CurrentScale | D::CurrentNoise => format!("current:{wheel}"),
         D::SteerJump | D::SteerHeld | D::SteerBias => format!("steer:{wheel}"),
-        D::GyroBias | D::GyroScale => "gyro".to_owned(),
+        D::GyroBias | D::GyroScale | D::GyroNoise => "gyro".to_owned(),
         D::PoseJump | D::PoseHeld => "pose".to_owned(),
         _ => return None,
     })

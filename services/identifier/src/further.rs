@@ -1,7 +1,7 @@
 //! What gyro and currents say of faults: a hidden Markov model over single ones.
 //!
 //! Its states are a whole robot, a motor that has lost a share of its torque, a current sensor that
-//! is dead, scaled or off, a gyro that is dead or off, a stuck wheel, and what nobody knows. A size
+//! is dead, scaled, noisy or off, a gyro that is too, a stuck wheel, and what nobody knows. A size
 //! is a grid. Given the fault these channels depend neither on the pose nor on the encoders, which
 //! the other filter weighs ([`crate::multiple_hypothesis`]): probabilities of both are multiplied,
 //! over the prior that both contain. So hypotheses that say the same of a channel have one
@@ -9,14 +9,14 @@
 //! each makes of the currents.
 
 use vigil_blocks::{FaultBelief, SizeKind, WHEELS};
-use vigil_inference::logspace::{log_add, log_normal};
-use vigil_inference::outlier::SPREAD;
+use vigil_inference::logspace::log_add;
 use vigil_robot::learned::current_effects::{CurrentEffects, SHARES, STUCK};
 use vigil_robot::learned::further_watch::{FurtherWatch, Residual, Residuals, Turn};
 use vigil_robot::learned::wheel_evidence::TOGETHER_SD;
-use vigil_robot::learned::{Further, Healthy, Model, Observation, Reading, repeats};
+use vigil_robot::learned::{Further, Healthy, Model, Observation};
 use vigil_robot::{Description, FaultPrior};
 
+use crate::further_likelihood::{dead, mean, noisy, noisy_current, shifted, together};
 use crate::further_state::State;
 use crate::modes::Leaves;
 use crate::node_sizes::TOLD_MIN;
@@ -26,8 +26,11 @@ use crate::node_sizes::TOLD_MIN;
 const OFFSETS: [f64; 12] = [
     -40.0, -16.0, -8.0, -4.0, -2.0, -1.0, 1.0, 2.0, 4.0, 8.0, 16.0, 40.0,
 ];
-/// Its factors: reversed, none, half, double. What lies between is told to a factor of two.
+/// Factors of a broken current sensor or gyro: reversed, none, half, double. What lies between is
+/// told to a factor of two.
 const GAINS: [f64; 4] = [-1.0, 0.0, 0.5, 2.0];
+/// Factors of its noise. A healthy sensor's is followed up to five times, so less is none.
+const NOISES: [f64; 2] = [8.0, 32.0];
 /// Biases of a broken gyro, in deviations of its noise. The least is two tolerances of the rover.
 const BIASES: [f64; 10] = [-40.0, -16.0, -8.0, -4.0, -2.0, 2.0, 4.0, 8.0, 16.0, 40.0];
 /// Least deviation of a stuck wheel's effect on a current, in deviations of the sensor's noise: as
@@ -40,8 +43,6 @@ const UNKNOWN_CURRENT: f64 = 10.0;
 const UNKNOWN_TURN: f64 = 0.5;
 /// Share of channels that have one: two of seven, as what is unknown moves some and not all.
 const ANYTHING: f64 = 0.3;
-/// Share of readings that nothing explains: one observation in 50 s.
-const OUTLIER: f64 = 1e-3;
 /// One observation speaks for or against a state by this much at most (natural logarithm). Less
 /// than the e^32 of [`FLOOR`]: no single one lifts a state from nothing.
 const LOG_MAX: f64 = 30.0;
@@ -128,7 +129,9 @@ impl FurtherFilter {
                 let offsets = OFFSETS.map(offset);
                 let gains = GAINS.map(|gain| State::CurrentGain(wheel, gain));
                 let dead = std::iter::once(State::CurrentDead(wheel));
-                groups.push((dead.chain(offsets).chain(gains).collect(), Some(node)));
+                let noises = NOISES.map(|factor| State::CurrentNoise(wheel, factor));
+                let ways = dead.chain(offsets).chain(gains).chain(noises);
+                groups.push((ways.collect(), Some(node)));
             }
             if leaves.stuck[wheel].is_some() {
                 groups.push((vec![State::Stuck(wheel)], None));
@@ -138,7 +141,9 @@ impl FurtherFilter {
             let all = std::iter::once(State::GyroDead);
             let bias = |by: f64| State::GyroBias(by * robot.noise.yaw_rate_rad_s);
             let biases = BIASES.map(bias);
-            groups.push((all.chain(biases).collect(), Some(node)));
+            let (gains, noises) = (GAINS.map(State::GyroGain), NOISES.map(State::GyroNoise));
+            let ways = all.chain(biases).chain(gains).chain(noises);
+            groups.push((ways.collect(), Some(node)));
         }
         let mut filter = Self {
             watch,
@@ -275,9 +280,20 @@ impl FurtherFilter {
                 let healthy = learned.map_or(0.5, |learned| learned.repeat_rate);
                 dead(&further.yaw_rate, residuals.yaw_rate, healthy)
             }
+            State::CurrentNoise(wheel, factor) => noisy_current(currents, wheel, factor),
             State::GyroBias(bias) => residuals
                 .yaw_rate
                 .map_or(0.0, |residual| shifted(&residual, bias, residual.variance)),
+            State::GyroGain(gain) => residuals.yaw_rate.map_or(0.0, |residual| {
+                shifted(
+                    &residual,
+                    (gain - 1.0) * residual.expected,
+                    residual.variance,
+                )
+            }),
+            State::GyroNoise(factor) => residuals
+                .yaw_rate
+                .map_or(0.0, |residual| noisy(&residual, factor)),
             State::Unknown => {
                 let gyro = residuals
                     .yaw_rate
@@ -407,64 +423,5 @@ impl Fusion {
         };
         *place = (node, if known.is_some() { place.1 } else { 0.0 } + p);
         self.count = self.count.max(at + 1);
-    }
-}
-
-/// Mean over the currents that were read.
-fn mean(currents: &[Option<Residual>; WHEELS], of: impl Fn(&Residual, usize) -> f64) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (wheel, residual) in currents.iter().enumerate() {
-        if let Some(residual) = residual {
-            sum += of(residual, wheel);
-            count += 1.0;
-        }
-    }
-    sum / f64::max(count, 1.0)
-}
-
-/// Log-density of the currents if each departs by so much, known up to a deviation, over that of
-/// healthy ones. What all have in common is taken off: ground and load do that, too.
-fn together(
-    currents: &[Option<Residual>; WHEELS],
-    by: &[f64; WHEELS],
-    sd: impl Fn(f64) -> f64,
-) -> f64 {
-    let common = mean(currents, |residual, _| residual.apart);
-    let common_by = mean(currents, |_, wheel| by[wheel]);
-    let each = currents.iter().zip(by).filter_map(|(residual, &by)| {
-        let residual = (*residual)?;
-        let apart = residual.apart - common;
-        let residual = Residual { apart, ..residual };
-        let more = sd(by);
-        let variance = residual.variance + more * more;
-        Some(shifted(&residual, by - common_by, variance))
-    });
-    each.sum()
-}
-
-/// Log-density of a residual whose mean is `by` and whose variance is this, over that of a healthy
-/// one; now and then each is an outlier.
-fn shifted(residual: &Residual, by: f64, variance: f64) -> f64 {
-    let density = |apart: f64, variance: f64| {
-        let wide = variance * SPREAD * SPREAD;
-        log_add(
-            log_normal(apart, variance),
-            OUTLIER.ln() + log_normal(apart, wide),
-        )
-    };
-    density(residual.apart - by, variance) - density(residual.apart, residual.variance)
-}
-
-/// The same for a sensor that repeats itself, most often zero.
-fn dead(read: &Reading, residual: Option<Residual>, healthy: f64) -> f64 {
-    // The first sample of a dead sensor differs from the last of a living one.
-    let is_first = read.plain == 1 && read.zeros > 0;
-    match residual.filter(|_| is_first) {
-        Some(residual) => {
-            let repeats = Reading { plain: 0, ..*read };
-            shifted(&residual, -residual.expected, residual.variance)
-                + repeats::log_ratio(&repeats, healthy)
-        }
-        None => repeats::log_ratio(read, healthy),
     }
 }

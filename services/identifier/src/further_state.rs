@@ -16,10 +16,16 @@ pub(crate) enum State {
     CurrentOffset(usize, f64),
     /// It reads this many times the current.
     CurrentGain(usize, f64),
+    /// Its noise is this many times the usual.
+    CurrentNoise(usize, f64),
     /// The gyro repeats itself.
     GyroDead,
     /// It reads so much more, rad/s.
     GyroBias(f64),
+    /// It reads this many times the yaw rate.
+    GyroGain(f64),
+    /// Its noise is this many times the usual.
+    GyroNoise(f64),
     /// A wheel is stuck: its leaf belongs to the other filter.
     Stuck(usize),
     Unknown,
@@ -31,9 +37,10 @@ impl State {
         match self {
             Self::Torque(_, share) => (SizeKind::TorqueShareLost, SHARES[share]),
             Self::CurrentOffset(_, offset_a) => (SizeKind::CurrentOffsetA, offset_a),
-            Self::CurrentGain(_, gain) => (SizeKind::Gain, gain),
+            Self::CurrentGain(_, gain) | Self::GyroGain(gain) => (SizeKind::Gain, gain),
             Self::GyroBias(bias_rad_s) => (SizeKind::RateBiasRadS, bias_rad_s),
             Self::CurrentDead(_) | Self::GyroDead => (SizeKind::Frozen, 0.0),
+            Self::CurrentNoise(..) | Self::GyroNoise(_) => (SizeKind::Noise, 0.0),
             Self::Stuck(_) | Self::Whole | Self::Unknown => (SizeKind::None, 0.0),
         }
     }
@@ -49,8 +56,9 @@ impl State {
             Self::Whole | Self::Unknown | Self::Stuck(_) => gyro || (0..WHEELS).any(current),
             Self::CurrentDead(wheel)
             | Self::CurrentOffset(wheel, _)
-            | Self::CurrentGain(wheel, _) => current(wheel),
-            Self::GyroDead | Self::GyroBias(_) => gyro,
+            | Self::CurrentGain(wheel, _)
+            | Self::CurrentNoise(wheel, _) => current(wheel),
+            Self::GyroDead | Self::GyroBias(_) | Self::GyroGain(_) | Self::GyroNoise(_) => gyro,
         }
     }
 }

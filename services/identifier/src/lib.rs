@@ -11,6 +11,7 @@ mod encoders;
 mod engine;
 mod fault_rates;
 pub mod further;
+mod further_likelihood;
 mod further_stage;
 mod further_state;
 mod generic;

@@ -53,14 +53,16 @@ impl Disturbed {
     pub(crate) fn yaw_rate(&self, true_rad_s: f64, noise_rad_s: f64) -> f64 {
         use DisturbanceKind as D;
         let bias = |kind| self.at(kind, 0).unwrap_or(0.0);
+        let noise_rad_s = self.at(D::GyroNoise, 0).unwrap_or(1.0) * noise_rad_s;
         let rate = true_rad_s + bias(D::YawRateBias) + bias(D::GyroBias) + noise_rad_s;
         self.at(D::GyroScale, 0).map_or(rate, |gain| gain * rate)
     }
 
-    /// What the current sensor of a wheel makes of a healthy reading, A.
-    pub(crate) fn current(&self, wheel: usize, healthy_a: f64) -> f64 {
+    /// What the current sensor of a wheel reports of a current with this noise, A.
+    pub(crate) fn current(&self, wheel: usize, true_a: f64, noise_a: f64) -> f64 {
         use DisturbanceKind as D;
-        let current = healthy_a + self.at(D::CurrentBias, wheel).unwrap_or(0.0);
+        let noise_a = self.at(D::CurrentNoise, wheel).unwrap_or(1.0) * noise_a;
+        let current = true_a + self.at(D::CurrentBias, wheel).unwrap_or(0.0) + noise_a;
         self.at(D::CurrentScale, wheel)
             .map_or(current, |gain| gain * current)
     }

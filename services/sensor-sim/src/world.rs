@@ -207,7 +207,7 @@ impl World {
             let rate = self.encoders.scaled(i, self.motion.wheel_rate_rad_s[i], on);
             rates_rad_s[i] = rate + noise.draw(noise.wheel_rate_rad_s);
             let current = CURRENT_PER_TORQUE_A_N_M * self.motion.torque_n_m[i];
-            frame.current[i] = on.current(i, current + noise.draw(noise.current_a));
+            frame.current[i] = on.current(i, current, noise.draw(noise.current_a));
             frame.valid |= Valid::wheel_rate(i) | Valid::current(i);
             if kinematics.steered[i] {
                 frame.steer[i] = on.steer(i, steer) + noise.draw(noise.steer_rad);

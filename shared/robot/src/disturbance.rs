@@ -73,6 +73,10 @@ pub enum DisturbanceKind {
     PoseJump,
     /// The pose is reported anew only every so many seconds, and repeated in between.
     PoseHeld,
+    /// The gyro's noise is so many times the usual.
+    GyroNoise,
+    /// That of a wheel's current sensor is.
+    CurrentNoise,
 }
 
 /// Where a disturbance acts.
@@ -159,6 +163,7 @@ const MORE: &[Parameter] = &[parameter("RAD_PER_S", -5.0, 5.0, 0.6)];
 const GROWS: &[Parameter] = &[parameter("RAD_PER_S2", -0.5, 0.5, 0.05)];
 const AMPERES: &[Parameter] = &[parameter("A", -10.0, 10.0, 0.5)];
 const GAIN: &[Parameter] = &[parameter("FACTOR", -2.0, 3.0, 0.0)];
+const NOISE: &[Parameter] = &[parameter("FACTOR", 1.0, 100.0, 20.0)];
 const SHIFT: &[Parameter] = &[
     parameter("M_FORWARD", -0.1, 0.1, -0.08),
     parameter("M_LEFT", -0.15, 0.15, 0.1),
@@ -168,7 +173,7 @@ const SHIFT: &[Parameter] = &[
 pub const DELAY_MAX_S: f64 = 2.0;
 
 /// Every kind, in the order of the codes.
-pub const KINDS: [Kind; 28] = {
+pub const KINDS: [Kind; 30] = {
     use DisturbanceKind as D;
     use Place::{Rover, Side, SteeredWheel, Wheel};
     [
@@ -205,6 +210,8 @@ pub const KINDS: [Kind; 28] = {
         row(D::SteerBias, "steer-bias", SteeredWheel, ANGLE),
         row(D::PoseJump, "pose-jump", Rover, JUMP),
         row(D::PoseHeld, "pose-held", Rover, HOLD),
+        row(D::GyroNoise, "gyro-noise", Rover, NOISE),
+        row(D::CurrentNoise, "current-noise", Wheel, NOISE),
     ]
 };
 

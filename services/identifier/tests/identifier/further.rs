@@ -57,6 +57,11 @@ impl Rover {
 
     /// After so many seconds in which the currents depart by these and the yaw rate by that.
     fn after(&self, seconds: f64, currents: [f64; WHEELS], yaw_rate: f64) -> Fusion {
+        self.changing(seconds, |_| (currents, yaw_rate))
+    }
+
+    /// The same where they change from observation to observation.
+    fn changing(&self, seconds: f64, apart: impl Fn(usize) -> ([f64; WHEELS], f64)) -> Fusion {
         let mut filter = self.filter();
         let observation = Observation {
             dt_s: 0.05,
@@ -78,13 +83,14 @@ impl Rover {
             expected,
             outlier_rate: 1e-10,
         };
-        let residuals = Residuals {
-            currents: std::array::from_fn(|wheel| {
-                (wheel < 6).then(|| residual(currents[wheel], NOISE_A, self.carried(wheel)))
-            }),
-            yaw_rate: Some(residual(yaw_rate, NOISE_RAD_S, 0.06)),
-        };
-        for _ in 0..(seconds / 0.05) as usize {
+        for k in 0..(seconds / 0.05) as usize {
+            let (currents, yaw_rate) = apart(k);
+            let residuals = Residuals {
+                currents: std::array::from_fn(|wheel| {
+                    (wheel < 6).then(|| residual(currents[wheel], NOISE_A, self.carried(wheel)))
+                }),
+                yaw_rate: Some(residual(yaw_rate, NOISE_RAD_S, 0.06)),
+            };
             filter.step(&observation, &further, &residuals);
         }
         filter.fusion()
@@ -183,6 +189,28 @@ fn a_weak_motor_a_broken_sensor_and_a_stuck_wheel_are_told_apart() {
     }
     let fusion = rover.after(1.0, [0.0; WHEELS], 0.05);
     assert!(rover.odds(&fusion, "GYRO") > 1e3);
+}
+
+#[test]
+fn a_gyro_that_reads_half_or_is_noisy_and_a_noisy_current_sensor_are_named() {
+    let rover = Rover::read();
+    // It turns at 0.06 rad/s.
+    for gain in [0.5, 2.0, -1.0] {
+        let fusion = rover.after(2.0, [0.0; WHEELS], (gain - 1.0) * 0.06);
+        assert!(rover.odds(&fusion, "GYRO") > 1e3, "{gain}");
+    }
+    let noise = |k: usize, sd: f64| 20.0 * sd * [1.0, -1.0, -0.2, 0.4][k % 4];
+    let fusion = rover.changing(2.0, |k| ([0.0; WHEELS], noise(k, NOISE_RAD_S)));
+    assert!(rover.odds(&fusion, "GYRO") > 1e3);
+    let fusion = rover.changing(2.0, |k| {
+        let mut currents = [0.0; WHEELS];
+        currents[1] = noise(k, NOISE_A);
+        (currents, 0.0)
+    });
+    assert!(rover.odds(&fusion, "LM_CURRENT") > 1e3);
+    for other in ["GYRO", "LM_TORQUE", "RM_CURRENT"] {
+        assert!(rover.odds(&fusion, other) < 0.05, "{other}");
+    }
 }
 
 #[test]
