@@ -244,7 +244,8 @@ enum SeenBy {
 const fn seen_by(kind: DisturbanceKind) -> SeenBy {
     use DisturbanceKind as D;
     match kind {
-        D::GyroBias | D::GyroScale | D::CurrentBias | D::CurrentScale => SeenBy::All,
+        D::GyroBias | D::GyroScale | D::GyroNoise => SeenBy::All,
+        D::CurrentBias | D::CurrentScale | D::CurrentNoise => SeenBy::All,
         D::SteerBias => SeenBy::Wheels,
         _ => SeenBy::Pose,
     }

@@ -75,7 +75,10 @@ pub(crate) fn noisy_current(
     };
     let common = mean(currents, |residual, _| residual.apart);
     let others = currents.iter().flatten().count() as f64 - 1.0;
-    let moved = (common - own.apart) / others.max(1.0);
+    if others < 1.0 {
+        return 0.0;
+    }
+    let moved = (common - own.apart) / others;
     let each = currents.iter().enumerate().filter_map(|(at, residual)| {
         let residual = (*residual)?;
         let scale = if at == wheel { factor * factor } else { 1.0 };

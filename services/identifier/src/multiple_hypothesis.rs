@@ -229,11 +229,11 @@ impl MultipleHypothesis {
         noise: NoiseScales,
     ) -> bool {
         let modes = &self.modes;
-        // A jump that begins with this pose explains whatever it reads, as an outlier does: the
-        // next pose tells which it was.
+        // A jump that begins with this pose, its first, explains whatever it reads, as an outlier
+        // does: the next pose tells which it was.
         let begins = |hypothesis: &Hypothesis<State>| {
             let jumps = modes[hypothesis.mode].jump != [0.0; 3];
-            jumps && hypothesis.onset == observation.t_first_ns
+            jumps && hypothesis.state.jump_m.is_none()
         };
         let all = self.bank.hypotheses().iter().filter(|h| !begins(h));
         let tracks = all.map(|h| (&h.state.track, h.log_weight));
@@ -244,18 +244,16 @@ impl MultipleHypothesis {
         let mut failed = false;
         for hypothesis in self.bank.hypotheses_mut() {
             let begins = begins(hypothesis);
-            let MotionMode {
-                moved, is_thrown, ..
-            } = modes[hypothesis.mode];
+            let is_thrown = modes[hypothesis.mode].is_thrown;
             let state = &mut hypothesis.state;
             let before = state.track;
-            let gained = state.take_pose(observation.pose, trusted, is_thrown);
+            let mut gained = state.take_pose(observation.pose, trusted, is_thrown);
             if begins && gained.is_some() {
                 // Where it has jumped to it is as good as any.
                 state.track = before;
-                failed |= state.track.update(observation.pose, variance).is_none();
-            }
-            if moved == Moved::Pose && state.jump_m.is_none() {
+                if state.track.update(observation.pose, variance).is_none() {
+                    gained = None;
+                }
                 let jump_m = (state.track.pose() - before.pose()).xy().norm();
                 state.jump_m = Some((jump_m, (variance[0] + variance[1]).sqrt()));
             }

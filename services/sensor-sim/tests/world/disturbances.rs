@@ -69,11 +69,13 @@ fn disturbances_of_sensors_touch_their_own_channel_only_and_end_without_a_trace(
     let gyro: Undo = |frame, healthy| frame.yaw_rate = healthy.yaw_rate;
     let current: Undo = |frame, healthy| frame.current[1] = healthy.current[1];
     let steer: Undo = |frame, healthy| frame.steer[0] = healthy.steer[0];
-    let kinds: [(&str, Undo); 15] = [
+    let kinds: [(&str, Undo); 17] = [
         ("steer-bias:LF:0.1", steer),
         ("pose-jump:0.3", position),
         ("gyro-bias:0.05", gyro),
         ("gyro-scale:0", gyro),
+        ("gyro-noise:20", gyro),
+        ("current-noise:LM:20", current),
         ("current-bias:LM:0.5", current),
         ("current-scale:LM:0", current),
         ("yaw-rate-bias:0.02", yaw),
@@ -276,6 +278,14 @@ fn a_moved_payload_loads_the_wheels_where_it_lies() {
     );
     assert!(left != 0.0 && right != 0.0 && left.abs() < 0.01 && right.abs() < 0.01);
     assert!(left * right < 0.0, "{left} {right}");
+}
+
+#[test]
+fn a_noisy_gyro_has_so_many_times_its_noise() {
+    for [(healthy, at), (frame, _)] in pairs(0.5, &["gyro-noise:20"]) {
+        let noise = |frame: &SensorFrame| frame.yaw_rate - at.velocity[2];
+        assert!((noise(&frame) - 20.0 * noise(&healthy)).abs() < 1e-12);
+    }
 }
 
 #[test]

@@ -36,6 +36,10 @@ const LEAN: f64 = 1.0;
 /// Samples over which the estimate forgets. Half a minute of 50 ms: known within sqrt(3.9 / 600) =
 /// 8 %.
 const MEMORY: f64 = 600.0;
+const FADING: f64 = 1.0 - 1.0 / MEMORY;
+/// Ratio of two intervals up to which a second difference tells an outlier of its middle sample
+/// from the noise as well as one of equal intervals does, nearly: chosen.
+const EVEN: f64 = 1.25;
 
 /// How much noisier each channel is than learned, as ratios of standard deviations. A channel has
 /// a scale of its own: one that is noisy hides nothing on another.
@@ -90,6 +94,8 @@ pub struct NoiseScale {
     sum: f64,
     count: f64,
     outliers: f64,
+    /// Samples of which it was asked whether they are outliers.
+    asked: f64,
     far_in_a_row: u32,
 }
 
@@ -99,6 +105,7 @@ impl Default for NoiseScale {
             sum: PRIOR,
             count: PRIOR,
             outliers: 0.0,
+            asked: PRIOR,
             far_in_a_row: 0,
         }
     }
@@ -112,20 +119,37 @@ impl NoiseScale {
         if normalised_square.is_nan() {
             return;
         }
-        let fading = 1.0 - 1.0 / MEMORY;
-        let ratio = (self.sum / self.count).max(RATIO_MIN);
-        let largest = CLIP * ratio;
         // There and back again: what stays there is far in one difference less, and no outlier.
-        let is_far = normalised_square > FAR * ratio;
+        let is_far = normalised_square > FAR * self.believed();
         self.far_in_a_row = if is_far {
             self.far_in_a_row.saturating_add(1)
         } else {
             0
         };
         let is_outlier = self.far_in_a_row > order;
-        self.outliers = self.outliers * fading + f64::from(u8::from(is_outlier));
-        self.sum = self.sum * fading + normalised_square.clamp(0.0, largest) / CLIPPED_MEAN;
-        self.count = self.count * fading + 1.0;
+        self.outliers = self.outliers * FADING + f64::from(u8::from(is_outlier));
+        self.asked = self.asked * FADING + 1.0;
+        self.take(normalised_square);
+    }
+
+    /// Takes one that does not tell an outlier: of intervals so unequal that a sample weighs little
+    /// in one of its differences.
+    fn push_uneven(&mut self, normalised_square: f64) {
+        self.far_in_a_row = 0;
+        if !normalised_square.is_nan() {
+            self.take(normalised_square);
+        }
+    }
+
+    fn take(&mut self, normalised_square: f64) {
+        let largest = CLIP * self.believed();
+        self.sum = self.sum * FADING + normalised_square.clamp(0.0, largest) / CLIPPED_MEAN;
+        self.count = self.count * FADING + 1.0;
+    }
+
+    /// Ratio of the variances as it is believed to be.
+    fn believed(&self) -> f64 {
+        (self.sum / self.count).max(RATIO_MIN)
     }
 
     /// Takes the first difference of a channel whose samples have the learned standard deviation
@@ -156,7 +180,7 @@ impl NoiseScale {
     /// Share of the samples that are outliers.
     #[must_use]
     pub fn outlier_rate(&self) -> f64 {
-        (self.outliers / self.count).clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX)
+        (self.outliers / self.asked).clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX)
     }
 
     /// Ratio of the variances. It leans to the high side by its own uncertainty: false alarms come
@@ -250,11 +274,15 @@ impl SensorNoise {
             let [a, b, c] = all.map(|o| o.pose_variance(model, [1.0; 3]));
             // Of intervals as long as they are: what departs at a constant rate leaves nothing.
             let longer = now.dt_s / last.dt_s;
+            let is_even = (1.0 / EVEN..EVEN).contains(&longer);
             let (first, middle) = (longer * longer, (1.0 + longer) * (1.0 + longer));
             for i in 0..a.len() {
                 let bend = up[i] - longer * down[i];
                 let variance = first * a[i] + middle * b[i] + c[i];
-                self.pose[i].push(bend * bend / variance, 2);
+                match is_even {
+                    true => self.pose[i].push(bend * bend / variance, 2),
+                    false => self.pose[i].push_uneven(bend * bend / variance),
+                }
             }
         }
         let surge = (now.command[1] - last.command[1]).abs();
@@ -281,7 +309,7 @@ fn outlier_rates<const N: usize>(all: &[NoiseScale; N]) -> [f64; N] {
     let most = |a: &&NoiseScale, b: &&NoiseScale| a.outliers.total_cmp(&b.outliers);
     let most = all.iter().max_by(most).copied().unwrap_or_default();
     let sum = |of: fn(&NoiseScale) -> f64| all.iter().map(of).sum::<f64>() - of(&most);
-    let (outliers, count) = (sum(|scale| scale.outliers), sum(|scale| scale.count));
+    let (outliers, count) = (sum(|scale| scale.outliers), sum(|scale| scale.asked));
     let usual = (outliers + EXPECTED) / count;
     let bounded = |rate: f64| rate.clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX);
     all.each_ref()
