@@ -294,22 +294,25 @@ impl FurtherFilter {
             State::GyroNoise(factor) => residuals
                 .yaw_rate
                 .map_or(0.0, |residual| noisy(&residual, factor)),
-            State::Unknown => {
-                let gyro = residuals
-                    .yaw_rate
-                    .map(|residual| (residual, self.wide.turn_rad_s));
-                let mean = mean(currents, |residual, _| residual.apart);
-                let currents = currents.iter().flatten().map(|residual| {
-                    let apart = residual.apart - mean;
-                    (Residual { apart, ..*residual }, self.wide.current_a)
-                });
-                let anything = |(residual, sd): (Residual, f64)| {
-                    let wide = shifted(&residual, 0.0, residual.variance + sd * sd);
-                    log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + wide)
-                };
-                currents.chain(gyro).map(anything).sum()
-            }
+            State::Unknown => self.log_ratio_unknown(residuals),
         }
+    }
+
+    /// The same in the unknown: each channel may read anything.
+    fn log_ratio_unknown(&self, residuals: &Residuals) -> f64 {
+        let gyro = residuals
+            .yaw_rate
+            .map(|residual| (residual, self.wide.turn_rad_s));
+        let mean = mean(&residuals.currents, |residual, _| residual.apart);
+        let currents = residuals.currents.iter().flatten().map(|residual| {
+            let apart = residual.apart - mean;
+            (Residual { apart, ..*residual }, self.wide.current_a)
+        });
+        let anything = |(residual, sd): (Residual, f64)| {
+            let wide = shifted(&residual, 0.0, residual.variance + sd * sd);
+            log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + wide)
+        };
+        currents.chain(gyro).map(anything).sum()
     }
 
     /// What a fault of a wheel makes of all currents, A, where it would carry `expected_a`.

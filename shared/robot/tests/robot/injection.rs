@@ -64,7 +64,7 @@ fn kinds_stand_in_the_order_of_their_codes() {
         assert_eq!(DisturbanceKind::named(row.name), Some(row.kind));
     }
     assert_eq!(DisturbanceKind::from_wire(100), None);
-    assert_eq!(DisturbanceKind::from_wire(129), None);
+    assert_eq!(DisturbanceKind::from_wire(131), None);
 }
 
 #[test]
