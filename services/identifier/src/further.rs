@@ -16,7 +16,9 @@ use vigil_robot::learned::wheel_evidence::TOGETHER_SD;
 use vigil_robot::learned::{Further, Healthy, Model, Observation};
 use vigil_robot::{Description, FaultPrior};
 
-use crate::further_likelihood::{dead, mean, noisy, noisy_current, shifted, together};
+use crate::further_likelihood::{
+    Currents, dead, noisy, noisy_current, shifted, together, without_common,
+};
 use crate::further_state::State;
 use crate::modes::Leaves;
 use crate::node_sizes::TOLD_MIN;
@@ -29,7 +31,7 @@ const OFFSETS: [f64; 12] = [
 /// Factors of a broken current sensor or gyro: reversed, none, half, double. What lies between is
 /// told to a factor of two.
 const GAINS: [f64; 4] = [-1.0, 0.0, 0.5, 2.0];
-/// Factors of its noise. A healthy sensor's is followed up to five times, so less is none.
+/// Factors of its noise, beyond what is followed: that of a healthy sensor, up to five times.
 const NOISES: [f64; 2] = [8.0, 32.0];
 /// Biases of a broken gyro, in deviations of its noise. The least is two tolerances of the rover.
 const BIASES: [f64; 10] = [-40.0, -16.0, -8.0, -4.0, -2.0, 2.0, 4.0, 8.0, 16.0, 40.0];
@@ -221,8 +223,9 @@ impl FurtherFilter {
             p[0] -= changed;
         }
         let mut largest = f64::NEG_INFINITY;
+        let beside = without_common(&residuals.currents);
         for at in 0..self.states.len() {
-            let log = self.log_ratio(self.states[at], observation, further, residuals);
+            let log = self.log_ratio(self.states[at], observation, further, residuals, &beside);
             let log = if log.is_finite() { log } else { 0.0 };
             self.logs[at] = log.clamp(-LOG_MAX, LOG_MAX);
             largest = largest.max(self.logs[at]);
@@ -237,36 +240,41 @@ impl FurtherFilter {
         }
     }
 
-    /// Log-likelihood of the readings in a state, over that of a whole robot.
+    /// Log-likelihood of the readings in a state, over that of a whole robot; `beside` are the
+    /// currents without what they have in common.
     fn log_ratio(
         &self,
         state: State,
         observation: &Observation,
         further: &Further,
         residuals: &Residuals,
+        beside: &Currents,
     ) -> f64 {
         let currents = &residuals.currents;
         let alone = |wheel: usize, by: f64| {
             let mut all = [0.0; WHEELS];
             all[wheel] = by;
-            together(currents, &all, |_| 0.0)
+            together(beside, &all, |_| 0.0)
+        };
+        let gyro = |log_ratio: &dyn Fn(&Residual) -> f64| {
+            residuals.yaw_rate.as_ref().map_or(0.0, log_ratio)
         };
         let expected = |wheel: usize| currents[wheel].map_or(0.0, |residual| residual.expected);
         match state {
             State::Whole => 0.0,
             State::Torque(wheel, share) => {
                 let by = self.effect(share, wheel, observation, expected(wheel));
-                together(currents, &by, |_| 0.0)
+                together(beside, &by, |_| 0.0)
             }
             State::Stuck(wheel) => {
                 let by = self.effect(STUCK, wheel, observation, expected(wheel));
                 // How a robot turns on a stuck wheel the pose says.
-                let gyro = residuals.yaw_rate.map_or(0.0, |residual| {
+                let turns = gyro(&|residual| {
                     let wide = residual.variance + self.wide.turn_rad_s * self.wide.turn_rad_s;
-                    log_add(0.0, shifted(&residual, 0.0, wide)) - std::f64::consts::LN_2
+                    log_add(0.0, shifted(residual, 0.0, wide)) - std::f64::consts::LN_2
                 });
                 let sd = |by: f64| (TOGETHER_SD * by).abs().max(self.wide.stuck_a);
-                gyro + together(currents, &by, sd)
+                turns + together(beside, &by, sd)
             }
             State::CurrentOffset(wheel, offset) => alone(wheel, offset),
             State::CurrentGain(wheel, gain) => alone(wheel, (gain - 1.0) * expected(wheel)),
@@ -280,34 +288,27 @@ impl FurtherFilter {
                 let healthy = learned.map_or(0.5, |learned| learned.repeat_rate);
                 dead(&further.yaw_rate, residuals.yaw_rate, healthy)
             }
-            State::CurrentNoise(wheel, factor) => noisy_current(currents, wheel, factor),
-            State::GyroBias(bias) => residuals
-                .yaw_rate
-                .map_or(0.0, |residual| shifted(&residual, bias, residual.variance)),
-            State::GyroGain(gain) => residuals.yaw_rate.map_or(0.0, |residual| {
+            State::CurrentNoise(wheel, factor) => noisy_current(beside, wheel, factor),
+            State::GyroBias(bias) => gyro(&|residual| shifted(residual, bias, residual.variance)),
+            State::GyroGain(gain) => gyro(&|residual| {
                 shifted(
-                    &residual,
+                    residual,
                     (gain - 1.0) * residual.expected,
                     residual.variance,
                 )
             }),
-            State::GyroNoise(factor) => residuals
-                .yaw_rate
-                .map_or(0.0, |residual| noisy(&residual, factor)),
-            State::Unknown => self.log_ratio_unknown(residuals),
+            State::GyroNoise(factor) => gyro(&|residual| noisy(residual, factor)),
+            State::Unknown => self.log_ratio_unknown(residuals, beside),
         }
     }
 
     /// The same in the unknown: each channel may read anything.
-    fn log_ratio_unknown(&self, residuals: &Residuals) -> f64 {
+    fn log_ratio_unknown(&self, residuals: &Residuals, beside: &Currents) -> f64 {
         let gyro = residuals
             .yaw_rate
             .map(|residual| (residual, self.wide.turn_rad_s));
-        let mean = mean(&residuals.currents, |residual, _| residual.apart);
-        let currents = residuals.currents.iter().flatten().map(|residual| {
-            let apart = residual.apart - mean;
-            (Residual { apart, ..*residual }, self.wide.current_a)
-        });
+        let currents = beside.iter().flatten();
+        let currents = currents.map(|residual| (*residual, self.wide.current_a));
         let anything = |(residual, sd): (Residual, f64)| {
             let wide = shifted(&residual, 0.0, residual.variance + sd * sd);
             log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + wide)

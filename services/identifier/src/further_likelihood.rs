@@ -10,11 +10,22 @@ use vigil_robot::learned::{Reading, repeats};
 /// Share of readings that nothing explains: one observation in 50 s.
 const OUTLIER: f64 = 1e-3;
 
+/// Residuals of the currents that were read, by wheel.
+pub(crate) type Currents = [Option<Residual>; WHEELS];
+
+/// The currents without what all have in common: ground and load do that, too.
+pub(crate) fn without_common(currents: &Currents) -> Currents {
+    let common = mean(currents, |residual, _| residual.apart);
+    currents.map(|residual| {
+        residual.map(|residual| Residual {
+            apart: residual.apart - common,
+            ..residual
+        })
+    })
+}
+
 /// Mean over the currents that were read.
-pub(crate) fn mean(
-    currents: &[Option<Residual>; WHEELS],
-    of: impl Fn(&Residual, usize) -> f64,
-) -> f64 {
+fn mean(currents: &Currents, of: impl Fn(&Residual, usize) -> f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for (wheel, residual) in currents.iter().enumerate() {
         if let Some(residual) = residual {
@@ -25,22 +36,14 @@ pub(crate) fn mean(
     sum / f64::max(count, 1.0)
 }
 
-/// Log-density of the currents if each departs by so much, known up to a deviation, over that of
-/// healthy ones. What all have in common is taken off: ground and load do that, too.
-pub(crate) fn together(
-    currents: &[Option<Residual>; WHEELS],
-    by: &[f64; WHEELS],
-    sd: impl Fn(f64) -> f64,
-) -> f64 {
-    let common = mean(currents, |residual, _| residual.apart);
-    let common_by = mean(currents, |_, wheel| by[wheel]);
-    let each = currents.iter().zip(by).filter_map(|(residual, &by)| {
-        let residual = (*residual)?;
-        let apart = residual.apart - common;
-        let residual = Residual { apart, ..residual };
-        let more = sd(by);
+/// Log-density of currents, without what they have in common, if each departs by so much, known up
+/// to a deviation, over that of healthy ones.
+pub(crate) fn together(beside: &Currents, by: &[f64; WHEELS], sd: impl Fn(f64) -> f64) -> f64 {
+    let common_by = mean(beside, |_, wheel| by[wheel]);
+    let each = beside.iter().zip(by).filter_map(|(residual, &by)| {
+        let (residual, more) = (residual.as_ref()?, sd(by));
         let variance = residual.variance + more * more;
-        Some(shifted(&residual, by - common_by, variance))
+        Some(shifted(residual, by - common_by, variance))
     });
     each.sum()
 }
@@ -63,28 +66,21 @@ pub(crate) fn noisy(residual: &Residual, factor: f64) -> f64 {
     shifted(residual, 0.0, residual.variance * factor * factor)
 }
 
-/// The same of all currents if the sensor of one wheel is so noisy: what all have in common the
-/// others tell.
-pub(crate) fn noisy_current(
-    currents: &[Option<Residual>; WHEELS],
-    wheel: usize,
-    factor: f64,
-) -> f64 {
-    let Some(own) = &currents[wheel] else {
+/// The same of all currents, without what they have in common, if the sensor of one wheel is so
+/// noisy: then the others tell what is common.
+pub(crate) fn noisy_current(beside: &Currents, wheel: usize, factor: f64) -> f64 {
+    let Some(own) = &beside[wheel] else {
         return 0.0;
     };
-    let common = mean(currents, |residual, _| residual.apart);
-    let others = currents.iter().flatten().count() as f64 - 1.0;
+    let others = beside.iter().flatten().count() as f64 - 1.0;
     if others < 1.0 {
         return 0.0;
     }
-    let moved = (common - own.apart) / others;
-    let each = currents.iter().enumerate().filter_map(|(at, residual)| {
-        let residual = (*residual)?;
+    let moved = -own.apart / others;
+    let each = beside.iter().enumerate().filter_map(|(at, residual)| {
+        let residual = residual.as_ref()?;
         let scale = if at == wheel { factor * factor } else { 1.0 };
-        let apart = residual.apart - common;
-        let beside = Residual { apart, ..residual };
-        Some(shifted(&beside, moved, residual.variance * scale))
+        Some(shifted(residual, moved, residual.variance * scale))
     });
     each.sum()
 }

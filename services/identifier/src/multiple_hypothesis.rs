@@ -251,9 +251,8 @@ impl MultipleHypothesis {
             if begins && gained.is_some() {
                 // Where it has jumped to it is as good as any.
                 state.track = before;
-                if state.track.update(observation.pose, variance).is_none() {
-                    gained = None;
-                }
+                let taken = state.track.update(observation.pose, variance);
+                gained = gained.filter(|_| taken.is_some());
                 let jump_m = (state.track.pose() - before.pose()).xy().norm();
                 state.jump_m = Some((jump_m, (variance[0] + variance[1]).sqrt()));
             }

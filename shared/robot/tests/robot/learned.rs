@@ -11,11 +11,11 @@ fn read(name: &str) -> String {
     std::fs::read_to_string(root.join(name)).unwrap()
 }
 
-fn robot() -> Description {
+pub fn robot() -> Description {
     toml::from_str(&read("robots/rover.toml")).unwrap()
 }
 
-fn model() -> Model {
+pub fn model() -> Model {
     Model::from_toml(&read("models/rover.toml")).unwrap()
 }
 

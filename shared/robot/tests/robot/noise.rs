@@ -1,15 +1,14 @@
 //! How noisy the sensors are is known however unevenly their frames come.
 
-use std::path::PathBuf;
-
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{SensorFrame, Valid};
-use vigil_robot::Description;
 use vigil_robot::learned::noise_scale::SensorNoise;
 use vigil_robot::learned::wheels::rolling_rate;
-use vigil_robot::learned::{Model, NoiseScales, Observer};
+use vigil_robot::learned::{NoiseScales, Observer};
+
+use crate::learned::{model, robot};
 
 /// Factor on the learned noise of every sensor.
 const NOISIER: f64 = 1.6;
@@ -18,16 +17,10 @@ const OUTLIERS: f64 = 0.01;
 const FAR: f64 = 20.0;
 const WHEELS: usize = 6;
 
-fn read(name: &str) -> String {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
-    std::fs::read_to_string(root.join(name)).unwrap()
-}
-
 /// What is believed after a minute on a circle, at 20 Hz: each frame comes within a share of its
 /// period, and a share of them not at all.
 fn scales(jitter: f64, loss: f64) -> NoiseScales {
-    let robot: Description = toml::from_str(&read("robots/rover.toml")).unwrap();
-    let model = Model::from_toml(&read("models/rover.toml")).unwrap();
+    let (robot, model) = (robot(), model());
     let mut observer = Observer::new(&model, &robot);
     let mut noise = SensorNoise::default();
     let mut rng = Pcg64Mcg::seed_from_u64(7);

@@ -1,15 +1,9 @@
 //! Several stuck wheels, of which nothing was learned together, on soils that they do not know.
 
-use std::path::PathBuf;
-
-use vigil_robot::Description;
-use vigil_robot::learned::{Model, Moved, motion_modes};
+use vigil_robot::learned::{Moved, motion_modes};
 use vigil_robot::slip::{Condition, Situation, SlipModel, Soil};
 
-fn read(name: &str) -> String {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
-    std::fs::read_to_string(root.join(name)).unwrap()
-}
+use crate::learned::{model, robot};
 
 #[test]
 fn the_motion_of_every_set_lies_within_what_its_mode_expects() {
@@ -21,8 +15,7 @@ fn the_motion_of_every_set_lies_within_what_its_mode_expects() {
         (0.5, 0.25),
         (0.8, 0.15),
     ];
-    let robot: Description = toml::from_str(&read("robots/rover.toml")).unwrap();
-    let model = Model::from_toml(&read("models/rover.toml")).unwrap();
+    let (robot, model) = (robot(), model());
     let slip = SlipModel::new(&robot).unwrap();
     let modes = motion_modes(&model, &robot, 0b11_1111, false, true);
     let several = modes.iter().filter(|mode| match mode.moved {
