@@ -69,6 +69,12 @@ pub struct Way {
     rng: Pcg64Mcg,
 }
 
+impl std::fmt::Display for Way {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:?}", self.drawn)
+    }
+}
+
 impl Way {
     /// The way of a run's frames; `noise` is the factor on the world's noise, gaps are
     /// later by `later_s`.

@@ -180,6 +180,23 @@ impl Conditions {
     }
 }
 
+impl std::fmt::Display for Conditions {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { rate_hz, way, .. } = self;
+        let Simulator {
+            lag_s,
+            friction_scatter,
+            noise_scale,
+            ..
+        } = self.simulator;
+        write!(
+            f,
+            "{rate_hz} Hz, lag {lag_s} s, friction scatter {friction_scatter:.3}, \
+             noise {noise_scale:.2}, {way}"
+        )
+    }
+}
+
 /// Drives a run with every set of sensors of its scenario.
 ///
 /// # Errors
@@ -190,6 +207,9 @@ pub fn run(graph: &Graph, library: &Library, job: &Job<'_>) -> Result<Vec<Scored
         return recorded::play(material, job).map_err(|error| named(error.to_string()));
     }
     let conditions = Conditions::draw(graph, job).map_err(named)?;
+    if job.timeline {
+        eprintln!("{} {}: {conditions}", job.scenario.name, conditions.seed);
+    }
     let sets: Vec<(Sensors, &'static str)> = job.scenario.sets().collect();
     // A world that obeys is another one for each set.
     let groups: Vec<&[(Sensors, &'static str)]> = match job.scenario.obeys {

@@ -145,6 +145,7 @@ impl<const K: usize> Departure<K> {
     /// Puts every track at this pose and keeps what is known of the motion: the frame of the
     /// measurement has jumped, or the pose was lost.
     pub fn anchor(&mut self, pose: [f64; 3], variance: [f64; 3]) {
+        self.trust = Trust::default();
         self.track.anchor(pose, variance);
         for fault in self.all_mut() {
             fault.track.anchor(pose, variance);

@@ -13,6 +13,9 @@ const WINDOW: usize = 10;
 /// Probability that a fault vanishes in a step of the constant forms: bounds their log-odds at
 /// about 21, above the alarm of any usual setting, and not so high that they never fall again.
 const VANISHES: f64 = 1e-9;
+/// Deviation of what a broken channel reads if it reads anything, in units of the residual's: that
+/// of an outlier.
+const ANYTHING: f64 = 10.0;
 
 /// What the fault state says of a residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -104,6 +107,14 @@ impl<const D: usize> Evidence<D> {
             Self::Windowed(filter) => filter.step(residual, tau_squared, birth, VANISHES),
         }
     }
+}
+
+/// By how much more likely the square of a whitened residual is from a channel that reads anything
+/// than from a whole one (natural logarithm). Where a fault is known to have been, an outlier is
+/// rather the fault's than the sensor's.
+pub(super) fn log_ratio_any(square: f64) -> f64 {
+    let wide = 1.0 + ANYTHING * ANYTHING;
+    0.5 * (square * (1.0 - 1.0 / wide) - wide.ln())
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use crate::Description;
 pub struct Turn {
     /// Yaw rate, rad/s.
     pub rate_rad_s: f64,
-    /// Its variance by the lag of the body, (rad/s)².
+    /// Its variance by the lag of the body and by gaps, (rad/s)².
     pub variance: f64,
 }
 
@@ -31,12 +31,17 @@ impl Turn {
         observation: &Observation,
         turned_rad: impl FnOnce(&Displacement) -> f64,
     ) -> Option<Self> {
-        let is_known = !observation.anchor && observation.dt_s > 0.0;
+        let over_s = observation.middles_s;
+        let is_known = !observation.anchor && over_s > 0.0;
         is_known.then(|| {
             let step = observation.displacement(model, &model.nominal.motion);
+            let rate_rad_s = turned_rad(&step) / over_s;
+            // After a gap the gyro reads how the robot turns now, not how it did on the average.
+            let [curvature, speed] = observation.command;
+            let since = (curvature * speed - rate_rad_s) * (1.0 - observation.covered());
             Self {
-                rate_rad_s: turned_rad(&step) / observation.dt_s,
-                variance: observation.turn_variance / (observation.dt_s * observation.dt_s),
+                rate_rad_s,
+                variance: observation.turn_variance / (over_s * over_s) + since * since,
             }
         })
     }

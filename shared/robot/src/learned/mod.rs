@@ -6,7 +6,8 @@
 //! | [`motion`] | displacement per commanded metre, and its noise |
 //! | [`wheels`] | wheel rates and steering angles, and what an encoder says about its wheel |
 //! | [`BodyLag`] | how the body follows a changing command, learned on the way |
-//! | [`observation`] | frames averaged into observations of about the learned interval |
+//! | [`observation`] | frames averaged over about the learned interval |
+//! | [`Observer`] | builds observations from frames |
 //! | [`motion_modes`] | how a robot may move: nominal, wheels stuck, servo off, unknown |
 //! | [`FaultRates`] | how often faults come and go |
 //! | [`steer_reading`] | what a steering angle says of its servo |
@@ -45,10 +46,12 @@ pub mod motion;
 pub mod motion_modes;
 pub mod noise_scale;
 pub mod observation;
+pub(crate) mod observer;
 pub mod past_rates;
 mod provenance;
 mod reading;
 pub mod repeats;
+mod settling;
 pub mod steer_reading;
 pub mod switching;
 mod together;
@@ -68,7 +71,8 @@ pub use monitor::Monitor;
 pub use motion::{Curve, MotionModel};
 pub use motion_modes::{MotionMode, Moved, motion_modes, steer_modes};
 pub use noise_scale::{NoiseScales, OutlierRates};
-pub use observation::{Intake, Observation, Observer};
+pub use observation::Observation;
+pub use observer::{Intake, Observer};
 pub use reading::Reading;
 pub use steer_reading::{ANY_ANGLE_SD_RAD, SteerReading};
 pub use switching::Switching;

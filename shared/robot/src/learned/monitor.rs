@@ -23,12 +23,13 @@ use vigil_inference::track::{Displacement, Track};
 
 pub use super::channels::Channels;
 use super::faults::{Faults, KINDS};
-use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION};
+use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION, log_ratio_any};
 use super::further_evidence::FurtherEvidence;
 use super::further_watch::Turn;
 use super::lateness::{Lateness, Timely};
 use super::noise_scale::{NoiseScales, SensorNoise, UNSEEN_S};
 use super::repeats::Repeats;
+use super::settling::Settling;
 use super::wheel_context::{Beside, WheelContext};
 use super::wheels::rolling_rate;
 use super::{Further, Healthy, Model, Observation, SteerReading, Troubles};
@@ -54,9 +55,6 @@ const FOLLOWING: f64 = 0.1;
 /// Squared norm beyond which a single residual says no more for a deviation of any kind: it takes
 /// several to tell one from an outlier, as each gives 3.6 nats at most.
 const ANY_NORM_MAX: f64 = 12.0;
-/// Deviation of what a broken channel reads if it reads anything, in units of the residual's: that
-/// of an outlier.
-const ANYTHING: f64 = 10.0;
 /// Probability that a broken channel begins or ceases to read anything, an observation. Chosen:
 /// once in 2.5 s; each observation of one that does not costs 0.02 nats.
 const WAY_CHANGES: f64 = 0.02;
@@ -78,6 +76,7 @@ pub struct Monitor {
     fault_rate_1_s: f64,
     tracking: bool,
     coasted: u32,
+    settling: Settling,
     departure: Departure<KINDS>,
     faults: Faults,
     context: WheelContext,
@@ -139,6 +138,7 @@ impl Monitor {
             fault_rate_1_s: fault_rate_1_h / 3600.0,
             tracking: false,
             coasted: 0,
+            settling: Settling::default(),
             departure: Departure::new(model.nominal_noise(robot)),
             faults: Faults::new(model, robot),
             context: WheelContext::new(robot.tolerance),
@@ -297,6 +297,7 @@ impl Monitor {
             if measured {
                 self.departure.start(observation.pose, unvouched(variance));
                 self.tracking = true;
+                self.settling.begin();
             }
             return;
         }
@@ -304,6 +305,7 @@ impl Monitor {
             if measured {
                 self.departure.anchor(observation.pose, unvouched(variance));
                 self.coasted = 0;
+                self.settling.begin();
             }
             return;
         }
@@ -323,15 +325,20 @@ impl Monitor {
         self.departure.predict(&step, &kinds, birth, suspected);
         if measured {
             let rates = scales.outliers.pose;
-            let variance = self.departure.trusted(observation.pose, variance, rates);
-            self.weigh_pose(observation, variance);
+            let trusted = self.departure.trusted(observation.pose, variance, rates);
+            let agrees = (0..3).all(|axis| trusted[axis] < 2.0 * variance[axis]);
+            if self.settling.take(agrees) {
+                self.weigh_pose(observation, trusted);
+            } else {
+                self.departure.anchor(observation.pose, unvouched(variance));
+            }
         }
     }
 
     /// Evidence of the pose's residual. A standing robot tells nothing about its motion, but its
     /// pose stays known.
     fn weigh_pose(&mut self, observation: &Observation, variance: [f64; 3]) {
-        let counts = observation.moving;
+        let counts = observation.moving && self.settling.is_over();
         let Some(said) = self.departure.update(observation.pose, variance, counts) else {
             self.coasted += 1;
             self.report.degenerate_count += 1;
@@ -485,14 +492,6 @@ impl Monitor {
         self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);
         self.report.channels = channels.map(|value| value.max(LOG_ODDS_MIN));
     }
-}
-
-/// By how much more likely the square of a whitened residual is from a channel that reads anything
-/// than from a whole one (natural logarithm). Where a fault is known to have been, an outlier is
-/// rather the fault's than the sensor's.
-fn log_ratio_any(square: f64) -> f64 {
-    let wide = 1.0 + ANYTHING * ANYTHING;
-    0.5 * (square * (1.0 - 1.0 / wide) - wide.ln())
 }
 
 /// Log-odds below this are reported as this: no evidence for a fault at all.

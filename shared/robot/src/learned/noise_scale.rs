@@ -11,14 +11,17 @@ use crate::Description;
 /// Three deviations.
 const CLIP: f64 = 9.0;
 /// Squares above this many times the mean one go to an outlier, or come from it. Noise reaches it
-/// once in 1,900 samples; an outlier of 9 deviations does in every difference.
+/// once in 1,900 samples.
 const FAR: f64 = 12.0;
+/// What an impulse leaves in successive differences of the first and the second order, as shares of
+/// the largest square: binomial coefficients. A step leaves one, or two that are equal.
+const IMPULSE: [&[f64]; 2] = [&[1.0, 1.0], &[0.25, 1.0, 0.25]];
 /// Bounds of the rate of outliers: what is believed of a sensor that never had one, of which no
 /// single sample is a fault, and what is no sensor any more. Once in 1.4 h of 50 ms; one sample in
 /// ten.
 const OUTLIER_RATE_MIN: f64 = 1e-5;
 const OUTLIER_RATE_MAX: f64 = 0.1;
-/// Outliers that count as seen before any sample. One in 10,000 of the prior's samples.
+/// Outliers that count as seen before any sample. One in 10,000 of [`ASKED`].
 const EXPECTED: f64 = 0.002;
 /// Mean of a squared standard normal clipped at [`CLIP`]: 0.995, and half a percent to the high
 /// side, with which the shipped model was calibrated.
@@ -28,11 +31,14 @@ const CLIPPED_MEAN: f64 = 0.99;
 const RATIO_MIN: f64 = 0.1;
 /// A channel five times as noisy as learned is no healthy one: what is beyond is evidence.
 const RATIO_MAX: f64 = 25.0;
-/// Samples that the learned scale of 1 counts for. One second of 50 ms.
-const PRIOR: f64 = 20.0;
-/// Standard errors of the estimate by which it leans to the high side. One in six estimates is then
-/// too small.
-const LEAN: f64 = 1.0;
+/// Samples that the learned scale of 1 counts for: healthy sensors differ by a factor of two and
+/// more, which two degrees of freedom say.
+const PRIOR: f64 = 4.0;
+/// Samples that count as asked for outliers before any was. One second of 50 ms.
+const ASKED: f64 = 20.0;
+/// Twice the log-odds that residuals must add up to for an alarm: 11 nats by the prior (once an
+/// hour, in 50 ms), some to choose kind and onset, and as many again for what is to be sure.
+const DEVIANCE: f64 = 50.0;
 /// Samples over which the estimate forgets. Half a minute of 50 ms: known within sqrt(3.9 / 600) =
 /// 8 %.
 const MEMORY: f64 = 600.0;
@@ -96,7 +102,8 @@ pub struct NoiseScale {
     outliers: f64,
     /// Samples of which it was asked whether they are outliers.
     asked: f64,
-    far_in_a_row: u32,
+    /// The last squares over the mean one, newest last.
+    squares: [f64; 3],
 }
 
 impl Default for NoiseScale {
@@ -105,8 +112,8 @@ impl Default for NoiseScale {
             sum: PRIOR,
             count: PRIOR,
             outliers: 0.0,
-            asked: PRIOR,
-            far_in_a_row: 0,
+            asked: ASKED,
+            squares: [0.0; 3],
         }
     }
 }
@@ -119,14 +126,17 @@ impl NoiseScale {
         if normalised_square.is_nan() {
             return;
         }
-        // There and back again: what stays there is far in one difference less, and no outlier.
-        let is_far = normalised_square > FAR * self.believed();
-        self.far_in_a_row = if is_far {
-            self.far_in_a_row.saturating_add(1)
-        } else {
-            0
-        };
-        let is_outlier = self.far_in_a_row > order;
+        let [_, before, last] = self.squares;
+        self.squares = [before, last, normalised_square / self.believed()];
+        let impulse = IMPULSE[usize::from(order > 1)];
+        let newest = self.squares.iter().rev();
+        let is_outlier = impulse
+            .iter()
+            .zip(newest)
+            .all(|(share, square)| *square > share * FAR);
+        if is_outlier {
+            self.squares = [0.0; 3];
+        }
         self.outliers = self.outliers * FADING + f64::from(u8::from(is_outlier));
         self.asked = self.asked * FADING + 1.0;
         self.take(normalised_square);
@@ -135,7 +145,7 @@ impl NoiseScale {
     /// Takes one that does not tell an outlier: of intervals so unequal that a sample weighs little
     /// in one of its differences.
     fn push_uneven(&mut self, normalised_square: f64) {
-        self.far_in_a_row = 0;
+        self.squares = [0.0; 3];
         if !normalised_square.is_nan() {
             self.take(normalised_square);
         }
@@ -183,18 +193,20 @@ impl NoiseScale {
         (self.outliers / self.asked).clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX)
     }
 
-    /// Ratio of the variances. It leans to the high side by its own uncertainty: false alarms come
-    /// from noise taken as smaller than it is.
+    /// Ratio of the variances, so much larger than its estimate that residuals are no more unlikely
+    /// where it matters than they are by Student's t, the distribution of a residual whose variance
+    /// is an estimate: false alarms come from noise taken as smaller than it is.
     #[must_use]
     pub fn variance_ratio(&self) -> f64 {
         // Second differences are correlated by -2/3 and 1/6: 2 (1 + 2 (4/9 + 1/36)) = 3.9.
-        let lean = 1.0 + LEAN * (3.9 / self.count).sqrt();
-        (self.sum / self.count * lean).clamp(RATIO_MIN, RATIO_MAX)
+        let freedom = 2.0 * self.count / 3.9;
+        let wider = DEVIANCE / ((freedom + 1.0) * (DEVIANCE / freedom).ln_1p());
+        (self.sum / self.count * wider).clamp(RATIO_MIN, RATIO_MAX)
     }
 }
 
 /// Samples of a channel after which its noise counts as known. With the prior's, the variance is
-/// known within sqrt(3.9 / 45) = 29 %.
+/// known within sqrt(3.9 / 29) = 37 %.
 const KNOWN: f64 = 25.0;
 /// Change of the command (speed, m/s, or curvature, 1/m) up to which it counts as the same: chosen,
 /// a thousandth of the most.
@@ -273,7 +285,7 @@ impl SensorNoise {
             let (up, down) = (apart(model, &last, now), apart(model, &before, &last));
             let [a, b, c] = all.map(|o| o.pose_variance(model, [1.0; 3]));
             // Of intervals as long as they are: what departs at a constant rate leaves nothing.
-            let longer = now.dt_s / last.dt_s;
+            let longer = now.middles_s / last.middles_s;
             let is_even = (1.0 / EVEN..EVEN).contains(&longer);
             let (first, middle) = (longer * longer, (1.0 + longer) * (1.0 + longer));
             for i in 0..a.len() {
@@ -357,7 +369,7 @@ mod tests {
 
     #[test]
     fn one_channel_with_outliers_may_be_broken_and_two_warn_the_others() {
-        let expected = EXPECTED / (2.0 * PRIOR);
+        let expected = EXPECTED / (2.0 * ASKED);
         let mut all = [NoiseScale::default(); 3];
         assert_eq!(outlier_rates(&all), [expected; 3]);
         for square in [1.0, 400.0, 400.0, 1.0] {

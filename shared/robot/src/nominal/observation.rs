@@ -6,7 +6,7 @@ use vigil_inference::angle::wrap;
 use crate::Description;
 use crate::frame_guard::BEYOND_LIMITS;
 use crate::learned::Intake;
-use crate::learned::observation::STALE_MAX;
+use crate::learned::observer::STALE_MAX;
 
 /// Observations that a prediction may look back, the newest included.
 pub const DEPTH: usize = 5;
