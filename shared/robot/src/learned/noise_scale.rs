@@ -10,7 +10,7 @@ use crate::Description;
 /// Squares above this many times the believed variance say nothing about noise (a jump, a fault).
 /// Three deviations.
 const CLIP: f64 = 9.0;
-/// Squares above this many times the mean one go to an outlier, or come from it. Noise reaches it
+/// Squares above this many times that of the noise go to an outlier, or come from it. Noise reaches it
 /// once in 1,900 samples.
 const FAR: f64 = 12.0;
 /// What an impulse leaves in successive differences of the first and the second order, as shares of
@@ -36,9 +36,12 @@ const RATIO_MAX: f64 = 25.0;
 const PRIOR: f64 = 4.0;
 /// Samples that count as asked for outliers before any was. One second of 50 ms.
 const ASKED: f64 = 20.0;
-/// Twice the log-odds that residuals must add up to for an alarm: 11 nats by the prior (once an
-/// hour, in 50 ms), some to choose kind and onset, and as many again for what is to be sure.
+/// Twice the log-odds that residuals add up to where they decide: of a pose, a gyro or a current
+/// many do, to what an alarm takes, 11 nats by the prior (once an hour, in 50 ms), some to choose
+/// kind and onset, and as many again to be sure ..
 const DEVIANCE: f64 = 50.0;
+/// .. and each of a wheel decides by itself, as far as it is no outlier: chosen, 8 nats.
+const DEVIANCE_ALONE: f64 = 16.0;
 /// Samples over which the estimate forgets. Half a minute of 50 ms: known within sqrt(3.9 / 600) =
 /// 8 %.
 const MEMORY: f64 = 600.0;
@@ -102,7 +105,7 @@ pub struct NoiseScale {
     outliers: f64,
     /// Samples of which it was asked whether they are outliers.
     asked: f64,
-    /// The last squares over the mean one, newest last.
+    /// The last squares over that of the noise, newest last.
     squares: [f64; 3],
 }
 
@@ -127,7 +130,7 @@ impl NoiseScale {
             return;
         }
         let [_, before, last] = self.squares;
-        self.squares = [before, last, normalised_square / self.believed()];
+        self.squares = [before, last, normalised_square / self.variance_ratio()];
         let impulse = IMPULSE[usize::from(order > 1)];
         let newest = self.squares.iter().rev();
         let is_outlier = impulse
@@ -198,9 +201,13 @@ impl NoiseScale {
     /// is an estimate: false alarms come from noise taken as smaller than it is.
     #[must_use]
     pub fn variance_ratio(&self) -> f64 {
+        self.ratio(DEVIANCE)
+    }
+
+    fn ratio(&self, deviance: f64) -> f64 {
         // Second differences are correlated by -2/3 and 1/6: 2 (1 + 2 (4/9 + 1/36)) = 3.9.
         let freedom = 2.0 * self.count / 3.9;
-        let wider = DEVIANCE / ((freedom + 1.0) * (DEVIANCE / freedom).ln_1p());
+        let wider = deviance / ((freedom + 1.0) * (deviance / freedom).ln_1p());
         (self.sum / self.count * wider).clamp(RATIO_MIN, RATIO_MAX)
     }
 }
@@ -233,18 +240,21 @@ impl SensorNoise {
     /// The ratios at present.
     #[must_use]
     pub fn scales(&self) -> NoiseScales {
-        let sd = |scale: &NoiseScale| {
+        let sd = |scale: &NoiseScale, deviance: f64| {
             let unseen = match self.moved_s < UNSEEN_S {
                 true => 0.0,
                 false => ((PRIOR + KNOWN - scale.count) / KNOWN).clamp(0.0, 1.0),
             };
-            let ratio = scale.variance_ratio();
+            let ratio = scale.ratio(deviance);
             (ratio + unseen * (UNSEEN - ratio).max(0.0)).sqrt()
         };
         NoiseScales {
-            pose: self.pose.each_ref().map(sd),
-            wheels: self.wheels.each_ref().map(sd),
-            steer: self.steer.each_ref().map(sd),
+            pose: self.pose.each_ref().map(|scale| sd(scale, DEVIANCE)),
+            wheels: self
+                .wheels
+                .each_ref()
+                .map(|scale| sd(scale, DEVIANCE_ALONE)),
+            steer: self.steer.each_ref().map(|scale| sd(scale, DEVIANCE_ALONE)),
             outliers: OutlierRates {
                 pose: outlier_rates(&self.pose),
                 wheels: outlier_rates(&self.wheels),
