@@ -378,6 +378,29 @@ mod tests {
     }
 
     #[test]
+    fn noise_that_is_hardly_known_is_seldom_believed_to_be_smaller_than_it_is() {
+        const SEEDS: usize = 400;
+        for ratio in [0.5, 4.0, 9.0] {
+            for samples in [25, 50, 200] {
+                let is_small = |seed: &usize| {
+                    let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(*seed as u64);
+                    let mut scale = NoiseScale::default();
+                    let noise: Vec<f64> = (0..samples + 2)
+                        .map(|_| rng.sample(StandardNormal))
+                        .collect();
+                    for w in noise.windows(3) {
+                        let bend = w[0] - 2.0 * w[1] + w[2];
+                        scale.push(ratio * bend * bend / 6.0, 2);
+                    }
+                    scale.variance_ratio() < ratio
+                };
+                let share = (0..SEEDS).filter(is_small).count() as f64 / SEEDS as f64;
+                assert!(share < 0.12, "{samples} of {ratio}: {share}");
+            }
+        }
+    }
+
+    #[test]
     fn one_channel_with_outliers_may_be_broken_and_two_warn_the_others() {
         let expected = EXPECTED / (2.0 * ASKED);
         let mut all = [NoiseScale::default(); 3];

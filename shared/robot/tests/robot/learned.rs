@@ -114,7 +114,7 @@ fn compensation_makes_a_stuck_robot_drive_the_commanded_curvature() {
 }
 
 /// Frames of a robot on a circle of curvature .5 at .2 m/s, `rate_hz` times a second.
-fn circle(rate_hz: f64, duration_s: f64) -> Vec<SensorFrame> {
+pub fn circle(rate_hz: f64, duration_s: f64) -> Vec<SensorFrame> {
     let (curvature, speed) = (0.5, 0.2);
     (0..=(duration_s * rate_hz) as u64)
         .map(|k| {
@@ -134,7 +134,7 @@ fn circle(rate_hz: f64, duration_s: f64) -> Vec<SensorFrame> {
         .collect()
 }
 
-fn observe(frames: &[SensorFrame]) -> Vec<Observation> {
+pub fn observe(frames: &[SensorFrame]) -> Vec<Observation> {
     let mut observer = Observer::new(&model(), &robot());
     let complete = |frame| {
         observer

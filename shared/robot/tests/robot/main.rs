@@ -4,6 +4,7 @@
 
 mod condition;
 mod frame_guard;
+mod gaps;
 mod injection;
 mod learned;
 mod noise;
