@@ -130,7 +130,7 @@ impl NoiseScale {
             return;
         }
         let [_, before, last] = self.squares;
-        self.squares = [before, last, normalised_square / self.variance_ratio()];
+        self.squares = [before, last, normalised_square / self.leaning(DEVIANCE)];
         let impulse = IMPULSE[usize::from(order > 1)];
         let newest = self.squares.iter().rev();
         let is_outlier = impulse
@@ -205,10 +205,15 @@ impl NoiseScale {
     }
 
     fn ratio(&self, deviance: f64) -> f64 {
+        self.leaning(deviance).clamp(RATIO_MIN, RATIO_MAX)
+    }
+
+    /// The same where it is no healthy channel's.
+    fn leaning(&self, deviance: f64) -> f64 {
         // Second differences are correlated by -2/3 and 1/6: 2 (1 + 2 (4/9 + 1/36)) = 3.9.
         let freedom = 2.0 * self.count / 3.9;
         let wider = deviance / ((freedom + 1.0) * (deviance / freedom).ln_1p());
-        (self.sum / self.count * wider).clamp(RATIO_MIN, RATIO_MAX)
+        self.believed() * wider
     }
 }
 
