@@ -130,7 +130,11 @@ impl NoiseScale {
             return;
         }
         let [_, before, last] = self.squares;
-        self.squares = [before, last, normalised_square / self.leaning(DEVIANCE)];
+        self.squares = [
+            before,
+            last,
+            normalised_square / self.leaning(DEVIANCE_ALONE),
+        ];
         let impulse = IMPULSE[usize::from(order > 1)];
         let newest = self.squares.iter().rev();
         let is_outlier = impulse
