@@ -10,8 +10,8 @@ use crate::Description;
 /// Squares above this many times the believed variance say nothing about noise (a jump, a fault).
 /// Three deviations.
 const CLIP: f64 = 9.0;
-/// Squares above this many times that of the noise go to an outlier, or come from it. Noise reaches it
-/// once in 1,900 samples.
+/// Squares above this many times that of the noise go to an outlier, or come from it. Noise reaches
+/// it once in 1,900 samples.
 const FAR: f64 = 12.0;
 /// What an impulse leaves in successive differences of the first and the second order, as shares of
 /// the largest square: binomial coefficients. A step leaves one, or two that are equal.
@@ -200,9 +200,9 @@ impl NoiseScale {
         (self.outliers / self.asked).clamp(OUTLIER_RATE_MIN, OUTLIER_RATE_MAX)
     }
 
-    /// Ratio of the variances, so much larger than its estimate that residuals are no more unlikely
-    /// where it matters than they are by Student's t, the distribution of a residual whose variance
-    /// is an estimate: false alarms come from noise taken as smaller than it is.
+    /// Ratio of the variances. It is larger than its estimate by as much as makes residuals of
+    /// [`DEVIANCE`] no less likely than by Student's t, the distribution of residuals whose
+    /// variance is an estimate: false alarms come from noise taken as smaller than it is.
     #[must_use]
     pub fn variance_ratio(&self) -> f64 {
         self.ratio(DEVIANCE)
@@ -212,7 +212,7 @@ impl NoiseScale {
         self.leaning(deviance).clamp(RATIO_MIN, RATIO_MAX)
     }
 
-    /// The same where it is no healthy channel's.
+    /// The same without bounds: of a channel that may be broken.
     fn leaning(&self, deviance: f64) -> f64 {
         // Second differences are correlated by -2/3 and 1/6: 2 (1 + 2 (4/9 + 1/36)) = 3.9.
         let freedom = 2.0 * self.count / 3.9;
