@@ -38,10 +38,10 @@ impl Turn {
             let rate_rad_s = turned_rad(&step) / over_s;
             // After a gap the gyro reads how the robot turns now, not how it did on the average.
             let [curvature, speed] = observation.command;
-            let since = (curvature * speed - rate_rad_s) * (1.0 - observation.covered());
+            let changed = (curvature * speed - rate_rad_s) * (1.0 - observation.covered());
             Self {
                 rate_rad_s,
-                variance: observation.turn_variance / (over_s * over_s) + since * since,
+                variance: observation.turn_variance / (over_s * over_s) + changed * changed,
             }
         })
     }

@@ -257,13 +257,11 @@ impl SensorNoise {
             let ratio = scale.ratio(deviance);
             (ratio + unseen * (UNSEEN - ratio).max(0.0)).sqrt()
         };
+        let alone = |scale: &NoiseScale| sd(scale, DEVIANCE_ALONE);
         NoiseScales {
             pose: self.pose.each_ref().map(|scale| sd(scale, DEVIANCE)),
-            wheels: self
-                .wheels
-                .each_ref()
-                .map(|scale| sd(scale, DEVIANCE_ALONE)),
-            steer: self.steer.each_ref().map(|scale| sd(scale, DEVIANCE_ALONE)),
+            wheels: self.wheels.each_ref().map(alone),
+            steer: self.steer.each_ref().map(alone),
             outliers: OutlierRates {
                 pose: outlier_rates(&self.pose),
                 wheels: outlier_rates(&self.wheels),

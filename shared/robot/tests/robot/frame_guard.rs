@@ -1,8 +1,6 @@
 //! The content check of frames lets pass everything that a robot and its faults can say, and
 //! nothing else.
 
-use std::path::Path;
-
 use proptest::prelude::*;
 use vigil_blocks::{COMMANDS, Rejection, SensorFrame, Valid, WHEELS};
 use vigil_robot::frame_guard::{
@@ -11,10 +9,7 @@ use vigil_robot::frame_guard::{
 };
 use vigil_robot::{Description, FrameGuard};
 
-fn robot() -> Description {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/robots/rover.toml");
-    toml::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
+use crate::learned::robot;
 
 /// A number of a frame: its name, how to get at it, which of an array, and its bound.
 type Place = (String, fn(&mut SensorFrame, usize) -> &mut f64, usize, f64);
