@@ -1,6 +1,7 @@
 //! What the identifier takes of the detector's belief.
 
 use vigil_blocks::DetectionBelief;
+use vigil_robot::Suspects;
 use vigil_robot::learned::{NoiseScales, OutlierRates};
 
 /// The last detection.
@@ -10,6 +11,8 @@ pub struct Detection {
     pub alarm: bool,
     /// Since when, capture time ns.
     pub t_ns: u64,
+    /// The channels in which a fault is suspected.
+    pub suspects: Suspects,
     /// Probability of a fault.
     pub p_fault: f64,
     /// How noisy the sensors are.
@@ -27,8 +30,10 @@ impl Detection {
             true => rate,
             false => OutlierRates::default().pose[0],
         };
+        let alarm = belief.alarm != 0;
         Self {
-            alarm: belief.alarm != 0,
+            alarm,
+            suspects: Suspects::new(alarm, &belief.channel_log_odds),
             t_ns: belief.alarm_t_capture_ns,
             p_fault: belief.p_fault,
             noise: NoiseScales {

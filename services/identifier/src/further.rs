@@ -14,7 +14,7 @@ use vigil_robot::learned::current_effects::{CurrentEffects, SHARES, STUCK};
 use vigil_robot::learned::further_watch::{FurtherWatch, Residual, Residuals, Turn};
 use vigil_robot::learned::wheel_evidence::TOGETHER_SD;
 use vigil_robot::learned::{Further, Healthy, Model, Observation};
-use vigil_robot::{Description, FaultPrior};
+use vigil_robot::{Description, FaultPrior, Suspects};
 
 use crate::further_likelihood::{
     Currents, dead, noisy, noisy_current, shifted, together, without_common,
@@ -189,20 +189,20 @@ impl FurtherFilter {
         }
     }
 
-    /// What an observation holds beside what is expected of a healthy robot, learned from unless a
-    /// fault is suspected. None at rest.
+    /// What an observation holds beside what is expected of a healthy robot; what `suspects` read
+    /// teaches nothing. None at rest.
     pub fn look(
         &mut self,
         model: &Model,
         robot: &Description,
         seen: (&Observation, &Further),
         healthy: &Healthy,
-        learns: bool,
+        suspects: Suspects,
     ) -> Option<Residuals> {
         let turn = Turn::expected(model, seen.0, |step| {
             (step.per_metre[0] + healthy.context.mean[0]) * step.travel_m
         });
-        self.watch.take(model, robot, seen, turn, learns)
+        self.watch.take(model, robot, seen, turn, suspects)
     }
 
     /// Takes an observation: the faults come and go, and its readings weigh them.

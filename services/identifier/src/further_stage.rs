@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 
 use vigil_blocks::FaultBelief;
-use vigil_robot::Description;
 use vigil_robot::learned::further_watch::Residuals;
 use vigil_robot::learned::{Further, Healthy, Model, Observation};
+use vigil_robot::{Description, Suspects};
 use vigil_setup::schema;
 
 use crate::assemble::Models;
@@ -58,17 +58,17 @@ impl FurtherStage {
     }
 
     /// Adds an observation to the ring; the oldest gives way. What is believed of a healthy robot
-    /// follows it unless a fault is suspected.
+    /// follows it but for what `suspects` read.
     pub fn keep(
         &mut self,
         observation: &Observation,
         further: &Further,
         healthy: &Healthy,
-        learns: bool,
+        suspects: Suspects,
     ) {
         let (model, robot) = (&self.model, &self.robot);
         let seen = (observation, further);
-        let residuals = self.filter.look(model, robot, seen, healthy, learns);
+        let residuals = self.filter.look(model, robot, seen, healthy, suspects);
         if self.ring.len() == self.capacity {
             self.ring.pop_front();
         }

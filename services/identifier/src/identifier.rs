@@ -287,8 +287,8 @@ impl Identifier {
             .and_then(|(_, block)| Healthy::from_block(&block.healthy, self.unsure.wheels));
         if let (Some(stage), Some(read)) = (&mut self.further, self.observer.further()) {
             let healthy = healthy.as_ref().unwrap_or(&self.unsure);
-            let learns = !self.detection.alarm;
-            stage.keep(self.observer.observation(), read, healthy, learns);
+            let suspects = self.detection.suspects;
+            stage.keep(self.observer.observation(), read, healthy, suspects);
         }
         if self.ring.len() == self.capacity {
             self.ring.pop_front();

@@ -22,6 +22,7 @@ pub mod nominal;
 pub mod period;
 mod robot_model;
 pub mod slip;
+mod suspects;
 pub mod tolerance;
 
 pub use alarm::{Alarm, AlarmError};
@@ -34,4 +35,5 @@ pub use frame_guard::FrameGuard;
 pub use fused_alarm::FusedAlarm;
 pub use injection::Injection;
 pub use robot_model::RobotModel;
+pub use suspects::Suspects;
 pub use tolerance::Tolerance;

@@ -24,16 +24,9 @@ const GAIN_MAX: f64 = 3.0;
 /// health, and while a fault is suspected: half of the rover's tolerance, and three times as much.
 /// Chosen. No lag is learned from that.
 const SLIP_SD: [f64; 2] = [0.03, 0.1];
-/// Part of a window's slip that enters the running estimate of it. Chosen: followed within three
-/// windows, 3 s.
+/// Part of a window's slip that enters the running estimate of it, where the measurement shows it
+/// well. Chosen: followed within three windows, 3 s.
 const SLIP_SHARE: f64 = 0.3;
-/// Part of a window's misfit that enters the running estimate of how noisy the measurement is, and
-/// how many times that it may be. Chosen: slower than slip, ten windows; clipped at three
-/// deviations.
-const MISFIT_SHARE: f64 = 0.1;
-const MISFIT_CLIP: f64 = 9.0;
-/// A window with less travel than this says nothing on slip, m: four deviations of a pose of 5 mm.
-const TRAVEL_MIN_M: f64 = 0.02;
 /// Time for which an error of the prediction counts as one with those before, s: about as long as a
 /// change of the command and its correction by the pose take. Six of the longest lags.
 const COHERENT_S: f64 = 3.0;
@@ -90,8 +83,6 @@ pub struct BodyLag {
     window: Window,
     /// Displacement per metre of travel beyond the model, by ground or a fault: m/m and rad/m.
     slip: [f64; 2],
-    /// Mean square by which the fitting candidates miss, over that expected, less 1.
-    misfit: f64,
 }
 
 /// What is not known of the body because the command changed at some instant between two frames:
@@ -137,6 +128,9 @@ struct Window {
     observations: u32,
     measured: [f64; 2],
     between: [f64; 2],
+    /// Squares by which single displacements were apart from those expected: what the noise of the
+    /// measurement is in this window.
+    squares: [f64; 2],
 }
 
 impl BodyLag {
@@ -272,16 +266,22 @@ impl BodyLag {
         per_metre: [f64; 2],
         is_suspected: bool,
     ) {
+        let mut expected = [0.0; 2];
         for candidate in &mut self.candidates {
             let [travel_m, turn_rad] = candidate.moved;
-            candidate.window[0] += per_metre[0] * travel_m;
-            candidate.window[1] += turn_rad + per_metre[1] * travel_m;
+            let moved = [per_metre[0] * travel_m, turn_rad + per_metre[1] * travel_m];
+            for (i, moved) in moved.into_iter().enumerate() {
+                candidate.window[i] += moved;
+                expected[i] += candidate.p * moved;
+            }
         }
-        for (sum, measured) in self.window.measured.iter_mut().zip(measured) {
-            *sum += measured;
+        let window = &mut self.window;
+        for (i, measured) in measured.into_iter().enumerate() {
+            window.measured[i] += measured;
+            window.squares[i] += (measured - expected[i]).powi(2);
         }
-        self.window.observations += 1;
-        if self.window.observations >= WINDOW {
+        window.observations += 1;
+        if window.observations >= WINDOW {
             self.weigh(variance, SLIP_SD[usize::from(is_suspected)]);
             self.interrupt();
         }
@@ -290,41 +290,45 @@ impl BodyLag {
     /// Weighs the candidates by the window. What the robot slips in all of them alike is no lag.
     fn weigh(&mut self, variance: [f64; 2], slip_sd: f64) {
         let Window {
-            measured, between, ..
+            observations,
+            measured,
+            between,
+            squares,
         } = self.window;
-        let expected: [f64; 2] = std::array::from_fn(|i| {
-            let all = self.candidates.iter().map(|c| c.p * c.window[i]);
-            all.sum()
-        });
-        let travel_m = expected[0];
+        // A noisier pose than learned says less; that it is less noisy is not relied on.
+        let noise: [f64; 2] =
+            std::array::from_fn(|i| variance[i].max(squares[i] / f64::from(observations)));
+        let travel_m = self.expected(0);
         let slip_m = slip_sd * travel_m;
-        let spread: [f64; 2] = std::array::from_fn(|i| variance[i] + slip_m * slip_m + between[i]);
-        let slipped: [f64; 2] =
-            std::array::from_fn(|i| measured[i] - self.slip[i] * travel_m - expected[i]);
-        let fits = self.candidates.map(|candidate| {
-            let square = |i: usize| {
-                let apart = slipped[i] + expected[i] - candidate.window[i];
-                apart * apart / spread[i]
-            };
-            -0.5 * (square(0) + square(1)) / (1.0 + self.misfit)
+        let spread: [f64; 2] = std::array::from_fn(|i| noise[i] + slip_m * slip_m + between[i]);
+        let apart = |candidate: &Candidate, i: usize| {
+            measured[i] - self.slip[i] * travel_m - candidate.window[i]
+        };
+        let fits = self.candidates.each_ref().map(|candidate| {
+            let square = |i: usize| apart(candidate, i).powi(2) / spread[i];
+            -0.5 * (square(0) + square(1))
         });
-        if travel_m.abs() > TRAVEL_MIN_M {
-            for (slip, slipped) in self.slip.iter_mut().zip(slipped) {
-                *slip += SLIP_SHARE * slipped / travel_m;
-            }
-        }
         let best = fits.into_iter().fold(f64::NEG_INFINITY, f64::max);
         if !best.is_finite() {
             return;
         }
-        // A pose that is noisier than learned says less; that it is less noisy is not relied on.
-        let noise = 1.0 + self.misfit;
-        let found = (-best).min(MISFIT_CLIP) * noise;
-        self.misfit = (self.misfit + MISFIT_SHARE * (found - noise)).max(0.0);
         for (candidate, fit) in self.candidates.iter_mut().zip(fits) {
             candidate.p *= (fit - best).max(-GAIN_MAX).exp();
         }
         self.normalise();
+        // What no lag explains is slip; of a short travel the noise says nothing about it.
+        for i in 0..2 {
+            let slipped = measured[i] - self.slip[i] * travel_m - self.expected(i);
+            let gain = SLIP_SHARE * slip_m * slip_m / (noise[i] + slip_m * slip_m);
+            if gain > 0.0 {
+                self.slip[i] += gain * slipped / travel_m;
+            }
+        }
+    }
+
+    /// Expected travel (m) or turn (rad) since the window began.
+    fn expected(&self, i: usize) -> f64 {
+        self.candidates.iter().map(|c| c.p * c.window[i]).sum()
     }
 
     fn normalise(&mut self) {
@@ -381,6 +385,40 @@ mod tests {
             assert!(near, "{true_s}: {lag_s}");
             assert!(worst < 4.0, "{true_s}: {worst}");
         }
+    }
+
+    #[test]
+    fn a_pose_noisier_than_learned_and_a_stop_on_an_outlier_teach_no_wrong_lag() {
+        const TRUE_S: f64 = 0.3;
+        let mut bank = BodyLag::new(0.1, 0.5);
+        bank.begin([0.5, 0.0]);
+        // The measurement is believed to be four times as precise as it is.
+        let believed = [(0.007_f64).powi(2); 2];
+        let mut seed = 1_u64;
+        let mut noise = || {
+            let mut uniform = || {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                (seed >> 33) as f64 / (1_u64 << 31) as f64 - 0.5
+            };
+            0.02 * (0..12).map(|_| uniform()).sum::<f64>()
+        };
+        let (mut body, mut before) = (0.0, 0.0);
+        for k in 0..1200 {
+            // Half a minute of changes, then it stands; one pose jumps by 0.2 m and back.
+            let command = if k < 600 && k / 40 % 2 == 0 { 0.3 } else { 0.0 };
+            let moved = body;
+            body += (1.0 - (-0.05_f64 / TRUE_S).exp()) * (command - body);
+            bank.advance([0.5, command], 0.05);
+            bank.complete(0.05);
+            let apart = noise() + if k == 699 { 0.2 } else { 0.0 };
+            let travel_m = 0.5 * (moved + body) * 0.05;
+            let measured = [travel_m + apart - before, 0.5 * travel_m];
+            bank.learn(measured, believed, [1.0, 0.0], false);
+            before = apart;
+            assert!(bank.slip[0].abs() < 0.1, "{k}: slip {}", bank.slip[0]);
+        }
+        let lag_s = bank.lag_s();
+        assert!((lag_s - TRUE_S).abs() < 0.1, "{lag_s}");
     }
 
     #[test]

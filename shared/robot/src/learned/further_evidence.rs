@@ -13,7 +13,7 @@ use super::further::Further;
 use super::further_watch::{FurtherWatch, GYRO, Residual, Turn};
 use super::repeats::Repeats;
 use super::{Model, Observation};
-use crate::Description;
+use crate::{Description, Suspects};
 
 /// Shares of the prior beside those of the other channels: how a fault of these first shows. A
 /// share counts by its logarithm only: half as much is 0.7 nats later.
@@ -78,7 +78,7 @@ impl FurtherEvidence {
         model: &Model,
         robot: &Description,
         (observation, further): (&Observation, &Further),
-        (turn, following): (Option<Turn>, bool),
+        (turn, suspects): (Option<Turn>, Suspects),
         birth: impl Fn(f64) -> f64,
     ) {
         self.gains = [0.0; WHEELS + 1];
@@ -86,7 +86,7 @@ impl FurtherEvidence {
             .iter_mut()
             .for_each(|repeats| repeats.gain = 0.0);
         let seen = (observation, further);
-        let Some(residuals) = self.watch.take(model, robot, seen, turn, !following) else {
+        let Some(residuals) = self.watch.take(model, robot, seen, turn, suspects) else {
             return;
         };
         let share = 1.0 / self.watch.wheels().max(1) as f64;

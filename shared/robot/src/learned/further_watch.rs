@@ -3,7 +3,7 @@
 //! Of a current: what the model says at this command, and what the slopes add. Of the gyro: the
 //! turn of the pose's track, and the gyro's bias. Noise and context are learned on the way.
 
-use vigil_blocks::WHEELS;
+use vigil_blocks::{Channel, WHEELS};
 use vigil_inference::slow_state::{Drift, SlowState};
 use vigil_inference::track::Displacement;
 
@@ -12,7 +12,7 @@ use super::further::{Further, FurtherModel};
 use super::noise_scale::{NoiseScale, STEADY_COMMAND};
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Model, Observation, Reading};
-use crate::Description;
+use crate::{Description, Suspects};
 
 /// What the pose's track says of the gyro.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -140,25 +140,28 @@ impl FurtherWatch {
         self.model.currents.is_none() || currents.any(NoiseScale::is_known)
     }
 
-    /// Takes one observation; it `learns` from it unless a fault is suspected. None at rest.
+    /// Takes one observation; what `suspects` read teaches it nothing. None at rest.
     pub fn take(
         &mut self,
         model: &Model,
         robot: &Description,
         (observation, further): (&Observation, &Further),
         turn: Option<Turn>,
-        learns: bool,
+        suspects: Suspects,
     ) -> Option<Residuals> {
         if let Some((last, before)) = self.last.replace((*observation, *further)) {
-            self.measure_noise(model, (&last, &before), (observation, further));
+            self.measure_noise(model, (&last, &before), (observation, further), suspects);
         }
         if !observation.moving {
             self.turn_before = None;
             return None;
         }
+        // What all currents have in common is known only if none is suspected.
+        let learns = !suspects.has_current();
+        let learns_bias = !suspects.has(Channel::YAW_RATE);
         Some(Residuals {
             currents: self.currents(model, robot, observation, further, learns),
-            yaw_rate: self.yaw_rate(model, observation, &further.yaw_rate, turn, learns),
+            yaw_rate: self.yaw_rate(model, observation, &further.yaw_rate, turn, learns_bias),
         })
     }
 
@@ -265,6 +268,7 @@ impl FurtherWatch {
         model: &Model,
         (last, before): (&Observation, &Further),
         (now, further): (&Observation, &Further),
+        suspects: Suspects,
     ) {
         let change = |axis: usize| (now.command[axis] - last.command[axis]).abs();
         let is_same = change(0) < STEADY_COMMAND && change(1) < STEADY_COMMAND;
@@ -274,11 +278,18 @@ impl FurtherWatch {
         let current = self.model.currents.as_ref().map_or(0.0, |all| all.noise_a);
         let gyro = self.model.yaw_rate.map_or(0.0, |gyro| gyro.noise_rad_s);
         for at in (0..self.wheels).chain([GYRO]) {
-            let (sd, readings) = match at {
-                GYRO => (gyro, [&before.yaw_rate, &further.yaw_rate]),
-                wheel => (current, [&before.currents[wheel], &further.currents[wheel]]),
+            let (channel, sd, readings) = match at {
+                GYRO => (
+                    Channel::YAW_RATE,
+                    gyro,
+                    [&before.yaw_rate, &further.yaw_rate],
+                ),
+                wheel => {
+                    let readings = [&before.currents[wheel], &further.currents[wheel]];
+                    (Channel::current(wheel), current, readings)
+                }
             };
-            if sd > 0.0 {
+            if sd > 0.0 && !suspects.has(channel) {
                 self.noise[at].push_step(model, now, sd, readings, 0.0);
             }
         }

@@ -33,8 +33,8 @@ use super::settling::Settling;
 use super::wheel_context::{Beside, WheelContext};
 use super::wheels::rolling_rate;
 use super::{Further, Healthy, Model, Observation, SteerReading, Troubles};
-use crate::Description;
 use crate::channel_odds::ChannelOdds;
+use crate::{Description, Suspects};
 
 /// Shares of the prior: how a fault first shows. Chosen: one counts by its logarithm only, half as
 /// much is 0.7 nats later.
@@ -259,6 +259,7 @@ impl Monitor {
         further: Option<&Further>,
         following: bool,
     ) {
+        let suspects = Suspects::new(following, &self.report.channels);
         if let Some(read) = further
             && let Some(mut evidence) = self.further.take()
         {
@@ -269,7 +270,7 @@ impl Monitor {
             };
             let birth = |share| self.birth(observation.dt_s, share);
             let (model, robot) = (&self.model, &self.robot);
-            evidence.step(model, robot, (observation, read), (turn, following), birth);
+            evidence.step(model, robot, (observation, read), (turn, suspects), birth);
             self.further = Some(evidence);
         }
         self.report.evidence = 0.0;
@@ -278,11 +279,12 @@ impl Monitor {
             .iter_mut()
             .for_each(|repeats| repeats.gain = 0.0);
         self.troubles = observation.troubles;
-        self.noise.update(&self.model, &self.robot, observation);
+        let (model, robot) = (&self.model, &self.robot);
+        self.noise.update(model, robot, observation, suspects);
         let scales = self.noise.scales();
         self.step_pose(observation, following, scales);
         if observation.moving && self.channels.use_wheels() {
-            self.step_wheels(observation, following, scales);
+            self.step_wheels(observation, suspects, scales);
             self.step_steer(observation, scales);
         } else if self.channels.use_wheels() {
             self.late.rest(observation.t_ns);
@@ -366,7 +368,7 @@ impl Monitor {
         self.report.evidence += said.log_density;
     }
 
-    fn step_wheels(&mut self, observation: &Observation, following: bool, scales: NoiseScales) {
+    fn step_wheels(&mut self, observation: &Observation, suspects: Suspects, scales: NoiseScales) {
         let learned = self.model.noise.wheel_rate_rad_s;
         let samples = observation.sample_variances(&self.model, learned, scales.wheels);
         let share = 1.0 / self.robot.wheels.len() as f64;
@@ -418,7 +420,7 @@ impl Monitor {
             self.report.evidence += log_normal(apart, variance);
         }
         // What a fault does is no context of the nominal mode.
-        if !following {
+        if !suspects.has_wheel_rate() {
             self.context.learn(&all);
         }
         let birth = self.birth(observation.dt_s, SHARE_LATE * share);

@@ -1,11 +1,11 @@
 //! How much noisier the sensors are than the learned ones.
 
-use vigil_blocks::WHEELS;
+use vigil_blocks::{Channel, WHEELS};
 use vigil_inference::angle::wrap;
 
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Model, Observation, Reading};
-use crate::Description;
+use crate::{Description, Suspects};
 
 /// Squares above this many times the believed variance say nothing about noise (a jump, a fault).
 /// Three deviations.
@@ -286,7 +286,14 @@ impl SensorNoise {
 
     /// Second differences of the pose and first differences of wheel rates and steering angles,
     /// less what the nominal motion makes of them: neither a curve nor a fault that persists shows.
-    pub fn update(&mut self, model: &Model, robot: &Description, now: &Observation) {
+    /// Wheels and angles that are suspected teach nothing: their noise may be the fault.
+    pub fn update(
+        &mut self,
+        model: &Model,
+        robot: &Description,
+        now: &Observation,
+        suspects: Suspects,
+    ) {
         // A robot at rest shows nothing of its noise.
         self.moved_s += now.moved_s();
         let [before, last] = self.history;
@@ -323,10 +330,14 @@ impl SensorNoise {
             for i in 0..count {
                 let expected = turns(now, i) - turns(&last, i);
                 let readings = [&last.wheels[i], &now.wheels[i]];
-                self.wheels[i].push_step(model, now, rate, readings, expected);
+                if !suspects.has(Channel::wheel_rate(i)) {
+                    self.wheels[i].push_step(model, now, rate, readings, expected);
+                }
                 let expected = steers(now, i) - steers(&last, i);
                 let readings = [&last.steer[i], &now.steer[i]];
-                self.steer[i].push_step(model, now, angle, readings, expected);
+                if !suspects.has(Channel::steer(i)) {
+                    self.steer[i].push_step(model, now, angle, readings, expected);
+                }
             }
         }
     }

@@ -4,6 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{SensorFrame, Valid};
+use vigil_robot::Suspects;
 use vigil_robot::learned::noise_scale::SensorNoise;
 use vigil_robot::learned::wheels::rolling_rate;
 use vigil_robot::learned::{NoiseScales, Observer};
@@ -53,7 +54,7 @@ fn scales(jitter: f64, loss: f64) -> NoiseScales {
         }
         frame.valid = Valid::POSE | Valid::command(0) | Valid::command(1) | 0x3f00;
         if rng.random::<f64>() >= loss && observer.push(&frame).complete {
-            noise.update(&model, &robot, observer.observation());
+            noise.update(&model, &robot, observer.observation(), Suspects::default());
         }
     }
     noise.scales()
