@@ -2,18 +2,18 @@
 //! anything.
 
 use vigil_blocks::WHEELS;
-use vigil_inference::alternative::Alternative;
+use vigil_inference::alternative::Alternatives;
 use vigil_robot::learned::SteerReading;
 use vigil_robot::learned::wheel_evidence::ANYTHING;
 
 /// Of each steered wheel: as commanded, or anything.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Angles([Alternative; WHEELS]);
+pub struct Angles([Alternatives<2>; WHEELS]);
 
 impl Default for Angles {
     /// As the unknown begins.
     fn default() -> Self {
-        Self([Alternative::new(ANYTHING); WHEELS])
+        Self([Alternatives::new([1.0 - ANYTHING, ANYTHING]); WHEELS])
     }
 }
 
@@ -29,6 +29,6 @@ impl Angles {
 
     /// The same of one wheel's angle.
     pub fn step_one(&mut self, wheel: usize, reading: &SteerReading, changes: f64) -> f64 {
-        self.0[wheel].step(reading.log_ratio_any(), changes)
+        self.0[wheel].step([0.0, reading.log_ratio_any()], changes)
     }
 }

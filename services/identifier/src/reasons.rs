@@ -6,7 +6,7 @@
 //! moment ago, and owes its past to the best.
 
 use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
-use vigil_inference::alternative::Alternative;
+use vigil_inference::alternative::Alternatives;
 use vigil_inference::logspace::log_add;
 use vigil_inference::outlier::unvouched;
 use vigil_inference::track::Track;
@@ -48,7 +48,7 @@ struct Lineage {
     offsets: RateOffsets,
     servo: Option<Servo>,
     /// In the unknown: which wheels and which angles do anything.
-    anything: [Alternative; WHEELS],
+    anything: [Alternatives<2>; WHEELS],
     angles: Angles,
     /// Log-likelihood of the readings, by channel.
     heard: [f64; CHANNELS],
@@ -162,7 +162,7 @@ impl Reasons {
                     }
                     _ => None,
                 },
-                anything: [Alternative::new(ANYTHING); WHEELS],
+                anything: [Alternatives::new([1.0 - ANYTHING, ANYTHING]); WHEELS],
                 angles: Angles::default(),
                 heard: [0.0; CHANNELS],
             })
@@ -221,7 +221,7 @@ impl Reasons {
                 } else if moved == Moved::UnknownAny {
                     let healthy = evidence.healthy[wheel];
                     let ratio = evidence.any[wheel] - healthy;
-                    healthy + lineage.anything[wheel].step(ratio, CHANGES)
+                    healthy + lineage.anything[wheel].step([0.0, ratio], CHANGES)
                 } else if mode.turns_anyhow(wheel) && !is_new {
                     let dragged = evidence.dragged(&self.model, observation, mode, wheel);
                     let (model, offsets) = (&self.model, &mut lineage.offsets);

@@ -29,7 +29,7 @@
 //! |---|---|
 //! | [`constant`] | the paper's detection: a constant likelihood, and its blind spot |
 //! | [`departure`] | a planar robot departing from its nominal motion by an unknown amount |
-//! | [`alternative`] | which of two explanations holds, where either may |
+//! | [`alternative`] | which of several explanations holds, where any may |
 //! | [`ending`] | whether a fault that was alarmed is still there |
 //! | [`windowed`] | the same on sums over overlapping windows: a smaller blind spot |
 //! | [`risk`] | what losing track of a mode costs, for risk-sensitive proposals |

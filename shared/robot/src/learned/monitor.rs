@@ -14,7 +14,7 @@
 
 use vigil_blocks::{CHANNELS, Channel, WHEELS};
 use vigil_inference::ages::Whitened;
-use vigil_inference::alternative::Alternative;
+use vigil_inference::alternative::Alternatives;
 use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
 use vigil_inference::logspace::{log_normal, log_sum_exp};
@@ -55,9 +55,9 @@ const FOLLOWING: f64 = 0.1;
 /// Squared norm beyond which a single residual says no more for a deviation of any kind: it takes
 /// several to tell one from an outlier, as each gives 3.6 nats at most.
 const ANY_NORM_MAX: f64 = 12.0;
-/// Probability that a broken channel begins or ceases to read anything, an observation. Chosen:
-/// once in 2.5 s; each observation of one that does not costs 0.02 nats.
-const WAY_CHANGES: f64 = 0.02;
+/// Probability that a broken encoder changes the way it is broken for each other one, an
+/// observation. Chosen: once in 2.5 s in all; each observation without costs 0.02 nats.
+const WAY_CHANGES: f64 = 0.02 / 3.0;
 /// Residuals beyond this many deviations mean a lost track: an outlier's own.
 const LOST: f64 = 10.0;
 /// Time in motion after which evidence counts if the noise is known, s: twenty observations;
@@ -82,8 +82,8 @@ pub struct Monitor {
     context: WheelContext,
     pose: Evidence<3>,
     wheels: [Evidence<1>; WHEELS],
-    /// Of a broken one: off by a bias, or reading anything.
-    anything: [Alternative; WHEELS],
+    /// Of a broken one: off by a bias, reading anything, late, or repeating itself.
+    ways: [Alternatives<4>; WHEELS],
     steer: [Evidence<1>; WHEELS],
     repeats: [Repeats; WHEELS],
     late: Lateness,
@@ -144,7 +144,7 @@ impl Monitor {
             context: WheelContext::new(robot.tolerance),
             pose: Evidence::new(form, BIAS_CHANNEL),
             wheels: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
-            anything: [Alternative::new(0.5); WHEELS],
+            ways: [Alternatives::new([0.25; 4]); WHEELS],
             steer: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
             repeats: [Repeats::default(); WHEELS],
             late: Lateness::default(),
@@ -188,7 +188,7 @@ impl Monitor {
         self.departure.forget();
         self.pose = Evidence::new(self.form, BIAS_CHANNEL);
         self.wheels = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
-        self.anything = [Alternative::new(0.5); WHEELS];
+        self.ways = [Alternatives::new([0.25; 4]); WHEELS];
         self.steer = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
         self.repeats = [Repeats::default(); WHEELS];
         self.late.forget();
@@ -374,12 +374,11 @@ impl Monitor {
         let share = 1.0 / self.robot.wheels.len() as f64;
         let birth = self.birth(observation.dt_s, SHARE_WHEELS * share);
         let birth_repeats = self.birth(observation.dt_s, SHARE_REPEATS * share);
-        let (command, lagged) = (
-            observation.command,
-            [observation.curvature, observation.speed],
-        );
+        let command = observation.command;
         self.context.fade(observation.travel_m);
         let (mut all, mut timely) = ([None; WHEELS], [None; WHEELS]);
+        // By how much better a bias fits, and anything.
+        let mut fits = [[0.0; 2]; WHEELS];
         let mut rates = [(0.0, 0.0); WHEELS];
         let wheels = self.robot.wheels.len();
         for (i, sample) in samples.into_iter().enumerate().take(wheels) {
@@ -387,7 +386,8 @@ impl Monitor {
             let healthy = self.model.encoder.repeat_rate;
             self.repeats[i].step(reading, healthy, birth_repeats);
             let rolling = rolling_rate(&self.robot, i, command[0], command[1]);
-            let behind = rolling - rolling_rate(&self.robot, i, lagged[0], lagged[1]);
+            let behind =
+                rolling - rolling_rate(&self.robot, i, observation.curvature, observation.speed);
             let (rate, variance) = self.model.nominal.rates[i].rate(rolling, command[0]);
             let (shift, uncertain) = self.context.shift(i, rolling);
             let variance = variance + behind * behind;
@@ -413,10 +413,8 @@ impl Monitor {
                 outlier_rate,
             });
             self.wheels[i].step(&whitened, birth);
-            let square = whitened.value.norm_squared();
-            let gain = self.wheels[i].gain();
-            let either = &mut self.anything[i];
-            self.gains.wheels[i] = gain + either.step(log_ratio_any(square) - gain, WAY_CHANGES);
+            let any = log_ratio_any(whitened.value.norm_squared());
+            fits[i] = [self.wheels[i].gain(), any];
             self.report.evidence += log_normal(apart, variance);
         }
         // What a fault does is no context of the nominal mode.
@@ -425,6 +423,10 @@ impl Monitor {
         }
         let birth = self.birth(observation.dt_s, SHARE_LATE * share);
         self.late.step(observation.t_ns, rates, &timely, birth);
+        for (i, [biased, any]) in fits.into_iter().enumerate().take(wheels) {
+            let ways = [biased, any, self.late.odds(i).1, self.repeats[i].gain];
+            self.gains.wheels[i] = self.ways[i].step(ways, WAY_CHANGES);
+        }
     }
 
     fn step_steer(&mut self, observation: &Observation, scales: NoiseScales) {
@@ -458,9 +460,8 @@ impl Monitor {
             for i in 0..self.robot.wheels.len() {
                 let channel = Channel::wheel_rate(i);
                 enter(channel, self.wheels[i].log_odds(), gains.wheels[i]);
-                enter(channel, self.repeats[i].log_odds, self.repeats[i].gain);
-                let (late, gain) = self.late.odds(i);
-                enter(channel, late, gain);
+                enter(channel, self.repeats[i].log_odds, gains.wheels[i]);
+                enter(channel, self.late.odds(i).0, gains.wheels[i]);
                 if self.robot.wheels[i].steered {
                     enter(Channel::steer(i), self.steer[i].log_odds(), gains.steer[i]);
                 }

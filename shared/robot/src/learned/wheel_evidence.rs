@@ -20,6 +20,10 @@ pub const BREAKAGES: [EncoderState; 4] = [
 ];
 /// Index of the breakage that reads what a standing wheel's encoder does.
 const DEAD: usize = 3;
+/// Index of noise, and the share of its observations that read right, as with a loose contact.
+/// Chosen: so two or three that chance puts there are no end of the fault; six are, in 0.3 s.
+const NOISE: usize = 2;
+const READS_RIGHT: f64 = 0.1;
 /// Prior shares of [`BREAKAGES`]. Chosen: three alike, as nothing is known; dead is rarer, or a
 /// stuck wheel would wait 2 nats for its name.
 pub const BREAKAGE_SHARES: [f64; BREAKAGES.len()] = [0.32, 0.32, 0.32, 0.04];
@@ -126,6 +130,9 @@ impl WheelEvidence {
             evidence.own_rate[i] = read(EncoderState::OwnRate(behind));
             evidence.any[i] = read(EncoderState::Any);
             evidence.broken[i] = BREAKAGES.map(read);
+            let right = READS_RIGHT.ln() + evidence.healthy[i];
+            let noise = &mut evidence.broken[i][NOISE];
+            *noise = log_add((1.0 - READS_RIGHT).ln() + *noise, right);
         }
         evidence
     }
