@@ -376,15 +376,14 @@ impl Monitor {
         let birth_repeats = self.birth(observation.dt_s, SHARE_REPEATS * share);
         let command = observation.command;
         self.context.fade(observation.travel_m);
-        let (mut all, mut timely) = ([None; WHEELS], [None; WHEELS]);
         // By how much better a bias fits, and anything.
         let mut fits = [[0.0; 2]; WHEELS];
-        let mut rates = [(0.0, 0.0); WHEELS];
+        let (mut all, mut timely, mut rates) =
+            ([None; WHEELS], [None; WHEELS], [(0.0, 0.0); WHEELS]);
         let wheels = self.robot.wheels.len();
         for (i, sample) in samples.into_iter().enumerate().take(wheels) {
             let reading = &observation.wheels[i];
-            let healthy = self.model.encoder.repeat_rate;
-            self.repeats[i].step(reading, healthy, birth_repeats);
+            self.repeats[i].step(reading, self.model.encoder.repeat_rate, birth_repeats);
             let rolling = rolling_rate(&self.robot, i, command[0], command[1]);
             let behind =
                 rolling - rolling_rate(&self.robot, i, observation.curvature, observation.speed);

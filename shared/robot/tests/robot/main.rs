@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 mod condition;
+mod encoder_noise;
 mod frame_guard;
 mod gaps;
 mod injection;

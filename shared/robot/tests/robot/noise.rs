@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::{CHANNELS, Channel, SensorFrame, Valid};
 use vigil_robot::Suspects;
 use vigil_robot::learned::noise_scale::SensorNoise;
 use vigil_robot::learned::wheels::rolling_rate;
@@ -19,8 +19,8 @@ const FAR: f64 = 20.0;
 const WHEELS: usize = 6;
 
 /// What is believed after a minute on a circle, at 20 Hz: each frame comes within a share of its
-/// period, and a share of them not at all.
-fn scales(jitter: f64, loss: f64) -> NoiseScales {
+/// period, and a share of them not at all. What is suspected teaches nothing.
+fn scales(jitter: f64, loss: f64, suspects: Suspects) -> NoiseScales {
     let (robot, model) = (robot(), model());
     let mut observer = Observer::new(&model, &robot);
     let mut noise = SensorNoise::default();
@@ -54,7 +54,7 @@ fn scales(jitter: f64, loss: f64) -> NoiseScales {
         }
         frame.valid = Valid::POSE | Valid::command(0) | Valid::command(1) | 0x3f00;
         if rng.random::<f64>() >= loss && observer.push(&frame).complete {
-            noise.update(&model, &robot, observer.observation(), Suspects::default());
+            noise.update(&model, &robot, observer.observation(), suspects);
         }
     }
     noise.scales()
@@ -63,7 +63,7 @@ fn scales(jitter: f64, loss: f64) -> NoiseScales {
 #[test]
 fn noise_and_outliers_are_known_however_unevenly_frames_come() {
     for (jitter, loss) in [(0.0, 0.0), (0.5, 0.0), (0.9, 0.0), (0.0, 0.3), (0.9, 0.3)] {
-        let scales = scales(jitter, loss);
+        let scales = scales(jitter, loss, Suspects::default());
         let wheels = &scales.wheels[..WHEELS];
         // Outliers, clipped, and its own uncertainty make it lean to the high side.
         for scale in scales.pose.iter().chain(wheels) {
@@ -81,5 +81,16 @@ fn noise_and_outliers_are_known_however_unevenly_frames_come() {
                 .iter()
                 .all(|rate| *rate < 0.2 * OUTLIERS)
         );
+    }
+}
+
+#[test]
+fn a_wheel_that_is_suspected_teaches_no_noise_and_the_others_do() {
+    let mut log_odds = [-5.0; CHANNELS];
+    log_odds[Channel::wheel_rate(1)] = 5.0;
+    let scales = scales(0.0, 0.0, Suspects::new(true, &log_odds));
+    for (wheel, scale) in scales.wheels.iter().enumerate().take(WHEELS) {
+        let is_learned = (0.85 * NOISIER..1.4 * NOISIER).contains(scale);
+        assert_eq!(is_learned, wheel != 1, "{wheel}: {scale}");
     }
 }
