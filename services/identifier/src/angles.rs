@@ -29,6 +29,6 @@ impl Angles {
 
     /// The same of one wheel's angle.
     pub fn step_one(&mut self, wheel: usize, reading: &SteerReading, changes: f64) -> f64 {
-        self.0[wheel].step([0.0, reading.log_ratio_any()], changes)
+        self.0[wheel].step([0.0, reading.log_ratio_any()], [changes; 2])
     }
 }

@@ -19,13 +19,14 @@ impl<const N: usize> Alternatives<N> {
     }
 
     /// Takes a reading with its log-likelihoods by each explanation, over that of any one thing;
-    /// before it each explanation becomes each of the others with the probability `changes`.
-    /// Returns the log-likelihood by all together; an explanation without a number is none.
-    pub fn step(&mut self, log_likelihoods: [f64; N], changes: f64) -> f64 {
-        // None becomes impossible.
-        let changes = changes.clamp(1e-12, 1.0 / N as f64);
+    /// before it each explanation takes the place of another with the probability `enters`: none
+    /// where it could not be told. Returns the log-likelihood by all together; an explanation
+    /// whose is no number is left out.
+    pub fn step(&mut self, log_likelihoods: [f64; N], enters: [f64; N]) -> f64 {
+        let enters = enters.map(|p| p.clamp(0.0, 1.0 / N as f64));
+        let all: f64 = enters.iter().sum();
         let joint: [f64; N] = std::array::from_fn(|i| {
-            let before = self.p[i] + changes * (1.0 - N as f64 * self.p[i]);
+            let before = self.p[i] * (1.0 - all) + enters[i];
             match log_likelihoods[i].is_nan() {
                 true => f64::NEG_INFINITY,
                 false => before.ln() + log_likelihoods[i].clamp(-1e300, 1e300),
@@ -48,7 +49,7 @@ mod tests {
 
     fn gained(ways: &mut Alternatives<2>, log_ratio: f64, count: usize) -> f64 {
         (0..count)
-            .map(|_| ways.step([0.0, log_ratio], CHANGES))
+            .map(|_| ways.step([0.0, log_ratio], [CHANGES; 2]))
             .sum()
     }
 
@@ -76,7 +77,7 @@ mod tests {
             [0.5, -1.0, 3.0],
             [-1.0_f64, 3.0, 0.0],
         ] {
-            gained += ways.step(reading, 0.1);
+            gained += ways.step(reading, [0.1; 3]);
             let [a, b, c] = p;
             p = [
                 0.8 * a + 0.1 * (b + c),
@@ -91,14 +92,25 @@ mod tests {
     }
 
     #[test]
+    fn an_explanation_that_nothing_would_show_is_no_refuge() {
+        let lost = |enters| {
+            let mut ways = Alternatives::new([1.0, 0.0]);
+            (0..50).map(|_| ways.step([-3.0, 0.0], enters)).sum::<f64>()
+        };
+        // The second says the same as health: what enters it is never lost.
+        assert!(lost([1e-3; 2]) > -10.0);
+        assert!((lost([1e-3, 0.0]) + 150.0).abs() < 1e-9);
+    }
+
+    #[test]
     fn no_reading_makes_it_less_than_a_number() {
         for ratio in [f64::NAN, 1e300, -1e300, f64::INFINITY, f64::NEG_INFINITY] {
             let mut ways = Alternatives::new([0.5; 2]);
             for _ in 0..10 {
-                assert!(!ways.step([0.0, ratio], 1e-3).is_nan());
+                assert!(!ways.step([0.0, ratio], [1e-3; 2]).is_nan());
             }
-            assert!(ways.step([0.0; 2], 1e-3).is_finite());
-            assert_eq!(ways.step([f64::NAN; 2], 1e-3), 0.0);
+            assert!(ways.step([0.0; 2], [1e-3; 2]).is_finite());
+            assert_eq!(ways.step([f64::NAN; 2], [1e-3; 2]), 0.0);
         }
     }
 }

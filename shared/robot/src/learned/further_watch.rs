@@ -289,8 +289,8 @@ impl FurtherWatch {
                     (Channel::current(wheel), current, readings)
                 }
             };
-            if sd > 0.0 && !suspects.has(channel) {
-                self.noise[at].push_step(model, now, sd, readings, 0.0);
+            if sd > 0.0 {
+                self.noise[at].push_step(model, now, sd, readings, 0.0, suspects.has(channel));
             }
         }
     }

@@ -38,18 +38,18 @@ impl Timely {
 }
 
 /// Log-odds that a wheel's encoder is late, by each delay and in all, and what the last reading
-/// said for that.
+/// said for that, if a delay would have shown.
 #[derive(Debug, Clone, Copy)]
 struct Odds {
     delays: [f64; DELAYS_S.len()],
     all: f64,
-    gain: f64,
+    gain: Option<f64>,
 }
 
 const NONE: Odds = Odds {
     delays: [f64::NEG_INFINITY; DELAYS_S.len()],
     all: f64::NEG_INFINITY,
-    gain: 0.0,
+    gain: None,
 };
 
 /// Of all encoders.
@@ -74,15 +74,16 @@ impl Lateness {
         self.wheels = [NONE; WHEELS];
     }
 
-    /// Log-odds that a wheel's encoder is late, and what the last observation said for that.
-    pub const fn odds(&self, wheel: usize) -> (f64, f64) {
+    /// Log-odds that a wheel's encoder is late, and what the last observation said for that; None
+    /// where a delay would not have shown.
+    pub const fn odds(&self, wheel: usize) -> (f64, Option<f64>) {
         (self.wheels[wheel].all, self.wheels[wheel].gain)
     }
 
     /// The wheels stand at `t_ns`.
     pub fn rest(&mut self, t_ns: u64) {
         self.past.keep(t_ns, [(0.0, 0.0); WHEELS]);
-        self.wheels.iter_mut().for_each(|odds| odds.gain = 0.0);
+        self.wheels.iter_mut().for_each(|odds| odds.gain = None);
     }
 
     /// Takes readings of wheels that turn at `rates` at `t_ns`; `birth` is the
@@ -98,7 +99,7 @@ impl Lateness {
         self.past.keep(t_ns, rates);
         let born = birth.ln() - (DELAYS_S.len() as f64).ln();
         for (wheel, reading) in readings.iter().enumerate() {
-            self.wheels[wheel].gain = 0.0;
+            self.wheels[wheel].gain = None;
             if let Some(reading) = reading {
                 self.wheels[wheel].step(wheel, reading, &self.past, born);
             }
@@ -122,7 +123,7 @@ impl Odds {
             self.delays[i] = before[i] + if said.is_finite() { said } else { 0.0 };
         }
         self.all = log_sum_exp(&self.delays);
-        self.gain = self.all - log_sum_exp(&before);
+        self.gain = Some(self.all - log_sum_exp(&before));
         let excess = (self.all - LOG_ODDS_MAX).max(0.0);
         self.delays.iter_mut().for_each(|odds| *odds -= excess);
         self.all -= excess;
@@ -191,7 +192,7 @@ mod tests {
         let (odds, _) = at(120, 2.5, 2.5);
         assert!(odds > 20.0, "{odds}");
         for k in 121..2000 {
-            assert_eq!(at(k, 2.5, 2.5), (odds, 0.0));
+            assert_eq!(at(k, 2.5, 2.5), (odds, None));
         }
     }
 
@@ -206,7 +207,7 @@ mod tests {
             late.step(k * PERIOD_NS, [(rate(k), WIDTH); WHEELS], &readings, 1e-6);
             most = most.max(late.odds(0).0);
             if k > 6_000 {
-                gained += late.odds(0).1;
+                gained += late.odds(0).1.unwrap_or_default();
             }
         }
         // 100 changes, each of which shows in ten readings.

@@ -32,6 +32,7 @@ mod channels;
 mod compensation;
 mod current_context;
 pub mod current_effects;
+mod encoder_ways;
 mod fault_rates;
 mod faults;
 pub mod form;

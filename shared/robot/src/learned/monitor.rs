@@ -14,7 +14,6 @@
 
 use vigil_blocks::{CHANNELS, Channel, WHEELS};
 use vigil_inference::ages::Whitened;
-use vigil_inference::alternative::Alternatives;
 use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
 use vigil_inference::logspace::{log_normal, log_sum_exp};
@@ -22,13 +21,14 @@ use vigil_inference::outlier::unvouched;
 use vigil_inference::track::{Displacement, Track};
 
 pub use super::channels::Channels;
+use super::encoder_ways::{EncoderWays, Fits};
 use super::faults::{Faults, KINDS};
 use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION, log_ratio_any};
 use super::further_evidence::FurtherEvidence;
 use super::further_watch::Turn;
 use super::lateness::{Lateness, Timely};
 use super::noise_scale::{NoiseScales, SensorNoise, UNSEEN_S};
-use super::repeats::Repeats;
+use super::repeats::{Repeats, log_ratio};
 use super::settling::Settling;
 use super::wheel_context::{Beside, WheelContext};
 use super::wheels::rolling_rate;
@@ -55,9 +55,6 @@ const FOLLOWING: f64 = 0.1;
 /// Squared norm beyond which a single residual says no more for a deviation of any kind: it takes
 /// several to tell one from an outlier, as each gives 3.6 nats at most.
 const ANY_NORM_MAX: f64 = 12.0;
-/// Probability that a broken encoder changes the way it is broken for each other one, an
-/// observation. Chosen: once in 2.5 s in all; each observation without costs 0.02 nats.
-const WAY_CHANGES: f64 = 0.02 / 3.0;
 /// Residuals beyond this many deviations mean a lost track: an outlier's own.
 const LOST: f64 = 10.0;
 /// Time in motion after which evidence counts if the noise is known, s: twenty observations;
@@ -82,8 +79,7 @@ pub struct Monitor {
     context: WheelContext,
     pose: Evidence<3>,
     wheels: [Evidence<1>; WHEELS],
-    /// Of a broken one: off by a bias, reading anything, late, or repeating itself.
-    ways: [Alternatives<4>; WHEELS],
+    ways: [EncoderWays; WHEELS],
     steer: [Evidence<1>; WHEELS],
     repeats: [Repeats; WHEELS],
     late: Lateness,
@@ -144,7 +140,7 @@ impl Monitor {
             context: WheelContext::new(robot.tolerance),
             pose: Evidence::new(form, BIAS_CHANNEL),
             wheels: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
-            ways: [Alternatives::new([0.25; 4]); WHEELS],
+            ways: [EncoderWays::default(); WHEELS],
             steer: [Evidence::new(form, BIAS_CHANNEL); WHEELS],
             repeats: [Repeats::default(); WHEELS],
             late: Lateness::default(),
@@ -188,7 +184,7 @@ impl Monitor {
         self.departure.forget();
         self.pose = Evidence::new(self.form, BIAS_CHANNEL);
         self.wheels = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
-        self.ways = [Alternatives::new([0.25; 4]); WHEELS];
+        self.ways = [EncoderWays::default(); WHEELS];
         self.steer = [Evidence::new(self.form, BIAS_CHANNEL); WHEELS];
         self.repeats = [Repeats::default(); WHEELS];
         self.late.forget();
@@ -423,8 +419,12 @@ impl Monitor {
         let birth = self.birth(observation.dt_s, SHARE_LATE * share);
         self.late.step(observation.t_ns, rates, &timely, birth);
         for (i, [biased, any]) in fits.into_iter().enumerate().take(wheels) {
-            let ways = [biased, any, self.late.odds(i).1, self.repeats[i].gain];
-            self.gains.wheels[i] = self.ways[i].step(ways, WAY_CHANGES);
+            self.gains.wheels[i] = self.ways[i].step(&Fits {
+                biased,
+                any,
+                late: self.late.odds(i).1,
+                repeats: log_ratio(&observation.wheels[i], self.model.encoder.repeat_rate),
+            });
         }
     }
 

@@ -42,6 +42,9 @@ const ASKED: f64 = 20.0;
 const DEVIANCE: f64 = 50.0;
 /// .. and each of a wheel decides by itself, as far as it is no outlier: chosen, 8 nats.
 const DEVIANCE_ALONE: f64 = 16.0;
+/// Samples of a suspected channel after which its estimate has settled: e^4 times what it was, more
+/// than [`RATIO_MAX`], if each is clipped.
+const SETTLED: u32 = 300;
 /// Samples over which the estimate forgets. Half a minute of 50 ms: known within sqrt(3.9 / 600) =
 /// 8 %.
 const MEMORY: f64 = 600.0;
@@ -107,6 +110,9 @@ pub struct NoiseScale {
     asked: f64,
     /// The last squares over that of the noise, newest last.
     squares: [f64; 3],
+    /// Ratio before the channel was suspected, and samples since then.
+    before: f64,
+    suspected: u32,
 }
 
 impl Default for NoiseScale {
@@ -117,6 +123,8 @@ impl Default for NoiseScale {
             outliers: 0.0,
             asked: ASKED,
             squares: [0.0; 3],
+            before: 1.0,
+            suspected: 0,
         }
     }
 }
@@ -162,6 +170,20 @@ impl NoiseScale {
         let largest = CLIP * self.believed();
         self.sum = self.sum * FADING + normalised_square.clamp(0.0, largest) / CLIPPED_MEAN;
         self.count = self.count * FADING + 1.0;
+        if self.suspected == 0 {
+            self.before = self.believed();
+        }
+    }
+
+    /// Ratio of the variances of a healthy channel. While it is suspected more noise may be the
+    /// fault: it is believed once it has settled within what a healthy one may have.
+    fn healthy(&self) -> f64 {
+        let believed = self.believed();
+        let is_settled = self.suspected == 0 || self.suspected > SETTLED;
+        match is_settled && (self.suspected == 0 || believed <= RATIO_MAX) {
+            true => believed,
+            false => self.before,
+        }
     }
 
     /// Ratio of the variances as it is believed to be.
@@ -170,7 +192,7 @@ impl NoiseScale {
     }
 
     /// Takes the first difference of a channel whose samples have the learned standard deviation
-    /// `sd`, of which `expected` is no noise.
+    /// `sd`, of which `expected` is no noise; a channel that `is_suspected` may be broken.
     pub fn push_step(
         &mut self,
         model: &Model,
@@ -178,7 +200,12 @@ impl NoiseScale {
         sd: f64,
         [last_read, now_read]: [&Reading; 2],
         expected: f64,
+        is_suspected: bool,
     ) {
+        self.suspected = match is_suspected {
+            true => self.suspected.saturating_add(1),
+            false => 0,
+        };
         if last_read.plain == 0 || now_read.plain == 0 {
             return;
         }
@@ -217,7 +244,7 @@ impl NoiseScale {
         // Second differences are correlated by -2/3 and 1/6: 2 (1 + 2 (4/9 + 1/36)) = 3.9.
         let freedom = 2.0 * self.count / 3.9;
         let wider = deviance / ((freedom + 1.0) * (deviance / freedom).ln_1p());
-        self.believed() * wider
+        self.healthy() * wider
     }
 }
 
@@ -286,7 +313,7 @@ impl SensorNoise {
 
     /// Second differences of the pose and first differences of wheel rates and steering angles,
     /// less what the nominal motion makes of them: neither a curve nor a fault that persists shows.
-    /// Wheels and angles that are suspected teach nothing: their noise may be the fault.
+    /// The noise of wheels and angles that are suspected may be the fault.
     pub fn update(
         &mut self,
         model: &Model,
@@ -330,14 +357,12 @@ impl SensorNoise {
             for i in 0..count {
                 let expected = turns(now, i) - turns(&last, i);
                 let readings = [&last.wheels[i], &now.wheels[i]];
-                if !suspects.has(Channel::wheel_rate(i)) {
-                    self.wheels[i].push_step(model, now, rate, readings, expected);
-                }
+                let suspected = suspects.has(Channel::wheel_rate(i));
+                self.wheels[i].push_step(model, now, rate, readings, expected, suspected);
                 let expected = steers(now, i) - steers(&last, i);
                 let readings = [&last.steer[i], &now.steer[i]];
-                if !suspects.has(Channel::steer(i)) {
-                    self.steer[i].push_step(model, now, angle, readings, expected);
-                }
+                let suspected = suspects.has(Channel::steer(i));
+                self.steer[i].push_step(model, now, angle, readings, expected, suspected);
             }
         }
     }

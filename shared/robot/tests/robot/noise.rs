@@ -3,11 +3,11 @@
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{CHANNELS, Channel, SensorFrame, Valid};
+use vigil_blocks::{SensorFrame, Valid};
 use vigil_robot::Suspects;
-use vigil_robot::learned::noise_scale::SensorNoise;
+use vigil_robot::learned::noise_scale::{NoiseScale, SensorNoise};
 use vigil_robot::learned::wheels::rolling_rate;
-use vigil_robot::learned::{NoiseScales, Observer};
+use vigil_robot::learned::{NoiseScales, Observation, Observer, Reading};
 
 use crate::learned::{model, robot};
 
@@ -19,8 +19,8 @@ const FAR: f64 = 20.0;
 const WHEELS: usize = 6;
 
 /// What is believed after a minute on a circle, at 20 Hz: each frame comes within a share of its
-/// period, and a share of them not at all. What is suspected teaches nothing.
-fn scales(jitter: f64, loss: f64, suspects: Suspects) -> NoiseScales {
+/// period, and a share of them not at all.
+fn scales(jitter: f64, loss: f64) -> NoiseScales {
     let (robot, model) = (robot(), model());
     let mut observer = Observer::new(&model, &robot);
     let mut noise = SensorNoise::default();
@@ -54,7 +54,7 @@ fn scales(jitter: f64, loss: f64, suspects: Suspects) -> NoiseScales {
         }
         frame.valid = Valid::POSE | Valid::command(0) | Valid::command(1) | 0x3f00;
         if rng.random::<f64>() >= loss && observer.push(&frame).complete {
-            noise.update(&model, &robot, observer.observation(), suspects);
+            noise.update(&model, &robot, observer.observation(), Suspects::default());
         }
     }
     noise.scales()
@@ -63,7 +63,7 @@ fn scales(jitter: f64, loss: f64, suspects: Suspects) -> NoiseScales {
 #[test]
 fn noise_and_outliers_are_known_however_unevenly_frames_come() {
     for (jitter, loss) in [(0.0, 0.0), (0.5, 0.0), (0.9, 0.0), (0.0, 0.3), (0.9, 0.3)] {
-        let scales = scales(jitter, loss, Suspects::default());
+        let scales = scales(jitter, loss);
         let wheels = &scales.wheels[..WHEELS];
         // Outliers, clipped, and its own uncertainty make it lean to the high side.
         for scale in scales.pose.iter().chain(wheels) {
@@ -85,12 +85,42 @@ fn noise_and_outliers_are_known_however_unevenly_frames_come() {
 }
 
 #[test]
-fn a_wheel_that_is_suspected_teaches_no_noise_and_the_others_do() {
-    let mut log_odds = [-5.0; CHANNELS];
-    log_odds[Channel::wheel_rate(1)] = 5.0;
-    let scales = scales(0.0, 0.0, Suspects::new(true, &log_odds));
-    for (wheel, scale) in scales.wheels.iter().enumerate().take(WHEELS) {
-        let is_learned = (0.85 * NOISIER..1.4 * NOISIER).contains(scale);
-        assert_eq!(is_learned, wheel != 1, "{wheel}: {scale}");
+fn noise_of_a_suspected_wheel_is_believed_once_it_has_settled_as_a_healthy_one_may() {
+    let model = model();
+    let sd = model.noise.wheel_rate_rad_s;
+    let mut rng = Pcg64Mcg::seed_from_u64(9);
+    // After a minute in which all was well the noise is as many times as large, and suspected.
+    let mut ratio_after = |factor: f64, seconds: usize| {
+        let mut scale = NoiseScale::default();
+        let observation = Observation {
+            frame_s: 0.05,
+            ..Observation::default()
+        };
+        let mut last = Reading::default();
+        for k in 0..20 * (60 + seconds) {
+            let is_suspected = k >= 1200;
+            let sd = if is_suspected { factor * sd } else { sd };
+            let mut now = last.next();
+            now.push(sd * rng.sample::<f64, _>(StandardNormal), None);
+            let read = [&last, &now];
+            scale.push_step(
+                &model,
+                &observation,
+                model.noise.wheel_rate_rad_s,
+                read,
+                0.0,
+                is_suspected,
+            );
+            last = now;
+        }
+        scale.variance_ratio().sqrt()
+    };
+    let held = ratio_after(4.0, 10);
+    assert!((0.85..1.4).contains(&held), "{held}");
+    let adopted = ratio_after(4.0, 60);
+    assert!((3.4..5.0).contains(&adopted), "{adopted}");
+    for seconds in [2, 10, 20, 60, 600] {
+        let broken = ratio_after(10.0, seconds);
+        assert!((0.85..1.4).contains(&broken), "{seconds} s: {broken}");
     }
 }
