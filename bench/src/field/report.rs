@@ -94,6 +94,23 @@ impl<'a> Outcome<'a> {
         })
     }
 
+    /// The bars that are not met, one by line with the figure.
+    fn missed(&self) -> Vec<String> {
+        let missed = self.bars().filter(|(_, met)| *met == Some(false));
+        let line = |(bar, _): (&Bar, Option<bool>)| {
+            let mut all = self.figures.iter();
+            let figure = all.find(|figure| figure.name == bar.figure)?;
+            let value = figure.value.map_or("never".to_owned(), number);
+            let bounds = bounds(figure).map_or(String::new(), |bounds| format!(" ({bounds})"));
+            let (name, sensors) = (&self.scenario.name, self.sensors);
+            let runs = self.runs.len();
+            Some(format!(
+                "- {name}, {sensors}, runs {runs}: {bar}: {value}{bounds}"
+            ))
+        };
+        missed.filter_map(line).collect()
+    }
+
     fn lines(&self) -> Vec<String> {
         let head = format!(
             "| {} | {} | {} | {:.2} ",
@@ -150,15 +167,17 @@ fn verdict(bar: &Bar, met: Option<bool>) -> String {
 
 fn words(figure: &Figure) -> String {
     let text = |value: Option<f64>| value.map_or("never".to_owned(), number);
-    let bounds = match (figure.lower_95, figure.upper_95) {
-        (Some(lower), Some(upper)) => format!("{} to {}", number(lower), number(upper)),
-        _ => String::new(),
-    };
+    let bounds = bounds(figure).unwrap_or_default();
     let worst = figure.worst.map_or(String::new(), |worst| {
         format!("{} ({})", text(worst.value), worst.seed)
     });
     let (name, value, n) = (figure.name, text(figure.value), figure.n);
     format!("| {name} | {value} | {bounds} | {n} | {worst} ")
+}
+
+fn bounds(figure: &Figure) -> Option<String> {
+    let (lower, upper) = (figure.lower_95?, figure.upper_95?);
+    Some(format!("{} to {}", number(lower), number(upper)))
 }
 
 /// Four digits, or all of a whole number.
@@ -186,14 +205,18 @@ pub fn lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
     lines
 }
 
-/// The rows of the table that have a bar, first those that do not meet it.
+/// The bars that are not met, as a list that no summary cuts; the rows of the table that meet
+/// theirs; the departures.
 #[must_use]
 pub fn barred_lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
+    let mut lines: Vec<String> = outcomes.iter().flat_map(Outcome::missed).collect();
+    if !lines.is_empty() {
+        lines.splice(0..0, ["Not met:".to_owned(), String::new()]);
+        lines.push(String::new());
+    }
+    lines.extend(HEAD.map(str::to_owned));
     let rows = outcomes.iter().flat_map(Outcome::lines);
-    let mut rows: Vec<String> = rows.filter(|row| !row.ends_with("|  |")).collect();
-    rows.sort_by_key(|row| !row.contains(NOT_MET));
-    let mut lines = HEAD.map(str::to_owned).to_vec();
-    lines.extend(rows);
+    lines.extend(rows.filter(|row| !row.ends_with("|  |") && !row.contains(NOT_MET)));
     lines.extend(departure::table(outcomes));
     lines
 }

@@ -8,7 +8,7 @@ use super::shorten::shortened;
 use crate::machine;
 
 /// Lines of a question at most.
-const LINES_MAX: usize = 40;
+const LINES_MAX: usize = 60;
 /// Columns of a line that can be broken.
 const COLUMNS_MAX: usize = 120;
 
@@ -152,7 +152,7 @@ mod tests {
     fn long_lines_are_broken_and_long_tables_cut() {
         let long = format!("- {}- b", "a ".repeat(58));
         let whole = ["| a |", "|---|"].into_iter().chain([long.as_str(); 2]);
-        let rows = std::iter::repeat_n("| 1 |", 50);
+        let rows = std::iter::repeat_n("| 1 |", 80);
         let summary: Vec<&str> = whole
             .clone()
             .take(2)
@@ -164,8 +164,8 @@ mod tests {
             text.lines()
                 .all(|line| line.chars().count() <= COLUMNS_MAX + 3)
         );
-        assert_eq!(text.matches("| 1 |").count(), 32, "{text}");
-        assert!(text.contains("\nMore: ") && text.contains("\n... 18 more rows\n"));
+        assert_eq!(text.matches("| 1 |").count(), 52, "{text}");
+        assert!(text.contains("\nMore: ") && text.contains("\n... 28 more rows\n"));
         assert_eq!(broken("a b"), ["a b"]);
         assert_eq!(broken(&format!("- {} c", "x".repeat(117))).len(), 2);
     }

@@ -7,6 +7,8 @@ use vigil_setup::schema::{self, Form, Sensors};
 
 use crate::recorded::{model, robot, runs};
 
+/// Length of a recorded run, s.
+const RUN_S: f64 = 10.0;
 const FORMS: [Form; 3] = [Form::LearnedBias, Form::Constant, Form::Windowed];
 
 /// The same robot where nobody expects other ground: the paper's forms, which judge single
@@ -39,8 +41,8 @@ fn alarm_s(detector: &Detector, frames: &[SensorFrame]) -> Option<f64> {
     alarm.map(|frame| frame.header.t_capture_ns as f64 * 1e-9)
 }
 
-/// Mean delay of the alarms over all stuck runs left out, s, none of which is missed; there is no
-/// alarm without a fault.
+/// Mean delay of the alarms over all stuck runs left out, s, where one that is missed counts as long
+/// as its run lasts; there is no alarm without a fault.
 fn delay_s(sensors: Sensors, form: Form) -> f64 {
     let (runs, labels) = runs(&robot());
     let robot = match form {
@@ -63,18 +65,19 @@ fn delay_s(sensors: Sensors, form: Form) -> f64 {
         } else if label.kind == "stuck" {
             let Some(alarm_s) = alarm_s else {
                 missed += 1;
+                delays_s.push(RUN_S);
                 continue;
             };
             delays_s.push(alarm_s - label.onset_s.unwrap());
             assert!(delays_s.last().is_some_and(|&delay_s| delay_s > 0.0));
         }
     }
-    assert_eq!((nominal, delays_s.len() + missed), (20, 120));
+    assert_eq!((nominal, delays_s.len()), (20, 120));
     // A wheel that is stuck three seconds after the start, when little is known of the noise, in
     // the tightest turn, may take longer by the pose than its run lasts.
     let allowed = usize::from(sensors == Sensors::Pose);
     assert!(missed <= allowed, "{form:?}: {missed} missed");
-    delays_s.iter().sum::<f64>() / delays_s.len() as f64
+    delays_s.iter().sum::<f64>() / 120.0
 }
 
 #[test]

@@ -5,10 +5,6 @@ use vigil_inference::alternative::Alternatives;
 /// Probability that an encoder is broken in each other way from an observation on. Chosen: it counts
 /// by its logarithm, 7 nats once; each observation without a change costs 0.003 nats.
 const CHANGES: f64 = 0.001;
-/// The same for a late one, where a delay would show. One that is late reads right while the
-/// command is constant: so little of any other fault may be taken for it that its end is seen.
-/// Chosen: 18 nats, which are what an alarm's end takes.
-const BECOMES_LATE: f64 = 1e-8;
 
 /// Log-likelihoods of an observation for each way to be broken, over that of a whole encoder.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +32,9 @@ impl Default for EncoderWays {
 impl EncoderWays {
     /// Takes an observation; the log-likelihood of all ways together, over that of a whole encoder.
     pub fn step(&mut self, fits: &Fits) -> f64 {
-        let late = fits.late.map_or(0.0, |_| BECOMES_LATE);
+        // Where a delay would not show a late one reads right: whatever has ended would be taken
+        // for it.
+        let late = fits.late.map_or(0.0, |_| CHANGES);
         let log_ratios = [
             fits.biased,
             fits.any,
@@ -51,7 +49,8 @@ impl EncoderWays {
 mod tests {
     use super::*;
 
-    /// By how much a second of whole readings speaks against a small bias that was seen before.
+    /// By how much two seconds of whole readings speak against a small bias that was seen before: for
+    /// a second while the command changed, and for another while it did not.
     fn lost_after(late: Option<f64>) -> f64 {
         let mut ways = EncoderWays::default();
         let fits = |biased, any, late| Fits {
@@ -60,10 +59,10 @@ mod tests {
             late,
             repeats: -4.6,
         };
-        for _ in 0..20 {
-            ways.step(&fits(1.0, 0.5, Some(-0.5)));
+        for k in 0..40 {
+            ways.step(&fits(1.0, 0.5, (k < 20).then_some(-0.5)));
         }
-        (0..20).map(|_| ways.step(&fits(-1.5, -2.3, late))).sum()
+        (0..40).map(|_| ways.step(&fits(-1.5, -2.3, late))).sum()
     }
 
     #[test]
