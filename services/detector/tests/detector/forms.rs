@@ -41,8 +41,8 @@ fn alarm_s(detector: &Detector, frames: &[SensorFrame]) -> Option<f64> {
     alarm.map(|frame| frame.header.t_capture_ns as f64 * 1e-9)
 }
 
-/// Mean delay of the alarms over all stuck runs left out, s, where one that is missed counts as long
-/// as its run lasts; there is no alarm without a fault.
+/// Mean delay of the alarms over all stuck runs left out, s, where one that is missed counts as
+/// long as its run lasts; there is no alarm without a fault.
 fn delay_s(sensors: Sensors, form: Form) -> f64 {
     let (runs, labels) = runs(&robot());
     let robot = match form {

@@ -2,8 +2,8 @@
 
 use vigil_inference::alternative::Alternatives;
 
-/// Probability that an encoder is broken in each other way from an observation on. Chosen: it counts
-/// by its logarithm, 7 nats once; each observation without a change costs 0.003 nats.
+/// Probability that an encoder is broken in each other way from an observation on. Chosen: it
+/// counts by its logarithm, 7 nats once; each observation without a change costs 0.003 nats.
 const CHANGES: f64 = 0.001;
 
 /// Log-likelihoods of an observation for each way to be broken, over that of a whole encoder.
@@ -49,8 +49,8 @@ impl EncoderWays {
 mod tests {
     use super::*;
 
-    /// By how much two seconds of whole readings speak against a small bias that was seen before: for
-    /// a second while the command changed, and for another while it did not.
+    /// By how much two seconds of whole readings speak against a small bias that was seen before:
+    /// for a second while the command changed, and for another while it did not.
     fn lost_after(late: Option<f64>) -> f64 {
         let mut ways = EncoderWays::default();
         let fits = |biased, any, late| Fits {
