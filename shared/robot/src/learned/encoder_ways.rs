@@ -7,7 +7,7 @@ use vigil_inference::alternative::Alternatives;
 const CHANGES: f64 = 0.001;
 
 /// Log-likelihoods of an observation for each way to be broken, over that of a whole encoder.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Fits {
     /// Off by a bias that is learned.
     pub biased: f64,

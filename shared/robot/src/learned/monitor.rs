@@ -28,7 +28,7 @@ use super::further_evidence::FurtherEvidence;
 use super::further_watch::Turn;
 use super::lateness::{Lateness, Timely};
 use super::noise_scale::{NoiseScales, SensorNoise, UNSEEN_S};
-use super::repeats::{Repeats, log_ratio};
+use super::repeats::Repeats;
 use super::settling::Settling;
 use super::wheel_context::{Beside, WheelContext};
 use super::wheels::rolling_rate;
@@ -271,9 +271,6 @@ impl Monitor {
         }
         self.report.evidence = 0.0;
         self.gains = Gains::default();
-        self.repeats
-            .iter_mut()
-            .for_each(|repeats| repeats.gain = 0.0);
         self.troubles = observation.troubles;
         let (model, robot) = (&self.model, &self.robot);
         self.noise.update(model, robot, observation, suspects);
@@ -372,14 +369,14 @@ impl Monitor {
         let birth_repeats = self.birth(observation.dt_s, SHARE_REPEATS * share);
         let command = observation.command;
         self.context.fade(observation.travel_m);
-        // By how much better a bias fits, and anything.
-        let mut fits = [[0.0; 2]; WHEELS];
+        let mut fits = [Fits::default(); WHEELS];
         let (mut all, mut timely, mut rates) =
             ([None; WHEELS], [None; WHEELS], [(0.0, 0.0); WHEELS]);
         let wheels = self.robot.wheels.len();
         for (i, sample) in samples.into_iter().enumerate().take(wheels) {
             let reading = &observation.wheels[i];
-            self.repeats[i].step(reading, self.model.encoder.repeat_rate, birth_repeats);
+            let healthy = self.model.encoder.repeat_rate;
+            fits[i].repeats = self.repeats[i].step(reading, healthy, birth_repeats);
             let rolling = rolling_rate(&self.robot, i, command[0], command[1]);
             let behind =
                 rolling - rolling_rate(&self.robot, i, observation.curvature, observation.speed);
@@ -408,8 +405,8 @@ impl Monitor {
                 outlier_rate,
             });
             self.wheels[i].step(&whitened, birth);
-            let any = log_ratio_any(whitened.value.norm_squared());
-            fits[i] = [self.wheels[i].gain(), any];
+            fits[i].biased = self.wheels[i].gain();
+            fits[i].any = log_ratio_any(whitened.value.norm_squared());
             self.report.evidence += log_normal(apart, variance);
         }
         // What a fault does is no context of the nominal mode.
@@ -418,13 +415,9 @@ impl Monitor {
         }
         let birth = self.birth(observation.dt_s, SHARE_LATE * share);
         self.late.step(observation.t_ns, rates, &timely, birth);
-        for (i, [biased, any]) in fits.into_iter().enumerate().take(wheels) {
-            self.gains.wheels[i] = self.ways[i].step(&Fits {
-                biased,
-                any,
-                late: self.late.odds(i).1,
-                repeats: log_ratio(&observation.wheels[i], self.model.encoder.repeat_rate),
-            });
+        for (i, fits) in fits.iter_mut().enumerate().take(wheels) {
+            fits.late = self.late.odds(i).1;
+            self.gains.wheels[i] = self.ways[i].step(fits);
         }
     }
 

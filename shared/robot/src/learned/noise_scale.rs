@@ -179,10 +179,11 @@ impl NoiseScale {
     /// fault: it is believed once it has settled within what a healthy one may have.
     fn healthy(&self) -> f64 {
         let believed = self.believed();
-        let is_settled = self.suspected == 0 || self.suspected > SETTLED;
-        match is_settled && (self.suspected == 0 || believed <= RATIO_MAX) {
-            true => believed,
-            false => self.before,
+        match self.suspected {
+            0 => believed,
+            1..=SETTLED => self.before,
+            _ if believed <= RATIO_MAX => believed,
+            _ => self.before,
         }
     }
 

@@ -35,11 +35,13 @@ impl Default for Repeats {
 
 impl Repeats {
     /// Takes a reading; `birth` is the probability that the sensor has frozen since the last one.
-    pub fn step(&mut self, reading: &Reading, healthy: f64, birth: f64) {
+    /// Returns its [`log_ratio`].
+    pub fn step(&mut self, reading: &Reading, healthy: f64, birth: f64) -> f64 {
         let seen = log_ratio(reading, healthy);
         let before = log_add(self.log_odds, birth.ln());
         self.log_odds = (before + seen).clamp(birth.ln(), LOG_ODDS_MAX);
         // At the lower bound there is nothing to lose: a gain below what was lost is none.
         self.gain = seen.max(self.log_odds - before);
+        seen
     }
 }
