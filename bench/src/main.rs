@@ -31,6 +31,8 @@ struct Program {
 enum Question {
     /// Does the latency report tell the machine's misses from Vigil's own?
     Attribution(attribution::Args),
+    /// Are verdicts and actions the same, bit for bit, as those of `bench/bits.txt`?
+    Bits(bits::Args),
     /// Does the diagnosis hold on noisier sensors, and does it tell a dead encoder from a stuck
     /// wheel?
     Derived(Json),
@@ -116,6 +118,7 @@ impl Question {
     fn answer(&self) -> Result<(), Box<dyn Error>> {
         match self {
             Self::Attribution(args) => attribution::run(args),
+            Self::Bits(args) => bits::run(args),
             Self::Derived(args) => derived::run(args),
             Self::Detection => detection::run(),
             Self::FaultSets => fault_sets::run(),

@@ -1,6 +1,7 @@
 //! The questions, and what the options of several of them share.
 
 pub mod attribution;
+pub mod bits;
 pub mod derived;
 pub mod detection;
 pub mod fault_sets;

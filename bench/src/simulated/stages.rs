@@ -114,6 +114,12 @@ impl Stages {
         &self.action
     }
 
+    /// What the three stages say now.
+    #[must_use]
+    pub const fn blocks(&self) -> (&DetectionBelief, &FaultBelief, &Action) {
+        (&self.detection, &self.diagnosis, &self.action)
+    }
+
     /// What is said now.
     #[must_use]
     pub fn moment(&self, t_s: f64, dt_s: f64, drives: bool) -> Moment<'_> {
