@@ -19,6 +19,7 @@ use crate::latency::cycles::{STAGE_NAMES, STAGES};
 use carriers::{Carrier, Incoming, Outgoing};
 
 pub mod carriers;
+mod futex;
 mod payload;
 mod queue;
 

@@ -12,6 +12,8 @@ mod fault;
 mod frames;
 mod ground;
 mod healthy;
+mod husky;
+mod logs;
 mod recorded;
 mod report;
 mod run;

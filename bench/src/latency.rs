@@ -6,15 +6,11 @@
 //! a bare futex; and a canary on each core says when the machine was late.
 
 pub mod attribution;
+pub mod canary;
 pub mod cell;
 pub mod cycles;
 pub mod files;
 pub mod flood;
 pub mod graph;
-pub mod halves;
 pub mod load;
-pub mod page;
-pub mod parts;
-pub mod recording;
-pub mod stalls;
 pub mod system;

@@ -1,34 +1,19 @@
-//! What the questions share: the archive, the facts about the machine, the yardstick and the
-//! filters that are compared.
+//! What the questions share: the archive of results, facts about the machine, simulated drives.
 
 use std::error::Error;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 pub mod archive;
 pub mod chain;
 pub mod field;
-pub mod figure7;
-pub mod filters;
-pub mod ground;
-pub mod guard;
 pub mod instructions;
 pub mod latency;
 pub mod machine;
-pub mod matched;
 pub mod missions;
-pub mod naive;
-pub mod noncentrality;
-pub mod pairs;
-pub mod pomdp_learning;
-pub mod rare;
-pub mod real;
-pub mod recorded;
 pub mod results;
-pub mod shares;
 pub mod simulated;
-pub mod speed;
-pub mod unmodelled;
 
 /// What the question of this name ends with: 0, or 1 and the reason.
 pub fn ended(name: &str, result: Result<(), Box<dyn Error>>) -> ExitCode {
@@ -54,6 +39,32 @@ pub fn in_folder<T>(
     let result = work(&folder);
     let _ = std::fs::remove_dir_all(&folder);
     result
+}
+
+/// `f` of every item, in order, on all cores.
+pub fn in_parallel<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        while let Some((i, item)) = {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            items.get(i).map(|item| (i, item))
+        } {
+            done.push((i, f(item)));
+        }
+        done
+    };
+    let mut results: Vec<(usize, R)> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
+        let joined = workers.into_iter().map(|worker| match worker.join() {
+            Ok(done) => done,
+            Err(panic) => std::panic::resume_unwind(panic),
+        });
+        joined.flatten().collect()
+    });
+    results.sort_by_key(|(i, _)| *i);
+    results.into_iter().map(|(_, result)| result).collect()
 }
 
 /// True if `n` samples are enough to speak of their percentile `q`: of 99 none lies beyond the p99.

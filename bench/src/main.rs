@@ -29,34 +29,11 @@ struct Program {
 /// What is measured. The help of each is the first line of its module.
 #[derive(Debug, Subcommand)]
 enum Question {
-    /// Does the latency report tell the machine's misses from Vigil's own?
-    Attribution(attribution::Args),
     /// Are verdicts and actions the same, bit for bit, as those of `bench/bits.txt`?
     Bits(bits::Args),
-    /// Does the diagnosis hold on noisier sensors, and does it tell a dead encoder from a stuck
-    /// wheel?
-    Derived(Json),
-    /// How long does detection take at equal false-alarm rate, by size of the fault, beside the
-    /// bound?
-    Detection,
-    /// How long does the exact belief over all 4096 sets of twelve faults take per step?
-    FaultSets,
     /// Does the diagnosis hold in the field: for hours, over gaps, on other grounds, with other
     /// lags?
     Field(field::Args),
-    /// Does a stuck wheel bend the path as the paper says, and by how much?
-    Figure7(Json),
-    /// Which filter is worth its time?
-    Filters,
-    /// Does the graph do its main job? Stuck wheel, quiet drive, recorded runs, held-out
-    /// evaluation.
-    FirstLight,
-    /// What does a flood of frames cost? That of a stranger should cost nothing.
-    Flood(flood::Args),
-    /// Does a model that was learned on one soil fail honestly on stiffer ones?
-    Ground(ground::Args),
-    /// Does the guard find every bad frame by its right cause, and let pass what is the filters'?
-    Guard(guard::Args),
     /// Records healthy runs of the simulated rover, every channel in them, for
     /// `vigil learn --more`.
     Healthy(healthy::Args),
@@ -64,35 +41,10 @@ enum Question {
     Instructions(instructions::Args),
     /// How long from the schedule to the action, under load, and whose misses are they?
     Latency(latency::Args),
-    /// How fast is the look-ahead filter on a linear 13-mode model?
-    LookAhead,
     /// What is Vigil worth? Missions with random faults: with it, without, and with plainer rules.
     Missions(missions::Args),
-    /// Do slow, stopped or dead observers disturb the graph, and what does its instrumentation
-    /// cost?
-    Observers(observers::Args),
     /// Where does zero-copy pay?
     Peers(peers::Args),
-    /// How good and how fast are the bounds and the point-based solver on the public models?
-    PomdpBounds(pomdp_bounds::Args),
-    /// Do the heuristics earn what another implementation says, and what are they worth, how fast?
-    PomdpCompare(pomdp_compare::Args),
-    /// Is a model learned from missions as good as the true one, and does learning on the way help?
-    PomdpLearning(pomdp_learning::Args),
-    /// How fast is a belief update?
-    PomdpUpdate(Json),
-    /// Does a publisher in Python lose frames, and how late are they?
-    Publishers(publishers::Args),
-    /// Does one detector serve real robots, each learned from its own log, with one rule for the
-    /// alarm?
-    Robots,
-    /// How fast is a particle filter? A plain one and the lanes at each level, in turn, in one
-    /// process.
-    Rover13(Json),
-    /// Are two stuck wheels named, both and no other, and is a second one told from a dead encoder?
-    TwoWheels(two_wheels::Args),
-    /// Is what no model contains detected, and called unknown? And what does nominal driving raise?
-    Unmodelled(unmodelled::Args),
     /// Writes bench/README.md anew from the results
     Page,
     #[command(flatten)]
@@ -104,12 +56,8 @@ enum Question {
 enum Role {
     #[command(name = chain::STAGE_WORD, hide = true)]
     Stage { role: String },
-    #[command(name = flood::FLOOD_WORD, hide = true)]
-    FrameFlood { address: String },
     #[command(name = sensor_flood::FLOOD_WORD, hide = true)]
     SensorFlood { config: PathBuf },
-    #[command(name = observers::OBSERVE_WORD, hide = true)]
-    Observer { config: PathBuf, folder: PathBuf },
     #[command(name = instructions::RUN_WORD, hide = true)]
     RunCycles,
 }
@@ -117,34 +65,13 @@ enum Role {
 impl Question {
     fn answer(&self) -> Result<(), Box<dyn Error>> {
         match self {
-            Self::Attribution(args) => attribution::run(args),
             Self::Bits(args) => bits::run(args),
-            Self::Derived(args) => derived::run(args),
-            Self::Detection => detection::run(),
-            Self::FaultSets => fault_sets::run(),
             Self::Field(args) => field::run(args),
-            Self::Figure7(args) => figure7::run(args),
-            Self::Filters => filters::run(),
-            Self::FirstLight => first_light::run(),
-            Self::Flood(args) => flood::run(args),
-            Self::Ground(args) => ground::run(args),
-            Self::Guard(args) => guard::run(args),
             Self::Healthy(args) => healthy::run(args),
             Self::Instructions(args) => instructions::run(args),
             Self::Latency(args) => latency::run(args),
-            Self::LookAhead => look_ahead::run(),
             Self::Missions(args) => missions::run(args),
-            Self::Observers(args) => observers::run(args),
             Self::Peers(args) => peers::run(args),
-            Self::PomdpBounds(args) => pomdp_bounds::run(args),
-            Self::PomdpCompare(args) => pomdp_compare::run(args),
-            Self::PomdpLearning(args) => pomdp_learning::run(args),
-            Self::PomdpUpdate(args) => pomdp_update::run(args),
-            Self::Publishers(args) => publishers::run(args),
-            Self::Robots => robots::run(),
-            Self::Rover13(args) => rover13::run(args),
-            Self::TwoWheels(args) => two_wheels::run(args),
-            Self::Unmodelled(args) => unmodelled::run(args),
             Self::Page => write_page(),
             Self::Role(role) => role.play(),
         }
@@ -155,9 +82,7 @@ impl Role {
     fn play(&self) -> Result<(), Box<dyn Error>> {
         match self {
             Self::Stage { role } => chain::be_stage(role),
-            Self::FrameFlood { address } => flood::be_flood(address),
             Self::SensorFlood { config } => sensor_flood::be_flood(config),
-            Self::Observer { config, folder } => observers::observe(config, folder),
             Self::RunCycles => instructions::run_cycles(),
         }
     }

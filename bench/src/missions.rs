@@ -28,7 +28,7 @@ pub use course::Course;
 pub use drive::{Mission, drive};
 pub use escalation::{Escalation, Explanation, Seen, Told};
 pub use plan::{Fault, Kind, Plan};
-pub use report::{document, lines, lost_against, picture, say};
+pub use report::{document, lines, lost_against, say};
 pub use score::{MEASURES, Measure, Obeyed, Pay, Score, Truth};
 
 use std::error::Error;

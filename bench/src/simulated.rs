@@ -1,11 +1,7 @@
 //! The simulated rover through detector and identifier in one process, as they run live.
 
-mod chain;
-mod drives;
 mod stages;
 
-pub use chain::{Chain, Said};
-pub use drives::{Conditions, constant, weaving};
 pub use stages::Stages;
 
 use std::error::Error;

@@ -7,9 +7,9 @@ use std::os::unix::net::UnixDatagram;
 use std::path::Path;
 use std::time::Duration;
 
+use super::futex::FutexBlock;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
-use vigil_cycle::futex::FutexBlock;
 use vigil_cycle::{Clock, Monotonic};
 
 use super::payload;

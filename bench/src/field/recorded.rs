@@ -18,7 +18,7 @@ use super::ground::stream;
 use super::run::{Job, Scored, Watch};
 use super::scenario::Scenario;
 use super::timeline::Timeline;
-use crate::real;
+use super::{husky, logs};
 use crate::simulated::Stages;
 
 /// Velocity from which a robot counts as driving, m/s and rad/s.
@@ -142,7 +142,7 @@ fn material(root: &Path, data: &Path, source: &Source) -> Result<Material, Box<d
     match source.log.as_str() {
         "left-out" | "grounds" | "mujoco" => rover(root, data, &source.log),
         "kobuki" => {
-            let log = real::log("kobuki_wheel_fault", "kobuki")?;
+            let log = logs::log("kobuki_wheel_fault", "kobuki")?;
             let whole = log.runs.into_iter().next().ok_or("no run")?;
             let middle = whole.frames.len() / 2;
             let half = |id: u32, frames: &[vigil_blocks::SensorFrame]| {
@@ -157,9 +157,9 @@ fn material(root: &Path, data: &Path, source: &Source) -> Result<Material, Box<d
             learned(root, log.robot, halves, source.half.unwrap_or(1))
         }
         "husky" => {
-            let folder = real::unpacked("husky_boreal")?;
+            let folder = logs::unpacked("husky_boreal")?;
             let robot = load_robot(&root.join("config/robots/husky.toml"))?;
-            let runs = real::husky::runs(&folder, &robot)?;
+            let runs = husky::runs(&folder, &robot)?;
             learned(root, robot, runs, source.half.unwrap_or(1))
         }
         other => Err(format!(

@@ -9,7 +9,7 @@
 //! as much is told beside it. Instants that one answer has ended share its verdict: the first of
 //! them says how long it was due.
 
-use vigil_cycle::canary::{Late, Seen};
+use super::canary::{Late, Seen};
 
 use super::cycles::Cycle;
 

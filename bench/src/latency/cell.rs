@@ -4,10 +4,10 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Duration;
 
+use super::canary::{Canary, Seen};
 use clap::ValueEnum;
 use serde_json::{Value, json};
 use vigil_blocks::{Action, DetectionBelief, FaultBelief, ParticleBlock, SensorFrame};
-use vigil_cycle::canary::{Canary, Seen};
 use vigil_cycle::latency::Percentiles;
 use vigil_cycle::placement::Wanted;
 use vigil_cycle::{CycleStamps, Latency, Placement};
@@ -17,7 +17,6 @@ use super::attribution::{self, Miss, Record};
 use super::cycles::{self, Cycle, STAGE_NAMES, STAGES, Spectra};
 use super::graph::{Change, Prepared, Ran};
 use super::load::{Load, Running};
-use super::parts::{self, Part};
 use super::system::Ticks;
 use crate::chain::Chain;
 use crate::chain::carriers::Carrier;
@@ -407,7 +406,6 @@ impl Cell {
                 "missed_by_recount": self.recounted,
             },
             "missed_without_one_long_stall": self.not_one_stall(),
-            "parts": parts::of(self).iter().map(Part::json).collect::<Vec<_>>(),
             "canary_late_ppm": self.canary_late_ppm.map(round),
             "machine_over_canary": self.machine_over_canary().map(round),
             "max_at": self.slowest(),

@@ -7,13 +7,13 @@ use std::io::Write as _;
 use std::path::Path;
 use std::time::{Duration, UNIX_EPOCH};
 
+use super::canary::Late;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::IntervalLogWriterBuilder;
 use vigil_cycle::Latency;
-use vigil_cycle::canary::Late;
 
 use super::cell::Cell;
 use super::cycles::{Cycle, STAGE_NAMES, Stage};

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use super::canary::Canary;
 use serde_json::Value;
 use toml::Table;
-use vigil_cycle::canary::Canary;
 use vigil_cycle::placement::Wanted;
 use vigil_cycle::serve::Leave;
 use vigil_cycle::topic::ServiceName;

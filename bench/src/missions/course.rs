@@ -38,11 +38,6 @@ impl Course {
         self.points.last().map(|(at, _)| *at)
     }
 
-    /// Its points, m.
-    pub fn path(&self) -> impl Iterator<Item = [f64; 2]> {
-        self.points.iter().map(|(at, _)| *at)
-    }
-
     /// Distance of `at` from the nearest place of the path between `from_m` and `to_m` along it,
     /// m. Beyond the ends of that stretch, from its ends; infinite of a course without points.
     #[must_use]

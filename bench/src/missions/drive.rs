@@ -56,11 +56,6 @@ impl Driven {
     fn score(&self, course: &Course) -> Score {
         Score::new(&self.tally, &self.places, course, self.done)
     }
-
-    /// The path that was planned.
-    pub(super) fn course(&self) -> Course {
-        Course::new(self.planned.iter().copied())
-    }
 }
 
 /// The world of a mission, what is wrong in it, and who helps.

@@ -1,17 +1,14 @@
-//! Missions in words, numbers and a picture.
-
-use std::error::Error;
+//! Missions in words and numbers.
 
 use serde_json::{Value, json};
 
 use super::arm::Arm;
-use super::drive::{Mission, ride};
-use super::plan::{Kind, Plan};
+use super::drive::Mission;
+use super::plan::Kind;
 use super::score::MEASURES;
 use super::table::{against, differences, figures, means, of};
-use super::{HELP_S, LIMIT_S, Shipped};
+use super::{HELP_S, LIMIT_S};
 use crate::archive::Archive;
-use crate::figure7;
 
 /// All figures, by kind of mission.
 #[must_use]
@@ -90,33 +87,6 @@ pub fn say(archive: &mut Archive, missions: &[Mission], rate_hz: f64) {
         archive.say("");
         differences(&here).iter().for_each(|row| archive.say(row));
     }
-}
-
-/// Paths of the first of these missions in which a wheel sticks, as SVG with its title; `None` if
-/// there is none.
-///
-/// # Errors
-/// A mission that cannot be driven, or what could not be drawn.
-pub fn picture(shipped: &Shipped, plans: &[Plan]) -> Result<Option<String>, Box<dyn Error>> {
-    let Some(plan) = plans.iter().find(|plan| plan.kind == Kind::Stuck) else {
-        return Ok(None);
-    };
-    let fault = plan.fault.as_ref().map_or("", |fault| fault.spec.as_str());
-    let mut paths = Vec::new();
-    for arm in [Arm::Without, Arm::Escalation, Arm::Vigil] {
-        let driven = ride(shipped, plan, arm)?;
-        if paths.is_empty() {
-            let course = driven.course();
-            paths.push((
-                "planned".to_owned(),
-                course.path().map(|[x, y]| (x, y)).collect(),
-            ));
-        }
-        let places = driven.places.iter().map(|place| (place.at[0], place.at[1]));
-        paths.push((arm.name().to_owned(), places.collect()));
-    }
-    let title = format!("Mission {}: {fault}", plan.seed);
-    Ok(Some(figure7::draw(&title, &paths)?))
 }
 
 /// The commanders that Vigil does not beat on the mission reward with 95 % confidence; the one

@@ -14,8 +14,8 @@ use vigil_bench::field::{
     self, File, Graph, Job, Library, Outcome, Scenario, Scored, barred_lines, document, jobs,
     library, lines, select,
 };
+use vigil_bench::in_parallel;
 use vigil_bench::machine;
-use vigil_bench::matched::in_parallel;
 
 /// Does the diagnosis hold in the field?
 #[derive(Debug, clap::Args)]

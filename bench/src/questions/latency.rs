@@ -10,8 +10,8 @@ use serde_json::Value;
 use vigil_bench::archive::Archive;
 use vigil_bench::latency::cell::{Cell, Scheduling, Spec};
 use vigil_bench::latency::load::Load;
-use vigil_bench::latency::{files, page, system};
-use vigil_bench::{machine, percentile};
+use vigil_bench::latency::{files, system};
+use vigil_bench::percentile;
 use vigil_cycle::latency::Percentiles;
 
 /// Shortest run, s: the first two seconds are warm-up.
@@ -161,8 +161,8 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
     archive.say(
         "Times in us; every latency from the schedule, hand-over and floor without compute; \
          folded are instants that only a later one's answer ended. Own, by stage: instants that \
-         each stage answered after its own deadline and that are not the machine's. \
-         `report.html` shows all of it.\n",
+         each stage answered after its own deadline and that are not the machine's. Histograms \
+         (`.hgrm`, `.hlog`) lie with the raw data.\n",
     );
     archive.say(
         "| cell | cycles | folded | end to end p50 | p99 | p99.9 | max | hand-over p50 | p99 | \
@@ -170,7 +170,6 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
          stage |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
     );
     let mut cells: Vec<Cell> = Vec::new();
-    let mut facts = facts();
     for (i, spec) in specs.iter().enumerate() {
         eprintln!("{} of {}: {}", i + 1, specs.len(), spec.name());
         let cell = match spec.run(folder) {
@@ -186,12 +185,10 @@ fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Err
         };
         archive.say(&line(&cell));
         cells.push(cell);
-        let name = page::names(&cells).pop().unwrap_or_default();
+        let name = format!("{:02}-{}", i + 1, spec.name());
         files::write(&cells[cells.len() - 1], &archive.folder().join(name))?;
     }
-    facts.push(("command".into(), command));
-    let html = page::html("Latency from the schedule to the action", &facts, &cells)?;
-    archive.store_text("report.html", &html)?;
+    archive.store("machine.json", &system::facts())?;
     let all: Vec<Value> = cells.iter().map(Cell::json).collect();
     archive.store("cells.json", &Value::from(all))?;
     archive.close()?;
@@ -231,18 +228,4 @@ fn line(cell: &Cell) -> String {
             .map_or_else(|| "-".into(), |times| format!("{times:.2}")),
         cell.own_by_stage(),
     )
-}
-
-/// What is to be known of the machine, name and value.
-fn facts() -> Vec<(String, String)> {
-    let mut facts = Vec::new();
-    for group in [machine::facts(), system::facts()] {
-        for (name, value) in group.as_object().into_iter().flatten() {
-            let value = value
-                .as_str()
-                .map_or_else(|| value.to_string(), str::to_owned);
-            facts.push((name.clone(), value));
-        }
-    }
-    facts
 }

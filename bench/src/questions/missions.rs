@@ -9,11 +9,9 @@ use std::time::Instant;
 
 use serde_json::json;
 use vigil_bench::archive::Archive;
+use vigil_bench::in_parallel;
 use vigil_bench::machine;
-use vigil_bench::matched::in_parallel;
 use vigil_bench::missions::{self, Mission, Plan, Shipped};
-
-use super::from_zero;
 
 /// Missions between two lines of progress.
 const PROGRESS: usize = 25;
@@ -67,9 +65,6 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new("missions")?;
     archive.store("missions.json", &document)?;
     archive.store_text("missions.csv", &missions::lines(&driven))?;
-    if let Some(svg) = missions::picture(&shipped, &plans)? {
-        archive.store_text("paths.svg", &svg)?;
-    }
     missions::say(&mut archive, &driven, rate_hz);
     archive.say(&format!("\nWall time {wall_s:.0} s."));
     archive.close()?;
@@ -81,4 +76,11 @@ fn won(driven: &[Mission]) -> Result<(), Box<dyn Error>> {
         [] => Ok(()),
         lost => Err(format!("Vigil does not win on the mission reward against: {lost:?}").into()),
     }
+}
+
+/// A finite number of at least 0.
+fn from_zero(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    let number = number.filter(|n: &f64| n.is_finite() && *n >= 0.0);
+    number.ok_or_else(|| "allowed is a number from 0".to_owned())
 }

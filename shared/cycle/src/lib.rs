@@ -8,12 +8,10 @@
 //! One turn: wake, count deadlines that have passed, take input, check it, step, publish, account.
 
 pub mod allocation;
-pub mod canary;
 pub mod clock;
 pub mod datagrams;
 mod deadline;
 pub mod domain;
-pub mod futex;
 pub mod health;
 pub mod input;
 pub mod keep_awake;

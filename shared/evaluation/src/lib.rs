@@ -1,10 +1,8 @@
 //! Data sets, learning of models, scoring, reports. Reads files; knows no transport and no clock.
 
 pub mod bounds;
-pub mod cases;
 mod correlation;
 mod data_hash;
-pub mod derived;
 pub mod import;
 pub mod learning;
 pub mod learning_nominal;

@@ -10,13 +10,9 @@
 //! |---|---|---|
 //! | no model of the faults | [`ages`] | delay 1.0 to 1.3 of the Lorden bound |
 //! | one fault at a time, linear(ised) | [`merged`] | p = 1e-6: none of 138 missed, 0.1 s |
-//! | several faults at once | [`fault_sets`] | exact over 4096 sets in 20 us a step |
 //! | a model to simulate | [`bootstrap`], raised [`proposal`]s | 100 particles miss 0, not 99 % |
 //! | the same, faults alike at first | [`hierarchical`], raised | pose, 1e-3: 94 % right, flat 62 |
 //! | linear(ised), evidence wanted | [`look_ahead`] | 1000 particles beat 10000 of [`bootstrap`] |
-//! | linear, modes that only shift | [`lanes::linear`] | 32 particles, 13 modes: 0.6 us a step |
-//! | a planar robot, many particles | [`lanes`] | 4.3 ns per particle and step (AVX-512) |
-//! | an oracle for short runs | [`sequences`], [`forward`] | exact while all sequences fit |
 //!
 //! The faults missed are those of recorded runs with encoders; the leaves those of simulated runs,
 //! 100 particles. By a weak signal alone (a pose) sampled filters fall behind [`merged`].
@@ -51,13 +47,10 @@ pub mod bootstrap;
 pub mod constant;
 pub mod departure;
 pub mod ending;
-pub mod fault_sets;
 pub mod filter;
-pub mod forward;
 pub mod gaussian;
 pub mod hierarchical;
 pub mod hybrid;
-pub mod lanes;
 pub mod logspace;
 pub mod look_ahead;
 pub mod merged;
@@ -66,7 +59,6 @@ pub mod outlier;
 pub mod proposal;
 pub mod resample;
 pub mod risk;
-pub mod sequences;
 pub mod size;
 pub mod slow_state;
 pub mod track;

@@ -2,13 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-mod derived;
-mod filters;
-mod hierarchy;
 mod import;
 mod learning;
 mod learning_nominal;
-mod look_ahead;
 mod nominal_sensing;
 mod reader;
 mod refusals;
