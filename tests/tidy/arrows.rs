@@ -6,7 +6,6 @@ use crate::source::{Source, workspace};
 const SHARED: &[&str] = &[
     "vigil-setup",
     "vigil-cycle",
-    "vigil-evaluation",
     "vigil-recording",
     "vigil-robot",
     "vigil-inference",
@@ -21,6 +20,21 @@ const SERVICES: &[&str] = &[
     "vigil-identifier",
     "vigil-supervisor",
 ];
+
+/// The tools, in order: each sees those before it.
+const TOOLS: &[&str] = &[
+    "vigil-terminal",
+    "vigil-pages",
+    "vigil-plausibility",
+    "vigil-learning",
+    "vigil-evaluation",
+    "vigil-import",
+    "vigil-lab",
+    "vigil",
+];
+
+/// The tools that the door may link: it starts the others.
+const OF_THE_DOOR: &[&str] = &["vigil-terminal", "vigil-plausibility"];
 
 /// For each shared crate, the crates of the workspace that it may see.
 const ALLOWED: &[(&str, &[&str])] = &[
@@ -44,15 +58,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "vigil-recording",
         &["vigil-robot", "vigil-inference", "vigil-blocks"],
-    ),
-    (
-        "vigil-evaluation",
-        &[
-            "vigil-recording",
-            "vigil-robot",
-            "vigil-inference",
-            "vigil-blocks",
-        ],
     ),
 ];
 
@@ -79,9 +84,15 @@ fn allowed(manifest: &Manifest) -> Option<Vec<&'static str>> {
     if let Some((_, shared)) = ALLOWED.iter().find(|(name, _)| *name == package) {
         return Some(shared.to_vec());
     }
-    // The operator's tool, the measuring program and the tests stand outside the graph.
-    if ["vigil", "vigil-bench", "vigil-tests"].contains(&package) {
-        return Some([SHARED, SERVICES].concat());
+    if package == "vigil" {
+        return Some([SHARED, SERVICES, OF_THE_DOOR].concat());
+    }
+    if let Some(at) = TOOLS.iter().position(|tool| *tool == package) {
+        return Some([SHARED, SERVICES, &TOOLS[..at]].concat());
+    }
+    // The measuring program and the tests stand outside.
+    if ["vigil-bench", "vigil-tests"].contains(&package) {
+        return Some([SHARED, SERVICES, TOOLS].concat());
     }
     // Publishers to begin with use what a robot's program would use.
     if package == "vigil-examples" {
@@ -150,11 +161,11 @@ fn manifests(sources: &[Source]) -> Vec<Manifest> {
 #[test]
 fn arrows_between_crates_point_one_way() {
     let manifests = manifests(workspace());
-    assert!(manifests.len() >= SHARED.len() + SERVICES.len());
+    assert!(manifests.len() >= SHARED.len() + SERVICES.len() + TOOLS.len());
     crate::demand_none(
         "Move what you need to the room that may hold it, or pass it in as data: services -> \
          {setup, cycle, recording} -> robot -> inference -> blocks, \
-         setup -> cycle, decision -> blocks; evaluation -> recording.",
+         setup -> cycle, decision -> blocks; tools -> services, shared.",
         &arrow_violations(&manifests),
     );
 }
@@ -212,7 +223,13 @@ fn wrong_arrows_are_refused() {
             "vigil-supervisor",
             &["vigil-detector"],
         ),
-        read("services/vigil/Cargo.toml", "vigil", &["vigil-detector"]),
+        read("tools/vigil/Cargo.toml", "vigil", &["vigil-detector"]),
+        read("tools/pages/Cargo.toml", "vigil-pages", &["vigil-lab"]),
+        read(
+            "services/detector/Cargo.toml",
+            "vigil-detector",
+            &["vigil-pages"],
+        ),
     ];
     let found = arrow_violations(&bad);
     let at: Vec<&str> = found
@@ -221,7 +238,14 @@ fn wrong_arrows_are_refused() {
         .collect();
     assert_eq!(
         at,
-        ["inference", "robot", "misc", "supervisor"],
+        [
+            "inference",
+            "robot",
+            "misc",
+            "supervisor",
+            "pages",
+            "detector"
+        ],
         "{found:?}"
     );
 }

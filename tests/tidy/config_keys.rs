@@ -7,12 +7,12 @@ use std::collections::BTreeSet;
 
 /// Where the keys of the files below a folder of `config/` are defined; the first match holds.
 const DEFINITIONS: [(&str, &[&str]); 6] = [
-    ("config/logs/", &["shared/evaluation/src/import/"]),
+    ("config/logs/", &["tools/import/src/"]),
     ("config/robots/", &["shared/robot/src/"]),
     ("config/trees/", &["shared/setup/src/schema"]),
     (
         "config/models/",
-        &["shared/robot/src/", "shared/evaluation/src/"],
+        &["shared/robot/src/", "tools/learning/src/"],
     ),
     (
         "config/navigation.toml",

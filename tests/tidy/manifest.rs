@@ -9,7 +9,7 @@ pub struct Manifest {
     pub path: String,
     /// Name of the package.
     pub package: String,
-    /// Packages it depends on, in any section: for tests, build and single targets too.
+    /// Packages it depends on, for single targets and its build too; its tests may see everything.
     pub dependencies: Vec<String>,
     /// True if it takes the workspace's lints.
     pub has_workspace_lints: bool,
@@ -61,10 +61,7 @@ impl Manifest {
 
 fn is_dependencies(section: &str) -> bool {
     let last = section.rsplit('.').next().unwrap_or_default();
-    matches!(
-        last,
-        "dependencies" | "dev-dependencies" | "build-dependencies"
-    ) && !section.starts_with("workspace")
+    matches!(last, "dependencies" | "build-dependencies") && !section.starts_with("workspace")
 }
 
 /// The package of a section such as `dependencies.name`.
@@ -96,6 +93,6 @@ fn every_way_to_write_a_dependency_is_read() {
     assert!(manifest.has_workspace_lints);
     assert_eq!(
         manifest.dependencies,
-        ["a", "b", "vigil-cycle", "d", "e", "f", "g", "libc"]
+        ["a", "b", "vigil-cycle", "e", "f", "g", "libc"]
     );
 }

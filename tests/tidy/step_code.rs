@@ -175,7 +175,7 @@ fn allocations_are_refused_in_steady_functions_only() {
     assert_eq!(found("services/detector/src/lib.rs", "steps"), 0);
     assert_eq!(found("shared/decision/src/fib.rs", "update"), 0);
     assert_eq!(found("shared/decision/src/policy.rs", "decide"), 2);
-    assert_eq!(found("shared/evaluation/src/score.rs", "update"), 0);
+    assert_eq!(found("tools/evaluation/src/score.rs", "update"), 0);
     let quiet = "fn step(&mut self) { self.buffer.clear(); } // vec![0; 3]\n";
     let source = Source::new("shared/inference/src/filter.rs", quiet);
     assert_eq!(allocations(&[source]), Vec::<String>::new());

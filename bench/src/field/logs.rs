@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use vigil_evaluation::import::{LogDescription, import};
+use vigil_import::{LogDescription, import};
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_setup::load_robot;

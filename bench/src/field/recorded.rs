@@ -5,9 +5,9 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use vigil_evaluation::learning_nominal;
 use vigil_evaluation::scoring::Taxonomy;
 use vigil_evaluation::scoring::field::{Scorer, Stretch, Truth};
+use vigil_learning::learning_nominal;
 use vigil_recording::{frames, labels};
 use vigil_robot::RobotModel;
 use vigil_setup::schema::Sensors;

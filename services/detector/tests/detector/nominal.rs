@@ -10,7 +10,7 @@ use vigil_blocks::{
 };
 use vigil_cycle::allocation::allocations;
 use vigil_detector::Detector;
-use vigil_evaluation::learning_nominal::learn;
+use vigil_learning::learning_nominal::learn;
 use vigil_recording::frames::Run;
 use vigil_robot::{Description, RobotModel};
 use vigil_setup::schema;

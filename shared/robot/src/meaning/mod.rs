@@ -8,7 +8,7 @@
 //! judged is said ([`Meaning::unjudged`]). Once all is judged a frame costs nothing more.
 //!
 //! For recordings, where all frames are at hand, `vigil import` judges by
-//! `vigil_evaluation::plausible`.
+//! `vigil_plausibility`.
 
 mod finding;
 mod pose;

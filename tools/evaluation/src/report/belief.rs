@@ -1,0 +1,195 @@
+//! What was believed over time, run by run.
+
+use super::{Report, words};
+use crate::scoring::{Case, Taxonomy, UNKNOWN, Verdict};
+use vigil_pages::chart::{Axis, Chart, ChartError, Curve, INK, Stroke};
+use vigil_pages::page::{beside, escaped, key, section as page_section};
+
+/// Modes drawn of a run.
+const MODES: usize = 5;
+/// A mode that never gets more is not drawn, unless it is true.
+const P_LEAST: f64 = 0.1;
+/// A change of less than this is not drawn.
+const P_STEP: f64 = 0.02;
+/// Bytes that these charts may take; further runs are named only.
+const BYTES_MAX: usize = 7_000_000;
+const SIZE: (u32, u32) = (900, 270);
+
+/// A mode: where its probability stands in a verdict.
+#[derive(Clone, Copy, PartialEq)]
+enum Of {
+    Node(usize),
+    Unknown,
+}
+
+impl Of {
+    fn p(self, verdict: &Verdict) -> f64 {
+        match self {
+            Self::Node(i) => verdict.p_nodes.get(i).copied().unwrap_or(0.0),
+            Self::Unknown => verdict.p_unknown,
+        }
+    }
+}
+
+/// A mode to draw: the true one, nominal driving and unknown have colours of their own.
+struct Mode<'a> {
+    of: Of,
+    name: &'a str,
+    colour: usize,
+}
+
+/// The true mode first, then the others that reached most.
+fn leading<'a>(case: &Case, taxonomy: &'a Taxonomy) -> Vec<Mode<'a>> {
+    let nodes = taxonomy.leaf_names().map(|(i, name)| (Of::Node(i), name));
+    let all = nodes.chain([(Of::Unknown, UNKNOWN)]);
+    let highest = |of: Of| case.verdicts.iter().map(|v| of.p(v)).fold(0.0, f64::max);
+    let expected = taxonomy.expected(&case.label.mode);
+    let mut found: Vec<(f64, Of, &str)> = all
+        .map(|(of, name)| match name == expected {
+            true => (f64::INFINITY, of, name),
+            false => (highest(of), of, name),
+        })
+        .filter(|mode| mode.0 >= P_LEAST)
+        .collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.truncate(MODES);
+    let mut free = [3, 4, 6].into_iter();
+    let coloured = found.into_iter().map(|(highest, of, name)| {
+        let colour = match of {
+            _ if highest.is_infinite() => 1,
+            Of::Node(0) => 2,
+            Of::Unknown => 5,
+            Of::Node(_) => free.next().unwrap_or(INK),
+        };
+        Mode { of, name, colour }
+    });
+    coloured.collect()
+}
+
+/// Points of a curve without those that change nothing to the eye.
+fn thinned(case: &Case, of: Of) -> Vec<(f64, f64)> {
+    let mut kept: Vec<(f64, f64)> = Vec::new();
+    let mut last: Option<(f64, f64)> = None;
+    for verdict in &case.verdicts {
+        let now = (verdict.t_s, of.p(verdict));
+        let before = kept.last().copied();
+        if before.is_none_or(|before| (before.1 - now.1).abs() > P_STEP) {
+            // Level until the frame before.
+            kept.extend(last.filter(|last| before.is_some_and(|kept| kept.0 < last.0)));
+            kept.push(now);
+        }
+        last = Some(now);
+    }
+    kept.extend(last.filter(|last| kept.last() != Some(last)));
+    kept
+}
+
+fn chart(case: &Case, taxonomy: &Taxonomy, set: &str) -> Result<String, ChartError> {
+    let modes = leading(case, taxonomy);
+    let end_s = case.verdicts.last().map_or(1.0, |last| last.t_s);
+    let mut curves = Vec::new();
+    if let Some(onset_s) = case.label.onset_s {
+        curves.push(Curve {
+            colour: INK,
+            stroke: Stroke::Dashed,
+            points: vec![(onset_s, 0.0), (onset_s, 1.0)],
+        });
+    }
+    // The true mode lies on top.
+    curves.extend(modes.iter().rev().map(|mode| Curve {
+        colour: mode.colour,
+        stroke: Stroke::Solid,
+        points: thinned(case, mode.of),
+    }));
+    let chart = Chart {
+        caption: format!("Belief over time, run {}, {set}", case.label.run),
+        size: SIZE,
+        x: Axis::linear("", end_s, 6.0),
+        y: Axis {
+            ticks: [0.0, 0.5, 1.0].map(|p: f64| (p, p.to_string())).to_vec(),
+            ..Axis::share("")
+        },
+        curves,
+    };
+    let names: Vec<_> = modes.iter().map(|m| (m.colour, m.name, false)).collect();
+    Ok(format!("{}{}\n", key(&names), chart.svg()?))
+}
+
+/// The same run in all sets.
+fn run(report: &Report<'_>, i: usize) -> Result<String, ChartError> {
+    let mut parts = Vec::new();
+    let mut heading = String::new();
+    for set in &report.sets {
+        let Some(case) = set.cases.get(i) else {
+            continue;
+        };
+        let label = &case.label;
+        heading = match label.onset_s {
+            Some(s) => format!(
+                "run {}: {} ({}), onset {s:.2} s",
+                label.run, label.mode, label.kind
+            ),
+            None => format!("run {}: nominal", label.run),
+        };
+        parts.push(format!(
+            "<span class=\"soft\">{}</span>\n{}",
+            escaped(words(set.name)),
+            chart(case, report.taxonomy, set.name)?
+        ));
+    }
+    let (heading, charts) = (escaped(&heading), beside(&parts));
+    Ok(format!(
+        "<div class=\"run\"><h3>{heading}</h3>\n{charts}</div>\n"
+    ))
+}
+
+/// True if anything was wrong about the run: a false alarm, a fault missed, a wrong leaf after 2 s.
+fn is_wrong(report: &Report<'_>, i: usize) -> bool {
+    report.sets.iter().any(|set| {
+        let id = set.cases.get(i).map(|case| case.label.run);
+        let has = |ids: &[u32]| id.is_some_and(|id| ids.contains(&id));
+        let score = set.score;
+        let missed = score
+            .detection
+            .get("all")
+            .map(|found| &found.missed_run_ids);
+        let named = score.identification.get("all");
+        has(&score.false_alarms.run_ids)
+            || missed.is_some_and(|ids| has(ids))
+            || named.is_some_and(|found| has(&found.wrong_run_ids_after_2_s))
+    })
+}
+
+/// All runs, the wrong ones first.
+pub fn section(report: &Report<'_>) -> Result<String, ChartError> {
+    let count = report.sets.first().map_or(0, |set| set.cases.len());
+    let (wrong, right): (Vec<usize>, Vec<usize>) = (0..count).partition(|i| is_wrong(report, *i));
+    let (mut inside, mut left_out) = (String::new(), Vec::new());
+    for (name, runs) in [("Something was wrong", wrong), ("All was right", right)] {
+        let total = runs.len();
+        inside.push_str(&format!(
+            "<details><summary>{name}: {total} runs</summary>\n"
+        ));
+        for i in runs {
+            if inside.len() < BYTES_MAX {
+                inside.push_str(&run(report, i)?);
+            } else {
+                let case = report.sets.first().and_then(|set| set.cases.get(i));
+                left_out.extend(case.map(|case| case.label.run.to_string()));
+            }
+        }
+        inside.push_str("</details>\n");
+    }
+    if !left_out.is_empty() {
+        let text = format!(
+            "Not drawn, to keep the file small: runs {}.",
+            left_out.join(", ")
+        );
+        inside.push_str(&format!("<p class=\"soft\">{}</p>\n", escaped(&text)));
+    }
+    let about = "Probability of the leading modes over time, s; before an alarm, of nominal \
+                 driving and unknown. The first name is the true one; the broken line is the \
+                 onset. First the runs with a false alarm, a missed fault or a wrong leaf 2 s \
+                 after the onset, with any of the channels.";
+    Ok(page_section("belief", "Belief over time", about, &inside))
+}

@@ -1,0 +1,95 @@
+//! `vigil diagnose`: detector and identifier over unlabelled recorded frames.
+
+use std::fs::File;
+use std::path::PathBuf;
+
+use vigil_evaluation::scoring::Verdict;
+use vigil_plausibility as plausible;
+
+use super::offline::{FilterArgs, Prepared};
+use vigil_terminal::output::Progress;
+use vigil_terminal::{CommandError, Outcome};
+
+/// Runs detector and identifier offline over recorded frames; one row per frame.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    filter: FilterArgs,
+    /// Where to write the verdicts (CSV).
+    #[arg(long, value_name = "F")]
+    out: PathBuf,
+}
+
+/// Header of the verdicts.
+const COLUMNS: [&str; 15] = [
+    "run",
+    "t",
+    "p_fault",
+    "alarm",
+    "mode",
+    "p_mode",
+    "p_unknown",
+    "fault_set",
+    "p_left_stuck",
+    "p_right_stuck",
+    "reported",
+    "reason",
+    "action",
+    "size",
+    "size_kind",
+];
+
+/// Writes the verdicts.
+///
+/// # Errors
+/// An input that is refused; an output that cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let Prepared {
+        robot,
+        mut pipeline,
+        runs,
+        ..
+    } = args.filter.prepare()?;
+    let all = runs.iter().map(|run| (run, f64::INFINITY));
+    for warning in plausible::warnings(all, &robot) {
+        eprintln!("warning: {}: {warning}", args.filter.frames.display());
+    }
+    let at_out = |error: &dyn std::fmt::Display| format!("{}: {error}", args.out.display());
+    let file = File::create(&args.out).map_err(|e| CommandError::usage(at_out(&e)))?;
+    let mut writer = csv::Writer::from_writer(file);
+    let mut written = writer.write_record(COLUMNS);
+    let progress = Progress::new("runs", runs.len());
+    for (done, run) in runs.iter().enumerate() {
+        progress.show(done);
+        pipeline.run(run, |verdict| {
+            if written.is_ok() {
+                written = writer.write_record(row(run.id, &verdict));
+            }
+        });
+    }
+    written
+        .and_then(|()| writer.flush().map_err(csv::Error::from))
+        .map_err(|error| CommandError::failure(at_out(&error)))?;
+    Ok(Outcome::Done)
+}
+
+fn row(run: u32, verdict: &Verdict) -> [String; 15] {
+    let p = |value: f64| format!("{value:.6}");
+    [
+        run.to_string(),
+        verdict.t_s.to_string(),
+        p(verdict.p_fault),
+        u8::from(verdict.alarm).to_string(),
+        verdict.mode.clone(),
+        p(verdict.p_mode),
+        p(verdict.p_unknown),
+        verdict.fault_set.clone(),
+        p(verdict.p_left_stuck),
+        p(verdict.p_right_stuck),
+        verdict.reported.clone(),
+        String::new(),
+        verdict.action.clone(),
+        verdict.size.map_or_else(String::new, p),
+        verdict.size_kind.to_owned(),
+    ]
+}

@@ -1,0 +1,370 @@
+//! `vigil learn`: learns a robot's model, from labelled runs or healthy ones alone, or shows one.
+
+use std::fmt::Display;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use vigil_learning::learning::further;
+use vigil_learning::learning::{self, Options, RESIDUAL_BAR, Report, Residual, View};
+use vigil_learning::learning_nominal;
+use vigil_learning::split::split;
+use vigil_recording::frames::{self, Run};
+use vigil_recording::labels::{self, Label};
+use vigil_robot::learned::Model;
+use vigil_robot::learned::model::Provenance;
+use vigil_robot::{Description, RobotModel};
+
+use super::offline::{RobotArgs, load_model};
+use vigil_terminal::{CommandError, Outcome};
+
+use super::learn_nominal;
+use vigil_terminal::output;
+
+/// Largest part of the runs that may be left out.
+const TEST_FRACTION_MAX: f64 = 0.9;
+
+/// Learns a robot's model, and tests it on the runs left out.
+///
+/// With `--show`, prints a learned model instead.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Recorded frames (CSV, plain or gzip).
+    #[arg(long, value_name = "F", required_unless_present = "show")]
+    frames: Option<PathBuf>,
+    /// Labels of the runs (CSV). Without them every run counts as one without a fault, and the
+    /// model is of nominal behaviour alone.
+    #[arg(long, value_name = "R")]
+    runs: Option<PathBuf>,
+    /// Frames of healthy runs that hold more channels, yaw rate or motor currents, of which a model
+    /// with faults learns then too (CSV). Left out: the healthy runs of --frames, if they do.
+    #[arg(long, value_name = "F", requires = "runs")]
+    more: Option<PathBuf>,
+    /// Runs to learn from, by their ids, separated by commas; without labels only.
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        conflicts_with = "runs"
+    )]
+    only: Vec<u32>,
+    /// End of what is learned from in each run, s; without labels only.
+    #[arg(long, value_name = "S", conflicts_with = "runs")]
+    until: Option<f64>,
+    /// Where to write the model (TOML).
+    #[arg(long, value_name = "MODEL", required_unless_present = "show")]
+    out: Option<PathBuf>,
+    /// Print the model given with --model as text, and learn nothing.
+    #[arg(long, requires = "model", conflicts_with_all = ["frames", "runs", "out"])]
+    show: bool,
+    /// Learned model to show (TOML).
+    #[arg(long, value_name = "MODEL", requires = "show")]
+    model: Option<PathBuf>,
+    /// Part of the runs of every mode and kind to leave out, 0 to 0.9.
+    #[arg(long, value_name = "X", default_value_t = 0.333, value_parser = test_fraction)]
+    test_fraction: f64,
+    /// Seed of the split.
+    #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed())]
+    seed: u64,
+    #[command(flatten)]
+    robot: RobotArgs,
+    /// Print the report, or the model shown, as one JSON document.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Shown<'a, V> {
+    schema_version: u32,
+    model: String,
+    #[serde(flatten)]
+    view: &'a V,
+}
+
+#[derive(Debug, Serialize)]
+struct Document<'a> {
+    schema_version: u32,
+    model: String,
+    model_hash: String,
+    seed: u64,
+    #[serde(flatten)]
+    report: &'a Report,
+    held_out_run_ids: &'a [u32],
+}
+
+/// A model file holds whole numbers up to this one.
+fn seed() -> clap::builder::RangedU64ValueParser {
+    clap::value_parser!(u64).range(0..=i64::MAX.unsigned_abs())
+}
+
+fn test_fraction(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=TEST_FRACTION_MAX).contains(&value) => Ok(value),
+        _ => Err(format!("allowed is 0 to {TEST_FRACTION_MAX}")),
+    }
+}
+
+/// Writes the model and prints its error, or shows a model.
+///
+/// # Errors
+/// An input that is refused; an output that cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    match (&args.model, &args.frames, &args.out) {
+        (Some(model), ..) => show(model, args.json),
+        (None, Some(frames), Some(out)) => learn(args, frames, out),
+        _ => Err(CommandError::usage("--frames and --out are needed")),
+    }
+}
+
+fn show(path: &Path, is_json: bool) -> Result<Outcome, CommandError> {
+    let rate_1_h = vigil_setup::schema::Detector::default().fault_rate_1_h;
+    match load_model(path)? {
+        RobotModel::Faults(model) => print_view(&View::new(&model, rate_1_h), path, is_json),
+        RobotModel::Nominal(model) => {
+            let view = learning_nominal::View::new(&model, rate_1_h);
+            print_view(&view, path, is_json)
+        }
+    }
+}
+
+fn print_view<V: Serialize + Display>(
+    view: &V,
+    path: &Path,
+    is_json: bool,
+) -> Result<Outcome, CommandError> {
+    let printed = if is_json {
+        output::json(&Shown {
+            schema_version: 1,
+            model: path.display().to_string(),
+            view,
+        })
+    } else {
+        output::line(&view.to_string())
+    };
+    printed.map_err(CommandError::failure)?;
+    Ok(Outcome::Done)
+}
+
+/// Refuses a file to write into a folder that is not there.
+fn check_folder(out: &Path) -> Result<(), CommandError> {
+    let folder = out.parent().filter(|f| !f.as_os_str().is_empty());
+    match folder.filter(|folder| !folder.is_dir()) {
+        Some(folder) => {
+            let refused = format!("--out: there is no folder {}", folder.display());
+            Err(CommandError::usage(refused))
+        }
+        None => Ok(()),
+    }
+}
+
+fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, CommandError> {
+    check_folder(out)?;
+    let robot = args.robot.load()?;
+    let Some(labels_file) = &args.runs else {
+        if robot.has_fault_models() {
+            let refused = "--runs is needed: the faults of this kind of robot are learned too, and \
+                           without labels faulty runs would count as healthy";
+            return Err(CommandError::usage(refused));
+        }
+        return unlabelled(args, frames_file, out, &robot);
+    };
+    if !robot.has_fault_models() {
+        let refused = "--runs: faults are learned for an ackermann6 only; leave the labels out, \
+                       and the faulty runs too (--only)";
+        return Err(CommandError::usage(refused));
+    }
+    let labels = labels::read(labels_file, &robot).map_err(CommandError::usage)?;
+    let runs = frames::read(frames_file, &robot).map_err(CommandError::usage)?;
+    let with_frames: Vec<_> = labels
+        .iter()
+        .filter(|label| runs.iter().any(|run| run.id == label.run))
+        .cloned()
+        .collect();
+    let held_out = split(&with_frames, args.test_fraction, args.seed);
+    let options = Options::default();
+    let (mut model, mut report) = learning::learn(&runs, &labels, &held_out, &robot, &options)
+        .map_err(|error| CommandError::usage(format!("{}: {error}", frames_file.display())))?;
+    let terrain = labels::terrain(labels_file, &model.provenance.runs_learned);
+    model.provenance = Provenance {
+        frames_file: file_name(frames_file),
+        labels_file: file_name(labels_file),
+        test_fraction: args.test_fraction,
+        seed: args.seed,
+        terrain: terrain.map_err(CommandError::usage)?,
+        software_version: env!("CARGO_PKG_VERSION").to_owned(),
+        ..model.provenance
+    };
+    let healthy = healthy_of(&runs, &labels, &model);
+    match &args.more {
+        Some(more) => {
+            let runs = frames::read(more, &robot).map_err(CommandError::usage)?;
+            learn_further(&mut model, &runs.iter().collect::<Vec<_>>(), more, &robot)?;
+        }
+        None if further::is_in(&healthy) => {
+            learn_further(&mut model, &healthy, frames_file, &robot)?;
+        }
+        None => {}
+    }
+    let model = model.sealed();
+    report.bounds = learning::bounds::of(&model, &robot);
+    let text = model.to_toml().map_err(CommandError::failure)?;
+    write_whole(out, &text)
+        .map_err(|error| CommandError::failure(format!("{}: {error}", out.display())))?;
+    let printed = if args.json {
+        output::json(&Document {
+            schema_version: 1,
+            model: out.display().to_string(),
+            model_hash: format!("{:016x}", model.hash()),
+            seed: args.seed,
+            report: &report,
+            held_out_run_ids: &model.provenance.runs_held_out,
+        })
+    } else {
+        output::line(&table(&report, out))
+    };
+    printed
+        .map_err(CommandError::failure)
+        .map(|()| Outcome::Done)
+}
+
+/// The runs without a fault that a model was learned from.
+fn healthy_of<'a>(runs: &'a [Run], labels: &[Label], model: &Model) -> Vec<&'a Run> {
+    let is_healthy = |run: &&Run| {
+        let is_learned = model.provenance.runs_learned.contains(&run.id);
+        let mut labels = labels.iter().filter(|label| label.run == run.id);
+        is_learned && labels.all(Label::is_nominal)
+    };
+    runs.iter().filter(is_healthy).collect()
+}
+
+/// Learns gyro and currents.
+fn learn_further(
+    model: &mut Model,
+    runs: &[&Run],
+    file: &Path,
+    robot: &Description,
+) -> Result<(), CommandError> {
+    further::learn(model, runs, &file_name(file), robot)
+        .map_err(|error| CommandError::usage(format!("{}: {error}", file.display())))
+}
+
+/// The last part of a path: where a file lay is of no interest to others.
+pub(super) fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// Learns from runs without labels.
+fn unlabelled(
+    args: &Args,
+    frames_file: &Path,
+    out: &Path,
+    robot: &Description,
+) -> Result<Outcome, CommandError> {
+    let mut runs = frames::read(frames_file, robot).map_err(CommandError::usage)?;
+    let ids: Vec<u32> = runs.iter().map(|run| run.id).collect();
+    if let Some(id) = args.only.iter().find(|id| !ids.contains(id)) {
+        let refused = format!("--only: {} has no run {id}", frames_file.display());
+        return Err(CommandError::usage(refused));
+    }
+    if !args.only.is_empty() {
+        runs.retain(|run| args.only.contains(&run.id));
+    }
+    learn_nominal::run(&learn_nominal::Task {
+        robot,
+        runs: &runs,
+        frames: frames_file,
+        out,
+        test_fraction: args.test_fraction,
+        seed: args.seed,
+        until_s: args.until.unwrap_or(f64::INFINITY),
+        json: args.json,
+    })
+}
+
+/// Writes a file so that its place holds either the old one or the whole new one.
+pub(super) fn write_whole(path: &Path, text: &str) -> io::Result<()> {
+    let mut name = path.as_os_str().to_owned();
+    name.push(format!(".{}.part", std::process::id()));
+    let part = PathBuf::from(name);
+    let write = || {
+        let mut file = File::create(&part)?;
+        file.write_all(text.as_bytes())?;
+        file.sync_all()?;
+        fs::rename(&part, path)
+    };
+    write().inspect_err(|_| {
+        // Nothing is left behind; that there may be nothing to remove is no error.
+        let _ = fs::remove_file(&part);
+    })
+}
+
+fn table(report: &Report, out: &Path) -> String {
+    let mut lines = vec![
+        format!("model        {}", out.display()),
+        format!(
+            "learned from {} runs, {} left out",
+            report.runs_learned, report.runs_held_out
+        ),
+        format!(
+            "alarms       calibrated on {:.2} h without a fault",
+            report.exposure_h
+        ),
+        String::new(),
+        "error of the motion one interval ahead on the runs left out, against the sensor's noise;"
+            .into(),
+        "in brackets what the model itself predicts of it, as the ground varies within a run"
+            .into(),
+        format!(
+            "{:<10} {:>6} {:>12} {:>11} {:>9} {:>11} {:>6} {:>5} {:>6} {:>7}",
+            "mode",
+            "poses",
+            "position, mm",
+            "x noise",
+            "yaw, mrad",
+            "x noise",
+            "",
+            "left",
+            "right",
+            "ln p"
+        ),
+    ];
+    for mode in &report.modes {
+        let turn = |turn: &Option<Residual>| match turn {
+            Some(turn) => format!("{:.2}", turn.to_floor),
+            None => "-".into(),
+        };
+        let (position, yaw) = (&mode.position, &mode.yaw);
+        let floor = |of: &Residual| format!("{:.2} ({:.2})", of.to_floor, of.predicted_to_floor);
+        lines.push(format!(
+            "{:<10} {:>6} {:>12.2} {:>11} {:>9.2} {:>11} +-{:.2} {:>5} {:>6} {:>7.2}",
+            mode.mode,
+            mode.poses,
+            1e3 * position.rms,
+            floor(position),
+            1e3 * yaw.rms,
+            floor(yaw),
+            yaw.to_floor_error,
+            turn(&mode.yaw_left),
+            turn(&mode.yaw_right),
+            mode.log_likelihood,
+        ));
+    }
+    if report.modes.is_empty() {
+        lines.push("none: no runs were left out".into());
+    }
+    let above = report.modes.iter().filter(|mode| !mode.is_within_bar());
+    lines.extend(above.map(|mode| {
+        format!(
+            "{} exceeds {RESIDUAL_BAR} times the sensor's noise",
+            mode.mode
+        )
+    }));
+    let bounds = report.bounds.lines();
+    if !bounds.is_empty() {
+        lines.push(String::new());
+        lines.extend(bounds);
+    }
+    lines.join("\n")
+}

@@ -1,0 +1,88 @@
+//! `vigil learn` without labels: the nominal behaviour of any described robot.
+
+use std::path::Path;
+
+use serde::Serialize;
+use vigil_learning::learning_nominal::{self, Report};
+use vigil_learning::split::split_runs;
+use vigil_recording::frames::Run;
+use vigil_robot::Description;
+use vigil_robot::learned::model::Provenance;
+
+use vigil_terminal::output;
+use vigil_terminal::{CommandError, Outcome};
+
+/// Runs from which some are left out; below, blocks of them are.
+const RUNS_TO_SPLIT: usize = 6;
+
+/// What to learn from.
+pub(super) struct Task<'a> {
+    /// The robot.
+    pub robot: &'a Description,
+    /// Runs, all without a fault.
+    pub runs: &'a [Run],
+    /// Frames file, for messages.
+    pub frames: &'a Path,
+    /// Where to write the model.
+    pub out: &'a Path,
+    /// Part of the runs to leave out.
+    pub test_fraction: f64,
+    /// Seed of that choice.
+    pub seed: u64,
+    /// End of what is learned from in each run, s.
+    pub until_s: f64,
+    /// Print JSON.
+    pub json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Document<'a> {
+    schema_version: u32,
+    model: String,
+    model_hash: String,
+    #[serde(flatten)]
+    report: &'a Report,
+    held_out_run_ids: &'a [u32],
+}
+
+/// Writes the model and says how well it holds.
+///
+/// # Errors
+/// A log that cannot support a model; an output that cannot be written.
+pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
+    let ids: Vec<u32> = task.runs.iter().map(|run| run.id).collect();
+    let held_out = match ids.len() < RUNS_TO_SPLIT {
+        true => Vec::new(),
+        false => split_runs(&ids, task.test_fraction, task.seed),
+    };
+    let (mut model, report) =
+        learning_nominal::learn(task.runs, &held_out, task.until_s, task.robot)
+            .map_err(|error| CommandError::usage(format!("{}: {error}", task.frames.display())))?;
+    model.provenance = Provenance {
+        frames_file: super::learn::file_name(task.frames),
+        seed: task.seed,
+        test_fraction: task.test_fraction,
+        software_version: env!("CARGO_PKG_VERSION").to_owned(),
+        ..model.provenance
+    };
+    let model = model.sealed();
+    let text = model.to_toml().map_err(CommandError::failure)?;
+    super::learn::write_whole(task.out, &text)
+        .map_err(|error| CommandError::failure(format!("{}: {error}", task.out.display())))?;
+    for warning in &report.warnings {
+        eprintln!("warning: {warning}");
+    }
+    let printed = if task.json {
+        output::json(&Document {
+            schema_version: 1,
+            model: task.out.display().to_string(),
+            model_hash: format!("{:016x}", model.hash()),
+            report: &report,
+            held_out_run_ids: &model.provenance.runs_held_out,
+        })
+    } else {
+        output::line(&format!("model {}\n{report}", task.out.display()))
+    };
+    printed.map_err(CommandError::failure)?;
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,226 @@
+//! All missions of all contestants, and what came out.
+
+use std::time::Instant;
+
+use serde::Serialize;
+use serde_json::{Value, json};
+use vigil_decision::Pomdp;
+use vigil_decision::simulation::{Act, Agent, Mission, Paired, Rules, Summary, run};
+
+use super::bound::Upper;
+use super::contestant::{Contestant, Knowledge};
+use crate::commands::pomdp::seed;
+use vigil_terminal::CommandError;
+use vigil_terminal::output::Progress;
+
+/// Where and how long.
+pub struct Setting<'a> {
+    /// What happens follows this model.
+    pub world: &'a Pomdp,
+    /// When a mission ends.
+    pub rules: &'a Rules,
+    /// Seed of the missions.
+    pub seed: u64,
+    /// Their number.
+    pub episodes: u64,
+    /// Upper bound of the value at the start belief.
+    pub upper: Option<Upper>,
+    /// Index of the contestant that the others are compared with.
+    pub against: usize,
+}
+
+/// What came out, one row a contestant.
+pub struct Contest {
+    /// In the order of the contestants.
+    pub rows: Vec<Row>,
+}
+
+/// What one contestant did.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    /// Name of the policy.
+    pub policy: String,
+    /// K of dual control; null without it.
+    pub threshold: Option<f64>,
+    /// Mean of the discounted rewards.
+    pub mean: f64,
+    /// The mean's 95 % interval is `mean` +- this.
+    pub half_width_95: f64,
+    /// Median of the discounted rewards.
+    pub median: f64,
+    /// 5 % quantile of the discounted rewards.
+    pub worst_5_percent: f64,
+    /// Upper bound minus mean; null without a bound.
+    pub regret: Option<f64>,
+    /// Mean of the undiscounted rewards.
+    pub undiscounted_mean: f64,
+    /// Its 95 % half-width.
+    pub undiscounted_half_width_95: f64,
+    /// Steps of a mission, mean.
+    pub steps_mean: f64,
+    /// Share of missions that an action ended.
+    pub ended_share: f64,
+    /// Share of steps taken for information.
+    pub dual_share: f64,
+    /// Share of steps in which gathering information had stalled.
+    pub stalled_share: f64,
+    /// Observations that were impossible in its eyes, all missions.
+    pub impossible: usize,
+    /// Time of a decision without the belief's update, median, ns.
+    pub decision_p50_ns: f64,
+    /// The same, 99 % quantile, ns.
+    pub decision_p99_ns: f64,
+    /// Paired difference to the reference: mean.
+    pub difference: f64,
+    /// Its 95 % half-width.
+    pub difference_half_width_95: f64,
+    /// Probability of such a difference by chance (paired t-test, two-sided).
+    pub difference_p: f64,
+    /// True for the largest mean.
+    pub is_best: bool,
+    /// True if its paired difference to the best is within its 95 % interval.
+    pub is_like_best: bool,
+}
+
+impl Contest {
+    /// Holds it.
+    pub fn hold(
+        setting: &Setting<'_>,
+        knowledge: &Knowledge<'_>,
+        contestants: &[Contestant],
+    ) -> Result<Self, CommandError> {
+        // Refusals come before the first mission.
+        let agents: Result<Vec<_>, _> = contestants.iter().map(|c| c.build(knowledge)).collect();
+        let seed = seed::of("compare", setting.seed);
+        let total = contestants.len() * setting.episodes as usize;
+        let progress = Progress::new("missions", total);
+        let (mut rows, mut rewards) = (Vec::new(), Vec::new());
+        for (contestant, agent) in contestants.iter().zip(agents?) {
+            let mut agent = Timed {
+                agent,
+                times_ns: Vec::new(),
+            };
+            let mut missions = Vec::with_capacity(setting.episodes as usize);
+            for episode in 0..setting.episodes {
+                let numbers = (seed, episode);
+                missions.push(run(setting.world, &mut agent, setting.rules, numbers));
+                let done = rows.len() * setting.episodes as usize + missions.len();
+                if missions.len() % 64 == 0 {
+                    progress.show(done);
+                }
+            }
+            rewards.push(missions.iter().map(|m| m.discounted).collect::<Vec<f64>>());
+            rows.push(row(contestant, setting, &missions, agent.times_ns));
+        }
+        compare(&mut rows, &rewards, setting.against);
+        Ok(Self { rows })
+    }
+
+    /// As one JSON document.
+    pub fn document(&self, setting: &Setting<'_>, of: &Knowledge<'_>, file: &str) -> Value {
+        let discount = setting.world.discount();
+        let against = &self.rows[setting.against];
+        let ends = setting.world.actions().iter().zip(&setting.rules.is_end);
+        let ends: Vec<&String> = ends
+            .filter(|(_, is_end)| **is_end)
+            .map(|(a, _)| a)
+            .collect();
+        json!({
+            "file": file,
+            "model_hash": format!("{:016x}", of.model.hash()),
+            "world_hash": format!("{:016x}", setting.world.hash()),
+            "discount": discount,
+            "episodes": setting.episodes,
+            "seed": setting.seed,
+            "steps_max": setting.rules.steps_max,
+            "weight_beyond_horizon": discount.powi(setting.rules.steps_max as i32),
+            "ends": ends,
+            "information_actions": of.information_actions(),
+            "stall_guard_steps": of.stall_steps,
+            "upper": setting.upper.as_ref().map(|upper| upper.value),
+            "upper_from": setting.upper.as_ref().map(|upper| upper.from),
+            "against": {"policy": against.policy, "threshold": against.threshold},
+            "rows": self.rows,
+        })
+    }
+}
+
+/// An agent whose decisions are timed.
+struct Timed<'a> {
+    agent: Box<dyn Agent + 'a>,
+    times_ns: Vec<f64>,
+}
+
+impl Agent for Timed<'_> {
+    fn begin(&mut self) {
+        self.agent.begin();
+    }
+
+    fn decide(&mut self, chance: f64) -> Act {
+        let started = Instant::now();
+        let act = self.agent.decide(chance);
+        self.times_ns.push(started.elapsed().as_nanos() as f64);
+        act
+    }
+
+    fn notice(&mut self, action: usize, observation: usize) -> bool {
+        self.agent.notice(action, observation)
+    }
+}
+
+fn row(
+    contestant: &Contestant,
+    setting: &Setting<'_>,
+    missions: &[Mission],
+    mut times_ns: Vec<f64>,
+) -> Row {
+    let mut discounted: Vec<f64> = missions.iter().map(|m| m.discounted).collect();
+    let mut undiscounted: Vec<f64> = missions.iter().map(|m| m.undiscounted).collect();
+    let discounted = Summary::of(&mut discounted);
+    let undiscounted = Summary::of(&mut undiscounted);
+    let count = |of: fn(&Mission) -> usize| missions.iter().map(of).sum::<usize>() as f64;
+    let steps = count(|m| m.steps);
+    times_ns.sort_unstable_by(f64::total_cmp);
+    let quantile = |q: f64| {
+        let at = (q * times_ns.len() as f64) as usize;
+        let at = at.min(times_ns.len().saturating_sub(1));
+        times_ns.get(at).copied().unwrap_or(f64::NAN)
+    };
+    Row {
+        policy: contestant.name(),
+        threshold: contestant.threshold,
+        mean: discounted.mean,
+        half_width_95: discounted.half_width,
+        median: discounted.median,
+        worst_5_percent: discounted.worst_5_percent,
+        regret: (setting.upper.as_ref()).map(|upper| upper.value - discounted.mean),
+        undiscounted_mean: undiscounted.mean,
+        undiscounted_half_width_95: undiscounted.half_width,
+        steps_mean: steps / missions.len() as f64,
+        ended_share: count(|m| usize::from(m.is_ended)) / missions.len() as f64,
+        dual_share: count(|m| m.dual_steps) / steps,
+        stalled_share: count(|m| m.stalled_steps) / steps,
+        impossible: missions.iter().map(|m| m.impossible).sum(),
+        decision_p50_ns: quantile(0.5),
+        decision_p99_ns: quantile(0.99),
+        difference: 0.0,
+        difference_half_width_95: 0.0,
+        difference_p: 1.0,
+        is_best: false,
+        is_like_best: false,
+    }
+}
+
+/// Compares with the reference and with the best, in pairs.
+fn compare(rows: &mut [Row], rewards: &[Vec<f64>], against: usize) {
+    let best = (0..rows.len()).reduce(|a, b| if rows[b].mean > rows[a].mean { b } else { a });
+    for (index, (row, ours)) in rows.iter_mut().zip(rewards).enumerate() {
+        let paired = Paired::of(ours, &rewards[against]);
+        row.difference = paired.difference;
+        row.difference_half_width_95 = paired.half_width;
+        row.difference_p = paired.p;
+        row.is_best = Some(index) == best;
+        let to_best = best.map(|best| Paired::of(ours, &rewards[best]));
+        row.is_like_best = to_best.is_some_and(|p| p.difference.abs() <= p.half_width);
+    }
+}

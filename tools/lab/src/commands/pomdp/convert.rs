@@ -1,0 +1,75 @@
+//! `vigil pomdp convert`: a model as a `.pomdp` file.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::load;
+use vigil_terminal::output;
+use vigil_terminal::{CommandError, Outcome};
+
+/// Writes a model (.pomdp or .pomdpx) as a .pomdp file that reads back to the same model, bit by
+/// bit.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The model.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Where to write it; standard output if not given.
+    #[arg(long, short, value_name = "F")]
+    out: Option<PathBuf>,
+    /// Print one JSON document about what was written; needs --out.
+    #[arg(long, requires = "out")]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Document {
+    schema_version: u32,
+    file: String,
+    out: String,
+    hash: String,
+    bytes: usize,
+    warnings: Vec<String>,
+}
+
+/// Writes it.
+///
+/// # Errors
+/// A model that is refused; an output that cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let model = load(&args.file)?;
+    let text = model.to_cassandra();
+    let warnings = model.warnings().iter();
+    let warnings: Vec<String> = warnings
+        .map(|w| format!("{}: {}", w.at, w.message))
+        .collect();
+    for warning in &warnings {
+        eprintln!("{}: warning: {warning}", args.file.display());
+    }
+    let Some(out) = &args.out else {
+        output::line(text.trim_end()).map_err(CommandError::failure)?;
+        return Ok(Outcome::Done);
+    };
+    if out
+        .extension()
+        .is_some_and(|extension| extension == "pomdpx")
+    {
+        let message = "--out: .pomdpx is read, not written; allowed is .pomdp";
+        return Err(CommandError::usage(message));
+    }
+    let failed = |error| CommandError::failure(format!("{}: {error}", out.display()));
+    std::fs::write(out, &text).map_err(failed)?;
+    if args.json {
+        let document = Document {
+            schema_version: 1,
+            file: args.file.display().to_string(),
+            out: out.display().to_string(),
+            hash: format!("{:016x}", model.hash()),
+            bytes: text.len(),
+            warnings,
+        };
+        output::json(&document).map_err(CommandError::failure)?;
+    }
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,214 @@
+//! `vigil pomdp learn`: a model's probabilities from recorded missions.
+
+mod document;
+
+use std::fs;
+use std::path::PathBuf;
+
+use vigil_decision::learning::check::{Agreement, Followed, Refusal};
+use vigil_decision::learning::{Learned, Record, Settings, check, learn};
+use vigil_decision::policy::{Dual, PolicyName};
+use vigil_decision::simulation::{Paired, PolicyAgent, Rules, Summary, horizon, run as fly};
+use vigil_decision::{Pomdp, mdp};
+
+use super::compare::{count, fits};
+use super::{load, missions, seed};
+use document::{Document, Mean};
+use vigil_terminal::output;
+use vigil_terminal::{CommandError, Outcome};
+
+/// Learn a model's probabilities from recorded missions (JSON lines, see `vigil pomdp simulate`).
+///
+/// FILE is the model made by hand: it gives names, rewards, what is impossible, and counts as
+/// --prior-strength visits of every row of T and Z. The learned model is written only if what it
+/// predicts is within 20 % of what was measured: the rewards of the missions, if they are recorded,
+/// and those of its policy in --world, if one is given; what chance may do to the two (95 %) is
+/// allowed besides. Otherwise exit code 1, and no file; one that was there is left as it was.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The model made by hand (.pomdp or .pomdpx).
+    file: PathBuf,
+    /// The missions.
+    #[arg(long)]
+    missions: PathBuf,
+    /// Where to write the learned model.
+    #[arg(long)]
+    out: PathBuf,
+    /// Visits that each row of the model made by hand counts as; 0 learns from the missions alone.
+    #[arg(long, default_value_t = 50.0)]
+    prior_strength: f64,
+    /// Iterations at most, of each start.
+    #[arg(long, default_value_t = 200, value_parser = count(1))]
+    iterations: u64,
+    /// Starts: the first is FILE, others are drawn around it; the best one counts.
+    #[arg(long, default_value_t = 1, value_parser = count(1))]
+    starts: u64,
+    /// Write the model though there is nothing to check it by: no rewards, and no --world.
+    #[arg(long)]
+    unchecked: bool,
+    /// Seed of drawn starts and simulated missions; with the same seed the random numbers of other
+    /// commands are others.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Policy whose worth is predicted: mls, av, qmdp or fib.
+    #[arg(long, default_value = "fib")]
+    policy: String,
+    /// Simulated missions for the prediction.
+    #[arg(long, default_value_t = 1000, value_parser = count(2))]
+    episodes: u64,
+    /// A model that stands for the world: the learned model's policy is measured in it.
+    #[arg(long, value_name = "OTHER")]
+    world: Option<PathBuf>,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Files and options that are refused; a model that may not be deployed (exit code 1).
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let prior = load(&args.file)?;
+    let world = args.world.as_deref().map(load).transpose()?;
+    if let Some(world) = &world {
+        fits("--world", &prior, world)?;
+    }
+    let flown = missions::read(&args.missions, &prior)?;
+    let learned = learned(args, &prior, &flown.records)?;
+    let Worths {
+        predicted,
+        measured,
+        logged,
+        checks,
+    } = worths(args, &learned.model, world.as_ref(), &flown.records)?;
+    let refusal = refusal(args, &checks);
+    let is_weak = |check: &Result<Agreement, _>| check.is_ok_and(|agreement| agreement.is_weak);
+    let document = Document {
+        schema_version: 2,
+        file: args.file.display().to_string(),
+        missions_file: args.missions.display().to_string(),
+        missions: flown.records.len(),
+        steps: flown.records.iter().map(Record::steps).sum(),
+        flown_by: flown.policy,
+        prior_strength: args.prior_strength,
+        start: learned.start,
+        iterations: document::iterations(&learned),
+        rows: document::rows(&learned),
+        policy: args.policy.clone(),
+        episodes: args.episodes,
+        predicted: Mean::of(predicted),
+        measured: measured.map(Mean::of),
+        logged_predicted: logged.map(|l| Mean::of(l.predicted)),
+        logged_measured: logged.map(|l| Mean::of(l.measured)),
+        is_checked: !checks.is_empty(),
+        is_weakly_checked: checks.iter().any(is_weak),
+        is_older_out_left: refusal.is_some() && args.out.exists(),
+        refused: refusal.clone(),
+        hash: format!("{:016x}", learned.model.hash()),
+    };
+    let printed = if args.json {
+        output::json(&document)
+    } else {
+        output::line(&document.text())
+    };
+    printed.map_err(CommandError::failure)?;
+    if let Some(mut refusal) = refusal {
+        if document.is_older_out_left {
+            let out = args.out.display();
+            refusal = format!("{refusal}\n{out} is older and was left as it was");
+        }
+        return Err(CommandError::failure(refusal));
+    }
+    let written = fs::write(&args.out, learned.model.to_cassandra());
+    written.map_err(|e| CommandError::failure(format!("{}: {e}", args.out.display())))?;
+    Ok(Outcome::Done)
+}
+
+/// Learns, counting on standard error.
+fn learned(args: &Args, prior: &Pomdp, records: &[Record]) -> Result<Learned, CommandError> {
+    let settings = Settings {
+        prior_strength: args.prior_strength,
+        iterations_max: args.iterations as usize,
+        starts: args.starts as usize,
+        seed: seed::of("learn", args.seed),
+        ..Settings::default()
+    };
+    let total = settings.starts * settings.iterations_max;
+    let progress = output::Progress::new("iterations, at most:", total);
+    let mut done = 0;
+    let learned = learn(prior, records, &settings, &mut |_| {
+        done += 1;
+        progress.show(done);
+    });
+    drop(progress);
+    learned.map_err(|error| CommandError::usage(format!("{}: {error}", args.missions.display())))
+}
+
+/// What the model predicts and what was measured, discounted rewards of missions.
+struct Worths {
+    /// Its policy by itself.
+    predicted: Summary,
+    /// Its policy in the world.
+    measured: Option<Summary>,
+    /// The recorded missions.
+    logged: Option<Followed>,
+    /// Whether predictions and measurements agree.
+    checks: Vec<Result<Agreement, Refusal>>,
+}
+
+fn worths(
+    args: &Args,
+    model: &Pomdp,
+    world: Option<&Pomdp>,
+    records: &[Record],
+) -> Result<Worths, CommandError> {
+    let mut predicted = worth(args, model, model)?;
+    let measured = world.map(|world| worth(args, model, world)).transpose()?;
+    let half_width = |m: &Vec<f64>| Paired::of(&predicted, m).half_width;
+    let half_width = measured.as_ref().map(half_width);
+    let predicted = Summary::of(&mut predicted);
+    let measured = measured.map(|mut measured| Summary::of(&mut measured));
+    let logged = check::follow(model, records);
+    let in_world = measured.zip(half_width);
+    let checks = [
+        logged.map(|logged| logged.check()),
+        in_world.map(|(m, half_width)| check::within(predicted.mean, m.mean, half_width)),
+    ];
+    Ok(Worths {
+        predicted,
+        measured,
+        logged,
+        checks: checks.into_iter().flatten().collect(),
+    })
+}
+
+/// Why the model is not to be written.
+fn refusal(args: &Args, checks: &[Result<Agreement, Refusal>]) -> Option<String> {
+    if checks.is_empty() && !args.unchecked {
+        let message = "not to be deployed: there is nothing to check the model by, as the missions \
+                       hold no rewards and no --world is given; allowed with --unchecked";
+        return Some(message.to_owned());
+    }
+    let refusal = checks.iter().find_map(|check| check.err());
+    refusal.map(|refusal| refusal.to_string())
+}
+
+/// What the policy of `model` earns in `world`, discounted, mission by mission.
+fn worth(args: &Args, model: &Pomdp, world: &Pomdp) -> Result<Vec<f64>, CommandError> {
+    let solution = mdp::solve(model).map_err(CommandError::usage)?;
+    let name: PolicyName = args.policy.parse().map_err(CommandError::usage)?;
+    if name.information.is_some() {
+        let message = format!("--policy {name}: allowed are mls, av, qmdp, fib");
+        return Err(CommandError::usage(message));
+    }
+    let decider = name.build(model, &solution, |information| Dual::new(information, 1.0));
+    let mut agent = PolicyAgent::new(model, decider.map_err(CommandError::usage)?);
+    let rules = Rules {
+        steps_max: horizon(world.discount(), 2000),
+        is_end: vec![false; world.actions().len()],
+    };
+    let seed = seed::of("learn", args.seed);
+    let one = |mission| fly(world, &mut agent, &rules, (seed, mission)).discounted;
+    Ok((0..args.episodes).map(one).collect())
+}

@@ -1,0 +1,104 @@
+//! `vigil pomdp`: what can be done with a decision model, one command a module.
+
+mod compare;
+mod convert;
+mod escalation;
+mod generate;
+mod info;
+mod learn;
+mod missions;
+mod picture;
+mod seed;
+mod simulate;
+mod solve;
+mod solved;
+mod track;
+
+use std::path::Path;
+
+use vigil_decision::Pomdp;
+
+use vigil_terminal::{CommandError, Outcome};
+
+/// Looks at, follows, compares, learns, draws and converts decision models (`.pomdp`, `.pomdpx`).
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    Compare(Box<compare::Args>),
+    Generate(generate::Args),
+    Info(info::Args),
+    Learn(learn::Args),
+    Picture(picture::Args),
+    Simulate(simulate::Args),
+    Track(track::Args),
+    Convert(convert::Args),
+    Solve(solve::Args),
+}
+
+/// Does what the subcommand says.
+///
+/// # Errors
+/// An input that is refused; an output that cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    match &args.command {
+        Command::Compare(args) => compare::run(args),
+        Command::Generate(args) => generate::run(args),
+        Command::Info(args) => info::run(args),
+        Command::Learn(args) => learn::run(args),
+        Command::Picture(args) => picture::run(args),
+        Command::Simulate(args) => simulate::run(args),
+        Command::Track(args) => track::run(args),
+        Command::Convert(args) => convert::run(args),
+        Command::Solve(args) => solve::run(args),
+    }
+}
+
+/// Largest model file, bytes: the readers' own limit.
+const FILE_BYTES_MAX: u64 = 256 << 20;
+
+/// Reads a model: APPL's format if the name ends in `.pomdpx`, otherwise Cassandra's.
+///
+/// # Errors
+/// The file's name, line and column, what was found and what is allowed.
+fn load(path: &Path) -> Result<Pomdp, CommandError> {
+    let wrong = |problem: &dyn std::fmt::Display| {
+        CommandError::usage(format!("{}: {problem}", path.display()))
+    };
+    let size = std::fs::metadata(path).map_err(|e| wrong(&e))?.len();
+    if size > FILE_BYTES_MAX {
+        let problem = format!("{size} bytes, allowed are {FILE_BYTES_MAX}");
+        return Err(wrong(&problem));
+    }
+    let bytes = std::fs::read(path).map_err(|e| wrong(&e))?;
+    // Old files hold comments in other encodings; names are plain.
+    let text = String::from_utf8_lossy(&bytes);
+    let is_xml = path
+        .extension()
+        .is_some_and(|extension| extension == "pomdpx");
+    let model = if is_xml {
+        Pomdp::parse_pomdpx(&text)
+    } else {
+        Pomdp::parse(&text)
+    };
+    model.map_err(|e| wrong(&e))
+}
+
+/// The index of a name, or of an index.
+fn find(names: &[String], word: &str, what: &str) -> Result<usize, String> {
+    let by_name = names.iter().position(|name| name == word);
+    let index = by_name.or_else(|| word.parse().ok().filter(|i| *i < names.len()));
+    index.ok_or_else(|| {
+        const SHOWN: usize = 12;
+        let more = if names.len() > SHOWN { " ..." } else { "" };
+        let some = names[..names.len().min(SHOWN)].join(" ");
+        format!(
+            "'{word}' is no {what}, allowed are {some}{more}, or 0 to {}",
+            names.len() - 1
+        )
+    })
+}

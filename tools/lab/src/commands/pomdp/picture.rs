@@ -1,0 +1,123 @@
+//! `vigil pomdp picture`: a policy's graph, its regions, a belief over time.
+
+mod belief;
+mod canvas;
+mod graph;
+mod regions;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use vigil_decision::policy::{Decider, Dual, Policy, PolicyName};
+use vigil_decision::policy_graph::{Limits, PolicyGraph};
+use vigil_decision::{Pomdp, mdp};
+
+use super::{load, solved, track};
+use vigil_terminal::{CommandError, Outcome};
+
+/// Draw a model's policy or belief as an SVG.
+///
+/// --graph: what a policy does from the start belief on, as a graph (SVG, or DOT if the name ends
+/// in .dot). --regions: which action a policy takes at which belief (models of two or three
+/// states). --belief: the belief over some actions and observations, as stacked areas.
+#[derive(Debug, clap::Args)]
+#[command(group(clap::ArgGroup::new("what").required(true)))]
+pub struct Args {
+    /// The model (.pomdp or .pomdpx).
+    file: PathBuf,
+    /// Draw the policy's graph.
+    #[arg(long, group = "what")]
+    graph: bool,
+    /// Draw the policy's regions.
+    #[arg(long, group = "what")]
+    regions: bool,
+    /// Draw the belief over these actions and observations, names or numbers.
+    #[arg(long, group = "what", value_name = "A:O,A:O,...")]
+    belief: Option<String>,
+    /// The policy: mls, av, qmdp, fib, dm-X or adm-X (K = 0.5), or a file of `vigil pomdp solve`.
+    #[arg(long, default_value = "fib")]
+    policy: String,
+    /// Nodes of a graph at most, 1 to 60.
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=60))]
+    nodes: u64,
+    /// Beliefs share a node of a graph if the sum of their differences is at most this, 0 to 2.
+    #[arg(long, default_value_t = 0.25)]
+    tolerance: f64,
+    /// Where to write the drawing.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A model, policy or option that is refused; a file that cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let model = load(&args.file)?;
+    let name = args.file.file_name().unwrap_or_default();
+    let name = name.to_string_lossy();
+    let is_dot = args
+        .out
+        .extension()
+        .is_some_and(|extension| extension == "dot");
+    if is_dot && !args.graph {
+        let message = format!("--out {}: only a graph can be .dot", args.out.display());
+        return Err(CommandError::usage(message));
+    }
+    let text = if let Some(steps) = &args.belief {
+        let steps = track::pairs(&model, steps).map_err(CommandError::usage)?;
+        belief::draw(&model, &steps, &name)
+    } else {
+        let mut decider = decider(&model, &args.policy)?;
+        let title = format!("{name}, policy {}", short(&args.policy));
+        if args.regions {
+            regions::draw(&model, &mut decider, &title)
+        } else {
+            let limits = limits(args)?;
+            let graph = PolicyGraph::of(&model, &mut decider, limits);
+            if is_dot {
+                Ok(graph::dot(&model, &graph))
+            } else {
+                graph::draw(&model, &graph, &title)
+            }
+        }
+    };
+    let text = text.map_err(CommandError::usage)?;
+    let written = fs::write(&args.out, text);
+    written.map_err(|e| CommandError::failure(format!("{}: {e}", args.out.display())))?;
+    Ok(Outcome::Done)
+}
+
+fn limits(args: &Args) -> Result<Limits, CommandError> {
+    if !(0.0..=2.0).contains(&args.tolerance) {
+        let message = format!("--tolerance {}: allowed is 0 to 2", args.tolerance);
+        return Err(CommandError::usage(message));
+    }
+    Ok(Limits {
+        nodes_max: args.nodes as usize,
+        tolerance: args.tolerance,
+    })
+}
+
+/// The last part of a path.
+fn short(word: &str) -> String {
+    let name = Path::new(word).file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// A policy by name, or from a file.
+fn decider(model: &Pomdp, word: &str) -> Result<Decider, CommandError> {
+    let solution = mdp::solve(model).map_err(CommandError::usage)?;
+    if let Ok(name) = word.parse::<PolicyName>() {
+        let decider = name.build(model, &solution, |information| Dual::new(information, 0.5));
+        return decider.map_err(CommandError::usage);
+    }
+    if !Path::new(word).exists() {
+        let known = "mls, av, qmdp, fib, dm-X, adm-X, or a file of `vigil pomdp solve`";
+        let message =
+            format!("--policy {word}: no such policy and no such file; allowed are {known}");
+        return Err(CommandError::usage(message));
+    }
+    let policy: Box<dyn Policy> = Box::new(solved::load(model, "--policy", Path::new(word))?);
+    Ok(Decider::new(policy, model, &solution))
+}

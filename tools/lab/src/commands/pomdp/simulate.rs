@@ -1,0 +1,96 @@
+//! `vigil pomdp simulate`: missions of the event simulator, recorded.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
+
+use vigil_decision::learning::Record;
+use vigil_decision::mdp;
+use vigil_decision::simulation::{Rules, horizon};
+
+use super::compare::contestant::{Contestant, Knowledge};
+use super::compare::{among, count, solved_by};
+use super::escalation::EscalationArgs;
+use super::{load, missions, seed};
+use vigil_terminal::output::Progress;
+use vigil_terminal::{CommandError, Outcome};
+
+/// Record missions that a policy flies in the event simulator, as JSON lines.
+///
+/// The first line says what the file is, each other line is one mission: actions, observations,
+/// rewards, and, if wished, the states, which no policy sees.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The model (.pomdp or .pomdpx).
+    file: PathBuf,
+    /// Policy, as in `vigil pomdp compare`; dual control with K = 0.5.
+    #[arg(long, default_value = "escalation-1")]
+    policy: String,
+    /// Missions, 1 to 10000000.
+    #[arg(long, default_value_t = 1000, value_parser = count(1))]
+    episodes: u64,
+    /// Seed from which the missions' random numbers start; with the same seed those of other
+    /// commands are others.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Steps of a mission at most; it ends before when what follows weighs less than 1e-4.
+    #[arg(long, default_value_t = 2000, value_parser = count(1))]
+    steps_max: u64,
+    /// Actions that end a mission.
+    #[arg(long, value_delimiter = ',')]
+    ends: Vec<String>,
+    /// Record the states, too.
+    #[arg(long)]
+    states: bool,
+    /// Where to write.
+    #[arg(long)]
+    out: PathBuf,
+    /// File of the policy point-based, as `vigil pomdp solve FILE --out POLICY` writes it.
+    #[arg(long, value_name = "POLICY")]
+    policy_file: Option<PathBuf>,
+    #[command(flatten)]
+    escalation: EscalationArgs,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A model or an option that is refused; a file that cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let model = load(&args.file)?;
+    let solution = mdp::solve(&model).map_err(CommandError::usage)?;
+    let contestants = Contestant::all(std::slice::from_ref(&args.policy), &[0.5])?;
+    let contestant = contestants.first();
+    let contestant = contestant.ok_or_else(|| CommandError::usage("--policy: one is needed"))?;
+    let rules = Rules {
+        steps_max: horizon(model.discount(), args.steps_max as usize),
+        is_end: among(&model, "--ends", &args.ends)?,
+    };
+    let ends = rules.is_end.iter().enumerate();
+    let knowledge = Knowledge {
+        model: &model,
+        solution: &solution,
+        allowed: Some(ends.filter(|(_, end)| !**end).map(|(a, _)| a).collect()),
+        stall_steps: 0,
+        gate: None,
+        escalation: &args.escalation,
+        solved: solved_by(&model, args.policy_file.as_deref(), &contestants)?,
+    };
+    let mut agent = contestant.build(&knowledge)?;
+    let failed =
+        |error: std::io::Error| CommandError::failure(format!("{}: {error}", args.out.display()));
+    let mut out = BufWriter::new(File::create(&args.out).map_err(failed)?);
+    missions::write_head(&mut out, contestant.label()).map_err(failed)?;
+    let progress = Progress::new("missions", args.episodes as usize);
+    let seed = seed::of("simulate", args.seed);
+    for episode in 0..args.episodes {
+        let numbers = (seed, episode);
+        let (record, _) = Record::simulated(&model, &mut *agent, &rules, numbers, args.states);
+        missions::write(&mut out, &model, &record).map_err(failed)?;
+        if episode % 64 == 0 {
+            progress.show(episode as usize);
+        }
+    }
+    out.flush().map_err(failed)?;
+    Ok(Outcome::Done)
+}

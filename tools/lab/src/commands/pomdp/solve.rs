@@ -1,0 +1,254 @@
+//! `vigil pomdp solve`: how much a model is worth at best, and a policy that earns it.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use vigil_cycle::clock::process_cpu_s;
+use vigil_cycle::signal;
+use vigil_decision::policy_file::{PolicyFile, alpha, appl};
+use vigil_decision::solver::{Answer, Ended, Method, Options, Progress, bound};
+use vigil_decision::{Budget, Pomdp};
+
+use super::load;
+use vigil_terminal::output;
+use vigil_terminal::{CommandError, Outcome};
+
+/// Memory at which the search ends, bytes.
+const MEMORY_BYTES_MAX: usize = 3 << 30;
+/// Progress is told when this factor of time has passed since the last line.
+const PROGRESS_FACTOR: f64 = 1.5;
+/// ... the first time after so many seconds.
+const PROGRESS_FIRST_S: f64 = 0.25;
+
+/// Bounds what a decision model earns at best from its start belief, and finds a policy.
+///
+/// Upper bounds: mdp (the state is seen), qmdp (seen after one step), fib (fast informed bound),
+/// tib (tighter informed bound). Lower: blind (one action for ever). Both, and a policy: sarsop.
+/// Ctrl-C ends a search early; what was found until then counts.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The model (.pomdp or .pomdpx).
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// mdp, blind, qmdp, fib, tib or sarsop.
+    #[arg(long, default_value = "sarsop")]
+    method: Method,
+    /// Processor time after which to end, s, from the start of the program.
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 60.0,
+        allow_negative_numbers = true
+    )]
+    timeout: f64,
+    /// Gap between the bounds at which sarsop ends, in units of reward.
+    #[arg(
+        long,
+        value_name = "E",
+        default_value_t = 1e-3,
+        allow_negative_numbers = true
+    )]
+    precision: f64,
+    /// Where to write the policy: Vigil's own format, which supervisor.policy_file takes (a coarse
+    /// --precision makes fewer vectors and quicker decisions); that of APPL if the name ends in
+    /// .policy, of pomdp-solve if in .alpha.
+    #[arg(long, value_name = "POLICY")]
+    out: Option<PathBuf>,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Document {
+    schema_version: u32,
+    file: String,
+    model_hash: String,
+    method: String,
+    discount: f64,
+    /// What the file holds; bounds are rewards in any case, costs negative.
+    values: &'static str,
+    lower: Option<f64>,
+    upper: Option<f64>,
+    gap: Option<f64>,
+    /// gap over the larger of the bounds' magnitudes.
+    gap_relative: Option<f64>,
+    cpu_s: f64,
+    ended: &'static str,
+    rounds: usize,
+    beliefs: usize,
+    points: usize,
+    vectors: usize,
+    policy: Option<String>,
+}
+
+/// Solves, and tells what was found.
+///
+/// # Errors
+/// A model or an option that is refused; values without bound; an output that cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    check(args)?;
+    let model = load(&args.file)?;
+    for warning in model.warnings() {
+        let file = args.file.display();
+        eprintln!("{file}: warning: {}: {}", warning.at, warning.message);
+    }
+    signal::install();
+    let mut stop = || signal::stop_requested() || process_cpu_s() >= args.timeout;
+    let mut budget = Budget::new(&mut stop);
+    let options = Options {
+        precision: args.precision,
+        memory_bytes_max: MEMORY_BYTES_MAX,
+    };
+    let mut next_s = PROGRESS_FIRST_S;
+    let watch = &mut |progress: &Progress| {
+        let now_s = process_cpu_s();
+        if now_s >= next_s {
+            next_s = now_s * PROGRESS_FACTOR;
+            eprintln!("{}", progress_line(now_s, progress));
+        }
+    };
+    let answer = bound(args.method, &model, &options, &mut budget, watch)
+        .map_err(|e| CommandError::failure(format!("{}: {e}", args.file.display())))?;
+    let cpu_s = process_cpu_s();
+    if let Some(out) = &args.out {
+        let bytes = policy_bytes(args, &model, &answer, cpu_s, out)?;
+        let failed = |error| CommandError::failure(format!("{}: {error}", out.display()));
+        fs::write(out, bytes).map_err(failed)?;
+    }
+    let document = document(args, &model, &answer, cpu_s);
+    let printed = if args.json {
+        output::json(&document)
+    } else {
+        output::line(&summary(&document))
+    };
+    printed.map_err(CommandError::failure)?;
+    Ok(Outcome::Done)
+}
+
+fn check(args: &Args) -> Result<(), CommandError> {
+    let numbers = [("--timeout", args.timeout), ("--precision", args.precision)];
+    for (name, value) in numbers {
+        if !(value.is_finite() && value >= 0.0) {
+            let message = format!("{name} {value}: allowed is a number from 0");
+            return Err(CommandError::usage(message));
+        }
+    }
+    if args.out.is_some() && !matches!(args.method, Method::Sarsop | Method::Blind) {
+        let message = format!(
+            "--out: {} gives no policy; allowed with sarsop and blind",
+            args.method
+        );
+        return Err(CommandError::usage(message));
+    }
+    Ok(())
+}
+
+fn policy_bytes(
+    args: &Args,
+    model: &Pomdp,
+    answer: &Answer,
+    cpu_s: f64,
+    out: &Path,
+) -> Result<Vec<u8>, CommandError> {
+    let (Some(vectors), Some(lower)) = (&answer.vectors, answer.lower) else {
+        let message = "--out: ended before there was a policy; give it more time by --timeout";
+        return Err(CommandError::failure(message));
+    };
+    let extension = out.extension().and_then(|extension| extension.to_str());
+    match extension {
+        Some("policy") => Ok(appl::write(vectors, &args.file.display().to_string()).into_bytes()),
+        Some("alpha") => Ok(alpha::write(vectors).into_bytes()),
+        _ => {
+            let file = PolicyFile {
+                model_hash: model.hash(),
+                discount: model.discount(),
+                method: args.method.to_string(),
+                lower,
+                upper: answer.upper,
+                cpu_s,
+                vectors: vectors.clone(),
+            };
+            file.write(model).map_err(CommandError::failure)
+        }
+    }
+}
+
+fn document(args: &Args, model: &Pomdp, answer: &Answer, cpu_s: f64) -> Document {
+    let gap = answer
+        .lower
+        .zip(answer.upper)
+        .map(|(lower, upper)| upper - lower);
+    let scale = [answer.lower, answer.upper].into_iter().flatten();
+    let scale = scale.fold(0.0_f64, |m, v| m.max(v.abs()));
+    let vectors = answer.vectors.as_ref();
+    Document {
+        schema_version: 1,
+        file: args.file.display().to_string(),
+        model_hash: format!("{:016x}", model.hash()),
+        method: args.method.to_string(),
+        discount: model.discount(),
+        values: if model.is_cost() { "cost" } else { "reward" },
+        lower: answer.lower,
+        upper: answer.upper,
+        gap,
+        gap_relative: gap.map(|gap| gap / scale.max(f64::MIN_POSITIVE)),
+        cpu_s,
+        ended: match answer.ended {
+            Ended::Precision => "precision",
+            Ended::Memory => "memory",
+            Ended::Stopped if signal::stop_requested() => "interrupted",
+            Ended::Stopped => "timeout",
+        },
+        rounds: answer.progress.rounds,
+        beliefs: answer.progress.beliefs,
+        points: answer.progress.points,
+        vectors: vectors.map_or(0, vigil_decision::AlphaVectors::len),
+        policy: args.out.as_ref().map(|out| out.display().to_string()),
+    }
+}
+
+fn progress_line(now_s: f64, progress: &Progress) -> String {
+    let bracket = progress.bracket;
+    format!(
+        "{now_s:>8.2} s  {:.8} <= V* <= {:.8}  gap {:.3e}  {} vectors, {} points, {} beliefs",
+        bracket.lower,
+        bracket.upper,
+        bracket.gap(),
+        progress.vectors,
+        progress.points,
+        progress.beliefs
+    )
+}
+
+fn summary(document: &Document) -> String {
+    let shown = |bound: Option<f64>, none: &str| {
+        bound.map_or_else(|| none.to_owned(), |value| format!("{value:.10}"))
+    };
+    let mut text = format!(
+        "{}: {} <= V* <= {} at the start belief",
+        document.file,
+        shown(document.lower, "?"),
+        shown(document.upper, "?")
+    );
+    if let Some((gap, relative)) = document.gap.zip(document.gap_relative) {
+        let _ = write!(text, ", gap {gap:.3e} ({:.3e} of the value)", relative);
+    }
+    if document.values == "cost" {
+        text.push_str("\nthe file holds costs: bounds are rewards, that is costs with a minus");
+    }
+    let _ = write!(
+        text,
+        "\n{} in {:.3} s of processor time, ended by {}",
+        document.method, document.cpu_s, document.ended
+    );
+    if document.vectors > 0 {
+        let _ = write!(text, "; policy of {} vectors", document.vectors);
+    }
+    if let Some(policy) = &document.policy {
+        let _ = write!(text, ": {policy}");
+    }
+    text
+}

@@ -1,0 +1,162 @@
+//! `vigil pomdp track`: the belief after each of some actions and observations.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+use vigil_decision::{Evidence, Pomdp, Tracker};
+
+use super::{find, load};
+use vigil_terminal::output;
+use vigil_terminal::{CommandError, Outcome};
+
+/// Follows the belief over actions and observations. Exit code 1 if one of them was impossible:
+/// the belief then is the prediction with 0.01 of the start belief mixed in.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The model (.pomdp or .pomdpx).
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Action and observation of each step, names or numbers, separated by commas.
+    #[arg(long, value_name = "A:O,A:O,...")]
+    steps: String,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Document {
+    schema_version: u32,
+    file: String,
+    hash: String,
+    states: Vec<String>,
+    start: Vec<f64>,
+    steps: Vec<Step>,
+    impossible_steps: usize,
+    /// Of all steps; null if one was impossible.
+    log_likelihood: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct Step {
+    action: String,
+    observation: String,
+    belief: Vec<f64>,
+    /// p(z|a,b) before the step; 0 if it was impossible.
+    probability: f64,
+    impossible: bool,
+    entropy: f64,
+}
+
+/// Prints the beliefs.
+///
+/// # Errors
+/// A model or a step that is refused; an output that cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let model = load(&args.file)?;
+    let steps = pairs(&model, &args.steps).map_err(CommandError::usage)?;
+    let document = follow(args, &model, &steps);
+    let printed = if args.json {
+        output::json(&document)
+    } else {
+        output::line(&table(&document))
+    };
+    printed.map_err(CommandError::failure)?;
+    Ok(match document.impossible_steps {
+        0 => Outcome::Done,
+        _ => Outcome::Failed,
+    })
+}
+
+/// Indices of actions and observations.
+pub(super) fn pairs(model: &Pomdp, text: &str) -> Result<Vec<(usize, usize)>, String> {
+    let steps = text
+        .split(',')
+        .map(str::trim)
+        .filter(|step| !step.is_empty());
+    let steps = steps.enumerate().map(|(number, step)| {
+        let at = |problem| format!("--steps: step {}: {problem}", number + 1);
+        let (action, observation) = step
+            .split_once(':')
+            .ok_or_else(|| at(format!("'{step}', wanted is ACTION:OBSERVATION")))?;
+        let action = find(model.actions(), action.trim(), "action").map_err(at)?;
+        let z = find(model.observations(), observation.trim(), "observation").map_err(at)?;
+        Ok((action, z))
+    });
+    steps.collect()
+}
+
+fn follow(args: &Args, model: &Pomdp, steps: &[(usize, usize)]) -> Document {
+    let mut tracker = Tracker::new(model);
+    let start = tracker.belief().to_vec();
+    let mut log_likelihood = Some(0.0);
+    let steps: Vec<Step> = steps
+        .iter()
+        .map(|&(action, z)| {
+            let evidence = tracker.update(model, action, z);
+            let probability = match evidence {
+                Evidence::Taken(p) => p,
+                Evidence::Impossible => 0.0,
+            };
+            let impossible = evidence == Evidence::Impossible;
+            log_likelihood = log_likelihood
+                .filter(|_| !impossible)
+                .map(|sum: f64| sum + probability.ln());
+            Step {
+                action: model.actions()[action].clone(),
+                observation: model.observations()[z].clone(),
+                belief: tracker.belief().to_vec(),
+                probability,
+                impossible,
+                entropy: tracker.entropy(),
+            }
+        })
+        .collect();
+    Document {
+        schema_version: 1,
+        file: args.file.display().to_string(),
+        hash: format!("{:016x}", model.hash()),
+        states: model.states().to_vec(),
+        start,
+        impossible_steps: steps.iter().filter(|step| step.impossible).count(),
+        steps,
+        log_likelihood,
+    }
+}
+
+/// The most probable states of each step.
+fn table(document: &Document) -> String {
+    const SHOWN: usize = 4;
+    let best = |belief: &[f64]| {
+        let mut order: Vec<usize> = (0..belief.len()).filter(|&s| belief[s] > 0.0).collect();
+        order.sort_by(|&one, &other| belief[other].total_cmp(&belief[one]));
+        let more = if order.len() > SHOWN { "  ..." } else { "" };
+        let named = order.iter().take(SHOWN);
+        let named = named.map(|&s| format!("{} {:.6}", document.states[s], belief[s]));
+        named.collect::<Vec<_>>().join("  ") + more
+    };
+    let mut lines = vec![format!(
+        "{:24} {:>10}  {}",
+        "start",
+        "",
+        best(&document.start)
+    )];
+    for step in &document.steps {
+        let name = format!("{}:{}", step.action, step.observation);
+        let probability = if step.impossible {
+            "IMPOSSIBLE".to_owned()
+        } else {
+            format!("{:.6}", step.probability)
+        };
+        let belief = best(&step.belief);
+        lines.push(format!("{name:24} {probability:>10}  {belief}"));
+    }
+    match document.log_likelihood {
+        Some(sum) => lines.push(format!("log-likelihood {sum:.6}")),
+        None => lines.push(format!(
+            "{} impossible: the model rules out what was seen",
+            document.impossible_steps
+        )),
+    }
+    lines.join("\n")
+}

@@ -1,0 +1,41 @@
+//! `vigil-lab`: what is done at the desk. `vigil COMMAND` starts it.
+
+mod commands;
+mod pipeline;
+mod recovery;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use vigil_terminal::exit_code;
+
+use commands::{diagnose, evaluate, import, learn, pomdp};
+
+/// Learns models, imports logs, diagnoses and scores recorded runs, solves decision models.
+///
+/// Exit codes: 0 done, 1 the run found or had a failure, 2 usage or configuration error.
+#[derive(Debug, Parser)]
+#[command(version, about, bin_name = "vigil")]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Import(import::Args),
+    Learn(learn::Args),
+    Diagnose(diagnose::Args),
+    Evaluate(evaluate::Args),
+    Pomdp(pomdp::Args),
+}
+
+fn main() -> ExitCode {
+    exit_code(match Args::parse().command {
+        Command::Import(args) => import::run(&args),
+        Command::Learn(args) => learn::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
+        Command::Pomdp(args) => pomdp::run(&args),
+    })
+}

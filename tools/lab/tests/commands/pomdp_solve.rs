@@ -1,0 +1,135 @@
+//! `vigil pomdp solve` as a user runs it.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use vigil_decision::policy_file::{PolicyFile, alpha, appl};
+use vigil_decision::{Pomdp, mdp};
+
+const TIGER: &str = "discount: 0.95\nstates: left right\nactions: listen open-left open-right\n\
+    observations: hear-left hear-right\nT: * uniform\nT: listen identity\nO: * uniform\n\
+    O: listen\n0.85 0.15\n0.15 0.85\nR: listen : * : * : * -1\n\
+    R: open-left : left : * : * -100\nR: open-left : right : * : * 10\n\
+    R: open-right : left : * : * 10\nR: open-right : right : * : * -100\n";
+
+fn solve(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_vigil-lab"));
+    command
+        .args(["pomdp", "solve"])
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+fn document(arguments: &[&str]) -> Value {
+    let output = solve(&[arguments, &["--json"]].concat());
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn every_method_gives_its_bound_and_null_for_the_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("tiger.pomdp");
+    fs::write(&file, TIGER).unwrap();
+    let file = file.to_str().unwrap();
+    let cases = [
+        ("mdp", None, Some(200.0)),
+        ("blind", Some(-20.0), None),
+        ("qmdp", None, Some(189.0)),
+        ("fib", None, Some(87.179_487_18)),
+        ("tib", None, Some(49.605_609_1)),
+        ("sarsop", Some(19.371_368), Some(19.371_368)),
+    ];
+    for (method, lower, upper) in cases {
+        let found = document(&[file, "--method", method, "--precision", "1e-6"]);
+        for (key, wanted) in [("lower", lower), ("upper", upper)] {
+            let value = found[key].as_f64();
+            assert_eq!(value.is_some(), wanted.is_some(), "{method}: {found}");
+            let error = value.unwrap_or(0.0) - wanted.unwrap_or(0.0);
+            assert!(error.abs() < 2e-6, "{method}, {key}: {found}");
+        }
+        assert!(found["cpu_s"].as_f64().unwrap() > 0.0);
+        assert_eq!(found["ended"], "precision");
+    }
+}
+
+#[test]
+fn the_policy_is_written_in_all_formats() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("tiger.pomdp");
+    fs::write(&file, TIGER).unwrap();
+    let model = Pomdp::parse(TIGER).unwrap();
+    let write = |name: &str| {
+        let out = folder.path().join(name);
+        let found = document(&[file.to_str().unwrap(), "--out", out.to_str().unwrap()]);
+        (fs::read(out).unwrap(), found)
+    };
+    let (bytes, found) = write("tiger.json");
+    let policy = PolicyFile::read(&bytes, &model).unwrap();
+    assert_eq!(Some(policy.lower), found["lower"].as_f64());
+    assert!((policy.vectors.value(model.start()) - policy.lower).abs() < 1e-6);
+    assert_eq!(policy.method, "sarsop");
+    let (xml, text) = (write("tiger.policy").0, write("tiger.alpha").0);
+    let xml = appl::read(std::str::from_utf8(&xml).unwrap(), &model).unwrap();
+    let text = alpha::read(std::str::from_utf8(&text).unwrap(), &model).unwrap();
+    assert_eq!((&xml, &text), (&policy.vectors, &policy.vectors));
+    // Nothing better can be seen than the state.
+    let best = mdp::solve(&model).unwrap().value(0);
+    assert!(
+        policy
+            .vectors
+            .rows()
+            .all(|(_, values)| values.iter().all(|v| *v <= best + 1e-9))
+    );
+}
+
+#[test]
+fn costs_are_negative_rewards_and_said_to_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("costs.pomdp");
+    fs::write(&file, format!("values: cost\n{TIGER}")).unwrap();
+    let output = solve(&[file.to_str().unwrap(), "--method", "mdp"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("costs") && text.contains("2000.0"), "{text}");
+}
+
+#[test]
+fn a_timeout_leaves_a_bracket() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("tiger.pomdp");
+    fs::write(&file, TIGER).unwrap();
+    let arguments = [
+        file.to_str().unwrap(),
+        "--precision",
+        "0",
+        "--timeout",
+        "0.05",
+    ];
+    let found = document(&arguments);
+    let bound = |key: &str| found[key].as_f64().unwrap();
+    assert!(
+        bound("lower") <= 19.371_369 && bound("upper") >= 19.371_368,
+        "{found}"
+    );
+}
+
+#[test]
+fn wrong_options_are_refused() {
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/rover.pomdp");
+    let shipped = shipped.to_str().unwrap();
+    let cases: [(&[&str], &str); 4] = [
+        (&["--method", "magic"], "sarsop"),
+        (&["--timeout", "-1"], "--timeout"),
+        (&["--precision", "nan"], "--precision"),
+        (&["--method", "fib", "--out", "x"], "--out"),
+    ];
+    for (options, part) in cases {
+        let output = solve(&[&[shipped], options].concat());
+        assert_eq!(output.status.code(), Some(2), "{options:?}");
+        let text = String::from_utf8(output.stderr).unwrap();
+        assert!(text.contains(part), "{options:?}: {text}");
+    }
+}

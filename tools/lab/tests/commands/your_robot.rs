@@ -1,0 +1,178 @@
+//! The page "Your robot in 30 minutes", followed word by word on the Kobuki's data.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn page() -> String {
+    fs::read_to_string(root().join("docs/your-robot.md")).unwrap()
+}
+
+/// Every command of the page's blocks, its program first; the file of labels is none.
+fn commands(page: &str) -> Vec<Vec<String>> {
+    let blocks = page.split("```").skip(1).step_by(2);
+    let lines = blocks.flat_map(str::lines).map(str::trim);
+    let is_command = |line: &&str| line.contains(' ') && !line.contains(", ");
+    let words = |line: &str| line.split(' ').map(str::to_owned).collect();
+    lines.filter(is_command).map(words).collect()
+}
+
+/// The page's file of labels.
+fn labels(page: &str) -> String {
+    let start = page.find("run,mode,onset_s").unwrap();
+    let rest = &page[start..];
+    rest[..rest.find("```").unwrap()].to_owned()
+}
+
+/// Runs a command of the page in `folder`, with the programs of this build instead of the released
+/// ones.
+fn follow(command: &[String], folder: &Path) -> Output {
+    let vigil = Path::new(env!("CARGO_BIN_EXE_vigil-lab"));
+    let (program, more) = match command[0].as_str() {
+        "target/release/vigil" => (vigil.to_path_buf(), Vec::new()),
+        // All that this script does but build and say where the default graph is.
+        "scripts/up" => {
+            let script = fs::read_to_string(root().join("scripts/up")).unwrap();
+            let last = script.lines().last().unwrap();
+            assert_eq!(last, "exec \"$root/target/release/vigil-launcher\" \"$@\"");
+            let graph = format!("t{}-your-robot", std::process::id());
+            let more = ["--json".to_owned(), "--graph".to_owned(), graph];
+            (vigil.with_file_name("vigil-launcher"), more.to_vec())
+        }
+        other => panic!("what is {other}?"),
+    };
+    assert!(
+        program.exists(),
+        "{} is not built: run `cargo build --workspace`",
+        program.display()
+    );
+    let mut command_of_page = Command::new(program);
+    command_of_page.args(&command[1..]).args(more);
+    command_of_page.env_remove("VIGIL_CONFIG");
+    command_of_page.current_dir(folder).output().unwrap()
+}
+
+/// A folder that looks like the project's, with the unpacked log in it.
+fn workplace(data: &str) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    std::os::unix::fs::symlink(
+        root().join("config").canonicalize().unwrap(),
+        folder.path().join("config"),
+    )
+    .unwrap();
+    let packed = Path::new(data).join("real/kobuki_wheel_fault.tar.xz");
+    let mut tar = Command::new("tar");
+    tar.arg("-xJf").arg(&packed).arg("-C").arg(folder.path());
+    assert!(tar.status().unwrap().success(), "{}", packed.display());
+    folder
+}
+
+/// First alarm of every run of the verdicts, s.
+fn first_alarms(verdicts: &Path) -> BTreeMap<String, Option<f64>> {
+    let text = fs::read_to_string(verdicts).unwrap();
+    let mut found = BTreeMap::new();
+    for line in text.lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let alarm = found.entry(cells[0].to_owned()).or_insert(None);
+        if alarm.is_none() && cells[3] == "1" {
+            *alarm = Some(cells[1].parse().unwrap());
+        }
+    }
+    found
+}
+
+#[test]
+fn the_page_names_every_step() {
+    let page = page();
+    let commands = commands(&page);
+    let names: Vec<&str> = commands
+        .iter()
+        .map(|command| match command[0].as_str() {
+            "target/release/vigil" => command[1].as_str(),
+            program => program,
+        })
+        .collect();
+    let wanted = [
+        "import",
+        "learn",
+        "learn",
+        "diagnose",
+        "evaluate",
+        "check",
+        "scripts/up",
+    ];
+    assert_eq!(names, wanted);
+    assert_eq!(labels(&page).lines().count(), 5);
+}
+
+/// What the page says of a step, besides that it succeeds.
+fn check_step(command: &[String], output: &Output) {
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    let step = command[1].as_str();
+    // Check says with its code whether this machine may run a graph: not the page's affair.
+    let codes: &[i32] = if step == "check" { &[0, 1] } else { &[0] };
+    let code = output.status.code().unwrap();
+    assert!(
+        codes.contains(&code),
+        "{command:?}: {code} {printed} {errors}"
+    );
+    match (step, command[2].as_str()) {
+        ("learn", "--show") => assert!(
+            printed.contains("of each run    the first 40 s"),
+            "{printed}"
+        ),
+        ("learn", _) => assert!(
+            errors.contains("less than 600 s"),
+            "a short log is told: {errors}"
+        ),
+        ("evaluate", _) => {
+            let score: Value = serde_json::from_slice(&output.stdout).unwrap();
+            assert_eq!(score["false_alarms"]["alarms"], 0);
+        }
+        ("check", _) => assert!(printed.contains("kobuki"), "{printed}"),
+        _ => {}
+    }
+}
+
+/// The recording, played through the real processes: the alarm of the run with a taped wheel.
+fn check_replay(output: &Output) {
+    let lines = String::from_utf8_lossy(&output.stdout).into_owned();
+    let summary: Value = serde_json::from_str(lines.lines().last().unwrap()).unwrap();
+    assert_eq!(summary["ended"], "end-of-recording", "{lines}");
+    let events = summary["events"].as_array().unwrap();
+    let alarms = events.iter().filter(|event| event["event"] == "alarm");
+    assert!(alarms.count() > 0, "{lines}");
+}
+
+#[test]
+fn the_page_can_be_followed_on_the_kobukis_data() {
+    let Ok(data) = std::env::var("VIGIL_DATA") else {
+        eprintln!("SKIPPED: VIGIL_DATA is not set");
+        return;
+    };
+    let folder = workplace(&data);
+    fs::write(folder.path().join("labels.csv"), labels(&page())).unwrap();
+    for command in commands(&page()) {
+        let output = follow(&command, folder.path());
+        check_step(&command, &output);
+        if command[0] == "scripts/up" {
+            check_replay(&output);
+        }
+    }
+    let alarms = first_alarms(&folder.path().join("verdicts.csv"));
+    assert_eq!(alarms.len(), 4);
+    assert_eq!(alarms["0"], None, "the run without a fault");
+    for run in ["1", "2", "3"] {
+        let first_s = alarms[run].unwrap_or(f64::INFINITY);
+        assert!(first_s < 40.0, "run {run}: {first_s} s");
+    }
+}

@@ -1,0 +1,13 @@
+//! Models of robots, learned from recorded runs. Reads no file itself.
+
+pub mod bounds;
+mod correlation;
+mod data_hash;
+pub mod learning;
+pub mod learning_nominal;
+mod maxima;
+pub mod model_view;
+pub mod split;
+
+pub use correlation::correlation;
+pub use data_hash::data_hash;

@@ -1,0 +1,302 @@
+//! A nominal model of a synthetic robot: what it finds, what it refuses, what it then detects.
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+use vigil_blocks::{SensorFrame, Valid};
+use vigil_learning::learning_nominal::{NominalError, learn};
+use vigil_recording::frames::Run;
+use vigil_robot::Description;
+use vigil_robot::learned::Form;
+use vigil_robot::learned::monitor::Channels;
+use vigil_robot::nominal::{Model, Monitor, Observer};
+
+const TRACK_M: f64 = 0.2;
+const RADIUS_M: f64 = 0.1;
+const NOISE_RAD_S: f64 = 0.05;
+const RATE_HZ: f64 = 50.0;
+
+fn robot() -> Description {
+    toml::from_str(
+        r#"
+name = "small"
+kinematics = "differential"
+wheel_radius_m = 0.1
+command = [{ name = "v", unit = "m/s", limit = 1.0 }, { name = "w", unit = "rad/s", limit = 2.0 }]
+wheels = [
+  { name = "L", x = 0.0, y = 0.1, steered = false },
+  { name = "R", x = 0.0, y = -0.1, steered = false },
+]
+measured = { pose = false, wheel_rates = true, steer = false, yaw_rate = true, currents = false }
+polynomial_order = 2
+limits = { speed_m_s = 1.0, yaw_rate_rad_s = 2.0, wheel_rate_rad_s = 50.0 }
+"#,
+    )
+    .unwrap()
+}
+
+/// What is wrong with the gyro from a time on.
+#[derive(Clone, Copy)]
+enum Fault {
+    None,
+    Bias(f64, f64),
+    Scatter(f64, f64),
+}
+
+/// A run; `drive` gives speed and yaw rate commanded at a time.
+fn run(id: u32, length_s: f64, drive: impl Fn(f64) -> [f64; 2], fault: Fault) -> Run {
+    let mut rng = Pcg64Mcg::seed_from_u64(u64::from(id));
+    let mut noise = || NOISE_RAD_S * rng.sample::<f64, _>(StandardNormal);
+    let mut frames = Vec::new();
+    for i in 0..(length_s * RATE_HZ) as u64 {
+        let t = i as f64 / RATE_HZ;
+        let [v, w] = drive(t);
+        let mut frame = SensorFrame::default();
+        frame.header.t_capture_ns = (t * 1e9) as u64;
+        (frame.header.seq, frame.run_id) = (i, u64::from(id) + 1);
+        frame.command[0] = v;
+        frame.command[1] = w;
+        frame.wheel_rate[0] = (v - 0.5 * TRACK_M * w) / RADIUS_M + noise();
+        frame.wheel_rate[1] = (v + 0.5 * TRACK_M * w) / RADIUS_M + noise();
+        let wrong = match fault {
+            Fault::Bias(from_s, size) if t >= from_s => size,
+            Fault::Scatter(from_s, size) if t >= from_s => size * noise() / NOISE_RAD_S,
+            _ => 0.0,
+        };
+        frame.yaw_rate = w + noise() + wrong;
+        frame.valid = Valid::command(0) | Valid::command(1) | Valid::YAW_RATE;
+        frame.valid |= Valid::wheel_rate(0) | Valid::wheel_rate(1);
+        frames.push(frame);
+    }
+    Run { id, frames }
+}
+
+fn weave(t: f64) -> [f64; 2] {
+    [0.5 + 0.3 * (0.5 * t).sin(), 0.8 * (0.37 * t).sin()]
+}
+
+fn model(length_s: f64) -> (Model, Vec<String>) {
+    let runs = [run(0, length_s, weave, Fault::None)];
+    let (model, report) = learn(&runs, &[], f64::INFINITY, &robot()).unwrap();
+    (model, report.warnings)
+}
+
+/// First time at which the log-odds reach the alarm for 24 h between false alarms, s.
+fn alarm(model: &Model, run: &Run) -> Option<f64> {
+    let form = Form::LearnedBias;
+    let calibration = model.calibration(Channels::PoseEncoders, form).unwrap();
+    let threshold = calibration.alarm_log_odds(24.0, 1.0);
+    let mut monitor = Monitor::new(model, Channels::PoseEncoders, form, 1.0);
+    let mut observer = Observer::new(&robot());
+    for frame in &run.frames {
+        if observer.push(frame).complete {
+            monitor.step(observer.history(), false);
+            if !monitor.is_ready() {
+                monitor.forget_evidence();
+            } else if monitor.report().log_odds > threshold {
+                return Some(frame.header.t_capture_ns as f64 * 1e-9);
+            }
+        }
+    }
+    None
+}
+
+#[test]
+fn residuals_reach_the_sensors_noise_and_weights_the_geometry() {
+    let (model, warnings) = model(700.0);
+    assert!(
+        !warnings.iter().any(|w| w.contains("widened")),
+        "{warnings:?}"
+    );
+    assert!((model.widened - 1.0).abs() < 1e-12);
+    let gyro = &model.channel[0];
+    // Five frames an observation; noise of the gyro, and of two wheels through the geometry.
+    let expected = NOISE_RAD_S / 5_f64.sqrt() * (1.0 + 2.0 * (RADIUS_M / TRACK_M).powi(2)).sqrt();
+    let found = gyro.variance[0].sqrt();
+    assert!(
+        found < 1.1 * expected && found > 0.8 * expected,
+        "{found} {expected}"
+    );
+    assert!(
+        (gyro.held_out_ratio - 1.0).abs() < 0.1,
+        "{}",
+        gyro.held_out_ratio
+    );
+    // The wheels' own noise enters by the mean of three observations, and so is carried on.
+    assert!(
+        (0.0..0.5).contains(&gyro.correlation),
+        "{}",
+        gyro.correlation
+    );
+    let text = model.to_toml().unwrap();
+    assert_eq!(Model::from_toml(&text).unwrap(), model);
+}
+
+#[test]
+fn a_short_log_warns_and_widens_by_what_it_says() {
+    let (short, warnings) = model(60.0);
+    assert!(short.widened > 1.03, "{}", short.widened);
+    let told = format!("{:.2}", short.widened);
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.contains(&told) && w.contains("600 s")),
+        "{warnings:?}"
+    );
+}
+
+#[test]
+fn bias_and_scatter_are_found_and_healthy_driving_is_not() {
+    let (model, _) = model(700.0);
+    let faults = [Fault::Bias(20.0, 0.08), Fault::Scatter(20.0, 0.15)];
+    for (i, fault) in faults.into_iter().enumerate() {
+        let found = alarm(&model, &run(10 + i as u32, 40.0, weave, fault)).unwrap();
+        assert!((20.0..25.0).contains(&found), "fault {i}: {found} s");
+    }
+    for id in 20..26 {
+        assert_eq!(
+            alarm(&model, &run(id, 120.0, weave, Fault::None)),
+            None,
+            "run {id}"
+        );
+    }
+}
+
+#[test]
+fn a_log_that_lacks_what_a_model_needs_is_refused_by_name() {
+    let refused = |drive: &dyn Fn(f64) -> [f64; 2]| {
+        learn(
+            &[run(0, 100.0, drive, Fault::None)],
+            &[],
+            f64::INFINITY,
+            &robot(),
+        )
+        .unwrap_err()
+    };
+    let straight = refused(&|t| [0.5 + 0.3 * t.sin(), 0.0]);
+    assert!(
+        matches!(&straight, NominalError::Unexcited { axis, .. } if axis == "w"),
+        "{straight}"
+    );
+    let coupled = refused(&|t| [0.4 + 0.3 * t.sin(), 0.8 + 0.6 * t.sin()]);
+    assert!(
+        matches!(coupled, NominalError::Together { .. }),
+        "{coupled}"
+    );
+    let rare = refused(&|t| [0.5 + 0.3 * t.sin(), if t < 0.6 { 0.8 } else { 0.0 }]);
+    assert!(
+        matches!(&rare, NominalError::Follows { axis } if axis == "w"),
+        "{rare}"
+    );
+    let still = refused(&|_| [0.0, 0.0]);
+    assert!(matches!(still, NominalError::Still { .. }), "{still}");
+    assert_eq!(
+        learn(&[], &[], f64::INFINITY, &robot()),
+        Err(NominalError::NoRuns)
+    );
+}
+
+#[test]
+fn commands_outside_the_learned_range_widen_the_noise() {
+    let (model, _) = model(100.0);
+    let fast = |_: f64| [1.0, 0.0];
+    let mut monitor = Monitor::new(&model, Channels::PoseEncoders, Form::LearnedBias, 1.0);
+    let mut observer = Observer::new(&robot());
+    for frame in &run(5, 3.0, fast, Fault::None).frames {
+        if observer.push(frame).complete {
+            monitor.step(observer.history(), false);
+        }
+    }
+    assert!(monitor.is_extrapolating());
+}
+
+/// Two speeds, three yaw rates, each kept up for some seconds.
+fn two_speeds(t: f64) -> [f64; 2] {
+    let step = (t / 3.7) as u64 * 7919 % 101;
+    [
+        [0.2, 0.5][(step % 2) as usize],
+        [-0.6, 0.0, 0.6][(step % 3) as usize],
+    ]
+}
+
+#[test]
+fn speeds_between_those_of_the_log_are_no_fault_and_what_it_does_not_tell_is_said() {
+    // A drive that takes a few frames to follow: a fit may explain its steps by a curve.
+    let lagged = |id: u32, drive: &dyn Fn(f64) -> [f64; 2], length_s: f64| {
+        let mut run = run(id, length_s, drive, Fault::None);
+        let mut state = [run.frames[0].wheel_rate[0], run.frames[0].wheel_rate[1]];
+        for frame in &mut run.frames {
+            let commanded = [
+                (frame.command[0] - 0.5 * TRACK_M * frame.command[1]) / RADIUS_M,
+                (frame.command[0] + 0.5 * TRACK_M * frame.command[1]) / RADIUS_M,
+            ];
+            for (i, state) in state.iter_mut().enumerate() {
+                *state += 0.15 * (commanded[i] - *state);
+                frame.wheel_rate[i] += *state - commanded[i];
+            }
+            frame.yaw_rate += (state[1] - state[0]) * RADIUS_M / TRACK_M - frame.command[1];
+        }
+        run
+    };
+    let log = [lagged(0, &two_speeds, 700.0)];
+    let (model, report) = learn(&log, &[], f64::INFINITY, &robot()).unwrap();
+    assert_eq!(model.command[0].gaps, [[0.2, 0.5]]);
+    let told = |text: &str| report.warnings.iter().any(|w| w.contains(text));
+    assert!(
+        told("without v^2: ") && told("v was not driven between 0.200 and 0.500 m/s"),
+        "{:?}",
+        report.warnings
+    );
+    for id in 0..15 {
+        let speed = 0.25 + 0.05 * f64::from(id % 5);
+        let healthy = lagged(30 + id, &|t: f64| [speed, two_speeds(t)[1]], 25.0);
+        assert_eq!(alarm(&model, &healthy), None, "{speed} m/s");
+    }
+    // Noise is widened there, but a fault is still seen.
+    let mut stuck = lagged(50, &|t: f64| [0.35, two_speeds(t)[1]], 25.0);
+    for frame in stuck.frames.iter_mut().skip(500) {
+        frame.wheel_rate[0] = 0.0;
+    }
+    let found_s = alarm(&model, &stuck).unwrap();
+    assert!((10.0..11.0).contains(&found_s), "{found_s}");
+}
+
+#[test]
+fn columns_that_mean_something_else_are_refused_in_the_words_of_the_description() {
+    let refused = |change: &dyn Fn(&mut SensorFrame)| {
+        let mut run = run(3, 60.0, weave, Fault::None);
+        run.frames.iter_mut().for_each(change);
+        let refused = learn(&[run], &[], f64::INFINITY, &robot()).unwrap_err();
+        assert!(matches!(refused, NominalError::Doubtful(_)), "{refused}");
+        refused.to_string()
+    };
+    let message = refused(&|frame| frame.yaw_rate = frame.yaw_rate.to_degrees());
+    assert!(message.contains("yaw_rate in deg/s?"), "{message}");
+    let message = refused(&|frame| frame.yaw_rate *= -1.0);
+    assert!(
+        message.contains("is yaw_rate or w positive to the right?"),
+        "{message}"
+    );
+    let message = refused(&|frame| frame.wheel_rate.swap(0, 1));
+    assert!(
+        message.contains("exchanged, or is w positive to the right?"),
+        "{message}"
+    );
+    let message = refused(&|frame| frame.command[0] *= 1000.0);
+    assert!(message.contains("v in mm/s?"), "{message}");
+    let message = refused(&|frame| frame.wheel_rate[1] = 3.0);
+    assert!(message.contains("enc_R is 3 throughout"), "{message}");
+}
+
+#[test]
+fn one_doubtful_run_among_many_is_told_and_learned_from() {
+    let mut runs: Vec<Run> = (0..5).map(|id| run(id, 60.0, weave, Fault::None)).collect();
+    runs[2]
+        .frames
+        .iter_mut()
+        .for_each(|frame| frame.yaw_rate *= -1.0);
+    let (_, report) = learn(&runs, &[], f64::INFINITY, &robot()).unwrap();
+    let told =
+        |w: &String| w.starts_with("1 of 5 runs are doubtful") && w.contains("run 2: yaw_rate");
+    assert!(report.warnings.iter().any(told), "{:?}", report.warnings);
+}

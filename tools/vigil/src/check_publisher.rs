@@ -1,0 +1,83 @@
+//! `vigil check-publisher`: what fits and what does not in an external publisher's frames.
+
+use serde::Serialize;
+use vigil_setup::GraphArgs;
+
+use crate::findings::{self, Finding, Status};
+use vigil_terminal::output;
+use vigil_terminal::{CommandError, Outcome};
+
+use crate::publisher;
+
+/// Listens to a publisher of sensor frames, beside a running graph or in its place, and says what
+/// to change.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    graph: GraphArgs,
+    /// How long to listen, s.
+    #[arg(long, value_name = "S", default_value_t = 5.0)]
+    seconds: f64,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Document<'a> {
+    schema_version: u32,
+    ok: bool,
+    frames: usize,
+    seconds: f64,
+    findings: &'a [Finding],
+}
+
+/// Listens and tells; outcome `Failed` if something will not work.
+///
+/// # Errors
+/// A configuration that is refused; a transport that cannot be opened for another reason than a
+/// publisher's types.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    if !(0.1..=3600.0).contains(&args.seconds) {
+        let message = format!("--seconds {}: allowed is 0.1 to 3600", args.seconds);
+        return Err(CommandError::usage(message));
+    }
+    let mut setup = args.graph.load().map_err(CommandError::usage)?;
+    setup.file.sensor.source = publisher::source(&setup).map_err(CommandError::failure)?;
+    if !args.json {
+        eprintln!("listening for {} s", args.seconds);
+    }
+    let (heard, unheard) =
+        publisher::listen(&setup, args.seconds).map_err(CommandError::failure)?;
+    let mut found = publisher::findings(&setup, &heard);
+    if let Some(error) = unheard {
+        found.push(Finding::new(
+            "listening",
+            Status::Failure,
+            error.to_string(),
+        ));
+    }
+    // What is to be changed comes last, where it is read first.
+    found.sort_by_key(|finding| finding.status);
+    let ok = findings::are_ok(&found);
+    if args.json {
+        let document = Document {
+            schema_version: 1,
+            ok,
+            frames: heard.frames.len(),
+            seconds: heard.seconds,
+            findings: &found,
+        };
+        output::json(&document).map_err(CommandError::failure)?;
+    } else {
+        findings::print(&found)?;
+        let end = if ok {
+            "the publisher fits".to_owned()
+        } else {
+            let wrong = found.iter().filter(|f| f.status == Status::Failure).count();
+            format!("to change: {wrong}, see FAILURE")
+        };
+        output::line(&end).map_err(CommandError::failure)?;
+    }
+    Ok(if ok { Outcome::Done } else { Outcome::Failed })
+}

@@ -1,0 +1,62 @@
+//! What a check has found, for people and for programs.
+
+use serde::Serialize;
+
+use vigil_terminal::CommandError;
+use vigil_terminal::output;
+
+/// How bad it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// As it should be.
+    Ok,
+    /// It will work, but not as well as it could.
+    Warning,
+    /// It will not work.
+    Failure,
+}
+
+/// One thing that was looked at.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// What was looked at.
+    pub check: String,
+    /// How it is.
+    pub status: Status,
+    /// What was found, and what to do about it.
+    pub detail: String,
+}
+
+impl Finding {
+    /// A finding.
+    pub fn new(check: impl Into<String>, status: Status, detail: impl Into<String>) -> Self {
+        Self {
+            check: check.into(),
+            status,
+            detail: detail.into(),
+        }
+    }
+}
+
+/// True if none of them is a failure.
+pub fn are_ok(findings: &[Finding]) -> bool {
+    findings.iter().all(|f| f.status != Status::Failure)
+}
+
+/// Prints them, one a line.
+///
+/// # Errors
+/// Standard output's.
+pub fn print(findings: &[Finding]) -> Result<(), CommandError> {
+    for finding in findings {
+        let mark = match finding.status {
+            Status::Ok => "ok      ",
+            Status::Warning => "warning ",
+            Status::Failure => "FAILURE ",
+        };
+        let (check, detail) = (&finding.check, &finding.detail);
+        output::line(&format!("{mark} {check:<15} {detail}")).map_err(CommandError::failure)?;
+    }
+    Ok(())
+}

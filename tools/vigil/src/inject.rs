@@ -1,0 +1,92 @@
+//! `vigil inject`: breaks the simulated rover at run time, where the configuration permits it.
+
+use std::time::{Duration, Instant};
+
+use vigil_blocks::{Control, ControlCommand, Health};
+use vigil_cycle::port::Link;
+use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{Graph, Monotonic, Receiver, Stamp, Topic};
+use vigil_robot::Injection;
+use vigil_robot::disturbance::PARAMETERS;
+use vigil_setup::GraphArgs;
+
+use vigil_terminal::{CommandError, Outcome};
+
+/// Time that the simulator may take to answer.
+const ANSWER_LIMIT: Duration = Duration::from_secs(2);
+
+/// Injects a fault into the running simulator, or clears it.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    graph: GraphArgs,
+    /// `stuck:RM`, `encoder:LF:zero|frozen|noise`, `clear:RM`, `clear:all`, or one of many that no
+    /// model contains (`tether:20`, `brush:RM`; a wrong word lists all).
+    #[arg(value_name = "SPEC")]
+    spec: String,
+}
+
+/// Sends the command and waits for the simulator's answer.
+///
+/// # Errors
+/// A specification or configuration that is refused; no simulator that answers.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let setup = args.graph.load().map_err(CommandError::usage)?;
+    let change = Injection::parse_change(&args.spec, &setup.robot).map_err(CommandError::usage)?;
+    if !setup.file.control.allow_injection {
+        let path = setup.path.display();
+        let message = format!("{path}: control.allow_injection is false: injection is refused");
+        return Err(CommandError::usage(message));
+    }
+    let domain = setup.domain().map_err(CommandError::failure)?;
+    if domain.lock().map_err(CommandError::failure)?.is_some() {
+        let name = domain.graph();
+        return Err(CommandError::failure(format!(
+            "no graph named '{name}' is running"
+        )));
+    }
+    let link = Link::join(&domain, "vigil-inject").map_err(CommandError::failure)?;
+    let graph = Graph::SharedMemory(link);
+    let simulator = ServiceName::SensorSim;
+    let mut health = graph
+        .receiver(Topic::Health(simulator))
+        .map_err(CommandError::failure)?;
+    let mut sender = graph
+        .sender::<Control>(Topic::Control(simulator))
+        .map_err(CommandError::failure)?;
+    let block = sender.block();
+    let wire = change.to_wire();
+    let command = match wire.injects {
+        true => ControlCommand::Inject,
+        false => ControlCommand::Clear,
+    };
+    (block.command, block.fault, block.wheel) = (command as u32, wire.kind, wire.place);
+    block.parameter[..PARAMETERS].copy_from_slice(&wire.parameter);
+    let (epoch, seq) = (sender.epoch(), sender.next_seq());
+    sender
+        .send(Stamp::default(), &Monotonic)
+        .map_err(CommandError::failure)?;
+    match answer(health.as_mut(), epoch, seq) {
+        Some(true) => {
+            eprintln!("injected {}", args.spec);
+            Ok(Outcome::Done)
+        }
+        Some(false) => Err(CommandError::failure("the simulator refused the injection")),
+        None => Err(CommandError::failure("no simulator answered")),
+    }
+}
+
+/// Waits for the answer to command (epoch, seq).
+fn answer(health: &mut dyn Receiver<Health>, epoch: u64, seq: u64) -> Option<bool> {
+    let started = Instant::now();
+    while started.elapsed() < ANSWER_LIMIT {
+        while health.advance() {
+            let Some(block) = health.held() else { break };
+            if (block.control_epoch, block.control_seq) == (epoch, seq) {
+                return Some(block.control_result == 1);
+            }
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    None
+}

@@ -1,0 +1,73 @@
+//! Commands of the laboratory: another program, `vigil-lab`, beside this one, so that a graph can
+//! be started without building it.
+
+use std::convert::Infallible;
+use std::ffi::OsString;
+use std::os::unix::process::CommandExt;
+use std::process::Command;
+
+use vigil_terminal::{CommandError, Outcome};
+
+/// The program's name.
+const PROGRAM: &str = "vigil-lab";
+/// Its commands, and what each does.
+const COMMANDS: [(&str, &str); 5] = [
+    ("import", "Turns another program's log into frames"),
+    ("learn", "Learns a model from recorded frames, or shows one"),
+    ("diagnose", "Diagnoses recorded runs"),
+    ("evaluate", "Scores the diagnosis on labelled runs"),
+    (
+        "pomdp",
+        "Checks, solves, compares and learns decision models",
+    ),
+];
+
+/// What the help says of them.
+pub fn help() -> String {
+    let mut text = format!("Commands of {PROGRAM}, built by `cargo build --release`:\n");
+    for (name, about) in COMMANDS {
+        text.push_str(&format!("  {name:<16} {about}\n"));
+    }
+    text
+}
+
+/// Becomes `vigil-lab` with these words.
+///
+/// # Errors
+/// A command that neither program has; a program that is not built.
+pub fn run(words: &[OsString]) -> Result<Outcome, CommandError> {
+    let command = words
+        .first()
+        .and_then(|word| word.to_str())
+        .unwrap_or_default();
+    if !COMMANDS.iter().any(|(name, _)| *name == command) {
+        let message = format!("'{command}' is no command; `vigil --help` lists them");
+        return Err(CommandError::usage(message));
+    }
+    match replace(words) {
+        Ok(never) => match never {},
+        Err(error) => Err(error),
+    }
+}
+
+fn replace(words: &[OsString]) -> Result<Infallible, CommandError> {
+    let here = std::env::current_exe().map_err(CommandError::failure)?;
+    let program = here.with_file_name(PROGRAM);
+    if !program.is_file() {
+        let release = if cfg!(debug_assertions) {
+            ""
+        } else {
+            " --release"
+        };
+        let message = format!(
+            "{} is not built: run `cargo build{release} -p {PROGRAM}`",
+            program.display()
+        );
+        return Err(CommandError::usage(message));
+    }
+    let error = Command::new(&program).args(words).exec();
+    Err(CommandError::failure(format!(
+        "{}: {error}",
+        program.display()
+    )))
+}

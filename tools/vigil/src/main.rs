@@ -1,0 +1,48 @@
+//! `vigil`: the operator's tool. Never in the data path of a running graph.
+
+mod bindings;
+mod check;
+mod check_publisher;
+mod findings;
+mod inject;
+mod laboratory;
+mod print_types;
+mod publisher;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use vigil_terminal::exit_code;
+
+/// Fault detection, diagnosis and recovery for mobile robots.
+///
+/// Exit codes: 0 done, 1 the run found or had a failure, 2 usage or configuration error.
+#[derive(Debug, Parser)]
+#[command(version, about, after_help = laboratory::help(), disable_help_subcommand = true)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Check(check::Args),
+    CheckPublisher(check_publisher::Args),
+    Inject(inject::Args),
+    #[command(name = "types")]
+    PrintTypes(print_types::Args),
+    /// A command of the laboratory.
+    #[command(external_subcommand)]
+    Laboratory(Vec<OsString>),
+}
+
+fn main() -> ExitCode {
+    exit_code(match Args::parse().command {
+        Command::Check(args) => check::run(&args),
+        Command::CheckPublisher(args) => check_publisher::run(&args),
+        Command::Inject(args) => inject::run(&args),
+        Command::PrintTypes(args) => print_types::run(&args),
+        Command::Laboratory(words) => laboratory::run(&words),
+    })
+}
