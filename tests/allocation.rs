@@ -9,7 +9,6 @@ use std::path::Path;
 
 use cases::{HiddenMarkov, JumpLinear, PoseAndWheels};
 use vigil_cycle::allocation::{CountingAllocator, allocations};
-use vigil_decision::{Evidence, Pomdp, Tracker};
 use vigil_inference::adaptive::Adaptive;
 use vigil_inference::ages::Ages;
 use vigil_inference::bank::{Bank, Hypothesis};
@@ -22,6 +21,7 @@ use vigil_inference::merged::Merged;
 use vigil_inference::proposal::Proposal;
 use vigil_inference::resample::Resampling;
 use vigil_inference::windowed::Windowed;
+use vigil_pomdp::{Evidence, Pomdp, Tracker};
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;

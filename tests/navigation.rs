@@ -7,10 +7,10 @@ use vigil_blocks::{
     Action, ActionOutcome, DetectionBelief, Entry, FaultBelief, ParticleBlock, RecoveryKind,
     SensorFrame, Symptoms,
 };
-use vigil_decision::solver::{Options, solve};
-use vigil_decision::{Budget, PointBased};
 use vigil_detector::Detector;
 use vigil_identifier::{Diagnoser, Input};
+use vigil_pomdp::solver::{Options, solve};
+use vigil_pomdp::{Budget, PointBased};
 use vigil_robot::injection::Injection;
 use vigil_sensor_sim::{Assembled, Happening, Simulation};
 use vigil_setup::schema::{GraphFile, Trouble, TroubleKind};

@@ -12,10 +12,10 @@ use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
     DeadlineMonitor, Graph, HealthBoard, SourceCycle, Stage, StageCycle, Topic, VirtualClock,
 };
-use vigil_decision::solver::{Options, solve};
-use vigil_decision::{Budget, PointBased};
 use vigil_detector::DetectorStage;
 use vigil_identifier::IdentifierStage;
+use vigil_pomdp::solver::{Options, solve};
+use vigil_pomdp::{Budget, PointBased};
 use vigil_sensor_sim::{Assembled, SimulatorSource};
 use vigil_setup::{GraphArgs, Setup};
 use vigil_supervisor::SupervisorStage;

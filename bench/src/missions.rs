@@ -35,8 +35,8 @@ use std::error::Error;
 use std::path::Path;
 
 use vigil_blocks::RecoveryKind;
-use vigil_decision::Pomdp;
-use vigil_decision::mdp::{self, Solution};
+use vigil_pomdp::Pomdp;
+use vigil_pomdp::mdp::{self, Solution};
 use vigil_robot::Injection;
 use vigil_robot::injection::Change;
 use vigil_setup::{GraphArgs, Setup};

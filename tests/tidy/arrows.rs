@@ -9,7 +9,7 @@ const SHARED: &[&str] = &[
     "vigil-recording",
     "vigil-robot",
     "vigil-inference",
-    "vigil-decision",
+    "vigil-pomdp",
     "vigil-blocks",
 ];
 
@@ -29,6 +29,7 @@ const TOOLS: &[&str] = &[
     "vigil-learning",
     "vigil-evaluation",
     "vigil-import",
+    "vigil-missions",
     "vigil-lab",
     "vigil",
 ];
@@ -40,7 +41,7 @@ const OF_THE_DOOR: &[&str] = &["vigil-terminal", "vigil-plausibility"];
 const ALLOWED: &[(&str, &[&str])] = &[
     ("vigil-blocks", &[]),
     ("vigil-inference", &["vigil-blocks"]),
-    ("vigil-decision", &["vigil-blocks"]),
+    ("vigil-pomdp", &[]),
     ("vigil-cycle", &["vigil-blocks"]),
     ("vigil-robot", &["vigil-inference", "vigil-blocks"]),
     // Setup reads every model that a graph names, and turns the configuration into what the cycle
@@ -49,7 +50,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "vigil-setup",
         &[
             "vigil-cycle",
-            "vigil-decision",
+            "vigil-pomdp",
             "vigil-robot",
             "vigil-inference",
             "vigil-blocks",
@@ -65,7 +66,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
 const PURE: &[&str] = &[
     "vigil-blocks",
     "vigil-inference",
-    "vigil-decision",
+    "vigil-pomdp",
     "vigil-robot",
 ];
 
@@ -165,7 +166,7 @@ fn arrows_between_crates_point_one_way() {
     crate::demand_none(
         "Move what you need to the room that may hold it, or pass it in as data: services -> \
          {setup, cycle, recording} -> robot -> inference -> blocks, \
-         setup -> cycle, decision -> blocks; tools -> services, shared.",
+         setup -> cycle, pomdp; tools -> services, shared.",
         &arrow_violations(&manifests),
     );
 }
@@ -224,7 +225,7 @@ fn wrong_arrows_are_refused() {
             &["vigil-detector"],
         ),
         read("tools/vigil/Cargo.toml", "vigil", &["vigil-detector"]),
-        read("tools/pages/Cargo.toml", "vigil-pages", &["vigil-lab"]),
+        read("tools/pages/Cargo.toml", "vigil-pages", &["vigil"]),
         read(
             "services/detector/Cargo.toml",
             "vigil-detector",

@@ -16,7 +16,7 @@ const DEFINITIONS: [(&str, &[&str]); 6] = [
     ),
     (
         "config/navigation.toml",
-        &["shared/decision/src/navigation/"],
+        &["tools/missions/src/navigation/"],
     ),
     ("config/", &["shared/setup/src/schema"]),
 ];

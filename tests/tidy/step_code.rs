@@ -12,7 +12,7 @@ const ROOMS: &[&str] = &[
     "services/supervisor/src/",
     "shared/inference/src/",
     "shared/robot/src/",
-    "shared/decision/src/",
+    "shared/pomdp/src/",
 ];
 
 /// Files of a service that connect its `step` to the world.
@@ -89,7 +89,7 @@ fn banned_calls(sources: &[Source]) -> Vec<String> {
 }
 
 fn is_steady(source: &Source, function: &Function) -> bool {
-    let decision = source.is_under(&["shared/decision/"]);
+    let decision = source.is_under(&["shared/pomdp/"]);
     let prefixes = if decision { STEADY_DECISION } else { STEADY };
     let runs_every_cycle = prefixes.iter().any(|prefix| {
         let tail = function.name.strip_prefix(prefix);
@@ -173,8 +173,8 @@ fn allocations_are_refused_in_steady_functions_only() {
     assert_eq!(found("services/detector/src/lib.rs", "predict_only"), 2);
     assert_eq!(found("services/detector/src/lib.rs", "new"), 0);
     assert_eq!(found("services/detector/src/lib.rs", "steps"), 0);
-    assert_eq!(found("shared/decision/src/fib.rs", "update"), 0);
-    assert_eq!(found("shared/decision/src/policy.rs", "decide"), 2);
+    assert_eq!(found("shared/pomdp/src/fib.rs", "update"), 0);
+    assert_eq!(found("shared/pomdp/src/policy.rs", "decide"), 2);
     assert_eq!(found("tools/evaluation/src/score.rs", "update"), 0);
     let quiet = "fn step(&mut self) { self.buffer.clear(); } // vec![0; 3]\n";
     let source = Source::new("shared/inference/src/filter.rs", quiet);

@@ -1,7 +1,7 @@
 //! Means and paired differences of missions.
 
 use serde_json::{Value, json};
-use vigil_decision::simulation::{Paired, Summary};
+use vigil_missions::simulation::{Paired, Summary};
 
 use super::arm::Arm;
 use super::drive::Mission;

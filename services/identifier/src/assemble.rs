@@ -1,7 +1,7 @@
 //! From the configuration to an identifier.
 
-use vigil_decision::Pomdp;
 use vigil_inference::FaultTree;
+use vigil_pomdp::Pomdp;
 use vigil_robot::learned::Model;
 use vigil_robot::{Description, RobotModel};
 use vigil_setup::Setup;

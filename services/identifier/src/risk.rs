@@ -1,7 +1,7 @@
 //! Risk of losing track of a mode, from the recovery model.
 
-use vigil_decision::Pomdp;
 use vigil_inference::risk::{self, Recovery, Tracking};
+use vigil_pomdp::Pomdp;
 
 use crate::modes::IdentifierError;
 

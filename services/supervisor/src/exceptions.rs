@@ -1,9 +1,9 @@
 //! Decisions about exceptions of the navigation: states are told by symptoms and outcomes.
 
 use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
-use vigil_decision::policy::choose_among;
-use vigil_decision::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
 use vigil_inference::FaultTree;
+use vigil_pomdp::policy::choose_among;
+use vigil_pomdp::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
 use vigil_setup::schema;
 
 use crate::epoch::{End, Epoch, Limits};

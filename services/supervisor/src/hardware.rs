@@ -30,7 +30,7 @@
 //! Without the identifier, an alarm of the detector is something unknown, with its probability.
 
 use vigil_blocks::{DetectionBelief, FaultBelief};
-use vigil_decision::Pomdp;
+use vigil_pomdp::Pomdp;
 
 use crate::evidence::{DRIFT_MAX, LOG_EPOCH_MAX, LOG_RATIO_MAX, P_TOLERANCE};
 

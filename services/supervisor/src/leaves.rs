@@ -1,8 +1,8 @@
 //! Decisions about the leaves of the fault tree: states are told by the identifier.
 
 use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
-use vigil_decision::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
 use vigil_inference::FaultTree;
+use vigil_pomdp::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
 use vigil_robot::Description;
 use vigil_setup::schema;
 

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use vigil_blocks::{DECISION_ACTIONS, DECISION_STATES, RecoveryKind};
-use vigil_decision::Pomdp;
-use vigil_decision::mdp::SolveError;
-use vigil_decision::policy::{BuildError, KindError};
 use vigil_inference::FaultTree;
+use vigil_pomdp::Pomdp;
+use vigil_pomdp::mdp::SolveError;
+use vigil_pomdp::policy::{BuildError, KindError};
 use vigil_robot::Description;
 use vigil_setup::schema::RecoveryAction;
 

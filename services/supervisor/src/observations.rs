@@ -1,7 +1,7 @@
 //! From a set of symptoms and outcomes to an observation of the decision model, by name.
 
 use vigil_blocks::Symptoms;
-use vigil_decision::Pomdp;
+use vigil_pomdp::Pomdp;
 
 use crate::mapping::SupervisorError;
 

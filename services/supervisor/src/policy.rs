@@ -1,8 +1,8 @@
 //! The policy that the settings name.
 
-use vigil_decision::mdp::Solution;
-use vigil_decision::policy::{Dual, Gate, Information, Measure, PolicyKind};
-use vigil_decision::{Decider, PointBased, Policy, Pomdp, QMdp};
+use vigil_pomdp::mdp::Solution;
+use vigil_pomdp::policy::{Dual, Gate, Information, Measure, PolicyKind};
+use vigil_pomdp::{Decider, PointBased, Policy, Pomdp, QMdp};
 use vigil_setup::schema;
 
 use crate::mapping::SupervisorError;

@@ -11,8 +11,8 @@
 //!   and then stands looks healthy, whatever is wrong with it: what pulls at it pulls no more.
 
 use vigil_blocks::RecoveryKind;
-use vigil_decision::policy::choose_among;
-use vigil_decision::{Choice, Control};
+use vigil_pomdp::policy::choose_among;
+use vigil_pomdp::{Choice, Control};
 
 use crate::mapping::ActionMeaning;
 

@@ -1,8 +1,8 @@
 //! One decision cycle.
 
 use vigil_blocks::{Action, DetectionBelief, Entry, FaultBelief};
-use vigil_decision::{PointBased, Pomdp};
 use vigil_inference::FaultTree;
+use vigil_pomdp::{PointBased, Pomdp};
 use vigil_robot::Description;
 use vigil_setup::schema;
 

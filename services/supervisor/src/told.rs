@@ -3,8 +3,8 @@
 use vigil_blocks::{
     Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, ValueKind,
 };
-use vigil_decision::policy::Measure;
-use vigil_decision::{Choice, Control, Decider, Pomdp, Tracker};
+use vigil_pomdp::policy::Measure;
+use vigil_pomdp::{Choice, Control, Decider, Pomdp, Tracker};
 
 use crate::mapping::ActionMeaning;
 

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use vigil_blocks::fnv1a;
-use vigil_decision::{PointBased, Pomdp};
 use vigil_inference::FaultTree;
 use vigil_inference::tree::Node;
+use vigil_pomdp::{PointBased, Pomdp};
 use vigil_robot::learned::ModelError;
 use vigil_robot::{Description, RobotModel};
 

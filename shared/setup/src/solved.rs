@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use vigil_blocks::fnv1a;
-use vigil_decision::policy_file::PolicyFile;
-use vigil_decision::{PointBased, Pomdp};
+use vigil_pomdp::policy_file::PolicyFile;
+use vigil_pomdp::{PointBased, Pomdp};
 
 /// Largest file, bytes: more than what a cycle has time for.
 const BYTES_MAX: u64 = 64 << 20;

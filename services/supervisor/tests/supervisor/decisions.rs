@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use vigil_blocks::{ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
 use vigil_cycle::allocation::allocations;
-use vigil_decision::{Policy, Pomdp, QMdp, mdp};
+use vigil_pomdp::{Policy, Pomdp, QMdp, mdp};
 use vigil_setup::schema::GraphFile;
 use vigil_supervisor::{Compensation, Inputs, Supervisor};
 

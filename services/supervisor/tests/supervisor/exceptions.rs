@@ -2,7 +2,7 @@
 
 use vigil_blocks::{ActionOutcome, Entry, RecoveryKind, Symptoms};
 use vigil_cycle::allocation::allocations;
-use vigil_decision::{Pomdp, Tracker};
+use vigil_pomdp::{Pomdp, Tracker};
 use vigil_setup::schema::Supervisor as Settings;
 use vigil_supervisor::Inputs;
 

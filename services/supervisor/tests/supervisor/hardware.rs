@@ -1,7 +1,7 @@
 //! The navigation model behind the supervisor: what identifier and detector say about hardware.
 
 use vigil_blocks::{ActionOutcome, ControlMode, Entry, RecoveryKind, Symptoms};
-use vigil_decision::{Pomdp, Tracker};
+use vigil_pomdp::{Pomdp, Tracker};
 use vigil_supervisor::Inputs;
 
 use crate::told::{CYCLE_NS, FP, MODEL, Told, assert_near, build, settings, tracked};

@@ -2,8 +2,8 @@
 
 use vigil_blocks::{ControlMode, DetectionBelief, Entry, RecoveryKind, ValueKind};
 use vigil_cycle::allocation::allocations;
-use vigil_decision::policy::{Base, Dual, PolicyName, normalised_entropy};
-use vigil_decision::{Pomdp, mdp};
+use vigil_pomdp::policy::{Base, Dual, PolicyName, normalised_entropy};
+use vigil_pomdp::{Pomdp, mdp};
 use vigil_setup::schema::{Gate, GraphFile, Supervisor as Settings};
 use vigil_supervisor::{Inputs, Supervisor};
 

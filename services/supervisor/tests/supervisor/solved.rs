@@ -8,9 +8,9 @@ use vigil_blocks::{
     Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind, Symptoms, ValueKind,
 };
 use vigil_cycle::allocation::allocations;
-use vigil_decision::policy_file::PolicyFile;
-use vigil_decision::solver::{Options, solve};
-use vigil_decision::{AlphaVectors, Budget, Pomdp};
+use vigil_pomdp::policy_file::PolicyFile;
+use vigil_pomdp::solver::{Options, solve};
+use vigil_pomdp::{AlphaVectors, Budget, Pomdp};
 use vigil_setup::schema::GraphFile;
 use vigil_setup::{Setup, load_graph};
 use vigil_supervisor::{Inputs, Supervisor, assemble};

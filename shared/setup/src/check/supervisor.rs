@@ -1,6 +1,6 @@
 //! Rules of `[supervisor]`.
 
-use vigil_decision::policy::PolicyKind;
+use vigil_pomdp::policy::PolicyKind;
 
 use crate::schema::{Evidence, GraphFile, Navigation, Recovery, Source, Supervisor};
 

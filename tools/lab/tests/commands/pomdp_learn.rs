@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 use tempfile::TempDir;
-use vigil_decision::Pomdp;
+use vigil_pomdp::Pomdp;
 
 const MODEL: &str = "config/navigation.pomdp";
 

@@ -5,8 +5,8 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
-use vigil_decision::policy_file::{PolicyFile, alpha, appl};
-use vigil_decision::{Pomdp, mdp};
+use vigil_pomdp::policy_file::{PolicyFile, alpha, appl};
+use vigil_pomdp::{Pomdp, mdp};
 
 const TIGER: &str = "discount: 0.95\nstates: left right\nactions: listen open-left open-right\n\
     observations: hear-left hear-right\nT: * uniform\nT: listen identity\nO: * uniform\n\

@@ -1,8 +1,8 @@
 //! The navigation model behind the supervisor, told cycle by cycle what is seen.
 
 use vigil_blocks::{Action, ActionOutcome, DetectionBelief, Entry, FaultBelief, RecoveryKind};
-use vigil_decision::{Pomdp, Tracker};
 use vigil_inference::FaultTree;
+use vigil_pomdp::{Pomdp, Tracker};
 use vigil_setup::schema::{GraphFile, Supervisor as Settings};
 use vigil_supervisor::{Inputs, Supervisor};
 

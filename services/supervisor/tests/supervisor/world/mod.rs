@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use vigil_blocks::{Action, DetectionBelief, Entry, FaultBelief, RecoveryKind};
-use vigil_decision::Pomdp;
 use vigil_inference::FaultTree;
+use vigil_pomdp::Pomdp;
 use vigil_robot::Description;
 use vigil_setup::schema::{self, GraphFile};
 use vigil_supervisor::{Compensation, Inputs, Supervisor};

@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::RangedU64ValueParser;
 use clap::{ArgAction, ValueEnum};
-use vigil_decision::policy::{Gate, PolicyKind};
-use vigil_decision::simulation::{Rules, horizon};
-use vigil_decision::{PointBased, Pomdp, mdp};
+use vigil_missions::simulation::{Rules, horizon};
+use vigil_pomdp::policy::{Gate, PolicyKind};
+use vigil_pomdp::{PointBased, Pomdp, mdp};
 
 use super::escalation::EscalationArgs;
 use super::{load, solved};

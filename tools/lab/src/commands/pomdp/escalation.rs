@@ -1,7 +1,8 @@
 //! What the deterministic baseline does.
 
-use vigil_decision::simulation::Escalation;
-use vigil_decision::{Pomdp, navigation};
+use vigil_missions::navigation;
+use vigil_missions::simulation::Escalation;
+use vigil_pomdp::Pomdp;
 
 use vigil_terminal::CommandError;
 

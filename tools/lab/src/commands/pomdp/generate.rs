@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use vigil_decision::navigation::{self, Parameters};
+use vigil_missions::navigation::{self, Parameters};
 
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 
 use serde::Serialize;
-use vigil_decision::Pomdp;
+use vigil_pomdp::Pomdp;
 
 use super::load;
 use vigil_terminal::output;

@@ -5,11 +5,11 @@ mod document;
 use std::fs;
 use std::path::PathBuf;
 
-use vigil_decision::learning::check::{Agreement, Followed, Refusal};
-use vigil_decision::learning::{Learned, Record, Settings, check, learn};
-use vigil_decision::policy::{Dual, PolicyName};
-use vigil_decision::simulation::{Paired, PolicyAgent, Rules, Summary, horizon, run as fly};
-use vigil_decision::{Pomdp, mdp};
+use vigil_missions::learning::check::{Agreement, Followed, Refusal};
+use vigil_missions::learning::{Learned, Record, Settings, check, learn};
+use vigil_missions::simulation::{Paired, PolicyAgent, Rules, Summary, horizon, run as fly};
+use vigil_pomdp::policy::{Dual, PolicyName};
+use vigil_pomdp::{Pomdp, mdp};
 
 use super::compare::{count, fits};
 use super::{load, missions, seed};

@@ -15,8 +15,8 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use vigil_decision::Pomdp;
-use vigil_decision::learning::Record;
+use vigil_missions::learning::Record;
+use vigil_pomdp::Pomdp;
 
 use super::find;
 use vigil_terminal::CommandError;

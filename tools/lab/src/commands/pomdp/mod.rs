@@ -16,7 +16,7 @@ mod track;
 
 use std::path::Path;
 
-use vigil_decision::Pomdp;
+use vigil_pomdp::Pomdp;
 
 use vigil_terminal::{CommandError, Outcome};
 

@@ -8,9 +8,9 @@ mod regions;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use vigil_decision::policy::{Decider, Dual, Policy, PolicyName};
-use vigil_decision::policy_graph::{Limits, PolicyGraph};
-use vigil_decision::{Pomdp, mdp};
+use vigil_pomdp::policy::{Decider, Dual, Policy, PolicyName};
+use vigil_pomdp::policy_graph::{Limits, PolicyGraph};
+use vigil_pomdp::{Pomdp, mdp};
 
 use super::{load, solved, track};
 use vigil_terminal::{CommandError, Outcome};

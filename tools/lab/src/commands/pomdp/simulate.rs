@@ -4,9 +4,9 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
-use vigil_decision::learning::Record;
-use vigil_decision::mdp;
-use vigil_decision::simulation::{Rules, horizon};
+use vigil_missions::learning::Record;
+use vigil_missions::simulation::{Rules, horizon};
+use vigil_pomdp::mdp;
 
 use super::compare::contestant::{Contestant, Knowledge};
 use super::compare::{among, count, solved_by};

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use vigil_cycle::clock::process_cpu_s;
 use vigil_cycle::signal;
-use vigil_decision::policy_file::{PolicyFile, alpha, appl};
-use vigil_decision::solver::{Answer, Ended, Method, Options, Progress, bound};
-use vigil_decision::{Budget, Pomdp};
+use vigil_pomdp::policy_file::{PolicyFile, alpha, appl};
+use vigil_pomdp::solver::{Answer, Ended, Method, Options, Progress, bound};
+use vigil_pomdp::{Budget, Pomdp};
 
 use super::load;
 use vigil_terminal::output;
@@ -205,7 +205,7 @@ fn document(args: &Args, model: &Pomdp, answer: &Answer, cpu_s: f64) -> Document
         rounds: answer.progress.rounds,
         beliefs: answer.progress.beliefs,
         points: answer.progress.points,
-        vectors: vectors.map_or(0, vigil_decision::AlphaVectors::len),
+        vectors: vectors.map_or(0, vigil_pomdp::AlphaVectors::len),
         policy: args.out.as_ref().map(|out| out.display().to_string()),
     }
 }

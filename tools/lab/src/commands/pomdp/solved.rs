@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use vigil_decision::policy_file::{PolicyFile, alpha, appl};
-use vigil_decision::{PointBased, Pomdp};
+use vigil_pomdp::policy_file::{PolicyFile, alpha, appl};
+use vigil_pomdp::{PointBased, Pomdp};
 
 use vigil_terminal::CommandError;
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
-use vigil_decision::{Evidence, Pomdp, Tracker};
+use vigil_pomdp::{Evidence, Pomdp, Tracker};
 
 use super::{find, load};
 use vigil_terminal::output;

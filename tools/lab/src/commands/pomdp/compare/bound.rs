@@ -1,8 +1,8 @@
 //! What regret is measured from.
 
-use vigil_decision::bounds::fib;
-use vigil_decision::solver::{Options, solve};
-use vigil_decision::{Budget, Pomdp};
+use vigil_pomdp::bounds::fib;
+use vigil_pomdp::solver::{Options, solve};
+use vigil_pomdp::{Budget, Pomdp};
 
 use super::Args;
 use vigil_terminal::CommandError;

@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use serde::Serialize;
 use serde_json::{Value, json};
-use vigil_decision::Pomdp;
-use vigil_decision::simulation::{Act, Agent, Mission, Paired, Rules, Summary, run};
+use vigil_missions::simulation::{Act, Agent, Mission, Paired, Rules, Summary, run};
+use vigil_pomdp::Pomdp;
 
 use super::bound::Upper;
 use super::contestant::{Contestant, Knowledge};

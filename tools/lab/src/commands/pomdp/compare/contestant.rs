@@ -1,9 +1,9 @@
 //! Who takes part.
 
-use vigil_decision::mdp::Solution;
-use vigil_decision::policy::{Dual, Gate, Information, PolicyKind};
-use vigil_decision::simulation::{Agent, PolicyAgent, Random};
-use vigil_decision::{PointBased, Pomdp};
+use vigil_missions::simulation::{Agent, PolicyAgent, Random};
+use vigil_pomdp::mdp::Solution;
+use vigil_pomdp::policy::{Dual, Gate, Information, PolicyKind};
+use vigil_pomdp::{PointBased, Pomdp};
 
 use crate::commands::pomdp::escalation::EscalationArgs;
 use vigil_terminal::CommandError;

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use serde::Serialize;
-use vigil_decision::learning::{self, Learned, LearnedRow, Table};
-use vigil_decision::simulation::Summary;
+use vigil_missions::learning::{self, Learned, LearnedRow, Table};
+use vigil_missions::simulation::Summary;
 
 /// What the command prints.
 #[derive(Debug, Serialize)]

@@ -1,6 +1,6 @@
 //! The belief over time, as stacked areas.
 
-use vigil_decision::{Evidence, Pomdp, Tracker};
+use vigil_pomdp::{Evidence, Pomdp, Tracker};
 
 use super::canvas::{Anchor, INK, colour, drawing};
 

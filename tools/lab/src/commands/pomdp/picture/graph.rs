@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use vigil_decision::Pomdp;
-use vigil_decision::policy_graph::{Edge, Node, PolicyGraph};
+use vigil_pomdp::Pomdp;
+use vigil_pomdp::policy_graph::{Edge, Node, PolicyGraph};
 
 use super::canvas::{Anchor, Canvas, INK, Point, colour, drawing};
 

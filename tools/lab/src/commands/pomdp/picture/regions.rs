@@ -1,7 +1,7 @@
 //! Which action a policy takes at which belief: a line for two states, a triangle for three.
 
-use vigil_decision::Pomdp;
-use vigil_decision::policy::Decider;
+use vigil_pomdp::Pomdp;
+use vigil_pomdp::policy::Decider;
 
 use super::canvas::{Anchor, Canvas, INK, Point, colour, drawing};
 

@@ -1,0 +1,167 @@
+//! A POMDP in the form that tracking and deciding need: sparse transitions, dense columns of Z.
+
+mod build;
+mod hash;
+mod joint;
+pub(crate) mod rewards;
+pub(crate) mod sparse;
+
+pub use build::Probabilities;
+pub(crate) use build::{Parts, ROW_SUM_TOLERANCE, refuse_sum};
+
+use crate::reader::{self, ParseError, Position};
+use joint::Joint;
+use rewards::Rewards;
+use sparse::Sparse;
+
+/// Something about a model that its author may want to mend.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Warning {
+    /// Where.
+    pub at: Position,
+    /// What.
+    pub message: String,
+}
+
+/// A partially observable Markov decision process.
+///
+/// Two models are equal if all their names and numbers are; warnings do not count.
+#[derive(Debug, Clone)]
+pub struct Pomdp {
+    discount: f64,
+    is_cost: bool,
+    states: Vec<String>,
+    actions: Vec<String>,
+    observations: Vec<String>,
+    start: Vec<f64>,
+    /// Per action: for each s the successors and their probabilities.
+    transitions: Vec<Sparse>,
+    /// Z[a][z][s'].
+    observation: Vec<f64>,
+    rewards: Rewards,
+    /// R[a][s], expected.
+    reward: Vec<f64>,
+    /// T and Z in one, unless that is too large.
+    joint: Option<Joint>,
+    hash: u64,
+    warnings: Vec<Warning>,
+}
+
+impl PartialEq for Pomdp {
+    fn eq(&self, other: &Self) -> bool {
+        self.hash == other.hash
+            && self.is_cost == other.is_cost
+            && self.discount == other.discount
+            && self.states == other.states
+            && self.actions == other.actions
+            && self.observations == other.observations
+            && self.start == other.start
+            && self.transitions == other.transitions
+            && self.observation == other.observation
+            && self.rewards == other.rewards
+            && self.reward == other.reward
+    }
+}
+
+impl Pomdp {
+    /// Reads Cassandra's `.pomdp` format.
+    ///
+    /// Memory: at most about ten times the text, besides tables of 2^24 entries.
+    ///
+    /// # Errors
+    /// [`ParseError`] with line and column, what was found and what is allowed.
+    pub fn parse(text: &str) -> Result<Self, ParseError> {
+        reader::parse(text)
+    }
+
+    /// Names of the states.
+    #[must_use]
+    pub fn states(&self) -> &[String] {
+        &self.states
+    }
+
+    /// Names of the actions.
+    #[must_use]
+    pub fn actions(&self) -> &[String] {
+        &self.actions
+    }
+
+    /// Names of the observations; `none` alone for a model without any.
+    #[must_use]
+    pub fn observations(&self) -> &[String] {
+        &self.observations
+    }
+
+    /// Discount per step, 0 to 1.
+    #[must_use]
+    pub const fn discount(&self) -> f64 {
+        self.discount
+    }
+
+    /// True if the file states costs (`values: cost`). Rewards here are their negatives.
+    #[must_use]
+    pub const fn is_cost(&self) -> bool {
+        self.is_cost
+    }
+
+    /// Start belief, as the file gives it: its sum may be off 1 by up to 1e-5.
+    #[must_use]
+    pub fn start(&self) -> &[f64] {
+        &self.start
+    }
+
+    /// R(s,a), the expected immediate reward; costs count negative.
+    #[must_use]
+    pub fn reward(&self, state: usize, action: usize) -> f64 {
+        self.reward[action * self.states.len() + state]
+    }
+
+    /// R(s,a,s',z), the reward of one outcome; costs count negative. [`Self::reward`] is its
+    /// expectation.
+    #[must_use]
+    pub fn reward_of(&self, state: usize, action: usize, next: usize, observation: usize) -> f64 {
+        self.rewards.block(state, action).at(next, observation)
+    }
+
+    /// True if some reward depends on s' or z.
+    #[must_use]
+    pub fn has_outcome_rewards(&self) -> bool {
+        let mut blocks = self.rewards.blocks().iter();
+        blocks.any(|block| !block.others.is_empty())
+    }
+
+    /// Successors of `state` under `action`: (s', probability), s' ascending.
+    #[must_use]
+    pub fn successors(&self, state: usize, action: usize) -> &[(usize, f64)] {
+        self.transitions[action].row(state)
+    }
+
+    /// Z(a,s',z) for every s'.
+    #[must_use]
+    pub fn likelihood(&self, action: usize, observation: usize) -> &[f64] {
+        let n = self.states.len();
+        let first = (action * self.observations.len() + observation) * n;
+        &self.observation[first..first + n]
+    }
+
+    /// Hash over everything that has a meaning: numbers and names, not comments or layout. A cost
+    /// hashes as the negative reward that it is.
+    #[must_use]
+    pub const fn hash(&self) -> u64 {
+        self.hash
+    }
+
+    /// What the author may want to mend.
+    #[must_use]
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    pub(crate) const fn joint(&self) -> Option<&Joint> {
+        self.joint.as_ref()
+    }
+
+    pub(crate) const fn rewards(&self) -> &Rewards {
+        &self.rewards
+    }
+}

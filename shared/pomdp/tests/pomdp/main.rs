@@ -1,0 +1,19 @@
+//! Tests of the library of decision models.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+mod belief;
+mod bounds;
+mod dual;
+mod grammar;
+mod hostile;
+mod point_based;
+mod policy_file;
+mod policy_graph;
+#[cfg(feature = "xml")]
+mod pomdpx;
+mod public;
+mod reference;
+mod round_trip;
+mod solver;
+mod solver_shapes;

@@ -1,0 +1,13 @@
+//! Simulated missions, and what is learned from recorded ones.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod heuristics;
+mod learning;
+mod learning_intervals;
+mod learning_navigation;
+mod learning_online;
+mod navigation;
+mod public;
+mod recorded;
+mod simulation;
