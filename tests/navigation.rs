@@ -7,15 +7,15 @@ use vigil_blocks::{
     Action, ActionOutcome, DetectionBelief, Entry, FaultBelief, ParticleBlock, RecoveryKind,
     SensorFrame, Symptoms,
 };
-use vigil_detector::Detector;
-use vigil_identifier::{Diagnoser, Input};
+use vigil_decision::{Inputs, Supervisor};
+use vigil_diagnosis::detect::Detector;
+use vigil_diagnosis::identify::{Diagnoser, Input};
 use vigil_pomdp::solver::{Options, solve};
 use vigil_pomdp::{Budget, PointBased};
 use vigil_robot::injection::Injection;
 use vigil_sensor_sim::{Assembled, Happening, Simulation};
 use vigil_setup::schema::{GraphFile, Trouble, TroubleKind};
 use vigil_setup::{Setup, load_graph};
-use vigil_supervisor::{Inputs, Supervisor};
 
 const PERIOD_NS: u64 = 10_000_000;
 

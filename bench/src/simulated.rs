@@ -7,8 +7,8 @@ pub use stages::Stages;
 use std::error::Error;
 use std::path::Path;
 
-use vigil_inference::FaultTree;
 use vigil_robot::Description;
+use vigil_robot::FaultTree;
 use vigil_robot::learned::Model;
 use vigil_setup::schema::Sensors;
 

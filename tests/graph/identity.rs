@@ -6,7 +6,7 @@ use vigil_blocks::{
     Block, CauseKind, DetectionBelief, Entry, FaultBelief, Header, ParticleBlock, SensorFrame,
 };
 use vigil_cycle::Topic;
-use vigil_identifier::Input;
+use vigil_diagnosis::identify::Input;
 use vigil_setup::schema::IdentifierFilter;
 
 use crate::harness::{Running, drain, machine};

@@ -9,6 +9,8 @@ const SHARED: &[&str] = &[
     "vigil-recording",
     "vigil-robot",
     "vigil-inference",
+    "vigil-decision",
+    "vigil-diagnosis",
     "vigil-pomdp",
     "vigil-blocks",
 ];
@@ -40,16 +42,31 @@ const OF_THE_DOOR: &[&str] = &["vigil-terminal", "vigil-plausibility"];
 /// For each shared crate, the crates of the workspace that it may see.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("vigil-blocks", &[]),
-    ("vigil-inference", &["vigil-blocks"]),
+    ("vigil-inference", &[]),
     ("vigil-pomdp", &[]),
     ("vigil-cycle", &["vigil-blocks"]),
     ("vigil-robot", &["vigil-inference", "vigil-blocks"]),
+    (
+        "vigil-diagnosis",
+        &[
+            "vigil-pomdp",
+            "vigil-robot",
+            "vigil-inference",
+            "vigil-blocks",
+        ],
+    ),
+    (
+        "vigil-decision",
+        &["vigil-pomdp", "vigil-robot", "vigil-blocks"],
+    ),
     // Setup reads every model that a graph names, and turns the configuration into what the cycle
     // needs: placement, deadlines, queues.
     (
         "vigil-setup",
         &[
             "vigil-cycle",
+            "vigil-decision",
+            "vigil-diagnosis",
             "vigil-pomdp",
             "vigil-robot",
             "vigil-inference",
@@ -68,6 +85,8 @@ const PURE: &[&str] = &[
     "vigil-inference",
     "vigil-pomdp",
     "vigil-robot",
+    "vigil-diagnosis",
+    "vigil-decision",
 ];
 
 /// What a pure crate never sees.

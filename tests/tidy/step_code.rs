@@ -10,6 +10,8 @@ const ROOMS: &[&str] = &[
     "services/detector/src/",
     "services/identifier/src/",
     "services/supervisor/src/",
+    "shared/decision/src/",
+    "shared/diagnosis/src/",
     "shared/inference/src/",
     "shared/robot/src/",
     "shared/pomdp/src/",

@@ -4,8 +4,8 @@
 use std::path::PathBuf;
 
 use vigil_blocks::{DetectionBelief, Entry, FaultBelief, ParticleBlock, SensorFrame};
-use vigil_detector::Detector;
-use vigil_identifier::{Diagnoser, Input};
+use vigil_diagnosis::detect::Detector;
+use vigil_diagnosis::identify::{Diagnoser, Input};
 use vigil_robot::{Fault, FaultKind};
 use vigil_sensor_sim::{EffectiveCommand, World};
 use vigil_setup::{GraphArgs, Setup};

@@ -6,7 +6,7 @@ use rand::seq::SliceRandom;
 use rand::{Rng, RngExt};
 use vigil_blocks::SizeKind;
 use vigil_evaluation::scoring::field::{Size, Stretch, Truth};
-use vigil_inference::FaultTree;
+use vigil_robot::FaultTree;
 use vigil_robot::injection::Change;
 use vigil_robot::{Description, DisturbanceKind, FaultKind, Injection};
 use vigil_setup::schema::Sensors;

@@ -5,9 +5,9 @@ use std::error::Error;
 use vigil_blocks::{
     Action, DetectionBelief, Entry, FaultBelief, ParticleBlock, RecoveryKind, SensorFrame,
 };
-use vigil_detector::Detector;
-use vigil_identifier::{Diagnoser, Input};
-use vigil_supervisor::{Inputs, Supervisor};
+use vigil_decision::{Inputs, Supervisor};
+use vigil_diagnosis::detect::Detector;
+use vigil_diagnosis::identify::{Diagnoser, Input};
 
 use super::arm::Arm;
 use super::escalation::{Escalation, Explanation, Seen, Told};

@@ -6,13 +6,13 @@ use vigil_blocks::{
     Action, ControlMode, DetectionBelief, Entry, FaultBelief, MODE_BLIND, MODE_MULTIPLE,
     MODE_UNKNOWN, ParticleBlock, RecoveryKind, SensorFrame, SizeKind,
 };
-use vigil_detector::Detector;
+use vigil_decision::{Inputs, Supervisor, fused_alarm};
+use vigil_diagnosis::detect::Detector;
+use vigil_diagnosis::identify::{Diagnoser, Input};
 use vigil_evaluation::scoring::field::{BLIND, Moment, Size, Told};
 use vigil_evaluation::scoring::{Belief, MULTIPLE, UNKNOWN};
-use vigil_identifier::{Diagnoser, Input};
 use vigil_setup::Setup;
 use vigil_setup::schema::Sensors;
-use vigil_supervisor::{Inputs, Supervisor, fused_alarm};
 
 /// The three stages of a graph.
 pub struct Stages {

@@ -4,7 +4,7 @@ use vigil_robot::{Description, Measured, RobotModel};
 use vigil_setup::Setup;
 use vigil_setup::schema::{Sensors, Source};
 
-use crate::{Detector, DetectorError};
+use vigil_diagnosis::detect::{Detector, DetectorError};
 
 /// The detector that a configuration describes.
 ///

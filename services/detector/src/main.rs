@@ -8,7 +8,8 @@ use vigil_blocks::SensorFrame;
 use vigil_cycle::Topic;
 use vigil_cycle::serve::{self, ServeError};
 use vigil_cycle::topic::ServiceName;
-use vigil_detector::{Detector, DetectorStage, assemble};
+use vigil_detector::{DetectorStage, assemble};
+use vigil_diagnosis::detect::Detector;
 use vigil_setup::{ServiceArgs, Setup};
 
 /// Detects any deviation from nominal behaviour.

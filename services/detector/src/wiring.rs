@@ -9,7 +9,7 @@ use vigil_cycle::{
 
 use vigil_robot::{Description, FrameGuard};
 
-use crate::Detector;
+use vigil_diagnosis::detect::Detector;
 
 /// A robot at rest is told of after so long, ns: one that turns round does not count.
 const REST_NS: u64 = 1_000_000_000;

@@ -1,25 +1,8 @@
 //! From the configuration to an identifier.
 
-use vigil_inference::FaultTree;
-use vigil_pomdp::Pomdp;
-use vigil_robot::learned::Model;
-use vigil_robot::{Description, RobotModel};
+use vigil_diagnosis::identify::{Diagnoser, Identifier, IdentifierError, Models, Watcher};
+use vigil_robot::RobotModel;
 use vigil_setup::Setup;
-
-use crate::{Diagnoser, Identifier, IdentifierError, Watcher};
-
-/// The models that an identifier is built from.
-#[derive(Debug, Clone, Copy)]
-pub struct Models<'a> {
-    /// How the robot behaves.
-    pub model: &'a Model,
-    /// The robot.
-    pub robot: &'a Description,
-    /// Its faults.
-    pub tree: &'a FaultTree,
-    /// What faults cost; only the risk-sensitive filter needs it.
-    pub decision: Option<&'a Pomdp>,
-}
 
 /// The identifier that a configuration describes.
 ///

@@ -8,7 +8,8 @@ use vigil_blocks::DetectionBelief;
 use vigil_cycle::Topic;
 use vigil_cycle::serve::{self, ServeError};
 use vigil_cycle::topic::ServiceName;
-use vigil_identifier::{Diagnoser, IdentifierStage, assemble};
+use vigil_diagnosis::identify::Diagnoser;
+use vigil_identifier::{IdentifierStage, assemble};
 use vigil_setup::{ServiceArgs, Setup};
 
 /// Identifies the fault.

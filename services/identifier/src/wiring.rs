@@ -14,7 +14,7 @@ use vigil_cycle::{
 use vigil_robot::{Description, FrameGuard};
 
 use crate::told_size::ToldSize;
-use crate::{Diagnoser, Input};
+use vigil_diagnosis::identify::{Diagnoser, Input};
 
 /// Sensor frames that may wait for their detection: more than a queue of them holds by default.
 const PENDING_MAX: usize = 256;

@@ -2,7 +2,7 @@
 
 use vigil_setup::Setup;
 
-use crate::{Compensation, Supervisor, SupervisorError};
+use vigil_decision::{Compensation, Supervisor, SupervisorError};
 
 /// Without any belief the robot stops after this long, ns (two observations, 2 cm at 0.2 m/s), and
 /// not before so many misses: a single late cycle at a low rate is none.

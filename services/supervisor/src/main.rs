@@ -8,8 +8,9 @@ use vigil_blocks::FaultBelief;
 use vigil_cycle::Topic;
 use vigil_cycle::serve::{self, ServeError};
 use vigil_cycle::topic::ServiceName;
+use vigil_decision::Supervisor;
 use vigil_setup::{ServiceArgs, Setup};
-use vigil_supervisor::{Supervisor, SupervisorStage, assemble, validity_ns};
+use vigil_supervisor::{SupervisorStage, assemble, validity_ns};
 
 /// Decides what to do about a fault.
 #[derive(Debug, Parser)]

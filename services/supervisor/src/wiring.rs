@@ -6,7 +6,7 @@ use vigil_cycle::{
     Topic,
 };
 
-use crate::{Inputs, Supervisor};
+use vigil_decision::{Inputs, Supervisor};
 
 /// The supervisor as a stage of the graph: diagnoses and detections in, actions out.
 pub struct SupervisorStage {

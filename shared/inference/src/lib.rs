@@ -35,7 +35,6 @@
 //! | [`outlier`] | measurements of which now and then one is far off |
 //! | [`onsets`] | components by the age of their onset, in bounded number |
 //! | [`bank`] | exact single faults: one hypothesis per (mode, onset) |
-//! | [`tree`] | the fault tree |
 //! | [`logspace`], [`angle`] | probabilities as logarithms, angles on the circle |
 
 pub mod adaptive;
@@ -62,8 +61,5 @@ pub mod risk;
 pub mod size;
 pub mod slow_state;
 pub mod track;
-pub mod tree;
 pub mod weights;
 pub mod windowed;
-
-pub use tree::FaultTree;

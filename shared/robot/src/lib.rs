@@ -24,6 +24,7 @@ mod robot_model;
 pub mod slip;
 mod suspects;
 pub mod tolerance;
+pub mod tree;
 
 pub use alarm::{Alarm, AlarmError};
 pub use body::Body;
@@ -37,3 +38,4 @@ pub use injection::Injection;
 pub use robot_model::RobotModel;
 pub use suspects::Suspects;
 pub use tolerance::Tolerance;
+pub use tree::FaultTree;

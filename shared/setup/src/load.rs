@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use vigil_blocks::fnv1a;
-use vigil_inference::FaultTree;
-use vigil_inference::tree::Node;
 use vigil_pomdp::{PointBased, Pomdp};
+use vigil_robot::FaultTree;
 use vigil_robot::learned::ModelError;
+use vigil_robot::tree::Node;
 use vigil_robot::{Description, RobotModel};
 
 use crate::check;

@@ -4,21 +4,18 @@
 //! tree, the learned model and the decision model, each a file of its own. Paths are relative to
 //! the graph file. Keys end in their unit. Unknown keys are errors.
 
-use std::fmt;
-
-use clap::ValueEnum;
 use serde::Deserialize;
 use vigil_cycle::OnMiss;
-use vigil_robot::learned;
-use vigil_robot::learned::monitor::Channels;
 
 mod navigation;
 mod sensor;
-mod supervisor;
 
-pub use navigation::{Monitors, Navigation, Obstacle, Trouble, TroubleKind};
+pub use navigation::{Navigation, Obstacle, Trouble, TroubleKind};
 pub use sensor::{Sensor, Socket, Source};
-pub use supervisor::{Evidence, Gate, Recovery, RecoveryAction, Supervisor};
+pub use vigil_decision::settings::{Evidence, Gate, Recovery, RecoveryAction, Supervisor};
+pub use vigil_diagnosis::settings::{
+    Detector, Form, Identifier, IdentifierFilter, Monitors, PARTICLES, Sensors,
+};
 
 /// A whole graph file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -199,156 +196,6 @@ impl Default for Simulator {
             scatter_length_m: 0.2,
             lag_s: 0.1,
             noise_scale: 1.0,
-        }
-    }
-}
-
-/// The detection filter.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Detector {
-    /// Mean time between false alarms to which the alarm threshold is set, h, 0.01 to 10000. The
-    /// model holds the calibration from nominal runs.
-    pub false_alarm_interval_h: f64,
-    /// Prior rate of faults, 1/h, above 0.
-    pub fault_rate_1_h: f64,
-    /// Channels used: `pose`, `pose+encoders`, or `all`, which the frames hold and the model knows.
-    pub sensors: Sensors,
-    /// What a fault is taken for: `learned-bias`, `constant` or `windowed`. The model holds a
-    /// calibration for each.
-    pub form: Form,
-}
-
-impl Default for Detector {
-    fn default() -> Self {
-        Self {
-            false_alarm_interval_h: 24.0,
-            fault_rate_1_h: 1.0,
-            sensors: Sensors::PoseEncoders,
-            form: Form::LearnedBias,
-        }
-    }
-}
-
-/// Channels that the filters may use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-pub enum Sensors {
-    /// Pose and command.
-    #[serde(rename = "pose")]
-    Pose,
-    /// Pose, command, wheel rates and steering angles.
-    #[default]
-    #[serde(rename = "pose+encoders")]
-    PoseEncoders,
-    /// Everything that the frames hold: yaw rate and motor currents too.
-    #[serde(rename = "all")]
-    All,
-}
-
-impl From<Sensors> for Channels {
-    fn from(sensors: Sensors) -> Self {
-        match sensors {
-            Sensors::Pose => Self::Pose,
-            Sensors::PoseEncoders => Self::PoseEncoders,
-            Sensors::All => Self::All,
-        }
-    }
-}
-
-/// What the detection filter takes a fault for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Form {
-    /// An unknown constant bias of the residual, learned; no fault is too small to be seen.
-    #[default]
-    LearnedBias,
-    /// A constant likelihood (Verma, Fernandez, Simmons 2002), for comparison: it never sees faults
-    /// below a size.
-    Constant,
-    /// A constant likelihood over windows of ten observations: that size is ten times smaller.
-    Windowed,
-}
-
-impl From<Form> for learned::Form {
-    fn from(form: Form) -> Self {
-        match form {
-            Form::LearnedBias => Self::LearnedBias,
-            Form::Constant => Self::Constant,
-            Form::Windowed => Self::Windowed,
-        }
-    }
-}
-
-/// Particles of a sampled identification filter, if the configuration does not say.
-pub const PARTICLES: usize = 256;
-
-/// The identification filter.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Identifier {
-    /// Filter: `multiple-hypothesis` (sets of faults), or one of those over single faults:
-    /// `bootstrap`, `raised`, `adaptive`, `risk-sensitive`, `hierarchical`, `look-ahead`, `imm`.
-    pub filter: IdentifierFilter,
-    /// Particles of a sampled filter, 32 to 1024, default 256; `look-ahead` has an eighth of them,
-    /// `imm` none. Of `multiple-hypothesis`: the most hypotheses kept from one observation to the
-    /// next, the most probable ones; default as many as its tables hold, which drops none.
-    pub particles: Option<usize>,
-    /// Kept frames from which an identification starts, s, 0.5 to 30.
-    pub ring_s: f64,
-    /// Prior probability that a fault is one that no model describes, 0 to 0.5.
-    pub p_unknown: f64,
-}
-
-/// An identification filter, by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum IdentifierFilter {
-    /// Sets of faults and their onsets; `exact` in earlier configurations.
-    #[default]
-    #[serde(alias = "exact")]
-    #[value(alias = "exact")]
-    MultipleHypothesis,
-    /// The classical particle filter: the model's own transitions.
-    Bootstrap,
-    /// Faults are tried more often than they occur, and weights pay for it.
-    Raised,
-    /// The same with a number of particles that follows the belief's spread.
-    Adaptive,
-    /// As `raised`, and particles stay where a lost track is expensive, by the decision model.
-    RiskSensitive,
-    /// Faults are tracked together along the fault tree until the data tell them apart.
-    Hierarchical,
-    /// Every mode is tried on every particle before any is drawn.
-    LookAhead,
-    /// One Kalman filter per mode, merged.
-    Imm,
-}
-
-impl fmt::Display for IdentifierFilter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_name(self, f)
-    }
-}
-
-impl fmt::Display for Form {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_name(self, f)
-    }
-}
-
-/// Writes the name that files and options use.
-fn write_name(value: &impl ValueEnum, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    let value = value.to_possible_value();
-    f.write_str(value.as_ref().map_or("", |value| value.get_name()))
-}
-
-impl Default for Identifier {
-    fn default() -> Self {
-        Self {
-            filter: IdentifierFilter::MultipleHypothesis,
-            particles: None,
-            ring_s: 3.0,
-            p_unknown: 0.01,
         }
     }
 }

@@ -4,15 +4,15 @@ use vigil_blocks::{
     DetectionBelief, Entry, FaultBelief, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN, ParticleBlock,
     SensorFrame, SizeKind,
 };
-use vigil_detector::{Detector, DetectorError};
+use vigil_decision::fused_alarm;
+use vigil_diagnosis::detect::{Detector, DetectorError};
+use vigil_diagnosis::identify::{Diagnoser, Identifier, IdentifierError, Input, Models, Watcher};
 use vigil_evaluation::scoring::field::BLIND;
 use vigil_evaluation::scoring::{MULTIPLE, Side, Taxonomy, UNKNOWN, Verdict};
-use vigil_identifier::{Diagnoser, Identifier, IdentifierError, Input, Models, Watcher};
-use vigil_inference::FaultTree;
 use vigil_recording::frames::Run;
+use vigil_robot::FaultTree;
 use vigil_robot::{Description, nominal};
 use vigil_setup::schema;
-use vigil_supervisor::fused_alarm;
 
 use crate::recovery::{Recoverer, Recovering};
 

@@ -6,11 +6,11 @@ use serde::Deserialize;
 use serde::de::IntoDeserializer;
 use serde::de::value::{Error as Refused, StrDeserializer};
 use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
-use vigil_inference::FaultTree;
+use vigil_decision::{Compensation, Inputs, Supervisor, SupervisorError};
 use vigil_pomdp::Pomdp;
+use vigil_robot::FaultTree;
 use vigil_robot::{Description, RobotModel};
 use vigil_setup::schema::{self, Recovery};
-use vigil_supervisor::{Compensation, Inputs, Supervisor, SupervisorError};
 
 /// Misses in a row without any detection after which no belief is usable. Recorded frames have no
 /// deadlines, so none is ever missed.

@@ -115,39 +115,6 @@ pub enum TroubleKind {
     Phantom,
 }
 
-/// Monitors of the pose against the planned pose (Verma, Fernandez, Simmons 2002, section 3).
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Monitors {
-    /// Distance of pose and planned pose above which there is an error in position, m, 0.05 to 10;
-    /// it ends below half of it.
-    pub position_error_m: f64,
-    /// A robot that stays within 0.1 m for so long is stopped, s, 0.1 to 60: the error is EPS, else
-    /// EPM.
-    pub stopped_after_s: f64,
-    /// LD: the robot is this near to where it was before, though its plan is not, m, 0.05 to 5.
-    pub loop_radius_m: f64,
-    /// LD: travel between the two, m, above twice `loop_radius_m`, to 30.
-    pub loop_travel_m: f64,
-    /// SD: turn beyond the planned one, rad, 1 to 100.
-    pub spin_turn_rad: f64,
-    /// SD: within this radius, m, 0.05 to 5.
-    pub spin_radius_m: f64,
-}
-
-impl Default for Monitors {
-    fn default() -> Self {
-        Self {
-            position_error_m: 0.5,
-            stopped_after_s: 2.0,
-            loop_radius_m: 0.3,
-            loop_travel_m: 3.0,
-            spin_turn_rad: 6.3,
-            spin_radius_m: 0.5,
-        }
-    }
-}
-
 const fn speed_m_s() -> f64 {
     0.25
 }

@@ -6,8 +6,6 @@ use std::net::SocketAddr;
 use clap::ValueEnum;
 use serde::Deserialize;
 
-use super::write_name;
-
 /// Where sensor frames come from.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -79,7 +77,8 @@ pub enum Source {
 
 impl fmt::Display for Source {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_name(self, f)
+        let value = self.to_possible_value();
+        f.write_str(value.as_ref().map_or("", |value| value.get_name()))
     }
 }
 

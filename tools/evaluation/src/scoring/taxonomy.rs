@@ -1,7 +1,7 @@
 //! Side and type of every node of a fault tree.
 
-use vigil_inference::FaultTree;
 use vigil_robot::Description;
+use vigil_robot::FaultTree;
 
 use super::UNKNOWN;
 

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use vigil_inference::FaultTree;
-use vigil_inference::tree::Node;
 use vigil_robot::Description;
+use vigil_robot::FaultTree;
+use vigil_robot::tree::Node;
 
 fn path(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

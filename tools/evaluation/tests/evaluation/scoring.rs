@@ -1,9 +1,9 @@
 //! Scores of hand-made verdicts.
 
 use vigil_evaluation::scoring::{Case, Claims, Ratio, Score, Side, Taxonomy, Verdict, score};
-use vigil_inference::FaultTree;
-use vigil_inference::tree::Node;
 use vigil_recording::labels::Label;
+use vigil_robot::FaultTree;
+use vigil_robot::tree::Node;
 
 use crate::rover::{robot, tree};
 

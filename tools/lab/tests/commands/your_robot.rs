@@ -35,9 +35,9 @@ fn labels(page: &str) -> String {
 /// Runs a command of the page in `folder`, with the programs of this build instead of the released
 /// ones.
 fn follow(command: &[String], folder: &Path) -> Output {
-    let vigil = Path::new(env!("CARGO_BIN_EXE_vigil-lab"));
+    let vigil = Path::new(env!("CARGO_BIN_EXE_vigil-lab")).with_file_name("vigil");
     let (program, more) = match command[0].as_str() {
-        "target/release/vigil" => (vigil.to_path_buf(), Vec::new()),
+        "target/release/vigil" => (vigil, Vec::new()),
         // All that this script does but build and say where the default graph is.
         "scripts/up" => {
             let script = fs::read_to_string(root().join("scripts/up")).unwrap();

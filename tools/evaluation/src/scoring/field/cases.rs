@@ -4,9 +4,9 @@
 
 use super::*;
 use vigil_blocks::SizeKind;
-use vigil_inference::FaultTree;
-use vigil_inference::tree::Node;
 use vigil_robot::Description;
+use vigil_robot::FaultTree;
+use vigil_robot::tree::Node;
 
 const DT_S: f64 = 0.5;
 

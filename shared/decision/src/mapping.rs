@@ -1,0 +1,269 @@
+//! From the fault tree's nodes to the decision model's states, and from its actions to the robot.
+
+use std::collections::BTreeMap;
+
+use crate::settings::RecoveryAction;
+use vigil_blocks::{DECISION_ACTIONS, DECISION_STATES, RecoveryKind};
+use vigil_pomdp::Pomdp;
+use vigil_pomdp::mdp::SolveError;
+use vigil_pomdp::policy::{BuildError, KindError};
+use vigil_robot::Description;
+use vigil_robot::FaultTree;
+
+/// Name of the decision model's state for deviations that no fault model explains.
+const UNKNOWN: &str = "UNKNOWN";
+
+/// Counter-steering that lets a robot with a stuck wheel drive the commanded curvature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Compensation {
+    /// Index of the stuck wheel.
+    pub wheel: usize,
+    /// The curvature to command is `curvature_gain * curvature + curvature_offset_1_m`.
+    pub curvature_gain: f64,
+    /// See `curvature_gain`; 1/m.
+    pub curvature_offset_1_m: f64,
+}
+
+/// Why a supervisor could not be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SupervisorError {
+    /// The decision model is larger than a block can carry.
+    #[error(
+        "the decision model has {states} states and {actions} actions; allowed are \
+         {DECISION_STATES} and {DECISION_ACTIONS}"
+    )]
+    Size {
+        /// States of the model.
+        states: usize,
+        /// Actions of the model.
+        actions: usize,
+    },
+    /// A leaf of the fault tree, nominal or unknown has no state.
+    #[error("the decision model has no state '{0}'; it needs one for every leaf, ND and UNKNOWN")]
+    NoState(String),
+    /// A state means nothing in the fault tree.
+    #[error("state '{0}' of the decision model is no leaf of the fault tree, ND or UNKNOWN")]
+    NoLeaf(String),
+    /// An action of the model is not mapped.
+    #[error("action '{0}' of the decision model is missing in [supervisor.actions]")]
+    NoAction(String),
+    /// A mapped action is not in the model.
+    #[error("[supervisor.actions] names '{0}', which the decision model does not have")]
+    ForeignAction(String),
+    /// A wheel that may be stuck has no usable compensation, though the model compensates.
+    #[error(
+        "wheel {0} may be stuck and action '{1}' compensates, but it has no compensation; each \
+         such wheel needs a finite curvature gain and offset"
+    )]
+    NoCompensation(usize, String),
+    /// An observation is no set of symptoms and outcomes.
+    #[error(
+        "observation '{0}' of the decision model is no set of symptoms; allowed are 'none', and \
+         EPS, EPM, LD, SD, BO, ALT, NNA, each at most once, joined by '_'"
+    )]
+    NoSet(String),
+    /// Two observations are the same set.
+    #[error("observations '{0}' and '{1}' of the decision model are the same set of symptoms")]
+    SameSet(String, String),
+    /// A symptom alone, or silence, has no observation.
+    #[error(
+        "the decision model has no observation '{0}'; with supervisor.evidence = \"symptoms\" it \
+         needs none, EPS, EPM, LD, SD, BO, ALT and NNA, and those of their sets that can occur"
+    )]
+    NoObservation(&'static str),
+    /// A state that the settings name is not in the model.
+    #[error("supervisor.{key}: the decision model has no state '{found}'; allowed are {allowed}")]
+    NamedState {
+        /// Key that names it.
+        key: &'static str,
+        /// Name that was given.
+        found: String,
+        /// Names of the model's states.
+        allowed: String,
+    },
+    /// The policy is not known.
+    #[error("supervisor.policy: {0}")]
+    Policy(#[from] KindError),
+    /// Dual control cannot be set up.
+    #[error("supervisor: {0}")]
+    Build(#[from] BuildError),
+    /// An action for information is not in the model.
+    #[error(
+        "supervisor.information_actions: the decision model has no action '{found}'; allowed are \
+         {allowed}"
+    )]
+    InformationAction {
+        /// Name that was given.
+        found: String,
+        /// Names of the model's actions.
+        allowed: String,
+    },
+    /// The model has no solution.
+    #[error("decision model: {0}")]
+    Solve(#[from] SolveError),
+}
+
+/// Index of a state that the settings name, if they do.
+pub(crate) fn state(
+    model: &Pomdp,
+    key: &'static str,
+    name: Option<&str>,
+) -> Result<Option<usize>, SupervisorError> {
+    let index = |name: &str| {
+        let found = model.states().iter().position(|state| state == name);
+        found.ok_or_else(|| SupervisorError::NamedState {
+            key,
+            found: name.to_owned(),
+            allowed: model.states().join(", "),
+        })
+    };
+    name.map(index).transpose()
+}
+
+/// Which node of the fault tree, and which wheel, a state of the decision model stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct StateMeaning {
+    /// Node of the fault tree; `None` for UNKNOWN.
+    pub node: Option<usize>,
+    /// Wheel of the fault.
+    pub wheel: Option<usize>,
+    /// True if the fault is a stuck wheel.
+    pub stuck: bool,
+}
+
+/// Checks that a block can carry the model's belief and values.
+pub(crate) fn check_size(model: &Pomdp) -> Result<(), SupervisorError> {
+    let (states, actions) = (model.states().len(), model.actions().len());
+    if states > DECISION_STATES || actions > DECISION_ACTIONS {
+        return Err(SupervisorError::Size { states, actions });
+    }
+    Ok(())
+}
+
+/// Meaning of every state, in the model's order.
+pub(crate) fn states(
+    model: &Pomdp,
+    tree: &FaultTree,
+    robot: &Description,
+) -> Result<Vec<StateMeaning>, SupervisorError> {
+    check_size(model)?;
+    let names = std::iter::once(0)
+        .chain(tree.leaves())
+        .map(|i| tree.nodes()[i].name.as_str());
+    for name in names.chain([UNKNOWN]) {
+        if !model.states().iter().any(|state| state == name) {
+            return Err(SupervisorError::NoState(name.to_owned()));
+        }
+    }
+    model
+        .states()
+        .iter()
+        .map(|name| meaning(name, tree, robot))
+        .collect()
+}
+
+fn meaning(
+    name: &str,
+    tree: &FaultTree,
+    robot: &Description,
+) -> Result<StateMeaning, SupervisorError> {
+    if name == UNKNOWN {
+        return Ok(StateMeaning {
+            node: None,
+            wheel: None,
+            stuck: false,
+        });
+    }
+    let node = tree
+        .index(name)
+        .ok_or_else(|| SupervisorError::NoLeaf(name.to_owned()))?;
+    let fault = tree.nodes()[node].fault.as_deref();
+    if node != 0 && fault.is_none() {
+        return Err(SupervisorError::NoLeaf(name.to_owned()));
+    }
+    let wheel = fault
+        .and_then(|f| f.split(':').nth(1))
+        .and_then(|w| robot.wheel_index(w));
+    let stuck = fault.is_some_and(|f| f.starts_with("stuck:"));
+    Ok(StateMeaning {
+        node: Some(node),
+        wheel,
+        stuck,
+    })
+}
+
+/// What an action of the decision model makes the robot do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ActionMeaning {
+    pub kind: RecoveryKind,
+    pub speed_scale: f64,
+}
+
+/// Meaning of every action, in the model's order.
+pub(crate) fn actions(
+    model: &Pomdp,
+    settings: &BTreeMap<String, RecoveryAction>,
+) -> Result<Vec<ActionMeaning>, SupervisorError> {
+    if let Some(foreign) = settings.keys().find(|name| !model.actions().contains(name)) {
+        return Err(SupervisorError::ForeignAction(foreign.clone()));
+    }
+    model
+        .actions()
+        .iter()
+        .map(|name| {
+            let action = settings
+                .get(name)
+                .ok_or_else(|| SupervisorError::NoAction(name.clone()))?;
+            let kind = RecoveryKind::from(action.kind);
+            let speed_scale = action
+                .speed_scale
+                .unwrap_or_else(|| usual_speed_scale(kind));
+            Ok(ActionMeaning { kind, speed_scale })
+        })
+        .collect()
+}
+
+/// Factor of the speed where the settings name none. Who slows down or compensates does so as the
+/// configurations in `config/` say.
+const fn usual_speed_scale(kind: RecoveryKind) -> f64 {
+    match kind {
+        RecoveryKind::None
+        | RecoveryKind::Stop
+        | RecoveryKind::CallForHelp
+        | RecoveryKind::NewPath
+        | RecoveryKind::Relocalise
+        | RecoveryKind::GiveUp => 0.0,
+        RecoveryKind::SlowDown => 0.5,
+        RecoveryKind::Compensate => 0.7,
+        RecoveryKind::GoOn
+        | RecoveryKind::IgnoreEncoder
+        | RecoveryKind::GoThrough
+        | RecoveryKind::MoveAway => 1.0,
+    }
+}
+
+/// Checks that every wheel whose stuck motor is a state can be compensated, if an action does so.
+pub(crate) fn check_compensation(
+    model: &Pomdp,
+    states: &[StateMeaning],
+    actions: &[ActionMeaning],
+    compensation: &[Compensation],
+) -> Result<(), SupervisorError> {
+    let compensates = |meaning: &ActionMeaning| meaning.kind == RecoveryKind::Compensate;
+    let Some(action) = actions.iter().position(compensates) else {
+        return Ok(());
+    };
+    let is_usable = |wheel: usize| {
+        compensation.iter().any(|c| {
+            c.wheel == wheel && c.curvature_gain.is_finite() && c.curvature_offset_1_m.is_finite()
+        })
+    };
+    let stuck = states.iter().filter(|state| state.stuck);
+    match stuck.filter_map(|s| s.wheel).find(|&w| !is_usable(w)) {
+        Some(wheel) => Err(SupervisorError::NoCompensation(
+            wheel,
+            model.actions()[action].clone(),
+        )),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,134 @@
+//! The navigation model behind the supervisor, told cycle by cycle what is seen.
+
+use vigil_blocks::{Action, ActionOutcome, DetectionBelief, Entry, FaultBelief, RecoveryKind};
+use vigil_decision::{Inputs, Supervisor};
+use vigil_pomdp::{Pomdp, Tracker};
+use vigil_robot::FaultTree;
+use vigil_setup::schema::{GraphFile, Supervisor as Settings};
+
+/// Time between cycles.
+pub const CYCLE_NS: u64 = 10_000_000;
+/// The shipped model.
+pub const MODEL: &str = include_str!("../../../../../config/navigation.pomdp");
+const GRAPH: &str = include_str!("../../../../../config/corridor-obstacle.toml");
+
+pub fn settings() -> Settings {
+    toml::from_str::<GraphFile>(GRAPH).unwrap().supervisor
+}
+
+pub fn tree() -> FaultTree {
+    let config = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
+    vigil_setup::load_tree(&config.join("trees/rover.toml")).unwrap()
+}
+
+pub fn build(model: &str, settings: &Settings) -> Result<Supervisor, String> {
+    let config = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
+    let robot = vigil_setup::load_robot(&config.join("robots/rover.toml")).unwrap();
+    let model = Pomdp::parse(model).unwrap();
+    Supervisor::new(model, None, &tree(), &robot, settings, Vec::new(), 10)
+        .map_err(|e| e.to_string())
+}
+
+/// A supervisor, and what it is told.
+pub struct Told {
+    pub supervisor: Supervisor,
+    pub action: Action,
+    pub detection: DetectionBelief,
+    pub diagnosis: FaultBelief,
+}
+
+impl Told {
+    pub fn new() -> Self {
+        Self::of(MODEL)
+    }
+
+    pub fn of(model: &str) -> Self {
+        let mut diagnosis = FaultBelief {
+            tree_hash: tree().hash(),
+            ..FaultBelief::default()
+        };
+        (diagnosis.p[0], diagnosis.p_predicted[0]) = (1.0, 1.0);
+        Self {
+            supervisor: build(model, &settings()).unwrap(),
+            action: Action::default(),
+            detection: DetectionBelief::default(),
+            diagnosis,
+        }
+    }
+
+    /// One cycle with these symptoms.
+    pub fn cycle(&mut self, symptoms: u32) {
+        self.detection.symptoms = symptoms;
+        self.detection.header.t_capture_ns += CYCLE_NS;
+        self.diagnosis.header.t_capture_ns += CYCLE_NS;
+        let inputs = Inputs {
+            diagnosis: Some(&self.diagnosis),
+            detection: Some(&self.detection),
+        };
+        self.supervisor.step(Entry::Frame(inputs), &mut self.action);
+    }
+
+    pub fn rest(&mut self, seconds: f64, symptoms: u32) {
+        (0..(seconds * 100.0) as u32).for_each(|_| self.cycle(symptoms));
+    }
+
+    /// The robot reports how the present decision ended.
+    pub fn ended(&mut self, outcome: ActionOutcome, symptoms: u32) {
+        self.detection.action_seq = self.action.decision_seq;
+        self.detection.action_outcome = outcome as u32;
+        self.cycle(symptoms);
+    }
+
+    /// The identifier's probability of a fault, and what it predicted.
+    pub fn identify(&mut self, p: f64, predicted: f64) {
+        self.diagnosis.identifying = 1;
+        self.diagnosis.p[0] = 1.0 - p;
+        self.diagnosis.p_predicted[0] = 1.0 - predicted;
+    }
+
+    /// The same of something that no fault of the tree explains.
+    pub fn unknown(&mut self, p: f64, predicted: f64) {
+        self.identify(p, predicted);
+        self.diagnosis.p_unknown = p;
+        self.diagnosis.p_unknown_predicted = predicted;
+    }
+
+    /// It watches.
+    pub fn nothing(&mut self) {
+        self.unknown(0.0, 0.0);
+        self.diagnosis.identifying = 0;
+    }
+
+    pub fn kind(&self) -> RecoveryKind {
+        RecoveryKind::from_wire(self.action.kind).unwrap()
+    }
+
+    pub fn hp(&self) -> f64 {
+        self.action.belief[2]
+    }
+
+    pub fn lst(&self) -> f64 {
+        self.action.belief[6]
+    }
+}
+
+/// The belief after these steps, by the tracker alone.
+pub fn tracked(steps: &[(usize, &str)]) -> Vec<f64> {
+    let model = Pomdp::parse(MODEL).unwrap();
+    let mut tracker = Tracker::new(&model);
+    for (action, name) in steps {
+        let z = model.observations().iter().position(|z| z == name);
+        tracker.update(&model, *action, z.unwrap());
+    }
+    tracker.belief().to_vec()
+}
+
+/// Soft evidence of 1 for every state may round.
+pub fn assert_near(told: &Told, expected: &[f64]) {
+    for (found, expected) in told.action.belief.iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    }
+}
+
+/// Index of FP.
+pub const FP: usize = 0;

@@ -1,0 +1,436 @@
+//! The detector's `step`: guard, observe, monitor, alarm, report.
+
+use crate::settings;
+use vigil_blocks::{
+    CHANNELS, Channel, DetectionBelief, Entry, HealthyBelief, MODE_UNKNOWN, ParticleBlock,
+    Readiness, SensorFrame, Symptoms, Valid, WeightedHypothesis,
+};
+use vigil_inference::ending::Ending;
+use vigil_inference::logspace::{log_add, log_sum_exp, probability};
+use vigil_robot::learned::monitor::Channels;
+use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
+use vigil_robot::meaning::Finding;
+use vigil_robot::nominal;
+use vigil_robot::{Alarm, AlarmError, Description};
+
+use crate::detect::monitors::Monitors;
+use crate::detect::publisher::Publisher;
+use crate::detect::sight::{self, Sight};
+use crate::detect::watch::{Observed, Watch};
+
+/// Without monitors, pose log-odds beyond which the detector reports an error in position: even
+/// odds, as the planner weighs the symptom by its own model.
+const SYMPTOM_LOG_ODDS: f64 = 0.0;
+
+/// Why a detector was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DetectorError {
+    /// The model does not fit.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A rate or an interval is not positive and finite.
+    #[error("detector.{key}: {value} is not allowed: a positive finite number")]
+    Value {
+        /// The key.
+        key: &'static str,
+        /// What was found.
+        value: f64,
+    },
+    /// There is no threshold for the alarm, or it could never rise.
+    #[error("detector: {0}")]
+    Alarm(#[from] AlarmError),
+}
+
+/// The detection filter at frame rate.
+///
+/// A step that completes an observation (about every learned interval, 50 ms) updates the belief;
+/// the steps between repeat it. Equal entries give bit-identical beliefs.
+#[derive(Debug, Clone)]
+pub struct Detector {
+    watch: Watch,
+    fault_rate_1_s: f64,
+    alarm: Alarm,
+    /// While an alarm stands: is a fault still there, in each channel?
+    endings: [Ending; CHANNELS],
+    /// Of a fault now.
+    log_odds: f64,
+    armed: bool,
+    /// Whether the last observation was of a robot in motion.
+    moving: bool,
+    sight: Sight,
+    /// With a live publisher.
+    publisher: Option<Publisher>,
+    period_s: f64,
+    t_last_ns: u64,
+    run_id: u64,
+    alarm_t_ns: u64,
+    alarm_count: u32,
+    invalid_count: u32,
+    symptoms: u32,
+    external: u32,
+    /// In a graph with a planned path: these say what the symptoms are, not the pose's log-odds.
+    monitors: Option<Monitors>,
+    /// Last action that the robot obeyed, and its outcome, as the frame says it.
+    obeyed: (u64, u32),
+}
+
+impl Detector {
+    /// A detector for `model` and its robot. The alarm threshold follows from the model's
+    /// calibration and `settings.false_alarm_interval_h`.
+    ///
+    /// # Errors
+    /// [`DetectorError`] if the model is of another robot, has no calibration for channels and
+    /// form, or a setting is out of range.
+    pub fn new(
+        model: &Model,
+        robot: &Description,
+        settings: &settings::Detector,
+    ) -> Result<Self, DetectorError> {
+        model.check_robot(robot)?;
+        let (channels, form) = chosen(settings);
+        let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
+        let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
+        let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
+        let watch = Watch::Faults {
+            observer: Box::new(match channels {
+                Channels::All => Observer::new(model, robot).with_further(),
+                _ => Observer::new(model, robot),
+            }),
+            monitor: Box::new(Monitor::new(model, robot, channels, form, rate)),
+        };
+        let interval_s = model.interval_s;
+        Ok(Self::watching(
+            interval_s,
+            robot,
+            alarm_log_odds,
+            settings,
+            watch,
+        ))
+    }
+
+    /// A detector for a robot of which only the nominal behaviour is known.
+    ///
+    /// # Errors
+    /// As [`Detector::new`].
+    pub fn nominal(
+        model: &nominal::Model,
+        robot: &Description,
+        settings: &settings::Detector,
+    ) -> Result<Self, DetectorError> {
+        model.check_robot(robot)?;
+        let (channels, form) = chosen(settings);
+        let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
+        let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
+        let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
+        let watch = Watch::Nominal {
+            observer: Box::new(nominal::Observer::new(robot)),
+            monitor: Box::new(nominal::Monitor::new(model, channels, form, rate)),
+            last: Observed::default(),
+        };
+        let interval_s = model.interval_s;
+        Ok(Self::watching(
+            interval_s,
+            robot,
+            alarm_log_odds,
+            settings,
+            watch,
+        ))
+    }
+
+    fn watching(
+        interval_s: f64,
+        robot: &Description,
+        alarm_log_odds: f64,
+        settings: &settings::Detector,
+        watch: Watch,
+    ) -> Self {
+        Self {
+            log_odds: watch.report().log_odds,
+            watch,
+            fault_rate_1_s: settings.fault_rate_1_h / 3600.0,
+            alarm: Alarm::new(alarm_log_odds),
+            endings: [Ending::new(robot.fault_prior.again_1_s, robot.fault_prior.mended_1_s);
+                CHANNELS],
+            armed: false,
+            moving: false,
+            sight: sight_of(robot, settings),
+            publisher: None,
+            period_s: interval_s,
+            t_last_ns: 0,
+            run_id: 0,
+            alarm_t_ns: 0,
+            alarm_count: 0,
+            invalid_count: 0,
+            symptoms: 0,
+            external: 0,
+            monitors: None,
+            obeyed: (0, 0),
+        }
+    }
+
+    /// The same detector with monitors of the pose against the planned pose, whose symptoms take
+    /// the place of its own; with `None`, as it was.
+    #[must_use]
+    pub fn with_monitors(mut self, settings: Option<&settings::Monitors>) -> Self {
+        self.monitors = settings.map(Monitors::new);
+        self
+    }
+
+    /// The same detector in a graph of this period, s: it tells when it sees nothing by the graph's
+    /// time; see [`Sight::in_graph`]. A publisher that is `live`, and no recording, is tested in
+    /// passing.
+    #[must_use]
+    pub fn in_graph(mut self, robot: &Description, period_s: f64, live: bool) -> Self {
+        self.sight = self.sight.in_graph(period_s, live);
+        self.publisher = live.then(|| Publisher::new(robot, period_s));
+        self
+    }
+
+    /// What was found of the publisher since it was asked last.
+    #[must_use]
+    pub fn found(&mut self) -> [Option<Finding>; 2] {
+        self.publisher.as_mut().map_or([None; 2], Publisher::tell)
+    }
+
+    /// A frame came, and the border refused it: an entry of the journal that changes no belief.
+    pub const fn refuse(&mut self) {
+        self.sight.refuse();
+    }
+
+    /// True with monitors of the planned pose.
+    #[must_use]
+    pub const fn is_monitoring(&self) -> bool {
+        self.monitors.is_some()
+    }
+
+    /// Log-odds at which the alarm rises.
+    #[must_use]
+    pub const fn alarm_log_odds(&self) -> f64 {
+        self.alarm.threshold_log_odds()
+    }
+
+    /// True once an alarm can rise: evidence from before the track has settled and the noise is
+    /// known is no evidence.
+    #[must_use]
+    pub const fn is_armed(&self) -> bool {
+        self.armed
+    }
+
+    /// Takes one entry of the journal and fills the belief and the hypotheses (headers and causes
+    /// are the caller's).
+    // Never merged into its caller, so that its instructions can be counted.
+    #[inline(never)]
+    pub fn step(
+        &mut self,
+        entry: Entry<&SensorFrame>,
+        belief: &mut DetectionBelief,
+        hypotheses: &mut ParticleBlock,
+    ) {
+        let mut missed = 0;
+        match entry {
+            Entry::Frame(frame) => {
+                self.sight.take(frame);
+                if let Some(publisher) = &mut self.publisher {
+                    publisher.take(frame);
+                    self.sight.doubt(publisher.is_blinding());
+                }
+                self.take(frame);
+            }
+            Entry::Missed(count) => {
+                self.sight.miss(count);
+                if let Some(publisher) = &mut self.publisher {
+                    publisher.miss(count);
+                }
+                missed = count;
+            }
+            // Its cost is that of one track: there is nothing to shed.
+            Entry::Budget(_) => {}
+            Entry::Reset => {
+                self.watch.reset_observer();
+                self.begin_run();
+            }
+        }
+        self.report(missed, belief);
+        self.publish(belief.log_odds, hypotheses);
+    }
+
+    fn begin_run(&mut self) {
+        self.watch.reset();
+        (self.armed, self.moving) = (false, false);
+        self.alarm.reset();
+        self.log_odds = self.watch.report().log_odds;
+        (self.alarm_t_ns, self.symptoms) = (0, 0);
+        if let Some(monitors) = &mut self.monitors {
+            monitors.reset();
+        }
+    }
+
+    fn take(&mut self, frame: &SensorFrame) {
+        let intake = self.watch.push(frame);
+        self.external = frame.symptoms & Symptoms::ALL;
+        self.invalid_count = self.invalid_count.saturating_add(u32::from(intake.invalid));
+        if intake.new_run {
+            self.begin_run();
+        }
+        if frame.header.t_capture_ns > self.t_last_ns && !intake.new_run {
+            let period_s = (frame.header.t_capture_ns - self.t_last_ns) as f64 * 1e-9;
+            self.period_s = period_s.min(1.0);
+        }
+        self.t_last_ns = frame.header.t_capture_ns;
+        self.run_id = frame.run_id;
+        self.obeyed = (frame.action_seq, frame.action_outcome);
+        if intake.complete {
+            self.observe();
+        }
+        if let Some(monitors) = &mut self.monitors {
+            monitors.observe(frame);
+            self.symptoms = monitors.symptoms();
+        }
+    }
+
+    fn observe(&mut self) {
+        let observation = self.watch.step(self.alarm.stands());
+        let moving = observation.moving;
+        self.moving = moving;
+        if !self.armed {
+            // Evidence from before the noise scale is known is no evidence.
+            self.armed = self.watch.is_ready();
+            self.watch.forget_evidence();
+        }
+        self.weigh_end(&observation);
+        let stood = self.alarm.stands();
+        // Clearing needs evidence: time at rest does not count.
+        if self.armed && self.alarm.take(self.log_odds, observation.dt_s, moving) {
+            self.alarm_t_ns = observation.t_ns.max(1);
+            self.alarm_count = self.alarm_count.saturating_add(1);
+            self.endings.iter_mut().for_each(Ending::begin);
+        } else if !self.alarm.stands() {
+            self.alarm_t_ns = 0;
+        }
+        if stood && !self.alarm.stands() {
+            // What spoke for the fault that has ended does not speak for the next one.
+            self.watch.forget_evidence();
+            self.log_odds = self.watch.report().log_odds;
+        }
+        let off_course = self.watch.report().channels[Channel::POSE] > SYMPTOM_LOG_ODDS;
+        self.symptoms = if !off_course {
+            0
+        } else if moving {
+            Symptoms::EPM
+        } else {
+            Symptoms::EPS
+        };
+    }
+
+    /// Log-odds of a fault now: while an alarm stands, in no channel more than those that its fault
+    /// has not ended there.
+    fn weigh_end(&mut self, observation: &Observed) {
+        let report = self.watch.report();
+        if !self.alarm.stands() {
+            self.log_odds = report.log_odds;
+            return;
+        }
+        // At rest no fault ends, and none becomes more certain.
+        if !observation.moving {
+            return;
+        }
+        let (mut channels, gains) = (report.channels, report.gains);
+        let endings = self.endings.iter_mut().zip(gains);
+        for (log_odds, (ending, gain)) in channels.iter_mut().zip(endings) {
+            ending.step(gain, observation.dt_s);
+            *log_odds = log_odds.min(ending.log_odds());
+        }
+        self.log_odds = log_sum_exp(&channels);
+    }
+
+    fn report(&self, missed: u32, belief: &mut DetectionBelief) {
+        let report = self.watch.report();
+        let p_now = probability(self.log_odds);
+        // The state stays at the last frame; what is told is its prediction.
+        let appears = self.fault_rate_1_s * self.period_s * f64::from(missed);
+        let p_fault = p_now + (1.0 - p_now) * (1.0 - (-appears).exp());
+        let odds = (p_fault / (1.0 - p_fault)).ln();
+        belief.run_id = self.run_id;
+        belief.p_fault = p_fault;
+        belief.log_odds = if missed > 0 && odds.is_finite() {
+            odds
+        } else {
+            self.log_odds
+        };
+        belief.alarm_log_odds = self.alarm_log_odds();
+        belief.evidence = if report.evidence.is_finite() {
+            report.evidence
+        } else {
+            0.0
+        };
+        let NoiseScales {
+            pose,
+            wheels,
+            steer,
+            outliers,
+        } = self.watch.scales();
+        belief.noise_scale = pose;
+        belief.noise_scale_wheels = wheels;
+        belief.noise_scale_steer = steer;
+        belief.outlier_rate = outliers.pose;
+        belief.outlier_rate_wheels = outliers.wheels;
+        belief.outlier_rate_steer = outliers.steer;
+        belief.channel_log_odds = report.channels;
+        belief.alarm_t_capture_ns = self.alarm_t_ns;
+        belief.alarm = u32::from(self.alarm.stands());
+        belief.alarm_count = self.alarm_count;
+        belief.symptoms = self.symptoms | self.external;
+        (belief.action_seq, belief.action_outcome) = self.obeyed;
+        belief.invalid_count = self.invalid_count;
+        belief.blind = self.sight.blind().map_or(0, |cause| cause as u32);
+        belief.readiness = match (self.armed, self.moving) {
+            (false, _) => Readiness::Arming,
+            (true, true) => Readiness::Armed,
+            (true, false) => Readiness::NotExcited,
+        } as u32;
+        belief.degenerate_count = report.degenerate_count;
+    }
+
+    /// Nominal or unknown, at these odds; where a pose is tracked, it is the healthy robot's.
+    fn publish(&self, log_odds: f64, block: &mut ParticleBlock) {
+        let healthy = self.watch.healthy();
+        block.healthy = healthy.map_or_else(HealthyBelief::default, |it| it.to_block());
+        let nominal = WeightedHypothesis {
+            pose: block.healthy.pose,
+            pose_covariance: block.healthy.pose_covariance,
+            log_weight: -log_add(0.0, log_odds),
+            ..WeightedHypothesis::default()
+        };
+        let unknown = WeightedHypothesis {
+            onset_t_capture_ns: self.alarm_t_ns,
+            log_weight: -log_add(0.0, -log_odds),
+            mode: MODE_UNKNOWN,
+            ..nominal
+        };
+        block.hypotheses[..2].copy_from_slice(&[nominal, unknown]);
+        block.count = 2;
+    }
+}
+
+fn chosen(settings: &settings::Detector) -> (Channels, Form) {
+    (settings.sensors.into(), settings.form.into())
+}
+
+/// What frames of `robot` must carry for these settings.
+fn sight_of(robot: &Description, settings: &settings::Detector) -> Sight {
+    let channels = match settings.sensors {
+        settings::Sensors::Pose => Valid::POSE,
+        settings::Sensors::PoseEncoders | settings::Sensors::All => {
+            sight::all_channels(robot.wheels.len())
+        }
+    };
+    let axes = 0..robot.command.len();
+    Sight::new(channels, axes.fold(0, |bits, i| bits | Valid::command(i)))
+}
+
+fn positive(key: &'static str, value: f64) -> Result<f64, DetectorError> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(value);
+    }
+    Err(DetectorError::Value { key, value })
+}

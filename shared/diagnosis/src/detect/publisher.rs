@@ -1,0 +1,59 @@
+//! What is found of the publisher in passing: what its frames mean, and when they come.
+
+use vigil_blocks::SensorFrame;
+use vigil_robot::Description;
+use vigil_robot::meaning::{Finding, Meaning};
+
+use crate::detect::pace::Pace;
+
+/// The tests of a live publisher.
+#[derive(Debug, Clone)]
+pub(crate) struct Publisher {
+    meaning: Meaning,
+    pace: Pace,
+    epoch: u64,
+    run_id: u64,
+    /// Found, and not yet told.
+    found: [Option<Finding>; 2],
+}
+
+impl Publisher {
+    /// Of frames of `robot` in a graph of this period, s.
+    pub(crate) fn new(robot: &Description, period_s: f64) -> Self {
+        Self {
+            meaning: Meaning::new(robot),
+            pace: Pace::new(period_s),
+            epoch: 0,
+            run_id: 0,
+            found: [None; 2],
+        }
+    }
+
+    /// True if faults go unseen behind what was found.
+    pub(crate) const fn is_blinding(&self) -> bool {
+        self.meaning.is_blinding()
+    }
+
+    /// Takes a frame.
+    pub(crate) fn take(&mut self, frame: &SensorFrame) {
+        let source = (frame.header.epoch, frame.run_id);
+        if source != (self.epoch, self.run_id) {
+            (self.epoch, self.run_id) = source;
+            self.meaning.reset();
+        }
+        let pace = self.pace.take(frame.header.t_capture_ns);
+        self.found[0] = pace.or(self.found[0]);
+        // Frames come faster than findings, so that none waits for the next.
+        self.found[1] = self.meaning.take(frame).or(self.found[1]);
+    }
+
+    /// Deadlines passed without input.
+    pub(crate) const fn miss(&mut self, count: u32) {
+        self.pace.miss(count);
+    }
+
+    /// What is to be told.
+    pub(crate) fn tell(&mut self) -> [Option<Finding>; 2] {
+        std::mem::take(&mut self.found)
+    }
+}

@@ -1,0 +1,117 @@
+//! The filter that an identification runs on.
+
+use vigil_robot::learned::{Healthy, NoiseScales, Observation};
+
+use crate::identify::further::Fusion;
+use crate::identify::generic::Generic;
+use crate::identify::hypotheses::{Ranked, add_hypotheses};
+use crate::identify::modes::Leaves;
+use crate::identify::multiple_hypothesis::MultipleHypothesis;
+use crate::identify::node_sizes::NodeSizes;
+use crate::identify::posterior::Posterior;
+
+/// The multiple-hypothesis filter over sets of faults, or one of the library's over single faults.
+#[derive(Debug, Clone)]
+pub enum Engine {
+    /// Sets of faults.
+    MultipleHypothesis(Box<MultipleHypothesis>),
+    /// Single faults.
+    Generic(Box<Generic>),
+}
+
+impl Engine {
+    /// Starts from the nominal mode, as the detector knew it at `t_ns`.
+    pub fn restart(&mut self, healthy: &Healthy, t_ns: u64) {
+        match self {
+            Self::MultipleHypothesis(filter) => filter.restart(healthy, t_ns),
+            Self::Generic(filter) => filter.restart(healthy, t_ns),
+        }
+    }
+
+    /// Most hypotheses or particles.
+    #[must_use]
+    pub fn limit(&self) -> usize {
+        match self {
+            Self::MultipleHypothesis(filter) => filter.limit(),
+            Self::Generic(filter) => filter.limit(),
+        }
+    }
+
+    /// From the next observation on at most `count` hypotheses or particles.
+    pub fn set_limit(&mut self, count: usize) {
+        match self {
+            Self::MultipleHypothesis(filter) => filter.set_limit(count),
+            Self::Generic(filter) => filter.set_limit(count),
+        }
+    }
+
+    /// Hypotheses or particles at present.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        match self {
+            Self::MultipleHypothesis(filter) => filter.hypotheses().len(),
+            Self::Generic(filter) => filter.count(),
+        }
+    }
+
+    /// Takes one observation.
+    pub fn step(&mut self, observation: &Observation, noise: NoiseScales) {
+        match self {
+            Self::MultipleHypothesis(filter) => filter.step(observation, noise),
+            Self::Generic(filter) => filter.step(observation, noise),
+        }
+    }
+
+    /// Fills the probabilities of nodes, sets and unknown; the first by what more channels
+    /// say too.
+    pub fn posterior(&mut self, leaves: &Leaves, fusion: Option<&Fusion>, out: &mut Posterior) {
+        match self {
+            Self::MultipleHypothesis(filter) => filter.posterior(fusion, out),
+            Self::Generic(filter) => filter.posterior(leaves, out),
+        }
+    }
+
+    /// In which way each leaf's component is broken, and by how much: the first filter knows.
+    #[must_use]
+    pub fn sizes(&self, leaves: &Leaves, posterior: &Posterior) -> NodeSizes {
+        match self {
+            Self::MultipleHypothesis(filter) => NodeSizes::of(filter, leaves, posterior),
+            Self::Generic(_) => NodeSizes::default(),
+        }
+    }
+
+    /// Most probable onset of a leaf's fault, capture time ns; 0 if it is no leaf.
+    #[must_use]
+    pub fn onset(&self, node: usize) -> u64 {
+        match self {
+            Self::MultipleHypothesis(filter) => filter.onset(node),
+            Self::Generic(filter) => filter.onset(node),
+        }
+    }
+
+    /// Most probable onset of the unknown, capture time ns; 0 if it was never supposed.
+    #[must_use]
+    pub fn onset_unknown(&self) -> u64 {
+        match self {
+            Self::MultipleHypothesis(filter) => filter.onset_unknown(),
+            Self::Generic(filter) => filter.onset_unknown(),
+        }
+    }
+
+    /// Observations that nothing explained, and were passed over.
+    #[must_use]
+    pub const fn degenerate_count(&self) -> u32 {
+        match self {
+            Self::MultipleHypothesis(filter) => filter.degenerate_count(),
+            Self::Generic(filter) => filter.degenerate_count(),
+        }
+    }
+
+    /// Adds the hypotheses, or the particles.
+    pub fn hypotheses(&self, leaves: &Leaves, out: &mut Ranked) {
+        match self {
+            Self::MultipleHypothesis(filter) => add_hypotheses(filter, leaves, out),
+            Self::Generic(filter) => filter.hypotheses(out),
+        }
+    }
+}

@@ -1,0 +1,406 @@
+//! The library's filters over single faults, by name.
+
+use crate::settings::{self, IdentifierFilter};
+use nalgebra::Vector3;
+use vigil_blocks::{FaultSet, MODE_UNKNOWN, WHEELS, WeightedHypothesis};
+use vigil_inference::adaptive::Adaptive;
+use vigil_inference::bootstrap::ParticleFilter;
+use vigil_inference::filter::Filter;
+use vigil_inference::gaussian::Gaussian;
+use vigil_inference::hierarchical::Hierarchical;
+use vigil_inference::hybrid::Modes;
+use vigil_inference::look_ahead::LookAhead;
+use vigil_inference::merged::Merged;
+use vigil_inference::proposal::Proposal;
+use vigil_inference::resample::Resampling;
+use vigil_inference::track::TRACK_DIMENSION;
+use vigil_robot::Description;
+use vigil_robot::FaultTree;
+use vigil_robot::learned::switching::{MODES_MAX, Seen};
+use vigil_robot::learned::{
+    FaultRates, Healthy, Moved, NoiseScales, Observation, Switching, triangle,
+};
+
+use crate::identify::fault_rates::fault_rates;
+use crate::identify::hypotheses::Ranked;
+use crate::identify::models::Models;
+use crate::identify::modes::{IdentifierError, Leaves};
+use crate::identify::posterior::Posterior;
+use crate::identify::risk::risks;
+use crate::identify::sets::{FLOOR, entropy};
+
+/// Share of the draws that leave a mode in the raised proposals. Half at most doubles a weight's
+/// spread.
+const RAISED: f64 = 0.5;
+/// Each particle of the look-ahead filter tries every mode: there are fewer of them.
+const LOOK_AHEAD_SHARE: usize = 8;
+/// KLD-sampling: distance, quantile (99 %), and least number of particles. The distance is Fox's
+/// (2003); 32 are no fewer than the modes.
+const ADAPTIVE: (f64, f64, usize) = (0.05, 2.326, 32);
+/// A fault began when its probability was last below this. Chosen: later than the birth, before it
+/// has a name at 0.5.
+const ONSET: f64 = 0.1;
+
+/// A filter and its model.
+#[derive(Debug, Clone)]
+enum Kind {
+    Sampled(ParticleFilter<Switching>),
+    Hierarchical(Hierarchical<Switching>),
+    LookAhead(LookAhead<Switching, TRACK_DIMENSION>),
+    Merged(Merged<Switching, TRACK_DIMENSION>),
+}
+
+/// What a mode is in the words of the tree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Meaning {
+    Node(usize),
+    Unknown,
+}
+
+/// A filter over nominal, single faults and the unknown.
+#[derive(Debug, Clone)]
+pub struct Generic {
+    kind: Kind,
+    meanings: Vec<Meaning>,
+    use_wheels: bool,
+    seed: u64,
+    limit: usize,
+    /// Travel while the robot counted as standing, m.
+    pending_m: f64,
+    since_ns: [u64; MODES_MAX],
+    degenerate_count: u32,
+}
+
+/// A particle in a wrong mode reaches the right one only by a change of fault: that is not rarer
+/// than a first one.
+fn rates(robot: &Description, leaves: &Leaves, p_unknown: f64) -> FaultRates {
+    FaultRates {
+        further: 1.0,
+        ..fault_rates(&robot.fault_prior, leaves, p_unknown)
+    }
+}
+
+impl Generic {
+    /// A filter over the leaves of a tree.
+    ///
+    /// # Errors
+    /// [`IdentifierError`] if the models do not fit the filter.
+    pub fn new(
+        models: &Models<'_>,
+        leaves: &Leaves,
+        settings: &settings::Identifier,
+        use_wheels: bool,
+        seed: u64,
+    ) -> Result<Self, IdentifierError> {
+        let encoders = if use_wheels {
+            leaves.encoder_wheels()
+        } else {
+            0
+        };
+        let rates = rates(models.robot, leaves, settings.p_unknown);
+        let (model, robot) = (models.model, models.robot);
+        let switching = Switching::new(model, robot, leaves.stuck_wheels(), encoders, &rates);
+        let meanings: Vec<Meaning> = (0..switching.modes())
+            .map(|mode| meaning(&switching, mode, leaves))
+            .collect();
+        let resampling = Resampling::default();
+        let count = settings.particles.unwrap_or(settings::PARTICLES);
+        let sampled =
+            |proposal, model| ParticleFilter::new(model, proposal, resampling, count, seed);
+        let refuse = |error: &dyn std::fmt::Display| IdentifierError::Build(error.to_string());
+        let raised = |model: &Switching| Proposal::raised(model, RAISED).map_err(|e| refuse(&e));
+        let kind = match settings.filter {
+            IdentifierFilter::MultipleHypothesis => return Err(refuse(&"not one of these")),
+            IdentifierFilter::Bootstrap => {
+                Kind::Sampled(sampled(Proposal::prior(&switching), switching))
+            }
+            IdentifierFilter::Raised => Kind::Sampled(sampled(raised(&switching)?, switching)),
+            IdentifierFilter::Adaptive => {
+                let (error, quantile, least) = ADAPTIVE;
+                let adaptive = Adaptive::new(error, quantile, least, count);
+                let filter = sampled(raised(&switching)?, switching);
+                Kind::Sampled(filter.with_adaptive_count(adaptive))
+            }
+            IdentifierFilter::RiskSensitive => {
+                let decision = models
+                    .decision
+                    .ok_or_else(|| refuse(&"risk-sensitive needs a decision model"))?;
+                let prior = rates.fault_1_s * settings.ring_s;
+                let named = names(models.tree, &meanings, prior);
+                let risks = risks(decision, &named, count)?;
+                let proposal = Proposal::risk_raised(&switching, RAISED, &risks);
+                Kind::Sampled(sampled(proposal.map_err(|e| refuse(&e))?, switching))
+            }
+            IdentifierFilter::Hierarchical => {
+                let nodes = abstract_nodes(models.tree, leaves, &meanings);
+                let filter = Hierarchical::new(switching, &nodes, resampling, count, seed);
+                let filter = filter.map_err(|e| refuse(&e))?;
+                Kind::Hierarchical(filter.with_raised_proposals(RAISED))
+            }
+            IdentifierFilter::LookAhead => {
+                let count = count.div_ceil(LOOK_AHEAD_SHARE);
+                Kind::LookAhead(LookAhead::new(switching, count, seed))
+            }
+            IdentifierFilter::Imm => Kind::Merged(Merged::new(switching)),
+        };
+        Ok(Self {
+            kind,
+            meanings,
+            use_wheels,
+            seed,
+            limit: count,
+            pending_m: 0.0,
+            since_ns: [0; MODES_MAX],
+            degenerate_count: 0,
+        })
+    }
+
+    /// Starts from the nominal mode, its pose known as the detector knew it at `t_ns`.
+    pub fn restart(&mut self, healthy: &Healthy, t_ns: u64) {
+        self.pending_m = 0.0;
+        self.since_ns = [t_ns; MODES_MAX];
+        self.model_mut().start_at(healthy.pose, healthy.covariance);
+        match &mut self.kind {
+            Kind::Sampled(filter) => filter.restart(self.seed),
+            Kind::Hierarchical(filter) => filter.restart(self.seed),
+            Kind::LookAhead(filter) => filter.restart(self.seed),
+            Kind::Merged(filter) => filter.reset(),
+        }
+    }
+
+    /// Most particles.
+    #[must_use]
+    pub const fn limit(&self) -> usize {
+        self.limit
+    }
+
+    /// Particles at present, as [`Self::limit`] counts them.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        match &self.kind {
+            Kind::Sampled(filter) => filter.count(),
+            Kind::Hierarchical(filter) => filter.particles().count(),
+            Kind::LookAhead(filter) => LOOK_AHEAD_SHARE * filter.particles().count(),
+            Kind::Merged(_) => 0,
+        }
+    }
+
+    /// From the next observation on at most `count` particles.
+    pub fn set_limit(&mut self, count: usize) {
+        self.limit = count;
+        match &mut self.kind {
+            Kind::Sampled(filter) => filter.limit(count),
+            Kind::Hierarchical(filter) => filter.limit(count),
+            Kind::LookAhead(filter) => filter.limit(count.div_ceil(LOOK_AHEAD_SHARE)),
+            // One Gaussian a mode: nothing to save.
+            Kind::Merged(_) => {}
+        }
+    }
+
+    const fn model_mut(&mut self) -> &mut Switching {
+        match &mut self.kind {
+            Kind::Sampled(filter) => filter.model_mut(),
+            Kind::Hierarchical(filter) => filter.model_mut(),
+            Kind::LookAhead(filter) => filter.model_mut(),
+            Kind::Merged(filter) => filter.model_mut(),
+        }
+    }
+
+    fn filter(&self) -> &dyn Filter<Observation = Seen> {
+        match &self.kind {
+            Kind::Sampled(filter) => filter,
+            Kind::Hierarchical(filter) => filter,
+            Kind::LookAhead(filter) => filter,
+            Kind::Merged(filter) => filter,
+        }
+    }
+
+    fn filter_mut(&mut self) -> &mut dyn Filter<Observation = Seen> {
+        match &mut self.kind {
+            Kind::Sampled(filter) => filter,
+            Kind::Hierarchical(filter) => filter,
+            Kind::LookAhead(filter) => filter,
+            Kind::Merged(filter) => filter,
+        }
+    }
+
+    /// Observations that nothing explained, and were passed over.
+    #[must_use]
+    pub const fn degenerate_count(&self) -> u32 {
+        self.degenerate_count
+    }
+
+    /// Takes one observation.
+    pub fn step(&mut self, observation: &Observation, noise: NoiseScales) {
+        let mut observation = *observation;
+        observation.travel_m += std::mem::take(&mut self.pending_m);
+        let is_useful = observation.moving || observation.anchor && observation.pose_frames > 0;
+        if !is_useful {
+            // A robot at rest tells nothing: no fault appears, fades or is named.
+            self.pending_m = observation.travel_m;
+            return;
+        }
+        let use_wheels = self.use_wheels;
+        let seen = self.model_mut().look(&observation, noise, use_wheels);
+        let step = self.filter_mut().step(&seen);
+        if step.event.is_some() {
+            self.degenerate_count = self.degenerate_count.saturating_add(1);
+        }
+        let mut since_ns = self.since_ns;
+        for (since_ns, p) in since_ns.iter_mut().zip(self.filter().posterior()) {
+            if *p < ONSET {
+                *since_ns = observation.t_first_ns;
+            }
+        }
+        self.since_ns = since_ns;
+    }
+
+    /// Fills the probabilities of nodes, sets and unknown.
+    pub fn posterior(&self, leaves: &Leaves, out: &mut Posterior) {
+        let p = self.filter().posterior();
+        let total: f64 = p.iter().map(|p| p.max(FLOOR)).sum();
+        out.clear();
+        for (meaning, p) in self.meanings.iter().zip(p) {
+            let p = p.max(FLOOR) / total;
+            match *meaning {
+                Meaning::Unknown => out.unknown += p,
+                Meaning::Node(0) => out.add(FaultSet { leaves: 0, p }, leaves),
+                Meaning::Node(node) => {
+                    let leaves_in = 1 << node;
+                    out.add(
+                        FaultSet {
+                            leaves: leaves_in,
+                            p,
+                        },
+                        leaves,
+                    );
+                }
+            }
+        }
+        out.entropy += entropy(out.unknown);
+    }
+
+    /// Onset of a leaf's fault, capture time ns; 0 if it is no leaf.
+    #[must_use]
+    pub fn onset(&self, node: usize) -> u64 {
+        self.onset_of(Meaning::Node(node))
+    }
+
+    /// Onset of the unknown, capture time ns.
+    #[must_use]
+    pub fn onset_unknown(&self) -> u64 {
+        self.onset_of(Meaning::Unknown)
+    }
+
+    fn onset_of(&self, meaning: Meaning) -> u64 {
+        let p = self.filter().posterior();
+        let modes = (0..self.meanings.len()).filter(|&mode| self.meanings[mode] == meaning);
+        modes
+            .max_by(|&a, &b| p[a].total_cmp(&p[b]))
+            .map_or(0, |mode| self.since_ns[mode])
+    }
+
+    /// Adds the particles with their weights, or each mode's Gaussian.
+    pub fn hypotheses(&self, out: &mut Ranked) {
+        match &self.kind {
+            Kind::Sampled(filter) => {
+                let total: f64 = filter.particles().map(|(_, _, weight)| weight).sum();
+                for (mode, state, weight) in filter.particles() {
+                    self.push(out, (state.pose, [0.0; 6]), mode, weight / total);
+                }
+            }
+            Kind::Hierarchical(filter) => {
+                for (state, shares, weight) in filter.particles() {
+                    for (mode, &share) in shares.iter().enumerate() {
+                        self.push(out, (state.pose, [0.0; 6]), mode, weight * share);
+                    }
+                }
+            }
+            Kind::LookAhead(filter) => {
+                let weight = 1.0 / filter.particles().count() as f64;
+                for (mode, state) in filter.particles() {
+                    self.push(out, pose(state), mode, weight);
+                }
+            }
+            Kind::Merged(filter) => {
+                let states = filter.states().iter().zip(filter.posterior());
+                for (mode, (state, &weight)) in states.enumerate() {
+                    self.push(out, pose(state), mode, weight);
+                }
+            }
+        }
+    }
+
+    /// Adds one, unless it is impossible.
+    fn push(
+        &self,
+        out: &mut Ranked,
+        (pose, covariance): (Vector3<f64>, [f64; 6]),
+        mode: usize,
+        weight: f64,
+    ) {
+        if weight.is_nan() || weight <= 0.0 {
+            return;
+        }
+        let (leaves, index) = match self.meanings[mode] {
+            Meaning::Node(0) => (0, 0),
+            Meaning::Node(node) => (1 << node, node as u32),
+            Meaning::Unknown => (0, MODE_UNKNOWN),
+        };
+        out.push(WeightedHypothesis {
+            leaves,
+            onset_t_capture_ns: if index == 0 { 0 } else { self.since_ns[mode] },
+            pose: pose.into(),
+            pose_covariance: covariance,
+            log_weight: weight.ln(),
+            mode: index,
+            ..WeightedHypothesis::default()
+        });
+    }
+}
+
+/// Name of each mode among the states of a decision model, and its prior probability.
+fn names<'a>(tree: &'a FaultTree, meanings: &[Meaning], prior: f64) -> Vec<(&'a str, f64)> {
+    let nominal = 1.0 - prior * meanings.len().saturating_sub(1) as f64;
+    let named = meanings.iter().map(|meaning| match meaning {
+        Meaning::Node(0) => (tree.nodes()[0].name.as_str(), nominal),
+        Meaning::Node(node) => (tree.nodes()[*node].name.as_str(), prior),
+        Meaning::Unknown => ("UNKNOWN", prior),
+    });
+    named.collect()
+}
+
+fn meaning(switching: &Switching, mode: usize, leaves: &Leaves) -> Meaning {
+    let leaf = match switching.meaning(mode) {
+        (Moved::Unknown | Moved::UnknownAny, _) => return Meaning::Unknown,
+        (_, Some(wheel)) => leaves.encoder[wheel],
+        (moved, None) => (0..WHEELS)
+            .find(|&wheel| moved.is_stuck(wheel))
+            .and_then(|wheel| leaves.stuck[wheel]),
+    };
+    Meaning::Node(leaf.unwrap_or(0))
+}
+
+/// Modes below each abstract node of a tree that has two or more of them; of nodes with the same
+/// modes the first.
+fn abstract_nodes(tree: &FaultTree, leaves: &Leaves, meanings: &[Meaning]) -> Vec<Vec<usize>> {
+    let mut nodes: Vec<Vec<usize>> = Vec::new();
+    for (index, node) in tree.nodes().iter().enumerate().skip(1) {
+        let is_below = |meaning: &Meaning| match meaning {
+            Meaning::Node(node) => leaves.below[index] >> node & 1 == 1,
+            Meaning::Unknown => false,
+        };
+        let modes = (1..meanings.len()).filter(|&mode| is_below(&meanings[mode]));
+        let modes: Vec<usize> = modes.collect();
+        if node.fault.is_none() && modes.len() > 1 && !nodes.contains(&modes) {
+            nodes.push(modes);
+        }
+    }
+    nodes
+}
+
+/// Moments of the pose of a track.
+fn pose(state: &Gaussian<TRACK_DIMENSION>) -> (Vector3<f64>, [f64; 6]) {
+    let covariance = state.covariance.fixed_view::<3, 3>(0, 0).into();
+    (state.mean.fixed_rows::<3>(0).into(), triangle(&covariance))
+}

@@ -1,0 +1,500 @@
+//! The identifier's `step`: watch, keep a ring, identify from it after an alarm, report.
+
+use std::collections::VecDeque;
+
+use crate::settings;
+use nalgebra::Vector3;
+use vigil_blocks::{
+    DetectionBelief, Entry, FaultBelief, HealthyBelief, MODE_UNKNOWN, ParticleBlock, SensorFrame,
+};
+use vigil_robot::FaultPrior;
+use vigil_robot::learned::{Healthy, NoiseScales, Observation, Observer, motion_modes};
+
+use crate::identify::check::{FURTHER_NEED_HYPOTHESES, check};
+use crate::identify::detection::Detection;
+use crate::identify::engine::Engine;
+use crate::identify::fault_rates::fault_rates;
+use crate::identify::further_stage::FurtherStage;
+use crate::identify::generic::Generic;
+use crate::identify::hypotheses::{Ranked, copy};
+use crate::identify::models::Models;
+use crate::identify::modes::{IdentifierError, Leaves};
+use crate::identify::multiple_hypothesis::MultipleHypothesis;
+use crate::identify::node_sizes::NodeSizes;
+use crate::identify::posterior::Posterior;
+use crate::identify::reasons::Reasons;
+use crate::identify::reported::Reported;
+use crate::identify::trouble::believed;
+
+/// A ring is worked off in about this time after an alarm, s: the name is two observations late.
+const CATCH_UP_S: f64 = 0.1;
+/// Observations since which the reasons of a diagnosis are looked for, at most.
+const REASONS_MAX: usize = 20;
+
+/// What the identifier takes each cycle.
+#[derive(Debug, Clone, Copy)]
+pub struct Input<'a> {
+    /// The sensor frame.
+    pub frame: &'a SensorFrame,
+    /// The detector's belief and hypotheses of the same frame, if they are known.
+    pub detection: Option<(&'a DetectionBelief, &'a ParticleBlock)>,
+}
+
+/// An observation kept for an identification, and what the detector believed after it.
+#[derive(Debug, Clone, Copy)]
+struct Kept {
+    observation: Observation,
+    noise: NoiseScales,
+    healthy: Option<Healthy>,
+}
+
+/// What the identifier is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// No alarm, no fault believed.
+    Watching,
+    /// The next observation of the ring to take has this index.
+    Identifying(usize),
+}
+
+/// The identification filter at frame rate.
+///
+/// Before an alarm it reports nominal with 1 - p(fault) and keeps a ring of observations, each
+/// with what the detector believed after it. An alarm starts the filter from what it believed at
+/// the beginning of the ring: the fault had not happened yet, and later beliefs of the robot as a
+/// healthy one follow a nominal model that no longer holds. The ring is worked off within about
+/// 0.1 s, a bounded number of observations per cycle; until then the report stays what it was. Then
+/// every observation is one update; cycles between observations repeat the belief, with predicted
+/// and present probability equal.
+#[derive(Debug, Clone)]
+pub struct Identifier {
+    leaves: Leaves,
+    engine: Engine,
+    observer: Observer,
+    /// What is known of a healthy robot of which the detector says nothing.
+    unsure: Healthy,
+    p_unknown: f64,
+    prior: FaultPrior,
+    use_wheels: bool,
+    /// Sensors are silent, or the robot moves though it should stand: nothing can be identified.
+    in_trouble: bool,
+    /// Most hypotheses or particles of the engine, without a budget.
+    particles: usize,
+    ranked: Ranked,
+    /// The hypotheses after the last observation.
+    told: Box<ParticleBlock>,
+    updated: bool,
+    tells_own: bool,
+    ring: VecDeque<Kept>,
+    capacity: usize,
+    /// Time of an observation, s.
+    interval_s: f64,
+    phase: Phase,
+    /// Gyro and currents, where they take part: a filter, and what the ring's observations hold.
+    further: Option<Box<FurtherStage>>,
+    detection: Detection,
+    posterior: Posterior,
+    predicted: Posterior,
+    sizes: NodeSizes,
+    reasons: Reasons,
+    mode: u32,
+    mode_changes: u32,
+    reported: Reported,
+    /// Motion in the last observation, s, until it has been reported.
+    moved_s: f64,
+    run_id: u64,
+}
+
+impl Identifier {
+    /// An identifier over the leaves of `tree`.
+    ///
+    /// # Errors
+    /// [`IdentifierError`] if the model is of another robot or lacks a leaf's fault, or a setting
+    /// is out of range.
+    pub fn new(
+        models: &Models<'_>,
+        settings: &settings::Identifier,
+        sensors: settings::Sensors,
+        seed: u64,
+    ) -> Result<Self, IdentifierError> {
+        let Models {
+            model, robot, tree, ..
+        } = *models;
+        model.check_robot(robot)?;
+        check(settings)?;
+        let leaves = Leaves::new(tree, model, robot, sensors)?;
+        let use_wheels = sensors != settings::Sensors::Pose;
+        let (engine, modes) = match settings.filter {
+            settings::IdentifierFilter::MultipleHypothesis => {
+                let rates = fault_rates(&robot.fault_prior, &leaves, settings.p_unknown);
+                let mut filter = MultipleHypothesis::new(model, robot, &leaves, use_wheels, rates);
+                filter.set_limit(settings.particles.unwrap_or(usize::MAX));
+                let modes = filter.modes().to_vec();
+                (Engine::MultipleHypothesis(Box::new(filter)), modes)
+            }
+            _ if leaves.need_hypotheses() => {
+                return Err(IdentifierError::Build(FURTHER_NEED_HYPOTHESES.to_owned()));
+            }
+            _ => {
+                let filter = Generic::new(models, &leaves, settings, use_wheels, seed)?;
+                let modes = motion_modes(model, robot, leaves.stuck_wheels(), false, false);
+                (Engine::Generic(Box::new(filter)), modes)
+            }
+        };
+        let capacity = (settings.ring_s / model.interval_s).ceil().max(2.0) as usize;
+        let mut observer = Observer::new(model, robot);
+        let further = FurtherStage::new(models, &leaves, (sensors, settings), capacity);
+        if further.is_some() {
+            observer = observer.with_further();
+        }
+        Ok(Self {
+            particles: engine.limit(),
+            engine,
+            reasons: Reasons::new(model, robot, modes, use_wheels),
+            observer,
+            unsure: Healthy::unsure(model, robot),
+            p_unknown: settings.p_unknown,
+            prior: robot.fault_prior,
+            use_wheels,
+            in_trouble: false,
+            ranked: Ranked::new(),
+            told: Box::default(),
+            updated: false,
+            tells_own: false,
+            leaves,
+            ring: VecDeque::with_capacity(capacity),
+            capacity,
+            interval_s: model.interval_s,
+            phase: Phase::Watching,
+            further: further.map(Box::new),
+            detection: Detection::default(),
+            posterior: Posterior::nominal(),
+            predicted: Posterior::nominal(),
+            sizes: NodeSizes::default(),
+            mode: 0,
+            mode_changes: 0,
+            reported: Reported::default(),
+            moved_s: 0.0,
+            run_id: 0,
+        })
+    }
+
+    /// Most hypotheses of the default filter, or particles of a sampled one, without a budget.
+    #[must_use]
+    pub const fn particles(&self) -> u32 {
+        self.particles as u32
+    }
+
+    /// Hypotheses or particles that an observation costs at present; 0 while nothing is identified.
+    #[must_use]
+    pub fn particles_in_use(&self) -> u32 {
+        match self.phase {
+            Phase::Watching => 0,
+            Phase::Identifying(_) => self.engine.count() as u32,
+        }
+    }
+
+    /// Takes one entry of the journal and fills the belief and the hypotheses (headers and causes
+    /// are the caller's).
+    pub fn step(
+        &mut self,
+        entry: Entry<Input<'_>>,
+        belief: &mut FaultBelief,
+        hypotheses: &mut ParticleBlock,
+    ) {
+        self.predicted = self.posterior;
+        self.updated = false;
+        let mut detected = None;
+        match entry {
+            Entry::Frame(input) => {
+                detected = input.detection.map(|(_, block)| block);
+                self.take(&input);
+            }
+            // The state stays at the last frame: what is told is its prediction.
+            Entry::Missed(_) => {}
+            Entry::Budget(count) => {
+                let count = (count as usize).clamp(1, self.particles);
+                self.engine.set_limit(count);
+            }
+            Entry::Reset => {
+                self.observer.reset();
+                self.begin_run();
+            }
+        }
+        self.report(belief);
+        self.publish(detected, hypotheses);
+    }
+
+    fn begin_run(&mut self) {
+        self.ring.clear();
+        self.told.count = 0;
+        self.told.healthy = HealthyBelief::default();
+        self.phase = Phase::Watching;
+        self.in_trouble = false;
+        self.detection = Detection::default();
+        self.posterior = Posterior::nominal();
+        self.predicted = self.posterior;
+        self.reasons.clear();
+        self.reported.begin_run();
+        if let Some(further) = &mut self.further {
+            further.begin_run();
+        }
+    }
+
+    fn take(&mut self, input: &Input<'_>) {
+        self.observer.suspect(self.detection.alarm);
+        let intake = self.observer.push(input.frame);
+        if intake.new_run {
+            self.begin_run();
+        }
+        self.run_id = input.frame.run_id;
+        if let Some((belief, _)) = input.detection {
+            self.detection = Detection::of(belief);
+        }
+        if intake.complete {
+            self.in_trouble = self.observer.observation().troubles.any(self.use_wheels);
+            self.keep(input);
+            self.moved_s += self.observer.observation().moved_s();
+        }
+        if self.in_trouble {
+            self.phase = Phase::Watching;
+            let troubles = &self.observer.observation().troubles;
+            (self.posterior, self.sizes) = believed(troubles, self.use_wheels, &self.leaves);
+            self.reasons.clear();
+            return;
+        }
+        if !self.detection.alarm {
+            // The detector decides whether there is a fault: none is named without its alarm.
+            self.phase = Phase::Watching;
+        }
+        match self.phase {
+            Phase::Watching if self.detection.alarm => self.begin(),
+            Phase::Watching => {
+                self.posterior = Posterior::watching(self.detection.p_fault);
+                self.reasons.clear();
+            }
+            Phase::Identifying(_) => {}
+        }
+        if let Phase::Identifying(next) = self.phase {
+            self.identify(next, intake.complete);
+        }
+    }
+
+    /// Adds the last observation to the ring; the oldest gives way.
+    fn keep(&mut self, input: &Input<'_>) {
+        let healthy = input
+            .detection
+            .and_then(|(_, block)| Healthy::from_block(&block.healthy, self.unsure.wheels));
+        if let (Some(stage), Some(read)) = (&mut self.further, self.observer.further()) {
+            let healthy = healthy.as_ref().unwrap_or(&self.unsure);
+            let suspects = self.detection.suspects;
+            stage.keep(self.observer.observation(), read, healthy, suspects);
+        }
+        if self.ring.len() == self.capacity {
+            self.ring.pop_front();
+            if let Phase::Identifying(next) = self.phase {
+                // An observation that nobody has taken is taken before it goes; see catch_up.
+                self.phase = Phase::Identifying(next.saturating_sub(1));
+            }
+        }
+        self.ring.push_back(Kept {
+            observation: *self.observer.observation(),
+            noise: self.detection.noise,
+            healthy,
+        });
+    }
+
+    /// What the detector believed, or else that the pose is as it was measured.
+    fn healthy(&self, kept: &Kept) -> Healthy {
+        let pose = Vector3::from(kept.observation.pose);
+        kept.healthy.unwrap_or(Healthy {
+            pose,
+            ..self.unsure
+        })
+    }
+
+    /// Starts from the oldest kept observation whose pose is known.
+    fn begin(&mut self) {
+        let known = self
+            .ring
+            .iter()
+            .position(|kept| kept.healthy.is_some() || kept.observation.pose_frames > 0);
+        let start = known.unwrap_or(0);
+        let Some(kept) = self.ring.get(start) else {
+            return;
+        };
+        let healthy = self.healthy(kept);
+        self.engine.restart(&healthy, kept.observation.t_ns);
+        if let Some(further) = &mut self.further {
+            further.restart();
+        }
+        self.phase = Phase::Identifying(start + 1);
+        self.sizes = NodeSizes::default();
+        // What was unknown so far is now any of the faults, by their priors.
+        self.predicted = self.predicted.divided(&self.leaves, self.p_unknown);
+    }
+
+    fn identify(&mut self, next: usize, complete: bool) {
+        let behind = self.ring.len().saturating_sub(next);
+        let was_behind = behind > usize::from(complete);
+        let allowed = if was_behind { self.catch_up() } else { 1 };
+        let taken = behind.min(allowed);
+        let mut moved_s = 0.0;
+        for i in next..next + taken {
+            let Some(kept) = self.ring.get(i) else { break };
+            self.engine.step(&kept.observation, kept.noise);
+            if let Some(further) = &mut self.further {
+                further.step(i, &kept.observation);
+            }
+            moved_s += kept.observation.moved_s();
+        }
+        self.phase = Phase::Identifying(next + taken);
+        if taken < behind {
+            // The report stays what it was until the ring is worked off.
+            self.posterior = self.predicted;
+            return;
+        }
+        if taken == 0 {
+            return;
+        }
+        let prior = &self.prior;
+        let (birth, death) = (prior.suspected_1_s * moved_s, prior.mended_1_s * moved_s);
+        self.predicted = self
+            .predicted
+            .predicted(&self.leaves, self.p_unknown, birth, death);
+        let fusion = self.further.as_ref().map(|further| further.fusion());
+        self.engine
+            .posterior(&self.leaves, fusion.as_ref(), &mut self.posterior);
+        self.sizes = self.engine.sizes(&self.leaves, &self.posterior);
+        self.find_reasons(next, next + taken);
+        self.updated = true;
+    }
+
+    /// Follows the diagnosis and its rival over the observations `first..end`, which have just been
+    /// taken: anew from the onset when the diagnosis has changed.
+    fn find_reasons(&mut self, first: usize, end: usize) {
+        let (mode, _) = self.posterior.mode(&self.leaves);
+        if mode == self.mode {
+            self.follow(first, end);
+            return;
+        }
+        self.reasons.clear();
+        let onset_ns = match mode {
+            0 => return,
+            MODE_UNKNOWN => self.engine.onset_unknown(),
+            _ => self.onset_of_leaf(),
+        };
+        // The last pose from before the onset, not too long ago: the work of a cycle is bounded.
+        let end = end.min(self.ring.len());
+        let earliest = end.saturating_sub(REASONS_MAX);
+        let taken = self.ring.range(earliest..end);
+        let before = taken.take_while(|kept| kept.observation.t_ns <= onset_ns);
+        let start = earliest + before.count().saturating_sub(1);
+        let Some(kept) = self.ring.get(start) else {
+            return;
+        };
+        let healthy = self.healthy(kept);
+        let (posterior, leaves) = (&self.posterior, &self.leaves);
+        let at = &kept.observation;
+        let drive = (at.curvature, at.speed, at.command[0]);
+        self.reasons
+            .begin(posterior, leaves, &healthy, drive, onset_ns);
+        self.follow(start + 1, end);
+    }
+
+    fn follow(&mut self, first: usize, end: usize) {
+        for i in first..end {
+            let Some(kept) = self.ring.get(i) else { break };
+            self.reasons.follow(&kept.observation, kept.noise);
+        }
+    }
+
+    /// Observations to work off in one cycle while behind: more than arrive.
+    fn catch_up(&self) -> usize {
+        let frame_s = self.observer.observation().frame_s;
+        let arriving = frame_s / self.interval_s;
+        let wanted = (self.capacity as f64 * frame_s / CATCH_UP_S).ceil() as usize;
+        wanted.max(arriving as usize + 1).min(self.capacity)
+    }
+
+    fn is_catching_up(&self) -> bool {
+        matches!(self.phase, Phase::Identifying(next) if next < self.ring.len())
+    }
+
+    fn report(&mut self, belief: &mut FaultBelief) {
+        self.posterior.write(&self.leaves, belief);
+        match self.phase {
+            Phase::Identifying(_) => self.sizes.write(belief),
+            Phase::Watching if self.in_trouble => self.sizes.write(belief),
+            Phase::Watching => NodeSizes::default().write(belief),
+        }
+        belief.p_predicted = self.predicted.nodes;
+        belief.p_unknown_predicted = self.predicted.unknown;
+        belief.run_id = self.run_id;
+        let (mode, p_mode) = match self.phase {
+            _ if self.in_trouble => self.posterior.mode(&self.leaves),
+            Phase::Watching => (0, self.posterior.nodes[0]),
+            Phase::Identifying(_) if self.is_catching_up() => (self.mode, belief.p[0]),
+            Phase::Identifying(_) => self.posterior.mode(&self.leaves),
+        };
+        if mode != self.mode {
+            self.mode = mode;
+            self.mode_changes = self.mode_changes.saturating_add(1);
+        }
+        let moved_s = std::mem::take(&mut self.moved_s);
+        let (posterior, leaves) = (&self.posterior, &self.leaves);
+        self.reported
+            .take((mode, p_mode), posterior, leaves, moved_s);
+        belief.reported = self.reported.name();
+        belief.reported_change_count = self.reported.changes();
+        belief.mode = mode;
+        belief.p_mode = p_mode;
+        belief.mode_change_count = self.mode_changes;
+        belief.alarm_t_capture_ns = if self.detection.alarm {
+            self.detection.t_ns
+        } else {
+            0
+        };
+        belief.onset_t_capture_ns = self.onset();
+        belief.identifying = u32::from(self.phase != Phase::Watching || self.in_trouble);
+        belief.runner_up = self.reasons.runner_up();
+        belief.channel_evidence = self.reasons.channel_evidence();
+        belief.degenerate_count = self.engine.degenerate_count();
+        belief.particle_limit = self.engine.limit() as u32;
+        let is_identifying = self.phase != Phase::Watching && !self.is_catching_up();
+        if let Some(further) = self.further.as_ref().filter(|_| is_identifying) {
+            further.sizes(belief);
+        }
+    }
+
+    fn onset(&self) -> u64 {
+        if self.phase == Phase::Watching || self.is_catching_up() {
+            return 0;
+        }
+        self.onset_of_leaf()
+    }
+
+    /// Onset of the most probable leaf; 0 of those of gyro and currents, which know none.
+    fn onset_of_leaf(&self) -> u64 {
+        let p = &self.posterior.nodes;
+        let most = self.leaves.all().max_by(|&a, &b| p[a].total_cmp(&p[b]));
+        most.map_or(0, |node| self.engine.onset(node))
+    }
+
+    /// Without an identification, in troubles too, the detector's hypotheses are repeated.
+    fn publish(&mut self, detected: Option<&ParticleBlock>, out: &mut ParticleBlock) {
+        if self.phase == Phase::Watching || self.is_catching_up() {
+            if let Some(block) = detected {
+                copy(block, &mut self.told);
+            } else if self.tells_own {
+                self.told.count = 0;
+            }
+            self.tells_own = false;
+        } else if self.updated {
+            self.engine.hypotheses(&self.leaves, &mut self.ranked);
+            self.ranked.drain(&mut self.told);
+            self.tells_own = true;
+        }
+        copy(&self.told, out);
+    }
+}

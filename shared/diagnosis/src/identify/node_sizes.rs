@@ -1,0 +1,98 @@
+//! In which way the component of each node is broken, and by how much.
+
+use vigil_blocks::{FAULT_NODES, FaultBelief, SizeKind, WHEELS};
+
+use vigil_robot::learned::{MotionMode, Moved};
+
+use crate::identify::encoders::{STATES, WAYS_TO_BREAK};
+use crate::identify::modes::Leaves;
+use crate::identify::multiple_hypothesis::MultipleHypothesis;
+use crate::identify::posterior::Posterior;
+
+/// Of a fault that is less probable nothing is told: at the odds of a masked one a size is noise.
+pub const TOLD_MIN: f64 = 0.01;
+
+/// What is told of each node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NodeSizes {
+    size: [f64; FAULT_NODES],
+    sd: [f64; FAULT_NODES],
+    kind: [u32; FAULT_NODES],
+}
+
+impl Default for NodeSizes {
+    fn default() -> Self {
+        Self {
+            size: [0.0; FAULT_NODES],
+            sd: [0.0; FAULT_NODES],
+            kind: [0; FAULT_NODES],
+        }
+    }
+}
+
+impl NodeSizes {
+    /// What a filter holds of the leaves that are probable enough.
+    #[must_use]
+    pub fn of(filter: &MultipleHypothesis, leaves: &Leaves, posterior: &Posterior) -> Self {
+        let mut out = Self::default();
+        let is_told = |node: &usize| posterior.nodes[*node] >= TOLD_MIN;
+        for node in leaves.stuck.into_iter().flatten().filter(is_told) {
+            out.kind[node] = SizeKind::Stuck as u32;
+        }
+        for (wheel, node) in leaves.encoder.into_iter().enumerate().take(WHEELS) {
+            if let Some(node) = node.filter(is_told) {
+                let (kind, (size, sd)) = broken(filter, wheel);
+                (out.size[node], out.sd[node], out.kind[node]) = (size, sd, kind as u32);
+            }
+        }
+        for (wheel, node) in leaves.steer.into_iter().enumerate() {
+            let servo = filter
+                .best(Moved::Steer(wheel))
+                .and_then(|best| best.state.servo);
+            if let Some((node, servo)) = node.filter(is_told).zip(servo) {
+                let (kind, (size, sd)) = servo.size();
+                (out.size[node], out.sd[node], out.kind[node]) = (size, sd, kind as u32);
+            }
+        }
+        if let Some((node, best)) = leaves.pose.filter(is_told).zip(filter.best(Moved::Pose)) {
+            let jump_m = best.state.jump_m.unwrap_or_default();
+            (out.size[node], out.sd[node]) = jump_m;
+            out.kind[node] = SizeKind::JumpM as u32;
+        }
+        out
+    }
+
+    /// Tells of a node in which way it is broken, without a size.
+    pub const fn tell(&mut self, node: usize, kind: SizeKind) {
+        self.kind[node] = kind as u32;
+    }
+
+    /// Writes them into a block.
+    pub const fn write(&self, belief: &mut FaultBelief) {
+        belief.size = self.size;
+        belief.size_sd = self.sd;
+        belief.size_kind = self.kind;
+    }
+}
+
+/// The most probable way in which an encoder is broken, its size and standard deviation.
+fn broken(filter: &MultipleHypothesis, wheel: usize) -> (SizeKind, (f64, f64)) {
+    let mut sums = [0.0; STATES];
+    for (MotionMode { moved, .. }, hypothesis) in filter.hypotheses() {
+        if moved.is_unknown() {
+            continue;
+        }
+        let p = hypothesis.log_weight.exp();
+        let ways = hypothesis.state.encoders.ways(wheel);
+        for (sum, way) in sums.iter_mut().zip(ways) {
+            *sum += p * way;
+        }
+    }
+    let all = WAYS_TO_BREAK.into_iter().zip(sums);
+    let best = all.max_by(|(_, a), (_, b)| a.total_cmp(b));
+    match best {
+        Some(((kind, Some(way)), _)) => (kind, filter.sizes().estimate(wheel, way)),
+        Some(((kind, None), _)) => (kind, (0.0, 0.0)),
+        None => (SizeKind::None, (0.0, 0.0)),
+    }
+}

@@ -1,0 +1,276 @@
+//! Why one explanation is preferred to another: the evidence of each channel.
+//!
+//! When a diagnosis is made, it and the next best explanation are both followed from the onset on,
+//! each as if it alone were true, and the log-likelihoods of their readings are summed by channel.
+//! The filter's own hypotheses cannot say this: the next best of them has usually become it a
+//! moment ago, and owes its past to the best.
+
+use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
+use vigil_inference::alternative::Alternatives;
+use vigil_inference::logspace::log_add;
+use vigil_inference::outlier::unvouched;
+use vigil_inference::track::Track;
+use vigil_robot::Description;
+use vigil_robot::learned::wheel_evidence::ANYTHING;
+use vigil_robot::learned::wheels::steering_angle;
+use vigil_robot::learned::{
+    Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext, WheelEvidence,
+};
+
+use crate::identify::angles::Angles;
+use crate::identify::modes::Leaves;
+use crate::identify::posterior::Posterior;
+use crate::identify::prepared::is_new;
+use crate::identify::rate_offsets::RateOffsets;
+use crate::identify::servo::{Servo, ServoPrior};
+
+/// Probability that in the unknown a wheel or an angle begins or ceases to do anything, an
+/// observation: once in 1.4 h of 50 ms.
+const CHANGES: f64 = 1e-5;
+
+/// What a diagnosis may say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Explanation {
+    /// Exactly this set of leaves.
+    Leaves(u64),
+    /// No modelled fault.
+    Unknown,
+}
+
+/// An explanation that is taken to be true since the onset.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Lineage {
+    /// Index of the motion mode.
+    mode: usize,
+    /// Wheels whose encoders are broken, as bits.
+    broken: u32,
+    track: Track,
+    offsets: RateOffsets,
+    servo: Option<Servo>,
+    /// In the unknown: which wheels and which angles do anything.
+    anything: [Alternatives<2>; WHEELS],
+    angles: Angles,
+    /// Log-likelihood of the readings, by channel.
+    heard: [f64; CHANNELS],
+}
+
+/// The diagnosis and its rival.
+#[derive(Debug, Clone)]
+pub struct Reasons {
+    model: Model,
+    robot: Description,
+    modes: Vec<MotionMode>,
+    use_wheels: bool,
+    servo: ServoPrior,
+    /// Of the wheels, from before the onset.
+    wheels: WheelContext,
+    followed: Option<[Lineage; 2]>,
+    onset_ns: u64,
+    runner_up: u32,
+}
+
+impl Reasons {
+    /// No diagnosis yet, of a robot that may move in these ways.
+    #[must_use]
+    pub fn new(
+        model: &Model,
+        robot: &Description,
+        modes: Vec<MotionMode>,
+        use_wheels: bool,
+    ) -> Self {
+        Self {
+            model: model.clone(),
+            robot: robot.clone(),
+            modes,
+            use_wheels,
+            servo: ServoPrior::new(robot),
+            wheels: WheelContext::default(),
+            followed: None,
+            onset_ns: 0,
+            runner_up: 0,
+        }
+    }
+
+    /// Forgets the diagnosis.
+    pub fn clear(&mut self) {
+        (self.followed, self.runner_up) = (None, 0);
+    }
+
+    /// The next best when the diagnosis was made: a node, unknown or multiple, as
+    /// `FaultBelief::mode`.
+    #[must_use]
+    pub const fn runner_up(&self) -> u32 {
+        self.runner_up
+    }
+
+    /// By channel: how much more the readings since the onset are expected under the diagnosis than
+    /// under its rival, natural log-likelihood.
+    #[must_use]
+    pub fn channel_evidence(&self) -> [f64; CHANNELS] {
+        self.followed.map_or([0.0; CHANNELS], |[named, rival]| {
+            std::array::from_fn(|i| {
+                let apart = named.heard[i] - rival.heard[i];
+                if apart.is_finite() { apart } else { 0.0 }
+            })
+        })
+    }
+
+    /// Begins to follow the diagnosis of `posterior` and its rival from before `onset_ns`, while
+    /// the robot drives at this curvature (1/m) and speed (m/s), and is told this curvature.
+    pub fn begin(
+        &mut self,
+        posterior: &Posterior,
+        leaves: &Leaves,
+        healthy: &Healthy,
+        (curvature, speed, commanded_1_m): (f64, f64, f64),
+        onset_ns: u64,
+    ) {
+        let (named, rival) = contenders(posterior);
+        self.runner_up = match rival {
+            Explanation::Unknown => MODE_UNKNOWN,
+            Explanation::Leaves(0) => 0,
+            Explanation::Leaves(set) if set.count_ones() > 1 => MODE_MULTIPLE,
+            Explanation::Leaves(set) => set.trailing_zeros(),
+        };
+        (self.onset_ns, self.wheels) = (onset_ns, healthy.wheels);
+        let lineage = |explanation| {
+            let (moved, broken) = match explanation {
+                Explanation::Unknown => (Moved::UnknownAny, 0),
+                Explanation::Leaves(set) => {
+                    let (stuck, askew) = (wheels(&leaves.stuck, set), wheels(&leaves.steer, set));
+                    let jumped = leaves.pose.is_some_and(|pose| set >> pose & 1 == 1);
+                    let moved = match (stuck, askew) {
+                        (0, 0) if jumped => Moved::Pose,
+                        (0, 0) => Moved::Nominal,
+                        (0, askew) => Moved::Steer(askew.trailing_zeros() as usize),
+                        (stuck, _) => Moved::Stuck(stuck),
+                    };
+                    (moved, wheels(&leaves.encoder, set))
+                }
+            };
+            let mode = self.modes.iter().position(|mode| mode.moved == moved)?;
+            let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
+            Some(Lineage {
+                mode,
+                broken,
+                track: healthy.track(&noise),
+                offsets: RateOffsets::default(),
+                servo: match moved {
+                    Moved::Steer(wheel) => {
+                        let angle = steering_angle(&self.robot, wheel, commanded_1_m);
+                        Some(Servo::new(&self.servo, angle))
+                    }
+                    _ => None,
+                },
+                anything: [Alternatives::new([1.0 - ANYTHING, ANYTHING]); WHEELS],
+                angles: Angles::default(),
+                heard: [0.0; CHANNELS],
+            })
+        };
+        self.followed = lineage(named).zip(lineage(rival)).map(<[_; 2]>::from);
+    }
+
+    /// Takes the next observation.
+    pub fn follow(&mut self, observation: &Observation, noise: NoiseScales) {
+        let Some(mut followed) = self.followed else {
+            return;
+        };
+        self.wheels.fade(observation.travel_m);
+        let variance = observation.pose_variance(&self.model, noise.pose);
+        for Lineage { mode, track, .. } in &mut followed {
+            let mode = &self.modes[*mode];
+            if !observation.anchor {
+                let step = observation.displacement(&self.model, &mode.motion);
+                track.predict(&step, &mode.noise);
+            } else if observation.pose_frames > 0 {
+                track.anchor(observation.pose, unvouched(variance));
+            }
+        }
+        if observation.moving && !observation.anchor {
+            if self.use_wheels {
+                self.hear_wheels(&mut followed, observation, noise);
+            }
+            if observation.pose_frames > 0 {
+                for Lineage { track, heard, .. } in &mut followed {
+                    let gained = track.update(observation.pose, variance);
+                    heard[Channel::POSE] += gained.unwrap_or(0.0);
+                }
+            }
+        }
+        self.followed = Some(followed);
+    }
+
+    fn hear_wheels(
+        &self,
+        followed: &mut [Lineage; 2],
+        observation: &Observation,
+        noise: NoiseScales,
+    ) {
+        let (model, robot) = (&self.model, &self.robot);
+        let evidence = WheelEvidence::new(model, robot, observation, noise, &self.wheels);
+        let is_new = is_new(observation.t_ns, self.onset_ns);
+        for lineage in followed {
+            let mode = &self.modes[lineage.mode];
+            let moved = mode.moved;
+            for wheel in 0..self.robot.wheels.len().min(WHEELS) {
+                let is_broken = lineage.broken >> wheel & 1 == 1;
+                lineage.heard[Channel::wheel_rate(wheel)] += if is_broken {
+                    // In any way, also by a size: then it reads a smooth rate of its own.
+                    let ways = [evidence.broken_anyhow(wheel), evidence.own_rate[wheel]];
+                    log_add(ways[0], ways[1]) - std::f64::consts::LN_2
+                } else if moved == Moved::UnknownAny {
+                    let healthy = evidence.healthy[wheel];
+                    let ratio = evidence.any[wheel] - healthy;
+                    healthy + lineage.anything[wheel].step([0.0, ratio], [CHANGES; 2])
+                } else if mode.turns_anyhow(wheel) && !is_new {
+                    let dragged = evidence.dragged(&self.model, observation, mode, wheel);
+                    let (model, offsets) = (&self.model, &mut lineage.offsets);
+                    let heard =
+                        offsets.log_likelihood(model, observation, &evidence, wheel, &dragged);
+                    offsets.learn(observation, &evidence, wheel, &dragged);
+                    heard
+                } else {
+                    evidence.whole(&self.model, observation, mode, is_new, wheel)
+                };
+            }
+            for (wheel, reading) in evidence.steer.iter().enumerate() {
+                let Some(reading) = reading else { continue };
+                lineage.heard[Channel::steer(wheel)] += match (moved, &mut lineage.servo) {
+                    (Moved::UnknownAny, _) => lineage.angles.step_one(wheel, reading, CHANGES),
+                    (Moved::Steer(askew), Some(servo)) if askew == wheel => {
+                        servo.step(&self.servo, reading)
+                    }
+                    _ => 0.0,
+                };
+            }
+        }
+    }
+}
+
+/// The best explanation and the next best that is not the same faults and one more: those explain
+/// nothing else.
+fn contenders(posterior: &Posterior) -> (Explanation, Explanation) {
+    let named = posterior.sets[0].leaves;
+    let others = posterior.sets[1..posterior.set_count.max(1)].iter();
+    let mut others = others.filter(|set| named == 0 || set.leaves & named != named);
+    let rival = others.next().copied().unwrap_or_default();
+    if posterior.unknown > 0.5 {
+        (Explanation::Unknown, Explanation::Leaves(named))
+    } else if posterior.unknown > rival.p {
+        (Explanation::Leaves(named), Explanation::Unknown)
+    } else {
+        (
+            Explanation::Leaves(named),
+            Explanation::Leaves(rival.leaves),
+        )
+    }
+}
+
+/// Wheels whose node is in a set, as bits.
+fn wheels(nodes: &[Option<usize>; WHEELS], set: u64) -> u32 {
+    let is_in = |node: &Option<usize>| node.is_some_and(|node| set >> node & 1 == 1);
+    let wheels = nodes.iter().enumerate();
+    wheels.fold(0, |bits, (wheel, node)| {
+        bits | u32::from(is_in(node)) << wheel
+    })
+}

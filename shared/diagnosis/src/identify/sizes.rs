@@ -1,0 +1,263 @@
+//! How far an encoder is off that still follows its wheel: gain, bias, drift and delay.
+//!
+//! One estimate a wheel and way, shared by all hypotheses: it follows the rate that the most
+//! probable named one expects of the wheel. Before each reading it is the mixture of what has been
+//! learned since the fault and of what is known when it begins with this reading, as probable as
+//! that hypothesis has them; after it, of the mixture's moments. So the onset needs no hypothesis
+//! of its own, and what a healthy encoder read before it is forgotten at the first faulty reading.
+
+use vigil_blocks::WHEELS;
+use vigil_inference::logspace::log_add;
+use vigil_inference::size::{Prior, Size};
+use vigil_robot::learned::wheel_context::FAR_SD;
+use vigil_robot::learned::wheels::STANDING_SD_RAD_S;
+use vigil_robot::learned::{Model, MotionMode, Observation, WheelEvidence};
+use vigil_robot::{Description, Tolerance};
+
+use crate::identify::encoders::Encoders;
+use crate::identify::late::Late;
+
+/// Ways with a size: gain, bias, drift, delay.
+pub const WAYS: usize = 4;
+/// Index of each among them.
+pub const GAIN: usize = 0;
+/// See [`GAIN`].
+pub const BIAS: usize = 1;
+/// See [`GAIN`].
+pub const DRIFT: usize = 2;
+/// See [`GAIN`].
+pub const DELAY: usize = 3;
+/// Prior shares among all ways in which an encoder breaks. Chosen: together a third of the
+/// breakages; a gain costs 1 nat beside a freeze.
+pub const SIZED_SHARES: [f64; WAYS] = [0.12, 0.12, 0.04, 0.08];
+
+/// Gain of a broken encoder: mean and deviation. Lost pulses are commoner than pulses too many. Two
+/// deviations span all pulses lost to two thirds too many.
+const GAIN_PRIOR: (f64, f64) = (0.75, 0.45);
+/// Deviation of a bias, in tolerances of one wheel's rate; the same of a drift per second, and of
+/// the bias that it has reached when it is first looked for. Chosen: three times the least bias.
+const BIAS_SD: f64 = 10.0;
+const DRIFT_SD_1_S: f64 = 2.5;
+const DRIFTED_SD: f64 = 5.0;
+/// A gain is one beyond this many tolerances of the wheels' ratio, a bias beyond so many of one
+/// wheel's rate: what load and ground make of a rate is no encoder's fault. Chosen: smaller sizes
+/// differ from load by nothing, larger ones are named later.
+const RATIOS: f64 = 2.0;
+const RATES: f64 = 3.0;
+/// A drift is one if it passes the tolerance of a rate within this time, s. Chosen: a slower one is
+/// taken up as load.
+const DRIFTS_S: f64 = 5.0;
+/// Tolerances of a robot that declares none: share of the rate, and rad/s. The rover's.
+const UNDECLARED: (f64, f64) = (0.08, 0.06);
+/// Deviation by which a gain wanders from one reading to the next: 0.035 in a minute of 20 Hz, less
+/// than half a tolerance.
+const GAIN_WANDERS: f64 = 0.001;
+/// That of a bias, as a part of the tolerance of a rate: in a minute it wanders by one.
+const BIAS_WANDERS: f64 = 30.0;
+
+/// What the last observation says of each wheel's encoder, if it is broken in each way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sized {
+    /// Log-likelihoods, comparable within a wheel.
+    pub logs: [[f64; WAYS]; WHEELS],
+    /// That of a bias on a wheel that stands.
+    pub standing: [f64; WHEELS],
+    /// Wheels, as bits, of which a late encoder reads anything else than a timely one.
+    pub late: u32,
+}
+
+/// The estimates.
+#[derive(Debug, Clone)]
+pub struct Sizes {
+    /// Of gain, bias and drift.
+    priors: [Prior; DELAY],
+    fresh: [Size; DELAY],
+    held: [[Size; DELAY]; WHEELS],
+    late: Late,
+}
+
+/// One observation, with the rates of the most probable motion that has a name.
+#[derive(Debug, Clone, Copy)]
+pub struct Sight<'a> {
+    /// The model.
+    pub model: &'a Model,
+    /// The observation.
+    pub observation: &'a Observation,
+    /// What its wheels say.
+    pub evidence: &'a WheelEvidence,
+    /// The motion.
+    pub mode: &'a MotionMode,
+    /// The encoders before the observation.
+    pub encoders: &'a Encoders,
+    /// Probabilities that each encoder breaks in it.
+    pub births: &'a [f64; WHEELS],
+}
+
+impl Sight<'_> {
+    /// Share of the fault that began before this observation, if the encoder is broken this way.
+    pub fn begun(&self, wheel: usize, way: usize) -> f64 {
+        let before = self.encoders.p_sized(wheel, way);
+        let now = self.encoders.p_whole(wheel) * self.births[wheel] * SIZED_SHARES[way];
+        let both = before + now;
+        if both > 0.0 { before / both } else { 0.0 }
+    }
+
+    /// Log-likelihood of a wheel's readings about this rate.
+    pub fn reads(&self, wheel: usize, about: (f64, f64, f64)) -> f64 {
+        self.evidence
+            .reads(self.model, self.observation, wheel, about)
+    }
+}
+
+impl Sizes {
+    /// Nothing is known of any size.
+    #[must_use]
+    pub fn new(robot: &Description) -> Self {
+        let declared = |t: Tolerance| (t.wheel_ratio, t.wheel_rate_rad_s);
+        let (ratio, rate) = robot.tolerance.map_or(UNDECLARED, declared);
+        let (gain, bias) = (RATIOS * ratio, RATES * rate);
+        let drift = rate / DRIFTS_S;
+        let priors = [
+            Prior {
+                mean: [GAIN_PRIOR.0, 0.0],
+                sd: [GAIN_PRIOR.1, 0.0],
+                wander: [GAIN_WANDERS, 0.0],
+                healthy: [1.0 - gain, 1.0 + gain],
+            },
+            Prior {
+                mean: [0.0; 2],
+                sd: [BIAS_SD * rate, 0.0],
+                wander: [rate / BIAS_WANDERS, 0.0],
+                healthy: [-bias, bias],
+            },
+            Prior {
+                mean: [0.0; 2],
+                sd: [DRIFT_SD_1_S * rate, DRIFTED_SD * rate],
+                wander: [0.0, rate / BIAS_WANDERS],
+                healthy: [-drift, drift],
+            },
+        ];
+        let fresh = priors.each_ref().map(Size::new);
+        Self {
+            priors,
+            fresh,
+            held: [fresh; WHEELS],
+            late: Late::default(),
+        }
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.held = [self.fresh; WHEELS];
+        self.late.clear();
+    }
+
+    /// The robot stands: its wheels' rates are 0, and what drifts drifts on.
+    pub fn rest(&mut self, observation: &Observation) {
+        for held in &mut self.held {
+            held[DRIFT].predict(observation.dt_s, &self.priors[DRIFT]);
+        }
+        self.late.keep(observation.t_ns, [(0.0, 0.0); WHEELS]);
+    }
+
+    /// Expected size and standard deviation of a way, in its unit.
+    #[must_use]
+    pub fn estimate(&self, wheel: usize, way: usize) -> (f64, f64) {
+        match way {
+            DELAY => self.late.estimate(wheel),
+            _ => self.held[wheel][way].estimate(),
+        }
+    }
+
+    /// Takes an observation of the first `wheels` wheels: what it says, and what it teaches.
+    pub fn take(&mut self, sight: &Sight<'_>, wheels: usize) -> Sized {
+        let mut said = Sized {
+            logs: [[f64::NEG_INFINITY; WAYS]; WHEELS],
+            standing: [0.0; WHEELS],
+            late: 0,
+        };
+        let rate = |i: usize| match i < wheels {
+            true => {
+                let (model, observation, mode) = (sight.model, sight.observation, sight.mode);
+                sight.evidence.rate(model, observation, mode, i)
+            }
+            false => (0.0, 0.0, 0.0),
+        };
+        let rates: [_; WHEELS] = std::array::from_fn(rate);
+        for (wheel, &about) in rates.iter().enumerate().take(wheels) {
+            for way in 0..DELAY {
+                said.logs[wheel][way] = self.line(sight, wheel, way, about);
+            }
+            let (bias, variance) = self.held[wheel][BIAS].expected([1.0, 0.0]);
+            let spread = variance + STANDING_SD_RAD_S * STANDING_SD_RAD_S;
+            said.standing[wheel] = sight.reads(wheel, (bias, spread, about.2));
+        }
+        let means = rates.map(|(rate, variance, _)| (rate, variance));
+        self.late.keep(sight.observation.t_ns, means);
+        for (wheel, &about) in rates.iter().enumerate().take(wheels) {
+            let begun = sight.begun(wheel, DELAY);
+            let is_stuck = sight.mode.moved.is_stuck(wheel);
+            let reads = |about| sight.reads(wheel, about);
+            if let Some(log) = self.late.take(wheel, about.2, begun, is_stuck, reads) {
+                said.logs[wheel][DELAY] = log;
+                said.late |= 1 << wheel;
+            }
+        }
+        said
+    }
+
+    /// What a wheel's readings say for a gain, bias or drift while it turns at about this rate; the
+    /// estimate learns from them, unless the wheel stands.
+    fn line(&mut self, sight: &Sight<'_>, wheel: usize, way: usize, about: (f64, f64, f64)) -> f64 {
+        let prior = &self.priors[way];
+        let mut held = self.held[wheel][way];
+        let dt_s = match way {
+            DRIFT => sight.observation.dt_s,
+            _ => 0.0,
+        };
+        held.predict(dt_s, prior);
+        let begun = sight.begun(wheel, way);
+        let (log_held, held) = heard(sight, wheel, way, about, held, prior);
+        let (log_fresh, fresh) = heard(sight, wheel, way, about, self.fresh[way], prior);
+        let (log_held, log_fresh) = (begun.ln() + log_held, (1.0 - begun).ln() + log_fresh);
+        let log = log_add(log_held, log_fresh);
+        if !sight.mode.moved.is_stuck(wheel) && log.is_finite() {
+            let share = (log_held - log).exp();
+            self.held[wheel][way] = held.mixed(&fresh, share, prior);
+        }
+        log
+    }
+}
+
+/// What a wheel's readings say for a size, and what it is after them.
+fn heard(
+    sight: &Sight<'_>,
+    wheel: usize,
+    way: usize,
+    (rate, variance, tail): (f64, f64, f64),
+    mut size: Size,
+    prior: &Prior,
+) -> (f64, Size) {
+    let (by, base, variance) = match way {
+        GAIN => {
+            let (gain, _) = size.estimate();
+            ([rate, 0.0], 0.0, gain * gain * variance)
+        }
+        BIAS => ([1.0, 0.0], rate, variance),
+        _ => ([0.0, 1.0], rate, variance),
+    };
+    let (beside, uncertain) = size.expected(by);
+    let log = sight.reads(wheel, (base + beside, variance + uncertain, tail));
+    let reading = &sight.observation.wheels[wheel];
+    if reading.plain == 0 {
+        return (log, size);
+    }
+    let noise = variance + sight.evidence.sample_variance(wheel, reading.plain);
+    let apart = reading.mean - base - beside;
+    if apart * apart > FAR_SD * FAR_SD * (noise + uncertain) {
+        return (log, size);
+    }
+    let before = size.log_material();
+    size.update(by, reading.mean - base, noise, prior);
+    (log + size.log_material() - before, size)
+}

@@ -1,0 +1,26 @@
+//! A steady cycle of the detector allocates nothing.
+
+use vigil_blocks::{DetectionBelief, Entry, ParticleBlock};
+use vigil_cycle::allocation::allocations;
+use vigil_diagnosis::detect::Detector;
+use vigil_setup::schema;
+
+use crate::recorded;
+
+#[test]
+fn steady_cycles_allocate_nothing() {
+    let (frames, _) = recorded::unseen("RM_STUCK", "stuck");
+    let (model, robot) = (recorded::model(), recorded::robot());
+    let mut detector = Detector::new(&model, &robot, &schema::Detector::default()).unwrap();
+    let mut belief = DetectionBelief::default();
+    let mut hypotheses: Box<ParticleBlock> = Box::default();
+    let before = allocations();
+    for frame in &frames {
+        detector.step(Entry::Frame(frame), &mut belief, &mut hypotheses);
+        detector.step(Entry::Missed(1), &mut belief, &mut hypotheses);
+    }
+    detector.step(Entry::Reset, &mut belief, &mut hypotheses);
+    assert_eq!(allocations() - before, 0);
+    // It did detect.
+    assert_eq!(belief.alarm_count, 1);
+}
