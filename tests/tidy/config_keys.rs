@@ -18,7 +18,14 @@ const DEFINITIONS: [(&str, &[&str]); 6] = [
         "config/navigation.toml",
         &["tools/missions/src/navigation/"],
     ),
-    ("config/", &["shared/setup/src/schema"]),
+    (
+        "config/",
+        &[
+            "shared/setup/src/schema",
+            "shared/diagnosis/src/settings.rs",
+            "shared/decision/src/settings.rs",
+        ],
+    ),
 ];
 
 fn schema<'a>(sources: &'a [Source], path: &str) -> impl Iterator<Item = (&'a Source, Field)> {

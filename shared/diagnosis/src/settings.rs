@@ -1,4 +1,4 @@
-//! Settings of the diagnosis: sections `[detector]`, `[monitors]` and `[identifier]` of a graph file.
+//! Settings of the diagnosis: `[detector]`, `[monitors]` and `[identifier]` of a graph file.
 
 use std::fmt;
 

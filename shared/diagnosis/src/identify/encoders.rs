@@ -8,7 +8,7 @@ use vigil_robot::learned::wheel_evidence::{ANYTHING, BREAKAGE_SHARES, BREAKAGES}
 
 use crate::identify::sizes::{BIAS, DELAY, DRIFT, GAIN, SIZED_SHARES, WAYS};
 
-/// First of the states of an encoder that is off by a size; see [`crate::identify::sizes`]. The states before
+/// First of the states of an encoder that is off by a size; see [`super::sizes`]. The states before
 /// it are whole, and the breakages.
 pub const SIZED: usize = 1 + BREAKAGES.len();
 /// State of a whole encoder whose wheel turns at a rate of its own, in the unknown.
@@ -40,7 +40,7 @@ const AGAINST_MAX: f64 = -80.0;
 /// and silent on a standing wheel.
 pub const STATES: usize = SILENT + 1;
 
-/// Names of the ways to break, in the order of the states, and which of [`crate::identify::sizes`] has one.
+/// Names of the ways to break, in the order of the states, and which of [`super::sizes`] has one.
 pub const WAYS_TO_BREAK: [(SizeKind, Option<usize>); BREAKAGES.len() + WAYS] = [
     (SizeKind::Zero, None),
     (SizeKind::Frozen, None),

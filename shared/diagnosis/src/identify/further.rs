@@ -3,7 +3,7 @@
 //! Its states are a whole robot, a motor that has lost a share of its torque, a current sensor that
 //! is dead, scaled, noisy or off, a gyro that is too, a stuck wheel, and what nobody knows. A size
 //! is a grid. Given the fault these channels depend neither on the pose nor on the encoders, which
-//! the other filter weighs ([`crate::identify::multiple_hypothesis`]): probabilities of both are multiplied,
+//! the other filter weighs ([`super::multiple_hypothesis`]): probabilities of both are multiplied,
 //! over the prior that both contain. So hypotheses that say the same of a channel have one
 //! likelihood of it, and a broken encoder, a stuck wheel and a weak motor are told apart by what
 //! each makes of the currents.

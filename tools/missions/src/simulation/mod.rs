@@ -1,6 +1,6 @@
 //! Missions through an event simulator: what a policy is worth on a model.
 //!
-//! [`World`] draws start, next state and observation from a [`vigil_pomdp::Pomdp`]; an [`Agent`] acts:
+//! [`World`] draws start, next state and observation from a decision model; an [`Agent`] acts:
 //! a policy with its belief, a deterministic [`Escalation`], or [`Random`]; [`run`] brings the two
 //! together for one mission. Random numbers are *paired*: step k of episode e takes the same
 //! numbers whoever acts, so that differences between agents ([`Paired`]) are known far better than
