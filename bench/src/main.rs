@@ -34,6 +34,8 @@ enum Question {
     /// Does the diagnosis hold in the field: for hours, over gaps, on other grounds, with other
     /// lags?
     Field(field::Args),
+    /// How long from a clone to the first alarm, packages downloaded?
+    FirstMinute,
     /// Records healthy runs of the simulated rover, every channel in them, for
     /// `vigil learn --more`.
     Healthy(healthy::Args),
@@ -67,6 +69,7 @@ impl Question {
         match self {
             Self::Bits(args) => bits::run(args),
             Self::Field(args) => field::run(args),
+            Self::FirstMinute => first_minute::run(),
             Self::Healthy(args) => healthy::run(args),
             Self::Instructions(args) => instructions::run(args),
             Self::Latency(args) => latency::run(args),

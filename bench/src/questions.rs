@@ -2,6 +2,7 @@
 
 pub mod bits;
 pub mod field;
+pub mod first_minute;
 pub mod healthy;
 pub mod instructions;
 pub mod latency;

@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 use std::fs;
 
-use vigil_blocks::{
-    Action, Block, Cause, CauseKind, DetectionBelief, FaultBelief, Health, SensorFrame,
-};
+use vigil_blocks::{Action, Cause, CauseKind, DetectionBelief, FaultBelief, Health, SensorFrame};
+use vigil_cycle::port::Carried;
 use vigil_cycle::{Graph, Receiver, Topic};
 
 use crate::harness::{HealthWatch, Running, config_with, drain, machine, unique};
@@ -20,7 +19,7 @@ struct Tap<T> {
     anchor: Option<Health>,
 }
 
-impl<T: Block> Tap<T> {
+impl<T: Carried> Tap<T> {
     fn new(graph: &Graph, topic: Topic, cause: fn(&T) -> Option<Cause>) -> Self {
         let receiver = graph.receiver(topic).unwrap();
         Self {

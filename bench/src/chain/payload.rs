@@ -4,8 +4,9 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Duration;
 
-use vigil_blocks::{Block, Header};
+use vigil_blocks::Header;
 use vigil_cycle::domain::Queues;
+use vigil_cycle::port::Carried;
 use vigil_cycle::port::{EventListener, Link};
 use vigil_cycle::wake::{self, Inputs, Timer, Wake};
 use vigil_cycle::{Clock, Domain, Graph, Monotonic, Receiver, Sender, Stamp, Topic};
@@ -58,7 +59,7 @@ vigil_blocks::block! {
 }
 
 /// A block with bytes to fill and to look at.
-trait Payload: Block {
+trait Payload: Carried {
     fn bytes(&self) -> &[u8];
     fn bytes_mut(&mut self) -> &mut [u8];
 }
@@ -70,6 +71,7 @@ macro_rules! payload {
     })* };
 }
 payload!(Payload64, Payload4k, Payload64k, Payload1m);
+vigil_cycle::carried!(Payload64, Payload4k, Payload64k, Payload1m);
 
 const TOPICS: [Topic; 4] = [
     Topic::Sensor,

@@ -7,10 +7,11 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use vigil_blocks::{
-    Action, Block, Cause, CauseKind, DetectionBelief, FaultBelief, Header, Health, SensorFrame,
+    Action, Cause, CauseKind, DetectionBelief, FaultBelief, Header, Health, SensorFrame,
 };
 use vigil_cycle::placement::{Placement, Wanted};
 use vigil_cycle::port::Bus;
+use vigil_cycle::port::Carried;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
     Clock, DeadlineMonitor, Graph, HealthBoard, Intake, PortError, Produced, Receiver, Schedule,
@@ -36,7 +37,7 @@ fn compute_ns(delay: &Delay, t_schedule_ns: u64) -> u64 {
 }
 
 /// A block that says which frame it comes from.
-trait Caused: Block {
+trait Caused: Carried {
     fn cause(&mut self) -> &mut Cause;
 }
 
@@ -48,7 +49,7 @@ macro_rules! caused {
 caused!(DetectionBelief, FaultBelief, Action);
 
 /// Passes on what it gets, after the injected delay.
-struct Relay<I: Block, O: Caused> {
+struct Relay<I: Carried, O: Caused> {
     input: Box<dyn Receiver<I>>,
     output: Box<dyn Sender<O>>,
     identity: fn(&I) -> Option<(u64, u64)>,
@@ -56,7 +57,7 @@ struct Relay<I: Block, O: Caused> {
     delay: Delay,
 }
 
-impl<I: Block, O: Caused> Stage for Relay<I, O> {
+impl<I: Carried, O: Caused> Stage for Relay<I, O> {
     fn take(&mut self, intake: &mut Intake<'_>) {
         for _ in 0..self.input.buffer() {
             if !self.input.advance() {
@@ -120,7 +121,7 @@ struct Tap<T> {
     seen: Vec<(u64, u64)>,
 }
 
-impl<T: Block> Tap<T> {
+impl<T: Carried> Tap<T> {
     fn new(graph: &Graph, topic: Topic, is_frame: fn(&T) -> bool) -> Self {
         Self {
             receiver: graph.receiver(topic).unwrap(),
@@ -202,7 +203,7 @@ fn monitor(service: ServiceName) -> DeadlineMonitor {
     DeadlineMonitor::new(schedule(service))
 }
 
-fn stage<I: Block, O: Caused>(
+fn stage<I: Carried, O: Caused>(
     graph: &Graph,
     (service, input, output): (ServiceName, Topic, Topic),
     identity: fn(&I) -> Option<(u64, u64)>,

@@ -1,5 +1,6 @@
 //! Ports: typed senders and receivers of blocks, over shared memory or in process.
 
+mod carried;
 mod found;
 mod in_process;
 mod shared_memory;
@@ -9,6 +10,7 @@ use vigil_blocks::{Block, Header};
 use crate::clock::Clock;
 use crate::topic::Topic;
 
+pub use carried::Carried;
 pub use found::FoundTopic;
 pub use in_process::Bus;
 pub use shared_memory::{EventListener, EventNotifier, Link, Wire};
@@ -134,9 +136,9 @@ impl Graph {
     ///
     /// # Errors
     /// [`PortError::Open`], among others when the topic already has a living writer.
-    pub fn sender<T: Block>(&self, topic: Topic) -> Result<Box<dyn Sender<T>>, PortError> {
+    pub fn sender<T: Carried>(&self, topic: Topic) -> Result<Box<dyn Sender<T>>, PortError> {
         Ok(match self {
-            Self::SharedMemory(link) => Box::new(link.sender::<T>(topic)?),
+            Self::SharedMemory(link) => T::sender(link, topic)?,
             Self::InProcess(bus) => Box::new(bus.sender::<T>(topic)),
         })
     }
@@ -145,9 +147,9 @@ impl Graph {
     ///
     /// # Errors
     /// [`PortError::Open`].
-    pub fn receiver<T: Block>(&self, topic: Topic) -> Result<Box<dyn Receiver<T>>, PortError> {
+    pub fn receiver<T: Carried>(&self, topic: Topic) -> Result<Box<dyn Receiver<T>>, PortError> {
         Ok(match self {
-            Self::SharedMemory(link) => Box::new(link.receiver::<T>(topic)?),
+            Self::SharedMemory(link) => T::receiver(link, topic)?,
             Self::InProcess(bus) => Box::new(bus.receiver::<T>(topic)),
         })
     }

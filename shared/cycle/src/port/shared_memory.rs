@@ -38,6 +38,22 @@ pub struct Link {
     queues: Queues,
 }
 
+/// What peers must agree on, without the type itself.
+#[derive(Debug, Clone, Copy)]
+struct WireType {
+    name: &'static str,
+    size: usize,
+}
+
+impl WireType {
+    const fn new<T: Block>() -> Self {
+        Self {
+            name: T::TYPE_NAME,
+            size: size_of::<T>(),
+        }
+    }
+}
+
 type TopicFactory<T> =
     iceoryx2::service::port_factory::publish_subscribe::PortFactory<ipc::Service, Wire<T>, ()>;
 type EventFactory = iceoryx2::service::port_factory::event::PortFactory<ipc::Service>;
@@ -67,7 +83,10 @@ impl Link {
 
     /// The one place where topics are opened: the same settings for every peer, whoever is first.
     fn topic<T: Block>(&self, topic: Topic) -> Result<TopicFactory<T>, PortError> {
-        let (name, queues) = (self.name::<T>(topic)?, self.queues.of(topic));
+        let (name, queues) = (
+            self.name(topic, WireType::new::<T>())?,
+            self.queues.of(topic),
+        );
         self.node
             .service_builder(&name)
             .publish_subscribe::<Wire<T>>()
@@ -79,11 +98,11 @@ impl Link {
             .history_size(queues.history)
             .enable_safe_overflow(true)
             .open_or_create()
-            .map_err(|e| self.open_error::<T>(topic, &e))
+            .map_err(|e| self.open_error(topic, WireType::new::<T>(), &e))
     }
 
-    fn event<T: Block>(&self, topic: Topic) -> Result<EventFactory, PortError> {
-        let name = self.name::<T>(topic)?;
+    fn event(&self, topic: Topic, wire: WireType) -> Result<EventFactory, PortError> {
+        let name = self.name(topic, wire)?;
         self.node
             .service_builder(&name)
             .event()
@@ -92,52 +111,50 @@ impl Link {
             .max_nodes(self.queues.max_subscribers + 4)
             .event_id_max_value(15)
             .open_or_create()
-            .map_err(|e| self.open_error::<T>(topic, &e))
+            .map_err(|e| self.open_error(topic, wire, &e))
     }
 
-    fn name<T: Block>(&self, topic: Topic) -> Result<ServiceName, PortError> {
+    fn name(&self, topic: Topic, wire: WireType) -> Result<ServiceName, PortError> {
         let path = topic.path(&self.graph);
-        ServiceName::new(&path).map_err(|e| self.open_error::<T>(topic, &e))
+        ServiceName::new(&path).map_err(|e| self.open_error(topic, wire, &e))
     }
 
-    fn open_error<T: Block>(&self, topic: Topic, cause: &impl std::fmt::Debug) -> PortError {
+    fn open_error(&self, topic: Topic, wire: WireType, cause: &impl std::fmt::Debug) -> PortError {
         let path = topic.path(&self.graph);
         let mut cause = format!("{cause:?}");
         let found = FoundTopic::listed(self.node.config()).unwrap_or_default();
-        let other = |found: &&FoundTopic| found.path == path && found.type_name != T::TYPE_NAME;
+        let other = |found: &&FoundTopic| found.path == path && found.type_name != wire.name;
         if let Some(found) = found.iter().find(other) {
             cause.push_str(&format!("; somebody has made it as {found}"));
         }
         PortError::Open {
             topic: path,
-            type_name: T::TYPE_NAME,
-            size: size_of::<T>(),
+            type_name: wire.name,
+            size: wire.size,
             cause,
         }
     }
 
     /// Opens the writing side; warm: one block is loaned, and every slot was touched by the
     /// transport's own initialisation.
-    pub(super) fn sender<T: Block>(&self, topic: Topic) -> Result<SharedSender<T>, PortError> {
+    #[doc(hidden)]
+    pub fn sender<T: Block>(&self, topic: Topic) -> Result<Box<dyn Sender<T>>, PortError> {
+        let wire = WireType::new::<T>();
         let publisher = self
             .topic::<T>(topic)?
             .publisher_builder()
             .max_loaned_samples(2)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
-            .map_err(|e| self.open_error::<T>(topic, &e))?;
-        let notifier = self
-            .event::<T>(topic)?
-            .notifier_builder()
-            .create()
-            .map_err(|e| self.open_error::<T>(topic, &e))?;
+            .map_err(|e| self.open_error(topic, wire, &e))?;
+        let notifier = self.event_notifier(topic, wire)?;
         let path = topic.path(&self.graph);
         let loaned = loan(&publisher, &path)?;
         // The start instant identifies the start: no two starts of one writer share it, as the
         // transport admits one living writer only.
         let epoch = Monotonic.now_ns().max(1);
         let spare = bytemuck::allocation::zeroed_box();
-        Ok(SharedSender {
+        Ok(Box::new(SharedSender {
             loaned: Some(loaned),
             spare,
             has_refused: false,
@@ -146,23 +163,25 @@ impl Link {
             path,
             epoch,
             seq: 0,
-        })
+        }))
     }
 
     /// Opens a reading side.
-    pub(super) fn receiver<T: Block>(&self, topic: Topic) -> Result<SharedReceiver<T>, PortError> {
+    #[doc(hidden)]
+    pub fn receiver<T: Block>(&self, topic: Topic) -> Result<Box<dyn Receiver<T>>, PortError> {
+        let wire = WireType::new::<T>();
         let buffer = self.queues.of(topic).buffer;
         let subscriber = self
             .topic::<T>(topic)?
             .subscriber_builder()
             .buffer_size(buffer)
             .create()
-            .map_err(|e| self.open_error::<T>(topic, &e))?;
-        Ok(SharedReceiver {
+            .map_err(|e| self.open_error(topic, wire, &e))?;
+        Ok(Box::new(SharedReceiver {
             subscriber,
             held: None,
             buffer,
-        })
+        }))
     }
 
     /// Opens the wake-up side of a topic.
@@ -170,11 +189,15 @@ impl Link {
     /// # Errors
     /// [`PortError::Open`].
     pub fn listener<T: Block>(&self, topic: Topic) -> Result<EventListener, PortError> {
+        self.event_listener(topic, WireType::new::<T>())
+    }
+
+    fn event_listener(&self, topic: Topic, wire: WireType) -> Result<EventListener, PortError> {
         let listener = self
-            .event::<T>(topic)?
+            .event(topic, wire)?
             .listener_builder()
             .create()
-            .map_err(|e| self.open_error::<T>(topic, &e))?;
+            .map_err(|e| self.open_error(topic, wire, &e))?;
         Ok(EventListener { listener })
     }
 
@@ -184,12 +207,19 @@ impl Link {
     /// # Errors
     /// [`PortError::Open`].
     pub fn notifier<T: Block>(&self, topic: Topic) -> Result<EventNotifier, PortError> {
-        let notifier = self
-            .event::<T>(topic)?
+        let notifier = self.event_notifier(topic, WireType::new::<T>())?;
+        Ok(EventNotifier { notifier })
+    }
+
+    fn event_notifier(
+        &self,
+        topic: Topic,
+        wire: WireType,
+    ) -> Result<Notifier<ipc::Service>, PortError> {
+        self.event(topic, wire)?
             .notifier_builder()
             .create()
-            .map_err(|e| self.open_error::<T>(topic, &e))?;
-        Ok(EventNotifier { notifier })
+            .map_err(|e| self.open_error(topic, wire, &e))
     }
 
     /// Removes what dead processes of this graph left behind. File-system work: never on a
