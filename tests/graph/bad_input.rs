@@ -3,11 +3,11 @@
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output};
 
 use flate2::bufread::GzDecoder;
 
-use crate::harness::{Running, eventually, launch, machine, root, unique};
+use crate::harness::{Running, binary, eventually, launch, machine, root, unique};
 
 /// A copy of `config/` in which one text is replaced.
 fn changed(folder: &Path, file: &str, from: &str, to: &str) {
@@ -221,5 +221,36 @@ fn a_second_graph_of_the_same_name_is_refused_and_the_first_goes_on() {
     let summary = first.finish();
     for name in ["sensor-sim", "detector", "identifier", "supervisor"] {
         assert_eq!(summary.service(name, "restarts"), 0);
+    }
+}
+
+/// The words of `scripts/up`, on a machine without Rust.
+fn up(words: &[&str]) -> Output {
+    let mut command = Command::new(root().join("scripts/up"));
+    let command = command.args(words).env("PATH", "/usr/bin:/bin");
+    command.env("CARGO_HOME", "/nonexistent").output().unwrap()
+}
+
+#[test]
+fn help_and_misspelt_options_need_no_build() {
+    let help = up(&["--duration", "5", "--help"]);
+    assert_eq!(help.status.code(), Some(0), "{help:?}");
+    let mut launcher = binary("vigil-launcher");
+    let launcher = launcher.arg("--help").env_remove("VIGIL_CONFIG");
+    let launcher = launcher.output().unwrap();
+    assert_eq!(
+        String::from_utf8_lossy(&help.stdout),
+        String::from_utf8_lossy(&launcher.stdout),
+        "write it anew: target/debug/vigil-launcher --help > scripts/up.help"
+    );
+    for wrong in ["--duratoin", "--durat", "--sources=external"] {
+        let refused = up(&[wrong, "5"]);
+        assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+        let message = String::from_utf8_lossy(&refused.stderr);
+        assert!(message.contains("unknown option --"), "{message}");
+    }
+    for right in ["--duration=5", "--rate", "--keep-awake"] {
+        let help = up(&[right, "--help"]);
+        assert_eq!(help.status.code(), Some(0), "{help:?}");
     }
 }

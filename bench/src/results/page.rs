@@ -15,7 +15,7 @@ const COLUMNS_MAX: usize = 120;
 const HEAD: &str = "# Results
 
 Of each question what was measured last: written by `scripts/bench page` from `results/`, not by
-hand. How to read it stands in [docs/measurements.md](../docs/measurements.md).
+hand. How to read it stands in [docs/results.md](../docs/results.md).
 
 A result is one file, `results/<date>-<machine>/<question>.json`. It holds the lines that are shown
 here, all of them if they are not too many, the command, the commit, facts about the machine,

@@ -13,7 +13,7 @@ use vigil_setup::{GraphArgs, Setup};
 
 /// Starts the Vigil graph and says what happened.
 #[derive(Debug, Clone, clap::Parser)]
-#[command(name = "scripts/up", version, about)]
+#[command(name = "scripts/up", bin_name = "scripts/up", version)]
 pub struct LauncherArgs {
     #[command(flatten)]
     pub graph: GraphArgs,
@@ -22,7 +22,7 @@ pub struct LauncherArgs {
     pub duration: Option<f64>,
     /// Inject a fault: `stuck:RM@5`, `encoder:LF:zero@3`, `clear:RM@9` (seconds after the start),
     /// or what no model contains: `tether:20@5`, `steer-jump:LF:0.2@5`, `clear:all@9`; a wrong
-    /// word lists all 18 kinds.
+    /// word lists all kinds.
     #[arg(long, value_name = "SPEC@T")]
     pub inject: Vec<String>,
     /// Keep every core of the graph awake by a thread of the lowest class on each: waking a core

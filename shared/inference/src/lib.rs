@@ -17,9 +17,9 @@
 //! The faults missed are those of recorded runs with encoders; the leaves those of simulated runs,
 //! 100 particles. By a weak signal alone (a pose) sampled filters fall behind [`merged`].
 //!
-//! Figures: `bench/results/2026-11-21-vm/` (`filters`, `fault-sets`, `rover13`, `detection`,
-//! `look-ahead`), on 2 shared cores. Equal seeds and observations give equal bits; a step allocates
-//! nothing; observations that are not finite or that nothing explains are events, never panics.
+//! Figures: `docs/results.md`, closed studies. Equal seeds and observations give equal bits; a step
+//! allocates nothing; observations that are not finite or that nothing explains are events, never
+//! panics.
 //!
 //! | also here | holds |
 //! |---|---|
