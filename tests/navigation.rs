@@ -13,7 +13,7 @@ use vigil_diagnosis::identify::{Diagnoser, Input};
 use vigil_pomdp::solver::{Options, solve};
 use vigil_pomdp::{Budget, PointBased};
 use vigil_robot::injection::Injection;
-use vigil_sensor_sim::{Assembled, Happening, Simulation};
+use vigil_sensor_sim::{NavigatorEvent, SensorSource, Simulation};
 use vigil_setup::schema::{GraphFile, Trouble, TroubleKind};
 use vigil_setup::{Setup, load_graph};
 
@@ -48,7 +48,8 @@ struct Corridor {
 
 impl Corridor {
     fn new(setup: Setup) -> Self {
-        let Assembled::Simulator(simulation, _) = vigil_sensor_sim::assemble(&setup, &[]).unwrap()
+        let SensorSource::Simulator(simulation, _) =
+            vigil_sensor_sim::assemble(&setup, &[]).unwrap()
         else {
             unreachable!("a corridor is simulated");
         };
@@ -73,7 +74,7 @@ impl Corridor {
         self.simulation.measure(&mut self.frame);
         self.frame.header.t_capture_ns += PERIOD_NS;
         match self.simulation.happening() {
-            Some(Happening::Ended(kind, outcome)) => {
+            Some(NavigatorEvent::Ended(kind, outcome)) => {
                 let name = Self::name(kind);
                 let how = if outcome == ActionOutcome::Succeeded {
                     "done"
@@ -82,7 +83,7 @@ impl Corridor {
                 };
                 self.told.push(format!("{name} {how}"));
             }
-            Some(Happening::Goal) => self.told.push("goal".to_owned()),
+            Some(NavigatorEvent::Goal) => self.told.push("goal".to_owned()),
             None => {}
         }
         let fired = self.detection.symptoms;

@@ -6,7 +6,7 @@ mod watched;
 
 use vigil_blocks::{Channel, MODE_MULTIPLE};
 use vigil_robot::{Fault, FaultKind};
-use watched::Watched;
+use watched::WatchedRover;
 
 /// Two different faults, of different wheels, in an order that uses every kind and wheel.
 fn pair(trial: usize) -> [Fault; 2] {
@@ -29,7 +29,7 @@ fn two_faults_at_once_are_both_named() {
     const TRIALS: usize = 60;
     let mut wrong = Vec::new();
     for trial in 0..TRIALS {
-        let mut watched = Watched::new(100 + trial as u64);
+        let mut watched = WatchedRover::new(100 + trial as u64);
         let faults = pair(trial);
         watched.drive(3.0);
         watched.world.inject(faults[0]).unwrap();
@@ -58,7 +58,7 @@ fn two_wheels_that_stick_at_once_are_both_named() {
     assert_eq!(pairs.len(), TRIALS);
     let mut wrong = Vec::new();
     for (trial, wheels) in pairs.into_iter().enumerate() {
-        let mut watched = Watched::new(200 + trial as u64);
+        let mut watched = WatchedRover::new(200 + trial as u64);
         let faults = wheels.map(|wheel| Fault {
             kind: FaultKind::Stuck,
             wheel,
@@ -80,7 +80,7 @@ fn two_wheels_that_stick_at_once_are_both_named() {
 
 #[test]
 fn a_wheel_that_sticks_frees_itself_and_sticks_again_is_followed() {
-    let mut watched = Watched::new(7);
+    let mut watched = WatchedRover::new(7);
     let fault = Fault {
         kind: FaultKind::Stuck,
         wheel: 4,
@@ -106,7 +106,7 @@ fn the_sensors_may_be_noisier_or_quieter_than_the_learned_ones() {
             (FaultKind::Stuck, "STUCK"),
             (FaultKind::EncoderNoise, "ENC"),
         ] {
-            let mut watched = Watched::with_noise(seed, noise_scale);
+            let mut watched = WatchedRover::with_noise(seed, noise_scale);
             watched.drive(30.0);
             assert_eq!(watched.detection.alarm_count, 0, "{noise_scale}");
             let fault = Fault { kind, wheel: 1 };
@@ -126,7 +126,7 @@ fn the_sensors_may_be_noisier_or_quieter_than_the_learned_ones() {
 
 #[test]
 fn a_diagnosis_says_which_channels_speak_for_it() {
-    let mut watched = Watched::new(8);
+    let mut watched = WatchedRover::new(8);
     let fault = Fault {
         kind: FaultKind::Stuck,
         wheel: 4,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use vigil_blocks::EventKind;
 use vigil_cycle::allocation::{CountingAllocator, allocations};
-use vigil_cycle::placement::{Wanted, read_back};
+use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
@@ -16,7 +16,7 @@ use vigil_detector::DetectorStage;
 use vigil_identifier::IdentifierStage;
 use vigil_pomdp::solver::{Options, solve};
 use vigil_pomdp::{Budget, PointBased};
-use vigil_sensor_sim::{Assembled, SimulatorSource};
+use vigil_sensor_sim::{SensorSource, SimulatorSource};
 use vigil_setup::{GraphArgs, Setup};
 use vigil_supervisor::SupervisorStage;
 
@@ -56,7 +56,7 @@ fn cycle_parts(setup: &Setup, graph: &Graph, name: ServiceName) -> (DeadlineMoni
     let schedule = setup
         .plan(name, vigil_cycle::serve::Leave::default())
         .schedule;
-    let wanted = Wanted {
+    let wanted = PlacementRequest {
         core: 0,
         priority: 1,
     };
@@ -69,7 +69,7 @@ fn cycle_parts(setup: &Setup, graph: &Graph, name: ServiceName) -> (DeadlineMoni
 fn simulator(setup: &Setup, graph: &Graph) -> SimulatorSource {
     let inject = ["stuck:RM@3".to_owned()];
     match vigil_sensor_sim::assemble(setup, &inject).unwrap() {
-        Assembled::Simulator(simulation, schedule) => {
+        SensorSource::Simulator(simulation, schedule) => {
             let period_ns = setup.period_ns();
             SimulatorSource::new(*simulation, schedule, true, period_ns, graph).unwrap()
         }

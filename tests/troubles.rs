@@ -5,16 +5,16 @@
 mod watched;
 
 use vigil_blocks::{MODE_UNKNOWN, SensorFrame, Valid};
-use watched::Watched;
+use watched::WatchedRover;
 
 /// True once the alarm stands and the diagnosis is unknown.
-fn is_noticed(watched: &Watched) -> bool {
+fn is_noticed(watched: &WatchedRover) -> bool {
     watched.detection.alarm != 0
         && watched.diagnosis.mode == MODE_UNKNOWN
         && watched.diagnosis.p_unknown > 0.99
 }
 
-fn is_well(watched: &Watched) -> bool {
+fn is_well(watched: &WatchedRover) -> bool {
     watched.detection.alarm == 0 && watched.diagnosis.mode == 0 && watched.diagnosis.p[0] > 0.9
 }
 
@@ -25,7 +25,7 @@ fn without(bits: u64) -> impl Fn(&mut SensorFrame) {
 #[test]
 fn a_sensor_that_falls_silent_is_noticed_and_forgiven_when_it_reads_again() {
     for bits in [Valid::POSE, Valid::wheel_rate(2)] {
-        let mut watched = Watched::new(31);
+        let mut watched = WatchedRover::new(31);
         watched.drive(8.0);
         watched.drive_with(1.5, without(bits));
         assert!(is_well(&watched));
@@ -40,7 +40,7 @@ fn a_sensor_that_falls_silent_is_noticed_and_forgiven_when_it_reads_again() {
 
 #[test]
 fn a_robot_that_drives_on_though_it_should_stand_is_noticed() {
-    let mut watched = Watched::new(32);
+    let mut watched = WatchedRover::new(32);
     watched.drive(8.0);
     let commanded_rest = |frame: &mut SensorFrame| frame.command[1] = 0.0;
     watched.drive_with(2.5, commanded_rest);
@@ -49,7 +49,7 @@ fn a_robot_that_drives_on_though_it_should_stand_is_noticed() {
 
 #[test]
 fn a_clock_that_is_set_back_stops_nobody() {
-    let mut watched = Watched::new(33);
+    let mut watched = WatchedRover::new(33);
     watched.drive(8.0);
     watched.frame_time_back(5.0);
     watched.drive(3.0);

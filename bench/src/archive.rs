@@ -95,7 +95,7 @@ impl Archive {
     pub fn close(mut self) -> io::Result<()> {
         let summary = self.run.summary.join("\n");
         self.store_text("summary.md", &format!("{summary}\n"))?;
-        self.run.raw = Raw::of(&self.folder())?;
+        self.run.raw = Raw::list(&self.folder())?;
         let Self { mut run, host } = self;
         run.shrink();
         let folder = format!("{RESULTS}/{}-{host}", run.date);

@@ -12,7 +12,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use vigil_cycle::placement::{self, Wanted};
+use vigil_cycle::placement::{self, PlacementRequest};
 use vigil_cycle::{Clock, CycleStamps, Monotonic, Stamps, clock, signal, stamps};
 
 use crate::latency::cycles::{STAGE_NAMES, STAGES};
@@ -95,7 +95,7 @@ impl Role {
 
     fn place(&self) {
         let (core, priority) = self.chain.placed[self.stage];
-        let _ = placement::apply(Wanted { core, priority });
+        let _ = placement::apply(PlacementRequest { core, priority });
     }
 
     /// Plays the role between these two; none before the source.

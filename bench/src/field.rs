@@ -25,7 +25,7 @@ pub use departure::Departure;
 pub use healthy::record;
 pub use recorded::{Library, Material, Source, library};
 pub use report::{Outcome, barred_lines, document, lines};
-pub use run::{Graph, Job, Scored, jobs, run, select};
+pub use run::{Graph, Job, ScoredRun, jobs, run, select};
 pub use scenario::{Draw, File, Frames, Scenario, World};
 
 /// Words and priors of a graph's faults.

@@ -7,7 +7,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use vigil_cycle::placement::{Wanted, read_back};
+use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::Bus;
 use vigil_cycle::serve::Leave;
 use vigil_cycle::topic::ServiceName;
@@ -16,7 +16,7 @@ use vigil_cycle::{
 };
 use vigil_detector::DetectorStage;
 use vigil_identifier::IdentifierStage;
-use vigil_sensor_sim::{Assembled, SimulatorSource};
+use vigil_sensor_sim::{SensorSource, SimulatorSource};
 use vigil_setup::{GraphArgs, Setup};
 use vigil_supervisor::SupervisorStage;
 
@@ -65,7 +65,8 @@ impl InProcess {
             Ok(StageCycle::new(monitor, board)?)
         };
         let inject = [format!("stuck:RM@{STUCK_S}")];
-        let Assembled::Simulator(simulation, drive) = vigil_sensor_sim::assemble(&setup, &inject)?
+        let SensorSource::Simulator(simulation, drive) =
+            vigil_sensor_sim::assemble(&setup, &inject)?
         else {
             return Err("the default graph does not simulate".into());
         };
@@ -128,7 +129,7 @@ fn parts(
     name: ServiceName,
 ) -> Result<(DeadlineMonitor, HealthBoard), PortError> {
     let schedule = setup.plan(name, Leave::default()).schedule;
-    let wanted = Wanted {
+    let wanted = PlacementRequest {
         core: 0,
         priority: 1,
     };

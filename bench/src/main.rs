@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use vigil_bench::results::{self, Kept};
+use vigil_bench::results::{self, ResultFile};
 use vigil_bench::{archive, chain, latency::flood as sensor_flood};
 
 use questions::*;
@@ -94,7 +94,7 @@ impl Role {
 /// Writes the page of results.
 fn write_page() -> Result<(), Box<dyn Error>> {
     let folder = archive::results();
-    let page = results::page(&Kept::all(&folder)?);
+    let page = results::page(&ResultFile::all(&folder)?);
     std::fs::write(folder.with_file_name("README.md"), page)?;
     Ok(())
 }

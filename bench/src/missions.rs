@@ -26,10 +26,10 @@ mod table;
 pub use arm::Arm;
 pub use course::Course;
 pub use drive::{Mission, drive};
-pub use escalation::{Escalation, Explanation, Seen, Told};
+pub use escalation::{Escalation, Explanation, RuleInput, RuleOutput};
 pub use plan::{Fault, Kind, Plan};
 pub use report::{document, lines, lost_against, say};
-pub use score::{MEASURES, Measure, Obeyed, Pay, Score, Truth};
+pub use score::{MEASURES, Measure, ObeyedOrder, Pay, Score, Truth};
 
 use std::error::Error;
 use std::path::Path;
@@ -48,14 +48,14 @@ pub const HELP_S: f64 = 30.0;
 
 /// The graph as it ships, and what is needed to judge missions.
 #[derive(Debug, Clone)]
-pub struct Shipped {
+pub struct ShippedGraph {
     /// The configuration.
     pub setup: Setup,
     /// The decision model's fully observable relaxation: what to do about a state that is known.
     pub solution: Solution,
 }
 
-impl Shipped {
+impl ShippedGraph {
     /// Reads `config/rover.toml` below `root`; frames come `rate_hz` times a second.
     ///
     /// # Errors

@@ -68,7 +68,7 @@ impl Raw {
     ///
     /// # Errors
     /// The file system's.
-    pub fn of(folder: &Path) -> io::Result<Vec<Self>> {
+    pub fn list(folder: &Path) -> io::Result<Vec<Self>> {
         let one = |path: PathBuf| {
             let mark = if path.is_dir() { "/" } else { "" };
             let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -176,14 +176,14 @@ fn block([open, close]: [&str; 2], items: impl Iterator<Item = String>) -> Strin
 
 /// A result that is kept.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Kept {
+pub struct ResultFile {
     /// Its file, from the folder of all: `2026-11-22-vm/latency.json`.
     pub path: String,
     /// What it says.
     pub run: Run,
 }
 
-impl Kept {
+impl ResultFile {
     /// All results in `folder`, in order of their paths.
     ///
     /// # Errors
@@ -282,7 +282,7 @@ pub(crate) mod tests {
         fs::write(folder.join("b.csv"), "123456789").unwrap();
         fs::write(folder.join("cell/x"), "12345").unwrap();
         fs::write(folder.join("cell/y"), "6789").unwrap();
-        let found = Raw::of(&folder).unwrap();
+        let found = Raw::list(&folder).unwrap();
         fs::remove_dir_all(&folder).unwrap();
         let raw = |name: &str, files| Raw {
             name: name.into(),

@@ -1,6 +1,6 @@
 //! The paper's two stories through the four processes.
 
-use crate::harness::{Running, Summary, machine};
+use crate::harness::{RunningGraph, Summary, machine};
 
 /// Decisions, symptoms, outcomes and the goal, in order, from the first decision on.
 fn story(summary: &Summary) -> Vec<String> {
@@ -26,7 +26,7 @@ fn assert_fired(summary: &Summary, first: &str) {
 fn a_blocked_corridor_is_tried_and_gone_round_live() {
     let _machine = machine();
     let config = "config/corridor-obstacle.toml".into();
-    let summary = Running::start_with(config, "obstacle", &["--duration", "40"]).finish();
+    let summary = RunningGraph::start_with(config, "obstacle", &["--duration", "40"]).finish();
     let expected = [
         "FP",
         "GO",
@@ -51,7 +51,7 @@ fn a_blocked_corridor_is_tried_and_gone_round_live() {
 fn people_in_a_corridor_are_waited_for_and_passed_live() {
     let _machine = machine();
     let config = "config/corridor-people.toml".into();
-    let summary = Running::start_with(config, "people", &["--duration", "40"]).finish();
+    let summary = RunningGraph::start_with(config, "people", &["--duration", "40"]).finish();
     let expected = ["FP", "GO", "blockage overtaken", "FP", "goal"];
     assert_eq!(story(&summary), expected);
     assert_fired(&summary, "EPM");

@@ -7,7 +7,7 @@ use vigil_cycle::clock::sleep_until;
 use vigil_cycle::{Clock, Monotonic, Stamp, Topic};
 use vigil_recording::frames;
 
-use crate::harness::{Running, config_with, launch, machine, root, unique};
+use crate::harness::{RunningGraph, config_with, launch, machine, root, unique};
 
 #[test]
 fn an_external_publisher_drives_the_graph() {
@@ -23,7 +23,7 @@ fn an_external_publisher_drives_the_graph() {
         "a real robot cannot be broken"
     );
 
-    let mut graph = Running::start_with(path, "external", &["--duration", "3"]);
+    let mut graph = RunningGraph::start_with(path, "external", &["--duration", "3"]);
     let observed = graph.observe();
     let mut sensor = observed.sender::<SensorFrame>(Topic::Sensor).unwrap();
     let recording = root().join("tests/data/rover/learn_frames.csv.gz");

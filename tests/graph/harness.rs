@@ -83,14 +83,14 @@ pub fn launch(config: &Path, name: &str, options: &[&str]) -> Output {
 }
 
 /// A running graph; stopped, with all its services, when dropped.
-pub struct Running {
+pub struct RunningGraph {
     launcher: Option<Child>,
     /// What the launcher prints, read as it comes: a full pipe would hold it up.
     printed: Option<JoinHandle<String>>,
     pub setup: Setup,
 }
 
-impl Running {
+impl RunningGraph {
     /// Starts the launcher with `--json` and these options.
     pub fn start(name: &str, options: &[&str]) -> Self {
         Self::start_with("config/rover.toml".into(), name, options)
@@ -168,7 +168,7 @@ impl Running {
     }
 }
 
-impl Drop for Running {
+impl Drop for RunningGraph {
     fn drop(&mut self) {
         if let Some(launcher) = self.launcher.take() {
             vigil_cycle::signal::terminate(launcher.id());

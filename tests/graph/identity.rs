@@ -9,11 +9,11 @@ use vigil_cycle::Topic;
 use vigil_diagnosis::identify::Input;
 use vigil_setup::schema::IdentifierFilter;
 
-use crate::harness::{Running, drain, machine};
+use crate::harness::{RunningGraph, drain, machine};
 
 /// Everything that the graph published, by identity of the sensor frame.
 #[derive(Default)]
-struct Recorded {
+struct RecordedBlocks {
     frames: BTreeMap<u64, SensorFrame>,
     detections: BTreeMap<u64, DetectionBelief>,
     diagnoses: BTreeMap<u64, FaultBelief>,
@@ -21,14 +21,14 @@ struct Recorded {
     missed: usize,
 }
 
-fn record(graph: &mut Running) -> Recorded {
+fn record(graph: &mut RunningGraph) -> RecordedBlocks {
     let observed = graph.observe();
     let mut sensor = observed.receiver::<SensorFrame>(Topic::Sensor).unwrap();
     let mut detection = observed
         .receiver::<DetectionBelief>(Topic::Detection)
         .unwrap();
     let mut diagnosis = observed.receiver::<FaultBelief>(Topic::Diagnosis).unwrap();
-    let mut recorded = Recorded::default();
+    let mut recorded = RecordedBlocks::default();
     while graph.is_alive() {
         drain(sensor.as_mut(), |frame| {
             recorded.frames.insert(frame.header.seq, *frame);
@@ -72,7 +72,7 @@ fn compare(filter: IdentifierFilter) {
         "--identifier",
         &name,
     ];
-    let mut graph = Running::start("identity", &options);
+    let mut graph = RunningGraph::start("identity", &options);
     let recorded = record(&mut graph);
     let mut setup = graph.setup.clone();
     setup.file.identifier.filter = filter;

@@ -1,6 +1,6 @@
 //! The main job: a wheel sticks, the graph says so and acts.
 
-use crate::harness::{Running, Summary, binary, eventually, machine, root};
+use crate::harness::{RunningGraph, Summary, binary, eventually, machine, root};
 
 /// What must hold when RM sticks in a running graph.
 fn assert_told_and_obeyed(summary: &Summary) {
@@ -38,7 +38,7 @@ fn assert_told_and_obeyed(summary: &Summary) {
 #[test]
 fn a_stuck_wheel_is_detected_named_and_acted_upon() {
     let _machine = machine();
-    let graph = Running::start("stuck", &["--duration", "9", "--inject", "stuck:RM@3"]);
+    let graph = RunningGraph::start("stuck", &["--duration", "9", "--inject", "stuck:RM@3"]);
     let summary = graph.finish();
     assert_told_and_obeyed(&summary);
     let services = summary.json["services"].as_object().unwrap();
@@ -65,7 +65,7 @@ fn a_stuck_wheel_is_named_at_1_khz_too() {
         "--inject",
         "stuck:RM@3",
     ];
-    assert_told_and_obeyed(&Running::start("khz", &options).finish());
+    assert_told_and_obeyed(&RunningGraph::start("khz", &options).finish());
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn with_every_channel_a_servo_that_slips_is_named_with_its_angle() {
     let _machine = machine();
     let config = root().join("config/rover-all.toml");
     let options = ["--duration", "9", "--inject", "steer-jump:RF:0.2@3"];
-    let summary = Running::start_with(config, "servo", &options).finish();
+    let summary = RunningGraph::start_with(config, "servo", &options).finish();
     let diagnoses = summary.events("diagnosis");
     assert_eq!(diagnoses.last().unwrap().1, "RF_STEER", "{diagnoses:?}");
     let sizes = summary.events("size");
@@ -91,7 +91,7 @@ fn with_every_channel_a_servo_that_slips_is_named_with_its_angle() {
 #[test]
 fn without_a_fault_nothing_is_said() {
     let _machine = machine();
-    let summary = Running::start("quiet", &["--duration", "12"]).finish();
+    let summary = RunningGraph::start("quiet", &["--duration", "12"]).finish();
     assert_eq!(summary.events("alarm"), []);
     assert_eq!(summary.events("diagnosis"), []);
     assert_eq!(summary.service("detector", "lost"), 0);
@@ -100,7 +100,7 @@ fn without_a_fault_nothing_is_said() {
 #[test]
 fn a_fault_injected_at_run_time_is_named_and_its_end_is_seen() {
     let _machine = machine();
-    let mut graph = Running::start("inject", &["--duration", "40"]);
+    let mut graph = RunningGraph::start("inject", &["--duration", "40"]);
     let name = graph.setup.file.graph.name.clone();
     let observed = graph.observe();
     let mut health = crate::harness::HealthWatch::new(&observed);

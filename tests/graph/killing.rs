@@ -5,13 +5,13 @@ use std::process::Command;
 use vigil_blocks::FaultBelief;
 use vigil_cycle::Topic;
 
-use crate::harness::{HealthWatch, ModeWatch, Running, drain, eventually, machine};
+use crate::harness::{HealthWatch, ModeWatch, RunningGraph, drain, eventually, machine};
 
 #[test]
 fn a_restarted_simulator_goes_on_with_its_broken_rover() {
     let _machine = machine();
     let options = ["--duration", "60", "--inject", "encoder:LF:zero@1"];
-    let mut graph = Running::start("resume", &options);
+    let mut graph = RunningGraph::start("resume", &options);
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
     let mut seen = ModeWatch::new(&observed, &graph.setup);
@@ -61,7 +61,7 @@ fn kill(pid: u32) {
 #[test]
 fn each_service_killed_once_comes_back_and_nothing_is_left() {
     let _machine = machine();
-    let mut graph = Running::start("kill", &["--duration", "60"]);
+    let mut graph = RunningGraph::start("kill", &["--duration", "60"]);
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
     let services = ["sensor-sim", "detector", "identifier", "supervisor"];

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 
-use crate::harness::{Running, machine, root};
+use crate::harness::{RunningGraph, machine, root};
 
 /// Labels of the recorded runs: run -> mode.
 fn labels() -> BTreeMap<u32, String> {
@@ -41,7 +41,7 @@ fn stuck_wheels_of_recorded_runs_are_named_live() {
         .join(",");
     let frames = "tests/data/rover/learn_frames.csv.gz";
     let options = ["--replay", frames, "--runs", &list, "--speed", "20"];
-    let summary = Running::start("playback", &options).finish();
+    let summary = RunningGraph::start("playback", &options).finish();
     assert_eq!(summary.json["ended"], "end-of-recording");
 
     assert_eq!(summary.events("end-of-recording").len(), 1);

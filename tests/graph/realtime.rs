@@ -8,7 +8,7 @@ use std::time::Duration;
 use vigil_cycle::{Clock, CycleStamps, Monotonic, stamps};
 
 use crate::harness::{
-    HealthWatch, Running, binary, config_with, eventually, launch, machine, root, unique,
+    HealthWatch, RunningGraph, binary, config_with, eventually, launch, machine, root, unique,
 };
 
 /// What a service in its steady state may ask of the kernel, and how often in a cycle: to be woken,
@@ -53,7 +53,7 @@ fn a_service_that_is_stopped_is_found_ended_and_restarted() {
     let config = config_with(&folder, |text| {
         format!("{text}\n[watchdog]\nalive_s = 0.5\ndeadline_percent = 0.0\n")
     });
-    let mut graph = Running::start_with(config, "hang", &["--duration", "60"]);
+    let mut graph = RunningGraph::start_with(config, "hang", &["--duration", "60"]);
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
     eventually("all services run", || health.all_running().then_some(()));
@@ -128,7 +128,7 @@ fn a_stall_shows_as_long_as_it_was_and_in_every_cycle_it_delayed() {
     let _machine = machine();
     let folder = folder("stall");
     let left = folder.display().to_string();
-    let mut graph = Running::start("stall", &["--duration", "60", "--stamps", &left]);
+    let mut graph = RunningGraph::start("stall", &["--duration", "60", "--stamps", &left]);
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
     eventually("all services run", || health.all_running().then_some(()));
@@ -241,7 +241,7 @@ fn strange(calls: &BTreeMap<String, u64>, cycles: u64) -> Vec<String> {
 fn a_steady_cycle_asks_the_kernel_for_nothing_but_waking() {
     let _machine = machine();
     let folder = folder("calls");
-    let mut graph = Running::start("calls", &["--duration", "60"]);
+    let mut graph = RunningGraph::start("calls", &["--duration", "60"]);
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
     eventually("all services run", || health.all_running().then_some(()));
@@ -341,7 +341,7 @@ fn a_stage_that_looks_for_its_input_before_it_sleeps_does_the_same_work() {
         )
     });
     let options = ["--duration", "6", "--inject", "stuck:RM@2"];
-    let graph = Running::start_with(config, "spin", &options);
+    let graph = RunningGraph::start_with(config, "spin", &options);
     let summary = graph.finish();
     // Every frame was taken, whether it was found or announced, and none twice.
     let [detected, identified] =

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::fs;
 
 use vigil_blocks::{Action, Cause, CauseKind, DetectionBelief, FaultBelief, Health, SensorFrame};
-use vigil_cycle::port::Carried;
+use vigil_cycle::port::TopicBlock;
 use vigil_cycle::{Graph, Receiver, Topic};
 
-use crate::harness::{HealthWatch, Running, config_with, drain, machine, unique};
+use crate::harness::{HealthWatch, RunningGraph, config_with, drain, machine, unique};
 
 /// Publication instants of the frame-caused blocks of a topic, by their scheduled instant.
 struct Tap<T> {
@@ -19,7 +19,7 @@ struct Tap<T> {
     anchor: Option<Health>,
 }
 
-impl<T: Carried> Tap<T> {
+impl<T: TopicBlock> Tap<T> {
     fn new(graph: &Graph, topic: Topic, cause: fn(&T) -> Option<Cause>) -> Self {
         let receiver = graph.receiver(topic).unwrap();
         Self {
@@ -96,7 +96,8 @@ fn the_monitors_count_what_the_stamps_say() {
         format!("{text}\n[transport]\nbuffer = 256\nmax_subscribers = 4\n")
     });
 
-    let mut graph = Running::start_with(path, "recount", &["--rate", "1000", "--duration", "8"]);
+    let mut graph =
+        RunningGraph::start_with(path, "recount", &["--rate", "1000", "--duration", "8"]);
     let observed = graph.observe();
     let mut health = HealthWatch::new(&observed);
     let mut sensor = Tap::<SensorFrame>::new(&observed, Topic::Sensor, |_| None);

@@ -19,6 +19,7 @@ mod step_code;
 mod struct_fields;
 mod test_regions;
 mod unsafety;
+mod vocabulary;
 mod words;
 
 /// Fails with all `violations`, one a line, under the sentence that says what to do.

@@ -23,7 +23,7 @@ fn setup() -> Setup {
 }
 
 /// The rover and its watchers in one thread.
-pub struct Watched {
+pub struct WatchedRover {
     pub setup: Setup,
     pub world: World,
     detector: Detector,
@@ -34,7 +34,7 @@ pub struct Watched {
     particles: [Box<ParticleBlock>; 2],
 }
 
-impl Watched {
+impl WatchedRover {
     pub fn new(seed: u64) -> Self {
         Self::with_noise(seed, 1.0)
     }

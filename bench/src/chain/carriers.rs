@@ -54,14 +54,14 @@ pub trait Outgoing {
     fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>>;
 }
 
-type Opened<T> = Result<Box<T>, Box<dyn Error>>;
+type OpenResult<T> = Result<Box<T>, Box<dyn Error>>;
 
 impl Carrier {
     /// Opens the reading side behind stage `before`, which writes blocks of `size` bytes.
     ///
     /// # Errors
     /// The system's; a queue has no sides that could be opened apart.
-    pub fn incoming(self, shared: &Path, before: usize, size: usize) -> Opened<dyn Incoming> {
+    pub fn incoming(self, shared: &Path, before: usize, size: usize) -> OpenResult<dyn Incoming> {
         let path = shared.join(before.to_string());
         Ok(match self {
             Self::Futex => Box::new(FutexReader {
@@ -85,7 +85,7 @@ impl Carrier {
     ///
     /// # Errors
     /// As [`Self::incoming`].
-    pub fn outgoing(self, shared: &Path, stage: usize, size: usize) -> Opened<dyn Outgoing> {
+    pub fn outgoing(self, shared: &Path, stage: usize, size: usize) -> OpenResult<dyn Outgoing> {
         let path = shared.join(stage.to_string());
         // Nobody reads the last stage.
         let is_last = stage + 1 == crate::latency::cycles::STAGES;

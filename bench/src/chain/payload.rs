@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use vigil_blocks::Header;
 use vigil_cycle::domain::Queues;
-use vigil_cycle::port::Carried;
+use vigil_cycle::port::TopicBlock;
 use vigil_cycle::port::{EventListener, Link};
 use vigil_cycle::wake::{self, Inputs, Timer, Wake};
 use vigil_cycle::{Clock, Domain, Graph, Monotonic, Receiver, Sender, Stamp, Topic};
@@ -59,7 +59,7 @@ vigil_blocks::block! {
 }
 
 /// A block with bytes to fill and to look at.
-trait Payload: Carried {
+trait Payload: TopicBlock {
     fn bytes(&self) -> &[u8];
     fn bytes_mut(&mut self) -> &mut [u8];
 }

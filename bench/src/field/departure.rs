@@ -137,7 +137,7 @@ fn shares(outcome: &Outcome<'_>) -> String {
 mod tests {
     use std::path::Path;
 
-    use vigil_evaluation::scoring::field::{Onset, Run, Seen};
+    use vigil_evaluation::scoring::field::{JudgedTime, Onset, Run};
 
     use super::*;
     use crate::field::scenario::File;
@@ -154,10 +154,10 @@ mod tests {
         };
         Run {
             onsets: vec![onset],
-            from_10_s: Seen {
+            from_10_s: JudgedTime {
                 driven_s: 40.0,
                 alarm_s,
-                ..Seen::default()
+                ..JudgedTime::default()
             },
             ..Run::default()
         }

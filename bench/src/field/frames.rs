@@ -87,7 +87,7 @@ impl Way {
     ) -> Self {
         let mut of = |draw: &Option<Draw>, otherwise: f64| {
             draw.as_ref()
-                .map_or(otherwise, |draw| draw.of(run, &mut rng))
+                .map_or(otherwise, |draw| draw.sample(run, &mut rng))
         };
         let drawn = Drawn {
             loss: of(&frames.loss, 0.0),

@@ -146,8 +146,8 @@ impl Ground {
             }
         }
         let rng = &mut self.rng;
-        let each = self.each.as_ref().map(|draw| draw.of(self.run, rng));
-        let over = self.over.as_ref().map(|draw| draw.of(self.run, rng));
+        let each = self.each.as_ref().map(|draw| draw.sample(self.run, rng));
+        let over = self.over.as_ref().map(|draw| draw.sample(self.run, rng));
         self.each_m = each.unwrap_or(f64::INFINITY);
         self.over_m = over.unwrap_or(OVER_MIN_M).max(OVER_MIN_M);
         self.driven_m = 0.0;
@@ -156,7 +156,7 @@ impl Ground {
     fn draw_place(&mut self) {
         let rng = &mut self.rng;
         for (i, draw) in self.draws.iter().enumerate() {
-            let drawn = draw.as_ref().map(|draw| draw.of(self.run, rng));
+            let drawn = draw.as_ref().map(|draw| draw.sample(self.run, rng));
             // Friction and shear modulus are factors on what is usual.
             self.to[i] = match i {
                 0 | 1 => self.usual[i] * drawn.unwrap_or(1.0),

@@ -15,7 +15,7 @@ use vigil_setup::{GraphArgs, Setup, load_robot};
 
 use super::frames::{Fate, Way};
 use super::ground::stream;
-use super::run::{Job, Scored, Watch};
+use super::run::{Job, ScoredRun, Watch};
 use super::scenario::Scenario;
 use super::timeline::Timeline;
 use super::{husky, logs};
@@ -269,7 +269,7 @@ impl Case {
 ///
 /// # Errors
 /// Stages that cannot be made.
-pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<Scored>, Box<dyn Error>> {
+pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<ScoredRun>, Box<dyn Error>> {
     let Material {
         setup,
         taxonomy,
@@ -303,7 +303,7 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<Scored>, Box<dyn E
             watch.score((t_s, dt_s), drives, frame);
             t_before_s = Some(t_s);
         }
-        scored.push(Scored {
+        scored.push(ScoredRun {
             sensors: name,
             run: watch.scorer.finish(),
         });

@@ -37,7 +37,7 @@ pub struct Job<'a> {
 
 /// What a run brought with one set of sensors.
 #[derive(Debug, Clone)]
-pub struct Scored {
+pub struct ScoredRun {
     /// Name of the set.
     pub sensors: &'static str,
     /// The score.
@@ -103,7 +103,7 @@ impl Graph {
     }
 
     /// Setup and words for a set of sensors.
-    fn of(&self, sensors: Sensors) -> (&Setup, &Taxonomy) {
+    fn setup(&self, sensors: Sensors) -> (&Setup, &Taxonomy) {
         match sensors {
             Sensors::All => (&self.all.0, &self.all.1),
             _ => (&self.setup, &self.taxonomy),
@@ -129,10 +129,11 @@ impl Conditions {
         let Job { scenario, run, .. } = *job;
         let seed = scenario.first_seed + run as u64;
         let (robot, rng) = (&graph.setup.robot, &mut stream(seed, 0));
-        let rate_hz = scenario.rate_hz.of(run, rng);
+        let rate_hz = scenario.rate_hz.sample(run, rng);
         let usual = Simulator::default();
         let mut of = |draw: &Option<super::Draw>, otherwise: f64| {
-            draw.as_ref().map_or(otherwise, |draw| draw.of(run, rng))
+            draw.as_ref()
+                .map_or(otherwise, |draw| draw.sample(run, rng))
         };
         let noise = of(&scenario.world.noise, 1.0);
         let mut simulator = Simulator {
@@ -201,7 +202,7 @@ impl std::fmt::Display for Conditions {
 ///
 /// # Errors
 /// A scenario that cannot be driven, with its name.
-pub fn run(graph: &Graph, library: &Library, job: &Job<'_>) -> Result<Vec<Scored>, String> {
+pub fn run(graph: &Graph, library: &Library, job: &Job<'_>) -> Result<Vec<ScoredRun>, String> {
     let named = |error: String| format!("{}: {error}", job.scenario.name);
     if let Some(material) = library.get(&job.scenario.name) {
         return recorded::play(material, job).map_err(|error| named(error.to_string()));
@@ -230,19 +231,19 @@ fn drive(
     job: &Job<'_>,
     conditions: &Conditions,
     sets: &[(Sensors, &'static str)],
-) -> Result<Vec<Scored>, Box<dyn Error>> {
+) -> Result<Vec<ScoredRun>, Box<dyn Error>> {
     let (robot, scenario) = (&graph.setup.robot, job.scenario);
     let &Conditions { rate_hz, seed, .. } = conditions;
     let truths = sets.iter().map(|(sensors, _)| {
-        let tree = &graph.of(*sensors).0.tree;
+        let tree = &graph.setup(*sensors).0.tree;
         fault::truth(&conditions.faults, tree, robot, *sensors)
     });
     let truths: Vec<Vec<Stretch>> = truths.collect();
     let mut watches = Vec::new();
     for ((sensors, name), truth) in sets.iter().zip(&truths) {
         watches.push(Watch {
-            stages: Stages::new(graph.of(*sensors).0, *sensors, rate_hz, seed)?,
-            scorer: Scorer::new(truth, graph.of(*sensors).1, [0.0, scenario.run_s], seed),
+            stages: Stages::new(graph.setup(*sensors).0, *sensors, rate_hz, seed)?,
+            scorer: Scorer::new(truth, graph.setup(*sensors).1, [0.0, scenario.run_s], seed),
             timeline: Timeline::asked_for(job, seed, name),
         });
     }
@@ -283,7 +284,7 @@ fn drive(
     }
     let named = watches.into_iter().zip(sets);
     Ok(named
-        .map(|(watch, (_, sensors))| Scored {
+        .map(|(watch, (_, sensors))| ScoredRun {
             sensors,
             run: watch.scorer.finish(),
         })

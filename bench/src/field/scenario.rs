@@ -177,7 +177,7 @@ pub enum Draw {
 
 impl Draw {
     /// The number of a run.
-    pub fn of(&self, run: usize, rng: &mut impl Rng) -> f64 {
+    pub fn sample(&self, run: usize, rng: &mut impl Rng) -> f64 {
         match self {
             Self::Always(value) => *value,
             Self::InTurn(values) => *values.get(run % values.len().max(1)).unwrap_or(&f64::NAN),

@@ -9,7 +9,7 @@
 //! as much is told beside it. Instants that one answer has ended share its verdict: the first of
 //! them says how long it was due.
 
-use super::canary::{Late, Seen};
+use super::canary::{CanaryRecord, LateWakeUp};
 
 use super::cycles::Cycle;
 
@@ -35,7 +35,7 @@ pub struct Miss {
 /// Late wake-ups of one canary, ready to be asked.
 #[derive(Debug, Clone)]
 pub struct Record<'a> {
-    late: &'a [Late],
+    late: &'a [LateWakeUp],
     longest_ns: u64,
     /// Lateness that is usual for this canary, ns.
     usual_ns: u64,
@@ -44,12 +44,12 @@ pub struct Record<'a> {
 impl<'a> Record<'a> {
     /// Of what a canary has seen.
     #[must_use]
-    pub fn of(seen: &'a Seen) -> Self {
+    pub fn from_canary(seen: &'a CanaryRecord) -> Self {
         Self::new(&seen.late, seen.lateness.percentiles().p90_ns)
     }
 
     /// Of late wake-ups in the order of their schedule.
-    fn new(late: &'a [Late], usual_ns: u64) -> Self {
+    fn new(late: &'a [LateWakeUp], usual_ns: u64) -> Self {
         let longest_ns = late.iter().map(|l| l.late_ns).max().unwrap_or(0);
         Self {
             late,
@@ -59,7 +59,7 @@ impl<'a> Record<'a> {
     }
 
     /// Wake-ups that were overdue at some time from `from_ns` to `to_ns`.
-    fn about(&self, from_ns: u64, to_ns: u64) -> impl Iterator<Item = &Late> {
+    fn about(&self, from_ns: u64, to_ns: u64) -> impl Iterator<Item = &LateWakeUp> {
         let earliest_ns = from_ns.saturating_sub(self.longest_ns);
         let first = self
             .late
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn a_miss_is_the_machines_only_if_a_canary_was_overdue_long_enough_in_its_time() {
-        let late = |t_schedule_ns, late_ns| Late {
+        let late = |t_schedule_ns, late_ns| LateWakeUp {
             t_schedule_ns,
             late_ns,
         };

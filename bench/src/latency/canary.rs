@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 
 use vigil_cycle::Latency;
 use vigil_cycle::clock::{self, Clock, Monotonic};
-use vigil_cycle::placement::{self, Placement, Wanted};
+use vigil_cycle::placement::{self, Placement, PlacementRequest};
 use vigil_cycle::port::PortError;
 
 /// Lateness from which a wake-up is kept one by one, ns.
@@ -18,7 +18,7 @@ pub const KEPT_FROM_NS: u64 = 5_000;
 
 /// A late wake-up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Late {
+pub struct LateWakeUp {
     /// When it was due, ns.
     pub t_schedule_ns: u64,
     /// How late it came, ns.
@@ -27,13 +27,13 @@ pub struct Late {
 
 /// What a canary has seen.
 #[derive(Debug)]
-pub struct Seen {
+pub struct CanaryRecord {
     /// Where it ran, as the kernel says.
     pub placement: Placement,
     /// Lateness of every instant of its schedule, ns; those that it slept through too.
     pub lateness: Latency,
     /// Wake-ups late by [`KEPT_FROM_NS`] or more, in order.
-    pub late: Vec<Late>,
+    pub late: Vec<LateWakeUp>,
     /// Late wake-ups for which there was no room.
     pub not_kept: u64,
 }
@@ -42,7 +42,7 @@ pub struct Seen {
 #[derive(Debug)]
 pub struct Canary {
     stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<Seen>>,
+    thread: Option<JoinHandle<CanaryRecord>>,
 }
 
 impl Canary {
@@ -50,7 +50,11 @@ impl Canary {
     ///
     /// # Errors
     /// [`PortError::Setup`] if the thread or its histogram cannot be made.
-    pub fn start(wanted: Wanted, period_ns: u64, capacity: usize) -> Result<Self, PortError> {
+    pub fn start(
+        wanted: PlacementRequest,
+        period_ns: u64,
+        capacity: usize,
+    ) -> Result<Self, PortError> {
         let stop = Arc::new(AtomicBool::new(false));
         let lateness = Latency::new().map_err(|e| PortError::setup("histogram", &e))?;
         let asked = Arc::clone(&stop);
@@ -66,7 +70,7 @@ impl Canary {
 
     /// Ends it; what it has seen, `None` if it has died.
     #[must_use]
-    pub fn finish(mut self) -> Option<Seen> {
+    pub fn finish(mut self) -> Option<CanaryRecord> {
         self.stop.store(true, Ordering::Relaxed);
         self.thread.take()?.join().ok()
     }
@@ -82,15 +86,15 @@ impl Drop for Canary {
 }
 
 fn watch(
-    wanted: Wanted,
+    wanted: PlacementRequest,
     period_ns: u64,
     capacity: usize,
     lateness: Latency,
     stop: &AtomicBool,
-) -> Seen {
+) -> CanaryRecord {
     let placement = placement::apply(wanted);
     let mut account = Account::new(
-        Seen {
+        CanaryRecord {
             placement,
             lateness,
             late: touched(capacity),
@@ -108,8 +112,8 @@ fn watch(
 }
 
 /// An empty list with room for `capacity` wake-ups, every page of it touched.
-fn touched(capacity: usize) -> Vec<Late> {
-    let touched = Late {
+fn touched(capacity: usize) -> Vec<LateWakeUp> {
+    let touched = LateWakeUp {
         t_schedule_ns: u64::MAX,
         late_ns: 0,
     };
@@ -121,7 +125,7 @@ fn touched(capacity: usize) -> Vec<Late> {
 /// The book of a canary: what each wake-up says.
 #[derive(Debug)]
 struct Account {
-    seen: Seen,
+    seen: CanaryRecord,
     room: usize,
     due_ns: u64,
     period_ns: u64,
@@ -129,7 +133,7 @@ struct Account {
 
 impl Account {
     /// First due at `due_ns`; room for as many late wake-ups as the list of `seen` has now.
-    const fn new(seen: Seen, due_ns: u64, period_ns: u64) -> Self {
+    const fn new(seen: CanaryRecord, due_ns: u64, period_ns: u64) -> Self {
         Self {
             room: seen.late.capacity(),
             seen,
@@ -146,7 +150,7 @@ impl Account {
         };
         if late_ns >= KEPT_FROM_NS {
             if self.seen.late.len() < self.room {
-                self.seen.late.push(Late {
+                self.seen.late.push(LateWakeUp {
                     t_schedule_ns: self.due_ns,
                     late_ns,
                 });
@@ -168,7 +172,7 @@ mod tests {
 
     #[test]
     fn a_wake_up_accounts_for_every_instant_that_it_slept_through() {
-        let seen = Seen {
+        let seen = CanaryRecord {
             placement: placement::read_back(0),
             lateness: Latency::new().unwrap(),
             late: Vec::with_capacity(2),
@@ -187,7 +191,7 @@ mod tests {
         }
         let Account { seen, due_ns, .. } = account;
         assert_eq!(due_ns, 1_000_000);
-        let late = |t_schedule_ns, late_ns| Late {
+        let late = |t_schedule_ns, late_ns| LateWakeUp {
             t_schedule_ns,
             late_ns,
         };
@@ -202,7 +206,7 @@ mod tests {
 
     #[test]
     fn every_instant_of_its_schedule_is_accounted() {
-        let wanted = Wanted {
+        let wanted = PlacementRequest {
             core: 0,
             priority: 1,
         };

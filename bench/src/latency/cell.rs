@@ -4,19 +4,19 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Duration;
 
-use super::canary::{Canary, Seen};
+use super::canary::{Canary, CanaryRecord};
 use clap::ValueEnum;
 use serde_json::{Value, json};
 use vigil_blocks::{Action, DetectionBelief, FaultBelief, ParticleBlock, SensorFrame};
 use vigil_cycle::latency::Percentiles;
-use vigil_cycle::placement::Wanted;
+use vigil_cycle::placement::PlacementRequest;
 use vigil_cycle::{CycleStamps, Latency, Placement};
 use vigil_setup::schema::Source;
 
 use super::attribution::{self, Miss, Record};
 use super::cycles::{self, Cycle, STAGE_NAMES, STAGES, Spectra};
-use super::graph::{Change, Prepared, Ran};
-use super::load::{Load, Running};
+use super::graph::{Change, GraphFile, GraphRun};
+use super::load::{Load, LoadProcess};
 use super::system::Ticks;
 use crate::chain::Chain;
 use crate::chain::carriers::Carrier;
@@ -83,7 +83,7 @@ pub struct Cell {
     /// The same of the floor, before and after the graph together.
     pub floor: Spectra,
     /// What the canaries saw while the graph ran and the floors.
-    pub canaries: Vec<Seen>,
+    pub canaries: Vec<CanaryRecord>,
     /// Cycles past the last deadline of the chain.
     pub misses: Vec<Miss>,
     /// Instants that each stage has answered after its own deadline: Vigil's own, the machine's.
@@ -105,7 +105,7 @@ pub struct Cell {
     /// What the machine did meanwhile.
     pub system: Value,
     /// Core and priority wanted for each stage.
-    pub wanted: [Wanted; STAGES],
+    pub wanted: [PlacementRequest; STAGES],
 }
 
 impl Spec {
@@ -136,7 +136,7 @@ impl Spec {
             source: Source::Simulator,
             is_faulty: self.is_faulty,
         };
-        let prepared = Prepared::new(change, folder)?;
+        let prepared = GraphFile::new(change, folder)?;
         let wanted = prepared.wanted();
         let period_ns = prepared.setup().period_ns();
         let floor_s = (FLOOR_SHARE * self.seconds).clamp(FLOOR_S[0], FLOOR_S[1]);
@@ -147,7 +147,7 @@ impl Spec {
             period_ns,
             cycles: (floor_s * self.rate_hz) as u64,
         };
-        let load = Running::start(self.load, &prepared.cores(), folder, Some(prepared.path()))?;
+        let load = LoadProcess::start(self.load, &prepared.cores(), folder, Some(prepared.path()))?;
         std::thread::sleep(LOAD_START);
         let canaries = prepared.canaries(self.seconds + 2.0 * floor_s + AROUND_S)?;
         let before = floor.run(folder)?;
@@ -155,16 +155,16 @@ impl Spec {
         let ran = prepared.run(self.seconds, folder, || Ok(()))?;
         let system = Ticks::now().since(ticks);
         let after = floor.run(folder)?;
-        let canaries: Vec<Seen> = canaries.into_iter().filter_map(Canary::finish).collect();
+        let canaries: Vec<CanaryRecord> = canaries.into_iter().filter_map(Canary::finish).collect();
         load.finish()?;
         self.judge(&prepared, (ran, [before, after]), canaries, system)
     }
 
     fn judge(
         &self,
-        prepared: &Prepared,
-        (ran, floors): (Ran, [[Vec<CycleStamps>; STAGES]; 2]),
-        canaries: Vec<Seen>,
+        prepared: &GraphFile,
+        (ran, floors): (GraphRun, [[Vec<CycleStamps>; STAGES]; 2]),
+        canaries: Vec<CanaryRecord>,
         system: Value,
     ) -> Result<Cell, Box<dyn Error>> {
         let (wanted, deadline_ns) = (prepared.wanted(), prepared.deadline_ns());
@@ -177,7 +177,7 @@ impl Spec {
         let recounted = recounted(&cycles, deadline_ns, &ran.summary)?;
         cycles.retain(|cycle| cycle.t_schedule_ns >= from_ns);
         let believed = canaries.iter().filter(|_| is_attributed);
-        let records: Vec<Record<'_>> = believed.map(Record::of).collect();
+        let records: Vec<Record<'_>> = believed.map(Record::from_canary).collect();
         if cycles.iter().all(Cycle::is_folded) {
             return Err("no instant after the warm-up has the stamps of every stage".into());
         }
@@ -188,15 +188,15 @@ impl Spec {
             let deadline_ns = prepared.stage_deadline_ns(i);
             counts(&attribution::misses(&cycles, deadline_ns, &records))
         });
-        let graph = Spectra::of(&cycles)?;
+        let graph = Spectra::new(&cycles)?;
         let floors = floors.iter().flat_map(|stamps| {
             let first = stamps[0].first().map_or(0, |s| s.t_schedule_ns);
             cycles::join(stamps, period_ns, first + (1e9 * WARM_UP_S / 4.0) as u64)
         });
-        let floor = Spectra::of(&floors.collect::<Vec<_>>())?;
+        let floor = Spectra::new(&floors.collect::<Vec<_>>())?;
         let usual_ns = graph.end_to_end.percentiles().p50_ns;
         let slack_ns = deadline_ns.saturating_sub(usual_ns);
-        let late = |seen: &Seen| {
+        let late = |seen: &CanaryRecord| {
             seen.lateness
                 .histogram()
                 .count_between(slack_ns.max(1), u64::MAX)
@@ -251,8 +251,8 @@ fn missed_by_the_monitor(summary: &Value) -> Option<u64> {
 /// over, as without the right to real-time priority.
 pub(super) fn check(
     summary: &Value,
-    canaries: &[Seen],
-    wanted: &[Wanted; STAGES],
+    canaries: &[CanaryRecord],
+    wanted: &[PlacementRequest; STAGES],
 ) -> Result<bool, Box<dyn Error>> {
     for name in STAGE_NAMES {
         if summary["services"][name]["restarts"] != 0 {
@@ -260,8 +260,9 @@ pub(super) fn check(
         }
     }
     let highest = wanted.iter().map(|w| u32::from(w.priority)).max();
-    let is_above =
-        |seen: &Seen| seen.placement.pinned && seen.placement.priority > highest.unwrap_or(0);
+    let is_above = |seen: &CanaryRecord| {
+        seen.placement.pinned && seen.placement.priority > highest.unwrap_or(0)
+    };
     if canaries.iter().any(|seen| seen.not_kept > 0) {
         return Err("a canary had no room for what it saw: nobody can say whose a miss is".into());
     }
@@ -377,7 +378,7 @@ impl Cell {
         let stages: serde_json::Map<String, Value> = (0..STAGES)
             .map(|i| (STAGE_NAMES[i].to_owned(), stage(i)))
             .collect();
-        let canary = |seen: &Seen| {
+        let canary = |seen: &CanaryRecord| {
             json!({
                 "core": seen.placement.core,
                 "scheduling": Placement::scheduling(seen.placement.policy, seen.placement.priority),

@@ -130,7 +130,7 @@ impl Spectra {
     ///
     /// # Errors
     /// None in practice; see [`Latency::new`].
-    pub fn of(cycles: &[Cycle]) -> Result<Self, Box<dyn std::error::Error>> {
+    pub fn new(cycles: &[Cycle]) -> Result<Self, Box<dyn std::error::Error>> {
         let pair = || Ok::<_, Box<dyn std::error::Error>>((Latency::new()?, Latency::new()?));
         let mut spectra = Self {
             end_to_end: Latency::new()?,
@@ -195,7 +195,7 @@ mod tests {
         for stages in cycles.iter().filter_map(|c| c.stages) {
             assert_eq!(stages.iter().map(|s| s.compute_ns).sum::<u64>(), 53);
         }
-        let spectra = Spectra::of(&cycles).ok();
+        let spectra = Spectra::new(&cycles).ok();
         let counts = spectra.map(|s| (s.end_to_end.percentiles().n, s.compute.percentiles().n));
         assert_eq!(counts, Some((6, 3)));
     }

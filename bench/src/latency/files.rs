@@ -7,7 +7,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::time::{Duration, UNIX_EPOCH};
 
-use super::canary::Late;
+use super::canary::LateWakeUp;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use hdrhistogram::Histogram;
@@ -139,7 +139,7 @@ fn misses(cell: &Cell) -> String {
 /// Wake-ups of the canaries that were late enough to matter.
 fn canaries(cell: &Cell) -> String {
     let mut text = String::from("core,t_schedule_ns,late_us\n");
-    let is_about_a_miss = |late: &Late| {
+    let is_about_a_miss = |late: &LateWakeUp| {
         let until_ns = late.t_schedule_ns + late.late_ns;
         let first = cell
             .misses
@@ -147,7 +147,7 @@ fn canaries(cell: &Cell) -> String {
         let miss = cell.misses.get(first);
         miss.is_some_and(|miss| miss.t_schedule_ns <= until_ns)
     };
-    let matters = |late: &&Late| late.late_ns >= CANARY_FROM_NS || is_about_a_miss(late);
+    let matters = |late: &&LateWakeUp| late.late_ns >= CANARY_FROM_NS || is_about_a_miss(late);
     for seen in &cell.canaries {
         for late in seen.late.iter().filter(matters) {
             let (core, us) = (seen.placement.core, late.late_ns as f64 * 1e-3);

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::canary::Canary;
 use serde_json::Value;
 use toml::Table;
-use vigil_cycle::placement::Wanted;
+use vigil_cycle::placement::PlacementRequest;
 use vigil_cycle::serve::Leave;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{CycleStamps, PortError, stamps};
@@ -43,7 +43,7 @@ const FAULT: &str = "stuck:RM@1";
 
 /// A graph file for measuring.
 #[derive(Debug)]
-pub struct Prepared {
+pub struct GraphFile {
     path: PathBuf,
     launcher: PathBuf,
     setup: Setup,
@@ -52,14 +52,14 @@ pub struct Prepared {
 
 /// What a run of the graph left.
 #[derive(Debug)]
-pub struct Ran {
+pub struct GraphRun {
     /// The launcher's document.
     pub summary: Value,
     /// Stamps of each service's cycles; none of a service that the graph does without.
     pub stamps: [Vec<CycleStamps>; STAGES],
 }
 
-impl Prepared {
+impl GraphFile {
     /// The default graph with this change, written to `folder`.
     ///
     /// # Errors
@@ -119,10 +119,10 @@ impl Prepared {
 
     /// Core and priority of each stage.
     #[must_use]
-    pub fn wanted(&self) -> [Wanted; STAGES] {
+    pub fn wanted(&self) -> [PlacementRequest; STAGES] {
         ServiceName::ALL.map(|name| {
             let service = self.setup.service(name);
-            Wanted {
+            PlacementRequest {
                 core: service.core,
                 priority: service.priority,
             }
@@ -161,7 +161,7 @@ impl Prepared {
         let priority = highest.max(1) + 1;
         let period_ns = (self.setup.period_ns() / 8).clamp(100_000, 1_000_000);
         let capacity = (seconds * 1e9 / period_ns as f64).ceil() as usize;
-        let start = |core| Canary::start(Wanted { core, priority }, period_ns, capacity);
+        let start = |core| Canary::start(PlacementRequest { core, priority }, period_ns, capacity);
         self.cores().into_iter().map(start).collect()
     }
 
@@ -245,7 +245,7 @@ impl Prepared {
         seconds: f64,
         folder: &Path,
         beside: impl FnOnce() -> Result<(), Box<dyn Error>>,
-    ) -> Result<Ran, Box<dyn Error>> {
+    ) -> Result<GraphRun, Box<dyn Error>> {
         let rate_hz = self.setup.file.graph.rate_hz;
         let kept = ((seconds + START_S) * rate_hz).ceil().to_string();
         let stamps_in = folder.display().to_string();
@@ -261,7 +261,7 @@ impl Prepared {
             found
         };
         let stamps = [read(0)?, read(1)?, read(2)?, read(3)?];
-        Ok(Ran { summary, stamps })
+        Ok(GraphRun { summary, stamps })
     }
 }
 

@@ -59,12 +59,12 @@ const LONGEST: &str = "3600s";
 
 /// A load that lasts until it is dropped.
 #[derive(Debug)]
-pub struct Running {
+pub struct LoadProcess {
     program: Option<Child>,
     _awake: Option<KeepAwake>,
 }
 
-impl Running {
+impl LoadProcess {
     /// Starts `load` for a machine of `cores`; files it may need lie in `folder`. `graph` is the
     /// file of the graph that a flood is for.
     ///
@@ -122,7 +122,7 @@ fn flood(graph: &Path) -> Result<Child, Box<dyn Error>> {
     Ok(command.spawn()?)
 }
 
-impl Drop for Running {
+impl Drop for LoadProcess {
     fn drop(&mut self) {
         if let Some(program) = &mut self.program {
             // stress-ng ends its workers on SIGTERM; one that has ended is not to be signalled.

@@ -22,12 +22,12 @@ impl Ticks {
     #[must_use]
     pub fn now() -> Self {
         let text = fs::read_to_string("/proc/stat").unwrap_or_default();
-        Self::of(&text, Monotonic.now_ns())
+        Self::parse(&text, Monotonic.now_ns())
     }
 
     /// From the text of /proc/stat, read at `t_ns`: user, nice, system, idle, iowait, irq, softirq,
     /// steal; and context switches in a line of their own.
-    fn of(text: &str, t_ns: u64) -> Self {
+    fn parse(text: &str, t_ns: u64) -> Self {
         let line = text.lines().next().unwrap_or_default();
         let fields: Vec<u64> = line
             .split_ascii_whitespace()
@@ -144,8 +144,8 @@ mod tests {
     fn shares_are_of_all_ticks() {
         let before = "cpu  100 0 50 800 40 5 5 0 0 0\ncpu0 1 2\nctxt 5000\n";
         let after = "cpu  160 0 60 820 40 5 5 10 0 0\ncpu0 1 2\nctxt 8000\n";
-        let before = Ticks::of(before, 1_000_000_000);
-        let after = Ticks::of(after, 3_000_000_000);
+        let before = Ticks::parse(before, 1_000_000_000);
+        let after = Ticks::parse(after, 3_000_000_000);
         let shares = after.since(before);
         assert_eq!(shares["busy_percent"], 70.0);
         assert_eq!(shares["steal_percent"], 10.0);

@@ -10,8 +10,8 @@ use vigil_diagnosis::detect::Detector;
 use vigil_diagnosis::identify::{Diagnoser, Input};
 
 use super::arm::Arm;
-use super::escalation::{Escalation, Explanation, Seen, Told};
-use super::{Shipped, Truth};
+use super::escalation::{Escalation, Explanation, RuleInput, RuleOutput};
+use super::{ShippedGraph, Truth};
 
 /// Detector and identifier as they ship, one frame at a time.
 struct Watch {
@@ -24,7 +24,7 @@ struct Watch {
 }
 
 impl Watch {
-    fn new(shipped: &Shipped, seed: u64) -> Result<Self, Box<dyn Error>> {
+    fn new(shipped: &ShippedGraph, seed: u64) -> Result<Self, Box<dyn Error>> {
         let mut setup = shipped.setup.clone();
         setup.file.graph.seed = seed;
         Ok(Self {
@@ -60,7 +60,7 @@ impl Watch {
 
 /// One of the commanders.
 pub(super) struct Commander<'a> {
-    shipped: &'a Shipped,
+    shipped: &'a ShippedGraph,
     mind: Mind,
     /// Leaves of the tree with what they mean.
     leaves: Vec<(usize, Explanation)>,
@@ -76,7 +76,11 @@ enum Mind {
 }
 
 impl<'a> Commander<'a> {
-    pub(super) fn new(shipped: &'a Shipped, arm: Arm, seed: u64) -> Result<Self, Box<dyn Error>> {
+    pub(super) fn new(
+        shipped: &'a ShippedGraph,
+        arm: Arm,
+        seed: u64,
+    ) -> Result<Self, Box<dyn Error>> {
         let watch = || Watch::new(shipped, seed).map(Box::new);
         let mind = match arm {
             Arm::Vigil => {
@@ -115,7 +119,8 @@ impl<'a> Commander<'a> {
             Mind::Escalation(watch, rules) => {
                 let alarm = watch.detect(frame);
                 let explanation = most_probable(&self.leaves, watch.identify(frame));
-                let Told { kind, wheel } = rules.answer(Seen { alarm, explanation }, dt_s);
+                let RuleOutput { kind, wheel } =
+                    rules.answer(RuleInput { alarm, explanation }, dt_s);
                 Some((kind, wheel))
             }
             Mind::StopAndCall(watch) => match watch.detect(frame) {
@@ -162,7 +167,7 @@ impl<'a> Commander<'a> {
     }
 }
 
-fn leaves(shipped: &Shipped) -> Vec<(usize, Explanation)> {
+fn leaves(shipped: &ShippedGraph) -> Vec<(usize, Explanation)> {
     let tree = &shipped.setup.tree;
     let meaning = |node: usize| {
         let fault = tree.nodes().get(node)?.fault.as_deref()?;

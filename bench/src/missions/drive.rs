@@ -10,8 +10,8 @@ use super::arm::Arm;
 use super::commander::Commander;
 use super::course::{Course, distance};
 use super::plan::Plan;
-use super::score::{Obeyed, Pay, Place, Score, Step, Tally, Truth};
-use super::{HELP_S, LIMIT_S, Shipped};
+use super::score::{ObeyedOrder, Pay, Place, Score, Step, Tally, Truth};
+use super::{HELP_S, LIMIT_S, ShippedGraph};
 
 /// Time between two places that are remembered, s.
 const REMEMBER_S: f64 = 0.1;
@@ -26,7 +26,7 @@ pub struct Mission {
 }
 
 /// What one commander made of it.
-pub(super) struct Driven {
+pub(super) struct CommanderRun {
     tally: Tally,
     pub(super) places: Vec<Place>,
     /// The planned positions, m.
@@ -38,7 +38,7 @@ pub(super) struct Driven {
 ///
 /// # Errors
 /// A world or commander that cannot be made.
-pub fn drive(shipped: &Shipped, plan: Plan) -> Result<Mission, Box<dyn Error>> {
+pub fn drive(shipped: &ShippedGraph, plan: Plan) -> Result<Mission, Box<dyn Error>> {
     // Who goes on whatever happens drives the whole plan: its planned positions are the path.
     let without = ride(shipped, &plan, Arm::Without)?;
     let course = Course::new(without.planned.iter().copied());
@@ -52,7 +52,7 @@ pub fn drive(shipped: &Shipped, plan: Plan) -> Result<Mission, Box<dyn Error>> {
     Ok(Mission { plan, scores })
 }
 
-impl Driven {
+impl CommanderRun {
     fn score(&self, course: &Course) -> Score {
         Score::new(&self.tally, &self.places, course, self.done)
     }
@@ -60,7 +60,7 @@ impl Driven {
 
 /// The world of a mission, what is wrong in it, and who helps.
 struct Field<'a> {
-    shipped: &'a Shipped,
+    shipped: &'a ShippedGraph,
     world: World,
     truth: Truth,
     pending: Option<(Change, f64, Truth)>,
@@ -69,7 +69,7 @@ struct Field<'a> {
 }
 
 impl<'a> Field<'a> {
-    fn new(shipped: &'a Shipped, plan: &Plan, rate_hz: f64) -> Result<Self, Box<dyn Error>> {
+    fn new(shipped: &'a ShippedGraph, plan: &Plan, rate_hz: f64) -> Result<Self, Box<dyn Error>> {
         let robot = &shipped.setup.robot;
         let world = World::new(robot, &plan.simulator, &plan.segments, rate_hz, plan.seed)?;
         let pending = match &plan.fault {
@@ -99,7 +99,7 @@ impl<'a> Field<'a> {
     }
 
     /// True when help has come: all is mended.
-    fn help(&mut self, obeyed: Obeyed, dt_s: f64) -> Result<bool, Box<dyn Error>> {
+    fn help(&mut self, obeyed: ObeyedOrder, dt_s: f64) -> Result<bool, Box<dyn Error>> {
         match obeyed.kind {
             RecoveryKind::CallForHelp => self.waited_s += dt_s,
             _ => self.waited_s = 0.0,
@@ -116,7 +116,7 @@ impl<'a> Field<'a> {
     }
 }
 
-fn nominal(shipped: &Shipped) -> Result<Truth, Box<dyn Error>> {
+fn nominal(shipped: &ShippedGraph) -> Result<Truth, Box<dyn Error>> {
     Ok(Truth {
         state: state(shipped, "ND")?,
         wheel: None,
@@ -124,7 +124,7 @@ fn nominal(shipped: &Shipped) -> Result<Truth, Box<dyn Error>> {
     })
 }
 
-fn truth_of(shipped: &Shipped, fault: &super::Fault) -> Result<Truth, Box<dyn Error>> {
+fn truth_of(shipped: &ShippedGraph, fault: &super::Fault) -> Result<Truth, Box<dyn Error>> {
     let wheel = fault
         .wheel
         .and_then(|name| shipped.setup.robot.wheel_index(name));
@@ -135,7 +135,7 @@ fn truth_of(shipped: &Shipped, fault: &super::Fault) -> Result<Truth, Box<dyn Er
     })
 }
 
-fn state(shipped: &Shipped, name: &str) -> Result<usize, Box<dyn Error>> {
+fn state(shipped: &ShippedGraph, name: &str) -> Result<usize, Box<dyn Error>> {
     let found = shipped
         .model()
         .states()
@@ -145,7 +145,11 @@ fn state(shipped: &Shipped, name: &str) -> Result<usize, Box<dyn Error>> {
 }
 
 /// Drives a mission with one commander.
-pub(super) fn ride(shipped: &Shipped, plan: &Plan, arm: Arm) -> Result<Driven, Box<dyn Error>> {
+pub(super) fn ride(
+    shipped: &ShippedGraph,
+    plan: &Plan,
+    arm: Arm,
+) -> Result<CommanderRun, Box<dyn Error>> {
     let rate_hz = shipped.setup.file.graph.rate_hz;
     let dt_s = 1.0 / rate_hz;
     let period_ns = (1e9 / rate_hz).round() as u64;
@@ -153,7 +157,7 @@ pub(super) fn ride(shipped: &Shipped, plan: &Plan, arm: Arm) -> Result<Driven, B
     let mut commander = Commander::new(shipped, arm, plan.seed)?;
     let mut obedience = Obedience::new(&shipped.setup.robot.limits);
     let pay = Pay::new(shipped);
-    let mut driven = Driven {
+    let mut driven = CommanderRun {
         tally: Tally::default(),
         places: Vec::new(),
         planned: Vec::new(),
@@ -168,7 +172,7 @@ pub(super) fn ride(shipped: &Shipped, plan: &Plan, arm: Arm) -> Result<Driven, B
         frame.header.t_capture_ns = (k + 1) * period_ns;
         let action = commander.command(&frame, field.truth, dt_s);
         field.break_what_is_due(k as f64 * dt_s)?;
-        let obeyed = Obeyed::new(action);
+        let obeyed = ObeyedOrder::new(action);
         let planned = field.world.planned();
         let command = obedience.apply(planned, Some(action), frame.header.t_capture_ns);
         let (before, was_planned) = (field.world.truth().pose, frame.planned_pose);

@@ -36,7 +36,7 @@ pub enum Explanation {
 
 /// What the rules see in one cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub struct RuleInput {
     /// The detector's alarm.
     pub alarm: bool,
     /// The identifier's most probable explanation.
@@ -45,7 +45,7 @@ pub struct Seen {
 
 /// What the rules say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Told {
+pub struct RuleOutput {
     /// Kind of action.
     pub kind: RecoveryKind,
     /// The wheel it is about.
@@ -84,7 +84,7 @@ impl Default for Escalation {
 
 impl Escalation {
     /// The rules' answer to what is seen, `dt_s` after the last cycle.
-    pub fn answer(&mut self, seen: Seen, dt_s: f64) -> Told {
+    pub fn answer(&mut self, seen: RuleInput, dt_s: f64) -> RuleOutput {
         self.phase = match self.phase {
             Phase::Driving if seen.alarm => self.stop(),
             Phase::Looking { for_s } if for_s + dt_s < LOOK_S => Phase::Looking {
@@ -115,7 +115,7 @@ impl Escalation {
 
     fn remedy(
         &mut self,
-        seen: Seen,
+        seen: RuleInput,
         (what, for_s, doubt_s): (Explanation, f64, f64),
         dt_s: f64,
     ) -> Phase {
@@ -140,7 +140,7 @@ impl Escalation {
         }
     }
 
-    const fn told(&self) -> Told {
+    const fn told(&self) -> RuleOutput {
         let (kind, wheel) = match self.phase {
             Phase::Driving => (RecoveryKind::GoOn, None),
             Phase::Looking { .. } => (RecoveryKind::Stop, None),
@@ -152,7 +152,7 @@ impl Escalation {
                 Explanation::Unknown => (RecoveryKind::SlowDown, None),
             },
         };
-        Told { kind, wheel }
+        RuleOutput { kind, wheel }
     }
 }
 
@@ -168,7 +168,7 @@ mod tests {
         let mut said = Vec::new();
         for &(alarm, explanation, tenths) in sights {
             for _ in 0..tenths {
-                let told = rules.answer(Seen { alarm, explanation }, 0.1);
+                let told = rules.answer(RuleInput { alarm, explanation }, 0.1);
                 if said.last() != Some(&(told.kind, told.wheel)) {
                     said.push((told.kind, told.wheel));
                 }

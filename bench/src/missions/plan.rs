@@ -197,12 +197,12 @@ fn fault(rng: &mut Pcg64Mcg, kind: Kind, onset_s: f64) -> Option<Fault> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::missions::Shipped;
+    use crate::missions::ShippedGraph;
 
     #[test]
     fn missions_are_as_stated_and_every_fault_is_understood() {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        let shipped = Shipped::read(&root, 100.0).unwrap();
+        let shipped = ShippedGraph::read(&root, 100.0).unwrap();
         let plans: Vec<Plan> = (0..2000).map(Plan::new).collect();
         for plan in &plans {
             let length_m: f64 = plan

@@ -6,7 +6,7 @@ use super::arm::Arm;
 use super::drive::Mission;
 use super::plan::Kind;
 use super::score::MEASURES;
-use super::table::{against, differences, figures, means, of};
+use super::table::{against, differences, figures, means, select};
 use super::{HELP_S, LIMIT_S};
 use crate::archive::Archive;
 
@@ -14,10 +14,10 @@ use crate::archive::Archive;
 #[must_use]
 pub fn document(missions: &[Mission]) -> Value {
     let mut document = json!({
-        "limit_s": LIMIT_S, "help_s": HELP_S, "all": figures(&of(missions, None)),
+        "limit_s": LIMIT_S, "help_s": HELP_S, "all": figures(&select(missions, None)),
     });
     for (kind, _) in Kind::SHARES {
-        document[kind.name()] = figures(&of(missions, Some(kind)));
+        document[kind.name()] = figures(&select(missions, Some(kind)));
     }
     document
 }
@@ -65,7 +65,7 @@ pub fn say(archive: &mut Archive, missions: &[Mission], rate_hz: f64) {
          call*: at an alarm of the detector. *told the fault*: knows it when it begins and takes \
          the best action for the known state.\n",
     );
-    let all = of(missions, None);
+    let all = select(missions, None);
     archive.say("## All\n");
     means(&all).iter().for_each(|row| archive.say(row));
     archive.say("");
@@ -81,7 +81,7 @@ pub fn say(archive: &mut Archive, missions: &[Mission], rate_hz: f64) {
         ));
     }
     for (kind, _) in Kind::SHARES {
-        let here = of(missions, Some(kind));
+        let here = select(missions, Some(kind));
         archive.say(&format!("\n## {} ({} missions)\n", kind.name(), here.len()));
         means(&here).iter().for_each(|row| archive.say(row));
         archive.say("");
@@ -93,7 +93,7 @@ pub fn say(archive: &mut Archive, missions: &[Mission], rate_hz: f64) {
 /// that is told the fault is none to beat.
 #[must_use]
 pub fn lost_against(missions: &[Mission]) -> Vec<&'static str> {
-    let all = of(missions, None);
+    let all = select(missions, None);
     let wins = |arm: &Arm| {
         let found = against(&all, *arm, MEASURES[0]);
         found.difference - found.half_width > 0.0

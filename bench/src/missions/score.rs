@@ -2,7 +2,7 @@
 
 use vigil_blocks::{Action, RecoveryKind};
 
-use super::Shipped;
+use super::ShippedGraph;
 use super::course::{Course, distance};
 
 /// The path is looked for from so far behind the planned place to so far ahead of it, m: a rover
@@ -23,7 +23,7 @@ pub struct Truth {
 
 /// What the rover obeys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Obeyed {
+pub struct ObeyedOrder {
     /// Index in the decision model.
     pub action: usize,
     /// Its kind.
@@ -32,7 +32,7 @@ pub struct Obeyed {
     pub wheel: Option<usize>,
 }
 
-impl Obeyed {
+impl ObeyedOrder {
     /// What an action block says.
     #[must_use]
     pub fn new(action: &Action) -> Self {
@@ -56,7 +56,7 @@ impl Obeyed {
 /// What the decision model pays.
 #[derive(Debug, Clone, Copy)]
 pub struct Pay<'a> {
-    shipped: &'a Shipped,
+    shipped: &'a ShippedGraph,
     go_on: Option<usize>,
     epoch_s: f64,
 }
@@ -64,7 +64,7 @@ pub struct Pay<'a> {
 impl<'a> Pay<'a> {
     /// As the shipped model states it, per epoch of the shipped supervisor.
     #[must_use]
-    pub fn new(shipped: &'a Shipped) -> Self {
+    pub fn new(shipped: &'a ShippedGraph) -> Self {
         Self {
             shipped,
             go_on: shipped.action(RecoveryKind::GoOn),
@@ -75,7 +75,7 @@ impl<'a> Pay<'a> {
     /// Reward of `dt_s` under an action, in epochs' rewards. A remedy for another wheel than the
     /// broken one is worth no more than going on.
     #[must_use]
-    pub fn reward(&self, truth: Truth, obeyed: Obeyed, dt_s: f64) -> f64 {
+    pub fn reward(&self, truth: Truth, obeyed: ObeyedOrder, dt_s: f64) -> f64 {
         let model = self.shipped.model();
         let stated = model.reward(truth.state, obeyed.action);
         let is_wrong = |(at, broken): (usize, usize)| at != broken;
@@ -105,7 +105,7 @@ pub(super) struct Tally {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
     pub truth: Truth,
-    pub obeyed: Obeyed,
+    pub obeyed: ObeyedOrder,
     /// True if standing is the best that can be done in this state.
     pub may_stand: bool,
     /// Way of the body, m.
@@ -251,12 +251,12 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    fn shipped() -> Shipped {
+    fn shipped() -> ShippedGraph {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        Shipped::read(&root, 100.0).unwrap()
+        ShippedGraph::read(&root, 100.0).unwrap()
     }
 
-    fn truth(shipped: &Shipped, name: &str, wheel: Option<usize>) -> Truth {
+    fn truth(shipped: &ShippedGraph, name: &str, wheel: Option<usize>) -> Truth {
         let state = shipped
             .model()
             .states()
@@ -271,9 +271,9 @@ mod tests {
         }
     }
 
-    fn obeyed(shipped: &Shipped, kind: RecoveryKind, wheel: Option<usize>) -> Obeyed {
+    fn obeyed(shipped: &ShippedGraph, kind: RecoveryKind, wheel: Option<usize>) -> ObeyedOrder {
         let action = shipped.action(kind).unwrap();
-        Obeyed {
+        ObeyedOrder {
             action,
             kind,
             wheel,

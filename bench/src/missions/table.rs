@@ -1,7 +1,7 @@
 //! Means and paired differences of missions.
 
 use serde_json::{Value, json};
-use vigil_missions::simulation::{Paired, Summary};
+use vigil_missions::simulation::{PairedDifference, Summary};
 
 use super::arm::Arm;
 use super::drive::Mission;
@@ -9,7 +9,7 @@ use super::plan::Kind;
 use super::score::{MEASURES, Measure, Score};
 
 /// Missions of a kind; all for `None`.
-pub(super) fn of(missions: &[Mission], kind: Option<Kind>) -> Vec<&Mission> {
+pub(super) fn select(missions: &[Mission], kind: Option<Kind>) -> Vec<&Mission> {
     let is = |mission: &&Mission| kind.is_none_or(|kind| mission.plan.kind == kind);
     missions.iter().filter(is).collect()
 }
@@ -21,13 +21,13 @@ fn values(missions: &[&Mission], arm: Arm, of: fn(&Score) -> f64) -> Vec<f64> {
 
 /// Of one figure, what a commander brings.
 pub(super) fn summary(missions: &[&Mission], arm: Arm, measure: Measure) -> Summary {
-    Summary::of(&mut values(missions, arm, measure.of))
+    Summary::new(&mut values(missions, arm, measure.of))
 }
 
 /// Of one figure, Vigil less another commander.
-pub(super) fn against(missions: &[&Mission], other: Arm, measure: Measure) -> Paired {
+pub(super) fn against(missions: &[&Mission], other: Arm, measure: Measure) -> PairedDifference {
     let ours = values(missions, Arm::Vigil, measure.of);
-    Paired::of(&ours, &values(missions, other, measure.of))
+    PairedDifference::new(&ours, &values(missions, other, measure.of))
 }
 
 /// All figures of these missions.

@@ -11,7 +11,7 @@ use std::time::Instant;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::field::{
-    self, File, Graph, Job, Library, Outcome, Scenario, Scored, barred_lines, document, jobs,
+    self, File, Graph, Job, Library, Outcome, Scenario, ScoredRun, barred_lines, document, jobs,
     library, lines, select,
 };
 use vigil_bench::in_parallel;
@@ -148,7 +148,7 @@ fn measure<'a>(
         }
         found
     };
-    let found: Result<Vec<Vec<Scored>>, String> = in_parallel(all, one).into_iter().collect();
+    let found: Result<Vec<Vec<ScoredRun>>, String> = in_parallel(all, one).into_iter().collect();
     let found = found?;
     let mut outcomes = Vec::new();
     for scenario in scenarios {
@@ -157,7 +157,7 @@ fn measure<'a>(
             both.filter(|(job, _)| std::ptr::eq(job.scenario, *scenario))
         };
         let sets = mine().next().map(|(_, scored)| scored.as_slice());
-        for (set, Scored { sensors, .. }) in sets.unwrap_or_default().iter().enumerate() {
+        for (set, ScoredRun { sensors, .. }) in sets.unwrap_or_default().iter().enumerate() {
             let runs = mine().filter_map(|(_, scored)| Some(scored.get(set)?.run.clone()));
             outcomes.push(Outcome::new(scenario, sensors, runs.collect()));
         }

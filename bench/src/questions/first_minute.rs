@@ -1,6 +1,6 @@
 //! How long from a clone to the first alarm, packages downloaded?
 //!
-//! Copies what git tracks into a folder of its own, runs the README's first command in it, and reads
+//! Clones the project into a folder of its own, runs the README's first command there, and reads
 //! when the first alarm came. Cargo's timings of that build stay with the raw data.
 
 use std::error::Error;
@@ -67,11 +67,13 @@ fn measure(folder: &Path) -> Result<(), Box<dyn Error>> {
          | first alarm, a fault injected after 5 s included | {alarm_s:.0} |",
         units.len(),
     ));
-    let slowest = slowest(units);
-    archive.store(
-        "first-minute.json",
-        &json!({ "started_s": started_s, "unit_s": unit_s, "alarm_s": alarm_s, "slowest": slowest }),
-    )?;
+    let document = json!({
+        "started_s": started_s,
+        "unit_s": unit_s,
+        "alarm_s": alarm_s,
+        "slowest": slowest(units),
+    });
+    archive.store("first-minute.json", &document)?;
     archive.store_text("cargo-timing.html", &report)?;
     archive.close()?;
     Ok(())

@@ -11,7 +11,7 @@ use serde_json::json;
 use vigil_bench::archive::Archive;
 use vigil_bench::in_parallel;
 use vigil_bench::machine;
-use vigil_bench::missions::{self, Mission, Plan, Shipped};
+use vigil_bench::missions::{self, Mission, Plan, ShippedGraph};
 
 /// Missions between two lines of progress.
 const PROGRESS: usize = 25;
@@ -39,7 +39,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         return Err("a debug build takes hours: use scripts/bench".into());
     }
     let (count, first, rate_hz) = (args.missions, args.first_seed, args.rate);
-    let shipped = Shipped::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."), rate_hz)?;
+    let shipped = ShippedGraph::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."), rate_hz)?;
     let plans: Vec<Plan> = (first..first + count).map(Plan::new).collect();
     let (began, done) = (Instant::now(), AtomicUsize::new(0));
     let drive = |plan: &Plan| {

@@ -13,7 +13,7 @@ use vigil_bench::chain::Chain;
 use vigil_bench::chain::carriers::Carrier;
 use vigil_bench::latency::cell::us;
 use vigil_bench::latency::cycles::{STAGES, Spectra, join};
-use vigil_bench::latency::load::{Load, Running};
+use vigil_bench::latency::load::{Load, LoadProcess};
 use vigil_bench::percentile;
 
 /// Sizes of block, bytes.
@@ -52,7 +52,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let mut cores: Vec<usize> = PLACED.map(|(core, _)| core).to_vec();
     cores.dedup();
     let rows = vigil_bench::in_folder("peers", |folder| {
-        let _load = Running::start(args.load, &cores, folder, None)?;
+        let _load = LoadProcess::start(args.load, &cores, folder, None)?;
         measure(args, folder)
     })?;
     if args.json {
@@ -96,7 +96,7 @@ fn one(chain: &Chain, round: usize, folder: &Path) -> Value {
         if cycles.is_empty() {
             return Err("nothing arrived".into());
         }
-        Ok((Spectra::of(&cycles)?, cycles))
+        Ok((Spectra::new(&cycles)?, cycles))
     });
     match found {
         Ok((spectra, cycles)) => json!({

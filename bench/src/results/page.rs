@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use super::Kept;
+use super::ResultFile;
 use super::shorten::shortened;
 use crate::machine;
 
@@ -25,9 +25,9 @@ where it was measured. `-` for a percentile: there are too few samples for it.
 
 /// The page, Markdown.
 #[must_use]
-pub fn page(results: &[Kept]) -> String {
+pub fn page(results: &[ResultFile]) -> String {
     let mut newest = BTreeMap::new();
-    let mut in_order: Vec<&Kept> = results.iter().collect();
+    let mut in_order: Vec<&ResultFile> = results.iter().collect();
     in_order.sort_by_key(|kept| (&kept.run.date, &kept.path));
     for kept in in_order {
         newest.insert(&kept.run.question, kept);
@@ -39,7 +39,7 @@ pub fn page(results: &[Kept]) -> String {
     text
 }
 
-fn section(Kept { path, run }: &Kept) -> String {
+fn section(ResultFile { path, run }: &ResultFile) -> String {
     let command = format!("`{}`", run.command);
     let is_said = |line: &&String| line.is_empty() || **line == command;
     let whole = run.summary.iter().skip_while(is_said);
@@ -124,12 +124,12 @@ mod tests {
     use super::super::tests::empty;
     use super::*;
 
-    fn kept(folder: &str, date: &str, summary: &[&str]) -> Kept {
+    fn kept(folder: &str, date: &str, summary: &[&str]) -> ResultFile {
         let mut run = empty("latency");
         run.date = date.into();
         run.summary = summary.iter().map(|line| (*line).to_owned()).collect();
         let path = format!("{folder}/latency.json");
-        Kept { path, run }
+        ResultFile { path, run }
     }
 
     #[test]
@@ -173,7 +173,7 @@ mod tests {
     #[test]
     fn the_committed_page_is_what_the_results_make() {
         let folder = crate::archive::results();
-        let results = Kept::all(&folder).unwrap();
+        let results = ResultFile::all(&folder).unwrap();
         let committed = std::fs::read_to_string(folder.join("../README.md")).unwrap();
         assert!(
             page(&results) == committed,

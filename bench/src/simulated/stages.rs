@@ -9,7 +9,7 @@ use vigil_blocks::{
 use vigil_decision::{Inputs, Supervisor, fused_alarm};
 use vigil_diagnosis::detect::Detector;
 use vigil_diagnosis::identify::{Diagnoser, Input};
-use vigil_evaluation::scoring::field::{BLIND, Moment, Size, Told};
+use vigil_evaluation::scoring::field::{BLIND, Moment, RobotOrder, Size};
 use vigil_evaluation::scoring::{Belief, MULTIPLE, UNKNOWN};
 use vigil_setup::Setup;
 use vigil_setup::schema::Sensors;
@@ -180,20 +180,20 @@ impl Stages {
 }
 
 /// An action as it is scored. What is not decided stops the robot.
-fn told(action: &Action) -> Told {
+fn told(action: &Action) -> RobotOrder {
     if action.control_mode == ControlMode::Safe as u32 {
-        return Told::Blind;
+        return RobotOrder::Blind;
     }
     match RecoveryKind::from_wire(action.kind).unwrap_or(RecoveryKind::None) {
-        RecoveryKind::GoOn => Told::GoOn,
-        RecoveryKind::SlowDown => Told::Slow,
-        RecoveryKind::None | RecoveryKind::Stop | RecoveryKind::GiveUp => Told::Stop,
-        RecoveryKind::CallForHelp => Told::Help,
+        RecoveryKind::GoOn => RobotOrder::GoOn,
+        RecoveryKind::SlowDown => RobotOrder::Slow,
+        RecoveryKind::None | RecoveryKind::Stop | RecoveryKind::GiveUp => RobotOrder::Stop,
+        RecoveryKind::CallForHelp => RobotOrder::Help,
         RecoveryKind::Compensate
         | RecoveryKind::IgnoreEncoder
         | RecoveryKind::NewPath
         | RecoveryKind::Relocalise
         | RecoveryKind::GoThrough
-        | RecoveryKind::MoveAway => Told::Other,
+        | RecoveryKind::MoveAway => RobotOrder::Other,
     }
 }

@@ -13,7 +13,7 @@ const CHANGED: f64 = 0.2;
 
 /// What is said of a component: node of the fault tree, way, size and standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Said {
+struct ReportedSize {
     node: u32,
     kind: u32,
     size: f64,
@@ -23,16 +23,16 @@ struct Said {
 /// What was told last.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ToldSize {
-    now: Said,
+    now: ReportedSize,
     cycles: u32,
-    told: Option<Said>,
+    told: Option<ReportedSize>,
 }
 
 impl ToldSize {
     /// Takes the next belief.
     pub fn take(&mut self, belief: &FaultBelief) {
         let node = belief.mode as usize;
-        let said = Said {
+        let said = ReportedSize {
             node: belief.mode,
             kind: belief.size_kind.get(node).copied().unwrap_or_default(),
             size: belief.size.get(node).copied().unwrap_or_default(),
@@ -52,7 +52,7 @@ impl ToldSize {
 
     /// What is to be told: node + 256 x way, size and its standard deviation in the way's unit.
     pub fn news(&mut self) -> Option<(u32, f64, f64)> {
-        let Said {
+        let ReportedSize {
             node,
             kind,
             size,

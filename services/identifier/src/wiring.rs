@@ -37,7 +37,7 @@ pub struct IdentifierStage {
     detection: (u64, u64),
     belief: Box<dyn Sender<FaultBelief>>,
     hypotheses: Box<dyn Sender<ParticleBlock>>,
-    reported: Reported,
+    reported: LastBelief,
     told: u32,
     /// The mode that was told last. That nothing is seen, the detector tells.
     told_mode: u32,
@@ -46,7 +46,7 @@ pub struct IdentifierStage {
 
 /// What the last belief said, for the timeline.
 #[derive(Debug, Clone, Copy, Default)]
-struct Reported {
+struct LastBelief {
     mode: u32,
     p_mode: f64,
     leaves: u64,
@@ -70,14 +70,14 @@ impl IdentifierStage {
             detections: graph.receiver(Topic::Detection)?,
             detected: graph.receiver(Topic::DetectionParticles)?,
             frames: graph.receiver(Topic::Sensor)?,
-            frame_account: InputAccount::of(Writer::Publisher),
+            frame_account: InputAccount::new(Writer::Publisher),
             guard: FrameGuard::new(robot),
             epoch: 0,
             pending: VecDeque::with_capacity(PENDING_MAX),
             detection: (0, 0),
             belief: graph.sender(Topic::Diagnosis)?,
             hypotheses: graph.sender(Topic::DiagnosisParticles)?,
-            reported: Reported::default(),
+            reported: LastBelief::default(),
             told: 0,
             told_mode: 0,
             size: ToldSize::default(),
@@ -198,7 +198,7 @@ impl Stage for IdentifierStage {
         let evidence = belief.channel_evidence.iter().enumerate();
         let strongest = evidence.max_by(|a, b| a.1.total_cmp(b.1));
         let (channel, evidence) = strongest.map_or((0, 0.0), |(i, value)| (i, *value));
-        self.reported = Reported {
+        self.reported = LastBelief {
             mode: belief.mode,
             p_mode: belief.p_mode,
             leaves: belief.sets[0].leaves,
@@ -237,7 +237,7 @@ impl Stage for IdentifierStage {
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         health.add_input(&self.frame_account);
-        let Reported {
+        let LastBelief {
             mode,
             p_mode,
             leaves,

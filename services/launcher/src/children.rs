@@ -18,7 +18,7 @@ const STOP_LIMIT: Duration = Duration::from_secs(3);
 const POLL: Duration = Duration::from_millis(5);
 
 /// One service process.
-struct Supervised {
+struct ServiceProcess {
     name: ServiceName,
     child: Child,
     report: PathBuf,
@@ -31,7 +31,7 @@ struct Supervised {
 
 /// All service processes of a graph.
 pub struct Children {
-    services: Vec<Supervised>,
+    services: Vec<ServiceProcess>,
     restarted: Vec<ServiceName>,
     gave_up: Option<ServiceName>,
 }
@@ -48,7 +48,7 @@ impl Children {
             let report = domain.folder().join(format!("{}.report", name.as_str()));
             let _ = std::fs::remove_file(&report);
             match spawn(plan.command(name), &report, plan.recording(name)) {
-                Ok(child) => children.services.push(Supervised {
+                Ok(child) => children.services.push(ServiceProcess {
                     name,
                     child,
                     report,
@@ -67,7 +67,7 @@ impl Children {
 
     /// Leaves the process ids where whoever finds the graph running can read them.
     fn list(&self, domain: &Domain) -> io::Result<()> {
-        let line = |s: &Supervised| format!("{} {}\n", s.name.as_str(), s.child.id());
+        let line = |s: &ServiceProcess| format!("{} {}\n", s.name.as_str(), s.child.id());
         let text: String = self.services.iter().map(line).collect();
         // First: a publisher that finds the graph may ask for its types.
         domain.tell_types()?;
@@ -167,7 +167,7 @@ impl Children {
 
     /// The run reports that the services have left.
     pub fn reports(&self) -> Vec<(ServiceName, Option<RunReport>)> {
-        let read = |service: &Supervised| match RunReport::read(&service.report) {
+        let read = |service: &ServiceProcess| match RunReport::read(&service.report) {
             Ok(report) => Some(report),
             Err(error) => {
                 tell!("vigil: no report of {}: {error}", service.name.as_str());

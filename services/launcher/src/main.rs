@@ -114,8 +114,8 @@ fn watch(
     plan: &Plan,
     observer: &mut Observer,
     children: &mut Children,
-) -> summary::Ended {
-    use summary::Ended;
+) -> summary::EndReason {
+    use summary::EndReason;
     let started = Instant::now();
     let startup_limit = Duration::from_secs_f64(plan.setup.file.watchdog.startup_s);
     let mut supervisor = Supervisor::new(plan);
@@ -124,25 +124,25 @@ fn watch(
         std::thread::sleep(POLL);
         observer.poll(!args.json);
         if signal::stop_requested() {
-            return Ended::Stopped;
+            return EndReason::Stopped;
         }
         if observer.timeline().has(EventKind::EndOfRecording) {
             // What the services miss from now on, and do about it, is nothing to look after.
             let since = *recording_ended.get_or_insert_with(Instant::now);
             if since.elapsed() > DRAIN {
-                return Ended::EndOfRecording;
+                return EndReason::EndOfRecording;
             }
             continue;
         }
         if children.look_after(plan, observer) {
-            return Ended::GaveUp;
+            return EndReason::GaveUp;
         }
         supervisor.look_after(observer, children);
         if observer.ready_ns().is_none() && plan.waits_for_ready() {
             if started.elapsed() > startup_limit {
                 let limit_s = startup_limit.as_secs_f64();
                 tell!("vigil: no action came back within {limit_s} s");
-                return Ended::NeverReady;
+                return EndReason::NeverReady;
             }
             continue;
         }
@@ -151,7 +151,7 @@ fn watch(
             .duration
             .is_some_and(|limit_s| lasted.is_some_and(|s| s >= limit_s))
         {
-            return Ended::Duration;
+            return EndReason::Duration;
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::plan::{Drive, Plan};
 use crate::timeline::Timeline;
 
 /// What the launcher knows of one service.
-pub struct Watched {
+pub struct ServiceView {
     /// Which service.
     pub name: ServiceName,
     receiver: Box<dyn Receiver<Health>>,
@@ -63,7 +63,7 @@ fn accounted_after(health: &Health, end_ns: u64) -> u64 {
 /// Reads Health and keeps the timeline.
 pub struct Observer {
     graph: Graph,
-    watched: Vec<Watched>,
+    watched: Vec<ServiceView>,
     timeline: Timeline,
     is_external: bool,
 }
@@ -75,7 +75,7 @@ impl Observer {
         let watch = |name| {
             let receiver = graph.receiver(Topic::Health(name))?;
             let before = Counters::default();
-            Ok(Watched {
+            Ok(ServiceView {
                 name,
                 receiver,
                 seen_events: 0,
@@ -151,7 +151,7 @@ impl Observer {
 
     /// Counters of a service over all its processes. What it missed because a recording was at its
     /// end is no miss.
-    pub fn counters(&self, service: &Watched) -> Counters {
+    pub fn counters(&self, service: &ServiceView) -> Counters {
         let mut counters = service.before;
         if let Some(health) = &service.latest {
             counters.add(health);
@@ -164,7 +164,7 @@ impl Observer {
     }
 
     /// Every service watched.
-    pub fn watched(&self) -> &[Watched] {
+    pub fn watched(&self) -> &[ServiceView] {
         &self.watched
     }
 

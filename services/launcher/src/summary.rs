@@ -10,14 +10,14 @@ use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Placement, RunReport};
 
 use crate::children::Children;
-use crate::observer::{Counters, Observer, Watched};
+use crate::observer::{Counters, Observer, ServiceView};
 use crate::plan::Plan;
-use crate::timeline::Told;
+use crate::timeline::TimelineEntry;
 
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Ended {
+pub enum EndReason {
     /// The duration is over.
     Duration,
     /// The recording is over.
@@ -95,14 +95,14 @@ pub struct Summary {
     graph: String,
     rate_hz: f64,
     duration_s: f64,
-    ended: Ended,
+    ended: EndReason,
     release_build: bool,
     config_hash: String,
     services: BTreeMap<&'static str, ServiceSummary>,
     end_to_end_us: Microseconds,
     /// Per detector, how long it saw nothing, s, by cause.
     blind: BTreeMap<&'static str, BTreeMap<&'static str, f64>>,
-    events: Vec<Told>,
+    events: Vec<TimelineEntry>,
     events_overwritten: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     gave_up: Option<String>,
@@ -115,7 +115,7 @@ impl Summary {
         observer: &Observer,
         children: &Children,
         reports: &[(ServiceName, Option<RunReport>)],
-        ended: Ended,
+        ended: EndReason,
     ) -> Self {
         let report = |name| {
             reports
@@ -162,7 +162,7 @@ impl Summary {
 
     /// True if the run itself failed, or nothing was seen for a part of it, or for all of it.
     pub fn failed(&self) -> bool {
-        matches!(self.ended, Ended::GaveUp | Ended::NeverReady)
+        matches!(self.ended, EndReason::GaveUp | EndReason::NeverReady)
             || !self.blind.is_empty()
             || self.saw_nothing()
     }
@@ -174,7 +174,7 @@ impl Summary {
 }
 
 fn service(
-    w: &Watched,
+    w: &ServiceView,
     counters: Counters,
     restarts: usize,
     report: Option<&RunReport>,

@@ -18,7 +18,7 @@ use crate::words;
 
 /// An event in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Told {
+pub struct TimelineEntry {
     /// Seconds since every service answered for the first time.
     pub t_s: f64,
     /// The service that says so.
@@ -35,7 +35,7 @@ pub struct Told {
     pub fault_set: Option<String>,
 }
 
-impl fmt::Display for Told {
+impl fmt::Display for TimelineEntry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             t_s,
@@ -184,7 +184,7 @@ impl Timeline {
     }
 
     /// Every event in words, in order.
-    pub fn told(&self) -> Vec<Told> {
+    pub fn told(&self) -> Vec<TimelineEntry> {
         let origin_ns = self.origin_ns;
         let mut sorted = self.raw.clone();
         sorted.sort_by_key(|(_, event)| event.t_ns);
@@ -246,14 +246,14 @@ impl Namer {
         }
     }
 
-    fn tell(&self, service: ServiceName, event: &Event, origin_ns: Option<u64>) -> Told {
+    fn tell(&self, service: ServiceName, event: &Event, origin_ns: Option<u64>) -> TimelineEntry {
         let kind = EventKind::from_wire(event.kind);
         let t_s = origin_ns.map_or(0.0, |origin| (event.t_ns as f64 - origin as f64) * 1e-9);
         let has_p = matches!(
             kind,
             Some(EventKind::Alarm | EventKind::Cleared | EventKind::Diagnosis | EventKind::Action)
         );
-        Told {
+        TimelineEntry {
             t_s: (t_s * 1e6).round() * 1e-6,
             service: service.as_str(),
             event: kind.map_or("unknown", kind_name),

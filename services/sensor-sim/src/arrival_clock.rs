@@ -11,11 +11,11 @@ const HELD_UP_MAX_NS: i128 = 1_000_000_000;
 /// that a frame held up on its way still counts from when it was due.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ArrivalClock {
-    known: Option<Known>,
+    known: Option<ClockOffset>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Known {
+struct ClockOffset {
     epoch: u64,
     t_capture_ns: u64,
     /// Our clock minus the publisher's, ns.
@@ -67,7 +67,7 @@ impl ArrivalClock {
         };
         header.t_schedule_ns = u64::try_from(i128::from(t_capture_ns) + offset_ns).unwrap_or(0);
         Self {
-            known: Some(Known {
+            known: Some(ClockOffset {
                 epoch,
                 t_capture_ns,
                 offset_ns,

@@ -11,7 +11,7 @@ use vigil_setup::schema::Source;
 use crate::{Listen, Navigator, Obedience, Playback, Schedule, Simulation, World};
 
 /// What is to be the source of the graph.
-pub enum Assembled {
+pub enum SensorSource {
     /// The simulated rover, and what is to break when.
     Simulator(Box<Simulation>, Schedule),
     /// Recorded frames.
@@ -24,7 +24,7 @@ pub enum Assembled {
 ///
 /// # Errors
 /// What does not fit, with the file, key or option in which it lies.
-pub fn assemble(setup: &Setup, injections: &[String]) -> Result<Assembled, Box<dyn Error>> {
+pub fn assemble(setup: &Setup, injections: &[String]) -> Result<SensorSource, Box<dyn Error>> {
     let (file, path) = (&setup.file, setup.path.display());
     let schedule = schedule(setup, injections)?;
     Ok(match file.sensor.source {
@@ -35,10 +35,10 @@ pub fn assemble(setup: &Setup, injections: &[String]) -> Result<Assembled, Box<d
             let obedience = Obedience::new(&setup.robot.limits);
             let navigator = file.navigation.as_ref().map(Navigator::new);
             let simulation = Simulation::new(world, obedience, navigator);
-            Assembled::Simulator(Box::new(simulation), schedule)
+            SensorSource::Simulator(Box::new(simulation), schedule)
         }
-        Source::Playback => Assembled::Playback(playback(setup)?),
-        Source::Socket => Assembled::Socket(listen(setup)?),
+        Source::Playback => SensorSource::Playback(playback(setup)?),
+        Source::Socket => SensorSource::Socket(listen(setup)?),
         Source::External => {
             return Err(format!("{path}: sensor.source is external: nothing to simulate").into());
         }

@@ -11,11 +11,11 @@ const FIRM_RESISTANCE: f64 = 0.05;
 
 /// At most one disturbance of each kind at each place.
 #[derive(Debug, Clone)]
-pub(crate) struct Disturbed {
+pub(crate) struct Disturbances {
     on: [[Option<[f64; PARAMETERS]>; ROVER_WHEELS]; KINDS.len()],
 }
 
-impl Disturbed {
+impl Disturbances {
     pub(crate) const fn nothing() -> Self {
         Self {
             on: [[None; ROVER_WHEELS]; KINDS.len()],

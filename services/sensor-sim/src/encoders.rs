@@ -5,7 +5,7 @@ use rand_pcg::Pcg64Mcg;
 use vigil_robot::kinematics::ROVER_WHEELS;
 use vigil_robot::{DisturbanceKind, FaultKind};
 
-use crate::disturbed::Disturbed;
+use crate::disturbed::Disturbances;
 use crate::history::History;
 
 /// Smallest rate that a noisy encoder reports, rad/s.
@@ -41,7 +41,7 @@ impl Encoders {
     }
 
     /// A cycle passes.
-    pub(crate) fn advance(&mut self, dt_s: f64, on: &Disturbed) {
+    pub(crate) fn advance(&mut self, dt_s: f64, on: &Disturbances) {
         for (wheel, drifted) in self.drifted_rad_s.iter_mut().enumerate() {
             *drifted = match on.at(DisturbanceKind::EncoderDrift, wheel) {
                 Some(rad_s2) => *drifted + rad_s2 * dt_s,
@@ -51,7 +51,7 @@ impl Encoders {
     }
 
     /// The rates seen, before noise, of wheels that turn at `rate_rad_s`.
-    pub(crate) fn scaled(&self, wheel: usize, rate_rad_s: f64, on: &Disturbed) -> f64 {
+    pub(crate) fn scaled(&self, wheel: usize, rate_rad_s: f64, on: &Disturbances) -> f64 {
         let of = |kind, otherwise| on.at(kind, wheel).unwrap_or(otherwise);
         let bias_rad_s = of(DisturbanceKind::EncoderBias, 0.0);
         let scaled = of(DisturbanceKind::EncoderScale, 1.0) * rate_rad_s;
@@ -69,7 +69,7 @@ impl Encoders {
         &mut self,
         t_s: f64,
         healthy_rad_s: [f64; ROVER_WHEELS],
-        on: &Disturbed,
+        on: &Disturbances,
     ) -> [f64; ROVER_WHEELS] {
         self.past.keep(t_s, healthy_rad_s);
         std::array::from_fn(|wheel| {

@@ -29,11 +29,11 @@ mod wiring;
 mod world;
 
 pub use arrival_clock::{ArrivalClock, Here};
-pub use assemble::{Assembled, assemble};
+pub use assemble::{SensorSource, assemble};
 pub use check::WorldError;
 pub use drive::{ACCELERATION_MAX_M_S2, CURVATURE_RATE_MAX_1_M_S, DriveCommand};
 pub use encoders::{NOISE_MAX_RAD_S, NOISE_MIN_RAD_S};
-pub use navigation::{Happening, Navigator, Order};
+pub use navigation::{Navigator, NavigatorEvent, Order};
 pub use obedience::{EffectiveCommand, Obedience};
 pub use playback::{Playback, PlaybackError};
 pub use schedule::Schedule;

@@ -9,7 +9,9 @@ use clap::Parser;
 use vigil_cycle::datagrams::Datagrams;
 use vigil_cycle::serve::{self, Plan, ServeError};
 use vigil_cycle::topic::ServiceName;
-use vigil_sensor_sim::{Assembled, Listen, PlaybackSource, SimulatorSource, SocketStage, assemble};
+use vigil_sensor_sim::{
+    Listen, PlaybackSource, SensorSource, SimulatorSource, SocketStage, assemble,
+};
 use vigil_setup::{ServiceArgs, Setup};
 
 /// The simulated rover, playback of recorded frames, and frames that arrive at a socket.
@@ -48,27 +50,27 @@ fn main() -> ExitCode {
     }
 }
 
-fn prepare(args: &Args) -> Result<(Setup, Assembled), Box<dyn Error>> {
+fn prepare(args: &Args) -> Result<(Setup, SensorSource), Box<dyn Error>> {
     let setup = args.service.graph.load()?;
     let source = assemble(&setup, &args.inject)?;
     Ok((setup, source))
 }
 
-fn serve(setup: &Setup, source: Assembled, args: &Args) -> Result<(), ServeError> {
+fn serve(setup: &Setup, source: SensorSource, args: &Args) -> Result<(), ServeError> {
     let plan = setup.plan(ServiceName::SensorSim, args.service.leave());
     let began_ns = args.began_ns;
     match source {
-        Assembled::Simulator(simulation, schedule) => {
+        SensorSource::Simulator(simulation, schedule) => {
             let (allow, period_ns) = (setup.file.control.allow_injection, setup.period_ns());
             serve::source(&plan, |graph| {
                 let source = SimulatorSource::new(*simulation, schedule, allow, period_ns, graph)?;
                 Ok(source.resuming(began_ns))
             })
         }
-        Assembled::Playback(playback) => serve::source(&plan, |graph| {
+        SensorSource::Playback(playback) => serve::source(&plan, |graph| {
             PlaybackSource::new(playback, graph).map_err(ServeError::from)
         }),
-        Assembled::Socket(listen) => serve_socket(setup, &listen, plan),
+        SensorSource::Socket(listen) => serve_socket(setup, &listen, plan),
     }
 }
 

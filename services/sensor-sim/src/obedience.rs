@@ -96,9 +96,13 @@ pub(crate) fn is_valid(action: &Action, now_ns: u64) -> bool {
 }
 
 /// Decision and, unless it says stop, the command and its share of the planned speed.
-type Obeyed = (u64, Option<(DriveCommand, f64)>);
+type ObeyedCommand = (u64, Option<(DriveCommand, f64)>);
 
-fn obey(planned: DriveCommand, action: Option<&Action>, now_ns: u64) -> Result<Obeyed, Refusal> {
+fn obey(
+    planned: DriveCommand,
+    action: Option<&Action>,
+    now_ns: u64,
+) -> Result<ObeyedCommand, Refusal> {
     let action = action.ok_or(Refusal::Nothing)?;
     if now_ns > action.valid_until_ns {
         return Err(Refusal::Expired);

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vigil_robot::{Disturbance, DisturbanceKind};
 
-use crate::disturbed::Disturbed;
+use crate::disturbed::Disturbances;
 use crate::history::History;
 
 /// What the pose sensor makes of the true pose: it scales, drifts, jumps, is late, repeats itself,
@@ -57,13 +57,13 @@ impl PoseSensor {
     }
 
     /// `dt_s` pass.
-    pub(crate) fn advance(&mut self, dt_s: f64, on: &Disturbed) {
+    pub(crate) fn advance(&mut self, dt_s: f64, on: &Disturbances) {
         self.drift_m += dt_s * on.at(DisturbanceKind::PoseDrift, 0).unwrap_or(0.0);
         self.yaw_drift_rad += dt_s * on.at(DisturbanceKind::YawRateBias, 0).unwrap_or(0.0);
     }
 
     /// The reading at `t_s` without noise, for the true `pose`, which is not late.
-    pub(crate) fn distort(&self, pose: [f64; 3], on: &Disturbed) -> [f64; 3] {
+    pub(crate) fn distort(&self, pose: [f64; 3], on: &Disturbances) -> [f64; 3] {
         let [mut x, mut y, mut yaw] = pose;
         if let Some(scale) = on.at(DisturbanceKind::PoseScale, 0) {
             x = self.anchor_m[0] + scale * (x - self.anchor_m[0]);
@@ -91,7 +91,7 @@ impl PoseSensor {
         &mut self,
         t_s: f64,
         reading: [f64; 3],
-        on: &Disturbed,
+        on: &Disturbances,
     ) -> Option<[f64; 3]> {
         self.past.keep(t_s, reading);
         let share = on.at(DisturbanceKind::PoseDrop, 0).unwrap_or(0.0);

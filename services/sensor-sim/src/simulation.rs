@@ -3,7 +3,7 @@
 use vigil_blocks::{Action, SensorFrame};
 use vigil_robot::injection::Change;
 
-use crate::navigation::{Happening, Navigator, Order};
+use crate::navigation::{Navigator, NavigatorEvent, Order};
 use crate::{EffectiveCommand, Obedience, World, WorldError, obedience};
 
 /// A simulated rover that drives its segments or, with a navigator, its path.
@@ -73,7 +73,7 @@ impl Simulation {
     }
 
     /// What happened to the navigation in the last cycle, once.
-    pub fn happening(&mut self) -> Option<Happening> {
+    pub fn happening(&mut self) -> Option<NavigatorEvent> {
         self.navigator.as_mut().and_then(Navigator::happening)
     }
 }

@@ -9,7 +9,7 @@ use vigil_robot::{Description, Disturbance, DisturbanceKind, Fault, FaultKind};
 use vigil_setup::schema::{DriveSegment, Simulator};
 
 use crate::check::{self, WorldError};
-use crate::disturbed::Disturbed;
+use crate::disturbed::Disturbances;
 use crate::drive::{Drive, Servo};
 use crate::encoders::Encoders;
 use crate::noise::Noise;
@@ -58,7 +58,7 @@ pub struct World {
     motion: Solution,
     motion_age_s: f64,
     stuck: [bool; ROVER_WHEELS],
-    disturbed: Disturbed,
+    disturbed: Disturbances,
     /// What the disturbances make of body and wheels.
     condition: Condition,
     pose_sensor: PoseSensor,
@@ -116,7 +116,7 @@ impl World {
             motion,
             motion_age_s: f64::INFINITY,
             stuck: [false; ROVER_WHEELS],
-            disturbed: Disturbed::nothing(),
+            disturbed: Disturbances::nothing(),
             condition: Condition::default(),
             pose_sensor: PoseSensor::new(rate_hz, stream(3)),
             encoders: Encoders::new(rate_hz, stream(1)),

@@ -9,7 +9,7 @@ use std::rc::Rc;
 
 use vigil_blocks::{Block, Rejection, SensorFrame, datagram};
 use vigil_cycle::datagrams::Datagrams;
-use vigil_cycle::placement::{Wanted, read_back};
+use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
@@ -42,7 +42,7 @@ impl Border {
         let clock = VirtualClock::default();
         clock.set(60_000_000_000);
         let graph = Graph::InProcess(Bus::new(clock.clone()));
-        let wanted = Wanted {
+        let wanted = PlacementRequest {
             core: 0,
             priority: 1,
         };

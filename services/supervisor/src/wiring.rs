@@ -18,7 +18,7 @@ pub struct SupervisorStage {
     detection_is_new: bool,
     validity_ns: u64,
     action: Box<dyn Sender<Action>>,
-    decided: Decided,
+    decided: LastDecision,
     told: u64,
     /// Whether the alarm stands, how many there were, and what was told of both.
     alarm: (bool, u32),
@@ -28,7 +28,7 @@ pub struct SupervisorStage {
 
 /// What the last block decided, for the timeline.
 #[derive(Debug, Clone, Copy, Default)]
-struct Decided {
+struct LastDecision {
     seq: u64,
     action: u32,
     wheel: u32,
@@ -51,7 +51,7 @@ impl SupervisorStage {
             detection_is_new: false,
             validity_ns,
             action: graph.sender(Topic::Action)?,
-            decided: Decided::default(),
+            decided: LastDecision::default(),
             told: 0,
             alarm: (false, 0),
             alarm_told: (false, 0),
@@ -155,7 +155,7 @@ impl Stage for SupervisorStage {
         action.valid_until_ns = clock.now_ns() + self.validity_ns;
         self.alarm = (action.alarm != 0, action.alarm_count);
         let states = (action.state_count as usize).min(action.belief.len());
-        self.decided = Decided {
+        self.decided = LastDecision {
             seq: action.decision_seq,
             action: action.action,
             wheel: action.wheel,
@@ -175,7 +175,7 @@ impl Stage for SupervisorStage {
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         health.add_input(&self.detection_account);
         self.tell(health, now_ns);
-        let Decided {
+        let LastDecision {
             seq,
             action,
             wheel,

@@ -21,7 +21,7 @@ const SENSOR_BUFFERS: usize = 8;
 /// Sizes of the shared-memory queues; the same for every peer of a graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Queues {
-    /// Blocks a reader may fall behind before the oldest is overwritten; see [`Self::of`].
+    /// Blocks a reader may fall behind before the oldest is overwritten; see [`Self::for_topic`].
     pub buffer: usize,
     /// Blocks kept for a reader that connects late.
     pub history: usize,
@@ -207,7 +207,7 @@ pub fn shared_memory_free_bytes() -> Option<u64> {
 impl Queues {
     /// The sizes of one topic's queues: sensor frames may wait eight times as many.
     #[must_use]
-    pub const fn of(mut self, topic: Topic) -> Self {
+    pub const fn for_topic(mut self, topic: Topic) -> Self {
         if matches!(topic, Topic::Sensor) {
             self.buffer *= SENSOR_BUFFERS;
         }

@@ -7,7 +7,7 @@ use vigil_blocks::{
 use crate::clock::Clock;
 use crate::deadline::Schedule;
 use crate::input::InputAccount;
-use crate::placement::{self, Placement, Wanted};
+use crate::placement::{self, Placement, PlacementRequest};
 use crate::port::{PortError, Sender, Stamp};
 
 /// Health goes out at least this often, ns; at once when something happens.
@@ -37,7 +37,7 @@ impl HealthBoard {
     pub fn new(
         sender: Box<dyn Sender<Health>>,
         schedule: Schedule,
-        wanted: Wanted,
+        wanted: PlacementRequest,
         got: Placement,
     ) -> Self {
         let block = Health {

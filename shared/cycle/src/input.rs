@@ -97,7 +97,7 @@ impl InputAccount {
     /// An account of this writer's blocks. One outside the graph is no faster than the schedule,
     /// and not trusted for ever.
     #[must_use]
-    pub fn of(writer: Writer) -> Self {
+    pub fn new(writer: Writer) -> Self {
         Self {
             writer,
             ..Self::default()

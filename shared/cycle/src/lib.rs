@@ -45,7 +45,7 @@ pub use port::{Graph, PortError, Receiver, Sender, Stamp};
 pub use recorder::Recorder;
 pub use report::RunReport;
 pub use shed::Shedder;
-pub use source::{Produced, Source, SourceCycle};
+pub use source::{Source, SourceCycle, SourceOutcome};
 pub use stage::{Intake, Stage, StageCycle, Timing};
 pub use stamps::{CycleStamps, Stamps};
 pub use topic::Topic;

@@ -1,7 +1,7 @@
 //! Runs a cycle on its thread: placement, waiting, orderly stop.
 
 use crate::clock::{self, Clock, Monotonic};
-use crate::placement::{self, Placement, Wanted};
+use crate::placement::{self, Placement, PlacementRequest};
 use crate::port::PortError;
 use crate::signal;
 use crate::source::{Source, SourceCycle};
@@ -17,7 +17,7 @@ const WARM_UP_CYCLES: u64 = 200;
 
 /// How a service's run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ended {
+pub enum ServiceEnd {
     /// SIGINT or SIGTERM.
     Stopped,
     /// It missed a deadline, and that was to end it.
@@ -28,7 +28,7 @@ pub enum Ended {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Run {
     /// Why it ended.
-    pub ended: Ended,
+    pub ended: ServiceEnd,
     /// Minor and major page faults in the steady state; `None` if it was never reached.
     pub page_faults: Option<[u64; 2]>,
 }
@@ -47,7 +47,7 @@ impl SteadyFaults {
         }
     }
 
-    fn run(&self, ended: Ended) -> Run {
+    fn run(&self, ended: ServiceEnd) -> Run {
         let after = page_faults();
         let since = |before: [u64; 2]| [after[0] - before[0], after[1] - before[1]];
         Run {
@@ -70,12 +70,12 @@ pub fn run_stage(
 ) -> Result<Run, PortError> {
     let timer = Timer::new().map_err(|e| PortError::setup("timer", &e))?;
     let mut faults = SteadyFaults::default();
-    let mut ended = Ended::Stopped;
+    let mut ended = ServiceEnd::Stopped;
     cycle.ready(&Monotonic)?;
     while !signal::stop_requested() {
         let wake = await_input(cycle, stage, (inputs, &timer), spin_ns);
         if cycle.turn(stage, &Monotonic)?.is_break() {
-            ended = Ended::Missed;
+            ended = ServiceEnd::Missed;
             break;
         }
         faults.take(cycle.health().view().cycles);
@@ -150,7 +150,7 @@ pub fn run_source(
     spin_ns: u64,
 ) -> Result<Run, PortError> {
     let mut faults = SteadyFaults::default();
-    let mut ended = Ended::Stopped;
+    let mut ended = ServiceEnd::Stopped;
     cycle.ready(&Monotonic)?;
     while !signal::stop_requested() {
         let latest_ns = Monotonic.now_ns() + WAIT_NS_MAX;
@@ -162,7 +162,7 @@ pub fn run_source(
             spin_until(due_ns, || false);
         }
         if cycle.turn(source, &Monotonic)?.is_break() {
-            ended = Ended::Missed;
+            ended = ServiceEnd::Missed;
             break;
         }
         faults.take(cycle.health().view().cycles);
@@ -173,7 +173,7 @@ pub fn run_source(
 
 /// Places the calling thread; see [`placement::apply`].
 #[must_use]
-pub fn place(wanted: Wanted) -> Placement {
+pub fn place(wanted: PlacementRequest) -> Placement {
     signal::install();
     placement::apply(wanted)
 }

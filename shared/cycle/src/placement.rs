@@ -2,7 +2,7 @@
 
 /// What a service asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Wanted {
+pub struct PlacementRequest {
     /// Core to run on.
     pub core: usize,
     /// `SCHED_FIFO` priority; 0 for `SCHED_OTHER`.
@@ -39,7 +39,7 @@ impl Placement {
 /// Pins the calling thread, asks for the wanted class, locked memory and 1 ns of timer slack, and
 /// reads back what came of it. What is not permitted is left as it is: the caller reports it.
 #[must_use]
-pub fn apply(wanted: Wanted) -> Placement {
+pub fn apply(wanted: PlacementRequest) -> Placement {
     pin(wanted.core);
     let param = libc::sched_param {
         sched_priority: i32::from(wanted.priority),

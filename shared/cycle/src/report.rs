@@ -25,11 +25,11 @@ pub struct RunReport {
     /// Name of the service.
     pub service: String,
     /// From the publication of the input to the wake-up.
-    pub wake_up: Stored,
+    pub wake_up: StoredHistogram,
     /// From the wake-up to the publication of the output.
-    pub step: Stored,
+    pub step: StoredHistogram,
     /// From the schedule to the publication of the output.
-    pub from_schedule: Stored,
+    pub from_schedule: StoredHistogram,
     /// Minor and major page faults in the steady state, after the first 200 cycles; `None` if it
     /// did not come to that.
     pub page_faults: Option<[u64; 2]>,
@@ -39,7 +39,7 @@ pub struct RunReport {
 
 /// A histogram in a file: its percentiles, and all of it in HdrHistogram's V2 form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Stored {
+pub struct StoredHistogram {
     /// What a person reads.
     pub percentiles: Percentiles,
     /// V2 serialisation.
@@ -57,7 +57,7 @@ pub enum ReportError {
     Format(String),
 }
 
-impl Stored {
+impl StoredHistogram {
     /// Stores a histogram.
     ///
     /// # Errors
@@ -96,9 +96,9 @@ impl RunReport {
     ) -> Result<Self, ReportError> {
         Ok(Self {
             service: service.to_owned(),
-            wake_up: Stored::new(&timing.wake_up)?,
-            step: Stored::new(&timing.step)?,
-            from_schedule: Stored::new(&timing.from_schedule)?,
+            wake_up: StoredHistogram::new(&timing.wake_up)?,
+            step: StoredHistogram::new(&timing.step)?,
+            from_schedule: StoredHistogram::new(&timing.from_schedule)?,
             page_faults,
             timer_slack_ns: placement::timer_slack_ns(),
         })

@@ -7,9 +7,9 @@ use crate::clock::{Clock, Monotonic};
 use crate::deadline::{DeadlineMonitor, Schedule};
 use crate::domain::{Domain, Queues};
 use crate::health::HealthBoard;
-use crate::live::{self, Ended, Run};
+use crate::live::{self, Run, ServiceEnd};
 use crate::on_miss::OnMiss;
-use crate::placement::Wanted;
+use crate::placement::PlacementRequest;
 use crate::port::{Graph, Link, PortError};
 use crate::recorder::Recorder;
 use crate::report::{ReportError, RunReport};
@@ -32,7 +32,7 @@ pub struct Plan {
     /// Sizes of the queues.
     pub queues: Queues,
     /// Core and priority.
-    pub wanted: Wanted,
+    pub wanted: PlacementRequest,
     /// Period, deadline and budget.
     pub schedule: Schedule,
     /// What it does about its own misses.
@@ -179,7 +179,7 @@ fn leave(plan: &Plan, recorder: &Recorder, run: Run) -> Result<(), ServeError> {
         RunReport::new(service, &recorder.timing, run.page_faults)?.write(path)?;
     }
     match run.ended {
-        Ended::Stopped => Ok(()),
-        Ended::Missed => Err(ServeError::Missed),
+        ServiceEnd::Stopped => Ok(()),
+        ServiceEnd::Missed => Err(ServeError::Missed),
     }
 }

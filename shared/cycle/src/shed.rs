@@ -135,7 +135,7 @@ mod tests {
 
     const BUDGET_NS: u64 = 500_000;
 
-    fn of(configured: u32, period_ns: u64) -> Shedder {
+    fn shedder(configured: u32, period_ns: u64) -> Shedder {
         let schedule = Schedule {
             period_ns,
             deadline_ns: period_ns.max(BUDGET_NS),
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn particles_are_shed_before_the_budget_is_spent_and_given_back_when_there_is_room() {
-        let mut shedder = of(1000, 1_000_000);
+        let mut shedder = shedder(1000, 1_000_000);
         assert_eq!(run(&mut shedder, 2000, 350), 1000, "70 % of the budget");
         // 90 % of the budget: down to half of it at the tenth such cycle.
         assert_eq!(run(&mut shedder, 9, 450), 1000);
@@ -168,7 +168,7 @@ mod tests {
 
     #[test]
     fn single_stalls_of_the_machine_shed_nothing() {
-        let mut shedder = of(1000, 1_000_000);
+        let mut shedder = shedder(1000, 1_000_000);
         for cycle in 0..100_000 {
             let cycle_ns = if cycle % 200 == 0 { 20_000_000 } else { 50_000 };
             assert_eq!(shedder.take(cycle_ns, 0, 1000), None, "cycle {cycle}");
@@ -179,7 +179,7 @@ mod tests {
     fn heavy_cycles_between_light_ones_count() {
         // An observation each 50 ms, at 1 kHz and at 5 kHz.
         for (period_ns, each) in [(1_000_000, 50), (200_000, 250)] {
-            let mut shedder = of(1000, period_ns);
+            let mut shedder = shedder(1000, period_ns);
             let found = (0..10 * each).find_map(|cycle: u32| {
                 let is_heavy = cycle.is_multiple_of(each);
                 shedder.take(if is_heavy { 480_000 } else { 5_000 }, 0, 1000)
@@ -212,7 +212,7 @@ mod tests {
 
     #[test]
     fn what_is_shed_is_what_was_in_use() {
-        let mut shedder = of(1000, 1_000_000);
+        let mut shedder = shedder(1000, 1_000_000);
         let mut take =
             |cycles: u32, in_use: u32| (0..cycles).find_map(|_| shedder.take(450_000, 0, in_use));
         assert_eq!(take(5000, 0), None, "no particle has cost anything");
@@ -221,9 +221,9 @@ mod tests {
 
     #[test]
     fn there_are_always_some_particles() {
-        let mut shedder = of(1000, 1_000_000);
-        assert_eq!(run(&mut shedder, 1000, 1_000_000), PARTICLES_MIN);
-        let mut few = of(8, 1_000_000);
+        let mut many = shedder(1000, 1_000_000);
+        assert_eq!(run(&mut many, 1000, 1_000_000), PARTICLES_MIN);
+        let mut few = shedder(8, 1_000_000);
         assert_eq!(run(&mut few, 1000, 1_000_000), 8);
     }
 }

@@ -14,7 +14,7 @@ use crate::stamps::CycleStamps;
 
 /// What a source did at an instant of its schedule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Produced {
+pub enum SourceOutcome {
     /// A frame was published at this instant, ns.
     Frame(u64),
     /// Nothing is to be published at this instant.
@@ -29,7 +29,11 @@ pub trait Source {
     ///
     /// # Errors
     /// The transport's.
-    fn produce(&mut self, t_schedule_ns: u64, clock: &dyn Clock) -> Result<Produced, PortError>;
+    fn produce(
+        &mut self,
+        t_schedule_ns: u64,
+        clock: &dyn Clock,
+    ) -> Result<SourceOutcome, PortError>;
 
     /// Readies the block of the next cycle, see [`crate::Sender::prepare`]. Off the critical path.
     ///
@@ -127,9 +131,9 @@ impl SourceCycle {
                 self.recorder.timing.wake_up.record(late_ns);
             }
             match source.produce(schedule_ns, clock)? {
-                Produced::Nothing => {}
-                Produced::End => self.ended = true,
-                Produced::Frame(published_ns) => {
+                SourceOutcome::Nothing => {}
+                SourceOutcome::End => self.ended = true,
+                SourceOutcome::Frame(published_ns) => {
                     self.account(schedule_ns, woken_ns, published_ns, slips);
                 }
             }

@@ -241,7 +241,7 @@ impl StageCycle {
     /// The same cycle, whose input this writer writes.
     #[must_use]
     pub fn with_input_of(mut self, writer: Writer) -> Self {
-        self.account = InputAccount::of(writer);
+        self.account = InputAccount::new(writer);
         self
     }
 
@@ -348,7 +348,7 @@ impl StageCycle {
         let (frames, newest, cause) = (intake.frames, intake.newest, intake.cause);
         self.had_input = intake.is_input;
         if frames > 0 {
-            let stamp = Stamp::of(&newest);
+            let stamp = Stamp::from_header(&newest);
             let published_ns = stage.publish(cause, stamp, clock)?;
             // What came while it was held up in this turn, it had not before it came.
             let woken_ns = woken_ns.max(newest.t_publish_ns.min(published_ns));

@@ -60,7 +60,7 @@ pub struct Limits {
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Watched {
+struct Peer {
     started_ns: u64,
     /// Writer of the reports before the last start: those of a process that is gone.
     old_epoch: u64,
@@ -91,7 +91,7 @@ const LOOK_NS_MAX: u64 = 200_000_000;
 #[derive(Debug, Clone)]
 pub struct Watchdog {
     limits: Limits,
-    services: Vec<Watched>,
+    services: Vec<Peer>,
     looked_ns: u64,
     is_blind: bool,
 }
@@ -100,9 +100,9 @@ impl Watchdog {
     /// A watchdog over `count` services that start at `now_ns`.
     #[must_use]
     pub fn new(limits: Limits, count: usize, now_ns: u64) -> Self {
-        let watched = Watched {
+        let watched = Peer {
             started_ns: now_ns,
-            ..Watched::default()
+            ..Peer::default()
         };
         Self {
             limits,
@@ -138,7 +138,7 @@ impl Watchdog {
     /// The process of a service has been started anew.
     pub fn started(&mut self, service: usize, now_ns: u64) {
         if let Some(watched) = self.services.get_mut(service) {
-            *watched = Watched {
+            *watched = Peer {
                 started_ns: now_ns,
                 // One that never reported has left nothing about.
                 old_epoch: if watched.epoch == 0 {
@@ -146,7 +146,7 @@ impl Watchdog {
                 } else {
                     watched.epoch
                 },
-                ..Watched::default()
+                ..Peer::default()
             };
         }
     }
@@ -198,7 +198,7 @@ impl Watchdog {
     }
 }
 
-impl Watched {
+impl Peer {
     fn examine(&mut self, limits: &Limits, now_ns: u64) -> Option<Supervision> {
         if self.is_gone || self.is_stopping {
             return None;

@@ -236,7 +236,7 @@ fn is_quarantined(history: &[Came]) -> bool {
 }
 
 fn judged(writer: Writer, series: &[Sent]) -> (InputAccount, Vec<Came>) {
-    let mut account = InputAccount::of(writer);
+    let mut account = InputAccount::new(writer);
     let (mut history, mut now_ns, mut seq) = (Vec::new(), START_NS, 100_000_u64);
     for sent in series {
         now_ns += sent.after_ns;

@@ -6,7 +6,7 @@
 use std::ops::ControlFlow;
 
 use vigil_blocks::{Action, Cause, CauseKind, Degraded, EventKind, Health, SensorFrame};
-use vigil_cycle::placement::{Wanted, read_back};
+use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
@@ -97,7 +97,7 @@ impl World {
     fn new(on_miss: OnMiss) -> Self {
         let clock = VirtualClock::default();
         let graph = Graph::InProcess(Bus::new(clock.clone()));
-        let wanted = Wanted {
+        let wanted = PlacementRequest {
             core: 0,
             priority: 1,
         };

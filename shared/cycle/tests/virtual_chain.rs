@@ -9,13 +9,13 @@ use std::rc::Rc;
 use vigil_blocks::{
     Action, Cause, CauseKind, DetectionBelief, FaultBelief, Header, Health, SensorFrame,
 };
-use vigil_cycle::placement::{Placement, Wanted};
+use vigil_cycle::placement::{Placement, PlacementRequest};
 use vigil_cycle::port::Bus;
-use vigil_cycle::port::Carried;
+use vigil_cycle::port::TopicBlock;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    Clock, DeadlineMonitor, Graph, HealthBoard, Intake, PortError, Produced, Receiver, Schedule,
-    Sender, Source, SourceCycle, Stage, StageCycle, Stamp, Topic, VirtualClock,
+    Clock, DeadlineMonitor, Graph, HealthBoard, Intake, PortError, Receiver, Schedule, Sender,
+    Source, SourceCycle, SourceOutcome, Stage, StageCycle, Stamp, Topic, VirtualClock,
 };
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -37,7 +37,7 @@ fn compute_ns(delay: &Delay, t_schedule_ns: u64) -> u64 {
 }
 
 /// A block that says which frame it comes from.
-trait Caused: Carried {
+trait Caused: TopicBlock {
     fn cause(&mut self) -> &mut Cause;
 }
 
@@ -49,7 +49,7 @@ macro_rules! caused {
 caused!(DetectionBelief, FaultBelief, Action);
 
 /// Passes on what it gets, after the injected delay.
-struct Relay<I: Carried, O: Caused> {
+struct Relay<I: TopicBlock, O: Caused> {
     input: Box<dyn Receiver<I>>,
     output: Box<dyn Sender<O>>,
     identity: fn(&I) -> Option<(u64, u64)>,
@@ -57,7 +57,7 @@ struct Relay<I: Carried, O: Caused> {
     delay: Delay,
 }
 
-impl<I: Carried, O: Caused> Stage for Relay<I, O> {
+impl<I: TopicBlock, O: Caused> Stage for Relay<I, O> {
     fn take(&mut self, intake: &mut Intake<'_>) {
         for _ in 0..self.input.buffer() {
             if !self.input.advance() {
@@ -94,13 +94,17 @@ struct Sensor {
 }
 
 impl Source for Sensor {
-    fn produce(&mut self, t_schedule_ns: u64, clock: &dyn Clock) -> Result<Produced, PortError> {
+    fn produce(
+        &mut self,
+        t_schedule_ns: u64,
+        clock: &dyn Clock,
+    ) -> Result<SourceOutcome, PortError> {
         self.clock.advance(compute_ns(&self.delay, t_schedule_ns));
         let stamp = Stamp {
             t_schedule_ns,
             t_capture_ns: t_schedule_ns,
         };
-        self.output.send(stamp, clock).map(Produced::Frame)
+        self.output.send(stamp, clock).map(SourceOutcome::Frame)
     }
 
     fn prepare(&mut self) -> Result<(), PortError> {
@@ -121,7 +125,7 @@ struct Tap<T> {
     seen: Vec<(u64, u64)>,
 }
 
-impl<T: Carried> Tap<T> {
+impl<T: TopicBlock> Tap<T> {
     fn new(graph: &Graph, topic: Topic, is_frame: fn(&T) -> bool) -> Self {
         Self {
             receiver: graph.receiver(topic).unwrap(),
@@ -183,7 +187,7 @@ fn board(graph: &Graph, service: ServiceName) -> HealthBoard {
         priority: 0,
         memory_locked: false,
     };
-    let wanted = Wanted {
+    let wanted = PlacementRequest {
         core: 0,
         priority: 1,
     };
@@ -203,7 +207,7 @@ fn monitor(service: ServiceName) -> DeadlineMonitor {
     DeadlineMonitor::new(schedule(service))
 }
 
-fn stage<I: Carried, O: Caused>(
+fn stage<I: TopicBlock, O: Caused>(
     graph: &Graph,
     (service, input, output): (ServiceName, Topic, Topic),
     identity: fn(&I) -> Option<(u64, u64)>,

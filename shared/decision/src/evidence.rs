@@ -41,7 +41,7 @@ pub(crate) const P_TOLERANCE: f64 = 1e-6;
 
 /// Evidence gathered since the last epoch.
 #[derive(Debug, Clone)]
-pub(crate) struct Gathered {
+pub(crate) struct EpochEvidence {
     log_likelihood: [f64; DECISION_STATES],
     /// Whether the identifier identifies, and whether an alarm stands.
     reports: Option<(u32, bool)>,
@@ -58,7 +58,7 @@ pub(crate) enum Effect {
     Anchor,
 }
 
-impl Gathered {
+impl EpochEvidence {
     pub(crate) const fn new() -> Self {
         Self {
             log_likelihood: [0.0; DECISION_STATES],

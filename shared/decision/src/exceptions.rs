@@ -13,8 +13,8 @@ use crate::observations::Observations;
 use crate::policy::{self, Worth};
 use crate::silence::Silence;
 use crate::supervisor::Inputs;
-use crate::told::{Decided, Told};
-use crate::watch::Seen;
+use crate::told::{Decision, Instruction};
+use crate::watch::Situation;
 
 /// Tracks the belief over exceptions, one step an epoch, and chooses actions.
 ///
@@ -101,7 +101,7 @@ impl Exceptions {
     }
 
     /// See [`crate::Supervisor::step`].
-    pub(crate) fn step(&mut self, entry: Entry<Inputs<'_>>, seen: Seen, action: &mut Action) {
+    pub(crate) fn step(&mut self, entry: Entry<Inputs<'_>>, seen: Situation, action: &mut Action) {
         match entry {
             Entry::Frame(inputs) if seen.is_blind => self.take_blindly(inputs),
             Entry::Frame(inputs) => self.take(inputs),
@@ -261,7 +261,7 @@ impl Exceptions {
     fn track(&mut self, set: u32, end: End) {
         self.remember(set, end);
         let action = self.step_of(end);
-        let evidence = match self.observations.of(set) {
+        let evidence = match self.observations.index(set) {
             Some(z) => self.tracker.update(&self.model, action, z),
             None => {
                 self.tracker.predict(&self.model, action);
@@ -334,7 +334,7 @@ impl Exceptions {
         if let Some(hardware) = &self.hardware
             && !hardware.allows(best.action)
         {
-            let values = self.worth.of(&self.decider, belief);
+            let values = self.worth.values(&self.decider, belief);
             best = choose_among(values, |action| hardware.allows(action));
         }
         self.choice = match self.held {
@@ -358,12 +358,12 @@ impl Exceptions {
         self.epoch.ask();
     }
 
-    fn decided(&self) -> Decided {
+    fn decided(&self) -> Instruction {
         let action = self.choice.action;
         if self.control_mode == ControlMode::Safe {
-            return Decided::stop(&self.actions, action);
+            return Instruction::stop(&self.actions, action);
         }
-        Decided {
+        Instruction {
             action,
             kind: self.kind(action),
             wheel: None,
@@ -388,7 +388,7 @@ impl Exceptions {
         action.log_evidence = self.log_evidence;
         action.impossible_count = self.impossible_count;
         action.lost_stages = self.silence.lost_stages();
-        let told = Told {
+        let told = Decision {
             decided,
             choice: self.choice,
             meanings: &self.actions,

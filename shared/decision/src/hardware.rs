@@ -44,12 +44,12 @@ const P_MAX: f64 = 1.0 - 1e-6;
 
 /// Probabilities of the explanations; what is left is that nothing is wrong.
 #[derive(Debug, Clone, Copy, Default)]
-struct Explained {
+struct Explanations {
     modelled: f64,
     unknown: f64,
 }
 
-impl Explained {
+impl Explanations {
     fn new(p_nominal: f64, p_unknown: f64) -> Self {
         let unknown = p_unknown.clamp(0.0, 1.0);
         Self {
@@ -76,7 +76,7 @@ pub(crate) struct Hardware {
     /// Sums of logarithms: of the hardware state, of the lost robot's, of the others.
     log: [f64; 3],
     before: Option<Context>,
-    p: Explained,
+    p: Explanations,
     identifies: bool,
     /// The robot has sought its place.
     has_sought: bool,
@@ -110,7 +110,7 @@ impl Hardware {
             tree_hash,
             log: [0.0; 3],
             before: None,
-            p: Explained::default(),
+            p: Explanations::default(),
             identifies: false,
             has_sought: false,
         }
@@ -137,12 +137,13 @@ impl Hardware {
             diagnosis.identifying,
             diagnosis.mode_change_count,
         );
-        let p = Explained::new(diagnosis.p[0], diagnosis.p_unknown);
+        let p = Explanations::new(diagnosis.p[0], diagnosis.p_unknown);
         if self.enter(now, identifies, p) {
             return true;
         }
         if self.identifies {
-            let predicted = Explained::new(diagnosis.p_predicted[0], diagnosis.p_unknown_predicted);
+            let predicted =
+                Explanations::new(diagnosis.p_predicted[0], diagnosis.p_unknown_predicted);
             let ratios = [
                 p.any() / predicted.any(),
                 (1.0 - p.modelled) / (1.0 - predicted.modelled),
@@ -159,17 +160,17 @@ impl Hardware {
     pub(crate) fn add_alarm(&mut self, detection: &DetectionBelief) -> bool {
         let DetectionBelief { alarm, p_fault, .. } = *detection;
         let now = (false, detection.header.epoch, alarm, detection.alarm_count);
-        let p = Explained::new(1.0 - p_fault, p_fault);
+        let p = Explanations::new(1.0 - p_fault, p_fault);
         self.enter(now, alarm != 0, p)
     }
 
     /// True if the context has changed and what is said now, or was said before, is a fault.
-    fn enter(&mut self, now: Context, identifies: bool, p: Explained) -> bool {
+    fn enter(&mut self, now: Context, identifies: bool, p: Explanations) -> bool {
         let before = self.before.replace(now);
         let identified = std::mem::replace(&mut self.identifies, identifies);
         self.p = match identifies {
             true => p,
-            false => Explained::default(),
+            false => Explanations::default(),
         };
         let is_new = before != Some(now);
         if is_new {
@@ -204,7 +205,7 @@ impl Hardware {
 
     /// Writes `belief` with the identifier's probabilities of the states into `weights`.
     pub(crate) fn anchored(&self, belief: &[f64], start: &[f64], weights: &mut [f64]) {
-        let Explained { modelled, unknown } = self.p;
+        let Explanations { modelled, unknown } = self.p;
         let share = [belief, start].into_iter().find_map(|of| self.share(of));
         let share = share.unwrap_or(1.0);
         let p = (modelled + unknown * share).clamp(self.p_start, P_MAX);
@@ -266,7 +267,7 @@ impl Hardware {
     /// Nothing has been said.
     pub(crate) fn reset(&mut self) {
         self.forget();
-        (self.identifies, self.p) = (false, Explained::default());
+        (self.identifies, self.p) = (false, Explanations::default());
         self.has_sought = false;
     }
 

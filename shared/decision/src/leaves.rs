@@ -6,14 +6,14 @@ use vigil_pomdp::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker
 use vigil_robot::Description;
 use vigil_robot::FaultTree;
 
-use crate::evidence::{self, Effect, Gathered};
+use crate::evidence::{self, Effect, EpochEvidence};
 use crate::mapping::{self, ActionMeaning, Compensation, StateMeaning, SupervisorError};
 use crate::policy::{self, Worth};
 use crate::restraint::Restraint;
 use crate::silence::Silence;
 use crate::supervisor::Inputs;
-use crate::told::{Decided, Told};
-use crate::watch::Seen;
+use crate::told::{Decision, Instruction};
+use crate::watch::Situation;
 
 /// Tracks the belief over the leaves of the fault tree, nominal and unknown, and chooses actions.
 pub(crate) struct Leaves {
@@ -27,20 +27,20 @@ pub(crate) struct Leaves {
     compensation: Vec<Compensation>,
     silence: Silence,
     epoch_ns: u64,
-    gathered: Gathered,
+    gathered: EpochEvidence,
     restraint: Restraint,
     scratch: Vec<f64>,
     epoch_t_capture_ns: Option<u64>,
     choice: Choice,
     /// True while the present action stands although another is better.
     is_held: bool,
-    decided: Option<Decided>,
+    decided: Option<Instruction>,
     decision_seq: u64,
     log_evidence: f64,
     impossible_count: u32,
     control_mode: ControlMode,
     run_id: u64,
-    seen: Seen,
+    seen: Situation,
     hold_epochs: u32,
 }
 
@@ -73,7 +73,7 @@ impl Leaves {
             tracker: Tracker::new(&model),
             silence: Silence::new(blind_after_misses),
             epoch_ns: (settings.epoch_ms * 1e6) as u64,
-            gathered: Gathered::new(),
+            gathered: EpochEvidence::new(),
             restraint: Restraint::new(hold_epochs),
             scratch: vec![0.0; states.len()],
             epoch_t_capture_ns: None,
@@ -89,7 +89,7 @@ impl Leaves {
             impossible_count: 0,
             control_mode: ControlMode::Policy,
             run_id: 0,
-            seen: Seen::default(),
+            seen: Situation::default(),
             hold_epochs,
             model,
             states,
@@ -101,7 +101,7 @@ impl Leaves {
     }
 
     /// See [`crate::Supervisor::step`].
-    pub(crate) fn step(&mut self, entry: Entry<Inputs<'_>>, seen: Seen, action: &mut Action) {
+    pub(crate) fn step(&mut self, entry: Entry<Inputs<'_>>, seen: Situation, action: &mut Action) {
         self.seen = seen;
         match entry {
             Entry::Frame(inputs) if seen.is_blind => self.take_blindly(inputs),
@@ -254,7 +254,7 @@ impl Leaves {
 
     fn decide(&mut self, timed: bool) {
         let best = self.decider.decide(self.tracker.belief()).choice();
-        let values = self.worth.of(&self.decider, self.tracker.belief());
+        let values = self.worth.values(&self.decider, self.tracker.belief());
         let current = self.decided.map(|decided| decided.action);
         self.choice = self
             .restraint
@@ -263,9 +263,9 @@ impl Leaves {
     }
 
     /// What the robot is told now.
-    fn decided(&self) -> Decided {
+    fn decided(&self) -> Instruction {
         if self.control_mode == ControlMode::Safe {
-            return Decided::stop(&self.actions, self.choice.action);
+            return Instruction::stop(&self.actions, self.choice.action);
         }
         let action = self.choice.action;
         let kind = self
@@ -282,7 +282,7 @@ impl Leaves {
             RecoveryKind::IgnoreEncoder => self.most_probable_wheel(false),
             _ => None,
         };
-        Decided {
+        Instruction {
             action,
             kind,
             wheel,
@@ -316,7 +316,7 @@ impl Leaves {
         action.log_evidence = self.log_evidence;
         action.impossible_count = self.impossible_count;
         action.lost_stages = self.silence.lost_stages();
-        let told = Told {
+        let told = Decision {
             decided,
             choice: self.choice,
             meanings: &self.actions,

@@ -34,7 +34,7 @@ impl Observations {
     }
 
     /// The model's observation; `None` if the model has none for this set.
-    pub(crate) fn of(&self, set: u32) -> Option<usize> {
+    pub(crate) fn index(&self, set: u32) -> Option<usize> {
         self.index.get(set as usize).copied().flatten()
     }
 }

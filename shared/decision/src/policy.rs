@@ -38,7 +38,7 @@ impl Worth {
     }
 
     /// Of every action, after the decider's decision about `belief`.
-    pub(crate) fn of<'a>(&'a mut self, decider: &'a Decider, belief: &[f64]) -> &'a [f64] {
+    pub(crate) fn values<'a>(&'a mut self, decider: &'a Decider, belief: &[f64]) -> &'a [f64] {
         if decider.measure() == Measure::Value {
             return decider.values();
         }

@@ -10,13 +10,13 @@ use crate::mapping::ActionMeaning;
 
 /// What the robot is to do; a change of it is a new decision.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Decided {
+pub(crate) struct Instruction {
     pub action: usize,
     pub kind: RecoveryKind,
     pub wheel: Option<usize>,
 }
 
-impl Decided {
+impl Instruction {
     /// A stop by rule: the model's action of that kind, if it has one, else `otherwise`.
     pub(crate) fn stop(meanings: &[ActionMeaning], otherwise: usize) -> Self {
         let is_stop = |m: &ActionMeaning| m.kind == RecoveryKind::Stop;
@@ -29,14 +29,14 @@ impl Decided {
 }
 
 /// A decision and how it was made.
-pub(crate) struct Told<'a> {
-    pub decided: Decided,
+pub(crate) struct Decision<'a> {
+    pub decided: Instruction,
     pub choice: Choice,
     pub meanings: &'a [ActionMeaning],
     pub control_mode: ControlMode,
 }
 
-impl Told<'_> {
+impl Decision<'_> {
     /// Writes belief, values and decision into the block.
     pub(crate) fn write(
         &self,

@@ -4,7 +4,7 @@
 use vigil_blocks::{
     Action, CauseKind, DetectionBelief, Entry, FaultBelief, MODE_BLIND, Readiness, RecoveryKind,
 };
-use vigil_robot::fused_alarm::{FusedAlarm, Said};
+use vigil_robot::fused_alarm::{FusedAlarm, StageOdds};
 
 use crate::supervisor::Inputs;
 
@@ -18,7 +18,7 @@ const STEP_MAX_S: f64 = 0.5;
 
 /// What decisions depend on besides beliefs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Seen {
+pub(crate) struct Situation {
     /// Nothing is seen: no belief counts.
     pub is_blind: bool,
     /// The fused alarm stands: before it, what has no name counts as nothing.
@@ -111,7 +111,7 @@ impl Watch {
         let passed_s = t_ns.saturating_sub(self.t_ns) as f64 * 1e-9;
         (self.t_ns, self.readiness) = (t_ns, detection.readiness);
         let rests = self.readiness == Readiness::NotExcited as u32;
-        self.alarm.take(&Said {
+        self.alarm.take(&StageOdds {
             t_ns,
             moved_s: if rests { 0.0 } else { passed_s.min(STEP_MAX_S) },
             alarm: detection.alarm != 0,
@@ -123,8 +123,8 @@ impl Watch {
     }
 
     /// What decisions depend on.
-    pub(crate) const fn seen(&self) -> Seen {
-        Seen {
+    pub(crate) const fn seen(&self) -> Situation {
+        Situation {
             is_blind: self.blind != 0,
             alarm: self.alarm.stands(),
         }

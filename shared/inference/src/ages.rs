@@ -10,7 +10,7 @@
 //! one, their first two moments are kept.
 //!
 //! Residuals whose number of dimensions only a model tells stand in the first ones of a longer
-//! vector, the rest 0: [`Ages::of`].
+//! vector, the rest 0: [`Ages::with_dimensions`].
 //!
 //! One prior deviation serves faults of every size: it enters the delay by its
 //! logarithm only, and mixtures of several gained on small faults what they lost on others.
@@ -26,7 +26,7 @@ pub const LOG_ODDS_MAX: f64 = 700.0;
 
 /// A whitened residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Whitened<const D: usize> {
+pub struct WhitenedResidual<const D: usize> {
     /// The residual over its standard deviation.
     pub value: SVector<f64, D>,
     /// By how much a bias of one unit moves it: 1 at the usual noise, less where more is uncertain.
@@ -36,7 +36,7 @@ pub struct Whitened<const D: usize> {
     pub outlier_rate: f64,
 }
 
-impl<const D: usize> Whitened<D> {
+impl<const D: usize> WhitenedResidual<D> {
     /// One with no more than the usual noise, and no outlier.
     #[must_use]
     pub const fn usual(value: SVector<f64, D>) -> Self {
@@ -48,10 +48,10 @@ impl<const D: usize> Whitened<D> {
     }
 }
 
-impl Whitened<1> {
+impl WhitenedResidual<1> {
     /// A residual of this variance, of which the part `passing` is there for the moment only.
     #[must_use]
-    pub fn of(apart: f64, variance: f64, passing: f64, outlier_rate: f64) -> Self {
+    pub fn new(apart: f64, variance: f64, passing: f64, outlier_rate: f64) -> Self {
         let usual = (variance - passing).max(0.0);
         Self {
             value: SVector::from([apart / variance.sqrt()]),
@@ -86,12 +86,12 @@ impl<const D: usize> Ages<D> {
     /// residual's.
     #[must_use]
     pub fn new(bias_sd: f64) -> Self {
-        Self::of(D, bias_sd)
+        Self::with_dimensions(D, bias_sd)
     }
 
     /// The same over residuals of the first `dimensions` of D, at most D; all others must be 0.
     #[must_use]
-    pub fn of(dimensions: usize, bias_sd: f64) -> Self {
+    pub fn with_dimensions(dimensions: usize, bias_sd: f64) -> Self {
         Self {
             components: Onsets::default(),
             prior_variance: bias_sd * bias_sd,
@@ -117,11 +117,11 @@ impl<const D: usize> Ages<D> {
     /// One step with the whitened residual and the probability `birth` that a fault appears in it.
     /// A residual that is not finite is no evidence.
     pub fn step(&mut self, residual: &SVector<f64, D>, birth: f64) {
-        self.take(&Whitened::usual(*residual), birth);
+        self.take(&WhitenedResidual::usual(*residual), birth);
     }
 
     /// The same of a residual that is not like the others.
-    pub fn take(&mut self, residual: &Whitened<D>, birth: f64) {
+    pub fn take(&mut self, residual: &WhitenedResidual<D>, birth: f64) {
         let square = residual.value.norm_squared();
         if !(square.is_finite() && residual.exposure.is_finite()) {
             return;
@@ -171,7 +171,7 @@ fn contaminated(square: f64, rate: f64, dimensions: f64) -> (f64, f64) {
 
 impl<const D: usize> Component<D> {
     /// Conditions on a residual: the weight's ratio to the nominal density, then the bias.
-    fn take(&mut self, residual: &Whitened<D>, nominal: f64) {
+    fn take(&mut self, residual: &WhitenedResidual<D>, nominal: f64) {
         let exposure = residual.exposure;
         let shown = exposure * exposure * self.variance;
         let spread = 1.0 + shown;
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn dimensions_that_are_not_used_change_nothing() {
-        let (mut short, mut long) = (Ages::<2>::new(1.5), Ages::<5>::of(2, 1.5));
+        let (mut short, mut long) = (Ages::<2>::new(1.5), Ages::<5>::with_dimensions(2, 1.5));
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(4);
         for step in 0..200 {
             let bias = if step < 150 { 0.0 } else { 1.0 };
@@ -281,7 +281,7 @@ mod tests {
         for step in 0..500 {
             let exposure = if step % 10 == 9 { 0.1 } else { 1.0 };
             let noise: f64 = rng.sample(StandardNormal);
-            let residual = Whitened {
+            let residual = WhitenedResidual {
                 value: SVector::from([20.0 * exposure + noise]),
                 exposure,
                 outlier_rate: 1e-6,

@@ -88,7 +88,7 @@ pub struct Suspicion {
 
 /// What a pose said.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Said {
+pub struct PoseEvidence {
     /// Log-density of the pose under nominal motion.
     pub log_density: f64,
     /// Its residual in the body frame (forward, left, yaw), whitened.
@@ -286,7 +286,12 @@ impl<const K: usize> Departure<K> {
 
     /// Conditions on a measured pose (x, y, yaw) with independent noise of `variance`; it is
     /// evidence if `counts`. None, unchanged, if the nominal track cannot take it.
-    pub fn update(&mut self, pose: [f64; 3], variance: [f64; 3], counts: bool) -> Option<Said> {
+    pub fn update(
+        &mut self,
+        pose: [f64; 3],
+        variance: [f64; 3],
+        counts: bool,
+    ) -> Option<PoseEvidence> {
         self.gain = 0.0;
         let said = self.residual(pose, variance)?;
         self.track.update(pose, variance)?;
@@ -374,14 +379,14 @@ impl<const K: usize> Departure<K> {
     }
 
     /// What a pose would say of the nominal motion.
-    fn residual(&self, pose: [f64; 3], variance: [f64; 3]) -> Option<Said> {
+    fn residual(&self, pose: [f64; 3], variance: [f64; 3]) -> Option<PoseEvidence> {
         let (apart, spread) = self.track.innovation(pose, variance);
         let (sin, cos) = wrap(self.track.pose()[2]).sin_cos();
         let turn = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
         let (apart, spread) = (turn * apart, turn * spread * turn.transpose());
         let (log_density, factor) = crate::gaussian::log_density(&apart, spread)?;
         let residual = factor.l_dirty().solve_lower_triangular(&apart)?;
-        Some(Said {
+        Some(PoseEvidence {
             log_density,
             residual,
         })

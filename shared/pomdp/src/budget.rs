@@ -7,7 +7,7 @@ const WORK_PER_QUESTION: usize = 20_000;
 
 /// Told to stop before the end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stopped;
+pub struct StopRequest;
 
 /// What a computation may spend. The caller owns the clock: its closure says when time is up.
 pub struct Budget<'a> {
@@ -31,8 +31,8 @@ impl<'a> Budget<'a> {
     /// Accounts for `work` elementary operations.
     ///
     /// # Errors
-    /// [`Stopped`] once the budget has ended.
-    pub fn spend(&mut self, work: usize) -> Result<(), Stopped> {
+    /// [`StopRequest`] once the budget has ended.
+    pub fn spend(&mut self, work: usize) -> Result<(), StopRequest> {
         self.work += work;
         self.spent += work as u64;
         if !self.is_stopped && self.work >= WORK_PER_QUESTION {
@@ -40,7 +40,7 @@ impl<'a> Budget<'a> {
             self.is_stopped = (self.stop)();
         }
         if self.is_stopped {
-            Err(Stopped)
+            Err(StopRequest)
         } else {
             Ok(())
         }

@@ -62,7 +62,7 @@ pub struct PolicyGraph {
 }
 
 /// A belief that waits for its node.
-struct Reached {
+struct OpenBelief {
     from: usize,
     observation: usize,
     probability: f64,
@@ -74,7 +74,7 @@ impl PolicyGraph {
     /// Follows `decider` from the start belief of `model`. A decider that remembers is asked as at
     /// the beginning of a mission.
     #[must_use]
-    pub fn of(model: &Pomdp, decider: &mut Decider, limits: Limits) -> Self {
+    pub fn new(model: &Pomdp, decider: &mut Decider, limits: Limits) -> Self {
         let mut graph = Self::default();
         let mut tracker = Tracker::new(model);
         let start = tracker.belief().to_vec();
@@ -112,7 +112,7 @@ impl PolicyGraph {
         tracker: &mut Tracker,
         belief: Vec<f64>,
         weight: f64,
-    ) -> Vec<Reached> {
+    ) -> Vec<OpenBelief> {
         decider.reset();
         let action = decider.decide(&belief).action;
         let from = self.nodes.len();
@@ -120,7 +120,7 @@ impl PolicyGraph {
         for observation in 0..model.observations().len() {
             tracker.anchor(&belief);
             if let Evidence::Taken(probability) = tracker.update(model, action, observation) {
-                reached.push(Reached {
+                reached.push(OpenBelief {
                     from,
                     observation,
                     probability,
@@ -181,7 +181,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Of equally probable ones the first that was reached.
-fn most_probable(waiting: &[Reached]) -> Option<usize> {
+fn most_probable(waiting: &[OpenBelief]) -> Option<usize> {
     let better = |a: usize, b: usize| {
         let key = |i: usize| (waiting[i].from, waiting[i].observation);
         let order = waiting[b].weight.total_cmp(&waiting[a].weight);

@@ -36,7 +36,7 @@ impl SparseBeliefs {
     }
 
     /// A belief's entries.
-    pub(crate) fn of(&self, id: BeliefId) -> &[(u32, f64)] {
+    pub(crate) fn entries(&self, id: BeliefId) -> &[(u32, f64)] {
         let id = id as usize;
         let first = if id == 0 { 0 } else { self.ends[id - 1] };
         &self.entries[first..self.ends[id]]
@@ -50,7 +50,7 @@ impl SparseBeliefs {
         let last = self.last.get(&hash).copied();
         let mut candidate = last;
         while let Some(id) = candidate {
-            if is_same(self.of(id), belief) {
+            if is_same(self.entries(id), belief) {
                 return id;
             }
             candidate = self.before[id as usize];
@@ -91,5 +91,5 @@ fn equal_beliefs_are_stored_once_and_small_entries_count() {
     assert_ne!(other, first);
     assert_ne!(store.intern(&[(0, 0.3), (2, 1.1e-12), (3, 0.7)]), other);
     assert_eq!((store.len(), store.entry_count()), (3, 8));
-    assert_eq!(store.of(other)[1], (2, 1e-12));
+    assert_eq!(store.entries(other)[1], (2, 1e-12));
 }

@@ -53,13 +53,13 @@ pub enum TableError {
 }
 
 /// Refuses content longer than a limit, where `Read::take` would pass off its first part as whole.
-struct Limited<R> {
+struct LimitedReader<R> {
     content: R,
     /// Bytes that may still come.
     left: u64,
 }
 
-impl<R: Read> Read for Limited<R> {
+impl<R: Read> Read for LimitedReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.content.read(buffer)?;
         self.left = self.left.checked_sub(count as u64).ok_or_else(|| {
@@ -123,7 +123,7 @@ impl Table {
             Box::new(plain)
         };
         let left = TABLE_BYTES_MAX;
-        let mut content = BufReader::new(Limited { content, left });
+        let mut content = BufReader::new(LimitedReader { content, left });
         let mut skipped = Vec::new();
         for _ in 0..layout.skip_rows {
             skipped.clear();
@@ -271,7 +271,7 @@ mod tests {
         let read = |left: u64| {
             let mut text = String::new();
             let content = &b"0123456789"[..];
-            Limited { content, left }
+            LimitedReader { content, left }
                 .read_to_string(&mut text)
                 .map(|_| text)
         };

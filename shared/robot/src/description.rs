@@ -207,14 +207,14 @@ fn any_curvature_1_m() -> f64 {
 fn given_or_estimated<'de, D: serde::Deserializer<'de>>(from: D) -> Result<SensorNoise, D::Error> {
     #[derive(Deserialize)]
     #[serde(untagged)]
-    enum Given {
+    enum Setting {
         Table(SensorNoise),
         Word(String),
     }
-    match Given::deserialize(from)? {
-        Given::Table(noise) => Ok(noise),
-        Given::Word(word) if word == "estimate" => Ok(SensorNoise::default()),
-        Given::Word(word) => Err(serde::de::Error::custom(format!(
+    match Setting::deserialize(from)? {
+        Setting::Table(noise) => Ok(noise),
+        Setting::Word(word) if word == "estimate" => Ok(SensorNoise::default()),
+        Setting::Word(word) => Err(serde::de::Error::custom(format!(
             "noise is '{word}': allowed are \"estimate\" and a table of standard deviations"
         ))),
     }

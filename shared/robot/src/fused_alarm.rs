@@ -21,7 +21,7 @@ const SLACK_S: f64 = 1e-6;
 
 /// What both stages say of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Said {
+pub struct StageOdds {
     /// Capture time of the frame, ns.
     pub t_ns: u64,
     /// Time since the frame before, s; 0 while the robot stands, which shows nothing.
@@ -81,7 +81,7 @@ impl FusedAlarm {
     }
 
     /// Takes what both stages say of the next frame.
-    pub fn take(&mut self, said: &Said) {
+    pub fn take(&mut self, said: &StageOdds) {
         let is_new = !self.was_raised || said.alarm_count != self.raised_count;
         (self.was_raised, self.raised_count) = (said.alarm, said.alarm_count);
         if !said.alarm {
@@ -107,7 +107,7 @@ impl FusedAlarm {
     }
 
     /// The first set that is named is what the alarm was about; a larger one is another fault.
-    fn follow(&mut self, said: &Said) {
+    fn follow(&mut self, said: &StageOdds) {
         if self.faults == 0 || said.faults <= self.faults {
             self.faults = self.faults.max(said.faults);
             self.grown_s = 0.0;
@@ -137,7 +137,7 @@ impl FusedAlarm {
 mod tests {
     use super::*;
 
-    const ALARM: Said = Said {
+    const ALARM: StageOdds = StageOdds {
         t_ns: 7,
         moved_s: 0.1,
         alarm: true,
@@ -146,7 +146,7 @@ mod tests {
         p_nominal: 0.01,
         faults: 0,
     };
-    const QUIET: Said = Said {
+    const QUIET: StageOdds = StageOdds {
         alarm: false,
         alarm_t_ns: 0,
         p_nominal: 1.0,
@@ -162,7 +162,7 @@ mod tests {
         alarm
     }
 
-    fn takes(alarm: &mut FusedAlarm, times: usize, said: Said) {
+    fn takes(alarm: &mut FusedAlarm, times: usize, said: StageOdds) {
         (0..times).for_each(|_| alarm.take(&said));
     }
 
@@ -173,7 +173,7 @@ mod tests {
         assert!(alarm.stands());
         alarm.take(&QUIET);
         assert_eq!((alarm.stands(), alarm.t_ns(), alarm.count()), (false, 0, 1));
-        alarm.take(&Said {
+        alarm.take(&StageOdds {
             alarm_count: 2,
             ..ALARM
         });
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_nominal_diagnosis_ends_it_after_a_second_of_motion() {
-        let nominal = Said {
+        let nominal = StageOdds {
             p_nominal: 0.96,
             ..ALARM
         };
@@ -192,7 +192,7 @@ mod tests {
         takes(
             &mut alarm,
             50,
-            Said {
+            StageOdds {
                 moved_s: 0.0,
                 ..nominal
             },
@@ -207,13 +207,13 @@ mod tests {
         takes(
             &mut alarm,
             50,
-            Said {
+            StageOdds {
                 p_nominal: 0.35,
                 ..nominal
             },
         );
         assert_eq!((alarm.stands(), alarm.count()), (false, 1));
-        alarm.take(&Said {
+        alarm.take(&StageOdds {
             p_nominal: 0.25,
             ..nominal
         });
@@ -222,19 +222,19 @@ mod tests {
 
     #[test]
     fn another_alarm_of_the_detector_is_one_whatever_the_identifier_says() {
-        let nominal = Said {
+        let nominal = StageOdds {
             p_nominal: 1.0,
             ..ALARM
         };
         let mut alarm = standing();
         takes(&mut alarm, 10, nominal);
         assert!(!alarm.stands());
-        alarm.take(&Said {
+        alarm.take(&StageOdds {
             alarm_count: 2,
             ..nominal
         });
         assert_eq!((alarm.stands(), alarm.count()), (true, 2));
-        alarm.take(&Said {
+        alarm.take(&StageOdds {
             alarm_count: 3,
             ..ALARM
         });
@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn a_second_fault_during_the_first_is_an_alarm_of_its_own() {
-        let of = |faults| Said { faults, ..ALARM };
+        let of = |faults| StageOdds { faults, ..ALARM };
         let mut alarm = standing();
         takes(&mut alarm, 5, of(1));
         alarm.take(&of(2));

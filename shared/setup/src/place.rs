@@ -1,7 +1,7 @@
 //! From the configuration to what the cycle needs.
 
 use vigil_cycle::domain::Queues;
-use vigil_cycle::placement::Wanted;
+use vigil_cycle::placement::PlacementRequest;
 use vigil_cycle::serve::{Leave, Plan};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Domain, PortError, Schedule};
@@ -56,7 +56,7 @@ impl Setup {
             service: name,
             graph: self.file.graph.name.clone(),
             queues: self.queues(),
-            wanted: Wanted {
+            wanted: PlacementRequest {
                 core: service.core,
                 priority: service.priority,
             },

@@ -3,14 +3,14 @@
 use super::ImportError;
 use super::description::{ChannelSource, Clock, Delay, LogDescription, Source, Unit};
 
-type Checked = Result<(), ImportError>;
+type CheckResult = Result<(), ImportError>;
 
-fn wrong(key: impl Into<String>, message: impl Into<String>) -> Checked {
+fn wrong(key: impl Into<String>, message: impl Into<String>) -> CheckResult {
     Err(ImportError::description(key, message))
 }
 
 /// A time that may be as long as one likes.
-fn limit(key: &str, value_s: f64) -> Checked {
+fn limit(key: &str, value_s: f64) -> CheckResult {
     match value_s > 0.0 {
         true => Ok(()),
         false => wrong(
@@ -22,7 +22,7 @@ fn limit(key: &str, value_s: f64) -> Checked {
 
 impl LogDescription {
     /// Checks that every number is one, every column has one channel, and every channel a source.
-    pub(super) fn check(&self, columns: &[String]) -> Checked {
+    pub(super) fn check(&self, columns: &[String]) -> CheckResult {
         if !(1.0..=1000.0).contains(&self.rate_hz) {
             let message = format!("{} is out of range: allowed is 1 to 1000 Hz", self.rate_hz);
             return wrong("rate_hz", message);
@@ -50,7 +50,7 @@ impl LogDescription {
         self.source.iter().any(|source| source.name == name)
     }
 
-    fn check_channel(&self, key: &str, channel: &ChannelSource, columns: &[String]) -> Checked {
+    fn check_channel(&self, key: &str, channel: &ChannelSource, columns: &[String]) -> CheckResult {
         if !columns.contains(&channel.name) {
             let message = format!(
                 "the robot has no channel '{}': allowed are {}",
@@ -98,7 +98,7 @@ impl LogDescription {
         check_modulus(key, channel.modulus)
     }
 
-    fn check_source(&self, key: &str, source: &Source) -> Checked {
+    fn check_source(&self, key: &str, source: &Source) -> CheckResult {
         if let Some([other, _]) = &source.time_as
             && !self.has_source(other)
         {
@@ -117,7 +117,7 @@ impl LogDescription {
     }
 }
 
-fn check_clock(key: &str, clock: &Clock) -> Checked {
+fn check_clock(key: &str, clock: &Clock) -> CheckResult {
     if !clock.unit.is_time() {
         let message = "is no unit of time: allowed are s, ms, us, ns";
         return wrong(format!("{key}.unit"), message);
@@ -125,7 +125,7 @@ fn check_clock(key: &str, clock: &Clock) -> Checked {
     check_modulus(key, clock.modulus)
 }
 
-fn check_modulus(key: &str, modulus: Option<f64>) -> Checked {
+fn check_modulus(key: &str, modulus: Option<f64>) -> CheckResult {
     match modulus.filter(|modulus| !(*modulus > 0.0 && modulus.is_finite())) {
         None => Ok(()),
         Some(found) => {

@@ -134,17 +134,17 @@ impl<'de> Deserialize<'de> for Delay {
     fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         #[derive(Deserialize)]
         #[serde(untagged)]
-        enum Given {
+        enum Setting {
             Number(f64),
             Word(String),
         }
-        match Given::deserialize(from)? {
-            Given::Number(delay_s) if (-1.0..=1.0).contains(&delay_s) => Ok(Self::Given(delay_s)),
-            Given::Word(word) if word == "estimate" => Ok(Self::Estimate),
-            Given::Number(delay_s) => Err(serde::de::Error::custom(format!(
+        match Setting::deserialize(from)? {
+            Setting::Number(delay_s) if (-1.0..=1.0).contains(&delay_s) => Ok(Self::Given(delay_s)),
+            Setting::Word(word) if word == "estimate" => Ok(Self::Estimate),
+            Setting::Number(delay_s) => Err(serde::de::Error::custom(format!(
                 "delay_s is {delay_s}: allowed is -1 to 1 s, or \"estimate\""
             ))),
-            Given::Word(word) => Err(serde::de::Error::custom(format!(
+            Setting::Word(word) => Err(serde::de::Error::custom(format!(
                 "delay_s is '{word}': allowed is -1 to 1 s, or \"estimate\""
             ))),
         }

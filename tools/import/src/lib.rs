@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 
 pub use description::{ChannelSource, Clock, Delay, LogDescription, Method, Source, Unit};
 use resample::Grid;
-pub use ros::Lacking;
+pub use ros::MissingColumn;
 pub use series::Disorder;
 use series::Series;
 use vigil_blocks::SensorFrame;
@@ -88,7 +88,7 @@ impl ImportError {
     }
 }
 
-impl Imported {
+impl ImportedLog {
     /// The runs as frames, as [`vigil_recording::frames::read`] would read them from the written
     /// file, but for its rounding and its checks.
     #[must_use]
@@ -128,12 +128,12 @@ pub struct ImportedRun {
     pub id: u32,
     /// File or folder that it came from, relative to the log's folder.
     pub name: String,
-    /// Frames: time since the first, s, then the values in the order of [`Imported::columns`].
+    /// Frames: time since the first, s, then the values in the order of [`ImportedLog::columns`].
     pub rows: Vec<Vec<f64>>,
     /// Clocks that do not rise in its files.
     pub disorder: Vec<Disorder>,
     /// Messages of which nothing was made.
-    pub lacking: Vec<Lacking>,
+    pub lacking: Vec<MissingColumn>,
     /// Channels that are differentiated, with the rows of which nothing was made as their stamp
     /// repeats or precedes the one before: repeated packets.
     pub repeated: Vec<(String, usize)>,
@@ -141,7 +141,7 @@ pub struct ImportedRun {
 
 /// An imported log.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Imported {
+pub struct ImportedLog {
     /// Names of the columns after `run` and `t`.
     pub columns: Vec<String>,
     /// Runs.
@@ -158,7 +158,7 @@ pub fn import(
     log: &LogDescription,
     robot: &Description,
     folder: &Path,
-) -> Result<Imported, ImportError> {
+) -> Result<ImportedLog, ImportError> {
     let columns: Vec<String> = fields(robot).into_iter().map(|(name, _)| name).collect();
     log.check(&columns)?;
     let found = find::runs(folder, &log.runs)?;
@@ -205,7 +205,7 @@ pub fn import(
             rows: grid.rows(log, &columns, &series)?,
         });
     }
-    Ok(Imported {
+    Ok(ImportedLog {
         columns,
         runs,
         delays_s: delays,

@@ -168,7 +168,7 @@ impl Message {
     }
 
     /// Reads a message of a recording.
-    fn of(message: &mcap::Message<'_>) -> Result<Self, String> {
+    fn decode(message: &mcap::Message<'_>) -> Result<Self, String> {
         let schema = message.channel.schema.as_ref();
         let kind = schema.map_or("", |schema| schema.name.as_str());
         match Self::read(kind, &message.data) {
@@ -261,7 +261,7 @@ fn decode<T: DeserializeOwned>(data: &[u8]) -> Result<T, String> {
 /// Messages of a topic that lack a column: nothing is made of them. Two programs may share a topic,
 /// each with joints of its own; a first message may hold nothing yet.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Lacking {
+pub struct MissingColumn {
     /// The file.
     pub path: PathBuf,
     /// Its topic.
@@ -284,7 +284,7 @@ pub(super) fn columns(
     path: &Path,
     topic: &str,
     columns: &[String],
-) -> Result<(Vec<Vec<f64>>, Option<Lacking>), ImportError> {
+) -> Result<(Vec<Vec<f64>>, Option<MissingColumn>), ImportError> {
     let io = |error| ImportError::Io {
         path: path.to_owned(),
         error,
@@ -298,7 +298,7 @@ pub(super) fn columns(
     let content = fs::read(path).map_err(io)?;
     let stream = mcap::MessageStream::new(&content).map_err(|e| wrong(0, e.to_string()))?;
     let mut values = vec![Vec::new(); columns.len()];
-    let (mut row, mut others, mut lacking) = (0, Vec::<String>::new(), None::<Lacking>);
+    let (mut row, mut others, mut lacking) = (0, Vec::<String>::new(), None::<MissingColumn>);
     for message in stream {
         let message = message.map_err(|e| wrong(row, e.to_string()))?;
         if message.channel.topic != topic {
@@ -308,14 +308,14 @@ pub(super) fn columns(
             continue;
         }
         row += 1;
-        let decoded = Message::of(&message).map_err(|e| wrong(row, format!("{topic}: {e}")))?;
+        let decoded = Message::decode(&message).map_err(|e| wrong(row, format!("{topic}: {e}")))?;
         let value = |column: &String| match column.as_str() {
             "log_time" => Some(message.log_time as f64),
             name => decoded.value(name).filter(|value| value.is_finite()),
         };
         match columns.iter().find(|column| value(column).is_none()) {
             Some(column) => {
-                let lacking = lacking.get_or_insert_with(|| Lacking {
+                let lacking = lacking.get_or_insert_with(|| MissingColumn {
                     path: path.to_owned(),
                     topic: topic.to_owned(),
                     column: column.clone(),

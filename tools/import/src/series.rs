@@ -8,7 +8,7 @@ use vigil_recording::table::{Layout, Table};
 
 use super::ImportError;
 use super::description::{ChannelSource, Clock, LogDescription, Source};
-use super::ros::{self, Lacking};
+use super::ros::{self, MissingColumn};
 
 /// Columns of one source that are needed, with their rows.
 pub(super) struct SourceTable {
@@ -23,7 +23,7 @@ pub(super) struct SourceTable {
     /// What was out of order.
     pub disorder: Vec<Disorder>,
     /// Messages of which nothing was made.
-    pub lacking: Option<Lacking>,
+    pub lacking: Option<MissingColumn>,
 }
 
 /// Rows of a file whose clock does not rise: they are put in order of time, and told.

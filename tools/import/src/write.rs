@@ -7,13 +7,13 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use super::{ImportError, Imported};
+use super::{ImportError, ImportedLog};
 
 /// Writes the frames as CSV, compressed if the name ends in `.gz`.
 ///
 /// # Errors
 /// [`ImportError::Io`].
-pub fn write(imported: &Imported, path: &Path) -> Result<(), ImportError> {
+pub fn write(imported: &ImportedLog, path: &Path) -> Result<(), ImportError> {
     let io = |error| ImportError::Io {
         path: path.to_path_buf(),
         error,
@@ -30,7 +30,7 @@ pub fn write(imported: &Imported, path: &Path) -> Result<(), ImportError> {
     }
 }
 
-fn rows(imported: &Imported, out: &mut impl Write) -> std::io::Result<()> {
+fn rows(imported: &ImportedLog, out: &mut impl Write) -> std::io::Result<()> {
     let mut text = format!("run,t,{}\n", imported.columns.join(","));
     for run in &imported.runs {
         for row in &run.rows {

@@ -14,7 +14,7 @@ use vigil_robot::FaultTree;
 use vigil_robot::{Description, nominal};
 use vigil_setup::schema;
 
-use crate::recovery::{Recoverer, Recovering};
+use crate::recovery::{Recoverer, RecoveryRun};
 
 /// Velocity from which a robot counts as driving, m/s and rad/s.
 const DRIVES: f64 = 0.005;
@@ -56,7 +56,7 @@ impl Pipeline {
     ) -> Result<Self, PipelineError> {
         let prior_unknown = identifier.p_unknown;
         let identifier = Identifier::new(models, identifier, detector.sensors, seed)?;
-        Ok(Self::of(
+        Ok(Self::assemble(
             Detector::new(models.model, models.robot, detector)?,
             Diagnoser::from(identifier),
             Taxonomy::new(models.tree, models.robot).with_prior_unknown(prior_unknown),
@@ -74,7 +74,7 @@ impl Pipeline {
         tree: &FaultTree,
         detector: &schema::Detector,
     ) -> Result<Self, PipelineError> {
-        Ok(Self::of(
+        Ok(Self::assemble(
             Detector::nominal(model, robot, detector)?,
             Diagnoser::from(Watcher::new(tree)),
             Taxonomy::new(tree, robot),
@@ -82,7 +82,7 @@ impl Pipeline {
         ))
     }
 
-    fn of(
+    fn assemble(
         detector: Detector,
         identifier: Diagnoser,
         taxonomy: Taxonomy,
@@ -149,7 +149,7 @@ impl Pipeline {
         &self,
         frame: &SensorFrame,
         warming_up: bool,
-        recovering: Option<&Recovering<'_>>,
+        recovering: Option<&RecoveryRun<'_>>,
     ) -> Verdict {
         let belief = &self.diagnosis;
         let name = |i: usize| self.taxonomy.name(i).unwrap_or(UNKNOWN).to_owned();
@@ -173,7 +173,7 @@ impl Pipeline {
             t_s: frame.header.t_capture_ns as f64 / 1e9,
             p_fault: self.detection.p_fault,
             log_odds: self.detection.log_odds,
-            alarm: fused_alarm(&self.detection, recovering.map(Recovering::action)),
+            alarm: fused_alarm(&self.detection, recovering.map(RecoveryRun::action)),
             warming_up,
             mode: word(belief.mode),
             p_mode: belief.p_mode,
@@ -188,7 +188,7 @@ impl Pipeline {
             p_nodes: belief.p[..(belief.node_count as usize).min(belief.p.len())].to_vec(),
             is_identifying: belief.identifying != 0,
             reported: word(belief.reported),
-            action: recovering.map_or_else(String::new, Recovering::name),
+            action: recovering.map_or_else(String::new, RecoveryRun::name),
             size_kind: kind.word(),
             size: size.filter(|_| kind.unit().is_some()),
             drives: velocity.iter().any(|value| value.abs() >= DRIVES),

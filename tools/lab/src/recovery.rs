@@ -84,8 +84,8 @@ impl Recoverer {
     }
 
     /// A supervisor at the beginning of a run.
-    pub fn begin(&self) -> Option<Recovering<'_>> {
-        Some(Recovering {
+    pub fn begin(&self) -> Option<RecoveryRun<'_>> {
+        Some(RecoveryRun {
             of: self,
             supervisor: self.supervisor().ok()?,
             action: Box::default(),
@@ -94,13 +94,13 @@ impl Recoverer {
 }
 
 /// A supervisor over one run.
-pub struct Recovering<'a> {
+pub struct RecoveryRun<'a> {
     of: &'a Recoverer,
     supervisor: Supervisor,
     action: Box<Action>,
 }
 
-impl Recovering<'_> {
+impl RecoveryRun<'_> {
     /// Takes what both stages say of a frame.
     pub fn take(&mut self, detection: &DetectionBelief, diagnosis: &FaultBelief) {
         let inputs = Inputs {

@@ -10,7 +10,7 @@ const NAMED_MAX: usize = 3;
 /// How a number came to differ from what the log says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Held {
+pub enum BoundCause {
     /// The log says less.
     Least,
     /// The log says more.
@@ -31,7 +31,7 @@ pub struct Bound {
     /// The bound.
     pub bound: f64,
     /// Which bound.
-    pub held: Held,
+    pub held: BoundCause,
     /// Why it is there.
     pub why: &'static str,
 }
@@ -93,9 +93,9 @@ impl Bounds {
             |bound: f64| bound.is_finite() && (value - bound).abs() <= ROUNDING * bound.abs();
         self.looked_at.push(limits.number);
         let (bound, held, why) = if value <= least || near(least) {
-            (least, Held::Least, why_least)
+            (least, BoundCause::Least, why_least)
         } else if value >= most || near(most) {
-            (most, Held::Most, why_most)
+            (most, BoundCause::Most, why_most)
         } else {
             return;
         };
@@ -125,7 +125,7 @@ impl Bounds {
                 number,
                 value,
                 bound: value,
-                held: Held::Given,
+                held: BoundCause::Given,
                 why,
             });
         }
@@ -176,9 +176,9 @@ impl Bounds {
             false => format!("{} to {}", number(low), number(high)),
         };
         let (on, held) = match first.held {
-            Held::Least => ("on its bound", "least: "),
-            Held::Most => ("on its bound", "most: "),
-            Held::Given => ("not learned", ""),
+            BoundCause::Least => ("on its bound", "least: "),
+            BoundCause::Most => ("on its bound", "most: "),
+            BoundCause::Given => ("not learned", ""),
         };
         format!("{on}: {places} = {values} ({held}{})", first.why)
     }
@@ -219,8 +219,8 @@ mod tests {
             .map(|b| (b.key.as_str(), b.value, b.held))
             .collect();
         let expected = [
-            ("offset_sd[0]", 1e-3, Held::Least),
-            ("offset_sd[2]", 1.0, Held::Most),
+            ("offset_sd[0]", 1e-3, BoundCause::Least),
+            ("offset_sd[2]", 1.0, BoundCause::Most),
         ];
         assert_eq!(told, expected);
         assert_eq!(

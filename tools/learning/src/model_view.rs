@@ -38,7 +38,7 @@ pub struct Alarm {
 
 impl Alarm {
     /// Of all calibrations of a model, for this prior rate of faults.
-    pub(crate) fn of(calibrations: &[Calibration], fault_rate_1_h: f64) -> Vec<Self> {
+    pub(crate) fn all(calibrations: &[Calibration], fault_rate_1_h: f64) -> Vec<Self> {
         let alarm = |calibration: &Calibration| Self {
             calibration: calibration.clone(),
             alarm_log_odds_24_h: calibration.alarm_log_odds(INTERVAL_H, fault_rate_1_h),

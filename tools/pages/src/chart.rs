@@ -125,13 +125,13 @@ const LETTER: i32 = 22;
 
 /// An axis with labels at chosen values.
 #[derive(Clone)]
-struct Ticked {
+struct LabelledAxis {
     coordinate: plotters::coord::types::RangedCoordf64,
     at: Vec<f64>,
 }
 
-impl Ticked {
-    fn of(axis: &Axis) -> Self {
+impl LabelledAxis {
+    fn new(axis: &Axis) -> Self {
         Self {
             coordinate: (axis.range[0]..axis.range[1]).into(),
             at: axis.ticks.iter().map(|tick| tick.0).collect(),
@@ -139,7 +139,7 @@ impl Ticked {
     }
 }
 
-impl Ranged for Ticked {
+impl Ranged for LabelledAxis {
     type FormatOption = plotters::coord::ranged1d::NoDefaultFormatting;
     type ValueType = f64;
 
@@ -156,7 +156,7 @@ impl Ranged for Ticked {
     }
 }
 
-impl plotters::coord::ranged1d::ValueFormatter<f64> for Ticked {
+impl plotters::coord::ranged1d::ValueFormatter<f64> for LabelledAxis {
     fn format_ext(&self, value: &f64) -> String {
         value.to_string()
     }
@@ -182,7 +182,7 @@ impl Chart {
             .margin_right(LETTER)
             .x_label_area_size(LETTER + 12 + title(&self.x))
             .y_label_area_size(2 * LETTER + 16 + title(&self.y))
-            .build_cartesian_2d(Ticked::of(&self.x), Ticked::of(&self.y))?;
+            .build_cartesian_2d(LabelledAxis::new(&self.x), LabelledAxis::new(&self.y))?;
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)

@@ -17,7 +17,7 @@ pub(super) struct Chord<'a> {
 }
 
 /// The chords of pieces of motion without a break; what is left at the end of each is none.
-pub(super) fn of<'a>(pieces: &'a [&'a [&'a SensorFrame]]) -> impl Iterator<Item = Chord<'a>> {
+pub(super) fn chords<'a>(pieces: &'a [&'a [&'a SensorFrame]]) -> impl Iterator<Item = Chord<'a>> {
     pieces.iter().flat_map(|frames| {
         let mut from = 0;
         std::iter::from_fn(move || {

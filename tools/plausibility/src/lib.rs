@@ -56,7 +56,7 @@ pub enum Doubt {
 
 /// A doubt about one run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Doubtful {
+pub struct RunDoubt {
     /// The run.
     pub run: u32,
     /// What is wrong with it.
@@ -67,7 +67,7 @@ pub struct Doubtful {
     pub axes: [String; 2],
 }
 
-impl fmt::Display for Doubtful {
+impl fmt::Display for RunDoubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "run {}: ", self.run)?;
         let [_, turning] = &self.axes;
@@ -161,7 +161,7 @@ const RATE_UNITS: [(f64, &str); 5] = [
     (-1.0, "rates of the other sign"),
 ];
 
-impl Doubtful {
+impl RunDoubt {
     /// Names the unit whose factor is within a fifth of the ratio.
     fn unit(&self, ratio: f64, units: &[(f64, &str)]) -> String {
         let near = |factor: f64| (0.8..1.25).contains(&(ratio / factor));
@@ -179,7 +179,7 @@ impl Doubtful {
 /// What is doubtful about the first `until_s` seconds of a run, in which the robot is taken to be
 /// healthy. None if all is well or the stretch tells nothing.
 #[must_use]
-pub fn doubt(run: &Run, robot: &Description, until_s: f64) -> Option<Doubtful> {
+pub fn doubt(run: &Run, robot: &Description, until_s: f64) -> Option<RunDoubt> {
     let moves = |frame: &&SensorFrame| is_moving(frame, robot);
     let until = |frame: &&SensorFrame| seconds(frame) <= until_s;
     let frames: Vec<&SensorFrame> = run.frames.iter().take_while(until).collect();
@@ -205,7 +205,7 @@ pub fn doubt(run: &Run, robot: &Description, until_s: f64) -> Option<Doubtful> {
             .get(i)
             .map_or("the command", |axis| &axis.name)
     };
-    Some(Doubtful {
+    Some(RunDoubt {
         run: run.id,
         doubt: found,
         wheel: wheel.unwrap_or_default(),
@@ -275,7 +275,7 @@ fn is_doubtful(ratio: f64) -> bool {
 
 /// Sums over the chords of a stretch.
 #[derive(Default)]
-struct Driven {
+struct ChordSums {
     travel_m: f64,
     commanded_m: f64,
     turn_rad: f64,
@@ -285,7 +285,7 @@ struct Driven {
     left_m: f64,
 }
 
-impl Driven {
+impl ChordSums {
     fn add(&mut self, chord: &Chord<'_>, robot: &Description) {
         let twist = chord.mean_twist(robot);
         let (duration_s, [x, y, turn]) = (chord.duration_s(), chord.moved());
@@ -308,8 +308,8 @@ fn doubt_pose(pieces: &[&[&SensorFrame]], robot: &Description) -> Option<Doubt> 
     if !have(pieces, Valid::POSE) {
         return None;
     }
-    let mut driven = Driven::default();
-    chords::of(pieces).for_each(|chord| driven.add(&chord, robot));
+    let mut driven = ChordSums::default();
+    chords::chords(pieces).for_each(|chord| driven.add(&chord, robot));
     if driven.commanded_m >= TRAVEL_MIN_M {
         let travel = driven.travel_m / driven.commanded_m;
         if is_doubtful(travel) {
@@ -350,7 +350,7 @@ fn doubt_gyro(pieces: &[&[&SensorFrame]], robot: &Description) -> Option<Doubt> 
         return None;
     }
     let (mut turned_rad, mut found, mut expected) = (0.0, 0.0, 0.0);
-    for chord in chords::of(pieces) {
+    for chord in chords::chords(pieces) {
         let commanded = chord.mean_twist(robot)[2];
         turned_rad += commanded.abs() * chord.duration_s();
         found += chord.mean(|frame| frame.yaw_rate) * commanded;
@@ -404,7 +404,7 @@ fn doubt_wheels(pieces: &[&[&SensorFrame]], robot: &Description) -> Option<Doubt
     let mut ratios: Vec<f64> = Vec::new();
     for wheel in wheels.clone() {
         let (mut found, mut expected) = (0.0, 0.0);
-        for chord in chords::of(pieces) {
+        for chord in chords::chords(pieces) {
             rolling(robot, wheel, &[])?;
             let rate = chord.mean(|f| rolling(robot, wheel, &f.command).unwrap_or(0.0));
             found += chord.mean(|frame| frame.wheel_rate[wheel]) * rate;

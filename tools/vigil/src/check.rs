@@ -9,7 +9,7 @@ use vigil_blocks::{
 };
 use vigil_cycle::Topic;
 use vigil_cycle::domain::shared_memory_free_bytes;
-use vigil_cycle::placement::{self, Placement, Wanted};
+use vigil_cycle::placement::{self, Placement, PlacementRequest};
 use vigil_cycle::topic::ServiceName;
 use vigil_recording::frames;
 use vigil_setup::schema::Source;
@@ -140,7 +140,7 @@ fn cores(setup: &Setup) -> Vec<Finding> {
 
 /// Tries the placement on a thread of its own, which ends with it.
 fn trial(core: usize, priority: u8) -> Option<Placement> {
-    std::thread::spawn(move || placement::apply(Wanted { core, priority }))
+    std::thread::spawn(move || placement::apply(PlacementRequest { core, priority }))
         .join()
         .ok()
 }
@@ -203,7 +203,7 @@ fn preemption() -> Finding {
 
 fn shared_memory(setup: &Setup) -> Finding {
     let queues = setup.queues();
-    let frames = queues.of(Topic::Sensor);
+    let frames = queues.for_topic(Topic::Sensor);
     let frames = frames.reserved_bytes(size_of::<SensorFrame>());
     let sizes = [
         size_of::<DetectionBelief>(),

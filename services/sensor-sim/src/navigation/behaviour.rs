@@ -3,7 +3,7 @@
 use vigil_setup::schema::Navigation;
 
 use super::lane::Lane;
-use super::navigator::{Happening, Navigator};
+use super::navigator::{Navigator, NavigatorEvent};
 use super::path::distance;
 use super::task::Task;
 use crate::DriveCommand;
@@ -59,7 +59,7 @@ impl Navigator {
         let is_near = self.off_path_m() <= NEAR_M;
         if left_m <= AT_GOAL_M && is_near {
             if !std::mem::replace(&mut self.at_goal, true) {
-                self.happening = Some(Happening::Goal);
+                self.happening = Some(NavigatorEvent::Goal);
             }
             return self.stand();
         }

@@ -12,4 +12,4 @@ mod path;
 mod task;
 mod troubles;
 
-pub use navigator::{Happening, Navigator, Order};
+pub use navigator::{Navigator, NavigatorEvent, Order};

@@ -23,7 +23,7 @@ pub struct Order {
 
 /// What is worth telling.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Happening {
+pub enum NavigatorEvent {
     /// An order is done, or cannot be.
     Ended(RecoveryKind, ActionOutcome),
     /// The robot is at its goal.
@@ -65,7 +65,7 @@ pub struct Navigator {
     is_found: bool,
     /// The plan begins anew where the robot is, with the next pose.
     pub(super) is_anew: bool,
-    pub(super) happening: Option<Happening>,
+    pub(super) happening: Option<NavigatorEvent>,
 }
 
 impl Navigator {
@@ -154,7 +154,7 @@ impl Navigator {
     }
 
     /// What happened in the last cycle, once.
-    pub const fn happening(&mut self) -> Option<Happening> {
+    pub const fn happening(&mut self) -> Option<NavigatorEvent> {
         self.happening.take()
     }
 
@@ -238,7 +238,7 @@ impl Navigator {
         self.symptoms = said(self.kind, succeeded);
         let follows = succeeded && self.kind == RecoveryKind::GoThrough;
         self.task = if follows { Task::Follow } else { Task::Stand };
-        self.happening = Some(Happening::Ended(self.kind, self.outcome));
+        self.happening = Some(NavigatorEvent::Ended(self.kind, self.outcome));
     }
 
     /// No speed; the steering stays.

@@ -1,7 +1,9 @@
 //! Recorded frames as the source of the graph.
 
 use vigil_blocks::{EventKind, SensorFrame};
-use vigil_cycle::{Clock, Graph, HealthBoard, PortError, Produced, Sender, Source, Stamp, Topic};
+use vigil_cycle::{
+    Clock, Graph, HealthBoard, PortError, Sender, Source, SourceOutcome, Stamp, Topic,
+};
 
 use super::actions::Actions;
 use super::peers::Peers;
@@ -45,14 +47,18 @@ impl PlaybackSource {
 }
 
 impl Source for PlaybackSource {
-    fn produce(&mut self, t_schedule_ns: u64, clock: &dyn Clock) -> Result<Produced, PortError> {
+    fn produce(
+        &mut self,
+        t_schedule_ns: u64,
+        clock: &dyn Clock,
+    ) -> Result<SourceOutcome, PortError> {
         if !self.peers.are_up() {
-            return Ok(Produced::Nothing);
+            return Ok(SourceOutcome::Nothing);
         }
         self.actions.take(t_schedule_ns, self.frames.epoch());
         let Some(frame) = self.playback.next() else {
             self.ended = true;
-            return Ok(Produced::End);
+            return Ok(SourceOutcome::End);
         };
         *self.frames.block() = *frame;
         (self.run_id, self.last_ns) = (frame.run_id, t_schedule_ns);
@@ -60,7 +66,7 @@ impl Source for PlaybackSource {
             t_schedule_ns,
             t_capture_ns: frame.header.t_capture_ns,
         };
-        self.frames.send(stamp, clock).map(Produced::Frame)
+        self.frames.send(stamp, clock).map(SourceOutcome::Frame)
     }
 
     fn prepare(&mut self) -> Result<(), PortError> {

@@ -3,14 +3,14 @@
 use vigil_blocks::{Block, Control, ControlCommand, EventKind, Refusal, SensorFrame};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    Clock, Graph, HealthBoard, PortError, Produced, Receiver, Sender, Source, Stamp, Topic,
+    Clock, Graph, HealthBoard, PortError, Receiver, Sender, Source, SourceOutcome, Stamp, Topic,
 };
 use vigil_robot::disturbance::PARAMETERS;
 use vigil_robot::injection::{Change, Wire};
 
 use super::actions::Actions;
 use super::peers::Peers;
-use crate::{Happening, Schedule, Simulation};
+use crate::{NavigatorEvent, Schedule, Simulation};
 
 /// Changes that may wait to be told in one cycle.
 const CHANGES_MAX: usize = 16;
@@ -18,7 +18,7 @@ const CHANGES_MAX: usize = 16;
 /// Simulates, measures, obeys.
 pub struct SimulatorSource {
     simulation: Simulation,
-    happening: Option<Happening>,
+    happening: Option<NavigatorEvent>,
     schedule: Schedule,
     allow_injection: bool,
     peers: Peers,
@@ -135,9 +135,13 @@ fn change_of(command: &Control) -> Option<Change> {
 }
 
 impl Source for SimulatorSource {
-    fn produce(&mut self, t_schedule_ns: u64, clock: &dyn Clock) -> Result<Produced, PortError> {
+    fn produce(
+        &mut self,
+        t_schedule_ns: u64,
+        clock: &dyn Clock,
+    ) -> Result<SourceOutcome, PortError> {
         if !self.peers.are_up() {
-            return Ok(Produced::Nothing);
+            return Ok(SourceOutcome::Nothing);
         }
         self.actions.take(t_schedule_ns, self.frames.epoch());
         self.take_due_injections(t_schedule_ns);
@@ -155,7 +159,7 @@ impl Source for SimulatorSource {
             t_schedule_ns,
             t_capture_ns: t_schedule_ns,
         };
-        self.frames.send(stamp, clock).map(Produced::Frame)
+        self.frames.send(stamp, clock).map(SourceOutcome::Frame)
     }
 
     fn prepare(&mut self) -> Result<(), PortError> {
@@ -177,10 +181,10 @@ impl Source for SimulatorSource {
             self.obeyed_told = self.obeyed;
         }
         match self.happening.take() {
-            Some(Happening::Ended(kind, outcome)) => {
+            Some(NavigatorEvent::Ended(kind, outcome)) => {
                 health.event(now_ns, EventKind::Outcome, kind as u32, 0.0, outcome as u64);
             }
-            Some(Happening::Goal) => health.event(now_ns, EventKind::Goal, 0, 0.0, 0),
+            Some(NavigatorEvent::Goal) => health.event(now_ns, EventKind::Goal, 0, 0.0, 0),
             None => {}
         }
         self.take_control(health, now_ns);

@@ -153,7 +153,7 @@ impl Stage for SocketStage {
         let mut published_ns = clock.now_ns();
         for frame in self.waiting.drain(..) {
             *self.frames.block() = frame;
-            published_ns = self.frames.send(Stamp::of(&frame.header), clock)?;
+            published_ns = self.frames.send(Stamp::from_header(&frame.header), clock)?;
         }
         Ok(published_ns)
     }

@@ -1,7 +1,7 @@
 //! The robot on its path: each order, what comes of it, and that nothing is driven through.
 
 use vigil_blocks::{Action, ActionOutcome, RecoveryKind, SensorFrame, Symptoms};
-use vigil_sensor_sim::{Happening, Navigator, Obedience, Simulation, World};
+use vigil_sensor_sim::{Navigator, NavigatorEvent, Obedience, Simulation, World};
 use vigil_setup::schema::{Navigation, Obstacle, Trouble, TroubleKind};
 
 /// A straight corridor of 8 m, 2.4 m wide, changed.
@@ -60,7 +60,7 @@ impl Robot {
     }
 
     /// Does this for at most `seconds`; what happened first, and when. Nothing is ever touched.
-    fn told(&mut self, kind: RecoveryKind, seconds: f64) -> Option<(Happening, f64)> {
+    fn told(&mut self, kind: RecoveryKind, seconds: f64) -> Option<(NavigatorEvent, f64)> {
         self.action.kind = kind as u32;
         self.action.decision_seq += 1;
         for k in 1..=(seconds * 100.0) as u32 {
@@ -104,8 +104,8 @@ impl Robot {
     }
 }
 
-const fn ended(kind: RecoveryKind, outcome: ActionOutcome) -> Happening {
-    Happening::Ended(kind, outcome)
+const fn ended(kind: RecoveryKind, outcome: ActionOutcome) -> NavigatorEvent {
+    NavigatorEvent::Ended(kind, outcome)
 }
 
 use ActionOutcome::{Failed, Succeeded};
@@ -117,7 +117,7 @@ use crate::rover::{even_soil, robot};
 fn a_free_path_is_followed_with_the_plan_to_the_goal() {
     let mut robot = Robot::new(corridor(|_| {}));
     let (happening, t_s) = robot.told(GoOn, 60.0).unwrap();
-    assert_eq!(happening, Happening::Goal);
+    assert_eq!(happening, NavigatorEvent::Goal);
     // 8 m at 0.25 m/s, and what slowing down at the goal takes.
     assert!((32.0..40.0).contains(&t_s), "{t_s}");
     assert!(robot.off_plan_m() < 0.2 && robot.place()[1].abs() < 0.05);
@@ -157,7 +157,7 @@ fn an_opening_beside_the_path_is_gone_through_and_the_path_taken_up_again() {
     assert_eq!(robot.outcome(), (Some(Succeeded), Symptoms::BO));
     assert!(robot.place()[1] > 0.1, "to the left of it");
     assert!(robot.off_plan_m() < 0.3, "the plan goes on from here");
-    assert_eq!(robot.told(GoOn, 40.0).unwrap().0, Happening::Goal);
+    assert_eq!(robot.told(GoOn, 40.0).unwrap().0, NavigatorEvent::Goal);
     assert!(robot.place()[1].abs() < 0.2);
 }
 
@@ -179,7 +179,7 @@ fn people_leave_and_the_way_is_free() {
     assert!(waits.off_plan_m() > 2.0);
     assert_eq!(waits.told(GoOn, 1.5), None);
     assert!(waits.off_plan_m() < 0.5);
-    assert_eq!(waits.told(GoOn, 60.0).unwrap().0, Happening::Goal);
+    assert_eq!(waits.told(GoOn, 60.0).unwrap().0, NavigatorEvent::Goal);
 }
 
 #[test]
@@ -231,7 +231,7 @@ fn the_alternative_is_taken_once() {
     assert_eq!(happening, ended(NewPath, Succeeded));
     assert_eq!(robot.outcome(), (Some(Succeeded), Symptoms::ALT));
     assert!(robot.off_plan_m() < 0.2);
-    assert_eq!(robot.told(GoOn, 120.0).unwrap().0, Happening::Goal);
+    assert_eq!(robot.told(GoOn, 120.0).unwrap().0, NavigatorEvent::Goal);
 }
 
 #[test]
@@ -289,7 +289,7 @@ fn a_phantom_stops_the_robot_and_a_blind_one_stops_at_touch() {
     assert!(robot.place()[0] < 2.4);
     let (happening, _) = robot.told(GoThrough, 40.0).unwrap();
     assert_eq!(happening, ended(GoThrough, Succeeded));
-    assert_eq!(robot.told(GoOn, 40.0).unwrap().0, Happening::Goal);
+    assert_eq!(robot.told(GoOn, 40.0).unwrap().0, NavigatorEvent::Goal);
 
     let blind = trouble(TroubleKind::Blind, 0.0, [0.0; 3]);
     let mut robot = Robot::new(corridor(|c| {
@@ -314,7 +314,7 @@ fn a_wrong_heading_leads_off_the_path_until_it_is_planned_anew() {
         ended(NewPath, Succeeded)
     );
     assert!(robot.off_plan_m() < 0.2);
-    assert_eq!(robot.told(GoOn, 60.0).unwrap().0, Happening::Goal);
+    assert_eq!(robot.told(GoOn, 60.0).unwrap().0, NavigatorEvent::Goal);
 }
 
 #[test]
@@ -327,7 +327,7 @@ fn help_clears_the_way_and_begins_a_new_run() {
     assert!((t_s - robot.settings.help_s).abs() < 0.02);
     assert_ne!(robot.frame.run_id, run);
     robot.settings.obstacle.clear();
-    assert_eq!(robot.told(GoOn, 60.0).unwrap().0, Happening::Goal);
+    assert_eq!(robot.told(GoOn, 60.0).unwrap().0, NavigatorEvent::Goal);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::topic::Topic;
 
 /// A block that topics carry; [`carried`](crate::carried) implements it. The transport is generic
 /// over the block: where it is implemented, there it is compiled, so each service merely links it.
-pub trait Carried: Block {
+pub trait TopicBlock: Block {
     /// The writing side of a topic in shared memory.
     ///
     /// # Errors
@@ -27,7 +27,7 @@ pub trait Carried: Block {
 #[macro_export]
 macro_rules! carried {
     ($($block:ty),+ $(,)?) => { $(
-        impl $crate::port::Carried for $block {
+        impl $crate::port::TopicBlock for $block {
             fn sender(
                 link: &$crate::port::Link,
                 topic: $crate::Topic,

@@ -16,12 +16,12 @@ const BUFFER: usize = 16;
 
 /// What waits for one reader. Blocks that were read go round, so that a steady cycle in process
 /// allocates as little as one over shared memory.
-struct Waiting<T> {
+struct ReaderQueue<T> {
     blocks: VecDeque<Box<T>>,
     spare: Vec<Box<T>>,
 }
 
-impl<T: Block> Waiting<T> {
+impl<T: Block> ReaderQueue<T> {
     fn new() -> Self {
         Self {
             blocks: VecDeque::with_capacity(BUFFER),
@@ -45,7 +45,7 @@ impl<T: Block> Waiting<T> {
     }
 }
 
-type Queue<T> = Rc<RefCell<Waiting<T>>>;
+type Queue<T> = Rc<RefCell<ReaderQueue<T>>>;
 type Readers<T> = Rc<RefCell<Vec<Queue<T>>>>;
 
 /// All topics of one in-process graph. Clones share them. A block is visible from the instant of
@@ -92,7 +92,7 @@ impl Bus {
     }
 
     pub(super) fn receiver<T: Block>(&self, topic: Topic) -> LocalReceiver<T> {
-        let queue = Rc::new(RefCell::new(Waiting::new()));
+        let queue = Rc::new(RefCell::new(ReaderQueue::new()));
         self.readers::<T>(topic)
             .borrow_mut()
             .push(Rc::clone(&queue));

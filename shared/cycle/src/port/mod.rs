@@ -10,7 +10,7 @@ use vigil_blocks::{Block, Header};
 use crate::clock::Clock;
 use crate::topic::Topic;
 
-pub use carried::Carried;
+pub use carried::TopicBlock;
 pub use found::FoundTopic;
 pub use in_process::Bus;
 pub use shared_memory::{EventListener, EventNotifier, Link, Wire};
@@ -70,7 +70,7 @@ pub struct Stamp {
 impl Stamp {
     /// The times of an input block.
     #[must_use]
-    pub const fn of(header: &Header) -> Self {
+    pub const fn from_header(header: &Header) -> Self {
         Self {
             t_schedule_ns: header.t_schedule_ns,
             t_capture_ns: header.t_capture_ns,
@@ -136,7 +136,7 @@ impl Graph {
     ///
     /// # Errors
     /// [`PortError::Open`], among others when the topic already has a living writer.
-    pub fn sender<T: Carried>(&self, topic: Topic) -> Result<Box<dyn Sender<T>>, PortError> {
+    pub fn sender<T: TopicBlock>(&self, topic: Topic) -> Result<Box<dyn Sender<T>>, PortError> {
         Ok(match self {
             Self::SharedMemory(link) => T::sender(link, topic)?,
             Self::InProcess(bus) => Box::new(bus.sender::<T>(topic)),
@@ -147,7 +147,7 @@ impl Graph {
     ///
     /// # Errors
     /// [`PortError::Open`].
-    pub fn receiver<T: Carried>(&self, topic: Topic) -> Result<Box<dyn Receiver<T>>, PortError> {
+    pub fn receiver<T: TopicBlock>(&self, topic: Topic) -> Result<Box<dyn Receiver<T>>, PortError> {
         Ok(match self {
             Self::SharedMemory(link) => T::receiver(link, topic)?,
             Self::InProcess(bus) => Box::new(bus.receiver::<T>(topic)),

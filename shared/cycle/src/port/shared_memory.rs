@@ -85,7 +85,7 @@ impl Link {
     fn topic<T: Block>(&self, topic: Topic) -> Result<TopicFactory<T>, PortError> {
         let (name, queues) = (
             self.name(topic, WireType::new::<T>())?,
-            self.queues.of(topic),
+            self.queues.for_topic(topic),
         );
         self.node
             .service_builder(&name)
@@ -170,7 +170,7 @@ impl Link {
     #[doc(hidden)]
     pub fn receiver<T: Block>(&self, topic: Topic) -> Result<Box<dyn Receiver<T>>, PortError> {
         let wire = WireType::new::<T>();
-        let buffer = self.queues.of(topic).buffer;
+        let buffer = self.queues.for_topic(topic).buffer;
         let subscriber = self
             .topic::<T>(topic)?
             .subscriber_builder()
@@ -260,12 +260,12 @@ impl EventNotifier {
     }
 }
 
-type Loaned<T> = SampleMut<ipc::Service, Wire<T>, ()>;
+type LoanedSample<T> = SampleMut<ipc::Service, Wire<T>, ()>;
 
 fn loan<T: Block>(
     publisher: &Publisher<ipc::Service, Wire<T>, ()>,
     path: &str,
-) -> Result<Loaned<T>, PortError> {
+) -> Result<LoanedSample<T>, PortError> {
     let mut sample = publisher
         .loan_uninit()
         .map_err(|e| transfer(path, "loan", &e))?;
@@ -288,7 +288,7 @@ fn transfer(path: &str, operation: &'static str, cause: &impl std::fmt::Debug) -
 
 pub(super) struct SharedSender<T: Block> {
     // Fields drop in this order: the loaned block returns before its publisher goes.
-    loaned: Option<Loaned<T>>,
+    loaned: Option<LoanedSample<T>>,
     /// Written to when the transport refuses a block.
     spare: Box<T>,
     has_refused: bool,

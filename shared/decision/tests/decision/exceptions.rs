@@ -6,14 +6,14 @@ use vigil_decision::Inputs;
 use vigil_pomdp::{Pomdp, Tracker};
 use vigil_setup::schema::Supervisor as Settings;
 
-use crate::told::{CYCLE_NS, FP, MODEL, Told, assert_near, build, settings, tracked};
+use crate::told::{CYCLE_NS, FP, MODEL, ToldSupervisor, assert_near, build, settings, tracked};
 
 const NP: usize = 1;
 const GO: usize = 3;
 
 #[test]
 fn a_firing_counts_once_however_many_cycles_carry_it() {
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.rest(1.0, 0);
     assert_eq!(
         (told.kind(), told.action.decision_seq),
@@ -42,7 +42,7 @@ fn a_firing_counts_once_however_many_cycles_carry_it() {
 
 #[test]
 fn what_is_decided_again_is_done_again_but_following_goes_on() {
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.rest(40.0, 0);
     assert_eq!(
         (told.kind(), told.action.decision_seq),
@@ -65,7 +65,7 @@ fn what_is_decided_again_is_done_again_but_following_goes_on() {
 fn an_impossible_set_is_counted_and_the_belief_restored() {
     // "Overtaken" after following the path; and a set that no observation is.
     for outcome in [Symptoms::BO, Symptoms::BO | Symptoms::ALT] {
-        let mut told = Told::new();
+        let mut told = ToldSupervisor::new();
         told.cycle(0);
         told.ended(ActionOutcome::Succeeded, outcome);
         assert_eq!(told.action.impossible_count, 1);
@@ -83,7 +83,9 @@ fn an_impossible_set_is_counted_and_the_belief_restored() {
 
 #[test]
 fn a_task_given_up_stays_given_up_until_a_reset() {
-    let mut told = Told::of(&MODEL.replace("R: SH : * : * : * -10", "R: SH : * : * : * -900"));
+    let mut told = ToldSupervisor::with_model(
+        &MODEL.replace("R: SH : * : * : * -10", "R: SH : * : * : * -900"),
+    );
     told.rest(1.0, 0);
     told.identify(0.99, 0.9);
     told.cycle(0);
@@ -99,7 +101,7 @@ fn a_task_given_up_stays_given_up_until_a_reset() {
 
 #[test]
 fn an_action_that_runs_is_neither_ended_by_the_epoch_nor_asked_anew() {
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.rest(1.0, 0);
     told.cycle(Symptoms::EPM);
     assert_eq!(told.kind(), RecoveryKind::GoThrough);
@@ -118,7 +120,7 @@ fn an_action_that_runs_is_neither_ended_by_the_epoch_nor_asked_anew() {
 
 #[test]
 fn a_symptom_while_an_action_runs_is_a_step_of_following_and_does_not_begin_it_anew() {
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.rest(1.0, 0);
     told.cycle(Symptoms::EPM);
     let asked = told.action.decision_seq;
@@ -133,7 +135,7 @@ fn a_symptom_while_an_action_runs_is_a_step_of_following_and_does_not_begin_it_a
 #[test]
 fn what_the_robot_says_it_could_not_do_mends_nothing() {
     let lost = |outcome: ActionOutcome| {
-        let mut told = Told::new();
+        let mut told = ToldSupervisor::new();
         told.rest(1.0, 0);
         // The pose jumps: something that no fault of the tree explains.
         told.unknown(0.99, 0.9);
@@ -160,7 +162,7 @@ fn what_the_robot_says_it_could_not_do_mends_nothing() {
 
 #[test]
 fn symptoms_that_cease_while_diagnoses_come_are_missed() {
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.rest(1.0, 0);
     for cycle in 1..=20 {
         told.diagnosis.header.t_capture_ns += CYCLE_NS;
@@ -190,7 +192,7 @@ fn symptoms_that_cease_while_diagnoses_come_are_missed() {
 
 #[test]
 fn without_symptoms_for_long_the_robot_stops_and_decides_anew_when_they_come_back() {
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.rest(1.0, 0);
     let before = told.action.decision_seq;
     told.supervisor.step(Entry::Missed(10), &mut told.action);
@@ -236,7 +238,7 @@ fn settings_stop() -> vigil_setup::schema::RecoveryAction {
 
 #[test]
 fn a_steady_cycle_allocates_nothing_and_no_number_goes_bad() {
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     let before = allocations();
     for i in 0..20_000_u32 {
         told.identify(f64::from(i % 11) / 10.0, f64::from(i % 7) / 6.0);

@@ -4,11 +4,11 @@ use vigil_blocks::{ActionOutcome, ControlMode, Entry, RecoveryKind, Symptoms};
 use vigil_decision::Inputs;
 use vigil_pomdp::{Pomdp, Tracker};
 
-use crate::told::{CYCLE_NS, FP, MODEL, Told, assert_near, build, settings, tracked};
+use crate::told::{CYCLE_NS, FP, MODEL, ToldSupervisor, assert_near, build, settings, tracked};
 
 #[test]
 fn the_identifiers_evidence_counts_once() {
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.rest(1.0, 0);
     told.identify(0.5, 0.5);
     told.cycle(0);
@@ -40,7 +40,7 @@ fn the_identifiers_evidence_counts_once() {
 
 #[test]
 fn hardware_is_called_help_for_at_once_and_the_call_stands_until_a_new_run() {
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.rest(1.0, 0);
     told.identify(0.99, 0.9);
     told.cycle(0);
@@ -75,7 +75,7 @@ fn hardware_is_called_help_for_at_once_and_the_call_stands_until_a_new_run() {
 #[test]
 fn what_is_unknown_is_a_fault_that_nobody_has_modelled_or_a_place_that_is_lost() {
     // The place is looked for; if that does not explain it, help is called for.
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.rest(1.0, 0);
     told.unknown(0.999, 0.9);
     told.cycle(0);
@@ -94,7 +94,7 @@ fn what_is_unknown_is_a_fault_that_nobody_has_modelled_or_a_place_that_is_lost()
     // Where no state means a lost robot, it is the hardware's.
     let mut alone = settings();
     alone.lost_state = None;
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.supervisor = build(MODEL, &alone).unwrap();
     told.rest(1.0, 0);
     told.unknown(0.999, 0.9);
@@ -110,7 +110,7 @@ fn what_comes_back_after_the_place_was_sought_is_hardware_until_it_was_quiet() {
         (40.0, RecoveryKind::Relocalise),
     ] {
         for outcome in [ActionOutcome::Succeeded, ActionOutcome::Failed] {
-            let mut told = Told::new();
+            let mut told = ToldSupervisor::new();
             told.unknown(0.999, 0.9);
             told.cycle(0);
             assert_eq!(told.kind(), RecoveryKind::Relocalise);
@@ -136,7 +136,7 @@ fn while_something_is_wrong_only_what_may_mend_it_is_done() {
     for policy in ["qmdp", "mls", "av", "fib"] {
         let mut settings = settings();
         settings.policy = policy.into();
-        let mut told = Told::new();
+        let mut told = ToldSupervisor::new();
         told.supervisor = build(MODEL, &settings).unwrap();
         told.rest(1.0, 0);
         told.cycle(Symptoms::EPM);
@@ -154,10 +154,10 @@ fn while_something_is_wrong_only_what_may_mend_it_is_done() {
 
 #[test]
 fn without_the_identifier_the_detectors_alarm_is_heard() {
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.rest(1.0, 0);
     told.detection.p_fault = 0.3;
-    let cycle = |told: &mut Told| {
+    let cycle = |told: &mut ToldSupervisor| {
         told.detection.header.t_capture_ns += CYCLE_NS;
         told.supervisor.step(Entry::Missed(1), &mut told.action);
         let inputs = Inputs {
@@ -180,7 +180,7 @@ fn without_the_identifier_the_detectors_alarm_is_heard() {
     assert_eq!(told.action.belief, believed);
     assert_eq!(told.action.impossible_count, bad + 1);
     // What was hardware stays hardware.
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.identify(0.99, 0.9);
     told.rest(1.0, 0);
     (told.detection.alarm, told.detection.p_fault) = (1, 0.99);
@@ -190,7 +190,7 @@ fn without_the_identifier_the_detectors_alarm_is_heard() {
 
 #[test]
 fn a_watching_identifier_says_nothing_and_one_of_another_tree_is_refused() {
-    let mut told = Told::new();
+    let mut told = ToldSupervisor::new();
     told.diagnosis.p[0] = 0.2;
     told.diagnosis.p_unknown = 0.8;
     told.rest(20.0, 0);

@@ -16,7 +16,7 @@ use vigil_robot::{Alarm, AlarmError, Description};
 use crate::detect::monitors::Monitors;
 use crate::detect::publisher::Publisher;
 use crate::detect::sight::{self, Sight};
-use crate::detect::watch::{Observed, Watch};
+use crate::detect::watch::{DetectorInput, Watch};
 
 /// Without monitors, pose log-odds beyond which the detector reports an error in position: even
 /// odds, as the planner weighs the symptom by its own model.
@@ -125,7 +125,7 @@ impl Detector {
         let watch = Watch::Nominal {
             observer: Box::new(nominal::Observer::new(robot)),
             monitor: Box::new(nominal::Monitor::new(model, channels, form, rate)),
-            last: Observed::default(),
+            last: DetectorInput::default(),
         };
         let interval_s = model.interval_s;
         Ok(Self::watching(
@@ -324,7 +324,7 @@ impl Detector {
 
     /// Log-odds of a fault now: while an alarm stands, in no channel more than those that its fault
     /// has not ended there.
-    fn weigh_end(&mut self, observation: &Observed) {
+    fn weigh_end(&mut self, observation: &DetectorInput) {
         let report = self.watch.report();
         if !self.alarm.stands() {
             self.log_odds = report.log_odds;

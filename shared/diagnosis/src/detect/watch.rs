@@ -7,7 +7,7 @@ use vigil_robot::nominal;
 
 /// What the detector must know of an observation.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Observed {
+pub(crate) struct DetectorInput {
     /// When it ended, ns.
     pub t_ns: u64,
     /// Its length, s.
@@ -33,7 +33,7 @@ pub(crate) enum Watch {
         /// Detection filter.
         monitor: Box<nominal::Monitor>,
         /// The last observation.
-        last: Observed,
+        last: DetectorInput,
     },
 }
 
@@ -47,13 +47,13 @@ impl Watch {
     }
 
     /// Takes the observation that the last frame completed.
-    pub fn step(&mut self, suspected: bool) -> Observed {
+    pub fn step(&mut self, suspected: bool) -> DetectorInput {
         match self {
             Self::Faults { observer, monitor } => {
                 observer.suspect(suspected);
                 let observation = observer.observation();
                 monitor.step_with(observation, observer.further(), suspected);
-                Observed {
+                DetectorInput {
                     t_ns: observation.t_ns,
                     dt_s: observation.dt_s,
                     moving: observation.moving,
@@ -66,7 +66,7 @@ impl Watch {
             } => {
                 monitor.step(observer.history(), suspected);
                 if let Some(now) = observer.history().ago(0) {
-                    *last = Observed {
+                    *last = DetectorInput {
                         t_ns: now.t_ns,
                         dt_s: now.dt_s,
                         moving: now.moving,

@@ -21,7 +21,7 @@ pub struct Detection {
 
 impl Detection {
     /// What a belief says; scales and rates that no detector reports are those of a good sensor.
-    pub fn of(belief: &DetectionBelief) -> Self {
+    pub fn from_belief(belief: &DetectionBelief) -> Self {
         let scale = |scale: f64| match scale > 0.1 && scale < 100.0 {
             true => scale,
             false => 1.0,

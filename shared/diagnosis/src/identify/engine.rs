@@ -4,7 +4,7 @@ use vigil_robot::learned::{Healthy, NoiseScales, Observation};
 
 use crate::identify::further::Fusion;
 use crate::identify::generic::Generic;
-use crate::identify::hypotheses::{Ranked, add_hypotheses};
+use crate::identify::hypotheses::{HypothesisList, add_hypotheses};
 use crate::identify::modes::Leaves;
 use crate::identify::multiple_hypothesis::MultipleHypothesis;
 use crate::identify::node_sizes::NodeSizes;
@@ -75,7 +75,7 @@ impl Engine {
     #[must_use]
     pub fn sizes(&self, leaves: &Leaves, posterior: &Posterior) -> NodeSizes {
         match self {
-            Self::MultipleHypothesis(filter) => NodeSizes::of(filter, leaves, posterior),
+            Self::MultipleHypothesis(filter) => NodeSizes::new(filter, leaves, posterior),
             Self::Generic(_) => NodeSizes::default(),
         }
     }
@@ -108,7 +108,7 @@ impl Engine {
     }
 
     /// Adds the hypotheses, or the particles.
-    pub fn hypotheses(&self, leaves: &Leaves, out: &mut Ranked) {
+    pub fn hypotheses(&self, leaves: &Leaves, out: &mut HypothesisList) {
         match self {
             Self::MultipleHypothesis(filter) => add_hypotheses(filter, leaves, out),
             Self::Generic(filter) => filter.hypotheses(out),

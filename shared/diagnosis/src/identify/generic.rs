@@ -16,13 +16,13 @@ use vigil_inference::resample::Resampling;
 use vigil_inference::track::TRACK_DIMENSION;
 use vigil_robot::Description;
 use vigil_robot::FaultTree;
-use vigil_robot::learned::switching::{MODES_MAX, Seen};
+use vigil_robot::learned::switching::{MODES_MAX, SwitchingObservation};
 use vigil_robot::learned::{
-    FaultRates, Healthy, Moved, NoiseScales, Observation, Switching, triangle,
+    FaultRates, Healthy, Mover, NoiseScales, Observation, Switching, triangle,
 };
 
 use crate::identify::fault_rates::fault_rates;
-use crate::identify::hypotheses::Ranked;
+use crate::identify::hypotheses::HypothesisList;
 use crate::identify::models::Models;
 use crate::identify::modes::{IdentifierError, Leaves};
 use crate::identify::posterior::Posterior;
@@ -206,7 +206,7 @@ impl Generic {
         }
     }
 
-    fn filter(&self) -> &dyn Filter<Observation = Seen> {
+    fn filter(&self) -> &dyn Filter<Observation = SwitchingObservation> {
         match &self.kind {
             Kind::Sampled(filter) => filter,
             Kind::Hierarchical(filter) => filter,
@@ -215,7 +215,7 @@ impl Generic {
         }
     }
 
-    fn filter_mut(&mut self) -> &mut dyn Filter<Observation = Seen> {
+    fn filter_mut(&mut self) -> &mut dyn Filter<Observation = SwitchingObservation> {
         match &mut self.kind {
             Kind::Sampled(filter) => filter,
             Kind::Hierarchical(filter) => filter,
@@ -301,7 +301,7 @@ impl Generic {
     }
 
     /// Adds the particles with their weights, or each mode's Gaussian.
-    pub fn hypotheses(&self, out: &mut Ranked) {
+    pub fn hypotheses(&self, out: &mut HypothesisList) {
         match &self.kind {
             Kind::Sampled(filter) => {
                 let total: f64 = filter.particles().map(|(_, _, weight)| weight).sum();
@@ -334,7 +334,7 @@ impl Generic {
     /// Adds one, unless it is impossible.
     fn push(
         &self,
-        out: &mut Ranked,
+        out: &mut HypothesisList,
         (pose, covariance): (Vector3<f64>, [f64; 6]),
         mode: usize,
         weight: f64,
@@ -372,7 +372,7 @@ fn names<'a>(tree: &'a FaultTree, meanings: &[Meaning], prior: f64) -> Vec<(&'a 
 
 fn meaning(switching: &Switching, mode: usize, leaves: &Leaves) -> Meaning {
     let leaf = match switching.meaning(mode) {
-        (Moved::Unknown | Moved::UnknownAny, _) => return Meaning::Unknown,
+        (Mover::Unknown | Mover::UnknownAny, _) => return Meaning::Unknown,
         (_, Some(wheel)) => leaves.encoder[wheel],
         (moved, None) => (0..WHEELS)
             .find(|&wheel| moved.is_stuck(wheel))

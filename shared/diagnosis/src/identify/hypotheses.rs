@@ -4,7 +4,7 @@ use vigil_blocks::{
     HealthyBelief, MODE_MULTIPLE, MODE_UNKNOWN, PARTICLE_CAPACITY, ParticleBlock, WHEELS,
     WeightedHypothesis,
 };
-use vigil_robot::learned::{Moved, triangle};
+use vigil_robot::learned::{Mover, triangle};
 
 use crate::identify::encoders::Encoders;
 use crate::identify::modes::Leaves;
@@ -16,13 +16,13 @@ const ROOM: usize = 2 * PARTICLE_CAPACITY;
 
 /// Collects hypotheses; where there are more than a block holds, the most probable.
 #[derive(Debug, Clone)]
-pub struct Ranked {
+pub struct HypothesisList {
     all: Vec<WeightedHypothesis>,
     /// Weight and place of each, to be sorted.
     order: Vec<(f64, usize)>,
 }
 
-impl Ranked {
+impl HypothesisList {
     /// Without any. Allocates all that it will need.
     #[must_use]
     pub fn new() -> Self {
@@ -84,7 +84,7 @@ struct Broken {
 
 /// Adds those of the multiple-hypothesis filter: each with every set of broken encoders that is not
 /// negligible, for each wheel that may move the robot so.
-pub fn add_hypotheses(filter: &MultipleHypothesis, leaves: &Leaves, out: &mut Ranked) {
+pub fn add_hypotheses(filter: &MultipleHypothesis, leaves: &Leaves, out: &mut HypothesisList) {
     let mut sets = [Broken::default(); 1 << WHEELS];
     for (motion, hypothesis) in filter.hypotheses() {
         let (track, p_unknown) = (&hypothesis.state.track, motion.p_unknown);
@@ -123,12 +123,12 @@ pub fn add_hypotheses(filter: &MultipleHypothesis, leaves: &Leaves, out: &mut Ra
 }
 
 /// Leaves of what moves the robot, as bits; none of the unknown.
-fn moved_leaves(moved: Moved, leaves: &Leaves) -> Option<u64> {
+fn moved_leaves(moved: Mover, leaves: &Leaves) -> Option<u64> {
     match moved {
-        Moved::Unknown | Moved::UnknownAny => return None,
-        Moved::Steer(wheel) => return Some(1 << leaves.steer[wheel]?),
-        Moved::Pose => return Some(1 << leaves.pose?),
-        Moved::Nominal | Moved::Stuck(_) => {}
+        Mover::Unknown | Mover::UnknownAny => return None,
+        Mover::Steer(wheel) => return Some(1 << leaves.steer[wheel]?),
+        Mover::Pose => return Some(1 << leaves.pose?),
+        Mover::Nominal | Mover::Stuck(_) => {}
     }
     let mut wheels = (0..WHEELS).filter(|&wheel| moved.is_stuck(wheel));
     wheels.try_fold(0, |bits, wheel| Some(bits | 1 << leaves.stuck[wheel]?))
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn of_too_many_the_most_probable_stay_and_come_first() {
-        let mut ranked = Ranked::new();
+        let mut ranked = HypothesisList::new();
         let count = 3 * PARTICLE_CAPACITY as u64;
         for i in 0..count {
             // Every weight once, in no order.

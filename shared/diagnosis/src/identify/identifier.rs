@@ -16,14 +16,14 @@ use crate::identify::engine::Engine;
 use crate::identify::fault_rates::fault_rates;
 use crate::identify::further_stage::FurtherStage;
 use crate::identify::generic::Generic;
-use crate::identify::hypotheses::{Ranked, copy};
+use crate::identify::hypotheses::{HypothesisList, copy};
 use crate::identify::models::Models;
 use crate::identify::modes::{IdentifierError, Leaves};
 use crate::identify::multiple_hypothesis::MultipleHypothesis;
 use crate::identify::node_sizes::NodeSizes;
 use crate::identify::posterior::Posterior;
 use crate::identify::reasons::Reasons;
-use crate::identify::reported::Reported;
+use crate::identify::reported::HeldName;
 use crate::identify::trouble::believed;
 
 /// A ring is worked off in about this time after an alarm, s: the name is two observations late.
@@ -42,7 +42,7 @@ pub struct Input<'a> {
 
 /// An observation kept for an identification, and what the detector believed after it.
 #[derive(Debug, Clone, Copy)]
-struct Kept {
+struct RingEntry {
     observation: Observation,
     noise: NoiseScales,
     healthy: Option<Healthy>,
@@ -80,12 +80,12 @@ pub struct Identifier {
     in_trouble: bool,
     /// Most hypotheses or particles of the engine, without a budget.
     particles: usize,
-    ranked: Ranked,
+    ranked: HypothesisList,
     /// The hypotheses after the last observation.
     told: Box<ParticleBlock>,
     updated: bool,
     tells_own: bool,
-    ring: VecDeque<Kept>,
+    ring: VecDeque<RingEntry>,
     capacity: usize,
     /// Time of an observation, s.
     interval_s: f64,
@@ -99,7 +99,7 @@ pub struct Identifier {
     reasons: Reasons,
     mode: u32,
     mode_changes: u32,
-    reported: Reported,
+    reported: HeldName,
     /// Motion in the last observation, s, until it has been reported.
     moved_s: f64,
     run_id: u64,
@@ -157,7 +157,7 @@ impl Identifier {
             prior: robot.fault_prior,
             use_wheels,
             in_trouble: false,
-            ranked: Ranked::new(),
+            ranked: HypothesisList::new(),
             told: Box::default(),
             updated: false,
             tells_own: false,
@@ -173,7 +173,7 @@ impl Identifier {
             sizes: NodeSizes::default(),
             mode: 0,
             mode_changes: 0,
-            reported: Reported::default(),
+            reported: HeldName::default(),
             moved_s: 0.0,
             run_id: 0,
         })
@@ -249,7 +249,7 @@ impl Identifier {
         }
         self.run_id = input.frame.run_id;
         if let Some((belief, _)) = input.detection {
-            self.detection = Detection::of(belief);
+            self.detection = Detection::from_belief(belief);
         }
         if intake.complete {
             self.in_trouble = self.observer.observation().troubles.any(self.use_wheels);
@@ -297,7 +297,7 @@ impl Identifier {
                 self.phase = Phase::Identifying(next.saturating_sub(1));
             }
         }
-        self.ring.push_back(Kept {
+        self.ring.push_back(RingEntry {
             observation: *self.observer.observation(),
             noise: self.detection.noise,
             healthy,
@@ -305,7 +305,7 @@ impl Identifier {
     }
 
     /// What the detector believed, or else that the pose is as it was measured.
-    fn healthy(&self, kept: &Kept) -> Healthy {
+    fn healthy(&self, kept: &RingEntry) -> Healthy {
         let pose = Vector3::from(kept.observation.pose);
         kept.healthy.unwrap_or(Healthy {
             pose,

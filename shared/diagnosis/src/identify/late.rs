@@ -11,12 +11,12 @@ const EVEN: f64 = 1.0 / DELAYS_S.len() as f64;
 
 /// Probabilities of the delays, and the rates that the wheels had.
 #[derive(Debug, Clone)]
-pub struct Late {
+pub struct DelayBelief {
     p: [[f64; DELAYS_S.len()]; WHEELS],
     rates: PastRates,
 }
 
-impl Default for Late {
+impl Default for DelayBelief {
     fn default() -> Self {
         Self {
             p: [[EVEN; DELAYS_S.len()]; WHEELS],
@@ -25,7 +25,7 @@ impl Default for Late {
     }
 }
 
-impl Late {
+impl DelayBelief {
     /// Forgets everything.
     pub const fn clear(&mut self) {
         self.p = [[EVEN; DELAYS_S.len()]; WHEELS];
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn a_delay_on_the_grid_is_found_and_a_constant_rate_tells_nothing() {
-        let mut late = Late::default();
+        let mut late = DelayBelief::default();
         let mut sum = 0.0;
         for k in 0..120_u64 {
             let t_s = k as f64 * 0.05;
@@ -113,7 +113,7 @@ mod tests {
         let (delay_s, sd) = late.estimate(0);
         assert!((delay_s - 0.5).abs() < 0.02 && sd < 0.05, "{delay_s} {sd}");
         assert!(sum > 100.0);
-        let mut late = Late::default();
+        let mut late = DelayBelief::default();
         for k in 0..100_u64 {
             late.keep(k * PERIOD_NS, [(2.0, 1e-4); WHEELS]);
             assert_eq!(late.take(0, 0.0, 0.0, false, |_| 0.0), None);

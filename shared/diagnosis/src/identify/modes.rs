@@ -3,7 +3,7 @@
 use crate::settings::Sensors;
 use vigil_blocks::{FAULT_NODES, WHEELS};
 use vigil_robot::FaultTree;
-use vigil_robot::learned::{Model, ModelError, MotionMode, Moved};
+use vigil_robot::learned::{Model, ModelError, MotionMode, Mover};
 use vigil_robot::{Description, Fault};
 
 /// Why an identifier was refused.
@@ -133,9 +133,9 @@ impl Leaves {
     }
 
     /// What may move the robot in a mode, and how probable each is.
-    pub fn shares(&self, mode: &MotionMode) -> impl Iterator<Item = (Moved, f64)> + use<> {
+    pub fn shares(&self, mode: &MotionMode) -> impl Iterator<Item = (Mover, f64)> + use<> {
         let alike = match mode.moved {
-            Moved::Stuck(one) if mode.p_alike > 0.0 => {
+            Mover::Stuck(one) if mode.p_alike > 0.0 => {
                 self.same_side[one.trailing_zeros() as usize]
             }
             _ => 0,
@@ -146,7 +146,7 @@ impl Leaves {
             _ => (1.0 - mode.p_alike, mode.p_alike / count),
         };
         let others = (0..WHEELS).filter(move |wheel| alike >> wheel & 1 == 1);
-        let others = others.map(move |wheel| (Moved::Stuck(1 << wheel), other));
+        let others = others.map(move |wheel| (Mover::Stuck(1 << wheel), other));
         std::iter::once((mode.moved, own)).chain(others)
     }
 

@@ -18,7 +18,7 @@ use vigil_inference::outlier::{Trust, unvouched};
 use vigil_inference::track::Context;
 use vigil_robot::Description;
 use vigil_robot::learned::{
-    FaultRates, Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext,
+    FaultRates, Healthy, Model, MotionMode, Mover, NoiseScales, Observation, WheelContext,
     WheelEvidence, motion_modes, steer_modes,
 };
 
@@ -27,7 +27,7 @@ use crate::identify::encoders::Encoders;
 use crate::identify::further::Fusion;
 use crate::identify::modes::Leaves;
 use crate::identify::posterior::Posterior;
-use crate::identify::prepared::{Prepared, Seen, is_new};
+use crate::identify::prepared::{MotionTerms, WheelObservation, is_new};
 use crate::identify::rate_offsets::RateOffsets;
 use crate::identify::servo::ServoPrior;
 use crate::identify::sets::Sets;
@@ -61,7 +61,7 @@ pub struct MultipleHypothesis {
     servo: ServoPrior,
     trust: Trust,
     /// What the last observation says in each mode, where a hypothesis has asked.
-    prepared: Vec<Option<Prepared>>,
+    prepared: Vec<Option<MotionTerms>>,
     sets: Sets,
     degenerate_count: u32,
 }
@@ -81,10 +81,10 @@ impl MultipleHypothesis {
         modes.extend(steer_modes(model, leaves.steered_wheels()));
         for mode in modes.iter_mut().filter(|mode| mode.jump != [0.0; 3]) {
             if leaves.pose.is_some() {
-                (mode.moved, mode.share, mode.p_unknown) = (Moved::Pose, 1.0, 0.0);
+                (mode.moved, mode.share, mode.p_unknown) = (Mover::Pose, 1.0, 0.0);
             }
         }
-        let mut unknown = modes.iter_mut().filter(|mode| mode.moved == Moved::Unknown);
+        let mut unknown = modes.iter_mut().filter(|mode| mode.moved == Mover::Unknown);
         if let (Some(alone), None) = (unknown.next(), unknown.next()) {
             alone.share = 1.0;
         }
@@ -273,8 +273,8 @@ impl MultipleHypothesis {
             let mode = &self.modes[hypothesis.mode];
             // Wheels that do anything are unknown however the robot moves.
             let is_material = match mode.moved {
-                Moved::Unknown => !mode.is_nominal_motion(),
-                Moved::UnknownAny => !self.use_wheels,
+                Mover::Unknown => !mode.is_nominal_motion(),
+                Mover::UnknownAny => !self.use_wheels,
                 _ => false,
             };
             let state = &mut hypothesis.state;
@@ -299,14 +299,14 @@ impl MultipleHypothesis {
     /// Weighs by the wheels' readings.
     fn weigh_wheels(&mut self, observation: &Observation, evidence: &WheelEvidence) {
         let death = self.rates.death_1_s * observation.dt_s;
-        let seen = Seen {
+        let seen = WheelObservation {
             model: &self.model,
             robot: &self.robot,
             observation,
             evidence,
         };
         let (rates, births_1_s) = (self.rates, self.births_1_s);
-        let births = |moved: Moved, encoders: &Encoders| {
+        let births = |moved: Mover, encoders: &Encoders| {
             let p_other = encoders.p_other_broken();
             let factor = |wheel: usize| rates.factor(moved, p_other[wheel]);
             std::array::from_fn(|wheel| births_1_s[wheel] * observation.dt_s * factor(wheel))
@@ -345,11 +345,11 @@ impl MultipleHypothesis {
             }
             let gained = seen.weigh(prepared, (&births, death), *fresh, encoders, offsets);
             hypothesis.log_weight += gained;
-            if self.modes[index].moved == Moved::UnknownAny {
+            if self.modes[index].moved == Mover::UnknownAny {
                 let changes = rates.fault_1_s * observation.dt_s;
                 hypothesis.log_weight += angles.step(&evidence.steer, changes);
             }
-            if let (Moved::Steer(wheel), Some(servo)) = (self.modes[index].moved, servo)
+            if let (Mover::Steer(wheel), Some(servo)) = (self.modes[index].moved, servo)
                 && let Some(reading) = &evidence.steer[wheel]
             {
                 hypothesis.log_weight += servo.step(&self.servo, reading);
@@ -366,7 +366,7 @@ impl MultipleHypothesis {
         };
         let moved = self.modes[best.mode].moved;
         let is_settled = !is_new(observation.t_ns, best.onset);
-        let is_off = matches!(moved, Moved::UnknownAny | Moved::Steer(_));
+        let is_off = matches!(moved, Mover::UnknownAny | Mover::Steer(_));
         if is_off || moved.stuck().count_ones() > 1 || !is_settled {
             return;
         }
@@ -395,7 +395,7 @@ impl MultipleHypothesis {
 
     /// The most probable hypothesis under which the robot is moved so.
     #[must_use]
-    pub fn best(&self, moved: Moved) -> Option<&Hypothesis<State>> {
+    pub fn best(&self, moved: Mover) -> Option<&Hypothesis<State>> {
         self.bank.best(|mode| self.modes[mode].moved == moved)
     }
 
@@ -417,11 +417,11 @@ impl MultipleHypothesis {
             return best.map_or(0, |best| best.onset);
         }
         if let Some(wheel) = wheel(&self.leaves.steer) {
-            let best = self.best(Moved::Steer(wheel));
+            let best = self.best(Mover::Steer(wheel));
             return best.map_or(0, |best| best.onset);
         }
         if self.leaves.pose == Some(node) {
-            return self.best(Moved::Pose).map_or(0, |best| best.onset);
+            return self.best(Mover::Pose).map_or(0, |best| best.onset);
         }
         if let Some(wheel) = wheel(&self.leaves.encoder) {
             let known = self.bank.hypotheses().iter();

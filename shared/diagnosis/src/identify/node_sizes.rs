@@ -2,7 +2,7 @@
 
 use vigil_blocks::{FAULT_NODES, FaultBelief, SizeKind, WHEELS};
 
-use vigil_robot::learned::{MotionMode, Moved};
+use vigil_robot::learned::{MotionMode, Mover};
 
 use crate::identify::encoders::{STATES, WAYS_TO_BREAK};
 use crate::identify::modes::Leaves;
@@ -33,7 +33,7 @@ impl Default for NodeSizes {
 impl NodeSizes {
     /// What a filter holds of the leaves that are probable enough.
     #[must_use]
-    pub fn of(filter: &MultipleHypothesis, leaves: &Leaves, posterior: &Posterior) -> Self {
+    pub fn new(filter: &MultipleHypothesis, leaves: &Leaves, posterior: &Posterior) -> Self {
         let mut out = Self::default();
         let is_told = |node: &usize| posterior.nodes[*node] >= TOLD_MIN;
         for node in leaves.stuck.into_iter().flatten().filter(is_told) {
@@ -47,14 +47,14 @@ impl NodeSizes {
         }
         for (wheel, node) in leaves.steer.into_iter().enumerate() {
             let servo = filter
-                .best(Moved::Steer(wheel))
+                .best(Mover::Steer(wheel))
                 .and_then(|best| best.state.servo);
             if let Some((node, servo)) = node.filter(is_told).zip(servo) {
                 let (kind, (size, sd)) = servo.size();
                 (out.size[node], out.sd[node], out.kind[node]) = (size, sd, kind as u32);
             }
         }
-        if let Some((node, best)) = leaves.pose.filter(is_told).zip(filter.best(Moved::Pose)) {
+        if let Some((node, best)) = leaves.pose.filter(is_told).zip(filter.best(Mover::Pose)) {
             let jump_m = best.state.jump_m.unwrap_or_default();
             (out.size[node], out.sd[node]) = jump_m;
             out.kind[node] = SizeKind::JumpM as u32;

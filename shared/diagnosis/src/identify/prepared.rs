@@ -2,28 +2,28 @@
 
 use vigil_blocks::WHEELS;
 use vigil_robot::Description;
-use vigil_robot::learned::wheel_evidence::Dragged;
-use vigil_robot::learned::{Model, MotionMode, Moved, Observation, WheelEvidence};
+use vigil_robot::learned::wheel_evidence::WheelDrag;
+use vigil_robot::learned::{Model, MotionMode, Mover, Observation, WheelEvidence};
 
 use crate::identify::encoders::{
     DEAD, Encoders, FROZEN, Likelihoods, OWN_RATE, SILENT, SIZED, ZERO,
 };
 use crate::identify::rate_offsets::RateOffsets;
-use crate::identify::sizes::{BIAS, DRIFT, Sized};
+use crate::identify::sizes::{BIAS, DRIFT, EncoderSizes};
 
 /// Of one motion mode.
 #[derive(Debug, Clone, Copy)]
-pub struct Prepared {
+pub struct MotionTerms {
     /// In general, and at the mode's onset.
     likelihoods: [Likelihoods; 2],
     /// Wheels that turn in a way of which nothing was learned, and how they may.
-    dragged: [Option<Dragged>; WHEELS],
+    dragged: [Option<WheelDrag>; WHEELS],
     stuck: u32,
 }
 
 /// One observation and its wheels.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen<'a> {
+pub struct WheelObservation<'a> {
     /// The model.
     pub model: &'a Model,
     /// Its robot.
@@ -34,13 +34,13 @@ pub struct Seen<'a> {
     pub evidence: &'a WheelEvidence,
 }
 
-impl Seen<'_> {
+impl WheelObservation<'_> {
     /// What the wheels say in one motion mode, `sized` being what they say of encoders that are off
     /// by a size.
     #[must_use]
-    pub fn prepared(&self, mode: &MotionMode, sized: &Sized) -> Prepared {
+    pub fn prepared(&self, mode: &MotionMode, sized: &EncoderSizes) -> MotionTerms {
         let stuck = mode.moved.stuck();
-        Prepared {
+        MotionTerms {
             likelihoods: [false, true].map(|is_new| self.likelihoods(mode, is_new, sized)),
             dragged: std::array::from_fn(|wheel| {
                 let is_wheel = wheel < self.robot.wheels.len();
@@ -53,16 +53,16 @@ impl Seen<'_> {
         }
     }
 
-    fn likelihoods(&self, mode: &MotionMode, is_new: bool, off: &Sized) -> Likelihoods {
+    fn likelihoods(&self, mode: &MotionMode, is_new: bool, off: &EncoderSizes) -> Likelihoods {
         let (evidence, moved) = (self.evidence, mode.moved);
         let likelihoods = Likelihoods::new(self.robot.wheels.len(), |wheel, state| {
             match (state, moved) {
-                (0, Moved::UnknownAny) | (_, Moved::Unknown) => evidence.healthy[wheel],
+                (0, Mover::UnknownAny) | (_, Mover::Unknown) => evidence.healthy[wheel],
                 (0, _) => evidence.whole(self.model, self.observation, mode, is_new, wheel),
-                (OWN_RATE, Moved::UnknownAny) => evidence.own_rate[wheel],
+                (OWN_RATE, Mover::UnknownAny) => evidence.own_rate[wheel],
                 // A wheel that reads as if it stood stands, or its encoder alone is dead.
-                (ZERO | DEAD, Moved::UnknownAny) => f64::NEG_INFINITY,
-                (FROZEN, Moved::UnknownAny) if self.reads_zero(wheel) => f64::NEG_INFINITY,
+                (ZERO | DEAD, Mover::UnknownAny) => f64::NEG_INFINITY,
+                (FROZEN, Mover::UnknownAny) if self.reads_zero(wheel) => f64::NEG_INFINITY,
                 (OWN_RATE, _) => f64::NEG_INFINITY,
                 // What reads alike shares one likelihood, broken or not.
                 (SILENT, _) if moved.is_stuck(wheel) => evidence.broken[wheel][ZERO - 1],
@@ -76,7 +76,7 @@ impl Seen<'_> {
     }
 
     /// A wheel's readings by an encoder that is off in this way.
-    fn off(&self, mode: &MotionMode, wheel: usize, way: usize, said: &Sized) -> f64 {
+    fn off(&self, mode: &MotionMode, wheel: usize, way: usize, said: &EncoderSizes) -> f64 {
         let is_stuck = mode.moved.is_stuck(wheel);
         match (is_stuck, way) {
             (true, BIAS | DRIFT) => said.standing[wheel],
@@ -91,7 +91,7 @@ impl Seen<'_> {
     /// changed.
     pub fn weigh(
         &self,
-        prepared: &Prepared,
+        prepared: &MotionTerms,
         (births, death): (&[f64; WHEELS], f64),
         fresh: u32,
         encoders: &mut Encoders,
@@ -173,7 +173,7 @@ pub fn age_s(t_ns: u64, onset_ns: u64) -> f64 {
 }
 
 /// True if more than one wheel sticks or turns again; not if a single stuck wheel was another one.
-pub fn changes_several(before: Moved, after: Moved) -> bool {
+pub fn changes_several(before: Mover, after: Mover) -> bool {
     let is_unknown = after.is_unknown();
     let (before, after) = (before.stuck(), after.stuck());
     let is_another = before.count_ones() == 1 && after.count_ones() == 1;
@@ -181,7 +181,7 @@ pub fn changes_several(before: Moved, after: Moved) -> bool {
 }
 
 /// The wheel that sticks besides those that do.
-pub fn newly_stuck(before: Moved, after: Moved) -> Option<usize> {
+pub fn newly_stuck(before: Mover, after: Mover) -> Option<usize> {
     let new = after.stuck() & !before.stuck();
     (new != 0).then(|| new.trailing_zeros() as usize)
 }

@@ -7,7 +7,7 @@
 
 use vigil_blocks::WHEELS;
 use vigil_robot::learned::wheel_context::FAR_SD;
-use vigil_robot::learned::wheel_evidence::{Dragged, TOGETHER_SD};
+use vigil_robot::learned::wheel_evidence::{TOGETHER_SD, WheelDrag};
 use vigil_robot::learned::{Model, Observation, WheelEvidence};
 
 /// Deviation by which the offset drifts from one observation to the next: the ground changes. It
@@ -40,7 +40,7 @@ impl RateOffsets {
         observation: &Observation,
         evidence: &WheelEvidence,
         wheel: usize,
-        dragged: &Dragged,
+        dragged: &WheelDrag,
     ) -> f64 {
         let about = self.expected(wheel, dragged);
         evidence.turning(model, observation, wheel, about)
@@ -52,7 +52,7 @@ impl RateOffsets {
         observation: &Observation,
         evidence: &WheelEvidence,
         wheel: usize,
-        dragged: &Dragged,
+        dragged: &WheelDrag,
     ) {
         let reading = &observation.wheels[wheel];
         if reading.plain > 0 {
@@ -62,7 +62,7 @@ impl RateOffsets {
     }
 
     /// Rate (rad/s) and variance at which a wheel is expected, the offset included.
-    fn expected(&self, wheel: usize, dragged: &Dragged) -> (f64, f64) {
+    fn expected(&self, wheel: usize, dragged: &WheelDrag) -> (f64, f64) {
         let change = dragged.change_rad_s;
         (
             dragged.rate_rad_s + self.mean[wheel] * change,
@@ -71,7 +71,7 @@ impl RateOffsets {
     }
 
     /// Takes a rate as read, rad/s, with the variance of its noise.
-    fn update(&mut self, wheel: usize, dragged: &Dragged, rate: f64, noise: f64) {
+    fn update(&mut self, wheel: usize, dragged: &WheelDrag, rate: f64, noise: f64) {
         let (expected, variance) = self.expected(wheel, dragged);
         let (apart, total) = (rate - expected, variance + noise);
         if apart * apart <= FAR_SD * FAR_SD * total {
@@ -88,8 +88,8 @@ impl RateOffsets {
 mod tests {
     use super::*;
 
-    fn dragged(change_rad_s: f64) -> Dragged {
-        Dragged {
+    fn dragged(change_rad_s: f64) -> WheelDrag {
+        WheelDrag {
             rate_rad_s: 2.0 + change_rad_s,
             change_rad_s,
             variance: 0.001,

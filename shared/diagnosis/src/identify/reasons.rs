@@ -14,7 +14,7 @@ use vigil_robot::Description;
 use vigil_robot::learned::wheel_evidence::ANYTHING;
 use vigil_robot::learned::wheels::steering_angle;
 use vigil_robot::learned::{
-    Healthy, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext, WheelEvidence,
+    Healthy, Model, MotionMode, Mover, NoiseScales, Observation, WheelContext, WheelEvidence,
 };
 
 use crate::identify::angles::Angles;
@@ -135,15 +135,15 @@ impl Reasons {
         (self.onset_ns, self.wheels) = (onset_ns, healthy.wheels);
         let lineage = |explanation| {
             let (moved, broken) = match explanation {
-                Explanation::Unknown => (Moved::UnknownAny, 0),
+                Explanation::Unknown => (Mover::UnknownAny, 0),
                 Explanation::Leaves(set) => {
                     let (stuck, askew) = (wheels(&leaves.stuck, set), wheels(&leaves.steer, set));
                     let jumped = leaves.pose.is_some_and(|pose| set >> pose & 1 == 1);
                     let moved = match (stuck, askew) {
-                        (0, 0) if jumped => Moved::Pose,
-                        (0, 0) => Moved::Nominal,
-                        (0, askew) => Moved::Steer(askew.trailing_zeros() as usize),
-                        (stuck, _) => Moved::Stuck(stuck),
+                        (0, 0) if jumped => Mover::Pose,
+                        (0, 0) => Mover::Nominal,
+                        (0, askew) => Mover::Steer(askew.trailing_zeros() as usize),
+                        (stuck, _) => Mover::Stuck(stuck),
                     };
                     (moved, wheels(&leaves.encoder, set))
                 }
@@ -156,7 +156,7 @@ impl Reasons {
                 track: healthy.track(&noise),
                 offsets: RateOffsets::default(),
                 servo: match moved {
-                    Moved::Steer(wheel) => {
+                    Mover::Steer(wheel) => {
                         let angle = steering_angle(&self.robot, wheel, commanded_1_m);
                         Some(Servo::new(&self.servo, angle))
                     }
@@ -218,7 +218,7 @@ impl Reasons {
                     // In any way, also by a size: then it reads a smooth rate of its own.
                     let ways = [evidence.broken_anyhow(wheel), evidence.own_rate[wheel]];
                     log_add(ways[0], ways[1]) - std::f64::consts::LN_2
-                } else if moved == Moved::UnknownAny {
+                } else if moved == Mover::UnknownAny {
                     let healthy = evidence.healthy[wheel];
                     let ratio = evidence.any[wheel] - healthy;
                     healthy + lineage.anything[wheel].step([0.0, ratio], [CHANGES; 2])
@@ -236,8 +236,8 @@ impl Reasons {
             for (wheel, reading) in evidence.steer.iter().enumerate() {
                 let Some(reading) = reading else { continue };
                 lineage.heard[Channel::steer(wheel)] += match (moved, &mut lineage.servo) {
-                    (Moved::UnknownAny, _) => lineage.angles.step_one(wheel, reading, CHANGES),
-                    (Moved::Steer(askew), Some(servo)) if askew == wheel => {
+                    (Mover::UnknownAny, _) => lineage.angles.step_one(wheel, reading, CHANGES),
+                    (Mover::Steer(askew), Some(servo)) if askew == wheel => {
                         servo.step(&self.servo, reading)
                     }
                     _ => 0.0,

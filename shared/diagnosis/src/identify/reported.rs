@@ -14,13 +14,13 @@ const SLACK_S: f64 = 1e-6;
 
 /// The name that is held: index of a node, [`MODE_UNKNOWN`] or [`MODE_MULTIPLE`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Reported {
+pub struct HeldName {
     held: u32,
     changes: u32,
     nominal_s: f64,
 }
 
-impl Reported {
+impl HeldName {
     /// The held name.
     #[must_use]
     pub const fn name(&self) -> u32 {
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn a_name_is_held_until_another_one_is_clear_or_the_robot_is_nominal_for_a_second() {
-        let (mut reported, leaves) = (Reported::default(), leaves());
+        let (mut reported, leaves) = (HeldName::default(), leaves());
         reported.take((3, 0.69), &belief(0.31, 0.69, 0.0), &leaves, 0.05);
         assert_eq!(reported.name(), 0, "the nominal mode is above .3");
         reported.take((3, 0.8), &belief(0.2, 0.8, 0.0), &leaves, 0.05);
@@ -150,7 +150,7 @@ mod tests {
 
     #[test]
     fn what_holds_with_the_held_name_takes_its_place() {
-        let (mut reported, leaves) = (Reported::default(), leaves());
+        let (mut reported, leaves) = (HeldName::default(), leaves());
         let mut belief = belief(0.0, 0.9, 0.0);
         belief.nodes[2] = 0.99;
         reported.take((2, 0.99), &belief, &leaves, 0.05);

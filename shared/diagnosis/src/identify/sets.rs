@@ -1,7 +1,7 @@
 //! Probabilities of all sets of faults, from hypotheses about motion and encoders.
 
 use vigil_blocks::{FAULT_SETS, FaultSet, WHEELS};
-use vigil_robot::learned::{MotionMode, Moved};
+use vigil_robot::learned::{MotionMode, Mover};
 
 use crate::identify::further::Fusion;
 use crate::identify::modes::Leaves;
@@ -22,7 +22,7 @@ pub struct Sets {
     /// (bits) are broken.
     p: Vec<f64>,
     /// Of each motion mode: [`Leaves::shares`].
-    shares: Vec<Vec<(Moved, f64)>>,
+    shares: Vec<Vec<(Mover, f64)>>,
     /// Per motion mode: what of it no fault describes.
     p_unknown: Vec<f64>,
     wheels: usize,
@@ -36,7 +36,7 @@ impl Sets {
     #[must_use]
     pub fn new(modes: &[MotionMode], leaves: &Leaves, wheels: usize) -> Self {
         let subsets = 1 << wheels;
-        let is_other = |mode: &MotionMode| matches!(mode.moved, Moved::Steer(_) | Moved::Pose);
+        let is_other = |mode: &MotionMode| matches!(mode.moved, Mover::Steer(_) | Mover::Pose);
         let others = if modes.iter().any(is_other) {
             POSE + 1
         } else {
@@ -82,8 +82,8 @@ impl Sets {
         let subsets = self.products.len();
         for (moved, share) in shares {
             let row = match moved {
-                Moved::Steer(wheel) => subsets + wheel,
-                Moved::Pose => subsets + POSE,
+                Mover::Steer(wheel) => subsets + wheel,
+                Mover::Pose => subsets + POSE,
                 moved => moved.stuck() as usize,
             };
             let row = &mut self.p[row * subsets..(row + 1) * subsets];

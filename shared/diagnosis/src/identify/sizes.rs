@@ -15,7 +15,7 @@ use vigil_robot::learned::{Model, MotionMode, Observation, WheelEvidence};
 use vigil_robot::{Description, Tolerance};
 
 use crate::identify::encoders::Encoders;
-use crate::identify::late::Late;
+use crate::identify::late::DelayBelief;
 
 /// Ways with a size: gain, bias, drift, delay.
 pub const WAYS: usize = 4;
@@ -57,7 +57,7 @@ const BIAS_WANDERS: f64 = 30.0;
 
 /// What the last observation says of each wheel's encoder, if it is broken in each way.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sized {
+pub struct EncoderSizes {
     /// Log-likelihoods, comparable within a wheel.
     pub logs: [[f64; WAYS]; WHEELS],
     /// That of a bias on a wheel that stands.
@@ -73,7 +73,7 @@ pub struct Sizes {
     priors: [Prior; DELAY],
     fresh: [Size; DELAY],
     held: [[Size; DELAY]; WHEELS],
-    late: Late,
+    late: DelayBelief,
 }
 
 /// One observation, with the rates of the most probable motion that has a name.
@@ -142,7 +142,7 @@ impl Sizes {
             priors,
             fresh,
             held: [fresh; WHEELS],
-            late: Late::default(),
+            late: DelayBelief::default(),
         }
     }
 
@@ -170,8 +170,8 @@ impl Sizes {
     }
 
     /// Takes an observation of the first `wheels` wheels: what it says, and what it teaches.
-    pub fn take(&mut self, sight: &Sight<'_>, wheels: usize) -> Sized {
-        let mut said = Sized {
+    pub fn take(&mut self, sight: &Sight<'_>, wheels: usize) -> EncoderSizes {
+        let mut said = EncoderSizes {
             logs: [[f64::NEG_INFINITY; WAYS]; WHEELS],
             standing: [0.0; WHEELS],
             late: 0,

@@ -7,7 +7,7 @@ use crate::identify::blindfold::Blindfold;
 use crate::identify::identifier::{Identifier, Input};
 use crate::identify::modes::Leaves;
 use crate::identify::posterior::Posterior;
-use crate::identify::reported::Reported;
+use crate::identify::reported::HeldName;
 
 /// Reports ND with 1 - p(fault) of the detector and the rest as unknown.
 #[derive(Debug, Clone)]
@@ -16,7 +16,7 @@ pub struct Watcher {
     node_count: u32,
     posterior: Posterior,
     leaves: Leaves,
-    reported: Reported,
+    reported: HeldName,
     run_id: u64,
     /// Capture time of the last frame, ns, and motion in it, s, until it has been reported.
     t_ns: u64,
@@ -33,7 +33,7 @@ impl Watcher {
             node_count: tree.nodes().len() as u32,
             posterior: Posterior::nominal(),
             leaves: Leaves::none(),
-            reported: Reported::default(),
+            reported: HeldName::default(),
             run_id: 0,
             t_ns: 0,
             moved_s: 0.0,

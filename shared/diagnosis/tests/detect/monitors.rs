@@ -9,12 +9,12 @@ use vigil_setup::schema;
 /// Time between frames.
 const STEP_S: f64 = 0.1;
 
-struct Watched {
+struct Frames {
     monitors: Monitors,
     frame: SensorFrame,
 }
 
-impl Watched {
+impl Frames {
     fn new() -> Self {
         let settings = schema::Monitors {
             position_error_m: 0.5,
@@ -46,7 +46,7 @@ impl Watched {
 
 #[test]
 fn an_error_in_position_is_of_a_moving_or_a_stopped_robot_and_ends_below_half() {
-    let mut robot = Watched::new();
+    let mut robot = Frames::new();
     // The plan goes on by 0.05 m a frame, the robot by 0.025 m: 0.5 m apart after 20 frames.
     let mut fired = Vec::new();
     for k in 1..=30 {
@@ -80,7 +80,7 @@ fn round(k: u32) -> [f64; 3] {
 
 #[test]
 fn a_loop_is_a_place_come_back_to_that_the_plan_did_not_come_back_to() {
-    let mut robot = Watched::new();
+    let mut robot = Frames::new();
     // The plan goes straight on, within half a metre at first: only what loops counts here.
     let first = (0..=160).find(|&k| {
         let planned = [0.05 * f64::from(k), 0.0, 0.0];
@@ -91,7 +91,7 @@ fn a_loop_is_a_place_come_back_to_that_the_plan_did_not_come_back_to() {
     let k = first.unwrap();
     assert!((74..=80).contains(&k), "{k}");
     // A plan that goes round is no loop.
-    let mut planned = Watched::new();
+    let mut planned = Frames::new();
     for k in 0..400 {
         assert_eq!(planned.at(round(k), round(k)), 0);
     }
@@ -99,7 +99,7 @@ fn a_loop_is_a_place_come_back_to_that_the_plan_did_not_come_back_to() {
 
 #[test]
 fn a_spin_is_a_turn_on_the_spot_that_the_plan_does_not_make() {
-    let spins = |robot: &mut Watched, turn: f64, planned: f64, drift_m: f64| {
+    let spins = |robot: &mut Frames, turn: f64, planned: f64, drift_m: f64| {
         (1..=200).find(|k| {
             let k = f64::from(*k);
             let yaw = |turn: f64| (k * turn + PI).rem_euclid(TAU) - PI;
@@ -109,13 +109,13 @@ fn a_spin_is_a_turn_on_the_spot_that_the_plan_does_not_make() {
         })
     };
     // From the first frame on; 6.25 rad by 0.1 rad a frame: 63 more.
-    assert_eq!(spins(&mut Watched::new(), 0.1, 0.0, 0.0), Some(64));
-    assert_eq!(spins(&mut Watched::new(), -0.1, 0.0, 0.0), Some(64));
+    assert_eq!(spins(&mut Frames::new(), 0.1, 0.0, 0.0), Some(64));
+    assert_eq!(spins(&mut Frames::new(), -0.1, 0.0, 0.0), Some(64));
     // Planned turns do not count; a robot that leaves the spot does not spin.
-    assert_eq!(spins(&mut Watched::new(), 0.1, 0.1, 0.0), None);
-    assert_eq!(spins(&mut Watched::new(), 0.1, 0.0, 0.02), None);
+    assert_eq!(spins(&mut Frames::new(), 0.1, 0.1, 0.0), None);
+    assert_eq!(spins(&mut Frames::new(), 0.1, 0.0, 0.02), None);
     // To and fro is no spin.
-    let mut robot = Watched::new();
+    let mut robot = Frames::new();
     for k in 0..400 {
         let yaw = 1.5 * (0.1 * f64::from(k)).sin();
         assert_eq!(robot.at([0.0, 0.0, yaw], [0.0; 3]), 0);
@@ -124,7 +124,7 @@ fn a_spin_is_a_turn_on_the_spot_that_the_plan_does_not_make() {
 
 #[test]
 fn a_jump_of_the_frame_begins_anew_and_half_a_frame_changes_nothing() {
-    let mut robot = Watched::new();
+    let mut robot = Frames::new();
     assert_eq!(robot.at([0.0; 3], [0.0; 3]), 0);
     assert_eq!(robot.at([2.0, 0.0, 0.0], [0.0; 3]), Symptoms::EPM);
     for (valid, x) in [
@@ -149,7 +149,7 @@ fn a_jump_of_the_frame_begins_anew_and_half_a_frame_changes_nothing() {
 
 #[test]
 fn without_a_plan_for_long_the_robot_is_not_where_it_should_be() {
-    let mut robot = Watched::new();
+    let mut robot = Frames::new();
     let whole = robot.frame.valid;
     // A planner that has never spoken says nothing.
     robot.frame.valid = Valid::POSE;
@@ -176,7 +176,7 @@ fn without_a_plan_for_long_the_robot_is_not_where_it_should_be() {
 
 #[test]
 fn an_error_in_position_does_not_outlive_the_pose() {
-    let mut robot = Watched::new();
+    let mut robot = Frames::new();
     robot.at([0.0; 3], [0.0; 3]);
     assert_eq!(robot.at([2.0, 0.0, 0.0], [0.0; 3]), Symptoms::EPM);
     robot.frame.valid = Valid::PLANNED_POSE;
@@ -189,12 +189,12 @@ fn an_error_in_position_does_not_outlive_the_pose() {
 
 #[test]
 fn a_loop_and_a_spin_end_when_the_robot_stands() {
-    let mut robot = Watched::new();
+    let mut robot = Frames::new();
     for k in 0..=80 {
         robot.at(round(k), [0.05 * f64::from(k), 0.0, 0.0]);
     }
     let planned = [4.0, 0.0, 0.0];
-    let fires = |robot: &mut Watched, pose, symptom| {
+    let fires = |robot: &mut Frames, pose, symptom| {
         let fired: Vec<bool> = (0..150)
             .map(|_| robot.at(pose, planned) & symptom != 0)
             .collect();
@@ -203,8 +203,8 @@ fn a_loop_and_a_spin_end_when_the_robot_stands() {
     };
     fires(&mut robot, round(80), Symptoms::LD);
     // On the spot, once round; then it stands; then once round again.
-    let mut robot = Watched::new();
-    let spin = |robot: &mut Watched| {
+    let mut robot = Frames::new();
+    let spin = |robot: &mut Frames| {
         (1..=64)
             .map(|k| robot.at([4.0, 0.0, wrapped(0.1 * f64::from(k))], planned))
             .last()

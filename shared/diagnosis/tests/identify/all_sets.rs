@@ -10,7 +10,7 @@ use vigil_inference::track::Track;
 use vigil_robot::Description;
 use vigil_robot::learned::wheel_evidence::{BREAKAGE_SHARES, BREAKAGES};
 use vigil_robot::learned::{
-    FaultRates, Healthy, Model, MotionMode, Moved, NoiseScales, Observation, Observer,
+    FaultRates, Healthy, Model, MotionMode, Mover, NoiseScales, Observation, Observer,
     WheelContext, WheelEvidence, motion_modes,
 };
 use vigil_robot::slip::SlipModel;
@@ -56,8 +56,8 @@ impl Rig {
             modes: (0..SETS as u32)
                 .map(|set| {
                     let moved = match set {
-                        0 => Moved::Nominal,
-                        set => Moved::Stuck(set),
+                        0 => Mover::Nominal,
+                        set => Mover::Stuck(set),
                     };
                     modes
                         .iter()

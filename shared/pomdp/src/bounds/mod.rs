@@ -20,7 +20,7 @@ pub(crate) mod linear;
 pub mod mdp;
 pub mod tib;
 
-use crate::budget::Stopped;
+use crate::budget::StopRequest;
 
 /// What a backup over so many `terms` may lose by rounding, relative to the largest value; upper
 /// bounds are moved up by it and lower ones down, so that such as are equal in truth never cross.
@@ -62,7 +62,7 @@ impl ActionValues {
 
     /// q_a over states.
     #[must_use]
-    pub fn of(&self, action: usize) -> &[f64] {
+    pub fn values(&self, action: usize) -> &[f64] {
         &self.values[action * self.states..][..self.states]
     }
 
@@ -104,8 +104,8 @@ pub enum SolveError {
     Stopped,
 }
 
-impl From<Stopped> for SolveError {
-    fn from(_: Stopped) -> Self {
+impl From<StopRequest> for SolveError {
+    fn from(_: StopRequest) -> Self {
         Self::Stopped
     }
 }

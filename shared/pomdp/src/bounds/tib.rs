@@ -113,7 +113,7 @@ impl Steps {
         Ok(steps)
     }
 
-    fn of(&self, s: usize, a: usize) -> &[(BeliefId, f64)] {
+    fn successors(&self, s: usize, a: usize) -> &[(BeliefId, f64)] {
         &self.to[(s * self.actions + a) * self.observations..][..self.observations]
     }
 
@@ -122,12 +122,12 @@ impl Steps {
         let states = self.to.len() / self.actions / self.observations;
         let branches: Vec<usize> = (0..states)
             .map(|s| {
-                let all = (0..self.actions).flat_map(|a| self.of(s, a));
+                let all = (0..self.actions).flat_map(|a| self.successors(s, a));
                 all.filter(|(_, p)| *p > 0.0).count()
             })
             .collect();
         let ids = 0..self.beliefs.len() as BeliefId;
-        ids.flat_map(|id| self.beliefs.of(id))
+        ids.flat_map(|id| self.beliefs.entries(id))
             .map(|(s, _)| branches[*s as usize])
             .sum()
     }
@@ -135,14 +135,14 @@ impl Steps {
     fn mixtures(&self, model: &Pomdp, budget: &mut Budget<'_>) -> Result<Mixtures, SolveError> {
         let mut mixtures = Mixtures::new(self.actions);
         for id in 0..self.beliefs.len() as BeliefId {
-            let belief = self.beliefs.of(id);
+            let belief = self.beliefs.entries(id);
             for a in 0..self.actions {
                 budget.spend(self.observations * belief.len())?;
                 let mut count = 0;
                 for o in 0..self.observations {
                     let mut is_possible = false;
                     for (s, b) in belief {
-                        let (to, p) = self.of(*s as usize, a)[o];
+                        let (to, p) = self.successors(*s as usize, a)[o];
                         if p > 0.0 {
                             mixtures.rows_mut().push(to as usize, b * p);
                             is_possible = true;
@@ -191,8 +191,8 @@ pub fn solve_from(
     let guess = ids
         .flat_map(|id| (0..actions).map(move |a| (id, a)))
         .map(|(id, a)| {
-            let q = fast.of(a);
-            let terms = steps.beliefs.of(id).iter();
+            let q = fast.values(a);
+            let terms = steps.beliefs.entries(id).iter();
             terms.map(|(s, b)| b * q[*s as usize]).sum()
         })
         .collect();
@@ -203,7 +203,7 @@ pub fn solve_from(
             budget.spend(actions * n)?;
             for next in 0..actions {
                 table.extend((0..n).map(|s| {
-                    let (to, p) = steps.of(s, a)[o];
+                    let (to, p) = steps.successors(s, a)[o];
                     model.discount() * p * q[to as usize * actions + next]
                 }));
             }

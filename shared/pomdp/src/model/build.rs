@@ -93,7 +93,7 @@ impl Pomdp {
     /// Checks every distribution, and computes what follows from the parts.
     pub(crate) fn from_parts(mut parts: Parts) -> Result<Self, ParseError> {
         let n = parts.states.len();
-        let mut told = Told {
+        let mut told = WarningList {
             warnings: std::mem::take(&mut parts.warnings),
             left_out: 0,
         };
@@ -158,12 +158,12 @@ pub(crate) fn refuse_sum(
 }
 
 /// Warnings so far.
-struct Told {
+struct WarningList {
     warnings: Vec<Warning>,
     left_out: usize,
 }
 
-impl Told {
+impl WarningList {
     fn check_sum(
         &mut self,
         sum: f64,

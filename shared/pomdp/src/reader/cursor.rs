@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::lexer::{Lexer, Placed, Token};
+use super::lexer::{Lexer, PlacedToken, Token};
 use super::limits::NAMES_MAX;
 use super::{ParseError, Position};
 
@@ -77,7 +77,7 @@ impl Names {
 /// A place in the text.
 pub(super) struct Cursor<'a> {
     lexer: Lexer<'a>,
-    ahead: Placed<'a>,
+    ahead: PlacedToken<'a>,
 }
 
 impl<'a> Cursor<'a> {

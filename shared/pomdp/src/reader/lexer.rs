@@ -18,7 +18,7 @@ pub(super) enum Token<'a> {
 
 /// A token and where it begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Placed<'a> {
+pub(super) struct PlacedToken<'a> {
     pub token: Token<'a>,
     pub at: Position,
 }
@@ -42,11 +42,11 @@ impl<'a> Lexer<'a> {
     }
 
     /// The next token; [`Token::End`] again and again at the end.
-    pub(super) fn next(&mut self) -> Result<Placed<'a>, ParseError> {
+    pub(super) fn next(&mut self) -> Result<PlacedToken<'a>, ParseError> {
         self.skip_space();
         let at = self.at;
         let token = self.token()?;
-        Ok(Placed { token, at })
+        Ok(PlacedToken { token, at })
     }
 
     fn rest(&self) -> &'a str {

@@ -79,10 +79,10 @@ impl<F> Rules<F> {
             for state in 0..self.states {
                 numbers.clear();
                 let parts = [
-                    whole.of(0),
-                    by_state.of(state),
-                    by_action.of(action),
-                    by_row.of(action * self.states + state),
+                    whole.indices(0),
+                    by_state.indices(state),
+                    by_action.indices(action),
+                    by_row.indices(action * self.states + state),
                 ];
                 for part in parts {
                     numbers.extend_from_slice(part);
@@ -128,7 +128,7 @@ struct Lists {
 }
 
 impl Lists {
-    fn of(&self, key: usize) -> &[u32] {
+    fn indices(&self, key: usize) -> &[u32] {
         &self.numbers[self.starts[key] as usize..self.starts[key + 1] as usize]
     }
 }

@@ -59,7 +59,7 @@ impl Alphas {
         self.stamp
     }
 
-    pub(super) fn of(&self, id: AlphaId) -> &[f64] {
+    pub(super) fn values(&self, id: AlphaId) -> &[f64] {
         &self.values[id as usize * self.states..][..self.states]
     }
 
@@ -78,7 +78,7 @@ impl Alphas {
     }
 
     pub(super) fn value(&self, id: AlphaId, belief: &[(u32, f64)]) -> f64 {
-        let alpha = self.of(id);
+        let alpha = self.values(id);
         belief.iter().map(|(s, b)| b * alpha[*s as usize]).sum()
     }
 

@@ -2,7 +2,7 @@
 
 use super::alphas::AlphaId;
 use super::tree::Tree;
-use crate::budget::{Budget, Stopped};
+use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
 /// An improvement below this, relative to the value, is rounding.
@@ -17,7 +17,7 @@ impl Tree<'_> {
         &mut self,
         id: BeliefId,
         budget: &mut Budget<'_>,
-    ) -> Result<usize, Stopped> {
+    ) -> Result<usize, StopRequest> {
         let before = self.upper(id, budget)?;
         budget.spend(10 * self.model.actions().len())?;
         let first = self.branches_of(id, budget)?;
@@ -57,7 +57,7 @@ impl Tree<'_> {
         &mut self,
         id: BeliefId,
         budget: &mut Budget<'_>,
-    ) -> Result<(), Stopped> {
+    ) -> Result<(), StopRequest> {
         let before = self.lower(id, budget)?;
         let first = self.branches_of(id, budget)?;
         let mut best = (0, before + ROUNDING * before.abs().max(1e-3), false);
@@ -101,7 +101,7 @@ impl Tree<'_> {
         id: BeliefId,
         action: usize,
         budget: &mut Budget<'_>,
-    ) -> Result<(), Stopped> {
+    ) -> Result<(), StopRequest> {
         let children = self.children_of(id, action, budget)?;
         let children = &self.children[children];
         // What cannot be observed here goes on as what is most probable.
@@ -127,7 +127,7 @@ impl Tree<'_> {
         let states = model.states().len();
         let mut seen = vec![0.0; states];
         for (o, successor) in successors.iter().enumerate() {
-            let alpha = self.alphas.of(*successor);
+            let alpha = self.alphas.values(*successor);
             for ((sum, z), v) in seen.iter_mut().zip(model.likelihood(action, o)).zip(alpha) {
                 *sum += z * v;
             }

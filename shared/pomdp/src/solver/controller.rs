@@ -12,7 +12,7 @@ use super::alphas::{AlphaId, Alphas};
 use super::tree::Tree;
 use crate::bounds::SolveError;
 use crate::bounds::linear::{Rows, System};
-use crate::budget::{Budget, Stopped};
+use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
 /// Largest number of matrix entries.
@@ -57,7 +57,7 @@ impl Tree<'_> {
         &mut self,
         root: BeliefId,
         budget: &mut Budget<'_>,
-    ) -> Result<(), Stopped> {
+    ) -> Result<(), StopRequest> {
         let controller = self.controller(root, budget)?;
         // The root alone may be too large, or its best plan not looked into yet.
         if controller.parts.is_empty() {
@@ -65,12 +65,12 @@ impl Tree<'_> {
         }
         let values = match self.controller_values(&controller, budget) {
             Ok(values) => values,
-            Err(SolveError::Stopped) => return Err(Stopped),
+            Err(SolveError::Stopped) => return Err(StopRequest),
             Err(_) => return Ok(()),
         };
         let states = self.model.states().len();
         let is_better = |tree: &Self, part: usize| {
-            let belief = tree.beliefs.of(controller.parts[part]);
+            let belief = tree.beliefs.entries(controller.parts[part]);
             let alpha = &values[part * states..][..states];
             let value: f64 = belief.iter().map(|(s, b)| b * alpha[*s as usize]).sum();
             let before = tree.nodes[controller.parts[part] as usize].lower;
@@ -104,7 +104,7 @@ impl Tree<'_> {
         &mut self,
         root: BeliefId,
         budget: &mut Budget<'_>,
-    ) -> Result<Controller, Stopped> {
+    ) -> Result<Controller, StopRequest> {
         let states = self.model.states().len();
         let observations = self.model.observations().len();
         let mut place: HashMap<BeliefId, u32> = HashMap::new();
@@ -146,7 +146,7 @@ impl Tree<'_> {
         parts: Vec<BeliefId>,
         place: &HashMap<BeliefId, u32>,
         budget: &mut Budget<'_>,
-    ) -> Result<Controller, Stopped> {
+    ) -> Result<Controller, StopRequest> {
         let mut controller = Controller {
             actions: Vec::new(),
             next: Vec::new(),
@@ -200,7 +200,7 @@ impl Tree<'_> {
                             _ if w <= 0.0 => {}
                             Next::Part(part) => rows.push(*part as usize * states + to, w),
                             Next::Vector(id) => {
-                                reward += model.discount() * w * self.alphas.of(*id)[*to];
+                                reward += model.discount() * w * self.alphas.values(*id)[*to];
                             }
                         }
                     }
@@ -211,7 +211,7 @@ impl Tree<'_> {
                 budget.spend(observations * model.successors(s, *action).len())?;
             }
             let witness = self.nodes[controller.parts[part] as usize].witness;
-            guess.extend(self.alphas.of(witness));
+            guess.extend(self.alphas.values(witness));
         }
         let system = System {
             rows: &rows,

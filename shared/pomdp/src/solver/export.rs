@@ -49,14 +49,14 @@ impl Tree<'_> {
         let needed = self.unbeaten(needed);
         let rows = needed
             .iter()
-            .map(|id| (self.alphas.action(*id), self.alphas.of(*id)));
+            .map(|id| (self.alphas.action(*id), self.alphas.values(*id)));
         AlphaVectors::new(self.model.states().len(), actions, rows)
     }
 
     /// Takes out what another one beats in every state; of equal ones the first stays.
     fn unbeaten(&self, ids: Vec<AlphaId>) -> Vec<AlphaId> {
         // What beats another has the larger sum.
-        let sum = |id: AlphaId| (self.alphas.of(id).iter().sum::<f64>(), id);
+        let sum = |id: AlphaId| (self.alphas.values(id).iter().sum::<f64>(), id);
         let mut by_sum: Vec<(f64, AlphaId)> = ids.into_iter().map(sum).collect();
         by_sum.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut kept: Vec<AlphaId> = Vec::with_capacity(by_sum.len());
@@ -77,7 +77,11 @@ impl Tree<'_> {
     }
 
     fn beats(&self, one: AlphaId, other: AlphaId) -> bool {
-        let pairs = self.alphas.of(one).iter().zip(self.alphas.of(other));
+        let pairs = self
+            .alphas
+            .values(one)
+            .iter()
+            .zip(self.alphas.values(other));
         pairs.into_iter().all(|(one, other)| one >= other)
     }
 }

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use super::controller::heaviest;
 use super::tree::Tree;
-use crate::budget::{Budget, Stopped};
+use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
 /// Beliefs gone through, and expanded.
@@ -22,7 +22,7 @@ impl Tree<'_> {
         &mut self,
         root: BeliefId,
         budget: &mut Budget<'_>,
-    ) -> Result<(), Stopped> {
+    ) -> Result<(), StopRequest> {
         let mut weights = HashMap::from([(root, 1.0)]);
         let mut is_seen = vec![false; self.nodes.len()];
         let (mut visited, mut edge) = (Vec::new(), Vec::new());

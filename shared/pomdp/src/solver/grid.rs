@@ -8,7 +8,7 @@
 use super::tree::Tree;
 use crate::bounds::SolveError;
 use crate::bounds::linear::{Rows, System};
-use crate::budget::{Budget, Stopped};
+use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
 /// Largest number of beliefs.
@@ -45,7 +45,7 @@ impl Choices {
 
 impl Tree<'_> {
     /// Lowers the upper bounds of all expanded beliefs to what they allow each other.
-    pub(super) fn lower_all(&mut self, budget: &mut Budget<'_>) -> Result<(), Stopped> {
+    pub(super) fn lower_all(&mut self, budget: &mut Budget<'_>) -> Result<(), StopRequest> {
         let ids: Vec<BeliefId> = (0..self.nodes.len() as BeliefId)
             .filter(|id| self.nodes[*id as usize].branches.is_some())
             .collect();
@@ -59,7 +59,7 @@ impl Tree<'_> {
             .collect();
         let values = match self.grid_values(&choices, guess, budget) {
             Ok(values) => values,
-            Err(SolveError::Stopped) => return Err(Stopped),
+            Err(SolveError::Stopped) => return Err(StopRequest),
             Err(_) => return Ok(()),
         };
         for (id, value) in ids.iter().zip(values) {
@@ -73,7 +73,11 @@ impl Tree<'_> {
         Ok(())
     }
 
-    fn choices(&mut self, ids: &[BeliefId], budget: &mut Budget<'_>) -> Result<Choices, Stopped> {
+    fn choices(
+        &mut self,
+        ids: &[BeliefId],
+        budget: &mut Budget<'_>,
+    ) -> Result<Choices, StopRequest> {
         let mut place = vec![u32::MAX; self.nodes.len()];
         for (at, id) in ids.iter().enumerate() {
             place[*id as usize] = at as u32;

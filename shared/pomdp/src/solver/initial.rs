@@ -1,6 +1,6 @@
 //! The bounds that a search begins with.
 
-use super::{Bracket, Found};
+use super::{Bracket, SearchResult};
 use crate::alpha_vectors::AlphaVectors;
 use crate::bounds::tib::{self, Tib};
 use crate::bounds::{ActionValues, SolveError, blind, fib};
@@ -41,7 +41,7 @@ impl Initial {
     }
 
     /// Narrows the bracket to these bounds.
-    pub(super) fn narrow(&self, model: &Pomdp, found: &mut Found) {
+    pub(super) fn narrow(&self, model: &Pomdp, found: &mut SearchResult) {
         let actions = model.actions().len();
         if let Some(blind) = &self.blind {
             found.bracket.lower = found.bracket.lower.max(blind.value(model.start()));

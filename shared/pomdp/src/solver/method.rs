@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{Bracket, Ended, Options, Progress, solve};
+use super::{Bracket, EndReason, Options, Progress, solve};
 use crate::alpha_vectors::AlphaVectors;
 use crate::bounds::{SolveError, blind, fib, mdp, tib};
 use crate::budget::Budget;
@@ -79,7 +79,7 @@ pub struct Answer {
     /// How far the search came; zeros for the other methods.
     pub progress: Progress,
     /// Why it ended: a method that is not a search and went to its end counts as precise.
-    pub ended: Ended,
+    pub ended: EndReason,
     /// A policy that earns the lower bound, if the method gives one.
     pub vectors: Option<AlphaVectors>,
 }
@@ -99,7 +99,7 @@ impl Answer {
                 points: 0,
                 beliefs: 0,
             },
-            ended: Ended::Precision,
+            ended: EndReason::Precision,
             vectors: None,
         }
     }
@@ -157,7 +157,7 @@ pub fn bound(
     };
     match found {
         Ok(()) => {}
-        Err(SolveError::Stopped) => answer.ended = Ended::Stopped,
+        Err(SolveError::Stopped) => answer.ended = EndReason::Stopped,
         Err(error) => return Err(error),
     }
     Ok(answer)

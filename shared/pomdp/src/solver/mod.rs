@@ -104,7 +104,7 @@ pub struct Progress {
 
 /// Why a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ended {
+pub enum EndReason {
     /// The gap is small enough.
     Precision,
     /// The budget ended.
@@ -115,13 +115,13 @@ pub enum Ended {
 
 /// What a search found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct SearchResult {
     /// Of the optimal value at the start belief.
     pub bracket: Bracket,
     /// How far it came.
     pub progress: Progress,
     /// Why it ended.
-    pub ended: Ended,
+    pub ended: EndReason,
     /// The policy; its value at the start belief is at least the lower bound. None if the budget
     /// ended before there was any.
     pub vectors: Option<AlphaVectors>,
@@ -141,11 +141,11 @@ pub fn solve(
     options: &Options,
     budget: &mut Budget<'_>,
     watch: &mut dyn FnMut(&Progress),
-) -> Result<Found, SolveError> {
-    let mut found = Found {
+) -> Result<SearchResult, SolveError> {
+    let mut found = SearchResult {
         bracket: initial::trivial(model),
         progress: Progress::default(),
-        ended: Ended::Stopped,
+        ended: EndReason::Stopped,
         vectors: None,
     };
     let initial = Initial::new(model, budget)?;

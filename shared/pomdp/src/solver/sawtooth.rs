@@ -87,7 +87,7 @@ impl Sawtooth {
     /// Stores or lowers the value of a point.
     pub(super) fn put(&mut self, beliefs: &SparseBeliefs, belief: BeliefId, value: f64) {
         self.stamp += 1;
-        let entries = beliefs.of(belief);
+        let entries = beliefs.entries(belief);
         let known = self.points.iter().rposition(|p| p.belief == belief);
         let slot = match known {
             Some(at) => self.points.remove(at).slot,
@@ -147,7 +147,7 @@ impl Sawtooth {
             let fall_plane = point.plane - point.value;
             let mut c = 1.0_f64;
             let mut hopeless = false;
-            for (s, b) in beliefs.of(point.belief) {
+            for (s, b) in beliefs.entries(point.belief) {
                 c = c.min(self.dense[*s as usize] / b);
                 work += 1;
                 let floor = (fast - c * fall_fast).min(plane - c * fall_plane);

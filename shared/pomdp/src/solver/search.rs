@@ -1,8 +1,8 @@
 //! What is done in which order: walks, and now and then what serves all beliefs at once.
 
 use super::tree::Tree;
-use super::{Bracket, Ended, Options, Progress};
-use crate::budget::{Budget, Stopped};
+use super::{Bracket, EndReason, Options, Progress};
+use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
 /// A walk aims at this share of the gap at the start belief.
@@ -64,7 +64,7 @@ impl Rhythm {
 }
 
 impl<'m> Search<'m> {
-    pub(super) fn new(mut tree: Tree<'m>, budget: &mut Budget<'_>) -> Result<Self, Stopped> {
+    pub(super) fn new(mut tree: Tree<'m>, budget: &mut Budget<'_>) -> Result<Self, StopRequest> {
         let start = tree.model.start().iter().enumerate();
         let start: Vec<(u32, f64)> = start
             .filter(|(_, b)| **b > 0.0)
@@ -91,26 +91,26 @@ impl<'m> Search<'m> {
         options: &Options,
         budget: &mut Budget<'_>,
         watch: &mut dyn FnMut(&Progress),
-    ) -> Ended {
+    ) -> EndReason {
         loop {
             watch(&self.progress);
             if self.progress.bracket.gap() <= options.precision {
-                return Ended::Precision;
+                return EndReason::Precision;
             }
             if self.tree.bytes() > options.memory_bytes_max {
-                return Ended::Memory;
+                return EndReason::Memory;
             }
             if self.round(options, budget).is_err() {
                 // What was found until then counts.
                 let node = self.tree.nodes[self.root as usize];
                 self.progress.bracket.lower = self.progress.bracket.lower.max(node.lower);
                 self.progress.bracket.upper = self.progress.bracket.upper.min(node.upper);
-                return Ended::Stopped;
+                return EndReason::Stopped;
             }
         }
     }
 
-    fn round(&mut self, options: &Options, budget: &mut Budget<'_>) -> Result<(), Stopped> {
+    fn round(&mut self, options: &Options, budget: &mut Budget<'_>) -> Result<(), StopRequest> {
         let before = (self.tree.children.len(), self.progress.bracket.gap());
         let began = budget.spent();
         // A walk follows what is most probable; what is rare is met at the edge.
@@ -130,7 +130,7 @@ impl<'m> Search<'m> {
         Ok(())
     }
 
-    fn note(&mut self, budget: &mut Budget<'_>) -> Result<(), Stopped> {
+    fn note(&mut self, budget: &mut Budget<'_>) -> Result<(), StopRequest> {
         let tree = &mut self.tree;
         self.progress = Progress {
             bracket: Bracket {
@@ -145,7 +145,7 @@ impl<'m> Search<'m> {
         Ok(())
     }
 
-    fn now_and_then(&mut self, budget: &mut Budget<'_>) -> Result<(), Stopped> {
+    fn now_and_then(&mut self, budget: &mut Budget<'_>) -> Result<(), StopRequest> {
         let (tree, root) = (&mut self.tree, self.root);
         let (lower, upper) = (tree.lower(root, budget)?, tree.upper(root, budget)?);
         let pays = PAYS_SHARE * (upper - lower);

@@ -3,7 +3,7 @@
 use super::alphas::{AlphaId, Alphas};
 use super::sawtooth::{Query, Sawtooth};
 use crate::bounds::tib::Tib;
-use crate::budget::{Budget, Stopped};
+use crate::budget::{Budget, StopRequest};
 use crate::model::Pomdp;
 use crate::sparse_beliefs::{BeliefId, SparseBeliefs};
 
@@ -93,7 +93,7 @@ impl<'m> Tree<'m> {
         &mut self,
         entries: &[(u32, f64)],
         budget: &mut Budget<'_>,
-    ) -> Result<BeliefId, Stopped> {
+    ) -> Result<BeliefId, StopRequest> {
         let id = self.beliefs.intern(entries);
         if (id as usize) < self.nodes.len() {
             return Ok(id);
@@ -115,10 +115,14 @@ impl<'m> Tree<'m> {
     }
 
     /// The lower bound of a node under the newest vectors.
-    pub(super) fn lower(&mut self, id: BeliefId, budget: &mut Budget<'_>) -> Result<f64, Stopped> {
+    pub(super) fn lower(
+        &mut self,
+        id: BeliefId,
+        budget: &mut Budget<'_>,
+    ) -> Result<f64, StopRequest> {
         let node = &mut self.nodes[id as usize];
         if node.alphas_seen < self.alphas.stamp() {
-            let belief = self.beliefs.of(id);
+            let belief = self.beliefs.entries(id);
             let known = (node.witness, node.lower);
             let (best, looked_at) = self.alphas.best_since(node.alphas_seen, belief, known);
             (node.witness, node.lower) = best;
@@ -129,11 +133,15 @@ impl<'m> Tree<'m> {
     }
 
     /// The upper bound of a node under the newest points.
-    pub(super) fn upper(&mut self, id: BeliefId, budget: &mut Budget<'_>) -> Result<f64, Stopped> {
+    pub(super) fn upper(
+        &mut self,
+        id: BeliefId,
+        budget: &mut Budget<'_>,
+    ) -> Result<f64, StopRequest> {
         let node = &mut self.nodes[id as usize];
         if node.points_seen < self.sawtooth.stamp() || node.points_seen == 0 {
             let query = Query {
-                entries: self.beliefs.of(id),
+                entries: self.beliefs.entries(id),
                 value: node.upper,
                 seen: node.points_seen,
             };
@@ -146,7 +154,11 @@ impl<'m> Tree<'m> {
     }
 
     /// Upper less lower bound of a node.
-    pub(super) fn gap(&mut self, id: BeliefId, budget: &mut Budget<'_>) -> Result<f64, Stopped> {
+    pub(super) fn gap(
+        &mut self,
+        id: BeliefId,
+        budget: &mut Budget<'_>,
+    ) -> Result<f64, StopRequest> {
         Ok(self.upper(id, budget)? - self.lower(id, budget)?)
     }
 
@@ -155,13 +167,13 @@ impl<'m> Tree<'m> {
         &mut self,
         id: BeliefId,
         budget: &mut Budget<'_>,
-    ) -> Result<usize, Stopped> {
+    ) -> Result<usize, StopRequest> {
         if let Some(first) = self.nodes[id as usize].branches {
             return Ok(first as usize);
         }
         let first = self.branches.len();
         let actions = self.model.actions().len();
-        let belief = self.beliefs.of(id);
+        let belief = self.beliefs.entries(id);
         let cap = self.nodes[id as usize].upper;
         for a in 0..actions {
             let rewards = belief.iter();
@@ -185,7 +197,7 @@ impl<'m> Tree<'m> {
         id: BeliefId,
         action: usize,
         budget: &mut Budget<'_>,
-    ) -> Result<std::ops::Range<usize>, Stopped> {
+    ) -> Result<std::ops::Range<usize>, StopRequest> {
         let branch = self.branches_of(id, budget)? + action;
         if let Some((first, count)) = self.branches[branch].children {
             return Ok(first as usize..(first + count) as usize);
@@ -193,7 +205,7 @@ impl<'m> Tree<'m> {
         let mut predicted = std::mem::take(&mut self.predicted);
         predicted.fill(0.0);
         let mut work = predicted.len();
-        for (s, b) in self.beliefs.of(id) {
+        for (s, b) in self.beliefs.entries(id) {
             let successors = self.model.successors(*s as usize, action);
             work += successors.len();
             for (to, p) in successors {

@@ -1,7 +1,7 @@
 //! One walk from the start belief to where the bounds are furthest apart, and back.
 
 use super::tree::Tree;
-use crate::budget::{Budget, Stopped};
+use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
 /// Longest walk.
@@ -16,7 +16,7 @@ impl Tree<'_> {
         root: BeliefId,
         target: f64,
         budget: &mut Budget<'_>,
-    ) -> Result<(), Stopped> {
+    ) -> Result<(), StopRequest> {
         let mut path = vec![root];
         let mut node = root;
         let mut allowed = target;

@@ -15,7 +15,7 @@ fn graph(nodes_max: usize) -> (Pomdp, PolicyGraph) {
         nodes_max,
         tolerance: 1e-9,
     };
-    let graph = PolicyGraph::of(&model, &mut decider, limits);
+    let graph = PolicyGraph::new(&model, &mut decider, limits);
     (model, graph)
 }
 

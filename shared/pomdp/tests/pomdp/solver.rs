@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vigil_pomdp::bounds::{blind, fib, tib};
-use vigil_pomdp::solver::{Ended, Found, Options, Progress, solve};
+use vigil_pomdp::solver::{EndReason, Options, Progress, SearchResult, solve};
 use vigil_pomdp::{Budget, Evidence, PointBased, Policy, Pomdp, Tracker};
 
 use crate::public;
@@ -125,7 +125,7 @@ fn pick(u: f64, probabilities: impl IntoIterator<Item = f64>) -> usize {
 }
 
 /// Solves; the budget ends after so many questions.
-fn solved(model: &Pomdp, precision: f64, questions: usize) -> (Found, Vec<Progress>) {
+fn solved(model: &Pomdp, precision: f64, questions: usize) -> (SearchResult, Vec<Progress>) {
     let mut left = questions;
     let mut stop = || {
         left = left.saturating_sub(1);
@@ -141,7 +141,7 @@ fn solved(model: &Pomdp, precision: f64, questions: usize) -> (Found, Vec<Progre
     (found, course)
 }
 
-fn demand_order(name: &str, model: &Pomdp, found: &Found, course: &[Progress]) {
+fn demand_order(name: &str, model: &Pomdp, found: &SearchResult, course: &[Progress]) {
     let mut never = || false;
     let mut budget = Budget::new(&mut never);
     let fast = fib::solve(model, &mut budget).unwrap().value(model.start());
@@ -165,7 +165,7 @@ fn demand_order(name: &str, model: &Pomdp, found: &Found, course: &[Progress]) {
 fn tiger_is_solved() {
     let model = Pomdp::parse(TIGER).unwrap();
     let (found, course) = solved(&model, 1e-7, usize::MAX);
-    assert_eq!(found.ended, Ended::Precision);
+    assert_eq!(found.ended, EndReason::Precision);
     assert!(found.bracket.gap() <= 1e-7);
     assert!((found.bracket.lower - 19.371_368).abs() < 1e-6, "{found:?}");
     demand_order("tiger", &model, &found, &course);
@@ -325,7 +325,12 @@ fn public_models_are_solved_or_narrowed() {
     for (name, precision, questions) in SOLVED {
         let model = public::read(&folder, name);
         let (found, course) = solved(&model, precision, questions);
-        assert_eq!(found.ended, Ended::Precision, "{name}: {:?}", found.bracket);
+        assert_eq!(
+            found.ended,
+            EndReason::Precision,
+            "{name}: {:?}",
+            found.bracket
+        );
         demand_order(name, &model, &found, &course);
     }
     for (name, questions, gap) in NARROWED {

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use vigil_pomdp::bounds::{SolveError, fib, tib};
-use vigil_pomdp::solver::{Found, Options, solve};
+use vigil_pomdp::solver::{Options, SearchResult, solve};
 use vigil_pomdp::{Budget, Pomdp};
 
 /// Solves; the budget ends after so many questions.
-fn solved(model: &Pomdp, questions: usize) -> Found {
+fn solved(model: &Pomdp, questions: usize) -> SearchResult {
     let mut left = questions;
     let mut stop = || {
         left = left.saturating_sub(1);

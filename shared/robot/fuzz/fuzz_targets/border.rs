@@ -35,7 +35,7 @@ fn mended(bytes: &[u8]) -> Vec<u8> {
 }
 
 fuzz_target!(|input: &[u8]| {
-    let mut account = InputAccount::of(Writer::Stranger);
+    let mut account = InputAccount::new(Writer::Stranger);
     let mut guard = GUARD.clone();
     let mut now_ns = 60_000_000_000;
     for bytes in input.chunks(DATAGRAM_SIZE + 1) {

@@ -37,7 +37,7 @@ const COHERENCE: f64 = 3.0;
 
 /// Commanded motion between two observations, from middle to middle, as the body follows it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Followed {
+pub struct FollowedMotion {
     /// Travel, m.
     pub travel_m: f64,
     /// Change of heading by the commanded curvature, rad.
@@ -79,7 +79,7 @@ pub struct BodyLag {
     between: [f64; 2],
     /// Variances of `apart` over the candidates.
     coherent: [f64; 2],
-    late: Late,
+    late: TimingDeviation,
     window: Window,
     /// Displacement per metre of travel beyond the model, by ground or a fault: m/m and rad/m.
     slip: [f64; 2],
@@ -88,7 +88,7 @@ pub struct BodyLag {
 /// What is not known of the body because the command changed at some instant between two frames:
 /// after a gap it may be about to follow, or have followed long ago. Standard deviations.
 #[derive(Debug, Clone, Copy, Default)]
-struct Late {
+struct TimingDeviation {
     /// Of yaw rate, rad/s, and speed, m/s.
     rates: [f64; 2],
     /// Of turn, rad, and travel, m, that have come of it, fading.
@@ -97,7 +97,7 @@ struct Late {
     told: [f64; 2],
 }
 
-impl Late {
+impl TimingDeviation {
     /// Lets `dt_s` pass, in which the rates that the command asks for changed by so much.
     fn advance(&mut self, changes: [f64; 2], dt_s: f64, lag_s: f64) {
         let stays = (-dt_s / lag_s).exp();
@@ -201,7 +201,7 @@ impl BodyLag {
     }
 
     /// Closes an observation of `interval_s`.
-    pub fn complete(&mut self, interval_s: f64) -> Followed {
+    pub fn complete(&mut self, interval_s: f64) -> FollowedMotion {
         let frames = f64::from(self.frames.max(1));
         for candidate in &mut self.candidates {
             candidate.moved = candidate.middles.map(|middle| middle / frames);
@@ -232,7 +232,7 @@ impl BodyLag {
         });
         let grown: [f64; 2] = std::array::from_fn(|i| (coherent[i] - self.coherent[i]).max(0.0));
         let late = self.late.complete(fading);
-        let followed = Followed {
+        let followed = FollowedMotion {
             travel_m,
             turn_rad,
             speed_m_s,
@@ -423,7 +423,7 @@ mod tests {
 
     #[test]
     fn after_a_gap_the_body_is_unsure_of_what_it_still_follows_and_then_sure_again() {
-        let mut late = Late::default();
+        let mut late = TimingDeviation::default();
         // The speed changed in a gap of half a second; then nothing happens.
         late.advance([0.0, 0.2], 0.5, 0.1);
         late.advance([0.0; 2], 0.05, 0.1);

@@ -1,6 +1,6 @@
 //! How often faults come and go, before anything is read.
 
-use super::Moved;
+use super::Mover;
 
 /// Wheels that stick at once, or turn again at once, do so from one cause, whichever they are: how
 /// often, beside one wheel. Chosen: one cause in ten, 2.3 nats.
@@ -23,8 +23,8 @@ impl FaultRates {
     /// Factor on the rates of faults in a robot that moves like this, and has another fault
     /// besides with this probability: 1 if there is none.
     #[must_use]
-    pub fn factor(&self, from: Moved, p_other: f64) -> f64 {
-        if from == Moved::Nominal {
+    pub fn factor(&self, from: Mover, p_other: f64) -> f64 {
+        if from == Mover::Nominal {
             1.0 - p_other * (1.0 - self.further)
         } else {
             self.further
@@ -34,7 +34,7 @@ impl FaultRates {
     /// Rate at which `from`, beside which there is another fault with the probability `p_other`,
     /// becomes `to`, 1/s; 0 if it takes several steps.
     #[must_use]
-    pub fn rate_1_s(&self, from: Moved, to: Moved, p_other: f64) -> f64 {
+    pub fn rate_1_s(&self, from: Mover, to: Mover, p_other: f64) -> f64 {
         let (before, after) = (from.stuck(), to.stuck());
         let (more, fewer) = (
             (after & !before).count_ones(),
@@ -44,13 +44,13 @@ impl FaultRates {
         let factor = self.factor(from, p_other);
         match to {
             _ if from == to => 0.0,
-            Moved::Unknown | Moved::UnknownAny => 0.5 * self.unknown_1_s * factor,
+            Mover::Unknown | Mover::UnknownAny => 0.5 * self.unknown_1_s * factor,
             // One servo or the pose, of a robot whose wheels turn.
-            Moved::Steer(_) | Moved::Pose if before == 0 => self.fault_1_s * factor,
-            Moved::Steer(_) | Moved::Pose => 0.0,
-            Moved::Stuck(_) if fewer == 0 => self.fault_1_s * at_once * factor,
+            Mover::Steer(_) | Mover::Pose if before == 0 => self.fault_1_s * factor,
+            Mover::Steer(_) | Mover::Pose => 0.0,
+            Mover::Stuck(_) if fewer == 0 => self.fault_1_s * at_once * factor,
             // Another wheel instead of the only one.
-            Moved::Stuck(_) if before.count_ones() == 1 && after.count_ones() == 1 => {
+            Mover::Stuck(_) if before.count_ones() == 1 && after.count_ones() == 1 => {
                 self.fault_1_s * factor
             }
             _ if more == 0 => self.death_1_s * at_once,
@@ -71,7 +71,7 @@ mod tests {
             further: 1.0,
             death_1_s: 5.0,
         };
-        use Moved::{Nominal, Pose, Steer, Stuck, Unknown, UnknownAny};
+        use Mover::{Nominal, Pose, Steer, Stuck, Unknown, UnknownAny};
         let cases = [
             (Nominal, Nominal, 0.0),
             (Nominal, Stuck(1), 2.0),

@@ -1,6 +1,6 @@
 //! How a group of channels turns its whitened residuals into evidence for a fault.
 
-use vigil_inference::ages::{self, Ages, Whitened};
+use vigil_inference::ages::{self, Ages, WhitenedResidual};
 use vigil_inference::constant::Constant;
 use vigil_inference::outlier::tempered;
 use vigil_inference::windowed::Windowed;
@@ -92,7 +92,7 @@ impl<const D: usize> Evidence<D> {
     }
 
     /// Takes a residual; `birth` is the probability that a fault appears with it.
-    pub(crate) fn step(&mut self, residual: &Whitened<D>, birth: f64) {
+    pub(crate) fn step(&mut self, residual: &WhitenedResidual<D>, birth: f64) {
         let tau_squared = TAU_SQUARED_PER_DIMENSION * D as f64;
         if let Self::LearnedBias(filter) = self {
             return filter.take(residual, birth);
@@ -125,7 +125,7 @@ mod tests {
     fn after(form: Form, residual: f64) -> f64 {
         let mut evidence = Evidence::<1>::new(form, 1.0);
         for _ in 0..200 {
-            evidence.step(&Whitened::of(residual, 1.0, 0.0, 0.0), 1e-6);
+            evidence.step(&WhitenedResidual::new(residual, 1.0, 0.0, 0.0), 1e-6);
         }
         evidence.log_odds()
     }

@@ -6,7 +6,7 @@
 //! of exact repeats.
 
 use vigil_blocks::{Channel, WHEELS};
-use vigil_inference::ages::Whitened;
+use vigil_inference::ages::WhitenedResidual;
 
 use super::form::{Evidence, Form};
 use super::further::Further;
@@ -145,8 +145,8 @@ impl FurtherEvidence {
 
 /// A bias is taken to show in full in whatever variance: what these channels do while the command
 /// changes is modelled too coarsely to learn from it how large a bias is.
-fn whitened(apart: f64, variance: f64, outlier_rate: f64) -> Whitened<1> {
-    Whitened::of(apart, variance, 0.0, outlier_rate)
+fn whitened(apart: f64, variance: f64, outlier_rate: f64) -> WhitenedResidual<1> {
+    WhitenedResidual::new(apart, variance, 0.0, outlier_rate)
 }
 
 /// One of several values less the mean of the others, and the variance of that difference, from

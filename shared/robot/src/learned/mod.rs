@@ -70,7 +70,7 @@ pub use healthy::{Healthy, triangle};
 pub use model::{Model, ModelError};
 pub use monitor::Monitor;
 pub use motion::{Curve, MotionModel};
-pub use motion_modes::{MotionMode, Moved, motion_modes, steer_modes};
+pub use motion_modes::{MotionMode, Mover, motion_modes, steer_modes};
 pub use noise_scale::{NoiseScales, OutlierRates};
 pub use observation::Observation;
 pub use observer::{Intake, Observer};

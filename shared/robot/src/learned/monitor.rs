@@ -13,7 +13,7 @@
 //! residuals: 256 of them were too few to tell a misjudged first heading from a fault.
 
 use vigil_blocks::{CHANNELS, Channel, WHEELS};
-use vigil_inference::ages::Whitened;
+use vigil_inference::ages::WhitenedResidual;
 use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
 use vigil_inference::logspace::{log_normal, log_sum_exp};
@@ -349,7 +349,8 @@ impl Monitor {
             Form::LearnedBias => self.departure.gain(),
             Form::Constant | Form::Windowed => {
                 let birth = self.birth(observation.dt_s, SHARE_POSE);
-                self.pose.step(&Whitened::usual(said.residual), birth);
+                self.pose
+                    .step(&WhitenedResidual::usual(said.residual), birth);
                 self.pose.gain()
             }
         };
@@ -396,7 +397,7 @@ impl Monitor {
             });
             let (apart, variance) = (reading.mean - rate - shift, variance + uncertain);
             let outlier_rate = scales.outliers.wheels[i];
-            let whitened = Whitened::of(apart, variance, behind * behind, outlier_rate);
+            let whitened = WhitenedResidual::new(apart, variance, behind * behind, outlier_rate);
             timely[i] = Some(Timely {
                 read_rad_s: reading.mean,
                 apart_rad_s: apart,

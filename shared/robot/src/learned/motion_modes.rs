@@ -65,7 +65,7 @@ const SHAPE: [f64; 3] = [0.1, 0.1, 0.5];
 
 /// What moves the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Moved {
+pub enum Mover {
     /// All wheels as commanded.
     Nominal,
     /// These wheels are stuck: bit w is wheel w.
@@ -80,7 +80,7 @@ pub enum Moved {
     UnknownAny,
 }
 
-impl Moved {
+impl Mover {
     /// True if `wheel` is stuck.
     #[must_use]
     pub const fn is_stuck(self, wheel: usize) -> bool {
@@ -113,7 +113,7 @@ impl Moved {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionMode {
     /// What moves the robot.
-    pub moved: Moved,
+    pub moved: Mover,
     /// Share of what moves the robot so that it does in this way.
     pub share: f64,
     /// Probability that something moves the robot in this way that no fault describes.
@@ -143,15 +143,15 @@ impl MotionMode {
     /// True if the robot moves as it should, from wherever its pose has jumped.
     #[must_use]
     pub fn is_nominal_motion(&self) -> bool {
-        self.moved == Moved::Nominal || self.jump != [0.0; 3]
+        self.moved == Mover::Nominal || self.jump != [0.0; 3]
     }
 
     /// True if this wheel turns in a way of which nothing was learned before.
     #[must_use]
     pub fn turns_anyhow(&self, wheel: usize) -> bool {
         match self.moved {
-            Moved::Stuck(stuck) => stuck.count_ones() > 1 && !self.moved.is_stuck(wheel),
-            Moved::Steer(askew) => askew == wheel,
+            Mover::Stuck(stuck) => stuck.count_ones() > 1 && !self.moved.is_stuck(wheel),
+            Mover::Steer(askew) => askew == wheel,
             _ => false,
         }
     }
@@ -198,7 +198,7 @@ pub fn motion_modes(
     let learned = 1.0 - grounds.iter().map(|ground| ground.share).sum::<f64>();
     let nominal = model.nominal.motion;
     let mut modes = vec![MotionMode {
-        moved: Moved::Nominal,
+        moved: Mover::Nominal,
         share: 1.0,
         p_unknown: 0.0,
         p_alike: 0.0,
@@ -230,15 +230,15 @@ pub fn motion_modes(
     }
     modes.push(MotionMode {
         share: 1.0 - JUMP_SHARE,
-        ..drives_on(model, Moved::Unknown)
+        ..drives_on(model, Mover::Unknown)
     });
-    modes.push(drives_on(model, Moved::UnknownAny));
+    modes.push(drives_on(model, Mover::UnknownAny));
     if rare {
         modes.push(MotionMode {
             share: JUMP_SHARE,
             noise: nominal.noise(),
             jump: jump_sd(robot).map(|sd| sd * sd),
-            ..drives_on(model, Moved::Unknown)
+            ..drives_on(model, Mover::Unknown)
         });
     }
     modes
@@ -247,11 +247,11 @@ pub fn motion_modes(
 /// How the robot moves while a steering servo does not do as it is told, of these wheels (bits).
 pub fn steer_modes(model: &Model, steered: u32) -> impl Iterator<Item = MotionMode> {
     let wheels = (0..WHEELS).filter(move |wheel| steered >> wheel & 1 == 1);
-    wheels.map(|wheel| drives_on(model, Moved::Steer(wheel)))
+    wheels.map(|wheel| drives_on(model, Mover::Steer(wheel)))
 }
 
 /// Nominal motion with a large constant deviation.
-fn drives_on(model: &Model, moved: Moved) -> MotionMode {
+fn drives_on(model: &Model, moved: Mover) -> MotionMode {
     MotionMode {
         moved,
         share: 1.0,
@@ -299,7 +299,7 @@ fn stuck_mode(model: &Model, wheel: usize) -> MotionMode {
         .stuck(wheel)
         .map_or(model.nominal.motion, |stuck| stuck.motion);
     MotionMode {
-        moved: Moved::Stuck(1 << wheel),
+        moved: Mover::Stuck(1 << wheel),
         share: 1.0,
         p_unknown: 0.0,
         p_alike: 0.0,
@@ -330,7 +330,7 @@ fn several_mode(together: &Together<'_>, set: u32) -> Option<MotionMode> {
         share: 1.0,
         p_unknown: 0.0,
         p_alike: 0.0,
-        moved: Moved::Stuck(set),
+        moved: Mover::Stuck(set),
         motion: several.motion,
         noise: several.noise,
         ground: (1.0, 0.0),

@@ -1,7 +1,7 @@
 //! What a steering angle of one observation says of its servo.
 
 use vigil_blocks::WHEELS;
-use vigil_inference::ages::Whitened;
+use vigil_inference::ages::WhitenedResidual;
 use vigil_inference::logspace::{log_add, log_normal};
 use vigil_inference::outlier::tempered;
 
@@ -68,8 +68,8 @@ impl SteerReading {
 
     /// What it is off by, as evidence of a bias.
     #[must_use]
-    pub fn whitened(&self) -> Whitened<1> {
-        Whitened::of(
+    pub fn whitened(&self) -> WhitenedResidual<1> {
+        WhitenedResidual::new(
             self.beyond_rad,
             self.variance,
             self.passing,

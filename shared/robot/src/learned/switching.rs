@@ -18,7 +18,7 @@ use vigil_inference::outlier::unvouched;
 use vigil_inference::track::{Context, Displacement, TRACK_DIMENSION, Track};
 
 use super::{
-    FaultRates, Model, MotionMode, Moved, NoiseScales, Observation, WheelContext, WheelEvidence,
+    FaultRates, Model, MotionMode, Mover, NoiseScales, Observation, WheelContext, WheelEvidence,
     motion_modes,
 };
 use crate::Description;
@@ -36,7 +36,7 @@ const CELL: f64 = 0.02;
 /// One mode.
 #[derive(Debug, Clone)]
 struct Mode {
-    moved: Moved,
+    moved: Mover,
     /// Wheel whose encoder is broken.
     broken: Option<usize>,
     motion: MotionMode,
@@ -63,7 +63,7 @@ pub struct Switching {
 
 /// What is seen in one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub struct SwitchingObservation {
     /// Pose (x m, y m, yaw rad) and its variances, if it was measured and is evidence.
     pub pose: Option<([f64; 3], [f64; 3])>,
     /// Log-likelihood of the wheels' readings in each mode.
@@ -91,9 +91,9 @@ enum Family {
 impl Mode {
     const fn family(&self) -> Family {
         match self.moved {
-            Moved::Nominal | Moved::Pose => Family::Nominal,
-            Moved::Stuck(_) => Family::Stuck,
-            Moved::Steer(_) | Moved::Unknown | Moved::UnknownAny => Family::Unknown,
+            Mover::Nominal | Mover::Pose => Family::Nominal,
+            Mover::Stuck(_) => Family::Stuck,
+            Mover::Steer(_) | Mover::Unknown | Mover::UnknownAny => Family::Unknown,
         }
     }
 }
@@ -149,7 +149,7 @@ impl Switching {
 
     /// What moves the robot in a mode, and the wheel whose encoder is broken.
     #[must_use]
-    pub fn meaning(&self, mode: usize) -> (Moved, Option<usize>) {
+    pub fn meaning(&self, mode: usize) -> (Mover, Option<usize>) {
         (self.modes[mode].moved, self.modes[mode].broken)
     }
 
@@ -166,7 +166,7 @@ impl Switching {
         observation: &Observation,
         noise: NoiseScales,
         use_wheels: bool,
-    ) -> Seen {
+    ) -> SwitchingObservation {
         let variance = observation.pose_variance(&self.model, noise.pose);
         let is_measured = observation.pose_frames > 0;
         let pose = is_measured.then_some((observation.pose, variance));
@@ -185,7 +185,7 @@ impl Switching {
                 *sum = self.weigh(mode, observation, &evidence);
             }
         }
-        Seen {
+        SwitchingObservation {
             pose: pose.filter(|_| !observation.anchor),
             wheels,
         }
@@ -201,12 +201,12 @@ impl Switching {
             (0..count).map(whole).sum()
         };
         match mode.moved {
-            Moved::Stuck(_) => log_add(
+            Mover::Stuck(_) => log_add(
                 (1.0 - AT_ONSET).ln() + sum(false),
                 AT_ONSET.ln() + sum(true),
             ),
-            Moved::UnknownAny => sum(false) + evidence.steering(),
-            Moved::Nominal | Moved::Pose | Moved::Unknown | Moved::Steer(_) => sum(false),
+            Mover::UnknownAny => sum(false) + evidence.steering(),
+            Mover::Nominal | Mover::Pose | Mover::Unknown | Mover::Steer(_) => sum(false),
         }
     }
 }
@@ -220,7 +220,7 @@ fn transitions(modes: &[Mode], rates: &FaultRates, interval_s: f64) -> Vec<f64> 
             let rate = match (from.broken, to.broken) {
                 _ if std::ptr::eq(from, to) => 0.0,
                 (_, Some(_)) => rates.fault_1_s,
-                (Some(_), None) if to.moved == Moved::Nominal => rates.death_1_s,
+                (Some(_), None) if to.moved == Mover::Nominal => rates.death_1_s,
                 _ => rates.rate_1_s(from.moved, to.moved, 0.0),
             };
             table.push(rate * interval_s);
@@ -267,7 +267,7 @@ impl Modes for Switching {
 
 impl Sampled for Switching {
     type State = RoverState;
-    type Observation = Seen;
+    type Observation = SwitchingObservation;
 
     fn draw(&self, mode: usize, rng: &mut Pcg64Mcg) -> RoverState {
         let mode = &self.modes[mode];
@@ -299,7 +299,7 @@ impl Sampled for Switching {
         next
     }
 
-    fn log_likelihood(&self, mode: usize, state: &RoverState, z: &Seen) -> f64 {
+    fn log_likelihood(&self, mode: usize, state: &RoverState, z: &SwitchingObservation) -> f64 {
         let pose = z.pose.map_or(0.0, |(pose, variance)| {
             log_normal(pose[0] - state.pose[0], variance[0])
                 + log_normal(pose[1] - state.pose[1], variance[1])
@@ -336,7 +336,12 @@ impl Sampled for Switching {
         offset + log_density(&factor(spread), &(body - expected))
     }
 
-    fn locate(&self, mode: usize, z: &Seen, rng: &mut Pcg64Mcg) -> Option<RoverState> {
+    fn locate(
+        &self,
+        mode: usize,
+        z: &SwitchingObservation,
+        rng: &mut Pcg64Mcg,
+    ) -> Option<RoverState> {
         let (pose, variance) = z.pose?;
         let sd = Vector3::from(variance).map(f64::sqrt);
         Some(RoverState {
@@ -352,7 +357,7 @@ impl Sampled for Switching {
 }
 
 impl Conditional<TRACK_DIMENSION> for Switching {
-    type Observation = Seen;
+    type Observation = SwitchingObservation;
 
     fn prior(&self, mode: usize) -> Gaussian<TRACK_DIMENSION> {
         let noise = &self.modes[mode].motion.noise;
@@ -376,7 +381,12 @@ impl Conditional<TRACK_DIMENSION> for Switching {
         *state = track.into();
     }
 
-    fn update(&self, mode: usize, state: &mut Gaussian<TRACK_DIMENSION>, z: &Seen) -> Option<f64> {
+    fn update(
+        &self,
+        mode: usize,
+        state: &mut Gaussian<TRACK_DIMENSION>,
+        z: &SwitchingObservation,
+    ) -> Option<f64> {
         let mut track = Track::from(*state);
         let pose = match z.pose {
             Some((pose, variance)) => track.update(pose, variance)?,

@@ -7,7 +7,7 @@ use super::steer_reading::SteerReading;
 use super::wheel_context::Beside;
 use super::wheels::rolling_rate;
 use super::{
-    EncoderState, Model, MotionMode, Moved, NoiseScales, Observation, RateModel, WheelContext,
+    EncoderState, Model, MotionMode, Mover, NoiseScales, Observation, RateModel, WheelContext,
 };
 use crate::Description;
 
@@ -74,7 +74,7 @@ pub struct WheelEvidence {
 
 /// How a wheel turns while others drag.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Dragged {
+pub struct WheelDrag {
     /// Expected rate, rad/s.
     pub rate_rad_s: f64,
     /// What the drag changes of it, rad/s.
@@ -159,7 +159,7 @@ impl WheelEvidence {
                 MOMENT.ln() + self.any[i],
             ),
             moved if moved.is_stuck(i) => self.standing(i),
-            Moved::Stuck(stuck) => {
+            Mover::Stuck(stuck) => {
                 let dragged = self.dragged(model, observation, mode, i);
                 let sd = match stuck.count_ones() {
                     0 | 1 => 0.0,
@@ -169,10 +169,10 @@ impl WheelEvidence {
                 let dragged = self.turning(model, observation, i, about);
                 either(dragged, self.healthy[i])
             }
-            Moved::UnknownAny => self.unsure(i),
+            Mover::UnknownAny => self.unsure(i),
             // A wheel that stands askew rolls as it can.
-            Moved::Steer(askew) if askew == i => self.unsure(i),
-            Moved::Nominal | Moved::Unknown | Moved::Steer(_) | Moved::Pose => self.healthy[i],
+            Mover::Steer(askew) if askew == i => self.unsure(i),
+            Mover::Nominal | Mover::Unknown | Mover::Steer(_) | Mover::Pose => self.healthy[i],
         }
     }
 
@@ -184,7 +184,7 @@ impl WheelEvidence {
         observation: &Observation,
         mode: &MotionMode,
         i: usize,
-    ) -> Dragged {
+    ) -> WheelDrag {
         let (rolling, behind) = self.rolling[i];
         let curvature = observation.command[0];
         let rate = |rates: &[RateModel]| rates[i].rate(rolling, curvature);
@@ -210,12 +210,12 @@ impl WheelEvidence {
             _ => {}
         }
         // A wheel that stands askew is turned by the ground, too.
-        let askew = if mode.moved == Moved::Steer(i) {
+        let askew = if mode.moved == Mover::Steer(i) {
             ASKEW * nominal
         } else {
             0.0
         };
-        Dragged {
+        WheelDrag {
             rate_rad_s: nominal + shift + change,
             change_rad_s: change + askew,
             variance: variance + behind + uncertain,

@@ -50,7 +50,7 @@ const ALL: u32 = (1 << TESTS) - 1;
 
 /// Outcome of one test so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Judged {
+pub enum TestOutcome {
     /// The motion has not shown it.
     NotYet,
     /// As it should be.
@@ -204,13 +204,13 @@ impl Meaning {
         for test in (0..TESTS).filter(|test| ended >> test & 1 == 0) {
             let bit = 1 << test;
             match self.judge(test) {
-                Judged::NotYet => self.suspected &= !bit,
-                Judged::Fits => {
+                TestOutcome::NotYet => self.suspected &= !bit,
+                TestOutcome::Fits => {
                     self.suspected &= !bit;
                     self.judged |= bit;
                 }
-                Judged::Wrong(_) if before & bit == 0 => self.suspected |= bit,
-                Judged::Wrong(finding) => {
+                TestOutcome::Wrong(_) if before & bit == 0 => self.suspected |= bit,
+                TestOutcome::Wrong(finding) => {
                     self.judged |= bit;
                     self.is_blinding |= finding.kind.is_blinding();
                     return Some(finding);
@@ -221,11 +221,11 @@ impl Meaning {
         None
     }
 
-    fn judge(&self, test: usize) -> Judged {
+    fn judge(&self, test: usize) -> TestOutcome {
         match test {
             TRAVEL => self.poses.travel(),
             TURN => self.poses.turn(),
-            GYRO if self.gyro[2] < TURN_MIN_RAD => Judged::NotYet,
+            GYRO if self.gyro[2] < TURN_MIN_RAD => TestOutcome::NotYet,
             GYRO => turn(Kind::Gyro, self.gyro[0] / self.gyro[1]),
             UNIT => self.wheels.unit(),
             SIGN..STEER => self.wheels.sign(test - SIGN),
@@ -253,9 +253,9 @@ impl Meaning {
 }
 
 /// A ratio of turns.
-fn turn(kind: Kind, ratio: f64) -> Judged {
+fn turn(kind: Kind, ratio: f64) -> TestOutcome {
     match !(TURN_REVERSED..=TURN_UNIT).contains(&ratio) {
-        true => Judged::of(kind, None, ratio),
-        false => Judged::Fits,
+        true => TestOutcome::new(kind, None, ratio),
+        false => TestOutcome::Fits,
     }
 }

@@ -3,7 +3,7 @@
 use vigil_blocks::{SensorFrame, Valid};
 use vigil_inference::angle::wrap;
 
-use super::{Finding, Judged, Kind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M};
+use super::{Finding, Kind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
 
 /// Length of a stretch, s: a path is nearly straight over it, and noise hardly counts. At 0.2 m/s
 /// it is 0.1 m, twenty deviations of a pose of 5 mm.
@@ -121,9 +121,9 @@ impl Poses {
     }
 
     /// What is found of travel and heading.
-    pub fn travel(&self) -> Judged {
+    pub fn travel(&self) -> TestOutcome {
         if self.count < STRETCHES_MIN || self.commanded_m < TRAVEL_MIN_M {
-            return Judged::NotYet;
+            return TestOutcome::NotYet;
         }
         let [along, left] = self.moved_m;
         let total_m = along.hypot(left);
@@ -131,31 +131,31 @@ impl Poses {
         let error_m = (scatter * self.count / (self.count - 1.0)).sqrt();
         let ratio = total_m / self.commanded_m;
         if ratio > RATIO_MAX && total_m > CERTAIN * error_m {
-            return Judged::of(Kind::Travel, None, ratio);
+            return TestOutcome::new(Kind::Travel, None, ratio);
         }
         // A robot that hardly moves has no direction.
         if ratio < 1.0 / RATIO_MAX || total_m < CERTAIN * error_m {
-            return Judged::NotYet;
+            return TestOutcome::NotYet;
         }
         let angle = left.atan2(along);
         match angle.abs() > ANGLE_MAX_RAD {
-            true => Judged::of(Kind::Heading, None, angle),
-            false if self.swung_rad < TURNED_RAD && self.come_m < COME_M => Judged::NotYet,
-            false => Judged::Fits,
+            true => TestOutcome::new(Kind::Heading, None, angle),
+            false if self.swung_rad < TURNED_RAD && self.come_m < COME_M => TestOutcome::NotYet,
+            false => TestOutcome::Fits,
         }
     }
 
     /// What is found of turns.
-    pub fn turn(&self) -> Judged {
+    pub fn turn(&self) -> TestOutcome {
         if self.turn_rad < TURN_MIN_RAD {
-            return Judged::NotYet;
+            return TestOutcome::NotYet;
         }
         super::turn(Kind::Turn, self.turned_rad / self.turn_rad)
     }
 }
 
-impl Judged {
-    pub(super) const fn of(kind: Kind, wheel: Option<usize>, value: f64) -> Self {
+impl TestOutcome {
+    pub(super) const fn new(kind: Kind, wheel: Option<usize>, value: f64) -> Self {
         Self::Wrong(Finding { kind, wheel, value })
     }
 }

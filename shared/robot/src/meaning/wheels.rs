@@ -3,7 +3,7 @@
 use vigil_blocks::{SensorFrame, Valid, WHEELS};
 
 use super::finding::is_rate_unit;
-use super::{Judged, Kind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M};
+use super::{Kind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
 use crate::Description;
 use crate::description::Kinematics;
 use crate::learned::wheels::{rolling_rate, steering_angle};
@@ -156,7 +156,7 @@ impl Wheels {
     }
 
     /// What is found of the rates' unit: all wheels agree on it.
-    pub fn unit(&self) -> Judged {
+    pub fn unit(&self) -> TestOutcome {
         let mut ratios = [0.0; WHEELS];
         let mut count = 0;
         for wheel in (0..self.wheel_count).filter(|&wheel| self.is_judged(wheel)) {
@@ -167,54 +167,54 @@ impl Wheels {
         }
         // Fewer than half of the wheels speak for no unit.
         if 2 * count <= self.wheel_count {
-            return Judged::NotYet;
+            return TestOutcome::NotYet;
         }
         let ratios = &mut ratios[..count];
         ratios.sort_unstable_by(f64::total_cmp);
         let middle = ratios[count / 2];
         match middle.abs() > RATIO_MAX || is_rate_unit(middle) {
-            true => Judged::of(Kind::Rates, None, middle),
-            false => Judged::Fits,
+            true => TestOutcome::new(Kind::Rates, None, middle),
+            false => TestOutcome::Fits,
         }
     }
 
     /// What is found of one wheel's sign.
-    pub fn sign(&self, wheel: usize) -> Judged {
+    pub fn sign(&self, wheel: usize) -> TestOutcome {
         if wheel >= self.wheel_count || !self.is_judged(wheel) {
-            return Judged::NotYet;
+            return TestOutcome::NotYet;
         }
         match self.rates[wheel].is_reversed() {
-            true => Judged::of(Kind::RateSign, Some(wheel), self.rates[wheel].ratio()),
-            false => Judged::Fits,
+            true => TestOutcome::new(Kind::RateSign, Some(wheel), self.rates[wheel].ratio()),
+            false => TestOutcome::Fits,
         }
     }
 
     /// What is found of one wheel's steering.
-    pub fn steering(&self, wheel: usize) -> Judged {
+    pub fn steering(&self, wheel: usize) -> TestOutcome {
         let Some(steer) = self.steer.get(wheel) else {
-            return Judged::NotYet;
+            return TestOutcome::NotYet;
         };
         let is_judged = steer.time_s >= TIME_MIN_S
             && steer.expected >= STEER_MIN_RAD * STEER_MIN_RAD * steer.time_s;
         match (is_judged, steer.is_reversed()) {
-            (false, _) => Judged::NotYet,
-            (true, true) => Judged::of(Kind::SteerSign, Some(wheel), steer.ratio()),
-            (true, false) => Judged::Fits,
+            (false, _) => TestOutcome::NotYet,
+            (true, true) => TestOutcome::new(Kind::SteerSign, Some(wheel), steer.ratio()),
+            (true, false) => TestOutcome::Fits,
         }
     }
 
     /// What is found of the sides of a pair of wheels.
-    pub fn sides(&self, pair: usize) -> Judged {
+    pub fn sides(&self, pair: usize) -> TestOutcome {
         let Some(pair) = self.pairs[..self.pair_count].get(pair) else {
-            return Judged::NotYet;
+            return TestOutcome::NotYet;
         };
         if pair.turned_rad < TURN_MIN_RAD {
-            return Judged::NotYet;
+            return TestOutcome::NotYet;
         }
         let is_exchanged = pair.exchanged < EXCHANGED * pair.named && pair.named > pair.apart;
         match is_exchanged {
-            true => Judged::of(Kind::Sides, Some(pair.wheels[0]), 0.0),
-            false => Judged::Fits,
+            true => TestOutcome::new(Kind::Sides, Some(pair.wheels[0]), 0.0),
+            false => TestOutcome::Fits,
         }
     }
 

@@ -43,7 +43,7 @@ impl Together {
         (several && form == Form::LearnedBias).then(|| {
             let bias_sd = bias_sd / (channels as f64).sqrt();
             Self {
-                bias: Ages::of(channels, bias_sd),
+                bias: Ages::with_dimensions(channels, bias_sd),
                 channels,
                 bias_sd,
                 whitened: SVector::zeros(),
@@ -55,7 +55,7 @@ impl Together {
 
     /// No evidence yet.
     pub fn forget(&mut self) {
-        self.bias = Ages::of(self.channels, self.bias_sd);
+        self.bias = Ages::with_dimensions(self.channels, self.bias_sd);
         self.gain = 0.0;
     }
 

@@ -20,7 +20,7 @@
 
 use nalgebra::SVector;
 use vigil_blocks::{CHANNELS, Channel as Slot, WHEELS};
-use vigil_inference::ages::Whitened;
+use vigil_inference::ages::WhitenedResidual;
 use vigil_inference::constant::Constant;
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
 
@@ -59,7 +59,7 @@ const LOG_ODDS_MIN: f64 = -700.0;
 
 /// One channel at work.
 #[derive(Debug, Clone)]
-struct Watched {
+struct ActiveChannel {
     channel: Channel,
     track: Track,
     bias: Evidence<1>,
@@ -75,7 +75,7 @@ struct Watched {
     tail: Option<Tail>,
 }
 
-impl Watched {
+impl ActiveChannel {
     /// Whether the channel is there, in motion.
     fn present(&mut self, now: &Observation, form: Form, birth: f64) {
         if self.channel.target.is_measured(now) {
@@ -87,7 +87,7 @@ impl Watched {
         self.absent_s += now.dt_s;
         if self.absent_s > ABSENT_S {
             self.absent
-                .step(&Whitened::usual(SVector::from([CLIP])), birth);
+                .step(&WhitenedResidual::usual(SVector::from([CLIP])), birth);
             self.gains[1] = self.absent.gain();
         }
     }
@@ -103,7 +103,7 @@ impl Watched {
         if let Some(velocity) = velocity.filter(|_| self.channel.rest_sd > 0.0) {
             let whitened = (velocity / self.channel.rest_sd).clamp(-CLIP, CLIP);
             self.rest
-                .step(&Whitened::usual(SVector::from([whitened])), birth);
+                .step(&WhitenedResidual::usual(SVector::from([whitened])), birth);
             self.gains[2] = self.rest.gain();
         }
     }
@@ -130,7 +130,7 @@ impl Watched {
             log_add(self.scatter.log_odds(), birth.ln()),
         );
         self.bias
-            .step(&Whitened::usual(SVector::from([whitened])), birth);
+            .step(&WhitenedResidual::usual(SVector::from([whitened])), birth);
         let square = whitened * whitened / self.channel.scatter;
         self.scatter
             .step(square, TAU_SQUARED_PER_DIMENSION, birth, birth);
@@ -149,7 +149,7 @@ pub struct Monitor {
     form: Form,
     /// What the prior fault rate adds to the log-odds.
     prior_log_odds: f64,
-    watched: Vec<Watched>,
+    watched: Vec<ActiveChannel>,
     together: Option<Together>,
     /// The tail of all channels together; none while it is being learned.
     joint: Option<Tail>,
@@ -164,7 +164,7 @@ impl Monitor {
     pub fn new(model: &Model, channels: Channels, form: Form, fault_rate_1_h: f64) -> Self {
         let used = model.channel.iter();
         let used = used.filter(|channel| channel.is_among(channels));
-        let watched = used.map(|channel| Watched {
+        let watched = used.map(|channel| ActiveChannel {
             channel: channel.clone(),
             track: Track::new(channel),
             bias: Evidence::new(form, BIAS),
@@ -175,7 +175,7 @@ impl Monitor {
             gains: [0.0; 3],
             tail: channel.tail(form).cloned(),
         });
-        let watched: Vec<Watched> = watched.collect();
+        let watched: Vec<ActiveChannel> = watched.collect();
         let mut monitor = Self {
             sizes: model.sizes(),
             form,
@@ -280,7 +280,7 @@ impl Monitor {
         self.run_s += now.dt_s;
         for watched in &mut self.watched {
             watched.present(now, self.form, birth);
-            let Watched { channel, track, .. } = watched;
+            let ActiveChannel { channel, track, .. } = watched;
             let settled = now.steady_s >= SETTLE_S || !channel.target.quantity.is_pose();
             let residual = channel.residual(history, &self.sizes);
             let Some(residual) = residual.filter(|_| settled) else {

@@ -1,6 +1,6 @@
 //! Several stuck wheels, of which nothing was learned together, on soils that they do not know.
 
-use vigil_robot::learned::{Moved, motion_modes};
+use vigil_robot::learned::{Mover, motion_modes};
 use vigil_robot::slip::{Condition, Situation, SlipModel, Soil};
 
 use crate::learned::{model, robot};
@@ -19,7 +19,7 @@ fn the_motion_of_every_set_lies_within_what_its_mode_expects() {
     let slip = SlipModel::new(&robot).unwrap();
     let modes = motion_modes(&model, &robot, 0b11_1111, false, true);
     let several = modes.iter().filter(|mode| match mode.moved {
-        Moved::Stuck(wheels) => wheels.count_ones() > 1,
+        Mover::Stuck(wheels) => wheels.count_ones() > 1,
         _ => false,
     });
     let (mut count, mut squares, mut far) = (0_u32, 0.0_f64, Vec::new());

@@ -2,7 +2,7 @@
 
 use super::summary::{number, types};
 use super::{Report, SensorSet, words};
-use crate::scoring::{Bin, Found, Point, Score};
+use crate::scoring::{Bin, ClassDetection, Point, Score};
 use vigil_pages::chart::{Axis, COLOURS, Chart, ChartError, Curve, INK, Stroke};
 use vigil_pages::page::{beside, escaped, key, section};
 
@@ -169,7 +169,7 @@ fn rate_axis(score: &Score) -> Axis {
 fn over_thresholds(
     score: &Score,
     class: &str,
-    of: impl Fn(&Found) -> Option<f64>,
+    of: impl Fn(&ClassDetection) -> Option<f64>,
 ) -> [Vec<(f64, f64)>; 2] {
     let at = |point: &Point| {
         let rate = point.rate.false_alarms_per_h?;

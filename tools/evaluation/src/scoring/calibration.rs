@@ -55,7 +55,7 @@ impl Claims {
         for &claim in &self.claims {
             bins[bin_of(claim.0)].push(claim);
         }
-        bins.iter().filter_map(|bin| Bin::of(bin)).collect()
+        bins.iter().filter_map(|bin| Bin::new(bin)).collect()
     }
 
     /// See [`expected_calibration_error`].
@@ -91,7 +91,7 @@ pub struct Bin {
 
 impl Bin {
     /// `None` without a claim.
-    fn of(claims: &[(f64, bool)]) -> Option<Self> {
+    fn new(claims: &[(f64, bool)]) -> Option<Self> {
         let mut is_true = Ratio::default();
         claims.iter().for_each(|claim| is_true.add(claim.1));
         let p = || claims.iter().map(|claim| claim.0);
@@ -107,7 +107,7 @@ impl Bin {
 
 /// What a verdict was worth.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Judged {
+pub(super) struct VerdictScore {
     /// The mode named is the true one, or an abstract node above it.
     pub is_true: bool,
     /// -ln p(true mode), nats.
@@ -117,13 +117,13 @@ pub(super) struct Judged {
 }
 
 /// Judges a verdict when `truth` is true.
-pub(super) fn judge(verdict: &Verdict, truth: &str, taxonomy: &Taxonomy) -> Judged {
+pub(super) fn judge(verdict: &Verdict, truth: &str, taxonomy: &Taxonomy) -> VerdictScore {
     let is_true = taxonomy.covers(&verdict.mode, truth);
     let p = match taxonomy.index(truth) {
         Some(index) => verdict.belief().node(index, taxonomy),
         None => verdict.belief().unknown(taxonomy),
     };
-    Judged {
+    VerdictScore {
         is_true,
         log_score_nats: log_score_nats(p),
         is_confident_wrong: !is_true && verdict.p_mode > CONFIDENT_P,
@@ -150,7 +150,7 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    pub(super) fn of(cases: &[&Case], taxonomy: &Taxonomy) -> Self {
+    pub(super) fn new(cases: &[&Case], taxonomy: &Taxonomy) -> Self {
         let (mut claims, mut log_score) = (Claims::default(), 0.0);
         let mut confident_wrong = Ratio::default();
         for case in cases {

@@ -25,7 +25,7 @@ pub(super) fn leaves(cases: &[Case]) -> Matrix {
 }
 
 impl Coarse {
-    pub(super) fn of(cases: &[Case], taxonomy: &Taxonomy) -> Self {
+    pub(super) fn new(cases: &[Case], taxonomy: &Taxonomy) -> Self {
         let side = |mode: &str| match taxonomy.side(mode) {
             Some(Side::Left) => "left".to_owned(),
             Some(Side::Right) => "right".to_owned(),

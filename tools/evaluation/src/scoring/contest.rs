@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::bounds::Difference;
-use super::calibration::{Judged, judge};
+use super::calibration::{VerdictScore, judge};
 use super::{Case, JUDGED_S, Ratio, Taxonomy};
 
 /// Instants after the onset at which names are compared, s.
@@ -24,7 +24,7 @@ struct Run {
     class: String,
     leaf: [Option<bool>; 3],
     side: [Option<bool>; 3],
-    judged: Option<Judged>,
+    judged: Option<VerdictScore>,
 }
 
 impl Entrant {

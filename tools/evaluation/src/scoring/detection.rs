@@ -17,7 +17,7 @@ pub struct Rate {
 }
 
 impl Rate {
-    pub(super) fn of(alarms: usize, exposure_h: f64) -> Self {
+    pub(super) fn new(alarms: usize, exposure_h: f64) -> Self {
         let an_hour = |events: f64| (exposure_h > 0.0).then(|| events / exposure_h);
         let bounds = bounds::poisson(alarms);
         Self {
@@ -54,7 +54,7 @@ pub struct FalseAlarms {
 }
 
 impl FalseAlarms {
-    pub(super) fn of(cases: &[Case]) -> Self {
+    pub(super) fn new(cases: &[Case]) -> Self {
         let mut found = Self::default();
         for case in cases {
             let rises = rises(healthy(case)).count();
@@ -72,7 +72,7 @@ impl FalseAlarms {
             }
         }
         (found.exposure_h, found.warm_up_h) = exposure_h(cases);
-        found.rate = Rate::of(found.alarms, found.exposure_h);
+        found.rate = Rate::new(found.alarms, found.exposure_h);
         found
     }
 }
@@ -129,7 +129,7 @@ pub struct Detection {
 }
 
 impl Detection {
-    pub(super) fn of(cases: &[&Case]) -> Self {
+    pub(super) fn new(cases: &[&Case]) -> Self {
         let (mut delays, mut missed_run_ids) = (Vec::new(), Vec::new());
         for case in cases {
             match delay_s(case) {
@@ -141,13 +141,13 @@ impl Detection {
             n: cases.len(),
             detected: delays.len(),
             missed: missed_run_ids.len(),
-            within: Instants::of(cases, |case, verdict| {
+            within: Instants::new(cases, |case, verdict| {
                 let onset_s = case.label.onset_s.unwrap_or(f64::INFINITY);
                 let passed_s = verdict.t_s - onset_s + TIME_SLACK_S;
                 delay_s(case).is_some_and(|delay_s| delay_s <= passed_s)
             }),
             delays_s: sorted(&delays),
-            delay: Spread::of(delays),
+            delay: Spread::new(delays),
             missed_run_ids,
         }
     }

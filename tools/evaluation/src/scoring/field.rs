@@ -45,7 +45,7 @@ mod run;
 pub use claims::{CLAIMED_S, Claim};
 pub use figures::{Figure, Worst, figures};
 pub use recorded::{Figures, SAFE_STOP, of_cases};
-pub use run::{Actions, Changes, End, Onset, Run, Scorer, Seen};
+pub use run::{Actions, Changes, End, JudgedTime, Onset, Run, Scorer};
 
 use vigil_blocks::SizeKind;
 
@@ -109,7 +109,7 @@ impl Size {
 
 /// What a robot is told to do, as far as it is scored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Told {
+pub enum RobotOrder {
     /// As planned.
     #[default]
     GoOn,
@@ -149,7 +149,7 @@ pub struct Moment<'a> {
     /// Mode with hysteresis.
     pub reported: &'a str,
     /// What the robot is told.
-    pub told: Told,
+    pub told: RobotOrder,
     /// Which of the decision model's actions that is, and about which component: a change of either
     /// is another action.
     pub action: u64,

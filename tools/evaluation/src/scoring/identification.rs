@@ -18,7 +18,7 @@ pub struct Instants {
 }
 
 impl Instants {
-    pub(super) fn of(cases: &[&Case], right: impl Fn(&Case, &Verdict) -> bool) -> Self {
+    pub(super) fn new(cases: &[&Case], right: impl Fn(&Case, &Verdict) -> bool) -> Self {
         let mut found = Self::default();
         for &case in cases {
             let note = |ratio: &mut Ratio, verdict: Option<&Verdict>| {
@@ -54,7 +54,7 @@ pub struct Identification {
 }
 
 impl Identification {
-    pub(super) fn of(cases: &[&Case], taxonomy: &Taxonomy) -> Self {
+    pub(super) fn new(cases: &[&Case], taxonomy: &Taxonomy) -> Self {
         let leaf = |case: &Case, v: &Verdict| taxonomy.is_leaf_right(&v.mode, &case.label.mode);
         let side = |case: &Case, v: &Verdict| taxonomy.is_side_right(&v.mode, &case.label.mode);
         let class = |case: &Case, v: &Verdict| taxonomy.is_class_right(&v.mode, &case.label.mode);
@@ -69,11 +69,11 @@ impl Identification {
         };
         let wrong = |case: &&&Case| case.at(2.0).is_some_and(|verdict| !leaf(case, verdict));
         Self {
-            leaf: Instants::of(cases, leaf),
-            side: Instants::of(cases, side),
-            class: Instants::of(cases, class),
-            unknown: Instants::of(cases, |_, verdict| verdict.mode == super::UNKNOWN),
-            isolation: Spread::of(cases.iter().filter_map(isolated_s).collect()),
+            leaf: Instants::new(cases, leaf),
+            side: Instants::new(cases, side),
+            class: Instants::new(cases, class),
+            unknown: Instants::new(cases, |_, verdict| verdict.mode == super::UNKNOWN),
+            isolation: Spread::new(cases.iter().filter_map(isolated_s).collect()),
             wrong_run_ids_after_2_s: cases.iter().filter(wrong).map(|c| c.label.run).collect(),
         }
     }

@@ -40,7 +40,7 @@ pub use detection::{Detection, FalseAlarms, Rate};
 pub use identification::{Identification, Instants};
 pub use ratio::{Ratio, Spread};
 pub use taxonomy::{Side, Taxonomy};
-pub use trade_off::{Found, Point, TradeOff};
+pub use trade_off::{ClassDetection, Point, TradeOff};
 
 use vigil_recording::labels::Label;
 
@@ -194,25 +194,25 @@ pub fn score(cases: &[Case], taxonomy: &Taxonomy, alarm_log_odds: f64) -> Score 
     }
     let detection = classes
         .iter()
-        .map(|(class, of)| (class.clone(), Detection::of(of)));
+        .map(|(class, of)| (class.clone(), Detection::new(of)));
     let identifies = taxonomy.has_faults();
     let named = || classes.iter().filter(|_| identifies);
     let identification =
-        named().map(|(class, of)| (class.clone(), Identification::of(of, taxonomy)));
-    let calibration = named().map(|(class, of)| (class.clone(), Calibration::of(of, taxonomy)));
+        named().map(|(class, of)| (class.clone(), Identification::new(of, taxonomy)));
+    let calibration = named().map(|(class, of)| (class.clone(), Calibration::new(of, taxonomy)));
     Score {
         runs,
         identifies,
-        false_alarms: FalseAlarms::of(cases),
+        false_alarms: FalseAlarms::new(cases),
         detection: detection.collect(),
         identification: identification.collect(),
         confusion: confusion::leaves(cases),
         confusion_by: match identifies {
-            true => Coarse::of(cases, taxonomy),
+            true => Coarse::new(cases, taxonomy),
             false => Coarse::default(),
         },
         calibration: calibration.collect(),
-        trade_off: TradeOff::of(cases, taxonomy, alarm_log_odds),
+        trade_off: TradeOff::new(cases, taxonomy, alarm_log_odds),
         field: field::of_cases(cases, taxonomy),
     }
 }

@@ -72,7 +72,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    pub(super) fn of(mut values: Vec<f64>) -> Self {
+    pub(super) fn new(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         let rank = |q: f64| {
             let rank = (q * values.len() as f64).ceil() as usize;

@@ -22,7 +22,7 @@ const LEVELS: usize = 30;
 
 /// Detection of the faults of one class at one threshold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Found {
+pub struct ClassDetection {
     /// Faults.
     pub n: usize,
     /// Faults at or after whose onset the alarm rises; one that stands before is no detection.
@@ -35,8 +35,8 @@ pub struct Found {
     pub delay: Spread,
 }
 
-impl Found {
-    fn of(n: usize, delays_s: Vec<f64>) -> Self {
+impl ClassDetection {
+    fn new(n: usize, delays_s: Vec<f64>) -> Self {
         let detected = delays_s.len();
         let mean_s = delays_s.iter().sum::<f64>() / detected as f64;
         Self {
@@ -44,7 +44,7 @@ impl Found {
             detected,
             miss_rate: (n > 0).then(|| (n - detected) as f64 / n as f64),
             delay_mean_s: (detected > 0).then_some(mean_s),
-            delay: Spread::of(delays_s),
+            delay: Spread::new(delays_s),
         }
     }
 }
@@ -60,7 +60,7 @@ pub struct Point {
     #[serde(flatten)]
     pub rate: Rate,
     /// Detection by type of fault; `all` is every one.
-    pub detection: BTreeMap<String, Found>,
+    pub detection: BTreeMap<String, ClassDetection>,
 }
 
 /// Detection at all thresholds.
@@ -75,7 +75,7 @@ pub struct TradeOff {
 }
 
 impl TradeOff {
-    pub(super) fn of(cases: &[Case], taxonomy: &Taxonomy, alarm_log_odds: f64) -> Self {
+    pub(super) fn new(cases: &[Case], taxonomy: &Taxonomy, alarm_log_odds: f64) -> Self {
         let (exposure_h, _) = exposure_h(cases);
         let point = |threshold| point(cases, taxonomy, exposure_h, threshold);
         Self {
@@ -119,11 +119,11 @@ fn point(cases: &[Case], taxonomy: &Taxonomy, exposure_h: f64, threshold: f64) -
     }
     let found = classes
         .into_iter()
-        .map(|(class, (n, delays_s))| (class, Found::of(n, delays_s)));
+        .map(|(class, (n, delays_s))| (class, ClassDetection::new(n, delays_s)));
     Point {
         threshold_log_odds: threshold,
         false_alarms,
-        rate: Rate::of(false_alarms, exposure_h),
+        rate: Rate::new(false_alarms, exposure_h),
         detection: found.collect(),
     }
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use vigil_evaluation::scoring::Verdict;
 use vigil_plausibility as plausible;
 
-use super::offline::{FilterArgs, Prepared};
+use super::offline::{FilterArgs, OfflineModels};
 use vigil_terminal::output::Progress;
 use vigil_terminal::{CommandError, Outcome};
 
@@ -44,7 +44,7 @@ const COLUMNS: [&str; 15] = [
 /// # Errors
 /// An input that is refused; an output that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let Prepared {
+    let OfflineModels {
         robot,
         mut pipeline,
         runs,

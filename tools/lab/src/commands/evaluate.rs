@@ -18,9 +18,9 @@ use vigil_robot::RobotModel;
 use vigil_setup::schema::IdentifierFilter;
 
 use super::learn::write_whole;
-use super::offline::{FilterArgs, Prepared, Used};
+use super::offline::{FilterArgs, FilterSettings, OfflineModels};
 use document::{Document, filters_text};
-use passes::{Found, Passes};
+use passes::{Passes, SensorSetResult};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
@@ -99,7 +99,7 @@ impl Args {
     }
 
     /// The runs to score, and their labels.
-    fn cases(&self, prepared: &Prepared) -> Result<Vec<(Run, Label)>, CommandError> {
+    fn cases(&self, prepared: &OfflineModels) -> Result<Vec<(Run, Label)>, CommandError> {
         let labels = labels::read(&self.runs, &prepared.robot).map_err(CommandError::usage)?;
         let labels = labels.into_iter().map(|label| (label.run, label));
         let mut labels: BTreeMap<u32, Label> = labels.collect();
@@ -178,7 +178,11 @@ fn check_place(out: &Path) -> Result<(), CommandError> {
     Ok(())
 }
 
-fn print(args: &Args, prepared: &Prepared, found: &[Found]) -> Result<(), CommandError> {
+fn print(
+    args: &Args,
+    prepared: &OfflineModels,
+    found: &[SensorSetResult],
+) -> Result<(), CommandError> {
     let Some(asked) = found.iter().find(|set| set.name == args.filter.sensors) else {
         return Err(CommandError::failure("the set of channels was not run"));
     };
@@ -200,9 +204,9 @@ fn print(args: &Args, prepared: &Prepared, found: &[Found]) -> Result<(), Comman
 
 fn page(
     args: &Args,
-    prepared: &Prepared,
+    prepared: &OfflineModels,
     runs: &[(Run, Label)],
-    found: &[Found],
+    found: &[SensorSetResult],
 ) -> Result<String, CommandError> {
     let sets = found.iter().map(|set| SensorSet {
         name: &set.name,
@@ -219,8 +223,12 @@ fn page(
 }
 
 /// What the report says of its origin.
-fn facts(args: &Args, prepared: &Prepared, runs: &[(Run, Label)]) -> Vec<(&'static str, String)> {
-    let Used {
+fn facts(
+    args: &Args,
+    prepared: &OfflineModels,
+    runs: &[(Run, Label)],
+) -> Vec<(&'static str, String)> {
+    let FilterSettings {
         model_hash,
         tree_hash,
         detector,

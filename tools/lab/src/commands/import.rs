@@ -36,12 +36,12 @@ struct Document {
     frames: String,
     rate_hz: f64,
     columns: Vec<String>,
-    delays: Vec<Estimated>,
+    delays: Vec<DelayEstimate>,
     runs: Vec<Run>,
 }
 
 #[derive(Debug, Serialize)]
-struct Estimated {
+struct DelayEstimate {
     channel: String,
     delay_s: f64,
 }
@@ -53,13 +53,13 @@ struct Run {
     frames: usize,
     duration_s: f64,
     /// Clocks of its files that do not rise everywhere; their rows were put in order.
-    disorder: Vec<Disordered>,
+    disorder: Vec<DisorderCount>,
     /// Rows of which nothing was made, by channel: their stamps repeat those before.
     repeated_rows: BTreeMap<String, usize>,
 }
 
 #[derive(Debug, Serialize)]
-struct Disordered {
+struct DisorderCount {
     file: String,
     column: String,
     rows: usize,
@@ -67,7 +67,7 @@ struct Disordered {
     back_s: f64,
 }
 
-impl From<&import::Disorder> for Disordered {
+impl From<&import::Disorder> for DisorderCount {
     fn from(found: &import::Disorder) -> Self {
         Self {
             file: found.path.display().to_string(),
@@ -103,13 +103,13 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             .and_then(|row| row.first())
             .copied()
             .unwrap_or(0.0),
-        disorder: run.disorder.iter().map(Disordered::from).collect(),
+        disorder: run.disorder.iter().map(DisorderCount::from).collect(),
         repeated_rows: run.repeated.iter().cloned().collect(),
     });
     let delays = imported
         .delays_s
         .iter()
-        .map(|(channel, delay_s)| Estimated {
+        .map(|(channel, delay_s)| DelayEstimate {
             channel: channel.clone(),
             delay_s: *delay_s,
         });
@@ -132,12 +132,12 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 }
 
 /// What is doubtful about the frames: columns that mean something else, rows out of order.
-fn warnings(imported: &import::Imported, robot: &Description) -> Vec<String> {
+fn warnings(imported: &import::ImportedLog, robot: &Description) -> Vec<String> {
     let frames = imported.frames(robot);
     let mut warnings = plausible::warnings(frames.iter().map(|run| (run, f64::INFINITY)), robot);
     let lacking = imported.runs.iter().flat_map(|run| &run.lacking);
     warnings.extend(lacking.map(|found| {
-        let import::Lacking {
+        let import::MissingColumn {
             path,
             topic,
             column,

@@ -207,7 +207,7 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
         None => {}
     }
     let model = model.sealed();
-    report.bounds = learning::bounds::of(&model, &robot);
+    report.bounds = learning::bounds::bounds(&model, &robot);
     let text = model.to_toml().map_err(CommandError::failure)?;
     write_whole(out, &text)
         .map_err(|error| CommandError::failure(format!("{}: {error}", out.display())))?;

@@ -87,7 +87,7 @@ pub struct FilterArgs {
 
 /// What was used, for the record.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Used {
+pub struct FilterSettings {
     /// Hash of the learned model.
     pub model_hash: String,
     /// Hash of the fault tree.
@@ -105,7 +105,7 @@ pub struct Used {
 }
 
 /// Everything that a run of the filters needs, read and checked.
-pub struct Prepared {
+pub struct OfflineModels {
     /// The robot.
     pub robot: Description,
     /// The learned model.
@@ -117,12 +117,12 @@ pub struct Prepared {
     /// All runs of the frames file.
     pub runs: Vec<Run>,
     /// What was used.
-    pub used: Used,
+    pub used: FilterSettings,
 }
 
 impl FilterArgs {
     /// Reads and checks all files and settings.
-    pub fn prepare(&self) -> Result<Prepared, CommandError> {
+    pub fn prepare(&self) -> Result<OfflineModels, CommandError> {
         let robot = self.robot.load()?;
         let model = load_model(&self.model)?;
         let tree = match &model {
@@ -138,7 +138,7 @@ impl FilterArgs {
         };
         let pipeline = self.pipeline(&model, &robot, &tree, &self.sensors, self.identifier)?;
         let runs = frames::read(&self.frames, &robot).map_err(CommandError::usage)?;
-        let used = Used {
+        let used = FilterSettings {
             model_hash: format!("{:016x}", model.hash()),
             tree_hash: format!("{:016x}", tree.hash()),
             sensors: self.sensors.clone(),
@@ -147,7 +147,7 @@ impl FilterArgs {
             particles: pipeline.particles(),
             seed: self.seed,
         };
-        Ok(Prepared {
+        Ok(OfflineModels {
             robot,
             model,
             tree,

@@ -93,7 +93,7 @@ fn sensor_sd(described: f64) -> Limits {
 
 /// What of `model` stands on a bound, or was not learned.
 #[must_use]
-pub fn of(model: &Model, robot: &Description) -> Bounds {
+pub fn bounds(model: &Model, robot: &Description) -> Bounds {
     let mut bounds = Bounds::default();
     motion(&mut bounds, "nominal", &model.nominal.motion);
     rates(&mut bounds, "nominal", &model.nominal.rates);
@@ -265,7 +265,7 @@ fn assumed(bounds: &mut Bounds, model: &Model, robot: &Description) {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::bounds::Held;
+    use crate::bounds::BoundCause;
 
     fn shipped() -> (Model, Description) {
         let read = |path: &str| {
@@ -284,24 +284,27 @@ mod tests {
         model.nominal.rates[3].rate_sd_rad_s = RATE_SD.hold(0.03);
         model.encoder.repeat_rate = REPEAT_RATE.hold(1e-9);
         model.noise.yaw_rad = 3.0 * robot.noise.yaw_rad;
-        let found = of(&model, &robot);
+        let found = bounds(&model, &robot);
         let held = |key: &str| {
             let bound = found.found().iter().find(|bound| bound.key == key);
             bound.map(|bound| (bound.value, bound.held))
         };
         assert_eq!(
             held("nominal.motion.offset_sd[0]"),
-            Some((1e-3, Held::Least))
+            Some((1e-3, BoundCause::Least))
         );
         assert_eq!(
             held("nominal.rates[2].rate_sd_rad_s"),
-            Some((0.008, Held::Least))
+            Some((0.008, BoundCause::Least))
         );
-        assert_eq!(held("encoder.repeat_rate"), Some((1e-4, Held::Least)));
-        assert_eq!(held("noise.yaw_rad").map(|held| held.1), Some(Held::Most));
+        assert_eq!(held("encoder.repeat_rate"), Some((1e-4, BoundCause::Least)));
+        assert_eq!(
+            held("noise.yaw_rad").map(|held| held.1),
+            Some(BoundCause::Most)
+        );
         assert_eq!(
             held("command.lag_s"),
-            Some((model.command.lag_s, Held::Given))
+            Some((model.command.lag_s, BoundCause::Given))
         );
         for free in [
             "nominal.motion.offset_sd[1]",
@@ -317,7 +320,7 @@ mod tests {
     #[test]
     fn the_rates_of_the_shipped_model_that_stand_on_the_floor_are_one_line() {
         let (model, robot) = shipped();
-        let lines = of(&model, &robot).lines();
+        let lines = bounds(&model, &robot).lines();
         let rates: Vec<_> = lines
             .iter()
             .filter(|line| line.contains("rate_sd_rad_s"))

@@ -21,7 +21,7 @@ const SAMPLES_MIN: f64 = 200.0;
 const MODE: &str = "ND";
 
 /// One observation of a healthy run.
-type Seen = (Observation, Further);
+type HealthyObservation = (Observation, Further);
 
 /// True if any frame holds a yaw rate or a current.
 #[must_use]
@@ -43,7 +43,8 @@ pub fn learn(
     frames_file: &str,
     robot: &Description,
 ) -> Result<(), LearnError> {
-    let seen: Vec<Vec<Seen>> = runs.iter().map(|run| observed(run, robot, model)).collect();
+    let seen: Vec<Vec<HealthyObservation>> =
+        runs.iter().map(|run| observed(run, robot, model)).collect();
     let further = FurtherModel {
         frames_file: frames_file.to_owned(),
         data_hash: data_hash(runs, f64::INFINITY),
@@ -62,7 +63,7 @@ pub fn learn(
 }
 
 /// Observations of one run in motion, settled.
-fn observed(run: &Run, robot: &Description, model: &Model) -> Vec<Seen> {
+fn observed(run: &Run, robot: &Description, model: &Model) -> Vec<HealthyObservation> {
     let mut observer = Observer::new(model, robot).with_further();
     let begin_ns = run.frames.first().map_or(0, |f| f.header.t_capture_ns);
     let mut out = Vec::new();
@@ -83,7 +84,11 @@ fn observed(run: &Run, robot: &Description, model: &Model) -> Vec<Seen> {
 
 /// Noise of a channel per sample at the reference rate, from first differences while the command
 /// stays as it is, and how often a sample repeats itself; None with too few samples.
-fn noise(seen: &[Vec<Seen>], model: &Model, of: impl Fn(&Further) -> &Reading) -> Option<[f64; 2]> {
+fn noise(
+    seen: &[Vec<HealthyObservation>],
+    model: &Model,
+    of: impl Fn(&Further) -> &Reading,
+) -> Option<[f64; 2]> {
     let (mut sum, mut count, mut repeats, mut samples) = (0.0, 0.0, 0.0, 0.0);
     for two in seen.iter().flat_map(|run| run.windows(2)) {
         let (before, now) = (&two[0], &two[1]);
@@ -101,7 +106,7 @@ fn noise(seen: &[Vec<Seen>], model: &Model, of: impl Fn(&Further) -> &Reading) -
     (count >= SAMPLES_MIN && sum > 0.0).then(|| [f64::sqrt(sum / count), repeat_rate])
 }
 
-fn gyro(seen: &[Vec<Seen>], model: &Model) -> Option<YawRateModel> {
+fn gyro(seen: &[Vec<HealthyObservation>], model: &Model) -> Option<YawRateModel> {
     let [noise_rad_s, repeat_rate] = noise(seen, model, |further| &further.yaw_rate)?;
     Some(YawRateModel {
         noise_rad_s,
@@ -110,7 +115,7 @@ fn gyro(seen: &[Vec<Seen>], model: &Model) -> Option<YawRateModel> {
 }
 
 fn currents(
-    seen: &[Vec<Seen>],
+    seen: &[Vec<HealthyObservation>],
     robot: &Description,
     model: &Model,
 ) -> Result<Option<CurrentsModel>, LearnError> {
@@ -133,7 +138,7 @@ fn currents(
 }
 
 fn current(
-    seen: &[Vec<Seen>],
+    seen: &[Vec<HealthyObservation>],
     robot: &Description,
     wheel: usize,
     noise_a: f64,
@@ -157,7 +162,7 @@ fn current(
     // What the means of longer stretches scatter by beyond the sensor's noise is the ground's.
     let (mut sum, mut count) = (0.0, 0.0);
     for window in seen.iter().flat_map(|run| run.chunks_exact(WINDOW)) {
-        let apart = |(observation, further): &Seen| {
+        let apart = |(observation, further): &HealthyObservation| {
             let basis = basis(observation);
             let expected: f64 = basis.iter().zip(terms).map(|(basis, c)| basis * c).sum();
             further.currents[wheel].mean - expected

@@ -32,7 +32,7 @@ use crate::data_hash::data_hash;
 pub use report::{ModeError, RESIDUAL_BAR, Report, Residual};
 use segments::Segments;
 pub use view::View;
-use vigil_plausibility::{self as plausible, Doubtful};
+use vigil_plausibility::{self as plausible, RunDoubt};
 
 /// How to learn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,7 +70,7 @@ pub enum LearnError {
     },
     /// A run cannot mean what its columns say.
     #[error("{0}")]
-    Doubtful(Doubtful),
+    Doubtful(RunDoubt),
     /// All runs turn to one side.
     #[error("the runs of {mode} turn only {side}, runs that turn to either side are needed")]
     OneSide {

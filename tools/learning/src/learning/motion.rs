@@ -260,7 +260,7 @@ pub fn log_likelihood(model: &Model, motion: &MotionModel, segment: &Segment) ->
 
 /// What the tracking filter said of one pose before it saw it, and what it then saw.
 #[derive(Debug, Clone, Copy)]
-pub struct Predicted {
+pub struct Prediction {
     /// Time since the track began, s.
     pub tracked_s: f64,
     /// Measured less predicted pose: x m, y m, yaw rad.
@@ -278,7 +278,7 @@ pub fn follow(
     model: &Model,
     motion: &MotionModel,
     segment: &Segment,
-    mut tell: impl FnMut(&Predicted),
+    mut tell: impl FnMut(&Prediction),
 ) {
     let noise = motion.noise();
     let limit = model.command.curvature_max_1_m;
@@ -304,7 +304,7 @@ pub fn follow(
         if observation.pose_frames > 0 {
             let (innovation, covariance) = track.innovation(observation.pose, sensor);
             if let Some(log_likelihood) = track.update(observation.pose, sensor) {
-                tell(&Predicted {
+                tell(&Prediction {
                     tracked_s,
                     innovation,
                     variance: covariance.diagonal().into(),

@@ -8,7 +8,7 @@ use vigil_robot::learned::{Model, MotionModel};
 
 use super::LearnError;
 use super::bounds;
-use super::motion::{Predicted, follow};
+use super::motion::{Prediction, follow};
 use super::segments::{Segment, Segments};
 use crate::bounds::Bounds;
 
@@ -117,7 +117,7 @@ pub fn report(
         runs_held_out: tested.len(),
         exposure_h: exposure.fold(f64::INFINITY, f64::min),
         modes,
-        bounds: bounds::of(model, robot),
+        bounds: bounds::bounds(model, robot),
     })
 }
 
@@ -178,7 +178,7 @@ struct Squares {
 }
 
 impl Squares {
-    fn add(&mut self, step: &Predicted, axis: usize) {
+    fn add(&mut self, step: &Prediction, axis: usize) {
         self.count += 1.0;
         self.found += step.innovation[axis] * step.innovation[axis];
         self.predicted += step.variance[axis];

@@ -95,7 +95,7 @@ impl View {
             modes,
             heading_rate_speed_m_s: speed,
             heading_rate_change: rows.collect(),
-            alarms: Alarm::of(&model.calibration, fault_rate_1_h),
+            alarms: Alarm::all(&model.calibration, fault_rate_1_h),
         }
     }
 }

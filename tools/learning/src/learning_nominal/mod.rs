@@ -26,7 +26,7 @@ use crate::data_hash::data_hash;
 use record::{Part, Record};
 pub use report::{ChannelError, Report};
 pub use view::View;
-use vigil_plausibility::{self as plausible, Doubtful};
+use vigil_plausibility::{self as plausible, RunDoubt};
 
 /// Logs shorter than this are learned from with a warning and wider deviations, s.
 const LONG_ENOUGH_S: f64 = 600.0;
@@ -41,7 +41,7 @@ pub enum NominalError {
     NoRuns,
     /// Half of the runs, or more, cannot mean what their columns say: one of them.
     #[error("{0}")]
-    Doubtful(Doubtful),
+    Doubtful(RunDoubt),
     /// The robot hardly moves.
     #[error("the robot moves for {found_s:.1} s, at least {needed_s:.0} s are needed")]
     Still {
@@ -199,7 +199,7 @@ fn blank(
 /// them and more are doubtful, the columns are, and refused.
 fn doubt(runs: &[&Run], until_s: f64, robot: &Description) -> Result<Option<String>, NominalError> {
     let of = |run: &&Run| plausible::doubt(run, robot, until_s);
-    let doubts: Vec<Doubtful> = runs.iter().filter_map(of).collect();
+    let doubts: Vec<RunDoubt> = runs.iter().filter_map(of).collect();
     let judged = |run: &&&Run| plausible::is_judged(run, robot, until_s);
     let (found, all) = (doubts.len(), runs.iter().filter(judged).count());
     match doubts.into_iter().next() {

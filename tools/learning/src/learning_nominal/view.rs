@@ -88,7 +88,7 @@ impl View {
             command: model.command.clone(),
             channels: model.channel.iter().map(channel).collect(),
             joint: model.joint.clone(),
-            alarms: Alarm::of(&model.calibration, fault_rate_1_h),
+            alarms: Alarm::all(&model.calibration, fault_rate_1_h),
             reachable: Form::ALL.map(reachable).to_vec(),
         }
     }

@@ -1,7 +1,7 @@
 //! Is a model's prediction of what missions bring near enough to what they brought?
 
 use super::record::Record;
-use crate::simulation::{Paired, Summary};
+use crate::simulation::{PairedDifference, Summary};
 use vigil_pomdp::Pomdp;
 use vigil_pomdp::Tracker;
 
@@ -68,7 +68,7 @@ pub fn within(predicted: f64, measured: f64, half_width: f64) -> Result<Agreemen
 
 /// What a model expects of recorded missions, and what they brought: discounted rewards.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Followed {
+pub struct RewardCheck {
     /// Predicted, step by step, from what was observed before.
     pub predicted: Summary,
     /// Measured.
@@ -79,7 +79,7 @@ pub struct Followed {
     pub missions: usize,
 }
 
-impl Followed {
+impl RewardCheck {
     /// [`within`].
     ///
     /// # Errors
@@ -93,7 +93,7 @@ impl Followed {
 /// sum_s b(s) R(s,a) of the action that was taken. If the model is right, the mean over many
 /// missions is that of the rewards, whoever acted and by whatever rule. `None` without rewards.
 #[must_use]
-pub fn follow(model: &Pomdp, records: &[Record]) -> Option<Followed> {
+pub fn follow(model: &Pomdp, records: &[Record]) -> Option<RewardCheck> {
     let mut tracker = Tracker::new(model);
     let (mut predicted, mut measured) = (Vec::new(), Vec::new());
     for record in records {
@@ -113,10 +113,10 @@ pub fn follow(model: &Pomdp, records: &[Record]) -> Option<Followed> {
         }
         predicted.push(sum);
     }
-    (!measured.is_empty()).then(|| Followed {
+    (!measured.is_empty()).then(|| RewardCheck {
         missions: measured.len(),
-        half_width: Paired::of(&predicted, &measured).half_width,
-        predicted: Summary::of(&mut predicted),
-        measured: Summary::of(&mut measured),
+        half_width: PairedDifference::new(&predicted, &measured).half_width,
+        predicted: Summary::new(&mut predicted),
+        measured: Summary::new(&mut measured),
     })
 }

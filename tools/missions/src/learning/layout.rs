@@ -64,7 +64,7 @@ pub(super) struct Layout {
 
 impl Layout {
     /// The layout of a model, and the model's probabilities in it, rows normalised.
-    pub(super) fn of(model: &Pomdp) -> (Self, Vec<f64>) {
+    pub(super) fn new(model: &Pomdp) -> (Self, Vec<f64>) {
         let (n, k) = (model.states().len(), model.observations().len());
         let actions = model.actions().len();
         let mut layout = Self {

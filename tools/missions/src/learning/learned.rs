@@ -8,7 +8,7 @@ use vigil_pomdp::Pomdp;
 
 /// A learned model and its origin.
 #[derive(Debug, Clone)]
-pub struct Learned {
+pub struct LearnedModel {
     /// The model.
     pub model: Pomdp,
     /// Every iteration of every start.
@@ -64,7 +64,7 @@ pub struct Entry {
     pub interval: [f64; 2],
 }
 
-impl Learned {
+impl LearnedModel {
     /// Every row: the start belief, T, Z.
     pub fn rows(&self) -> impl Iterator<Item = LearnedRow> + '_ {
         let rows = self.layout.rows().enumerate();

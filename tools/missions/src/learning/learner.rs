@@ -6,7 +6,7 @@ use rand_pcg::Pcg64Mcg;
 use super::expectation::{Impossible, Passes};
 use super::information::Information;
 use super::layout::Layout;
-use super::learned::Learned;
+use super::learned::LearnedModel;
 use super::record::{Record, RecordError};
 use super::sampling;
 use vigil_pomdp::ParseError;
@@ -99,9 +99,9 @@ pub fn learn(
     records: &[Record],
     settings: &Settings,
     watch: &mut dyn FnMut(Iteration),
-) -> Result<Learned, LearnError> {
+) -> Result<LearnedModel, LearnError> {
     checked(prior, records, settings)?;
-    let (layout, hand) = Layout::of(prior);
+    let (layout, hand) = Layout::new(prior);
     let kappa: Vec<f64> = hand.iter().map(|p| p * settings.prior_strength).collect();
     let mut search = Search::new(&layout, &kappa, records);
     let mut generator = Pcg64Mcg::seed_from_u64(settings.seed);
@@ -129,7 +129,7 @@ pub fn learn(
     let (_, start, theta) = best.ok_or(LearnError::Empty)?;
     let (counts, worth) = search.information(&theta)?;
     let model = layout.model(prior, &theta).map_err(LearnError::Model)?;
-    Ok(Learned {
+    Ok(LearnedModel {
         model,
         iterations,
         start,

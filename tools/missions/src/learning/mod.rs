@@ -15,7 +15,7 @@
 //!
 //! **States** may be told with a mission, all or some ([`Record::labels`]); then they are facts.
 //!
-//! [`learn`] does this, from several starts if wished, and [`Learned`] says of each row what is
+//! [`learn`] does this, from several starts if wished. [`LearnedModel`] says of each row what is
 //! data and what is prior, with credible intervals. [`check`] compares what a model predicts with
 //! what was measured, and refuses one that is off by more than a fifth. [`Posterior`] learns on the
 //! way, mission by mission.
@@ -32,7 +32,7 @@ mod sampling;
 
 pub use expectation::Impossible;
 pub use layout::{Row, Table};
-pub use learned::{Entry, Learned, LearnedRow};
+pub use learned::{Entry, LearnedModel, LearnedRow};
 pub use learner::{Iteration, LearnError, Settings, learn};
 pub use posterior::Posterior;
 pub use record::{Record, RecordError};

@@ -40,7 +40,7 @@ impl Posterior {
                 allowed: "a positive number",
             });
         }
-        let (layout, theta) = Layout::of(prior);
+        let (layout, theta) = Layout::new(prior);
         Ok(Self {
             prior: prior.clone(),
             kappa: theta.iter().map(|p| p * strength).collect(),

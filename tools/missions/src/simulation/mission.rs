@@ -48,7 +48,7 @@ pub fn horizon(discount: f64, cap: usize) -> usize {
 
 /// One step of a mission, with the states that no agent sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub struct HiddenStep {
     /// The state in which the action was taken.
     pub before: usize,
     /// What the agent did.
@@ -73,7 +73,7 @@ pub fn run_watched(
     agent: &mut dyn Agent,
     rules: &Rules,
     (seed, episode): (u64, u64),
-    watch: &mut dyn FnMut(Seen),
+    watch: &mut dyn FnMut(HiddenStep),
 ) -> Mission {
     let mut world = World::new(model, seed, episode);
     let mut mission = Mission::default();
@@ -83,7 +83,7 @@ pub fn run_watched(
         let act = agent.decide(world.chance());
         let before = world.state();
         let event = world.step(act.action);
-        watch(Seen {
+        watch(HiddenStep {
             before,
             action: act.action,
             after: world.state(),

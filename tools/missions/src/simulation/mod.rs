@@ -3,8 +3,8 @@
 //! [`World`] draws start, next state and observation from a decision model; an [`Agent`] acts:
 //! a policy with its belief, a deterministic [`Escalation`], or [`Random`]; [`run`] brings the two
 //! together for one mission. Random numbers are *paired*: step k of episode e takes the same
-//! numbers whoever acts, so that differences between agents ([`Paired`]) are known far better than
-//! their means ([`Summary`]).
+//! numbers whoever acts, so that differences between agents ([`PairedDifference`]) are known far
+//! better than their means ([`Summary`]).
 //!
 //! The world may follow another model than the one that the agent believes in, as long as names
 //! agree: that shows what an error in the model costs.
@@ -18,7 +18,7 @@ mod world;
 
 pub use agent::{Act, Agent, PolicyAgent, Random};
 pub use escalation::{Escalation, EscalationError};
-pub use mission::{Mission, Rules, Seen, horizon, run, run_watched};
-pub use statistics::{Paired, Summary};
+pub use mission::{HiddenStep, Mission, Rules, horizon, run, run_watched};
+pub use statistics::{PairedDifference, Summary};
 pub use stream::Stream;
 pub use world::{Event, World};

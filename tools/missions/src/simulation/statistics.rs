@@ -18,7 +18,7 @@ pub struct Summary {
 impl Summary {
     /// Sorts `values`. All fields are NaN without any.
     #[must_use]
-    pub fn of(values: &mut [f64]) -> Self {
+    pub fn new(values: &mut [f64]) -> Self {
         let (mean, half_width) = mean_and_half_width(values);
         values.sort_unstable_by(f64::total_cmp);
         let count = values.len();
@@ -34,7 +34,7 @@ impl Summary {
 
 /// Of the differences between two agents, mission by mission.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Paired {
+pub struct PairedDifference {
     /// Mean of the differences.
     pub difference: f64,
     /// Its 95 % interval is `difference` +- this (Student).
@@ -44,10 +44,10 @@ pub struct Paired {
     pub p: f64,
 }
 
-impl Paired {
+impl PairedDifference {
     /// `ours` minus `theirs`, of the same missions in the same order.
     #[must_use]
-    pub fn of(ours: &[f64], theirs: &[f64]) -> Self {
+    pub fn new(ours: &[f64], theirs: &[f64]) -> Self {
         let differences: Vec<f64> = ours.iter().zip(theirs).map(|(a, b)| a - b).collect();
         let (difference, half_width) = mean_and_half_width(&differences);
         let error = standard_error(&differences, difference);

@@ -32,7 +32,7 @@ fn heuristics_earn_on_public_models_what_another_implementation_says() {
             let decider = policy.build(&model, &solution, |i| Dual::new(i, 0.5));
             let mut agent = PolicyAgent::new(&model, decider.unwrap());
             let mission = |e| run(&model, &mut agent, &rules, (1, e)).discounted;
-            let summary = Summary::of(&mut (0..EPISODES).map(mission).collect::<Vec<_>>());
+            let summary = Summary::new(&mut (0..EPISODES).map(mission).collect::<Vec<_>>());
             // Both means are known to within their intervals.
             let both = summary.half_width.hypot(half_width);
             let sigmas = (summary.mean - mean) / (both / 1.96);

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use vigil_missions::learning::{
-    Iteration, LearnError, Learned, LearnedRow, Record, RecordError, Settings, Table, learn,
+    Iteration, LearnError, LearnedModel, LearnedRow, Record, RecordError, Settings, Table, learn,
 };
 use vigil_pomdp::Pomdp;
 
@@ -24,7 +24,7 @@ fn settings(prior_strength: f64, iterations_max: usize) -> Settings {
     }
 }
 
-fn learned(prior: &Pomdp, records: &[Record], settings: &Settings) -> Learned {
+fn learned(prior: &Pomdp, records: &[Record], settings: &Settings) -> LearnedModel {
     learn(prior, records, settings, &mut |_| ()).unwrap()
 }
 
@@ -251,7 +251,7 @@ fn of_several_starts_the_best_one_counts() {
         ..settings(1.0, 40)
     };
     let several = learned(&model, &records, &four);
-    let last = |of: &Learned, start| {
+    let last = |of: &LearnedModel, start| {
         let mut own = of.iterations.iter().filter(|i| i.start == start);
         own.next_back().copied().unwrap().objective
     };

@@ -2,7 +2,7 @@
 
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
-use vigil_missions::learning::{Learned, Posterior, Settings, learn};
+use vigil_missions::learning::{LearnedModel, Posterior, Settings, learn};
 use vigil_pomdp::Pomdp;
 
 use crate::recorded::missions;
@@ -12,7 +12,7 @@ const HAND: &str = include_str!("recorded/wear.pomdp");
 const STRENGTHS: [f64; 3] = [5.0, 20.0, 80.0];
 
 /// How many true probabilities lie in their intervals, below and above them.
-fn coverage(truth: &Pomdp, learned: &Learned) -> [usize; 3] {
+fn coverage(truth: &Pomdp, learned: &LearnedModel) -> [usize; 3] {
     let mut counts = [0; 3];
     for row in learned.rows() {
         for entry in row.entries.iter().filter(|entry| entry.learned < 1.0) {

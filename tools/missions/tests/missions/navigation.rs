@@ -4,7 +4,7 @@ use vigil_missions::navigation::{
     ACTIONS, ENDS, ParameterError, Parameters, QUIET, STATES, generate,
 };
 use vigil_missions::simulation::{
-    Agent, Escalation, Paired, PolicyAgent, Random, Rules, Summary, horizon, run,
+    Agent, Escalation, PairedDifference, PolicyAgent, Random, Rules, Summary, horizon, run,
 };
 use vigil_pomdp::policy::{Base, Dual, PolicyName};
 use vigil_pomdp::{Evidence, Pomdp, Tracker, mdp};
@@ -273,7 +273,7 @@ fn every_policy_beats_the_escalation_over_a_thousand_missions() {
             let escalation = Escalation::new(&model, "FP", &ladder, &QUIET, patience);
             baselines.push(missions(&mut escalation.unwrap(), ends));
         }
-        let chance = Summary::of(&mut missions(&mut Random::new(ACTIONS.len()), ends)).mean;
+        let chance = Summary::new(&mut missions(&mut Random::new(ACTIONS.len()), ends)).mean;
         let prefixes = ["", "dm-", "adm-"];
         for name in prefixes
             .iter()
@@ -288,10 +288,10 @@ fn every_policy_beats_the_escalation_over_a_thousand_missions() {
             let decider = policy.build(&model, &solution, settings).unwrap();
             let ours = missions(&mut PolicyAgent::new(&model, decider), ends);
             for baseline in &baselines {
-                let Paired { difference, p, .. } = Paired::of(&ours, baseline);
+                let PairedDifference { difference, p, .. } = PairedDifference::new(&ours, baseline);
                 assert!(difference > 0.0 && p < 1e-3, "{name}: {difference}, p {p}");
             }
-            assert!(Summary::of(&mut ours.clone()).mean > chance);
+            assert!(Summary::new(&mut ours.clone()).mean > chance);
         }
     }
 }

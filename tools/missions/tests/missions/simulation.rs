@@ -1,8 +1,8 @@
 //! The event simulator: random numbers in pairs, missions, statistics.
 
 use vigil_missions::simulation::{
-    Act, Agent, Escalation, EscalationError, Paired, PolicyAgent, Random, Rules, Summary, World,
-    horizon, run,
+    Act, Agent, Escalation, EscalationError, PairedDifference, PolicyAgent, Random, Rules, Summary,
+    World, horizon, run,
 };
 use vigil_pomdp::policy::{Control, Dual, PolicyName};
 use vigil_pomdp::{Pomdp, mdp};
@@ -123,7 +123,7 @@ fn rewards_agree_with_the_exact_value_of_a_fixed_policy() {
     assert_eq!(rules.steps_max, 88);
     let mut mission = |episode| run(&model, &mut Scripted::new(&[0]), &rules, (1, episode));
     let missions: Vec<_> = (0..20_000).map(&mut mission).collect();
-    let summary = Summary::of(&mut missions.iter().map(|m| m.discounted).collect::<Vec<_>>());
+    let summary = Summary::new(&mut missions.iter().map(|m| m.discounted).collect::<Vec<_>>());
     // Never mended: V(worn) = -1/(1 - 0.9), V(good) = (2 + 0.9 0.2 V(worn)) / (1 - 0.9 0.8).
     let worn = -10.0;
     let good = (2.0 + 0.9 * 0.2 * worn) / (1.0 - 0.9 * 0.8);
@@ -153,7 +153,7 @@ fn an_ending_action_is_paid_for_and_is_the_last() {
     assert_eq!(agent.heard.len(), 2, "nothing is observed after the end");
     let mut random = Random::new(2);
     let shares = (0..2000).map(|e| run(&model, &mut random, &rules, (1, e)).steps as f64);
-    let mean = Summary::of(&mut shares.collect::<Vec<_>>()).mean;
+    let mean = Summary::new(&mut shares.collect::<Vec<_>>()).mean;
     assert!((mean - 2.0).abs() < 0.2, "half of all steps end it: {mean}");
 }
 
@@ -233,7 +233,7 @@ fn what_the_believed_model_rules_out_is_counted_and_survived() {
 #[test]
 fn summaries_and_paired_tests_agree_with_printed_tables() {
     let mut values = [4.0, 1.0, 3.0, 2.0, 5.0];
-    let summary = Summary::of(&mut values);
+    let summary = Summary::new(&mut values);
     assert_eq!(
         (summary.mean, summary.median, summary.worst_5_percent),
         (3.0, 3.0, 1.0)
@@ -241,12 +241,12 @@ fn summaries_and_paired_tests_agree_with_printed_tables() {
     // t(4, 0.975) = 2.776445, standard deviation sqrt(2.5).
     assert!((summary.half_width - 2.776_445 * (2.5_f64 / 5.0).sqrt()).abs() < 1e-5);
     let mut forty: Vec<f64> = (0..40).map(f64::from).collect();
-    let summary = Summary::of(&mut forty);
+    let summary = Summary::new(&mut forty);
     assert_eq!((summary.median, summary.worst_5_percent), (19.5, 1.0));
     // Sleep data of Student (1908), ten patients, two drugs: t = 4.0621, p = 0.002833.
     let first = [0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0];
     let second = [1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4];
-    let paired = Paired::of(&second, &first);
+    let paired = PairedDifference::new(&second, &first);
     assert!((paired.difference - 1.58).abs() < 1e-12);
     assert!((paired.p - 0.002_833).abs() < 1e-6, "{}", paired.p);
     assert!(
@@ -254,9 +254,9 @@ fn summaries_and_paired_tests_agree_with_printed_tables() {
         "{}",
         paired.half_width
     );
-    let same = Paired::of(&first, &first);
+    let same = PairedDifference::new(&first, &first);
     assert_eq!((same.difference, same.p), (0.0, 1.0));
-    let shifted = Paired::of(&[1.0, 2.0, 3.0], &[0.0, 1.0, 2.0]);
+    let shifted = PairedDifference::new(&[1.0, 2.0, 3.0], &[0.0, 1.0, 2.0]);
     assert_eq!((shifted.difference, shifted.p), (1.0, 0.0));
-    assert!(Summary::of(&mut []).mean.is_nan());
+    assert!(Summary::new(&mut []).mean.is_nan());
 }

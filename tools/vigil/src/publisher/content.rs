@@ -8,7 +8,7 @@ use vigil_recording::frames::{Field, Run, fields};
 use vigil_robot::Description;
 use vigil_robot::meaning::Meaning;
 
-use super::Arrived;
+use super::FrameArrival;
 use crate::findings::{Finding, Status};
 
 /// Commanded speed above which a robot is to move, m/s.
@@ -33,7 +33,7 @@ struct Stretch {
 }
 
 /// One finding for each field of the robot, and one about what they mean together.
-pub fn findings(robot: &Description, frames: &[Arrived]) -> Vec<Finding> {
+pub fn findings(robot: &Description, frames: &[FrameArrival]) -> Vec<Finding> {
     let fields = fields(robot);
     let one = |(name, field): &(String, Field)| {
         judge(
@@ -53,7 +53,7 @@ fn is_moving(robot: &Description, frame: &SensorFrame) -> bool {
     robot.path_speed_m_s(robot.twist(&frame.command)) > MOVING_M_S
 }
 
-fn stretch(robot: &Description, field: Field, frames: &[Arrived]) -> Stretch {
+fn stretch(robot: &Description, field: Field, frames: &[FrameArrival]) -> Stretch {
     let mut found = Stretch {
         least: f64::INFINITY,
         most: f64::NEG_INFINITY,
@@ -61,7 +61,7 @@ fn stretch(robot: &Description, field: Field, frames: &[Arrived]) -> Stretch {
         moving_most: f64::NEG_INFINITY,
         ..Stretch::default()
     };
-    for Arrived { frame, .. } in frames {
+    for FrameArrival { frame, .. } in frames {
         let Some(value) = field.get(frame) else {
             continue;
         };
@@ -142,7 +142,7 @@ const fn unit_guess(field: Field) -> &'static str {
 
 /// Units, signs and sides, from what the frames say about each other: the tests that run in the
 /// graph, then those of recordings.
-fn meanings(robot: &Description, frames: &[Arrived]) -> Vec<Finding> {
+fn meanings(robot: &Description, frames: &[FrameArrival]) -> Vec<Finding> {
     let mut meaning = Meaning::new(robot);
     let found = frames.iter().filter_map(|f| meaning.take(&f.frame));
     let found = found.map(|finding| finding.text(robot));
@@ -155,7 +155,7 @@ fn meanings(robot: &Description, frames: &[Arrived]) -> Vec<Finding> {
     }
 }
 
-fn doubts(robot: &Description, frames: &[Arrived], unjudged: &[&str]) -> Finding {
+fn doubts(robot: &Description, frames: &[FrameArrival], unjudged: &[&str]) -> Finding {
     let mut run = Run {
         id: 0,
         frames: Vec::new(),
@@ -201,12 +201,12 @@ mod tests {
     use super::*;
 
     /// A recorded run without a fault, in a curve, as a good publisher would send it.
-    fn recorded() -> (Description, Vec<Arrived>) {
+    fn recorded() -> (Description, Vec<FrameArrival>) {
         let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
         let robot = vigil_setup::load_robot(&root.join("config/robots/rover.toml")).unwrap();
         let path = root.join("tests/data/rover/learn_frames.csv.gz");
         let runs = vigil_recording::frames::read(&path, &robot).unwrap();
-        let arrived = |frame: &SensorFrame| Arrived {
+        let arrived = |frame: &SensorFrame| FrameArrival {
             now_ns: frame.header.t_capture_ns,
             frame: *frame,
         };

@@ -17,7 +17,7 @@ use vigil_sensor_sim::{ArrivalClock, Here};
 use vigil_setup::Setup;
 use vigil_setup::schema::Source;
 
-use super::{Arrived, BorderReport, Heard};
+use super::{BorderReport, FrameArrival, Reception};
 
 /// Frames that are kept.
 pub const FRAMES_MAX: usize = 500_000;
@@ -30,13 +30,13 @@ const SLEEP_NS: u64 = 50_000_000;
 ///
 /// # Errors
 /// That there is no place for a graph.
-pub fn listen(setup: &Setup, seconds: f64) -> Result<(Heard, Option<PortError>), PortError> {
+pub fn listen(setup: &Setup, seconds: f64) -> Result<(Reception, Option<PortError>), PortError> {
     let domain = setup.domain()?;
     // Held as long as this listens: no graph is started meanwhile.
     let lock = domain.lock().map_err(|e| PortError::setup("lock", &e))?;
-    let mut heard = Heard {
+    let mut heard = Reception {
         is_graph_running: lock.is_none(),
-        ..Heard::default()
+        ..Reception::default()
     };
     signal::install();
     let sign = if lock.is_some() {
@@ -78,10 +78,10 @@ impl Drop for Sign {
     }
 }
 
-impl Heard {
+impl Reception {
     fn take(&mut self, frame: SensorFrame, now_ns: u64) {
         if self.frames.len() < FRAMES_MAX {
-            self.frames.push(Arrived { now_ns, frame });
+            self.frames.push(FrameArrival { now_ns, frame });
         } else {
             self.more += 1;
         }
@@ -98,7 +98,7 @@ struct Guard {
 impl Guard {
     fn new(setup: &Setup) -> Self {
         Self {
-            account: InputAccount::of(match setup.file.sensor.source {
+            account: InputAccount::new(match setup.file.sensor.source {
                 Source::Socket => Writer::Stranger,
                 _ => Writer::Publisher,
             }),
@@ -120,8 +120,8 @@ impl Guard {
 fn while_it_lasts(
     seconds: f64,
     inputs: &impl Inputs,
-    heard: &mut Heard,
-    mut take: impl FnMut(&mut Heard),
+    heard: &mut Reception,
+    mut take: impl FnMut(&mut Reception),
 ) -> Result<(), PortError> {
     let timer = Timer::new().map_err(|e| PortError::setup("timer", &e))?;
     let from_ns = Monotonic.now_ns();
@@ -145,7 +145,7 @@ fn found_topic(setup: &Setup) -> Result<Option<FoundTopic>, PortError> {
 }
 
 /// Reads the sensor's topic.
-fn topic(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortError> {
+fn topic(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), PortError> {
     let domain = setup.domain()?;
     let graph = Graph::SharedMemory(Link::join(&domain, "check-publisher")?);
     let Graph::SharedMemory(link) = &graph else {
@@ -193,7 +193,7 @@ fn topic(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortError
 }
 
 /// Reads the sockets that a graph would read.
-fn sockets(setup: &Setup, seconds: f64, heard: &mut Heard) -> Result<(), PortError> {
+fn sockets(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), PortError> {
     let socket = &setup.file.sensor.socket;
     let folder = setup.domain()?.folder().to_owned();
     let unix = (!socket.unix.is_empty()).then(|| folder.join(&socket.unix));

@@ -18,7 +18,7 @@ pub use running::source;
 
 /// A frame, and when it arrived.
 #[derive(Debug, Clone)]
-pub struct Arrived {
+pub struct FrameArrival {
     /// `CLOCK_MONOTONIC` ns.
     pub now_ns: u64,
     /// The frame as it came.
@@ -27,9 +27,9 @@ pub struct Arrived {
 
 /// All that came while somebody listened.
 #[derive(Debug, Clone, Default)]
-pub struct Heard {
+pub struct Reception {
     /// Frames in the order of arrival, at most [`listen::FRAMES_MAX`].
-    pub frames: Vec<Arrived>,
+    pub frames: Vec<FrameArrival>,
     /// Frames beyond those.
     pub more: u64,
     /// How long was listened, s.
@@ -55,7 +55,7 @@ pub struct BorderReport {
 }
 
 /// Everything that can be said about it.
-pub fn findings(setup: &Setup, heard: &Heard) -> Vec<Finding> {
+pub fn findings(setup: &Setup, heard: &Reception) -> Vec<Finding> {
     let mut all = transport::findings(setup, heard);
     all.extend(refused::findings(heard));
     if heard.frames.is_empty() {

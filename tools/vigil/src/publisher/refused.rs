@@ -2,11 +2,11 @@
 
 use vigil_blocks::Rejection;
 
-use super::Heard;
+use super::Reception;
 use crate::findings::{Finding, Status};
 
 /// One finding for each cause that occurred; one if none did.
-pub fn findings(heard: &Heard) -> Vec<Finding> {
+pub fn findings(heard: &Reception) -> Vec<Finding> {
     let count = |cause: &Rejection| heard.rejected[*cause as usize];
     let causes: Vec<Rejection> = Rejection::ALL
         .into_iter()

@@ -2,7 +2,7 @@
 
 use vigil_cycle::Latency;
 
-use super::{Arrived, Heard};
+use super::{FrameArrival, Reception};
 use crate::findings::{Finding, Status};
 
 /// A rate may be off by this share.
@@ -19,7 +19,7 @@ const ARRIVAL_OFF_MAX_S: f64 = 0.01;
 const CLOCK_OFF_MAX: f64 = 5e-4;
 
 /// Findings about the times of the frames; there is at least one frame.
-pub fn findings(rate_hz: f64, heard: &Heard) -> Vec<Finding> {
+pub fn findings(rate_hz: f64, heard: &Reception) -> Vec<Finding> {
     let frames = &heard.frames;
     let mut all = vec![rate(rate_hz, frames)];
     all.extend(jitter(rate_hz, frames));
@@ -37,14 +37,14 @@ fn median(values: &mut [f64]) -> Option<f64> {
 }
 
 /// Intervals between consecutive frames of one start, by `at`, s.
-fn intervals(frames: &[Arrived], at: impl Fn(&Arrived) -> u64) -> Vec<f64> {
+fn intervals(frames: &[FrameArrival], at: impl Fn(&FrameArrival) -> u64) -> Vec<f64> {
     let pairs = frames.windows(2);
     let same = pairs.filter(|p| p[0].frame.header.epoch == p[1].frame.header.epoch);
     same.map(|p| (at(&p[1]) as f64 - at(&p[0]) as f64) * 1e-9)
         .collect()
 }
 
-fn rate(expected_hz: f64, frames: &[Arrived]) -> Finding {
+fn rate(expected_hz: f64, frames: &[FrameArrival]) -> Finding {
     let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
         return Finding::new("rate", Status::Failure, "no frame");
     };
@@ -63,7 +63,7 @@ fn rate(expected_hz: f64, frames: &[Arrived]) -> Finding {
     Finding::new("rate", Status::Failure, detail)
 }
 
-fn jitter(rate_hz: f64, frames: &[Arrived]) -> Option<Finding> {
+fn jitter(rate_hz: f64, frames: &[FrameArrival]) -> Option<Finding> {
     let mut latency = Latency::new().ok()?;
     let due = intervals(frames, |f| f.frame.header.t_schedule_ns);
     let middle_s = median(&mut due.clone())?;
@@ -90,7 +90,7 @@ fn jitter(rate_hz: f64, frames: &[Arrived]) -> Option<Finding> {
 }
 
 /// Lost frames, by sequence number.
-fn gaps(heard: &Heard) -> Finding {
+fn gaps(heard: &Reception) -> Finding {
     if let Some(lost) = heard.border.and_then(|border| border.lost_at_socket) {
         let detail = format!("{lost} frames were lost on their way to the socket");
         let status = if lost == 0 {
@@ -119,11 +119,11 @@ fn gaps(heard: &Heard) -> Finding {
 }
 
 /// How often the filters are made to begin anew.
-fn starts(frames: &[Arrived]) -> Option<Finding> {
+fn starts(frames: &[FrameArrival]) -> Option<Finding> {
     let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
         return None;
     };
-    let changes = |of: fn(&Arrived) -> u64| {
+    let changes = |of: fn(&FrameArrival) -> u64| {
         let pairs = frames.windows(2);
         pairs.filter(|pair| of(&pair[0]) != of(&pair[1])).count()
     };
@@ -147,7 +147,7 @@ fn starts(frames: &[Arrived]) -> Option<Finding> {
 }
 
 /// From when a frame was due to its arrival.
-fn way(frames: &[Arrived]) -> Option<Finding> {
+fn way(frames: &[FrameArrival]) -> Option<Finding> {
     let mut latency = Latency::new().ok()?;
     for arrived in frames {
         let header = &arrived.frame.header;
@@ -166,7 +166,7 @@ fn way(frames: &[Arrived]) -> Option<Finding> {
 }
 
 /// The clock of the capture times against this machine's.
-fn capture(frames: &[Arrived]) -> Finding {
+fn capture(frames: &[FrameArrival]) -> Finding {
     let times = intervals(frames, |f| f.frame.header.t_capture_ns);
     if !times.is_empty() && times.iter().all(|s| *s == 0.0) {
         let detail = "header.t_capture_ns never changes: it is when the data was captured, in ns \
@@ -215,23 +215,23 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     /// Frames of 100 Hz that arrive when they are due; `change` spoils them.
-    fn frames(count: u64, change: impl Fn(u64, &mut Arrived)) -> Vec<Arrived> {
+    fn frames(count: u64, change: impl Fn(u64, &mut FrameArrival)) -> Vec<FrameArrival> {
         let one = |k: u64| {
             let mut frame = SensorFrame::default();
             let now_ns = 5_000 * MS + k * 10 * MS;
             (frame.header.epoch, frame.header.seq) = (1, k);
             (frame.header.t_schedule_ns, frame.header.t_capture_ns) = (now_ns, now_ns);
-            let mut arrived = Arrived { now_ns, frame };
+            let mut arrived = FrameArrival { now_ns, frame };
             change(k, &mut arrived);
             arrived
         };
         (0..count).map(one).collect()
     }
 
-    fn found(rate_hz: f64, frames: Vec<Arrived>) -> Vec<(String, Status)> {
-        let heard = Heard {
+    fn found(rate_hz: f64, frames: Vec<FrameArrival>) -> Vec<(String, Status)> {
+        let heard = Reception {
             frames,
-            ..Heard::default()
+            ..Reception::default()
         };
         let found = findings(rate_hz, &heard);
         found.into_iter().map(|f| (f.check, f.status)).collect()
@@ -252,7 +252,7 @@ mod tests {
     #[test]
     fn each_fault_is_found_under_its_name() {
         let (warning, failure) = (Some(Status::Warning), Some(Status::Failure));
-        let of = |change: fn(u64, &mut Arrived)| found(100.0, frames(500, change));
+        let of = |change: fn(u64, &mut FrameArrival)| found(100.0, frames(500, change));
         assert_eq!(
             status(&found(50.0, frames(500, |_, _| {})), "rate"),
             failure

@@ -7,18 +7,18 @@ use vigil_cycle::port::FoundTopic;
 use vigil_setup::Setup;
 use vigil_setup::schema::Source;
 
-use super::Heard;
+use super::Reception;
 use crate::findings::{Finding, Status};
 
 /// Publishers that the graph lets a topic admit.
 const PUBLISHERS: usize = 1;
 
 /// The first few findings: the source, the type, its topic's settings, whether frames came.
-pub fn findings(setup: &Setup, heard: &Heard) -> Vec<Finding> {
+pub fn findings(setup: &Setup, heard: &Reception) -> Vec<Finding> {
     let mut all = vec![source(setup, heard)];
     if setup.file.sensor.source != Source::Socket {
         all.push(types(setup, heard));
-        let demanded = setup.queues().of(Topic::Sensor);
+        let demanded = setup.queues().for_topic(Topic::Sensor);
         let found = heard.topic.as_ref();
         all.extend(found.map(|found| settings(demanded, found)));
     }
@@ -26,7 +26,7 @@ pub fn findings(setup: &Setup, heard: &Heard) -> Vec<Finding> {
     all
 }
 
-fn source(setup: &Setup, heard: &Heard) -> Finding {
+fn source(setup: &Setup, heard: &Reception) -> Finding {
     let (path, source) = (setup.path.display(), setup.file.sensor.source);
     let who = if heard.is_graph_running {
         "the graph is running"
@@ -49,7 +49,7 @@ fn source(setup: &Setup, heard: &Heard) -> Finding {
 }
 
 /// The type on the topic, which its first user has fixed.
-fn types(setup: &Setup, heard: &Heard) -> Finding {
+fn types(setup: &Setup, heard: &Reception) -> Finding {
     let path = Topic::Sensor.path(&setup.file.graph.name);
     let (name, size, alignment) = (
         SensorFrame::TYPE_NAME,
@@ -129,7 +129,7 @@ fn difference(found: &str) -> String {
     told.join(", ")
 }
 
-fn frames(setup: &Setup, heard: &Heard) -> Finding {
+fn frames(setup: &Setup, heard: &Reception) -> Finding {
     let (count, seconds) = (heard.frames.len() as u64 + heard.more, heard.seconds);
     if count > 0 {
         let detail = format!("{count} in {seconds:.1} s");

@@ -30,19 +30,19 @@ pub fn build(model: &str, settings: &Settings) -> Result<Supervisor, String> {
 }
 
 /// A supervisor, and what it is told.
-pub struct Told {
+pub struct ToldSupervisor {
     pub supervisor: Supervisor,
     pub action: Action,
     pub detection: DetectionBelief,
     pub diagnosis: FaultBelief,
 }
 
-impl Told {
+impl ToldSupervisor {
     pub fn new() -> Self {
-        Self::of(MODEL)
+        Self::with_model(MODEL)
     }
 
-    pub fn of(model: &str) -> Self {
+    pub fn with_model(model: &str) -> Self {
         let mut diagnosis = FaultBelief {
             tree_hash: tree().hash(),
             ..FaultBelief::default()
@@ -124,7 +124,7 @@ pub fn tracked(steps: &[(usize, &str)]) -> Vec<f64> {
 }
 
 /// Soft evidence of 1 for every state may round.
-pub fn assert_near(told: &Told, expected: &[f64]) {
+pub fn assert_near(told: &ToldSupervisor, expected: &[f64]) {
     for (found, expected) in told.action.belief.iter().zip(expected) {
         assert!((found - expected).abs() < 1e-12, "{found} {expected}");
     }

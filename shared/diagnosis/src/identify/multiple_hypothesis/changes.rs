@@ -5,12 +5,14 @@ use vigil_blocks::WHEELS;
 use vigil_inference::bank::Hypothesis;
 use vigil_inference::track::Displacement;
 use vigil_robot::learned::wheels::steering_angle;
-use vigil_robot::learned::{Moved, Observation, WheelEvidence};
+use vigil_robot::learned::{Mover, Observation, WheelEvidence};
 
 use super::{FLOOR, MultipleHypothesis};
 use crate::identify::angles::Angles;
 use crate::identify::encoders::Encoders;
-use crate::identify::prepared::{EXPLAINED_S, Seen, age_s, changes_several, newly_stuck};
+use crate::identify::prepared::{
+    EXPLAINED_S, WheelObservation, age_s, changes_several, newly_stuck,
+};
 use crate::identify::rate_offsets::RateOffsets;
 use crate::identify::servo::Servo;
 use crate::identify::state::State;
@@ -25,20 +27,20 @@ impl MultipleHypothesis {
     /// these read so; from the most probable hypothesis of each kind.
     pub(super) fn spawn(&mut self, observation: &Observation, evidence: Option<&WheelEvidence>) {
         let modes = &self.modes;
-        let best = |wanted: &dyn Fn(Moved) -> bool| {
+        let best = |wanted: &dyn Fn(Mover) -> bool| {
             self.bank.best(|mode| wanted(modes[mode].moved)).copied()
         };
         const NEXT: usize = WHEELS + 1;
         let sources: [_; WHEELS + 3] = std::array::from_fn(|count| match count {
-            0 => best(&|moved| moved == Moved::Nominal),
+            0 => best(&|moved| moved == Mover::Nominal),
             1..=WHEELS => best(&|moved| moved.stuck().count_ones() as usize == count),
-            NEXT => best(&|moved| matches!(moved, Moved::Steer(_) | Moved::Pose)),
-            _ => best(&Moved::is_unknown),
+            NEXT => best(&|moved| matches!(moved, Mover::Steer(_) | Mover::Pose)),
+            _ => best(&Mover::is_unknown),
         });
         for from in sources.into_iter().flatten() {
             let before = self.modes[from.mode].moved;
             let read = evidence.map_or([before.stuck(); 3], |evidence| {
-                let seen = Seen {
+                let seen = WheelObservation {
                     model: &self.model,
                     robot: &self.robot,
                     observation,
@@ -94,7 +96,7 @@ impl MultipleHypothesis {
         let (curvature, speed) = (observation.curvature, observation.speed);
         let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
         let context = match before {
-            Moved::Nominal => from.state.track.context(),
+            Mover::Nominal => from.state.track.context(),
             _ => self.context,
         };
         let mut track = from.state.track.enter(&context, &noise);
@@ -111,8 +113,8 @@ impl MultipleHypothesis {
         track.diffuse(self.modes[mode].jump);
         let t_ns = observation.t_first_ns;
         let mut encoders = match (before, after) {
-            (_, Moved::UnknownAny) => Encoders::unsure(t_ns),
-            (Moved::UnknownAny, _) => Encoders::healthy(t_ns),
+            (_, Mover::UnknownAny) => Encoders::unsure(t_ns),
+            (Mover::UnknownAny, _) => Encoders::healthy(t_ns),
             _ => from.state.encoders,
         };
         for wheel in 0..WHEELS {
@@ -136,7 +138,7 @@ impl MultipleHypothesis {
             offsets: RateOffsets::default(),
             angles: Angles::default(),
             servo: match after {
-                Moved::Steer(wheel) => {
+                Mover::Steer(wheel) => {
                     let angle = steering_angle(&self.robot, wheel, observation.command[0]);
                     Some(Servo::new(&self.servo, angle))
                 }

@@ -69,7 +69,7 @@ fn quiet(t_s: f64) -> Moment<'static> {
         size: Size::default(),
         set: "ND",
         reported: "ND",
-        told: Told::GoOn,
+        told: RobotOrder::GoOn,
         action: 0,
     }
 }
@@ -338,14 +338,14 @@ fn actions_are_entries_and_stops_by_rule_are_counted_apart() {
     };
     let run = score(&[], 10.0, |t_s| match t_s {
         t if t < 2.0 => quiet(t),
-        t if t < 3.0 => told(t, Told::Slow, 1),
-        t if t < 4.0 => told(t, Told::Other, 2),
+        t if t < 3.0 => told(t, RobotOrder::Slow, 1),
+        t if t < 4.0 => told(t, RobotOrder::Other, 2),
         // The same kind for another wheel is another action.
-        t if t < 5.0 => told(t, Told::Other, 3),
-        t if t < 6.0 => told(t, Told::Blind, 4),
+        t if t < 5.0 => told(t, RobotOrder::Other, 3),
+        t if t < 6.0 => told(t, RobotOrder::Blind, 4),
         t if t < 7.0 => quiet(t),
-        t if t < 8.0 => told(t, Told::Stop, 4),
-        t => told(t, Told::Help, 5),
+        t if t < 8.0 => told(t, RobotOrder::Stop, 4),
+        t => told(t, RobotOrder::Help, 5),
     });
     let wanted = Actions {
         slow: 1,

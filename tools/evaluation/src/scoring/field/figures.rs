@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 
-use super::{Onset, Run, Seen};
+use super::{JudgedTime, Onset, Run};
 use crate::scoring::bounds::{Bounds, Difference, binomial, poisson};
 use crate::scoring::expected_calibration_error;
 
@@ -124,11 +124,12 @@ fn of_onsets(runs: &[Run]) -> Vec<Figure> {
 }
 
 /// The time of a run from an instant after each onset on.
-type From = fn(&Run) -> &Seen;
+type From = fn(&Run) -> &JudgedTime;
 
 fn of_time(runs: &[Run]) -> Vec<Figure> {
-    let of =
-        |pick: From, part: fn(&Seen) -> f64| move |run: &Run| (part(pick(run)), pick(run).driven_s);
+    let of = |pick: From, part: fn(&JudgedTime) -> f64| {
+        move |run: &Run| (part(pick(run)), pick(run).driven_s)
+    };
     let early: From = |run| &run.from_2_s;
     let late: From = |run| &run.from_10_s;
     let minutes = |run: &Run| run.duration_s / 60.0;
@@ -184,9 +185,9 @@ fn of_time(runs: &[Run]) -> Vec<Figure> {
 fn of_ends(runs: &[Run]) -> Vec<Figure> {
     let alarms = |run: &Run| run.ends.iter().map(|e| (e.alarm_s, e.driven_s)).collect();
     let names = |run: &Run| run.ends.iter().map(|e| (e.name_s, e.driven_s)).collect();
-    let times = |of: fn(&Run) -> Vec<Cleared>| {
+    let times = |of: fn(&Run) -> Vec<ClearingTime>| {
         move |run: &Run| -> Vec<f64> {
-            let time = |(time_s, _): Cleared| time_s.unwrap_or(f64::INFINITY);
+            let time = |(time_s, _): ClearingTime| time_s.unwrap_or(f64::INFINITY);
             of(run).into_iter().map(time).collect()
         }
     };
@@ -299,16 +300,16 @@ fn share_of_onsets(
 }
 
 /// Time until something had cleared, if it had, and the driven time there was.
-type Cleared = (Option<f64>, f64);
+type ClearingTime = (Option<f64>, f64);
 
 /// Ends after which something was down within a limit, of those after which so much was driven.
 fn cleared(
     name: &'static str,
     runs: &[Run],
-    of: impl Fn(&Run) -> Vec<Cleared>,
+    of: impl Fn(&Run) -> Vec<ClearingTime>,
     limit_s: f64,
 ) -> Option<Figure> {
-    let judged = |(time_s, driven_s): Cleared| {
+    let judged = |(time_s, driven_s): ClearingTime| {
         let is_down = time_s.is_some_and(|time_s| time_s <= limit_s);
         (is_down || driven_s >= limit_s).then_some(is_down)
     };

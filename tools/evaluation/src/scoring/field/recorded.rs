@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Figure, Moment, Run, Scorer, Size, Stretch, Told, Truth, figures};
+use super::{Figure, Moment, RobotOrder, Run, Scorer, Size, Stretch, Truth, figures};
 use crate::scoring::{Case, Taxonomy, Verdict};
 
 /// Name of a stop by rule, without a usable belief, among the actions of verdicts.
@@ -87,14 +87,14 @@ fn score(case: &Case, taxonomy: &Taxonomy) -> Run {
     scorer.finish()
 }
 
-fn told(verdict: &Verdict) -> Told {
+fn told(verdict: &Verdict) -> RobotOrder {
     let name = verdict.action.split(':').next().unwrap_or_default();
     match name {
-        "" | "go_on" => Told::GoOn,
-        "slow_down" => Told::Slow,
-        "stop" | "give_up" => Told::Stop,
-        "call_for_help" => Told::Help,
-        SAFE_STOP => Told::Blind,
-        _ => Told::Other,
+        "" | "go_on" => RobotOrder::GoOn,
+        "slow_down" => RobotOrder::Slow,
+        "stop" | "give_up" => RobotOrder::Stop,
+        "call_for_help" => RobotOrder::Help,
+        SAFE_STOP => RobotOrder::Blind,
+        _ => RobotOrder::Other,
     }
 }

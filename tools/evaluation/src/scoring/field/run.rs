@@ -1,7 +1,7 @@
 //! One run, moment by moment.
 
 use super::claims::{Claim, Instants};
-use super::{BLIND, CONFIDENT, HELD_S, JUDGED_S, Moment, SIZED_S, Stretch, Told, Truth};
+use super::{BLIND, CONFIDENT, HELD_S, JUDGED_S, Moment, RobotOrder, SIZED_S, Stretch, Truth};
 use crate::scoring::{TIME_SLACK_S, Taxonomy};
 
 /// One onset of a fault.
@@ -36,7 +36,7 @@ pub struct End {
 
 /// Driven time in which something was judged.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Seen {
+pub struct JudgedTime {
     /// All of it, s.
     pub driven_s: f64,
     /// With the right leaf as `mode`, s.
@@ -82,14 +82,14 @@ impl Actions {
         self.slow + self.stop + self.help + self.other
     }
 
-    const fn add(&mut self, told: Told) {
+    const fn add(&mut self, told: RobotOrder) {
         match told {
-            Told::GoOn => {}
-            Told::Slow => self.slow += 1,
-            Told::Stop => self.stop += 1,
-            Told::Blind => self.blind += 1,
-            Told::Help => self.help += 1,
-            Told::Other => self.other += 1,
+            RobotOrder::GoOn => {}
+            RobotOrder::Slow => self.slow += 1,
+            RobotOrder::Stop => self.stop += 1,
+            RobotOrder::Blind => self.blind += 1,
+            RobotOrder::Help => self.help += 1,
+            RobotOrder::Other => self.other += 1,
         }
     }
 }
@@ -116,9 +116,9 @@ pub struct Run {
     /// Time in a wrong mode, s: at any time, standing or not.
     pub wrong_s: f64,
     /// From 2 s after an onset on.
-    pub from_2_s: Seen,
+    pub from_2_s: JudgedTime,
     /// From 10 s after an onset on.
-    pub from_10_s: Seen,
+    pub from_10_s: JudgedTime,
     /// Changes of `mode`.
     pub mode: Changes,
     /// Changes of the reported name.
@@ -150,7 +150,7 @@ struct Before {
     mode: String,
     reported: String,
     action: u64,
-    told: Told,
+    told: RobotOrder,
 }
 
 /// Scores one run while it goes on.
@@ -233,7 +233,7 @@ impl<'a> Scorer<'a> {
     /// What the run brought.
     #[must_use]
     pub fn finish(mut self) -> Run {
-        let helps = |before: &Before| before.told == Told::Help;
+        let helps = |before: &Before| before.told == RobotOrder::Help;
         self.run.is_help_latched =
             self.now().is_healthy() && self.before.as_ref().is_some_and(helps);
         self.run

@@ -8,8 +8,8 @@ use vigil_evaluation::scoring::bounds::Difference;
 use vigil_evaluation::scoring::{Contest, Score, Share};
 
 use super::Part;
-use super::passes::Found;
-use crate::commands::offline::Used;
+use super::passes::SensorSetResult;
+use crate::commands::offline::FilterSettings;
 
 /// The document. Keys of the score stand at its top, for the set of channels that was asked for.
 #[derive(Debug, Serialize)]
@@ -17,7 +17,7 @@ pub struct Document<'a> {
     schema_version: u32,
     part: Part,
     #[serde(flatten)]
-    used: &'a Used,
+    used: &'a FilterSettings,
     #[serde(flatten)]
     score: &'a Score,
     /// The scores of all sets of channels, if a report or filters were asked for.
@@ -32,9 +32,9 @@ impl<'a> Document<'a> {
     /// Of the set that was `asked` for and of all sets `found`, which count if there are `several`.
     pub fn new(
         part: Part,
-        used: &'a Used,
-        asked: &'a Found,
-        found: &'a [Found],
+        used: &'a FilterSettings,
+        asked: &'a SensorSetResult,
+        found: &'a [SensorSetResult],
         several: bool,
     ) -> Self {
         let sets = found.iter().filter(|_| several);
@@ -53,7 +53,7 @@ impl<'a> Document<'a> {
 }
 
 /// The comparison of filters as tables, if there is one.
-pub fn filters_text(found: &Found) -> Option<String> {
+pub fn filters_text(found: &SensorSetResult) -> Option<String> {
     let mut text = String::new();
     for (class, rows) in found.contest.as_ref()? {
         let _ = write!(

@@ -8,12 +8,12 @@ use vigil_recording::labels::Label;
 use vigil_setup::schema::IdentifierFilter;
 
 use super::Args;
-use crate::commands::offline::Prepared;
+use crate::commands::offline::OfflineModels;
 use vigil_terminal::CommandError;
 use vigil_terminal::output::Progress;
 
 /// What was found with one set of channels.
-pub struct Found {
+pub struct SensorSetResult {
     /// Its name, as `--sensors` has it.
     pub name: String,
     /// The score of the chosen filter.
@@ -27,7 +27,7 @@ pub struct Found {
 /// Everything that stays the same over the passes.
 pub struct Passes<'a> {
     args: &'a Args,
-    prepared: &'a Prepared,
+    prepared: &'a OfflineModels,
     runs: &'a [(Run, Label)],
     done: Cell<usize>,
 }
@@ -40,7 +40,7 @@ struct Pass {
 
 impl<'a> Passes<'a> {
     /// Over these runs.
-    pub fn new(args: &'a Args, prepared: &'a Prepared, runs: &'a [(Run, Label)]) -> Self {
+    pub fn new(args: &'a Args, prepared: &'a OfflineModels, runs: &'a [(Run, Label)]) -> Self {
         Self {
             args,
             prepared,
@@ -57,7 +57,7 @@ impl<'a> Passes<'a> {
         &self,
         sets: &[&str],
         entrants: &[IdentifierFilter],
-    ) -> Result<Vec<Found>, CommandError> {
+    ) -> Result<Vec<SensorSetResult>, CommandError> {
         let chosen = self.args.filter.identifier;
         let others = entrants.iter().filter(|filter| **filter != chosen).count();
         let total = sets.len() * (1 + others) * self.runs.len();
@@ -71,7 +71,7 @@ impl<'a> Passes<'a> {
         set: &str,
         entrants: &[IdentifierFilter],
         progress: &Progress,
-    ) -> Result<Found, CommandError> {
+    ) -> Result<SensorSetResult, CommandError> {
         let taxonomy = self.prepared.pipeline.taxonomy();
         let chosen = self.args.filter.identifier;
         let pass = self.pass(set, chosen, progress)?;
@@ -85,7 +85,7 @@ impl<'a> Passes<'a> {
             )),
         });
         let entrants: Vec<Entrant> = entrants.collect::<Result<_, CommandError>>()?;
-        Ok(Found {
+        Ok(SensorSetResult {
             name: set.to_owned(),
             score,
             contest: (!entrants.is_empty()).then(|| scoring::contest(&entrants)),
@@ -102,7 +102,7 @@ impl<'a> Passes<'a> {
         filter: IdentifierFilter,
         progress: &Progress,
     ) -> Result<Pass, CommandError> {
-        let Prepared {
+        let OfflineModels {
             model, robot, tree, ..
         } = self.prepared;
         let mut pipeline = self.args.filter.pipeline(model, robot, tree, set, filter)?;

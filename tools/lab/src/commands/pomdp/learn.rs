@@ -5,9 +5,11 @@ mod document;
 use std::fs;
 use std::path::PathBuf;
 
-use vigil_missions::learning::check::{Agreement, Followed, Refusal};
-use vigil_missions::learning::{Learned, Record, Settings, check, learn};
-use vigil_missions::simulation::{Paired, PolicyAgent, Rules, Summary, horizon, run as fly};
+use vigil_missions::learning::check::{Agreement, Refusal, RewardCheck};
+use vigil_missions::learning::{LearnedModel, Record, Settings, check, learn};
+use vigil_missions::simulation::{
+    PairedDifference, PolicyAgent, Rules, Summary, horizon, run as fly,
+};
 use vigil_pomdp::policy::{Dual, PolicyName};
 use vigil_pomdp::{Pomdp, mdp};
 
@@ -97,10 +99,10 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         rows: document::rows(&learned),
         policy: args.policy.clone(),
         episodes: args.episodes,
-        predicted: Mean::of(predicted),
-        measured: measured.map(Mean::of),
-        logged_predicted: logged.map(|l| Mean::of(l.predicted)),
-        logged_measured: logged.map(|l| Mean::of(l.measured)),
+        predicted: Mean::new(predicted),
+        measured: measured.map(Mean::new),
+        logged_predicted: logged.map(|l| Mean::new(l.predicted)),
+        logged_measured: logged.map(|l| Mean::new(l.measured)),
         is_checked: !checks.is_empty(),
         is_weakly_checked: checks.iter().any(is_weak),
         is_older_out_left: refusal.is_some() && args.out.exists(),
@@ -126,12 +128,12 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 }
 
 /// Learns, counting on standard error.
-fn learned(args: &Args, prior: &Pomdp, records: &[Record]) -> Result<Learned, CommandError> {
+fn learned(args: &Args, prior: &Pomdp, records: &[Record]) -> Result<LearnedModel, CommandError> {
     let settings = Settings {
         prior_strength: args.prior_strength,
         iterations_max: args.iterations as usize,
         starts: args.starts as usize,
-        seed: seed::of("learn", args.seed),
+        seed: seed::for_command("learn", args.seed),
         ..Settings::default()
     };
     let total = settings.starts * settings.iterations_max;
@@ -152,7 +154,7 @@ struct Worths {
     /// Its policy in the world.
     measured: Option<Summary>,
     /// The recorded missions.
-    logged: Option<Followed>,
+    logged: Option<RewardCheck>,
     /// Whether predictions and measurements agree.
     checks: Vec<Result<Agreement, Refusal>>,
 }
@@ -165,10 +167,10 @@ fn worths(
 ) -> Result<Worths, CommandError> {
     let mut predicted = worth(args, model, model)?;
     let measured = world.map(|world| worth(args, model, world)).transpose()?;
-    let half_width = |m: &Vec<f64>| Paired::of(&predicted, m).half_width;
+    let half_width = |m: &Vec<f64>| PairedDifference::new(&predicted, m).half_width;
     let half_width = measured.as_ref().map(half_width);
-    let predicted = Summary::of(&mut predicted);
-    let measured = measured.map(|mut measured| Summary::of(&mut measured));
+    let predicted = Summary::new(&mut predicted);
+    let measured = measured.map(|mut measured| Summary::new(&mut measured));
     let logged = check::follow(model, records);
     let in_world = measured.zip(half_width);
     let checks = [
@@ -208,7 +210,7 @@ fn worth(args: &Args, model: &Pomdp, world: &Pomdp) -> Result<Vec<f64>, CommandE
         steps_max: horizon(world.discount(), 2000),
         is_end: vec![false; world.actions().len()],
     };
-    let seed = seed::of("learn", args.seed);
+    let seed = seed::for_command("learn", args.seed);
     let one = |mission| fly(world, &mut agent, &rules, (seed, mission)).discounted;
     Ok((0..args.episodes).map(one).collect())
 }

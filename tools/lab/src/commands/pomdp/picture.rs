@@ -74,7 +74,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             regions::draw(&model, &mut decider, &title)
         } else {
             let limits = limits(args)?;
-            let graph = PolicyGraph::of(&model, &mut decider, limits);
+            let graph = PolicyGraph::new(&model, &mut decider, limits);
             if is_dot {
                 Ok(graph::dot(&model, &graph))
             } else {

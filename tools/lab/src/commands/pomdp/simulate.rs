@@ -82,7 +82,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut out = BufWriter::new(File::create(&args.out).map_err(failed)?);
     missions::write_head(&mut out, contestant.label()).map_err(failed)?;
     let progress = Progress::new("missions", args.episodes as usize);
-    let seed = seed::of("simulate", args.seed);
+    let seed = seed::for_command("simulate", args.seed);
     for episode in 0..args.episodes {
         let numbers = (seed, episode);
         let (record, _) = Record::simulated(&model, &mut *agent, &rules, numbers, args.states);

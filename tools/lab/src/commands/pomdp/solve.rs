@@ -8,7 +8,7 @@ use serde::Serialize;
 use vigil_cycle::clock::process_cpu_s;
 use vigil_cycle::signal;
 use vigil_pomdp::policy_file::{PolicyFile, alpha, appl};
-use vigil_pomdp::solver::{Answer, Ended, Method, Options, Progress, bound};
+use vigil_pomdp::solver::{Answer, EndReason, Method, Options, Progress, bound};
 use vigil_pomdp::{Budget, Pomdp};
 
 use super::load;
@@ -197,10 +197,10 @@ fn document(args: &Args, model: &Pomdp, answer: &Answer, cpu_s: f64) -> Document
         gap_relative: gap.map(|gap| gap / scale.max(f64::MIN_POSITIVE)),
         cpu_s,
         ended: match answer.ended {
-            Ended::Precision => "precision",
-            Ended::Memory => "memory",
-            Ended::Stopped if signal::stop_requested() => "interrupted",
-            Ended::Stopped => "timeout",
+            EndReason::Precision => "precision",
+            EndReason::Memory => "memory",
+            EndReason::Stopped if signal::stop_requested() => "interrupted",
+            EndReason::Stopped => "timeout",
         },
         rounds: answer.progress.rounds,
         beliefs: answer.progress.beliefs,

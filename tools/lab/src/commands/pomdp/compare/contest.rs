@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 use serde_json::{Value, json};
-use vigil_missions::simulation::{Act, Agent, Mission, Paired, Rules, Summary, run};
+use vigil_missions::simulation::{Act, Agent, Mission, PairedDifference, Rules, Summary, run};
 use vigil_pomdp::Pomdp;
 
 use super::bound::Upper;
@@ -91,12 +91,12 @@ impl Contest {
     ) -> Result<Self, CommandError> {
         // Refusals come before the first mission.
         let agents: Result<Vec<_>, _> = contestants.iter().map(|c| c.build(knowledge)).collect();
-        let seed = seed::of("compare", setting.seed);
+        let seed = seed::for_command("compare", setting.seed);
         let total = contestants.len() * setting.episodes as usize;
         let progress = Progress::new("missions", total);
         let (mut rows, mut rewards) = (Vec::new(), Vec::new());
         for (contestant, agent) in contestants.iter().zip(agents?) {
-            let mut agent = Timed {
+            let mut agent = TimedAgent {
                 agent,
                 times_ns: Vec::new(),
             };
@@ -146,12 +146,12 @@ impl Contest {
 }
 
 /// An agent whose decisions are timed.
-struct Timed<'a> {
+struct TimedAgent<'a> {
     agent: Box<dyn Agent + 'a>,
     times_ns: Vec<f64>,
 }
 
-impl Agent for Timed<'_> {
+impl Agent for TimedAgent<'_> {
     fn begin(&mut self) {
         self.agent.begin();
     }
@@ -176,8 +176,8 @@ fn row(
 ) -> Row {
     let mut discounted: Vec<f64> = missions.iter().map(|m| m.discounted).collect();
     let mut undiscounted: Vec<f64> = missions.iter().map(|m| m.undiscounted).collect();
-    let discounted = Summary::of(&mut discounted);
-    let undiscounted = Summary::of(&mut undiscounted);
+    let discounted = Summary::new(&mut discounted);
+    let undiscounted = Summary::new(&mut undiscounted);
     let count = |of: fn(&Mission) -> usize| missions.iter().map(of).sum::<usize>() as f64;
     let steps = count(|m| m.steps);
     times_ns.sort_unstable_by(f64::total_cmp);
@@ -215,12 +215,12 @@ fn row(
 fn compare(rows: &mut [Row], rewards: &[Vec<f64>], against: usize) {
     let best = (0..rows.len()).reduce(|a, b| if rows[b].mean > rows[a].mean { b } else { a });
     for (index, (row, ours)) in rows.iter_mut().zip(rewards).enumerate() {
-        let paired = Paired::of(ours, &rewards[against]);
+        let paired = PairedDifference::new(ours, &rewards[against]);
         row.difference = paired.difference;
         row.difference_half_width_95 = paired.half_width;
         row.difference_p = paired.p;
         row.is_best = Some(index) == best;
-        let to_best = best.map(|best| Paired::of(ours, &rewards[best]));
+        let to_best = best.map(|best| PairedDifference::new(ours, &rewards[best]));
         row.is_like_best = to_best.is_some_and(|p| p.difference.abs() <= p.half_width);
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use serde::Serialize;
-use vigil_missions::learning::{self, Learned, LearnedRow, Table};
+use vigil_missions::learning::{self, LearnedModel, LearnedRow, Table};
 use vigil_missions::simulation::Summary;
 
 /// What the command prints.
@@ -62,7 +62,7 @@ pub struct Mean {
 
 impl Mean {
     /// Of a summary.
-    pub const fn of(summary: Summary) -> Self {
+    pub const fn new(summary: Summary) -> Self {
         Self {
             mean: summary.mean,
             half_width_95: summary.half_width,
@@ -105,7 +105,7 @@ struct Entry {
 }
 
 /// All iterations.
-pub fn iterations(learned: &Learned) -> Vec<Iteration> {
+pub fn iterations(learned: &LearnedModel) -> Vec<Iteration> {
     let of = |i: &learning::Iteration| Iteration {
         start: i.start,
         iteration: i.iteration,
@@ -116,7 +116,7 @@ pub fn iterations(learned: &Learned) -> Vec<Iteration> {
 }
 
 /// All rows.
-pub fn rows(learned: &Learned) -> Vec<Row> {
+pub fn rows(learned: &LearnedModel) -> Vec<Row> {
     let model = &learned.model;
     let of = |row: LearnedRow| {
         let (table, columns) = match row.row.table {
