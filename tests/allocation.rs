@@ -1,5 +1,5 @@
 //! No filter and no belief update allocates in a step.
-#![allow(clippy::unwrap_used)]
+#![cfg(test)]
 
 #[path = "../shared/inference/tests/filters/cases/mod.rs"]
 #[allow(dead_code, unused_imports)] // Only two of the cases are used here.

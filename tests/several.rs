@@ -1,6 +1,6 @@
 //! Several faults at once, and faults that come and go: the simulated rover, watched by detector
 //! and identifier.
-#![allow(clippy::unwrap_used, missing_docs)]
+#![cfg(test)]
 
 mod watched;
 

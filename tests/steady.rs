@@ -1,6 +1,6 @@
 //! A steady cycle of every service, its wiring and accounting included, allocates nothing (over
 //! the in-process bus; what the transport itself does is bounded and documented).
-#![allow(clippy::unwrap_used, missing_docs)]
+#![cfg(test)]
 
 use std::path::PathBuf;
 

@@ -1,6 +1,6 @@
 //! A fault that lasts keeps alarm and name: two minutes of what `scripts/bench field` drives for
 //! ten.
-#![allow(clippy::unwrap_used)]
+#![cfg(test)]
 
 use std::path::Path;
 

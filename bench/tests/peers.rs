@@ -1,7 +1,5 @@
 //! The chains of processes and threads, run for real: every carrier hands on every block.
 
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-
 use std::process::Command;
 
 use serde_json::Value;

@@ -196,7 +196,6 @@ impl Drop for FutexBlock {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -133,7 +133,6 @@ fn shares(outcome: &Outcome<'_>) -> String {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use std::path::Path;
 

@@ -193,7 +193,6 @@ fn raw(cycles: &[Cycle], start_ns: u64) -> Result<Vec<u8>, Box<dyn Error>> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -195,7 +195,6 @@ fn fault(rng: &mut Pcg64Mcg, kind: Kind, onset_s: f64) -> Option<Fault> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::missions::ShippedGraph;
 

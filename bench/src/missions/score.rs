@@ -248,7 +248,6 @@ pub const MEASURES: [Measure; 10] = [
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn shipped() -> ShippedGraph {

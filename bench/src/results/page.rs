@@ -119,7 +119,6 @@ fn broken(line: &str) -> Vec<String> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::super::tests::empty;
     use super::*;

@@ -100,7 +100,6 @@ fn check_times(run: &Run) -> Result<(), PlaybackError> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 mod tests {
     use super::*;
 

@@ -1,5 +1,4 @@
 //! A steady cycle of the simulator allocates nothing.
-#![allow(clippy::unwrap_used)]
 
 use std::path::Path;
 

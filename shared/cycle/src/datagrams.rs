@@ -183,7 +183,6 @@ impl Drop for Datagrams {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

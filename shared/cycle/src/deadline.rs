@@ -150,7 +150,6 @@ impl DeadlineMonitor {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

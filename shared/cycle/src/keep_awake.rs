@@ -78,7 +78,6 @@ fn enter_lowest_class(core: usize) -> io::Result<()> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -105,7 +105,6 @@ pub fn read(path: &Path) -> io::Result<Vec<CycleStamps>> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -106,7 +106,6 @@ pub fn wait(timer: &Timer, inputs: [RawFd; 2], deadline_ns: u64) -> Wake {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use crate::clock::{Clock, Monotonic};

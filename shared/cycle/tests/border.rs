@@ -1,6 +1,5 @@
 //! The account of an input judges any series of blocks as its rules say, found out anew for each
 //! block from all that came before.
-#![allow(clippy::unwrap_used, missing_docs)]
 
 use proptest::prelude::*;
 use vigil_blocks::{Block, Header, Rejection, SensorFrame};

@@ -1,7 +1,7 @@
 //! What a stage does about a missed deadline is what its configuration says, and the time that a
 //! stage has decides its number of particles; under the virtual clock.
 
-#![allow(clippy::unwrap_used, missing_docs)]
+#![cfg(test)]
 
 use std::ops::ControlFlow;
 

@@ -167,7 +167,6 @@ impl<T: Copy> Bank<T> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn hypothesis(mode: usize, onset: u64, p: f64) -> Hypothesis<()> {

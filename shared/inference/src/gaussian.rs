@@ -59,7 +59,6 @@ pub fn log_density<const M: usize>(
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

@@ -164,7 +164,6 @@ fn keep(count: usize, ancestors: &mut [u32]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use proptest::prelude::*;
     use rand::SeedableRng;

@@ -167,7 +167,6 @@ fn check(recovery: &Recovery, tracking: Tracking) -> Result<(), RiskError> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     /// Mode 0 is harmless; in mode 1 the right action costs 1, the wrong one 9. No mode changes.

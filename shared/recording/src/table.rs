@@ -258,8 +258,6 @@ pub fn wrong_row(path: &Path, row: u64, message: String) -> TableError {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
-
     use super::*;
 
     fn table(text: &'static str) -> Table {

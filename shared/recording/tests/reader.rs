@@ -1,5 +1,5 @@
 //! Recorded frames and labels: what is read, what is refused and in which words.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![cfg(test)]
 
 use std::io::Write;
 use std::path::PathBuf;

@@ -1,5 +1,4 @@
 //! A configuration whose alarm could never rise is refused.
-#![allow(clippy::unwrap_used)]
 
 mod shipped;
 

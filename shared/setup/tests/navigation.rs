@@ -1,5 +1,4 @@
 //! Corridors, monitors and what the supervisor needs for them: what does not fit is named.
-#![allow(clippy::unwrap_used)]
 
 mod shipped;
 

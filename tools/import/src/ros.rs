@@ -347,7 +347,6 @@ pub(super) fn columns(
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -57,7 +57,6 @@ pub fn risks(
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     const MODEL: &str = "discount: 0.5\nvalues: reward\nstates: ND A\nactions: go fix\n\

@@ -201,7 +201,6 @@ impl From<Identifier> for Diagnoser {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use vigil_blocks::SensorFrame;
     use vigil_robot::tree::Node;

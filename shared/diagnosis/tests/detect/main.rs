@@ -1,6 +1,6 @@
 //! Tests of the detector.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+#![cfg(test)]
 
 use vigil_cycle::allocation::CountingAllocator;
 

@@ -1,6 +1,5 @@
 //! The filter against one track per onset, and on ground that changes.
 
-#![allow(clippy::unwrap_used)]
 use super::*;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};

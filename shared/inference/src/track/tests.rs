@@ -1,6 +1,5 @@
 //! Tests of the track.
 
-#![allow(clippy::unwrap_used)]
 use super::*;
 
 fn noise() -> MotionNoise {

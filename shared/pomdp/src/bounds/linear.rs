@@ -242,7 +242,6 @@ pub(crate) fn largest(x: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     /// A ring of n states, half of it left at each step.

@@ -1,6 +1,6 @@
 //! Tests of the library of decision models.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+#![cfg(test)]
 
 mod belief;
 mod bounds;

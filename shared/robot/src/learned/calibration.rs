@@ -169,7 +169,6 @@ impl Calibration {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn fit(maxima: &mut [f64], window_s: f64) -> Option<Calibration> {

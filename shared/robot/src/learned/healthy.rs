@@ -106,7 +106,6 @@ fn symmetric(triangle: &[f64; 6]) -> Option<Matrix3<f64>> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn healthy() -> Healthy {

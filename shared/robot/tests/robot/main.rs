@@ -1,6 +1,6 @@
 //! Tests of the robot's models.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+#![cfg(test)]
 
 mod condition;
 mod encoder_noise;

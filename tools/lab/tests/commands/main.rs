@@ -1,6 +1,6 @@
 //! Tests of the commands, each a process of its own.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+#![cfg(test)]
 
 mod model;
 mod nominal;

@@ -263,7 +263,6 @@ fn assumed(bounds: &mut Bounds, model: &Model, robot: &Description) {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::bounds::BoundCause;
 

@@ -50,7 +50,6 @@ impl<const N: usize> LeastSquares<N> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

@@ -240,7 +240,6 @@ fn polynomial(curve: &Curve) -> Result<String, fmt::Error> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

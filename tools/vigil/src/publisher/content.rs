@@ -192,7 +192,6 @@ fn doubts(robot: &Description, frames: &[FrameArrival], unjudged: &[&str]) -> Fi
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use std::path::PathBuf;
 

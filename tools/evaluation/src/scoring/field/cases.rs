@@ -1,7 +1,5 @@
 //! Runs made by hand, with the figures that they must have.
 
-#![allow(clippy::unwrap_used)]
-
 use super::*;
 use vigil_blocks::SizeKind;
 use vigil_robot::Description;
