@@ -11,35 +11,36 @@ use vigil_robot::Injection;
 use vigil_setup::schema::Source;
 use vigil_setup::{GraphArgs, Setup};
 
-/// Starts the Vigil graph and says what happened.
+/// Starts a Vigil graph, watches it and prints what happened.
 #[derive(Debug, Clone, clap::Parser)]
 #[command(name = "scripts/up", bin_name = "scripts/up", version)]
 pub struct LauncherArgs {
     #[command(flatten)]
     pub graph: GraphArgs,
-    /// Stop after this many seconds, counted from the first cycle in which every service answers.
+    /// Stop after this many seconds. They count from the first cycle in which every service
+    /// answers.
     #[arg(long, value_name = "S")]
     pub duration: Option<f64>,
-    /// Inject a fault: `stuck:RM@5`, `encoder:LF:zero@3`, `clear:RM@9` (seconds after the start),
-    /// or what no model contains: `tether:20@5`, `steer-jump:LF:0.2@5`, `clear:all@9`; a wrong
-    /// word lists all kinds.
+    /// Break the simulated rover T seconds after the start: `stuck:RM@5`, `encoder:LF:zero@3`.
+    /// `clear:RM@9` and `clear:all@9` mend it. Some kinds are in no model, such as `tether:20@5`
+    /// and `steer-jump:LF:0.2@5`. An unknown kind prints the list of all.
     #[arg(long, value_name = "SPEC@T")]
     pub inject: Vec<String>,
-    /// Keep every core of the graph awake by a thread of the lowest class on each: waking a core
-    /// that has halted takes long. Costs power.
+    /// Keep the graph's cores from halting, with a thread of the lowest class on each. A halted
+    /// core takes long to wake; an awake one costs power.
     #[arg(long)]
     pub keep_awake: bool,
-    /// Leave the instants of every cycle in this folder, `SERVICE.stamps`: records of four 64-bit
-    /// little-endian numbers (due, input published, awake, output published; CLOCK_MONOTONIC ns).
+    /// Write the times of every cycle to `DIR/SERVICE.stamps`. A record is four little-endian
+    /// 64-bit numbers, ns of CLOCK_MONOTONIC: due, input published, awake, output published.
     #[arg(long, value_name = "DIR")]
     pub stamps: Option<PathBuf>,
-    /// Cycles whose instants are kept; the oldest give way.
+    /// Cycles whose times are kept; the oldest are dropped.
     #[arg(long, value_name = "N", default_value_t = 100_000, requires = "stamps")]
     pub stamped_cycles: usize,
-    /// Keep no histograms: the summary's latencies are empty. For measuring what they cost.
+    /// Record no latencies; the summary then has none. It serves to measure what recording costs.
     #[arg(long)]
     pub no_timing: bool,
-    /// Print one JSON document at the end, nothing else on standard output.
+    /// Print one JSON document at the end, and nothing else on standard output.
     #[arg(long)]
     pub json: bool,
 }

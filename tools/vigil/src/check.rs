@@ -19,8 +19,10 @@ use crate::findings::{self, Finding, Status};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Preflight: cores, scheduling rights, memory lock, shared memory, stale residue, configuration,
-/// release build.
+/// Checks before a start whether this machine can run the graph.
+///
+/// It looks at the configuration, cores, scheduling rights, memory lock, shared memory, files left
+/// behind by an earlier graph, and the kind of build.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]

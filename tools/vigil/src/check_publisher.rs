@@ -9,13 +9,15 @@ use vigil_terminal::{CommandError, Outcome};
 
 use crate::publisher;
 
-/// Listens to a publisher of sensor frames, beside a running graph or in its place, and says what
-/// to change.
+/// Listens to a publisher of sensor frames and says what to change in it.
+///
+/// It listens beside a running graph, or in its place while none runs. The exit code is 0 if every
+/// frame fits.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     graph: GraphArgs,
-    /// How long to listen, s.
+    /// Time to listen, s.
     #[arg(long, value_name = "S", default_value_t = 5.0)]
     seconds: f64,
     /// Print one JSON document.

@@ -15,13 +15,14 @@ use vigil_terminal::{CommandError, Outcome};
 /// Time that the simulator may take to answer.
 const ANSWER_LIMIT: Duration = Duration::from_secs(2);
 
-/// Injects a fault into the running simulator, or clears it.
+/// Breaks the simulated rover of a running graph, or mends it.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     graph: GraphArgs,
-    /// `stuck:RM`, `encoder:LF:zero|frozen|noise`, `clear:RM`, `clear:all`, or one of many that no
-    /// model contains (`tether:20`, `brush:RM`; a wrong word lists all).
+    /// What to break: `stuck:RM`, `encoder:LF:zero|frozen|noise`, or a kind that is in no model,
+    /// such as `tether:20`. `clear:RM` and `clear:all` mend it. An unknown kind prints the list of
+    /// all.
     #[arg(value_name = "SPEC")]
     spec: String,
 }

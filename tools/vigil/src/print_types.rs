@@ -10,7 +10,7 @@ use crate::bindings;
 /// Prints the wire blocks as a header for C and C++, or a module for Python.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Language.
+    /// Language to print the types in.
     language: Language,
 }
 

@@ -10,7 +10,7 @@ use super::offline::{FilterArgs, OfflineModels};
 use vigil_terminal::output::Progress;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Runs detector and identifier offline over recorded frames; one row per frame.
+/// Diagnoses recorded frames without labels and writes one row for each frame.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]

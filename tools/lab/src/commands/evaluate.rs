@@ -24,7 +24,7 @@ use passes::{Passes, SensorSetResult};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Runs detector and identifier offline over labelled frames and scores them.
+/// Diagnoses recorded frames with labels and scores the result.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -35,12 +35,12 @@ pub struct Args {
     /// Runs to score.
     #[arg(long, value_enum, default_value_t = Part::Heldout)]
     part: Part,
-    /// Also write everything as one page (HTML), for pose only and for pose and encoders, whatever
-    /// --sensors says. For a model of nominal behaviour alone: detection, by the sets it knows.
+    /// Also write all figures as one page (HTML). It shows pose alone beside pose and encoders,
+    /// whatever --sensors says. For a model without faults it shows detection only.
     #[arg(long, value_name = "OUT")]
     report: Option<PathBuf>,
     /// Also compare these identification filters with `multiple-hypothesis` on the same runs, for
-    /// both sets of channels. A model of nominal behaviour alone names no faults: refused there.
+    /// both sets of channels. Refused for a model without faults.
     #[arg(
         long,
         value_name = "LIST",

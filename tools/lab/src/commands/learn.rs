@@ -25,7 +25,7 @@ use vigil_terminal::output;
 /// Largest part of the runs that may be left out.
 const TEST_FRACTION_MAX: f64 = 0.9;
 
-/// Learns a robot's model, and tests it on the runs left out.
+/// Learns a robot's model from recorded frames, and tests it on held-out runs.
 ///
 /// With `--show`, prints a learned model instead.
 #[derive(Debug, clap::Args)]
@@ -33,15 +33,15 @@ pub struct Args {
     /// Recorded frames (CSV, plain or gzip).
     #[arg(long, value_name = "F", required_unless_present = "show")]
     frames: Option<PathBuf>,
-    /// Labels of the runs (CSV). Without them every run counts as one without a fault, and the
-    /// model is of nominal behaviour alone.
+    /// Labels of the runs (CSV). Without them every run counts as healthy, and the model knows no
+    /// faults.
     #[arg(long, value_name = "R")]
     runs: Option<PathBuf>,
-    /// Frames of healthy runs that hold more channels, yaw rate or motor currents, of which a model
-    /// with faults learns then too (CSV). Left out: the healthy runs of --frames, if they do.
+    /// Frames of healthy runs (CSV) from which a model with faults also learns yaw rate and motor
+    /// currents. Default: the healthy runs of --frames, if they hold these channels.
     #[arg(long, value_name = "F", requires = "runs")]
     more: Option<PathBuf>,
-    /// Runs to learn from, by their ids, separated by commas; without labels only.
+    /// Runs to learn from: ids separated by commas. Only without labels.
     #[arg(
         long,
         value_name = "LIST",
@@ -49,19 +49,19 @@ pub struct Args {
         conflicts_with = "runs"
     )]
     only: Vec<u32>,
-    /// End of what is learned from in each run, s; without labels only.
+    /// Learn only from the first S seconds of each run. Only without labels.
     #[arg(long, value_name = "S", conflicts_with = "runs")]
     until: Option<f64>,
     /// Where to write the model (TOML).
     #[arg(long, value_name = "MODEL", required_unless_present = "show")]
     out: Option<PathBuf>,
-    /// Print the model given with --model as text, and learn nothing.
+    /// Print the model that --model names, and learn nothing.
     #[arg(long, requires = "model", conflicts_with_all = ["frames", "runs", "out"])]
     show: bool,
     /// Learned model to show (TOML).
     #[arg(long, value_name = "MODEL", requires = "show")]
     model: Option<PathBuf>,
-    /// Part of the runs of every mode and kind to leave out, 0 to 0.9.
+    /// Fraction of the runs of every mode and kind to hold out, 0 to 0.9.
     #[arg(long, value_name = "X", default_value_t = 0.333, value_parser = test_fraction)]
     test_fraction: f64,
     /// Seed of the split.

@@ -48,23 +48,23 @@ pub struct FilterArgs {
     /// Recorded frames (CSV, plain or gzip), any number of runs.
     #[arg(long, value_name = "F")]
     pub frames: PathBuf,
-    /// Channels that the filters may use: pose and command, or wheel rates and steering angles
-    /// too, or everything that the frames hold and the model knows.
+    /// Channels that the filters may use. `pose` is pose and command; `pose+encoders` adds wheel
+    /// rates and steering angles; `all` is every channel of the frames that the model knows.
     #[arg(
         long,
         default_value = "pose+encoders",
         value_parser = PossibleValuesParser::new(SENSOR_SETS)
     )]
     pub sensors: String,
-    /// What the detection filter takes a fault for: an unknown bias of the residual, a constant
-    /// likelihood, or a constant likelihood over windows.
+    /// How the detection filter models a fault: as an unknown bias of the residual, by a constant
+    /// likelihood, or by a constant likelihood over windows.
     #[arg(long, value_name = "FORM", value_enum, default_value_t)]
     detector: Form,
     /// Identification filter.
     #[arg(long, value_name = "NAME", value_enum, default_value_t)]
     pub identifier: IdentifierFilter,
-    /// Particles of a sampled identification filter, 32 to 1024, default 256; of
-    /// `multiple-hypothesis` the most hypotheses, by default all.
+    /// Particles of a sampled identification filter, 32 to 1024 [default: 256]. For
+    /// `multiple-hypothesis` the greatest number of hypotheses [default: all].
     #[arg(
         long,
         value_name = "N",
@@ -79,8 +79,8 @@ pub struct FilterArgs {
     /// Fault tree (TOML); a nominal model needs none.
     #[arg(long, value_name = "F", default_value = "config/trees/rover.toml")]
     tree: PathBuf,
-    /// Decision model (`.pomdp`): what the robot would be told. A model with faults uses
-    /// config/rover.pomdp unless another is given; one of nominal behaviour alone decides nothing.
+    /// Decision model (`.pomdp`) that chooses the action of each row [default: config/rover.pomdp].
+    /// A model without faults chooses none.
     #[arg(long, value_name = "F")]
     decision: Option<PathBuf>,
 }

@@ -20,16 +20,16 @@ use contestant::{Contestant, Kind, Knowledge};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Compare policies on a decision model, over the same random missions.
+/// Compares policies of a decision model over the same random missions.
 ///
-/// Every policy meets the same random numbers at the same step of the same mission. Policies: mls,
-/// av, qmdp, fib; dm-X and adm-X of each, which gather information while the entropy (0 to 1) is
-/// above a threshold K; point-based, solved beforehand, with --policy-file; random; escalation-N,
-/// which after N firings in a row takes the next rung of --ladder. Each dm-X and adm-X runs with
-/// each threshold.
+/// Every policy meets the same random numbers at the same step of the same mission. The policies
+/// are mls, av, qmdp, fib, random, point-based (with --policy-file) and escalation-N. The dual
+/// controls dm-X and adm-X of the first four gather information while the entropy (0 to 1) is above
+/// a threshold K; each runs with each threshold. escalation-N takes the next action of --ladder
+/// after N symptoms in a row.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The model, in Cassandra's format.
+    /// The model (.pomdp or .pomdpx).
     file: PathBuf,
     /// Policies, separated by commas.
     #[arg(
@@ -45,38 +45,37 @@ pub struct Args {
     /// Missions of each policy, 2 to 10000000.
     #[arg(long, default_value_t = 1000, value_parser = count(2))]
     episodes: u64,
-    /// Seed from which the missions' random numbers start; with the same seed those of other
-    /// commands are others.
+    /// Seed of the missions. Each command draws its own numbers from a seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// A mission ends when what follows weighs less than 1e-4 by the discount, but after so many
-    /// steps at the latest.
+    /// Greatest number of steps of a mission. It ends earlier once the discount is below 1e-4.
     #[arg(long, default_value_t = 2000, value_parser = count(1))]
     steps_max: u64,
-    /// Actions that end a mission. No regret is given then: bounds are for missions without end.
+    /// Actions that end a mission. There is no regret then, as bounds hold for endless missions.
     #[arg(long, value_delimiter = ',')]
     ends: Vec<String>,
-    /// Actions that dual control may take for information [default: all that do not end a mission].
+    /// Actions that dual control may take to gain information [default: all that do not end a
+    /// mission].
     #[arg(long, value_delimiter = ',')]
     information_actions: Vec<String>,
-    /// After so many steps for information without falling entropy dual control yields; 0 never.
+    /// Steps without falling entropy after which dual control gathers no more; 0: never.
     #[arg(long, default_value_t = 0)]
     stall_guard_steps: u32,
-    /// Whose entropy is compared with K [default: state for dm-X, action for adm-X].
+    /// Entropy that is compared with K [default: state for dm-X, action for adm-X].
     #[arg(long)]
     gate: Option<GateName>,
-    /// Simulate with this model instead; the policies still believe in FILE.
+    /// Model that plays the world instead of FILE. The policies still use FILE.
     #[arg(long, value_name = "OTHER")]
     model_error: Option<PathBuf>,
-    /// Policy with which the others are compared in pairs [default: the first escalation, else
+    /// Policy with which each other one is compared in pairs [default: the first escalation, else
     /// the first policy].
     #[arg(long)]
     against: Option<String>,
-    /// Upper bound of the value at the start belief [default: that of the point-based solver after
-    /// about half a second, the same on every machine; the fast informed bound where it is lower].
+    /// Upper bound of the value at the start belief [default: the lower of the fast informed bound
+    /// and the point-based solver's after a fixed number of steps, about half a second].
     #[arg(long, allow_negative_numbers = true)]
     upper: Option<f64>,
-    /// File of the policy point-based, as `vigil pomdp solve FILE --out POLICY` writes it.
+    /// Policy file for `point-based`, as `vigil pomdp solve FILE --out POLICY` writes it.
     #[arg(long, value_name = "POLICY")]
     policy_file: Option<PathBuf>,
     #[command(flatten)]

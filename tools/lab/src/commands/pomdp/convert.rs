@@ -8,8 +8,9 @@ use super::load;
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Writes a model (.pomdp or .pomdpx) as a .pomdp file that reads back to the same model, bit by
-/// bit.
+/// Writes a model (.pomdp or .pomdpx) as a .pomdp file.
+///
+/// The file reads back to the same model, bit by bit.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model.

@@ -9,13 +9,13 @@ use vigil_terminal::CommandError;
 /// Options of `escalation-N`.
 #[derive(Debug, clap::Args)]
 pub struct EscalationArgs {
-    /// What escalation-N does while nothing fires.
+    /// Action of escalation-N while no symptom is observed.
     #[arg(long, default_value = navigation::ACTIONS[0])]
     usual: String,
-    /// The rungs of escalation-N.
+    /// Actions that escalation-N takes one after another while symptoms last.
     #[arg(long, value_delimiter = ',', default_value = "MA,GO,NP,RL,SH,GU")]
     ladder: Vec<String>,
-    /// Observations in which nothing fires, for escalation-N.
+    /// Observations that escalation-N takes for no symptom.
     #[arg(long, value_delimiter = ',', default_value = "none,BO,ALT")]
     quiet: Vec<String>,
 }

@@ -8,7 +8,7 @@ use vigil_missions::navigation::{self, Parameters};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Write the navigation model from a file of parameters.
+/// Writes the navigation model that follows from a file of parameters.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Parameters, such as config/navigation.toml.

@@ -10,7 +10,7 @@ use super::load;
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Says what a model holds: sizes, start, what can be reached and seen, warnings.
+/// Prints what a model holds: sizes, start belief, reachable states and observations, warnings.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model (.pomdp or .pomdpx).

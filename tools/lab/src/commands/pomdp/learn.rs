@@ -19,46 +19,47 @@ use document::{Document, Mean};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Learn a model's probabilities from recorded missions (JSON lines, see `vigil pomdp simulate`).
+/// Learns a model's probabilities from recorded missions (JSON lines, see `vigil pomdp simulate`).
 ///
-/// FILE is the model made by hand: it gives names, rewards, what is impossible, and counts as
-/// --prior-strength visits of every row of T and Z. The learned model is written only if what it
-/// predicts is within 20 % of what was measured: the rewards of the missions, if they are recorded,
-/// and those of its policy in --world, if one is given; what chance may do to the two (95 %) is
-/// allowed besides. Otherwise exit code 1, and no file; one that was there is left as it was.
+/// FILE is the model made by hand. It gives the names, the rewards and what is impossible, and
+/// counts as --prior-strength visits of every row of T and Z. The learned model is checked against
+/// the missions' rewards, if recorded, and against its policy's rewards in --world, if given. It is
+/// written only if its predictions are within 20 % and chance (95 %) of them. Otherwise the exit
+/// code is 1, and an older file stays as it was.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model made by hand (.pomdp or .pomdpx).
     file: PathBuf,
-    /// The missions.
+    /// Recorded missions, as `vigil pomdp simulate` writes them.
     #[arg(long)]
     missions: PathBuf,
     /// Where to write the learned model.
     #[arg(long)]
     out: PathBuf,
-    /// Visits that each row of the model made by hand counts as; 0 learns from the missions alone.
+    /// Weight of the model made by hand: the number of visits that each of its rows counts as.
+    /// 0 learns from the missions alone.
     #[arg(long, default_value_t = 50.0)]
     prior_strength: f64,
-    /// Iterations at most, of each start.
+    /// Greatest number of iterations of each start.
     #[arg(long, default_value_t = 200, value_parser = count(1))]
     iterations: u64,
-    /// Starts: the first is FILE, others are drawn around it; the best one counts.
+    /// Number of starts. The first is FILE, the others are drawn around it; the best result counts.
     #[arg(long, default_value_t = 1, value_parser = count(1))]
     starts: u64,
-    /// Write the model though there is nothing to check it by: no rewards, and no --world.
+    /// Write the model even if nothing can check it: the missions hold no rewards, and --world is
+    /// not given.
     #[arg(long)]
     unchecked: bool,
-    /// Seed of drawn starts and simulated missions; with the same seed the random numbers of other
-    /// commands are others.
+    /// Seed of drawn starts and simulated missions. Each command draws its own numbers from a seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Policy whose worth is predicted: mls, av, qmdp or fib.
+    /// Policy whose mean reward is predicted: mls, av, qmdp or fib.
     #[arg(long, default_value = "fib")]
     policy: String,
     /// Simulated missions for the prediction.
     #[arg(long, default_value_t = 1000, value_parser = count(2))]
     episodes: u64,
-    /// A model that stands for the world: the learned model's policy is measured in it.
+    /// Model that plays the world, in which the learned model's policy is measured.
     #[arg(long, value_name = "OTHER")]
     world: Option<PathBuf>,
     /// Print one JSON document.

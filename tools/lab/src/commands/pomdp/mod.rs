@@ -20,7 +20,7 @@ use vigil_pomdp::Pomdp;
 
 use vigil_terminal::{CommandError, Outcome};
 
-/// Looks at, follows, compares, learns, draws and converts decision models (`.pomdp`, `.pomdpx`).
+/// Checks, solves, compares, learns, draws and converts decision models (`.pomdp`, `.pomdpx`).
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]

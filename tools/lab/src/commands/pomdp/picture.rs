@@ -15,20 +15,20 @@ use vigil_pomdp::{Pomdp, mdp};
 use super::{load, solved, track};
 use vigil_terminal::{CommandError, Outcome};
 
-/// Draw a model's policy or belief as an SVG.
+/// Draws a model's policy or belief.
 ///
-/// --graph: what a policy does from the start belief on, as a graph (SVG, or DOT if the name ends
-/// in .dot). --regions: which action a policy takes at which belief (models of two or three
-/// states). --belief: the belief over some actions and observations, as stacked areas.
+/// --graph draws the policy from the start belief on; it is written as DOT if the name ends in
+/// .dot. --regions draws which action the policy takes at which belief, for models of two or three
+/// states. --belief draws the belief over given actions and observations as stacked areas.
 #[derive(Debug, clap::Args)]
 #[command(group(clap::ArgGroup::new("what").required(true)))]
 pub struct Args {
     /// The model (.pomdp or .pomdpx).
     file: PathBuf,
-    /// Draw the policy's graph.
+    /// Draw the policy as a graph.
     #[arg(long, group = "what")]
     graph: bool,
-    /// Draw the policy's regions.
+    /// Draw the regions of the belief in which the policy takes each action.
     #[arg(long, group = "what")]
     regions: bool,
     /// Draw the belief over these actions and observations, names or numbers.
@@ -37,13 +37,13 @@ pub struct Args {
     /// The policy: mls, av, qmdp, fib, dm-X or adm-X (K = 0.5), or a file of `vigil pomdp solve`.
     #[arg(long, default_value = "fib")]
     policy: String,
-    /// Nodes of a graph at most, 1 to 60.
+    /// Greatest number of nodes of a graph, 1 to 60.
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=60))]
     nodes: u64,
-    /// Beliefs share a node of a graph if the sum of their differences is at most this, 0 to 2.
+    /// Greatest sum of differences between beliefs that share a node of a graph, 0 to 2.
     #[arg(long, default_value_t = 0.25)]
     tolerance: f64,
-    /// Where to write the drawing.
+    /// Where to write the drawing (SVG or, for a graph, DOT).
     #[arg(long)]
     out: PathBuf,
 }

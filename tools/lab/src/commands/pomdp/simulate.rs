@@ -15,37 +15,36 @@ use super::{load, missions, seed};
 use vigil_terminal::output::Progress;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Record missions that a policy flies in the event simulator, as JSON lines.
+/// Simulates missions under a policy and records them as JSON lines.
 ///
-/// The first line says what the file is, each other line is one mission: actions, observations,
-/// rewards, and, if wished, the states, which no policy sees.
+/// The first line names the format. Each other line is one mission: actions, observations, rewards
+/// and, with --states, the true states.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model (.pomdp or .pomdpx).
     file: PathBuf,
-    /// Policy, as in `vigil pomdp compare`; dual control with K = 0.5.
+    /// Policy, as in `vigil pomdp compare`. Dual control uses K = 0.5.
     #[arg(long, default_value = "escalation-1")]
     policy: String,
     /// Missions, 1 to 10000000.
     #[arg(long, default_value_t = 1000, value_parser = count(1))]
     episodes: u64,
-    /// Seed from which the missions' random numbers start; with the same seed those of other
-    /// commands are others.
+    /// Seed of the missions. Each command draws its own numbers from a seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Steps of a mission at most; it ends before when what follows weighs less than 1e-4.
+    /// Greatest number of steps of a mission. It ends earlier once the discount is below 1e-4.
     #[arg(long, default_value_t = 2000, value_parser = count(1))]
     steps_max: u64,
     /// Actions that end a mission.
     #[arg(long, value_delimiter = ',')]
     ends: Vec<String>,
-    /// Record the states, too.
+    /// Also record the true states.
     #[arg(long)]
     states: bool,
-    /// Where to write.
+    /// Where to write the missions.
     #[arg(long)]
     out: PathBuf,
-    /// File of the policy point-based, as `vigil pomdp solve FILE --out POLICY` writes it.
+    /// Policy file for `point-based`, as `vigil pomdp solve FILE --out POLICY` writes it.
     #[arg(long, value_name = "POLICY")]
     policy_file: Option<PathBuf>,
     #[command(flatten)]

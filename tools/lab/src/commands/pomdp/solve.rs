@@ -22,20 +22,20 @@ const PROGRESS_FACTOR: f64 = 1.5;
 /// ... the first time after so many seconds.
 const PROGRESS_FIRST_S: f64 = 0.25;
 
-/// Bounds what a decision model earns at best from its start belief, and finds a policy.
+/// Bounds the best value of a decision model at its start belief, and finds a policy.
 ///
-/// Upper bounds: mdp (the state is seen), qmdp (seen after one step), fib (fast informed bound),
-/// tib (tighter informed bound). Lower: blind (one action for ever). Both, and a policy: sarsop.
-/// Ctrl-C ends a search early; what was found until then counts.
+/// Upper bounds are mdp (the state is known), qmdp (known after one step), fib (fast informed
+/// bound) and tib (tighter informed bound). blind (one action for ever) is a lower bound. sarsop
+/// gives both bounds and a policy. Ctrl-C ends a search early and keeps its result so far.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model (.pomdp or .pomdpx).
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// mdp, blind, qmdp, fib, tib or sarsop.
+    /// Method: mdp, blind, qmdp, fib, tib or sarsop.
     #[arg(long, default_value = "sarsop")]
     method: Method,
-    /// Processor time after which to end, s, from the start of the program.
+    /// Processor time after which to end, s.
     #[arg(
         long,
         value_name = "S",
@@ -43,7 +43,7 @@ pub struct Args {
         allow_negative_numbers = true
     )]
     timeout: f64,
-    /// Gap between the bounds at which sarsop ends, in units of reward.
+    /// Gap between the bounds at which sarsop ends, in units of the reward.
     #[arg(
         long,
         value_name = "E",
@@ -51,9 +51,9 @@ pub struct Args {
         allow_negative_numbers = true
     )]
     precision: f64,
-    /// Where to write the policy: Vigil's own format, which supervisor.policy_file takes (a coarse
-    /// --precision makes fewer vectors and quicker decisions); that of APPL if the name ends in
-    /// .policy, of pomdp-solve if in .alpha.
+    /// Where to write the policy. The name decides the format: `.policy` is APPL's, `.alpha` is
+    /// pomdp-solve's, any other is Vigil's own, which `supervisor.policy_file` takes. A coarse
+    /// --precision gives fewer vectors and quicker decisions.
     #[arg(long, value_name = "POLICY")]
     out: Option<PathBuf>,
     /// Print one JSON document.

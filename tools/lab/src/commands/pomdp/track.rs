@@ -9,8 +9,10 @@ use super::{find, load};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
-/// Follows the belief over actions and observations. Exit code 1 if one of them was impossible:
-/// the belief then is the prediction with 0.01 of the start belief mixed in.
+/// Prints the belief after each action and observation.
+///
+/// After an impossible observation the belief is the prediction with 0.01 of the start belief mixed
+/// in, and the exit code is 1.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The model (.pomdp or .pomdpx).
