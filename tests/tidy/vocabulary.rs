@@ -85,7 +85,8 @@ fn long_sentences(source: &Source) -> Vec<String> {
 
 fn is_document(source: &Source) -> bool {
     let path = source.path.as_str();
-    path.ends_with("README.md") && !path.starts_with("bench/") || path.starts_with("docs/")
+    path.ends_with("README.md") && !path.starts_with("bench/")
+        || path.starts_with("docs/") && path.ends_with(".md")
 }
 
 #[test]
