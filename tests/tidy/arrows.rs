@@ -1,7 +1,55 @@
 //! Dependencies between crates point one way.
 
-use crate::manifest::Manifest;
-use crate::source::{Source, workspace};
+use toml::{Table, Value};
+use vigil_size::Source;
+
+use crate::workspace;
+
+/// A crate of the workspace.
+struct Manifest {
+    /// Path of the manifest from the workspace's root.
+    path: String,
+    /// Name of the package.
+    package: String,
+    /// Packages it depends on, for single targets and its build too; its tests may see everything.
+    dependencies: Vec<String>,
+    /// True if it takes the workspace's lints.
+    has_workspace_lints: bool,
+}
+
+impl Manifest {
+    fn read(path: &str, text: &str) -> Self {
+        let table: Table = toml::from_str(text).unwrap();
+        let targets = table
+            .get("target")
+            .and_then(Value::as_table)
+            .into_iter()
+            .flatten();
+        let targets = targets.filter_map(|(_, target)| target.as_table());
+        let lints = table.get("lints").and_then(|lints| lints.get("workspace"));
+        Self {
+            path: path.to_owned(),
+            package: table["package"]["name"].as_str().unwrap().to_owned(),
+            dependencies: [&table]
+                .into_iter()
+                .chain(targets)
+                .flat_map(dependencies)
+                .collect(),
+            has_workspace_lints: lints.and_then(Value::as_bool) == Some(true),
+        }
+    }
+}
+
+/// The packages behind the names of a manifest's, or one of its targets', dependencies.
+fn dependencies(table: &Table) -> Vec<String> {
+    let tables = ["dependencies", "build-dependencies"].into_iter();
+    let tables = tables.filter_map(|name| table.get(name)?.as_table());
+    let package = |(name, of): (&String, &Value)| {
+        let renamed = of.get("package").and_then(Value::as_str);
+        renamed.unwrap_or(name).to_owned()
+    };
+    tables.flat_map(|table| table.iter().map(package)).collect()
+}
 
 const SHARED: &[&str] = &[
     "vigil-setup",
@@ -111,7 +159,7 @@ fn allowed(manifest: &Manifest) -> Option<Vec<&'static str>> {
         return Some([SHARED, SERVICES, &TOOLS[..at]].concat());
     }
     // The measuring program and the tests stand outside.
-    if ["vigil-bench", "vigil-tests"].contains(&package) {
+    if ["vigil-bench", "vigil-tests", "vigil-size"].contains(&package) {
         return Some([SHARED, SERVICES, TOOLS].concat());
     }
     // Publishers to begin with use what a robot's program would use.

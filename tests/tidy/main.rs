@@ -1,26 +1,43 @@
-//! Tidy checks: what the project demands of its own text.
+//! Tidy checks: what the project demands of its own text and clippy does not see.
 //!
 //! Each check is a pure function from sources to a list of violations, run once on the whole
-//! workspace and once on a bad sample that it must refuse. No dependency: the checks read text,
-//! with comments and literals masked, and match braces; they know no more Rust than that.
-
+//! workspace and once on a bad sample that it must refuse.
 #![cfg(test)]
 
 mod arrows;
-mod bans;
-mod config_keys;
-mod functions;
-mod manifest;
-mod mask;
+mod modules;
 mod names;
+mod pure;
+mod ratchet;
+mod sentences;
+mod signatures;
 mod sizes;
-mod source;
-mod step_code;
-mod struct_fields;
-mod test_regions;
 mod unsafety;
-mod vocabulary;
-mod words;
+
+use std::sync::OnceLock;
+
+use vigil_size::Source;
+
+/// All text files, read once.
+fn workspace() -> &'static [Source] {
+    static SOURCES: OnceLock<Vec<Source>> = OnceLock::new();
+    SOURCES.get_or_init(|| {
+        let sources = vigil_size::workspace().unwrap();
+        for must in ["Cargo.toml", "shared/blocks/src/lib.rs", "docs/results.md"] {
+            let found = sources.iter().any(|source| source.path == must);
+            assert!(
+                found,
+                "{must} was not read: the checks would pass without looking"
+            );
+        }
+        sources
+    })
+}
+
+/// A source of a bad or good sample.
+fn sample(path: &str, text: &str) -> Source {
+    Source::new(path, text).unwrap()
+}
 
 /// Fails with all `violations`, one a line, under the sentence that says what to do.
 fn demand_none(advice: &str, violations: &[String]) {

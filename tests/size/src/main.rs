@@ -1,11 +1,10 @@
 //! Prints the size of the workspace; see `scripts/bench size --help`.
 
-use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::{fs, io};
 
 use serde_json::{Value, json};
-use vigil_size::{Lines, Size, linked_crates, measure, root, workspace};
+use vigil_size::{Distribution, Lines, Size, linked_crates, measure, root, workspace};
 
 const HELP: &str = "Counts lines of code, without blank lines and comments
 
@@ -142,7 +141,15 @@ fn tables(size: &Size) -> Vec<String> {
 }
 
 fn figures(size: &Size) -> Value {
-    let of = |of: vigil_size::Distribution| json!({ "n": of.count, "median": of.median, "p90": of.p90, "max": of.max });
+    let lengths = |of: Distribution| {
+        let Distribution {
+            count,
+            median,
+            p90,
+            max,
+        } = of;
+        json!({ "n": count, "median": median, "p90": p90, "max": max })
+    };
     let rooms = size.rooms.iter().map(|(room, lines)| {
         let Lines {
             code,
@@ -161,8 +168,8 @@ fn figures(size: &Size) -> Value {
         "bench": bench(size),
         "tests_and_examples": tests(size),
         "comment_share": comment_share(size),
-        "functions": of(size.functions),
-        "files": of(size.files),
+        "functions": lengths(size.functions),
+        "files": lengths(size.files),
         "rooms": rooms.collect::<serde_json::Map<String, Value>>(),
     })
 }
@@ -190,14 +197,10 @@ fn archive(size: &Size, lines: &[String]) -> io::Result<()> {
         "figures": { "size.json": figures(size) },
         "raw": [],
     });
-    let folder = root().join(format!("bench/results/{date}-{host}"));
-    fs::create_dir_all(&folder)?;
-    fs::write(folder.join("size.json"), format!("{result:#}\n"))?;
-    eprintln!(
-        "result: {}",
-        Path::new("bench/results")
-            .join(format!("{date}-{host}/size.json"))
-            .display()
-    );
+    let folder = format!("bench/results/{date}-{host}");
+    fs::create_dir_all(root().join(&folder))?;
+    let path = format!("{folder}/size.json");
+    fs::write(root().join(&path), format!("{result:#}\n"))?;
+    eprintln!("result: {path}");
     Ok(())
 }

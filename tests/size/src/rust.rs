@@ -48,7 +48,7 @@ pub struct TypeName {
     pub name: String,
 }
 
-/// A path that begins at the crate or at a module above.
+/// A path that begins at the crate or at a module above, or what is shown to others.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Import {
     /// Its line, from 1.
@@ -273,7 +273,8 @@ impl Reader<'_> {
 
     fn import(&mut self, line: usize, path: Vec<String>, is_public: bool) {
         let first = path.first().map(String::as_str);
-        if matches!(first, Some("crate" | "super" | "self")) && self.tests == 0 {
+        let is_local = matches!(first, Some("crate" | "super" | "self"));
+        if (is_local || is_public) && self.tests == 0 {
             let inside = self.inside.clone();
             self.found.imports.push(Import {
                 line,

@@ -205,7 +205,7 @@ mod tests {
         ];
         condition_modules(&mut sources);
         let marks: Vec<bool> = sources.iter().map(|source| source.is_test(1)).collect();
-        assert_eq!(marks, [false, true, true, true, true, false]);
+        assert_eq!(marks, [true, true, true, true, true, false]);
     }
 
     #[test]

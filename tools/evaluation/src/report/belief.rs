@@ -17,12 +17,12 @@ const SIZE: (u32, u32) = (900, 270);
 
 /// A mode: where its probability stands in a verdict.
 #[derive(Clone, Copy, PartialEq)]
-enum Of {
+enum Explanation {
     Node(usize),
     Unknown,
 }
 
-impl Of {
+impl Explanation {
     fn p(self, verdict: &Verdict) -> f64 {
         match self {
             Self::Node(i) => verdict.p_nodes.get(i).copied().unwrap_or(0.0),
@@ -33,18 +33,20 @@ impl Of {
 
 /// A mode to draw: the true one, nominal driving and unknown have colours of their own.
 struct Mode<'a> {
-    of: Of,
+    of: Explanation,
     name: &'a str,
     colour: usize,
 }
 
 /// The true mode first, then the others that reached most.
 fn leading<'a>(case: &Case, taxonomy: &'a Taxonomy) -> Vec<Mode<'a>> {
-    let nodes = taxonomy.leaf_names().map(|(i, name)| (Of::Node(i), name));
-    let all = nodes.chain([(Of::Unknown, UNKNOWN)]);
-    let highest = |of: Of| case.verdicts.iter().map(|v| of.p(v)).fold(0.0, f64::max);
+    let nodes = taxonomy
+        .leaf_names()
+        .map(|(i, name)| (Explanation::Node(i), name));
+    let all = nodes.chain([(Explanation::Unknown, UNKNOWN)]);
+    let highest = |of: Explanation| case.verdicts.iter().map(|v| of.p(v)).fold(0.0, f64::max);
     let expected = taxonomy.expected(&case.label.mode);
-    let mut found: Vec<(f64, Of, &str)> = all
+    let mut found: Vec<(f64, Explanation, &str)> = all
         .map(|(of, name)| match name == expected {
             true => (f64::INFINITY, of, name),
             false => (highest(of), of, name),
@@ -57,9 +59,9 @@ fn leading<'a>(case: &Case, taxonomy: &'a Taxonomy) -> Vec<Mode<'a>> {
     let coloured = found.into_iter().map(|(highest, of, name)| {
         let colour = match of {
             _ if highest.is_infinite() => 1,
-            Of::Node(0) => 2,
-            Of::Unknown => 5,
-            Of::Node(_) => free.next().unwrap_or(INK),
+            Explanation::Node(0) => 2,
+            Explanation::Unknown => 5,
+            Explanation::Node(_) => free.next().unwrap_or(INK),
         };
         Mode { of, name, colour }
     });
@@ -67,7 +69,7 @@ fn leading<'a>(case: &Case, taxonomy: &'a Taxonomy) -> Vec<Mode<'a>> {
 }
 
 /// Points of a curve without those that change nothing to the eye.
-fn thinned(case: &Case, of: Of) -> Vec<(f64, f64)> {
+fn thinned(case: &Case, of: Explanation) -> Vec<(f64, f64)> {
     let mut kept: Vec<(f64, f64)> = Vec::new();
     let mut last: Option<(f64, f64)> = None;
     for verdict in &case.verdicts {
