@@ -19,7 +19,9 @@ fn page() -> String {
 /// Every command of the page's blocks, its program first; the file of labels is none.
 fn commands(page: &str) -> Vec<Vec<String>> {
     let blocks = page.split("```").skip(1).step_by(2);
-    let lines = blocks.flat_map(str::lines).map(str::trim);
+    // The first line of a block says what the block is.
+    let lines = blocks.flat_map(|block| block.lines().skip(1));
+    let lines = lines.map(str::trim);
     let is_command = |line: &&str| line.contains(' ') && !line.contains(", ");
     let words = |line: &str| line.split(' ').map(str::to_owned).collect();
     lines.filter(is_command).map(words).collect()
