@@ -4,11 +4,20 @@
 //! does not rule out, and from each the successors that the observation leaves possible. Nothing is
 //! dropped for being small: probabilities down to the smallest normal double (2.2e-308) are kept.
 
-use crate::model::Pomdp;
+use crate::model::{Pomdp, ROW_SUM_TOLERANCE};
 use crate::weights::Weights;
 
-/// Weight of the start belief that is mixed in after an impossible observation.
+/// Weight of the start belief that is mixed in after an impossible observation. Chosen by hand: one
+/// later observation of likelihood ratio 100 makes up for it. Smaller leaves a state that was ruled
+/// out wrongly so for longer; larger throws away more of what was known.
 const RESTART_WEIGHT: f64 = 0.01;
+/// A belief sums to 1 within this; rounding over 10^5 states, the most that a model has, is 2e-11.
+const SUM_TOLERANCE: f64 = 1e-9;
+/// An observation's probability is at most this: a row of T and one of Z may each sum to 1 and the
+/// tolerance.
+const PROBABILITY_MAX: f64 = 1.0 + 3.0 * ROW_SUM_TOLERANCE;
+/// The entropy of a belief exceeds ln n by rounding and by [`SUM_TOLERANCE`] at most, in nats.
+const ENTROPY_TOLERANCE: f64 = 1e-6;
 
 /// What an observation or soft evidence did to the belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,6 +121,10 @@ impl Tracker {
             }
         }
         if let Some(p) = self.accept(self.next.sum()) {
+            assert!(
+                p > 0.0 && p <= PROBABILITY_MAX,
+                "the probability of an observation is above 0 and at most 1: {p}"
+            );
             return Evidence::Taken(p);
         }
         self.predict(model, action);
@@ -140,9 +153,13 @@ impl Tracker {
     pub fn entropy(&self) -> f64 {
         let belief = self.belief.support().iter().map(|&s| self.belief.at(s));
         let nats: f64 = belief.map(|b| -b * b.ln()).sum();
-        let states = self.start.len() as f64;
-        if states > 1.0 {
-            (nats / states.ln()).clamp(0.0, 1.0)
+        let nats_max = (self.start.len() as f64).ln();
+        assert!(
+            (-ENTROPY_TOLERANCE..=nats_max + ENTROPY_TOLERANCE).contains(&nats),
+            "the entropy of a belief is between 0 and ln n: {nats}"
+        );
+        if nats_max > 0.0 {
+            (nats / nats_max).clamp(0.0, 1.0)
         } else {
             0.0
         }
@@ -157,7 +174,17 @@ impl Tracker {
         }
         self.belief.clear();
         self.belief.take_scaled(&mut self.next, 1.0 / sum);
+        self.assert_belief();
         Some(sum)
+    }
+
+    fn assert_belief(&self) {
+        let sum = self.belief.sum();
+        let is_negative = |s: &u32| self.belief.at(*s) < 0.0;
+        assert!(
+            (sum - 1.0).abs() <= SUM_TOLERANCE && !self.support().iter().any(is_negative),
+            "a belief sums to 1 and holds no negative number: {sum}"
+        );
     }
 
     /// Mixes in the start belief.
@@ -168,5 +195,45 @@ impl Tracker {
             .map(|(b, s)| (1.0 - RESTART_WEIGHT) * b + RESTART_WEIGHT * s);
         self.next.set(mixed);
         self.accept(self.next.sum());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COIN: &str = "discount: 0.9\nvalues: reward\nstates: heads tails\nactions: toss\n\
+        observations: bright dark\nT: toss uniform\nO: toss\n0.75 0.25\n0.25 0.75\n";
+
+    /// A belief that sums to 2.
+    fn broken() -> (Pomdp, Tracker) {
+        let model = Pomdp::parse(COIN).unwrap();
+        let mut tracker = Tracker::new(&model);
+        tracker.assert_belief();
+        assert!((tracker.entropy() - 1.0).abs() < 1e-12);
+        tracker.belief.set([1.0, 1.0].into_iter());
+        (model, tracker)
+    }
+
+    #[test]
+    #[should_panic(expected = "a belief sums to 1 and holds no negative number: 2")]
+    fn a_belief_that_does_not_sum_to_one_is_caught() {
+        broken().1.assert_belief();
+    }
+
+    #[test]
+    #[should_panic(expected = "the probability of an observation is above 0 and at most 1: 1.0003")]
+    fn a_probability_above_one_is_caught() {
+        let (model, mut tracker) = broken();
+        tracker.belief.set([1.0003, 1.0003].into_iter());
+        tracker.update(&model, 0, 0);
+    }
+
+    #[test]
+    #[should_panic(expected = "the entropy of a belief is between 0 and ln n")]
+    fn an_entropy_beyond_the_uniform_one_is_caught() {
+        let (_, mut tracker) = broken();
+        tracker.belief.set([0.4, 0.4].into_iter());
+        let _ = tracker.entropy();
     }
 }

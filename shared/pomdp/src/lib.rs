@@ -1,12 +1,8 @@
-//! Decisions under uncertainty: POMDP models, their solution, policies, belief tracking.
-//!
-//! A [`Pomdp`] is read from Cassandra's `.pomdp` format or APPL's `.pomdpx`, and written as
-//! `.pomdp`; [`bounds`] and [`solver`] say what it is worth at best, and find plans; a [`Policy`]
-//! turns a belief into an action; a [`Tracker`] keeps the belief.
-//! Deciding and tracking allocate nothing. No transport, no clock, no files.
-//!
-//! Notation of Verma, Fernandez and Simmons (2002): states S, actions A, observations Z,
-//! T(s,a,s') = p(s'|s,a), Z(a,s',z) = p(z|a,s'), R(s,a), discount gamma.
+#![cfg_attr(feature = "solver", doc = include_str!("../README.md"))]
+#![cfg_attr(
+    not(feature = "solver"),
+    doc = "Models, belief tracking and policies of partially observable Markov decision processes."
+)]
 
 pub mod alpha_vectors;
 pub mod belief;
@@ -14,15 +10,20 @@ pub mod bounds;
 pub mod budget;
 mod fnv1a;
 pub mod model;
+mod parse_error;
 pub mod policy;
 pub mod policy_file;
+#[cfg(feature = "solver")]
 pub mod policy_graph;
-#[cfg(feature = "xml")]
+#[cfg(feature = "pomdpx")]
 mod pomdpx;
 mod reader;
+#[cfg(feature = "solver")]
 pub mod solver;
+#[cfg(feature = "solver")]
 mod sparse_beliefs;
 mod weights;
+#[cfg(feature = "solver")]
 mod writer;
 
 pub use alpha_vectors::AlphaVectors;
@@ -30,7 +31,7 @@ pub use belief::{Evidence, Tracker};
 pub use bounds::mdp;
 pub use budget::Budget;
 pub use model::{Pomdp, Warning};
+pub use parse_error::{ParseError, Position};
 pub use policy::{
     ActionVoting, Choice, Control, Decider, MostLikelyState, PointBased, Policy, QMdp,
 };
-pub use reader::{ParseError, Position};

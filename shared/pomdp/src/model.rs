@@ -9,7 +9,7 @@ pub(crate) mod sparse;
 pub use build::Probabilities;
 pub(crate) use build::{Parts, ROW_SUM_TOLERANCE, refuse_sum};
 
-use crate::reader::{self, ParseError, Position};
+use crate::parse_error::Position;
 use joint::Joint;
 use rewards::Rewards;
 use sparse::Sparse;
@@ -64,16 +64,6 @@ impl PartialEq for Pomdp {
 }
 
 impl Pomdp {
-    /// Reads Cassandra's `.pomdp` format.
-    ///
-    /// Memory: at most about ten times the text, besides tables of 2^24 entries.
-    ///
-    /// # Errors
-    /// [`ParseError`] with line and column, what was found and what is allowed.
-    pub fn parse(text: &str) -> Result<Self, ParseError> {
-        reader::parse(text)
-    }
-
     /// Names of the states.
     #[must_use]
     pub fn states(&self) -> &[String] {
@@ -144,6 +134,13 @@ impl Pomdp {
         &self.observation[first..first + n]
     }
 
+    /// True if there is nothing to observe: one observation `none`, certain everywhere.
+    #[must_use]
+    pub fn is_mdp(&self) -> bool {
+        let certain = |action| self.likelihood(action, 0).iter().all(|p| *p == 1.0);
+        self.observations() == ["none"] && (0..self.actions().len()).all(certain)
+    }
+
     /// Hash over everything that has a meaning: numbers and names, not comments or layout. A cost
     /// hashes as the negative reward that it is.
     #[must_use]
@@ -161,6 +158,7 @@ impl Pomdp {
         self.joint.as_ref()
     }
 
+    #[cfg(feature = "solver")]
     pub(crate) const fn rewards(&self) -> &Rewards {
         &self.rewards
     }

@@ -12,8 +12,8 @@ mod table;
 mod xml;
 
 use crate::model::{Parts, Pomdp, Warning};
+use crate::parse_error::{ParseError, Position};
 use crate::reader::limits::{ENTRIES_MAX, ROWS_MAX, TEXT_BYTES_MAX, check};
-use crate::reader::{ParseError, Position};
 
 use factors::Factors;
 use product::Product;

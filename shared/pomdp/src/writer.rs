@@ -44,13 +44,6 @@ impl Pomdp {
         text
     }
 
-    /// True if there is nothing to observe: one observation `none`, certain everywhere.
-    #[must_use]
-    pub fn is_mdp(&self) -> bool {
-        let certain = |action| self.likelihood(action, 0).iter().all(|p| *p == 1.0);
-        self.observations() == ["none"] && (0..self.actions().len()).all(certain)
-    }
-
     fn write_preamble(&self, text: &mut String) {
         let values = if self.is_cost() { "cost" } else { "reward" };
         put(text, format_args!("discount: {}", Number(self.discount())));

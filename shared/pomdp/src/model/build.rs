@@ -5,7 +5,7 @@ use super::joint::Joint;
 use super::rewards::Rewards;
 use super::sparse::Sparse;
 use super::{Pomdp, Warning};
-use crate::reader::{ParseError, Position};
+use crate::parse_error::{ParseError, Position};
 
 /// Row sums may differ from 1 by this much; beyond it the model is refused.
 pub(crate) const ROW_SUM_TOLERANCE: f64 = 1e-5;
@@ -63,12 +63,22 @@ impl Pomdp {
             likelihoods,
         } = probabilities;
         let has_rows = transitions.iter().all(|rows| rows.len() == states);
-        assert!(start.len() == states && transitions.len() == actions && has_rows);
+        assert!(
+            start.len() == states && transitions.len() == actions && has_rows,
+            "start belief and transitions have the size of the model"
+        );
         assert_eq!(
             likelihoods.len(),
-            actions * self.observations.len() * states
+            actions * self.observations.len() * states,
+            "likelihoods have the size of the model"
         );
         let at = Position { line: 1, column: 1 };
+        let successors = transitions.iter().flatten().flatten().map(|(_, p)| p);
+        let mut all = start.iter().chain(&likelihoods).chain(successors);
+        if let Some(wrong) = all.find(|p| !(0.0..=1.0 + ROW_SUM_TOLERANCE).contains(*p)) {
+            let message = format!("{wrong} is no probability, allowed is 0 to 1");
+            return Err(ParseError::new(at, message));
+        }
         let sparse = transitions.into_iter().map(|rows| {
             let mut sparse = Sparse::default();
             rows.into_iter().for_each(|row| sparse.push(row));
@@ -106,7 +116,7 @@ impl Pomdp {
             let name = || parts.row_name("T", action, state);
             told.check_sum(sum.sum(), *at, name)?;
         }
-        let sums = observation_sums(&parts);
+        let sums = observation_sums(&parts.observation, n, parts.observations.len());
         for (row, (at, sum)) in observation_at.iter().zip(&sums).enumerate() {
             told.check_sum(*sum, *at, || parts.row_name("O", row / n, row % n))?;
         }
@@ -133,7 +143,37 @@ impl Pomdp {
             warnings: told.warnings(),
         };
         model.hash = hash(&model);
+        model.assert_distributions();
         Ok(model)
+    }
+}
+
+impl Pomdp {
+    /// What tracker, bounds and policies rely on. The readers refuse what would break it.
+    fn assert_distributions(&self) {
+        let n = self.states.len();
+        let is_one = |sum: f64| (sum - 1.0).abs() <= ROW_SUM_TOLERANCE;
+        for action in 0..self.actions.len() {
+            for state in 0..n {
+                let row = self.successors(state, action);
+                assert!(
+                    row.iter().all(|(_, p)| *p >= 0.0) && is_one(row.iter().map(|e| e.1).sum()),
+                    "row {state} of T under action {action} is a distribution: {row:?}"
+                );
+            }
+        }
+        assert!(
+            self.observation.iter().all(|p| *p >= 0.0),
+            "Z holds no negative number"
+        );
+        let sums = observation_sums(&self.observation, n, self.observations.len());
+        let wrong = sums.iter().find(|sum| !is_one(**sum));
+        assert!(wrong.is_none(), "rows of Z sum to 1: {wrong:?}");
+        let start: f64 = self.start.iter().sum();
+        assert!(
+            self.start.iter().all(|p| *p >= 0.0) && is_one(start),
+            "the start belief is a distribution: {start}"
+        );
     }
 }
 
@@ -195,11 +235,10 @@ impl WarningList {
 }
 
 /// sum_z Z(a,s',z) for every (a, s').
-fn observation_sums(parts: &Parts) -> Vec<f64> {
-    let (n, k) = (parts.states.len(), parts.observations.len());
-    let mut sums = vec![0.0; parts.actions.len() * n];
-    for (row, column) in parts.observation.chunks(n).enumerate() {
-        let action = row / k;
+fn observation_sums(likelihoods: &[f64], n: usize, observations: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; likelihoods.len() / observations];
+    for (row, column) in likelihoods.chunks(n).enumerate() {
+        let action = row / observations;
         for (sum, p) in sums[action * n..][..n].iter_mut().zip(column) {
             *sum += p;
         }
@@ -230,4 +269,67 @@ fn expected_rewards(parts: &Parts, observation_sums: &[f64]) -> Vec<f64> {
         }
     }
     reward
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COIN: &str = "discount: 0.9\nvalues: reward\nstates: heads tails\nactions: toss\n\
+        observations: bright dark\nT: toss uniform\nO: toss\n0.75 0.25\n0.25 0.75\n";
+
+    fn broken(by: impl FnOnce(&mut Pomdp)) {
+        let mut model = Pomdp::parse(COIN).unwrap();
+        model.assert_distributions();
+        by(&mut model);
+        model.assert_distributions();
+    }
+
+    #[test]
+    #[should_panic(expected = "row 1 of T under action 0 is a distribution")]
+    fn a_row_that_does_not_sum_to_one_is_caught() {
+        broken(|model| {
+            model.transitions[0] = Sparse::default();
+            model.transitions[0].push(vec![(0, 0.5), (1, 0.5)]);
+            model.transitions[0].push(vec![(0, 0.5), (1, 0.4)]);
+        });
+    }
+
+    #[test]
+    #[should_panic(expected = "rows of Z sum to 1: Some(1.25)")]
+    fn a_row_of_observations_that_does_not_sum_to_one_is_caught() {
+        broken(|model| model.observation[0] = 1.0);
+    }
+
+    #[test]
+    #[should_panic(expected = "Z holds no negative number")]
+    fn a_negative_number_in_a_row_that_sums_to_one_is_caught() {
+        broken(|model| (model.observation[0], model.observation[2]) = (1.5, -0.5));
+    }
+
+    #[test]
+    #[should_panic(expected = "the start belief is a distribution")]
+    fn a_start_belief_that_does_not_sum_to_one_is_caught() {
+        broken(|model| model.start[0] = 0.6);
+    }
+
+    #[test]
+    fn probabilities_from_elsewhere_that_are_none_are_refused() {
+        let model = Pomdp::parse(COIN).unwrap();
+        let good = Probabilities {
+            start: vec![0.5, 0.5],
+            transitions: vec![vec![vec![(0, 0.5), (1, 0.5)]; 2]],
+            likelihoods: vec![0.75, 0.25, 0.25, 0.75],
+        };
+        assert_eq!(model.with_probabilities(good.clone()), Ok(model.clone()));
+        let refused = |change: &dyn Fn(&mut Probabilities)| {
+            let mut wrong = good.clone();
+            change(&mut wrong);
+            model.with_probabilities(wrong).unwrap_err().message
+        };
+        let negative = refused(&|p| p.start = vec![1.5, -0.5]);
+        assert_eq!(negative, "1.5 is no probability, allowed is 0 to 1");
+        assert!(refused(&|p| p.likelihoods[1] = f64::NAN).starts_with("NaN is no"));
+        assert!(refused(&|p| p.transitions[0][0][1].1 = -0.1).starts_with("-0.1 is no"));
+    }
 }

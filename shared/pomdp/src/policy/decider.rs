@@ -2,7 +2,7 @@
 
 use super::dual::vote_entropy;
 use super::{Choice, Control, Measure, Policy, normalised_entropy};
-use crate::mdp::Solution;
+use crate::bounds::mdp::Solution;
 use crate::model::Pomdp;
 
 /// A decision and what it rests on; values and votes are [`Decider::values`] and
@@ -65,6 +65,11 @@ impl Decider {
     /// The action for a belief.
     pub fn decide(&mut self, belief: &[f64]) -> Decision {
         let choice = self.policy.evaluate(belief, &mut self.values);
+        assert!(
+            choice.action < self.values.len() && choice.margin >= 0.0,
+            "the action that a policy chooses is one of the model's, its margin not negative: \
+             {choice:?}"
+        );
         self.action_entropy = vote_entropy(belief, &self.best, &mut self.votes);
         self.measure = match choice.control {
             Control::Dual => Measure::Entropy,
@@ -108,5 +113,33 @@ impl Decider {
     /// A new mission begins.
     pub fn reset(&mut self) {
         self.policy.reset();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bounds::mdp;
+
+    /// Chooses an action that the model lacks.
+    struct Stray;
+
+    impl Policy for Stray {
+        fn evaluate(&mut self, _: &[f64], values: &mut [f64]) -> Choice {
+            Choice {
+                action: values.len(),
+                margin: 0.0,
+                control: Control::Policy,
+            }
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "the action that a policy chooses is one of the model's")]
+    fn an_action_that_the_model_lacks_is_caught() {
+        let text = "discount: 0.5\nvalues: reward\nstates: 1\nactions: 1\nT: * identity\n";
+        let model = Pomdp::parse(text).unwrap();
+        let solution = mdp::solve(&model).unwrap();
+        Decider::new(Box::new(Stray), &model, &solution).decide(&[1.0]);
     }
 }

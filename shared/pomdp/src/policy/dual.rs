@@ -11,7 +11,7 @@
 
 use super::entropy::{normalised, normalised_entropy};
 use super::{Choice, Control, LookAhead, Measure, Policy, choose_among};
-use crate::mdp::Solution;
+use crate::bounds::mdp::Solution;
 use crate::model::Pomdp;
 
 /// An entropy that falls by less has not fallen.

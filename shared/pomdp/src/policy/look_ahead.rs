@@ -8,7 +8,7 @@
 //! an action, and not |S| |Z|. The action's entropy needs those of the votes for each observation.
 
 use super::entropy::{minus_p_ln_p, normalised};
-use crate::mdp::Solution;
+use crate::bounds::mdp::Solution;
 use crate::model::Pomdp;
 
 /// Looks one step ahead; preallocated.

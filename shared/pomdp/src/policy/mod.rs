@@ -91,7 +91,9 @@ pub trait Policy {
     fn reset(&mut self) {}
 }
 
-/// Values within this much of the largest, relative to it (at least to 1), are a tie.
+/// Values within this much of the largest, relative to it (at least to 1), are a tie. Chosen by
+/// hand, far above what rounding leaves of equal values (about 1e-13) and far below any difference
+/// of rewards that somebody would write into a model.
 const TIE: f64 = 1e-9;
 
 /// The largest value; ties (within 1e-9 of the largest value or of 1, whichever is larger) go to
@@ -118,14 +120,54 @@ pub fn choose_among(values: &[f64], allowed: impl Fn(usize) -> bool) -> Choice {
             .fold(f64::NEG_INFINITY, |max, (_, value)| max.max(value))
     };
     let best = largest(None);
-    let least = best - TIE * best.abs().max(1.0);
+    let least = least_of_best(best);
     let action = candidates().find(|&(_, value)| value >= least);
     let action = action.map_or(0, |(action, _)| action);
+    assert_best(values, action, best);
     // Below 0 only by what still counts as a tie.
     let margin = (best - largest(Some(action))).max(0.0);
     Choice {
         action,
         margin: if margin.is_finite() { margin } else { 0.0 },
         control: Control::Policy,
+    }
+}
+
+/// The least value that is as good as `best`.
+const fn least_of_best(best: f64) -> f64 {
+    if best.is_finite() {
+        best - TIE * best.abs().max(1.0)
+    } else {
+        best
+    }
+}
+
+/// What every policy claims: nothing that is allowed is worth more than what it chooses. Without
+/// anything to choose from `best` is minus infinity, and nothing is claimed.
+fn assert_best(values: &[f64], action: usize, best: f64) {
+    let value = values.get(action).copied().unwrap_or(f64::NEG_INFINITY);
+    assert!(
+        best == f64::NEG_INFINITY || value >= least_of_best(best),
+        "the action chosen has the largest value of those allowed: {value} of {best}"
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn infinite_values_are_chosen_among_too() {
+        let chosen = |values: &[f64]| (choose(values).action, choose(values).margin);
+        assert_eq!(chosen(&[1.0, f64::INFINITY]), (1, 0.0));
+        assert_eq!(chosen(&[f64::NAN, f64::NEG_INFINITY]), (1, 0.0));
+        assert_eq!(chosen(&[f64::NAN, f64::NAN]), (0, 0.0));
+    }
+
+    #[test]
+    #[should_panic(expected = "largest value of those allowed: 1 of 2")]
+    fn a_choice_below_the_best_is_caught() {
+        assert_best(&[1.0, 2.0], 1, 2.0);
+        assert_best(&[1.0, 2.0], 0, 2.0);
     }
 }

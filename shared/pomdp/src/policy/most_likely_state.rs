@@ -1,7 +1,7 @@
 //! MLS: the best action of the most likely state.
 
 use super::{Choice, Measure, Policy, choose};
-use crate::mdp::Solution;
+use crate::bounds::mdp::Solution;
 
 /// pi_CO(argmax_s b(s)); ignores all other states.
 #[derive(Debug, Clone, PartialEq)]

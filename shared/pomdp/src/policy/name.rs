@@ -7,9 +7,9 @@ use super::{
     ActionVoting, Decider, Dual, DualControl, DualError, FastInformed, Information,
     MostLikelyState, PointBased, Policy, QMdp,
 };
+use crate::bounds::mdp::Solution;
 use crate::bounds::{SolveError, fib};
 use crate::budget::Budget;
-use crate::mdp::Solution;
 use crate::model::Pomdp;
 
 /// X: a policy without dual control.

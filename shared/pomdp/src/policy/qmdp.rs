@@ -1,7 +1,7 @@
 //! Q-MDP: the action with the largest expected value if all became observable after it.
 
 use super::{Choice, Policy, choose};
-use crate::mdp::Solution;
+use crate::bounds::mdp::Solution;
 
 /// argmax_a sum_s b(s) Q_CO(s,a). Never gathers information for its own sake; see
 /// [`super::ActionVoting`] for a policy that is robust to unequal scales of the values.

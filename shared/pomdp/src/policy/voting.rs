@@ -1,7 +1,7 @@
 //! Action voting: every state votes for its best action, with its probability.
 
 use super::{Choice, Measure, Policy, choose};
-use crate::mdp::Solution;
+use crate::bounds::mdp::Solution;
 
 /// argmax_a w(a), w(a) = sum_s b(s) [pi_CO(s) = a].
 #[derive(Debug, Clone, PartialEq)]

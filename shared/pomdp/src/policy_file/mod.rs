@@ -8,8 +8,9 @@
 //!
 //! Bytes in, bytes out; files are the caller's. All write digits that give back the same numbers.
 
+#[cfg(feature = "solver")]
 pub mod alpha;
-#[cfg(feature = "xml")]
+#[cfg(feature = "pomdpx")]
 pub mod appl;
 
 use serde::{Deserialize, Serialize};

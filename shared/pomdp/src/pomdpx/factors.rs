@@ -3,7 +3,7 @@
 use super::scope::Scope;
 use super::table::{Budget, Table};
 use super::xml::{Element, short};
-use crate::reader::ParseError;
+use crate::parse_error::ParseError;
 
 /// A variable and its probabilities given others.
 pub(super) struct Factor {

@@ -7,8 +7,8 @@ use super::scope::Scope;
 use super::table::Budget;
 use crate::model::rewards::{Block, Rewards};
 use crate::model::sparse::Sparse;
+use crate::parse_error::{ParseError, Position};
 use crate::reader::limits::{ENTRIES_MAX, WRITES_PER_REWARD};
-use crate::reader::{ParseError, Position};
 
 /// Where the work or the entries run out.
 const NOWHERE: Position = Position { line: 1, column: 1 };

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use super::xml::{Element, short};
-use crate::reader::ParseError;
+use crate::parse_error::ParseError;
 use crate::reader::limits::{NAMES_MAX, check};
 
 /// Most variables of a model.
@@ -197,7 +197,7 @@ impl Scope {
             lengths.max().unwrap_or(0) + 1
         };
         let length: usize = slots.iter().map(longest).sum();
-        let at = crate::reader::Position { line: 1, column: 1 };
+        let at = crate::parse_error::Position { line: 1, column: 1 };
         check(Some(length), NAME_BYTES_MAX, at, "bytes of a name")?;
         let mut names = vec![String::new()];
         for (i, &slot) in slots.iter().enumerate() {

@@ -3,7 +3,7 @@
 use super::scope::Scope;
 use super::xml::{Element, short};
 use crate::model::ROW_SUM_TOLERANCE;
-use crate::reader::ParseError;
+use crate::parse_error::ParseError;
 use crate::reader::limits::{ENTRIES_MAX, WRITES_MAX};
 
 /// What all tables together may still take.

@@ -1,6 +1,6 @@
 //! Elements of the document: children by name, text, places.
 
-use crate::reader::{ParseError, Position};
+use crate::parse_error::{ParseError, Position};
 
 /// An element.
 #[derive(Clone, Copy)]

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::lexer::{Lexer, PlacedToken, Token};
 use super::limits::NAMES_MAX;
-use super::{ParseError, Position};
+use crate::parse_error::{ParseError, Position};
 
 /// Words with a meaning of their own; never names.
 const RESERVED: [&str; 16] = [

@@ -1,6 +1,7 @@
 //! Words, numbers and signs of a `.pomdp` text. New lines mean nothing; `#` comments a line out.
 
-use super::{ParseError, Position, limits};
+use super::limits;
+use crate::parse_error::{ParseError, Position};
 
 /// A piece of the text.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 //! What a text may ask for. Together these bound memory to about 1 GB and ten times the text, and
 //! time to seconds.
 
-use super::{ParseError, Position};
+use crate::parse_error::{ParseError, Position};
 
 /// Longest text, bytes.
 pub(crate) const TEXT_BYTES_MAX: usize = 256 << 20;

@@ -14,50 +14,26 @@ mod reward_blocks;
 mod rules;
 mod start;
 
-use std::fmt;
-
 use cursor::Cursor;
-#[cfg(feature = "xml")]
+#[cfg(feature = "pomdpx")]
 pub(crate) use cursor::is_reserved;
 
 use crate::model::{Parts, Pomdp};
+use crate::parse_error::ParseError;
 
-/// Where in the text.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Position {
-    /// Line, from 1.
-    pub line: usize,
-    /// Column, from 1.
-    pub column: usize,
-}
-
-impl fmt::Display for Position {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "line {}, column {}", self.line, self.column)
+impl Pomdp {
+    /// Reads Cassandra's `.pomdp` format.
+    ///
+    /// Memory: at most about ten times the text, besides tables of 2^24 entries.
+    ///
+    /// # Errors
+    /// [`ParseError`] with line and column, what was found and what is allowed.
+    pub fn parse(text: &str) -> Result<Self, ParseError> {
+        read(text)
     }
 }
 
-/// Why a text is not a POMDP.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{at}: {message}")]
-pub struct ParseError {
-    /// Where.
-    pub at: Position,
-    /// What was found and what is allowed.
-    pub message: String,
-}
-
-impl ParseError {
-    pub(crate) fn new(at: Position, message: impl Into<String>) -> Self {
-        Self {
-            at,
-            message: message.into(),
-        }
-    }
-}
-
-/// Reads a POMDP.
-pub(crate) fn parse(text: &str) -> Result<Pomdp, ParseError> {
+fn read(text: &str) -> Result<Pomdp, ParseError> {
     let mut cursor = Cursor::new(text)?;
     let preamble = preamble::read(&mut cursor)?;
     let start_at = cursor.at();

@@ -1,8 +1,8 @@
 //! Discount, kind of values, names; in any order.
 
-use super::ParseError;
 use super::cursor::{Cursor, Names};
 use super::lexer::Token;
+use crate::parse_error::ParseError;
 
 /// What stands before the start belief.
 pub(super) struct Preamble {

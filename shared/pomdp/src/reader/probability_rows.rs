@@ -2,9 +2,9 @@
 
 use super::limits::{self, ENTRIES_MAX};
 use super::replay::Rules;
-use super::{ParseError, Position};
 use crate::model::refuse_sum;
 use crate::model::sparse::Sparse;
+use crate::parse_error::{ParseError, Position};
 
 /// What a rule writes into a row of probabilities.
 #[derive(Debug)]

@@ -2,7 +2,7 @@
 
 use super::cursor::Pick;
 use super::limits::{self, ROWS_MAX, WRITES_MAX};
-use super::{ParseError, Position};
+use crate::parse_error::{ParseError, Position};
 
 /// What one rule does to each of the rows that it covers.
 #[derive(Debug)]

@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::ParseError;
 use super::cursor::Pick;
 use super::limits::{self, ENTRIES_MAX};
 use super::replay::Rules;
 use crate::model::rewards::{Block, Rewards};
+use crate::parse_error::ParseError;
 
 /// What a rule writes into R(s,a,.,.).
 #[derive(Debug)]

@@ -7,8 +7,8 @@ use super::preamble::{Preamble, Sizes};
 use super::probability_rows::Fill;
 use super::replay::{Rule, Rules};
 use super::reward_blocks::RewardFill;
-use super::{ParseError, Position};
 use crate::model::sparse::Sparse;
+use crate::parse_error::{ParseError, Position};
 
 /// The rules of one text.
 pub(super) struct Tables {

@@ -1,8 +1,8 @@
 //! The start belief: a state, a list of probabilities, or equal weights over some states.
 
-use super::ParseError;
 use super::cursor::{Cursor, Names};
 use super::lexer::Token;
+use crate::parse_error::ParseError;
 
 /// Reads it; uniform if none is given. Its sum is checked with the rows of T.
 pub(super) fn read(cursor: &mut Cursor<'_>, states: &Names) -> Result<Vec<f64>, ParseError> {

@@ -89,6 +89,10 @@ impl Alphas {
         values: &[f64],
         successors: &[AlphaId],
     ) -> AlphaId {
+        assert!(
+            values.iter().all(|v| v.is_finite()),
+            "vectors of the solver are finite"
+        );
         let id = self.len() as AlphaId;
         self.origins.push(origin);
         self.actions.push(action as u32);
@@ -128,4 +132,12 @@ impl Alphas {
     pub(super) fn active(&self) -> impl Iterator<Item = AlphaId> {
         self.active.iter().map(|(_, id)| *id)
     }
+}
+
+#[test]
+#[should_panic(expected = "vectors of the solver are finite")]
+fn a_vector_that_is_not_finite_is_caught() {
+    let mut alphas = Alphas::new(&ActionValues::new(2, vec![0.0, 1.0]), 2, 1);
+    assert_eq!(alphas.len(), 1);
+    alphas.push(None, 0, &[0.0, f64::INFINITY], &[0]);
 }

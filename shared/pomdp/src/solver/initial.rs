@@ -1,6 +1,6 @@
 //! The bounds that a search begins with.
 
-use super::{Bracket, SearchResult};
+use super::report::{Bracket, SearchResult};
 use crate::alpha_vectors::AlphaVectors;
 use crate::bounds::tib::{self, Tib};
 use crate::bounds::{ActionValues, SolveError, blind, fib};
@@ -82,6 +82,13 @@ fn in_time<T>(found: Result<T, SolveError>) -> Result<Option<T>, SolveError> {
         Err(SolveError::Stopped) => Ok(None),
         Err(error) => Err(error),
     }
+}
+
+/// The largest expected reward of one step, by size.
+pub(super) fn largest_reward(model: &Pomdp) -> f64 {
+    let states = 0..model.states().len();
+    let rewards = states.flat_map(|s| (0..model.actions().len()).map(move |a| model.reward(s, a)));
+    rewards.fold(0.0, |most, reward| most.max(reward.abs()))
 }
 
 /// The least and the largest reward for ever.

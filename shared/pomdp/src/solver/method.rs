@@ -3,7 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{Bracket, EndReason, Options, Progress, solve};
+use super::point_based::solve;
+use super::report::{Bracket, EndReason, Options, Progress};
 use crate::alpha_vectors::AlphaVectors;
 use crate::bounds::{SolveError, blind, fib, mdp, tib};
 use crate::budget::Budget;

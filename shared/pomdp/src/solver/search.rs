@@ -1,7 +1,7 @@
 //! What is done in which order: walks, and now and then what serves all beliefs at once.
 
+use super::report::{Bracket, EndReason, Options, Progress};
 use super::tree::Tree;
-use super::{Bracket, EndReason, Options, Progress};
 use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
@@ -32,6 +32,8 @@ pub(super) struct Search<'m> {
     grid: Rhythm,
     /// Elementary operations of rounds at the edge of the graph.
     edge_work: u64,
+    /// Rounding that the bracket may hold.
+    rounding: f64,
     /// Numbers of vectors and of points at which pruning is due.
     alphas_due: usize,
     points_due: usize,
@@ -64,7 +66,11 @@ impl Rhythm {
 }
 
 impl<'m> Search<'m> {
-    pub(super) fn new(mut tree: Tree<'m>, budget: &mut Budget<'_>) -> Result<Self, StopRequest> {
+    pub(super) fn new(
+        mut tree: Tree<'m>,
+        rounding: f64,
+        budget: &mut Budget<'_>,
+    ) -> Result<Self, StopRequest> {
         let start = tree.model.start().iter().enumerate();
         let start: Vec<(u32, f64)> = start
             .filter(|(_, b)| **b > 0.0)
@@ -78,6 +84,7 @@ impl<'m> Search<'m> {
             controller: Rhythm::new(),
             grid: Rhythm::new(),
             edge_work: 0,
+            rounding,
             alphas_due: ALPHAS_MIN,
             points_due: POINTS_MIN,
         };
@@ -132,11 +139,13 @@ impl<'m> Search<'m> {
 
     fn note(&mut self, budget: &mut Budget<'_>) -> Result<(), StopRequest> {
         let tree = &mut self.tree;
+        let bracket = Bracket {
+            lower: tree.lower(self.root, budget)?,
+            upper: tree.upper(self.root, budget)?,
+        };
+        assert_narrower(&self.progress.bracket, &bracket, self.rounding);
         self.progress = Progress {
-            bracket: Bracket {
-                lower: tree.lower(self.root, budget)?,
-                upper: tree.upper(self.root, budget)?,
-            },
+            bracket,
             rounds: self.progress.rounds,
             vectors: tree.alphas.active_count(),
             points: tree.sawtooth.point_count(),
@@ -177,5 +186,46 @@ impl<'m> Search<'m> {
             self.points_due = (tree.sawtooth.point_count() * 3 / 2).max(POINTS_MIN);
         }
         Ok(())
+    }
+}
+
+/// Both bounds hold, so that they cross by rounding alone; what is known is never forgotten.
+fn assert_narrower(before: &Bracket, after: &Bracket, rounding: f64) {
+    assert!(
+        after.lower <= after.upper + 4.0 * rounding,
+        "the solver's lower bound does not exceed the upper one: {after:?}"
+    );
+    assert!(
+        after.lower >= before.lower && after.upper <= before.upper,
+        "the solver's gap does not grow: {before:?}, {after:?}"
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BEFORE: Bracket = Bracket {
+        lower: 1.0,
+        upper: 2.0,
+    };
+
+    #[test]
+    #[should_panic(expected = "the solver's lower bound does not exceed the upper one")]
+    fn bounds_that_cross_are_caught() {
+        let crossed = |lower| Bracket { lower, ..BEFORE };
+        assert_narrower(&BEFORE, &crossed(2.0), 0.0);
+        assert_narrower(&BEFORE, &crossed(2.1), 0.02);
+    }
+
+    #[test]
+    #[should_panic(expected = "the solver's gap does not grow")]
+    fn a_gap_that_grows_is_caught() {
+        assert_narrower(&Bracket::default(), &BEFORE, 0.0);
+        let wider = Bracket {
+            upper: 2.5,
+            ..BEFORE
+        };
+        assert_narrower(&BEFORE, &wider, 1.0);
     }
 }

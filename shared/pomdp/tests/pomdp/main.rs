@@ -10,7 +10,6 @@ mod hostile;
 mod point_based;
 mod policy_file;
 mod policy_graph;
-#[cfg(feature = "xml")]
 mod pomdpx;
 mod public;
 mod reference;
