@@ -73,7 +73,7 @@ impl Corridor {
         self.simulation.step(PERIOD_NS as f64 * 1e-9, action, 0);
         self.simulation.measure(&mut self.frame);
         self.frame.header.t_capture_ns += PERIOD_NS;
-        match self.simulation.happening() {
+        match self.simulation.take_event() {
             Some(NavigatorEvent::Ended(kind, outcome)) => {
                 let name = Self::name(kind);
                 let how = if outcome == ActionOutcome::Succeeded {

@@ -125,9 +125,9 @@ impl Wrong {
                 self.encoders.remove(&wheel);
                 self.sized.remove(&wheel);
                 self.others
-                    .retain(|(kind, place)| !(is_of_a_wheel(kind.row().place) && *place == wheel));
+                    .retain(|(kind, place)| !(is_of_a_wheel(kind.spec().place) && *place == wheel));
             }
-            Change::Calm(kind, at) => {
+            Change::EndDisturbance(kind, at) => {
                 let is_at = |place: usize| at.is_none_or(|at| at == place);
                 let way = size_of(kind, 0.0).map(|size| size.kind);
                 let calmed = |place: usize, size: &Size| way == Some(size.kind) && is_at(place);
@@ -251,8 +251,8 @@ const fn seen_by(kind: DisturbanceKind) -> SeenBy {
     }
 }
 
-const fn is_of_a_wheel(place: vigil_robot::disturbance::Place) -> bool {
-    use vigil_robot::disturbance::Place;
+const fn is_of_a_wheel(place: vigil_robot::disturbance_kind::Place) -> bool {
+    use vigil_robot::disturbance_kind::Place;
     matches!(place, Place::Wheel | Place::SteeredWheel)
 }
 

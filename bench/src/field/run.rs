@@ -8,7 +8,7 @@ use vigil_evaluation::scoring::Taxonomy;
 use vigil_evaluation::scoring::field::{Run, Scorer, Stretch};
 use vigil_robot::Injection;
 use vigil_robot::learned::Model;
-use vigil_sensor_sim::{EffectiveCommand, Obedience, World};
+use vigil_sensor_sim::{ActionGate, EffectiveCommand, World};
 use vigil_setup::schema::{Sensors, Simulator};
 use vigil_setup::{GraphArgs, Setup};
 
@@ -252,23 +252,23 @@ fn drive(
     let (mut ground, mut way) = (conditions.ground.clone(), conditions.way.clone());
     ground.begin(&mut world)?;
     let mut pending = conditions.changes.iter().peekable();
-    let mut obedience = Obedience::new(&robot.limits);
+    let mut gate = ActionGate::new(&robot.limits);
     let mut held: Option<SensorFrame> = None;
     let (mut frame, mut t_s) = (SensorFrame::default(), 0.0);
     for k in 0..(scenario.run_s * rate_hz).round() as u64 {
         while let Some(injection) = pending.next_if(|change| change.at_s <= t_s) {
             world.change(injection.change)?;
         }
-        let (planned, before) = (world.planned(), world.truth().pose);
+        let (planned, before) = (world.planned(), world.true_state().pose);
         let command = match watches.first().filter(|_| scenario.obeys && k > 0) {
-            Some(watch) => obedience.apply(planned, Some(watch.stages.action()), 0),
+            Some(watch) => gate.apply(planned, Some(watch.stages.action()), 0),
             None => EffectiveCommand::as_planned(planned),
         };
         let dt_s = way.instant_s(t_s, (k + 1) as f64 / rate_hz) - t_s;
         world.step(dt_s, command);
         t_s += dt_s;
         world.measure(&mut frame);
-        let pose = world.truth().pose;
+        let pose = world.true_state().pose;
         ground.advance((pose[0] - before[0]).hypot(pose[1] - before[1]), &mut world)?;
         way.blur(&mut frame, pose, dt_s);
         frame.header.epoch = 1;

@@ -344,7 +344,7 @@ mod tests {
     use crate::field::ground::stream;
     use crate::simulated::Rover;
     use vigil_evaluation::scoring::field::{Run, Truth, figures};
-    use vigil_robot::disturbance::KINDS;
+    use vigil_robot::disturbance_kind::KINDS;
     use vigil_setup::schema::Sensors;
 
     fn shipped() -> (File, Rover) {

@@ -4,7 +4,7 @@ use std::error::Error;
 
 use vigil_blocks::{RecoveryKind, SensorFrame};
 use vigil_robot::injection::Change;
-use vigil_sensor_sim::{Obedience, World};
+use vigil_sensor_sim::{ActionGate, World};
 
 use super::arm::Arm;
 use super::commander::Commander;
@@ -155,7 +155,7 @@ pub(super) fn ride(
     let period_ns = (1e9 / rate_hz).round() as u64;
     let mut field = Field::new(shipped, plan, rate_hz)?;
     let mut commander = Commander::new(shipped, arm, plan.seed)?;
-    let mut obedience = Obedience::new(&shipped.setup.robot.limits);
+    let mut gate = ActionGate::new(&shipped.setup.robot.limits);
     let pay = Pay::new(shipped);
     let mut driven = CommanderRun {
         tally: Tally::default(),
@@ -174,11 +174,11 @@ pub(super) fn ride(
         field.break_what_is_due(k as f64 * dt_s)?;
         let obeyed = ObeyedOrder::new(action);
         let planned = field.world.planned();
-        let command = obedience.apply(planned, Some(action), frame.header.t_capture_ns);
-        let (before, was_planned) = (field.world.truth().pose, frame.planned_pose);
+        let command = gate.apply(planned, Some(action), frame.header.t_capture_ns);
+        let (before, was_planned) = (field.world.true_state().pose, frame.planned_pose);
         field.world.step(dt_s, command);
         field.world.measure(&mut frame);
-        let (pose, at) = (field.world.truth().pose, frame.planned_pose);
+        let (pose, at) = (field.world.true_state().pose, frame.planned_pose);
         planned_m += distance([was_planned[0], was_planned[1]], [at[0], at[1]]);
         let step = Step {
             truth: field.truth,

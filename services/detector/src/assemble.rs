@@ -1,6 +1,6 @@
 //! From the configuration to a detector.
 
-use vigil_robot::{Description, Measured, RobotModel};
+use vigil_robot::{Description, MeasuredChannels, RobotModel};
 use vigil_setup::Setup;
 use vigil_setup::schema::{Sensors, Source};
 
@@ -28,11 +28,11 @@ pub fn assemble(setup: &Setup) -> Result<Detector, DetectorError> {
 }
 
 /// What of the robot's channels the detector looks at: what is wrong with the others hides nothing.
-fn looked_at(setup: &Setup) -> Measured {
+fn looked_at(setup: &Setup) -> MeasuredChannels {
     let measured = setup.robot.measured;
     let sensors = setup.file.detector.sensors;
     if sensors == Sensors::Pose {
-        return Measured {
+        return MeasuredChannels {
             pose: measured.pose,
             wheel_rates: false,
             steer: false,
@@ -45,7 +45,7 @@ fn looked_at(setup: &Setup) -> Measured {
     };
     // The rover's description leaves out what only some of its graphs use.
     let further = model.further.as_ref().filter(|_| sensors == Sensors::All);
-    Measured {
+    MeasuredChannels {
         yaw_rate: further.is_some_and(|further| further.yaw_rate.is_some()),
         currents: further.is_some_and(|further| further.currents.is_some()),
         ..measured

@@ -5,13 +5,13 @@ use std::fmt;
 
 use serde::Serialize;
 use vigil_blocks::{
-    Blindness, Channel, Event, EventKind, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN, Refusal,
+    ActionRejection, Blindness, Channel, Event, EventKind, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
     Rejection, SizeKind,
 };
 use vigil_cycle::Supervision;
 use vigil_cycle::topic::ServiceName;
-use vigil_robot::injection::{Change, Wire};
-use vigil_robot::meaning::Finding;
+use vigil_robot::injection::{Change, WireChange};
+use vigil_robot::publisher_check::Finding;
 
 use crate::plan::Plan;
 use crate::words;
@@ -308,16 +308,16 @@ impl Namer {
                 wheel.map_or_else(|| action.to_owned(), |w| format!("{action}:{}", w.name))
             }
             EventKind::Injected | EventKind::Restored => {
-                let wire = Wire::of_event(kind == EventKind::Injected, event);
+                let wire = WireChange::from_event(kind == EventKind::Injected, event);
                 Change::from_wire(&wire).map_or("?".into(), |change| change.text(&self.robot))
             }
             EventKind::Miss => format!("{} cycles", event.value),
-            EventKind::SafeStop => match Refusal::from_wire(event.what) {
-                Some(Refusal::Nothing) => "no action".into(),
-                Some(Refusal::Expired) => "the action has expired".into(),
-                Some(Refusal::UnknownKind) => "the action's kind is unknown".into(),
-                Some(Refusal::NotFinite) => "a parameter is not finite".into(),
-                Some(Refusal::OutOfRange) => "the speed factor is out of range".into(),
+            EventKind::SafeStop => match ActionRejection::from_wire(event.what) {
+                Some(ActionRejection::Nothing) => "no action".into(),
+                Some(ActionRejection::Expired) => "the action has expired".into(),
+                Some(ActionRejection::UnknownKind) => "the action's kind is unknown".into(),
+                Some(ActionRejection::NotFinite) => "a parameter is not finite".into(),
+                Some(ActionRejection::OutOfRange) => "the speed factor is out of range".into(),
                 None => "?".into(),
             },
             EventKind::Run => event.value.to_string(),

@@ -24,11 +24,11 @@ struct ClockOffset {
 
 /// Frames of one source that are here at the same time.
 #[derive(Debug, Clone, Copy)]
-pub struct Here<I> {
+pub struct ArrivalBatch<I> {
     /// Their headers.
     pub headers: I,
     /// False if more of them wait: the newest of these may have been held up as well.
-    pub are_all: bool,
+    pub is_complete: bool,
 }
 
 impl ArrivalClock {
@@ -39,7 +39,7 @@ impl ArrivalClock {
     pub fn date<'a>(
         self,
         header: &mut Header,
-        here: Here<impl IntoIterator<Item = &'a Header>>,
+        here: ArrivalBatch<impl IntoIterator<Item = &'a Header>>,
         now_ns: u64,
     ) -> Self {
         if header.t_schedule_ns != 0 {
@@ -57,7 +57,7 @@ impl ArrivalClock {
             Some(known) if known.epoch == epoch && known.t_capture_ns <= t_capture_ns => {
                 let elapsed_ns = (t_capture_ns - known.t_capture_ns) as f64;
                 let drifted_ns = known.offset_ns + (DRIFT_MAX * elapsed_ns).ceil() as i128;
-                if here.are_all && seen_ns - drifted_ns > HELD_UP_MAX_NS {
+                if here.is_complete && seen_ns - drifted_ns > HELD_UP_MAX_NS {
                     seen_ns
                 } else {
                     drifted_ns.min(seen_ns)
@@ -82,10 +82,10 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    fn all<I>(headers: I) -> Here<I> {
-        Here {
+    fn all<I>(headers: I) -> ArrivalBatch<I> {
+        ArrivalBatch {
             headers,
-            are_all: true,
+            is_complete: true,
         }
     }
 
@@ -181,9 +181,9 @@ mod tests {
         let mut due_ms = Vec::new();
         for piece in waiting.chunks(64) {
             for mut header in piece.iter().copied() {
-                let here = Here {
+                let here = ArrivalBatch {
                     headers: piece,
-                    are_all: piece.len() < 64,
+                    is_complete: piece.len() < 64,
                 };
                 clock = clock.date(&mut header, here, 3990 * MS);
                 due_ms.push(header.t_schedule_ns / MS);

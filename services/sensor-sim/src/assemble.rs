@@ -8,16 +8,22 @@ use vigil_robot::Injection;
 use vigil_setup::Setup;
 use vigil_setup::schema::Source;
 
-use crate::{Listen, Navigator, Obedience, Playback, Schedule, Simulation, World};
+use crate::action_gate::ActionGate;
+use crate::injection_schedule::InjectionSchedule;
+use crate::navigation::Navigator;
+use crate::playback::Playback;
+use crate::simulation::Simulation;
+use crate::wiring::ListenAddresses;
+use crate::world::World;
 
 /// What is to be the source of the graph.
 pub enum SensorSource {
     /// The simulated rover, and what is to break when.
-    Simulator(Box<Simulation>, Schedule),
+    Simulator(Box<Simulation>, InjectionSchedule),
     /// Recorded frames.
     Playback(Playback),
     /// Frames that arrive as datagrams.
-    Socket(Listen),
+    Socket(ListenAddresses),
 }
 
 /// The source that a configuration describes; `injections` (`stuck:RM@5`) break it.
@@ -32,9 +38,9 @@ pub fn assemble(setup: &Setup, injections: &[String]) -> Result<SensorSource, Bo
             let (rate_hz, seed) = (file.graph.rate_hz, file.graph.seed);
             let world = World::new(&setup.robot, &file.simulator, &file.drive, rate_hz, seed)
                 .map_err(|e| format!("{path}: simulator: {e}"))?;
-            let obedience = Obedience::new(&setup.robot.limits);
+            let gate = ActionGate::new(&setup.robot.limits);
             let navigator = file.navigation.as_ref().map(Navigator::new);
-            let simulation = Simulation::new(world, obedience, navigator);
+            let simulation = Simulation::new(world, gate, navigator);
             SensorSource::Simulator(Box::new(simulation), schedule)
         }
         Source::Playback => SensorSource::Playback(playback(setup)?),
@@ -45,7 +51,7 @@ pub fn assemble(setup: &Setup, injections: &[String]) -> Result<SensorSource, Bo
     })
 }
 
-fn schedule(setup: &Setup, specs: &[String]) -> Result<Schedule, Box<dyn Error>> {
+fn schedule(setup: &Setup, specs: &[String]) -> Result<InjectionSchedule, Box<dyn Error>> {
     if !specs.is_empty() && setup.file.sensor.source != Source::Simulator {
         return Err("--inject: only the simulator can be broken; the source is another".into());
     }
@@ -57,12 +63,12 @@ fn schedule(setup: &Setup, specs: &[String]) -> Result<Schedule, Box<dyn Error>>
     let parse = |spec: &String| {
         Injection::parse(spec, &setup.robot).map_err(|e| format!("--inject {spec}: {e}"))
     };
-    Ok(Schedule::new(
+    Ok(InjectionSchedule::new(
         specs.iter().map(parse).collect::<Result<_, _>>()?,
     ))
 }
 
-fn listen(setup: &Setup) -> Result<Listen, Box<dyn Error>> {
+fn listen(setup: &Setup) -> Result<ListenAddresses, Box<dyn Error>> {
     let socket = &setup.file.sensor.socket;
     let udp = socket
         .udp_address()
@@ -71,7 +77,7 @@ fn listen(setup: &Setup) -> Result<Listen, Box<dyn Error>> {
         "" => None,
         name => Some(setup.domain()?.folder().join(name)),
     };
-    Ok(Listen { udp, unix })
+    Ok(ListenAddresses { udp, unix })
 }
 
 fn playback(setup: &Setup) -> Result<Playback, Box<dyn Error>> {
@@ -83,7 +89,7 @@ fn playback(setup: &Setup) -> Result<Playback, Box<dyn Error>> {
     Ok(Playback::new(runs).map_err(|e| format!("{}: {e}", path.display()))?)
 }
 
-/// The runs that `sensor.runs` names, in its order.
+/// The runs that `sensor.runs` names, in its request.
 fn chosen(
     mut runs: Vec<frames::Run>,
     wanted: Option<&str>,

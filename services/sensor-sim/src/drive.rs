@@ -58,12 +58,12 @@ impl Drive {
 
 /// A command that follows its target at limited rates.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Servo {
+pub(crate) struct RateLimiter {
     /// The command at present.
     pub(crate) at: DriveCommand,
 }
 
-impl Servo {
+impl RateLimiter {
     pub(crate) fn follow(&mut self, target: DriveCommand, dt_s: f64) {
         let toward = |value: f64, target: f64, rate: f64| {
             let step = rate * dt_s;
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn a_servo_reaches_its_target_exactly_and_no_faster_than_allowed() {
-        let mut servo = Servo::default();
+        let mut servo = RateLimiter::default();
         let target = DriveCommand {
             curvature_1_m: -0.4,
             speed_m_s: 0.2,

@@ -5,8 +5,8 @@ use rand_pcg::Pcg64Mcg;
 use vigil_robot::kinematics::ROVER_WHEELS;
 use vigil_robot::{DisturbanceKind, FaultKind};
 
-use crate::disturbed::Disturbances;
-use crate::history::History;
+use crate::active_disturbances::ActiveDisturbances;
+use crate::delay_line::DelayLine;
 
 /// Smallest rate that a noisy encoder reports, rad/s.
 pub const NOISE_MIN_RAD_S: f64 = -4.0;
@@ -20,14 +20,14 @@ pub(crate) struct Encoders {
     last_rad_s: [Option<f64>; ROVER_WHEELS],
     /// What drifts have added so far.
     drifted_rad_s: [f64; ROVER_WHEELS],
-    past: History<ROVER_WHEELS>,
+    past: DelayLine<ROVER_WHEELS>,
     rng: Pcg64Mcg,
 }
 
 impl Encoders {
     pub(crate) fn new(rate_hz: f64, seed: u64) -> Self {
         Self {
-            past: History::new(rate_hz),
+            past: DelayLine::new(rate_hz),
             fault: [None; ROVER_WHEELS],
             last_rad_s: [None; ROVER_WHEELS],
             drifted_rad_s: [0.0; ROVER_WHEELS],
@@ -41,7 +41,7 @@ impl Encoders {
     }
 
     /// A cycle passes.
-    pub(crate) fn advance(&mut self, dt_s: f64, on: &Disturbances) {
+    pub(crate) fn advance(&mut self, dt_s: f64, on: &ActiveDisturbances) {
         for (wheel, drifted) in self.drifted_rad_s.iter_mut().enumerate() {
             *drifted = match on.at(DisturbanceKind::EncoderDrift, wheel) {
                 Some(rad_s2) => *drifted + rad_s2 * dt_s,
@@ -51,7 +51,7 @@ impl Encoders {
     }
 
     /// The rates seen, before noise, of wheels that turn at `rate_rad_s`.
-    pub(crate) fn scaled(&self, wheel: usize, rate_rad_s: f64, on: &Disturbances) -> f64 {
+    pub(crate) fn scaled(&self, wheel: usize, rate_rad_s: f64, on: &ActiveDisturbances) -> f64 {
         let of = |kind, otherwise| on.at(kind, wheel).unwrap_or(otherwise);
         let bias_rad_s = of(DisturbanceKind::EncoderBias, 0.0);
         let scaled = of(DisturbanceKind::EncoderScale, 1.0) * rate_rad_s;
@@ -69,12 +69,12 @@ impl Encoders {
         &mut self,
         t_s: f64,
         healthy_rad_s: [f64; ROVER_WHEELS],
-        on: &Disturbances,
+        on: &ActiveDisturbances,
     ) -> [f64; ROVER_WHEELS] {
-        self.past.keep(t_s, healthy_rad_s);
+        self.past.push(t_s, healthy_rad_s);
         std::array::from_fn(|wheel| {
             let seen = match on.at(DisturbanceKind::EncoderDelay, wheel) {
-                Some(delay_s) => self.past.before(t_s, delay_s)[wheel],
+                Some(delay_s) => self.past.delayed(t_s, delay_s)[wheel],
                 None => healthy_rad_s[wheel],
             };
             self.one(wheel, seen)

@@ -10,7 +10,7 @@ use vigil_cycle::datagrams::Datagrams;
 use vigil_cycle::serve::{self, Plan, ServeError};
 use vigil_cycle::topic::ServiceName;
 use vigil_sensor_sim::{
-    Listen, PlaybackSource, SensorSource, SimulatorSource, SocketStage, assemble,
+    ListenAddresses, PlaybackSource, SensorSource, SimulatorSource, SocketStage, assemble,
 };
 use vigil_setup::{ServiceArgs, Setup};
 
@@ -74,7 +74,7 @@ fn serve(setup: &Setup, source: SensorSource, args: &Args) -> Result<(), ServeEr
     }
 }
 
-fn serve_socket(setup: &Setup, listen: &Listen, mut plan: Plan) -> Result<(), ServeError> {
+fn serve_socket(setup: &Setup, listen: &ListenAddresses, mut plan: Plan) -> Result<(), ServeError> {
     // There is nothing to look at without a system call.
     plan.spin_ns = 0;
     serve::woken_by(&plan, |graph| {

@@ -43,7 +43,7 @@ pub struct Playback {
 }
 
 impl Playback {
-    /// Plays `runs` in the given order. Runs without frames are left out.
+    /// Plays `runs` in the given request. Runs without frames are left out.
     ///
     /// # Errors
     /// [`PlaybackError`] if the times or the order of the runs make no sense.

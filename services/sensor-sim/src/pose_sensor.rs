@@ -4,8 +4,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vigil_robot::{Disturbance, DisturbanceKind};
 
-use crate::disturbed::Disturbances;
-use crate::history::History;
+use crate::active_disturbances::ActiveDisturbances;
+use crate::delay_line::DelayLine;
 
 /// What the pose sensor makes of the true pose: it scales, drifts, jumps, is late, repeats itself,
 /// and misses.
@@ -21,7 +21,7 @@ pub(crate) struct PoseSensor {
     jump_heading_rad: f64,
     /// Since when it repeats a pose, s, and which.
     held: Option<(f64, [f64; 3])>,
-    past: History<3>,
+    past: DelayLine<3>,
     rng: Pcg64Mcg,
 }
 
@@ -34,7 +34,7 @@ impl PoseSensor {
             yaw_drift_rad: 0.0,
             jump_heading_rad: 0.0,
             held: None,
-            past: History::new(rate_hz),
+            past: DelayLine::new(rate_hz),
             rng: Pcg64Mcg::seed_from_u64(seed),
         }
     }
@@ -57,13 +57,13 @@ impl PoseSensor {
     }
 
     /// `dt_s` pass.
-    pub(crate) fn advance(&mut self, dt_s: f64, on: &Disturbances) {
+    pub(crate) fn advance(&mut self, dt_s: f64, on: &ActiveDisturbances) {
         self.drift_m += dt_s * on.at(DisturbanceKind::PoseDrift, 0).unwrap_or(0.0);
         self.yaw_drift_rad += dt_s * on.at(DisturbanceKind::YawRateBias, 0).unwrap_or(0.0);
     }
 
     /// The reading at `t_s` without noise, for the true `pose`, which is not late.
-    pub(crate) fn distort(&self, pose: [f64; 3], on: &Disturbances) -> [f64; 3] {
+    pub(crate) fn distort(&self, pose: [f64; 3], on: &ActiveDisturbances) -> [f64; 3] {
         let [mut x, mut y, mut yaw] = pose;
         if let Some(scale) = on.at(DisturbanceKind::PoseScale, 0) {
             x = self.anchor_m[0] + scale * (x - self.anchor_m[0]);
@@ -91,15 +91,15 @@ impl PoseSensor {
         &mut self,
         t_s: f64,
         reading: [f64; 3],
-        on: &Disturbances,
+        on: &ActiveDisturbances,
     ) -> Option<[f64; 3]> {
-        self.past.keep(t_s, reading);
+        self.past.push(t_s, reading);
         let share = on.at(DisturbanceKind::PoseDrop, 0).unwrap_or(0.0);
         if share > 0.0 && self.rng.random::<f64>() < share {
             return None;
         }
         let pose = match on.at(DisturbanceKind::PoseDelay, 0) {
-            Some(delay_s) => self.past.before(t_s, delay_s),
+            Some(delay_s) => self.past.delayed(t_s, delay_s),
             None => reading,
         };
         let Some(hold_s) = on.at(DisturbanceKind::PoseHeld, 0) else {

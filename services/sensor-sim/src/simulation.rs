@@ -1,27 +1,29 @@
-//! The rover, what it makes of actions, and the way that it finds, without a port.
+//! The rover, its action gate and its navigation, without a port.
 
-use vigil_blocks::{Action, SensorFrame};
+use vigil_blocks::{Action, RecoveryKind, SensorFrame};
 use vigil_robot::injection::Change;
 
-use crate::navigation::{Navigator, NavigatorEvent, Order};
-use crate::{EffectiveCommand, Obedience, World, WorldError, obedience};
+use crate::action_gate::{self, ActionGate, EffectiveCommand};
+use crate::check::WorldError;
+use crate::navigation::{ActionRequest, DecisionId, Navigator, NavigatorEvent};
+use crate::world::World;
 
 /// A simulated rover that drives its segments or, with a navigator, its path.
 #[derive(Debug, Clone)]
 pub struct Simulation {
     /// The rover on its soil.
     pub world: World,
-    obedience: Obedience,
+    gate: ActionGate,
     navigator: Option<Navigator>,
 }
 
 impl Simulation {
     /// From its parts.
     #[must_use]
-    pub const fn new(world: World, obedience: Obedience, navigator: Option<Navigator>) -> Self {
+    pub const fn new(world: World, gate: ActionGate, navigator: Option<Navigator>) -> Self {
         Self {
             world,
-            obedience,
+            gate,
             navigator,
         }
     }
@@ -33,22 +35,24 @@ impl Simulation {
         let planned = match &mut self.navigator {
             None => self.world.planned(),
             Some(navigator) => {
-                let order = action.filter(|a| obedience::is_valid(a, now_ns));
-                let order = order.and_then(order_of);
-                navigator.plan(dt_s, order, self.world.truth().pose)
+                let valid = action.filter(|action| action_gate::is_valid(action, now_ns));
+                navigator.plan(dt_s, valid.and_then(request), self.world.true_state().pose)
             }
         };
-        let command = self.obedience.apply(planned, action, now_ns);
+        let command = self.gate.apply(planned, action, now_ns);
         self.world.step(dt_s, command);
-        let helped = self.navigator.as_mut().is_some_and(Navigator::helped);
-        if helped {
-            // Mending what is broken cannot fail: everything that can be broken can be mended.
+        let was_helped = self.navigator.as_mut().is_some_and(Navigator::take_help);
+        if was_helped {
+            // Ending what is on cannot fail: everything that can be injected can be ended.
             let _ = self.world.change(Change::ClearAll);
         }
-        // Whoever has helped begins a new run, and so does a robot that finds itself elsewhere: the
-        // filters forget what is no longer so, or never was.
-        let found = self.navigator.as_mut().is_some_and(Navigator::found);
-        if helped || found {
+        // After help or a relocalisation a new run begins: the filters forget a state that is no
+        // longer true.
+        let was_relocalised = self
+            .navigator
+            .as_mut()
+            .is_some_and(Navigator::take_relocalisation);
+        if was_helped || was_relocalised {
             self.world.begin_run();
         }
         command
@@ -73,15 +77,19 @@ impl Simulation {
     }
 
     /// What happened to the navigation in the last cycle, once.
-    pub fn happening(&mut self) -> Option<NavigatorEvent> {
-        self.navigator.as_mut().and_then(Navigator::happening)
+    pub fn take_event(&mut self) -> Option<NavigatorEvent> {
+        self.navigator.as_mut().and_then(Navigator::take_event)
     }
 }
 
-fn order_of(action: &Action) -> Option<Order> {
-    Some(Order {
-        kind: vigil_blocks::RecoveryKind::from_wire(action.kind)?,
-        decision: (action.header.epoch, action.decision_seq),
+/// What an action asks of the navigation; `None` for a kind that this version does not know.
+fn request(action: &Action) -> Option<ActionRequest> {
+    Some(ActionRequest {
+        kind: RecoveryKind::from_wire(action.kind)?,
+        decision: DecisionId {
+            epoch: action.header.epoch,
+            seq: action.decision_seq,
+        },
         speed_scale: action.speed_scale,
     })
 }

@@ -1,21 +1,21 @@
 //! The simulated rover: drive, soil, slip, sensors, faults.
 
 use vigil_blocks::{ActionOutcome, SensorFrame, Valid};
-use vigil_robot::disturbance::{KINDS, Place, SIDES};
+use vigil_robot::disturbance_kind::{KINDS, Place, SIDES};
 use vigil_robot::injection::Change;
 use vigil_robot::kinematics::{ROVER_WHEELS, advance, wrap_angle};
 use vigil_robot::slip::{Condition, Situation, SlipModel, Solution};
 use vigil_robot::{Description, Disturbance, DisturbanceKind, Fault, FaultKind};
 use vigil_setup::schema::{DriveSegment, Simulator};
 
+use crate::action_gate::EffectiveCommand;
+use crate::active_disturbances::ActiveDisturbances;
 use crate::check::{self, WorldError};
-use crate::disturbed::Disturbances;
-use crate::drive::{Drive, Servo};
+use crate::drive::{Drive, DriveCommand, RateLimiter};
 use crate::encoders::Encoders;
 use crate::noise::Noise;
 use crate::pose_sensor::PoseSensor;
 use crate::soil::SoilPath;
-use crate::{DriveCommand, EffectiveCommand};
 
 /// Motor current per torque, A/(N m): the constant of the simulated motors with their gear.
 pub const CURRENT_PER_TORQUE_A_N_M: f64 = 2.0;
@@ -29,7 +29,7 @@ const STILL: f64 = 1e-5;
 
 /// The true state of the rover, for tests and displays; no filter may see it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Truth {
+pub struct TrueState {
     /// x m, y m, yaw rad (not wrapped).
     pub pose: [f64; 3],
     /// Body velocity: forward m/s, left m/s, yaw rate rad/s.
@@ -47,8 +47,8 @@ pub struct Truth {
 pub struct World {
     model: SlipModel,
     drive: Drive,
-    executed: Servo,
-    planned: Servo,
+    executed: RateLimiter,
+    planned: RateLimiter,
     planned_pose: [f64; 3],
     pose: [f64; 3],
     velocity: [f64; 3],
@@ -58,7 +58,7 @@ pub struct World {
     motion: Solution,
     motion_age_s: f64,
     stuck: [bool; ROVER_WHEELS],
-    disturbed: Disturbances,
+    disturbed: ActiveDisturbances,
     /// What the disturbances make of body and wheels.
     condition: Condition,
     pose_sensor: PoseSensor,
@@ -106,8 +106,8 @@ impl World {
         Ok(Self {
             model,
             drive: Drive::new(drive),
-            executed: Servo::default(),
-            planned: Servo::default(),
+            executed: RateLimiter::default(),
+            planned: RateLimiter::default(),
             planned_pose: [0.0; 3],
             pose: [0.0; 3],
             velocity: [0.0; 3],
@@ -116,7 +116,7 @@ impl World {
             motion,
             motion_age_s: f64::INFINITY,
             stuck: [false; ROVER_WHEELS],
-            disturbed: Disturbances::nothing(),
+            disturbed: ActiveDisturbances::nothing(),
             condition: Condition::default(),
             pose_sensor: PoseSensor::new(rate_hz, stream(3)),
             encoders: Encoders::new(rate_hz, stream(1)),
@@ -131,7 +131,7 @@ impl World {
         })
     }
 
-    /// What the drive wants now: input of [`crate::Obedience::apply`].
+    /// What the drive wants now: input of [`crate::action_gate::ActionGate::apply`].
     #[must_use]
     pub fn planned(&self) -> DriveCommand {
         self.drive.command()
@@ -156,10 +156,10 @@ impl World {
         for _ in 0..parts as u32 {
             self.move_on(part_s, &command);
         }
-        self.safe_stop = command.refusal.is_some();
+        self.safe_stop = command.rejection.is_some();
         self.action_seq = command.action_seq;
         let reached = self.executed.at == command.target;
-        self.outcome = match (command.action_seq, command.refusal.is_some()) {
+        self.outcome = match (command.action_seq, command.rejection.is_some()) {
             (0, _) => ActionOutcome::None,
             (_, true) => ActionOutcome::Failed,
             (_, false) if reached => ActionOutcome::Succeeded,
@@ -240,7 +240,7 @@ impl World {
         disturbance.check()?;
         let place = disturbance.place;
         let kinematics = self.model.kinematics();
-        let there = match disturbance.kind.row().place {
+        let there = match disturbance.kind.spec().place {
             Place::Rover => place == 0,
             Place::Side => place < SIDES.len(),
             Place::Wheel => place < ROVER_WHEELS,
@@ -248,7 +248,7 @@ impl World {
         };
         if !(there && self.disturbed.set(&disturbance)) {
             return Err(WorldError::Place {
-                kind: disturbance.kind.row().form(),
+                kind: disturbance.kind.spec().form(),
                 found: place,
             });
         }
@@ -289,7 +289,7 @@ impl World {
             Change::Inject(fault) => self.inject(fault),
             Change::Disturb(disturbance) => self.disturb(disturbance),
             Change::Clear(wheel) => self.clear(wheel),
-            Change::Calm(kind, place) => {
+            Change::EndDisturbance(kind, place) => {
                 self.calm(kind, place);
                 Ok(())
             }
@@ -320,8 +320,8 @@ impl World {
 
     /// The true state.
     #[must_use]
-    pub fn truth(&self) -> Truth {
-        Truth {
+    pub fn true_state(&self) -> TrueState {
+        TrueState {
             pose: self.pose,
             velocity: self.velocity,
             wheel_rate_rad_s: self.motion.wheel_rate_rad_s,
@@ -378,7 +378,7 @@ impl World {
                 speed_m_s: 0.0,
             },
             progress: 0.0,
-            refusal: Some(vigil_blocks::Refusal::Nothing),
+            rejection: Some(vigil_blocks::ActionRejection::Nothing),
             action_seq: command.action_seq,
         }
     }

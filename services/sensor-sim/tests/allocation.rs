@@ -6,7 +6,7 @@ use vigil_blocks::{Action, RecoveryKind, SensorFrame};
 use vigil_cycle::allocation::{CountingAllocator, allocations};
 use vigil_robot::injection::Change;
 use vigil_robot::{Fault, FaultKind};
-use vigil_sensor_sim::{Navigator, Obedience, Schedule, Simulation, World};
+use vigil_sensor_sim::{ActionGate, InjectionSchedule, Navigator, Simulation, World};
 use vigil_setup::schema::{DriveSegment, GraphFile, Simulator};
 
 #[global_allocator]
@@ -23,7 +23,7 @@ fn steady_cycles_with_faults_and_actions_allocate_nothing() {
     };
     let drive = [segment(0.5), segment(0.0), segment(-0.5)];
     let mut world = World::new(&robot, &Simulator::default(), &drive, 1000.0, 1).unwrap();
-    let mut obedience = Obedience::new(&robot.limits);
+    let mut gate = ActionGate::new(&robot.limits);
     let injection = |kind, wheel, at_s| vigil_robot::Injection {
         change: Change::Inject(Fault { kind, wheel }),
         at_s,
@@ -32,7 +32,7 @@ fn steady_cycles_with_faults_and_actions_allocate_nothing() {
         change: vigil_robot::Injection::parse_change(spec, &robot).unwrap(),
         at_s,
     };
-    let mut schedule = Schedule::new(vec![
+    let mut schedule = InjectionSchedule::new(vec![
         disturbance("pose-delay:0.3", 0.5),
         disturbance("encoder-delay:RF:0.2", 0.6),
         disturbance("tether:5", 0.7),
@@ -57,14 +57,16 @@ fn steady_cycles_with_faults_and_actions_allocate_nothing() {
         while let Some(change) = schedule.due(now_ns) {
             world.change(change).unwrap();
         }
-        let command = obedience.apply(world.planned(), Some(&action), now_ns);
+        let command = gate.apply(world.planned(), Some(&action), now_ns);
         world.step(0.001, command);
         world.measure(&mut frame);
     }
     assert_eq!(allocations() - before, 0);
     // It did drive, break and stop.
-    assert!(world.truth().stuck[4] && frame.safe_stop == 1 && schedule.due(u64::MAX).is_none());
-    assert!(world.truth().pose[0] > 0.3);
+    assert!(
+        world.true_state().stuck[4] && frame.safe_stop == 1 && schedule.due(u64::MAX).is_none()
+    );
+    assert!(world.true_state().pose[0] > 0.3);
     // The counter counts.
     drop(vec![1_u8]);
     assert!(allocations() > before);
@@ -78,8 +80,8 @@ fn a_robot_on_its_path_allocates_nothing_whatever_it_is_told() {
     let file: GraphFile = toml::from_str(&text).unwrap();
     let world = World::new(&robot, &file.simulator, &[], 100.0, 1).unwrap();
     let navigator = Navigator::new(file.navigation.as_ref().unwrap());
-    let obedience = Obedience::new(&robot.limits);
-    let mut simulation = Simulation::new(world, obedience, Some(navigator));
+    let gate = ActionGate::new(&robot.limits);
+    let mut simulation = Simulation::new(world, gate, Some(navigator));
     let mut action = Action {
         valid_until_ns: u64::MAX,
         speed_scale: 1.0,
@@ -97,7 +99,7 @@ fn a_robot_on_its_path_allocates_nothing_whatever_it_is_told() {
         for _ in 0..cycles {
             simulation.step(0.01, Some(&action), 0);
             simulation.measure(&mut frame);
-            happenings += u32::from(simulation.happening().is_some());
+            happenings += u32::from(simulation.take_event().is_some());
         }
     }
     assert_eq!(allocations() - before, 0);

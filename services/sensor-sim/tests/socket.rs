@@ -122,7 +122,7 @@ fn the_first_good_source_is_the_graphs_until_it_is_silent_for_a_second() {
         assert!(border.turn().is_empty());
     }
     border.turn();
-    // An old refusal may come back to the sender first.
+    // An old rejection may come back to the sender first.
     let _ = other.send_to(&border.frame(2, 60), to);
     other.send_to(&border.frame(2, 61), to).unwrap();
     // A new start is a new run.

@@ -128,7 +128,7 @@ impl RecoveryKind {
 /// Why a robot does not obey an action, and stops itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Refusal {
+pub enum ActionRejection {
     /// There is no action, or it says that nothing is decided.
     Nothing = 1,
     /// Its validity has passed.
@@ -141,8 +141,8 @@ pub enum Refusal {
     OutOfRange = 5,
 }
 
-impl Refusal {
-    /// The refusal behind an event's code, if this version knows it.
+impl ActionRejection {
+    /// The rejection behind an event's code, if this version knows it.
     #[must_use]
     pub const fn from_wire(value: u32) -> Option<Self> {
         Some(match value {

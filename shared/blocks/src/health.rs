@@ -51,7 +51,7 @@ pub enum EventKind {
     InputLost = 9,
     /// The input is back. `what`: as above.
     InputBack = 10,
-    /// The robot stops itself: no valid action. `what`: a [`crate::Refusal`].
+    /// The robot stops itself: no valid action. `what`: a [`crate::ActionRejection`].
     SafeStop = 11,
     /// The robot obeys actions again.
     SafeStopEnds = 12,

@@ -33,7 +33,8 @@ mod sensor;
 mod size_kind;
 
 pub use action::{
-    Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, Refusal, ValueKind,
+    Action, ActionRejection, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind,
+    ValueKind,
 };
 pub use block::{Block, fnv1a};
 #[doc(hidden)]

@@ -1,6 +1,6 @@
 //! The alarm: at which log-odds it rises, and when it falls again.
 
-use crate::learned::{Calibration, ModelError};
+use crate::model_file::ModelError;
 
 /// An alarm falls when the log-odds have stayed this far below those that raise it (e^5 = 150: no
 /// wander toggles it) ..
@@ -95,29 +95,6 @@ pub enum AlarmError {
         /// The longest time between false alarms whose threshold can be reached, h.
         interval_max_h: f64,
     },
-}
-
-/// The threshold of `calibration` for `interval_h` between false alarms, if log-odds up to
-/// `reachable` exceed it.
-pub(crate) fn threshold(
-    calibration: &Calibration,
-    form: &'static str,
-    interval_h: f64,
-    fault_rate_1_h: f64,
-    reachable: f64,
-) -> Result<f64, AlarmError> {
-    let alarm_log_odds = calibration.alarm_log_odds(interval_h, fault_rate_1_h);
-    if alarm_log_odds < reachable {
-        return Ok(alarm_log_odds);
-    }
-    Err(AlarmError::Unreachable {
-        form,
-        interval_h,
-        fault_rate_1_h,
-        alarm_log_odds,
-        reachable_log_odds: reachable,
-        interval_max_h: calibration.interval_h(reachable, fault_rate_1_h),
-    })
 }
 
 #[cfg(test)]

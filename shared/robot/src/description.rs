@@ -3,8 +3,10 @@
 use serde::{Deserialize, Serialize};
 use vigil_inference::track::MotionNoise;
 
-use crate::slip::{Ground, Motor, RockerBogie};
-use crate::{Body, FaultPrior, Tolerance};
+use crate::body::Body;
+use crate::chassis::{Ground, Motor, RockerBogie};
+use crate::fault_prior::FaultPrior;
+use crate::tolerance::Tolerance;
 
 /// What kind of motion the command vector means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,7 +37,7 @@ pub struct Axis {
 /// Which channels are measured, besides the command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Measured {
+pub struct MeasuredChannels {
     /// Pose: columns `x`, `y`, `yaw`.
     pub pose: bool,
     /// Rates of all wheels: columns `enc_<WHEEL>`.
@@ -48,7 +50,7 @@ pub struct Measured {
     pub currents: bool,
 }
 
-impl Default for Measured {
+impl Default for MeasuredChannels {
     fn default() -> Self {
         Self {
             pose: true,
@@ -129,7 +131,7 @@ pub struct Description {
     pub command: Vec<Axis>,
     /// Measured channels; left out: those of the rover.
     #[serde(default)]
-    pub measured: Measured,
+    pub measured: MeasuredChannels,
     /// Order of the polynomials of the command in a nominal model, 1 to 4.
     #[serde(default = "four")]
     pub polynomial_order: usize,

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use crate::{Description, disturbance};
+use crate::description::Description;
+use crate::disturbance_kind::{DisturbanceSpec, KINDS};
 
 /// Kind of a wheel fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -105,7 +106,7 @@ pub enum FaultError {
 impl FaultError {
     /// `text` is nothing that can be injected.
     pub(crate) fn form(text: &str) -> Self {
-        let forms: Vec<String> = disturbance::KINDS.iter().map(|kind| kind.form()).collect();
+        let forms: Vec<String> = KINDS.iter().map(DisturbanceSpec::form).collect();
         Self::Form {
             found: text.to_owned(),
             disturbances: forms.join(" "),

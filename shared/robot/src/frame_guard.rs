@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 
 use vigil_blocks::{ActionOutcome, COMMANDS, Rejection, SensorFrame, Valid, WHEELS};
 
-use crate::Description;
+use crate::description::Description;
 
 /// Largest coordinate of a pose, m.
 pub const POSITION_MAX_M: f64 = 1e6;

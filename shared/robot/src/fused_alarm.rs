@@ -40,7 +40,7 @@ pub struct StageOdds {
 }
 
 /// Fuses the detector's alarm with the identifier's diagnosis. Of one stage alone, use
-/// [`crate::Alarm`].
+/// [`crate::alarm::Alarm`].
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FusedAlarm {
     stands: bool,

@@ -2,8 +2,9 @@
 
 use vigil_blocks::Event;
 
-use crate::Description;
-use crate::disturbance::{Disturbance, DisturbanceKind, PARAMETERS};
+use crate::description::Description;
+use crate::disturbance::Disturbance;
+use crate::disturbance_kind::{DisturbanceKind, PARAMETERS};
 use crate::fault::{Fault, FaultError, FaultKind};
 
 /// A change of the simulated robot's health.
@@ -16,7 +17,7 @@ pub enum Change {
     /// Mend everything of the wheel with this index.
     Clear(usize),
     /// End a kind of disturbance, at one place or everywhere.
-    Calm(DisturbanceKind, Option<usize>),
+    EndDisturbance(DisturbanceKind, Option<usize>),
     /// Mend and end everything.
     ClearAll,
 }
@@ -74,13 +75,13 @@ impl Injection {
         match parts.as_slice() {
             ["clear", "all"] => Ok(Change::ClearAll),
             ["clear", name] => match DisturbanceKind::named(name) {
-                Some(kind) => Ok(Change::Calm(kind, None)),
+                Some(kind) => Ok(Change::EndDisturbance(kind, None)),
                 None => Fault::wheel_of(name, robot).map(Change::Clear),
             },
             ["clear", name, place] => {
                 let kind = DisturbanceKind::named(name).ok_or_else(|| FaultError::form(text))?;
-                let place = kind.row().place_of(place, robot)?;
-                Ok(Change::Calm(kind, Some(place)))
+                let place = kind.spec().place_of(place, robot)?;
+                Ok(Change::EndDisturbance(kind, Some(place)))
             }
             [name, ..] if DisturbanceKind::named(name).is_some() => {
                 Disturbance::parse(text, robot).map(Change::Disturb)
@@ -92,7 +93,7 @@ impl Injection {
 
 /// A change as numbers, for [`vigil_blocks::Control`] and [`vigil_blocks::Event`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wire {
+pub struct WireChange {
     /// True to break, false to mend.
     pub injects: bool,
     /// Code of a [`FaultKind`] or [`DisturbanceKind`]; 0 for everything.
@@ -109,7 +110,7 @@ pub const EVERYWHERE: u32 = u32::MAX;
 /// Place in an event's `what` that stands for [`EVERYWHERE`].
 const EVERYWHERE_EVENT: u32 = 0xff;
 
-impl Wire {
+impl WireChange {
     /// `what`, `p` and `value` of the event that tells of this change.
     #[must_use]
     pub const fn event(&self) -> (u32, f64, u64) {
@@ -124,7 +125,7 @@ impl Wire {
 
     /// What an event tells of; `injects` says of which kind the event is.
     #[must_use]
-    pub const fn of_event(injects: bool, event: &Event) -> Self {
+    pub const fn from_event(injects: bool, event: &Event) -> Self {
         let place = event.what & EVERYWHERE_EVENT;
         Self {
             injects,
@@ -142,7 +143,7 @@ impl Wire {
 impl Change {
     /// The change as numbers.
     #[must_use]
-    pub fn to_wire(self) -> Wire {
+    pub fn to_wire(self) -> WireChange {
         let (injects, kind, place, parameter) = match self {
             Self::Inject(Fault { kind, wheel }) => (true, kind as u32, Some(wheel), None),
             Self::Disturb(this) => (
@@ -152,10 +153,10 @@ impl Change {
                 Some(this.parameter),
             ),
             Self::Clear(wheel) => (false, 0, Some(wheel), None),
-            Self::Calm(kind, place) => (false, kind as u32, place, None),
+            Self::EndDisturbance(kind, place) => (false, kind as u32, place, None),
             Self::ClearAll => (false, 0, None, None),
         };
-        Wire {
+        WireChange {
             injects,
             kind,
             place: place.map_or(EVERYWHERE, |place| {
@@ -167,11 +168,11 @@ impl Change {
 
     /// The change behind numbers, if this version knows it and its parameters are in range.
     #[must_use]
-    pub fn from_wire(wire: &Wire) -> Option<Self> {
+    pub fn from_wire(wire: &WireChange) -> Option<Self> {
         let place = (wire.place != EVERYWHERE).then_some(wire.place as usize);
         if let Some(kind) = DisturbanceKind::from_wire(wire.kind) {
             if !wire.injects {
-                return Some(Self::Calm(kind, place));
+                return Some(Self::EndDisturbance(kind, place));
             }
             let this = Disturbance {
                 kind,
@@ -199,11 +200,11 @@ impl Change {
             Self::Inject(fault) => fault.text(robot),
             Self::Disturb(disturbance) => disturbance.text(robot),
             Self::Clear(i) => format!("clear:{}", wheel(i)),
-            Self::Calm(kind, place) => {
-                let row = kind.row();
-                match place.and_then(|place| row.place_name(place, robot)) {
-                    Some(place) => format!("clear:{}:{place}", row.name),
-                    None => format!("clear:{}", row.name),
+            Self::EndDisturbance(kind, place) => {
+                let spec = kind.spec();
+                match place.and_then(|place| spec.place_name(place, robot)) {
+                    Some(place) => format!("clear:{}:{place}", spec.name),
+                    None => format!("clear:{}", spec.name),
                 }
             }
             Self::ClearAll => "clear:all".to_owned(),

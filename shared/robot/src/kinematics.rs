@@ -5,7 +5,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::Description;
+use crate::description::Description;
 
 /// Wheels of the six-wheel rover.
 pub const ROVER_WHEELS: usize = 6;

@@ -4,10 +4,70 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use vigil_blocks::fnv1a;
 
-use crate::learned::ModelError;
-
 /// What stands for the hash in a file that a person has changed on purpose.
 pub const EDITED: &str = "edited";
+
+/// Why a model was refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ModelError {
+    /// Not TOML, or not a model.
+    #[error("not a learned model: {0}")]
+    Parse(String),
+    /// Another layout.
+    #[error(
+        "the model has layout version {found}; this program reads version {read}: learn it again \
+         with `vigil learn`"
+    )]
+    Version {
+        /// Version of the file.
+        found: u32,
+        /// Version that is read.
+        read: u32,
+    },
+    /// The content does not fit the hash that the file carries.
+    #[error(
+        "the content has the hash {found}, but the file says hash = \"{stored}\": it was changed \
+         or cut short. Learn it again; if the change is meant, write hash = \"{EDITED}\""
+    )]
+    Hash {
+        /// Hash that the file carries.
+        stored: String,
+        /// Hash of the content.
+        found: String,
+    },
+    /// A value is not finite or out of range.
+    #[error("{key}: {value} is not allowed: {allowed}")]
+    Value {
+        /// Where.
+        key: String,
+        /// What was found.
+        value: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// The model is of another robot.
+    #[error("the model is of robot '{model}' ({model_wheels}), not of '{robot}' ({robot_wheels})")]
+    Robot {
+        /// Robot of the model.
+        model: String,
+        /// Its wheels.
+        model_wheels: String,
+        /// Robot asked for.
+        robot: String,
+        /// Its wheels.
+        robot_wheels: String,
+    },
+    /// The model has no calibration for the channels and the form of detection.
+    #[error("the model has no calibration for '{sensors}' and '{form}', only for {known}")]
+    Calibration {
+        /// Channels.
+        sensors: &'static str,
+        /// Form.
+        form: &'static str,
+        /// Channels and forms for which it has one.
+        known: String,
+    },
+}
 
 /// A model that is kept in a file.
 pub(crate) trait ModelFile: Clone + Serialize + DeserializeOwned {

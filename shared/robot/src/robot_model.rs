@@ -1,10 +1,11 @@
 //! A learned model of either kind.
 
+use crate::alarm::AlarmError;
+use crate::description::Description;
 use crate::learned::model::Provenance;
 use crate::learned::monitor::Channels;
 use crate::learned::{self, Calibration, Form, ModelError};
 use crate::nominal;
-use crate::{AlarmError, Description};
 
 /// What was learned of a robot.
 #[derive(Debug, Clone, PartialEq)]

@@ -20,12 +20,11 @@ pub mod shear;
 mod solver;
 
 pub use condition::{Condition, WheelCondition};
-pub use loads::RockerBogie;
-pub use solver::Unknowns;
 
-use serde::{Deserialize, Serialize};
+use nalgebra::SVector;
 
-use crate::Description;
+use crate::chassis::{Motor, RockerBogie};
+use crate::description::Description;
 use crate::kinematics::{Ackermann6, GeometryError, ROVER_WHEELS, WheelTargets};
 
 /// Standard gravity as the weight of the reference rover assumes it, m/s².
@@ -34,19 +33,10 @@ pub const GRAVITY_M_S2: f64 = 9.81;
 /// wheels on the rover's ground.
 pub const IMMOBILE_STUCK: usize = 4;
 
-/// Drive motors: torque = `gain` (commanded rate - rate), limited; bearing friction against it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Motor {
-    /// Gain of the rate controller, N m s/rad.
-    pub gain_n_m_s: f64,
-    /// Largest torque, N m. Traction alone cannot reach it on soils up to a friction of about 1.
-    pub torque_max_n_m: f64,
-    /// Dry friction of the bearing, N m.
-    pub dry_friction_n_m: f64,
-    /// Viscous friction of the bearing, N m s/rad.
-    pub viscous_friction_n_m_s: f64,
-}
+/// Number of unknowns.
+pub const UNKNOWNS: usize = 9;
+/// Forward m/s, lateral m/s, yaw rate rad/s, then the six wheel rates rad/s.
+pub type Unknowns = SVector<f64, UNKNOWNS>;
 
 impl Motor {
     /// Its quantities, all of which are above 0.
@@ -84,17 +74,6 @@ impl Soil {
             shear_modulus,
         }
     }
-}
-
-/// The ground on which a robot's equilibria are solved: that of the runs which its model learned
-/// from.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Ground {
-    /// Friction coefficient.
-    pub friction: f64,
-    /// Shear modulus: relative slip at which 63 % of the friction is reached.
-    pub shear_modulus: f64,
 }
 
 /// What to solve for.

@@ -7,7 +7,7 @@ use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Graph, Monotonic, Receiver, Stamp, Topic};
 use vigil_robot::Injection;
-use vigil_robot::disturbance::PARAMETERS;
+use vigil_robot::disturbance_kind::PARAMETERS;
 use vigil_setup::GraphArgs;
 
 use vigil_terminal::{CommandError, Outcome};

@@ -6,7 +6,7 @@ use super::lane::Lane;
 use super::navigator::{Navigator, NavigatorEvent};
 use super::path::distance;
 use super::task::Task;
-use crate::DriveCommand;
+use crate::drive::DriveCommand;
 
 /// Step in which the way ahead is looked at, m.
 const LOOK_STEP_M: f64 = 0.05;
@@ -59,7 +59,7 @@ impl Navigator {
         let is_near = self.off_path_m() <= NEAR_M;
         if left_m <= AT_GOAL_M && is_near {
             if !std::mem::replace(&mut self.at_goal, true) {
-                self.happening = Some(NavigatorEvent::Goal);
+                self.event = Some(NavigatorEvent::Goal);
             }
             return self.stand();
         }
@@ -99,7 +99,8 @@ impl Navigator {
     /// Carefully through the opening, then back to the path; `is_phantom` if what blocked was none.
     pub(super) fn pass(
         &mut self,
-        (end_m, is_phantom): (f64, bool),
+        end_m: f64,
+        is_phantom: bool,
         passed_s: f64,
         dt_s: f64,
     ) -> DriveCommand {
@@ -114,7 +115,7 @@ impl Navigator {
             self.block_m = None;
             if is_phantom {
                 // What it drove past was not there.
-                self.troubles.phantom = None;
+                self.faults.phantom = None;
             }
             self.planned_m = self.along_m;
             self.lane = self.lane.change(self.along_m, 0.0);
@@ -128,7 +129,7 @@ impl Navigator {
         let here = [self.pose[0], self.pose[1]];
         if distance(from, here) >= self.settings.away_m || passed_s >= Navigation::AWAY_MAX_S {
             let moved = distance(from, here) >= 0.5 * self.settings.away_m;
-            self.is_anew = true;
+            self.restarts = true;
             self.end(moved);
             return self.stand();
         }
@@ -141,8 +142,8 @@ impl Navigator {
 
     /// Plans from here: along the alternative, once, if the way is blocked; along the same path if
     /// nothing blocks it.
-    pub(super) fn plan_anew(&mut self) {
-        self.troubles.wrong_heading_rad = 0.0;
+    pub(super) fn replan(&mut self) {
+        self.faults.wrong_heading_rad = 0.0;
         let slow_m = self.settings.slow_m;
         if self.block_m.is_some() || self.free_way(slow_m) < slow_m {
             let alternative = self.alternative.as_mut().filter(|_| !self.took_alternative);
@@ -154,7 +155,7 @@ impl Navigator {
             self.block_m = None;
         }
         self.lane = Lane::default();
-        self.is_anew = true;
+        self.restarts = true;
         self.end(true);
     }
 
@@ -172,15 +173,15 @@ impl Navigator {
     }
 
     /// True if the robot touches something if it goes on.
-    pub(super) fn touches(&self, truth: [f64; 3], is_forward: bool) -> bool {
+    pub(super) fn touches(&self, true_pose: [f64; 3], is_forward: bool) -> bool {
         let reach_m = if is_forward { BUMPER_M } else { -BUMPER_M };
-        let (sin, cos) = truth[2].sin_cos();
-        let place = [truth[0] + reach_m * cos, truth[1] + reach_m * sin];
+        let (sin, cos) = true_pose[2].sin_cos();
+        let place = [true_pose[0] + reach_m * cos, true_pose[1] + reach_m * sin];
         !self.map.is_free(place, self.t_s)
     }
 
     /// The plan goes on from here; a robot that is off its path first goes back to it.
-    pub(super) fn begin_anew(&mut self) {
+    pub(super) fn restart(&mut self) {
         let here = [self.pose[0], self.pose[1]];
         self.along_m = self.path.nearest(here, 0.0, self.path.length_m());
         if self.off_path_m() > NEAR_M {
@@ -197,13 +198,13 @@ impl Navigator {
 
     /// How far the robot could go on its lane, as the range sensor sees it, up to `most_m`.
     fn free_way(&self, most_m: f64) -> f64 {
-        if self.troubles.is_blind {
+        if self.faults.is_blind {
             return most_m;
         }
         let is_free = |ahead_m: f64| {
             let along_m = self.along_m + ahead_m;
             let [x, y, _] = self.path.beside(along_m, self.lane.at(along_m));
-            self.map.is_free(self.troubles.truly([x, y]), self.t_s) && !self.is_phantom([x, y])
+            self.map.is_free(self.faults.to_true([x, y]), self.t_s) && !self.is_phantom([x, y])
         };
         // What lies beyond the goal is in nobody's way.
         let left_m = self.path.length_m() - self.along_m;
@@ -214,7 +215,7 @@ impl Navigator {
 
     /// True if the range sensor sees the robot touch a phantom at `place`.
     fn is_phantom(&self, place: [f64; 2]) -> bool {
-        let phantom = self.troubles.phantom;
+        let phantom = self.faults.phantom;
         phantom.is_some_and(|at| self.map.touches_phantom(at, place))
     }
 
@@ -240,7 +241,7 @@ impl Navigator {
             let is_free = |step: u32| {
                 let along_m = self.along_m + f64::from(step) * SEARCH_STEP_M;
                 let [x, y, _] = self.path.beside(along_m, lane.at(along_m));
-                self.map.is_free(self.troubles.truly([x, y]), self.t_s)
+                self.map.is_free(self.faults.to_true([x, y]), self.t_s)
             };
             (0..=steps).all(is_free).then_some((lane, end_m))
         })
@@ -248,7 +249,7 @@ impl Navigator {
 
     /// Along the lane at a share of the speed.
     fn steer(&mut self, share: f64) -> DriveCommand {
-        let turned_rad = self.troubles.wrong_heading_rad;
+        let turned_rad = self.faults.wrong_heading_rad;
         self.curvature_1_m = self
             .lane
             .pursue(&self.path, self.along_m, self.pose, turned_rad);

@@ -1,15 +1,15 @@
-//! A robot that follows a planned path in a corridor, and does what the supervisor asks of it.
+//! A robot that follows a planned path in a corridor and executes the supervisor's actions.
 //!
-//! The navigator knows its pose only as measured; the range sensor and the walls, obstacles and
-//! people that it meets are the world's. It turns an order into a command for the rover, so that
-//! slip, faults and noise stay what they are.
+//! The navigator knows its pose only as measured. The range sensor, walls, obstacles and people
+//! belong to the simulated world. The navigator gives the rover commands only, so that slip, faults
+//! and noise act on it as on any drive.
 
 mod behaviour;
+mod faults;
 mod lane;
 mod map;
 mod navigator;
 mod path;
 mod task;
-mod troubles;
 
-pub use navigator::{Navigator, NavigatorEvent, Order};
+pub use navigator::{ActionRequest, DecisionId, Navigator, NavigatorEvent};

@@ -1,30 +1,39 @@
-//! From orders to commands.
+//! From requested actions to commands.
 
 use vigil_blocks::{ActionOutcome, RecoveryKind, SensorFrame, Valid};
 use vigil_setup::schema::Navigation;
 
+use super::faults::NavigationFaults;
 use super::lane::Lane;
 use super::map::Map;
 use super::path::Path;
-use super::task::{Task, said};
-use super::troubles::Troubles;
-use crate::DriveCommand;
+use super::task::{Task, symptoms_of};
+use crate::drive::DriveCommand;
 
-/// What the robot is to do.
+/// An action of the supervisor, as the navigation needs it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Order {
-    /// What.
+pub struct ActionRequest {
+    /// What the robot is to do.
     pub kind: RecoveryKind,
-    /// Writer and number of the decision; another one begins anew.
-    pub decision: (u64, u64),
+    /// The decision behind it; another one restarts the task.
+    pub decision: DecisionId,
     /// Factor on the speed, 0..1.
     pub speed_scale: f64,
 }
 
-/// What is worth telling.
+/// A decision of one start of the supervisor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DecisionId {
+    /// Epoch of the supervisor; 0 for no decision.
+    pub epoch: u64,
+    /// Number of the decision in that epoch.
+    pub seq: u64,
+}
+
+/// What becomes an event in the timeline.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NavigatorEvent {
-    /// An order is done, or cannot be.
+    /// An action is done, or has failed.
     Ended(RecoveryKind, ActionOutcome),
     /// The robot is at its goal.
     Goal,
@@ -35,7 +44,7 @@ pub enum NavigatorEvent {
 pub struct Navigator {
     pub(super) settings: Navigation,
     pub(super) map: Map,
-    pub(super) troubles: Troubles,
+    pub(super) faults: NavigationFaults,
     pub(super) path: Path,
     pub(super) alternative: Option<Path>,
     pub(super) lane: Lane,
@@ -51,7 +60,7 @@ pub struct Navigator {
     pub(super) block_m: Option<f64>,
     pub(super) task: Task,
     kind: RecoveryKind,
-    decision: (u64, u64),
+    decision: DecisionId,
     outcome: ActionOutcome,
     symptoms: u32,
     resets: u32,
@@ -60,12 +69,13 @@ pub struct Navigator {
     /// Something is within the bumper's reach.
     pub(super) touched: bool,
     pub(super) at_goal: bool,
-    is_helped: bool,
-    /// The robot has found itself elsewhere.
-    is_found: bool,
-    /// The plan begins anew where the robot is, with the next pose.
-    pub(super) is_anew: bool,
-    pub(super) happening: Option<NavigatorEvent>,
+    /// Help has come and was not reported yet.
+    was_helped: bool,
+    /// The robot's pose was corrected and this was not reported yet.
+    was_relocalised: bool,
+    /// With the next pose the plan restarts where the robot is.
+    pub(super) restarts: bool,
+    pub(super) event: Option<NavigatorEvent>,
 }
 
 impl Navigator {
@@ -75,7 +85,7 @@ impl Navigator {
         let other = &settings.alternative;
         Self {
             map: Map::new(settings),
-            troubles: Troubles::new(&settings.trouble),
+            faults: NavigationFaults::new(&settings.trouble),
             path: Path::new(&settings.path),
             alternative: (other.len() > 1).then(|| Path::new(other)),
             lane: Lane::default(),
@@ -86,7 +96,7 @@ impl Navigator {
             block_m: None,
             task: Task::Stand,
             kind: RecoveryKind::None,
-            decision: (0, 0),
+            decision: DecisionId::default(),
             outcome: ActionOutcome::None,
             symptoms: 0,
             resets: 0,
@@ -94,50 +104,55 @@ impl Navigator {
             took_alternative: false,
             touched: false,
             at_goal: false,
-            is_helped: false,
-            is_found: false,
-            is_anew: false,
-            happening: None,
+            was_helped: false,
+            was_relocalised: false,
+            restarts: false,
+            event: None,
             settings: settings.clone(),
         }
     }
 
-    /// The command that follows from an order (`None`: no valid action, the robot stands) after
-    /// `dt_s`, for a robot whose true pose is `truth`: speed before the order's factor.
-    pub fn plan(&mut self, dt_s: f64, order: Option<Order>, truth: [f64; 3]) -> DriveCommand {
-        let Some(order) = order else {
+    /// The command after `dt_s`, before the action's speed factor. Without a valid action the robot
+    /// stands. `true_pose` decides what the robot touches and where a navigation fault starts.
+    pub fn plan(
+        &mut self,
+        dt_s: f64,
+        request: Option<ActionRequest>,
+        true_pose: [f64; 3],
+    ) -> DriveCommand {
+        let Some(request) = request else {
             return self.stand();
         };
         self.t_s += dt_s;
-        self.troubles.strike(self.t_s, truth);
+        self.faults.apply_due(self.t_s, true_pose);
         self.find_along();
-        self.touched = self.touches(truth, true);
-        if order.decision != self.decision {
-            (self.decision, self.kind) = (order.decision, order.kind);
+        self.touched = self.touches(true_pose, true);
+        if request.decision != self.decision {
+            (self.decision, self.kind) = (request.decision, request.kind);
             self.outcome = ActionOutcome::Running;
             self.symptoms = 0;
-            self.task = Task::begin(order.kind, [self.pose[0], self.pose[1]]);
-            if matches!(order.kind, RecoveryKind::Stop | RecoveryKind::GiveUp) {
+            self.task = Task::begin(request.kind, [self.pose[0], self.pose[1]]);
+            if matches!(request.kind, RecoveryKind::Stop | RecoveryKind::GiveUp) {
                 self.end(true);
             }
         }
-        let command = self.pursue(dt_s, order.speed_scale);
+        let command = self.pursue(dt_s, request.speed_scale);
         let hits = match command.speed_m_s {
             forward if forward > 0.0 => self.touched,
-            back if back < 0.0 => self.touches(truth, false),
+            back if back < 0.0 => self.touches(true_pose, false),
             _ => false,
         };
         if hits { self.stand() } else { command }
     }
 
-    /// Writes what the navigation knows into a frame that holds the true pose as measured, and
-    /// learns the pose from it.
+    /// Writes pose, planned pose, outcome and symptoms into a measured frame, and takes its own pose
+    /// from it.
     pub fn report(&mut self, frame: &mut SensorFrame) {
         if frame.has(Valid::POSE) {
-            frame.pose = self.troubles.believed(frame.pose);
+            frame.pose = self.faults.to_believed(frame.pose);
             self.pose = frame.pose;
-            if std::mem::take(&mut self.is_anew) {
-                self.begin_anew();
+            if std::mem::take(&mut self.restarts) {
+                self.restart();
             }
         }
         frame.planned_pose = match self.task {
@@ -154,18 +169,18 @@ impl Navigator {
     }
 
     /// What happened in the last cycle, once.
-    pub const fn happening(&mut self) -> Option<NavigatorEvent> {
-        self.happening.take()
+    pub const fn take_event(&mut self) -> Option<NavigatorEvent> {
+        self.event.take()
     }
 
-    /// True once, when help has come: whatever is broken is to be mended.
-    pub fn helped(&mut self) -> bool {
-        std::mem::take(&mut self.is_helped)
+    /// True once after help has come: every fault ends.
+    pub fn take_help(&mut self) -> bool {
+        std::mem::take(&mut self.was_helped)
     }
 
-    /// True once, when the robot has found itself elsewhere than it believed to be.
-    pub fn found(&mut self) -> bool {
-        std::mem::take(&mut self.is_found)
+    /// True once after the robot's pose was corrected.
+    pub fn take_relocalisation(&mut self) -> bool {
+        std::mem::take(&mut self.was_relocalised)
     }
 
     fn pursue(&mut self, dt_s: f64, scale: f64) -> DriveCommand {
@@ -184,8 +199,8 @@ impl Navigator {
                 is_phantom,
             } => {
                 *passed_s += dt_s;
-                let (opening, passed_s) = ((*end_m, *is_phantom), *passed_s);
-                return self.pass(opening, passed_s, dt_s * scale);
+                let (end_m, is_phantom, passed_s) = (*end_m, *is_phantom, *passed_s);
+                return self.pass(end_m, is_phantom, passed_s, dt_s * scale);
             }
             Task::Back { from, passed_s } => {
                 *passed_s += dt_s;
@@ -195,13 +210,13 @@ impl Navigator {
             Task::Plan { passed_s } => {
                 *passed_s += dt_s;
                 if *passed_s >= think_s {
-                    self.plan_anew();
+                    self.replan();
                 }
             }
             Task::Locate { passed_s } => {
                 *passed_s += dt_s;
                 if *passed_s >= think_s {
-                    self.find_place();
+                    self.relocalise();
                     self.end(true);
                 }
             }
@@ -209,9 +224,9 @@ impl Navigator {
                 *passed_s += dt_s;
                 if *passed_s >= help_s {
                     self.map.clear();
-                    self.troubles.mend_sensor();
-                    self.find_place();
-                    self.is_helped = true;
+                    self.faults.repair_sensor();
+                    self.relocalise();
+                    self.was_helped = true;
                     self.end(true);
                 }
             }
@@ -219,26 +234,26 @@ impl Navigator {
         self.stand()
     }
 
-    fn find_place(&mut self) {
-        if self.troubles.find_place() {
+    fn relocalise(&mut self) {
+        if self.faults.relocalise() {
             self.resets = self.resets.wrapping_add(1);
-            self.is_found = true;
-            // What blocked was seen from elsewhere.
+            self.was_relocalised = true;
+            // The obstacle was placed by the wrong pose.
             self.block_m = None;
         }
-        self.is_anew = true;
+        self.restarts = true;
     }
 
-    /// The order is done, or cannot be. An opening behind it, the robot follows its path.
+    /// The action is done or has failed. After an opening the robot follows its path again.
     pub(super) fn end(&mut self, succeeded: bool) {
         self.outcome = match succeeded {
             true => ActionOutcome::Succeeded,
             false => ActionOutcome::Failed,
         };
-        self.symptoms = said(self.kind, succeeded);
+        self.symptoms = symptoms_of(self.kind, succeeded);
         let follows = succeeded && self.kind == RecoveryKind::GoThrough;
         self.task = if follows { Task::Follow } else { Task::Stand };
-        self.happening = Some(NavigatorEvent::Ended(self.kind, self.outcome));
+        self.event = Some(NavigatorEvent::Ended(self.kind, self.outcome));
     }
 
     /// No speed; the steering stays.

@@ -1,4 +1,4 @@
-//! What the robot is about.
+//! The navigator's tasks.
 
 use vigil_blocks::{RecoveryKind, Symptoms};
 
@@ -29,7 +29,7 @@ pub(super) enum Task {
 }
 
 impl Task {
-    /// What an order begins, for a robot that believes to be at `place`.
+    /// The task that an action starts, for a robot whose believed position is `place`.
     pub(super) const fn begin(kind: RecoveryKind, place: [f64; 2]) -> Self {
         let passed_s = 0.0;
         match kind {
@@ -50,8 +50,8 @@ impl Task {
     }
 }
 
-/// What the outcome of an order says: a basic observation of the paper's, or 0.
-pub(super) const fn said(kind: RecoveryKind, succeeded: bool) -> u32 {
+/// Symptoms that the outcome of an action shows: an observation of the paper, or 0.
+pub(super) const fn symptoms_of(kind: RecoveryKind, succeeded: bool) -> u32 {
     match (kind, succeeded) {
         (RecoveryKind::GoThrough, true) => Symptoms::BO,
         (RecoveryKind::NewPath, true) => Symptoms::ALT,

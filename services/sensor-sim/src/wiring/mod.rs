@@ -8,4 +8,4 @@ mod socket;
 
 pub use playback::PlaybackSource;
 pub use simulator::SimulatorSource;
-pub use socket::{Listen, SocketStage};
+pub use socket::{ListenAddresses, SocketStage};

@@ -7,22 +7,22 @@ use vigil_cycle::{
 
 use super::actions::Actions;
 use super::peers::Peers;
-use crate::Playback;
+use crate::playback::Playback;
 
 /// Plays recorded frames, one per period of the schedule; capture times stay the recording's own.
-/// A recording cannot obey actions.
+/// A recording ignores actions.
 pub struct PlaybackSource {
     playback: Playback,
     peers: Peers,
     actions: Actions,
     frames: Box<dyn Sender<SensorFrame>>,
     run_id: u64,
-    run_told: u64,
-    ready_told: bool,
+    run_published: u64,
+    ready_published: bool,
     /// Scheduled instant of the last frame.
     last_ns: u64,
     ended: bool,
-    end_told: bool,
+    end_published: bool,
 }
 
 impl PlaybackSource {
@@ -37,11 +37,11 @@ impl PlaybackSource {
             actions: Actions::new(graph)?,
             frames: graph.sender(Topic::Sensor)?,
             run_id: 0,
-            run_told: 0,
-            ready_told: false,
+            run_published: 0,
+            ready_published: false,
             last_ns: 0,
             ended: false,
-            end_told: false,
+            end_published: false,
         })
     }
 }
@@ -74,18 +74,18 @@ impl Source for PlaybackSource {
     }
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
-        if let (Some(ready_ns), false) = (self.actions.ready_ns(), self.ready_told) {
+        if let (Some(ready_ns), false) = (self.actions.ready_ns(), self.ready_published) {
             health.event(ready_ns, EventKind::Ready, 0, 0.0, self.frames.next_seq());
-            self.ready_told = true;
+            self.ready_published = true;
         }
-        if self.run_id != self.run_told {
+        if self.run_id != self.run_published {
             // Recorded runs count from 0, run ids from 1.
             health.event(now_ns, EventKind::Run, 0, 0.0, self.run_id - 1);
-            self.run_told = self.run_id;
+            self.run_published = self.run_id;
         }
-        if self.ended && !self.end_told {
+        if self.ended && !self.end_published {
             health.event(now_ns, EventKind::EndOfRecording, 0, 0.0, self.last_ns);
-            self.end_told = true;
+            self.end_published = true;
         }
     }
 }

@@ -1,25 +1,27 @@
 //! The simulated rover as the source of the graph.
 
-use vigil_blocks::{Block, Control, ControlCommand, EventKind, Refusal, SensorFrame};
+use vigil_blocks::{ActionRejection, Block, Control, ControlCommand, EventKind, SensorFrame};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
     Clock, Graph, HealthBoard, PortError, Receiver, Sender, Source, SourceOutcome, Stamp, Topic,
 };
-use vigil_robot::disturbance::PARAMETERS;
-use vigil_robot::injection::{Change, Wire};
+use vigil_robot::disturbance_kind::PARAMETERS;
+use vigil_robot::injection::{Change, WireChange};
 
 use super::actions::Actions;
 use super::peers::Peers;
-use crate::{NavigatorEvent, Schedule, Simulation};
+use crate::injection_schedule::InjectionSchedule;
+use crate::navigation::{DecisionId, NavigatorEvent};
+use crate::simulation::Simulation;
 
-/// Changes that may wait to be told in one cycle.
+/// Changes that become events in one cycle; further ones are made without an event.
 const CHANGES_MAX: usize = 16;
 
-/// Simulates, measures, obeys.
+/// Publishes the simulated rover's frames and executes actions, injections and control commands.
 pub struct SimulatorSource {
     simulation: Simulation,
-    happening: Option<NavigatorEvent>,
-    schedule: Schedule,
+    event: Option<NavigatorEvent>,
+    schedule: InjectionSchedule,
     allow_injection: bool,
     peers: Peers,
     actions: Actions,
@@ -29,12 +31,12 @@ pub struct SimulatorSource {
     began_ns: Option<u64>,
     period_ns: u64,
     changes: Vec<(u64, Change)>,
-    ready_told: bool,
-    refusal: Option<Refusal>,
-    refusal_told: Option<Refusal>,
-    /// Epoch and number of the decision obeyed.
-    obeyed: (u64, u64),
-    obeyed_told: (u64, u64),
+    ready_published: bool,
+    rejection: Option<ActionRejection>,
+    rejection_published: Option<ActionRejection>,
+    /// The decision executed last.
+    executed: DecisionId,
+    executed_published: DecisionId,
 }
 
 impl SimulatorSource {
@@ -44,7 +46,7 @@ impl SimulatorSource {
     /// The transport's.
     pub fn new(
         mut simulation: Simulation,
-        schedule: Schedule,
+        schedule: InjectionSchedule,
         allow_injection: bool,
         period_ns: u64,
         graph: &Graph,
@@ -53,7 +55,7 @@ impl SimulatorSource {
         simulation.world.set_run_id(frames.epoch());
         Ok(Self {
             simulation,
-            happening: None,
+            event: None,
             schedule,
             allow_injection,
             peers: Peers::new(graph)?,
@@ -64,19 +66,19 @@ impl SimulatorSource {
             period_ns,
             began_ns: None,
             changes: Vec::with_capacity(CHANGES_MAX),
-            ready_told: false,
-            refusal: None,
-            refusal_told: None,
-            obeyed: (0, 0),
-            obeyed_told: (0, 0),
+            ready_published: false,
+            rejection: None,
+            rejection_published: None,
+            executed: DecisionId::default(),
+            executed_published: DecisionId::default(),
         })
     }
 
-    /// Goes on with a drive that began at `began_ns`, if it is given: what was injected until now
-    /// is injected at once.
+    /// Continues a drive that began at `began_ns`, if given: injections due until now take effect at
+    /// once.
     #[must_use]
     pub fn resuming(mut self, began_ns: Option<u64>) -> Self {
-        self.ready_told = began_ns.is_some();
+        self.ready_published = began_ns.is_some();
         self.began_ns = began_ns;
         self
     }
@@ -125,7 +127,7 @@ fn change_of(command: &Control) -> Option<Change> {
     let known = injects || command.command == ControlCommand::Clear as u32;
     let mut parameter = [0.0; PARAMETERS];
     parameter.copy_from_slice(&command.parameter[..PARAMETERS]);
-    let wire = Wire {
+    let wire = WireChange {
         injects,
         kind: command.fault,
         place: command.wheel,
@@ -149,12 +151,15 @@ impl Source for SimulatorSource {
         let passed_ns = last_ns.map_or(self.period_ns, |last_ns| t_schedule_ns - last_ns);
         let (dt_s, action) = (passed_ns as f64 * 1e-9, self.actions.newest());
         let command = self.simulation.step(dt_s, action, clock.now_ns());
-        self.refusal = command.refusal;
-        if let (None, Some(action)) = (command.refusal, self.actions.newest()) {
-            self.obeyed = (action.header.epoch, command.action_seq);
+        self.rejection = command.rejection;
+        if let (None, Some(action)) = (command.rejection, self.actions.newest()) {
+            self.executed = DecisionId {
+                epoch: action.header.epoch,
+                seq: command.action_seq,
+            };
         }
         self.simulation.measure(self.frames.block());
-        self.happening = self.simulation.happening().or(self.happening);
+        self.event = self.simulation.take_event().or(self.event);
         let stamp = Stamp {
             t_schedule_ns,
             t_capture_ns: t_schedule_ns,
@@ -167,20 +172,20 @@ impl Source for SimulatorSource {
     }
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
-        if let (Some(ready_ns), false) = (self.actions.ready_ns(), self.ready_told) {
+        if let (Some(ready_ns), false) = (self.actions.ready_ns(), self.ready_published) {
             health.event(ready_ns, EventKind::Ready, 0, 0.0, self.frames.next_seq());
-            self.ready_told = true;
-            self.refusal_told = None;
+            self.ready_published = true;
+            self.rejection_published = None;
         }
-        if self.ready_told
-            && self.obeyed != self.obeyed_told
+        if self.ready_published
+            && self.executed != self.executed_published
             && let Some(action) = self.actions.newest()
         {
             let (what, wheel) = (action.action, u64::from(action.wheel));
             health.event(now_ns, EventKind::Obeys, what, 0.0, wheel);
-            self.obeyed_told = self.obeyed;
+            self.executed_published = self.executed;
         }
-        match self.happening.take() {
+        match self.event.take() {
             Some(NavigatorEvent::Ended(kind, outcome)) => {
                 health.event(now_ns, EventKind::Outcome, kind as u32, 0.0, outcome as u64);
             }
@@ -198,12 +203,12 @@ impl Source for SimulatorSource {
             health.event(at_ns, kind, what, p, value);
         }
         // Standing still before the first action is no event.
-        if self.ready_told && self.refusal != self.refusal_told {
-            match self.refusal {
+        if self.ready_published && self.rejection != self.rejection_published {
+            match self.rejection {
                 Some(reason) => health.event(now_ns, EventKind::SafeStop, reason as u32, 0.0, 0),
                 None => health.event(now_ns, EventKind::SafeStopEnds, 0, 0.0, 0),
             }
-            self.refusal_told = self.refusal;
+            self.rejection_published = self.rejection;
         }
     }
 }

@@ -13,7 +13,7 @@ use vigil_cycle::{
 };
 use vigil_robot::{Description, FrameGuard};
 
-use crate::arrival_clock::{ArrivalClock, Here};
+use crate::arrival_clock::{ArrivalBatch, ArrivalClock};
 
 /// Datagrams that one turn takes at most: a flood must not hold it.
 const TURN_MAX: usize = 64;
@@ -22,7 +22,7 @@ const START_SHIFT: u32 = 48;
 
 /// Where datagrams are to arrive.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Listen {
+pub struct ListenAddresses {
     /// Address of the UDP socket; `None` for none.
     pub udp: Option<SocketAddr>,
     /// File of the Unix datagram socket; `None` for none.
@@ -118,9 +118,9 @@ impl Stage for SocketStage {
             }
             let here = self.arrived.iter().filter(|(_, other)| *other == from);
             let here = here.map(|(frame, _)| &frame.header);
-            let here = Here {
+            let here = ArrivalBatch {
                 headers: here,
-                are_all: are_all_here,
+                is_complete: are_all_here,
             };
             let clock = self.clock.date(&mut frame.header, here, now_ns);
             frame.header.t_publish_ns = now_ns;

@@ -1,7 +1,7 @@
-//! The robot on its path: each order, what comes of it, and that nothing is driven through.
+//! The robot on its path: each request, what comes of it, and that nothing is driven through.
 
 use vigil_blocks::{Action, ActionOutcome, RecoveryKind, SensorFrame, Symptoms};
-use vigil_sensor_sim::{Navigator, NavigatorEvent, Obedience, Simulation, World};
+use vigil_sensor_sim::{ActionGate, Navigator, NavigatorEvent, Simulation, World};
 use vigil_setup::schema::{Navigation, Obstacle, Trouble, TroubleKind};
 
 /// A straight corridor of 8 m, 2.4 m wide, changed.
@@ -45,9 +45,9 @@ impl Robot {
     fn new(settings: Navigation) -> Self {
         let world = World::new(&robot(), &even_soil(), &[], 100.0, 1).unwrap();
         let navigator = Navigator::new(&settings);
-        let obedience = Obedience::new(&robot().limits);
+        let gate = ActionGate::new(&robot().limits);
         Self {
-            simulation: Simulation::new(world, obedience, Some(navigator)),
+            simulation: Simulation::new(world, gate, Some(navigator)),
             settings,
             action: Action {
                 speed_scale: 1.0,
@@ -80,15 +80,15 @@ impl Robot {
                     "touches at {x:.2} {y:.2}: {apart_m:.3}"
                 );
             }
-            if let Some(happening) = self.simulation.happening() {
-                return Some((happening, f64::from(k) * 0.01));
+            if let Some(event) = self.simulation.take_event() {
+                return Some((event, f64::from(k) * 0.01));
             }
         }
         None
     }
 
     fn place(&self) -> [f64; 3] {
-        self.simulation.world.truth().pose
+        self.simulation.world.true_state().pose
     }
 
     /// Distance of measured and planned pose.
@@ -116,8 +116,8 @@ use crate::rover::{even_soil, robot};
 #[test]
 fn a_free_path_is_followed_with_the_plan_to_the_goal() {
     let mut robot = Robot::new(corridor(|_| {}));
-    let (happening, t_s) = robot.told(GoOn, 60.0).unwrap();
-    assert_eq!(happening, NavigatorEvent::Goal);
+    let (event, t_s) = robot.told(GoOn, 60.0).unwrap();
+    assert_eq!(event, NavigatorEvent::Goal);
     // 8 m at 0.25 m/s, and what slowing down at the goal takes.
     assert!((32.0..40.0).contains(&t_s), "{t_s}");
     assert!(robot.off_plan_m() < 0.2 && robot.place()[1].abs() < 0.05);
@@ -134,13 +134,13 @@ fn the_robot_slows_down_and_stops_before_what_blocks_it_and_falls_behind_its_pla
     assert!((2.9..=3.05).contains(&x) && y.abs() < 0.05, "{x} {y}");
     assert!(robot.off_plan_m() > 4.0);
     // On each side the gap is 0.4 m wide.
-    let (happening, t_s) = robot.told(GoThrough, 20.0).unwrap();
-    assert_eq!(happening, ended(GoThrough, Failed));
+    let (event, t_s) = robot.told(GoThrough, 20.0).unwrap();
+    assert_eq!(event, ended(GoThrough, Failed));
     assert!((t_s - robot.settings.look_s).abs() < 0.02);
     assert_eq!(robot.outcome(), (Some(Failed), 0));
     // The only path is blocked.
-    let (happening, t_s) = robot.told(NewPath, 20.0).unwrap();
-    assert_eq!(happening, ended(NewPath, Failed));
+    let (event, t_s) = robot.told(NewPath, 20.0).unwrap();
+    assert_eq!(event, ended(NewPath, Failed));
     assert!((t_s - robot.settings.think_s).abs() < 0.02);
     assert_eq!(robot.outcome(), (Some(Failed), Symptoms::NNA));
 }
@@ -152,8 +152,8 @@ fn an_opening_beside_the_path_is_gone_through_and_the_path_taken_up_again() {
         (c.stop_m, c.slow_m) = (1.5, 3.0);
     }));
     assert_eq!(robot.told(GoOn, 40.0), None);
-    let (happening, _) = robot.told(GoThrough, 40.0).unwrap();
-    assert_eq!(happening, ended(GoThrough, Succeeded));
+    let (event, _) = robot.told(GoThrough, 40.0).unwrap();
+    assert_eq!(event, ended(GoThrough, Succeeded));
     assert_eq!(robot.outcome(), (Some(Succeeded), Symptoms::BO));
     assert!(robot.place()[1] > 0.1, "to the left of it");
     assert!(robot.off_plan_m() < 0.3, "the plan goes on from here");
@@ -170,8 +170,8 @@ fn people_leave_and_the_way_is_free() {
         });
     }));
     assert_eq!(robot.told(GoOn, 22.0), None);
-    let (happening, t_s) = robot.told(GoThrough, 40.0).unwrap();
-    assert_eq!(happening, ended(GoThrough, Succeeded));
+    let (event, t_s) = robot.told(GoThrough, 40.0).unwrap();
+    assert_eq!(event, ended(GoThrough, Succeeded));
     assert!(t_s > 3.0, "not before they have left");
     // Or it waits: the plan then goes on from where it is.
     let mut waits = Robot::new(robot.settings.clone());
@@ -193,8 +193,8 @@ fn what_blocks_is_not_forgotten_by_what_did_not_help() {
     for before in [NewPath, MoveAway, Relocalise] {
         robot.told(before, 20.0).unwrap();
         for kind in [GoThrough, NewPath] {
-            let (happening, _) = robot.told(kind, 40.0).unwrap();
-            assert_eq!(happening, ended(kind, Failed), "after {before:?}");
+            let (event, _) = robot.told(kind, 40.0).unwrap();
+            assert_eq!(event, ended(kind, Failed), "after {before:?}");
         }
     }
 }
@@ -207,8 +207,8 @@ fn an_opening_past_an_obstacle_does_not_clear_a_phantom_elsewhere() {
             .push(trouble(TroubleKind::Phantom, 0.0, [7.5, 0.0, 0.0]));
     }));
     assert_eq!(robot.told(GoOn, 30.0), None);
-    let (happening, _) = robot.told(GoThrough, 40.0).unwrap();
-    assert_eq!(happening, ended(GoThrough, Succeeded));
+    let (event, _) = robot.told(GoThrough, 40.0).unwrap();
+    assert_eq!(event, ended(GoThrough, Succeeded));
     let past_m = robot.place()[0];
     assert_eq!(robot.told(GoOn, 40.0), None, "the phantom still stops it");
     assert!(
@@ -227,8 +227,8 @@ fn the_alternative_is_taken_once() {
         (c.stop_m, c.slow_m) = (2.0, 3.5);
     }));
     assert_eq!(robot.told(GoOn, 15.0), None);
-    let (happening, _) = robot.told(NewPath, 5.0).unwrap();
-    assert_eq!(happening, ended(NewPath, Succeeded));
+    let (event, _) = robot.told(NewPath, 5.0).unwrap();
+    assert_eq!(event, ended(NewPath, Succeeded));
     assert_eq!(robot.outcome(), (Some(Succeeded), Symptoms::ALT));
     assert!(robot.off_plan_m() < 0.2);
     assert_eq!(robot.told(GoOn, 120.0).unwrap().0, NavigatorEvent::Goal);
@@ -239,15 +239,15 @@ fn moving_away_backs_and_stops_at_what_is_behind() {
     let mut robot = Robot::new(corridor(|_| {}));
     robot.told(GoOn, 10.0);
     let before = robot.place()[0];
-    let (happening, _) = robot.told(MoveAway, 20.0).unwrap();
-    assert_eq!(happening, ended(MoveAway, Succeeded));
+    let (event, _) = robot.told(MoveAway, 20.0).unwrap();
+    assert_eq!(event, ended(MoveAway, Succeeded));
     let back_m = before - robot.place()[0];
     assert!((0.5..0.75).contains(&back_m), "{back_m}");
     assert!(robot.off_plan_m() < 0.1, "the plan goes on from there");
     // A wall just behind the start.
     let mut robot = Robot::new(corridor(|c| c.walls.push([-0.6, -1.2, -0.6, 1.2])));
-    let (happening, _) = robot.told(MoveAway, 20.0).unwrap();
-    assert_eq!(happening, ended(MoveAway, Failed));
+    let (event, _) = robot.told(MoveAway, 20.0).unwrap();
+    assert_eq!(event, ended(MoveAway, Failed));
     assert!(robot.place()[0] > -0.15, "{:?}", robot.place());
 }
 
@@ -270,8 +270,8 @@ fn a_jump_of_the_believed_pose_lasts_until_the_robot_finds_its_place() {
     ];
     assert!(off.iter().all(|off| off.abs() < 0.05), "{off:?}");
     assert_eq!(robot.frame.pose_reset_count, 0);
-    let (happening, _) = robot.told(Relocalise, 5.0).unwrap();
-    assert_eq!(happening, ended(Relocalise, Succeeded));
+    let (event, _) = robot.told(Relocalise, 5.0).unwrap();
+    assert_eq!(event, ended(Relocalise, Succeeded));
     assert_eq!(robot.frame.pose_reset_count, 1);
     let ([x, y, _], seen) = (robot.place(), robot.frame.pose);
     assert!((seen[0] - x).hypot(seen[1] - y) < 0.05);
@@ -287,8 +287,8 @@ fn a_phantom_stops_the_robot_and_a_blind_one_stops_at_touch() {
     let mut robot = Robot::new(corridor(|c| c.trouble.push(phantom)));
     assert_eq!(robot.told(GoOn, 40.0), None);
     assert!(robot.place()[0] < 2.4);
-    let (happening, _) = robot.told(GoThrough, 40.0).unwrap();
-    assert_eq!(happening, ended(GoThrough, Succeeded));
+    let (event, _) = robot.told(GoThrough, 40.0).unwrap();
+    assert_eq!(event, ended(GoThrough, Succeeded));
     assert_eq!(robot.told(GoOn, 40.0).unwrap().0, NavigatorEvent::Goal);
 
     let blind = trouble(TroubleKind::Blind, 0.0, [0.0; 3]);
@@ -322,8 +322,8 @@ fn help_clears_the_way_and_begins_a_new_run() {
     let mut robot = Robot::new(corridor(|c| c.obstacle.push(obstacle(5.0, 0.0, 1.2))));
     assert_eq!(robot.told(GoOn, 30.0), None);
     let run = robot.frame.run_id;
-    let (happening, t_s) = robot.told(CallForHelp, 30.0).unwrap();
-    assert_eq!(happening, ended(CallForHelp, Succeeded));
+    let (event, t_s) = robot.told(CallForHelp, 30.0).unwrap();
+    assert_eq!(event, ended(CallForHelp, Succeeded));
     assert!((t_s - robot.settings.help_s).abs() < 0.02);
     assert_ne!(robot.frame.run_id, run);
     robot.settings.obstacle.clear();

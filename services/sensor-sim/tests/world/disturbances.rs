@@ -1,10 +1,10 @@
 //! What no model contains: each kind changes the signals that its physics says, and nothing else.
 
 use vigil_blocks::{SensorFrame, Valid};
-use vigil_robot::disturbance::{KINDS, Place};
+use vigil_robot::disturbance_kind::{KINDS, Place};
 use vigil_robot::injection::Change;
 use vigil_robot::{Disturbance, DisturbanceKind, Injection};
-use vigil_sensor_sim::{Truth, World};
+use vigil_sensor_sim::{TrueState, World};
 use vigil_setup::schema::Simulator;
 
 use crate::rover::{all_finite, drive, measure, robot, segment, steady};
@@ -19,7 +19,7 @@ fn change(world: &mut World, spec: &str) {
 }
 
 /// Frames and truths of 5 s after the onset of `specs`, and of the same world without them.
-fn pairs(curvature_1_m: f64, specs: &[&str]) -> Vec<[(SensorFrame, Truth); 2]> {
+fn pairs(curvature_1_m: f64, specs: &[&str]) -> Vec<[(SensorFrame, TrueState); 2]> {
     let mut worlds = [
         steady(curvature_1_m, RATE_HZ),
         steady(curvature_1_m, RATE_HZ),
@@ -27,7 +27,7 @@ fn pairs(curvature_1_m: f64, specs: &[&str]) -> Vec<[(SensorFrame, Truth); 2]> {
     let step = |worlds: &mut [World; 2]| {
         worlds.each_mut().map(|world| {
             drive(world, RATE_HZ, 1);
-            (measure(world), world.truth())
+            (measure(world), world.true_state())
         })
     };
     for _ in 0..BEFORE {
@@ -130,7 +130,7 @@ fn disturbed_sensors_are_off_by_what_was_asked_for() {
         .map(|[healthy, broken]| (broken.0.pose[0] - healthy.0.pose[0], healthy.1.pose[0]));
     assert_near(last.0 - first.0, 0.05 * (last.1 - first.1), 1e-9);
     let missing = |spec| {
-        let missing = |pair: &&[(SensorFrame, Truth); 2]| pair[1].0.valid & Valid::POSE == 0;
+        let missing = |pair: &&[(SensorFrame, TrueState); 2]| pair[1].0.valid & Valid::POSE == 0;
         with(spec).iter().filter(missing).count()
     };
     assert_eq!(missing("pose-drop"), 100);
@@ -305,7 +305,7 @@ fn noise_of_every_channel_is_the_same_with_and_without_a_disturbance() {
         }
         for [(healthy, at), (frame, moved)] in moves {
             assert!(at != moved, "{spec} moves the rover");
-            let noise = |frame: &SensorFrame, truth: &Truth| {
+            let noise = |frame: &SensorFrame, truth: &TrueState| {
                 let turned = frame.wheel_rate[0] - truth.wheel_rate_rad_s[0];
                 [
                     frame.pose[0] - truth.pose[0],
@@ -354,7 +354,7 @@ fn every_kind_is_survived_at_its_limits_and_all_at_once_at_their_defaults() {
         world.change(Change::ClearAll).unwrap();
         drive(&mut world, 100.0, 400);
         assert_eq!(world.unsolved(), 0);
-        let [vx, ..] = world.truth().velocity;
+        let [vx, ..] = world.true_state().velocity;
         assert!(vx > 0.09, "it drives again: {vx}");
     }
 }

@@ -19,7 +19,7 @@ fn a_stuck_wheel_turns_the_rover_toward_its_side() {
                     world.inject(fault(Stuck, wheel)).unwrap();
                 }
                 drive(&mut world, 100.0, 500);
-                world.truth().pose[2]
+                world.true_state().pose[2]
             };
             let added = turned(true) - turned(false);
             let side = if wheel < 3 { 1.0 } else { -1.0 };
@@ -45,7 +45,7 @@ fn a_stuck_wheel_settles_at_the_models_equilibrium_and_mends() {
     drive(&mut world, 1000.0, 3000);
     world.inject(fault(Stuck, 4)).unwrap();
     drive(&mut world, 1000.0, 2000);
-    let truth = world.truth();
+    let truth = world.true_state();
     let expected = equilibrium([false, false, false, false, true, false]);
     for axis in 0..3 {
         assert!((truth.velocity[axis] - expected.velocity[axis]).abs() < 1e-7);
@@ -61,7 +61,7 @@ fn a_stuck_wheel_settles_at_the_models_equilibrium_and_mends() {
     assert!(frame.wheel_rate[4].abs() < 2.0 && frame.wheel_rate[4] != 0.0);
     world.clear(4).unwrap();
     drive(&mut world, 1000.0, 2000);
-    assert!((world.truth().velocity[2] - 0.09959).abs() < 6e-6);
+    assert!((world.true_state().velocity[2] - 0.09959).abs() < 6e-6);
     assert_eq!(world.unsolved(), 0);
 }
 
@@ -72,7 +72,7 @@ fn the_body_follows_a_sudden_fault_with_its_lag() {
     world.inject(fault(Stuck, 1)).unwrap();
     drive(&mut world, 1000.0, 100);
     // One time constant: 1 - 1/e of the reference 0.0364 rad/s.
-    let share = world.truth().velocity[2] / 0.0364;
+    let share = world.true_state().velocity[2] / 0.0364;
     assert!((share - 0.632).abs() < 0.005, "{share}");
 }
 
@@ -135,12 +135,15 @@ fn a_wheel_may_be_stuck_and_its_encoder_broken() {
     let held = measure(&mut world).wheel_rate[1];
     world.inject(fault(Stuck, 1)).unwrap();
     drive(&mut world, 100.0, 200);
-    assert!((world.truth().velocity[2] - 0.0364).abs() < 1e-4);
+    assert!((world.true_state().velocity[2] - 0.0364).abs() < 1e-4);
     let frame = measure(&mut world);
-    assert_eq!((frame.wheel_rate[1], world.truth().stuck[1]), (held, true));
+    assert_eq!(
+        (frame.wheel_rate[1], world.true_state().stuck[1]),
+        (held, true)
+    );
     world.clear(1).unwrap();
     drive(&mut world, 100.0, 200);
-    assert!(world.truth().velocity[2].abs() < 1e-9);
+    assert!(world.true_state().velocity[2].abs() < 1e-9);
 }
 
 #[test]
@@ -155,7 +158,7 @@ fn every_set_of_stuck_wheels_is_survived_and_four_hold_the_rover() {
         }
         drive(&mut world, 100.0, 300);
         assert_eq!((world.unsolved(), world.invalid()), (0, 0), "{mask:06b}");
-        let speed = world.truth().velocity[0];
+        let speed = world.true_state().velocity[0];
         if mask.count_ones() >= 4 {
             assert!(speed.abs() < 1e-5, "{mask:06b}: {speed}");
         } else {
@@ -184,9 +187,9 @@ fn soil_scatter_disturbs_a_stuck_wheel_as_in_the_recorded_runs() {
         }
         let mut per_metre = Vec::new();
         for _ in 0..2000 {
-            let before = world.truth().pose[2];
+            let before = world.true_state().pose[2];
             drive(&mut world, 100.0, 50);
-            per_metre.push((world.truth().pose[2] - before) / 0.1);
+            per_metre.push((world.true_state().pose[2] - before) / 0.1);
         }
         let n = per_metre.len() as f64;
         let mean = per_metre.iter().sum::<f64>() / n;

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use vigil_blocks::Action;
 use vigil_robot::FaultKind;
-use vigil_sensor_sim::{DriveCommand, EffectiveCommand, Obedience, World};
+use vigil_sensor_sim::{ActionGate, DriveCommand, EffectiveCommand, World};
 use vigil_setup::schema::Simulator;
 
 use crate::rover::{all_finite, fault, measure, robot, segment};
@@ -56,10 +56,10 @@ proptest! {
         actions in proptest::collection::vec((action(), 0_u64..4000), 1..40),
         stuck in 0_usize..6,
     ) {
-        let (mut world, mut obedience) = (world(), Obedience::new(&robot().limits));
+        let (mut world, mut gate) = (world(), ActionGate::new(&robot().limits));
         world.inject(fault(FaultKind::Stuck, stuck)).unwrap();
         for (action, now_ns) in &actions {
-            let command = obedience.apply(world.planned(), Some(action), *now_ns);
+            let command = gate.apply(world.planned(), Some(action), *now_ns);
             let target = command.target;
             prop_assert!(target.curvature_1_m.abs() <= 1.2 && target.speed_m_s.abs() <= 0.5);
             prop_assert!((0.0..=1.0).contains(&command.progress));
@@ -68,12 +68,12 @@ proptest! {
                 .iter()
                 .all(|value| value.is_finite());
             if expired || !finite || !(1..=11).contains(&action.kind) {
-                prop_assert!(command.refusal.is_some() && target.speed_m_s == 0.0);
+                prop_assert!(command.rejection.is_some() && target.speed_m_s == 0.0);
             }
             world.step(0.01, command);
             let frame = measure(&mut world);
             prop_assert!(all_finite(&frame), "{frame:?}");
-            prop_assert_eq!(frame.safe_stop == 1, command.refusal.is_some());
+            prop_assert_eq!(frame.safe_stop == 1, command.rejection.is_some());
         }
         prop_assert_eq!(world.invalid(), 0);
     }
@@ -87,7 +87,7 @@ proptest! {
             let command = EffectiveCommand {
                 target: DriveCommand { curvature_1_m, speed_m_s },
                 progress,
-                refusal: None,
+                rejection: None,
                 action_seq: 1,
             };
             let invalid = world.invalid();

@@ -1,7 +1,7 @@
 //! How the rover moves, follows commands, and stops.
 
 use vigil_blocks::{Action, ActionOutcome, RecoveryKind};
-use vigil_sensor_sim::{DriveCommand, EffectiveCommand, Obedience, World};
+use vigil_sensor_sim::{ActionGate, DriveCommand, EffectiveCommand, World};
 use vigil_setup::schema::Simulator;
 
 use crate::rover::{drive, even_soil, measure, robot, segment, steady};
@@ -50,7 +50,7 @@ fn the_same_drive_at_any_rate_ends_at_the_same_place() {
         ];
         let mut world = World::new(&robot(), &even_soil(), &segments, rate_hz, 1).unwrap();
         drive(&mut world, rate_hz, (20.0 * rate_hz) as usize);
-        world.truth().pose
+        world.true_state().pose
     };
     let reference = end(1000.0);
     for rate_hz in [20.0, 50.0, 100.0, 333.0] {
@@ -72,7 +72,7 @@ fn a_nominal_rover_stays_near_its_plan() {
     // Nominal slip is half a per cent; 10 m of path.
     let mut world = steady(0.25, 100.0);
     drive(&mut world, 100.0, 5000);
-    let (frame, truth) = (measure(&mut world), world.truth());
+    let (frame, truth) = (measure(&mut world), world.true_state());
     let off = (frame.planned_pose[0] - truth.pose[0]).hypot(frame.planned_pose[1] - truth.pose[1]);
     assert!(off < 0.15, "{off}");
     // The plan itself is a circle about (0, 4 m), but for the first 0.4 s of acceleration and
@@ -86,12 +86,12 @@ fn without_an_action_nothing_moves_at_all() {
     let segments = [segment(10.0, 0.5, 0.2)];
     let settings = Simulator::default();
     let mut world = World::new(&robot(), &settings, &segments, 100.0, 1).unwrap();
-    let mut obedience = Obedience::new(&robot().limits);
+    let mut gate = ActionGate::new(&robot().limits);
     for _ in 0..500 {
-        let command = obedience.apply(world.planned(), None, 0);
+        let command = gate.apply(world.planned(), None, 0);
         world.step(0.01, command);
     }
-    let (frame, truth) = (measure(&mut world), world.truth());
+    let (frame, truth) = (measure(&mut world), world.true_state());
     assert_eq!((truth.pose, truth.velocity), ([0.0; 3], [0.0; 3]));
     assert_eq!(truth.wheel_rate_rad_s, [0.0; 6]);
     assert_eq!((frame.safe_stop, frame.action_seq), (1, 0));
@@ -106,13 +106,13 @@ fn without_an_action_nothing_moves_at_all() {
 #[test]
 fn an_expired_action_stops_the_rover_within_its_braking_time() {
     let mut world = steady(0.0, 100.0);
-    let mut obedience = Obedience::new(&robot().limits);
+    let mut gate = ActionGate::new(&robot().limits);
     let mut good = action(RecoveryKind::GoOn, 5);
     good.valid_until_ns = 2_000_000_000;
     let mut command_at = Vec::new();
     for cycle in 0..500_u64 {
         let now_ns = cycle * 10_000_000;
-        let command = obedience.apply(world.planned(), Some(&good), now_ns);
+        let command = gate.apply(world.planned(), Some(&good), now_ns);
         world.step(0.01, command);
         let frame = measure(&mut world);
         command_at.push(frame.command[1]);
@@ -127,7 +127,7 @@ fn an_expired_action_stops_the_rover_within_its_braking_time() {
     // 0.2 m/s at 0.5 m/s²: 40 cycles.
     assert!(command_at[230] > 0.04 && command_at[230] < 0.06);
     assert!(command_at[241..].iter().all(|&speed| speed == 0.0));
-    let truth = world.truth();
+    let truth = world.true_state();
     assert_eq!(
         (truth.velocity, truth.wheel_rate_rad_s),
         ([0.0; 3], [0.0; 6])
@@ -139,11 +139,11 @@ fn an_expired_action_stops_the_rover_within_its_braking_time() {
 #[test]
 fn a_stop_is_reported_running_until_it_is_done_and_driving_can_go_on() {
     let mut world = steady(0.5, 100.0);
-    let mut obedience = Obedience::new(&robot().limits);
+    let mut gate = ActionGate::new(&robot().limits);
     let mut turn = |world: &mut World, kind, seq, cycles: usize| {
         let mut outcomes = Vec::new();
         for _ in 0..cycles {
-            let command = obedience.apply(world.planned(), Some(&action(kind, seq)), 0);
+            let command = gate.apply(world.planned(), Some(&action(kind, seq)), 0);
             world.step(0.01, command);
             let frame = measure(world);
             assert_eq!((frame.action_seq, frame.safe_stop), (seq, 0));
@@ -157,12 +157,16 @@ fn a_stop_is_reported_running_until_it_is_done_and_driving_can_go_on() {
     let done = ActionOutcome::Succeeded as u32;
     assert!(outcomes[..38].iter().all(|&outcome| outcome == running));
     assert!(outcomes[41..].iter().all(|&outcome| outcome == done));
-    let stopped = world.truth();
+    let stopped = world.true_state();
     assert_eq!(stopped.velocity, [0.0; 3]);
     turn(&mut world, RecoveryKind::CallForHelp, 3, 50);
-    assert_eq!(world.truth().pose, stopped.pose, "standing still is exact");
+    assert_eq!(
+        world.true_state().pose,
+        stopped.pose,
+        "standing still is exact"
+    );
     turn(&mut world, RecoveryKind::GoOn, 4, 300);
-    assert!((world.truth().velocity[0] - 0.19907).abs() < 1e-4);
+    assert!((world.true_state().velocity[0] - 0.19907).abs() < 1e-4);
 }
 
 #[test]
@@ -179,7 +183,7 @@ fn a_slowed_rover_drives_the_same_path() {
             let command = EffectiveCommand {
                 target,
                 progress: speed_scale,
-                refusal: None,
+                rejection: None,
                 action_seq: 1,
             };
             world.step(0.01, command);

@@ -80,7 +80,7 @@ fn without_noise_every_channel_tells_the_truth() {
     let segments = [segment(100.0, 0.5, 0.2)];
     let mut world = World::new(&robot(), &settings, &segments, 100.0, 1).unwrap();
     drive(&mut world, 100.0, 1000);
-    let (frame, truth) = (measure(&mut world), world.truth());
+    let (frame, truth) = (measure(&mut world), world.true_state());
     assert_eq!(frame.pose, truth.pose);
     assert_eq!(frame.yaw_rate, truth.velocity[2]);
     assert_eq!(frame.wheel_rate[..6], truth.wheel_rate_rad_s);
@@ -161,5 +161,5 @@ fn yaw_stays_wrapped_on_a_long_turn() {
         assert!(frame.pose[2].abs() <= std::f64::consts::PI);
         assert!(frame.planned_pose[2].abs() <= std::f64::consts::PI);
     }
-    assert!(world.truth().pose[2] > 15.0);
+    assert!(world.true_state().pose[2] > 15.0);
 }

@@ -9,8 +9,8 @@ use vigil_inference::ending::Ending;
 use vigil_inference::logspace::{log_add, log_sum_exp, probability};
 use vigil_robot::learned::monitor::Channels;
 use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
-use vigil_robot::meaning::Finding;
 use vigil_robot::nominal;
+use vigil_robot::publisher_check::Finding;
 use vigil_robot::{Alarm, AlarmError, Description};
 
 use crate::detect::monitors::Monitors;

@@ -1,6 +1,6 @@
 //! Whether frames come when they are due.
 
-use vigil_robot::meaning::{Finding, Kind};
+use vigil_robot::publisher_check::{Finding, FindingKind};
 
 /// Time that is judged at once, s, and how often in a row it must be found wrong. As long as
 /// blindness takes.
@@ -24,7 +24,7 @@ pub(crate) struct Pace {
     missed: u32,
     spacing_s: f64,
     t_ns: u64,
-    suspected: Option<Kind>,
+    suspected: Option<FindingKind>,
     windows: u32,
     told: [bool; 2],
 }
@@ -67,9 +67,9 @@ impl Pace {
         let late = missed / frames;
         (self.frames, self.missed, self.spacing_s) = (0, 0, 0.0);
         let found = if !(1.0 / RATE_MAX..=RATE_MAX).contains(&rate) {
-            Some((Kind::Rate, rate))
+            Some((FindingKind::Rate, rate))
         } else if late > LATE_MAX {
-            Some((Kind::Late, late.min(1.0)))
+            Some((FindingKind::Late, late.min(1.0)))
         } else {
             None
         };
@@ -80,7 +80,7 @@ impl Pace {
         };
         self.suspected = kind;
         let (kind, value) = found.filter(|_| self.windows >= WINDOWS)?;
-        let told = &mut self.told[usize::from(kind == Kind::Late)];
+        let told = &mut self.told[usize::from(kind == FindingKind::Late)];
         (!std::mem::replace(told, true)).then_some(Finding {
             kind,
             wheel: None,
@@ -96,7 +96,7 @@ mod tests {
     const PERIOD_NS: u64 = 20_000_000;
 
     /// What is found in 4 s of journal entries: so many misses, then so many frames so far apart.
-    fn found(misses: u32, frames: u64, spacing_ns: u64) -> Option<(Kind, u64)> {
+    fn found(misses: u32, frames: u64, spacing_ns: u64) -> Option<(FindingKind, u64)> {
         let mut pace = Pace::new(0.02);
         let (mut t_ns, mut first_ns) = (1_000_000_000, 0);
         while t_ns < 5_000_000_000 {
@@ -123,19 +123,19 @@ mod tests {
         // Ten at once each 200 ms; each after its deadline; half as fast; twice.
         assert!(matches!(
             found(9, 10, PERIOD_NS),
-            Some((Kind::Late, 19..=25))
+            Some((FindingKind::Late, 19..=25))
         ));
         assert!(matches!(
             found(1, 1, PERIOD_NS),
-            Some((Kind::Late, 19..=25))
+            Some((FindingKind::Late, 19..=25))
         ));
         assert!(matches!(
             found(1, 1, 2 * PERIOD_NS),
-            Some((Kind::Rate, 19..=25))
+            Some((FindingKind::Rate, 19..=25))
         ));
         assert!(matches!(
             found(0, 1, PERIOD_NS / 2),
-            Some((Kind::Rate, 19..=25))
+            Some((FindingKind::Rate, 19..=25))
         ));
     }
 }

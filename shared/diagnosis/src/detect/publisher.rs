@@ -2,14 +2,14 @@
 
 use vigil_blocks::SensorFrame;
 use vigil_robot::Description;
-use vigil_robot::meaning::{Finding, Meaning};
+use vigil_robot::publisher_check::{Finding, PublisherCheck};
 
 use crate::detect::pace::Pace;
 
 /// The tests of a live publisher.
 #[derive(Debug, Clone)]
 pub(crate) struct Publisher {
-    meaning: Meaning,
+    meaning: PublisherCheck,
     pace: Pace,
     epoch: u64,
     run_id: u64,
@@ -21,7 +21,7 @@ impl Publisher {
     /// Of frames of `robot` in a graph of this period, s.
     pub(crate) fn new(robot: &Description, period_s: f64) -> Self {
         Self {
-            meaning: Meaning::new(robot),
+            meaning: PublisherCheck::new(robot),
             pace: Pace::new(period_s),
             epoch: 0,
             run_id: 0,

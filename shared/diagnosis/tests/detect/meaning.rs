@@ -2,13 +2,13 @@
 //! the motion shows what is wrong.
 
 use vigil_blocks::SensorFrame;
-use vigil_robot::meaning::{Kind, Meaning};
+use vigil_robot::publisher_check::{FindingKind, PublisherCheck};
 
 use crate::recorded::{model, path, robot, runs, unseen};
 
 /// All that is found in a run, and when, s after the first motion.
 fn found(frames: &[SensorFrame], spoil: impl Fn(&mut SensorFrame)) -> Vec<(Kind, f64)> {
-    let mut meaning = Meaning::new(&robot());
+    let mut meaning = PublisherCheck::new(&robot());
     let mut all = Vec::new();
     let mut began_s = None;
     for frame in frames {
@@ -33,7 +33,7 @@ fn nothing_is_found_in_recorded_runs_with_or_without_faults() {
     assert!(runs.len() > 50 && labels.len() == runs.len());
     let mut unjudged = 0;
     for run in &runs {
-        let mut meaning = Meaning::new(&robot);
+        let mut meaning = PublisherCheck::new(&robot);
         for frame in &run.frames {
             assert_eq!(meaning.take(frame), None, "run {}", run.id);
         }
@@ -46,22 +46,26 @@ fn nothing_is_found_in_recorded_runs_with_or_without_faults() {
 fn what_is_wrong_is_found_in_the_motion_that_shows_it() {
     type Spoil = fn(&mut SensorFrame);
     let spoils: [(Kind, Spoil); 10] = [
-        (Kind::Travel, |f| {
+        (FindingKind::Travel, |f| {
             (f.pose[0], f.pose[1]) = (1e3 * f.pose[0], 1e3 * f.pose[1])
         }),
-        (Kind::Heading, |f| f.pose.swap(0, 1)),
-        (Kind::Turn, |f| f.pose[2] = f.pose[2].to_degrees()),
-        (Kind::Turn, |f| f.pose[2] = -f.pose[2]),
-        (Kind::Rates, |f| {
+        (FindingKind::Heading, |f| f.pose.swap(0, 1)),
+        (FindingKind::Turn, |f| f.pose[2] = f.pose[2].to_degrees()),
+        (FindingKind::Turn, |f| f.pose[2] = -f.pose[2]),
+        (FindingKind::Rates, |f| {
             f.wheel_rate = f.wheel_rate.map(f64::to_degrees)
         }),
-        (Kind::RateSign, |f| f.wheel_rate[4] = -f.wheel_rate[4]),
-        (Kind::RateSign, |f| {
+        (FindingKind::RateSign, |f| {
+            f.wheel_rate[4] = -f.wheel_rate[4]
+        }),
+        (FindingKind::RateSign, |f| {
             f.wheel_rate[3..6].iter_mut().for_each(|r| *r = -*r)
         }),
-        (Kind::Sides, |f| f.wheel_rate.swap(1, 4)),
-        (Kind::SteerSign, |f| f.steer = f.steer.map(|angle| -angle)),
-        (Kind::SteerSign, |f| f.steer.swap(0, 2)),
+        (FindingKind::Sides, |f| f.wheel_rate.swap(1, 4)),
+        (FindingKind::SteerSign, |f| {
+            f.steer = f.steer.map(|angle| -angle)
+        }),
+        (FindingKind::SteerSign, |f| f.steer.swap(0, 2)),
     ];
     let (runs, labels) = runs(&robot());
     let nominal = labels.iter().filter(|label| label.mode == "ND");

@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::form::Form;
-use super::model::ModelError;
 use super::monitor::Channels;
+use crate::alarm::AlarmError;
+use crate::model_file::ModelError;
 
 /// Tail of the nominal log-odds, from which the alarm threshold follows.
 ///
@@ -65,6 +66,28 @@ pub(crate) fn find(
 }
 
 impl Calibration {
+    /// The threshold for `interval_h` between false alarms, if log-odds up to `reachable` exceed it.
+    pub(crate) fn alarm_below(
+        &self,
+        reachable: f64,
+        form: Form,
+        interval_h: f64,
+        fault_rate_1_h: f64,
+    ) -> Result<f64, AlarmError> {
+        let alarm_log_odds = self.alarm_log_odds(interval_h, fault_rate_1_h);
+        if alarm_log_odds < reachable {
+            return Ok(alarm_log_odds);
+        }
+        Err(AlarmError::Unreachable {
+            form: form.name(),
+            interval_h,
+            fault_rate_1_h,
+            alarm_log_odds,
+            reachable_log_odds: reachable,
+            interval_max_h: self.interval_h(reachable, fault_rate_1_h),
+        })
+    }
+
     /// Log-odds at which to alarm, so that `interval_h` pass on average between false alarms. Not
     /// below 0: an alarm below even odds would be no alarm.
     #[must_use]

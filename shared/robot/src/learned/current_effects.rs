@@ -8,7 +8,7 @@
 use vigil_blocks::WHEELS;
 
 use super::Model;
-use crate::Description;
+use crate::description::Description;
 use crate::kinematics::ROVER_WHEELS;
 use crate::slip::{Condition, Situation, SlipModel};
 

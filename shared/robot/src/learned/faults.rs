@@ -7,7 +7,7 @@ use vigil_inference::track::{Displacement, MotionNoise};
 
 use super::motion_modes::unknown_noise;
 use super::{Model, MotionModel, Observation};
-use crate::Description;
+use crate::description::Description;
 
 /// Kinds of faults: anything, and each wheel stuck.
 pub const KINDS: usize = 1 + WHEELS;

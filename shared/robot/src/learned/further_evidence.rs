@@ -13,7 +13,8 @@ use super::further::Further;
 use super::further_watch::{FurtherWatch, GYRO, Residual, Turn};
 use super::repeats::Repeats;
 use super::{Model, Observation};
-use crate::{Description, Suspects};
+use crate::description::Description;
+use crate::suspects::Suspects;
 
 /// Shares of the prior beside those of the other channels: how a fault of these first shows. A
 /// share counts by its logarithm only: half as much is 0.7 nats later.

@@ -12,7 +12,8 @@ use super::further::{Further, FurtherModel};
 use super::noise_scale::{NoiseScale, STEADY_COMMAND};
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Model, Observation, Reading};
-use crate::{Description, Suspects};
+use crate::description::Description;
+use crate::suspects::Suspects;
 
 /// What the pose's track says of the gyro.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,7 +5,7 @@ use vigil_blocks::HealthyBelief;
 use vigil_inference::track::{Context, MotionNoise, Track};
 
 use super::{Model, WheelContext};
-use crate::Description;
+use crate::description::Description;
 
 /// Deviation of a pose of which nothing but a measurement is known, m and rad: twice its noise.
 const UNSURE_M: f64 = 0.01;

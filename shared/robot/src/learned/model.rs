@@ -13,10 +13,10 @@ use super::monitor::Channels;
 use super::motion::{Curve, MotionModel};
 pub use super::provenance::Provenance;
 use super::wheels::{EncoderModel, RateModel};
-use crate::Description;
-use crate::alarm::{self, AlarmError};
-pub use crate::model_file::EDITED;
+use crate::alarm::AlarmError;
+use crate::description::Description;
 use crate::model_file::{self, ModelFile};
+pub use crate::model_file::{EDITED, ModelError};
 
 /// Version of the file's layout.
 pub const VERSION: u32 = 4;
@@ -113,68 +113,6 @@ pub struct StuckModel {
     pub rates: Vec<RateModel>,
 }
 
-/// Why a model was refused.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ModelError {
-    /// Not TOML, or not a model.
-    #[error("not a learned model: {0}")]
-    Parse(String),
-    /// Another layout.
-    #[error(
-        "the model has layout version {found}; this program reads version {read}: learn it again \
-         with `vigil learn`"
-    )]
-    Version {
-        /// Version of the file.
-        found: u32,
-        /// Version that is read.
-        read: u32,
-    },
-    /// The content does not fit the hash that the file carries.
-    #[error(
-        "the content has the hash {found}, but the file says hash = \"{stored}\": it was changed \
-         or cut short. Learn it again; if the change is meant, write hash = \"{EDITED}\""
-    )]
-    Hash {
-        /// Hash that the file carries.
-        stored: String,
-        /// Hash of the content.
-        found: String,
-    },
-    /// A value is not finite or out of range.
-    #[error("{key}: {value} is not allowed: {allowed}")]
-    Value {
-        /// Where.
-        key: String,
-        /// What was found.
-        value: String,
-        /// What is allowed.
-        allowed: &'static str,
-    },
-    /// The model is of another robot.
-    #[error("the model is of robot '{model}' ({model_wheels}), not of '{robot}' ({robot_wheels})")]
-    Robot {
-        /// Robot of the model.
-        model: String,
-        /// Its wheels.
-        model_wheels: String,
-        /// Robot asked for.
-        robot: String,
-        /// Its wheels.
-        robot_wheels: String,
-    },
-    /// The model has no calibration for the channels and the form of detection.
-    #[error("the model has no calibration for '{sensors}' and '{form}', only for {known}")]
-    Calibration {
-        /// Channels.
-        sensors: &'static str,
-        /// Form.
-        form: &'static str,
-        /// Channels and forms for which it has one.
-        known: String,
-    },
-}
-
 impl Model {
     /// Reads and checks a model.
     ///
@@ -253,8 +191,7 @@ impl Model {
     ) -> Result<f64, AlarmError> {
         let calibration = self.calibration(channels, form)?;
         let reachable = form.log_odds_max().min(departure::LOG_ODDS_MAX);
-        let form = form.name();
-        alarm::threshold(calibration, form, interval_h, fault_rate_1_h, reachable)
+        calibration.alarm_below(reachable, form, interval_h, fault_rate_1_h)
     }
 
     /// Noise of nominal motion on any ground that the robot's description allows for.

@@ -34,7 +34,8 @@ use super::wheel_context::{Beside, WheelContext};
 use super::wheels::rolling_rate;
 use super::{Further, Healthy, Model, Observation, SteerReading, Troubles};
 use crate::channel_odds::ChannelOdds;
-use crate::{Description, Suspects};
+use crate::description::Description;
+use crate::suspects::Suspects;
 
 /// Shares of the prior: how a fault first shows. Chosen: one counts by its logarithm only, half as
 /// much is 0.7 nats later.

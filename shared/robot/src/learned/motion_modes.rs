@@ -6,7 +6,7 @@ use vigil_inference::track::MotionNoise;
 
 use super::together::{Together, is_immobile};
 use super::{Curve, Model, MotionModel, RateModel};
-use crate::Description;
+use crate::description::Description;
 
 /// The unknown: standard deviation of its constant deviation per metre (yaw, forward, lateral).
 /// Chosen: 1.5 and 2 times the learned effects of the rover's stuck wheels; aside, 0.6 of ahead.

@@ -5,7 +5,8 @@ use vigil_inference::angle::wrap;
 
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Model, Observation, Reading};
-use crate::{Description, Suspects};
+use crate::description::Description;
+use crate::suspects::Suspects;
 
 /// Squares above this many times the believed variance say nothing about noise (a jump, a fault).
 /// Three deviations.

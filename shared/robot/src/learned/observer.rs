@@ -11,7 +11,7 @@ use vigil_inference::angle::wrap;
 use super::further::{Collector, Further};
 use super::troubles::{Limits, Troubles, Watchdog};
 use super::{BodyLag, Model, Observation, Reading};
-use crate::Description;
+use crate::description::Description;
 use crate::period::FramePeriod;
 
 /// A gap in the frames beyond which the pose starts anew, s: chosen, twenty observations.

@@ -8,7 +8,7 @@ use vigil_inference::outlier::tempered;
 use super::wheel_evidence::ANYTHING;
 use super::wheels::steering_angle;
 use super::{Model, NoiseScales, Observation};
-use crate::Description;
+use crate::description::Description;
 
 /// Standard deviation of a steering angle of which nothing is known, rad: half of what a servo
 /// turns.

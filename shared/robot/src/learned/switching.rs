@@ -21,7 +21,7 @@ use super::{
     FaultRates, Model, MotionMode, Mover, NoiseScales, Observation, WheelContext, WheelEvidence,
     motion_modes,
 };
-use crate::Description;
+use crate::description::Description;
 
 /// Most modes that there can be: nominal, stuck wheels, broken encoders, unknown.
 pub const MODES_MAX: usize = 2 * WHEELS + 3;

@@ -10,7 +10,7 @@ use vigil_blocks::WHEELS;
 use vigil_inference::track::MotionNoise;
 
 use super::{Curve, Model, MotionModel, RateModel};
-use crate::Description;
+use crate::description::Description;
 use crate::kinematics::ROVER_WHEELS;
 use crate::slip::{Condition, IMMOBILE_STUCK, Situation, SlipModel, Soil, Unknowns};
 

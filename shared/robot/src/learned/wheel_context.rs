@@ -8,7 +8,7 @@
 use vigil_blocks::{HealthyBelief, WHEELS};
 use vigil_inference::slow_state::SlowState;
 
-use crate::Tolerance;
+use crate::tolerance::Tolerance;
 
 /// Rates below so many tolerances of one wheel's rate tell little of a share of them: that
 /// tolerance is a fifth of them, and more.

@@ -9,7 +9,7 @@ use super::wheels::rolling_rate;
 use super::{
     EncoderState, Model, MotionMode, Mover, NoiseScales, Observation, RateModel, WheelContext,
 };
-use crate::Description;
+use crate::description::Description;
 
 /// Ways in which an encoder breaks: zero, frozen, noise, dead (zero plus the sensor's noise).
 pub const BREAKAGES: [EncoderState; 4] = [

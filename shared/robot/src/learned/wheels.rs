@@ -5,7 +5,7 @@ use vigil_inference::logspace::{log_add, log_normal};
 
 use super::Reading;
 use super::repeats::FAILS;
-use crate::Description;
+use crate::description::Description;
 
 /// Rate (rad/s) that rolling without slip demands of `wheel` at a curvature (1/m) and speed (m/s):
 /// `v·hypot(κX, 1 - κY) / r`.

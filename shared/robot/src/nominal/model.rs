@@ -6,8 +6,8 @@ use vigil_blocks::{COMMANDS, WHEELS};
 use super::channel::{Channel, FAULT_RATE_1_H, Of, Tail, Term};
 use super::joint::Joint;
 use super::observation::DEPTH;
-use crate::Description;
-use crate::alarm::{self, AlarmError};
+use crate::alarm::AlarmError;
+use crate::description::Description;
 use crate::learned::calibration::find;
 use crate::learned::model::{EDITED, ModelError, Provenance, check_calibration};
 use crate::learned::monitor::Channels;
@@ -211,8 +211,7 @@ impl Model {
     ) -> Result<f64, AlarmError> {
         let calibration = self.calibration(channels, form)?;
         let reachable = self.log_odds_max(channels, form, fault_rate_1_h);
-        let form = form.name();
-        alarm::threshold(calibration, form, interval_h, fault_rate_1_h, reachable)
+        calibration.alarm_below(reachable, form, interval_h, fault_rate_1_h)
     }
 
     /// Size of each axis of the command; 1 for axes that do not exist.

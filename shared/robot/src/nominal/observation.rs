@@ -3,7 +3,7 @@
 use vigil_blocks::{COMMANDS, SensorFrame, Valid, WHEELS};
 use vigil_inference::angle::wrap;
 
-use crate::Description;
+use crate::description::Description;
 use crate::frame_guard::BEYOND_LIMITS;
 use crate::learned::Intake;
 use crate::learned::observer::STALE_MAX;

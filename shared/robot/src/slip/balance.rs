@@ -3,8 +3,7 @@
 use nalgebra::SMatrix;
 
 use super::shear::{Contact, Shear};
-use super::solver::{UNKNOWNS, Unknowns};
-use super::{Condition, Situation, SlipModel};
+use super::{Condition, Situation, SlipModel, UNKNOWNS, Unknowns};
 use crate::kinematics::{ROVER_WHEELS, WheelTargets};
 
 /// Weight of the motors' rows (N m) against the forces' (N), for conditioning.

@@ -1,9 +1,8 @@
 //! What is not as built: bent steering, weak motors, shrunken wheels, soil that resists rolling,
 //! and forces from outside.
 
+use crate::chassis::RockerBogie;
 use crate::kinematics::{Ackermann6, ROVER_WHEELS};
-
-use super::RockerBogie;
 
 /// Speed below which a resisting force turns round smoothly, m/s.
 const RESISTANCE_SMOOTHING_M_S: f64 = 0.01;

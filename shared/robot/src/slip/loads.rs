@@ -4,8 +4,7 @@
 //! pivot, the bogie on the middle and the rear wheel; the differential leaves each rocker free to
 //! turn. Traction at the ground acts below the pivots and therefore shifts load between wheels.
 
-use serde::{Deserialize, Serialize};
-
+use crate::chassis::RockerBogie;
 use crate::kinematics::{Ackermann6, GeometryError, ROVER_WHEELS};
 
 /// Smallest load left on a wheel, N: a wheel never quite leaves the ground here. 1.4 % of the
@@ -14,20 +13,6 @@ pub const LOAD_MIN_N: f64 = 2.0;
 /// Traction per unit of load up to which load is shifted, either way. At 0.97 (its lever over its
 /// height) the reference bogie would tip over; soils below this friction never come here.
 pub const TRACTION_MAX: f64 = 0.85;
-
-/// Pivots of the linkage, m, in `base_link` (z up from the ground); the same on both sides.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RockerBogie {
-    /// Rocker pivot, forward.
-    pub rocker_x_m: f64,
-    /// Rocker pivot, height.
-    pub rocker_z_m: f64,
-    /// Bogie pivot, forward.
-    pub bogie_x_m: f64,
-    /// Bogie pivot, height.
-    pub bogie_z_m: f64,
-}
 
 impl RockerBogie {
     /// Wheels of the left and the right side, each as (front, middle, rear).

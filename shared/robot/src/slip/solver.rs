@@ -1,14 +1,7 @@
 //! Damped Newton, and pseudo-transient continuation where Newton fails.
 
-use nalgebra::SVector;
-
-use super::SlipError;
 use super::balance::{Balance, MOTOR_SCALE};
-
-/// Number of unknowns.
-pub const UNKNOWNS: usize = 9;
-/// Forward m/s, lateral m/s, yaw rate rad/s, then the six wheel rates rad/s.
-pub type Unknowns = SVector<f64, UNKNOWNS>;
+use super::{SlipError, UNKNOWNS, Unknowns};
 
 /// Largest residual of a solution, N.
 const TOLERANCE_N: f64 = 1e-8;

@@ -1,8 +1,9 @@
 //! The text and the numbers of faults and disturbances.
 
 use vigil_blocks::Event;
-use vigil_robot::disturbance::{Disturbance, KINDS, Place};
-use vigil_robot::injection::{Change, Wire};
+use vigil_robot::disturbance::Disturbance;
+use vigil_robot::disturbance_kind::{KINDS, Place};
+use vigil_robot::injection::{Change, WireChange};
 use vigil_robot::{Description, DisturbanceKind, Injection};
 
 use crate::rover;
@@ -51,7 +52,7 @@ fn every_change_survives_text_wire_and_event() {
             value,
             ..Event::default()
         };
-        let told = Wire::of_event(wire.injects, &event);
+        let told = WireChange::from_event(wire.injects, &event);
         assert_eq!(Change::from_wire(&told), Some(change), "{spec}");
     }
 }

@@ -6,7 +6,7 @@ use vigil_blocks::SensorFrame;
 use vigil_plausibility as plausible;
 use vigil_recording::frames::{Field, Run, fields};
 use vigil_robot::Description;
-use vigil_robot::meaning::Meaning;
+use vigil_robot::publisher_check::PublisherCheck;
 
 use super::FrameArrival;
 use crate::findings::{Finding, Status};
@@ -143,7 +143,7 @@ const fn unit_guess(field: Field) -> &'static str {
 /// Units, signs and sides, from what the frames say about each other: the tests that run in the
 /// graph, then those of recordings.
 fn meanings(robot: &Description, frames: &[FrameArrival]) -> Vec<Finding> {
-    let mut meaning = Meaning::new(robot);
+    let mut meaning = PublisherCheck::new(robot);
     let found = frames.iter().filter_map(|f| meaning.take(&f.frame));
     let found = found.map(|finding| finding.text(robot));
     let told = |detail| Finding::new("meaning", Status::Failure, detail);

@@ -13,7 +13,7 @@ use vigil_cycle::{
     Clock, Graph, InputAccount, Monotonic, PortError, Receiver, Topic, Writer, signal,
 };
 use vigil_robot::FrameGuard;
-use vigil_sensor_sim::{ArrivalClock, Here};
+use vigil_sensor_sim::{ArrivalBatch, ArrivalClock};
 use vigil_setup::Setup;
 use vigil_setup::schema::Source;
 
@@ -221,9 +221,9 @@ fn sockets(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), Por
         }
         let now_ns = Monotonic.now_ns();
         for mut frame in arrived.iter().copied() {
-            let here = Here {
+            let here = ArrivalBatch {
                 headers: arrived.iter().map(|other: &SensorFrame| &other.header),
-                are_all: arrived.len() < DATAGRAMS_MAX,
+                is_complete: arrived.len() < DATAGRAMS_MAX,
             };
             let dated = clock.date(&mut frame.header, here, now_ns);
             if guard.take(&frame, now_ns) {

@@ -1,8 +1,8 @@
 //! The six-wheel rover, as built.
 
 use vigil_robot::Description;
+use vigil_robot::chassis::{Ground, Motor, RockerBogie};
 use vigil_robot::description::{Kinematics, Limits, SensorNoise, Wheel};
-use vigil_robot::slip::{Ground, Motor, RockerBogie};
 
 /// Its description.
 pub fn rover() -> Description {
@@ -20,7 +20,7 @@ pub fn rover() -> Description {
         wheel_radius_m: 0.08,
         mass_kg: 14.2,
         command: Vec::new(),
-        measured: vigil_robot::description::Measured::default(),
+        measured: vigil_robot::description::MeasuredChannels::default(),
         polynomial_order: 4,
         interval_s: 0.1,
         wheels: places

@@ -5,7 +5,7 @@
 //! command, summed frame by frame from the first motion on, so that noise and ground leave them
 //! near 1; a finding needs a ratio that neither ground nor a fault explains. Each is judged once,
 //! as soon as the motion shows it: straight driving shows nothing of turns, and what has not been
-//! judged is said ([`Meaning::unjudged`]). Once all is judged a frame costs nothing more.
+//! judged is said ([`PublisherCheck::unjudged`]). Once all is judged a frame costs nothing more.
 //!
 //! For recordings, where all frames are at hand, `vigil import` judges by
 //! `vigil_plausibility`.
@@ -16,8 +16,8 @@ mod wheels;
 
 use vigil_blocks::{SensorFrame, Valid};
 
-use crate::Description;
-pub use finding::{Finding, Kind};
+use crate::description::Description;
+pub use finding::{Finding, FindingKind};
 use pose::Poses;
 use wheels::Wheels;
 
@@ -37,7 +37,7 @@ const TURN_UNIT: f64 = 8.0;
 /// A pause in the frames beyond which the motion counts as interrupted, s. Six periods of a sensor
 /// of 20 Hz.
 const PAUSE_S: f64 = 0.3;
-/// A command must have stood so long before a frame counts, s: three lags of [`crate::Body`].
+/// A command must have stood so long before a frame counts, s: three lags of [`crate::body::Body`].
 const SETTLED_S: f64 = 0.3;
 /// Change of the commanded velocity that begins this anew, m/s and rad/s: chosen, a tenth of the
 /// rover's fastest.
@@ -61,7 +61,7 @@ pub enum TestOutcome {
 
 /// The tests of one publisher.
 #[derive(Debug, Clone)]
-pub struct Meaning {
+pub struct PublisherCheck {
     robot: Description,
     poses: Poses,
     wheels: Wheels,
@@ -92,7 +92,7 @@ const SIGN: usize = 4;
 const STEER: usize = SIGN + vigil_blocks::WHEELS;
 const SIDES: usize = STEER + vigil_blocks::WHEELS;
 
-impl Meaning {
+impl PublisherCheck {
     /// The tests for frames of `robot`.
     #[must_use]
     pub fn new(robot: &Description) -> Self {
@@ -226,7 +226,7 @@ impl Meaning {
             TRAVEL => self.poses.travel(),
             TURN => self.poses.turn(),
             GYRO if self.gyro[2] < TURN_MIN_RAD => TestOutcome::NotYet,
-            GYRO => turn(Kind::Gyro, self.gyro[0] / self.gyro[1]),
+            GYRO => turn(FindingKind::Gyro, self.gyro[0] / self.gyro[1]),
             UNIT => self.wheels.unit(),
             SIGN..STEER => self.wheels.sign(test - SIGN),
             STEER..SIDES => self.wheels.steering(test - STEER),
@@ -253,7 +253,7 @@ impl Meaning {
 }
 
 /// A ratio of turns.
-fn turn(kind: Kind, ratio: f64) -> TestOutcome {
+fn turn(kind: FindingKind, ratio: f64) -> TestOutcome {
     match !(TURN_REVERSED..=TURN_UNIT).contains(&ratio) {
         true => TestOutcome::new(kind, None, ratio),
         false => TestOutcome::Fits,

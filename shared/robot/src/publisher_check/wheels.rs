@@ -3,8 +3,8 @@
 use vigil_blocks::{SensorFrame, Valid, WHEELS};
 
 use super::finding::is_rate_unit;
-use super::{Kind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
-use crate::Description;
+use super::{FindingKind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
+use crate::description::Description;
 use crate::description::Kinematics;
 use crate::learned::wheels::{rolling_rate, steering_angle};
 
@@ -173,7 +173,7 @@ impl Wheels {
         ratios.sort_unstable_by(f64::total_cmp);
         let middle = ratios[count / 2];
         match middle.abs() > RATIO_MAX || is_rate_unit(middle) {
-            true => TestOutcome::new(Kind::Rates, None, middle),
+            true => TestOutcome::new(FindingKind::Rates, None, middle),
             false => TestOutcome::Fits,
         }
     }
@@ -184,7 +184,11 @@ impl Wheels {
             return TestOutcome::NotYet;
         }
         match self.rates[wheel].is_reversed() {
-            true => TestOutcome::new(Kind::RateSign, Some(wheel), self.rates[wheel].ratio()),
+            true => TestOutcome::new(
+                FindingKind::RateSign,
+                Some(wheel),
+                self.rates[wheel].ratio(),
+            ),
             false => TestOutcome::Fits,
         }
     }
@@ -198,7 +202,7 @@ impl Wheels {
             && steer.expected >= STEER_MIN_RAD * STEER_MIN_RAD * steer.time_s;
         match (is_judged, steer.is_reversed()) {
             (false, _) => TestOutcome::NotYet,
-            (true, true) => TestOutcome::new(Kind::SteerSign, Some(wheel), steer.ratio()),
+            (true, true) => TestOutcome::new(FindingKind::SteerSign, Some(wheel), steer.ratio()),
             (true, false) => TestOutcome::Fits,
         }
     }
@@ -213,7 +217,7 @@ impl Wheels {
         }
         let is_exchanged = pair.exchanged < EXCHANGED * pair.named && pair.named > pair.apart;
         match is_exchanged {
-            true => TestOutcome::new(Kind::Sides, Some(pair.wheels[0]), 0.0),
+            true => TestOutcome::new(FindingKind::Sides, Some(pair.wheels[0]), 0.0),
             false => TestOutcome::Fits,
         }
     }

@@ -2,13 +2,13 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::Description;
+use crate::description::Description;
 use crate::description::Kinematics;
 
 /// What is wrong. The value is its code in events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Kind {
+pub enum FindingKind {
     /// The pose moves so many times the commanded travel.
     Travel = 1,
     /// The pose moves at this angle to its yaw, rad, where 0 is commanded.
@@ -31,7 +31,7 @@ pub enum Kind {
     Rate = 10,
 }
 
-impl Kind {
+impl FindingKind {
     const ALL: [Self; 10] = [
         Self::Travel,
         Self::Heading,
@@ -60,10 +60,10 @@ impl Kind {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
     /// What.
-    pub kind: Kind,
+    pub kind: FindingKind,
     /// Of which wheel, where it is of one.
     pub wheel: Option<usize>,
-    /// How far off; see [`Kind`].
+    /// How far off; see [`FindingKind`].
     pub value: f64,
 }
 
@@ -81,7 +81,9 @@ impl Finding {
     /// From an event's `what` and `p`, if this version knows it.
     #[must_use]
     pub fn from_wire(what: u32, value: f64) -> Option<Self> {
-        let kind = Kind::ALL.into_iter().find(|k| *k as u32 == what & 255)?;
+        let kind = FindingKind::ALL
+            .into_iter()
+            .find(|k| *k as u32 == what & 255)?;
         let wheel = (what >> 8 != NO_WHEEL).then_some((what >> 8) as usize);
         Some(Self { kind, wheel, value })
     }
@@ -95,48 +97,48 @@ impl Finding {
         let v = self.value;
         let unit = |units: &[(f64, &str)]| unit(v, units);
         match self.kind {
-            Kind::Travel => format!(
+            FindingKind::Travel => format!(
                 "units: x and y move {v:.3} times the commanded travel{}",
                 unit(&TRAVEL)
             ),
-            Kind::Heading => format!(
+            FindingKind::Heading => format!(
                 "axes: x and y move at {v:.2} rad to yaw, 0 is commanded: is yaw 0 along x, y to \
                  the left, and yaw in rad?"
             ),
-            Kind::Turn if v < 0.0 => format!(
+            FindingKind::Turn if v < 0.0 => format!(
                 "signs: yaw turns {v:.2} times the commanded angle: is yaw or {turn} positive to \
                  the right?"
             ),
-            Kind::Turn => format!(
+            FindingKind::Turn => format!(
                 "units: yaw turns {v:.2} times the commanded angle{}",
                 unit(&TURN)
             ),
-            Kind::Gyro if v < 0.0 => format!(
+            FindingKind::Gyro if v < 0.0 => format!(
                 "signs: yaw_rate is {v:.2} times the commanded one: is it or {turn} positive to \
                  the right?"
             ),
-            Kind::Gyro => format!(
+            FindingKind::Gyro => format!(
                 "units: yaw_rate is {v:.2} times the commanded one{}",
                 unit(&TURN)
             ),
-            Kind::Rates => format!(
+            FindingKind::Rates => format!(
                 "units: the wheels turn {v:.3} times as fast as the command makes them roll{}",
                 unit(&RATES)
             ),
-            Kind::RateSign => format!("signs: enc_{wheel} has the other sign"),
-            Kind::Sides => format!(
+            FindingKind::RateSign => format!("signs: enc_{wheel} has the other sign"),
+            FindingKind::Sides => format!(
                 "sides: enc_{wheel} and the wheel opposite turn as each other should: are they \
                  exchanged, or is {turn} positive to the right?"
             ),
-            Kind::SteerSign => {
+            FindingKind::SteerSign => {
                 format!("signs: steer_{wheel} has the other sign, or is another wheel's")
             }
-            Kind::Late => format!(
+            FindingKind::Late => format!(
                 "late: {:.0} % of the frames come after their deadlines: in bursts, or without the \
                  event that wakes the graph",
                 100.0 * v
             ),
-            Kind::Rate => format!("rate: frames come at {v:.2} times the graph's rate"),
+            FindingKind::Rate => format!("rate: frames come at {v:.2} times the graph's rate"),
         }
     }
 }
@@ -185,7 +187,7 @@ mod tests {
 
     #[test]
     fn findings_survive_the_wire() {
-        for kind in Kind::ALL {
+        for kind in FindingKind::ALL {
             for wheel in [None, Some(0), Some(5)] {
                 let finding = Finding {
                     kind,

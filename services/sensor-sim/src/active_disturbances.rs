@@ -1,6 +1,6 @@
 //! Which disturbances are on, and what they make of the rover.
 
-use vigil_robot::disturbance::{KINDS, PARAMETERS};
+use vigil_robot::disturbance_kind::{KINDS, PARAMETERS};
 use vigil_robot::kinematics::{Ackermann6, ROVER_WHEELS};
 use vigil_robot::slip::{Condition, Soil, WheelCondition};
 use vigil_robot::{Disturbance, DisturbanceKind};
@@ -11,11 +11,11 @@ const FIRM_RESISTANCE: f64 = 0.05;
 
 /// At most one disturbance of each kind at each place.
 #[derive(Debug, Clone)]
-pub(crate) struct Disturbances {
+pub(crate) struct ActiveDisturbances {
     on: [[Option<[f64; PARAMETERS]>; ROVER_WHEELS]; KINDS.len()],
 }
 
-impl Disturbances {
+impl ActiveDisturbances {
     pub(crate) const fn nothing() -> Self {
         Self {
             on: [[None; ROVER_WHEELS]; KINDS.len()],

@@ -3,7 +3,7 @@
 use vigil_blocks::{SensorFrame, Valid};
 use vigil_inference::angle::wrap;
 
-use super::{Finding, Kind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
+use super::{Finding, FindingKind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
 
 /// Length of a stretch, s: a path is nearly straight over it, and noise hardly counts. At 0.2 m/s
 /// it is 0.1 m, twenty deviations of a pose of 5 mm.
@@ -131,7 +131,7 @@ impl Poses {
         let error_m = (scatter * self.count / (self.count - 1.0)).sqrt();
         let ratio = total_m / self.commanded_m;
         if ratio > RATIO_MAX && total_m > CERTAIN * error_m {
-            return TestOutcome::new(Kind::Travel, None, ratio);
+            return TestOutcome::new(FindingKind::Travel, None, ratio);
         }
         // A robot that hardly moves has no direction.
         if ratio < 1.0 / RATIO_MAX || total_m < CERTAIN * error_m {
@@ -139,7 +139,7 @@ impl Poses {
         }
         let angle = left.atan2(along);
         match angle.abs() > ANGLE_MAX_RAD {
-            true => TestOutcome::new(Kind::Heading, None, angle),
+            true => TestOutcome::new(FindingKind::Heading, None, angle),
             false if self.swung_rad < TURNED_RAD && self.come_m < COME_M => TestOutcome::NotYet,
             false => TestOutcome::Fits,
         }
@@ -150,12 +150,12 @@ impl Poses {
         if self.turn_rad < TURN_MIN_RAD {
             return TestOutcome::NotYet;
         }
-        super::turn(Kind::Turn, self.turned_rad / self.turn_rad)
+        super::turn(FindingKind::Turn, self.turned_rad / self.turn_rad)
     }
 }
 
 impl TestOutcome {
-    pub(super) const fn new(kind: Kind, wheel: Option<usize>, value: f64) -> Self {
+    pub(super) const fn new(kind: FindingKind, wheel: Option<usize>, value: f64) -> Self {
         Self::Wrong(Finding { kind, wheel, value })
     }
 }
