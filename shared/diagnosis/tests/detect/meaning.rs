@@ -7,7 +7,7 @@ use vigil_robot::publisher_check::{FindingKind, PublisherCheck};
 use crate::recorded::{model, path, robot, runs, unseen};
 
 /// All that is found in a run, and when, s after the first motion.
-fn found(frames: &[SensorFrame], spoil: impl Fn(&mut SensorFrame)) -> Vec<(Kind, f64)> {
+fn found(frames: &[SensorFrame], spoil: impl Fn(&mut SensorFrame)) -> Vec<(FindingKind, f64)> {
     let mut meaning = PublisherCheck::new(&robot());
     let mut all = Vec::new();
     let mut began_s = None;
@@ -45,7 +45,7 @@ fn nothing_is_found_in_recorded_runs_with_or_without_faults() {
 #[test]
 fn what_is_wrong_is_found_in_the_motion_that_shows_it() {
     type Spoil = fn(&mut SensorFrame);
-    let spoils: [(Kind, Spoil); 10] = [
+    let spoils: [(FindingKind, Spoil); 10] = [
         (FindingKind::Travel, |f| {
             (f.pose[0], f.pose[1]) = (1e3 * f.pose[0], 1e3 * f.pose[1])
         }),
