@@ -2,7 +2,7 @@
 //!
 //! A mission ([`Plan`]) is a path of some 20 m and a fault, drawn from a seed. Each commander
 //! ([`Arm`]) drives it in the same world: same soil, same fault at the same time, same streams of
-//! sensor noise. The rover does what the commander's action says ([`vigil_sensor_sim::ActionGate`]).
+//! sensor noise. The rover executes the commander's action ([`vigil_sensor_sim::ActionGate`]).
 //!
 //! - The path is driven as planned, by the drive's own clock: nobody steers back to a path that was
 //!   left. Slowed, the clock runs slower, so that the rover drives the same path.

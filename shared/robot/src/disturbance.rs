@@ -1,8 +1,8 @@
 //! Disturbances: what may happen to the simulated rover that no fault model contains.
 //!
-//! A [`Fault`] has a leaf in the fault tree and a learned model; a [`Disturbance`] has neither. Only
-//! the simulated world carries one out, so that filters are tried on what they do not model. Their
-//! text is here because the launcher checks it before it starts anything, and prints it.
+//! A [`Fault`] has a leaf in the fault tree and a learned model; a [`Disturbance`] has neither.
+//! Only the simulated world carries one out, so that filters are tried on what they do not model.
+//! The text form is here because the launcher checks it before it starts anything, and prints it.
 
 use crate::description::Description;
 use crate::disturbance_kind::{DisturbanceKind, DisturbanceSpec, PARAMETERS, Place, SIDES};

@@ -145,8 +145,8 @@ impl Navigator {
         if hits { self.stand() } else { command }
     }
 
-    /// Writes pose, planned pose, outcome and symptoms into a measured frame, and takes its own pose
-    /// from it.
+    /// Writes pose, planned pose, outcome and symptoms into a measured frame, and takes its own
+    /// pose from it.
     pub fn report(&mut self, frame: &mut SensorFrame) {
         if frame.has(Valid::POSE) {
             frame.pose = self.faults.to_believed(frame.pose);

@@ -74,8 +74,8 @@ impl SimulatorSource {
         })
     }
 
-    /// Continues a drive that began at `began_ns`, if given: injections due until now take effect at
-    /// once.
+    /// Continues a drive that began at `began_ns`, if given: injections due until now take effect
+    /// at once.
     #[must_use]
     pub fn resuming(mut self, began_ns: Option<u64>) -> Self {
         self.ready_published = began_ns.is_some();

@@ -66,7 +66,8 @@ pub(crate) fn find(
 }
 
 impl Calibration {
-    /// The threshold for `interval_h` between false alarms, if log-odds up to `reachable` exceed it.
+    /// The threshold for `interval_h` between false alarms, if log-odds up to `reachable` exceed
+    /// it.
     pub(crate) fn alarm_below(
         &self,
         reachable: f64,
