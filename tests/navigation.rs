@@ -14,7 +14,7 @@ use vigil_pomdp::solver::{Options, solve};
 use vigil_pomdp::{Budget, PointBased};
 use vigil_robot::injection::Injection;
 use vigil_sensor_sim::{NavigatorEvent, SensorSource, Simulation};
-use vigil_setup::schema::{GraphFile, Trouble, TroubleKind};
+use vigil_setup::graph_file::{GraphFile, Trouble, TroubleKind};
 use vigil_setup::{Setup, load_graph};
 
 const PERIOD_NS: u64 = 10_000_000;

@@ -7,10 +7,10 @@ pub use stages::Stages;
 use std::error::Error;
 use std::path::Path;
 
+use vigil_diagnosis::Sensors;
 use vigil_robot::Description;
 use vigil_robot::FaultTree;
 use vigil_robot::learned::Model;
-use vigil_setup::schema::Sensors;
 
 /// The two sets of channels, and their names.
 pub const SENSOR_SETS: [(Sensors, &str); 2] = [

@@ -6,8 +6,8 @@ use vigil_blocks::{
     Block, CauseKind, DetectionBelief, Entry, FaultBelief, Header, ParticleBlock, SensorFrame,
 };
 use vigil_cycle::Topic;
+use vigil_diagnosis::identify::IdentifierFilter;
 use vigil_diagnosis::identify::Input;
-use vigil_setup::schema::IdentifierFilter;
 
 use crate::harness::{RunningGraph, drain, machine};
 

@@ -3,7 +3,7 @@
 use rand::{Rng, RngExt};
 use vigil_robot::Description;
 use vigil_robot::learned::model::CommandModel;
-use vigil_setup::schema::DriveSegment;
+use vigil_setup::graph_file::DriveSegment;
 
 /// Time that a command lasts, s.
 const COMMAND_S: std::ops::Range<f64> = 3.0..10.0;

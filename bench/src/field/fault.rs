@@ -5,11 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use rand::seq::SliceRandom;
 use rand::{Rng, RngExt};
 use vigil_blocks::SizeKind;
+use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::field::{Size, Stretch, Truth};
 use vigil_robot::FaultTree;
 use vigil_robot::injection::Change;
 use vigil_robot::{Description, DisturbanceKind, FaultKind, Injection};
-use vigil_setup::schema::Sensors;
 
 /// The names that stand for drawn places in a run.
 #[derive(Debug, Clone)]

@@ -5,7 +5,7 @@ use rand_pcg::Pcg64Mcg;
 use vigil_robot::slip::{Condition, Situation, SlipModel, Soil};
 use vigil_robot::{Description, Disturbance, DisturbanceKind, Tolerance};
 use vigil_sensor_sim::{World as Simulated, WorldError};
-use vigil_setup::schema::Simulator;
+use vigil_setup::graph_file::Simulator;
 
 use super::scenario::{Draw, World};
 

@@ -10,7 +10,7 @@ use flate2::write::GzEncoder;
 use vigil_blocks::SensorFrame;
 use vigil_recording::frames::{Field, fields, further};
 use vigil_sensor_sim::{EffectiveCommand, World};
-use vigil_setup::schema::Simulator;
+use vigil_setup::graph_file::Simulator;
 
 use super::course::{Range, course};
 use super::ground::stream;

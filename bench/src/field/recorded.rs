@@ -5,12 +5,12 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Taxonomy;
 use vigil_evaluation::scoring::field::{Scorer, Stretch, Truth};
 use vigil_learning::learning_nominal;
 use vigil_recording::{frames, labels};
 use vigil_robot::RobotModel;
-use vigil_setup::schema::Sensors;
 use vigil_setup::{GraphArgs, Setup, load_robot};
 
 use super::frames::{Fate, Way};

@@ -4,12 +4,13 @@ use std::error::Error;
 use std::path::Path;
 
 use vigil_blocks::SensorFrame;
+use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Taxonomy;
 use vigil_evaluation::scoring::field::{Run, Scorer, Stretch};
 use vigil_robot::Injection;
 use vigil_robot::learned::Model;
 use vigil_sensor_sim::{ActionGate, EffectiveCommand, World};
-use vigil_setup::schema::{Sensors, Simulator};
+use vigil_setup::graph_file::Simulator;
 use vigil_setup::{GraphArgs, Setup};
 
 use super::course::{Range, course};
@@ -115,7 +116,7 @@ impl Graph {
 struct Conditions {
     rate_hz: f64,
     simulator: Simulator,
-    drive: Vec<vigil_setup::schema::DriveSegment>,
+    drive: Vec<vigil_setup::graph_file::DriveSegment>,
     /// Faults, which count as such, and everything that changes in the world.
     faults: Vec<Injection>,
     changes: Vec<Injection>,

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use rand::{Rng, RngExt};
 use serde::Deserialize;
-use vigil_setup::schema::Sensors;
+use vigil_diagnosis::Sensors;
 
 use super::bar::Bar;
 use super::departure::Departure;
@@ -343,9 +343,9 @@ mod tests {
     use crate::field::fault::{Places, changes, truth};
     use crate::field::ground::stream;
     use crate::simulated::Rover;
+    use vigil_diagnosis::Sensors;
     use vigil_evaluation::scoring::field::{Run, Truth, figures};
     use vigil_robot::disturbance_kind::KINDS;
-    use vigil_setup::schema::Sensors;
 
     fn shipped() -> (File, Rover) {
         let here = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -11,7 +11,7 @@ use vigil_blocks::{Action, DetectionBelief, FaultBelief, ParticleBlock, SensorFr
 use vigil_cycle::latency::Percentiles;
 use vigil_cycle::placement::PlacementRequest;
 use vigil_cycle::{CycleStamps, Latency, Placement};
-use vigil_setup::schema::Source;
+use vigil_setup::graph_file::Source;
 
 use super::attribution::{self, Miss, Record};
 use super::cycles::{self, Cycle, STAGE_NAMES, STAGES, Spectra};

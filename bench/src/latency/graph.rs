@@ -12,7 +12,7 @@ use vigil_cycle::placement::PlacementRequest;
 use vigil_cycle::serve::Leave;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{CycleStamps, PortError, stamps};
-use vigil_setup::schema::Source;
+use vigil_setup::graph_file::Source;
 use vigil_setup::{GraphArgs, Setup};
 
 use super::cycles::{STAGE_NAMES, STAGES};

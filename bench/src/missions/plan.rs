@@ -2,7 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vigil_setup::schema::{DriveSegment, Simulator};
+use vigil_setup::graph_file::{DriveSegment, Simulator};
 
 /// Metres commanded.
 const LENGTH_M: f64 = 20.0;

@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use vigil_bench::simulated::{ALL_SETS, Stages};
 use vigil_blocks::{Action, DetectionBelief, FaultBelief, fnv1a};
+use vigil_diagnosis::Sensors;
+use vigil_diagnosis::identify::IdentifierFilter;
 use vigil_recording::frames::{self, Run};
-use vigil_setup::schema::{IdentifierFilter, Sensors};
 use vigil_setup::{GraphArgs, Setup};
 
 /// Runs that are hashed, evenly over those that `vigil learn` left out.

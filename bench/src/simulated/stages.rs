@@ -7,12 +7,12 @@ use vigil_blocks::{
     MODE_UNKNOWN, ParticleBlock, RecoveryKind, SensorFrame, SizeKind,
 };
 use vigil_decision::{Inputs, Supervisor, fused_alarm};
+use vigil_diagnosis::Sensors;
 use vigil_diagnosis::detect::Detector;
 use vigil_diagnosis::identify::{Diagnoser, Input};
 use vigil_evaluation::scoring::field::{BLIND, Moment, RobotOrder, Size};
 use vigil_evaluation::scoring::{Belief, MULTIPLE, UNKNOWN};
 use vigil_setup::Setup;
-use vigil_setup::schema::Sensors;
 
 /// The three stages of a graph.
 pub struct Stages {

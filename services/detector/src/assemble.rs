@@ -1,8 +1,9 @@
 //! From the configuration to a detector.
 
+use vigil_diagnosis::Sensors;
 use vigil_robot::{Description, MeasuredChannels, RobotModel};
 use vigil_setup::Setup;
-use vigil_setup::schema::{Sensors, Source};
+use vigil_setup::graph_file::Source;
 
 use vigil_diagnosis::detect::{Detector, DetectorError};
 

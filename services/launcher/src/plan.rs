@@ -8,7 +8,7 @@ use vigil_cycle::KeepAwake;
 use vigil_cycle::topic::ServiceName;
 use vigil_recording::frames;
 use vigil_robot::Injection;
-use vigil_setup::schema::Source;
+use vigil_setup::graph_file::Source;
 use vigil_setup::{GraphArgs, Setup};
 
 /// Starts a Vigil graph, watches it and prints what happened.

@@ -2,9 +2,7 @@
 
 use vigil_blocks::{Event, EventKind};
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::watchdog::Limits;
 use vigil_cycle::{Clock, Monotonic, Watchdog};
-use vigil_setup::schema;
 
 use crate::children::Children;
 use crate::observer::Observer;
@@ -21,9 +19,12 @@ impl Supervisor {
     /// Watches over the services of the plan, which start now.
     pub fn new(plan: &Plan) -> Self {
         let services: Vec<ServiceName> = plan.services().collect();
-        let limits = limits(&plan.setup.file.watchdog);
         Self {
-            watchdog: Watchdog::new(limits, services.len(), Monotonic.now_ns()),
+            watchdog: Watchdog::new(
+                &plan.setup.file.watchdog,
+                services.len(),
+                Monotonic.now_ns(),
+            ),
             services,
         }
     }
@@ -59,15 +60,5 @@ impl Supervisor {
                 children.end(name, words::failure(supervision));
             }
         }
-    }
-}
-
-fn limits(settings: &schema::Watchdog) -> Limits {
-    let ns = |s: f64| (s * 1e9).round() as u64;
-    Limits {
-        start_up_ns: ns(settings.startup_s),
-        alive_ns: ns(settings.alive_s),
-        logical_ns: ns(settings.logical_s),
-        missed_share: settings.deadline_percent * 1e-2,
     }
 }

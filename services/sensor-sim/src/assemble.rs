@@ -6,7 +6,7 @@ use std::path::Path;
 use vigil_recording::frames;
 use vigil_robot::Injection;
 use vigil_setup::Setup;
-use vigil_setup::schema::Source;
+use vigil_setup::graph_file::Source;
 
 use crate::action_gate::ActionGate;
 use crate::injection_schedule::InjectionSchedule;

@@ -1,6 +1,6 @@
 //! What the rover is to drive, and how fast a command may change.
 
-use vigil_setup::schema::DriveSegment;
+use vigil_setup::graph_file::DriveSegment;
 
 /// Fastest change of the executed curvature, 1/m per s: the steering servos' limit.
 pub const CURVATURE_RATE_MAX_1_M_S: f64 = 0.5;

@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use vigil_robot::kinematics::ROVER_WHEELS;
 use vigil_robot::slip::Soil;
-use vigil_setup::schema::Simulator;
+use vigil_setup::graph_file::Simulator;
 
 /// Share of the mean friction below which the scatter never takes it.
 const FRICTION_SHARE_MIN: f64 = 0.2;

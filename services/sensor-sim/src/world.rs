@@ -6,7 +6,8 @@ use vigil_robot::injection::Change;
 use vigil_robot::kinematics::{ROVER_WHEELS, advance, wrap_angle};
 use vigil_robot::slip::{Condition, Situation, SlipModel, Solution};
 use vigil_robot::{Description, Disturbance, DisturbanceKind, Fault, FaultKind};
-use vigil_setup::schema::{DriveSegment, Simulator};
+use vigil_setup::Ranges;
+use vigil_setup::graph_file::{DriveSegment, Simulator};
 
 use crate::action_gate::EffectiveCommand;
 use crate::active_disturbances::ActiveDisturbances;
@@ -45,6 +46,7 @@ pub struct TrueState {
 /// The simulated rover in its world.
 #[derive(Debug, Clone)]
 pub struct World {
+    ranges: Ranges<Simulator>,
     model: SlipModel,
     drive: Drive,
     executed: RateLimiter,
@@ -87,7 +89,9 @@ impl World {
         rate_hz: f64,
         seed: u64,
     ) -> Result<Self, WorldError> {
-        check::settings(settings, rate_hz)?;
+        check::rate(rate_hz)?;
+        let ranges = Ranges::default();
+        ranges.check(settings)?;
         check::drive(drive)?;
         check::noise(robot)?;
         let model = SlipModel::new(robot)?;
@@ -104,6 +108,7 @@ impl World {
         // One stream each, so that a fault changes no healthy channel's noise.
         let stream = |n: u64| seed.wrapping_mul(4).wrapping_add(n);
         Ok(Self {
+            ranges,
             model,
             drive: Drive::new(drive),
             executed: RateLimiter::default(),
@@ -304,16 +309,13 @@ impl World {
     /// them stays.
     ///
     /// # Errors
-    /// [`WorldError::Quantity`].
+    /// [`WorldError::Setting`].
     pub fn set_ground(&mut self, friction: f64, shear_modulus: f64) -> Result<(), WorldError> {
-        check::settings(
-            &Simulator {
-                friction,
-                shear_modulus,
-                ..Simulator::default()
-            },
-            1.0,
-        )?;
+        self.ranges.check(&Simulator {
+            friction,
+            shear_modulus,
+            ..Simulator::default()
+        })?;
         self.soil.set(friction, shear_modulus);
         Ok(())
     }

@@ -7,7 +7,7 @@ use vigil_cycle::allocation::{CountingAllocator, allocations};
 use vigil_robot::injection::Change;
 use vigil_robot::{Fault, FaultKind};
 use vigil_sensor_sim::{ActionGate, InjectionSchedule, Navigator, Simulation, World};
-use vigil_setup::schema::{DriveSegment, GraphFile, Simulator};
+use vigil_setup::graph_file::{DriveSegment, GraphFile, Simulator};
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;

@@ -7,6 +7,9 @@ use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 use iceoryx2::prelude::{Config, FileName, SemanticString};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 use vigil_blocks::{Action, Block, SensorFrame};
 
 use crate::port::PortError;
@@ -19,13 +22,21 @@ const TRANSPORT_VERSION: &str = "0.10.0";
 const SENSOR_BUFFERS: usize = 8;
 
 /// Sizes of the shared-memory queues; the same for every peer of a graph.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, SmartDefault, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub struct Queues {
-    /// Blocks a reader may fall behind before the oldest is overwritten; see [`Self::for_topic`].
+    /// Blocks a reader may fall behind before the oldest is overwritten; of sensor frames eight
+    /// times as many.
+    #[default(16)]
+    #[schemars(range(min = 2, max = 256), extend("x-unit" = "blocks"))]
     pub buffer: usize,
     /// Blocks kept for a reader that connects late.
+    #[default(1)]
+    #[schemars(range(min = 0, max = 8), extend("x-unit" = "blocks"))]
     pub history: usize,
-    /// Readers of one topic.
+    /// Readers of one topic, observers included.
+    #[default(8)]
+    #[schemars(range(min = 4, max = 32), extend("x-unit" = "readers"))]
     pub max_subscribers: usize,
 }
 

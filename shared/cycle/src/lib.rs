@@ -23,6 +23,7 @@ pub mod port;
 pub mod recorder;
 pub mod report;
 pub mod serve;
+pub mod service;
 pub mod shed;
 pub mod signal;
 pub mod source;

@@ -1,19 +1,19 @@
 //! What a service does about its own missed deadlines.
 
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// What a service does when a deadline passes before its block is out. It is always counted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnMiss {
     /// Nothing more: readers see silence.
     Count,
-    /// Publishes the prediction at once, without the input that is missing. A source has none and
-    /// only counts.
+    /// Publishes the prediction at once, without the input that is missing. A source predicts
+    /// nothing and only counts.
     #[default]
     Predict,
-    /// As `predict`, and declares itself degraded until [`IN_TIME_AGAIN`] cycles in a row were in
-    /// time.
+    /// As `predict`, and the service calls itself degraded until 100 cycles in a row are in time.
     Degrade,
     /// Ends the service, and with it the graph: the robot stops, as no action is valid any more.
     Stop,

@@ -5,6 +5,9 @@
 //! output follow its input. A process that has died is the launcher's to see; this finds the ones
 //! that hang, are stopped, or go on repeating themselves.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 use vigil_blocks::{Degraded, Health, ServiceState};
 
 /// Window in which missed deadlines are counted, ns.
@@ -45,18 +48,51 @@ impl Supervision {
     }
 }
 
-/// When a service counts as failed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
-    /// Time to the first report, ns.
-    pub start_up_ns: u64,
-    /// Longest silence, ns; 0 for no such supervision.
-    pub alive_ns: u64,
-    /// Longest time that the output may stand still while the input moves on, ns; 0 for no such
-    /// supervision.
-    pub logical_ns: u64,
-    /// Share of missed deadlines in one second, 0 to 1; 0 for no such supervision.
-    pub missed_share: f64,
+/// When a service that lives counts as failed. It is then ended and restarted, within the bounds of
+/// `[restart]`.
+#[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// Time that all services may take until the first action comes back, and a restarted one until
+    /// it cycles.
+    #[default(20.0)]
+    #[schemars(range(min = 0.1, max = 600.0))]
+    pub startup_s: f64,
+    /// Longest silence of a service that cycles; a healthy one reports 20 times a second.
+    #[default(2.0)]
+    #[schemars(range(min = 0.3, max = 60.0), extend("x-off" = 0))]
+    pub alive_s: f64,
+    /// Longest time for which a service may publish without following its input, while that moves
+    /// on.
+    #[default(2.0)]
+    #[schemars(range(min = 0.2, max = 60.0), extend("x-off" = 0))]
+    pub logical_s: f64,
+    /// Share of the deadlines of one second whose miss is reported as failed. Nothing is restarted
+    /// for it, as that would cost more deadlines.
+    #[default(50.0)]
+    #[schemars(range(min = 1.0, max = 100.0), extend("x-off" = 0))]
+    pub deadline_percent: f64,
+}
+
+/// The settings in the units of Health; 0 for no such supervision.
+#[derive(Debug, Clone, Copy)]
+struct Limits {
+    start_up_ns: u64,
+    alive_ns: u64,
+    logical_ns: u64,
+    missed_share: f64,
+}
+
+impl Limits {
+    fn new(settings: &Settings) -> Self {
+        let ns = |s: f64| (s * 1e9).round() as u64;
+        Self {
+            start_up_ns: ns(settings.startup_s),
+            alive_ns: ns(settings.alive_s),
+            logical_ns: ns(settings.logical_s),
+            missed_share: settings.deadline_percent * 1e-2,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -99,13 +135,13 @@ pub struct Watchdog {
 impl Watchdog {
     /// A watchdog over `count` services that start at `now_ns`.
     #[must_use]
-    pub fn new(limits: Limits, count: usize, now_ns: u64) -> Self {
+    pub fn new(settings: &Settings, count: usize, now_ns: u64) -> Self {
         let watched = Peer {
             started_ns: now_ns,
             ..Peer::default()
         };
         Self {
-            limits,
+            limits: Limits::new(settings),
             services: vec![watched; count],
             looked_ns: now_ns,
             is_blind: false,
@@ -244,11 +280,11 @@ mod tests {
     use super::*;
 
     const MS: u64 = 1_000_000;
-    const LIMITS: Limits = Limits {
-        start_up_ns: 3000 * MS,
-        alive_ns: 500 * MS,
-        logical_ns: 400 * MS,
-        missed_share: 0.5,
+    const SETTINGS: Settings = Settings {
+        startup_s: 3.0,
+        alive_s: 0.5,
+        logical_s: 0.4,
+        deadline_percent: 50.0,
     };
 
     /// A graph of three services that report every 50 ms and answer one frame in that time.
@@ -267,7 +303,7 @@ mod tests {
                 health.state = ServiceState::Running as u32;
             }
             Self {
-                watchdog: Watchdog::new(LIMITS, 3, 0),
+                watchdog: Watchdog::new(&SETTINGS, 3, 0),
                 now_ns: 0,
                 health,
             }

@@ -1,6 +1,6 @@
 //! Decisions about exceptions of the navigation: states are told by symptoms and outcomes.
 
-use crate::settings;
+use crate::settings::Settings;
 use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
 use vigil_pomdp::policy::choose_among;
 use vigil_pomdp::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
@@ -59,7 +59,7 @@ impl Exceptions {
         model: Pomdp,
         solved: Option<&PointBased>,
         tree: &FaultTree,
-        settings: &settings::Supervisor,
+        settings: &Settings,
         blind_after_misses: u32,
     ) -> Result<Self, SupervisorError> {
         mapping::check_size(&model)?;

@@ -1,6 +1,6 @@
 //! Decisions about the leaves of the fault tree: states are told by the identifier.
 
-use crate::settings;
+use crate::settings::Settings;
 use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
 use vigil_pomdp::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
 use vigil_robot::Description;
@@ -56,7 +56,7 @@ impl Leaves {
         solved: Option<&PointBased>,
         tree: &FaultTree,
         robot: &Description,
-        settings: &settings::Supervisor,
+        settings: &Settings,
         compensation: Vec<Compensation>,
         blind_after_misses: u32,
     ) -> Result<Self, SupervisorError> {

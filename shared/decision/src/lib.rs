@@ -11,7 +11,7 @@ mod mapping;
 mod observations;
 mod policy;
 mod restraint;
-pub mod settings;
+mod settings;
 mod silence;
 mod supervisor;
 mod told;
@@ -19,4 +19,5 @@ mod watch;
 
 pub use fused::fused_alarm;
 pub use mapping::{Compensation, SupervisorError};
+pub use settings::{Evidence, Gate, Recovery, RecoveryAction, Settings};
 pub use supervisor::{Inputs, Supervisor};

@@ -1,6 +1,6 @@
 //! The policy that the settings name.
 
-use crate::settings;
+use crate::settings::{self, Settings};
 use vigil_pomdp::mdp::Solution;
 use vigil_pomdp::policy::{Dual, Gate, Information, Measure, PolicyKind};
 use vigil_pomdp::{Decider, PointBased, Policy, Pomdp, QMdp};
@@ -13,7 +13,7 @@ pub(crate) fn decider(
     model: &Pomdp,
     solution: &Solution,
     solved: Option<&PointBased>,
-    settings: &settings::Supervisor,
+    settings: &Settings,
 ) -> Result<Decider, SupervisorError> {
     let kind: PolicyKind = settings.policy.parse()?;
     let allowed = information_actions(model, settings)?;
@@ -47,7 +47,7 @@ impl Worth {
     }
 }
 
-fn dual(information: Information, settings: &settings::Supervisor, allowed: Vec<usize>) -> Dual {
+fn dual(information: Information, settings: &Settings, allowed: Vec<usize>) -> Dual {
     if settings.as_published {
         return Dual::as_published(information, settings.threshold);
     }
@@ -64,10 +64,7 @@ fn dual(information: Information, settings: &settings::Supervisor, allowed: Vec<
 }
 
 /// Indices of the actions that may be taken for information.
-fn information_actions(
-    model: &Pomdp,
-    settings: &settings::Supervisor,
-) -> Result<Vec<usize>, SupervisorError> {
+fn information_actions(model: &Pomdp, settings: &Settings) -> Result<Vec<usize>, SupervisorError> {
     let index = |name: &String| {
         let found = model.actions().iter().position(|action| action == name);
         found.ok_or_else(|| SupervisorError::InformationAction {

@@ -1,101 +1,95 @@
-//! `[supervisor]`: the decision system.
+//! What the decision obeys: `[supervisor]` of a graph file.
 
 use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 use vigil_blocks::RecoveryKind;
 
-use serde::Deserialize;
-
 /// The decision system.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Supervisor {
-    /// What the decision model's states are told by: `faults`, if they are the leaves of the fault
-    /// tree; `symptoms`, if its observations are sets of symptoms and outcomes (`EPM_LD`, `none`).
+pub struct Settings {
+    /// What updates the belief over the decision model's states: `faults` if they are the leaves of
+    /// the fault tree, `symptoms` if the model's observations are sets of symptoms and outcomes
+    /// (`EPM_LD`, `none`).
     pub evidence: Evidence,
     /// With `symptoms`: the state that means a hardware fault; the identifier's belief in any fault
-    /// of its tree is soft evidence for it. Default: none, the identifier is then not heard.
+    /// of its tree is soft evidence for it. Without one the identifier is not used.
     pub hardware_state: Option<String>,
     /// With `hardware_state`: the state of a robot that is lost. What the identifier calls unknown
     /// is a fault that nobody has modelled, or a pose that jumped: soft evidence for both states.
-    /// Default: none, the unknown is then a hardware fault.
+    /// Without one the unknown is a hardware fault.
     pub lost_state: Option<String>,
     /// Policy: `qmdp`, `mls` (the best action of the most likely state), `av` (action voting),
     /// `fib` (fast informed bound), or one of these with dual control, which gathers information
     /// while the belief is too uncertain: `dm-X` about the state, `adm-X` about the best action.
     /// Or `point-based`, solved beforehand: see `policy_file`.
+    #[default = "qmdp"]
     pub policy: String,
     /// With `point-based`, and only then: file that `vigil pomdp solve MODEL --out FILE` has
     /// written for the decision model; relative to the graph file.
     pub policy_file: Option<String>,
-    /// Dual control: information is gathered above this entropy, 0 (certain) to 1; 1 never.
+    /// Dual control: information is gathered above this entropy, where 0 is certain; 1: never.
+    #[default(0.5)]
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub threshold: f64,
-    /// Dual control: whose entropy the threshold is for, `state` or `action`; default `state` for
-    /// `dm-X`, `action` for `adm-X`.
+    /// Dual control: whose entropy the threshold is for; `state` for `dm-X` and `action` for
+    /// `adm-X` unless given.
     pub gate: Option<Gate>,
     /// Dual control: actions of the decision model that may be taken for information. Required by
     /// `dm-X` and `adm-X`: a restart or a call for help must not be made merely to know more.
     pub information_actions: Vec<String>,
-    /// Dual control: after so many steps for information in a row without falling entropy, X acts
-    /// until it has fallen, 0 to 1000; 0 never.
+    /// Dual control: after this many steps for information in a row without falling entropy, X acts
+    /// until it has fallen; 0: never.
+    #[default(5)]
+    #[schemars(range(min = 0, max = 1000), extend("x-unit" = "steps"))]
     pub stall_guard_steps: u32,
     /// Dual control as published in 2002: gated on the state's entropy, any action may be taken
-    /// for information, no guard. Default false.
+    /// for information, no guard.
     pub as_published: bool,
-    /// Interval between decision epochs, ms, 1 to 60000. A change of the diagnosed mode opens an
-    /// epoch at once. With `symptoms`, the longest epoch, from 1000: an outcome or a new symptom
-    /// ends it too; an action that the robot says is running has until `action_max_s`.
+    /// Interval between decision epochs. A change of the diagnosed mode opens an epoch at once.
+    /// With `symptoms` this is the longest epoch, at least 1000: an outcome or a new symptom ends
+    /// it too; an action that the robot says is running has until `action_max_s`.
+    #[default(100.0)]
+    #[schemars(range(min = 1.0, max = 60_000.0))]
     pub epoch_ms: f64,
-    /// With `symptoms`: an action that the robot says is running counts as failed after so long, s,
-    /// 1 to 3600, and no less than the longest that `[navigation]` allows. Waiting for help has no
-    /// limit.
+    /// With `symptoms`: an action that the robot says is running counts as failed after this long,
+    /// no less than the longest that `[navigation]` allows. Waiting for help has no limit.
+    #[default(60.0)]
+    #[schemars(range(min = 1.0, max = 3600.0))]
     pub action_max_s: f64,
-    /// Factor on the speed of `go_on` until the detector is armed, 0 to 1: before that no alarm can
-    /// rise, and a fault would go unseen.
+    /// Factor on the speed of `go_on` until the detector is armed: before that no alarm can rise.
+    #[default(0.5)]
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub arming_speed_scale: f64,
     /// With `faults`: once `go_on` was left, it is taken again after it has been the best action
-    /// for so long without a break, s, 0 to 600. More cautious actions are taken at once.
+    /// for this long without a break. More cautious actions are taken at once.
+    #[default(2.0)]
+    #[schemars(range(min = 0.0, max = 600.0))]
     pub hold_s: f64,
-    /// Validity of a published action, as a multiple of the period, 1 to 1000 (at least 20 ms).
+    /// Validity of a published action, as a multiple of the period; 20 ms at least.
+    #[default(10.0)]
+    #[schemars(range(min = 1.0, max = 1000.0), extend("x-unit" = "periods"))]
     pub validity_periods: f64,
     /// What each action of the decision model makes the robot do, by the action's name.
     pub actions: BTreeMap<String, RecoveryAction>,
 }
 
-impl Default for Supervisor {
-    fn default() -> Self {
-        Self {
-            evidence: Evidence::Faults,
-            hardware_state: None,
-            lost_state: None,
-            policy: "qmdp".into(),
-            policy_file: None,
-            threshold: 0.5,
-            gate: None,
-            information_actions: Vec::new(),
-            stall_guard_steps: 5,
-            as_published: false,
-            epoch_ms: 100.0,
-            action_max_s: 60.0,
-            arming_speed_scale: 0.5,
-            hold_s: 2.0,
-            validity_periods: 10.0,
-            actions: BTreeMap::new(),
-        }
-    }
-}
-
-/// What the decision model's states are told by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+/// What updates the belief over the decision model's states.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Evidence {
     /// The identifier's belief over the leaves of the fault tree.
+    #[default]
     Faults,
     /// Symptoms and outcomes of actions.
     Symptoms,
 }
 
 /// Whose entropy decides whether information is gathered.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Gate {
     /// That of the belief over states.
@@ -105,18 +99,20 @@ pub enum Gate {
 }
 
 /// What an action makes the robot do.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RecoveryAction {
     /// Kind of the recovery.
     pub kind: Recovery,
-    /// Factor on the commanded speed, 0 to 1; default 1, 0.5 to `slow_down`, 0.7 to `compensate`, 0
-    /// for what is done standing: `stop`, `call_for_help`, `new_path`, `relocalise`, `give_up`.
+    /// Factor on the commanded speed. Unless given: 0.5 for `slow_down`, 0.7 for `compensate`, 0
+    /// for what is done standing (`stop`, `call_for_help`, `new_path`, `relocalise`, `give_up`),
+    /// else 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub speed_scale: Option<f64>,
 }
 
 /// Kind of a recovery action; see `vigil_blocks::RecoveryKind`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Recovery {
     /// Drive as planned.

@@ -1,6 +1,6 @@
 //! One decision cycle.
 
-use crate::settings;
+use crate::settings::{self, Settings};
 use vigil_blocks::{Action, DetectionBelief, Entry, FaultBelief};
 use vigil_pomdp::{PointBased, Pomdp};
 use vigil_robot::Description;
@@ -49,7 +49,7 @@ impl Supervisor {
         solved: Option<&PointBased>,
         tree: &FaultTree,
         robot: &Description,
-        settings: &settings::Supervisor,
+        settings: &Settings,
         compensation: Vec<Compensation>,
         blind_after_misses: u32,
     ) -> Result<Self, SupervisorError> {

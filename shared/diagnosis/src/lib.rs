@@ -3,4 +3,6 @@
 
 pub mod detect;
 pub mod identify;
-pub mod settings;
+mod sensors;
+
+pub use sensors::Sensors;

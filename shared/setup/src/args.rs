@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use vigil_cycle::serve::Leave;
+use vigil_diagnosis::identify::IdentifierFilter;
 
-use crate::load::{Setup, SetupError, load_graph};
-use crate::schema::{IdentifierFilter, Source};
+use crate::graph_file::Source;
+use crate::load::{Setup, load_graph};
+use crate::problem::SetupError;
 
 /// Which graph, and what to change in it for this start.
 #[derive(Debug, Clone, Default, PartialEq, clap::Args)]
@@ -25,7 +27,8 @@ pub struct GraphArgs {
     #[arg(long, value_name = "NAME")]
     pub graph: Option<String>,
     /// Seed; replaces `graph.seed`.
-    #[arg(long, value_name = "S")]
+    // A TOML file holds no larger one.
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub seed: Option<u64>,
     /// Identification filter; replaces `identifier.filter`.
     #[arg(long, value_name = "NAME")]

@@ -1,14 +1,15 @@
-//! Range and cross-field rules, beyond what the schema's types can say.
+//! Rules that span keys, rooms or the machine, beyond the ranges of single values.
 
 use std::path::Path;
 
-use vigil_blocks::{PARTICLE_CAPACITY, WHEELS};
+use vigil_blocks::WHEELS;
+use vigil_cycle::service;
 use vigil_robot::description::Kinematics;
 use vigil_robot::kinematics::GeometryError;
 use vigil_robot::slip::SlipModel;
 use vigil_robot::{AlarmError, Description, RobotModel, Tolerance};
 
-use crate::schema::{GraphFile, PARTICLES, Service, Socket, Source};
+use crate::graph_file::{GraphFile, Socket, Source};
 
 mod navigation;
 mod supervisor;
@@ -32,134 +33,11 @@ pub(crate) fn graph(
             format!("'{name}' is not a name: allowed are {allowed}"),
         );
     }
-    let mut range = |key: &str, value: f64, low: f64, high: f64| {
-        if !(low..=high).contains(&value) {
-            report(
-                key,
-                format!("{value} is out of range: allowed is {low} to {high}"),
-            );
-        }
-    };
-    range("graph.rate_hz", file.graph.rate_hz, 1.0, 10_000.0);
-    range("transport.buffer", file.transport.buffer as f64, 2.0, 256.0);
-    range("transport.history", file.transport.history as f64, 0.0, 8.0);
-    range(
-        "transport.max_subscribers",
-        file.transport.max_subscribers as f64,
-        4.0,
-        32.0,
-    );
-    simulator_ranges(file, &mut range);
-    filter_ranges(file, &mut range);
-    range(
-        "restart.max_restarts",
-        f64::from(file.restart.max_restarts),
-        0.0,
-        100.0,
-    );
-    range("restart.window_s", file.restart.window_s, 1.0, 3600.0);
-    range("restart.delay_ms", file.restart.delay_ms, 0.0, 10_000.0);
-    watchdog_ranges(file, &mut range);
     services(file, &mut report);
     sensor(file, path, &mut report);
     drive(file, robot, &mut report);
     navigation::check(file, robot, &mut report);
     supervisor::check(file, &mut report);
-}
-
-fn watchdog_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
-    let watchdog = &file.watchdog;
-    range("watchdog.startup_s", watchdog.startup_s, 0.1, 600.0);
-    let mut unless_off = |key: &str, value: f64, low: f64, high: f64| {
-        if value != 0.0 {
-            range(key, value, low, high);
-        }
-    };
-    unless_off("watchdog.alive_s", watchdog.alive_s, 0.3, 60.0);
-    unless_off("watchdog.logical_s", watchdog.logical_s, 0.2, 60.0);
-    let percent = watchdog.deadline_percent;
-    unless_off("watchdog.deadline_percent", percent, 1.0, 100.0);
-}
-
-fn simulator_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
-    let simulator = &file.simulator;
-    range("simulator.friction", simulator.friction, 0.1, 2.0);
-    range(
-        "simulator.shear_modulus",
-        simulator.shear_modulus,
-        0.02,
-        2.0,
-    );
-    range(
-        "simulator.friction_scatter",
-        simulator.friction_scatter,
-        0.0,
-        0.5,
-    );
-    range(
-        "simulator.scatter_length_m",
-        simulator.scatter_length_m,
-        0.01,
-        10.0,
-    );
-    range("simulator.lag_s", simulator.lag_s, 0.0, 1.0);
-    range("simulator.noise_scale", simulator.noise_scale, 0.0, 10.0);
-}
-
-fn filter_ranges(file: &GraphFile, range: &mut impl FnMut(&str, f64, f64, f64)) {
-    range(
-        "detector.false_alarm_interval_h",
-        file.detector.false_alarm_interval_h,
-        0.01,
-        1e4,
-    );
-    range(
-        "detector.fault_rate_1_h",
-        file.detector.fault_rate_1_h,
-        1e-9,
-        3600.0,
-    );
-    let particles = file.identifier.particles.unwrap_or(PARTICLES);
-    range(
-        "identifier.particles",
-        particles as f64,
-        32.0,
-        PARTICLE_CAPACITY as f64,
-    );
-    range("identifier.ring_s", file.identifier.ring_s, 0.5, 30.0);
-    range("identifier.p_unknown", file.identifier.p_unknown, 0.0, 0.5);
-    range(
-        "supervisor.epoch_ms",
-        file.supervisor.epoch_ms,
-        1.0,
-        60_000.0,
-    );
-    range(
-        "supervisor.action_max_s",
-        file.supervisor.action_max_s,
-        1.0,
-        3600.0,
-    );
-    range(
-        "supervisor.validity_periods",
-        file.supervisor.validity_periods,
-        1.0,
-        1000.0,
-    );
-    range("supervisor.threshold", file.supervisor.threshold, 0.0, 1.0);
-    let arming = file.supervisor.arming_speed_scale;
-    range("supervisor.arming_speed_scale", arming, 0.0, 1.0);
-    range("supervisor.hold_s", file.supervisor.hold_s, 0.0, 600.0);
-    range(
-        "supervisor.stall_guard_steps",
-        f64::from(file.supervisor.stall_guard_steps),
-        0.0,
-        1000.0,
-    );
-    for (name, action) in &file.supervisor.actions {
-        let key = format!("supervisor.actions.{name}.speed_scale");
-        range(&key, action.speed_scale.unwrap_or(1.0), 0.0, 1.0);
-    }
 }
 
 fn services(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
@@ -172,7 +50,11 @@ fn services(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let online = online_cores().unwrap_or_else(|| (0..cores).collect());
     for (name, service) in stages {
-        service_ranges(name, service, &online, report);
+        if !online.contains(&service.core) {
+            let core = service.core;
+            let message = format!("core {core} does not exist: this machine has {online:?}");
+            report(&format!("services.{name}.core"), message);
+        }
         spin((name, service), &stages, file.graph.rate_hz, report);
     }
     for pair in stages.windows(2) {
@@ -191,21 +73,22 @@ fn services(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
 /// One that spins keeps the others off its core, and a spin of more than a fifth of the time would
 /// come near to what the kernel takes from real-time threads by force.
 fn spin(
-    (name, service): (&str, &Service),
-    all: &[(&str, &Service)],
+    (name, service): (&str, &service::Settings),
+    all: &[(&str, &service::Settings)],
     rate_hz: f64,
     report: &mut impl FnMut(&str, String),
 ) {
     let (key, spin_us) = (format!("services.{name}.spin_us"), service.spin_us);
     let longest_us = 0.2e6 / rate_hz;
-    if !(0.0..=longest_us).contains(&spin_us) {
+    if spin_us > longest_us {
         let allowed = format!("0 to {longest_us}, a fifth of the period");
         report(
             &key,
             format!("{spin_us} is out of range: allowed is {allowed}"),
         );
     }
-    let shares = |(other, o): &&(&str, &Service)| *other != name && o.core == service.core;
+    let shares =
+        |(other, o): &&(&str, &service::Settings)| *other != name && o.core == service.core;
     if let Some((other, _)) = all.iter().find(shares).filter(|_| spin_us > 0.0) {
         let core = service.core;
         report(
@@ -215,30 +98,6 @@ fn spin(
             ),
         );
     }
-}
-
-fn service_ranges(
-    name: &str,
-    service: &Service,
-    online: &[usize],
-    report: &mut impl FnMut(&str, String),
-) {
-    if !online.contains(&service.core) {
-        let message = format!(
-            "core {} does not exist: this machine has {online:?}",
-            service.core
-        );
-        report(&format!("services.{name}.core"), message);
-    }
-    let mut range = |key: &str, value: f64, low: f64, high: f64| {
-        if !(low..=high).contains(&value) {
-            let message = format!("{value} is out of range: allowed is {low} to {high}");
-            report(&format!("services.{name}.{key}"), message);
-        }
-    };
-    range("priority", f64::from(service.priority), 0.0, 90.0);
-    range("deadline_percent", service.deadline_percent, 1.0, 100.0);
-    range("budget_percent", service.budget_percent, 1.0, 100.0);
 }
 
 fn sensor(file: &GraphFile, path: &Path, report: &mut impl FnMut(&str, String)) {
@@ -267,14 +126,6 @@ fn sensor(file: &GraphFile, path: &Path, report: &mut impl FnMut(&str, String)) 
             report(
                 "sensor.runs",
                 format!("'{runs}' is not understood: allowed are {allowed}"),
-            );
-        }
-        if let Some(speed) = sensor.speed
-            && !(0.01..=100.0).contains(&speed)
-        {
-            report(
-                "sensor.speed",
-                format!("{speed} is out of range: allowed is 0.01 to 100"),
             );
         }
     }
@@ -321,20 +172,19 @@ fn drive(file: &GraphFile, robot: Option<&Description>, report: &mut impl FnMut(
     let Some(robot) = robot else { return };
     let (curvature, speed) = (robot.limits.curvature_1_m, robot.limits.speed_m_s);
     for (i, segment) in file.drive.iter().enumerate() {
-        let mut range = |key: &str, value: f64, low: f64, high: f64| {
-            if !(low..=high).contains(&value) {
+        let mut limit = |key: &str, value: f64, low: f64, high: f64| {
+            if value < low || value > high {
                 let message = format!("{value} is out of range: allowed is {low} to {high}");
                 report(&format!("drive.{i}.{key}"), message);
             }
         };
-        range("duration_s", segment.duration_s, 0.01, 1e6);
-        range(
+        limit(
             "curvature_1_m",
             segment.curvature_1_m,
             -curvature,
             curvature,
         );
-        range("speed_m_s", segment.speed_m_s, 0.0, speed);
+        limit("speed_m_s", segment.speed_m_s, f64::MIN, speed);
     }
 }
 

@@ -1,19 +1,20 @@
-//! Configuration: schema, reading, validation with precise messages, defaults.
-//!
-//! [`GraphArgs`] are the command-line options that every program of the graph shares;
-//! [`GraphArgs::load`] reads the graph file and the files it names, applies the options, and checks
-//! everything before anything starts. All problems are reported at once, each with file, line,
-//! key and what is allowed.
+#![doc = include_str!("../README.md")]
 
 mod args;
 mod check;
+mod document;
+pub mod graph_file;
+mod hash;
 mod load;
 mod locate;
 mod place;
-pub mod schema;
-mod solved;
+mod problem;
+mod ranges;
+mod schema;
 
 pub use args::{GraphArgs, ServiceArgs};
-pub use load::{
-    Problem, Setup, SetupError, load_decision, load_graph, load_model, load_robot, load_tree,
-};
+pub use document::Document;
+pub use load::{Setup, load_decision, load_graph, load_model, load_robot, load_tree};
+pub use problem::{Problem, SetupError};
+pub use ranges::{OutOfRange, Ranges};
+pub use schema::schema;

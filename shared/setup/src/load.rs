@@ -1,20 +1,20 @@
-//! Reads the graph file and the files that it names.
+//! From what was read to a checked configuration.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 
-use serde::de::DeserializeOwned;
 use vigil_blocks::fnv1a;
+use vigil_pomdp::policy_file::PolicyFile;
 use vigil_pomdp::{PointBased, Pomdp};
 use vigil_robot::FaultTree;
 use vigil_robot::learned::ModelError;
 use vigil_robot::tree::Node;
 use vigil_robot::{Description, RobotModel};
 
-use crate::check;
-use crate::locate::{line_of_byte, line_of_key};
-use crate::schema::{GraphFile, TreeFile};
-use crate::solved;
+use crate::document::{Document, TextFile, resolve};
+use crate::graph_file::{GraphFile, TreeFile};
+use crate::problem::{Problem, SetupError};
+use crate::schema::schema;
+use crate::{check, hash, ranges};
 
 /// A checked configuration.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,114 +51,76 @@ impl Setup {
     }
 }
 
-/// One problem of a configuration.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
-    /// File in which it lies.
-    pub file: PathBuf,
-    /// Line, from 1; 0 if the file as a whole is meant.
-    pub line: usize,
-    /// Key, or empty.
-    pub key: String,
-    /// What is wrong and what is allowed.
-    pub message: String,
-}
-
-impl fmt::Display for Problem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.file.display())?;
-        if self.line > 0 {
-            write!(f, ":{}", self.line)?;
-        }
-        if !self.key.is_empty() {
-            write!(f, ": {}", self.key)?;
-        }
-        write!(f, ": {}", self.message)
-    }
-}
-
-/// Why a configuration was refused: every problem found.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}", .problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
-pub struct SetupError {
-    /// The problems, in the order of the files.
-    pub problems: Vec<Problem>,
-}
-
-impl From<Problem> for SetupError {
-    fn from(problem: Problem) -> Self {
-        Self {
-            problems: vec![problem],
-        }
-    }
-}
-
 /// Reads a graph file and the files that it names; `change` may replace values before the check.
 ///
 /// # Errors
 /// Every problem found, at once.
 pub fn load_graph(path: &Path, change: impl FnOnce(&mut GraphFile)) -> Result<Setup, SetupError> {
-    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-    let (mut file, text) = parse::<GraphFile>(&path)?;
-    change(&mut file);
-    let mut problems = Vec::new();
-    let robot_path = resolve(&path, &file.files.robot);
-    let tree_path = resolve(&path, &file.files.tree);
-    let model_path = resolve(&path, &file.files.model);
-    let decision_path = resolve(&path, &file.files.decision);
-    let robot = keep(load_robot(&robot_path), &mut problems);
-    let tree = keep(load_tree(&tree_path), &mut problems);
-    let model = keep(load_model(&model_path, robot.as_ref()), &mut problems);
-    let decision = keep(load_decision(&decision_path), &mut problems);
-    let at = |key: &str, message| at_key(&path, &text, key, message);
-    check::graph(&file, robot.as_ref(), &path, |key, message| {
-        problems.push(at(key, message));
-    });
-    if let Some(model) = model.as_ref().filter(|_| problems.is_empty()) {
-        check::alarm(&file, model, |key, message| problems.push(at(key, message)));
-    }
-    let mut solved = None;
-    if let (Some(name), Some(decision)) = (&file.supervisor.policy_file, &decision)
-        && problems.is_empty()
-    {
-        match solved::load(&resolve(&path, name), decision) {
-            Ok(loaded) => solved = Some(loaded),
-            Err(message) => problems.push(at("supervisor.policy_file", message)),
-        }
-    }
-    let (Some(robot), Some(tree), Some(model), Some(decision), true) =
-        (robot, tree, model, decision, problems.is_empty())
-    else {
-        return Err(SetupError { problems });
-    };
-    let text = format!("{file:?}{robot:?}");
-    let (policy, policy_hash) = solved.unzip();
-    let hash = [tree.hash(), model.hash(), decision.hash()]
-        .into_iter()
-        .chain(policy_hash)
-        .fold(fnv1a::hash(fnv1a::BASIS, text.as_bytes()), fnv1a::hash_u64);
-    Ok(Setup {
-        file,
-        path,
-        robot,
-        robot_path,
-        tree,
-        model,
-        model_path,
-        decision,
-        decision_path,
-        policy,
-        hash,
-    })
+    Document::read(path, change)?.check()
 }
 
-/// A problem of the value at `key` of the file `text`.
-fn at_key(path: &Path, text: &str, key: &str, message: String) -> Problem {
-    Problem {
-        file: path.to_path_buf(),
-        line: line_of_key(text, key),
-        key: key.to_owned(),
-        message,
+impl Document {
+    /// Checks everything: each file, each value against its range, and what spans rooms.
+    ///
+    /// # Errors
+    /// Every problem found, at once.
+    pub fn check(&self) -> Result<Setup, SetupError> {
+        let (file, path) = (&self.file, &self.graph.path);
+        let mut problems = Vec::new();
+        let robot = keep(robot(&self.robot), &mut problems);
+        let tree = keep(tree(&self.tree), &mut problems);
+        let model = keep(model(&self.model, robot.as_ref()), &mut problems);
+        let decision = keep(decision(&self.decision), &mut problems);
+        let text = self.graph.text()?;
+        let at = |key: &str, message| Problem::at_key(path, text, key, message);
+        match toml::Value::try_from(file) {
+            Ok(value) => ranges::check(&schema(), &value, "", &mut |key, message| {
+                problems.push(at(key, message));
+            }),
+            Err(error) => problems.push(Problem::at_line(path, 0, error.to_string())),
+        }
+        check::graph(file, robot.as_ref(), path, |key, message| {
+            problems.push(at(key, message));
+        });
+        if let Some(model) = model.as_ref().filter(|_| problems.is_empty()) {
+            check::alarm(file, model, |key, message| problems.push(at(key, message)));
+        }
+        let mut solved = None;
+        if let (Some(policy), Some(decision)) = (&self.policy, &decision)
+            && problems.is_empty()
+        {
+            match solved_policy(policy, decision) {
+                Ok(policy) => solved = Some(policy),
+                Err(message) => problems.push(at("supervisor.policy_file", message)),
+            }
+        }
+        let (Some(robot), Some(tree), Some(model), Some(decision), true) =
+            (robot, tree, model, decision, problems.is_empty())
+        else {
+            return Err(SetupError { problems });
+        };
+        let unwritable = |error: serde_json::Error| Problem::at_line(path, 0, error.to_string());
+        let values = hash::canonical(fnv1a::BASIS, file)
+            .and_then(|values| hash::canonical(values, &robot))
+            .map_err(unwritable)?;
+        let (policy, policy_hash) = solved.unzip();
+        let hash = [tree.hash(), model.hash(), decision.hash()]
+            .into_iter()
+            .chain(policy_hash)
+            .fold(values, fnv1a::hash_u64);
+        Ok(Setup {
+            file: file.clone(),
+            path: path.clone(),
+            robot,
+            robot_path: self.robot.path.clone(),
+            tree,
+            model,
+            model_path: self.model.path.clone(),
+            decision,
+            decision_path: self.decision.path.clone(),
+            policy,
+            hash,
+        })
     }
 }
 
@@ -172,10 +134,15 @@ fn keep<T>(result: Result<T, SetupError>, problems: &mut Vec<Problem>) -> Option
 /// # Errors
 /// Every problem found, at once.
 pub fn load_robot(path: &Path) -> Result<Description, SetupError> {
-    let (robot, text) = parse::<Description>(path)?;
+    robot(&TextFile::read(path.to_path_buf()))
+}
+
+fn robot(file: &TextFile) -> Result<Description, SetupError> {
+    let robot: Description = file.parse()?;
+    let text = file.text()?;
     let mut problems = Vec::new();
     check::robot(&robot, |key, message| {
-        problems.push(at_key(path, &text, key, message))
+        problems.push(Problem::at_key(&file.path, text, key, message));
     });
     if problems.is_empty() {
         Ok(robot)
@@ -189,24 +156,25 @@ pub fn load_robot(path: &Path) -> Result<Description, SetupError> {
 /// # Errors
 /// The first problem found.
 pub fn load_tree(path: &Path) -> Result<FaultTree, SetupError> {
-    let (file, text) = parse::<TreeFile>(path)?;
-    let problem = |key: &str, message| at_key(path, &text, key, message);
-    let mut nodes = Vec::with_capacity(file.node.len());
-    for (i, node) in file.node.iter().enumerate() {
-        let parent = match &node.parent {
-            None => None,
-            Some(name) => Some(file.node.iter().position(|n| n.name == *name).ok_or_else(
-                || {
-                    problem(
-                        &format!("node.{i}.parent"),
-                        format!("there is no node '{name}'"),
-                    )
-                },
-            )?),
+    tree(&TextFile::read(path.to_path_buf()))
+}
+
+fn tree(file: &TextFile) -> Result<FaultTree, SetupError> {
+    let TreeFile { node: given } = file.parse()?;
+    let text = file.text()?;
+    let problem = |key: &str, message| Problem::at_key(&file.path, text, key, message);
+    let mut nodes = Vec::with_capacity(given.len());
+    for (i, node) in given.iter().enumerate() {
+        let position = |name: &String| {
+            let found = given.iter().position(|other| other.name == *name);
+            found.ok_or_else(|| {
+                let message = format!("there is no node '{name}'");
+                problem(&format!("node.{i}.parent"), message)
+            })
         };
         nodes.push(Node {
             name: node.name.clone(),
-            parent,
+            parent: node.parent.as_ref().map(position).transpose()?,
             fault: node.fault.clone(),
         });
     }
@@ -218,8 +186,12 @@ pub fn load_tree(path: &Path) -> Result<FaultTree, SetupError> {
 /// # Errors
 /// The first problem found.
 pub fn load_model(path: &Path, robot: Option<&Description>) -> Result<RobotModel, SetupError> {
-    let problem = |error: ModelError| whole_file(path, error.to_string());
-    let model = RobotModel::from_toml(&read(path)?).map_err(problem)?;
+    model(&TextFile::read(path.to_path_buf()), robot)
+}
+
+fn model(file: &TextFile, robot: Option<&Description>) -> Result<RobotModel, SetupError> {
+    let problem = |error: ModelError| Problem::at_line(&file.path, 0, error.to_string());
+    let model = RobotModel::from_toml(file.text()?).map_err(problem)?;
     robot.map_or(Ok(()), |robot| model.check_robot(robot).map_err(problem))?;
     Ok(model)
 }
@@ -229,48 +201,33 @@ pub fn load_model(path: &Path, robot: Option<&Description>) -> Result<RobotModel
 /// # Errors
 /// The first problem found.
 pub fn load_decision(path: &Path) -> Result<Pomdp, SetupError> {
-    let text = read(path)?;
-    Pomdp::parse(&text).map_err(|error| {
-        Problem {
-            file: path.to_path_buf(),
-            line: error.at.line,
-            key: String::new(),
-            message: error.message,
-        }
-        .into()
-    })
+    decision(&TextFile::read(path.to_path_buf()))
 }
 
-fn whole_file(path: &Path, message: String) -> Problem {
-    Problem {
-        file: path.to_path_buf(),
-        line: 0,
-        key: String::new(),
-        message,
+fn decision(file: &TextFile) -> Result<Pomdp, SetupError> {
+    let problem = |line, message| Problem::at_line(&file.path, line, message);
+    let model = Pomdp::parse(file.text()?);
+    Ok(model.map_err(|error| problem(error.at.line, error.message))?)
+}
+
+/// The policy of `model` in a file, and the hash of the file's bytes; or what is wrong with it.
+fn solved_policy(file: &TextFile, model: &Pomdp) -> Result<(PointBased, u64), String> {
+    let name = file.path.display();
+    let bytes = file
+        .text()
+        .map_err(|problem| problem.to_string())?
+        .as_bytes();
+    let read = PolicyFile::read(bytes, model).map_err(|error| format!("{name}: {error}"))?;
+    let policy = PointBased::new(model, &read.vectors).map_err(|e| format!("{name}: {e}"))?;
+    let (products, states) = (policy.products(), model.states().len());
+    if products > PointBased::PRODUCTS_MAX {
+        return Err(format!(
+            "{name}: a decision with its vectors and those that give every action a value, {} in \
+             all, of {states} values each, takes {products} multiplications, allowed are {}: solve \
+             with a larger --precision or a shorter --timeout",
+            products / states,
+            PointBased::PRODUCTS_MAX
+        ));
     }
-}
-
-fn resolve(graph_file: &Path, path: &str) -> PathBuf {
-    graph_file
-        .parent()
-        .unwrap_or_else(|| Path::new("."))
-        .join(path)
-}
-
-fn read(path: &Path) -> Result<String, Problem> {
-    std::fs::read_to_string(path)
-        .map_err(|error| whole_file(path, format!("cannot be read: {error}")))
-}
-
-fn parse<T: DeserializeOwned>(path: &Path) -> Result<(T, String), SetupError> {
-    let text = read(path)?;
-    let value = toml::from_str(&text).map_err(|error| Problem {
-        file: path.to_path_buf(),
-        line: error
-            .span()
-            .map_or(0, |span| line_of_byte(&text, span.start)),
-        key: String::new(),
-        message: error.message().replace('\n', " "),
-    })?;
-    Ok((value, text))
+    Ok((policy, fnv1a::hash(fnv1a::BASIS, bytes)))
 }

@@ -1,13 +1,11 @@
 //! From the configuration to what the cycle needs.
 
-use vigil_cycle::domain::Queues;
 use vigil_cycle::placement::PlacementRequest;
 use vigil_cycle::serve::{Leave, Plan};
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{Domain, PortError, Schedule};
+use vigil_cycle::{Domain, PortError, Schedule, service};
 
 use crate::load::Setup;
-use crate::schema::Service;
 
 impl Setup {
     /// Period of the schedule, ns.
@@ -18,7 +16,7 @@ impl Setup {
 
     /// Placement and deadline of a service.
     #[must_use]
-    pub const fn service(&self, name: ServiceName) -> &Service {
+    pub const fn service(&self, name: ServiceName) -> &service::Settings {
         let services = &self.file.services;
         match name {
             ServiceName::SensorSim => &services.sensor_sim,
@@ -28,23 +26,12 @@ impl Setup {
         }
     }
 
-    /// Sizes of the graph's queues.
-    #[must_use]
-    pub const fn queues(&self) -> Queues {
-        let transport = &self.file.transport;
-        Queues {
-            buffer: transport.buffer,
-            history: transport.history,
-            max_subscribers: transport.max_subscribers,
-        }
-    }
-
     /// The graph's place on this machine.
     ///
     /// # Errors
     /// [`PortError::Setup`] when no runtime folder can be made.
     pub fn domain(&self) -> Result<Domain, PortError> {
-        Domain::new(&self.file.graph.name, self.queues())
+        Domain::new(&self.file.graph.name, self.file.transport)
     }
 
     /// What the process of a service is to be, and what it is to leave behind.
@@ -55,7 +42,7 @@ impl Setup {
         Plan {
             service: name,
             graph: self.file.graph.name.clone(),
-            queues: self.queues(),
+            queues: self.file.transport,
             wanted: PlacementRequest {
                 core: service.core,
                 priority: service.priority,

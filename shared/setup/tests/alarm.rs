@@ -3,7 +3,8 @@
 mod shipped;
 
 use shipped::load;
-use vigil_setup::schema::{Form, GraphFile};
+use vigil_diagnosis::detect::Form;
+use vigil_setup::graph_file::GraphFile;
 
 #[test]
 fn an_alarm_that_could_never_rise_is_refused_with_line_key_and_bound() {

@@ -5,14 +5,15 @@ use vigil_blocks::{
     SensorFrame, SizeKind,
 };
 use vigil_decision::fused_alarm;
-use vigil_diagnosis::detect::{Detector, DetectorError};
-use vigil_diagnosis::identify::{Diagnoser, Identifier, IdentifierError, Input, Models, Watcher};
+use vigil_diagnosis::detect::{self, Detector, DetectorError};
+use vigil_diagnosis::identify::{
+    self, Diagnoser, Identifier, IdentifierError, Input, Models, Watcher,
+};
 use vigil_evaluation::scoring::field::BLIND;
 use vigil_evaluation::scoring::{MULTIPLE, Side, Taxonomy, UNKNOWN, Verdict};
 use vigil_recording::frames::Run;
 use vigil_robot::FaultTree;
 use vigil_robot::{Description, nominal};
-use vigil_setup::schema;
 
 use crate::recovery::{Recoverer, RecoveryRun};
 
@@ -50,8 +51,8 @@ impl Pipeline {
     /// [`PipelineError`] if model, robot, tree and settings do not fit together.
     pub fn new(
         models: &Models<'_>,
-        detector: &schema::Detector,
-        identifier: &schema::Identifier,
+        detector: &detect::Settings,
+        identifier: &identify::Settings,
         seed: u64,
     ) -> Result<Self, PipelineError> {
         let prior_unknown = identifier.p_unknown;
@@ -72,7 +73,7 @@ impl Pipeline {
         model: &nominal::Model,
         robot: &Description,
         tree: &FaultTree,
-        detector: &schema::Detector,
+        detector: &detect::Settings,
     ) -> Result<Self, PipelineError> {
         Ok(Self::assemble(
             Detector::nominal(model, robot, detector)?,

@@ -6,11 +6,11 @@ use serde::Deserialize;
 use serde::de::IntoDeserializer;
 use serde::de::value::{Error as Refused, StrDeserializer};
 use vigil_blocks::{Action, ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKind};
+use vigil_decision::Recovery;
 use vigil_decision::{Compensation, Inputs, Supervisor, SupervisorError};
 use vigil_pomdp::Pomdp;
 use vigil_robot::FaultTree;
 use vigil_robot::{Description, RobotModel};
-use vigil_setup::schema::{self, Recovery};
 
 /// Misses in a row without any detection after which no belief is usable. Recorded frames have no
 /// deadlines, so none is ever missed.
@@ -22,7 +22,7 @@ pub struct Recoverer {
     model: Pomdp,
     tree: FaultTree,
     robot: Description,
-    settings: schema::Supervisor,
+    settings: vigil_decision::Settings,
     compensation: Vec<Compensation>,
 }
 
@@ -41,13 +41,13 @@ impl Recoverer {
         let named = |name: &String| {
             let word: StrDeserializer<'_, Refused> = name.as_str().into_deserializer();
             let kind = Recovery::deserialize(word).ok()?;
-            let action = schema::RecoveryAction {
+            let action = vigil_decision::RecoveryAction {
                 kind,
                 speed_scale: None,
             };
             Some((name.clone(), action))
         };
-        let actions: BTreeMap<String, schema::RecoveryAction> =
+        let actions: BTreeMap<String, vigil_decision::RecoveryAction> =
             model.actions().iter().filter_map(named).collect();
         let compensation = (0..robot.wheels.len()).map(|wheel| {
             let (curvature_gain, curvature_offset_1_m) = learned.compensation(wheel);
@@ -59,9 +59,9 @@ impl Recoverer {
         });
         let recoverer = Self {
             compensation: compensation.collect(),
-            settings: schema::Supervisor {
+            settings: vigil_decision::Settings {
                 actions,
-                ..schema::Supervisor::default()
+                ..vigil_decision::Settings::default()
             },
             tree: tree.clone(),
             robot: robot.clone(),

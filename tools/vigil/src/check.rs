@@ -12,7 +12,7 @@ use vigil_cycle::domain::shared_memory_free_bytes;
 use vigil_cycle::placement::{self, Placement, PlacementRequest};
 use vigil_cycle::topic::ServiceName;
 use vigil_recording::frames;
-use vigil_setup::schema::Source;
+use vigil_setup::graph_file::Source;
 use vigil_setup::{GraphArgs, Setup};
 
 use crate::findings::{self, Finding, Status};
@@ -204,7 +204,7 @@ fn preemption() -> Finding {
 }
 
 fn shared_memory(setup: &Setup) -> Finding {
-    let queues = setup.queues();
+    let queues = setup.file.transport;
     let frames = queues.for_topic(Topic::Sensor);
     let frames = frames.reserved_bytes(size_of::<SensorFrame>());
     let sizes = [

@@ -1,6 +1,6 @@
 //! How the robot follows, stops, looks, passes, backs and plans.
 
-use vigil_setup::schema::Navigation;
+use vigil_setup::graph_file::Navigation;
 
 use super::lane::Lane;
 use super::navigator::{Navigator, NavigatorEvent};

@@ -2,7 +2,7 @@
 //! phantoms.
 
 use vigil_robot::kinematics::wrap_angle;
-use vigil_setup::schema::{Trouble, TroubleKind};
+use vigil_setup::graph_file::{Trouble, TroubleKind};
 
 /// NavigationFaults that are due, and what they have done.
 #[derive(Debug, Clone)]

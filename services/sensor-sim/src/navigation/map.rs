@@ -1,6 +1,6 @@
 //! What stands in the world, and what the range sensor makes of it.
 
-use vigil_setup::schema::{Navigation, Obstacle};
+use vigil_setup::graph_file::{Navigation, Obstacle};
 
 use super::path::distance;
 

@@ -1,7 +1,7 @@
 //! From requested actions to commands.
 
 use vigil_blocks::{ActionOutcome, RecoveryKind, SensorFrame, Valid};
-use vigil_setup::schema::Navigation;
+use vigil_setup::graph_file::Navigation;
 
 use super::faults::NavigationFaults;
 use super::lane::Lane;

@@ -2,7 +2,7 @@
 
 use vigil_blocks::{Action, ActionOutcome, RecoveryKind, SensorFrame, Symptoms};
 use vigil_sensor_sim::{ActionGate, Navigator, NavigatorEvent, Simulation, World};
-use vigil_setup::schema::{Navigation, Obstacle, Trouble, TroubleKind};
+use vigil_setup::graph_file::{Navigation, Obstacle, Trouble, TroubleKind};
 
 /// A straight corridor of 8 m, 2.4 m wide, changed.
 fn corridor(change: impl FnOnce(&mut Navigation)) -> Navigation {

@@ -5,7 +5,7 @@ use vigil_robot::disturbance_kind::{KINDS, Place};
 use vigil_robot::injection::Change;
 use vigil_robot::{Disturbance, DisturbanceKind, Injection};
 use vigil_sensor_sim::{TrueState, World};
-use vigil_setup::schema::Simulator;
+use vigil_setup::graph_file::Simulator;
 
 use crate::rover::{all_finite, drive, measure, robot, segment, steady};
 

@@ -3,7 +3,7 @@
 use vigil_robot::FaultKind::{EncoderFrozen, EncoderNoise, EncoderZero, Stuck};
 use vigil_robot::slip::{Condition, Situation, SlipModel, Soil};
 use vigil_sensor_sim::{World, WorldError};
-use vigil_setup::schema::Simulator;
+use vigil_setup::graph_file::Simulator;
 
 use crate::rover::{NAMES, drive, even_soil, fault, measure, robot, segment, steady};
 
@@ -213,7 +213,10 @@ fn impossible_worlds_and_wheels_are_refused_by_name() {
         ..even_soil()
     };
     let refused = World::new(&robot(), &slippery, &[], 100.0, 1).unwrap_err();
-    assert_eq!(refused.to_string(), "friction is 0: allowed is 0.1 to 2");
+    assert_eq!(
+        refused.to_string(),
+        "friction: 0 is out of range: allowed is 0.1 to 2"
+    );
     for segments in [[segment(0.0, 0.0, 0.1)], [segment(f64::NAN, 0.0, 0.1)]] {
         let refused = World::new(&robot(), &even_soil(), &segments, 100.0, 1).unwrap_err();
         assert!(

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use vigil_blocks::Action;
 use vigil_robot::FaultKind;
 use vigil_sensor_sim::{ActionGate, DriveCommand, EffectiveCommand, World};
-use vigil_setup::schema::Simulator;
+use vigil_setup::graph_file::Simulator;
 
 use crate::rover::{all_finite, fault, measure, robot, segment};
 

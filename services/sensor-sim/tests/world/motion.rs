@@ -2,7 +2,7 @@
 
 use vigil_blocks::{Action, ActionOutcome, RecoveryKind};
 use vigil_sensor_sim::{ActionGate, DriveCommand, EffectiveCommand, World};
-use vigil_setup::schema::Simulator;
+use vigil_setup::graph_file::Simulator;
 
 use crate::rover::{drive, even_soil, measure, robot, segment, steady};
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use vigil_blocks::SensorFrame;
 use vigil_robot::{Description, Fault, FaultKind};
 use vigil_sensor_sim::{EffectiveCommand, World};
-use vigil_setup::schema::{DriveSegment, Simulator};
+use vigil_setup::graph_file::{DriveSegment, Simulator};
 
 pub const NAMES: [&str; 6] = ["LF", "LM", "LR", "RF", "RM", "RR"];
 

@@ -3,7 +3,7 @@
 use vigil_blocks::{SensorFrame, Valid};
 use vigil_robot::FaultKind;
 use vigil_sensor_sim::World;
-use vigil_setup::schema::Simulator;
+use vigil_setup::graph_file::Simulator;
 
 use crate::rover::{drive, fault, measure, robot, segment};
 

@@ -5,7 +5,7 @@ use vigil_blocks::{ControlMode, DetectionBelief, Entry, FaultBelief, RecoveryKin
 use vigil_cycle::allocation::allocations;
 use vigil_decision::{Compensation, Inputs, Supervisor};
 use vigil_pomdp::{Policy, Pomdp, QMdp, mdp};
-use vigil_setup::schema::GraphFile;
+use vigil_setup::graph_file::GraphFile;
 
 use crate::world::{CYCLE_NS, World, config, model};
 

@@ -3,8 +3,8 @@
 use vigil_blocks::{ActionOutcome, Entry, RecoveryKind, Symptoms};
 use vigil_cycle::allocation::allocations;
 use vigil_decision::Inputs;
+use vigil_decision::Settings;
 use vigil_pomdp::{Pomdp, Tracker};
-use vigil_setup::schema::Supervisor as Settings;
 
 use crate::told::{CYCLE_NS, FP, MODEL, ToldSupervisor, assert_near, build, settings, tracked};
 
@@ -229,9 +229,9 @@ fn what_does_not_fit_is_named() {
     assert!(same.contains("'LD_EPM' and 'EPM_LD'"), "{same}");
 }
 
-fn settings_stop() -> vigil_setup::schema::RecoveryAction {
-    vigil_setup::schema::RecoveryAction {
-        kind: vigil_setup::schema::Recovery::Stop,
+fn settings_stop() -> vigil_decision::RecoveryAction {
+    vigil_decision::RecoveryAction {
+        kind: vigil_decision::Recovery::Stop,
         speed_scale: None,
     }
 }

@@ -2,10 +2,12 @@
 
 use vigil_blocks::{ControlMode, DetectionBelief, Entry, RecoveryKind, ValueKind};
 use vigil_cycle::allocation::allocations;
+use vigil_decision::Gate;
+use vigil_decision::Settings;
 use vigil_decision::{Inputs, Supervisor};
 use vigil_pomdp::policy::{Base, Dual, PolicyName, normalised_entropy};
 use vigil_pomdp::{Pomdp, mdp};
-use vigil_setup::schema::{Gate, GraphFile, Supervisor as Settings};
+use vigil_setup::graph_file::GraphFile;
 
 use crate::world::{CYCLE_NS, World, config, model};
 
@@ -175,8 +177,7 @@ fn settings_that_do_not_fit_the_model_are_named() {
         change(&mut settings);
         let source = std::fs::read_to_string(config().join("rover.pomdp")).unwrap();
         // Without compensating there is nothing to compensate with.
-        settings.actions.get_mut("compensate").unwrap().kind =
-            vigil_setup::schema::Recovery::SlowDown;
+        settings.actions.get_mut("compensate").unwrap().kind = vigil_decision::Recovery::SlowDown;
         let model = Pomdp::parse(&source).unwrap();
         let built = Supervisor::new(model, None, &tree, &robot, &settings, Vec::new(), 10);
         built.err().unwrap().to_string()

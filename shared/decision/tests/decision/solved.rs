@@ -12,7 +12,7 @@ use vigil_decision::{Inputs, Supervisor};
 use vigil_pomdp::policy_file::PolicyFile;
 use vigil_pomdp::solver::{Options, solve};
 use vigil_pomdp::{AlphaVectors, Budget, Pomdp};
-use vigil_setup::schema::GraphFile;
+use vigil_setup::graph_file::GraphFile;
 use vigil_setup::{Setup, load_graph};
 use vigil_supervisor::assemble;
 

@@ -1,6 +1,5 @@
 //! The detector's `step`: guard, observe, monitor, alarm, report.
 
-use crate::settings;
 use vigil_blocks::{
     CHANNELS, Channel, DetectionBelief, Entry, HealthyBelief, MODE_UNKNOWN, ParticleBlock,
     Readiness, SensorFrame, Symptoms, Valid, WeightedHypothesis,
@@ -15,8 +14,10 @@ use vigil_robot::{Alarm, AlarmError, Description};
 
 use crate::detect::monitors::Monitors;
 use crate::detect::publisher::Publisher;
+use crate::detect::settings::{MonitorSettings, Settings};
 use crate::detect::sight::{self, Sight};
 use crate::detect::watch::{DetectorInput, Watch};
+use crate::sensors::Sensors;
 
 /// Without monitors, pose log-odds beyond which the detector reports an error in position: even
 /// odds, as the planner weighs the symptom by its own model.
@@ -28,14 +29,6 @@ pub enum DetectorError {
     /// The model does not fit.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A rate or an interval is not positive and finite.
-    #[error("detector.{key}: {value} is not allowed: a positive finite number")]
-    Value {
-        /// The key.
-        key: &'static str,
-        /// What was found.
-        value: f64,
-    },
     /// There is no threshold for the alarm, or it could never rise.
     #[error("detector: {0}")]
     Alarm(#[from] AlarmError),
@@ -79,17 +72,16 @@ impl Detector {
     /// calibration and `settings.false_alarm_interval_h`.
     ///
     /// # Errors
-    /// [`DetectorError`] if the model is of another robot, has no calibration for channels and
-    /// form, or a setting is out of range.
+    /// [`DetectorError`] if the model is of another robot, or has no calibration for channels and
+    /// form.
     pub fn new(
         model: &Model,
         robot: &Description,
-        settings: &settings::Detector,
+        settings: &Settings,
     ) -> Result<Self, DetectorError> {
         model.check_robot(robot)?;
         let (channels, form) = chosen(settings);
-        let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
-        let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
+        let (rate, interval_h) = (settings.fault_rate_1_h, settings.false_alarm_interval_h);
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
         let watch = Watch::Faults {
             observer: Box::new(match channels {
@@ -115,12 +107,11 @@ impl Detector {
     pub fn nominal(
         model: &nominal::Model,
         robot: &Description,
-        settings: &settings::Detector,
+        settings: &Settings,
     ) -> Result<Self, DetectorError> {
         model.check_robot(robot)?;
         let (channels, form) = chosen(settings);
-        let rate = positive("fault_rate_1_h", settings.fault_rate_1_h)?;
-        let interval_h = positive("false_alarm_interval_h", settings.false_alarm_interval_h)?;
+        let (rate, interval_h) = (settings.fault_rate_1_h, settings.false_alarm_interval_h);
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
         let watch = Watch::Nominal {
             observer: Box::new(nominal::Observer::new(robot)),
@@ -141,7 +132,7 @@ impl Detector {
         interval_s: f64,
         robot: &Description,
         alarm_log_odds: f64,
-        settings: &settings::Detector,
+        settings: &Settings,
         watch: Watch,
     ) -> Self {
         Self {
@@ -171,7 +162,7 @@ impl Detector {
     /// The same detector with monitors of the pose against the planned pose, whose symptoms take
     /// the place of its own; with `None`, as it was.
     #[must_use]
-    pub fn with_monitors(mut self, settings: Option<&settings::Monitors>) -> Self {
+    pub fn with_monitors(mut self, settings: Option<&MonitorSettings>) -> Self {
         self.monitors = settings.map(Monitors::new);
         self
     }
@@ -412,25 +403,16 @@ impl Detector {
     }
 }
 
-fn chosen(settings: &settings::Detector) -> (Channels, Form) {
+fn chosen(settings: &Settings) -> (Channels, Form) {
     (settings.sensors.into(), settings.form.into())
 }
 
 /// What frames of `robot` must carry for these settings.
-fn sight_of(robot: &Description, settings: &settings::Detector) -> Sight {
+fn sight_of(robot: &Description, settings: &Settings) -> Sight {
     let channels = match settings.sensors {
-        settings::Sensors::Pose => Valid::POSE,
-        settings::Sensors::PoseEncoders | settings::Sensors::All => {
-            sight::all_channels(robot.wheels.len())
-        }
+        Sensors::Pose => Valid::POSE,
+        Sensors::PoseEncoders | Sensors::All => sight::all_channels(robot.wheels.len()),
     };
     let axes = 0..robot.command.len();
     Sight::new(channels, axes.fold(0, |bits, i| bits | Valid::command(i)))
-}
-
-fn positive(key: &'static str, value: f64) -> Result<f64, DetectorError> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(value);
-    }
-    Err(DetectorError::Value { key, value })
 }

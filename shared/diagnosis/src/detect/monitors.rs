@@ -1,6 +1,6 @@
 //! Monitors of the pose against the planned pose: EPS, EPM, LD and SD of Verma, Fernandez and
 //! Simmons (2002), section 3. The paper names them; the rules are ours, thresholds those of
-//! [`settings::Monitors`]:
+//! [`MonitorSettings`]:
 //!
 //! - **error in position**: the pose is farther than `position_error_m` from the planned pose; it
 //!   ends below half of that. The robot is stopped (EPS) once it has stayed within 0.1 m for
@@ -17,9 +17,10 @@
 //! A jump of the pose's frame and a new run begin everything anew; a frame without both poses
 //! changes nothing.
 
-use crate::settings;
 use vigil_blocks::{SensorFrame, Symptoms, Valid};
 use vigil_inference::angle::wrap;
+
+use crate::detect::settings::MonitorSettings;
 
 /// A robot that stays within this distance stands, m: twenty deviations of a pose of 5 mm.
 const STILL_M: f64 = 0.1;
@@ -49,7 +50,7 @@ struct Place {
 /// The four monitors. Allocates nothing after the start.
 #[derive(Debug, Clone)]
 pub struct Monitors {
-    settings: settings::Monitors,
+    settings: MonitorSettings,
     places: Vec<Place>,
     trace: Option<Trace>,
     symptoms: u32,
@@ -108,7 +109,7 @@ impl Trace {
 impl Monitors {
     /// With these thresholds.
     #[must_use]
-    pub fn new(settings: &settings::Monitors) -> Self {
+    pub fn new(settings: &MonitorSettings) -> Self {
         Self {
             settings: settings.clone(),
             places: Vec::with_capacity(PLACES),

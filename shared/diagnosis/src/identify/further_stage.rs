@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 
-use crate::settings;
 use vigil_blocks::FaultBelief;
 use vigil_robot::learned::further_watch::Residuals;
 use vigil_robot::learned::{Further, Healthy, Model, Observation};
@@ -11,6 +10,8 @@ use vigil_robot::{Description, Suspects};
 use crate::identify::further::{FurtherFilter, Fusion};
 use crate::identify::models::Models;
 use crate::identify::modes::Leaves;
+use crate::identify::settings::{IdentifierFilter, Settings};
+use crate::sensors::Sensors;
 
 /// The filter, and what each observation of the identifier's ring holds.
 #[derive(Debug, Clone)]
@@ -29,12 +30,12 @@ impl FurtherStage {
     pub fn new(
         models: &Models<'_>,
         leaves: &Leaves,
-        (sensors, settings): (settings::Sensors, &settings::Identifier),
+        (sensors, settings): (Sensors, &Settings),
         capacity: usize,
     ) -> Option<Self> {
         let (model, robot, p_unknown) = (models.model, models.robot, settings.p_unknown);
-        let holds_sets = settings.filter == settings::IdentifierFilter::MultipleHypothesis;
-        if sensors != settings::Sensors::All || !holds_sets {
+        let holds_sets = settings.filter == IdentifierFilter::MultipleHypothesis;
+        if sensors != Sensors::All || !holds_sets {
             return None;
         }
         Some(Self {

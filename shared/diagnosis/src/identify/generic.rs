@@ -1,6 +1,5 @@
 //! The library's filters over single faults, by name.
 
-use crate::settings::{self, IdentifierFilter};
 use nalgebra::Vector3;
 use vigil_blocks::{FaultSet, MODE_UNKNOWN, WHEELS, WeightedHypothesis};
 use vigil_inference::adaptive::Adaptive;
@@ -28,6 +27,7 @@ use crate::identify::modes::{IdentifierError, Leaves};
 use crate::identify::posterior::Posterior;
 use crate::identify::risk::risks;
 use crate::identify::sets::{FLOOR, entropy};
+use crate::identify::settings::{IdentifierFilter, PARTICLES, Settings};
 
 /// Share of the draws that leave a mode in the raised proposals. Half at most doubles a weight's
 /// spread.
@@ -88,7 +88,7 @@ impl Generic {
     pub fn new(
         models: &Models<'_>,
         leaves: &Leaves,
-        settings: &settings::Identifier,
+        settings: &Settings,
         use_wheels: bool,
         seed: u64,
     ) -> Result<Self, IdentifierError> {
@@ -104,7 +104,7 @@ impl Generic {
             .map(|mode| meaning(&switching, mode, leaves))
             .collect();
         let resampling = Resampling::default();
-        let count = settings.particles.unwrap_or(settings::PARTICLES);
+        let count = settings.particles.unwrap_or(PARTICLES);
         let sampled =
             |proposal, model| ParticleFilter::new(model, proposal, resampling, count, seed);
         let refuse = |error: &dyn std::fmt::Display| IdentifierError::Build(error.to_string());

@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 
-use crate::settings;
 use nalgebra::Vector3;
 use vigil_blocks::{
     DetectionBelief, Entry, FaultBelief, HealthyBelief, MODE_UNKNOWN, ParticleBlock, SensorFrame,
@@ -10,7 +9,6 @@ use vigil_blocks::{
 use vigil_robot::FaultPrior;
 use vigil_robot::learned::{Healthy, NoiseScales, Observation, Observer, motion_modes};
 
-use crate::identify::check::{FURTHER_NEED_HYPOTHESES, check};
 use crate::identify::detection::Detection;
 use crate::identify::engine::Engine;
 use crate::identify::fault_rates::fault_rates;
@@ -24,7 +22,13 @@ use crate::identify::node_sizes::NodeSizes;
 use crate::identify::posterior::Posterior;
 use crate::identify::reasons::Reasons;
 use crate::identify::reported::HeldName;
+use crate::identify::settings::{IdentifierFilter, Settings};
 use crate::identify::trouble::believed;
+use crate::sensors::Sensors;
+
+/// Why another filter is refused.
+const FURTHER_NEED_HYPOTHESES: &str =
+    "leaves steer, pose, torque, current and gyro need identifier.filter = \"multiple-hypothesis\"";
 
 /// A ring is worked off in about this time after an alarm, s: the name is two observations late.
 const CATCH_UP_S: f64 = 0.1;
@@ -109,23 +113,21 @@ impl Identifier {
     /// An identifier over the leaves of `tree`.
     ///
     /// # Errors
-    /// [`IdentifierError`] if the model is of another robot or lacks a leaf's fault, or a setting
-    /// is out of range.
+    /// [`IdentifierError`] if the model is of another robot or lacks a leaf's fault.
     pub fn new(
         models: &Models<'_>,
-        settings: &settings::Identifier,
-        sensors: settings::Sensors,
+        settings: &Settings,
+        sensors: Sensors,
         seed: u64,
     ) -> Result<Self, IdentifierError> {
         let Models {
             model, robot, tree, ..
         } = *models;
         model.check_robot(robot)?;
-        check(settings)?;
         let leaves = Leaves::new(tree, model, robot, sensors)?;
-        let use_wheels = sensors != settings::Sensors::Pose;
+        let use_wheels = sensors != Sensors::Pose;
         let (engine, modes) = match settings.filter {
-            settings::IdentifierFilter::MultipleHypothesis => {
+            IdentifierFilter::MultipleHypothesis => {
                 let rates = fault_rates(&robot.fault_prior, &leaves, settings.p_unknown);
                 let mut filter = MultipleHypothesis::new(model, robot, &leaves, use_wheels, rates);
                 filter.set_limit(settings.particles.unwrap_or(usize::MAX));

@@ -2,7 +2,6 @@
 
 mod angles;
 mod blindfold;
-mod check;
 mod detection;
 mod encoders;
 mod engine;
@@ -27,6 +26,7 @@ mod reported;
 mod risk;
 mod servo;
 mod sets;
+mod settings;
 mod sizes;
 mod state;
 mod trouble;
@@ -38,4 +38,5 @@ pub use modes::{IdentifierError, Leaves};
 pub use multiple_hypothesis::MultipleHypothesis;
 pub use posterior::Posterior;
 pub use risk::risks;
+pub use settings::{IdentifierFilter, PARTICLES_MAX, PARTICLES_MIN, Settings};
 pub use watcher::{Diagnoser, Watcher};

@@ -1,6 +1,6 @@
 //! Which leaf of the fault tree stands for which fault of the model.
 
-use crate::settings::Sensors;
+use crate::sensors::Sensors;
 use vigil_blocks::{FAULT_NODES, WHEELS};
 use vigil_robot::FaultTree;
 use vigil_robot::learned::{Model, ModelError, MotionMode, Mover};
@@ -32,16 +32,6 @@ pub enum IdentifierError {
     /// The filter cannot be built from these models.
     #[error("identifier.filter: {0}")]
     Build(String),
-    /// A setting is out of range.
-    #[error("identifier.{key}: {value} is not allowed: {allowed}")]
-    Value {
-        /// The key.
-        key: &'static str,
-        /// What was found.
-        value: f64,
-        /// What is allowed.
-        allowed: &'static str,
-    },
 }
 
 /// What a leaf stands for.

@@ -2,8 +2,8 @@
 
 use vigil_blocks::{DetectionBelief, Entry, ParticleBlock};
 use vigil_cycle::allocation::allocations;
+use vigil_diagnosis::detect;
 use vigil_diagnosis::detect::Detector;
-use vigil_setup::schema;
 
 use crate::recorded;
 
@@ -11,7 +11,7 @@ use crate::recorded;
 fn steady_cycles_allocate_nothing() {
     let (frames, _) = recorded::unseen("RM_STUCK", "stuck");
     let (model, robot) = (recorded::model(), recorded::robot());
-    let mut detector = Detector::new(&model, &robot, &schema::Detector::default()).unwrap();
+    let mut detector = Detector::new(&model, &robot, &detect::Settings::default()).unwrap();
     let mut belief = DetectionBelief::default();
     let mut hypotheses: Box<ParticleBlock> = Box::default();
     let before = allocations();

@@ -2,10 +2,11 @@
 
 use proptest::prelude::*;
 use vigil_blocks::{Channel, DetectionBelief, Entry, MODE_UNKNOWN, ParticleBlock, SensorFrame};
+use vigil_diagnosis::Sensors;
+use vigil_diagnosis::detect;
 use vigil_diagnosis::detect::Detector;
 use vigil_robot::learned::monitor::Channels;
 use vigil_robot::learned::{Form, Healthy, Monitor, Observer, triangle};
-use vigil_setup::schema;
 
 use crate::recorded::{model, robot, unseen};
 
@@ -21,10 +22,10 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(sensors: schema::Sensors) -> Self {
-        let settings = schema::Detector {
+    fn new(sensors: Sensors) -> Self {
+        let settings = detect::Settings {
             sensors,
-            ..schema::Detector::default()
+            ..detect::Settings::default()
         };
         let detector = Detector::new(&model(), &robot(), &settings).unwrap();
         Self {
@@ -52,7 +53,7 @@ impl Bench {
 #[test]
 fn nominal_driving_raises_no_alarm() {
     let (frames, _) = unseen("ND", "");
-    for sensors in [schema::Sensors::Pose, schema::Sensors::PoseEncoders] {
+    for sensors in [Sensors::Pose, Sensors::PoseEncoders] {
         assert_eq!(Bench::new(sensors).alarm_s(&frames), None);
     }
 }
@@ -60,11 +61,11 @@ fn nominal_driving_raises_no_alarm() {
 #[test]
 fn faults_are_seen_soon_after_their_onset() {
     let cases = [
-        ("RM_STUCK", "stuck", schema::Sensors::PoseEncoders, 0.15),
-        ("LR_STUCK", "stuck", schema::Sensors::Pose, 3.0),
-        ("LF_ENC", "zero", schema::Sensors::PoseEncoders, 0.15),
-        ("LF_ENC", "frozen", schema::Sensors::PoseEncoders, 0.35),
-        ("LF_ENC", "noise", schema::Sensors::PoseEncoders, 0.25),
+        ("RM_STUCK", "stuck", Sensors::PoseEncoders, 0.15),
+        ("LR_STUCK", "stuck", Sensors::Pose, 3.0),
+        ("LF_ENC", "zero", Sensors::PoseEncoders, 0.15),
+        ("LF_ENC", "frozen", Sensors::PoseEncoders, 0.35),
+        ("LF_ENC", "noise", Sensors::PoseEncoders, 0.25),
     ];
     for (mode, kind, sensors, allowed_s) in cases {
         let (frames, label) = unseen(mode, kind);
@@ -79,7 +80,7 @@ fn faults_are_seen_soon_after_their_onset() {
 #[test]
 fn the_channel_at_fault_is_named() {
     let (frames, label) = unseen("RF_ENC", "zero");
-    let mut bench = Bench::new(schema::Sensors::PoseEncoders);
+    let mut bench = Bench::new(Sensors::PoseEncoders);
     bench.alarm_s(&frames).unwrap();
     let wheel = label.wheel.unwrap();
     let channels = bench.belief.channel_log_odds;
@@ -101,7 +102,7 @@ fn dropout() -> Vec<SensorFrame> {
 
 #[test]
 fn an_alarm_falls_when_the_robot_is_nominal_again() {
-    let mut bench = Bench::new(schema::Sensors::PoseEncoders);
+    let mut bench = Bench::new(Sensors::PoseEncoders);
     for frame in dropout() {
         let t_s = time_s(&frame);
         let alarm = bench.step(&frame).alarm != 0;
@@ -114,7 +115,7 @@ fn an_alarm_falls_when_the_robot_is_nominal_again() {
 
 #[test]
 fn a_standing_robot_is_no_evidence() {
-    let mut bench = Bench::new(schema::Sensors::PoseEncoders);
+    let mut bench = Bench::new(Sensors::PoseEncoders);
     let mut last = 0.0;
     for mut frame in dropout() {
         let t_s = time_s(&frame);
@@ -139,17 +140,12 @@ fn a_jump_of_the_pose_frame_is_no_fault() {
         frame.pose[0] += 25.0;
         frame.pose_reset_count += 1;
     }
-    assert_eq!(
-        Bench::new(schema::Sensors::PoseEncoders).alarm_s(&frames),
-        None
-    );
+    assert_eq!(Bench::new(Sensors::PoseEncoders).alarm_s(&frames), None);
     // Without the count it is one.
     for frame in &mut frames {
         frame.pose_reset_count = 0;
     }
-    let alarm_s = Bench::new(schema::Sensors::PoseEncoders)
-        .alarm_s(&frames)
-        .unwrap();
+    let alarm_s = Bench::new(Sensors::PoseEncoders).alarm_s(&frames).unwrap();
     assert!((7.0..7.2).contains(&alarm_s), "{alarm_s}");
 }
 
@@ -157,8 +153,8 @@ fn a_jump_of_the_pose_frame_is_no_fault() {
 fn misses_predict_and_change_nothing() {
     let (frames, _) = unseen("ND", "");
     let (mut with, mut without) = (
-        Bench::new(schema::Sensors::PoseEncoders),
-        Bench::new(schema::Sensors::PoseEncoders),
+        Bench::new(Sensors::PoseEncoders),
+        Bench::new(Sensors::PoseEncoders),
     );
     for frame in &frames {
         without.step(frame);
@@ -179,7 +175,7 @@ fn misses_predict_and_change_nothing() {
 #[test]
 fn equal_input_and_seed_give_equal_bits_and_a_new_run_starts_anew() {
     let (frames, _) = unseen("RM_STUCK", "stuck");
-    let mut bench = Bench::new(schema::Sensors::PoseEncoders);
+    let mut bench = Bench::new(Sensors::PoseEncoders);
     let mut first = Vec::new();
     for frame in &frames {
         first.push(*bench.step(frame));
@@ -197,11 +193,11 @@ fn equal_input_and_seed_give_equal_bits_and_a_new_run_starts_anew() {
 fn an_identification_starts_from_what_the_detector_believes_bit_for_bit() {
     let (frames, _) = unseen("ND", "");
     let (model, robot) = (model(), robot());
-    let rate_1_h = schema::Detector::default().fault_rate_1_h;
+    let rate_1_h = detect::Settings::default().fault_rate_1_h;
     let channels = Channels::PoseEncoders;
     let mut monitor = Monitor::new(&model, &robot, channels, Form::LearnedBias, rate_1_h);
     let mut observer = Observer::new(&model, &robot);
-    let mut bench = Bench::new(schema::Sensors::PoseEncoders);
+    let mut bench = Bench::new(Sensors::PoseEncoders);
     let mut compared = 0;
     for frame in &frames {
         let belief = *bench.step(frame);
@@ -275,7 +271,7 @@ proptest! {
     fn frames_that_are_lost_are_no_evidence_of_a_fault(
         lost in prop::collection::vec(prop::bool::weighted(0.2), 400),
         gap_at in 20_usize..250, gap in 0_usize..18,
-        sensors in prop::sample::select(vec![schema::Sensors::Pose, schema::Sensors::PoseEncoders]),
+        sensors in prop::sample::select(vec![Sensors::Pose, Sensors::PoseEncoders]),
     ) {
         let (frames, _) = unseen("ND", "");
         let is_kept = |k: usize| !lost[k % lost.len()] && !(gap_at..gap_at + gap).contains(&k);
@@ -295,7 +291,7 @@ proptest! {
     })]
     #[test]
     fn no_input_breaks_the_belief(frames in prop::collection::vec(frame(), 1..60)) {
-        let mut bench = Bench::new(schema::Sensors::PoseEncoders);
+        let mut bench = Bench::new(Sensors::PoseEncoders);
         let mut t_ns = 0_u64;
         for (i, mut frame) in frames.into_iter().enumerate() {
             if i % 3 != 0 {

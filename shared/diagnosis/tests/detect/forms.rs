@@ -1,9 +1,11 @@
 //! The forms of detection, each calibrated, on recorded runs that the model has not seen.
 
 use vigil_blocks::{DetectionBelief, Entry, ParticleBlock, SensorFrame};
+use vigil_diagnosis::Sensors;
+use vigil_diagnosis::detect;
 use vigil_diagnosis::detect::Detector;
+use vigil_diagnosis::detect::Form;
 use vigil_robot::Description;
-use vigil_setup::schema::{self, Form, Sensors};
 
 use crate::recorded::{model, robot, runs};
 
@@ -21,10 +23,10 @@ fn on_one_ground() -> Description {
 }
 
 fn detector(robot: &Description, sensors: Sensors, form: Form) -> Detector {
-    let settings = schema::Detector {
+    let settings = detect::Settings {
         sensors,
         form,
-        ..schema::Detector::default()
+        ..detect::Settings::default()
     };
     Detector::new(&model(), robot, &settings).unwrap()
 }
@@ -127,7 +129,7 @@ fn an_encoder_that_is_a_little_off_is_in_the_blind_spot_of_the_constant_only() {
 
 #[test]
 fn an_alarm_that_could_never_rise_is_refused() {
-    let settings = |form| schema::Detector {
+    let settings = |form| detect::Settings {
         form,
         sensors: Sensors::Pose,
         false_alarm_interval_h: 1e4,
@@ -144,7 +146,7 @@ fn an_alarm_that_could_never_rise_is_refused() {
 
 #[test]
 fn an_alarm_above_the_bound_of_the_poses_log_odds_is_refused_with_that_bound() {
-    let settings = schema::Detector::default();
+    let settings = detect::Settings::default();
     let build = |level| {
         let mut model = model();
         model

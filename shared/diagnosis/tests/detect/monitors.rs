@@ -1,10 +1,10 @@
 //! The monitors of the planned pose on exact traces.
 
 use std::f64::consts::{PI, TAU};
+use vigil_diagnosis::detect::MonitorSettings;
 
 use vigil_blocks::{SensorFrame, Symptoms, Valid};
 use vigil_diagnosis::detect::Monitors;
-use vigil_setup::schema;
 
 /// Time between frames.
 const STEP_S: f64 = 0.1;
@@ -16,7 +16,7 @@ struct Frames {
 
 impl Frames {
     fn new() -> Self {
-        let settings = schema::Monitors {
+        let settings = MonitorSettings {
             position_error_m: 0.5,
             stopped_after_s: 2.0,
             loop_radius_m: 0.3,

@@ -1,6 +1,7 @@
 //! The detector on a nominal model, learned from frames made from a Kobuki's geometry.
 
 use std::path::PathBuf;
+use vigil_diagnosis::detect;
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -13,7 +14,6 @@ use vigil_diagnosis::detect::Detector;
 use vigil_learning::learning_nominal::learn;
 use vigil_recording::frames::Run;
 use vigil_robot::{Description, RobotModel};
-use vigil_setup::schema;
 
 const RADIUS_M: f64 = 0.035;
 const TRACK_M: f64 = 0.23;
@@ -39,7 +39,7 @@ fn detector() -> Detector {
         frames: (0..15_000).map(|i| frame(i, f64::INFINITY)).collect(),
     };
     let (model, _) = learn(&[healthy], &[], f64::INFINITY, &robot).unwrap();
-    Detector::nominal(&model, &robot, &schema::Detector::default()).unwrap()
+    Detector::nominal(&model, &robot, &detect::Settings::default()).unwrap()
 }
 
 /// Driving about; from `stuck_s` on the left wheel stands and the robot turns about it.

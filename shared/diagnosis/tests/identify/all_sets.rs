@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::SensorFrame;
+use vigil_diagnosis::Sensors;
 use vigil_diagnosis::identify::{Leaves, MultipleHypothesis, Posterior};
 use vigil_inference::track::Track;
 use vigil_robot::Description;
@@ -14,7 +15,6 @@ use vigil_robot::learned::{
     WheelContext, WheelEvidence, motion_modes,
 };
 use vigil_robot::slip::SlipModel;
-use vigil_setup::schema::Sensors;
 
 use crate::driven::{Faults, SETTLED_S, WHEELS, drive};
 

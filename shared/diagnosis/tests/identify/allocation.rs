@@ -3,8 +3,10 @@
 use clap::ValueEnum;
 use vigil_blocks::{Entry, FaultBelief, ParticleBlock, Valid};
 use vigil_cycle::allocation::allocations;
+use vigil_diagnosis::Sensors;
+use vigil_diagnosis::identify;
+use vigil_diagnosis::identify::IdentifierFilter;
 use vigil_diagnosis::identify::{Identifier, Input, Models};
-use vigil_setup::schema;
 
 use crate::alarm;
 use crate::recorded;
@@ -21,12 +23,12 @@ fn steady_cycles_of_every_filter_allocate_nothing() {
         tree: &tree,
         decision: Some(&decision),
     };
-    for &filter in schema::IdentifierFilter::value_variants() {
-        let settings = schema::Identifier {
+    for &filter in IdentifierFilter::value_variants() {
+        let settings = identify::Settings {
             filter,
-            ..schema::Identifier::default()
+            ..identify::Settings::default()
         };
-        let sensors = schema::Sensors::PoseEncoders;
+        let sensors = Sensors::PoseEncoders;
         let mut identifier = Identifier::new(&models, &settings, sensors, 1).unwrap();
         let mut belief = FaultBelief::default();
         let mut hypotheses: Box<ParticleBlock> = Box::default();
@@ -51,7 +53,7 @@ fn steady_cycles_of_every_filter_allocate_nothing() {
         let leaf = tree.index("RM_STUCK").unwrap();
         let is_right = belief.mode as usize == leaf;
         assert!(
-            is_right || filter == schema::IdentifierFilter::Bootstrap && belief.mode != 0,
+            is_right || filter == IdentifierFilter::Bootstrap && belief.mode != 0,
             "{filter}"
         );
     }
@@ -69,8 +71,8 @@ fn steady_cycles_with_every_channel_allocate_nothing() {
         tree: &tree,
         decision: None,
     };
-    let settings = schema::Identifier::default();
-    let mut identifier = Identifier::new(&models, &settings, schema::Sensors::All, 1).unwrap();
+    let settings = identify::Settings::default();
+    let mut identifier = Identifier::new(&models, &settings, Sensors::All, 1).unwrap();
     let mut belief = FaultBelief::default();
     let mut hypotheses: Box<ParticleBlock> = Box::default();
     let onset_s = label.onset_s.unwrap();

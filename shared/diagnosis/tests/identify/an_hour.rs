@@ -2,10 +2,11 @@
 //! nothing between them, and no prior adds up.
 
 use vigil_blocks::{Entry, FaultBelief, ParticleBlock};
+use vigil_diagnosis::Sensors;
+use vigil_diagnosis::identify;
 use vigil_diagnosis::identify::{Identifier, Input, Leaves, Models};
 use vigil_robot::Description;
 use vigil_robot::slip::SlipModel;
-use vigil_setup::schema::{self, Sensors};
 
 use crate::alarm::Alarm;
 use crate::driven::{Faults, ONSET_S, WHEELS, drive};
@@ -26,7 +27,7 @@ fn keeps_its_name(faults: Faults, seed: u64) {
         decision: Some(&decision),
     };
     let leaves = Leaves::new(&tree, &model, &robot, Sensors::PoseEncoders).unwrap();
-    let settings = schema::Identifier::default();
+    let settings = identify::Settings::default();
     let mut identifier = Identifier::new(&models, &settings, Sensors::PoseEncoders, 1).unwrap();
     let slip = SlipModel::new(&robot).unwrap();
     let (frames, _) = drive(&robot, &slip, faults, (seed, END_S));

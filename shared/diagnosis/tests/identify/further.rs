@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use vigil_blocks::WHEELS;
+use vigil_diagnosis::Sensors;
 use vigil_diagnosis::identify::Leaves;
 use vigil_diagnosis::identify::further::{FurtherFilter, Fusion};
 use vigil_robot::Description;
@@ -10,7 +11,6 @@ use vigil_robot::FaultTree;
 use vigil_robot::learned::current_effects::{CurrentEffects, SHARES, STUCK};
 use vigil_robot::learned::further_watch::{Residual, Residuals};
 use vigil_robot::learned::{Further, Model, Observation, Reading};
-use vigil_setup::schema::Sensors;
 
 /// Sensor noise of a current, A, and of the gyro, rad/s.
 const NOISE_A: f64 = 0.05;

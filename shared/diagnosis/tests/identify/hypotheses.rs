@@ -1,9 +1,10 @@
 //! What the identifier takes of the detector's block, what it keeps, and what it sheds.
 
 use vigil_blocks::{Entry, FaultBelief, HealthyBelief, ParticleBlock, SensorFrame};
+use vigil_diagnosis::Sensors;
+use vigil_diagnosis::identify;
 use vigil_diagnosis::identify::{Identifier, Input, Models};
 use vigil_robot::FaultTree;
-use vigil_setup::schema;
 
 use crate::alarm::Alarm;
 use crate::recorded;
@@ -28,8 +29,8 @@ impl Bench {
             tree: &tree,
             decision: None,
         };
-        let settings = schema::Identifier::default();
-        let sensors = schema::Sensors::PoseEncoders;
+        let settings = identify::Settings::default();
+        let sensors = Sensors::PoseEncoders;
         Self {
             identifier: Identifier::new(&models, &settings, sensors, 1).unwrap(),
             frames,

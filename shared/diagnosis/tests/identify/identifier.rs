@@ -3,10 +3,12 @@
 use clap::ValueEnum;
 use proptest::prelude::*;
 use vigil_blocks::{Entry, FaultBelief, MODE_MULTIPLE, MODE_UNKNOWN, ParticleBlock, SensorFrame};
-use vigil_diagnosis::identify::{Identifier, IdentifierError, Input, Models};
+use vigil_diagnosis::Sensors;
+use vigil_diagnosis::identify::{
+    self, Identifier, IdentifierError, IdentifierFilter, Input, Models,
+};
 use vigil_robot::FaultTree;
 use vigil_robot::tree::Node;
-use vigil_setup::schema;
 
 use crate::alarm::Alarm;
 use crate::recorded::{model, path, robot, unseen};
@@ -28,23 +30,18 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(sensors: schema::Sensors, alarm: Alarm) -> Self {
-        Self::with(schema::IdentifierFilter::MultipleHypothesis, sensors, alarm)
+    fn new(sensors: Sensors, alarm: Alarm) -> Self {
+        Self::with(IdentifierFilter::MultipleHypothesis, sensors, alarm)
     }
 
-    fn with(filter: schema::IdentifierFilter, sensors: schema::Sensors, alarm: Alarm) -> Self {
+    fn with(filter: IdentifierFilter, sensors: Sensors, alarm: Alarm) -> Self {
         Self::over(tree(), filter, sensors, alarm)
     }
 
-    fn over(
-        tree: FaultTree,
-        filter: schema::IdentifierFilter,
-        sensors: schema::Sensors,
-        alarm: Alarm,
-    ) -> Self {
-        let settings = schema::Identifier {
+    fn over(tree: FaultTree, filter: IdentifierFilter, sensors: Sensors, alarm: Alarm) -> Self {
+        let settings = identify::Settings {
             filter,
-            ..schema::Identifier::default()
+            ..identify::Settings::default()
         };
         let decision = vigil_setup::load_decision(&path("config/rover.pomdp")).unwrap();
         let models = Models {
@@ -121,12 +118,12 @@ impl Bench {
 #[test]
 fn each_fault_is_named_soon_after_the_alarm_and_to_the_end() {
     let cases = [
-        ("RM_STUCK", "stuck", schema::Sensors::PoseEncoders),
-        ("LF_STUCK", "stuck", schema::Sensors::PoseEncoders),
-        ("LR_STUCK", "stuck", schema::Sensors::Pose),
-        ("RF_ENC", "zero", schema::Sensors::PoseEncoders),
-        ("LM_ENC", "frozen", schema::Sensors::PoseEncoders),
-        ("RR_ENC", "noise", schema::Sensors::PoseEncoders),
+        ("RM_STUCK", "stuck", Sensors::PoseEncoders),
+        ("LF_STUCK", "stuck", Sensors::PoseEncoders),
+        ("LR_STUCK", "stuck", Sensors::Pose),
+        ("RF_ENC", "zero", Sensors::PoseEncoders),
+        ("LM_ENC", "frozen", Sensors::PoseEncoders),
+        ("RR_ENC", "noise", Sensors::PoseEncoders),
     ];
     for (mode, kind, sensors) in cases {
         let (frames, label) = unseen(mode, kind);
@@ -166,7 +163,7 @@ fn a_fault_that_goes_is_let_go() {
     {
         frame.wheel_rate[2] = 0.0;
     }
-    let mut bench = Bench::new(schema::Sensors::PoseEncoders, Alarm::between(4.1, 7.5));
+    let mut bench = Bench::new(Sensors::PoseEncoders, Alarm::between(4.1, 7.5));
     for frame in &frames {
         bench.step(frame);
         let t_s = time_s(frame);
@@ -196,7 +193,7 @@ fn no_fault_fades_while_the_robot_stands() {
         frame.pose = *rest.get_or_insert(frame.pose);
     }
     let alarm = Alarm::between(onset_s + 0.2, 99.0);
-    let mut bench = Bench::new(schema::Sensors::PoseEncoders, alarm);
+    let mut bench = Bench::new(Sensors::PoseEncoders, alarm);
     let mut before: Option<FaultBelief> = None;
     for frame in &frames {
         let belief = *bench.step(frame);
@@ -218,7 +215,7 @@ fn a_motion_that_no_fault_explains_is_unknown() {
         frame.pose[0] += 0.03 * t_s;
         frame.pose[1] += 0.03 * t_s;
     }
-    let mut bench = Bench::new(schema::Sensors::PoseEncoders, Alarm::between(5.5, 99.0));
+    let mut bench = Bench::new(Sensors::PoseEncoders, Alarm::between(5.5, 99.0));
     for frame in &frames {
         bench.step(frame);
         if time_s(frame) > 7.0 {
@@ -233,7 +230,7 @@ fn a_steering_angle_that_nobody_commanded_is_unknown() {
     for frame in frames.iter_mut().filter(|frame| time_s(frame) >= 5.0) {
         frame.steer[0] += 0.2;
     }
-    let mut bench = Bench::new(schema::Sensors::PoseEncoders, Alarm::between(5.1, 99.0));
+    let mut bench = Bench::new(Sensors::PoseEncoders, Alarm::between(5.1, 99.0));
     for frame in &frames {
         bench.step(frame);
     }
@@ -244,7 +241,7 @@ fn a_steering_angle_that_nobody_commanded_is_unknown() {
 fn between_observations_no_evidence_counts_twice() {
     let (frames, label) = unseen("LF_STUCK", "stuck");
     let alarm = Alarm::between(label.onset_s.unwrap() + 0.2, 99.0);
-    let mut bench = Bench::new(schema::Sensors::PoseEncoders, alarm);
+    let mut bench = Bench::new(Sensors::PoseEncoders, alarm);
     for frame in &frames {
         let told = *bench.step(frame);
         bench
@@ -265,9 +262,9 @@ fn equal_input_and_seed_give_equal_bits_whatever_came_before() {
     let (frames, label) = unseen("RM_STUCK", "stuck");
     let (others, _) = unseen("LF_STUCK", "stuck");
     let onset_s = label.onset_s.unwrap();
-    for &filter in schema::IdentifierFilter::value_variants() {
+    for &filter in IdentifierFilter::value_variants() {
         let alarm = || Alarm::between(onset_s + 0.5, 99.0);
-        let fresh = || Bench::with(filter, schema::Sensors::Pose, alarm());
+        let fresh = || Bench::with(filter, Sensors::Pose, alarm());
         let (mut a, mut b) = (fresh(), fresh());
         for frame in &others {
             b.step(frame);
@@ -288,8 +285,8 @@ fn equal_input_and_seed_give_equal_bits_whatever_came_before() {
 fn every_filter_names_single_faults() {
     // The classical filter has a fault only if one of its particles arrives there by chance, and is
     // shown in `bench` to be often wrong.
-    let all = schema::IdentifierFilter::value_variants().iter().copied();
-    for filter in all.filter(|filter| *filter != schema::IdentifierFilter::Bootstrap) {
+    let all = IdentifierFilter::value_variants().iter().copied();
+    for filter in all.filter(|filter| *filter != IdentifierFilter::Bootstrap) {
         for (mode, kind) in [
             ("RM_STUCK", "stuck"),
             ("RF_ENC", "zero"),
@@ -298,7 +295,7 @@ fn every_filter_names_single_faults() {
             let (frames, label) = unseen(mode, kind);
             let onset_s = label.onset_s.unwrap();
             let alarm = Alarm::between(onset_s + 0.1, 99.0);
-            let mut bench = Bench::with(filter, schema::Sensors::PoseEncoders, alarm);
+            let mut bench = Bench::with(filter, Sensors::PoseEncoders, alarm);
             let mut wrong_s = 0.0;
             for pair in frames.windows(2) {
                 bench.step(&pair[1]);
@@ -341,11 +338,11 @@ fn deep_tree() -> FaultTree {
 
 #[test]
 fn a_tree_may_have_any_depth() {
-    use schema::IdentifierFilter::{Hierarchical, MultipleHypothesis};
+    use vigil_diagnosis::identify::IdentifierFilter::{Hierarchical, MultipleHypothesis};
     let (frames, label) = unseen("LM_STUCK", "stuck");
     for filter in [MultipleHypothesis, Hierarchical] {
         let alarm = Alarm::between(label.onset_s.unwrap() + 0.1, 99.0);
-        let sensors = schema::Sensors::PoseEncoders;
+        let sensors = Sensors::PoseEncoders;
         let mut bench = Bench::over(deep_tree(), filter, sensors, alarm);
         for frame in &frames {
             bench.step(frame);
@@ -371,8 +368,8 @@ fn trees_that_the_model_cannot_serve_are_refused() {
             .map(|(i, f)| node(&format!("L{i}"), Some(f)));
         let nodes = std::iter::once(node("ND", None)).chain(leaves).collect();
         let tree = FaultTree::new(nodes).unwrap();
-        let settings = schema::Identifier::default();
-        let sensors = schema::Sensors::Pose;
+        let settings = identify::Settings::default();
+        let sensors = Sensors::Pose;
         let models = Models {
             model: &model(),
             robot: &robot(),
@@ -439,10 +436,10 @@ proptest! {
     fn no_input_breaks_the_belief(
         frames in prop::collection::vec(frame(), 1..60),
         p_fault in any::<f64>(), noise_scale in any::<f64>(), from_s in 0.0..2.0_f64,
-        filter in prop::sample::select(schema::IdentifierFilter::value_variants()),
+        filter in prop::sample::select(IdentifierFilter::value_variants()),
     ) {
         let alarm = Alarm::between(from_s, 1e9);
-        let mut bench = Bench::with(filter, schema::Sensors::PoseEncoders, alarm);
+        let mut bench = Bench::with(filter, Sensors::PoseEncoders, alarm);
         let mut t_ns = 0_u64;
         for (i, mut frame) in frames.into_iter().enumerate() {
             if i % 5 != 0 {

@@ -2,8 +2,9 @@
 //! run whose readings are changed.
 
 use vigil_blocks::{Entry, FaultBelief, ParticleBlock, SensorFrame, SizeKind, Valid};
+use vigil_diagnosis::Sensors;
+use vigil_diagnosis::identify;
 use vigil_diagnosis::identify::{Identifier, Input, Models};
-use vigil_setup::schema;
 
 use crate::alarm;
 use crate::recorded;
@@ -32,8 +33,8 @@ fn belief(mut change: impl FnMut(&mut SensorFrame)) -> (FaultBelief, [usize; 2])
         tree: &tree,
         decision: None,
     };
-    let settings = schema::Identifier::default();
-    let sensors = schema::Sensors::All;
+    let settings = identify::Settings::default();
+    let sensors = Sensors::All;
     let mut identifier = Identifier::new(&models, &settings, sensors, 1).unwrap();
     let mut belief = FaultBelief::default();
     let mut particles: Box<ParticleBlock> = Box::default();

@@ -1,8 +1,9 @@
 //! How far an encoder is off, on recorded healthy runs whose readings are changed by a known size.
 
 use vigil_blocks::{Entry, FaultBelief, ParticleBlock, SensorFrame, SizeKind};
+use vigil_diagnosis::Sensors;
+use vigil_diagnosis::identify;
 use vigil_diagnosis::identify::{Identifier, Input, Models};
-use vigil_setup::schema;
 
 use crate::alarm;
 use crate::recorded;
@@ -34,8 +35,8 @@ fn belief(read: impl Fn(f64, f64) -> f64) -> (FaultBelief, usize) {
         tree: &tree,
         decision: Some(&decision),
     };
-    let settings = schema::Identifier::default();
-    let sensors = schema::Sensors::PoseEncoders;
+    let settings = identify::Settings::default();
+    let sensors = Sensors::PoseEncoders;
     let mut identifier = Identifier::new(&models, &settings, sensors, 1).unwrap();
     let mut belief = FaultBelief::default();
     let mut hypotheses: Box<ParticleBlock> = Box::default();

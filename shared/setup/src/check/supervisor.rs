@@ -1,8 +1,9 @@
 //! Rules of `[supervisor]`.
 
+use vigil_decision::{Evidence, Recovery, Settings};
 use vigil_pomdp::policy::PolicyKind;
 
-use crate::schema::{Evidence, GraphFile, Navigation, Recovery, Source, Supervisor};
+use crate::graph_file::{GraphFile, Navigation, Source};
 
 /// With symptoms, the shortest epoch, ms.
 const EPOCH_MIN_MS: f64 = 1000.0;
@@ -48,7 +49,7 @@ fn durations(file: &GraphFile, report: &mut impl FnMut(&str, String)) {
     if settings.epoch_ms < EPOCH_MIN_MS {
         let message = format!(
             "{} is out of range: with supervisor.evidence = \"symptoms\" allowed is \
-             {EPOCH_MIN_MS} to 60000; a robot does nothing about an exception in less",
+             {EPOCH_MIN_MS} or more; a robot does nothing about an exception in less",
             settings.epoch_ms
         );
         report("supervisor.epoch_ms", message);
@@ -73,7 +74,7 @@ const fn needs_path(kind: Recovery) -> bool {
 }
 
 /// Name of the policy, and what its dual control needs.
-fn policy(settings: &Supervisor, report: &mut impl FnMut(&str, String)) {
+fn policy(settings: &Settings, report: &mut impl FnMut(&str, String)) {
     let kind = match settings.policy.parse::<PolicyKind>() {
         Ok(kind) => kind,
         Err(error) => return report("supervisor.policy", error.to_string()),

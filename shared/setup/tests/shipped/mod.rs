@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use vigil_setup::graph_file::GraphFile;
 use vigil_setup::load_graph;
-use vigil_setup::schema::GraphFile;
 
 /// Reads a graph of `config/` after a change of it; the message if it is refused.
 pub fn load(name: &str, change: impl FnOnce(&mut GraphFile)) -> Result<(), String> {

@@ -9,13 +9,13 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde::Serialize;
+use vigil_diagnosis::identify::IdentifierFilter;
 use vigil_evaluation::report::{Report, SensorSet};
 use vigil_learning::data_hash;
 use vigil_plausibility as plausible;
 use vigil_recording::frames::Run;
 use vigil_recording::labels::{self, Label};
 use vigil_robot::RobotModel;
-use vigil_setup::schema::IdentifierFilter;
 
 use super::learn::write_whole;
 use super::offline::{FilterArgs, FilterSettings, OfflineModels};

@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use vigil_diagnosis::detect;
 
 use serde::Serialize;
 use vigil_learning::learning::further;
@@ -118,7 +119,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 }
 
 fn show(path: &Path, is_json: bool) -> Result<Outcome, CommandError> {
-    let rate_1_h = vigil_setup::schema::Detector::default().fault_rate_1_h;
+    let rate_1_h = detect::Settings::default().fault_rate_1_h;
     match load_model(path)? {
         RobotModel::Faults(model) => print_view(&View::new(&model, rate_1_h), path, is_json),
         RobotModel::Nominal(model) => {

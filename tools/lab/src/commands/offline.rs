@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::PossibleValuesParser;
 use serde::Serialize;
-use vigil_blocks::PARTICLE_CAPACITY;
-use vigil_diagnosis::identify::Models;
+use vigil_diagnosis::Sensors;
+use vigil_diagnosis::detect::{self, Form};
+use vigil_diagnosis::identify::{self, IdentifierFilter, Models, PARTICLES_MAX, PARTICLES_MIN};
 use vigil_pomdp::Pomdp;
 use vigil_recording::frames::{self, Run};
 use vigil_robot::FaultTree;
 use vigil_robot::tree::Node;
 use vigil_robot::{Description, RobotModel};
-use vigil_setup::schema::{self, Form, IdentifierFilter, Sensors};
 use vigil_setup::{load_decision, load_robot, load_tree};
 
 use crate::pipeline::Pipeline;
@@ -63,12 +63,12 @@ pub struct FilterArgs {
     /// Identification filter.
     #[arg(long, value_name = "NAME", value_enum, default_value_t)]
     pub identifier: IdentifierFilter,
-    /// Particles of a sampled identification filter, 32 to 1024 [default: 256]. For
-    /// `multiple-hypothesis` the greatest number of hypotheses [default: all].
+    /// Particles of a sampled identification filter [default: 256]. For `multiple-hypothesis` the
+    /// greatest number of hypotheses [default: all].
     #[arg(
         long,
         value_name = "N",
-        value_parser = clap::value_parser!(u16).range(32..=PARTICLE_CAPACITY as i64)
+        value_parser = clap::value_parser!(u16).range(PARTICLES_MIN as i64..=PARTICLES_MAX as i64)
     )]
     particles: Option<u16>,
     /// Seed of the filters.
@@ -186,10 +186,10 @@ impl FilterArgs {
         sensors: &str,
         filter: IdentifierFilter,
     ) -> Result<Pipeline, CommandError> {
-        let detector = schema::Detector {
+        let detector = detect::Settings {
             sensors: channels(sensors),
             form: self.detector,
-            ..schema::Detector::default()
+            ..detect::Settings::default()
         };
         let refuse = |error: &dyn std::fmt::Display| {
             CommandError::usage(format!("{}: {error}", self.model.display()))
@@ -202,10 +202,10 @@ impl FilterArgs {
                 return Ok(pipeline.map_err(|e| refuse(&e))?.recovering(recoverer));
             }
         };
-        let identifier = schema::Identifier {
+        let identifier = identify::Settings {
             filter,
             particles: self.particles.map(usize::from),
-            ..schema::Identifier::default()
+            ..identify::Settings::default()
         };
         let needs_decision = identifier.filter == IdentifierFilter::RiskSensitive;
         let decision = match needs_decision {

@@ -15,7 +15,7 @@ use vigil_cycle::{
 use vigil_robot::FrameGuard;
 use vigil_sensor_sim::{ArrivalBatch, ArrivalClock};
 use vigil_setup::Setup;
-use vigil_setup::schema::Source;
+use vigil_setup::graph_file::Source;
 
 use super::{BorderReport, FrameArrival, Reception};
 

@@ -5,7 +5,7 @@ use std::fs;
 use vigil_cycle::PortError;
 use vigil_cycle::topic::ServiceName;
 use vigil_setup::Setup;
-use vigil_setup::schema::Source;
+use vigil_setup::graph_file::Source;
 
 /// The source of the running graph of this name; the file's if none is running.
 ///

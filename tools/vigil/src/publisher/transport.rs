@@ -5,7 +5,7 @@ use vigil_cycle::Topic;
 use vigil_cycle::domain::Queues;
 use vigil_cycle::port::FoundTopic;
 use vigil_setup::Setup;
-use vigil_setup::schema::Source;
+use vigil_setup::graph_file::Source;
 
 use super::Reception;
 use crate::findings::{Finding, Status};
@@ -18,7 +18,7 @@ pub fn findings(setup: &Setup, heard: &Reception) -> Vec<Finding> {
     let mut all = vec![source(setup, heard)];
     if setup.file.sensor.source != Source::Socket {
         all.push(types(setup, heard));
-        let demanded = setup.queues().for_topic(Topic::Sensor);
+        let demanded = setup.file.transport.for_topic(Topic::Sensor);
         let found = heard.topic.as_ref();
         all.extend(found.map(|found| settings(demanded, found)));
     }

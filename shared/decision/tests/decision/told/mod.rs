@@ -1,10 +1,11 @@
 //! The navigation model behind the supervisor, told cycle by cycle what is seen.
 
 use vigil_blocks::{Action, ActionOutcome, DetectionBelief, Entry, FaultBelief, RecoveryKind};
+use vigil_decision::Settings;
 use vigil_decision::{Inputs, Supervisor};
 use vigil_pomdp::{Pomdp, Tracker};
 use vigil_robot::FaultTree;
-use vigil_setup::schema::{GraphFile, Supervisor as Settings};
+use vigil_setup::graph_file::GraphFile;
 
 /// Time between cycles.
 pub const CYCLE_NS: u64 = 10_000_000;

@@ -7,7 +7,7 @@ use vigil_decision::{Compensation, Inputs, Supervisor};
 use vigil_pomdp::Pomdp;
 use vigil_robot::Description;
 use vigil_robot::FaultTree;
-use vigil_setup::schema::{self, GraphFile};
+use vigil_setup::graph_file::GraphFile;
 
 /// Time between cycles.
 pub const CYCLE_NS: u64 = 10_000_000;
@@ -38,7 +38,7 @@ impl World {
     }
 
     /// With the shipped configuration, changed.
-    pub fn with(change: impl FnOnce(&mut schema::Supervisor)) -> Self {
+    pub fn with(change: impl FnOnce(&mut vigil_decision::Settings)) -> Self {
         let tree = vigil_setup::load_tree(&config().join("trees/rover.toml")).unwrap();
         let robot = vigil_setup::load_robot(&config().join("robots/rover.toml")).unwrap();
         let text = std::fs::read_to_string(config().join("rover.toml")).unwrap();

@@ -2,10 +2,10 @@
 
 use std::cell::Cell;
 
+use vigil_diagnosis::identify::IdentifierFilter;
 use vigil_evaluation::scoring::{self, Case, Contest, Entrant, Score, Taxonomy};
 use vigil_recording::frames::Run;
 use vigil_recording::labels::Label;
-use vigil_setup::schema::IdentifierFilter;
 
 use super::Args;
 use crate::commands::offline::OfflineModels;

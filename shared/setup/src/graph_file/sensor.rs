@@ -4,44 +4,39 @@ use std::fmt;
 use std::net::SocketAddr;
 
 use clap::ValueEnum;
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 
 /// Where sensor frames come from.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sensor {
-    /// `simulator`, `playback`, `external` (a publisher in shared memory) or `socket`.
+    /// What publishes the frames.
     pub source: Source,
     /// Frames to play back (CSV or CSV.gz), relative to the graph file; for `playback`.
     pub frames: Option<String>,
     /// Runs to play back: `all`, `heldout` (those that the model was not learned from), or run ids
     /// separated by commas; for `playback`.
     pub runs: Option<String>,
-    /// Speed of the playback relative to the recording, 0.01 to 100; default 1.
+    /// Speed of the playback relative to the recording; 1 unless given.
+    #[schemars(range(min = 0.01, max = 100.0))]
     pub speed: Option<f64>,
     /// Where frames arrive as datagrams; for `socket`.
     pub socket: Socket,
 }
 
 /// Where frames arrive as datagrams.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Socket {
-    /// Address and port of a UDP socket; empty for none. The default, `127.0.0.1:7401`, is for
-    /// this machine alone; with another address every machine that reaches it may send frames.
+    /// Address and port of a UDP socket; empty for none. The default is for this machine alone;
+    /// with another address every machine that reaches it may send frames.
+    #[default = "127.0.0.1:7401"]
     pub udp: String,
-    /// Name of a Unix datagram socket in the graph's runtime folder; empty for none. Default:
-    /// `sensor.sock`.
+    /// Name of a Unix datagram socket in the graph's runtime folder; empty for none.
+    #[default = "sensor.sock"]
     pub unix: String,
-}
-
-impl Default for Socket {
-    fn default() -> Self {
-        Self {
-            udp: "127.0.0.1:7401".into(),
-            unix: "sensor.sock".into(),
-        }
-    }
 }
 
 impl Socket {
@@ -61,7 +56,9 @@ impl Socket {
 }
 
 /// Kind of the sensor source.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ValueEnum)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema, ValueEnum,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
     /// The simulated rover.
