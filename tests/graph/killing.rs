@@ -5,7 +5,9 @@ use std::process::Command;
 use vigil_blocks::FaultBelief;
 use vigil_cycle::Topic;
 
-use crate::harness::{HealthWatch, ModeWatch, RunningGraph, drain, eventually, machine};
+use crate::harness::{
+    HealthWatch, ModeWatch, RunningGraph, config_with, drain, eventually, machine, unique,
+};
 
 #[test]
 fn a_restarted_simulator_goes_on_with_its_broken_rover() {
@@ -90,4 +92,32 @@ fn each_service_killed_once_comes_back_and_nothing_is_left() {
         [],
         "a restart is no fault of the rover"
     );
+}
+
+#[test]
+fn a_restarted_service_runs_on_what_the_launcher_has_read() {
+    let _machine = machine();
+    let folder = std::env::temp_dir().join(unique("read-once"));
+    let config = config_with(&folder, |text| text);
+    let mut graph = RunningGraph::start_with(config.clone(), "read-once", &["--duration", "60"]);
+    let observed = graph.observe();
+    let mut health = HealthWatch::new(&observed);
+    eventually("all services run", || health.all_running().then_some(()));
+    let text = std::fs::read_to_string(&config).unwrap();
+    let edited = text.replace("rate_hz = 100.0", "rate_hz = 50.0");
+    assert_ne!(edited, text);
+    std::fs::write(&config, edited).unwrap();
+    for service in ["detector", "supervisor"] {
+        let before = health.poll()[service];
+        kill(before.pid);
+        let back = eventually("it is restarted", || {
+            let now = health.poll()[service];
+            (now.header.epoch != before.header.epoch && now.cycles > 10).then_some(now)
+        });
+        assert_eq!(back.period_ns, 10_000_000, "{service}");
+    }
+    assert!(graph.is_alive());
+    graph.interrupt();
+    graph.finish();
+    let _ = std::fs::remove_dir_all(folder);
 }

@@ -45,7 +45,7 @@ fn main() -> ExitCode {
 }
 
 fn prepare(args: &ServiceArgs) -> Result<(Setup, Diagnoser), Box<dyn std::error::Error>> {
-    let setup = args.graph.load()?;
+    let setup = args.load()?;
     let identifier = assemble(&setup).map_err(|e| format!("{}: {e}", setup.path.display()))?;
     Ok((setup, identifier))
 }

@@ -4,8 +4,8 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use vigil_cycle::KeepAwake;
 use vigil_cycle::topic::ServiceName;
+use vigil_cycle::{KeepAwake, SealedText};
 use vigil_recording::frames;
 use vigil_robot::Injection;
 use vigil_setup::graph_file::Source;
@@ -63,8 +63,8 @@ pub struct Drive {
 pub struct Plan {
     /// The configuration, options applied.
     pub setup: Setup,
-    /// Options for every service.
-    options: Vec<String>,
+    /// What every service reads: the same bytes at each restart, even if a file was edited.
+    document: SealedText,
     inject: Vec<String>,
     stamps: Option<(PathBuf, usize)>,
     no_timing: bool,
@@ -76,23 +76,23 @@ impl Plan {
         if args.duration.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
             return Err("--duration: allowed is any number of seconds above 0".into());
         }
-        let mut graph = args.graph.clone();
-        let mut setup = graph.load()?;
+        let mut document = args.graph.read()?;
+        let mut setup = document.check()?;
         if !args.inject.is_empty() && setup.file.sensor.source != Source::Simulator {
             return Err("--inject: only the simulator can be broken; the source is another".into());
         }
         if setup.file.sensor.source == Source::Playback {
-            if graph.rate.is_some() {
+            if args.graph.rate.is_some() {
                 return Err(
                     "--rate: recorded frames have their own; change it with --speed or sensor.speed"
                         .into(),
                 );
             }
-            graph.rate = Some(playback_rate_hz(&setup)?);
-            setup = graph.load()?;
+            document.file.graph.rate_hz = playback_rate_hz(&setup)?;
+            setup = document.check()?;
         }
         let plan = Self {
-            options: graph.to_command_line(),
+            document: SealedText::new(&document.to_text()?)?,
             setup,
             inject: args.inject.clone(),
             stamps: args.stamps.clone().map(|f| (f, args.stamped_cycles)),
@@ -219,7 +219,8 @@ impl Plan {
         let beside = std::env::current_exe()
             .unwrap_or_default()
             .with_file_name(program);
-        (beside, self.options.clone())
+        let document = self.document.path().display().to_string();
+        (beside, vec!["--setup".into(), document])
     }
 }
 

@@ -51,7 +51,7 @@ fn main() -> ExitCode {
 }
 
 fn prepare(args: &Args) -> Result<(Setup, SensorSource), Box<dyn Error>> {
-    let setup = args.service.graph.load()?;
+    let setup = args.service.load()?;
     let source = assemble(&setup, &args.inject)?;
     Ok((setup, source))
 }

@@ -46,7 +46,7 @@ fn main() -> ExitCode {
 }
 
 fn prepare(args: &ServiceArgs) -> Result<(Setup, Supervisor), Box<dyn std::error::Error>> {
-    let setup = args.graph.load()?;
+    let setup = args.load()?;
     let supervisor = assemble(&setup).map_err(|e| format!("{}: {e}", setup.path.display()))?;
     Ok((setup, supervisor))
 }

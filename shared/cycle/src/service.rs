@@ -10,7 +10,6 @@ use crate::on_miss::OnMiss;
 #[serde(deny_unknown_fields)]
 pub struct Settings {
     /// Core to pin to. Several services may name one core; every report says so.
-    #[schemars(extend("x-unit" = "number"))]
     pub core: usize,
     /// `SCHED_FIFO` priority, used where permitted; 0: `SCHED_OTHER`.
     #[serde(default = "Settings::priority")]

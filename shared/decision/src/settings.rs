@@ -92,9 +92,9 @@ pub enum Evidence {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Gate {
-    /// That of the belief over states.
+    /// The entropy of the belief over states.
     State,
-    /// That of the states' votes for their best actions.
+    /// The entropy of the states' votes for their best actions.
     Action,
 }
 

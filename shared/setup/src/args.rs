@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use vigil_cycle::serve::Leave;
 use vigil_diagnosis::identify::IdentifierFilter;
 
+use crate::document::Document;
 use crate::graph_file::Source;
-use crate::load::{Setup, load_graph};
+use crate::load::Setup;
 use crate::problem::SetupError;
 
 /// Which graph, and what to change in it for this start.
@@ -54,6 +55,10 @@ pub struct ServiceArgs {
     #[command(flatten)]
     #[allow(missing_docs)] // Would replace the options' own texts.
     pub graph: GraphArgs,
+    /// Document of a launcher that has read the configuration and all models: read in place of the
+    /// graph file, options applied.
+    #[arg(long, value_name = "F", hide = true)]
+    pub setup: Option<PathBuf>,
     /// Where to leave the run report.
     #[arg(long, value_name = "F")]
     pub report: Option<PathBuf>,
@@ -72,6 +77,17 @@ pub struct ServiceArgs {
 }
 
 impl ServiceArgs {
+    /// Reads and checks what the launcher has handed on, else as [`GraphArgs::load`].
+    ///
+    /// # Errors
+    /// Every problem found, at once.
+    pub fn load(&self) -> Result<Setup, SetupError> {
+        match &self.setup {
+            Some(document) => Document::read_text(document)?.check(),
+            None => self.graph.load(),
+        }
+    }
+
     /// What the service is to leave behind when it stops.
     #[must_use]
     pub fn leave(&self) -> Leave {
@@ -90,7 +106,15 @@ impl GraphArgs {
     /// # Errors
     /// Every problem found, at once; see [`SetupError`].
     pub fn load(&self) -> Result<Setup, SetupError> {
-        load_graph(&self.config, |file| {
+        self.read()?.check()
+    }
+
+    /// Reads the graph file and the files that it names, and applies these options.
+    ///
+    /// # Errors
+    /// Why the graph file cannot be understood.
+    pub fn read(&self) -> Result<Document, SetupError> {
+        Document::read(&self.config, |file| {
             if let Some(rate_hz) = self.rate {
                 file.graph.rate_hz = rate_hz;
             }
@@ -114,29 +138,5 @@ impl GraphArgs {
                 file.sensor.speed = self.speed;
             }
         })
-    }
-
-    /// The options as a command line, to hand them on to another program of the graph.
-    #[must_use]
-    pub fn to_command_line(&self) -> Vec<String> {
-        let mut line = vec!["--config".to_owned(), self.config.display().to_string()];
-        let mut option = |name: &str, value: Option<String>| {
-            if let Some(value) = value {
-                line.push(name.to_owned());
-                line.push(value);
-            }
-        };
-        option("--rate", self.rate.map(|v| v.to_string()));
-        option("--graph", self.graph.clone());
-        option("--seed", self.seed.map(|v| v.to_string()));
-        option("--identifier", self.identifier.map(|v| v.to_string()));
-        option("--source", self.source.map(|v| v.to_string()));
-        option(
-            "--replay",
-            self.replay.as_ref().map(|p| p.display().to_string()),
-        );
-        option("--runs", self.runs.clone());
-        option("--speed", self.speed.map(|v| v.to_string()));
-        line
     }
 }

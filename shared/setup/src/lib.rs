@@ -10,6 +10,7 @@ mod locate;
 mod place;
 mod problem;
 mod ranges;
+mod reference;
 mod schema;
 
 pub use args::{GraphArgs, ServiceArgs};
@@ -17,4 +18,5 @@ pub use document::Document;
 pub use load::{Setup, load_decision, load_graph, load_model, load_robot, load_tree};
 pub use problem::{Problem, SetupError};
 pub use ranges::{OutOfRange, Ranges};
+pub use reference::reference;
 pub use schema::schema;

@@ -158,7 +158,7 @@ mod tests {
             &schema,
             "list = [[0, 2]]\nmap = { a = { x = 3 } }\nsection = { x = 4 }",
         );
-        let out = "is out of range: allowed is 1 at most";
+        let out = "is out of range: allowed is at most 1";
         let expected = [
             "list: 1 entries: allowed are 2 or more".to_owned(),
             format!("list.0.1: 2 {out}"),

@@ -33,7 +33,7 @@ pub(crate) fn allowed(schema: &Value) -> Option<String> {
     let range = match (low, high) {
         (Some(low), Some(high)) => format!("{low} to {high}"),
         (Some(low), None) => format!("{low} or more"),
-        (None, Some(high)) => format!("{high} at most"),
+        (None, Some(high)) => format!("at most {high}"),
         (None, None) => return None,
     };
     Some(match number("x-off") {

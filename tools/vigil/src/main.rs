@@ -3,6 +3,7 @@
 mod bindings;
 mod check;
 mod check_publisher;
+mod config;
 mod findings;
 mod inject;
 mod laboratory;
@@ -29,6 +30,7 @@ struct Args {
 enum Command {
     Check(check::Args),
     CheckPublisher(check_publisher::Args),
+    Config(config::Args),
     Inject(inject::Args),
     #[command(name = "types")]
     PrintTypes(print_types::Args),
@@ -41,6 +43,7 @@ fn main() -> ExitCode {
     exit_code(match Args::parse().command {
         Command::Check(args) => check::run(&args),
         Command::CheckPublisher(args) => check_publisher::run(&args),
+        Command::Config(args) => config::run(&args),
         Command::Inject(args) => inject::run(&args),
         Command::PrintTypes(args) => print_types::run(&args),
         Command::Laboratory(words) => laboratory::run(&words),

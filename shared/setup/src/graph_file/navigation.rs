@@ -1,7 +1,5 @@
 //! `[navigation]`: the corridor of the simulator.
 
-use std::f64::consts::PI;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
@@ -10,6 +8,8 @@ use smart_default::SmartDefault;
 const COORDINATE_MAX_M: f64 = 1e3;
 /// Points of a path, walls, obstacles: what a cycle may have to look at.
 const COUNT_MAX: usize = 256;
+/// Half a turn, rad.
+const YAW_MAX_RAD: f64 = 3.1416;
 /// A year is never, s.
 const TIME_MAX_S: f64 = 3e7;
 
@@ -136,7 +136,7 @@ pub struct Trouble {
     /// `mislocalised`: jump of the believed heading; `wrong-heading`: turn of the direction that
     /// the robot takes.
     #[serde(default)]
-    #[schemars(range(min = -PI, max = PI))]
+    #[schemars(range(min = -YAW_MAX_RAD, max = YAW_MAX_RAD))]
     pub yaw_rad: f64,
 }
 
