@@ -43,6 +43,34 @@ pub fn dead(path: &Path) -> Vec<String> {
         .collect()
 }
 
+/// Paths of the repository that a document names and that do not exist.
+pub fn missing_paths(path: &Path, root: &Path) -> Vec<String> {
+    const FOLDERS: [&str; 8] = [
+        "bench/",
+        "config/",
+        "docs/",
+        "examples/",
+        "scripts/",
+        "services/",
+        "shared/",
+        "tests/",
+    ];
+    let text = std::fs::read_to_string(path).unwrap();
+    let spans = text
+        .lines()
+        .flat_map(|line| line.split('`').skip(1).step_by(2));
+    let is_path = |word: &&str| {
+        let is_name = |c: char| c.is_ascii_alphanumeric() || "/._-".contains(c);
+        FOLDERS.iter().any(|folder| word.starts_with(folder)) && word.chars().all(is_name)
+    };
+    let missing = spans
+        .filter(is_path)
+        .filter(|name| !root.join(name).exists());
+    missing
+        .map(|name| format!("{}: {name}", path.display()))
+        .collect()
+}
+
 #[test]
 fn dead_links_are_found() {
     let text = "# A `b` c?\n[x](y.md#z) and ![p](q.svg), [w](https://a.b/c)\n";

@@ -13,6 +13,7 @@
 
 mod blocks;
 mod follow;
+mod invariants;
 mod links;
 mod programs;
 
@@ -120,6 +121,15 @@ fn links_lead_somewhere() {
 }
 
 #[test]
+fn named_files_exist() {
+    let paths = documents().into_iter().map(|name| root().join(name));
+    let missing: Vec<String> = paths
+        .flat_map(|path| links::missing_paths(&path, &root()))
+        .collect();
+    assert_eq!(missing, [""; 0]);
+}
+
+#[test]
 fn help_without_a_build_is_the_launchers() {
     let output = Command::new(binary("vigil-launcher"))
         .arg("--help")
@@ -128,4 +138,18 @@ fn help_without_a_build_is_the_launchers() {
         .unwrap();
     let kept = std::fs::read_to_string(root().join("scripts/up.help")).unwrap();
     assert_eq!(String::from_utf8_lossy(&output.stdout), kept);
+}
+
+#[test]
+fn invariants_are_asserted_and_tested() {
+    let (count, mut wrong) = invariants::check(&root().join("ARCHITECTURE.md"));
+    assert!(count > 0, "ARCHITECTURE lists none");
+    for house in ["shared", "services", "tools"] {
+        let rooms = std::fs::read_dir(root().join(house)).unwrap();
+        let pages = rooms.map(|room| room.unwrap().path().join("README.md"));
+        for page in pages.filter(|page| page.is_file()) {
+            wrong.extend(invariants::check(&page).1);
+        }
+    }
+    assert_eq!(wrong, [""; 0]);
 }
