@@ -11,6 +11,8 @@
 //!
 //! Times are those of the documents, but a graph of which no lines are shown ends after two seconds.
 
+#![cfg(test)]
+
 mod blocks;
 mod follow;
 mod invariants;
@@ -87,7 +89,7 @@ fn blocks_that_do_not_run_say_why() {
     for document in documents() {
         for block in of_document(&root().join(&document)) {
             if let Kind::NotRun(reason) = &block.kind {
-                println!("{document}:{}: not run: {reason}", block.line);
+                eprintln!("{document}:{}: not run: {reason}", block.line);
             }
         }
     }
