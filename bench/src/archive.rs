@@ -7,8 +7,9 @@ use std::process::Command;
 
 use serde_json::{Map, Value};
 
-use crate::machine;
+use crate::machine::{self, output};
 use crate::results::{Raw, Run, SCHEMA_VERSION};
+use crate::root;
 
 /// Where results lie, from the project's folder.
 const RESULTS: &str = "bench/results";
@@ -108,11 +109,6 @@ impl Archive {
     }
 }
 
-/// The project's folder.
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
 /// Where results lie.
 #[must_use]
 pub fn results() -> PathBuf {
@@ -124,17 +120,6 @@ fn is_name(text: &str) -> bool {
     let mut parts = Path::new(text).components();
     let first = parts.next();
     matches!(first, Some(Component::Normal(name)) if name == text) && parts.next().is_none()
-}
-
-/// First line that a command prints; empty if it cannot run.
-pub(crate) fn output(command: &mut Command) -> String {
-    let output = command.output().map(|o| o.stdout).unwrap_or_default();
-    String::from_utf8_lossy(&output)
-        .lines()
-        .next()
-        .unwrap_or_default()
-        .trim()
-        .to_owned()
 }
 
 #[cfg(test)]

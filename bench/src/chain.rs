@@ -15,13 +15,17 @@ use serde::{Deserialize, Serialize};
 use vigil_cycle::placement::{self, PlacementRequest};
 use vigil_cycle::{Clock, CycleStamps, Monotonic, Stamps, clock, signal, stamps};
 
-use crate::latency::cycles::{STAGE_NAMES, STAGES};
 use carriers::{Carrier, Incoming, Outgoing};
 
 pub mod carriers;
 mod futex;
 mod payload;
 mod queue;
+
+/// Stages of the chain.
+pub const STAGES: usize = 4;
+/// Their names, in the order of the data.
+pub const STAGE_NAMES: [&str; STAGES] = ["sensor-sim", "detector", "identifier", "supervisor"];
 
 /// Silence after which a stage ends: the source is done, or has failed.
 const SILENCE: Duration = Duration::from_secs(2);

@@ -7,26 +7,27 @@
 
 mod bar;
 mod course;
-mod departure;
 mod fault;
 mod frames;
 mod ground;
 mod healthy;
 mod husky;
+mod job;
 mod logs;
 mod recorded;
 mod report;
 mod run;
 mod scenario;
 mod timeline;
+mod watch;
 
 pub use bar::{Bar, Comparison};
-pub use departure::Departure;
 pub use healthy::record;
-pub use recorded::{Library, Material, Source, library};
+pub use job::{Job, ScoredRun};
+pub use recorded::{Library, Material, library};
 pub use report::{Outcome, barred_lines, document, lines};
-pub use run::{Graph, Job, ScoredRun, jobs, run, select};
-pub use scenario::{Draw, File, Frames, Scenario, World};
+pub use run::{Graph, jobs, run, select};
+pub use scenario::{Departure, Draw, File, Frames, Scenario, Source, World};
 
 /// Words and priors of a graph's faults.
 fn taxonomy(setup: &vigil_setup::Setup) -> vigil_evaluation::scoring::Taxonomy {

@@ -1,14 +1,15 @@
 //! What the questions share: the archive of results, facts about the machine, simulated drives.
 
 use std::error::Error;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+use vigil_setup::{Setup, SetupError, load_graph};
 
 pub mod archive;
 pub mod chain;
 pub mod field;
-pub mod instructions;
 pub mod latency;
 pub mod machine;
 pub mod missions;
@@ -24,6 +25,20 @@ pub fn ended(name: &str, result: Result<(), Box<dyn Error>>) -> ExitCode {
             ExitCode::from(1)
         }
     }
+}
+
+/// The project's folder.
+#[must_use]
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// The graph of a configuration file; of `config/` if the path is relative.
+///
+/// # Errors
+/// A configuration that is refused.
+pub fn load(file: impl AsRef<Path>) -> Result<Setup, SetupError> {
+    load_graph(&root().join("config").join(file), |_| {})
 }
 
 /// What `work` makes of a folder of its own, which is gone afterwards.

@@ -5,8 +5,6 @@ use std::process::Command;
 
 use serde_json::{Value, json};
 
-use crate::archive::output;
-
 const CLOCKSOURCE: &str = "/sys/devices/system/clocksource/clocksource0/current_clocksource";
 
 /// What a reader of a figure must know: processor, cores, kernel, preemption, clock, load,
@@ -58,6 +56,17 @@ pub fn commit_in_words(commit: Option<&str>, facts: &Value) -> String {
         }
         (Some(commit), _) => format!("Commit: {commit}."),
     }
+}
+
+/// First line that a command prints; empty if it cannot run.
+pub(crate) fn output(command: &mut Command) -> String {
+    let output = command.output().map(|o| o.stdout).unwrap_or_default();
+    String::from_utf8_lossy(&output)
+        .lines()
+        .next()
+        .unwrap_or_default()
+        .trim()
+        .to_owned()
 }
 
 fn read(path: &str) -> String {

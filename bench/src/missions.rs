@@ -32,14 +32,13 @@ pub use report::{document, lines, lost_against, say};
 pub use score::{MEASURES, Measure, ObeyedOrder, Pay, Score, Truth};
 
 use std::error::Error;
-use std::path::Path;
 
 use vigil_blocks::RecoveryKind;
 use vigil_pomdp::Pomdp;
 use vigil_pomdp::mdp::{self, Solution};
 use vigil_robot::Injection;
 use vigil_robot::injection::Change;
-use vigil_setup::{GraphArgs, Setup};
+use vigil_setup::{Setup, load_graph};
 
 /// Longest mission, s.
 pub const LIMIT_S: f64 = 300.0;
@@ -56,17 +55,13 @@ pub struct ShippedGraph {
 }
 
 impl ShippedGraph {
-    /// Reads `config/rover.toml` below `root`; frames come `rate_hz` times a second.
+    /// Reads `config/rover.toml`; frames come `rate_hz` times a second.
     ///
     /// # Errors
     /// A configuration that is refused.
-    pub fn read(root: &Path, rate_hz: f64) -> Result<Self, Box<dyn Error>> {
-        let args = GraphArgs {
-            config: root.join("config/rover.toml"),
-            rate: Some(rate_hz),
-            ..GraphArgs::default()
-        };
-        let setup = args.load()?;
+    pub fn read(rate_hz: f64) -> Result<Self, Box<dyn Error>> {
+        let path = crate::root().join("config/rover.toml");
+        let setup = load_graph(&path, |file| file.graph.rate_hz = rate_hz)?;
         let solution = mdp::solve(&setup.decision)?;
         Ok(Self { setup, solution })
     }

@@ -5,7 +5,6 @@ mod stages;
 pub use stages::Stages;
 
 use std::error::Error;
-use std::path::Path;
 
 use vigil_diagnosis::Sensors;
 use vigil_robot::Description;
@@ -33,17 +32,17 @@ pub struct Rover {
 }
 
 impl Rover {
-    /// Reads the configuration below `root`.
+    /// Reads the configuration.
     ///
     /// # Errors
     /// A file that cannot be read or does not fit.
-    pub fn read(root: &Path) -> Result<Self, Box<dyn Error>> {
-        let robot = vigil_setup::load_robot(&root.join("config/robots/rover.toml"))?;
-        let model = vigil_setup::load_model(&root.join("config/models/rover.toml"), Some(&robot))?;
-        let model = model
-            .with_faults()
-            .ok_or("the rover's model has no faults")?;
-        let tree = vigil_setup::load_tree(&root.join("config/trees/rover.toml"))?;
-        Ok(Self { robot, model, tree })
+    pub fn read() -> Result<Self, Box<dyn Error>> {
+        let setup = crate::load("rover.toml")?;
+        let model = setup.model.with_faults();
+        Ok(Self {
+            robot: setup.robot,
+            model: model.ok_or("the rover's model has no faults")?,
+            tree: setup.tree,
+        })
     }
 }

@@ -2,15 +2,13 @@
 //! ten.
 #![cfg(test)]
 
-use std::path::Path;
-
 use vigil_bench::field::{File, Graph, Library, Outcome, Scenario, jobs, run};
+use vigil_bench::root;
 
 /// A figure of the first run of a scenario of `field.toml`, cut short.
 fn figure(name: &str, sensors: &'static str, figure: &str) -> f64 {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let graph = Graph::read(&here.join("..")).unwrap();
-    let file = File::read(&here.join("field.toml")).unwrap();
+    let graph = Graph::read().unwrap();
+    let file = File::read(&root().join("bench/field.toml")).unwrap();
     let found = file.scenario.iter().find(|all| all.name == name).unwrap();
     let scenario = Scenario {
         run_s: 130.0,

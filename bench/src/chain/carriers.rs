@@ -88,7 +88,7 @@ impl Carrier {
     pub fn outgoing(self, shared: &Path, stage: usize, size: usize) -> OpenResult<dyn Outgoing> {
         let path = shared.join(stage.to_string());
         // Nobody reads the last stage.
-        let is_last = stage + 1 == crate::latency::cycles::STAGES;
+        let is_last = stage + 1 == super::STAGES;
         Ok(match self {
             Self::Futex => Box::new(FutexWriter {
                 block: FutexBlock::open(&path, size)?,

@@ -4,9 +4,8 @@ use std::error::Error;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
-use super::Role;
 use super::carriers::{Incoming, Message, Outgoing};
-use crate::latency::cycles::STAGES;
+use super::{Role, STAGES};
 
 /// Blocks that may wait.
 const DEPTH: usize = 8;

@@ -69,6 +69,19 @@ pub struct Way {
     rng: Pcg64Mcg,
 }
 
+/// What differs between the runs of a scenario.
+#[derive(Debug, Clone, Copy)]
+pub struct RunConditions {
+    /// Number of the run, from 0.
+    pub run: usize,
+    /// Rate of the frames, Hz.
+    pub rate_hz: f64,
+    /// Factor on the world's noise.
+    pub noise: f64,
+    /// How much later gaps are, s.
+    pub later_s: f64,
+}
+
 impl std::fmt::Display for Way {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{:?}", self.drawn)
@@ -76,15 +89,19 @@ impl std::fmt::Display for Way {
 }
 
 impl Way {
-    /// The way of a run's frames; `noise` is the factor on the world's noise, gaps are
-    /// later by `later_s`.
+    /// The way of a run's frames.
     pub fn new(
         frames: &Frames,
         robot: &Description,
-        (rate_hz, noise): (f64, f64),
-        (run, later_s): (usize, f64),
+        conditions: RunConditions,
         mut rng: Pcg64Mcg,
     ) -> Self {
+        let RunConditions {
+            run,
+            rate_hz,
+            noise,
+            later_s,
+        } = conditions;
         let mut of = |draw: &Option<Draw>, otherwise: f64| {
             draw.as_ref()
                 .map_or(otherwise, |draw| draw.sample(run, &mut rng))

@@ -9,6 +9,8 @@ use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_setup::load_robot;
 
+use crate::root;
+
 /// A robot's log.
 #[derive(Debug)]
 pub struct Log {
@@ -25,8 +27,7 @@ pub struct Log {
 /// What is missing or malformed.
 pub fn log(archive: &str, log: &str) -> Result<Log, Box<dyn Error>> {
     let folder = unpacked(archive)?;
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let path = root.join(format!("config/logs/{log}.toml"));
+    let path = root().join(format!("config/logs/{log}.toml"));
     let description = LogDescription::load(&path)?;
     let robot = load_robot(&description.robot_path(&path))?;
     let imported = import(&description, &robot, &folder)?;
@@ -47,20 +48,15 @@ pub fn unpacked(archive: &str) -> Result<PathBuf, Box<dyn Error>> {
     let data = std::env::var("VIGIL_DATA").map_err(
         |_| "VIGIL_DATA is not set: the folder that holds real/kobuki_wheel_fault.tar.xz",
     )?;
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let into = root.join("target/real");
+    let into = root().join("target/real");
     let folder = into.join(archive);
     if !folder.is_dir() {
         std::fs::create_dir_all(&into)?;
         let packed = Path::new(&data)
             .join("real")
             .join(format!("{archive}.tar.xz"));
-        let status = Command::new("tar")
-            .arg("-xJf")
-            .arg(&packed)
-            .arg("-C")
-            .arg(&into)
-            .status()?;
+        let mut tar = Command::new("tar");
+        let status = tar.arg("-xJf").arg(&packed).arg("-C").arg(&into).status()?;
         if !status.success() {
             return Err(format!("{}: tar failed", packed.display()).into());
         }

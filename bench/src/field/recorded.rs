@@ -4,41 +4,26 @@ use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
 use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Taxonomy;
 use vigil_evaluation::scoring::field::{Scorer, Stretch, Truth};
 use vigil_learning::learning_nominal;
 use vigil_recording::{frames, labels};
 use vigil_robot::RobotModel;
-use vigil_setup::{GraphArgs, Setup, load_robot};
+use vigil_setup::{Setup, load_robot};
 
-use super::frames::{Fate, Way};
+use super::frames::{Fate, RunConditions, Way};
 use super::ground::stream;
-use super::run::{Job, ScoredRun, Watch};
-use super::scenario::Scenario;
+use super::job::{Job, ScoredRun};
+use super::scenario::{Scenario, Source};
 use super::timeline::Timeline;
+use super::watch::{Instant, Watch};
 use super::{husky, logs};
 use crate::simulated::Stages;
+use crate::{load, root};
 
 /// Velocity from which a robot counts as driving, m/s and rad/s.
 const DRIVES: f64 = 0.005;
-
-/// Which recorded runs.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Source {
-    /// `left-out` (the third of the rover's learn runs that was left out), `grounds` (the rover on
-    /// other grounds), `mujoco` (what `examples/mujoco_rover/record.py` has written to
-    /// `$VIGIL_DATA/rover`), `kobuki`, `husky`.
-    pub log: String,
-    /// Only runs on this ground.
-    pub ground: Option<String>,
-    /// Only runs whose label has this kind (`nominal`, `stuck`, `encoder`).
-    pub class: Option<String>,
-    /// Of logs that are learned from, too: which half is judged, 0 or 1, by the model of the other.
-    pub half: Option<usize>,
-}
 
 /// A run, and what is true in it.
 #[derive(Debug, Clone)]
@@ -64,7 +49,7 @@ pub type Library = BTreeMap<String, Material>;
 ///
 /// # Errors
 /// What is missing or malformed.
-pub fn library(root: &Path, scenarios: &[&Scenario]) -> Result<Library, Box<dyn Error>> {
+pub fn library(scenarios: &[&Scenario]) -> Result<Library, Box<dyn Error>> {
     let named = scenarios
         .iter()
         .filter_map(|s| Some((s, s.recorded.as_ref()?)));
@@ -84,7 +69,7 @@ pub fn library(root: &Path, scenarios: &[&Scenario]) -> Result<Library, Box<dyn 
         }
         let key = (source.log.clone(), source.half);
         if !read.contains_key(&key) {
-            read.insert(key.clone(), material(root, &data, source)?);
+            read.insert(key.clone(), material(&data, source)?);
         }
         let Some(whole) = read.get(&key) else {
             continue;
@@ -130,17 +115,9 @@ impl Material {
     }
 }
 
-fn graph(root: &Path, name: &str) -> Result<Setup, Box<dyn Error>> {
-    let args = GraphArgs {
-        config: root.join(format!("config/{name}.toml")),
-        ..GraphArgs::default()
-    };
-    Ok(args.load()?)
-}
-
-fn material(root: &Path, data: &Path, source: &Source) -> Result<Material, Box<dyn Error>> {
+fn material(data: &Path, source: &Source) -> Result<Material, Box<dyn Error>> {
     match source.log.as_str() {
-        "left-out" | "grounds" | "mujoco" => rover(root, data, &source.log),
+        "left-out" | "grounds" | "mujoco" => rover(data, &source.log),
         "kobuki" => {
             let log = logs::log("kobuki_wheel_fault", "kobuki")?;
             let whole = log.runs.into_iter().next().ok_or("no run")?;
@@ -154,13 +131,13 @@ fn material(root: &Path, data: &Path, source: &Source) -> Result<Material, Box<d
             };
             let (first, second) = whole.frames.split_at(middle);
             let halves = vec![half(0, first), half(1, second)];
-            learned(root, log.robot, halves, source.half.unwrap_or(1))
+            learned(log.robot, halves, source.half.unwrap_or(1))
         }
         "husky" => {
             let folder = logs::unpacked("husky_boreal")?;
-            let robot = load_robot(&root.join("config/robots/husky.toml"))?;
+            let robot = load_robot(&root().join("config/robots/husky.toml"))?;
             let runs = husky::runs(&folder, &robot)?;
-            learned(root, robot, runs, source.half.unwrap_or(1))
+            learned(robot, runs, source.half.unwrap_or(1))
         }
         other => Err(format!(
             "log '{other}': allowed are left-out, grounds, mujoco, kobuki, husky"
@@ -170,8 +147,8 @@ fn material(root: &Path, data: &Path, source: &Source) -> Result<Material, Box<d
 }
 
 /// The rover with its shipped model, which was learned from the other runs alone.
-fn rover(root: &Path, data: &Path, log: &str) -> Result<Material, Box<dyn Error>> {
-    let setup = graph(root, "rover")?;
+fn rover(data: &Path, log: &str) -> Result<Material, Box<dyn Error>> {
+    let setup = load("rover.toml")?;
     let name = match log {
         "grounds" => "grounds_dev",
         "mujoco" => "mujoco",
@@ -203,12 +180,11 @@ fn rover(root: &Path, data: &Path, log: &str) -> Result<Material, Box<dyn Error>
 
 /// A robot learned from every second run; the others are judged.
 fn learned(
-    root: &Path,
     robot: vigil_robot::Description,
     runs: Vec<(String, frames::Run)>,
     judged: usize,
 ) -> Result<Material, Box<dyn Error>> {
-    let mut setup = graph(root, "kobuki")?;
+    let mut setup = load("kobuki.toml")?;
     let is_judged = |run: &frames::Run| run.id as usize % 2 == judged;
     let others = runs.iter().filter(|(_, run)| !is_judged(run));
     let others: Vec<frames::Run> = others.map(|(_, run)| run.clone()).collect();
@@ -286,11 +262,16 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<ScoredRun>, Box<dy
             scorer: Scorer::new(&truth, taxonomy, case.span_s(), seed),
             timeline: Timeline::asked_for(job, seed, name),
         };
-        let rate = (1.0 / period_s, 0.0);
         let mut rng = stream(job.scenario.first_seed + seed, 4);
         let later_s = job.scenario.spread_s * rand::RngExt::random::<f64>(&mut rng);
-        let frames = &job.scenario.frames;
-        let mut way = Way::new(frames, &setup.robot, rate, (job.run, later_s), rng);
+        // What was recorded has its noise already.
+        let conditions = RunConditions {
+            run: job.run,
+            rate_hz: 1.0 / period_s,
+            noise: 0.0,
+            later_s,
+        };
+        let mut way = Way::new(&job.scenario.frames, &setup.robot, conditions, rng);
         let (mut t_before_s, mut held) = (None, None);
         for frame in &case.run.frames {
             let t_s = frame.header.t_capture_ns as f64 * 1e-9;
@@ -300,7 +281,7 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<ScoredRun>, Box<dy
             let velocity = setup.robot.twist(&frame.command);
             let drives = velocity.iter().any(|value| value.abs() >= DRIVES);
             let dt_s = t_s - t_before_s.unwrap_or(t_s);
-            watch.score((t_s, dt_s), drives, frame);
+            watch.score(Instant { t_s, dt_s }, drives, frame);
             t_before_s = Some(t_s);
         }
         scored.push(ScoredRun {

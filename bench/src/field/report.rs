@@ -4,8 +4,8 @@ use serde_json::{Value, json};
 use vigil_evaluation::scoring::field::{Figure, Run, figures};
 
 use super::bar::Bar;
-use super::departure;
 use super::scenario::Scenario;
+use crate::has_percentile;
 
 /// Figures that stand in the table even where no bar asks for them; the others are in the document.
 const SHOWN: [&str; 26] = [
@@ -36,6 +36,9 @@ const SHOWN: [&str; 26] = [
     "ece",
     "log_score_2s",
 ];
+
+/// The same of departures of constant size.
+const OF_DEPARTURES: [&str; 2] = ["detected", "standing_share_10s"];
 
 const NOT_MET: &str = "NOT met";
 
@@ -120,11 +123,12 @@ impl<'a> Outcome<'a> {
             self.hours()
         );
         let is_asked = |name: &str| self.bars().any(|(bar, _)| bar.figure == name);
-        // Departures have a table of their own.
-        let is_one_of_many = self.scenario.departure.is_some();
-        let is_shown = |figure: &Figure| {
-            !is_one_of_many && SHOWN.contains(&figure.name) && says_something(figure)
+        // A departure is one of many sizes.
+        let names = match self.scenario.departure {
+            Some(_) => &OF_DEPARTURES[..],
+            None => &SHOWN,
         };
+        let is_shown = |figure: &Figure| names.contains(&figure.name) && says_something(figure);
         let all = self.figures.iter();
         let shown = all.filter(|figure| is_asked(figure.name) || is_shown(figure));
         let mut lines: Vec<String> = Vec::new();
@@ -146,8 +150,11 @@ impl<'a> Outcome<'a> {
     }
 }
 
-/// False for what never happened where nothing is the rule.
+/// False for a percentile of too few cases, and for a rule that nothing broke.
 fn says_something(figure: &Figure) -> bool {
+    if figure.name.contains("_p95_") && !has_percentile(0.95, figure.n as u64) {
+        return false;
+    }
     let is_rule = figure.name.starts_with("reported_changes")
         || figure.name.starts_with("mode_changes")
         || figure.name == "contradiction_s"
@@ -201,12 +208,11 @@ const HEAD: [&str; 2] = [
 pub fn lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
     let mut lines = HEAD.map(str::to_owned).to_vec();
     lines.extend(outcomes.iter().flat_map(Outcome::lines));
-    lines.extend(departure::table(outcomes));
     lines
 }
 
 /// The bars that are not met, as a list that no summary cuts; the rows of the table that meet
-/// theirs; the departures.
+/// theirs.
 #[must_use]
 pub fn barred_lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
     let mut lines: Vec<String> = outcomes.iter().flat_map(Outcome::missed).collect();
@@ -217,7 +223,6 @@ pub fn barred_lines(outcomes: &[Outcome<'_>]) -> Vec<String> {
     lines.extend(HEAD.map(str::to_owned));
     let rows = outcomes.iter().flat_map(Outcome::lines);
     lines.extend(rows.filter(|row| !row.ends_with("|  |") && !row.contains(NOT_MET)));
-    lines.extend(departure::table(outcomes));
     lines
 }
 

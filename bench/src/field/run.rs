@@ -1,49 +1,31 @@
 //! Runs of scenarios.
 
 use std::error::Error;
-use std::path::Path;
 
 use vigil_blocks::SensorFrame;
 use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Taxonomy;
-use vigil_evaluation::scoring::field::{Run, Scorer, Stretch};
+use vigil_evaluation::scoring::field::{Scorer, Stretch};
 use vigil_robot::Injection;
 use vigil_robot::learned::Model;
 use vigil_sensor_sim::{ActionGate, EffectiveCommand, World};
+use vigil_setup::Setup;
 use vigil_setup::graph_file::Simulator;
-use vigil_setup::{GraphArgs, Setup};
 
 use super::course::{Range, course};
 use super::fault::{self, Places};
-use super::frames::{Fate, Way};
+use super::frames::{Fate, RunConditions, Way};
 use super::ground::{Ground, stream};
+use super::job::{Job, ScoredRun};
 use super::recorded::{self, Library, Material};
 use super::scenario::{File, Scenario};
 use super::timeline::Timeline;
+use super::watch::{Instant, Watch};
+use crate::load;
 use crate::simulated::Stages;
 
 /// Commanded speed from which a robot drives, m/s.
 const DRIVES_M_S: f64 = 0.005;
-
-/// One run of a scenario.
-#[derive(Debug, Clone, Copy)]
-pub struct Job<'a> {
-    /// The scenario.
-    pub scenario: &'a Scenario,
-    /// Number of the run, from 0.
-    pub run: usize,
-    /// Print whatever changes.
-    pub timeline: bool,
-}
-
-/// What a run brought with one set of sensors.
-#[derive(Debug, Clone)]
-pub struct ScoredRun {
-    /// Name of the set.
-    pub sensors: &'static str,
-    /// The score.
-    pub run: Run,
-}
 
 /// Every run of the scenarios; `scale` multiplies their number, at least one each stays. Recorded
 /// runs are all played, whatever the scale, and none without their files. Of a `timeline` only the
@@ -81,18 +63,11 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Reads `config/rover.toml` and `config/rover-all.toml` below `root`.
+    /// Reads `config/rover.toml` and `config/rover-all.toml`.
     ///
     /// # Errors
     /// A configuration that is refused.
-    pub fn read(root: &Path) -> Result<Self, Box<dyn Error>> {
-        let load = |name: &str| {
-            let args = GraphArgs {
-                config: root.join("config").join(name),
-                ..GraphArgs::default()
-            };
-            args.load()
-        };
+    pub fn read() -> Result<Self, Box<dyn Error>> {
         let (setup, all) = (load("rover.toml")?, load("rover-all.toml")?);
         let model = setup.model.clone().with_faults();
         Ok(Self {
@@ -168,8 +143,12 @@ impl Conditions {
             way: Way::new(
                 &scenario.frames,
                 robot,
-                (rate_hz, noise),
-                (run, later_s),
+                RunConditions {
+                    run,
+                    rate_hz,
+                    noise,
+                    later_s,
+                },
                 stream(seed, 4),
             ),
             rate_hz,
@@ -279,7 +258,7 @@ fn drive(
         let fate = way.fate(t_s);
         for watch in &mut watches {
             watch.deliver(&frame, fate, held.as_ref());
-            watch.score((t_s, dt_s), drives, &frame);
+            watch.score(Instant { t_s, dt_s }, drives, &frame);
         }
         held = (fate == Fate::Overtaken).then_some(frame);
     }
@@ -290,43 +269,6 @@ fn drive(
             run: watch.scorer.finish(),
         })
         .collect())
-}
-
-/// The stages of one set of sensors, and their score.
-pub(super) struct Watch<'a> {
-    pub(super) stages: Stages,
-    pub(super) scorer: Scorer<'a>,
-    pub(super) timeline: Option<Timeline>,
-}
-
-impl Watch<'_> {
-    /// Scores what is said after a frame, `dt_s` after what was scored before.
-    pub(super) fn score(&mut self, (t_s, dt_s): (f64, f64), drives: bool, frame: &SensorFrame) {
-        let moment = self.stages.moment(t_s, dt_s, drives);
-        self.scorer.take(&moment);
-        if let Some(timeline) = &mut self.timeline {
-            timeline.take(&moment, &self.stages, &frame.command);
-        }
-    }
-
-    /// What comes of a frame; `held` is one that this one has overtaken.
-    pub(super) fn deliver(&mut self, frame: &SensorFrame, fate: Fate, held: Option<&SensorFrame>) {
-        let stages = &mut self.stages;
-        match fate {
-            Fate::Lost | Fate::Overtaken => stages.miss(),
-            Fate::Late => {
-                stages.miss();
-                stages.take(frame);
-            }
-            Fate::Comes | Fate::Doubled => stages.take(frame),
-        }
-        if let Some(held) = held {
-            stages.take(held);
-        }
-        if fate == Fate::Doubled {
-            stages.take(frame);
-        }
-    }
 }
 
 /// The scenarios of a file whose names begin with any of `names`; all without one.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use vigil_evaluation::scoring::field::Moment;
 
-use super::run::Job;
+use super::job::Job;
 use crate::simulated::Stages;
 
 /// Prints a line on standard error for every change of alarm, name, set of faults or action.

@@ -11,15 +11,14 @@ use vigil_blocks::{Action, DetectionBelief, FaultBelief, ParticleBlock, SensorFr
 use vigil_cycle::latency::Percentiles;
 use vigil_cycle::placement::PlacementRequest;
 use vigil_cycle::{CycleStamps, Latency, Placement};
-use vigil_setup::graph_file::Source;
 
 use super::attribution::{self, Miss, Record};
-use super::cycles::{self, Cycle, STAGE_NAMES, STAGES, Spectra};
+use super::cycles::{self, Cycle, Spectra};
 use super::graph::{Change, GraphFile, GraphRun};
 use super::load::{Load, LoadProcess};
 use super::system::Ticks;
-use crate::chain::Chain;
 use crate::chain::carriers::Carrier;
+use crate::chain::{Chain, STAGE_NAMES, STAGES};
 
 /// Cycles at the start that are no steady state, s.
 const WARM_UP_S: f64 = 2.0;
@@ -133,7 +132,6 @@ impl Spec {
             rate_hz: self.rate_hz,
             particles: self.particles,
             is_fifo: self.scheduling == Scheduling::Fifo,
-            source: Source::Simulator,
             is_faulty: self.is_faulty,
         };
         let prepared = GraphFile::new(change, folder)?;
@@ -152,7 +150,7 @@ impl Spec {
         let canaries = prepared.canaries(self.seconds + 2.0 * floor_s + AROUND_S)?;
         let before = floor.run(folder)?;
         let ticks = Ticks::now();
-        let ran = prepared.run(self.seconds, folder, || Ok(()))?;
+        let ran = prepared.run(self.seconds, folder)?;
         let system = Ticks::now().since(ticks);
         let after = floor.run(folder)?;
         let canaries: Vec<CanaryRecord> = canaries.into_iter().filter_map(Canary::finish).collect();

@@ -4,10 +4,7 @@ use std::collections::BTreeMap;
 
 use vigil_cycle::{CycleStamps, Latency};
 
-/// Stages of the chain.
-pub const STAGES: usize = 4;
-/// Their names, in the order of the data.
-pub const STAGE_NAMES: [&str; STAGES] = ["sensor-sim", "detector", "identifier", "supervisor"];
+use crate::chain::STAGES;
 
 /// One instant of the schedule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

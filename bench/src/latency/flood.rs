@@ -8,7 +8,6 @@ use std::time::Duration;
 use vigil_blocks::SensorFrame;
 use vigil_cycle::port::Link;
 use vigil_cycle::{Topic, signal};
-use vigil_setup::GraphArgs;
 
 /// The word with which the program is a flood.
 pub const FLOOD_WORD: &str = "sensor-flood";
@@ -21,12 +20,7 @@ const BATCH: usize = 1000;
 /// # Errors
 /// Those of the file and the transport.
 pub fn be_flood(config: &Path) -> Result<(), Box<dyn Error>> {
-    let domain = GraphArgs {
-        config: config.to_owned(),
-        ..GraphArgs::default()
-    }
-    .load()?
-    .domain()?;
+    let domain = crate::load(config)?.domain()?;
     signal::install();
     while !signal::stop_requested() {
         // Not before the launcher has cleaned up and started its services.

@@ -3,7 +3,6 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
 use super::canary::Canary;
 use serde_json::Value;
@@ -12,10 +11,10 @@ use vigil_cycle::placement::PlacementRequest;
 use vigil_cycle::serve::Leave;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{CycleStamps, PortError, stamps};
-use vigil_setup::graph_file::Source;
-use vigil_setup::{GraphArgs, Setup};
+use vigil_setup::Setup;
 
-use super::cycles::{STAGE_NAMES, STAGES};
+use crate::chain::{STAGE_NAMES, STAGES};
+use crate::root;
 
 /// What is changed in the default graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,17 +25,12 @@ pub struct Change {
     pub particles: usize,
     /// True for `SCHED_FIFO` where permitted, false for `SCHED_OTHER`.
     pub is_fifo: bool,
-    /// Where frames come from.
-    pub source: Source,
     /// True if the hierarchical filter identifies, with all its particles, and a wheel sticks.
     pub is_faulty: bool,
 }
 
 /// Time that the services may take to start, s: under context switches it is minutes.
 const START_S: f64 = 240.0;
-
-/// Time to the start of the first service at most.
-const STARTED_MAX: Duration = Duration::from_secs(60);
 
 /// What breaks in a graph that is to have a fault, before any warm-up ends.
 const FAULT: &str = "stuck:RM@1";
@@ -71,12 +65,6 @@ impl GraphFile {
         set(&mut file, "graph", "rate_hz", change.rate_hz.into())?;
         let name = format!("bench-{}", std::process::id());
         set(&mut file, "graph", "name", name.into())?;
-        set(
-            &mut file,
-            "sensor",
-            "source",
-            change.source.to_string().into(),
-        )?;
         let particles = i64::try_from(change.particles)?;
         set(&mut file, "identifier", "particles", particles.into())?;
         if change.is_faulty {
@@ -97,11 +85,7 @@ impl GraphFile {
         }
         let path = folder.join("graph.toml");
         std::fs::write(&path, file.to_string())?;
-        let setup = GraphArgs {
-            config: path.clone(),
-            ..GraphArgs::default()
-        }
-        .load()?;
+        let setup = crate::load(path.clone())?;
         let is_faulty = change.is_faulty;
         Ok(Self {
             path,
@@ -174,83 +158,36 @@ impl GraphFile {
         Ok(text.replace(&format!("{}/", root().display()), ""))
     }
 
-    /// Waits until its services are being started; before that the launcher cleans up.
-    ///
-    /// # Errors
-    /// If that does not come to pass.
-    pub fn wait_until_started(&self) -> Result<(), Box<dyn Error>> {
-        let (domain, until) = (self.setup.domain()?, Instant::now() + STARTED_MAX);
-        while !domain.processes_file().exists() {
-            if Instant::now() > until {
-                return Err("the graph did not start".into());
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        Ok(())
-    }
-
     /// Where the graph file lies.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    fn command(&self, seconds: f64, options: &[&str]) -> Command {
+    /// Runs it for `seconds`; its services leave their stamps, by way of `folder`.
+    ///
+    /// # Errors
+    /// If the graph fails or leaves no stamps.
+    pub fn run(&self, seconds: f64, folder: &Path) -> Result<GraphRun, Box<dyn Error>> {
+        let rate_hz = self.setup.file.graph.rate_hz;
+        let kept = ((seconds + START_S) * rate_hz).ceil();
         let mut command = Command::new(&self.launcher);
         command
             .arg("--config")
             .arg(&self.path)
-            .args(["--json", "--duration", &seconds.to_string()])
-            .args(options)
-            .stdin(Stdio::null());
+            .arg("--stamps")
+            .arg(folder);
+        command.args(["--stamped-cycles", &kept.to_string()]);
+        command.args(["--json", "--duration", &seconds.to_string()]);
         if self.is_faulty {
             command.args(["--inject", FAULT]);
         }
-        command
-    }
-
-    /// Runs it for `seconds` with these further options while `beside` does its part; the
-    /// launcher's document.
-    ///
-    /// # Errors
-    /// If the graph or `beside` fails.
-    pub fn run_beside(
-        &self,
-        seconds: f64,
-        options: &[&str],
-        beside: impl FnOnce() -> Result<(), Box<dyn Error>>,
-    ) -> Result<Value, Box<dyn Error>> {
-        let mut command = self.command(seconds, options);
-        let launcher = command
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()?;
-        let done = beside();
-        let output = launcher.wait_with_output()?;
-        done?;
+        let output = command.stdin(Stdio::null()).output()?;
         if !output.status.success() {
-            let said = String::from_utf8_lossy(&output.stderr).into_owned();
-            return Err(format!("the graph ended with {}\n{said}", output.status).into());
+            let text = String::from_utf8_lossy(&output.stderr);
+            return Err(format!("the graph ended with {}\n{text}", output.status).into());
         }
-        Ok(serde_json::from_slice(&output.stdout)?)
-    }
-
-    /// Runs it for `seconds` while `beside` does its part; its services leave their stamps, by way
-    /// of `folder`.
-    ///
-    /// # Errors
-    /// If the graph or `beside` fails, or the graph leaves no stamps.
-    pub fn run(
-        &self,
-        seconds: f64,
-        folder: &Path,
-        beside: impl FnOnce() -> Result<(), Box<dyn Error>>,
-    ) -> Result<GraphRun, Box<dyn Error>> {
-        let rate_hz = self.setup.file.graph.rate_hz;
-        let kept = ((seconds + START_S) * rate_hz).ceil().to_string();
-        let stamps_in = folder.display().to_string();
-        let options = ["--stamps", &stamps_in, "--stamped-cycles", &kept];
-        let summary = self.run_beside(seconds, &options, beside)?;
+        let summary: Value = serde_json::from_slice(&output.stdout)?;
         let read = |stage: usize| {
             if summary["services"].get(STAGE_NAMES[stage]).is_none() {
                 return Ok(Vec::new());
@@ -270,10 +207,4 @@ fn set(file: &mut Table, table: &str, key: &str, value: toml::Value) -> Result<(
     let table = table.ok_or_else(|| format!("the default graph has no table for {key}"))?;
     table.insert(key.to_owned(), value);
     Ok(())
-}
-
-/// Folder of the project.
-#[must_use]
-pub fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }

@@ -2,61 +2,12 @@
 
 use std::error::Error;
 
-use vigil_blocks::{
-    Action, DetectionBelief, Entry, FaultBelief, ParticleBlock, RecoveryKind, SensorFrame,
-};
-use vigil_decision::{Inputs, Supervisor};
-use vigil_diagnosis::detect::Detector;
-use vigil_diagnosis::identify::{Diagnoser, Input};
+use vigil_blocks::{Action, FaultBelief, RecoveryKind, SensorFrame};
 
 use super::arm::Arm;
 use super::escalation::{Escalation, Explanation, RuleInput, RuleOutput};
 use super::{ShippedGraph, Truth};
-
-/// Detector and identifier as they ship, one frame at a time.
-struct Watch {
-    detector: Detector,
-    identifier: Diagnoser,
-    detection: Box<DetectionBelief>,
-    detection_particles: Box<ParticleBlock>,
-    diagnosis: Box<FaultBelief>,
-    diagnosis_particles: Box<ParticleBlock>,
-}
-
-impl Watch {
-    fn new(shipped: &ShippedGraph, seed: u64) -> Result<Self, Box<dyn Error>> {
-        let mut setup = shipped.setup.clone();
-        setup.file.graph.seed = seed;
-        Ok(Self {
-            detector: vigil_detector::assemble(&setup)?,
-            identifier: vigil_identifier::assemble(&setup)?,
-            detection: Box::default(),
-            detection_particles: Box::default(),
-            diagnosis: Box::default(),
-            diagnosis_particles: Box::default(),
-        })
-    }
-
-    fn detect(&mut self, frame: &SensorFrame) -> bool {
-        let (detection, particles) = (&mut *self.detection, &mut *self.detection_particles);
-        self.detector
-            .step(Entry::Frame(frame), detection, particles);
-        detection.header = frame.header;
-        detection.alarm != 0
-    }
-
-    fn identify(&mut self, frame: &SensorFrame) -> &FaultBelief {
-        let input = Input {
-            frame,
-            detection: Some((&*self.detection, &*self.detection_particles)),
-        };
-        let (diagnosis, particles) = (&mut *self.diagnosis, &mut *self.diagnosis_particles);
-        self.identifier
-            .step(Entry::Frame(input), diagnosis, particles);
-        diagnosis.header = frame.header;
-        diagnosis
-    }
-}
+use crate::simulated::Stages;
 
 /// One of the commanders.
 pub(super) struct Commander<'a> {
@@ -68,10 +19,10 @@ pub(super) struct Commander<'a> {
 }
 
 enum Mind {
-    Vigil(Box<Watch>, Box<Supervisor>),
+    Vigil(Box<Stages>),
     Without,
-    Escalation(Box<Watch>, Escalation),
-    StopAndCall(Box<Watch>),
+    Escalation(Box<Stages>, Escalation),
+    StopAndCall(Box<Stages>),
     Oracle,
 }
 
@@ -81,15 +32,14 @@ impl<'a> Commander<'a> {
         arm: Arm,
         seed: u64,
     ) -> Result<Self, Box<dyn Error>> {
-        let watch = || Watch::new(shipped, seed).map(Box::new);
+        let file = &shipped.setup.file;
+        let (sensors, rate_hz) = (file.detector.sensors, file.graph.rate_hz);
+        let stages = || Stages::new(&shipped.setup, sensors, rate_hz, seed).map(Box::new);
         let mind = match arm {
-            Arm::Vigil => {
-                let supervisor = vigil_supervisor::assemble(&shipped.setup)?;
-                Mind::Vigil(watch()?, Box::new(supervisor))
-            }
+            Arm::Vigil => Mind::Vigil(stages()?),
             Arm::Without => Mind::Without,
-            Arm::Escalation => Mind::Escalation(watch()?, Escalation::default()),
-            Arm::StopAndCall => Mind::StopAndCall(watch()?),
+            Arm::Escalation => Mind::Escalation(stages()?, Escalation::default()),
+            Arm::StopAndCall => Mind::StopAndCall(stages()?),
             Arm::Oracle => Mind::Oracle,
         };
         let leaves = leaves(shipped);
@@ -104,37 +54,34 @@ impl<'a> Commander<'a> {
     /// The action after a frame; `dt_s` is the time between frames. Only the oracle looks at the
     /// truth.
     pub(super) fn command(&mut self, frame: &SensorFrame, truth: Truth, dt_s: f64) -> &Action {
-        let told = match &mut self.mind {
-            Mind::Vigil(watch, supervisor) => {
-                watch.detect(frame);
-                watch.identify(frame);
-                let inputs = Inputs {
-                    diagnosis: Some(&*watch.diagnosis),
-                    detection: Some(&*watch.detection),
-                };
-                supervisor.step(Entry::Frame(inputs), &mut self.action);
-                None
+        let order = |kind| RuleOutput { kind, wheel: None };
+        let output = match &mut self.mind {
+            Mind::Vigil(stages) => {
+                stages.take(frame);
+                *self.action = *stages.action();
+                return &self.action;
             }
-            Mind::Without => Some((RecoveryKind::GoOn, None)),
-            Mind::Escalation(watch, rules) => {
-                let alarm = watch.detect(frame);
-                let explanation = most_probable(&self.leaves, watch.identify(frame));
-                let RuleOutput { kind, wheel } =
-                    rules.answer(RuleInput { alarm, explanation }, dt_s);
-                Some((kind, wheel))
+            Mind::Without => order(RecoveryKind::GoOn),
+            Mind::Escalation(stages, rules) => {
+                stages.take(frame);
+                let (detection, diagnosis, _) = stages.blocks();
+                let alarm = detection.alarm != 0;
+                let explanation = most_probable(&self.leaves, diagnosis);
+                rules.answer(RuleInput { alarm, explanation }, dt_s)
             }
-            Mind::StopAndCall(watch) => match watch.detect(frame) {
-                true => Some((RecoveryKind::CallForHelp, None)),
-                false => Some((RecoveryKind::GoOn, None)),
+            Mind::StopAndCall(stages) => {
+                stages.take(frame);
+                match stages.blocks().0.alarm {
+                    0 => order(RecoveryKind::GoOn),
+                    _ => order(RecoveryKind::CallForHelp),
+                }
+            }
+            Mind::Oracle => RuleOutput {
+                kind: self.shipped.kind(self.shipped.solution.best(truth.state)),
+                wheel: truth.wheel,
             },
-            Mind::Oracle => {
-                let best = self.shipped.solution.best(truth.state);
-                Some((self.shipped.kind(best), truth.wheel))
-            }
         };
-        if let Some((kind, wheel)) = told {
-            self.tell(kind, wheel);
-        }
+        self.set_action(output);
         self.action.valid_until_ns = u64::MAX;
         &self.action
     }
@@ -147,7 +94,7 @@ impl<'a> Commander<'a> {
     }
 
     /// The action block of a kind, as the supervisor would write it.
-    fn tell(&mut self, kind: RecoveryKind, wheel: Option<usize>) {
+    fn set_action(&mut self, RuleOutput { kind, wheel }: RuleOutput) {
         let action = self.shipped.action(kind).unwrap_or_default();
         let steers = wheel.filter(|_| kind == RecoveryKind::Compensate);
         let straight = (1.0, 0.0);

@@ -55,15 +55,17 @@ pub struct RuleOutput {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
     Driving,
-    Looking {
-        for_s: f64,
-    },
-    Remedying {
-        what: Explanation,
-        for_s: f64,
-        doubt_s: f64,
-    },
+    Looking { for_s: f64 },
+    Remedying(Remedy),
     Waiting,
+}
+
+/// What is being done about an explanation, and for how long it and doubt in it have lasted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Remedy {
+    what: Explanation,
+    for_s: f64,
+    doubt_s: f64,
 }
 
 /// The rules, one cycle at a time.
@@ -90,19 +92,15 @@ impl Escalation {
             Phase::Looking { for_s } if for_s + dt_s < LOOK_S => Phase::Looking {
                 for_s: for_s + dt_s,
             },
-            Phase::Looking { .. } => Phase::Remedying {
+            Phase::Looking { .. } => Phase::Remedying(Remedy {
                 what: seen.explanation,
                 for_s: 0.0,
                 doubt_s: 0.0,
-            },
-            Phase::Remedying {
-                what,
-                for_s,
-                doubt_s,
-            } => self.remedy(seen, (what, for_s + dt_s, doubt_s), dt_s),
+            }),
+            Phase::Remedying(remedy) => self.remedy(seen, remedy, dt_s),
             Phase::Driving | Phase::Waiting => self.phase,
         };
-        self.told()
+        self.output()
     }
 
     fn stop(&mut self) -> Phase {
@@ -113,39 +111,31 @@ impl Escalation {
         }
     }
 
-    fn remedy(
-        &mut self,
-        seen: RuleInput,
-        (what, for_s, doubt_s): (Explanation, f64, f64),
-        dt_s: f64,
-    ) -> Phase {
+    fn remedy(&mut self, seen: RuleInput, mut remedy: Remedy, dt_s: f64) -> Phase {
         let well = !seen.alarm && seen.explanation == Explanation::Nominal;
-        let doubt_s = match well || seen.explanation != what {
-            true => doubt_s + dt_s,
+        remedy.for_s += dt_s;
+        remedy.doubt_s = match well || seen.explanation != remedy.what {
+            true => remedy.doubt_s + dt_s,
             false => 0.0,
         };
-        if doubt_s >= DOUBT_S {
+        if remedy.doubt_s >= DOUBT_S {
             return match well {
                 true => Phase::Driving,
                 false => self.stop(),
             };
         }
-        if what == Explanation::Unknown && for_s >= CREEP_S {
+        if remedy.what == Explanation::Unknown && remedy.for_s >= CREEP_S {
             return Phase::Waiting;
         }
-        Phase::Remedying {
-            what,
-            for_s,
-            doubt_s,
-        }
+        Phase::Remedying(remedy)
     }
 
-    const fn told(&self) -> RuleOutput {
+    const fn output(&self) -> RuleOutput {
         let (kind, wheel) = match self.phase {
             Phase::Driving => (RecoveryKind::GoOn, None),
             Phase::Looking { .. } => (RecoveryKind::Stop, None),
             Phase::Waiting => (RecoveryKind::CallForHelp, None),
-            Phase::Remedying { what, .. } => match what {
+            Phase::Remedying(Remedy { what, .. }) => match what {
                 Explanation::Nominal => (RecoveryKind::GoOn, None),
                 Explanation::Stuck(wheel) => (RecoveryKind::Compensate, Some(wheel)),
                 Explanation::Encoder(wheel) => (RecoveryKind::IgnoreEncoder, Some(wheel)),

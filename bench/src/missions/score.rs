@@ -251,8 +251,7 @@ mod tests {
     use super::*;
 
     fn shipped() -> ShippedGraph {
-        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        ShippedGraph::read(&root, 100.0).unwrap()
+        ShippedGraph::read(100.0).unwrap()
     }
 
     fn truth(shipped: &ShippedGraph, name: &str, wheel: Option<usize>) -> Truth {

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeSet;
 use std::error::Error;
-use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use vigil_bench::simulated::{ALL_SETS, Stages};
+use vigil_bench::{load, root};
 use vigil_blocks::{Action, DetectionBelief, FaultBelief, fnv1a};
 use vigil_diagnosis::Sensors;
 use vigil_diagnosis::identify::IdentifierFilter;
 use vigil_recording::frames::{self, Run};
-use vigil_setup::{GraphArgs, Setup};
+use vigil_setup::Setup;
 
 /// Runs that are hashed, evenly over those that `vigil learn` left out.
 const RUNS: usize = 30;
@@ -28,16 +28,8 @@ pub struct Args {
 
 /// Hashes, prints, and compares or keeps.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let load = |name: &str| {
-        let args = GraphArgs {
-            config: root.join("config").join(name),
-            ..GraphArgs::default()
-        };
-        args.load()
-    };
     let (setup, setup_all) = (load("rover.toml")?, load("rover-all.toml")?);
-    let runs = left_out(&setup, &root)?;
+    let runs = left_out(&setup)?;
     let mut text = String::new();
     let mut total = fnv1a::BASIS;
     for (sensors, name) in ALL_SETS {
@@ -56,7 +48,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     }
     text.push_str(&format!("{total:016x} all\n"));
     println!("{total:016x} all");
-    let file: PathBuf = root.join("bench/bits.txt");
+    let file = root().join("bench/bits.txt");
     if args.keep {
         return Ok(std::fs::write(&file, text)?);
     }
@@ -67,11 +59,11 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
 }
 
 /// The runs, evenly drawn from those that the model was not learned from.
-fn left_out(setup: &Setup, root: &Path) -> Result<Vec<Run>, Box<dyn Error>> {
+fn left_out(setup: &Setup) -> Result<Vec<Run>, Box<dyn Error>> {
     let model = setup.model.clone().with_faults();
     let model = model.ok_or("the rover's model has no faults")?;
     let held_out: BTreeSet<u32> = model.provenance.runs_held_out.iter().copied().collect();
-    let file = root.join("tests/data/rover/learn_frames.csv.gz");
+    let file = root().join("tests/data/rover/learn_frames.csv.gz");
     let runs = frames::read(&file, &setup.robot)?;
     let runs: Vec<Run> = runs
         .into_iter()

@@ -4,7 +4,7 @@
 //! library.
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -14,8 +14,7 @@ use vigil_bench::field::{
     self, File, Graph, Job, Library, Outcome, Scenario, ScoredRun, barred_lines, document, jobs,
     library, lines, select,
 };
-use vigil_bench::in_parallel;
-use vigil_bench::machine;
+use vigil_bench::{in_parallel, machine, root};
 
 /// Does the diagnosis hold in the field?
 #[derive(Debug, clap::Args)]
@@ -54,9 +53,8 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if cfg!(debug_assertions) {
         return Err("a debug build takes hours: use scripts/bench".into());
     }
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let path = args.scenarios.clone();
-    let file = File::read(&path.unwrap_or_else(|| here.join("field.toml")))?;
+    let file = File::read(&path.unwrap_or_else(|| root().join("bench/field.toml")))?;
     let scenarios = select(&file, &args.only)?;
     if args.list {
         for scenario in scenarios {
@@ -65,8 +63,8 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         return Ok(());
     }
     let began = Instant::now();
-    let graph = Graph::read(&here.join(".."))?;
-    let library = library(&here.join(".."), &scenarios)?;
+    let graph = Graph::read()?;
+    let library = library(&scenarios)?;
     let all = jobs(&scenarios, args.scale, &library, args.timeline);
     if all.is_empty() {
         return Err("no scenario has such a run, or its recordings are not there".into());

@@ -23,11 +23,10 @@ pub fn run() -> Result<(), Box<dyn Error>> {
 }
 
 fn measure(folder: &Path) -> Result<(), Box<dyn Error>> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let clone = folder.join("vigil");
     let status = Command::new("git")
         .args(["clone", "--quiet", "--no-hardlinks"])
-        .args([&root, &clone])
+        .args([&vigil_bench::root(), &clone])
         .status()?;
     if !status.success() {
         return Err("git clone failed".into());

@@ -1,7 +1,7 @@
 //! Records healthy runs of the simulated rover, every channel in them, for `vigil learn --more`.
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use vigil_bench::field;
 use vigil_bench::simulated::Rover;
@@ -15,6 +15,5 @@ pub struct Args {
 
 /// Records.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    field::record(&Rover::read(&root)?, &args.file)
+    field::record(&Rover::read()?, &args.file)
 }

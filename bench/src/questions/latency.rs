@@ -103,30 +103,13 @@ fn archive_name(args: &Args, specs: &[Spec]) -> String {
 
 /// The cells asked for, in order.
 fn specs(args: &Args) -> Vec<Spec> {
-    let or = |given: &[f64], all: &[f64]| {
-        if given.is_empty() {
-            all.to_vec()
-        } else {
-            given.to_vec()
-        }
-    };
     let is_matrix = is_matrix(args);
-    let one_rate: &[f64] = if is_matrix { &RATES_HZ } else { &[1000.0] };
-    let loads: &[Load] = if is_matrix { &LOADS } else { &[Load::Idle] };
-    let loads = if args.load.is_empty() {
-        loads
-    } else {
-        &args.load
-    };
     let both = [Scheduling::Fifo, Scheduling::Other];
-    let scheduling: &[Scheduling] = if is_matrix { &both } else { &both[..1] };
-    let scheduling = if args.scheduling.is_empty() {
-        scheduling
-    } else {
-        &args.scheduling
-    };
+    let rates = or(&args.rate, if is_matrix { &RATES_HZ } else { &[1000.0] });
+    let loads = or(&args.load, if is_matrix { &LOADS } else { &[Load::Idle] });
+    let scheduling = or(&args.scheduling, if is_matrix { &both } else { &both[..1] });
     let mut specs = Vec::new();
-    for rate_hz in or(&args.rate, one_rate) {
+    for &rate_hz in rates {
         for &load in loads {
             for &scheduling in scheduling {
                 let spec = Spec {
@@ -144,6 +127,11 @@ fn specs(args: &Args) -> Vec<Spec> {
     specs
 }
 
+/// What was given, or else the default.
+const fn or<'a, T>(given: &'a [T], otherwise: &'a [T]) -> &'a [T] {
+    if given.is_empty() { otherwise } else { given }
+}
+
 fn print_one(specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
     let [spec] = specs else {
         return Err("--json measures one cell: give one --rate, --load and --scheduling".into());
@@ -155,44 +143,38 @@ fn print_one(specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
 
 fn archive(args: &Args, specs: &[Spec], folder: &Path) -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new(&archive_name(args, specs))?;
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    let command = format!("scripts/bench {}", words.join(" "));
-    archive.say(&format!("`{command}`\n"));
     archive.say(
         "Times in us; every latency from the schedule, hand-over and floor without compute; \
          folded are instants that only a later one's answer ended. Own, by stage: instants that \
-         each stage answered after its own deadline and that are not the machine's. Histograms \
-         (`.hgrm`, `.hlog`) lie with the raw data.\n",
+         each stage answered after its own deadline and that are not the machine's. Every cycle \
+         lies with the raw data.\n",
     );
     archive.say(
         "| cell | cycles | folded | end to end p50 | p99 | p99.9 | max | hand-over p50 | p99 | \
          floor p50 | p99 | missed: own | machine | no one stall | machine / canary | own, by \
          stage |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
     );
-    let mut cells: Vec<Cell> = Vec::new();
+    let mut cells = Vec::new();
     for (i, spec) in specs.iter().enumerate() {
         eprintln!("{} of {}: {}", i + 1, specs.len(), spec.name());
-        let cell = match spec.run(folder) {
-            Ok(cell) => cell,
-            Err(error) => {
-                let why = error.to_string().trim().replace('\n', "; ");
-                archive.say(&format!(
-                    "| {} | not measured: {why} | | | | | | | | | | | | | | |",
-                    spec.name()
-                ));
-                continue;
+        match spec.run(folder) {
+            Ok(cell) => {
+                archive.say(&line(&cell));
+                let name = format!("{:02}-{}", i + 1, spec.name());
+                files::write(&cell, &archive.folder().join(name))?;
+                cells.push(cell.json());
             }
-        };
-        archive.say(&line(&cell));
-        cells.push(cell);
-        let name = format!("{:02}-{}", i + 1, spec.name());
-        files::write(&cells[cells.len() - 1], &archive.folder().join(name))?;
+            Err(error) => {
+                let (name, why) = (spec.name(), error.to_string().trim().replace('\n', "; "));
+                let empty = "| ".repeat(14);
+                archive.say(&format!("| {name} | not measured: {why} {empty}|"));
+            }
+        }
     }
     archive.store("machine.json", &system::facts())?;
-    let all: Vec<Value> = cells.iter().map(Cell::json).collect();
-    archive.store("cells.json", &Value::from(all))?;
-    archive.close()?;
     let unmeasured = specs.len() - cells.len();
+    archive.store("cells.json", &Value::from(cells))?;
+    archive.close()?;
     if unmeasured > 0 {
         return Err(format!("{unmeasured} cells were not measured").into());
     }

@@ -3,7 +3,6 @@
 //! Exit: 1 if Vigil does not win on the mission reward against going on and against the escalation.
 
 use std::error::Error;
-use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -39,7 +38,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         return Err("a debug build takes hours: use scripts/bench".into());
     }
     let (count, first, rate_hz) = (args.missions, args.first_seed, args.rate);
-    let shipped = ShippedGraph::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."), rate_hz)?;
+    let shipped = ShippedGraph::read(rate_hz)?;
     let plans: Vec<Plan> = (first..first + count).map(Plan::new).collect();
     let (began, done) = (Instant::now(), AtomicUsize::new(0));
     let drive = |plan: &Plan| {

@@ -9,10 +9,10 @@ use std::path::Path;
 use clap::ValueEnum;
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
-use vigil_bench::chain::Chain;
 use vigil_bench::chain::carriers::Carrier;
+use vigil_bench::chain::{Chain, STAGES};
 use vigil_bench::latency::cell::us;
-use vigil_bench::latency::cycles::{STAGES, Spectra, join};
+use vigil_bench::latency::cycles::{Spectra, join};
 use vigil_bench::latency::load::{Load, LoadProcess};
 use vigil_bench::percentile;
 

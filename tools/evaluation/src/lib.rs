@@ -1,4 +1,4 @@
-//! Scores of a diagnosis on labelled runs, and their report. Reads no file itself.
+#![doc = include_str!("../README.md")]
 
 pub mod report;
 pub mod scoring;

@@ -1,20 +1,4 @@
-//! Recordings of other programs, turned into Vigil's frames of a described robot.
-//!
-//! A [`LogDescription`] says which columns of which files become which channels, and how. Each
-//! run's channels are put on one clock at a stated rate.
-//!
-//! A frame holds nothing that was measured after it, but for this, which a live publisher does
-//! otherwise:
-//!
-//! - a channel that comes late is moved forward by its delay; live, the others wait as long. An
-//!   estimated delay is a constant of the log, found in the beginning of its first run;
-//! - `interpolate` waits for the next sample;
-//! - with a `device_clock`, a line through all stamps of the run places each row: its offset and
-//!   rate are constants of the run. So is the median difference of clocks that `time_as` adds;
-//! - a run begins and ends where all its measured channels have values;
-//! - rows out of order are put in order ([`Disorder`]).
-//!
-//! All else (`mean`, `hold`, differences, unwrapping, units) looks back only.
+#![doc = include_str!("../README.md")]
 
 mod check;
 mod delay;

@@ -1,4 +1,4 @@
-//! Pages of HTML with charts as SVG, which open anywhere without a network.
+#![doc = include_str!("../README.md")]
 
 pub mod chart;
 pub mod page;

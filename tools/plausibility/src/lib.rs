@@ -1,11 +1,4 @@
-//! Whether recorded runs mean what their columns say: units, signs, sides.
-//!
-//! A healthy robot does roughly what it is commanded. Where it moves a thousand times as far, turns
-//! the other way or rolls on the wrong side, the columns hold something else than they should. Each
-//! figure is a ratio to the command over the whole of a stretch, so that sensor noise and soil
-//! leave it near 1; a doubt needs a ratio that no ground explains. What the command means says the
-//! robot's description ([`Description::twist`]); channels that are not measured are not judged, nor
-//! are the wheels of an omnidirectional robot, the senses of which differ from maker to maker.
+#![doc = include_str!("../README.md")]
 
 mod chords;
 

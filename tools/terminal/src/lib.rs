@@ -1,4 +1,4 @@
-//! What the commands share: output, progress, how they end.
+#![doc = include_str!("../README.md")]
 
 mod ending;
 pub mod output;
