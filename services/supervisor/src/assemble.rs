@@ -4,12 +4,15 @@ use vigil_setup::Setup;
 
 use vigil_decision::{Compensation, Supervisor, SupervisorError};
 
-/// Without any belief the robot stops after this long, ns (two observations, 2 cm at 0.2 m/s), and
-/// not before so many misses: a single late cycle at a low rate is none.
+/// Without any belief the robot stops after this long, ns. Chosen by hand: two observations, in
+/// which a robot of 0.2 m/s drives 2 cm.
 const BLIND_NS: u64 = 100_000_000;
+/// The robot does not stop for want of a belief before so many misses. Chosen by hand: at a low
+/// rate, a single late cycle is no loss of a stage.
 const BLIND_MISSES_MIN: u64 = 5;
-/// An action is valid for this long at least, ns: two cycles at 100 Hz.
-const VALIDITY_NS_MIN: f64 = 20e6;
+/// An action is valid for this long at least, ns: two cycles at 100 Hz. With less, the jitter of an
+/// ordinary kernel would stop a healthy robot.
+const VALIDITY_NS_MIN: u64 = 20_000_000;
 
 /// The supervisor that a configuration describes.
 ///
@@ -42,5 +45,27 @@ pub fn assemble(setup: &Setup) -> Result<Supervisor, SupervisorError> {
 #[must_use]
 pub fn validity_ns(setup: &Setup) -> u64 {
     let periods = setup.file.supervisor.validity_periods;
-    (periods * setup.period_ns() as f64).max(VALIDITY_NS_MIN) as u64
+    let validity_ns = (periods * setup.period_ns() as f64) as u64;
+    valid_period(validity_ns.max(VALIDITY_NS_MIN))
+}
+
+/// No action is published without a valid period, and none is valid for ever.
+fn valid_period(ns: u64) -> u64 {
+    assert!(
+        (VALIDITY_NS_MIN..u64::MAX).contains(&ns),
+        "an action is valid for two cycles at 100 Hz at least: {ns} ns"
+    );
+    ns
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[should_panic(expected = "an action is valid for two cycles at 100 Hz at least: 19999999 ns")]
+    fn an_action_without_a_valid_period_is_caught() {
+        assert_eq!(valid_period(VALIDITY_NS_MIN), VALIDITY_NS_MIN);
+        valid_period(VALIDITY_NS_MIN - 1);
+    }
 }

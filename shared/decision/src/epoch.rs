@@ -126,8 +126,8 @@ impl Epoch {
         set
     }
 
-    /// Another decision is waited for.
-    pub(crate) const fn ask(&mut self) {
+    /// Another decision begins, whose outcome is waited for.
+    pub(crate) const fn begin(&mut self) {
         self.is_answered = false;
         self.began_ns = None;
     }
@@ -205,7 +205,7 @@ mod tests {
         assert_eq!(epoch.take_set(S, End::Done), Symptoms::BO);
         let again = said(2, Symptoms::BO, (7, Succeeded));
         assert_eq!(epoch.take(&again, 7, &ENDS), None);
-        epoch.ask();
+        epoch.begin();
         let failed = said(3, 0, (8, Failed));
         assert_eq!(epoch.take(&failed, 8, &ENDS), Some(End::Failed));
         assert_eq!(epoch.take_set(3 * S, End::Failed), 0);

@@ -27,14 +27,16 @@ use vigil_blocks::{DECISION_STATES, FaultBelief, FaultSet};
 
 use crate::mapping::StateMeaning;
 
-/// One cycle can change the odds of a state by this factor at most, as a logarithm: e^20 is beyond
-/// any odds that a decision turns on.
+/// One cycle can change the odds of a state by this factor at most, as a logarithm. Chosen by hand:
+/// e^20 is beyond any odds that a decision turns on, and one wild cycle cannot outweigh an epoch.
 pub(crate) const LOG_RATIO_MAX: f64 = 20.0;
-/// An epoch can change them by this factor at most: below it, a double still holds both sides.
+/// An epoch can change them by this factor at most. e^-300 is 5e-131: times a belief it is still a
+/// normal double, the least of which is 2e-308.
 pub(crate) const LOG_EPOCH_MAX: f64 = 300.0;
 /// The tracked belief may differ from the identifier's by this much (half the sum of absolute
-/// differences), which changes no value by more than a twentieth of its range; beyond it, it is
-/// taken over.
+/// differences); beyond it, it is taken over. Chosen by hand: it changes no value by more than a
+/// twentieth of its range. Smaller discards what the decision model knows about mending; larger
+/// lets a fault fade that the identifier still holds.
 pub(crate) const DRIFT_MAX: f64 = 0.05;
 /// A probability may exceed 1 by this much, for rounding.
 pub(crate) const P_TOLERANCE: f64 = 1e-6;
@@ -101,6 +103,7 @@ impl EpochEvidence {
         for (out, log) in likelihood.iter_mut().zip(used) {
             *out = (log - max).exp();
         }
+        assert_likelihoods(likelihood);
         self.clear();
     }
 
@@ -113,6 +116,14 @@ impl EpochEvidence {
     fn clear(&mut self) {
         self.log_likelihood.fill(0.0);
     }
+}
+
+/// The largest is 1, so that none overflows and some state is left.
+pub(crate) fn assert_likelihoods(likelihood: &[f64]) {
+    assert!(
+        likelihood.iter().all(|l| (0.0..=1.0).contains(l)) && likelihood.contains(&1.0),
+        "likelihoods lie between 0 and 1, the largest being 1: {likelihood:?}"
+    );
 }
 
 /// Probability and predicted probability of a state; without an alarm, the unknown is nominal.
@@ -182,8 +193,8 @@ fn divide(set: &FaultSet, states: &[StateMeaning], weights: &mut [f64]) {
     }
 }
 
-/// True if a diagnosis speaks of the tree with `tree_hash` and gives every state a probability,
-/// and some state more than 0; and if its sets have probabilities.
+/// True if a diagnosis is about the tree with `tree_hash` and gives every state a probability, some
+/// state more than 0, and every set a probability.
 pub(crate) fn is_sound(diagnosis: &FaultBelief, states: &[StateMeaning], tree_hash: u64) -> bool {
     let mut sum = 0.0;
     for meaning in states {
@@ -203,7 +214,178 @@ pub(crate) fn is_sound(diagnosis: &FaultBelief, states: &[StateMeaning], tree_ha
 /// True if `belief` is too far from the identifier's, given as `weights` that need not sum to 1.
 pub(crate) fn has_drifted(belief: &[f64], weights: &[f64]) -> bool {
     let sum: f64 = weights.iter().sum();
-    let apart = |(b, w): (&f64, &f64)| (b - w / sum).abs();
-    let distance: f64 = belief.iter().zip(weights).map(apart).sum();
+    let difference = |(b, w): (&f64, &f64)| (b - w / sum).abs();
+    let distance: f64 = belief.iter().zip(weights).map(difference).sum();
     distance > 2.0 * DRIFT_MAX
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn state(node: Option<usize>, stuck: bool) -> StateMeaning {
+        StateMeaning {
+            node,
+            wheel: None,
+            stuck,
+        }
+    }
+
+    /// Nominal, two stuck wheels, two encoders, unknown.
+    const STATES: [StateMeaning; 6] = [
+        state(Some(0), false),
+        state(Some(1), true),
+        state(Some(2), true),
+        state(Some(3), false),
+        state(Some(4), false),
+        state(None, false),
+    ];
+
+    fn diagnosis(p: &[f64], p_unknown: f64) -> FaultBelief {
+        let mut diagnosis = FaultBelief {
+            tree_hash: 7,
+            p_unknown,
+            p_unknown_predicted: 0.25,
+            ..FaultBelief::default()
+        };
+        diagnosis.p[..p.len()].copy_from_slice(p);
+        diagnosis.p_predicted[..5].fill(0.5);
+        diagnosis
+    }
+
+    #[test]
+    fn a_quotient_is_bounded_and_says_nothing_where_it_is_none() {
+        assert_eq!(log_ratio(0.5, 0.25), 2.0_f64.ln());
+        assert_eq!(log_ratio(0.0, 0.5), -LOG_RATIO_MAX);
+        assert_eq!(log_ratio(1.0, 1e-300), LOG_RATIO_MAX);
+        for (p, predicted) in [
+            (0.5, 0.0),
+            (-0.5, 0.5),
+            (0.5, -0.5),
+            (f64::NAN, 0.5),
+            (0.5, f64::NAN),
+            (1e300, 1e-300),
+        ] {
+            assert_eq!(log_ratio(p, predicted), 0.0, "{p} {predicted}");
+        }
+    }
+
+    #[test]
+    fn evidence_sums_over_an_epoch_within_its_bound_and_is_used_once() {
+        let mut gathered = EpochEvidence::new();
+        let said = diagnosis(&[0.25, 1.0, 0.0, 0.5, 0.5], 0.25);
+        assert_eq!(gathered.add(&said, &STATES, true), Effect::Anchor);
+        assert_eq!(gathered.add(&said, &STATES, true), Effect::Wait);
+        assert_eq!(gathered.add(&said, &STATES, true), Effect::Wait);
+        let mut likelihood = [0.0; 6];
+        gathered.take(&mut likelihood);
+        // Relative to the first wheel, which data favour twice as much as predicted, twice.
+        let expected = [1.0 / 16.0, 1.0, (-40.0_f64).exp() / 4.0, 0.25, 0.25, 0.25];
+        for (l, e) in likelihood.iter().zip(expected) {
+            assert!((l - e).abs() < 1e-12 * e, "{likelihood:?}");
+        }
+        gathered.take(&mut likelihood);
+        assert_eq!(likelihood, [1.0; 6]);
+        for _ in 0..100 {
+            gathered.add(&said, &STATES, true);
+        }
+        assert_eq!(gathered.log_likelihood[2], -LOG_EPOCH_MAX);
+    }
+
+    #[test]
+    fn another_start_mode_or_alarm_of_the_identifier_is_taken_over() {
+        let said = diagnosis(&[0.5; 5], 0.25);
+        let effect = |change: &dyn Fn(&mut FaultBelief), alarm| {
+            let mut gathered = EpochEvidence::new();
+            gathered.add(&said, &STATES, true);
+            gathered.add(&said, &STATES, true);
+            let mut next = said;
+            change(&mut next);
+            let effect = gathered.add(&next, &STATES, alarm);
+            assert!(effect == Effect::Wait || gathered.log_likelihood == [0.0; DECISION_STATES]);
+            effect
+        };
+        assert_eq!(effect(&|_| {}, true), Effect::Wait);
+        assert_eq!(effect(&|_| {}, false), Effect::Anchor);
+        assert_eq!(effect(&|d| d.identifying = 1, true), Effect::Anchor);
+        assert_eq!(effect(&|d| d.mode_change_count = 1, true), Effect::Anchor);
+        assert_eq!(effect(&|d| d.header.epoch = 1, true), Effect::Anchor);
+        let mut gathered = EpochEvidence::new();
+        gathered.add(&said, &STATES, true);
+        gathered.forget();
+        assert_eq!(gathered.add(&said, &STATES, true), Effect::Anchor);
+    }
+
+    #[test]
+    fn before_an_alarm_the_unknown_is_nominal() {
+        let said = diagnosis(&[0.5, 0.125], 0.375);
+        let both = |node, alarm| probabilities(&said, state(node, false), alarm);
+        assert_eq!(both(None, true), (0.375, 0.25));
+        assert_eq!(both(None, false), (0.0, 0.0));
+        assert_eq!(both(Some(0), true), (0.5, 0.5));
+        assert_eq!(both(Some(0), false), (0.875, 0.75));
+        assert_eq!(both(Some(1), false), (0.125, 0.5));
+        assert_eq!(both(Some(10_000), true), (0.0, 0.0));
+        let full = diagnosis(&[0.9], 0.9);
+        assert_eq!(probabilities(&full, STATES[0], false).0, 1.0);
+    }
+
+    /// Weights where the sets are these: their leaves as bits, their probability.
+    fn weighed(p: &[f64], sets: &[(u64, f64)]) -> [f64; 6] {
+        let mut said = diagnosis(p, 0.0);
+        said.set_count = sets.len() as u32;
+        for (set, (leaves, p)) in said.sets.iter_mut().zip(sets) {
+            (set.leaves, set.p) = (*leaves, *p);
+        }
+        let mut out = [0.0; 6];
+        weights(&said, &STATES, true, &mut out);
+        out
+    }
+
+    #[test]
+    fn a_set_goes_to_its_stuck_wheel_to_its_encoders_or_to_the_unknown() {
+        let single = weighed(&[0.0, 1.0], &[(0b00010, 1.0)]);
+        assert_eq!(single, [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+        let stuck_and_encoder = weighed(&[0.0, 0.75, 0.0, 0.75], &[(0b01010, 0.75)]);
+        assert_eq!(stuck_and_encoder, [0.0, 0.75, 0.0, 0.0, 0.0, 0.0]);
+        let encoders = weighed(&[0.25, 0.0, 0.0, 0.5, 0.75], &[(0b11000, 0.5)]);
+        assert_eq!(encoders, [0.25, 0.0, 0.0, 0.25, 0.5, 0.0]);
+        let two_stuck = weighed(&[0.0, 0.75, 0.5], &[(0b00110, 0.5)]);
+        assert_eq!(two_stuck, [0.0, 0.25, 0.0, 0.0, 0.0, 0.5]);
+    }
+
+    #[test]
+    fn a_diagnosis_is_sound_if_all_it_says_is_a_probability_of_this_tree() {
+        let sound = |change: &dyn Fn(&mut FaultBelief)| {
+            let mut said = diagnosis(&[0.5, 0.5], 0.25);
+            change(&mut said);
+            is_sound(&said, &STATES, 7)
+        };
+        assert!(sound(&|_| {}));
+        assert!(sound(&|d| d.p[1] = 1.0 + 0.9 * P_TOLERANCE));
+        assert!(!sound(&|d| d.p[1] = 1.0 + 2.0 * P_TOLERANCE));
+        assert!(!sound(&|d| d.p[4] = -1e-9));
+        assert!(!sound(&|d| d.p_predicted[2] = f64::NAN));
+        assert!(!sound(&|d| d.p_unknown = f64::INFINITY));
+        assert!(!sound(&|d| d.p_unknown_predicted = -1.0));
+        assert!(!sound(&|d| d.tree_hash = 8));
+        assert!(!sound(&|d| (d.p[0], d.p[1], d.p_unknown) = (0.0, 0.0, 0.0)));
+        assert!(sound(&|d| d.sets[0].p = 9.0), "a set that is not in use");
+        assert!(!sound(&|d| (d.sets[0].p, d.set_count) = (1.1, 1)));
+        assert!(sound(&|d| d.set_count = u32::MAX), "no more than there are");
+    }
+
+    #[test]
+    fn a_belief_has_drifted_beyond_a_twentieth() {
+        assert!(!has_drifted(&[0.5, 0.5], &[1.09, 0.91]));
+        assert!(has_drifted(&[0.5, 0.5], &[1.11, 0.89]));
+        assert!(has_drifted(&[0.5, 0.5], &[0.89, 1.11]));
+    }
+
+    #[test]
+    #[should_panic(expected = "likelihoods lie between 0 and 1, the largest being 1")]
+    fn likelihoods_without_a_largest_of_one_are_caught() {
+        assert_likelihoods(&[0.0, 1.0]);
+        assert_likelihoods(&[0.0, 0.5]);
+    }
 }

@@ -1,7 +1,7 @@
-//! What the identifier says about two states of the decision model: that of hardware faults, and
-//! that of a robot that is lost.
+//! The identifier's soft evidence for two states of the decision model: the one of hardware faults,
+//! and the one of a robot that is lost.
 //!
-//! The identifier explains what it sees in one of three ways: nothing is wrong, a fault of its
+//! The identifier has three explanations of its observations: nothing is wrong, a fault of its
 //! tree, or something unknown. A state's likelihood is the identifier's probability of the
 //! explanations that fit it, divided by what it predicted for them before the cycle's data:
 //!
@@ -23,9 +23,10 @@
 //! what is unknown then is the hardware's, until an epoch of following the path was quiet and the
 //! identifier saw nothing. (A robot that finds itself elsewhere begins a new run.)
 //!
-//! While the identifier says that something is wrong, only what may mend hardware or find a lost
-//! robot's place, once, is done: no look at what blocks the way changes what the identifier sees,
-//! and a policy that expects to know more after any step (Q-MDP does) would look for ever.
+//! While the identifier reports that something is wrong, only actions that may mend the hardware are
+//! allowed, and once those that may find a lost robot's place. Looking at what blocks the way does
+//! not change the identifier's belief, and a policy that expects to know more after any step (Q-MDP
+//! does) would look for ever.
 //!
 //! Without the identifier, an alarm of the detector is something unknown, with its probability.
 
@@ -34,12 +35,13 @@ use vigil_pomdp::Pomdp;
 
 use crate::evidence::{DRIFT_MAX, LOG_EPOCH_MAX, LOG_RATIO_MAX, P_TOLERANCE};
 
-/// Something is wrong above this probability: more likely than not.
+/// Something is wrong above this probability: more likely than not, as for every name.
 const WRONG_MIN: f64 = 0.5;
-/// An action mends a state if it leads out of it by this much more than the least that any does:
-/// more than rounding.
+/// An action mends a state if it leads out of it by this much more than the least that any does.
+/// Chosen by hand between rounding (1e-15) and any probability that a model would name.
 const MENDS_MIN: f64 = 1e-6;
-/// Nothing is ever certain.
+/// No probability that is taken over is nearer to 1. Chosen by hand: soft evidence multiplies, and
+/// could never lead out of a belief of exactly 1.
 const P_MAX: f64 = 1.0 - 1e-6;
 
 /// Probabilities of the explanations; what is left is that nothing is wrong.
@@ -63,28 +65,51 @@ impl Explanations {
     }
 }
 
-/// Whose words, of which start, in which mode: quotients are good while this stays.
-type Context = (bool, u64, u32, u32);
+/// Who reports, of which start, in which mode. Quotients mean something while this stays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Context {
+    /// The identifier, not the detector in its place.
+    is_identifier: bool,
+    writer_epoch: u64,
+    /// Whether it identifies; of the detector, whether its alarm stands.
+    mode: u32,
+    changes: u32,
+}
 
 /// The states, and the evidence of the present epoch.
 #[derive(Debug, Clone)]
-pub(crate) struct Hardware {
+pub(crate) struct HardwareEvidence {
     state: usize,
     lost: Option<usize>,
     p_start: f64,
     tree_hash: u64,
-    /// Sums of logarithms: of the hardware state, of the lost robot's, of the others.
-    log: [f64; 3],
+    log: LogLikelihoods,
     before: Option<Context>,
     p: Explanations,
     identifies: bool,
     /// The robot has sought its place.
     has_sought: bool,
-    /// For each action, whether it mends the hardware, and whether it finds a lost robot's place.
-    mends: Vec<[bool; 2]>,
+    mends: Vec<Remedy>,
 }
 
-impl Hardware {
+/// Sums of log-likelihoods over an epoch.
+#[derive(Debug, Clone, Copy, Default)]
+struct LogLikelihoods {
+    hardware: f64,
+    lost: f64,
+    others: f64,
+}
+
+/// What an action is good for.
+#[derive(Debug, Clone, Copy)]
+struct Remedy {
+    /// It mends the hardware.
+    hardware: bool,
+    /// It finds the place of a lost robot.
+    place: bool,
+}
+
+impl HardwareEvidence {
     pub(crate) fn new(model: &Pomdp, state: usize, lost: Option<usize>, tree_hash: u64) -> Self {
         let leaves = |state: usize, action: usize| -> f64 {
             let elsewhere = model.successors(state, action).iter();
@@ -101,14 +126,17 @@ impl Hardware {
                 .fold(1.0, f64::min)
         };
         let mends = |state: usize, action| leaves(state, action) > least(state) + MENDS_MIN;
-        let both = |action| [Some(state), lost].map(|s| s.is_some_and(|s| mends(s, action)));
+        let remedy = |action| Remedy {
+            hardware: mends(state, action),
+            place: lost.is_some_and(|lost| mends(lost, action)),
+        };
         Self {
-            mends: actions.clone().map(both).collect(),
+            mends: actions.clone().map(remedy).collect(),
             state,
             lost,
             p_start: model.start().get(state).copied().unwrap_or(0.0),
             tree_hash,
-            log: [0.0; 3],
+            log: LogLikelihoods::default(),
             before: None,
             p: Explanations::default(),
             identifies: false,
@@ -131,12 +159,12 @@ impl Hardware {
     /// Takes a diagnosis; true if the identifier's probabilities are to be taken over.
     pub(crate) fn add(&mut self, diagnosis: &FaultBelief) -> bool {
         let identifies = diagnosis.identifying != 0;
-        let now = (
-            true,
-            diagnosis.header.epoch,
-            diagnosis.identifying,
-            diagnosis.mode_change_count,
-        );
+        let now = Context {
+            is_identifier: true,
+            writer_epoch: diagnosis.header.epoch,
+            mode: diagnosis.identifying,
+            changes: diagnosis.mode_change_count,
+        };
         let p = Explanations::new(diagnosis.p[0], diagnosis.p_unknown);
         if self.enter(now, identifies, p) {
             return true;
@@ -144,14 +172,16 @@ impl Hardware {
         if self.identifies {
             let predicted =
                 Explanations::new(diagnosis.p_predicted[0], diagnosis.p_unknown_predicted);
-            let ratios = [
-                p.any() / predicted.any(),
-                (1.0 - p.modelled) / (1.0 - predicted.modelled),
-                (1.0 - p.any()) / (1.0 - predicted.any()),
-            ];
-            for (sum, ratio) in self.log.iter_mut().zip(ratios) {
-                *sum = (*sum + log(ratio)).clamp(-LOG_EPOCH_MAX, LOG_EPOCH_MAX);
-            }
+            let add = |sum: &mut f64, p: f64, predicted: f64| {
+                *sum = (*sum + log(p / predicted)).clamp(-LOG_EPOCH_MAX, LOG_EPOCH_MAX);
+            };
+            add(&mut self.log.hardware, p.any(), predicted.any());
+            add(
+                &mut self.log.lost,
+                1.0 - p.modelled,
+                1.0 - predicted.modelled,
+            );
+            add(&mut self.log.others, 1.0 - p.any(), 1.0 - predicted.any());
         }
         false
     }
@@ -159,7 +189,12 @@ impl Hardware {
     /// Takes a detection in the identifier's place; true if its probability is to be taken over.
     pub(crate) fn add_alarm(&mut self, detection: &DetectionBelief) -> bool {
         let DetectionBelief { alarm, p_fault, .. } = *detection;
-        let now = (false, detection.header.epoch, alarm, detection.alarm_count);
+        let now = Context {
+            is_identifier: false,
+            writer_epoch: detection.header.epoch,
+            mode: alarm,
+            changes: detection.alarm_count,
+        };
         let p = Explanations::new(1.0 - p_fault, p_fault);
         self.enter(now, alarm != 0, p)
     }
@@ -181,11 +216,16 @@ impl Hardware {
 
     /// Writes the likelihood of every state, the larger being 1, and begins anew.
     pub(crate) fn take(&mut self, likelihood: &mut [f64]) {
-        let [state, lost, others] = self.log;
+        let LogLikelihoods {
+            hardware,
+            lost,
+            others,
+        } = self.log;
         let lost = self.lost.map(|index| (index, lost));
-        let max = lost.map_or(state, |(_, lost)| state.max(lost)).max(others);
+        let max = lost.map_or(hardware, |(_, lost)| hardware.max(lost));
+        let max = max.max(others);
         likelihood.fill((others - max).exp());
-        for (index, log) in lost.into_iter().chain([(self.state, state)]) {
+        for (index, log) in lost.into_iter().chain([(self.state, hardware)]) {
             if let Some(l) = likelihood.get_mut(index) {
                 *l = (log - max).exp();
             }
@@ -240,7 +280,7 @@ impl Hardware {
 
     /// True if an action may be taken now.
     pub(crate) fn allows(&self, action: usize) -> bool {
-        let may_mend = |[hardware, place]: &[bool; 2]| *hardware || (*place && !self.has_sought);
+        let may_mend = |remedy: &Remedy| remedy.hardware || (remedy.place && !self.has_sought);
         let is_wrong = self.identifies && self.p.any() > WRONG_MIN;
         !is_wrong
             || self.mends.get(action).is_some_and(may_mend)
@@ -259,7 +299,7 @@ impl Hardware {
     }
 
     /// Diagnoses were lost: the next is taken over, if it or the last speaks of a fault.
-    pub(crate) const fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.before = None;
         self.clear();
     }
@@ -271,8 +311,8 @@ impl Hardware {
         self.has_sought = false;
     }
 
-    const fn clear(&mut self) {
-        self.log = [0.0; 3];
+    fn clear(&mut self) {
+        self.log = LogLikelihoods::default();
     }
 }
 
@@ -284,3 +324,6 @@ fn log(ratio: f64) -> f64 {
         0.0
     }
 }
+
+#[cfg(test)]
+mod tests;

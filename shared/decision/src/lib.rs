@@ -1,23 +1,21 @@
-//! The decision as a pure function of state and journal entry: evidence becomes a belief of a
-//! recovery POMDP, the belief an action. No transport, no clock, no files.
+#![doc = include_str!("../README.md")]
 
+mod action_hysteresis;
+mod alarm_fusion;
+mod decision_process;
 mod epoch;
 mod evidence;
-mod exceptions;
-mod fused;
+mod fault_decision;
 mod hardware;
-mod leaves;
 mod mapping;
 mod observations;
 mod policy;
-mod restraint;
 mod settings;
-mod silence;
+mod stage_loss;
 mod supervisor;
-mod told;
-mod watch;
+mod symptom_decision;
 
-pub use fused::fused_alarm;
+pub use alarm_fusion::fused_alarm;
 pub use mapping::{Compensation, SupervisorError};
 pub use settings::{Evidence, Gate, Recovery, RecoveryAction, Settings};
 pub use supervisor::{Inputs, Supervisor};

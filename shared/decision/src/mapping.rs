@@ -223,8 +223,9 @@ pub(crate) fn actions(
         .collect()
 }
 
-/// Factor of the speed where the settings name none. Who slows down or compensates does so as the
-/// configurations in `config/` say.
+/// Factor of the speed where the settings name none. Chosen by hand, as the configurations in
+/// `config/` have them: half the speed halves what a wrong diagnosis costs and still shows faults;
+/// a robot that compensates keeps more of it, as its fault is known.
 const fn usual_speed_scale(kind: RecoveryKind) -> f64 {
     match kind {
         RecoveryKind::None
@@ -265,5 +266,86 @@ pub(crate) fn check_compensation(
             model.actions()[action].clone(),
         )),
         None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_done_standing_has_no_speed_and_what_drives_has_all_of_it() {
+        use RecoveryKind as R;
+        for (scale, kinds) in [
+            (
+                0.0,
+                &[
+                    R::None,
+                    R::Stop,
+                    R::CallForHelp,
+                    R::NewPath,
+                    R::Relocalise,
+                    R::GiveUp,
+                ][..],
+            ),
+            (0.5, &[R::SlowDown]),
+            (0.7, &[R::Compensate]),
+            (1.0, &[R::GoOn, R::IgnoreEncoder, R::GoThrough, R::MoveAway]),
+        ] {
+            for kind in kinds {
+                assert_eq!(usual_speed_scale(*kind), scale, "{kind:?}");
+            }
+        }
+    }
+
+    fn model(states: usize, actions: usize) -> Pomdp {
+        let text = format!(
+            "discount: 0.9\nvalues: reward\nstates: {states}\nactions: {actions}\nT: * identity\n"
+        );
+        Pomdp::parse(&text).unwrap()
+    }
+
+    #[test]
+    fn a_model_is_as_large_as_a_block_can_carry() {
+        assert_eq!(
+            check_size(&model(DECISION_STATES, DECISION_ACTIONS)),
+            Ok(())
+        );
+        for (states, actions) in [(DECISION_STATES + 1, 1), (1, DECISION_ACTIONS + 1)] {
+            let refused = check_size(&model(states, actions));
+            assert_eq!(refused, Err(SupervisorError::Size { states, actions }));
+        }
+    }
+
+    #[test]
+    fn each_stuck_wheel_needs_a_finite_compensation_of_its_own() {
+        let model = model(2, 1);
+        let compensate = ActionMeaning {
+            kind: RecoveryKind::Compensate,
+            speed_scale: 0.7,
+        };
+        let states = [Some(3), Some(4)].map(|wheel| StateMeaning {
+            node: wheel,
+            wheel,
+            stuck: wheel == Some(4),
+        });
+        let check = |compensation: &[Compensation], actions: &[ActionMeaning]| {
+            check_compensation(&model, &states, actions, compensation)
+        };
+        let of = |wheel, curvature_gain, curvature_offset_1_m| Compensation {
+            wheel,
+            curvature_gain,
+            curvature_offset_1_m,
+        };
+        let missing = Err(SupervisorError::NoCompensation(4, "0".to_owned()));
+        assert_eq!(check(&[of(4, 1.0, 0.0)], &[compensate]), Ok(()));
+        assert_eq!(check(&[of(3, 1.0, 0.0)], &[compensate]), missing);
+        assert_eq!(check(&[of(4, f64::NAN, 0.0)], &[compensate]), missing);
+        assert_eq!(check(&[of(4, 1.0, f64::NAN)], &[compensate]), missing);
+        let stop = ActionMeaning {
+            kind: RecoveryKind::Stop,
+            ..compensate
+        };
+        assert_eq!(check(&[], &[stop]), Ok(()));
     }
 }

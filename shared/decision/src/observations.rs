@@ -49,3 +49,20 @@ fn set_of(name: &str) -> Option<u32> {
         (set & bit == 0).then_some(set | bit)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_is_named_by_its_symptoms_in_any_order_each_once() {
+        assert_eq!(set_of("none"), Some(0));
+        assert_eq!(set_of("EPM"), Some(Symptoms::EPM));
+        for name in ["EPM_LD", "LD_EPM"] {
+            assert_eq!(set_of(name), Some(Symptoms::EPM | Symptoms::LD));
+        }
+        for name in ["EPM_EPM", "EPM_", "", "epm", "none_EPM"] {
+            assert_eq!(set_of(name), None, "{name}");
+        }
+    }
+}

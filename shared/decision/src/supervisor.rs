@@ -1,46 +1,39 @@
 //! One decision cycle.
 
-use crate::settings::{self, Settings};
 use vigil_blocks::{Action, DetectionBelief, Entry, FaultBelief};
 use vigil_pomdp::{PointBased, Pomdp};
-use vigil_robot::Description;
-use vigil_robot::FaultTree;
+use vigil_robot::{Description, FaultTree};
 
-use crate::exceptions::Exceptions;
-use crate::leaves::Leaves;
+use crate::alarm_fusion::AlarmFusion;
+use crate::decision_process::{DecisionProcess, DecisionRule};
+use crate::fault_decision::FaultDecision;
 use crate::mapping::{Compensation, SupervisorError};
-use crate::watch::Watch;
+use crate::settings::{self, Settings};
+use crate::symptom_decision::SymptomDecision;
 
-/// What a cycle of the supervisor is told; at least one of the two is there.
+/// What a cycle of the supervisor takes; at least one of the two is there.
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs<'a> {
     /// The identifier's belief, if it came.
     pub diagnosis: Option<&'a FaultBelief>,
-    /// The newest belief of the detector, if it is new. One that a missed deadline caused tells
-    /// whether the detector sees anything, and nothing else.
+    /// The newest belief of the detector, if it is new. One that a missed deadline caused says
+    /// whether the detector is blind, and nothing else.
     pub detection: Option<&'a DetectionBelief>,
 }
 
 /// Tracks the belief of the recovery POMDP and chooses actions.
 pub struct Supervisor {
-    watch: Watch,
-    of: Of,
-}
-
-/// What the decision model is about.
-enum Of {
-    /// Faults: leaves of the fault tree.
-    Leaves(Box<Leaves>),
-    /// Exceptions of the navigation, told by symptoms.
-    Exceptions(Box<Exceptions>),
+    fusion: AlarmFusion,
+    rule: Box<dyn DecisionRule>,
+    /// Of the last cycle.
+    decision_seq: u64,
 }
 
 impl Supervisor {
-    /// Builds a supervisor for a decision model: with `settings.evidence` of faults, its states
-    /// are the leaves of `tree`; of symptoms, its observations are sets of them. `solved` is what
-    /// the policy `point-based` decides by, the others do without. After
-    /// `blind_after_misses` misses in a row without any detection no belief is usable, and the
-    /// robot stops.
+    /// Builds a supervisor for a decision model. With `settings.evidence` of faults, its states are
+    /// the leaves of `tree`; of symptoms, its observations are sets of them. `solved` is what the
+    /// policy `point-based` decides by; the others do without. After `blind_after_misses` misses in
+    /// a row without any detection no belief is usable, and the robot stops.
     ///
     /// # Errors
     /// [`SupervisorError`] naming what does not fit.
@@ -53,54 +46,95 @@ impl Supervisor {
         compensation: Vec<Compensation>,
         blind_after_misses: u32,
     ) -> Result<Self, SupervisorError> {
-        let of = match settings.evidence {
-            settings::Evidence::Faults => Of::Leaves(Box::new(Leaves::new(
-                model,
-                solved,
-                tree,
-                robot,
-                settings,
-                compensation,
-                blind_after_misses,
-            )?)),
-            settings::Evidence::Symptoms => Of::Exceptions(Box::new(Exceptions::new(
-                model,
-                solved,
-                tree,
-                settings,
-                blind_after_misses,
-            )?)),
+        let process = DecisionProcess::new(model, solved, settings, blind_after_misses)?;
+        let rule: Box<dyn DecisionRule> = match settings.evidence {
+            settings::Evidence::Faults => {
+                let rule = FaultDecision::new(process, tree, robot, settings, compensation)?;
+                Box::new(rule)
+            }
+            settings::Evidence::Symptoms => {
+                Box::new(SymptomDecision::new(process, tree, settings)?)
+            }
         };
-        let watch = Watch::new(settings.arming_speed_scale);
-        Ok(Self { watch, of })
+        Ok(Self {
+            fusion: AlarmFusion::new(settings.arming_speed_scale),
+            rule,
+            decision_seq: 0,
+        })
     }
 
-    /// Takes one journal entry and writes the decision. On misses belief and decision stand (what
-    /// a late diagnosis says is folded in when it comes), until no stage is heard any more. While
-    /// the detector sees nothing the robot stops, and beliefs stand. Input that is not a
-    /// probability, or of another fault tree, is counted in `impossible_count` and refused; a
-    /// refused diagnosis counts as missed. Every field of `action` is written but the header's
-    /// epoch, sequence number and times, the cause and `valid_until_ns`: those belong to the
-    /// ports. Allocates nothing, never panics; no field is ever NaN.
+    /// Takes one journal entry and writes the decision. On misses belief and decision stand, until
+    /// every stage is lost; a diagnosis that is late is taken when it comes. While the detector is
+    /// blind the robot stops, and beliefs stand. Input that is not a probability, or of another
+    /// fault tree, is counted in `impossible_count` and refused; a refused diagnosis counts as
+    /// missed. Every field of `action` is written but the header's epoch, sequence number and
+    /// times, the cause and `valid_until_ns`: those belong to the ports. Allocates nothing, never
+    /// panics on any input; no field is ever NaN.
     // Never merged into its caller, so that its instructions can be counted.
     #[inline(never)]
     pub fn step(&mut self, entry: Entry<Inputs<'_>>, action: &mut Action) {
-        let entry = self.watch.take(entry);
-        let seen = self.watch.seen();
-        match &mut self.of {
-            Of::Leaves(leaves) => leaves.step(entry, seen, action),
-            Of::Exceptions(exceptions) => exceptions.step(entry, seen, action),
+        let entry = self.fusion.take(entry);
+        let situation = self.fusion.situation();
+        match entry {
+            Entry::Frame(inputs) if situation.is_blind => self.rule.take_blindly(inputs),
+            Entry::Frame(inputs) => self.rule.take(inputs, situation),
+            Entry::Missed(count) => self.rule.miss(count),
+            Entry::Reset => self.rule.reset(),
+            Entry::Budget(_) => {}
         }
-        self.watch.write(action);
+        self.rule.write(action);
+        self.fusion.write(action);
+        assert!(
+            action.decision_seq >= self.decision_seq,
+            "the number of a decision never falls: {} after {}",
+            action.decision_seq,
+            self.decision_seq
+        );
+        self.decision_seq = action.decision_seq;
     }
 
     /// The action that stands whatever is believed: a call for help, or the end of the task. It
     /// stands until a new run or a reset.
     #[must_use]
     pub fn latched(&self) -> Option<usize> {
-        match &self.of {
-            Of::Leaves(leaves) => leaves.latched(),
-            Of::Exceptions(exceptions) => exceptions.latched(),
+        self.rule.latched()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::alarm_fusion::Situation;
+
+    /// Publishes the number that it is given.
+    struct Numbered(u64);
+
+    impl DecisionRule for Numbered {
+        fn take(&mut self, _: Inputs<'_>, _: Situation) {}
+        fn take_blindly(&mut self, _: Inputs<'_>) {}
+        fn miss(&mut self, count: u32) {
+            self.0 = u64::from(count);
+        }
+        fn reset(&mut self) {}
+        fn latched(&self) -> Option<usize> {
+            None
+        }
+        fn write(&mut self, action: &mut Action) {
+            action.decision_seq = self.0;
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "the number of a decision never falls: 6 after 7")]
+    fn a_number_that_falls_is_caught() {
+        let mut supervisor = Supervisor {
+            fusion: AlarmFusion::new(1.0),
+            rule: Box::new(Numbered(0)),
+            decision_seq: 0,
+        };
+        let mut action = Action::default();
+        for count in [7, 7, 6] {
+            supervisor.step(Entry::Missed(count), &mut action);
         }
     }
 }

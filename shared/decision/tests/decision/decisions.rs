@@ -154,7 +154,7 @@ fn two_stuck_wheels_are_not_compensated_as_if_they_were_one() {
     let one = [(&["LF_STUCK"][..], 0.98)];
     for _ in 0..30 {
         let diagnosis = world.of_sets(&one);
-        world.told(&diagnosis);
+        world.diagnose(&diagnosis);
     }
     assert_eq!(world.kind(), RecoveryKind::Compensate);
     // The right front wheel sticks too: no turn is left to counter-steer for.
@@ -165,7 +165,7 @@ fn two_stuck_wheels_are_not_compensated_as_if_they_were_one() {
     for cycle in 0..400 {
         let mut diagnosis = world.of_sets(&both);
         diagnosis.mode_change_count = 1;
-        world.told(&diagnosis);
+        world.diagnose(&diagnosis);
         let expected = match cycle {
             0..150 => RecoveryKind::SlowDown,
             250.. => RecoveryKind::CallForHelp,
@@ -186,7 +186,7 @@ fn a_stuck_wheel_with_broken_encoders_is_compensated() {
     ];
     for _ in 0..100 {
         let diagnosis = world.of_sets(&set);
-        world.told(&diagnosis);
+        world.diagnose(&diagnosis);
         assert_eq!(world.kind(), RecoveryKind::Compensate);
     }
     let wheel = world.robot.wheel_index("LF").unwrap();
@@ -249,11 +249,11 @@ fn a_diagnosis_that_is_none_is_refused_counted_and_as_good_as_missed() {
         let mut world = World::new();
         world.rest(50, false, &nominal);
         let believed = world.action.belief;
-        (0..3).for_each(|_| world.told(&diagnosis));
+        (0..3).for_each(|_| world.diagnose(&diagnosis));
         assert_eq!(world.action.belief, believed);
         let action = &world.action;
         assert_eq!((action.impossible_count, action.lost_stages), (3, 3));
-        (0..7).for_each(|_| world.told(&diagnosis));
+        (0..7).for_each(|_| world.diagnose(&diagnosis));
         assert_eq!(world.kind(), RecoveryKind::Stop);
         world.rest(50, false, &nominal);
         assert_eq!(world.kind(), RecoveryKind::GoOn);

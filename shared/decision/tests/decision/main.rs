@@ -7,10 +7,10 @@ use vigil_cycle::allocation::CountingAllocator;
 mod decisions;
 mod exceptions;
 mod hardware;
+mod navigation;
 mod policies;
 mod sight;
 mod solved;
-mod told;
 mod world;
 
 #[global_allocator]

@@ -70,8 +70,8 @@ fn supervisor(graph: &str, decision: &str) -> (Setup, Supervisor) {
     (setup, supervisor)
 }
 
-/// What is told of every decision.
-fn demand_told(action: &Action) {
+/// What every decision publishes.
+fn demand_complete(action: &Action) {
     let values = &action.value[..action.action_count as usize];
     assert!(values.iter().all(|v| v.is_finite()), "{values:?}");
     assert_eq!(action.value_kind, ValueKind::Value as u32);
@@ -87,7 +87,7 @@ fn faults_are_met_by_a_solved_policy_without_allocating() {
         tree_hash: setup.tree.hash(),
         ..FaultBelief::default()
     };
-    let mut told = |supervisor: &mut Supervisor, stuck: f64, unknown: f64, cycles: usize| {
+    let mut kind_after = |supervisor: &mut Supervisor, stuck: f64, unknown: f64, cycles: usize| {
         let wheel = setup.tree.index("RM_STUCK").unwrap();
         diagnosis.identifying = u32::from(stuck + unknown > 0.1);
         let nominal = 1.0 - stuck - unknown;
@@ -110,20 +110,26 @@ fn faults_are_met_by_a_solved_policy_without_allocating() {
             assert!(before > 0, "the allocator does not count");
             supervisor.step(Entry::Frame(inputs), &mut action);
             assert_eq!(allocations() - before, 0);
-            demand_told(&action);
+            demand_complete(&action);
         }
         RecoveryKind::from_wire(action.kind).unwrap()
     };
-    assert_eq!(told(&mut first, 0.0, 1e-4, 50), RecoveryKind::GoOn);
-    assert_eq!(told(&mut first, 0.999, 0.0, 5), RecoveryKind::Compensate);
+    assert_eq!(kind_after(&mut first, 0.0, 1e-4, 50), RecoveryKind::GoOn);
+    assert_eq!(
+        kind_after(&mut first, 0.999, 0.0, 5),
+        RecoveryKind::Compensate
+    );
     let (_, mut fresh) = supervisor("rover.toml", "rover.pomdp");
     // What no model explains: first the best of what is not a call for help, then the call.
-    let kind = told(&mut fresh, 0.0, 0.99, 1);
+    let kind = kind_after(&mut fresh, 0.0, 0.99, 1);
     assert!(
         matches!(kind, RecoveryKind::Stop | RecoveryKind::SlowDown),
         "{kind:?}"
     );
-    assert_eq!(told(&mut fresh, 0.0, 0.99, 400), RecoveryKind::CallForHelp);
+    assert_eq!(
+        kind_after(&mut fresh, 0.0, 0.99, 400),
+        RecoveryKind::CallForHelp
+    );
 }
 
 #[test]
@@ -141,7 +147,7 @@ fn exceptions_are_met_by_a_solved_policy_without_allocating() {
         let before = allocations();
         supervisor.step(Entry::Frame(inputs), &mut action);
         assert_eq!(allocations() - before, 0);
-        demand_told(&action);
+        demand_complete(&action);
         assert_eq!(action.control_mode, ControlMode::Policy as u32);
         let kind = RecoveryKind::from_wire(action.kind).unwrap();
         if kinds.last() != Some(&kind) {

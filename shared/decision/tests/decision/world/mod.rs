@@ -1,4 +1,4 @@
-//! A supervisor with the shipped models, told cycle by cycle what the identifier believes.
+//! A supervisor with the shipped models, with what the identifier believes in each cycle.
 
 use std::path::PathBuf;
 
@@ -22,7 +22,7 @@ pub fn model() -> Pomdp {
     Pomdp::parse(&std::fs::read_to_string(config().join("rover.pomdp")).unwrap()).unwrap()
 }
 
-/// A supervisor and what it is told.
+/// A supervisor and what it takes.
 pub struct World {
     pub supervisor: Supervisor,
     pub tree: FaultTree,
@@ -123,7 +123,7 @@ impl World {
     }
 
     /// One cycle with an arbitrary diagnosis and no detection.
-    pub fn told(&mut self, diagnosis: &FaultBelief) {
+    pub fn diagnose(&mut self, diagnosis: &FaultBelief) {
         let inputs = Inputs {
             diagnosis: Some(diagnosis),
             detection: None,

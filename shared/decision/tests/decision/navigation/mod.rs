@@ -1,4 +1,4 @@
-//! The navigation model behind the supervisor, told cycle by cycle what is seen.
+//! The navigation model behind the supervisor, with symptoms and outcomes in each cycle.
 
 use vigil_blocks::{Action, ActionOutcome, DetectionBelief, Entry, FaultBelief, RecoveryKind};
 use vigil_decision::Settings;
@@ -30,15 +30,15 @@ pub fn build(model: &str, settings: &Settings) -> Result<Supervisor, String> {
         .map_err(|e| e.to_string())
 }
 
-/// A supervisor, and what it is told.
-pub struct ToldSupervisor {
+/// A supervisor, and what it is robot.
+pub struct Navigation {
     pub supervisor: Supervisor,
     pub action: Action,
     pub detection: DetectionBelief,
     pub diagnosis: FaultBelief,
 }
 
-impl ToldSupervisor {
+impl Navigation {
     pub fn new() -> Self {
         Self::with_model(MODEL)
     }
@@ -125,8 +125,8 @@ pub fn tracked(steps: &[(usize, &str)]) -> Vec<f64> {
 }
 
 /// Soft evidence of 1 for every state may round.
-pub fn assert_near(told: &ToldSupervisor, expected: &[f64]) {
-    for (found, expected) in told.action.belief.iter().zip(expected) {
+pub fn assert_near(robot: &Navigation, expected: &[f64]) {
+    for (found, expected) in robot.action.belief.iter().zip(expected) {
         assert!((found - expected).abs() < 1e-12, "{found} {expected}");
     }
 }

@@ -1,0 +1,255 @@
+//! What decisions by either kind of evidence share: the tracked belief, the policy, the present
+//! choice, and how they are published.
+
+use vigil_blocks::{
+    Action, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind, ValueKind,
+};
+use vigil_pomdp::policy::Measure;
+use vigil_pomdp::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker, mdp};
+
+use crate::action_hysteresis::hold;
+use crate::alarm_fusion::Situation;
+use crate::mapping::{self, ActionMeaning, SupervisorError};
+use crate::policy::{self, Worth};
+use crate::settings::Settings;
+use crate::stage_loss::StageLossMonitor;
+use crate::supervisor::Inputs;
+
+/// A published belief sums to 1 within this: the tracker's tolerance.
+const SUM_TOLERANCE: f64 = 1e-9;
+
+/// How one kind of evidence becomes a decision.
+pub(crate) trait DecisionRule {
+    /// Takes what the stages publish while the detector is not blind.
+    fn take(&mut self, inputs: Inputs<'_>, situation: Situation);
+
+    /// Takes what the stages publish while the detector is blind: that they live counts, what they
+    /// say does not.
+    fn take_blindly(&mut self, inputs: Inputs<'_>);
+
+    /// More missed cycles.
+    fn miss(&mut self, count: u32);
+
+    /// Everything begins anew.
+    fn reset(&mut self);
+
+    /// The action that stands whatever is believed.
+    fn latched(&self) -> Option<usize>;
+
+    /// Writes the decision, and counts it if it is a new one.
+    fn write(&mut self, action: &mut Action);
+}
+
+/// What the robot is to do; a change of it is a new decision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Instruction {
+    pub action: usize,
+    pub kind: RecoveryKind,
+    pub wheel: Option<usize>,
+}
+
+/// A decision model with its belief, policy and present choice.
+pub(crate) struct DecisionProcess {
+    pub model: Pomdp,
+    pub tracker: Tracker,
+    pub decider: Decider,
+    pub worth: Worth,
+    pub actions: Vec<ActionMeaning>,
+    pub losses: StageLossMonitor,
+    /// One number per state, of no meaning between two uses.
+    pub scratch: Vec<f64>,
+    pub choice: Choice,
+    pub decision_seq: u64,
+    pub log_evidence: f64,
+    pub impossible_count: u32,
+    pub control_mode: ControlMode,
+    pub run_id: u64,
+}
+
+impl DecisionProcess {
+    /// # Errors
+    /// [`SupervisorError`] naming what does not fit.
+    pub(crate) fn new(
+        model: Pomdp,
+        solved: Option<&PointBased>,
+        settings: &Settings,
+        blind_after_misses: u32,
+    ) -> Result<Self, SupervisorError> {
+        mapping::check_size(&model)?;
+        let actions = mapping::actions(&model, &settings.actions)?;
+        let solution = mdp::solve(&model)?;
+        Ok(Self {
+            decider: policy::decider(&model, &solution, solved, settings)?,
+            worth: Worth::new(solution, actions.len()),
+            tracker: Tracker::new(&model),
+            losses: StageLossMonitor::new(blind_after_misses),
+            scratch: vec![0.0; model.states().len()],
+            choice: hold(0),
+            decision_seq: 0,
+            log_evidence: 0.0,
+            impossible_count: 0,
+            control_mode: ControlMode::Policy,
+            run_id: 0,
+            model,
+            actions,
+        })
+    }
+
+    /// Belief, policy and mode as at the start; counters go on.
+    pub(crate) fn reset(&mut self) {
+        self.tracker.reset();
+        self.decider.reset();
+        self.log_evidence = 0.0;
+        self.control_mode = ControlMode::Policy;
+    }
+
+    /// Counts input that cannot be.
+    pub(crate) const fn refuse(&mut self) {
+        self.impossible_count = self.impossible_count.saturating_add(1);
+    }
+
+    /// The logarithm of the evidence's probability; what is impossible is counted and has none.
+    pub(crate) fn log_probability(&mut self, evidence: Evidence) -> Option<f64> {
+        match evidence {
+            Evidence::Taken(p) => Some(p.max(f64::MIN_POSITIVE).ln()),
+            Evidence::Impossible => {
+                self.refuse();
+                None
+            }
+        }
+    }
+
+    /// What an action makes the robot do.
+    pub(crate) fn kind(&self, action: usize) -> RecoveryKind {
+        self.actions
+            .get(action)
+            .map_or(RecoveryKind::Stop, |m| m.kind)
+    }
+
+    /// The stop of a safe mode: the model's action of that kind, if it has one, else the present
+    /// action's index.
+    pub(crate) fn safe_stop(&self) -> Instruction {
+        let is_stop = |m: &ActionMeaning| m.kind == RecoveryKind::Stop;
+        let stop = self.actions.iter().position(is_stop);
+        Instruction {
+            action: stop.unwrap_or(self.choice.action),
+            kind: RecoveryKind::Stop,
+            wheel: None,
+        }
+    }
+
+    /// Writes belief, values and decision into the block.
+    pub(crate) fn write(&self, instruction: Instruction, action: &mut Action) {
+        let values = self.decider.values();
+        let belief = self.tracker.belief();
+        let stops = instruction.kind == RecoveryKind::Stop;
+        let meaning = self.actions.get(instruction.action);
+        action.run_id = self.run_id;
+        action.decision_seq = self.decision_seq;
+        action.curvature_gain = 1.0;
+        action.curvature_offset = 0.0;
+        action.log_evidence = self.log_evidence;
+        action.impossible_count = self.impossible_count;
+        action.lost_stages = self.losses.lost_stages();
+        action.model_hash = self.model.hash();
+        action.belief = [0.0; DECISION_STATES];
+        action.value = [0.0; DECISION_ACTIONS];
+        action.belief[..belief.len()].copy_from_slice(belief);
+        action.value[..values.len()].copy_from_slice(values);
+        action.entropy = self.tracker.entropy();
+        action.action_entropy = self.decider.action_entropy();
+        action.value_kind = match self.decider.measure() {
+            Measure::Value => ValueKind::Value,
+            Measure::Votes => ValueKind::Votes,
+            Measure::Entropy => ValueKind::Entropy,
+        } as u32;
+        action.margin = self.choice.margin;
+        action.speed_scale = meaning.map_or(0.0, |m| if stops { 0.0 } else { m.speed_scale });
+        action.action = instruction.action as u32;
+        action.kind = instruction.kind as u32;
+        action.wheel = instruction.wheel.map_or(u32::MAX, |wheel| wheel as u32);
+        action.control_mode = self.published_mode() as u32;
+        action.state_count = belief.len() as u32;
+        action.action_count = values.len() as u32;
+        assert_sound(action);
+    }
+
+    /// Dual control is a way to use a belief with fresh evidence: in other modes it goes unnamed.
+    fn published_mode(&self) -> ControlMode {
+        match (self.control_mode, self.choice.control) {
+            (ControlMode::Policy, Control::Dual) => ControlMode::Dual,
+            (mode, _) => mode,
+        }
+    }
+}
+
+/// What the robot's side relies on.
+fn assert_sound(action: &Action) {
+    let sum: f64 = action.belief.iter().sum();
+    assert!(
+        (sum - 1.0).abs() <= SUM_TOLERANCE && action.belief.iter().all(|b| *b >= 0.0),
+        "a published belief sums to 1 and holds no negative number: {sum}"
+    );
+    assert!(
+        action.action < action.action_count,
+        "the action published is one of the model's: {}",
+        action.action
+    );
+    assert!(
+        action.control_mode != ControlMode::Safe as u32
+            || (action.kind == RecoveryKind::Stop as u32 && action.speed_scale == 0.0),
+        "in the safe mode the robot stops"
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sound() -> Action {
+        let mut action = Action {
+            action_count: 2,
+            state_count: 2,
+            ..Action::default()
+        };
+        action.belief[..2].copy_from_slice(&[0.25, 0.75]);
+        assert_sound(&action);
+        action
+    }
+
+    #[test]
+    #[should_panic(expected = "a published belief sums to 1 and holds no negative number: 1.25")]
+    fn a_published_belief_that_does_not_sum_to_one_is_caught() {
+        let mut action = sound();
+        action.belief[0] = 0.5;
+        assert_sound(&action);
+    }
+
+    #[test]
+    #[should_panic(expected = "a published belief sums to 1 and holds no negative number: 1")]
+    fn a_published_belief_with_a_negative_number_is_caught() {
+        let mut action = sound();
+        action.belief[..2].copy_from_slice(&[-0.5, 1.5]);
+        assert_sound(&action);
+    }
+
+    #[test]
+    #[should_panic(expected = "the action published is one of the model's: 2")]
+    fn an_action_that_the_model_lacks_is_caught() {
+        let mut action = sound();
+        action.action = 2;
+        assert_sound(&action);
+    }
+
+    #[test]
+    #[should_panic(expected = "in the safe mode the robot stops")]
+    fn a_safe_mode_without_a_stop_is_caught() {
+        let mut action = sound();
+        action.control_mode = ControlMode::Safe as u32;
+        action.kind = RecoveryKind::Stop as u32;
+        action.speed_scale = 0.0;
+        assert_sound(&action);
+        action.speed_scale = 0.5;
+        assert_sound(&action);
+    }
+}
