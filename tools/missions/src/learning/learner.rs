@@ -78,7 +78,7 @@ pub enum LearnError {
 }
 
 /// Where an iteration began.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Iteration {
     /// Start, from 0.
     pub start: usize,
@@ -175,7 +175,7 @@ fn checked(prior: &Pomdp, records: &[Record], settings: &Settings) -> Result<(),
 }
 
 /// What the iterations share.
-pub(super) struct Search<'a> {
+struct Search<'a> {
     layout: &'a Layout,
     kappa: &'a [f64],
     records: &'a [Record],
@@ -184,7 +184,7 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    pub(super) fn new(layout: &'a Layout, kappa: &'a [f64], records: &'a [Record]) -> Self {
+    fn new(layout: &'a Layout, kappa: &'a [f64], records: &'a [Record]) -> Self {
         Self {
             layout,
             kappa,
@@ -268,7 +268,7 @@ impl<'a> Search<'a> {
     }
 
     /// Expected counts of all missions; returns the log-likelihood.
-    pub(super) fn count(&mut self, theta: &[f64]) -> Result<f64, LearnError> {
+    fn count(&mut self, theta: &[f64]) -> Result<f64, LearnError> {
         self.counts.fill(0.0);
         let mut sum = 0.0;
         for (mission, record) in self.records.iter().enumerate() {
@@ -280,7 +280,7 @@ impl<'a> Search<'a> {
     }
 
     /// theta = (N + kappa) / sum. A row without either stays.
-    pub(super) fn maximise(&self, theta: &mut [f64]) {
+    fn maximise(&self, theta: &mut [f64]) {
         for row in self.layout.rows() {
             let weight = |at: usize| self.counts[at] + self.kappa[at];
             let sum: f64 = row.clone().map(weight).sum();
@@ -288,11 +288,6 @@ impl<'a> Search<'a> {
                 row.for_each(|at| theta[at] = weight(at) / sum);
             }
         }
-    }
-
-    /// The expected counts as of the last [`Self::count`].
-    pub(super) fn into_counts(self) -> Vec<f64> {
-        self.counts
     }
 
     /// Expected counts of all missions, and what they tell of each probability.

@@ -17,8 +17,7 @@
 //!
 //! [`learn`] does this, from several starts if wished. [`LearnedModel`] says of each row what is
 //! data and what is prior, with credible intervals. [`check`] compares what a model predicts with
-//! what was measured, and refuses one that is off by more than a fifth. [`Posterior`] learns on the
-//! way, mission by mission.
+//! what was measured, and refuses one that is off by more than a fifth.
 
 pub mod check;
 mod expectation;
@@ -26,7 +25,6 @@ mod information;
 mod layout;
 mod learned;
 mod learner;
-mod posterior;
 mod record;
 mod sampling;
 
@@ -34,5 +32,4 @@ pub use expectation::Impossible;
 pub use layout::{Row, Table};
 pub use learned::{Entry, LearnedModel, LearnedRow};
 pub use learner::{Iteration, LearnError, Settings, learn};
-pub use posterior::Posterior;
 pub use record::{Record, RecordError};

@@ -1,9 +1,11 @@
 //! Do credible intervals of learned probabilities hold what they promise?
 
-use rand::SeedableRng;
+use rand::{Rng, SeedableRng};
+use rand_distr::{Distribution, Gamma};
 use rand_pcg::Pcg64Mcg;
-use vigil_missions::learning::{LearnedModel, Posterior, Settings, learn};
+use vigil_missions::learning::{LearnedModel, Settings, learn};
 use vigil_pomdp::Pomdp;
+use vigil_pomdp::model::Probabilities;
 
 use crate::recorded::missions;
 
@@ -24,6 +26,48 @@ fn coverage(truth: &Pomdp, learned: &LearnedModel) -> [usize; 3] {
     counts
 }
 
+/// A row drawn from Dirichlet(`strength` times `row`).
+fn drawn_row(row: &[f64], strength: f64, generator: &mut impl Rng) -> Vec<f64> {
+    let draw = |p: &f64| match *p > 0.0 {
+        true => Gamma::new(p * strength, 1.0).unwrap().sample(generator),
+        false => 0.0,
+    };
+    let drawn: Vec<f64> = row.iter().map(draw).collect();
+    let sum: f64 = drawn.iter().sum();
+    drawn.iter().map(|weight| weight / sum).collect()
+}
+
+/// A world that the prior expects: every row is drawn around that of `hand`.
+fn drawn_world(hand: &Pomdp, strength: f64, generator: &mut impl Rng) -> Pomdp {
+    let (n, actions, k) = (
+        hand.states().len(),
+        hand.actions().len(),
+        hand.observations().len(),
+    );
+    let start = drawn_row(hand.start(), strength, generator);
+    let mut transitions = vec![Vec::new(); actions];
+    let mut likelihoods = vec![0.0; actions * k * n];
+    for action in 0..actions {
+        for state in 0..n {
+            let successors = hand.successors(state, action);
+            let row: Vec<f64> = successors.iter().map(|(_, p)| *p).collect();
+            let row = drawn_row(&row, strength, generator);
+            let to = successors.iter().map(|(to, _)| *to);
+            transitions[action].push(to.zip(row).collect::<Vec<_>>());
+            let row: Vec<f64> = (0..k).map(|z| hand.likelihood(action, z)[state]).collect();
+            for (z, p) in drawn_row(&row, strength, generator).into_iter().enumerate() {
+                likelihoods[(action * k + z) * n + state] = p;
+            }
+        }
+    }
+    let probabilities = Probabilities {
+        start,
+        transitions,
+        likelihoods,
+    };
+    hand.with_probabilities(probabilities).unwrap()
+}
+
 #[test]
 fn where_the_prior_is_right_they_do() {
     let hand = Pomdp::parse(HAND).unwrap();
@@ -36,9 +80,7 @@ fn where_the_prior_is_right_they_do() {
             iterations_max: 300,
             ..Settings::default()
         };
-        // The world is one of those that the prior expects.
-        let worlds = Posterior::new(&hand, strength).unwrap();
-        let truth = worlds.sample(&mut generator).unwrap();
+        let truth = drawn_world(&hand, strength, &mut generator);
         let records = missions(&truth, world, 200, 20, false);
         let found = learn(&hand, &records, &settings, &mut |_| ()).unwrap();
         let counts = coverage(&truth, &found);

@@ -4,9 +4,9 @@
 
 mod heuristics;
 mod learning;
+mod learning_check;
 mod learning_intervals;
 mod learning_navigation;
-mod learning_online;
 mod navigation;
 mod public;
 mod recorded;

@@ -14,10 +14,9 @@ use vigil_pomdp::policy::{Gate, PolicyKind};
 use vigil_pomdp::{PointBased, Pomdp, mdp};
 
 use super::escalation::EscalationArgs;
-use super::{load, solved};
+use super::{load, print, solved};
 use contest::{Contest, Setting};
 use contestant::{Contestant, Kind, Knowledge};
-use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
 /// Compares policies of a decision model over the same random missions.
@@ -137,12 +136,10 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     };
     let contest = Contest::hold(&setting, &knowledge, &contestants)?;
     let name = args.file.display().to_string();
-    let printed = if args.json {
-        output::json(&contest.document(&setting, &knowledge, &name))
-    } else {
-        output::line(&table::text(&contest, &setting, &knowledge, &name))
-    };
-    printed.map_err(CommandError::failure)?;
+    let document = contest.document(&setting, &knowledge, &name);
+    print(args.json, &document, || {
+        table::text(&contest, &setting, &knowledge, &name)
+    })?;
     Ok(Outcome::Done)
 }
 

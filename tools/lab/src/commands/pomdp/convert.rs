@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::load;
+use super::{load, save};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
@@ -59,8 +59,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         let message = "--out: .pomdpx is read, not written; allowed is .pomdp";
         return Err(CommandError::usage(message));
     }
-    let failed = |error| CommandError::failure(format!("{}: {error}", out.display()));
-    std::fs::write(out, &text).map_err(failed)?;
+    save(out, &text)?;
     if args.json {
         let document = Document {
             schema_version: 1,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use vigil_missions::navigation::{self, Parameters};
 
+use super::save;
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
@@ -31,8 +32,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let model = navigation::generate(&parameters)
         .map_err(|error| CommandError::usage(format!("{name}: {error}")))?;
     match &args.out {
-        Some(out) => fs::write(out, model)
-            .map_err(|error| CommandError::failure(format!("{}: {error}", out.display())))?,
+        Some(out) => save(out, model)?,
         None => output::line(model.trim_end()).map_err(CommandError::failure)?,
     }
     Ok(Outcome::Done)

@@ -6,8 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 use vigil_pomdp::Pomdp;
 
-use super::load;
-use vigil_terminal::output;
+use super::{load, print};
 use vigil_terminal::{CommandError, Outcome};
 
 /// Prints what a model holds: sizes, start belief, reachable states and observations, warnings.
@@ -64,12 +63,7 @@ struct Warning {
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let model = load(&args.file)?;
     let document = describe(args.file.display().to_string(), &model);
-    let printed = if args.json {
-        output::json(&document)
-    } else {
-        output::line(&table(&document))
-    };
-    printed.map_err(CommandError::failure)?;
+    print(args.json, &document, || table(&document))?;
     Ok(Outcome::Done)
 }
 

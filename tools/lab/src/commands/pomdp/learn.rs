@@ -2,7 +2,6 @@
 
 mod document;
 
-use std::fs;
 use std::path::PathBuf;
 
 use vigil_missions::learning::check::{Agreement, Refusal, RewardCheck};
@@ -14,7 +13,7 @@ use vigil_pomdp::policy::{Dual, PolicyName};
 use vigil_pomdp::{Pomdp, mdp};
 
 use super::compare::{count, fits};
-use super::{load, missions, seed};
+use super::{load, missions, print, save, seed};
 use document::{Document, Mean};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
@@ -96,7 +95,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         flown_by: flown.policy,
         prior_strength: args.prior_strength,
         start: learned.start,
-        iterations: document::iterations(&learned),
+        iterations: learned.iterations.clone(),
         rows: document::rows(&learned),
         policy: args.policy.clone(),
         episodes: args.episodes,
@@ -110,12 +109,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         refused: refusal.clone(),
         hash: format!("{:016x}", learned.model.hash()),
     };
-    let printed = if args.json {
-        output::json(&document)
-    } else {
-        output::line(&document.text())
-    };
-    printed.map_err(CommandError::failure)?;
+    print(args.json, &document, || document.text())?;
     if let Some(mut refusal) = refusal {
         if document.is_older_out_left {
             let out = args.out.display();
@@ -123,8 +117,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         }
         return Err(CommandError::failure(refusal));
     }
-    let written = fs::write(&args.out, learned.model.to_cassandra());
-    written.map_err(|e| CommandError::failure(format!("{}: {e}", args.out.display())))?;
+    save(&args.out, learned.model.to_cassandra())?;
     Ok(Outcome::Done)
 }
 

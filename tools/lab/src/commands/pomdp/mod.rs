@@ -16,9 +16,10 @@ mod track;
 
 use std::path::Path;
 
+use serde::Serialize;
 use vigil_pomdp::Pomdp;
 
-use vigil_terminal::{CommandError, Outcome};
+use vigil_terminal::{CommandError, Outcome, output};
 
 /// Checks, solves, compares, learns, draws and converts decision models (`.pomdp`, `.pomdpx`).
 #[derive(Debug, clap::Args)]
@@ -56,6 +57,32 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         Command::Convert(args) => convert::run(args),
         Command::Solve(args) => solve::run(args),
     }
+}
+
+/// Prints a command's document as JSON, or as text to read.
+///
+/// # Errors
+/// The system's.
+fn print(
+    as_json: bool,
+    document: &impl Serialize,
+    text: impl FnOnce() -> String,
+) -> Result<(), CommandError> {
+    let printed = if as_json {
+        output::json(document)
+    } else {
+        output::line(&text())
+    };
+    printed.map_err(CommandError::failure)
+}
+
+/// Writes a file.
+///
+/// # Errors
+/// The file's name and the system's.
+fn save(path: &Path, content: impl AsRef<[u8]>) -> Result<(), CommandError> {
+    let written = std::fs::write(path, content);
+    written.map_err(|error| CommandError::failure(format!("{}: {error}", path.display())))
 }
 
 /// Largest model file, bytes: the readers' own limit.

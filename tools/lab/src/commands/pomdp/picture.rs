@@ -5,14 +5,13 @@ mod canvas;
 mod graph;
 mod regions;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use vigil_pomdp::policy::{Decider, Dual, Policy, PolicyName};
 use vigil_pomdp::policy_graph::{Limits, PolicyGraph};
 use vigil_pomdp::{Pomdp, mdp};
 
-use super::{load, solved, track};
+use super::{load, save, solved, track};
 use vigil_terminal::{CommandError, Outcome};
 
 /// Draws a model's policy or belief.
@@ -83,8 +82,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         }
     };
     let text = text.map_err(CommandError::usage)?;
-    let written = fs::write(&args.out, text);
-    written.map_err(|e| CommandError::failure(format!("{}: {e}", args.out.display())))?;
+    save(&args.out, text)?;
     Ok(Outcome::Done)
 }
 

@@ -1,7 +1,6 @@
 //! `vigil pomdp solve`: how much a model is worth at best, and a policy that earns it.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -11,13 +10,12 @@ use vigil_pomdp::policy_file::{PolicyFile, alpha, appl};
 use vigil_pomdp::solver::{Answer, EndReason, Method, Options, Progress, bound};
 use vigil_pomdp::{Budget, Pomdp};
 
-use super::load;
-use vigil_terminal::output;
+use super::{load, print, save};
 use vigil_terminal::{CommandError, Outcome};
 
 /// Memory at which the search ends, bytes.
 const MEMORY_BYTES_MAX: usize = 3 << 30;
-/// Progress is told when this factor of time has passed since the last line.
+/// Progress is printed when this factor of time has passed since the last line.
 const PROGRESS_FACTOR: f64 = 1.5;
 /// ... the first time after so many seconds.
 const PROGRESS_FIRST_S: f64 = 0.25;
@@ -84,7 +82,7 @@ struct Document {
     policy: Option<String>,
 }
 
-/// Solves, and tells what was found.
+/// Solves, and prints what was found.
 ///
 /// # Errors
 /// A model or an option that is refused; values without bound; an output that cannot be written.
@@ -115,16 +113,10 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let cpu_s = process_cpu_s();
     if let Some(out) = &args.out {
         let bytes = policy_bytes(args, &model, &answer, cpu_s, out)?;
-        let failed = |error| CommandError::failure(format!("{}: {error}", out.display()));
-        fs::write(out, bytes).map_err(failed)?;
+        save(out, bytes)?;
     }
     let document = document(args, &model, &answer, cpu_s);
-    let printed = if args.json {
-        output::json(&document)
-    } else {
-        output::line(&summary(&document))
-    };
-    printed.map_err(CommandError::failure)?;
+    print(args.json, &document, || summary(&document))?;
     Ok(Outcome::Done)
 }
 

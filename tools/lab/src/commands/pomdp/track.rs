@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 use vigil_pomdp::{Evidence, Pomdp, Tracker};
 
-use super::{find, load};
-use vigil_terminal::output;
+use super::{find, load, print};
 use vigil_terminal::{CommandError, Outcome};
 
 /// Prints the belief after each action and observation.
@@ -58,12 +57,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let model = load(&args.file)?;
     let steps = pairs(&model, &args.steps).map_err(CommandError::usage)?;
     let document = follow(args, &model, &steps);
-    let printed = if args.json {
-        output::json(&document)
-    } else {
-        output::line(&table(&document))
-    };
-    printed.map_err(CommandError::failure)?;
+    print(args.json, &document, || table(&document))?;
     Ok(match document.impossible_steps {
         0 => Outcome::Done,
         _ => Outcome::Failed,

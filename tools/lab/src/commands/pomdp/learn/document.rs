@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use serde::Serialize;
-use vigil_missions::learning::{self, LearnedModel, LearnedRow, Table};
+use vigil_missions::learning::{Iteration, LearnedModel, LearnedRow, Table};
 use vigil_missions::simulation::Summary;
 
 /// What the command prints.
@@ -70,15 +70,6 @@ impl Mean {
     }
 }
 
-/// Where an iteration began.
-#[derive(Debug, Serialize)]
-pub struct Iteration {
-    start: usize,
-    iteration: usize,
-    log_likelihood: f64,
-    objective: f64,
-}
-
 /// A learned row.
 #[derive(Debug, Serialize)]
 pub struct Row {
@@ -102,17 +93,6 @@ struct Entry {
     credible_low: f64,
     credible_high: f64,
     effective_visits: f64,
-}
-
-/// All iterations.
-pub fn iterations(learned: &LearnedModel) -> Vec<Iteration> {
-    let of = |i: &learning::Iteration| Iteration {
-        start: i.start,
-        iteration: i.iteration,
-        log_likelihood: i.log_likelihood,
-        objective: i.objective,
-    };
-    learned.iterations.iter().map(of).collect()
 }
 
 /// All rows.

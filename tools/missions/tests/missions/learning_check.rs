@@ -1,8 +1,6 @@
-//! The check before deployment, and learning on the way.
+//! The check before deployment.
 
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
-use vigil_missions::learning::{LearnError, Posterior, Record, check};
+use vigil_missions::learning::{Record, check};
 use vigil_pomdp::Pomdp;
 
 use crate::recorded::missions;
@@ -90,47 +88,4 @@ fn rewards_of_what_happened_have_the_expected_mean() {
         assert!(pressed.iter().any(|r| (r - value).abs() < 1e-12), "{value}");
     }
     assert!((model.reward(1, 1) - -0.2).abs() < 1e-12 && (model.reward(0, 1) - -1.1).abs() < 1e-12);
-}
-
-#[test]
-fn a_posterior_narrows_around_the_truth() {
-    let truth = Pomdp::parse(LAMP).unwrap();
-    let wrong = LAMP.replace("0.3 0.7\n0.9 0.1", "0.6 0.4\n0.5 0.5");
-    let prior = Pomdp::parse(&wrong).unwrap();
-    let mut posterior = Posterior::new(&prior, 4.0).unwrap();
-    let p = |model: &Pomdp| model.successors(0, 1)[0].1;
-    let spread = |posterior: &Posterior| {
-        let mut generator = Pcg64Mcg::seed_from_u64(3);
-        let drawn: Vec<f64> = (0..400)
-            .map(|_| p(&posterior.sample(&mut generator).unwrap()))
-            .collect();
-        let mean = drawn.iter().sum::<f64>() / 400.0;
-        let square: f64 = drawn.iter().map(|d| (d - mean).powi(2)).sum();
-        (mean, (square / 400.0).sqrt())
-    };
-    let (mean, before) = spread(&posterior);
-    // Beta(2.4, 1.6): mean 0.6, standard deviation 0.219.
-    assert!(
-        (mean - 0.6).abs() < 0.04 && (before - 0.219).abs() < 0.03,
-        "{mean} {before}"
-    );
-    assert!((p(&posterior.mean().unwrap()) - 0.6).abs() < 1e-12);
-    for record in missions(&truth, 6, 150, 20, false) {
-        posterior.absorb(record, 2).unwrap();
-    }
-    let (mean, after) = spread(&posterior);
-    assert_eq!(posterior.missions(), 150);
-    assert!(
-        (mean - 0.3).abs() < 0.06 && after < 0.2 * before,
-        "{mean} {after}"
-    );
-    let bad = Record {
-        actions: vec![2],
-        observations: vec![0],
-        ..Record::default()
-    };
-    assert!(posterior.absorb(bad, 1).is_err());
-    assert_eq!(posterior.missions(), 150);
-    let refusal = Posterior::new(&prior, 0.0).unwrap_err();
-    assert!(matches!(refusal, LearnError::Setting { .. }));
 }
