@@ -45,6 +45,8 @@ enum Question {
     Latency(latency::Args),
     /// What is Vigil worth? Missions with random faults: with it, without, and with plainer rules.
     Missions(missions::Args),
+    /// Do the tests notice when a line of the filters, the decision or the cycle is wrong?
+    Mutants(mutants::Args),
     /// Where does zero-copy pay?
     Peers(peers::Args),
     /// Writes bench/README.md anew from the results
@@ -74,6 +76,7 @@ impl Question {
             Self::Instructions(args) => instructions::run(args),
             Self::Latency(args) => latency::run(args),
             Self::Missions(args) => missions::run(args),
+            Self::Mutants(args) => mutants::run(args),
             Self::Peers(args) => peers::run(args),
             Self::Page => write_page(),
             Self::Role(role) => role.play(),

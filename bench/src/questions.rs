@@ -7,4 +7,5 @@ pub mod healthy;
 pub mod instructions;
 pub mod latency;
 pub mod missions;
+pub mod mutants;
 pub mod peers;
