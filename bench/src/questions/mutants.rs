@@ -7,8 +7,9 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, ExitStatus, Stdio};
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -28,7 +29,9 @@ const PACKAGES: [&str; 4] = [
 const CAUGHT_MIN: f64 = 0.85;
 /// Time that the tests of one mutant may take, s: a multiple of the slowest package's. A mutant
 /// that takes longer hangs, which is noticed too.
-const TIMEOUT_S: &str = "300";
+const TIMEOUT_S: &str = "400";
+/// With what `timeout` ends if it had to.
+const TIMED_OUT: i32 = 124;
 
 /// Which mutants are drawn.
 #[derive(Debug, clap::Args)]
@@ -44,35 +47,24 @@ pub struct Args {
     package: Vec<String>,
 }
 
+/// A change of one place in the code, as `cargo mutants --list --json` describes it.
+#[derive(Debug, Clone, Deserialize)]
+struct Mutant {
+    name: String,
+    package: String,
+    file: PathBuf,
+    diff: String,
+}
+
 /// What the tests made of one mutant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Verdict {
-    Success,
-    CaughtMutant,
-    MissedMutant,
-    Timeout,
+    Caught,
+    Missed,
+    /// The tests did not end, which is noticed too.
+    TimedOut,
+    /// It does not compile.
     Unviable,
-    #[serde(other)]
-    Other,
-}
-
-/// The part of cargo-mutants' report that is read.
-#[derive(Debug, Deserialize)]
-struct Report {
-    outcomes: Vec<Outcome>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Outcome {
-    scenario: Scenario,
-    summary: Verdict,
-}
-
-/// What was tried: a mutant, or the unchanged tree.
-#[derive(Debug, Deserialize)]
-enum Scenario {
-    Baseline,
-    Mutant { name: String, package: String },
 }
 
 /// A mutant with what became of it.
@@ -81,6 +73,24 @@ struct Trial {
     name: String,
     package: String,
     verdict: Verdict,
+}
+
+/// How many mutants of a package ended how.
+#[derive(Debug, Default)]
+struct Counts {
+    caught: usize,
+    missed: usize,
+    unviable: usize,
+}
+
+impl Counts {
+    fn add(&mut self, verdict: Verdict) {
+        match verdict {
+            Verdict::Caught | Verdict::TimedOut => self.caught += 1,
+            Verdict::Missed => self.missed += 1,
+            Verdict::Unviable => self.unviable += 1,
+        }
+    }
 }
 
 /// Reasons of mutants that need not be caught, by their names without line and column.
@@ -111,97 +121,118 @@ fn measure(args: &Args, folder: &Path) -> Result<(), Box<dyn Error>> {
     if !status.success() {
         return Err("git clone failed".into());
     }
-    let mut names = listed(&clone, &args.package)?;
-    let drawable = names.len();
-    names.shuffle(&mut Pcg64Mcg::seed_from_u64(args.seed));
+    // A warning about code that a mutant no longer uses must not hide the mutant.
+    let manifest = clone.join("Cargo.toml");
+    let text = std::fs::read_to_string(&manifest)?;
+    std::fs::write(&manifest, text.replace("\"deny\"", "\"warn\""))?;
+    let mut mutants = listed(&clone, &args.package)?;
+    let drawable = mutants.len();
+    mutants.shuffle(&mut Pcg64Mcg::seed_from_u64(args.seed));
+    for package in &args.package {
+        if !is_passed(&clone, package)? {
+            return Err(format!("the tests of {package} fail without any mutant").into());
+        }
+    }
     let mut archive = Archive::new("mutants")?;
     let mut trials: Vec<Trial> = Vec::new();
-    let mut names = names.into_iter();
-    loop {
-        let viable = trials
-            .iter()
-            .filter(|trial| trial.verdict != Verdict::Unviable);
-        let batch: Vec<String> = names.by_ref().take(args.count - viable.count()).collect();
-        if batch.is_empty() {
+    let mut viable = 0;
+    for mutant in mutants {
+        if viable == args.count {
             break;
         }
-        trials.extend(tried(&clone, &args.package, &batch)?);
+        let verdict = judged(&clone, &mutant)?;
+        viable += usize::from(verdict != Verdict::Unviable);
+        eprintln!("{viable} of {}: {verdict:?}: {}", args.count, mutant.name);
+        trials.push(Trial {
+            name: mutant.name,
+            package: mutant.package,
+            verdict,
+        });
     }
     let survivors = std::fs::read_to_string(root.join("bench/survivors.toml"))?;
     let survivors: Survivors = toml::from_str(&survivors)?;
     let share = tell(&mut archive, args, drawable, &trials, &survivors)?;
     archive.close()?;
     if share < CAUGHT_MIN {
-        return Err(format!("{:.1} % are caught, not {CAUGHT_MIN}", share * 100.0).into());
+        let percent = share * 100.0;
+        return Err(format!("{percent:.1} % are caught, not {CAUGHT_MIN}").into());
     }
     Ok(())
 }
 
-fn cargo_mutants(clone: &Path, packages: &[String]) -> Command {
+/// All mutants, in the order of the files.
+fn listed(clone: &Path, packages: &[String]) -> Result<Vec<Mutant>, Box<dyn Error>> {
     let mut command = Command::new("cargo");
-    command.arg("mutants").current_dir(clone);
+    command
+        .args(["mutants", "--list", "--json"])
+        .current_dir(clone);
     for package in packages {
         command.args(["--package", package]);
     }
-    command
-}
-
-/// Names of all mutants, in the order of the files.
-fn listed(clone: &Path, packages: &[String]) -> Result<Vec<String>, Box<dyn Error>> {
-    let output = cargo_mutants(clone, packages).arg("--list").output()?;
+    let output = command.output()?;
     if !output.status.success() {
         let text = String::from_utf8_lossy(&output.stderr);
         return Err(format!("cargo mutants --list: {text}").into());
     }
-    Ok(String::from_utf8(output.stdout)?
-        .lines()
-        .map(str::to_owned)
-        .collect())
+    Ok(serde_json::from_slice(&output.stdout)?)
 }
 
-/// Runs the tests on each mutant of `names`.
-fn tried(
-    clone: &Path,
-    packages: &[String],
-    names: &[String],
-) -> Result<Vec<Trial>, Box<dyn Error>> {
-    let mut command = cargo_mutants(clone, packages);
-    // Denied warnings must not hide a mutant.
-    command.args(["--in-place", "--cap-lints", "true", "--timeout", TIMEOUT_S]);
-    for name in names {
-        command.args(["--re", &format!("^{}$", escaped(name))]);
+/// Applies the mutant, lets its package's tests judge it, and takes it back.
+fn judged(clone: &Path, mutant: &Mutant) -> Result<Verdict, Box<dyn Error>> {
+    let file = clone.join(&mutant.file);
+    let original = std::fs::read_to_string(&file)?;
+    let mut patch = Command::new("patch")
+        .arg("--quiet")
+        .arg(&file)
+        .stdin(Stdio::piped())
+        .spawn()?;
+    patch
+        .stdin
+        .take()
+        .ok_or("no standard input")?
+        .write_all(mutant.diff.as_bytes())?;
+    if !patch.wait()?.success() {
+        return Err(format!("{} cannot be applied", mutant.name).into());
     }
-    // 2: some were missed; 3: some took too long. Both stand in the report.
-    let code = command.status()?.code();
-    if !matches!(code, Some(0 | 2 | 3)) {
-        return Err(format!("cargo mutants ended with {code:?}").into());
-    }
-    let report: PathBuf = clone.join("mutants.out/outcomes.json");
-    let report: Report = serde_json::from_str(&std::fs::read_to_string(report)?)?;
-    let trials = report
-        .outcomes
-        .into_iter()
-        .filter_map(|outcome| match outcome.scenario {
-            Scenario::Baseline => None,
-            Scenario::Mutant { name, package } => Some(Trial {
-                name,
-                package,
-                verdict: outcome.summary,
-            }),
-        });
-    Ok(trials.collect())
-}
-
-/// The text as a regular expression that matches it alone.
-fn escaped(text: &str) -> String {
-    let mut pattern = String::new();
-    for character in text.chars() {
-        if character.is_ascii_punctuation() {
-            pattern.push('\\');
+    let verdict = if !cargo_test(clone, &mutant.package)
+        .arg("--no-run")
+        .status()?
+        .success()
+    {
+        Verdict::Unviable
+    } else {
+        match tests(clone, &mutant.package)?.code() {
+            Some(0) => Verdict::Missed,
+            Some(TIMED_OUT) => Verdict::TimedOut,
+            _ => Verdict::Caught,
         }
-        pattern.push(character);
-    }
-    pattern
+    };
+    std::fs::write(&file, original)?;
+    Ok(verdict)
+}
+
+fn is_passed(clone: &Path, package: &str) -> Result<bool, Box<dyn Error>> {
+    Ok(tests(clone, package)?.success())
+}
+
+/// Runs a package's tests for as long as they may take.
+fn tests(clone: &Path, package: &str) -> Result<ExitStatus, Box<dyn Error>> {
+    let mut limited = Command::new("timeout");
+    limited.args([TIMEOUT_S, "cargo"]);
+    Ok(with_tests(limited, clone, package).status()?)
+}
+
+fn cargo_test(clone: &Path, package: &str) -> Command {
+    with_tests(Command::new("cargo"), clone, package)
+}
+
+fn with_tests(mut command: Command, clone: &Path, package: &str) -> Command {
+    command
+        .args(["test", "--quiet", "--locked", "--package", package])
+        .current_dir(clone)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    command
 }
 
 /// `file: what` of a mutant's `file:line:column: what`.
@@ -219,14 +250,14 @@ fn tell(
     trials: &[Trial],
     survivors: &Survivors,
 ) -> Result<f64, Box<dyn Error>> {
-    let mut by_package: BTreeMap<&str, [usize; 3]> = BTreeMap::new();
+    let mut by_package: BTreeMap<&str, Counts> = BTreeMap::new();
+    let mut all = Counts::default();
     for trial in trials {
-        let counts = by_package.entry(&trial.package).or_default();
-        match trial.verdict {
-            Verdict::CaughtMutant | Verdict::Timeout => counts[0] += 1,
-            Verdict::MissedMutant => counts[1] += 1,
-            _ => counts[2] += 1,
-        }
+        by_package
+            .entry(&trial.package)
+            .or_default()
+            .add(trial.verdict);
+        all.add(trial.verdict);
     }
     archive.say(&format!(
         "{} of {drawable} mutants, seed {}.\n",
@@ -234,28 +265,25 @@ fn tell(
         args.seed
     ));
     archive.say("| package | caught | missed | did not compile |\n|---|---|---|---|");
-    let mut total = [0; 3];
-    for (package, counts) in &by_package {
-        archive.say(&format!(
-            "| {package} | {} | {} | {} |",
-            counts[0], counts[1], counts[2]
-        ));
-        for (sum, count) in total.iter_mut().zip(counts) {
-            *sum += count;
-        }
+    let rows = by_package
+        .iter()
+        .map(|(package, counts)| (*package, counts));
+    for (package, counts) in rows.chain([("all", &all)]) {
+        let Counts {
+            caught,
+            missed,
+            unviable,
+        } = counts;
+        archive.say(&format!("| {package} | {caught} | {missed} | {unviable} |"));
     }
-    let share = total[0] as f64 / (total[0] + total[1]).max(1) as f64;
+    let share = all.caught as f64 / (all.caught + all.missed).max(1) as f64;
     archive.say(&format!(
-        "| all | {} | {} | {} |\n",
-        total[0], total[1], total[2]
-    ));
-    archive.say(&format!(
-        "{:.1} % of those that compile are caught.\n",
+        "\n{:.1} % of those that compile are caught.\n",
         share * 100.0
     ));
     let missed = trials
         .iter()
-        .filter(|trial| trial.verdict == Verdict::MissedMutant);
+        .filter(|trial| trial.verdict == Verdict::Missed);
     for trial in missed {
         let known = without_place(&trial.name);
         let reason = survivors
@@ -275,8 +303,8 @@ fn tell(
             "seed": args.seed,
             "drawable": drawable,
             "caught_share": share,
-            "missed": names(Verdict::MissedMutant),
-            "timeout": names(Verdict::Timeout),
+            "missed": names(Verdict::Missed),
+            "timed_out": names(Verdict::TimedOut),
         }),
     )?;
     Ok(share)
@@ -287,11 +315,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_is_escaped_and_its_place_taken_off() {
-        assert_eq!(
-            escaped("a/b.rs:1:2: f -> x"),
-            "a\\/b\\.rs\\:1\\:2\\: f \\-\\> x"
-        );
+    fn the_place_is_taken_off_a_name() {
         assert_eq!(
             without_place("a/b.rs:1:2: replace + with -"),
             "a/b.rs: replace + with -"
