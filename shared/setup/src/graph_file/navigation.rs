@@ -8,8 +8,8 @@ use smart_default::SmartDefault;
 const COORDINATE_MAX_M: f64 = 1e3;
 /// Points of a path, walls, obstacles: what a cycle may have to look at.
 const COUNT_MAX: usize = 256;
-/// Half a turn, rad.
-const YAW_MAX_RAD: f64 = 3.1416;
+/// Half a turn, rounded up so that a written 3.1416 is allowed, rad.
+const YAW_MAX_RAD: f64 = 3.15;
 /// A year is never, s.
 const TIME_MAX_S: f64 = 3e7;
 
