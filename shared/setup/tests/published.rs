@@ -1,5 +1,7 @@
 //! The published page and schema are those of the present settings, and say what these say.
 
+#![cfg(test)]
+
 use std::path::PathBuf;
 
 use serde_json::Value;
