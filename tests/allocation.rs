@@ -31,21 +31,22 @@ const COUNT: usize = 64;
 /// The filters of a three-mode model, as the identifier builds them.
 fn filters(model: &JumpLinear) -> Vec<Box<dyn Filter<Observation = PoseAndWheels>>> {
     let resampling = Resampling::default();
-    let sampled = |proposal| ParticleFilter::new(model.clone(), proposal, resampling, COUNT, 1);
+    let sampled =
+        |proposal| ParticleFilter::new(model.clone(), proposal, resampling, COUNT, 1).unwrap();
     let hierarchical = || {
         let nodes = [vec![1, 2]];
         Hierarchical::new(model.clone(), &nodes, resampling, COUNT, 1).unwrap()
     };
     vec![
-        Box::new(sampled(Proposal::prior(model))),
+        Box::new(sampled(Proposal::prior(model).unwrap())),
         Box::new(sampled(Proposal::raised(model, 0.5).unwrap())),
         Box::new(sampled(
             Proposal::risk_raised(model, 0.5, &[1.0; 3]).unwrap(),
         )),
         Box::new(hierarchical()),
         Box::new(hierarchical().with_raised_proposals(0.5)),
-        Box::new(LookAhead::<_, 3>::new(model.clone(), COUNT, 1)),
-        Box::new(Merged::<_, 3>::new(model.clone())),
+        Box::new(LookAhead::<_, 3>::new(model.clone(), COUNT, 1).unwrap()),
+        Box::new(Merged::<_, 3>::new(model.clone()).unwrap()),
     ]
 }
 
@@ -73,9 +74,10 @@ fn no_identifying_filter_allocates_in_a_step() {
 fn no_adaptive_number_of_particles_allocates() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/filters");
     let hidden = HiddenMarkov::read(&data.join("case1_hmm13.json")).unwrap();
-    let proposal = Proposal::prior(&hidden);
+    let proposal = Proposal::prior(&hidden).unwrap();
     let adaptive = Adaptive::new(0.05, 2.33, 50, 500);
     let mut filter = ParticleFilter::new(hidden.clone(), proposal, Resampling::EVERY_STEP, 500, 1)
+        .unwrap()
         .with_adaptive_count(adaptive);
     let (before, mut fewest) = (allocations(), 500);
     for z in hidden.observations.iter().cycle().take(5_000) {

@@ -1,35 +1,39 @@
-//! Which of several explanations holds, when any may: a Markov chain.
+//! Alternative explanations of a series of measurements: a Markov chain over which one holds.
 //!
-//! Mixing all anew with every reading would cost the one that holds the logarithm of its share
-//! each time; here it costs that once.
+//! A mixture drawn anew for every measurement would charge the true explanation the logarithm of
+//! its share each time. Here, where explanations last, it is charged once.
 
+use crate::filter::SUM_TOLERANCE;
 use crate::logspace::log_sum_exp;
 
-/// Explanations of a series of readings.
+/// Probabilities of N explanations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alternatives<const N: usize> {
     p: [f64; N],
 }
 
 impl<const N: usize> Alternatives<N> {
-    /// Explanations that hold with these probabilities before any reading.
+    /// Explanations that hold with these probabilities before any measurement.
     #[must_use]
     pub const fn new(p: [f64; N]) -> Self {
         Self { p }
     }
 
-    /// Takes a reading with its log-likelihoods by each explanation, over that of any one thing;
-    /// before it each explanation takes the place of another with the probability `enters`: none
-    /// where it could not be told. Returns the log-likelihood by all together; an explanation
-    /// whose is no number is left out.
+    /// Takes a measurement with its log-likelihood under each explanation; all may be relative to
+    /// one common reference. Before it each explanation replaces another with the probability
+    /// `enters`, which is 0 where the measurement could not show it. Returns the log-likelihood
+    /// under all together. A log-likelihood that is no number counts as impossible.
     pub fn step(&mut self, log_likelihoods: [f64; N], enters: [f64; N]) -> f64 {
         let enters = enters.map(|p| p.clamp(0.0, 1.0 / N as f64));
         let all: f64 = enters.iter().sum();
         let joint: [f64; N] = std::array::from_fn(|i| {
             let before = self.p[i] * (1.0 - all) + enters[i];
-            match log_likelihoods[i].is_nan() {
-                true => f64::NEG_INFINITY,
-                false => before.ln() + log_likelihoods[i].clamp(-1e300, 1e300),
+            // Bounded, so that differences stay finite.
+            let joint = before.ln() + log_likelihoods[i].clamp(-1e300, 1e300);
+            if joint.is_nan() {
+                f64::NEG_INFINITY
+            } else {
+                joint
             }
         });
         let total = log_sum_exp(&joint);
@@ -37,6 +41,11 @@ impl<const N: usize> Alternatives<N> {
             return 0.0;
         }
         self.p = joint.map(|joint| (joint - total).exp());
+        let sum: f64 = self.p.iter().sum();
+        if (sum - 1.0).abs() > SUM_TOLERANCE {
+            // Beyond 1e10 nats the rounding of `total` exceeds the logarithm of a share.
+            self.p = self.p.map(|p| p / sum);
+        }
         total
     }
 }
@@ -103,11 +112,19 @@ mod tests {
     }
 
     #[test]
-    fn no_reading_makes_it_less_than_a_number() {
+    fn explanations_that_are_both_beyond_rounding_share_the_belief() {
+        let mut ways = Alternatives::new([0.5; 2]);
+        ways.step([1e300; 2], [0.0; 2]);
+        assert_eq!(ways.p, [0.5; 2]);
+    }
+
+    #[test]
+    fn no_measurement_makes_it_less_than_a_number() {
         for ratio in [f64::NAN, 1e300, -1e300, f64::INFINITY, f64::NEG_INFINITY] {
             let mut ways = Alternatives::new([0.5; 2]);
             for _ in 0..10 {
                 assert!(!ways.step([0.0, ratio], [1e-3; 2]).is_nan());
+                assert!(crate::filter::is_distribution(&ways.p));
             }
             assert!(ways.step([0.0; 2], [1e-3; 2]).is_finite());
             assert_eq!(ways.step([f64::NAN; 2], [1e-3; 2]), 0.0);

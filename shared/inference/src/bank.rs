@@ -1,11 +1,10 @@
-//! Exact single faults: one hypothesis per (mode, onset), each with its own continuous
-//! state.
+//! A bounded set of weighted hypotheses: one per mode and onset, each with its own continuous state.
 //!
-//! While no measurement is ambiguous about which hypothesis it belongs to, the posterior over modes
-//! is the sum of the hypotheses' weights: no sampling, no mixing. The number of hypotheses is
-//! bounded: unlikely ones are dropped, and when the bank is full the least likely gives way.
+//! The posterior over modes is the sum of the hypotheses' weights: no sampling, no mixing. The set
+//! is bounded: improbable hypotheses are dropped, and when a mode's places are taken its least
+//! probable hypothesis gives way.
 
-use crate::logspace::log_sum_exp;
+use crate::logspace::{log_add, log_sum_exp};
 
 /// One hypothesis: since `onset` the system is in `mode`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +25,8 @@ pub struct Bank<T> {
     hypotheses: Vec<Hypothesis<T>>,
     scratch: Vec<f64>,
     capacities: Vec<usize>,
+    /// Most hypotheses in all.
+    places: usize,
     limit: usize,
 }
 
@@ -33,11 +34,13 @@ impl<T: Copy> Bank<T> {
     /// An empty bank of at most `capacities[mode]` hypotheses for each mode. Allocates once.
     #[must_use]
     pub fn new(capacities: &[usize]) -> Self {
-        let capacity = capacities.iter().sum();
+        // At least that of the hypothesis which `restart` begins with.
+        let places = capacities.iter().sum::<usize>().max(1);
         Self {
-            hypotheses: Vec::with_capacity(capacity),
-            scratch: Vec::with_capacity(capacity),
+            hypotheses: Vec::with_capacity(places),
+            scratch: Vec::with_capacity(places),
             capacities: capacities.to_vec(),
+            places,
             limit: usize::MAX,
         }
     }
@@ -45,10 +48,11 @@ impl<T: Copy> Bank<T> {
     /// Most hypotheses that a normalisation leaves.
     #[must_use]
     pub fn limit(&self) -> usize {
-        self.limit.min(self.capacities.iter().sum())
+        self.limit.min(self.places)
     }
 
-    /// From the next normalisation on the `count` most probable hypotheses stay, at least one.
+    /// Keeps only the `count` most probable hypotheses, at least one, from the next normalisation
+    /// on.
     pub fn set_limit(&mut self, count: usize) {
         self.limit = count.max(1);
     }
@@ -84,34 +88,33 @@ impl<T: Copy> Bank<T> {
             .max_by(|a, b| a.log_weight.total_cmp(&b.log_weight))
     }
 
-    /// Adds a hypothesis. A mode that has its share of places gives up its least likely one; a mode
+    /// Adds a hypothesis. A mode whose places are taken gives up its least probable one; a mode
     /// without places takes none.
     pub fn add(&mut self, hypothesis: Hypothesis<T>) {
-        let same = self
-            .hypotheses
-            .iter()
-            .filter(|other| other.mode == hypothesis.mode)
-            .count();
-        let capacity = self.capacities.get(hypothesis.mode).copied().unwrap_or(0);
-        if same < capacity {
+        let mode = hypothesis.mode;
+        let is_alike = |other: &Hypothesis<T>| other.mode == mode;
+        let taken = self.hypotheses.iter().filter(|other| is_alike(other));
+        let capacity = self.capacities.get(mode).copied().unwrap_or(0);
+        // The caller may have moved hypotheses to other modes: the sum is bounded on its own.
+        if taken.count() < capacity && self.hypotheses.len() < self.places {
             self.hypotheses.push(hypothesis);
             return;
         }
-        let mode = hypothesis.mode;
-        let alike = self
-            .hypotheses
-            .iter_mut()
-            .filter(|other| other.mode == mode);
+        let alike = self.hypotheses.iter_mut().filter(|other| is_alike(other));
         let least = alike.min_by(|a, b| a.log_weight.total_cmp(&b.log_weight));
         if let Some(least) = least {
             *least = hypothesis;
         }
     }
 
-    /// Drops hypotheses whose log-weight is below `floor`, or not a number, normalises the others,
-    /// and keeps as many as the limit allows. Returns the logarithm of the sum before, or None,
-    /// unchanged, if nothing is possible.
+    /// Normalises, drops hypotheses whose log-weight is below `floor`, or not a number, and keeps
+    /// as many as the limit allows. Returns the logarithm of the sum before, or None, unchanged, if
+    /// nothing is possible.
     pub fn normalise(&mut self, floor: f64) -> Option<f64> {
+        assert!(
+            self.hypotheses.len() <= self.places,
+            "a bank holds no more hypotheses than it has places"
+        );
         self.scratch.clear();
         for hypothesis in &mut self.hypotheses {
             if hypothesis.log_weight.is_nan() {
@@ -131,8 +134,8 @@ impl<T: Copy> Bank<T> {
         Some(evidence)
     }
 
-    /// Keeps the most probable hypotheses up to the limit, in their order; of those equally
-    /// probable the first. The others' weight is gone: the next normalisation divides it.
+    /// Keeps the most probable hypotheses up to the limit, in their order; of equally probable ones
+    /// the first. The weight of the others is shared out by the next normalisation.
     fn keep(&mut self) {
         let count = self.limit;
         if self.hypotheses.len() <= count {
@@ -160,7 +163,7 @@ impl<T: Copy> Bank<T> {
         log_p.fill(f64::NEG_INFINITY);
         for hypothesis in &self.hypotheses {
             let p = &mut log_p[hypothesis.mode];
-            *p = crate::logspace::log_add(*p, hypothesis.log_weight);
+            *p = log_add(*p, hypothesis.log_weight);
         }
     }
 }
@@ -233,7 +236,50 @@ mod tests {
     }
 
     #[test]
-    fn impossible_weights_are_told() {
+    #[should_panic(expected = "a bank holds no more hypotheses than it has places")]
+    fn more_hypotheses_than_places_are_caught() {
+        let mut bank = Bank::new(&[1, 1]);
+        bank.restart(0, 0, ());
+        for onset in 1..3 {
+            bank.hypotheses.push(hypothesis(1, onset, 0.5));
+        }
+        bank.normalise(-30.0);
+    }
+
+    #[test]
+    fn a_full_mode_gives_up_its_least_probable_and_a_mode_without_places_takes_none() {
+        let mut bank = Bank::new(&[1, 2]);
+        bank.restart(0, 0, ());
+        for (onset, p) in [(1, 0.5), (2, 0.1), (3, 0.3)] {
+            bank.add(hypothesis(1, onset, p));
+        }
+        bank.add(hypothesis(2, 4, 0.9));
+        let onsets = |bank: &Bank<()>| -> Vec<u64> {
+            bank.hypotheses().iter().map(|other| other.onset).collect()
+        };
+        assert_eq!(onsets(&bank), [0, 1, 3]);
+        // Moved by the caller: mode 1 has room, the bank has none.
+        bank.hypotheses_mut()[1].mode = 0;
+        bank.add(hypothesis(1, 5, 0.2));
+        assert_eq!(onsets(&bank), [0, 1, 5]);
+        bank.normalise(-30.0).unwrap();
+    }
+
+    #[test]
+    fn a_hypothesis_at_the_floor_stays_and_one_below_it_goes() {
+        let mut bank = Bank::new(&[1, 2]);
+        bank.restart(0, 0, ());
+        bank.add(Hypothesis {
+            log_weight: f64::NEG_INFINITY,
+            ..hypothesis(1, 1, 1.0)
+        });
+        bank.normalise(0.0).unwrap();
+        assert_eq!(bank.hypotheses().len(), 1);
+        assert_eq!(bank.hypotheses()[0].log_weight, 0.0);
+    }
+
+    #[test]
+    fn impossible_weights_leave_the_bank_as_it_is() {
         let mut bank = Bank::new(&[2]);
         bank.restart(0, 0, ());
         bank.hypotheses_mut()[0].log_weight = f64::NAN;

@@ -1,9 +1,9 @@
-//! The hybrid particle filter: the paper's second listing, and what better proposals make of it.
+//! The hybrid particle filter: the paper's second listing, and its variants by proposal.
 //!
 //! Per particle and step (Verma, Fernandez and Simmons 2002, section 4.1): draw a mode, draw a
 //! continuous state, weigh by the likelihood; then resample. With [`Proposal::prior`] this is the
 //! paper's classical filter; with [`Proposal::raised`] faults are tried more often than they occur;
-//! with [`Proposal::risk_sensitive`] it is the decision-theoretic filter. The belief over modes is
+//! with [`Proposal::risk_raised`] it is the decision-theoretic filter. The belief over modes is
 //! the sum of weights before resampling, which has less variance than the one after.
 
 use rand::{RngExt, SeedableRng};
@@ -11,14 +11,15 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::adaptive::Adaptive;
 use crate::filter::{Event, Filter, Step, normalise_into};
-use crate::hybrid::Sampled;
-use crate::logspace::log_add;
-use crate::proposal::Proposal;
-use crate::resample::Resampling;
+use crate::hybrid::{self, Modes, Sampled};
+use crate::logspace::{log_add, log_sum_exp};
+use crate::proposal::{Proposal, ProposalError};
+use crate::resample::{Resampling, systematic};
 use crate::weights::Weights;
 
-/// Steps without a usable observation after which the continuous states are drawn anew. Chosen: a
-/// quarter of a second of 50 ms observations.
+/// Steps in a row without a usable observation after which the continuous states are drawn anew:
+/// a quarter of a second at 20 observations per second. Chosen by hand: with fewer, a short
+/// disturbance discards a good track; with more, a lost filter stays lost longer.
 const COASTED_MAX: u32 = 5;
 
 /// A particle filter over the modes and states of `M`. All buffers are made once.
@@ -37,7 +38,7 @@ pub struct ParticleFilter<M: Sampled> {
     other_modes: Vec<u16>,
     other_states: Vec<M::State>,
     weights: Weights,
-    /// What a particle's weight pays for its proposal.
+    /// Logarithm of the factor by which a particle's weight pays for its proposal.
     correction: Vec<f64>,
     increments: Vec<f64>,
     ancestors: Vec<u32>,
@@ -50,14 +51,23 @@ pub struct ParticleFilter<M: Sampled> {
 
 impl<M: Sampled> ParticleFilter<M> {
     /// A filter of `count` particles, at least 1.
+    ///
+    /// # Errors
+    /// [`ProposalError`] if the proposal was made for a model with another number of modes, or the
+    /// model is refused.
     pub fn new(
         model: M,
         proposal: Proposal,
         resampling: Resampling,
         count: usize,
         seed: u64,
-    ) -> Self {
+    ) -> Result<Self, ProposalError> {
+        hybrid::check(&model)?;
         let (count, modes) = (count.max(1), model.modes());
+        if proposal.modes() != modes {
+            let found = proposal.modes();
+            return Err(ProposalError::Length { found, modes });
+        }
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let state = model.draw(0, &mut rng);
         let mut filter = Self {
@@ -82,31 +92,24 @@ impl<M: Sampled> ParticleFilter<M> {
             model,
         };
         filter.reset();
-        filter
+        Ok(filter)
     }
 
-    /// The same filter with a number of particles that follows the belief's spread, at most the
-    /// number of the start.
+    /// Lets the number of particles follow the spread of the belief, up to the number of the start.
     #[must_use]
     pub fn with_adaptive_count(mut self, adaptive: Adaptive) -> Self {
         self.adaptive = Some(adaptive);
         self
     }
 
-    /// From the next step on at most `count` particles, 1 to the number of the start: fewer cost
-    /// less, and are resampled from those there are.
+    /// Limits the particles to `count`, 1 to the number of the start, from the next step on. Fewer
+    /// cost less; they are resampled from those there are.
     pub fn limit(&mut self, count: usize) {
         self.allowed = count.clamp(1, self.count_max);
     }
 
-    /// The model.
-    #[must_use]
-    pub const fn model(&self) -> &M {
-        &self.model
-    }
-
-    /// Begins anew from the prior and with the generator at `seed`: equal runs then have equal
-    /// beliefs, whatever came before.
+    /// Begins anew from the prior and with the generator at `seed`, so that equal runs have equal
+    /// beliefs.
     pub fn restart(&mut self, seed: u64) {
         self.rng = Pcg64Mcg::seed_from_u64(seed);
         self.reset();
@@ -136,23 +139,15 @@ impl<M: Sampled> ParticleFilter<M> {
             })
     }
 
-    /// Draws states for the particles' modes, from the prior or around an observation.
+    /// Draws each particle's mode from the prior, and its state from the prior or around an
+    /// observation.
     fn redraw(&mut self, z: Option<&M::Observation>) {
-        let initial = |model: &M, u: f64| {
-            let mut sum = 0.0;
-            (0..model.modes())
-                .find(|&mode| {
-                    sum += model.initial(mode);
-                    u < sum
-                })
-                .unwrap_or(0)
-        };
         let count = self.allowed;
         self.modes.resize(count, 0);
         self.states.truncate(count);
         self.weights.level(count);
         for i in 0..count {
-            let mode = initial(&self.model, self.rng.random());
+            let mode = initial_mode(&self.model, self.rng.random());
             self.modes[i] = mode as u16;
             let found = z.and_then(|z| self.model.locate(mode, z, &mut self.rng));
             let state = found.unwrap_or_else(|| self.model.draw(mode, &mut self.rng));
@@ -161,7 +156,7 @@ impl<M: Sampled> ParticleFilter<M> {
             } else {
                 self.states.push(state);
             }
-            // Drawn from the prior, not from the tilted one.
+            // Drawn from the prior; weights are those of the belief tilted by the risk.
             self.increments[i] = self.proposal.log_risk(mode);
         }
         self.weights.absorb(&self.increments[..count]);
@@ -198,7 +193,7 @@ impl<M: Sampled> ParticleFilter<M> {
             let log_p = &mut self.log_p[mode];
             *log_p = log_add(*log_p, log_weight - self.proposal.log_risk(mode));
         }
-        self.log_untilted = crate::logspace::log_sum_exp(&self.log_p);
+        self.log_untilted = log_sum_exp(&self.log_p);
         normalise_into(&self.log_p, &mut self.posterior);
     }
 
@@ -219,9 +214,8 @@ impl<M: Sampled> ParticleFilter<M> {
             None => self.allowed,
         };
         self.ancestors.resize(next, 0);
-        let (weights, spare) = (self.weights.linear(), &mut self.increments);
-        let scheme = self.resampling.scheme;
-        if !scheme.resample(weights, spare, &mut self.ancestors, &mut self.rng) {
+        let weights = self.weights.linear();
+        if !systematic(weights, self.rng.random(), &mut self.ancestors) {
             return;
         }
         self.other_modes.clear();
@@ -233,7 +227,7 @@ impl<M: Sampled> ParticleFilter<M> {
         std::mem::swap(&mut self.modes, &mut self.other_modes);
         std::mem::swap(&mut self.states, &mut self.other_states);
         self.weights.level(next);
-        // Which tilted particles survived decides what the next evidence is relative to.
+        // The next evidence is relative to the particles that survived.
         self.log_untilted = f64::NEG_INFINITY;
         let share = -(next as f64).ln();
         for &mode in &self.modes {
@@ -243,10 +237,28 @@ impl<M: Sampled> ParticleFilter<M> {
     }
 }
 
+/// The initial mode for a uniform draw `u` in [0, 1); the nominal one if rounding leaves none.
+fn initial_mode(model: &impl Modes, u: f64) -> usize {
+    let mut sum = 0.0;
+    (0..model.modes())
+        .find(|&mode| {
+            sum += model.initial(mode);
+            u < sum
+        })
+        .unwrap_or(0)
+}
+
 impl<M: Sampled> Filter for ParticleFilter<M> {
     type Observation = M::Observation;
 
     fn step(&mut self, z: &M::Observation) -> Step {
+        let count = self.count();
+        assert!(
+            count == self.states.len()
+                && count == self.weights.linear().len()
+                && (1..=self.count_max).contains(&count),
+            "each particle has a mode, a state and a weight, and their number is within bounds"
+        );
         self.predict();
         let before = self.log_untilted;
         let mut event = None;
@@ -256,7 +268,7 @@ impl<M: Sampled> Filter for ParticleFilter<M> {
             self.sum_modes();
             log_evidence = tilted + self.log_untilted - before;
         } else {
-            let count = self.count();
+            // The draws are paid for all the same; without an observation nothing else counts.
             self.weights.absorb(&self.correction[..count]);
             self.coasted += 1;
             event = Some(Event::Coasted);
@@ -268,11 +280,9 @@ impl<M: Sampled> Filter for ParticleFilter<M> {
         }
         let effective_sample_size = self.weights.effective_sample_size();
         let count = self.count();
+        // An adaptive number may well be smaller than what is allowed.
         let is_limited = count > self.allowed || self.adaptive.is_none() && count < self.allowed;
-        if effective_sample_size < self.resampling.threshold * count as f64
-            || self.resampling.threshold >= 1.0
-            || is_limited
-        {
+        if self.resampling.is_due(effective_sample_size, count) || is_limited {
             self.resample();
         }
         Step {
@@ -280,6 +290,7 @@ impl<M: Sampled> Filter for ParticleFilter<M> {
             effective_sample_size,
             event,
         }
+        .checked(&self.posterior, count)
     }
 
     fn posterior(&self) -> &[f64] {
@@ -288,5 +299,132 @@ impl<M: Sampled> Filter for ParticleFilter<M> {
 
     fn reset(&mut self) {
         self.redraw(None);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two modes, shown by the sign of the observation; states count their steps.
+    #[derive(Debug, Clone)]
+    struct Sign;
+
+    impl Modes for Sign {
+        fn modes(&self) -> usize {
+            2
+        }
+
+        fn transition(&self, from: usize, to: usize) -> f64 {
+            if from == to { 0.75 } else { 0.25 }
+        }
+    }
+
+    impl Sampled for Sign {
+        type State = usize;
+        type Observation = f64;
+
+        fn draw(&self, _mode: usize, _rng: &mut Pcg64Mcg) -> usize {
+            0
+        }
+
+        fn propagate(&self, _mode: usize, steps: &usize, _rng: &mut Pcg64Mcg) -> usize {
+            steps + 1
+        }
+
+        fn log_likelihood(&self, mode: usize, _steps: &usize, z: &f64) -> f64 {
+            match (mode == 0) == (*z >= 0.0) {
+                _ if z.is_nan() => f64::NEG_INFINITY,
+                true => 0.8_f64.ln(),
+                false => 0.2_f64.ln(),
+            }
+        }
+
+        fn locate(&self, _mode: usize, _z: &f64, _rng: &mut Pcg64Mcg) -> Option<usize> {
+            Some(100)
+        }
+    }
+
+    fn filter(count: usize) -> ParticleFilter<Sign> {
+        let proposal = Proposal::prior(&Sign).unwrap();
+        ParticleFilter::new(Sign, proposal, Resampling::default(), count, 1).unwrap()
+    }
+
+    #[test]
+    #[should_panic(expected = "each particle has a mode, a state and a weight")]
+    fn a_particle_without_a_state_is_caught() {
+        let mut filter = filter(10);
+        filter.states.pop();
+        filter.step(&1.0);
+    }
+
+    #[test]
+    fn a_proposal_for_another_number_of_modes_is_refused() {
+        struct Single;
+        impl Modes for Single {
+            fn modes(&self) -> usize {
+                1
+            }
+
+            fn transition(&self, _from: usize, _to: usize) -> f64 {
+                1.0
+            }
+        }
+        let proposal = Proposal::prior(&Single).unwrap();
+        let refused = ParticleFilter::new(Sign, proposal, Resampling::default(), 10, 1);
+        let length = ProposalError::Length { found: 1, modes: 2 };
+        assert_eq!(refused.map(|_| ()), Err(length));
+    }
+
+    #[test]
+    fn a_limit_holds_from_the_next_step_on_and_can_be_lifted() {
+        let mut filter = filter(40);
+        for (limit, count) in [(10, 10), (0, 1), (1000, 40)] {
+            filter.limit(limit);
+            filter.step(&1.0);
+            assert_eq!(filter.count(), count);
+            let total: f64 = filter.particles().map(|(_, _, weight)| weight).sum();
+            assert!((total - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn five_lost_steps_in_a_row_begin_anew_around_the_observation_and_four_do_not() {
+        let mut filter = filter(20);
+        for _ in 0..2 {
+            for _ in 0..4 {
+                assert_eq!(filter.step(&f64::NAN).event, Some(Event::Coasted));
+            }
+            assert_eq!(filter.step(&1.0).event, None);
+        }
+        for _ in 0..4 {
+            assert_eq!(filter.step(&f64::NAN).event, Some(Event::Coasted));
+        }
+        assert!(filter.particles().all(|(_, &steps, _)| steps == 14));
+        assert_eq!(filter.step(&f64::NAN).event, Some(Event::Restarted));
+        assert!(filter.particles().all(|(_, &steps, _)| steps == 100));
+        assert_eq!(filter.posterior(), [1.0, 0.0]);
+        assert_eq!(filter.step(&f64::NAN).event, Some(Event::Coasted));
+    }
+
+    #[test]
+    fn the_initial_mode_follows_the_prior() {
+        struct Prior;
+        impl Modes for Prior {
+            fn modes(&self) -> usize {
+                2
+            }
+
+            fn initial(&self, mode: usize) -> f64 {
+                [0.25, 0.75][mode]
+            }
+
+            fn transition(&self, from: usize, to: usize) -> f64 {
+                f64::from(u8::from(from == to))
+            }
+        }
+        for (u, mode) in [(0.0, 0), (0.2499, 0), (0.25, 1), (0.9999, 1), (1.0, 0)] {
+            assert_eq!(initial_mode(&Prior, u), mode, "{u}");
+        }
     }
 }

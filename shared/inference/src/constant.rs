@@ -1,12 +1,12 @@
-//! The paper's detection filter (Verma, Fernandez, Simmons 2002): nominal is modelled, the fault
-//! state has a constant likelihood. With the whitened nominal residual r the constant is
+//! The paper's detection filter (Verma, Fernandez, Simmons 2002): the nominal mode has a model, the
+//! fault a constant likelihood. With the whitened nominal residual r the constant is
 //! `peak · exp(-τ²/2)`, so that each step adds `(|r|² - τ²) / 2` to the log-odds: a CUSUM.
 //!
 //! **Blind spot.** For a residual of d dimensions with squared bias λ the mean of that step is
 //! `(d + λ - τ²) / 2`, as `E|r|² = d + λ`. Nominal residuals must not count as evidence, so
-//! `τ² > d`; then a fault with `λ <= τ² - d` adds evidence on average never, however long it lasts,
-//! and only luck raises an alarm. [`crate::windowed`] makes the blind spot smaller,
-//! [`crate::ages`] has none.
+//! `τ² > d`. Then a fault with `λ <= τ² - d` adds no evidence on average, however long it lasts:
+//! only chance raises an alarm. [`crate::windowed`] makes the blind spot smaller, [`crate::ages`]
+//! has none.
 
 use crate::departure::LOG_ODDS_MAX;
 use crate::logspace::log_add;
@@ -34,27 +34,34 @@ impl Constant {
         self.log_odds
     }
 
-    /// What the last step said for a fault that was there, and is: the logarithm of the
-    /// likelihoods' ratio.
+    /// Log-likelihood ratio of the last step for a fault that was present before it and stays.
     #[must_use]
     pub const fn gain(&self) -> f64 {
         self.gain
     }
 
-    /// One step with the squared norm of the whitened residual, the constant's `tau_squared` (above
-    /// the residual's dimension, or nominal steps count as evidence), and the probabilities of a
-    /// fault's appearing and vanishing in this step.
+    /// One step with the squared norm of the whitened residual, and the constant's `tau_squared`,
+    /// which exceeds the residual's dimension. `birth` and `death`: probabilities that a fault
+    /// appears and vanishes in this step. What is no number is no evidence.
     pub fn step(&mut self, norm_squared: f64, tau_squared: f64, birth: f64, death: f64) {
         if norm_squared.is_finite() {
             self.take(0.5 * (norm_squared - tau_squared), birth, death);
         }
     }
 
-    /// One step of the two states with the logarithm of the likelihoods' ratio.
+    /// One step of the two states with the log-likelihood ratio `evidence`.
     pub(crate) fn take(&mut self, evidence: f64, birth: f64, death: f64) {
+        assert!(
+            !self.log_odds.is_nan() && self.log_odds <= LOG_ODDS_MAX,
+            "log-odds of a constant likelihood are a number within their bound"
+        );
         let stays = log_add(self.log_odds + (1.0 - death).ln(), birth.ln());
         let leaves = log_add((1.0 - birth).ln(), self.log_odds + death.ln());
-        self.log_odds = (stays - leaves + evidence).min(LOG_ODDS_MAX);
+        let log_odds = stays - leaves + evidence;
+        if log_odds.is_nan() {
+            return;
+        }
+        self.log_odds = log_odds.min(LOG_ODDS_MAX);
         self.gain = evidence;
     }
 }
@@ -64,6 +71,7 @@ mod tests {
     use super::Constant;
     use crate::ages::Ages;
     use nalgebra::SVector;
+    use proptest::prelude::*;
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
@@ -143,11 +151,35 @@ mod tests {
     }
 
     #[test]
-    fn hostile_residuals_leave_finite_odds() {
+    fn the_last_gain_is_half_the_excess_over_the_constant() {
         let mut filter = Constant::default();
-        for norm in [f64::NAN, f64::INFINITY, 1e308, 0.0] {
-            filter.step(norm, 5.0, 1e-6, 1e-6);
-            assert!(!filter.log_odds().is_nan() && filter.log_odds() <= 40.0);
+        filter.step(9.0, 5.0, 0.1, 0.2);
+        assert_eq!(filter.gain(), 2.0);
+        filter.step(f64::NAN, 5.0, 0.1, 0.2);
+        assert_eq!(filter.gain(), 2.0);
+    }
+
+    #[test]
+    #[should_panic(expected = "log-odds of a constant likelihood are a number")]
+    fn log_odds_that_are_no_number_are_caught() {
+        let mut filter = Constant {
+            log_odds: f64::NAN,
+            gain: 0.0,
+        };
+        filter.step(1.0, 5.0, 1e-6, 1e-6);
+    }
+
+    proptest! {
+        #[test]
+        fn no_input_breaks_the_odds(
+            steps in prop::collection::vec(prop::array::uniform4(prop::num::f64::ANY), 1..20),
+        ) {
+            let mut filter = Constant::default();
+            for [norm, tau, birth, death] in steps {
+                filter.step(norm, tau, birth, death);
+                filter.step(norm, 5.0, 1e-6, 1e-6);
+                prop_assert!(!filter.log_odds().is_nan() && filter.log_odds() <= 40.0);
+            }
         }
     }
 }

@@ -1,59 +1,62 @@
 //! Detection on a planar pose: nominal motion against nominal motion plus an unknown departure.
 //!
-//! Under the fault the robot moves, from an onset on, by an unknown constant amount per metre more
-//! than its nominal model says. Each onset (a bounded number of them, [`crate::onsets`]) has a
-//! [`Track`] that learns that amount, forked from the nominal one. As the nominal track is pulled
-//! along by the measurements, the residuals of such a fault are no constant, but grow and settle;
-//! here they are what they should be for every fault, and a fault is seen sooner than by a constant
-//! bias of the residual.
+//! Under the fault the robot departs from its nominal model, from an onset on, by an unknown
+//! constant amount per metre. Each onset (a bounded number of them, [`crate::onsets`]) has a
+//! [`Track`] that learns that amount, forked from the nominal one. The measurements pull the
+//! nominal track along, so that the residuals of such a fault are not constant: they grow and
+//! settle. A track per onset predicts them exactly, and detects a fault sooner than a constant bias
+//! of the residual does.
 //!
-//! A healthy robot departs from its model too: slip, slope, a servo that stands off. The nominal
-//! track learns that as its context, up to a bound ([`MotionNoise::bound`]): what departs by more
-//! for good is never learned away. A fault of an unknown kind counts as far as its departure lies
-//! beyond the same bound, with the probability that it does: that is Bayes for a departure whose
-//! prior is cut off there. The ground may also change at once, so that what was learned of the old
-//! one holds no more: each such change is a healthy hypothesis of its own, within the bound.
+//! A healthy robot departs from its model too: slip, slope, the offset of a servo. The nominal
+//! track learns that as its context, up to a bound ([`MotionNoise::bound`]), so that a larger
+//! lasting departure is never learned away. A fault of an unknown kind is weighted by the
+//! probability that its departure lies beyond the same bound: Bayes' rule for a prior truncated
+//! there. The ground may also change suddenly, which makes the learned context useless: each such
+//! change is a healthy hypothesis of its own, within the bound.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::angle::wrap;
+use crate::gaussian::log_density;
 use crate::logspace::log_add;
 use crate::onsets::{Onset, Onsets};
 use crate::outlier::Trust;
 use crate::track::{Context, Displacement, MotionNoise, Track};
 
-/// Log-odds beyond which more evidence changes nothing, but delays recovery. An alarm above it is
-/// refused; each nat more must be lost again when a fault ends.
+/// Largest log-odds. Chosen by hand: more evidence changes no decision, and each nat must be lost
+/// again when the fault ends; with less, alarms with a very long false-alarm interval are
+/// impossible.
 pub const LOG_ODDS_MAX: f64 = 40.0;
-/// Components less probable than this, by their log-odds, are dropped. 1e-13: of no weight beside a
-/// birth of 1e-5 in an observation.
+/// Components less probable than this, by their log-odds, are dropped. 1e-13 has no weight beside
+/// births of 1e-5 per observation; a higher bound would drop births.
 const LOG_ODDS_MIN: f64 = -30.0;
-/// A change of the ground is dropped once it is so much less probable than when it was supposed.
-/// e^5 = 150: the next observation supposes one anew with more weight.
+/// A change of the ground is dropped once it has lost this much log-weight since it entered, nats.
+/// Chosen by hand: at a factor of 150 the next change enters with much more weight; less drops true
+/// changes after one outlier, more costs time.
 const CHANGE_LOSES: f64 = 5.0;
-/// A change of the ground that is e² times as probable as none is taken for granted. Until then it
-/// counts by its weight; a wrong one costs what was learned of the ground, no alarm.
+/// Log-odds against no change at which a change of the ground is adopted, nats. Chosen by hand: a
+/// wrong adoption only discards what was learned of the ground; a higher threshold delays it.
 const CHANGED: f64 = 2.0;
 
 /// A fault, its end, or a change of the ground that began at one of some successive steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Hypothesis {
     log_weight: f64,
-    /// Part of the weight: that its departure is material.
+    /// Part of the log-weight: the log-probability that its departure is material.
     log_material: f64,
     track: Track,
 }
 
-/// What faults of one kind do to the motion.
+/// The motion under faults of one kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kind {
     /// Share of all faults.
     pub share: f64,
     /// Displacement at the mean departure.
     pub step: Displacement,
-    /// How far faults of this kind depart from that.
+    /// How far faults of this kind depart from the mean.
     pub noise: MotionNoise,
-    /// Whether such a fault is one only where it departs beyond the nominal bound.
+    /// True if a departure counts as a fault only beyond the nominal bound.
     pub is_unknown: bool,
 }
 
@@ -62,16 +65,16 @@ pub struct Kind {
 pub struct Departure<const K: usize> {
     nominal: MotionNoise,
     track: Track,
-    /// Of the nominal mode, from before a fault was suspected.
+    /// Context of the nominal mode; while a fault is suspected, that from before.
     context: Context,
     trust: Trust,
     is_unknown: [bool; K],
     faults: [Onsets<Hypothesis>; K],
-    /// While a fault is suspected: nominal motion again, since one of some successive steps.
+    /// While a fault is suspected: nominal motion again since one of some successive steps.
     ended: Onsets<Hypothesis>,
     /// Nominal motion on another ground since one of some successive steps.
     changed: Onsets<Hypothesis>,
-    /// Weight of a change when it is supposed.
+    /// Log-weight of the last change when it entered.
     log_change: f64,
     is_suspected: bool,
     gain: f64,
@@ -86,7 +89,7 @@ pub struct Suspicion {
     pub ends: f64,
 }
 
-/// What a pose said.
+/// Evidence of a measured pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseEvidence {
     /// Log-density of the pose under nominal motion.
@@ -96,8 +99,7 @@ pub struct PoseEvidence {
 }
 
 impl<const K: usize> Departure<K> {
-    /// A filter at the origin, whose motion per metre departs from its model as `nominal` says in
-    /// health.
+    /// A filter at the origin. `nominal`: departures per metre of a healthy robot.
     #[must_use]
     pub fn new(nominal: MotionNoise) -> Self {
         Self {
@@ -123,10 +125,10 @@ impl<const K: usize> Departure<K> {
         self.track = Track::new(Vector3::from(pose), covariance, &self.nominal);
     }
 
-    /// Forgets what speaks for a fault, and keeps the track: that of the most probable end, if a
-    /// fault was suspected.
+    /// Forgets all evidence for a fault. The most probable healthy track stays: that of an end, if
+    /// a fault was suspected.
     pub fn forget(&mut self) {
-        // A change of the ground that is less probable than none has not happened.
+        // Log-weights are relative to the nominal track: above 0 a change is more probable.
         let changed = best(&self.changed).filter(|changed| changed.log_weight > 0.0);
         let healthy = [best(&self.ended), changed].into_iter().flatten();
         let likeliest = healthy.max_by(|a, b| a.log_weight.total_cmp(&b.log_weight));
@@ -142,8 +144,8 @@ impl<const K: usize> Departure<K> {
         self.changed = Onsets::default();
     }
 
-    /// Puts every track at this pose and keeps what is known of the motion: the frame of the
-    /// measurement has jumped, or the pose was lost.
+    /// Puts every track at this pose and keeps the deviations: the frame in which the pose is
+    /// measured has jumped, or the pose was lost.
     pub fn anchor(&mut self, pose: [f64; 3], variance: [f64; 3]) {
         self.trust = Trust::default();
         self.track.anchor(pose, variance);
@@ -161,7 +163,7 @@ impl<const K: usize> Departure<K> {
         &self.track
     }
 
-    /// What is known of the nominal mode's deviations; while a fault is suspected, from before it.
+    /// The context of the nominal mode; while a fault is suspected, that from before.
     #[must_use]
     pub const fn context(&self) -> &Context {
         &self.context
@@ -170,26 +172,31 @@ impl<const K: usize> Departure<K> {
     /// Natural log-odds of a fault.
     #[must_use]
     pub fn log_odds(&self) -> f64 {
-        self.log_faults() - self.log_healthy()
+        let log_odds = self.log_faults() - self.log_healthy();
+        assert!(
+            !log_odds.is_nan(),
+            "the log-odds of a departure are a number"
+        );
+        log_odds
     }
 
-    /// Weight of all faults over that of the nominal track.
+    /// Log-weight of all faults, relative to the nominal track.
     fn log_faults(&self) -> f64 {
         total(self.faults.iter().flat_map(Onsets::iter))
     }
 
-    /// Weight of nominal motion, on whatever ground, over that of the nominal track.
+    /// Log-weight of nominal motion on any ground, relative to the nominal track.
     fn log_healthy(&self) -> f64 {
         log_add(0.0, total(self.changed.iter()))
     }
 
-    /// Log-odds of a fault that is there against one that has ended, or was none.
+    /// Log-odds of a fault that is present against one that has ended, or that never was.
     fn log_persists(&self) -> f64 {
         self.log_faults() - total(self.ended.iter()).max(self.log_healthy())
     }
 
-    /// What the last pose said for a fault that was there, and is: the logarithm of the
-    /// likelihoods' ratio to one that has ended, or to none that began; 0 where it is no evidence.
+    /// Log-likelihood ratio of the last pose for a fault that was present and stays, to one that has
+    /// ended or never was; 0 where the pose is no evidence.
     #[must_use]
     pub const fn gain(&self) -> f64 {
         self.gain
@@ -201,8 +208,8 @@ impl<const K: usize> Departure<K> {
 
     /// Moves by one displacement, each fault by that of its kind. A fault begins before it with the
     /// probability `birth`, 0 for none. While a fault is `suspected` it may end, wherever it has
-    /// led the robot, and the nominal track learns nothing of the motion: what a fault does is no
-    /// context of the nominal mode.
+    /// led the robot. The nominal track then learns nothing of the motion: the effects of a fault
+    /// are no context of the nominal mode.
     pub fn predict(
         &mut self,
         step: &Displacement,
@@ -218,7 +225,7 @@ impl<const K: usize> Departure<K> {
         self.is_unknown = kinds.each_ref().map(|kind| kind.is_unknown);
         for (faults, kind) in self.faults.iter_mut().zip(kinds) {
             let born = birth * kind.share;
-            if born > 0.0 {
+            if born > 0.0 && born.is_finite() {
                 faults.enter(Hypothesis {
                     log_weight: born.ln(),
                     log_material: 0.0,
@@ -234,7 +241,8 @@ impl<const K: usize> Departure<K> {
         self.track.predict(step, &self.nominal);
     }
 
-    /// While a fault is suspected no change of the ground begins: it would explain every end.
+    /// While a fault is suspected no change of the ground begins: it could not be distinguished from
+    /// an end.
     fn predict_change(&mut self, step: &Displacement, counts: bool) {
         let nominal = self.nominal;
         let p = -(-nominal.changes_1_m * step.travel_m.abs()).exp_m1();
@@ -261,7 +269,7 @@ impl<const K: usize> Departure<K> {
         self.track.diffuse(variance);
         let faults = self.faults.iter().filter_map(best);
         let likeliest = faults.max_by(|a, b| a.log_weight.total_cmp(&b.log_weight));
-        let likeliest = likeliest.filter(|_| ends > 0.0);
+        let likeliest = likeliest.filter(|_| ends > 0.0 && ends.is_finite());
         if let Some(track) = likeliest.map(|fault| fault.track.enter(&context, &nominal)) {
             self.ended.enter(Hypothesis {
                 log_weight: self.log_faults() + ends.ln(),
@@ -274,8 +282,8 @@ impl<const K: usize> Departure<K> {
         }
     }
 
-    /// Variances of a measured pose as far as it can be trusted where such shares of the samples
-    /// are outliers.
+    /// Variances of a measured pose, widened where it is probably an outlier. `rates`: share of
+    /// outliers, axis by axis. See [`Trust::variance`].
     pub fn trusted(&mut self, pose: [f64; 3], variance: [f64; 3], rates: [f64; 3]) -> [f64; 3] {
         let faults = self.faults.iter().flat_map(Onsets::iter);
         let healthy = self.ended.iter().chain(self.changed.iter());
@@ -284,8 +292,8 @@ impl<const K: usize> Departure<K> {
         self.trust.variance(all, pose, variance, rates)
     }
 
-    /// Conditions on a measured pose (x, y, yaw) with independent noise of `variance`; it is
-    /// evidence if `counts`. None, unchanged, if the nominal track cannot take it.
+    /// Conditions on a measured pose (x, y, yaw) with independent noise of `variance`. It moves the
+    /// weights only if it `counts`. None, and nothing changed, if the nominal track cannot take it.
     pub fn update(
         &mut self,
         pose: [f64; 3],
@@ -293,13 +301,13 @@ impl<const K: usize> Departure<K> {
         counts: bool,
     ) -> Option<PoseEvidence> {
         self.gain = 0.0;
-        let said = self.residual(pose, variance)?;
+        let evidence = self.residual(pose, variance)?;
         self.track.update(pose, variance)?;
         let before = self.log_persists();
         let take = |hypothesis: &mut Hypothesis| {
             let gained = hypothesis.track.update(pose, variance);
-            // What cannot take it is impossible.
-            let gained = gained.map_or(f64::NEG_INFINITY, |gained| gained - said.log_density);
+            // A hypothesis that cannot take it is impossible, even where it is no evidence.
+            let gained = gained.map_or(f64::NEG_INFINITY, |gained| gained - evidence.log_density);
             if counts || gained == f64::NEG_INFINITY {
                 hypothesis.log_weight += gained;
             }
@@ -312,7 +320,7 @@ impl<const K: usize> Departure<K> {
         self.gain = if gain.is_finite() { gain } else { 0.0 };
         self.follow_ground();
         self.bound();
-        Some(said)
+        Some(evidence)
     }
 
     /// Holds the nominal mode within its bound, and an unknown fault beyond it.
@@ -333,7 +341,8 @@ impl<const K: usize> Departure<K> {
         }
     }
 
-    /// Takes a change of the ground for granted once there is little doubt of it.
+    /// Adopts a change of the ground once it is much more probable than none: its track becomes the
+    /// nominal one, and all weights become relative to it.
     fn follow_ground(&mut self) {
         if self.is_suspected {
             return;
@@ -354,7 +363,7 @@ impl<const K: usize> Departure<K> {
         self.changed = Onsets::default();
     }
 
-    /// Keeps the weights within bounds.
+    /// Bounds the weights of faults, and drops improbable hypotheses.
     fn bound(&mut self) {
         let highest = self
             .faults
@@ -378,14 +387,14 @@ impl<const K: usize> Departure<K> {
             .retain(|ended| ended.log_weight > likeliest + LOG_ODDS_MIN);
     }
 
-    /// What a pose would say of the nominal motion.
+    /// Evidence of a pose under nominal motion.
     fn residual(&self, pose: [f64; 3], variance: [f64; 3]) -> Option<PoseEvidence> {
-        let (apart, spread) = self.track.innovation(pose, variance);
+        let (innovation, spread) = self.track.innovation(pose, variance);
         let (sin, cos) = wrap(self.track.pose()[2]).sin_cos();
         let turn = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
-        let (apart, spread) = (turn * apart, turn * spread * turn.transpose());
-        let (log_density, factor) = crate::gaussian::log_density(&apart, spread)?;
-        let residual = factor.l_dirty().solve_lower_triangular(&apart)?;
+        let innovation = turn * innovation;
+        let (log_density, factor) = log_density(&innovation, turn * spread * turn.transpose())?;
+        let residual = factor.l_dirty().solve_lower_triangular(&innovation)?;
         Some(PoseEvidence {
             log_density,
             residual,
@@ -399,7 +408,7 @@ fn best(all: &Onsets<Hypothesis>) -> Option<&Hypothesis> {
         .max_by(|a, b| a.log_weight.total_cmp(&b.log_weight))
 }
 
-/// Logarithm of the sum of their weights.
+/// Logarithm of the sum of the weights of some hypotheses.
 fn total<'a>(all: impl Iterator<Item = &'a Hypothesis>) -> f64 {
     all.map(|fault| fault.log_weight)
         .fold(f64::NEG_INFINITY, log_add)
@@ -409,7 +418,8 @@ impl Onset for Hypothesis {
     /// Keeps the weight and the first two moments of both.
     fn merged(&self, older: &Self) -> Self {
         let log_weight = log_add(self.log_weight, older.log_weight);
-        if log_weight == f64::NEG_INFINITY {
+        // Shares of weights beyond all numbers are not defined.
+        if !log_weight.is_finite() {
             return *self;
         }
         let share = (self.log_weight - log_weight).exp();

@@ -1,16 +1,16 @@
-//! Is a fault that was alarmed still there? Two states, present and ended, against each other.
+//! The end of a fault: a Markov chain of two states, present and ended.
 //!
-//! A detection filter asks when a fault began and adds up all that has spoken for it since; after a
-//! long fault that sum takes long to be outweighed. Here only the present counts: each step's
-//! likelihood ratio, that of the fault as it has been learned to the nominal mode's, moves the odds
-//! of a two-state chain whose rates bound them. So the time until an end is seen depends on the
-//! size of the fault and not on how long it lasted.
+//! A detection filter adds up all evidence since a fault's onset; after a long fault that sum takes
+//! long to be outweighed. Here each step's likelihood ratio of the learned fault to the nominal
+//! mode moves the odds of a chain whose rates bound them. So the delay with which an end is
+//! detected depends on the size of the fault, not on how long it lasted.
 
 use crate::logspace::log_add;
 
-/// One step changes the odds by this much at most, natural logarithm: a single reading decides
-/// nothing. A fault that mends in minutes has odds of e^9 at most: to those that end it, e^-4, it
-/// takes three readings.
+/// Largest change of the log-odds by one step, nats, so that no single measurement decides. Chosen
+/// by hand: the chain of a fault that mends in minutes saturates near 9 nats, so that three
+/// measurements lead from there to -4. Smaller delays each end; larger lets one outlier end a
+/// fault.
 const GAIN_MAX: f64 = 5.0;
 
 /// The two-state chain.
@@ -32,27 +32,35 @@ impl Ending {
         }
     }
 
-    /// The fault is there.
+    /// Makes the fault certain.
     pub const fn begin(&mut self) {
         self.log_odds = f64::INFINITY;
     }
 
-    /// Natural log-odds that it is still there.
+    /// Natural log-odds that the fault is still present.
     #[must_use]
     pub const fn log_odds(&self) -> f64 {
         self.log_odds
     }
 
-    /// Takes the log-likelihood ratio of `dt_s` of motion.
+    /// Takes the log-likelihood ratio `gain` of `dt_s` of motion.
     pub fn step(&mut self, gain: f64, dt_s: f64) {
-        let [appears, vanishes] = [self.appears_1_s, self.vanishes_1_s]
-            .map(|rate_1_s| (rate_1_s * dt_s).clamp(1e-12, 0.5));
-        // Bounded, so that certainty is no infinity.
+        // Beyond a half the chain would alternate; at 0 a state would be permanent.
+        let change = |rate_1_s: f64| match rate_1_s * dt_s {
+            p if p.is_nan() => 1e-12,
+            p => p.clamp(1e-12, 0.5),
+        };
+        let (appears, vanishes) = (change(self.appears_1_s), change(self.vanishes_1_s));
+        // Certainty, an infinity, is bounded: the exponential of 700 is the last that is a double.
         let odds = self.log_odds.clamp(-700.0, 700.0);
         let stays = log_add(odds + (-vanishes).ln_1p(), appears.ln());
         let leaves = log_add((-appears).ln_1p(), odds + vanishes.ln());
         let gain = if gain.is_nan() { 0.0 } else { gain };
         self.log_odds = stays - leaves + gain.clamp(-GAIN_MAX, GAIN_MAX);
+        assert!(
+            self.log_odds.is_finite(),
+            "the log-odds of an end are finite after a step"
+        );
     }
 }
 
@@ -73,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_is_seen_as_soon_after_an_hour_as_after_a_second() {
+    fn an_end_is_detected_as_soon_after_an_hour_as_after_a_second() {
         let delay = |steps: usize| {
             let mut ending = Ending::new(1e-3, 1.0 / 60.0);
             (0..steps).for_each(|_| ending.step(2.0, 0.05));
@@ -86,6 +94,47 @@ mod tests {
         };
         assert_eq!(delay(20), delay(72_000));
         assert!(delay(20) < 40);
+    }
+
+    #[test]
+    #[should_panic(expected = "the log-odds of an end are finite after a step")]
+    fn log_odds_that_are_no_number_are_caught() {
+        let mut ending = Ending::new(1e-3, 1e-2);
+        ending.log_odds = f64::NAN;
+        ending.step(0.0, 0.05);
+    }
+
+    #[test]
+    fn one_step_moves_the_odds_by_five_nats_at_most() {
+        let after = |gain| {
+            let mut ending = Ending::new(1e-3, 1e-2);
+            ending.log_odds = 0.0;
+            ending.step(gain, 0.05);
+            ending.log_odds()
+        };
+        assert_eq!(after(6.0), after(5.0));
+        assert_eq!(after(-6.0), after(-5.0));
+        assert!((after(4.0) - after(0.0) - 4.0).abs() < 1e-12);
+        assert_eq!(after(f64::NAN), after(0.0));
+    }
+
+    #[test]
+    fn a_fault_that_begins_is_certain() {
+        let mut ending = Ending::new(1e-3, 1e-2);
+        assert_eq!(ending.log_odds(), f64::INFINITY);
+        ending.step(-5.0, 0.05);
+        assert!(ending.log_odds() < 8.0);
+        ending.begin();
+        assert_eq!(ending.log_odds(), f64::INFINITY);
+    }
+
+    #[test]
+    fn no_rate_breaks_it() {
+        for rate_1_s in [f64::NAN, f64::INFINITY, -1.0, 0.0, 1e300] {
+            let mut ending = Ending::new(rate_1_s, rate_1_s);
+            (0..10).for_each(|_| ending.step(-1.0, 0.05));
+            assert!(ending.log_odds().is_finite());
+        }
     }
 
     #[test]

@@ -38,9 +38,18 @@ impl<const N: usize> Gaussian<N> {
         let gain = factor.solve(&cross.transpose()).transpose();
         self.mean += gain * innovation;
         let covariance = self.covariance - gain * cross.transpose();
+        // Rounding makes the two triangles differ; their mean keeps later factors well-defined.
         self.covariance = 0.5 * (covariance + covariance.transpose());
+        assert_symmetric(&self.covariance);
         Some(log_likelihood)
     }
+}
+
+fn assert_symmetric<const N: usize>(covariance: &SMatrix<f64, N, N>) {
+    let is_equal = |a: f64, b: f64| a == b || a.is_nan() && b.is_nan();
+    let is_symmetric =
+        (0..N).all(|i| (0..i).all(|j| is_equal(covariance[(i, j)], covariance[(j, i)])));
+    assert!(is_symmetric, "a covariance is symmetric after an update");
 }
 
 /// `ln N(residual; 0, covariance)` and the covariance's Cholesky factor; None when it is not
@@ -77,6 +86,27 @@ mod tests {
         assert!((log_likelihood - crate::logspace::log_normal(1.5, 20.0)).abs() < 1e-14);
         assert!((state.mean[0] - (2.5 + 17.0 / 20.0 * 1.5)).abs() < 1e-14);
         assert!((state.covariance[0] - 17.0 * 3.0 / 20.0).abs() < 1e-14);
+    }
+
+    #[test]
+    #[should_panic(expected = "a covariance is symmetric after an update")]
+    fn a_covariance_that_is_not_symmetric_is_caught() {
+        assert_symmetric(&SMatrix::from([[1.0, 0.1], [0.2, 1.0]]));
+    }
+
+    #[test]
+    fn two_dimensions_observed_in_one_match_the_conditional_distribution() {
+        let mut state = Gaussian {
+            mean: SVector::from([1.0, 2.0]),
+            covariance: SMatrix::from([[4.0, 1.0], [1.0, 3.0]]),
+        };
+        let observe = SMatrix::<f64, 1, 2>::new(1.0, 0.0);
+        let found = state.update(&SVector::from([0.5]), &observe, &SMatrix::from([[1.0]]));
+        // Spread 5: gains 4/5 and 1/5.
+        assert!((found.unwrap() - crate::logspace::log_normal(0.5, 5.0)).abs() < 1e-14);
+        assert!((state.mean - SVector::from([1.4, 2.1])).abs().max() < 1e-14);
+        let expected = SMatrix::from([[0.8, 0.2], [0.2, 2.8]]);
+        assert!((state.covariance - expected).abs().max() < 1e-14);
     }
 
     #[test]

@@ -24,9 +24,9 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use crate::filter::{Event, Filter, Step};
-use crate::hybrid::{Modes, Sampled};
-use crate::resample::Resampling;
+use crate::filter::{Event, Filter, SUM_TOLERANCE, Step};
+use crate::hybrid::{self, ModelError, Modes, Sampled};
+use crate::resample::{Resampling, systematic};
 use crate::weights::Weights;
 
 /// Largest share below a node for a split, and for a merge: ten times the rest, no toggling.
@@ -36,8 +36,11 @@ const MERGE: f64 = 0.99;
 const PARTICLES_MIN: f64 = 3.0;
 
 /// Why a hierarchy was refused.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum HierarchyError {
+    /// The model is refused.
+    #[error(transparent)]
+    Model(#[from] ModelError),
     /// An abstract node needs two modes at least, none of them the nominal one.
     #[error("abstract node {0} needs two or more modes other than the nominal one")]
     Node(usize),
@@ -108,6 +111,7 @@ impl<M: Sampled> Hierarchical<M> {
         count: usize,
         seed: u64,
     ) -> Result<Self, HierarchyError> {
+        hybrid::check(&model)?;
         let (count, modes) = (count.max(1), model.modes());
         let (nodes, above) = arrange(&model, abstract_nodes)?;
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
@@ -164,12 +168,6 @@ impl<M: Sampled> Hierarchical<M> {
         particles.map(|((state, shares), &weight)| (state, shares, weight))
     }
 
-    /// True while the leaves of an abstract node are tracked together.
-    #[must_use]
-    pub fn is_merged(&self, node: usize) -> bool {
-        self.nodes.get(node).is_some_and(|node| node.merged)
-    }
-
     /// The same filter with raised proposals: a share `leave` (0 to 1) of the draws leaves the
     /// particle's node for the others that it can reach, in equal parts; weights pay for it.
     #[must_use]
@@ -204,7 +202,7 @@ impl<M: Sampled> Hierarchical<M> {
         self.predicted.fill(0.0);
         for (from, share) in row.iter().enumerate().filter(|(_, share)| **share > 0.0) {
             for (to, predicted) in self.predicted.iter_mut().enumerate() {
-                *predicted += share * self.model.transition(from, to);
+                *predicted += share * hybrid::transition(&self.model, from, to);
             }
         }
         let own = row.iter().position(|&share| share > 0.0).unwrap_or(0);
@@ -219,10 +217,10 @@ impl<M: Sampled> Hierarchical<M> {
             let stays = self.group(k) == drawn;
             self.predicted[k] = if stays { self.predicted[k] / mass } else { 0.0 };
         }
-        if mass > 0.0 {
+        if mass > 0.0 && mass.is_finite() {
             (mass / self.proposed[drawn]).ln()
         } else {
-            // Rows that do not sum to 1 lead nowhere.
+            // A chain that has changed since its check may lead nowhere: the mode stays.
             self.predicted.fill(0.0);
             self.predicted[own] = 1.0;
             f64::NEG_INFINITY
@@ -297,6 +295,10 @@ impl<M: Sampled> Hierarchical<M> {
             }
         }
         let total: f64 = self.posterior.iter().sum();
+        assert!(
+            (total - 1.0).abs() <= SUM_TOLERANCE,
+            "shares of a particle and weights of all each sum to one"
+        );
         for p in &mut self.posterior {
             *p /= total;
         }
@@ -304,17 +306,11 @@ impl<M: Sampled> Hierarchical<M> {
 
     fn resample(&mut self) {
         let modes = self.model.modes();
-        let scheme = self.resampling.scheme;
         let weights = self.weights.linear();
         self.ancestors.resize(self.allowed, 0);
         self.other_shares.resize(self.allowed * modes, 0.0);
         self.other_states.resize(self.allowed, self.states[0]);
-        if !scheme.resample(
-            weights,
-            &mut self.increments,
-            &mut self.ancestors,
-            &mut self.rng,
-        ) {
+        if !systematic(weights, self.rng.random(), &mut self.ancestors) {
             return;
         }
         for (i, &ancestor) in self.ancestors.iter().enumerate() {
@@ -452,20 +448,19 @@ impl<M: Sampled> Filter for Hierarchical<M> {
     type Observation = M::Observation;
 
     fn step(&mut self, z: &M::Observation) -> Step {
-        for i in 0..self.states.len() {
+        let count = self.states.len();
+        for i in 0..count {
             self.paid[i] = self.predict_shares(i);
             self.increments[i] = self.paid[i] + self.move_particle(i, z);
         }
-        let updated = self.weights.absorb(&self.increments);
+        let updated = self.weights.absorb(&self.increments[..count]);
         if updated.is_none() {
-            // Predicted, not updated: the proposal is to be paid all the same.
-            self.weights.absorb(&self.paid);
+            // Predicted, not updated: the draws are paid for all the same.
+            self.weights.absorb(&self.paid[..count]);
         }
         self.sum_modes();
         let effective_sample_size = self.weights.effective_sample_size();
-        let limit = self.resampling.threshold * self.states.len() as f64;
-        let is_limited = self.states.len() != self.allowed;
-        if effective_sample_size < limit || self.resampling.threshold >= 1.0 || is_limited {
+        if self.resampling.is_due(effective_sample_size, count) || count != self.allowed {
             self.resample();
         }
         self.choose_resolution();
@@ -474,6 +469,7 @@ impl<M: Sampled> Filter for Hierarchical<M> {
             effective_sample_size,
             event: updated.is_none().then_some(Event::Coasted),
         }
+        .checked(&self.posterior, count)
     }
 
     fn posterior(&self) -> &[f64] {
@@ -496,5 +492,132 @@ impl<M: Sampled> Filter for Hierarchical<M> {
             self.shares[i * modes + mode] = 1.0;
         }
         self.sum_modes();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nominal and three faults, of which 1 and 2 look alike; nothing moves.
+    #[derive(Debug, Clone)]
+    struct Alike;
+
+    impl Modes for Alike {
+        fn modes(&self) -> usize {
+            4
+        }
+
+        fn transition(&self, from: usize, to: usize) -> f64 {
+            match from {
+                0 => [0.7, 0.1, 0.1, 0.1][to],
+                _ => f64::from(u8::from(from == to)),
+            }
+        }
+    }
+
+    impl Sampled for Alike {
+        type State = ();
+        type Observation = [f64; 4];
+
+        fn draw(&self, _mode: usize, _rng: &mut Pcg64Mcg) {}
+
+        fn propagate(&self, _mode: usize, _state: &(), _rng: &mut Pcg64Mcg) {}
+
+        fn log_likelihood(&self, mode: usize, _state: &(), z: &[f64; 4]) -> f64 {
+            z[mode].ln()
+        }
+    }
+
+    fn filter(nodes: &[Vec<usize>]) -> Hierarchical<Alike> {
+        Hierarchical::new(Alike, nodes, Resampling::default(), 1000, 1).unwrap()
+    }
+
+    #[test]
+    #[should_panic(expected = "shares of a particle and weights of all each sum to one")]
+    fn shares_that_do_not_sum_to_one_are_caught() {
+        let mut filter = filter(&[vec![1, 2]]);
+        filter.shares.fill(0.3);
+        filter.sum_modes();
+    }
+
+    #[test]
+    fn a_node_is_split_once_its_leaves_are_told_apart_and_merged_when_empty() {
+        let mut filter = filter(&[vec![1, 2]]);
+        let merged = |filter: &Hierarchical<Alike>| filter.nodes[0].merged;
+        assert!(merged(&filter));
+        filter.step(&[0.1, 1.0, 1.0, 0.1]);
+        assert!(merged(&filter), "alike");
+        for _ in 0..8 {
+            filter.step(&[0.05, 1.0, 0.1, 0.05]);
+        }
+        assert!(!merged(&filter), "{:?}", filter.posterior());
+        for _ in 0..12 {
+            filter.step(&[1.0, 1e-3, 1e-3, 1e-3]);
+        }
+        assert!(merged(&filter), "{:?}", filter.posterior());
+    }
+
+    #[test]
+    fn a_mode_is_tracked_as_the_highest_merged_node_above_it() {
+        let mut filter = filter(&[vec![1, 2], vec![2, 1, 3]]);
+        assert_eq!([0, 1, 2, 3].map(|k| filter.group(k)), [0, 2, 2, 2]);
+        filter.nodes[1].merged = false;
+        assert_eq!([0, 1, 2, 3].map(|k| filter.group(k)), [0, 1, 1, 3]);
+        filter.nodes[0].merged = false;
+        assert_eq!([0, 1, 2, 3].map(|k| filter.group(k)), [0, 1, 2, 3]);
+        let [below, top] = &filter.nodes[..] else {
+            panic!("two nodes");
+        };
+        assert_eq!(
+            (&below.nodes_below[..], &below.leaves_below[..]),
+            (&[][..], &[1, 2][..])
+        );
+        assert_eq!(
+            (&top.nodes_below[..], &top.leaves_below[..]),
+            (&[0][..], &[3][..])
+        );
+    }
+
+    #[test]
+    fn a_limit_holds_from_the_next_step_on() {
+        let mut filter = filter(&[vec![1, 2]]);
+        for (limit, count) in [(10, 10), (0, 1), (5000, 1000)] {
+            filter.limit(limit);
+            filter.step(&[1.0; 4]);
+            assert_eq!(filter.particles().count(), count);
+        }
+    }
+
+    #[test]
+    fn an_index_is_drawn_by_its_probability_and_never_an_impossible_one() {
+        let mut rng = Pcg64Mcg::seed_from_u64(5);
+        let mut counts = [0; 4];
+        for _ in 0..10_000 {
+            counts[draw(&[0.0, 0.2, 0.8, 0.0], &mut rng)] += 1;
+        }
+        assert_eq!((counts[0], counts[3]), (0, 0));
+        assert!((1_800..2_200).contains(&counts[1]), "{counts:?}");
+        assert_eq!(draw(&[0.0; 4], &mut rng), 0);
+    }
+
+    #[test]
+    fn raised_draws_leave_as_often_as_asked_and_are_paid_for() {
+        let mut filter = filter(&[]).with_raised_proposals(0.6);
+        filter.mass.copy_from_slice(&[0.7, 0.0, 0.1, 0.2]);
+        let mut counts = [0; 4];
+        for _ in 0..10_000 {
+            counts[filter.propose(0)] += 1;
+        }
+        assert_eq!(filter.proposed, [0.4, 0.0, 0.3, 0.3]);
+        assert_eq!(counts[1], 0);
+        assert!((3_800..4_200).contains(&counts[0]), "{counts:?}");
+        // A particle whose own mode has no mass must leave.
+        filter.mass.copy_from_slice(&[0.0, 0.0, 0.1, 0.2]);
+        filter.propose(0);
+        assert_eq!(filter.proposed, [0.0, 0.0, 0.5, 0.5]);
+        // One that can reach no other stays.
+        filter.mass.copy_from_slice(&[0.7, 0.0, 0.0, 0.0]);
+        assert_eq!(filter.propose(0), 0);
     }
 }

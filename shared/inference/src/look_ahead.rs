@@ -12,7 +12,7 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::filter::{Event, Filter, Step, normalise_into};
 use crate::gaussian::Gaussian;
-use crate::hybrid::Conditional;
+use crate::hybrid::{self, Conditional, ModelError};
 use crate::logspace::{log_add, log_sum_exp};
 use crate::resample::systematic;
 
@@ -43,7 +43,11 @@ pub struct LookAhead<M, const N: usize> {
 
 impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
     /// A filter of `count` particles, at least 1.
-    pub fn new(model: M, count: usize, seed: u64) -> Self {
+    ///
+    /// # Errors
+    /// [`ModelError`].
+    pub fn new(model: M, count: usize, seed: u64) -> Result<Self, ModelError> {
+        hybrid::check(&model)?;
         let (count, modes) = (count.max(1), model.modes());
         let particle = Particle {
             mode: 0,
@@ -64,18 +68,18 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
             model,
         };
         filter.reset();
-        filter
+        Ok(filter)
     }
 
-    /// Begins anew from the prior and with the generator at `seed`: equal runs then have equal
-    /// beliefs, whatever came before.
+    /// Begins anew from the prior and with the generator at `seed`, so that equal runs have equal
+    /// beliefs.
     pub fn restart(&mut self, seed: u64) {
         self.rng = Pcg64Mcg::seed_from_u64(seed);
         self.reset();
     }
 
-    /// From the next step on `count` particles, 1 to the number of the start: fewer cost less, and
-    /// are drawn from those there are.
+    /// Sets the number of particles, 1 to the number of the start, from the next step on. Fewer
+    /// cost less; they are drawn from those there are.
     pub fn limit(&mut self, count: usize) {
         self.allowed = count.clamp(1, self.count_max);
     }
@@ -101,7 +105,7 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
         for (i, particle) in self.particles.iter().enumerate() {
             let row = &mut self.log_joint[i * modes..(i + 1) * modes];
             for (mode, log_joint) in row.iter_mut().enumerate() {
-                let p = self.model.transition(particle.mode, mode);
+                let p = hybrid::transition(&self.model, particle.mode, mode);
                 let mut state = particle.state;
                 *log_joint = f64::NEG_INFINITY;
                 if p > 0.0 {
@@ -109,7 +113,9 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
                         self.model.enter(particle.mode, mode, &mut state);
                     }
                     self.model.predict(mode, &mut state);
-                    if let Some(log_likelihood) = self.model.update(mode, &mut state, z) {
+                    let log_likelihood = self.model.update(mode, &mut state, z);
+                    // A likelihood that is no number counts as impossible.
+                    if let Some(log_likelihood) = log_likelihood.filter(|l| !l.is_nan()) {
                         *log_joint = p.ln() + log_likelihood;
                     }
                 }
@@ -120,7 +126,7 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
         normalise_into(&self.log_parent, &mut self.parent)
     }
 
-    /// Draws parents, then their modes, by what the look-ahead has found.
+    /// Draws parents, then their modes, by the probabilities that the look-ahead has computed.
     fn draw(&mut self, z: &M::Observation) {
         let modes = self.model.modes();
         self.ancestors.resize(self.allowed, 0);
@@ -136,7 +142,7 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
                 self.model.enter(parent.mode, mode, &mut child.state);
             }
             self.model.predict(mode, &mut child.state);
-            // It was possible a moment ago, in the look-ahead.
+            // Its log-likelihood is in the weights already, by the look-ahead.
             let _ = self.model.update(mode, &mut child.state, z);
             self.children.push(child);
         }
@@ -151,7 +157,7 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
             let mut left = self.rng.random::<f64>();
             let from = particle.mode;
             let drawn = (0..self.model.modes()).find(|&to| {
-                left -= self.model.transition(from, to);
+                left -= hybrid::transition(&self.model, from, to);
                 left < 0.0
             });
             particle.mode = drawn.unwrap_or(from);
@@ -184,16 +190,17 @@ impl<M: Conditional<N>, const N: usize> Filter for LookAhead<M, N> {
     type Observation = M::Observation;
 
     fn step(&mut self, z: &M::Observation) -> Step {
-        let count = self.particles.len() as f64;
+        let count = self.particles.len();
         if !self.look_ahead(z) {
             self.coast();
             return Step {
                 log_evidence: 0.0,
-                effective_sample_size: count,
+                effective_sample_size: count as f64,
                 event: Some(Event::Coasted),
-            };
+            }
+            .checked(&self.posterior, count);
         }
-        let log_evidence = log_sum_exp(&self.log_parent) - count.ln();
+        let log_evidence = log_sum_exp(&self.log_parent) - (count as f64).ln();
         normalise_into(&self.log_p, &mut self.posterior);
         let squares: f64 = self.parent.iter().map(|weight| weight * weight).sum();
         self.draw(z);
@@ -202,6 +209,7 @@ impl<M: Conditional<N>, const N: usize> Filter for LookAhead<M, N> {
             effective_sample_size: 1.0 / squares,
             event: None,
         }
+        .checked(&self.posterior, count)
     }
 
     fn posterior(&self) -> &[f64] {

@@ -1,14 +1,14 @@
 //! One Kalman filter per mode: the interacting multiple model filter.
 //!
-//! Exact mode sequences grow without bound; here the Gaussians that lead into one mode are merged
-//! into one of the same mean and covariance before each prediction (Blom and Bar-Shalom, *The
-//! Interacting Multiple Model
-//! Algorithm*, 1988): `μ_ij = b_i P_ij / Σ_i`, mean `m_j = Σ_i μ_ij m_i`,
-//! covariance `Σ_i μ_ij (V_i + (m_i - m_j)(m_i - m_j)ᵀ)`.
+//! The number of exact mode sequences grows without bound. Here the Gaussians that lead into one
+//! mode are merged into one of the same mean and covariance before each prediction (Blom and
+//! Bar-Shalom, *The Interacting Multiple Model Algorithm*, 1988): `μ_ij = b_i P_ij / Σ_i`, mean
+//! `m_j = Σ_i μ_ij m_i`, covariance `Σ_i μ_ij (V_i + (m_i - m_j)(m_i - m_j)ᵀ)`.
 
-use crate::filter::{Event, Filter, Step, normalise_into};
+use crate::filter::{Event, Filter, Step, is_distribution, normalise_into};
 use crate::gaussian::Gaussian;
-use crate::hybrid::Conditional;
+use crate::hybrid::{self, Conditional, ModelError};
+use crate::logspace::log_sum_exp;
 
 /// The interacting multiple model filter of N continuous dimensions.
 #[derive(Debug, Clone)]
@@ -23,7 +23,11 @@ pub struct Merged<M, const N: usize> {
 
 impl<M: Conditional<N>, const N: usize> Merged<M, N> {
     /// A filter at the model's prior.
-    pub fn new(model: M) -> Self {
+    ///
+    /// # Errors
+    /// [`ModelError`].
+    pub fn new(model: M) -> Result<Self, ModelError> {
+        hybrid::check(&model)?;
         let modes = model.modes();
         let states: Vec<_> = (0..modes).map(|mode| model.prior(mode)).collect();
         let mut filter = Self {
@@ -35,7 +39,7 @@ impl<M: Conditional<N>, const N: usize> Merged<M, N> {
             model,
         };
         filter.reset();
-        filter
+        Ok(filter)
     }
 
     /// The model, to give it the command of the next step.
@@ -49,20 +53,10 @@ impl<M: Conditional<N>, const N: usize> Merged<M, N> {
         &self.states
     }
 
-    /// Mean and covariance of the continuous state over all modes.
-    #[must_use]
-    pub fn state(&self) -> Gaussian<N> {
-        merge(
-            self.posterior
-                .iter()
-                .copied()
-                .zip(self.states.iter().copied()),
-        )
-    }
-
     fn predict(&mut self) {
         for to in 0..self.states.len() {
-            let share = |from: usize| self.posterior[from] * self.model.transition(from, to);
+            let share =
+                |from: usize| self.posterior[from] * hybrid::transition(&self.model, from, to);
             let total: f64 = (0..self.states.len()).map(share).sum();
             self.predicted[to] = total;
             if total > 0.0 {
@@ -76,7 +70,7 @@ impl<M: Conditional<N>, const N: usize> Merged<M, N> {
                 });
                 self.mixed[to] = merge(parts);
             } else {
-                // Nothing leads here: what this mode would have made of its own state.
+                // No mode leads here: the state goes on for a later step in which one does.
                 self.mixed[to] = self.states[to];
             }
             self.model.predict(to, &mut self.mixed[to]);
@@ -108,19 +102,26 @@ impl<M: Conditional<N>, const N: usize> Filter for Merged<M, N> {
         self.predict();
         for mode in 0..self.states.len() {
             let log_likelihood = self.model.update(mode, &mut self.states[mode], z);
-            self.log_p[mode] =
-                log_likelihood.unwrap_or(f64::NEG_INFINITY) + self.predicted[mode].ln();
+            let log_p = log_likelihood.unwrap_or(f64::NEG_INFINITY) + self.predicted[mode].ln();
+            // What is no number counts as impossible.
+            self.log_p[mode] = if log_p.is_nan() {
+                f64::NEG_INFINITY
+            } else {
+                log_p
+            };
         }
-        let highest = crate::logspace::log_sum_exp(&self.log_p);
+        let log_evidence = log_sum_exp(&self.log_p);
         let updated = normalise_into(&self.log_p, &mut self.posterior);
-        if !updated {
+        // A chain that has changed since its check may predict no belief: then the last one stays.
+        if !updated && is_distribution(&self.predicted) {
             self.posterior.copy_from_slice(&self.predicted);
         }
         Step {
-            log_evidence: if updated { highest } else { 0.0 },
+            log_evidence: if updated { log_evidence } else { 0.0 },
             effective_sample_size: 1.0 / self.posterior.iter().map(|p| p * p).sum::<f64>(),
             event: (!updated).then_some(Event::Coasted),
         }
+        .checked(&self.posterior, self.states.len())
     }
 
     fn posterior(&self) -> &[f64] {
@@ -131,5 +132,29 @@ impl<M: Conditional<N>, const N: usize> Filter for Merged<M, N> {
         for (mode, (state, p)) in self.states.iter_mut().zip(&mut self.posterior).enumerate() {
             (*state, *p) = (self.model.prior(mode), self.model.initial(mode));
         }
+        if !is_distribution(&self.posterior) {
+            // A chain that has changed since its check: the nominal mode is the default.
+            self.posterior.fill(0.0);
+            self.posterior[0] = 1.0;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{SMatrix, SVector};
+
+    #[test]
+    fn a_merged_gaussian_has_the_moments_of_the_mixture() {
+        let part = |mean, variance| Gaussian {
+            mean: SVector::from([mean]),
+            covariance: SMatrix::from([[variance]]),
+        };
+        let parts = [(0.25, part(1.0, 2.0)), (0.75, part(3.0, 4.0))];
+        let merged = merge(parts.into_iter());
+        // Mean .25 + 2.25; second moment .25 (2 + 1) + .75 (4 + 9) = 10.5.
+        assert!((merged.mean[0] - 2.5).abs() < 1e-14);
+        assert!((merged.covariance[0] - (10.5 - 6.25)).abs() < 1e-14);
     }
 }

@@ -1,27 +1,36 @@
-//! Measurements of which now and then one is far off: normal noise, contaminated.
+//! Contaminated noise: normal, but for rare outliers.
 //!
-//! With a small probability a sample's noise has [`SPREAD`] times the standard deviation. What is
-//! an outlier under every hypothesis is evidence for none of them.
+//! With a small probability the noise of a measurement has [`SPREAD`] times the standard deviation
+//! (the contaminated normal distribution of Tukey, 1960). An outlier under every hypothesis is
+//! evidence for none of them.
 
-use crate::logspace::{log_add, log_normal};
+use crate::logspace::{log_add, log_normal, probability};
 use crate::track::Track;
 
-/// Standard deviations of an outlier over those of the noise. Beyond three of them, thirty of the
-/// noise, a sample is evidence again.
+/// Ratio of an outlier's standard deviation to the noise's. Chosen by hand: beyond three of its
+/// deviations, thirty of the noise, a measurement is evidence again; a smaller ratio takes large
+/// outliers for evidence, a larger one hides small faults longer.
 pub const SPREAD: f64 = 10.0;
 
-/// Logarithms of the densities of a residual of variance `spread`, `noise` of it the sensor's:
-/// as it should be, and as an outlier, where such come with the probability `rate`.
-fn log_densities(residual: f64, spread: f64, noise: f64, rate: f64) -> (f64, f64) {
-    let wide = spread + (SPREAD * SPREAD - 1.0) * noise;
-    (
-        (-rate).ln_1p() + log_normal(residual, spread),
-        rate.ln() + log_normal(residual, wide),
-    )
+/// Log-densities of a residual, each with the logarithm of its prior probability.
+#[derive(Debug, Clone, Copy)]
+struct LogDensities {
+    usual: f64,
+    outlier: f64,
 }
 
-/// The whitened residual that has the log-density, relative to that of none, which `whitened` has
-/// where outliers come with the probability `rate`.
+/// Of a residual of variance `spread`, `noise` of it the sensor's, where outliers have the
+/// probability `rate`.
+fn log_densities(residual: f64, spread: f64, noise: f64, rate: f64) -> LogDensities {
+    let wide = spread + (SPREAD * SPREAD - 1.0) * noise;
+    LogDensities {
+        usual: (-rate).ln_1p() + log_normal(residual, spread),
+        outlier: rate.ln() + log_normal(residual, wide),
+    }
+}
+
+/// The whitened residual whose normal log-density, relative to the peak, is the one that `whitened`
+/// has where outliers have the probability `rate`.
 #[must_use]
 pub fn tempered(whitened: f64, rate: f64) -> f64 {
     if whitened.is_nan() {
@@ -35,24 +44,27 @@ pub fn tempered(whitened: f64, rate: f64) -> f64 {
     square.max(0.0).sqrt().copysign(whitened)
 }
 
-/// Probability, at least, that an outlier follows an outlier: what disturbs a sensor lasts. Chosen:
-/// one in a hundred, as a broken sensor's exception.
+/// Least probability that an outlier follows an outlier: disturbances of a sensor last. Chosen by
+/// hand: smaller takes the second sample of a disturbance for a departure; larger delays the
+/// acceptance of a jump.
 const AGAIN: f64 = 0.01;
-/// Probability below which a run of outliers is none: the pose has jumped. The fourth in a row at
-/// the least rate (1e-5 x 0.01^3), the tenth at the largest (0.1^10).
+/// Probability below which a streak of outliers is a jump of the pose. Chosen by hand, between
+/// three in a row and four at a rate of 1e-5: smaller delays the acceptance of a jump, larger takes
+/// disturbances for jumps.
 const FLUKE: f64 = 5e-10;
-/// Log-odds of an outlier under the most probable hypothesis below which none need be thought of.
-/// Chosen: one in 1,100 changes no belief and saves most of the work.
+/// Log-odds of an outlier under the most probable hypothesis below which the measurement is taken
+/// as usual. Chosen by hand: one in 1,100 changes no belief, and the others need not be asked; a
+/// higher bound lets outliers in.
 const UNLIKELY: f64 = -7.0;
 
-/// Variances of the first pose of a track. No earlier pose tells whether it is an outlier, so it is
-/// taken as noisier than a good one and less noisy than an outlier: the next pose can correct it.
+/// Variances of the first pose of a track. Whether it is an outlier cannot be known yet, so its
+/// noise is taken between that of a usual pose and that of an outlier: the next pose can correct it.
 #[must_use]
 pub fn unvouched(variance: [f64; 3]) -> [f64; 3] {
     variance.map(|variance| SPREAD * variance)
 }
 
-/// How far a measured pose can be trusted, axis by axis (x, y, yaw).
+/// Detection of outliers in a measured pose, axis by axis (x, y, yaw).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Trust {
     /// Outliers in a row.
@@ -60,9 +72,9 @@ pub struct Trust {
 }
 
 impl Trust {
-    /// Variances of a measured pose: that of an axis grows, up to its squared residual, by the
-    /// probability that it is an outlier, as `rates` say, under weighted hypotheses (logarithms).
-    /// Where so many in a row would be a fluke, it is none.
+    /// Variances of a measured pose under hypotheses with log-weights. That of an axis grows, up to
+    /// its squared residual, by the probability that it is an outlier; `rates` are the priors. A
+    /// streak of outliers that is too improbable is a jump: then the variances stay.
     pub fn variance<'a>(
         &mut self,
         hypotheses: impl Iterator<Item = (&'a Track, f64)> + Clone,
@@ -74,17 +86,18 @@ impl Trust {
             0 => rates[i],
             _ => rates[i].max(AGAIN),
         });
-        let said = |track: &Track| -> [(f64, (f64, f64)); 3] {
-            let (apart, spread) = track.innovation(pose, variance);
+        let densities = |track: &Track| -> [(f64, LogDensities); 3] {
+            let (innovation, spread) = track.innovation(pose, variance);
             std::array::from_fn(|i| {
-                let densities = log_densities(apart[i], spread[(i, i)], variance[i], again[i]);
-                (apart[i] * apart[i], densities)
+                let residual = innovation[i];
+                let log = log_densities(residual, spread[(i, i)], variance[i], again[i]);
+                (residual * residual, log)
             })
         };
         let likeliest = hypotheses.clone().max_by(|(_, a), (_, b)| a.total_cmp(b));
         let is_usual = likeliest.is_none_or(|(track, _)| {
-            let said = said(track);
-            said.iter().all(|(_, (usual, far))| far - usual < UNLIKELY)
+            let mut axes = densities(track).into_iter();
+            axes.all(|(_, log)| log.outlier - log.usual < UNLIKELY)
         });
         if is_usual {
             self.streak = [0; 3];
@@ -93,17 +106,18 @@ impl Trust {
         let (mut usual, mut far) = ([f64::NEG_INFINITY; 3], [f64::NEG_INFINITY; 3]);
         let mut nearest = [f64::INFINITY; 3];
         for (track, log_weight) in hypotheses {
-            for (i, (square, densities)) in said(track).into_iter().enumerate() {
-                usual[i] = usual[i].max(log_weight + densities.0);
-                far[i] = far[i].max(log_weight + densities.1);
+            for (i, (square, log)) in densities(track).into_iter().enumerate() {
+                // The best hypothesis of each kind stands for all.
+                usual[i] = usual[i].max(log_weight + log.usual);
+                far[i] = far[i].max(log_weight + log.outlier);
                 nearest[i] = nearest[i].min(square);
             }
         }
         std::array::from_fn(|i| {
             let is_fluke = rates[i] * rates[i].max(AGAIN).powi(self.streak[i]) < FLUKE;
-            // Without a number, the measurement is what it is.
+            // Without a likelihood no outlier can be shown.
             let p = match far[i].is_finite() {
-                true => crate::logspace::probability(far[i] - usual[i]),
+                true => probability(far[i] - usual[i]),
                 false => 0.0,
             };
             self.streak[i] = match p > 0.5 {
@@ -111,14 +125,25 @@ impl Trust {
                 false => 0,
             };
             let p = if is_fluke { 0.0 } else { p };
-            // An outlier has no largest size: one further off is noisier, not less likely.
+            // An outlier has no largest size: a farther one is noisier, not less probable.
             let wide = (nearest[i] / variance[i]).max(SPREAD * SPREAD);
             match wide.is_finite() {
-                true => variance[i] / (1.0 - p + p / wide),
+                true => variance[i] / precision(p, wide),
                 false => variance[i],
             }
         })
     }
+}
+
+/// Mean precision, relative to the usual one, of a measurement that has `wide` times the variance
+/// with the probability `p`.
+fn precision(p: f64, wide: f64) -> f64 {
+    let precision = 1.0 - p + p / wide;
+    assert!(
+        precision > 0.0 && precision <= 1.0,
+        "an outlier is less precise than a usual measurement, and not worthless"
+    );
+    precision
 }
 
 #[cfg(test)]
@@ -126,6 +151,27 @@ mod tests {
     use super::*;
     use crate::track::MotionNoise;
     use nalgebra::{Matrix3, Vector3};
+
+    #[test]
+    fn a_precision_is_the_mean_of_both() {
+        assert_eq!(precision(0.0, 100.0), 1.0);
+        assert_eq!(precision(1.0, 100.0), 0.01);
+        assert!((precision(0.25, 100.0) - 0.7525).abs() < 1e-15);
+    }
+
+    #[test]
+    #[should_panic(expected = "an outlier is less precise than a usual measurement")]
+    fn a_probability_above_one_is_caught() {
+        precision(1.5, 100.0);
+    }
+
+    #[test]
+    fn log_densities_are_those_of_two_normals() {
+        let found = log_densities(3.0, 5.0, 2.0, 0.1);
+        assert!((found.usual - 0.9_f64.ln() - log_normal(3.0, 5.0)).abs() < 1e-14);
+        assert!((found.outlier - 0.1_f64.ln() - log_normal(3.0, 203.0)).abs() < 1e-14);
+        assert_eq!(unvouched([1.0, 2.0, 3.0]), [10.0, 20.0, 30.0]);
+    }
 
     #[test]
     fn small_residuals_stay_and_large_ones_say_little_more_than_the_rate() {

@@ -1,11 +1,11 @@
 //! A Gaussian track of a planar pose whose motion per metre deviates from its model.
 //!
 //! State: x, y, yaw; three offsets that are constant within a run, or drift; three deviations that
-//! follow an Ornstein-Uhlenbeck process along the path. Both are per commanded metre, in the order
-//! yaw, forward, lateral. What an offset takes from the travel, as motors do that yield, it takes
-//! from the turn as well. A deviation does not, as a slope on which the robot slips, and it turns
-//! round when the robot drives the other way. The extended Kalman filter linearises about the
-//! heading at half the turn.
+//! follow an Ornstein-Uhlenbeck process along the path. Offsets and deviations are per commanded
+//! metre, in the order yaw, forward, lateral. A forward offset, as of motors that yield, shortens
+//! the turn in the same proportion as the travel. A deviation, as of a slope on which the robot
+//! slips, does not; and it changes sign when the robot drives the other way. The extended Kalman
+//! filter linearises about the heading at half the turn.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -31,12 +31,12 @@ pub struct MotionNoise {
     pub drift: Vector3<f64>,
     /// Largest mean deviation per metre in this mode; infinite where there is no such bound.
     pub bound: Vector3<f64>,
-    /// Rate at which the ground changes at once, 1/m: nothing is known of the deviations then.
+    /// Rate of sudden changes of the ground, 1/m, after which the deviations are unknown.
     pub changes_1_m: f64,
 }
 
-/// What is known of the deviations per metre of a healthy robot where it drives: slip, slope, a
-/// servo that stands off. It holds for a fault too, which adds to it.
+/// Estimated deviations per metre of a healthy robot where it drives: slip, slope, the offset of a
+/// servo. A fault adds to them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Context {
     /// Mean; order yaw, forward, lateral.
@@ -67,7 +67,7 @@ impl Default for Context {
 }
 
 impl Context {
-    /// Of deviations with this mean and covariance, in the direction that the robot drives in.
+    /// Deviations with this mean and covariance, whatever the direction of travel.
     #[must_use]
     pub const fn new(mean: Vector3<f64>, covariance: Matrix3<f64>) -> Self {
         Self {
@@ -77,7 +77,7 @@ impl Context {
         }
     }
 
-    /// The same, of deviations in this direction of travel: see [`Self::direction`].
+    /// This context for one direction of travel: see [`Self::direction`].
     #[must_use]
     pub const fn facing(self, direction: f64) -> Self {
         Self { direction, ..self }
@@ -89,10 +89,11 @@ impl Context {
         self.direction
     }
 
-    /// Forgets over a travel of `travel_m`, as the ground changes. A slope turns round with the
-    /// direction of travel.
+    /// Forgets over a travel of `travel_m`, as the ground changes. The effect of a slope changes
+    /// sign with the direction of travel.
     pub fn fade(&mut self, travel_m: f64, noise: &MotionNoise) {
         if turns_round(&mut self.direction, travel_m) {
+            // Forward and lateral; a yaw deviation per metre keeps its sign.
             for i in [1, 2] {
                 reverse(&mut self.mean, &mut self.covariance, i);
             }
@@ -105,7 +106,7 @@ impl Context {
     }
 }
 
-/// True if a travel of `travel_m` goes the other way than the `direction` before, which it becomes.
+/// True if a travel of `travel_m` is opposite to `direction`, which becomes that of the travel.
 fn turns_round(direction: &mut f64, travel_m: f64) -> bool {
     let turns = *direction * travel_m < 0.0;
     if travel_m != 0.0 {
@@ -201,7 +202,7 @@ impl Track {
         self.mean.fixed_rows::<3>(3) + self.mean.fixed_rows::<3>(6)
     }
 
-    /// What is known of the deviations.
+    /// The estimated deviations, offsets included.
     #[must_use]
     pub fn context(&self) -> Context {
         let view = |r: usize, c: usize| -> Matrix3<f64> {
@@ -215,15 +216,15 @@ impl Track {
         }
     }
 
-    /// The same, whose last displacement went in this direction: 1 forwards, -1 backwards, 0 none.
+    /// This track after a displacement in this direction: 1 forwards, -1 backwards, 0 none.
     #[must_use]
     pub const fn facing(self, direction: f64) -> Self {
         Self { direction, ..self }
     }
 
-    /// The same pose in another mode, in a context. A fault's offsets add to it, which do not turn
-    /// round with the direction of travel; in a mode with a bound, a nominal one, it is what the
-    /// deviations begin with.
+    /// The same pose in another mode, in a context. In a nominal mode, one with a bound, the context
+    /// becomes the deviations. In a fault it becomes the offsets, which keep their sign when the
+    /// direction of travel changes, plus those of the fault.
     #[must_use]
     pub fn enter(&self, context: &Context, noise: &MotionNoise) -> Self {
         let mut track = *self;
@@ -237,9 +238,8 @@ impl Track {
         track
     }
 
-    /// The same pose, where nothing is known of the deviations.
-    #[must_use]
-    pub fn renewed(&self, noise: &MotionNoise) -> Self {
+    /// The same pose on ground of which nothing is known: with the prior of the deviations.
+    pub(crate) fn renewed(&self, noise: &MotionNoise) -> Self {
         let mut track = *self;
         track.begin(&Context::default(), noise);
         track
@@ -255,12 +255,14 @@ impl Track {
         self.set(6, 6, &noise.deviation);
     }
 
-    /// Moves each mean deviation that is beyond its bound back onto it, and the rest of the state
-    /// as it correlates with it: a constrained Kalman filter by projection.
+    /// Moves each mean deviation that is beyond its bound back onto it, and the rest of the state as
+    /// far as it is correlated: a Kalman filter constrained by projection (Simon, *Kalman Filtering
+    /// with State Constraints*, 2010).
     pub fn saturate(&mut self, bound: &Vector3<f64>) {
         for i in 0..3 {
             let deviation = self.mean[3 + i] + self.mean[6 + i];
-            let beyond = deviation - deviation.clamp(-bound[i], bound[i]);
+            // Unlike `clamp` these accept a bound that is negative or no number.
+            let beyond = deviation - deviation.min(bound[i]).max(-bound[i]);
             if beyond == 0.0 {
                 continue;
             }
@@ -272,8 +274,8 @@ impl Track {
         }
     }
 
-    /// Natural logarithm of the probability that a deviation lies beyond its bound: a departure
-    /// within it is not material.
+    /// Natural logarithm of the probability that some deviation lies beyond its bound. A departure
+    /// within the bounds is not material.
     #[must_use]
     pub fn log_material(&self, bound: &Vector3<f64>) -> f64 {
         let Context {
@@ -289,12 +291,12 @@ impl Track {
             let beyond = 0.5 * (libm::erfc(near) + libm::erfc(far));
             within += (-beyond.min(1.0)).ln_1p();
         }
-        // 1 - the product of those within, exact where it is small.
+        // One minus the product of the probabilities within, without cancellation where it is small.
         (-within.exp_m1()).max(f64::MIN_POSITIVE).ln()
     }
 
-    /// Puts the pose at `pose` with `variance`, keeping what is known of the deviations: the frame
-    /// of the measurement has jumped.
+    /// Puts the pose at `pose` with `variance` and keeps the deviations: the frame in which the pose
+    /// is measured has jumped.
     pub fn anchor(&mut self, pose: [f64; 3], variance: [f64; 3]) {
         self.mean
             .fixed_rows_mut::<3>(0)
@@ -314,22 +316,25 @@ impl Track {
         }
     }
 
-    /// The Gaussian with the first two moments of this track, taken with the probability `share`,
-    /// and another one. Their headings must be less than a turn apart.
-    #[must_use]
-    pub fn mixed(&self, other: &Self, share: f64) -> Self {
+    /// The Gaussian with the first two moments of the mixture of this track, with the weight
+    /// `share`, and another one. Their headings must differ by less than a turn.
+    pub(crate) fn mixed(&self, other: &Self, share: f64) -> Self {
+        assert!(
+            (0.0..=1.0).contains(&share),
+            "the shares of a mixture are probabilities"
+        );
         let rest = 1.0 - share;
-        let apart = self.mean - other.mean;
+        let difference = self.mean - other.mean;
         Self {
             mean: self.mean * share + other.mean * rest,
             covariance: self.covariance * share
                 + other.covariance * rest
-                + apart * apart.transpose() * (share * rest),
+                + difference * difference.transpose() * (share * rest),
             direction: self.direction,
         }
     }
 
-    /// Turn that a displacement would make, rad.
+    /// Expected turn of a displacement, rad.
     #[must_use]
     pub fn turn(&self, step: &Displacement) -> f64 {
         let slipping = step.per_metre[0] * self.mean[4];
@@ -353,9 +358,11 @@ impl Track {
         let old = self.mean.fixed_rows::<3>(6).into_owned();
         self.mean.fixed_rows_mut::<3>(6).copy_from(&(old * fading));
 
+        // Jacobians of the new pose: by the old pose, and by the motion in the body frame.
         let heading = Matrix3::new(1.0, 0.0, -dy, 0.0, 1.0, dx, 0.0, 0.0, 1.0);
         let body = Matrix3::new(-0.5 * dy, cos, -sin, 0.5 * dx, sin, cos, 1.0, 0.0, 0.0);
         let by_deviation = body * travel;
+        // A forward offset changes the turn, too.
         let mut by = by_deviation;
         by.set_column(1, &(by.column(1) + body.column(0) * slipping));
         let view = |r: usize, c: usize| -> Matrix3<f64> {
@@ -363,7 +370,8 @@ impl Track {
         };
         let (pp, po, pd) = (view(0, 0), view(0, 3), view(0, 6));
         let (oo, od, dd) = (view(3, 3), view(3, 6), view(6, 6));
-        // Rows of the new pose against the old offsets and deviations.
+        // Covariances of the new pose with the old offsets and deviations. The product of whole
+        // 9x9 matrices would be mostly of zeros and ones.
         let pose_offset = heading * po + by * oo + by_deviation * od.transpose();
         let pose_deviation = heading * pd + by * od + by_deviation * dd;
         let mixed = heading * (po * by.transpose() + pd * by_deviation.transpose());
@@ -375,6 +383,7 @@ impl Track {
         let white = noise.white * travel.abs() + Vector3::from(step.extra);
         let white = body * Matrix3::from_diagonal(&white) * body.transpose();
         let pose = heading * pp * heading.transpose() + mixed + mixed.transpose() + drift + white;
+        // An Ornstein-Uhlenbeck process keeps its stationary covariance.
         let fresh = noise.deviation * (1.0 - fading * fading);
         let drifted = oo + Matrix3::from_diagonal(&(noise.drift * travel.abs()));
         self.set(3, 3, &drifted);
@@ -385,8 +394,8 @@ impl Track {
         self.set(6, 6, &(dd * (fading * fading) + fresh));
     }
 
-    /// A slope pulls in one direction of the ground: per metre it turns round with the direction of
-    /// travel, as what the motors yield does not.
+    /// Changes the sign of the forward and lateral deviations when the direction of travel does: a
+    /// slope pulls in one direction of the ground, so that its effect per metre driven changes sign.
     fn face(&mut self, travel_m: f64) {
         let turns = turns_round(&mut self.direction, travel_m);
         for i in [N - 2, N - 1].into_iter().filter(|_| turns) {
@@ -408,13 +417,13 @@ impl Track {
     /// Innovation of a measured pose (x, y, yaw) and its covariance, in the frame of the pose.
     #[must_use]
     pub fn innovation(&self, pose: [f64; 3], variance: [f64; 3]) -> (Vector3<f64>, Matrix3<f64>) {
-        let apart = Vector3::new(
+        let innovation = Vector3::new(
             pose[0] - self.mean[0],
             pose[1] - self.mean[1],
             wrap(pose[2] - self.mean[2]),
         );
         (
-            apart,
+            innovation,
             self.pose_covariance() + Matrix3::from_diagonal(&Vector3::from(variance)),
         )
     }
@@ -422,12 +431,13 @@ impl Track {
     /// Conditions on a measured pose (x, y, yaw) with independent noise of `variance`; returns
     /// its log-density. None, unchanged, if a value is not finite or the covariance degenerated.
     pub fn update(&mut self, pose: [f64; 3], variance: [f64; 3]) -> Option<f64> {
-        let (apart, spread) = self.innovation(pose, variance);
-        let (log_likelihood, factor) = log_density(&apart, spread)?;
+        let (innovation, spread) = self.innovation(pose, variance);
+        let (log_likelihood, factor) = log_density(&innovation, spread)?;
         let rows: SMatrix<f64, 3, N> = self.covariance.fixed_view::<3, N>(0, 0).into();
-        // With spread = L Lᵀ the gain is Wᵀ L⁻¹ for W = L⁻¹ rows: the covariance stays symmetric.
+        // With spread = L Lᵀ and W = L⁻¹ rows the gain is Wᵀ L⁻¹, and the covariance loses Wᵀ W,
+        // which is symmetric whatever the rounding.
         let root = factor.l_dirty();
-        let whitened = root.solve_lower_triangular(&apart)?;
+        let whitened = root.solve_lower_triangular(&innovation)?;
         let rows = root.solve_lower_triangular(&rows)?;
         let mean = self.mean + rows.tr_mul(&whitened);
         if !mean.iter().all(|value| value.is_finite()) {

@@ -1,8 +1,10 @@
 //! Weights of particles, kept as normalised logarithms.
 
+use crate::filter::is_distribution;
+
 /// Normalised weights: the logarithms and their exponentials.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Weights {
+pub(crate) struct Weights {
     log: Vec<f64>,
     linear: Vec<f64>,
     effective: f64,
@@ -10,8 +12,7 @@ pub struct Weights {
 
 impl Weights {
     /// `count` equal weights, at least 1.
-    #[must_use]
-    pub fn equal(count: usize) -> Self {
+    pub(crate) fn equal(count: usize) -> Self {
         let count = count.max(1);
         let mut weights = Self {
             log: vec![0.0; count],
@@ -23,7 +24,7 @@ impl Weights {
     }
 
     /// Makes `count` weights equal; allocates nothing up to the number of the start.
-    pub fn level(&mut self, count: usize) {
+    pub(crate) fn level(&mut self, count: usize) {
         let share = 1.0 / count as f64;
         self.log.resize(count, 0.0);
         self.linear.resize(count, 0.0);
@@ -33,10 +34,14 @@ impl Weights {
     }
 
     /// Multiplies each weight by `exp(increment)` and normalises; returns the logarithm of the sum
-    /// before: with log-likelihoods as increments the estimate of the evidence, whether or not the
-    /// particles were resampled in the step before. None, unchanged, if nothing is left. What is
-    /// not a number counts as impossible.
-    pub fn absorb(&mut self, increments: &[f64]) -> Option<f64> {
+    /// before. With log-likelihoods as increments that is the estimate of the evidence, whether or
+    /// not the particles were resampled in the step before. None, unchanged, if nothing is left.
+    /// An increment that is not a number counts as impossible.
+    pub(crate) fn absorb(&mut self, increments: &[f64]) -> Option<f64> {
+        assert!(
+            increments.len() == self.log.len(),
+            "each particle's weight has one increment"
+        );
         let mut highest = f64::NEG_INFINITY;
         for (log, increment) in self.log.iter().zip(increments) {
             // Not a number is never the maximum.
@@ -59,24 +64,25 @@ impl Weights {
             squares += *linear * *linear;
         }
         self.effective = 1.0 / squares;
+        assert!(
+            is_distribution(&self.linear),
+            "weights are positive and sum to one"
+        );
         Some(evidence)
     }
 
     /// The normalised weights.
-    #[must_use]
-    pub fn linear(&self) -> &[f64] {
+    pub(crate) fn linear(&self) -> &[f64] {
         &self.linear
     }
 
     /// Their logarithms.
-    #[must_use]
-    pub fn log(&self) -> &[f64] {
+    pub(crate) fn log(&self) -> &[f64] {
         &self.log
     }
 
     /// `1 / Σ W²`.
-    #[must_use]
-    pub const fn effective_sample_size(&self) -> f64 {
+    pub(crate) const fn effective_sample_size(&self) -> f64 {
         self.effective
     }
 }
@@ -100,6 +106,31 @@ mod tests {
         let fourths: f64 = (1..=4).map(|i| f64::from(i).powi(2)).sum();
         let expected = fourths * fourths / sixteenths;
         assert!((weights.effective_sample_size() - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    #[should_panic(expected = "weights are positive and sum to one")]
+    fn a_weight_that_was_left_out_is_caught() {
+        let mut weights = Weights::equal(3);
+        weights.linear.push(0.5);
+        weights.absorb(&[-1.0, -2.0, -3.0]);
+    }
+
+    #[test]
+    #[should_panic(expected = "each particle's weight has one increment")]
+    fn a_missing_increment_is_caught() {
+        Weights::equal(3).absorb(&[-1.0, -2.0]);
+    }
+
+    #[test]
+    fn levelled_weights_are_equal() {
+        let mut weights = Weights::equal(0);
+        assert_eq!(weights.linear(), [1.0]);
+        weights.absorb(&[-5.0]);
+        weights.level(4);
+        assert_eq!(weights.linear(), [0.25; 4]);
+        assert_eq!(weights.log(), [0.25_f64.ln(); 4]);
+        assert_eq!(weights.effective_sample_size(), 4.0);
     }
 
     proptest! {

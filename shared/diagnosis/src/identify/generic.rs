@@ -105,20 +105,23 @@ impl Generic {
             .collect();
         let resampling = Resampling::default();
         let count = settings.particles.unwrap_or(PARTICLES);
-        let sampled =
-            |proposal, model| ParticleFilter::new(model, proposal, resampling, count, seed);
         let refuse = |error: &dyn std::fmt::Display| IdentifierError::Build(error.to_string());
+        let sampled = |proposal, model| {
+            let filter = ParticleFilter::new(model, proposal, resampling, count, seed);
+            filter.map_err(|e| refuse(&e))
+        };
         let raised = |model: &Switching| Proposal::raised(model, RAISED).map_err(|e| refuse(&e));
         let kind = match settings.filter {
             IdentifierFilter::MultipleHypothesis => return Err(refuse(&"not one of these")),
             IdentifierFilter::Bootstrap => {
-                Kind::Sampled(sampled(Proposal::prior(&switching), switching))
+                let proposal = Proposal::prior(&switching).map_err(|e| refuse(&e))?;
+                Kind::Sampled(sampled(proposal, switching)?)
             }
-            IdentifierFilter::Raised => Kind::Sampled(sampled(raised(&switching)?, switching)),
+            IdentifierFilter::Raised => Kind::Sampled(sampled(raised(&switching)?, switching)?),
             IdentifierFilter::Adaptive => {
                 let (error, quantile, least) = ADAPTIVE;
                 let adaptive = Adaptive::new(error, quantile, least, count);
-                let filter = sampled(raised(&switching)?, switching);
+                let filter = sampled(raised(&switching)?, switching)?;
                 Kind::Sampled(filter.with_adaptive_count(adaptive))
             }
             IdentifierFilter::RiskSensitive => {
@@ -129,7 +132,7 @@ impl Generic {
                 let named = names(models.tree, &meanings, prior);
                 let risks = risks(decision, &named, count)?;
                 let proposal = Proposal::risk_raised(&switching, RAISED, &risks);
-                Kind::Sampled(sampled(proposal.map_err(|e| refuse(&e))?, switching))
+                Kind::Sampled(sampled(proposal.map_err(|e| refuse(&e))?, switching)?)
             }
             IdentifierFilter::Hierarchical => {
                 let nodes = abstract_nodes(models.tree, leaves, &meanings);
@@ -139,9 +142,10 @@ impl Generic {
             }
             IdentifierFilter::LookAhead => {
                 let count = count.div_ceil(LOOK_AHEAD_SHARE);
-                Kind::LookAhead(LookAhead::new(switching, count, seed))
+                let filter = LookAhead::new(switching, count, seed);
+                Kind::LookAhead(filter.map_err(|e| refuse(&e))?)
             }
-            IdentifierFilter::Imm => Kind::Merged(Merged::new(switching)),
+            IdentifierFilter::Imm => Kind::Merged(Merged::new(switching).map_err(|e| refuse(&e))?),
         };
         Ok(Self {
             kind,

@@ -50,12 +50,12 @@ fn kinds() -> [Kind; 2] {
     [anything, slower]
 }
 
-/// Poses measured on a path that turns by `apart` rad/m more from step `onset` on.
-fn poses(apart: f64, onset: usize, steps: usize, seed: u64) -> Vec<[f64; 3]> {
+/// Poses measured on a path that turns by `excess` rad/m more from step `onset` on.
+fn poses(excess: f64, onset: usize, steps: usize, seed: u64) -> Vec<[f64; 3]> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut at = [0.0_f64; 3];
     let drive = |step: usize| {
-        let turn = (0.5 + if step < onset { 0.0 } else { apart }) * 0.01;
+        let turn = (0.5 + if step < onset { 0.0 } else { excess }) * 0.01;
         let middle = at[2] + 0.5 * turn;
         at = [
             at[0] + 0.01 * middle.cos(),
@@ -222,7 +222,71 @@ fn nothing_is_forgotten_of_the_ground_with_what_speaks_for_a_fault() {
     assert_eq!(filter.track().pose(), Vector3::new(7.0, 8.0, 0.5));
 }
 
+#[test]
+#[should_panic(expected = "the log-odds of a departure are a number")]
+fn a_weight_that_is_no_number_is_caught() {
+    let mut filter = filter();
+    filter.predict(&STEP, &kinds(), BIRTH, None);
+    filter.all_mut().next().unwrap().log_weight = f64::NAN;
+    let _ = filter.log_odds();
+}
+
+#[test]
+fn the_first_pose_is_the_marginal_likelihood_ratio() {
+    let mut filter = filter();
+    let pose = [0.02, 0.01, 0.0];
+    filter.predict(&STEP, &kinds(), BIRTH, None);
+    let evidence = filter.update(pose, VARIANCE, true).unwrap();
+    let expected = every_onset(&[pose]);
+    assert!((filter.log_odds() - expected).abs() < 1e-9);
+    // With no fault before the pose, the gain is that of all newborns.
+    assert!((filter.gain() - (expected - BIRTH.ln())).abs() < 1e-9);
+    // The whitened residual has the density's exponent, whatever the frame.
+    let mut nominal = Track::new(
+        Vector3::zeros(),
+        Matrix3::identity() * 1e-4,
+        &filter.nominal,
+    );
+    nominal.predict(&STEP, &filter.nominal);
+    let (_, spread) = nominal.innovation(pose, VARIANCE);
+    let peak = -0.5 * spread.determinant().ln() - 1.5 * std::f64::consts::TAU.ln();
+    let exponent = -0.5 * evidence.residual.norm_squared();
+    assert!((evidence.log_density - peak - exponent).abs() < 1e-9);
+}
+
+#[test]
+fn weights_end_at_their_bound_and_the_improbable_is_dropped() {
+    let mut filter = filter();
+    for pose in poses(0.5, 0, 300, 11) {
+        filter.predict(&STEP, &kinds(), BIRTH, None);
+        filter.update(pose, VARIANCE, true).unwrap();
+    }
+    let highest = filter.faults.iter().filter_map(best);
+    let highest = highest.map(|it| it.log_weight).fold(0.0, f64::max);
+    assert!((highest - LOG_ODDS_MAX).abs() < 1e-9, "{highest}");
+    let mut all = filter.faults.iter().flat_map(Onsets::iter);
+    assert!(all.all(|fault| fault.log_weight > LOG_ODDS_MIN));
+}
+
 proptest! {
+    #[test]
+    fn no_input_breaks_the_filter(
+        steps in prop::collection::vec(any::<([f64; 3], [f64; 3], f64, f64)>(), 1..20)
+    ) {
+        let mut filter = on_ground(0.0125);
+        for (i, (pose, per_metre, travel_m, p)) in steps.into_iter().enumerate() {
+            let step = Displacement { per_metre, travel_m, ..STEP };
+            let suspected = (i % 3 == 0).then_some(Suspicion { ends: p, ..SUSPECTED });
+            filter.predict(&step, &unknown(), p, suspected);
+            let variance = filter.trusted(pose, per_metre, [p; 3]);
+            filter.update(pose, variance, true);
+            let _ = filter.log_odds();
+            filter.predict(&STEP, &unknown(), BIRTH, None);
+            filter.update(pose, VARIANCE, true);
+            let _ = filter.log_odds();
+        }
+    }
+
     #[test]
     fn no_pose_breaks_the_filter(values in prop::collection::vec(any::<[f64; 3]>(), 1..40)) {
         let mut filter = filter();

@@ -5,4 +5,5 @@
 mod cases;
 mod exact;
 mod hierarchy;
+mod hostile;
 mod oracles;
