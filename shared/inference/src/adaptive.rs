@@ -1,4 +1,4 @@
-//! How many particles a belief needs: KLD-sampling.
+//! The number of particles that a belief needs: KLD-sampling.
 //!
 //! With k occupied cells, `n` particles keep the Kullback-Leibler distance between their histogram
 //! and the belief below `error` with the probability of the quantile `z` if
@@ -12,7 +12,8 @@ pub struct Adaptive {
     error: f64,
     quantile: f64,
     count_min: usize,
-    /// Open-addressing table; a slot holds the round in which it was taken, and its cell.
+    /// Open-addressing table; a slot holds the round in which it was taken, and its cell. Rounds
+    /// save clearing it.
     slots: Vec<(u64, u64)>,
     round: u64,
 }
@@ -37,7 +38,7 @@ impl Adaptive {
         let mask = self.slots.len() - 1;
         let mut occupied = 0_usize;
         for cell in cells {
-            // Fibonacci hashing spreads neighbouring cells.
+            // Fibonacci hashing (2^64 over the golden ratio) spreads neighbouring cells.
             let mut at = (cell.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20) as usize & mask;
             while self.slots[at].0 == self.round && self.slots[at].1 != cell {
                 at = (at + 1) & mask;
@@ -46,7 +47,7 @@ impl Adaptive {
                 self.slots[at] = (self.round, cell);
                 occupied += 1;
             }
-            // More cells than the table was made for need the most particles anyway.
+            // More cells than particles need the most particles anyway, and the table must not fill.
             if occupied > mask / 2 + 1 {
                 break;
             }
@@ -54,6 +55,7 @@ impl Adaptive {
         self.needed(occupied)
     }
 
+    /// Fox's equation 12.
     fn needed(&self, occupied: usize) -> usize {
         if occupied < 2 {
             return self.count_min;

@@ -1,19 +1,19 @@
 //! Detection without a blind spot: nominal against nominal plus an unknown constant bias.
 //!
 //! A constant likelihood never accumulates evidence for a fault whose residual is small in every
-//! step. Here the fault state learns the bias of the whitened residual `r`: one component per
-//! onset, with a log-weight, a mean bias and a scalar variance; per step a newborn enters and every
-//! component is conditioned on `r` (a Kalman filter of a constant). The log-odds are the logarithm
-//! of the summed weights: with equal births a Shiryaev-Roberts statistic.
+//! step. Here the fault state learns the bias of the whitened residual `r`. There is one component
+//! per onset, with a log-weight, a mean bias and a scalar variance. Each step adds a component, and
+//! conditions all on `r` (a Kalman filter of a constant). The log-odds are the logarithm of the
+//! summed weights: with equal births a Shiryaev-Roberts statistic.
 //!
-//! Onsets are resolved in proportion to their age ([`crate::onsets`]); where two components become
+//! Onsets are resolved in proportion to their age ([`crate::onsets`]). Where two components become
 //! one, their first two moments are kept.
 //!
-//! Residuals whose number of dimensions only a model tells stand in the first ones of a longer
-//! vector, the rest 0: [`Ages::with_dimensions`].
+//! A residual whose dimension is known only at run time fills the first elements of a longer
+//! vector; the others are 0: [`Ages::with_dimensions`].
 //!
-//! One prior deviation serves faults of every size: it enters the delay by its
-//! logarithm only, and mixtures of several gained on small faults what they lost on others.
+//! One prior deviation of the bias serves faults of every size: the delay depends on its logarithm
+//! only. Mixtures of several gained on small faults what they lost on others.
 
 use nalgebra::SVector;
 
@@ -21,7 +21,7 @@ use crate::logspace::{log_add, probability};
 use crate::onsets::{Onset, Onsets};
 use crate::outlier::SPREAD;
 
-/// Log-odds beyond which more evidence changes nothing. The exponential of more is no double.
+/// Largest log-odds: the exponential of more exceeds a double, and no decision needs it.
 pub const LOG_ODDS_MAX: f64 = 700.0;
 
 /// A whitened residual.
@@ -29,15 +29,16 @@ pub const LOG_ODDS_MAX: f64 = 700.0;
 pub struct WhitenedResidual<const D: usize> {
     /// The residual over its standard deviation.
     pub value: SVector<f64, D>,
-    /// By how much a bias of one unit moves it: 1 at the usual noise, less where more is uncertain.
+    /// Change of the value by a bias of one unit: 1 at the usual noise, less where more is
+    /// uncertain.
     pub exposure: f64,
-    /// Probability that it is an outlier, whether the fault is there or not: it is evidence only as
-    /// far as one state explains it and the other does not.
+    /// Probability that it is an outlier, with or without a fault. An outlier under both is evidence
+    /// for neither.
     pub outlier_rate: f64,
 }
 
 impl<const D: usize> WhitenedResidual<D> {
-    /// One with no more than the usual noise, and no outlier.
+    /// A residual with the usual noise that is no outlier.
     #[must_use]
     pub const fn usual(value: SVector<f64, D>) -> Self {
         Self {
@@ -49,12 +50,13 @@ impl<const D: usize> WhitenedResidual<D> {
 }
 
 impl WhitenedResidual<1> {
-    /// A residual of this variance, of which the part `passing` is there for the moment only.
+    /// A residual of this variance; the part `passing` of the variance exceeds the usual noise, for
+    /// this measurement only.
     #[must_use]
-    pub fn new(apart: f64, variance: f64, passing: f64, outlier_rate: f64) -> Self {
+    pub fn new(residual: f64, variance: f64, passing: f64, outlier_rate: f64) -> Self {
         let usual = (variance - passing).max(0.0);
         Self {
-            value: SVector::from([apart / variance.sqrt()]),
+            value: SVector::from([residual / variance.sqrt()]),
             exposure: (usual / variance).sqrt(),
             outlier_rate,
         }
@@ -67,7 +69,7 @@ struct Component<const D: usize> {
     log_weight: f64,
     bias: SVector<f64, D>,
     variance: f64,
-    /// How many of the D dimensions are used.
+    /// Number of the D dimensions in use.
     dimensions: f64,
 }
 
@@ -89,7 +91,7 @@ impl<const D: usize> Ages<D> {
         Self::with_dimensions(D, bias_sd)
     }
 
-    /// The same over residuals of the first `dimensions` of D, at most D; all others must be 0.
+    /// A filter over residuals of `dimensions` elements, at most D; the others must be 0.
     #[must_use]
     pub fn with_dimensions(dimensions: usize, bias_sd: f64) -> Self {
         Self {
@@ -107,8 +109,7 @@ impl<const D: usize> Ages<D> {
         self.log_odds.clamp(-LOG_ODDS_MAX, LOG_ODDS_MAX)
     }
 
-    /// What the last step said for a fault that was there, and is: the logarithm of the
-    /// likelihoods' ratio.
+    /// Log-likelihood ratio of the last step for a fault that was present before it and stays.
     #[must_use]
     pub const fn gain(&self) -> f64 {
         self.gain
@@ -120,7 +121,7 @@ impl<const D: usize> Ages<D> {
         self.take(&WhitenedResidual::usual(*residual), birth);
     }
 
-    /// The same of a residual that is not like the others.
+    /// One step with a residual that has its own exposure and outlier rate.
     pub fn take(&mut self, residual: &WhitenedResidual<D>, birth: f64) {
         let square = residual.value.norm_squared();
         if !(square.is_finite() && residual.exposure.is_finite()) {
@@ -144,6 +145,7 @@ impl<const D: usize> Ages<D> {
         let log_weights = self.components.iter().map(|component| component.log_weight);
         self.log_odds = log_weights.fold(f64::NEG_INFINITY, log_add);
         self.gain = self.log_odds - before;
+        // All weights are relative to nominal: lowering them together keeps their ratios.
         let excess = (highest - LOG_ODDS_MAX).max(0.0);
         if excess > 0.0 {
             for component in self.components.iter_mut() {
@@ -154,10 +156,11 @@ impl<const D: usize> Ages<D> {
     }
 }
 
-/// Of the square of a whitened residual that is an outlier with the probability `rate`: the square
-/// that has its density where there are no outliers, and the variance of the noise by that. An
-/// outlier has ten times the deviation of the whole residual: a bias that is not known yet widens
-/// it, so that a channel that reads anything keeps its evidence.
+/// Effect of contamination on the `square` of a whitened residual, which is an outlier with the
+/// probability `rate`. Returns the square with the same density under pure normal noise, and the
+/// expected variance of the noise. An outlier has [`SPREAD`] times the deviation of the whole
+/// residual: a bias that is not known yet widens it too, so that arbitrary values of a broken
+/// channel stay evidence.
 fn contaminated(square: f64, rate: f64, dimensions: f64) -> (f64, f64) {
     if rate <= 0.0 || !square.is_finite() {
         return (square, 1.0);
@@ -189,17 +192,19 @@ impl<const D: usize> Onset for Component<D> {
     /// Keeps the weight and the first two moments of both.
     fn merged(&self, older: &Self) -> Self {
         let total = log_add(self.log_weight, older.log_weight);
-        if total == f64::NEG_INFINITY {
+        // Shares of weights beyond all numbers are not defined.
+        if !total.is_finite() {
             return *self;
         }
         let (one, two) = (
             (self.log_weight - total).exp(),
             (older.log_weight - total).exp(),
         );
-        let apart = (self.bias - older.bias).norm_squared() / self.dimensions.max(1.0);
-        // A distance beyond all numbers, after residuals beyond all sense, says nothing.
-        let between = if one * two > 0.0 && apart.is_finite() {
-            one * two * apart
+        // One variance serves all dimensions: the mean over them.
+        let distance = (self.bias - older.bias).norm_squared() / self.dimensions.max(1.0);
+        // After absurd residuals the distance may overflow; then only the parts' variances count.
+        let between = if one * two > 0.0 && distance.is_finite() {
+            one * two * distance
         } else {
             0.0
         };
@@ -292,7 +297,7 @@ mod tests {
         assert!(filter.log_odds() > 600.0);
         assert!(
             against > -5.0,
-            "a single reading speaks against it: {against}"
+            "a single residual is evidence against it: {against}"
         );
     }
 
@@ -333,11 +338,85 @@ mod tests {
                 let noise = SVector::<f64, 3>::from_fn(|_, _| rng.sample(StandardNormal));
                 residuals.push(noise + SVector::from([0.0, bias.sqrt(), 0.0]));
                 filter.step(&residuals[step], 1e-3);
-                let apart = filter.log_odds() - every_onset(&residuals, 1.0, 1e-3);
+                let error = filter.log_odds() - every_onset(&residuals, 1.0, 1e-3);
                 let allowed = if step < 2 { 1e-12 } else { 0.7 };
-                assert!(apart.abs() < allowed, "{lambda}, step {step}: {apart}");
+                assert!(error.abs() < allowed, "{lambda}, step {step}: {error}");
             }
         }
+    }
+
+    #[test]
+    fn the_gain_is_the_likelihood_ratio_without_the_birth() {
+        let mut filter = Ages::<1>::new(2.0);
+        filter.step(&SVector::from([3.0]), 0.01);
+        let ratio = crate::logspace::log_normal(3.0, 5.0) - crate::logspace::log_normal(3.0, 1.0);
+        assert!((filter.gain() - ratio).abs() < 1e-12);
+        let before = filter;
+        filter.step(&SVector::from([f64::NAN]), 0.01);
+        assert_eq!(filter, before);
+    }
+
+    #[test]
+    fn an_outlier_of_both_states_is_hardly_evidence() {
+        let gain = |outlier_rate| {
+            let mut filter = Ages::<1>::new(2.0);
+            let residual = WhitenedResidual {
+                value: SVector::from([8.0]),
+                exposure: 1.0,
+                outlier_rate,
+            };
+            filter.take(&residual, 0.01);
+            filter.gain()
+        };
+        // The mixture's densities by hand; an outlier has ten times the deviation.
+        let density = |rate: f64, variance: f64| {
+            let normal = |v: f64| crate::logspace::log_normal(8.0, v).exp();
+            (1.0 - rate) * normal(variance) + rate * normal(100.0 * variance)
+        };
+        for rate in [1e-6, 0.01, 0.2] {
+            let expected = (density(rate, 5.0) / density(rate, 1.0)).ln();
+            assert!((gain(rate) - expected).abs() < 1e-9, "{rate}");
+        }
+        assert!(gain(0.0) > 20.0 && gain(0.2) < 2.0);
+    }
+
+    #[test]
+    fn a_residual_is_whitened_by_all_its_variance_and_exposed_by_the_usual_part() {
+        let residual = WhitenedResidual::<1>::new(6.0, 4.0, 3.0, 0.1);
+        assert_eq!(residual.value[0], 3.0);
+        assert_eq!((residual.exposure, residual.outlier_rate), (0.5, 0.1));
+        assert_eq!(WhitenedResidual::<1>::new(6.0, 4.0, 5.0, 0.1).exposure, 0.0);
+    }
+
+    #[test]
+    fn merged_components_keep_weight_and_moments() {
+        let part = |p: f64, bias, variance| Component::<2> {
+            log_weight: p.ln(),
+            bias: SVector::from(bias),
+            variance,
+            dimensions: 2.0,
+        };
+        let merged = part(1.0, [1.0, 0.0], 2.0).merged(&part(3.0, [3.0, 4.0], 6.0));
+        assert!((merged.log_weight - 4.0_f64.ln()).abs() < 1e-12);
+        assert!((merged.bias - SVector::from([2.5, 3.0])).abs().max() < 1e-12);
+        // .25 of 2 and .75 of 6, and .25 x .75 of the squared distance 20, over two dimensions.
+        assert!((merged.variance - (0.5 + 4.5 + 0.1875 * 10.0)).abs() < 1e-12);
+        let impossible = part(0.0, [9.0, 9.0], 1.0);
+        assert_eq!(impossible.merged(&impossible), impossible);
+    }
+
+    #[test]
+    fn log_odds_end_at_their_bound_with_the_ratios_kept() {
+        let mut filter = Ages::<1>::new(2.0);
+        for _ in 0..3 {
+            filter.step(&SVector::from([60.0]), 1e-3);
+        }
+        let weights = filter.components.iter().map(|it| it.log_weight);
+        let highest = weights.fold(f64::NEG_INFINITY, f64::max);
+        assert!((highest - LOG_ODDS_MAX).abs() < 1e-9, "{highest}");
+        assert_eq!(filter.log_odds(), LOG_ODDS_MAX);
+        let sum = filter.components.iter().map(|it| it.log_weight);
+        assert!((filter.log_odds - log_sum_exp(&sum.collect::<Vec<_>>())).abs() < 1e-9);
     }
 
     proptest! {

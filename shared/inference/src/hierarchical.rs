@@ -1,4 +1,4 @@
-//! Hierarchical identification: faults are tracked together until the data can tell them apart.
+//! Hierarchical identification: faults are tracked together until data distinguishes them.
 //!
 //! The paper's identification filter (Verma, Fernandez and Simmons 2002, section 4.3) moves
 //! particles down a tree: from nominal to an abstract node (a stuck wheel on the left), from there
@@ -10,16 +10,15 @@
 //! observation, `s_k' ∝ s_k p(c' | k, c) p(z | k, c')`, and the particle's weight is multiplied by
 //! `Σ s_k p(c'|k,c) p(z|k,c') / Σ s_k p(c'|k,c)`. So nothing is lost when it moves down.
 //!
-//! When is an abstract node worth its coarseness? The rule of the variable resolution filter
-//! (Verma, Thrun and Simmons, IJCAI 2003) weighs the bias of a coarse answer, which divides the
-//! node's mass `p_A` by prior shares, against the variance `p_k (1 - p_k) / N` of the fine one. As
-//! shares are carried here, the coarse answer has no such bias: per node, the variance of both
-//! answers is that of the node's mass, and a split adds `p_A Σ s_k (1 - s_k) / N`, with the shares
-//! `s_k` of what lies directly below: noise that the other leaves, should the data turn, have to
-//! grow from. So a node is split when that is next to nothing, its leaves having been told apart
-//! (a share above 0.999), for a split node costs one likelihood per particle and not one per leaf;
-//! it is merged again when they blur (below 0.99). In a tree of several levels particles move down
-//! one level at a time.
+//! **When a node is split.** The rule of the variable resolution filter (Verma, Thrun and Simmons,
+//! IJCAI 2003) weighs the bias of a coarse answer, which divides the node's mass `p_A` by prior
+//! shares, against the variance `p_k (1 - p_k) / N` of the fine one. Here particles carry shares, so
+//! that the coarse answer has no such bias. Splitting only adds the variance
+//! `p_A Σ s_k (1 - s_k) / N`, with the shares `s_k` directly below the node: noise from which the
+//! other leaves have to grow if later data favours them. A split node saves time: one likelihood
+//! per particle instead of one per leaf. So a node is split when the added variance is negligible
+//! (a share above 0.999), and merged again when its leaves blur (below 0.99). In a tree of several
+//! levels particles move down one level at a time.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -29,10 +28,13 @@ use crate::hybrid::{self, ModelError, Modes, Sampled};
 use crate::resample::{Resampling, systematic};
 use crate::weights::Weights;
 
-/// Largest share below a node for a split, and for a merge: ten times the rest, no toggling.
+/// Share below a node above which it is split, and share below which it is merged. Chosen by hand:
+/// the remainders differ by a factor of ten, so that a node does not toggle; the rule is within the
+/// noise of the better fixed resolution (`tests/filters/hierarchy.rs`).
 const SPLIT: f64 = 0.999;
 const MERGE: f64 = 0.99;
-/// A node whose mass is less than this many particles' is merged: nothing is told apart there.
+/// A node with the mass of fewer particles than this is merged: too few to distinguish leaves.
+/// Chosen by hand; more merges nodes of rare faults, less splits by chance.
 const PARTICLES_MIN: f64 = 3.0;
 
 /// Why a hierarchy was refused.
@@ -53,7 +55,7 @@ pub enum HierarchyError {
         mode: usize,
     },
     /// Two nodes share some modes, and neither lies below the other.
-    #[error("abstract nodes {0} and {1} overlap: one must lie below the other, or apart")]
+    #[error("abstract nodes {0} and {1} overlap: one must contain the other, or none of its modes")]
     Overlap(usize, usize),
 }
 
@@ -84,7 +86,7 @@ pub struct Hierarchical<M: Sampled> {
     shares: Vec<f64>,
     other_shares: Vec<f64>,
     weights: Weights,
-    /// What each particle's weight pays for its proposal.
+    /// Logarithm of the factor by which each particle's weight pays for its proposal.
     paid: Vec<f64>,
     increments: Vec<f64>,
     ancestors: Vec<u32>,
@@ -143,15 +145,15 @@ impl<M: Sampled> Hierarchical<M> {
         Ok(filter)
     }
 
-    /// Begins anew from the prior and with the generator at `seed`: equal runs then have equal
-    /// beliefs, whatever came before.
+    /// Begins anew from the prior and with the generator at `seed`, so that equal runs have equal
+    /// beliefs.
     pub fn restart(&mut self, seed: u64) {
         self.rng = Pcg64Mcg::seed_from_u64(seed);
         self.reset();
     }
 
-    /// From the next step on `count` particles, 1 to the number of the start: fewer cost less, and
-    /// are resampled from those there are.
+    /// Sets the number of particles, 1 to the number of the start, from the next step on. Fewer
+    /// cost less; they are resampled from those there are.
     pub fn limit(&mut self, count: usize) {
         self.allowed = count.clamp(1, self.count_max);
     }
@@ -168,16 +170,15 @@ impl<M: Sampled> Hierarchical<M> {
         particles.map(|((state, shares), &weight)| (state, shares, weight))
     }
 
-    /// The same filter with raised proposals: a share `leave` (0 to 1) of the draws leaves the
-    /// particle's node for the others that it can reach, in equal parts; weights pay for it.
+    /// Raises proposals: a share `leave` (0 to 1) of the draws leaves the particle's node for the
+    /// others that it can reach, in equal parts. Weights pay for it.
     #[must_use]
     pub fn with_raised_proposals(mut self, leave: f64) -> Self {
         self.leave = Some(leave.clamp(0.0, 1.0));
         self
     }
 
-    /// The same filter with all its nodes merged for good, or all split: what the rule is
-    /// measured against.
+    /// Merges all nodes for good, or splits all: the baselines of the rule.
     #[must_use]
     pub fn with_fixed_resolution(mut self, merged: bool) -> Self {
         self.is_fixed = true;
@@ -187,15 +188,15 @@ impl<M: Sampled> Hierarchical<M> {
         self
     }
 
-    /// What mode `k` is tracked as at present: itself, or the first leaf of the highest abstract
+    /// The mode that stands for `k` at present: itself, or the first leaf of the highest abstract
     /// node above it whose leaves are tracked together.
     fn group(&self, k: usize) -> usize {
         let merged = self.above[k].iter().find(|&&node| self.nodes[node].merged);
         merged.map_or(k, |&node| self.nodes[node].leaves[0])
     }
 
-    /// Draws the group of particle i for the next step and fills `predicted` with the shares in
-    /// it; returns what the weight pays for the proposal.
+    /// Draws the group of particle i for the next step and fills `predicted` with the shares in it.
+    /// Returns the logarithm of the factor by which the weight pays for the proposal.
     fn predict_shares(&mut self, i: usize) -> f64 {
         let modes = self.model.modes();
         let row = &self.shares[i * modes..(i + 1) * modes];
@@ -353,7 +354,7 @@ impl<M: Sampled> Hierarchical<M> {
         }
     }
 
-    /// Each particle of a node becomes one of what is below it, by its shares.
+    /// Each particle of a node moves to a group directly below it, drawn by its shares.
     fn split(&mut self, node: usize) {
         let modes = self.model.modes();
         for i in 0..self.states.len() {
@@ -406,7 +407,7 @@ fn arrange(
     for nodes in &mut above {
         nodes.sort_by_key(|&node| std::cmp::Reverse(abstract_nodes[node].len()));
     }
-    // What lies directly above a mode, or above a node (seen from its first mode).
+    // The node directly above a mode (of size 1), or above a node, which its first mode stands for.
     let next_above = |mode: usize, size: usize| {
         let larger = above[mode].iter().rev();
         larger
@@ -542,7 +543,7 @@ mod tests {
     }
 
     #[test]
-    fn a_node_is_split_once_its_leaves_are_told_apart_and_merged_when_empty() {
+    fn a_node_is_split_once_its_leaves_are_distinguished_and_merged_when_empty() {
         let mut filter = filter(&[vec![1, 2]]);
         let merged = |filter: &Hierarchical<Alike>| filter.nodes[0].merged;
         assert!(merged(&filter));

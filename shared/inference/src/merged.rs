@@ -89,8 +89,8 @@ fn merge<const N: usize>(parts: impl Iterator<Item = (f64, Gaussian<N>)> + Clone
         merged.mean += part.mean * weight;
     }
     for (weight, part) in parts {
-        let apart = part.mean - merged.mean;
-        merged.covariance += (part.covariance + apart * apart.transpose()) * weight;
+        let difference = part.mean - merged.mean;
+        merged.covariance += (part.covariance + difference * difference.transpose()) * weight;
     }
     merged
 }

@@ -1,11 +1,10 @@
-//! How much it costs to lose track of a mode: the risk of the decision-theoretic filter.
+//! The cost of losing track of a mode: the risk of the decision-theoretic filter.
 //!
-//! A filter's particles either cover a mode (tracked) or not (lost); the two change into each other
-//! with a small probability per step. While tracked, the robot takes the best action; while lost,
-//! it does something: a mixture of the worst and the average action. The risk of a mode is what
-//! being lost in it costs more than being tracked (Thrun, Langford and Verma, *Risk Sensitive
-//! Particle Filters*, 2001). It follows from the recovery model by value iteration and is not set
-//! by hand.
+//! Particles either cover a mode (tracked) or do not (lost); the two change into each other with a
+//! small probability per step. While tracked, the robot takes the best action; while lost, a mixture
+//! of the worst and the average one. The risk of a mode is the difference in cost between lost and
+//! tracked (Thrun, Langford and Verma, *Risk Sensitive Particle Filters*, 2001). It follows from the
+//! recovery model by value iteration and is not set by hand.
 
 /// The fully observed recovery problem: costs and transitions per action.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,7 +17,7 @@ pub struct Recovery {
     pub discount: f64,
 }
 
-/// How tracked and lost change into each other, and what a lost robot does.
+/// Change between tracked and lost, and the actions of a lost robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tracking {
     /// Probability per step that tracked becomes lost, and lost tracked.
@@ -32,8 +31,8 @@ pub struct Tracking {
 impl Default for Tracking {
     fn default() -> Self {
         Self {
-            // Taken, not measured: once in 50 steps; half-way between the worst and the mean
-            // action.
+            // Chosen by hand: lost once in 50 steps; half-way between the worst and the mean
+            // action. Only ratios of risks matter, which change little with either.
             flip: 0.02,
             pessimism: 0.5,
             risk_min: 1e-3,
@@ -57,8 +56,10 @@ pub enum RiskError {
     },
 }
 
-/// Value iteration ends when no value changes by more than this share of the largest cost.
+/// Value iteration ends when no value changes by more than this share of the largest cost: far
+/// below any difference of risks that moves a particle.
 const TOLERANCE: f64 = 1e-9;
+/// Enough for a discount of 0.9998 to reach the tolerance; a bound for those closer to 1.
 const ROUNDS_MAX: usize = 100_000;
 
 /// Risk of each mode: `max(V(d, lost) - V(d, tracked), risk_min)`, in units of cost.
@@ -73,7 +74,7 @@ pub fn risk(recovery: &Recovery, tracking: Tracking) -> Result<Vec<f64>, RiskErr
         .iter()
         .flatten()
         .fold(0.0_f64, |m, c| m.max(c.abs()));
-    // Of each mode: lost, tracked.
+    // Values of each mode: lost, tracked.
     let mut values = vec![[0.0_f64; 2]; modes];
     for _ in 0..ROUNDS_MAX {
         let q = |d: usize, tracked: usize, u: usize| {
@@ -108,8 +109,9 @@ pub fn risk(recovery: &Recovery, tracking: Tracking) -> Result<Vec<f64>, RiskErr
     Ok(difference.map(|r| r.max(tracking.risk_min)).collect())
 }
 
-/// Bounds risks to what `count` particles can carry: with belief `p`, the nominal mode 0 keeps
-/// `nominal_min` of them: `Σ_k p_k r_k <= p_0 r_0 (count / nominal_min - 1)` over the faults k.
+/// Scales the risks of faults down so far that, with the belief `p`, the nominal mode 0 keeps
+/// `nominal_min` of `count` particles: `Σ_k p_k r_k <= p_0 r_0 (count / nominal_min - 1)` over the
+/// faults k. Their ratios stay.
 pub fn bound(risk: &mut [f64], p: &[f64], count: usize, nominal_min: f64) {
     let (Some(&nominal), Some(&p_nominal)) = (risk.first(), p.first()) else {
         return;

@@ -1,26 +1,28 @@
-//! The size of a fault, given that it is present: how far a sensor or an actuator is off.
+//! The size of a fault that is present: the gain or bias of a sensor, the offset of an actuator.
 //!
-//! A reading is linear in the size and in an offset beside it, so that the size's belief stays
-//! Gaussian and the likelihood of a reading integrates over it (Rao-Blackwell). The prior has no
-//! mass where healthy ones are: a normal prior cut off there gives a posterior cut off there,
-//! and the evidence of the cut-off prior is that of the whole one times the ratio of the masses
-//! beyond, posterior to prior. [`Size::log_material`] is the posterior's.
+//! A measurement is linear in the size and in a healthy offset beside it. So the belief about both
+//! stays Gaussian, and the likelihood of a measurement integrates over it (Rao-Blackwell). Healthy
+//! sizes have no prior mass: a normal prior truncated there gives a posterior truncated there. The
+//! evidence under the truncated prior is that under the whole one, times the ratio of the masses
+//! outside the healthy interval, posterior to prior. [`Size::log_material`] is the logarithm of the
+//! posterior's mass.
 
 use libm::erfc;
 
-/// No mass is taken to be smaller: what can return must not be impossible.
+/// Least mass outside the healthy interval: a size that can return must not become impossible.
+/// Chosen by hand: far below every prior, far above the smallest double.
 const MASS_MIN: f64 = 1e-12;
 
-/// What is believed of a size before any reading.
+/// The belief about a size and an offset before any measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// Means of the size and of the offset beside it.
     pub mean: [f64; 2],
     /// Their standard deviations.
     pub sd: [f64; 2],
-    /// By how much they wander from one reading to the next, as standard deviations.
+    /// Standard deviations of their random walk from one measurement to the next.
     pub wander: [f64; 2],
-    /// Sizes between these two are healthy: no fault has one.
+    /// Interval of healthy sizes, which no fault has.
     pub healthy: [f64; 2],
 }
 
@@ -34,7 +36,7 @@ pub struct Size {
 }
 
 impl Size {
-    /// What is known before any reading.
+    /// The belief before any measurement.
     #[must_use]
     pub fn new(prior: &Prior) -> Self {
         let [size, offset] = prior.sd.map(|sd| sd * sd);
@@ -59,18 +61,20 @@ impl Size {
         (self.mean[1], self.covariance[2])
     }
 
-    /// Logarithm of the mass beyond what is healthy, as the prior's; see the module.
+    /// Logarithm of the probability mass outside the healthy interval; see the module.
     #[must_use]
     pub const fn log_material(&self) -> f64 {
         self.log_material
     }
 
-    /// The offset grows by the size for `dt` (s, where the size is a rate), and both wander.
+    /// Adds the size times `dt` to the offset (`dt` s where the size is a rate, else 0), and lets
+    /// both wander.
     pub fn predict(&mut self, dt: f64, prior: &Prior) {
         self.mean[1] += dt * self.mean[0];
         let [size, both, offset] = self.covariance;
         let [wander, beside] = prior.wander.map(|sd| sd * sd);
         self.covariance = [
+            // Nothing is less certain than before any measurement.
             (size + wander).min(prior.sd[0] * prior.sd[0]),
             both + dt * size,
             offset + dt * (2.0 * both + dt * size) + beside,
@@ -87,20 +91,20 @@ impl Size {
         )
     }
 
-    /// Takes a reading of what [`Self::expected`] tells, with the variance `noise`. One that is no
-    /// number changes nothing.
-    pub fn update(&mut self, by: [f64; 2], reading: f64, noise: f64, prior: &Prior) {
+    /// Takes a measurement of the quantity that [`Self::expected`] predicts, with the variance
+    /// `noise`. One that is no number changes nothing.
+    pub fn update(&mut self, by: [f64; 2], measured: f64, noise: f64, prior: &Prior) {
         let (expected, variance) = self.expected(by);
-        let (apart, total) = (reading - expected, variance + noise);
-        if !(apart.is_finite() && total > 0.0) {
+        let (innovation, total) = (measured - expected, variance + noise);
+        if !(innovation.is_finite() && total > 0.0) {
             return;
         }
         let [size, both, offset] = self.covariance;
         let with = [by[0] * size + by[1] * both, by[0] * both + by[1] * offset];
         let gain = with.map(|with| with / total);
         self.mean = [
-            self.mean[0] + gain[0] * apart,
-            self.mean[1] + gain[1] * apart,
+            self.mean[0] + gain[0] * innovation,
+            self.mean[1] + gain[1] * innovation,
         ];
         self.covariance = [
             size - gain[0] * with[0],
@@ -110,17 +114,13 @@ impl Size {
         self.cut_off(prior);
     }
 
-    /// The Gaussian with the first two moments of this one, taken with the probability `share`, and
-    /// another one.
+    /// The Gaussian with the first two moments of the mixture of this one, with the weight `share`,
+    /// and another one.
     #[must_use]
     pub fn mixed(&self, other: &Self, share: f64, prior: &Prior) -> Self {
         let rest = 1.0 - share;
-        let apart = [self.mean[0] - other.mean[0], self.mean[1] - other.mean[1]];
-        let spread = [
-            apart[0] * apart[0],
-            apart[0] * apart[1],
-            apart[1] * apart[1],
-        ];
+        let [size, offset] = [self.mean[0] - other.mean[0], self.mean[1] - other.mean[1]];
+        let spread = [size * size, size * offset, offset * offset];
         let mut this = Self {
             mean: std::array::from_fn(|i| share * self.mean[i] + rest * other.mean[i]),
             covariance: std::array::from_fn(|i| {
@@ -132,6 +132,7 @@ impl Size {
         this
     }
 
+    /// Computes the mass outside the healthy interval.
     fn cut_off(&mut self, prior: &Prior) {
         let (mean, sd) = self.estimate();
         let scale = sd.max(f64::MIN_POSITIVE) * std::f64::consts::SQRT_2;
@@ -244,6 +245,50 @@ mod tests {
         let (found, sd) = one.mixed(&two, 0.3, &PRIOR).estimate();
         assert!((found - mean).abs() < 1e-12);
         assert!((sd * sd - (second - mean * mean)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_offset_integrates_the_size_and_is_measured_with_it() {
+        let prior = Prior {
+            mean: [1.0, 2.0],
+            sd: [0.5, 0.2],
+            wander: [0.3, 0.1],
+            healthy: [-0.1, 0.1],
+        };
+        let mut size = Size::new(&prior);
+        size.predict(2.0, &prior);
+        // Mean 2 + 2 x 1; covariance 2 x .25; variance .04 + 4 x .25 + .01; the size's is bounded.
+        let (offset, variance) = size.offset();
+        assert!((offset - 4.0).abs() < 1e-12 && (variance - 1.05).abs() < 1e-12);
+        let (mean, variance) = size.expected([3.0, -1.0]);
+        assert!((mean + 1.0).abs() < 1e-12, "{mean}");
+        assert!((variance - (9.0 * 0.25 - 6.0 * 0.5 + 1.05)).abs() < 1e-12);
+        // One measurement of the size alone, with the noise 0.25: half of the innovation.
+        size.update([1.0, 0.0], 2.0, 0.25, &prior);
+        let (mean, sd) = size.estimate();
+        assert!((mean - 1.5).abs() < 1e-12 && (sd * sd - 0.125).abs() < 1e-12);
+        let (offset, variance) = size.offset();
+        assert!((offset - 5.0).abs() < 1e-12 && (variance - 0.55).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_material_mass_lies_outside_the_healthy_interval() {
+        let prior = |mean| Prior {
+            mean: [mean, 0.0],
+            sd: [0.5, 0.0],
+            wander: [0.0; 2],
+            healthy: [-1.0, 0.5],
+        };
+        // Below -1 lies beyond two deviations, above 0.5 beyond one.
+        let expected: f64 = 0.158_655_253_931_457_05 + 0.022_750_131_948_179_21;
+        let found = Size::new(&prior(0.0)).log_material();
+        assert!((found - expected.ln()).abs() < 1e-12);
+        assert!(Size::new(&prior(50.0)).log_material().abs() < 1e-12);
+        let narrow = Prior {
+            sd: [1e-3, 0.0],
+            ..prior(0.0)
+        };
+        assert_eq!(Size::new(&narrow).log_material(), MASS_MIN.ln());
     }
 
     #[test]

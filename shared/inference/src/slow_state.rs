@@ -1,9 +1,10 @@
-//! A scalar that changes slowly along the path and is bounded: how far something healthy is off.
+//! A scalar context that changes slowly along the path and stays within a tolerance, such as the
+//! offset of a healthy channel.
 //!
-//! An Ornstein-Uhlenbeck process, estimated by a scalar Kalman filter; its mean saturates at the
-//! tolerance, so that what is off by more for good is never learned away.
+//! An Ornstein-Uhlenbeck process, estimated by a scalar Kalman filter. Its mean saturates at the
+//! tolerance, so that a larger lasting offset is never learned away.
 
-/// How far a slow state may go.
+/// Bounds of a slow state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drift {
     /// Largest healthy magnitude: twice the stationary deviation.
@@ -13,7 +14,8 @@ pub struct Drift {
 }
 
 impl Drift {
-    /// A tolerance is two deviations: 95 % of healthy states lie within.
+    /// Stationary variance: the tolerance is two deviations, so that 95 % of healthy states lie
+    /// within.
     fn variance(&self) -> f64 {
         0.25 * self.tolerance * self.tolerance
     }
@@ -29,7 +31,7 @@ pub struct SlowState {
 }
 
 impl SlowState {
-    /// What is known before any measurement.
+    /// The estimate before any measurement: the stationary distribution.
     #[must_use]
     pub fn new(drift: &Drift) -> Self {
         Self {
@@ -47,7 +49,7 @@ impl SlowState {
     }
 
     /// Takes a measurement of `scale` times the state, with the variance `noise`. One that is no
-    /// number, or tells nothing, changes nothing.
+    /// number, or has no variance at all, changes nothing.
     pub fn learn(&mut self, measured: f64, scale: f64, noise: f64, drift: &Drift) {
         let spread = scale * scale * self.variance + noise;
         let gain = self.variance * scale / spread;
@@ -55,7 +57,8 @@ impl SlowState {
         if !(spread > 0.0 && mean.is_finite()) {
             return;
         }
-        self.mean = mean.clamp(-drift.tolerance, drift.tolerance);
+        // Unlike `clamp` these accept a tolerance that is negative or no number.
+        self.mean = mean.min(drift.tolerance).max(-drift.tolerance);
         self.variance *= 1.0 - gain * scale;
     }
 }
@@ -90,6 +93,30 @@ mod tests {
         assert!((state.mean - 0.2 * (-1.0_f64).exp()).abs() < 1e-15);
         state.fade(1e3, &DRIFT);
         assert!(state.mean.abs() < 1e-9 && (state.variance - 0.01).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_mean_beyond_a_tolerance_saturates_on_both_sides() {
+        for (measured, mean) in [(5.0, 0.2), (-5.0, -0.2), (0.1, 0.1)] {
+            let mut state = SlowState::new(&DRIFT);
+            state.learn(measured, 1.0, 0.0, &DRIFT);
+            assert!((state.mean - mean).abs() < 1e-12 && state.variance.abs() < 1e-12);
+        }
+        let mut state = SlowState::new(&DRIFT);
+        state.mean = 0.1;
+        state.fade(-4.0, &DRIFT);
+        assert!(
+            (state.mean - 0.1 * (-1.0_f64).exp()).abs() < 1e-15,
+            "backwards, too"
+        );
+    }
+
+    #[test]
+    fn no_tolerance_breaks_it() {
+        for tolerance in [-1.0, f64::NAN] {
+            let drift = Drift { tolerance, ..DRIFT };
+            SlowState::new(&DRIFT).learn(0.1, 1.0, 1.0, &drift);
+        }
     }
 
     #[test]
