@@ -10,7 +10,8 @@ use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    DeadlineMonitor, Graph, HealthBoard, SourceCycle, Stage, StageCycle, Topic, VirtualClock,
+    CycleAccount, DeadlineMonitor, Graph, HealthBoard, SourceCycle, Stage, StageCycle, Topic,
+    VirtualClock,
 };
 use vigil_detector::DetectorStage;
 use vigil_identifier::IdentifierStage;
@@ -102,11 +103,11 @@ fn demand_steady(setup: &Setup) {
     let parts = |name| cycle_parts(setup, &graph, name);
     let stage = |name| {
         let (monitor, board) = parts(name);
-        StageCycle::new(monitor, board).unwrap()
+        StageCycle::new(CycleAccount::new(monitor, board).unwrap())
     };
     let mut sensor = simulator(setup, &graph);
     let (monitor, board) = parts(SensorSim);
-    let mut source = SourceCycle::new(monitor, board, period_ns).unwrap();
+    let mut source = SourceCycle::new(CycleAccount::new(monitor, board).unwrap(), period_ns);
     let detector = vigil_detector::assemble(setup).unwrap();
     let mut detector = (
         stage(Detector),
@@ -120,9 +121,9 @@ fn demand_steady(setup: &Setup) {
     let supervisor = SupervisorStage::new(supervisor, &graph, validity_ns).unwrap();
     let mut supervisor = (stage(Supervisor), supervisor);
     clock.set(period_ns);
-    detector.0.ready(&clock).unwrap();
-    identifier.0.ready(&clock).unwrap();
-    supervisor.0.ready(&clock).unwrap();
+    detector.0.account_mut().ready(&clock).unwrap();
+    identifier.0.account_mut().ready(&clock).unwrap();
+    supervisor.0.account_mut().ready(&clock).unwrap();
 
     for k in 1..=CYCLES {
         clock.set(k * period_ns);
@@ -142,12 +143,12 @@ fn demand_steady(setup: &Setup) {
         assert!(k <= WARM_UP || counts == [0; 4], "cycle {k}: {counts:?}");
     }
     // It did cycle, miss, and see the wheel stick.
-    assert_eq!(source.health().view().slips, 1);
+    assert_eq!(source.account().health().view().slips, 1);
     for cycle in [&detector.0, &identifier.0, &supervisor.0] {
-        let health = cycle.health().view();
+        let health = cycle.account().health().view();
         assert!(health.cycles > CYCLES - 5 && health.missed >= 1);
     }
-    let diagnoses = identifier.0.health().view().events;
+    let diagnoses = identifier.0.account().health().view().events;
     assert!(
         diagnoses
             .iter()

@@ -115,9 +115,7 @@ impl Stage for DetectorStage {
                 break;
             };
             let content = || self.guard.check(&frame);
-            if !intake.admit::<SensorFrame>(&frame.header, content) {
-                self.detector.refuse();
-            } else {
+            if intake.admit::<SensorFrame>(&frame.header, content) {
                 let (belief, hypotheses) = (self.belief.block(), self.hypotheses.block());
                 let before = std::mem::replace(&mut self.epoch, frame.header.epoch);
                 if before != 0 && before != self.epoch {
@@ -125,7 +123,9 @@ impl Stage for DetectorStage {
                     self.detector.step(Entry::Reset, belief, hypotheses);
                 }
                 self.detector.step(Entry::Frame(&frame), belief, hypotheses);
-                intake.stepped(&frame.header, (frame.header.epoch, frame.header.seq));
+                intake.stepped(&frame.header, frame.header.id());
+            } else {
+                self.detector.refuse();
             }
         }
     }

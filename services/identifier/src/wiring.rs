@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 
 use vigil_blocks::{
-    Cause, CauseKind, DetectionBelief, Entry, EventKind, FaultBelief, MODE_BLIND, ParticleBlock,
-    SensorFrame,
+    BlockId, Cause, CauseKind, DetectionBelief, Entry, EventKind, FaultBelief, MODE_BLIND,
+    ParticleBlock, SensorFrame,
 };
 use vigil_cycle::{
     Clock, Graph, HealthBoard, InputAccount, Intake, PortError, Receiver, Sender, Stage, Stamp,
@@ -33,8 +33,8 @@ pub struct IdentifierStage {
     /// Epoch of the last frame that was stepped.
     epoch: u64,
     pending: VecDeque<SensorFrame>,
-    /// Epoch and sequence number of the last detection that was taken.
-    detection: (u64, u64),
+    /// The last detection that was taken.
+    detection: BlockId,
     belief: Box<dyn Sender<FaultBelief>>,
     hypotheses: Box<dyn Sender<ParticleBlock>>,
     reported: LastBelief,
@@ -74,7 +74,7 @@ impl IdentifierStage {
             guard: FrameGuard::new(robot),
             epoch: 0,
             pending: VecDeque::with_capacity(PENDING_MAX),
-            detection: (0, 0),
+            detection: BlockId::default(),
             belief: graph.sender(Topic::Diagnosis)?,
             hypotheses: graph.sender(Topic::DiagnosisParticles)?,
             reported: LastBelief::default(),
@@ -103,15 +103,15 @@ impl IdentifierStage {
         }
     }
 
-    fn position(&self, (epoch, seq): (u64, u64)) -> Option<usize> {
+    fn position(&self, wanted: BlockId) -> Option<usize> {
         self.pending
             .iter()
-            .position(|frame| (frame.header.epoch, frame.header.seq) == (epoch, seq))
+            .position(|frame| frame.header.id() == wanted)
     }
 
     /// Steps the frames up to `wanted`, the one behind the held detection, of which the detector
     /// has folded `count`; false if it was lost on its way here.
-    fn step_held(&mut self, wanted: (u64, u64), count: usize, intake: &Intake<'_>) -> bool {
+    fn step_held(&mut self, wanted: BlockId, count: usize, intake: &Intake<'_>) -> bool {
         if self.position(wanted).is_none() {
             // It was published before its detection, but perhaps after the frames were taken.
             self.take_frames(intake);
@@ -171,18 +171,19 @@ impl Stage for IdentifierStage {
                 continue;
             }
             self.identifier.look(detection);
-            let newest = (header.epoch, header.seq);
+            let newest = header.id();
             let before = std::mem::replace(&mut self.detection, newest);
-            // Nobody knows what a detection that was lost on its way has folded.
-            let is_next = newest == (before.0, before.1 + 1);
+            let is_next =
+                newest.epoch == before.epoch && Some(newest.seq) == before.seq.checked_add(1);
+            // Which frames a detection that was lost on its way has answered is not known.
             let folded = if is_next {
                 cause.count as usize
             } else {
                 PENDING_MAX
             };
-            let identity = (cause.frame_epoch, cause.frame_seq);
-            if cause.kind() == Some(CauseKind::Frame) && self.step_held(identity, folded, intake) {
-                intake.stepped(&header, identity);
+            let frame = cause.frame();
+            if cause.kind() == Some(CauseKind::Frame) && self.step_held(frame, folded, intake) {
+                intake.stepped(&header, frame);
             }
         }
     }

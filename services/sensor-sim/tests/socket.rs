@@ -13,8 +13,8 @@ use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    Clock, DeadlineMonitor, Graph, HealthBoard, OnMiss, Receiver, Schedule, Stage, StageCycle,
-    Topic, VirtualClock,
+    Clock, CycleAccount, DeadlineMonitor, Graph, HealthBoard, OnMiss, Receiver, Schedule, Stage,
+    StageCycle, Topic, VirtualClock,
 };
 use vigil_sensor_sim::SocketStage;
 
@@ -55,12 +55,12 @@ impl Border {
         let datagrams = Rc::new(datagrams);
         let published = graph.receiver(Topic::Sensor).unwrap();
         let stage = SocketStage::new(Rc::clone(&datagrams), &robot, &graph).unwrap();
-        let cycle = StageCycle::new(DeadlineMonitor::new(SCHEDULE), board).unwrap();
+        let account = CycleAccount::new(DeadlineMonitor::new(SCHEDULE), board)
+            .unwrap()
+            .with_on_miss(OnMiss::Count);
         Self {
             clock,
-            cycle: cycle
-                .with_on_miss(OnMiss::Count)
-                .with_input_of(stage.writer()),
+            cycle: StageCycle::new(account).with_input_of(stage.writer()),
             stage,
             published,
             datagrams,
@@ -94,7 +94,7 @@ impl Border {
     }
 
     fn rejected(&self, cause: Rejection) -> u64 {
-        self.cycle.health().view().rejected[cause as usize]
+        self.cycle.account().health().view().rejected[cause as usize]
     }
 }
 
@@ -160,5 +160,5 @@ fn frames_that_come_together_all_go_out() {
         source.send_to(bytes, &border.file).unwrap();
     }
     assert_eq!(border.turn().len(), 8);
-    assert_eq!(border.cycle.health().view().lost, 0);
+    assert_eq!(border.cycle.account().health().view().lost, 0);
 }

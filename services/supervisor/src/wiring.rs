@@ -130,7 +130,7 @@ impl Stage for SupervisorStage {
                 self.supervisor
                     .step(Entry::Frame(inputs), self.action.block());
                 self.detection_is_new = false;
-                intake.stepped(header, (cause.frame_epoch, cause.frame_seq));
+                intake.stepped(header, cause.frame());
             }
         }
     }

@@ -26,6 +26,26 @@ pub struct Header, size 48 {
 }
 }
 
+/// What identifies a block on its topic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct BlockId {
+    /// See [`Header::epoch`].
+    pub epoch: u64,
+    /// See [`Header::seq`].
+    pub seq: u64,
+}
+
+impl Header {
+    /// What identifies the block.
+    #[must_use]
+    pub const fn id(&self) -> BlockId {
+        BlockId {
+            epoch: self.epoch,
+            seq: self.seq,
+        }
+    }
+}
+
 part! {
 /// Which journal entry a service had taken last when it wrote a block.
 #[derive(Eq)]
@@ -52,6 +72,15 @@ pub enum CauseKind {
 }
 
 impl Cause {
+    /// The newest sensor frame taken.
+    #[must_use]
+    pub const fn frame(&self) -> BlockId {
+        BlockId {
+            epoch: self.frame_epoch,
+            seq: self.frame_seq,
+        }
+    }
+
     /// The kind, if it is one that this version knows.
     #[must_use]
     pub const fn kind(&self) -> Option<CauseKind> {

@@ -44,7 +44,7 @@ pub use detection::{Blindness, CHANNELS, Channel, DetectionBelief, Readiness};
 pub use diagnosis::{
     FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
 };
-pub use header::{Cause, CauseKind, Header};
+pub use header::{BlockId, Cause, CauseKind, Header};
 pub use health::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
 pub use journal::Entry;
 pub use particles::{HealthyBelief, PARTICLE_CAPACITY, ParticleBlock, WeightedHypothesis};

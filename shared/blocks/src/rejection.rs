@@ -91,7 +91,7 @@ impl Rejection {
     /// True if it speaks against the source: what it sends cannot be trusted. A block that comes
     /// twice or too soon, or from somebody else, does not.
     #[must_use]
-    pub const fn is_misbehaviour(self) -> bool {
+    pub const fn is_offence(self) -> bool {
         !matches!(
             self,
             Self::OtherWriter

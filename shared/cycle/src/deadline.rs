@@ -8,7 +8,8 @@
 
 use crate::latency::Latency;
 
-/// Most schedule instants that one gap may account for; a larger gap re-anchors the grid.
+/// Most schedule instants that one gap may account for, 100 s at 1 kHz; a larger gap re-anchors the
+/// grid, so that no block makes a cycle loop for long.
 pub(crate) const GAP_INSTANTS_MAX: u64 = 100_000;
 
 /// When a service's cycles are due, and how long they may take.
@@ -31,6 +32,7 @@ pub struct DeadlineMonitor {
     undecided_ns: Option<u64>,
     /// First instant that no publication has answered.
     unanswered_ns: u64,
+    /// First and last instant accounted.
     accounted_ns: [u64; 2],
     missed: u64,
 }
@@ -60,8 +62,8 @@ impl DeadlineMonitor {
         };
         let count = late_ns / self.period_ns + 1;
         self.missed += count;
-        self.undecided_ns = Some(undecided + count * self.period_ns);
-        self.accounted_ns[1] = undecided + (count - 1) * self.period_ns;
+        let last_ns = undecided + (count - 1) * self.period_ns;
+        self.account(last_ns, last_ns + self.period_ns);
         count
     }
 
@@ -71,7 +73,7 @@ impl DeadlineMonitor {
         let first = match self.undecided_ns {
             None => {
                 self.unanswered_ns = schedule_ns;
-                self.accounted_ns[0] = schedule_ns;
+                self.accounted_ns = [schedule_ns; 2];
                 schedule_ns
             }
             Some(undecided) => undecided,
@@ -86,20 +88,39 @@ impl DeadlineMonitor {
                 }
             }
             self.missed += u64::from(publish_ns > schedule_ns + self.deadline_ns);
-            self.undecided_ns = Some(schedule_ns + self.period_ns);
-            self.accounted_ns[1] = schedule_ns;
+            self.account(schedule_ns, schedule_ns + self.period_ns);
         } else {
-            // The clock has counted it; but where its instants lie now, the source knows better.
-            let ahead_ns = (first - schedule_ns).saturating_sub(self.period_ns / 2);
-            let steps = ahead_ns.div_ceil(self.period_ns);
-            self.undecided_ns = Some(schedule_ns + steps * self.period_ns);
+            // The clock has counted this instant; but a source that starts anew may have moved its
+            // grid. The next instant is the first of the new grid that is nearer to the one after
+            // the last accounted than to that itself: none is decided twice, however often the
+            // grid moves.
+            let last_ns = self.last_accounted_ns();
+            let ahead_ns = (last_ns + self.period_ns / 2).saturating_sub(schedule_ns);
+            let steps = ahead_ns.div_ceil(self.period_ns).max(1);
+            self.account(last_ns, schedule_ns + steps * self.period_ns);
         }
         self.missed - missed_before
+    }
+
+    /// Every instant up to `last_ns` is decided; the next is `next_ns`.
+    fn account(&mut self, last_ns: u64, next_ns: u64) {
+        let [first_ns, before_ns] = self.accounted_ns;
+        assert!(
+            first_ns <= before_ns && before_ns <= last_ns,
+            "accounted instants never go back: {last_ns} after {before_ns} ns"
+        );
+        assert!(
+            next_ns >= last_ns + self.period_ns / 2,
+            "an instant is decided once: {next_ns} is to follow {last_ns} ns"
+        );
+        self.accounted_ns[1] = last_ns;
+        self.undecided_ns = Some(next_ns);
     }
 
     /// Records the latencies of the instants up to `schedule_ns` that nothing answered before.
     fn answer(&mut self, schedule_ns: u64, publish_ns: u64, latency: &mut Latency) {
         if schedule_ns + self.period_ns / 2 < self.unanswered_ns {
+            // An instant that a block has answered already.
             return;
         }
         let skipped = (schedule_ns + self.period_ns / 2 - self.unanswered_ns) / self.period_ns;
@@ -255,5 +276,35 @@ mod tests {
         // The restarted source is due at 3700: nearer to instant 4000 than to 3000.
         assert_eq!(m.published(3 * P + 700, 3 * P + 710, &mut l), 0);
         assert_eq!(m.next_deadline_ns(), Some(4 * P + 700 + D));
+    }
+
+    #[test]
+    fn a_grid_that_moves_again_and_again_decides_no_instant_twice() {
+        let (mut m, mut l) = monitor();
+        m.published(0, 10, &mut l);
+        assert_eq!(m.overdue(40 * P + D + 1), 40);
+        // Late blocks, each half a period off the grid of the one before.
+        for half in 1..70 {
+            m.published(half * P / 2, 40 * P + D + 2, &mut l);
+        }
+        assert_eq!(m.overdue(40 * P + D + 3), 0);
+        assert_eq!((m.missed(), m.last_accounted_ns()), (40, 40 * P));
+    }
+
+    #[test]
+    #[should_panic(expected = "accounted instants never go back")]
+    fn an_account_that_goes_back_is_found() {
+        let (mut m, mut l) = monitor();
+        m.published(0, 10, &mut l);
+        m.accounted_ns[1] = 9 * P;
+        m.published(P, P + 10, &mut l);
+    }
+
+    #[test]
+    #[should_panic(expected = "an instant is decided once")]
+    fn an_instant_that_would_be_decided_twice_is_found() {
+        let (mut m, mut l) = monitor();
+        m.published(0, 10, &mut l);
+        m.account(5 * P, 5 * P);
     }
 }

@@ -13,7 +13,7 @@ use smart_default::SmartDefault;
 use vigil_blocks::{Action, Block, SensorFrame};
 
 use crate::port::PortError;
-use crate::topic::Topic;
+use crate::topic::{ServiceName, Topic};
 
 /// Version of the transport, as the workspace's manifest demands it.
 const TRANSPORT_VERSION: &str = "0.10.0";
@@ -105,6 +105,12 @@ impl Domain {
     #[must_use]
     pub fn processes_file(&self) -> PathBuf {
         self.folder.join("processes")
+    }
+
+    /// File in which a service whose assertion has failed leaves a [`crate::failure::Failure`].
+    #[must_use]
+    pub fn failure_file(&self, service: ServiceName) -> PathBuf {
+        self.folder.join(format!("{}.failure", service.as_str()))
     }
 
     /// File that tells publishers the graph's types while it runs: name, size, alignment and the

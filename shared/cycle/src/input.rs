@@ -1,8 +1,8 @@
 //! End-to-end check of input blocks, by what their headers say, and the account of it.
 //!
 //! After AUTOSAR's end-to-end protocol (specification of E2E Protocol, R4): repetition, loss,
-//! wrong sequence, insertion and delay are told apart, and a source that misbehaves is trusted
-//! again only after it has behaved for a while.
+//! wrong sequence, insertion and delay are distinguished, and a source in quarantine is read again
+//! only after a row of good blocks.
 
 use vigil_blocks::{Block, Header, REJECTIONS, Rejection};
 
@@ -11,7 +11,7 @@ const AHEAD_PERIODS_MAX: u64 = 2;
 /// A scheduled instant may lie this far in the past, ns: older blocks are not of this drive, or of
 /// another clock.
 const BEHIND_NS_MAX: u64 = 10_000_000_000;
-/// A sequence number that is further ahead is not believed.
+/// A sequence number further ahead is an error of the writer, not a gap: 17 minutes at 1 kHz.
 const STEP_MAX: u64 = 1_000_000;
 /// Once nothing was taken for so long, ns, a source is silent: another one is believed, and a lower
 /// or far higher sequence number is a new start, of a counter that wraps around or of a device that
@@ -19,11 +19,13 @@ const STEP_MAX: u64 = 1_000_000;
 pub const SILENT_NS: u64 = 1_000_000_000;
 /// Blocks closer to the last one than this part of a period are more than the schedule allows.
 const EARLY_PERIOD_PART: u64 = 4;
-/// So many blocks are taken at once, whenever they say that they were due: those that have waited.
+/// So many blocks are taken at once, whatever their schedule: a full queue of sensor frames.
 const BURST_MAX: u64 = 256;
-/// A source that misbehaved in so many of its last [`HISTORY`] blocks is not trusted.
-const MISBEHAVED_MAX: u32 = 8;
-/// Blocks that are remembered; it is trusted again after so many good ones in a row.
+/// So many offences within the last [`HISTORY`] blocks put a source in quarantine: half of them. With
+/// fewer a few damaged blocks would silence a robot's only sensor; with more the filters would see
+/// mostly what is left of nonsense.
+const OFFENCES_MAX: u32 = 8;
+/// Blocks that are remembered; so many without an offence end a quarantine: 0.16 s at 100 Hz.
 const HISTORY: u32 = 16;
 
 /// What an input block is.
@@ -55,8 +57,8 @@ pub enum Writer {
     Service,
     /// A program outside of it, through shared memory: the transport admits one at a time.
     Publisher,
-    /// Anybody who reaches a socket: one is believed at a time.
-    Stranger,
+    /// Any program that reaches a socket: one is accepted at a time.
+    Socket,
 }
 
 /// The newest block of the known writer.
@@ -76,8 +78,8 @@ struct Last {
 pub struct InputAccount {
     writer: Writer,
     last: Option<Last>,
-    /// Whether the last blocks were misbehaviour, the newest in the lowest bit.
-    misbehaved: u32,
+    /// Which of the last blocks were offences, the newest in the lowest bit.
+    offences: u32,
     is_quarantined: bool,
     /// When a block came last, whatever became of it, ns.
     heard_ns: u64,
@@ -94,8 +96,8 @@ pub struct InputAccount {
 }
 
 impl InputAccount {
-    /// An account of this writer's blocks. One outside the graph is no faster than the schedule,
-    /// and not trusted for ever.
+    /// An account of this writer's blocks. Those from outside the graph are held to the pace of the
+    /// schedule, and to quarantine.
     #[must_use]
     pub fn new(writer: Writer) -> Self {
         Self {
@@ -104,7 +106,7 @@ impl InputAccount {
         }
     }
 
-    /// True while nothing of this source is taken, since it has misbehaved.
+    /// True while this source is in quarantine: none of its blocks is taken.
     #[must_use]
     pub const fn is_quarantined(&self) -> bool {
         self.is_quarantined
@@ -115,7 +117,7 @@ impl InputAccount {
         self.admit::<T>(header, now_ns, period_ns, || Ok(()))
     }
 
-    /// The same; a block that passes is taken only if `content` finds nothing wrong with it.
+    /// Accounts a block by its header and, if that passes, by what `content` finds in it.
     pub fn admit<T: Block>(
         &mut self,
         header: &Header,
@@ -123,7 +125,7 @@ impl InputAccount {
         period_ns: u64,
         content: impl FnOnce() -> Result<(), Rejection>,
     ) -> Arrival {
-        let is_first_word = now_ns.saturating_sub(self.heard_ns) > SILENT_NS;
+        let is_after_silence = now_ns.saturating_sub(self.heard_ns) > SILENT_NS;
         self.heard_ns = now_ns;
         let arrival = match self.judge::<T>(header, now_ns, period_ns) {
             Arrival::Rejected(rejection) => return self.reject(rejection),
@@ -131,13 +133,13 @@ impl InputAccount {
         };
         let content = content();
         if let (None, Err(rejection)) = (self.last, content) {
-            // Who says nothing good at first is not known by it.
+            // A source becomes the known writer by a good block only.
             return self.reject(rejection);
         }
         if let Arrival::AfterGap(lost) = arrival {
             self.lost += lost;
         }
-        // It has arrived, whatever it says: the next one is not after a gap.
+        // It has arrived, good or not: the next one is not after a gap.
         let last = self.last.get_or_insert(Last {
             epoch: header.epoch,
             seq: header.seq,
@@ -148,9 +150,9 @@ impl InputAccount {
         (last.epoch, last.seq) = (header.epoch, header.seq);
         if arrival == Arrival::NewEpoch {
             (last.started_ns, last.t_schedule_ns) = (now_ns, 0);
-            // Another start is no other source: only silence makes its misdeeds forgotten.
-            if is_first_word {
-                (self.misbehaved, self.is_quarantined) = (0, false);
+            // A restart clears no offences: only a second of silence does.
+            if is_after_silence {
+                (self.offences, self.is_quarantined) = (0, false);
             }
         }
         if let Err(rejection) = content {
@@ -176,7 +178,7 @@ impl InputAccount {
         arrival
     }
 
-    /// Accounts what was refused and is nobody's: no misbehaviour of the known writer.
+    /// Accounts what was refused and cannot be attributed to a writer.
     pub fn count(&mut self, rejection: Rejection) {
         self.rejected[rejection as usize] += 1;
         match rejection {
@@ -185,12 +187,12 @@ impl InputAccount {
         }
     }
 
-    /// Accounts what was refused before it had a header to look at.
+    /// Accounts what the known writer sent and was refused before its header could be read.
     pub fn reject(&mut self, rejection: Rejection) -> Arrival {
         self.count(rejection);
-        // Before there is a known writer, nobody can misbehave in its name.
+        // Without a known writer there is nobody to hold it against.
         let is_known = self.writer != Writer::Service && self.last.is_some();
-        if rejection.is_misbehaviour() && is_known {
+        if rejection.is_offence() && is_known {
             self.remember(true);
         }
         Arrival::Rejected(rejection)
@@ -215,13 +217,14 @@ impl InputAccount {
         };
         let is_silent = now_ns.saturating_sub(last.taken_ns) > SILENT_NS;
         if header.epoch != last.epoch {
-            let is_believed = match self.writer {
+            let is_accepted = match self.writer {
                 Writer::Service => true,
-                // The transport says that the one before is gone; but nobody starts anew each time.
+                // The transport guarantees that the one before is gone. One that restarts with
+                // every block is refused all the same.
                 Writer::Publisher => now_ns.saturating_sub(last.started_ns) > SILENT_NS,
-                Writer::Stranger => is_silent,
+                Writer::Socket => is_silent,
             };
-            return if is_believed {
+            return if is_accepted {
                 Arrival::NewEpoch
             } else {
                 Arrival::Rejected(Rejection::OtherWriter)
@@ -237,12 +240,12 @@ impl InputAccount {
         }
     }
 
-    fn remember(&mut self, is_misbehaviour: bool) {
+    fn remember(&mut self, is_offence: bool) {
         let mask = (1 << HISTORY) - 1;
-        self.misbehaved = (self.misbehaved << 1 | u32::from(is_misbehaviour)) & mask;
-        if self.misbehaved.count_ones() >= MISBEHAVED_MAX {
+        self.offences = (self.offences << 1 | u32::from(is_offence)) & mask;
+        if self.offences.count_ones() >= OFFENCES_MAX {
             self.is_quarantined = true;
-        } else if self.misbehaved == 0 {
+        } else if self.offences == 0 {
             self.is_quarantined = false;
         }
     }

@@ -3,7 +3,7 @@
 use hdrhistogram::{CreationError, Histogram};
 use serde::{Deserialize, Serialize};
 
-/// Largest latency that is told apart, ns; longer ones count as this long, and are counted apart.
+/// Largest latency that is resolved, ns; longer ones count as this long, and in `over_range`.
 pub const LATENCY_NS_MAX: u64 = 60_000_000_000;
 
 /// Histogram of latencies in ns, three significant digits.
@@ -49,7 +49,7 @@ impl Latency {
         })
     }
 
-    /// The same histogram, which takes nothing: to measure what recording costs.
+    /// A histogram that records nothing: to measure what recording costs.
     #[must_use]
     pub const fn switched_off(mut self) -> Self {
         self.is_off = true;
@@ -69,11 +69,9 @@ impl Latency {
             .saturating_record(ns.clamp(1, LATENCY_NS_MAX));
     }
 
-    /// Forgets everything recorded so far (the end of the warm-up).
-    pub fn clear(&mut self) {
-        self.histogram.reset();
-        self.over_range = 0;
-        self.max_ns = 0;
+    /// Latencies recorded; `None` if it records nothing.
+    pub(crate) fn count(&self) -> Option<u64> {
+        (!self.is_off).then(|| self.histogram.len())
     }
 
     /// The percentiles so far.
@@ -82,9 +80,15 @@ impl Latency {
         if self.histogram.is_empty() {
             return Percentiles::default();
         }
+        let n = self.histogram.len();
+        assert!(
+            self.over_range <= n,
+            "latencies beyond the range are counted with the others: {} of {n}",
+            self.over_range
+        );
         let at = |quantile| self.histogram.value_at_quantile(quantile).min(self.max_ns);
         Percentiles {
-            n: self.histogram.len(),
+            n,
             p50_ns: at(0.5),
             p90_ns: at(0.9),
             p99_ns: at(0.99),
@@ -131,5 +135,14 @@ mod tests {
         latency.record(u64::MAX);
         let p = latency.percentiles();
         assert_eq!((p.n, p.over_range, p.max_ns), (2, 1, u64::MAX));
+    }
+
+    #[test]
+    #[should_panic(expected = "latencies beyond the range are counted with the others")]
+    fn more_latencies_beyond_the_range_than_in_all_are_found() {
+        let mut latency = Latency::new().unwrap();
+        latency.record(1);
+        latency.over_range = 2;
+        let _ = latency.percentiles();
     }
 }

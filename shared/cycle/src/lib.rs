@@ -9,14 +9,16 @@
 
 pub mod allocation;
 pub mod clock;
+mod cycle_account;
 pub mod datagrams;
 mod deadline;
 pub mod domain;
+pub mod failure;
 pub mod health;
 pub mod input;
 pub mod keep_awake;
 pub mod latency;
-pub mod live;
+mod live;
 pub mod on_miss;
 pub mod placement;
 pub mod port;
@@ -35,6 +37,7 @@ pub mod wake;
 pub mod watchdog;
 
 pub use clock::{Clock, Monotonic, VirtualClock};
+pub use cycle_account::CycleAccount;
 pub use deadline::{DeadlineMonitor, Schedule};
 pub use domain::Domain;
 pub use health::HealthBoard;

@@ -33,17 +33,27 @@ pub struct Run {
     pub page_faults: Option<[u64; 2]>,
 }
 
-/// Counts page faults from the end of the warm-up on.
-#[derive(Debug, Default)]
-struct SteadyFaults {
-    before: Option<[u64; 2]>,
+/// The warm-up of a run: page faults count from its end on.
+#[derive(Debug)]
+pub(crate) struct WarmUp {
+    faults_before: Option<[u64; 2]>,
+    fails: bool,
 }
 
-impl SteadyFaults {
+impl WarmUp {
+    /// A warm-up that ends in a failed assertion if `fails`: for the tests of what follows then.
+    pub(crate) const fn new(fails: bool) -> Self {
+        Self {
+            faults_before: None,
+            fails,
+        }
+    }
+
     /// Takes the number of cycles done; asks the kernel once.
     fn take(&mut self, cycles: u64) {
-        if self.before.is_none() && cycles >= WARM_UP_CYCLES {
-            self.before = Some(page_faults());
+        if self.faults_before.is_none() && cycles >= WARM_UP_CYCLES {
+            assert!(!self.fails, "an assertion fails because a test wants it");
+            self.faults_before = Some(page_faults());
         }
     }
 
@@ -52,7 +62,7 @@ impl SteadyFaults {
         let since = |before: [u64; 2]| [after[0] - before[0], after[1] - before[1]];
         Run {
             ended,
-            page_faults: self.before.map(since),
+            page_faults: self.faults_before.map(since),
         }
     }
 }
@@ -62,38 +72,39 @@ impl SteadyFaults {
 ///
 /// # Errors
 /// The transport's; the service ends then and the launcher restarts it.
-pub fn run_stage(
+pub(crate) fn run_stage(
     cycle: &mut StageCycle,
     stage: &mut impl Stage,
     inputs: &impl Inputs,
     spin_ns: u64,
+    mut warm_up: WarmUp,
 ) -> Result<Run, PortError> {
     let timer = Timer::new().map_err(|e| PortError::setup("timer", &e))?;
-    let mut faults = SteadyFaults::default();
     let mut ended = ServiceEnd::Stopped;
-    cycle.ready(&Monotonic)?;
+    cycle.account_mut().ready(&Monotonic)?;
     while !signal::stop_requested() {
-        let wake = await_input(cycle, stage, (inputs, &timer), spin_ns);
+        let wake = await_input(cycle, stage, inputs, &timer, spin_ns);
         if cycle.turn(stage, &Monotonic)?.is_break() {
             ended = ServiceEnd::Missed;
             break;
         }
-        faults.take(cycle.health().view().cycles);
+        warm_up.take(cycle.account().health().view().cycles);
         if wake == Wake::Input && !cycle.had_input() {
-            // Whoever floods the topic with wake-ups is not to hold the core.
+            // A flood of wake-ups must not hold the core.
             let until_ns = cycle.listens_again_ns(Monotonic.now_ns());
             wake::wait(&timer, [NOTHING; 2], until_ns);
         }
     }
-    cycle.stop(&Monotonic)?;
-    Ok(faults.run(ended))
+    cycle.account_mut().stop(&Monotonic)?;
+    Ok(warm_up.run(ended))
 }
 
 /// Returns when there may be input, or something is due, and which.
 fn await_input(
     cycle: &StageCycle,
     stage: &impl Stage,
-    (inputs, timer): (&impl Inputs, &Timer),
+    inputs: &impl Inputs,
+    timer: &Timer,
     spin_ns: u64,
 ) -> Wake {
     let due_ns = cycle.next_wake_ns().min(Monotonic.now_ns() + WAIT_NS_MAX);
@@ -106,7 +117,8 @@ fn await_input(
     };
     let expected_ns = cycle.expected_input_ns().filter(|_| spin_ns > 0);
     if let Some(expected_ns) = expected_ns {
-        // What a spin has found may be announced only now; what has come since is not lost with it.
+        // The wake-up of a block that a spin has found may come only now: it is drained first, so
+        // that no block that came since is missed.
         inputs.drain();
         if stage.has_input() {
             return Wake::Input;
@@ -144,14 +156,14 @@ fn spin_until(until_ns: u64, found: impl Fn() -> bool) -> bool {
 ///
 /// # Errors
 /// The transport's; the service ends then and the launcher restarts it.
-pub fn run_source(
+pub(crate) fn run_source(
     cycle: &mut SourceCycle,
     source: &mut impl Source,
     spin_ns: u64,
+    mut warm_up: WarmUp,
 ) -> Result<Run, PortError> {
-    let mut faults = SteadyFaults::default();
     let mut ended = ServiceEnd::Stopped;
-    cycle.ready(&Monotonic)?;
+    cycle.account_mut().ready(&Monotonic)?;
     while !signal::stop_requested() {
         let latest_ns = Monotonic.now_ns() + WAIT_NS_MAX;
         let due_ns = cycle.next_wake_ns();
@@ -165,15 +177,15 @@ pub fn run_source(
             ended = ServiceEnd::Missed;
             break;
         }
-        faults.take(cycle.health().view().cycles);
+        warm_up.take(cycle.account().health().view().cycles);
     }
-    cycle.stop(&Monotonic)?;
-    Ok(faults.run(ended))
+    cycle.account_mut().stop(&Monotonic)?;
+    Ok(warm_up.run(ended))
 }
 
 /// Places the calling thread; see [`placement::apply`].
 #[must_use]
-pub fn place(wanted: PlacementRequest) -> Placement {
+pub(crate) fn place(wanted: PlacementRequest) -> Placement {
     signal::install();
     placement::apply(wanted)
 }

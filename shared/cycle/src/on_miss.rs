@@ -15,7 +15,7 @@ pub enum OnMiss {
     Predict,
     /// As `predict`, and the service calls itself degraded until 100 cycles in a row are in time.
     Degrade,
-    /// Ends the service, and with it the graph: the robot stops, as no action is valid any more.
+    /// Ends the service, and with it the graph: the last action expires and the robot stops.
     Stop,
 }
 
@@ -27,7 +27,8 @@ impl OnMiss {
     }
 }
 
-/// Cycles in time after which a service is no longer degraded for being late.
+/// Cycles in time after which a service is no longer degraded for being late: a second at 100 Hz.
+/// Fewer, and `degraded` would flicker; more, and it would outlast its cause.
 pub const IN_TIME_AGAIN: u32 = 100;
 
 /// Whether a service is to be called degraded for being late.
@@ -47,6 +48,10 @@ impl Lateness {
             self.in_time += 1;
             self.is_late = self.in_time < IN_TIME_AGAIN;
         }
+        assert!(
+            !self.is_late || self.in_time < IN_TIME_AGAIN,
+            "enough cycles in time end the lateness"
+        );
         self.is_late
     }
 }
@@ -70,5 +75,15 @@ mod tests {
         }
         assert!(!lateness.take(OnMiss::Degrade, 0, true));
         assert!(!lateness.take(OnMiss::Predict, 1, true));
+    }
+
+    #[test]
+    #[should_panic(expected = "enough cycles in time end the lateness")]
+    fn lateness_that_outlasts_its_cycles_is_found() {
+        let mut lateness = Lateness {
+            in_time: IN_TIME_AGAIN,
+            is_late: true,
+        };
+        lateness.take(OnMiss::Degrade, 0, false);
     }
 }

@@ -10,6 +10,7 @@ pub struct Recorder {
     /// The histograms.
     pub timing: Timing,
     stamps: Option<Stamps>,
+    cycles: u64,
 }
 
 impl Recorder {
@@ -21,17 +22,18 @@ impl Recorder {
         Ok(Self {
             timing: Timing::new()?,
             stamps: None,
+            cycles: 0,
         })
     }
 
-    /// The same, which keeps the stamps of the last `capacity` cycles.
+    /// The same recorder, which also keeps the stamps of the last `capacity` cycles.
     #[must_use]
     pub fn with_stamps(mut self, capacity: usize) -> Self {
         self.stamps = Some(Stamps::new(capacity));
         self
     }
 
-    /// The same without histograms: what they cost can be measured.
+    /// The same recorder without histograms: to measure what they cost.
     #[must_use]
     pub fn without_timing(mut self) -> Self {
         self.timing = self.timing.switched_off();
@@ -44,13 +46,47 @@ impl Recorder {
         self.stamps.as_ref()
     }
 
+    /// Cycles kept so far.
+    pub(crate) const fn cycles(&self) -> u64 {
+        self.cycles
+    }
+
     /// Keeps a cycle that has published; returns its time from wake-up to publication, ns.
     pub fn keep(&mut self, cycle: CycleStamps) -> u64 {
         let cycle_ns = cycle.t_publish_ns.saturating_sub(cycle.t_wake_ns);
         self.timing.step.record(cycle_ns);
+        self.cycles += 1;
+        let recorded = self.timing.step.count().unwrap_or(self.cycles);
+        assert!(
+            recorded == self.cycles,
+            "the histogram counts every cycle: {recorded} of {}",
+            self.cycles
+        );
         if let Some(stamps) = &mut self.stamps {
             stamps.push(cycle);
         }
         cycle_ns
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[should_panic(expected = "the histogram counts every cycle: 2 of 1")]
+    fn a_histogram_with_a_cycle_too_many_is_found() {
+        let mut recorder = Recorder::new().unwrap();
+        recorder.timing.step.record(1);
+        recorder.keep(CycleStamps::default());
+    }
+
+    #[test]
+    fn a_recorder_without_histograms_keeps_stamps() {
+        let recorder = Recorder::new().unwrap().without_timing();
+        let mut recorder = recorder.with_stamps(2);
+        recorder.keep(CycleStamps::default());
+        assert_eq!(recorder.timing.step.percentiles().n, 0);
+        assert_eq!(recorder.stamps().unwrap().iter().count(), 1);
     }
 }

@@ -4,10 +4,12 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::clock::{Clock, Monotonic};
+use crate::cycle_account::CycleAccount;
 use crate::deadline::{DeadlineMonitor, Schedule};
 use crate::domain::{Domain, Queues};
+use crate::failure;
 use crate::health::HealthBoard;
-use crate::live::{self, Run, ServiceEnd};
+use crate::live::{self, Run, ServiceEnd, WarmUp};
 use crate::on_miss::OnMiss;
 use crate::placement::PlacementRequest;
 use crate::port::{Graph, Link, PortError};
@@ -21,6 +23,9 @@ use crate::wake::Inputs;
 
 /// Delay between the opened ports and the first frame of a source, ns: time for the others.
 const START_DELAY_NS: u64 = 50_000_000;
+
+/// For tests: the service that this variable names fails an assertion at the end of its warm-up.
+const FAILS_VARIABLE: &str = "VIGIL_FAILS";
 
 /// What a service process is to be.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,18 +133,15 @@ pub fn woken_by<S: Stage, I: Inputs>(
     plan: &Plan,
     build: impl FnOnce(&Graph) -> Result<(S, I), ServeError>,
 ) -> Result<(), ServeError> {
-    let (graph, health) = open(plan)?;
+    let (graph, account) = open(plan)?;
     let (mut stage, inputs) = build(&graph)?;
-    let monitor = DeadlineMonitor::new(plan.schedule);
-    let mut cycle = StageCycle::new(monitor, health)?
-        .with_on_miss(plan.on_miss)
-        .with_input_of(stage.writer())
-        .with_recorder(plan.leave.recorder()?);
+    let mut cycle = StageCycle::new(account).with_input_of(stage.writer());
     if stage.particles() > 0 {
         cycle = cycle.with_shedder(Shedder::new(stage.particles(), plan.schedule));
     }
-    let run = live::run_stage(&mut cycle, &mut stage, &inputs, plan.spin_ns)?;
-    leave(plan, cycle.recorder(), run)
+    let warm_up = warm_up(plan);
+    let run = live::run_stage(&mut cycle, &mut stage, &inputs, plan.spin_ns, warm_up)?;
+    leave(plan, cycle.account().recorder(), run)
 }
 
 /// Runs a source until SIGINT or SIGTERM.
@@ -150,24 +152,30 @@ pub fn source<S: Source>(
     plan: &Plan,
     build: impl FnOnce(&Graph) -> Result<S, ServeError>,
 ) -> Result<(), ServeError> {
-    let (graph, health) = open(plan)?;
+    let (graph, account) = open(plan)?;
     let mut source = build(&graph)?;
     let first_ns = Monotonic.now_ns() + START_DELAY_NS;
-    let monitor = DeadlineMonitor::new(plan.schedule);
-    let mut cycle = SourceCycle::new(monitor, health, first_ns)?
-        .with_on_miss(plan.on_miss)
-        .with_recorder(plan.leave.recorder()?);
-    let run = live::run_source(&mut cycle, &mut source, plan.spin_ns)?;
-    leave(plan, cycle.recorder(), run)
+    let mut cycle = SourceCycle::new(account, first_ns);
+    let run = live::run_source(&mut cycle, &mut source, plan.spin_ns, warm_up(plan))?;
+    leave(plan, cycle.account().recorder(), run)
 }
 
-fn open(plan: &Plan) -> Result<(Graph, HealthBoard), PortError> {
-    let placement = live::place(plan.wanted);
+fn warm_up(plan: &Plan) -> WarmUp {
+    let name = plan.service.as_str();
+    WarmUp::new(std::env::var_os(FAILS_VARIABLE).is_some_and(|fails| fails == name))
+}
+
+fn open(plan: &Plan) -> Result<(Graph, CycleAccount), PortError> {
     let domain = Domain::new(&plan.graph, plan.queues)?;
+    failure::end_on_panic(domain.failure_file(plan.service));
+    let placement = live::place(plan.wanted);
     let graph = Graph::SharedMemory(Link::join(&domain, plan.service.as_str())?);
     let sender = graph.sender(Topic::Health(plan.service))?;
     let health = HealthBoard::new(sender, plan.schedule, plan.wanted, placement);
-    Ok((graph, health))
+    let account = CycleAccount::new(DeadlineMonitor::new(plan.schedule), health)?
+        .with_on_miss(plan.on_miss)
+        .with_recorder(plan.leave.recorder()?);
+    Ok((graph, account))
 }
 
 fn leave(plan: &Plan, recorder: &Recorder, run: Run) -> Result<(), ServeError> {

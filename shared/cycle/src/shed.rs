@@ -123,6 +123,11 @@ impl Shedder {
 
     fn allow(&mut self, particles: u32) -> Option<u32> {
         let particles = particles.min(self.configured);
+        assert!(
+            particles >= self.configured.min(PARTICLES_MIN),
+            "some particles are always allowed: {particles} of {}",
+            self.configured
+        );
         let is_new = particles != self.allowed;
         self.allowed = particles;
         is_new.then_some(particles)
@@ -225,5 +230,11 @@ mod tests {
         assert_eq!(run(&mut many, 1000, 1_000_000), PARTICLES_MIN);
         let mut few = shedder(8, 1_000_000);
         assert_eq!(run(&mut few, 1000, 1_000_000), 8);
+    }
+
+    #[test]
+    #[should_panic(expected = "some particles are always allowed: 3 of 1000")]
+    fn an_allowance_of_too_few_particles_is_found() {
+        shedder(1000, 1_000_000).allow(3);
     }
 }

@@ -2,14 +2,12 @@
 
 use std::ops::ControlFlow;
 
-use vigil_blocks::{Degraded, ServiceState};
-
 use crate::clock::Clock;
-use crate::deadline::{DeadlineMonitor, GAP_INSTANTS_MAX};
+use crate::cycle_account::{CycleAccount, TurnResult};
+use crate::deadline::GAP_INSTANTS_MAX;
+use crate::failure::{Work, work_on};
 use crate::health::HealthBoard;
-use crate::on_miss::{Lateness, OnMiss};
 use crate::port::PortError;
-use crate::recorder::Recorder;
 use crate::stamps::CycleStamps;
 
 /// What a source did at an instant of its schedule.
@@ -47,67 +45,41 @@ pub trait Source {
 
 /// Runs a [`Source`], one turn at a time.
 pub struct SourceCycle {
-    monitor: DeadlineMonitor,
-    health: HealthBoard,
-    recorder: Recorder,
+    account: CycleAccount,
     next_ns: u64,
     ended: bool,
-    on_miss: OnMiss,
-    lateness: Lateness,
 }
 
 impl SourceCycle {
-    /// A cycle whose first frame is due at `first_ns`.
-    ///
-    /// # Errors
-    /// None in practice; see [`crate::Latency::new`].
-    pub fn new(
-        monitor: DeadlineMonitor,
-        health: HealthBoard,
-        first_ns: u64,
-    ) -> Result<Self, PortError> {
-        Ok(Self {
-            monitor,
-            health,
-            recorder: Recorder::new()?,
+    /// A cycle that keeps this account; its first frame is due at `first_ns`.
+    #[must_use]
+    pub const fn new(account: CycleAccount, first_ns: u64) -> Self {
+        Self {
+            account,
             next_ns: first_ns,
             ended: false,
-            on_miss: OnMiss::default(),
-            lateness: Lateness::default(),
-        })
+        }
     }
 
-    /// The same cycle with this answer to its own misses.
+    /// What it accounts.
     #[must_use]
-    pub const fn with_on_miss(mut self, on_miss: OnMiss) -> Self {
-        self.on_miss = on_miss;
-        self
+    pub const fn account(&self) -> &CycleAccount {
+        &self.account
     }
 
-    /// The same cycle with this recorder.
-    #[must_use]
-    pub fn with_recorder(mut self, recorder: Recorder) -> Self {
-        self.recorder = recorder;
-        self
+    /// What it accounts, to announce start and stop.
+    pub const fn account_mut(&mut self) -> &mut CycleAccount {
+        &mut self.account
     }
 
     /// When the next turn is due, ns.
     #[must_use]
     pub fn next_wake_ns(&self) -> u64 {
         if self.ended {
-            self.health.due_ns()
+            self.account.health.due_ns()
         } else {
             self.next_ns
         }
-    }
-
-    /// Announces that the ports are open.
-    ///
-    /// # Errors
-    /// The transport's.
-    pub fn ready(&mut self, clock: &impl Clock) -> Result<(), PortError> {
-        self.health.enter(ServiceState::Ready);
-        self.health.publish(clock)
     }
 
     /// One turn: skip instants that were slept through (slips), produce, publish, account. Breaks
@@ -121,76 +93,74 @@ impl SourceCycle {
         clock: &impl Clock,
     ) -> Result<ControlFlow<()>, PortError> {
         let woken_ns = clock.now_ns();
-        let missed_before = self.monitor.missed();
+        let mut turn = TurnResult {
+            missed: 0,
+            is_published: false,
+        };
         if !self.ended && woken_ns >= self.next_ns {
-            let slips = (woken_ns - self.next_ns) / self.monitor.period_ns();
-            let schedule_ns = self.next_ns + slips * self.monitor.period_ns();
-            // Each instant that was slept through waited, too.
-            for instant in 0..=slips.min(GAP_INSTANTS_MAX) {
-                let late_ns = woken_ns - schedule_ns + instant * self.monitor.period_ns();
-                self.recorder.timing.wake_up.record(late_ns);
-            }
-            match source.produce(schedule_ns, clock)? {
-                SourceOutcome::Nothing => {}
-                SourceOutcome::End => self.ended = true,
-                SourceOutcome::Frame(published_ns) => {
-                    self.account(schedule_ns, woken_ns, published_ns, slips);
-                }
-            }
-            self.next_ns = schedule_ns + self.monitor.period_ns();
+            turn = self.produce(source, woken_ns, clock)?;
         }
         source.prepare()?;
-        source.after(&mut self.health, clock.now_ns());
-        self.health.publish(clock)?;
-        let is_end = self.monitor.missed() > missed_before && self.on_miss == OnMiss::Stop;
-        Ok(if is_end {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        })
+        let now_ns = clock.now_ns();
+        self.account.settle(now_ns, turn);
+        source.after(&mut self.account.health, now_ns);
+        self.account.health.publish(clock)?;
+        Ok(self.account.verdict(turn.missed))
     }
 
-    fn account(&mut self, schedule_ns: u64, woken_ns: u64, published_ns: u64, slips: u64) {
-        let latency = &mut self.recorder.timing.from_schedule;
-        let missed = self.monitor.published(schedule_ns, published_ns, latency);
-        let cycle_ns = self.recorder.keep(CycleStamps {
+    /// Produces the frame of the newest instant that is due, and accounts those slept through.
+    fn produce(
+        &mut self,
+        source: &mut impl Source,
+        woken_ns: u64,
+        clock: &impl Clock,
+    ) -> Result<TurnResult, PortError> {
+        let period_ns = self.account.monitor.period_ns();
+        let slips = (woken_ns - self.next_ns) / period_ns;
+        let schedule_ns = self.next_ns + slips * period_ns;
+        work_on(Work::Frame {
+            t_schedule_ns: schedule_ns,
+        });
+        let timing = &mut self.account.recorder.timing;
+        // Each instant that was slept through waited, too.
+        for instant in 0..=slips.min(GAP_INSTANTS_MAX) {
+            let late_ns = woken_ns - schedule_ns + instant * period_ns;
+            timing.wake_up.record(late_ns);
+        }
+        self.next_ns = schedule_ns + period_ns;
+        let published_ns = match source.produce(schedule_ns, clock)? {
+            SourceOutcome::Frame(published_ns) => published_ns,
+            outcome => {
+                self.ended |= outcome == SourceOutcome::End;
+                return Ok(TurnResult {
+                    missed: 0,
+                    is_published: false,
+                });
+            }
+        };
+        assert!(
+            published_ns >= woken_ns,
+            "a frame is published after the wake-up: {published_ns} < {woken_ns} ns"
+        );
+        let cycle = CycleStamps {
             t_schedule_ns: schedule_ns,
             t_input_ns: schedule_ns,
             t_wake_ns: woken_ns,
             t_publish_ns: published_ns,
-        });
-        let seq = self.health.view().cycles;
-        self.health.count_cycle(cycle_ns, seq);
-        self.health.block().answered_seq = seq;
-        self.health.enter(ServiceState::Running);
-        let (total, accounted_ns) = (self.monitor.missed(), self.monitor.accounted_ns());
-        let health = self.health.block();
+        };
+        let account = &mut self.account;
+        let seq = account.health.view().cycles;
+        let latency = &mut account.recorder.timing.from_schedule;
+        let missed = account
+            .monitor
+            .published(schedule_ns, published_ns, latency);
+        account.count_cycle(cycle, seq);
+        let health = account.health.block();
+        health.answered_seq = seq;
         health.slips += slips;
-        (health.missed, health.accounted_ns) = (total, accounted_ns);
-        self.health.miss(published_ns, missed);
-        let is_late = self.lateness.take(self.on_miss, missed, true);
-        self.health
-            .set_degraded(published_ns, Degraded::LATE, is_late);
-    }
-
-    /// Announces the end.
-    ///
-    /// # Errors
-    /// The transport's.
-    pub fn stop(&mut self, clock: &impl Clock) -> Result<(), PortError> {
-        self.health.enter(ServiceState::Stopping);
-        self.health.publish(clock)
-    }
-
-    /// What it has kept of its cycles.
-    #[must_use]
-    pub const fn recorder(&self) -> &Recorder {
-        &self.recorder
-    }
-
-    /// The board.
-    #[must_use]
-    pub const fn health(&self) -> &HealthBoard {
-        &self.health
+        Ok(TurnResult {
+            missed,
+            is_published: true,
+        })
     }
 }

@@ -2,24 +2,25 @@
 
 use std::ops::ControlFlow;
 
-use vigil_blocks::{Block, Cause, CauseKind, Degraded, Header, Rejection, ServiceState};
+use vigil_blocks::{Block, BlockId, Cause, CauseKind, Header, Rejection};
 
 use crate::clock::Clock;
-use crate::deadline::DeadlineMonitor;
+use crate::cycle_account::{CycleAccount, TurnResult};
+use crate::failure::{Work, work_on};
 use crate::health::HealthBoard;
 use crate::input::{Arrival, InputAccount, Writer};
 use crate::latency::Latency;
-use crate::on_miss::{Lateness, OnMiss};
 use crate::port::{PortError, Stamp};
-use crate::recorder::Recorder;
 use crate::shed::Shedder;
 use crate::stamps::CycleStamps;
 
-/// Misses in a row after which the input counts as lost, and the service as degraded.
+/// Misses in a row after which the input counts as lost, and the service as degraded. With fewer, a
+/// single stall of the machine would count; with more, a loss would show later.
 const LOST_AFTER_MISSES: u64 = 3;
-/// After a wake-up that brought nothing, the stage is deaf for this part of a period at least.
-const DEAF_PERIOD_PART: u64 = 32;
-/// It listens again this part of a period before its input is expected.
+/// After a wake-up without input the stage ignores wake-ups for this part of a period at least: a
+/// flood of them takes a core for 1/32 of the time at most. Larger, it would answer late.
+const PAUSE_PERIOD_PART: u64 = 32;
+/// It listens again this part of a period before its input is expected: more than inputs jitter.
 const EARLY_PERIOD_PART: u64 = 16;
 
 /// A service's work, as the cycle sees it. Implementations hold the ports and the filter.
@@ -99,7 +100,7 @@ impl Intake<'_> {
         self.admit::<T>(header, || Ok(()))
     }
 
-    /// The same for a block from outside, of which `content` judges what it says.
+    /// Accounts a block from outside the graph; `content` checks what it holds.
     pub fn admit<T: Block>(
         &mut self,
         header: &Header,
@@ -107,6 +108,10 @@ impl Intake<'_> {
     ) -> bool {
         let (now_ns, period_ns) = (self.now_ns(), self.period_ns);
         let arrival = self.account.admit::<T>(header, now_ns, period_ns, content);
+        if arrival.is_taken() {
+            let BlockId { epoch, seq } = header.id();
+            work_on(Work::Input { epoch, seq });
+        }
         self.new_epoch |= arrival == Arrival::NewEpoch;
         self.is_input |= arrival.is_taken();
         arrival.is_taken()
@@ -124,19 +129,19 @@ impl Intake<'_> {
         arrival.is_taken()
     }
 
-    /// Accounts what was refused before it had a header.
+    /// Accounts what the known writer sent and was refused before its header could be read.
     pub fn reject(&mut self, rejection: Rejection) {
         self.account.reject(rejection);
     }
 
-    /// Accounts what was refused and is nobody's.
+    /// Accounts what was refused and cannot be attributed to a writer.
     pub fn count(&mut self, rejection: Rejection) {
         self.account.count(rejection);
     }
 
-    /// The filter has stepped the sensor frame (epoch, seq) behind the accepted block with this
-    /// header: the output answers its instant of the schedule.
-    pub fn stepped(&mut self, header: &Header, (frame_epoch, frame_seq): (u64, u64)) {
+    /// The filter has stepped `frame`, the sensor frame behind the accepted block with this header:
+    /// the output answers its instant of the schedule.
+    pub fn stepped(&mut self, header: &Header, frame: BlockId) {
         // An old frame never moves the schedule back.
         if self.frames == 0 || header.t_schedule_ns >= self.newest.t_schedule_ns || self.new_epoch {
             self.newest = *header;
@@ -146,12 +151,13 @@ impl Intake<'_> {
         self.cause = Cause {
             kind: CauseKind::Frame as u32,
             count: self.frames,
-            frame_epoch,
-            frame_seq,
+            frame_epoch: frame.epoch,
+            frame_seq: frame.seq,
         };
     }
 
-    /// Now, ns: who is held up in a turn gets blocks that were not due when it began.
+    /// Now, ns. Read anew for each block: during a long turn blocks arrive that were not due when it
+    /// began.
     #[must_use]
     pub fn now_ns(&self) -> u64 {
         self.clock.now_ns()
@@ -184,7 +190,7 @@ impl Timing {
         })
     }
 
-    /// The same histograms, which take nothing.
+    /// Histograms that record nothing.
     #[must_use]
     pub fn switched_off(self) -> Self {
         Self {
@@ -197,15 +203,11 @@ impl Timing {
 
 /// Runs a [`Stage`], one turn at a time.
 pub struct StageCycle {
-    monitor: DeadlineMonitor,
-    account: InputAccount,
-    health: HealthBoard,
-    recorder: Recorder,
+    account: CycleAccount,
+    input: InputAccount,
     last_cause: Cause,
     last_stamp: Stamp,
     misses_in_a_row: u64,
-    on_miss: OnMiss,
-    lateness: Lateness,
     shedder: Option<Shedder>,
     /// From the schedule to the publication of the last input, ns.
     input_offset_ns: u64,
@@ -216,39 +218,26 @@ pub struct StageCycle {
 }
 
 impl StageCycle {
-    /// A cycle with this monitor and board.
-    ///
-    /// # Errors
-    /// None in practice; see [`Latency::new`].
-    pub fn new(monitor: DeadlineMonitor, health: HealthBoard) -> Result<Self, PortError> {
-        Ok(Self {
-            monitor,
-            account: InputAccount::default(),
-            health,
-            recorder: Recorder::new()?,
+    /// A cycle that keeps this account.
+    #[must_use]
+    pub fn new(account: CycleAccount) -> Self {
+        Self {
+            account,
+            input: InputAccount::default(),
             last_cause: Cause::default(),
             last_stamp: Stamp::default(),
             misses_in_a_row: 0,
-            on_miss: OnMiss::default(),
-            lateness: Lateness::default(),
             shedder: None,
             input_offset_ns: 0,
             woken_after_ns: 0,
             had_input: false,
-        })
+        }
     }
 
-    /// The same cycle, whose input this writer writes.
+    /// The same cycle, whose input comes from this kind of writer.
     #[must_use]
     pub fn with_input_of(mut self, writer: Writer) -> Self {
-        self.account = InputAccount::new(writer);
-        self
-    }
-
-    /// The same cycle with this answer to its own misses.
-    #[must_use]
-    pub const fn with_on_miss(mut self, on_miss: OnMiss) -> Self {
-        self.on_miss = on_miss;
+        self.input = InputAccount::new(writer);
         self
     }
 
@@ -259,11 +248,15 @@ impl StageCycle {
         self
     }
 
-    /// The same cycle with this recorder.
+    /// What it accounts.
     #[must_use]
-    pub fn with_recorder(mut self, recorder: Recorder) -> Self {
-        self.recorder = recorder;
-        self
+    pub const fn account(&self) -> &CycleAccount {
+        &self.account
+    }
+
+    /// What it accounts, to announce start and stop.
+    pub const fn account_mut(&mut self) -> &mut CycleAccount {
+        &mut self.account
     }
 
     /// When the next input is to be expected, ns: a period after the last one came; `None` before
@@ -276,9 +269,10 @@ impl StageCycle {
         )
     }
 
-    /// When the next instant of the schedule is, ns; `None` as above.
+    /// When the next instant of the schedule is, ns; `None` before the first input, and while the
+    /// input is lost.
     fn next_schedule_ns(&self) -> Option<u64> {
-        let next_ns = self.last_stamp.t_schedule_ns + self.monitor.period_ns();
+        let next_ns = self.last_stamp.t_schedule_ns + self.account.monitor.period_ns();
         (self.last_stamp.t_schedule_ns > 0 && self.misses_in_a_row == 0).then_some(next_ns)
     }
 
@@ -289,37 +283,29 @@ impl StageCycle {
     }
 
     /// When to listen again after a wake-up at `now_ns` that brought no input, ns: shortly before
-    /// the next input is expected, at once but for a breath if that is now, and no later than the
-    /// next turn is due.
+    /// the next input is expected, after a short pause if that is now, and no later than the next
+    /// turn is due.
     #[must_use]
     pub fn listens_again_ns(&self, now_ns: u64) -> u64 {
-        let period_ns = self.monitor.period_ns();
+        let period_ns = self.account.monitor.period_ns();
         let early_ns = period_ns / EARLY_PERIOD_PART;
         // The last input may have been late: the next may come as soon as it is due.
         let expected_ns = self
             .next_schedule_ns()
             .map_or(0, |ns| ns.saturating_sub(early_ns));
-        let breath_ns = now_ns + period_ns / DEAF_PERIOD_PART;
-        expected_ns.max(breath_ns).min(self.next_wake_ns())
+        let pause_ends_ns = now_ns + period_ns / PAUSE_PERIOD_PART;
+        expected_ns.max(pause_ends_ns).min(self.next_wake_ns())
     }
 
     /// When the next turn is due at the latest, ns.
     #[must_use]
     pub fn next_wake_ns(&self) -> u64 {
         let deadline_ns = self
+            .account
             .monitor
             .next_deadline_ns()
             .map_or(u64::MAX, |ns| ns + 1);
-        deadline_ns.min(self.health.due_ns())
-    }
-
-    /// Announces that the ports are open.
-    ///
-    /// # Errors
-    /// The transport's.
-    pub fn ready(&mut self, clock: &impl Clock) -> Result<(), PortError> {
-        self.health.enter(ServiceState::Ready);
-        self.health.publish(clock)
+        deadline_ns.min(self.account.health.due_ns())
     }
 
     /// One turn: count passed deadlines, take input, step, publish, account. Breaks when a deadline
@@ -333,11 +319,11 @@ impl StageCycle {
         clock: &impl Clock,
     ) -> Result<ControlFlow<()>, PortError> {
         let woken_ns = clock.now_ns();
-        let mut overdue = self.monitor.overdue(woken_ns);
+        let mut missed = self.account.monitor.overdue(woken_ns);
         let mut intake = Intake {
-            account: &mut self.account,
+            account: &mut self.input,
             clock,
-            period_ns: self.monitor.period_ns(),
+            period_ns: self.account.monitor.period_ns(),
             is_input: false,
             frames: 0,
             newest: Header::default(),
@@ -347,65 +333,75 @@ impl StageCycle {
         stage.take(&mut intake);
         let (frames, newest, cause) = (intake.frames, intake.newest, intake.cause);
         self.had_input = intake.is_input;
+        assert!(
+            frames == 0 || self.had_input,
+            "a stage steps only frames behind blocks that it has accepted"
+        );
         if frames > 0 {
             let stamp = Stamp::from_header(&newest);
             let published_ns = stage.publish(cause, stamp, clock)?;
-            // What came while it was held up in this turn, it had not before it came.
-            let woken_ns = woken_ns.max(newest.t_publish_ns.min(published_ns));
-            self.answered(&newest, cause, [woken_ns, published_ns]);
-            self.health.block().late +=
-                u64::from(woken_ns > newest.t_schedule_ns + self.monitor.deadline_ns());
-            overdue += self.monitor.published(
-                stamp.t_schedule_ns,
-                published_ns,
-                &mut self.recorder.timing.from_schedule,
+            assert!(
+                published_ns >= woken_ns,
+                "a block is published after the wake-up: {published_ns} < {woken_ns} ns"
             );
+            // A block that came during this turn woke nobody: the wait for it ends with its
+            // publication.
+            let woken_ns = woken_ns.max(newest.t_publish_ns.min(published_ns));
+            missed += self.answered(&newest, cause, woken_ns, published_ns);
             (self.last_cause, self.last_stamp) = (cause, stamp);
-        } else if overdue > 0 {
-            self.predict(stage, overdue, clock)?;
+        } else if missed > 0 {
+            self.predict(stage, missed, clock)?;
         }
         stage.prepare()?;
-        self.report(stage, frames, overdue, clock)?;
-        let is_end = overdue > 0 && self.on_miss == OnMiss::Stop;
-        Ok(if is_end {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        })
+        let turn = TurnResult {
+            missed,
+            is_published: frames > 0,
+        };
+        self.report(stage, turn, clock)?;
+        Ok(self.account.verdict(missed))
     }
 
-    /// Notes the times of a cycle that answered the input behind `newest`.
-    fn answered(&mut self, newest: &Header, cause: Cause, [woken_ns, published_ns]: [u64; 2]) {
-        let timing = &mut self.recorder.timing;
+    /// Accounts a cycle that answered the input behind `newest`; returns how many instants it
+    /// reveals as missed.
+    fn answered(&mut self, newest: &Header, cause: Cause, woken_ns: u64, published_ns: u64) -> u64 {
+        let account = &mut self.account;
+        let timing = &mut account.recorder.timing;
         timing
             .wake_up
             .record(woken_ns.saturating_sub(newest.t_publish_ns));
-        let cycle_ns = self.recorder.keep(CycleStamps {
+        let from_schedule = &mut timing.from_schedule;
+        let missed = account
+            .monitor
+            .published(newest.t_schedule_ns, published_ns, from_schedule);
+        let cycle = CycleStamps {
             t_schedule_ns: newest.t_schedule_ns,
             t_input_ns: newest.t_publish_ns,
             t_wake_ns: woken_ns,
             t_publish_ns: published_ns,
-        });
-        self.health.count_cycle(cycle_ns, newest.seq);
-        // Somebody outside may claim any time of publication.
+        };
+        account.count_cycle(cycle, newest.seq);
+        // A publisher outside the graph may claim any time of publication.
         let offset_ns = newest.t_publish_ns.saturating_sub(newest.t_schedule_ns);
-        self.input_offset_ns = offset_ns.min(self.monitor.deadline_ns());
+        self.input_offset_ns = offset_ns.min(account.monitor.deadline_ns());
         self.woken_after_ns = woken_ns.saturating_sub(newest.t_schedule_ns);
-        let health = self.health.block();
+        let health = account.health.block();
         (health.answered_epoch, health.answered_seq) = (cause.frame_epoch, cause.frame_seq);
+        health.late += u64::from(woken_ns > newest.t_schedule_ns + account.monitor.deadline_ns());
+        missed
     }
 
-    /// The deadline has passed without input: what can be said without it, if that is wanted.
+    /// The deadline has passed without input: publishes the prediction, if that is wanted.
     fn predict(
         &mut self,
         stage: &mut impl Stage,
-        overdue: u64,
+        missed: u64,
         clock: &impl Clock,
     ) -> Result<(), PortError> {
-        if !self.on_miss.predicts() || !stage.predicts() {
+        if !self.account.on_miss.predicts() || !stage.predicts() {
             return Ok(());
         }
-        let count = u32::try_from(overdue).unwrap_or(u32::MAX);
+        let count = u32::try_from(missed).unwrap_or(u32::MAX);
+        work_on(Work::Missed(count));
         stage.miss(count);
         let cause = Cause {
             kind: CauseKind::Missed as u32,
@@ -413,7 +409,7 @@ impl StageCycle {
             ..self.last_cause
         };
         let stamp = Stamp {
-            t_schedule_ns: self.monitor.last_accounted_ns(),
+            t_schedule_ns: self.account.monitor.last_accounted_ns(),
             ..self.last_stamp
         };
         stage.publish(cause, stamp, clock).map(drop)
@@ -424,71 +420,38 @@ impl StageCycle {
         let Some(shedder) = &mut self.shedder else {
             return;
         };
-        let cycle_ns = self.health.view().last_cycle_ns;
+        let health = &mut self.account.health;
+        let cycle_ns = health.view().last_cycle_ns;
         let in_use = stage.particles_in_use();
         if let Some(particles) = shedder.take(cycle_ns, self.woken_after_ns, in_use) {
             stage.limit(particles);
         }
-        let (allowed, configured) = (shedder.allowed(), shedder.configured());
-        self.health.set_particles(now_ns, allowed, configured);
+        health.set_particles(now_ns, shedder.allowed(), shedder.configured());
     }
 
+    /// Off the critical path: accounts the turn, and publishes Health if it is due.
     fn report(
         &mut self,
         stage: &mut impl Stage,
-        frames: u32,
-        overdue: u64,
+        turn: TurnResult,
         clock: &impl Clock,
     ) -> Result<(), PortError> {
-        use vigil_blocks::EventKind::{InputBack, InputLost};
         let now_ns = clock.now_ns();
-        self.health.miss(now_ns, overdue);
-        let was_lost = self.misses_in_a_row >= LOST_AFTER_MISSES;
-        self.misses_in_a_row = if frames > 0 {
+        self.account.settle(now_ns, turn);
+        self.misses_in_a_row = if turn.is_published {
             0
         } else {
-            self.misses_in_a_row + overdue
+            self.misses_in_a_row + turn.missed
         };
         let is_lost = self.misses_in_a_row >= LOST_AFTER_MISSES;
-        if is_lost != was_lost {
-            let kind = if is_lost { InputLost } else { InputBack };
-            self.health
-                .event(now_ns, kind, 0, 0.0, self.misses_in_a_row);
-            self.health
-                .set_degraded(now_ns, Degraded::INPUT_LOST, is_lost);
-        }
-        let is_late = self.lateness.take(self.on_miss, overdue, frames > 0);
-        self.health.set_degraded(now_ns, Degraded::LATE, is_late);
-        if frames > 0 {
-            self.health.enter(ServiceState::Running);
+        let health = &mut self.account.health;
+        health.set_input_lost(now_ns, is_lost, self.misses_in_a_row);
+        if turn.is_published {
             self.shed(stage, now_ns);
         }
-        let (missed, accounted_ns) = (self.monitor.missed(), self.monitor.accounted_ns());
-        self.health.set_input(now_ns, &self.account);
-        let health = self.health.block();
-        (health.missed, health.accounted_ns) = (missed, accounted_ns);
-        stage.after(&mut self.health, now_ns);
-        self.health.publish(clock)
-    }
-
-    /// Announces the end.
-    ///
-    /// # Errors
-    /// The transport's.
-    pub fn stop(&mut self, clock: &impl Clock) -> Result<(), PortError> {
-        self.health.enter(ServiceState::Stopping);
-        self.health.publish(clock)
-    }
-
-    /// What it has kept of its cycles.
-    #[must_use]
-    pub const fn recorder(&self) -> &Recorder {
-        &self.recorder
-    }
-
-    /// The board.
-    #[must_use]
-    pub const fn health(&self) -> &HealthBoard {
-        &self.health
+        let health = &mut self.account.health;
+        health.set_input(now_ns, &self.input);
+        stage.after(health, now_ns);
+        health.publish(clock)
     }
 }

@@ -47,6 +47,10 @@ impl Stamps {
 
     /// Keeps the stamps of a cycle; the oldest gives way. Allocates nothing.
     pub fn push(&mut self, stamps: CycleStamps) {
+        assert!(
+            self.count % self.records.len() as u64 == self.next as u64,
+            "the ring's place follows from the cycles kept"
+        );
         self.records[self.next] = stamps;
         self.next = (self.next + 1) % self.records.len();
         self.count += 1;
@@ -130,5 +134,13 @@ mod tests {
         std::fs::write(&path, [0; 33]).unwrap();
         assert!(read(&path).is_err());
         std::fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    #[should_panic(expected = "the ring's place follows from the cycles kept")]
+    fn a_ring_that_has_lost_its_place_is_found() {
+        let mut stamps = Stamps::new(5);
+        stamps.next = 3;
+        stamps.push(at(0));
     }
 }

@@ -151,7 +151,12 @@ impl Watchdog {
     /// Begins a look at the services. If the last is too long ago, that time does not count, and
     /// this look finds no failure.
     pub fn look(&mut self, now_ns: u64) {
-        let since_ns = now_ns.saturating_sub(self.looked_ns);
+        assert!(
+            now_ns >= self.looked_ns,
+            "the watchdog's time never goes back: {now_ns} after {} ns",
+            self.looked_ns
+        );
+        let since_ns = now_ns - self.looked_ns;
         self.looked_ns = now_ns;
         self.is_blind = since_ns > LOOK_NS_MAX;
         if self.is_blind {
@@ -236,10 +241,16 @@ impl Watchdog {
 
 impl Peer {
     fn examine(&mut self, limits: &Limits, now_ns: u64) -> Option<Supervision> {
+        assert!(
+            self.started_ns <= now_ns && self.reported_ns <= now_ns,
+            "a service has started and reported in the past: {} and {}, now {now_ns} ns",
+            self.started_ns,
+            self.reported_ns
+        );
         if self.is_gone || self.is_stopping {
             return None;
         }
-        let since = |then_ns: u64| now_ns.saturating_sub(then_ns);
+        let since = |then_ns: u64| now_ns - then_ns;
         if self.epoch == 0 {
             let is_late = since(self.started_ns) > limits.start_up_ns;
             return is_late.then_some(Supervision::StartUp);
@@ -482,5 +493,20 @@ mod tests {
             service != 1
         });
         assert_eq!(found, []);
+    }
+
+    #[test]
+    #[should_panic(expected = "the watchdog's time never goes back")]
+    fn a_look_from_the_past_is_found() {
+        let mut watchdog = Watchdog::new(LIMITS, 1, 5 * MS);
+        watchdog.look(4 * MS);
+    }
+
+    #[test]
+    #[should_panic(expected = "a service has started and reported in the past")]
+    fn a_report_from_the_future_is_found() {
+        let mut watchdog = Watchdog::new(LIMITS, 1, 0);
+        watchdog.services[0].reported_ns = 2 * MS;
+        watchdog.failed(MS);
     }
 }

@@ -144,7 +144,7 @@ fn wrong(
                 && match writer {
                     Writer::Service => false,
                     Writer::Publisher => known_for_ns <= S,
-                    Writer::Stranger => silent_ns <= S,
+                    Writer::Socket => silent_ns <= S,
                 },
             Rejection::OtherWriter,
         ),
@@ -221,7 +221,7 @@ fn is_quarantined(history: &[Came]) -> bool {
     for came in &history[judged_from(history)..] {
         match came.rejection {
             None | Some(Rejection::Quarantined) => marks.push(false),
-            Some(rejection) if rejection.is_misbehaviour() => marks.push(true),
+            Some(rejection) if rejection.is_offence() => marks.push(true),
             Some(_) => continue,
         }
         let recent = &marks[marks.len().saturating_sub(16)..];
@@ -276,7 +276,7 @@ fn judged(writer: Writer, series: &[Sent]) -> (InputAccount, Vec<Came>) {
 proptest! {
     #[test]
     fn every_block_is_judged_by_the_rules_and_counted_once(
-        writer in prop::sample::select(vec![Writer::Service, Writer::Publisher, Writer::Stranger]),
+        writer in prop::sample::select(vec![Writer::Service, Writer::Publisher, Writer::Socket]),
         series in prop::collection::vec(sent(), 1..200),
     ) {
         let (account, history) = judged(writer, &series);

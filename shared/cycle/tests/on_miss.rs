@@ -10,8 +10,8 @@ use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    Clock, DeadlineMonitor, Graph, HealthBoard, Intake, OnMiss, PortError, Receiver, Recorder,
-    Schedule, Sender, Shedder, Stage, StageCycle, Stamp, Topic, VirtualClock,
+    Clock, CycleAccount, DeadlineMonitor, Graph, HealthBoard, Intake, OnMiss, PortError, Receiver,
+    Recorder, Schedule, Sender, Shedder, Stage, StageCycle, Stamp, Topic, VirtualClock,
 };
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -40,7 +40,7 @@ impl Stage for Worker {
             if intake.accept::<SensorFrame>(&header) {
                 self.clock
                     .advance(self.ns_a_particle * u64::from(self.particles));
-                intake.stepped(&header, (header.epoch, header.seq));
+                intake.stepped(&header, header.id());
             }
             if let Some((mut sensor, periods)) = self.held_up.take() {
                 for _ in 0..periods {
@@ -103,7 +103,10 @@ impl World {
         };
         let sender = graph.sender(Topic::Health(ServiceName::Detector)).unwrap();
         let board = HealthBoard::new(sender, SCHEDULE, wanted, read_back(0));
-        let cycle = StageCycle::new(DeadlineMonitor::new(SCHEDULE), board).unwrap();
+        let account = CycleAccount::new(DeadlineMonitor::new(SCHEDULE), board)
+            .unwrap()
+            .with_on_miss(on_miss)
+            .with_recorder(Recorder::new().unwrap().with_stamps(8));
         Self {
             sensor: graph.sender(Topic::Sensor).unwrap(),
             actions: graph.receiver(Topic::Action).unwrap(),
@@ -116,10 +119,7 @@ impl World {
                 predictions: 0,
                 held_up: None,
             },
-            cycle: cycle
-                .with_on_miss(on_miss)
-                .with_shedder(Shedder::new(1000, SCHEDULE))
-                .with_recorder(Recorder::new().unwrap().with_stamps(8)),
+            cycle: StageCycle::new(account).with_shedder(Shedder::new(1000, SCHEDULE)),
             graph,
             clock,
             k: 0,
@@ -154,7 +154,7 @@ impl World {
     }
 
     fn health(&self) -> &Health {
-        self.cycle.health().view()
+        self.cycle.account().health().view()
     }
 }
 
@@ -183,7 +183,17 @@ fn each_answer_publishes_and_says_what_it_is_to() {
         let predictions = u32::from(on_miss.predicts());
         assert_eq!(world.worker.predictions, predictions, "{on_miss:?}");
         // A prediction is no cycle: it has no stamps of its own.
-        assert_eq!(world.cycle.recorder().stamps().unwrap().iter().count(), 2);
+        assert_eq!(
+            world
+                .cycle
+                .account()
+                .recorder()
+                .stamps()
+                .unwrap()
+                .iter()
+                .count(),
+            2
+        );
     }
 }
 
@@ -257,11 +267,11 @@ fn input_is_expected_a_period_after_the_last_and_not_while_it_is_lost() {
 #[test]
 fn a_wake_up_for_nothing_makes_deaf_until_shortly_before_the_next_input() {
     let mut world = World::new(OnMiss::Predict);
-    let breath_ns = PERIOD_NS / 32;
+    let pause_ns = PERIOD_NS / 32;
     // Nothing is known yet: a breath, and never past the time at which something is due.
     world.clock.set(500_000);
     let next_ns = world.cycle.next_wake_ns();
-    let expected_ns = (500_000 + breath_ns).min(next_ns);
+    let expected_ns = (500_000 + pause_ns).min(next_ns);
     assert_eq!(world.cycle.listens_again_ns(500_000), expected_ns);
     world.k = 99;
     assert!(world.instant(true).is_continue());
@@ -272,7 +282,7 @@ fn a_wake_up_for_nothing_makes_deaf_until_shortly_before_the_next_input() {
     );
     // The input is late: a breath at a time.
     let late_ns = 101 * PERIOD_NS + 10_000;
-    assert_eq!(world.cycle.listens_again_ns(late_ns), late_ns + breath_ns);
+    assert_eq!(world.cycle.listens_again_ns(late_ns), late_ns + pause_ns);
     // And never past the deadline.
     let close_ns = world.cycle.next_wake_ns() - 10;
     assert_eq!(world.cycle.listens_again_ns(close_ns), close_ns + 10);

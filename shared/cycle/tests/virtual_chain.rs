@@ -7,15 +7,16 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use vigil_blocks::{
-    Action, Cause, CauseKind, DetectionBelief, FaultBelief, Header, Health, SensorFrame,
+    Action, BlockId, Cause, CauseKind, DetectionBelief, FaultBelief, Header, Health, SensorFrame,
 };
 use vigil_cycle::placement::{Placement, PlacementRequest};
 use vigil_cycle::port::Bus;
 use vigil_cycle::port::TopicBlock;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    Clock, DeadlineMonitor, Graph, HealthBoard, Intake, PortError, Receiver, Schedule, Sender,
-    Source, SourceCycle, SourceOutcome, Stage, StageCycle, Stamp, Topic, VirtualClock,
+    Clock, CycleAccount, DeadlineMonitor, Graph, HealthBoard, Intake, PortError, Receiver,
+    Schedule, Sender, Source, SourceCycle, SourceOutcome, Stage, StageCycle, Stamp, Topic,
+    VirtualClock,
 };
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -52,7 +53,7 @@ caused!(DetectionBelief, FaultBelief, Action);
 struct Relay<I: TopicBlock, O: Caused> {
     input: Box<dyn Receiver<I>>,
     output: Box<dyn Sender<O>>,
-    identity: fn(&I) -> Option<(u64, u64)>,
+    identity: fn(&I) -> Option<BlockId>,
     clock: VirtualClock,
     delay: Delay,
 }
@@ -114,8 +115,8 @@ impl Source for Sensor {
     fn after(&mut self, _health: &mut HealthBoard, _now_ns: u64) {}
 }
 
-fn from_cause(cause: &Cause) -> Option<(u64, u64)> {
-    (cause.kind() == Some(CauseKind::Frame)).then_some((cause.frame_epoch, cause.frame_seq))
+fn from_cause(cause: &Cause) -> Option<BlockId> {
+    (cause.kind() == Some(CauseKind::Frame)).then_some(cause.frame())
 }
 
 /// Stamps of every frame-caused block on a topic: (schedule, publication).
@@ -203,17 +204,21 @@ fn schedule(service: ServiceName) -> Schedule {
     }
 }
 
-fn monitor(service: ServiceName) -> DeadlineMonitor {
-    DeadlineMonitor::new(schedule(service))
+fn account(graph: &Graph, service: ServiceName) -> CycleAccount {
+    CycleAccount::new(
+        DeadlineMonitor::new(schedule(service)),
+        board(graph, service),
+    )
+    .unwrap()
 }
 
 fn stage<I: TopicBlock, O: Caused>(
     graph: &Graph,
     (service, input, output): (ServiceName, Topic, Topic),
-    identity: fn(&I) -> Option<(u64, u64)>,
+    identity: fn(&I) -> Option<BlockId>,
     (clock, delay): (&VirtualClock, &Delay),
 ) -> (StageCycle, Relay<I, O>) {
-    let cycle = StageCycle::new(monitor(service), board(graph, service)).unwrap();
+    let cycle = StageCycle::new(account(graph, service));
     let relay = Relay {
         input: graph.receiver(input).unwrap(),
         output: graph.sender(output).unwrap(),
@@ -235,10 +240,9 @@ impl World {
             clock: clock.clone(),
             delay: Rc::clone(&delays[0]),
         };
-        let frame = |f: &SensorFrame| Some((f.header.epoch, f.header.seq));
+        let frame = |f: &SensorFrame| Some(f.header.id());
         Self {
-            source: SourceCycle::new(monitor(SensorSim), board(&graph, SensorSim), PERIOD_NS)
-                .unwrap(),
+            source: SourceCycle::new(account(&graph, SensorSim), PERIOD_NS),
             sensor,
             detector: stage(
                 &graph,
@@ -330,10 +334,10 @@ impl World {
 
     fn health(&self) -> [&Health; 4] {
         [
-            self.source.health().view(),
-            self.detector.0.health().view(),
-            self.identifier.0.health().view(),
-            self.supervisor.0.health().view(),
+            self.source.account().health().view(),
+            self.detector.0.account().health().view(),
+            self.identifier.0.account().health().view(),
+            self.supervisor.0.account().health().view(),
         ]
     }
 
@@ -406,6 +410,7 @@ fn a_stall_shows_in_the_latencies_of_every_cycle_that_it_delayed() {
     let end_to_end = world
         .supervisor
         .0
+        .account()
         .recorder()
         .timing
         .from_schedule
@@ -414,6 +419,7 @@ fn a_stall_shows_in_the_latencies_of_every_cycle_that_it_delayed() {
     let late = world
         .supervisor
         .0
+        .account()
         .recorder()
         .timing
         .from_schedule
@@ -443,7 +449,7 @@ fn a_silent_sensor_is_counted_by_every_stage_and_told_at_once() {
     world.run();
     let silent = CYCLES - DELAYED;
     for cycle in [&world.detector.0, &world.identifier.0, &world.supervisor.0] {
-        let health = cycle.health().view();
+        let health = cycle.account().health().view();
         assert_eq!(health.missed, silent + 1);
         assert_eq!(health.degraded, 1);
     }

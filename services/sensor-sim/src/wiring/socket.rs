@@ -138,7 +138,7 @@ impl Stage for SocketStage {
             // Behind this service its own epoch is seen: a new start of the source is a new run.
             frame.run_id ^= self.starts << START_SHIFT;
             self.waiting.push(frame);
-            intake.stepped(&frame.header, (frame.header.epoch, frame.header.seq));
+            intake.stepped(&frame.header, frame.header.id());
         }
     }
 
@@ -168,7 +168,7 @@ impl Stage for SocketStage {
     }
 
     fn writer(&self) -> Writer {
-        Writer::Stranger
+        Writer::Socket
     }
 
     fn after(&mut self, _health: &mut HealthBoard, now_ns: u64) {

@@ -28,7 +28,7 @@ fn with(
 #[test]
 fn sequence_faults_are_told_apart_and_counted() {
     use Rejection::{Repeated, WrongSequence};
-    for writer in [Writer::Service, Writer::Publisher, Writer::Stranger] {
+    for writer in [Writer::Service, Writer::Publisher, Writer::Socket] {
         let mut a = InputAccount::new(writer);
         // Another start is believed at once, or after a second.
         let later = if writer == Writer::Service { 6 } else { 1006 };
@@ -87,7 +87,7 @@ fn impossible_headers_are_refused_each_with_its_cause() {
 
 #[test]
 fn an_outsider_is_replaced_only_once_it_is_silent() {
-    let mut a = InputAccount::new(Writer::Stranger);
+    let mut a = InputAccount::new(Writer::Socket);
     assert_eq!(at(&mut a, (7, 0, 1)), Arrival::Next);
     let other = Arrival::Rejected(Rejection::OtherWriter);
     assert_eq!(at(&mut a, (9, 0, 2)), other);
@@ -155,7 +155,7 @@ fn no_more_than_a_burst_is_taken_at_once_whenever_it_says_that_it_was_due() {
 
 #[test]
 fn nobody_misbehaves_in_the_name_of_a_writer_that_is_not_known_yet() {
-    let mut a = InputAccount::new(Writer::Stranger);
+    let mut a = InputAccount::new(Writer::Socket);
     for _ in 0..100 {
         a.reject(Rejection::Schema);
     }
@@ -164,7 +164,7 @@ fn nobody_misbehaves_in_the_name_of_a_writer_that_is_not_known_yet() {
 
 #[test]
 fn an_outsider_faster_than_the_schedule_is_thinned_out_and_stays_trusted() {
-    let mut a = InputAccount::new(Writer::Stranger);
+    let mut a = InputAccount::new(Writer::Socket);
     let mut taken = 0;
     for seq in 0..10_000 {
         // Twenty blocks a period.
@@ -187,7 +187,7 @@ fn an_outsider_faster_than_the_schedule_is_thinned_out_and_stays_trusted() {
 
 #[test]
 fn who_says_something_bad_first_shuts_out_nobody() {
-    let mut a = InputAccount::new(Writer::Stranger);
+    let mut a = InputAccount::new(Writer::Socket);
     let bad = Err(Rejection::OutOfRange);
     assert!(!with(&mut a, (7, 1, 1), bad).is_taken());
     assert_eq!(at(&mut a, (8, 1, 2)), Arrival::Next);
@@ -202,7 +202,7 @@ fn a_counter_that_starts_over_does_not_end_a_quarantine_but_silence_does() {
         }
         assert!(a.is_quarantined());
     };
-    let mut a = InputAccount::new(Writer::Stranger);
+    let mut a = InputAccount::new(Writer::Socket);
     spoil(&mut a);
     // It sends on, by numbers that have started over; after a second that is a new start.
     for k in 20..1020 {
@@ -210,14 +210,14 @@ fn a_counter_that_starts_over_does_not_end_a_quarantine_but_silence_does() {
     }
     let refused = Arrival::Rejected(Rejection::Quarantined);
     assert_eq!(at(&mut a, (1, 1001, 1021)), refused);
-    let mut a = InputAccount::new(Writer::Stranger);
+    let mut a = InputAccount::new(Writer::Socket);
     spoil(&mut a);
     assert_eq!(at(&mut a, (1, 0, 1021)), Arrival::NewEpoch);
 }
 
 #[test]
 fn a_source_that_misbehaves_is_quarantined_until_it_behaves() {
-    let mut a = InputAccount::new(Writer::Stranger);
+    let mut a = InputAccount::new(Writer::Socket);
     let mut k = 0;
     let mut next = |a: &mut InputAccount, content| {
         k += 1;

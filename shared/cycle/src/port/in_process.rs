@@ -7,7 +7,7 @@ use std::rc::Rc;
 
 use vigil_blocks::Block;
 
-use super::{PortError, Receiver, Sender, Stamp, stamp_header};
+use super::{PortError, Receiver, Sender, Stamp, Stamper};
 use crate::clock::{Clock, VirtualClock};
 use crate::topic::Topic;
 
@@ -86,8 +86,7 @@ impl Bus {
         LocalSender {
             readers: self.readers(topic),
             loaned: bytemuck::allocation::zeroed_box(),
-            epoch: *self.epochs.borrow(),
-            seq: 0,
+            stamper: Stamper::new(*self.epochs.borrow()),
         }
     }
 
@@ -107,8 +106,7 @@ impl Bus {
 pub(super) struct LocalSender<T> {
     readers: Readers<T>,
     loaned: Box<T>,
-    epoch: u64,
-    seq: u64,
+    stamper: Stamper,
 }
 
 impl<T: Block> Sender<T> for LocalSender<T> {
@@ -121,8 +119,7 @@ impl<T: Block> Sender<T> for LocalSender<T> {
     }
 
     fn send(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
-        let published_ns = stamp_header(&mut *self.loaned, self.epoch, self.seq, stamp, clock);
-        self.seq += 1;
+        let published_ns = self.stamper.stamp(&mut *self.loaned, stamp, clock);
         for queue in self.readers.borrow().iter() {
             queue.borrow_mut().push(&self.loaned);
         }
@@ -131,11 +128,11 @@ impl<T: Block> Sender<T> for LocalSender<T> {
     }
 
     fn epoch(&self) -> u64 {
-        self.epoch
+        self.stamper.epoch
     }
 
     fn next_seq(&self) -> u64 {
-        self.seq
+        self.stamper.seq
     }
 }
 
@@ -157,6 +154,11 @@ impl<T: Block> Receiver<T> for LocalReceiver<T> {
         } else {
             None
         };
+        let schema = self.held.as_ref().map(|block| block.header().schema);
+        assert!(
+            schema.is_none_or(|schema| schema == T::SCHEMA),
+            "a queue holds the blocks of its topic, stamped"
+        );
         visible
     }
 
@@ -172,5 +174,20 @@ impl<T: Block> Receiver<T> for LocalReceiver<T> {
         let queue = self.queue.borrow();
         let next = queue.blocks.front();
         next.is_some_and(|block| block.header().t_publish_ns <= self.clock.now_ns())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vigil_blocks::SensorFrame;
+
+    #[test]
+    #[should_panic(expected = "a queue holds the blocks of its topic, stamped")]
+    fn a_block_without_a_stamp_is_found() {
+        let bus = Bus::new(VirtualClock::default());
+        let mut receiver = bus.receiver::<SensorFrame>(Topic::Sensor);
+        receiver.queue.borrow_mut().push(&SensorFrame::default());
+        receiver.advance();
     }
 }

@@ -155,22 +155,79 @@ impl Graph {
     }
 }
 
-/// Fills the header of a block that is about to go out; returns the publication instant, ns.
-fn stamp_header<T: Block>(
-    block: &mut T,
+/// Stamps the blocks of one writer.
+#[derive(Debug)]
+struct Stamper {
     epoch: u64,
+    /// Number of the next block.
     seq: u64,
-    stamp: Stamp,
-    clock: &dyn Clock,
-) -> u64 {
-    let t_publish_ns = clock.now_ns();
-    *block.header_mut() = Header {
-        schema: T::SCHEMA,
-        epoch,
-        seq,
-        t_schedule_ns: stamp.t_schedule_ns,
-        t_capture_ns: stamp.t_capture_ns,
-        t_publish_ns,
-    };
-    t_publish_ns
+    published_ns: u64,
+}
+
+impl Stamper {
+    /// For the writer that starts under this epoch.
+    fn new(epoch: u64) -> Self {
+        assert!(epoch != 0, "a writer has an epoch: 0 stands for none");
+        Self {
+            epoch,
+            seq: 0,
+            published_ns: 0,
+        }
+    }
+
+    /// Fills the header of the next block, which is about to go out; returns the publication
+    /// instant, ns.
+    fn stamp<T: Block>(&mut self, block: &mut T, stamp: Stamp, clock: &dyn Clock) -> u64 {
+        let t_publish_ns = clock.now_ns();
+        assert!(
+            t_publish_ns >= self.published_ns,
+            "publications of a writer never go back: {t_publish_ns} after {} ns",
+            self.published_ns
+        );
+        *block.header_mut() = Header {
+            schema: T::SCHEMA,
+            epoch: self.epoch,
+            seq: self.seq,
+            t_schedule_ns: stamp.t_schedule_ns,
+            t_capture_ns: stamp.t_capture_ns,
+            t_publish_ns,
+        };
+        self.seq += 1;
+        self.published_ns = t_publish_ns;
+        t_publish_ns
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clock::VirtualClock;
+    use vigil_blocks::SensorFrame;
+
+    #[test]
+    fn a_writers_blocks_carry_its_schema_and_epoch_and_count_up() {
+        let (mut stamper, clock) = (Stamper::new(7), VirtualClock::default());
+        let mut frame = SensorFrame::default();
+        for seq in 0..3 {
+            clock.advance(10);
+            stamper.stamp(&mut frame, Stamp::default(), &clock);
+            let header = frame.header;
+            assert_eq!((header.schema, header.epoch), (SensorFrame::SCHEMA, 7));
+            assert_eq!((header.seq, header.t_publish_ns), (seq, 10 * (seq + 1)));
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "a writer has an epoch")]
+    fn a_writer_without_an_epoch_is_found() {
+        Stamper::new(0);
+    }
+
+    #[test]
+    #[should_panic(expected = "publications of a writer never go back")]
+    fn a_publication_in_the_past_is_found() {
+        let (mut stamper, clock) = (Stamper::new(7), VirtualClock::default());
+        stamper.published_ns = 1;
+        stamper.stamp(&mut SensorFrame::default(), Stamp::default(), &clock);
+    }
 }

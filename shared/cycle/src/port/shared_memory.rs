@@ -11,7 +11,7 @@ use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
 use vigil_blocks::Block;
 
-use super::{FoundTopic, PortError, Receiver, Sender, Stamp, stamp_header};
+use super::{FoundTopic, PortError, Receiver, Sender, Stamp, Stamper};
 use crate::clock::{Clock, Monotonic};
 use crate::domain::{Domain, Queues};
 use crate::topic::Topic;
@@ -161,8 +161,7 @@ impl Link {
             publisher,
             notifier,
             path,
-            epoch,
-            seq: 0,
+            stamper: Stamper::new(epoch),
         }))
     }
 
@@ -295,8 +294,7 @@ pub(super) struct SharedSender<T: Block> {
     publisher: Publisher<ipc::Service, Wire<T>, ()>,
     notifier: Notifier<ipc::Service>,
     path: String,
-    epoch: u64,
-    seq: u64,
+    stamper: Stamper,
 }
 
 impl<T: Block> Sender<T> for SharedSender<T> {
@@ -319,7 +317,6 @@ impl<T: Block> Sender<T> for SharedSender<T> {
     }
 
     fn send(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
-        let (epoch, seq) = (self.epoch, self.seq);
         if std::mem::take(&mut self.has_refused) {
             let what = "a block was refused when it was to be written";
             return Err(transfer(&self.path, "send", &what));
@@ -328,8 +325,9 @@ impl<T: Block> Sender<T> for SharedSender<T> {
             Some(sample) => sample,
             None => loan(&self.publisher, &self.path)?,
         };
-        let published_ns = stamp_header(&mut sample.payload_mut().0, epoch, seq, stamp, clock);
-        self.seq += 1;
+        let published_ns = self
+            .stamper
+            .stamp(&mut sample.payload_mut().0, stamp, clock);
         sample
             .send()
             .map_err(|e| transfer(&self.path, "send", &e))?;
@@ -340,11 +338,11 @@ impl<T: Block> Sender<T> for SharedSender<T> {
     }
 
     fn epoch(&self) -> u64 {
-        self.epoch
+        self.stamper.epoch
     }
 
     fn next_seq(&self) -> u64 {
-        self.seq
+        self.stamper.seq
     }
 }
 

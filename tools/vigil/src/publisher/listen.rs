@@ -99,7 +99,7 @@ impl Guard {
     fn new(setup: &Setup) -> Self {
         Self {
             account: InputAccount::new(match setup.file.sensor.source {
-                Source::Socket => Writer::Stranger,
+                Source::Socket => Writer::Socket,
                 _ => Writer::Publisher,
             }),
             content: FrameGuard::new(&setup.robot),
