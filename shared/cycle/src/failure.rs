@@ -60,7 +60,10 @@ pub struct Failure {
 
 impl Failure {
     fn new(panic: &PanicHookInfo<'_>) -> Self {
-        let message = panic.payload_as_str().unwrap_or("no message");
+        let payload = panic.payload();
+        let literal = payload.downcast_ref::<&str>().copied();
+        let formatted = payload.downcast_ref::<String>().map(String::as_str);
+        let message = literal.or(formatted).unwrap_or("no message");
         Self {
             location: panic.location().map_or("?".into(), ToString::to_string),
             work: WORK.get().to_string(),

@@ -283,8 +283,8 @@ impl HealthBoard {
     }
 }
 
-/// Reads the events of `health` from number `seen` on, and moves `seen` behind them. Returns how many
-/// were overwritten before they could be read.
+/// Reads the events of `health` from number `seen` on, and moves `seen` behind them. Returns how
+/// many were overwritten before they could be read.
 pub fn new_events(health: &Health, seen: &mut u64, mut take: impl FnMut(&Event)) -> u64 {
     let oldest = health.event_count.saturating_sub(EVENTS as u64);
     let overwritten = oldest.saturating_sub(*seen);

@@ -21,9 +21,9 @@ pub const SILENT_NS: u64 = 1_000_000_000;
 const EARLY_PERIOD_PART: u64 = 4;
 /// So many blocks are taken at once, whatever their schedule: a full queue of sensor frames.
 const BURST_MAX: u64 = 256;
-/// So many offences within the last [`HISTORY`] blocks put a source in quarantine: half of them. With
-/// fewer a few damaged blocks would silence a robot's only sensor; with more the filters would see
-/// mostly what is left of nonsense.
+/// So many offences within the last [`HISTORY`] blocks put a source in quarantine: half of them.
+/// With fewer, a few damaged blocks would silence a robot's only sensor; with more, the filters
+/// would get mostly nonsense.
 const OFFENCES_MAX: u32 = 8;
 /// Blocks that are remembered; so many without an offence end a quarantine: 0.16 s at 100 Hz.
 const HISTORY: u32 = 16;

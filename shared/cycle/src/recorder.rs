@@ -1,8 +1,45 @@
 //! What a service keeps of its own cycles: histograms, and, if wanted, their stamps.
 
+use crate::latency::Latency;
 use crate::port::PortError;
-use crate::stage::Timing;
 use crate::stamps::{CycleStamps, Stamps};
+
+/// The histograms of a service.
+#[derive(Debug, Clone)]
+pub struct Timing {
+    /// From the publication of the input to the wake-up, ns.
+    pub wake_up: Latency,
+    /// From the wake-up to the publication of the output, ns.
+    pub step: Latency,
+    /// From the sensor's scheduled instant to the publication of the output, ns; every instant of
+    /// the schedule is in it.
+    pub from_schedule: Latency,
+}
+
+impl Timing {
+    /// Empty histograms.
+    ///
+    /// # Errors
+    /// None in practice; see [`Latency::new`].
+    pub fn new() -> Result<Self, PortError> {
+        let new = || Latency::new().map_err(|error| PortError::setup("histogram", &error));
+        Ok(Self {
+            wake_up: new()?,
+            step: new()?,
+            from_schedule: new()?,
+        })
+    }
+
+    /// Histograms that record nothing.
+    #[must_use]
+    pub fn switched_off(self) -> Self {
+        Self {
+            wake_up: self.wake_up.switched_off(),
+            step: self.step.switched_off(),
+            from_schedule: self.from_schedule.switched_off(),
+        }
+    }
+}
 
 /// Histograms and stamps of a service's cycles.
 #[derive(Debug, Clone)]

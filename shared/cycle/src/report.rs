@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::latency::{Latency, Percentiles};
 use crate::placement;
-use crate::stage::Timing;
+use crate::recorder::Timing;
 
 const MAGIC: [u8; 4] = *b"VGRP";
 const VERSION: u32 = 2;

@@ -9,7 +9,6 @@ use crate::cycle_account::{CycleAccount, TurnResult};
 use crate::failure::{Work, work_on};
 use crate::health::HealthBoard;
 use crate::input::{Arrival, InputAccount, Writer};
-use crate::latency::Latency;
 use crate::port::{PortError, Stamp};
 use crate::shed::Shedder;
 use crate::stamps::CycleStamps;
@@ -156,48 +155,11 @@ impl Intake<'_> {
         };
     }
 
-    /// Now, ns. Read anew for each block: during a long turn blocks arrive that were not due when it
-    /// began.
+    /// Now, ns. Read anew for each block: during a long turn blocks arrive that were not due when
+    /// it began.
     #[must_use]
     pub fn now_ns(&self) -> u64 {
         self.clock.now_ns()
-    }
-}
-
-/// The histograms of a service.
-#[derive(Debug, Clone)]
-pub struct Timing {
-    /// From the publication of the input to the wake-up, ns.
-    pub wake_up: Latency,
-    /// From the wake-up to the publication of the output, ns.
-    pub step: Latency,
-    /// From the sensor's scheduled instant to the publication of the output, ns; every instant of
-    /// the schedule is in it.
-    pub from_schedule: Latency,
-}
-
-impl Timing {
-    /// Empty histograms.
-    ///
-    /// # Errors
-    /// None in practice; see [`Latency::new`].
-    pub fn new() -> Result<Self, PortError> {
-        let new = || Latency::new().map_err(|error| PortError::setup("histogram", &error));
-        Ok(Self {
-            wake_up: new()?,
-            step: new()?,
-            from_schedule: new()?,
-        })
-    }
-
-    /// Histograms that record nothing.
-    #[must_use]
-    pub fn switched_off(self) -> Self {
-        Self {
-            wake_up: self.wake_up.switched_off(),
-            step: self.step.switched_off(),
-            from_schedule: self.from_schedule.switched_off(),
-        }
     }
 }
 

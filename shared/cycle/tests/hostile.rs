@@ -250,7 +250,13 @@ proptest! {
                 _ => {}
             }
             let [epoch, seq, missed, period_ns, answered_epoch, answered_seq] = numbers;
-            let mut health = Health { missed, period_ns, answered_epoch, answered_seq, ..Health::default() };
+            let mut health = Health {
+                missed,
+                period_ns,
+                answered_epoch,
+                answered_seq,
+                ..Health::default()
+            };
             // Few epochs and numbers, so that reports of one start follow each other.
             (health.header.epoch, health.header.seq) = (epoch % 4, seq % 8);
             [health.state, health.degraded] = words;
