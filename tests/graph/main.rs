@@ -3,6 +3,7 @@
 
 #![cfg(test)]
 
+mod assertion;
 mod bad_input;
 mod corridor;
 mod external;

@@ -1,19 +1,21 @@
-//! The service processes: start, restart within a bound, stop.
+//! The service processes: start, restart, stop.
 
 use std::io;
 use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use vigil_cycle::serve::EXIT_MISSED;
+use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Domain, RunReport, signal};
 
+use crate::error::LauncherError;
 use crate::observer::Observer;
-use crate::plan::Plan;
+use crate::plan::{CommandLine, Plan};
+use crate::restarts::{Death, RestartHistory};
 
-/// Time that a service may take to stop before it is killed.
+/// Time that a service may take to stop before it is killed: many cycles at the lowest rate, 1 Hz.
 const STOP_LIMIT: Duration = Duration::from_secs(3);
 const POLL: Duration = Duration::from_millis(5);
 
@@ -22,23 +24,22 @@ struct ServiceProcess {
     name: ServiceName,
     child: Child,
     report: PathBuf,
-    /// Those within the window.
-    restarts: Vec<Instant>,
-    restart_count: usize,
+    /// Where it leaves the assertion that ended it.
+    failure: PathBuf,
+    history: RestartHistory,
     restart_at: Option<Instant>,
-    last_exit: String,
 }
 
 /// All service processes of a graph.
 pub struct Children {
     services: Vec<ServiceProcess>,
     restarted: Vec<ServiceName>,
-    gave_up: Option<ServiceName>,
+    gave_up: Option<String>,
 }
 
 impl Children {
     /// Starts every service of the plan; on a failure stops those already started.
-    pub fn start(plan: &Plan, domain: &Domain) -> io::Result<Self> {
+    pub fn start(plan: &Plan, domain: &Domain) -> Result<Self, LauncherError> {
         let mut children = Self {
             services: Vec::new(),
             restarted: Vec::new(),
@@ -46,22 +47,25 @@ impl Children {
         };
         for name in plan.services() {
             let report = domain.folder().join(format!("{}.report", name.as_str()));
-            let _ = std::fs::remove_file(&report);
-            match spawn(plan.command(name), &report, plan.recording(name)) {
-                Ok(child) => children.services.push(ServiceProcess {
-                    name,
-                    child,
-                    report,
-                    restarts: Vec::new(),
-                    restart_count: 0,
-                    restart_at: None,
-                    last_exit: String::new(),
-                }),
-                // Those already started stop when `children` is dropped.
-                Err(error) => return Err(error),
+            let failure = domain.failure_file(name);
+            for old in [&report, &failure] {
+                let _ = std::fs::remove_file(old);
             }
+            // Those already started stop when `children` is dropped.
+            let child = spawn(plan.command(name, &report))?;
+            children.services.push(ServiceProcess {
+                name,
+                child,
+                report,
+                failure,
+                history: RestartHistory::new(plan.restart_policy()),
+                restart_at: None,
+            });
         }
-        children.list(domain)?;
+        let list = domain.processes_file();
+        children
+            .list(domain)
+            .map_err(|cause| LauncherError::file(list, cause))?;
         Ok(children)
     }
 
@@ -75,48 +79,43 @@ impl Children {
     }
 
     /// Restarts what has died; true if a service had to be given up.
-    pub fn look_after(&mut self, plan: &Plan, observer: &Observer) -> bool {
-        let policy = &plan.setup.file.restart;
-        let window = Duration::from_secs_f64(policy.window_s);
+    pub fn look_after(&mut self, plan: &Plan, observer: &mut Observer) -> bool {
         for service in &mut self.services {
             let now = Instant::now();
+            let name = service.name.as_str();
             if let (None, Ok(Some(status))) = (service.restart_at, service.child.try_wait()) {
-                service.last_exit = status.to_string();
-                service
-                    .restarts
-                    .retain(|at| now.duration_since(*at) < window);
-                let count = service.restarts.len() as u32;
-                let name = service.name.as_str();
-                // What was refused at a restart is refused at the next.
-                let is_refused = [Some(2), Some(i32::from(EXIT_MISSED))].contains(&status.code());
-                let is_final = is_refused || plan.cannot_resume(service.name);
-                if count >= policy.max_restarts || is_final {
-                    tell!("vigil: {name} ended ({status}); given up after {count} restarts");
-                    self.gave_up = Some(service.name);
-                    return true;
+                let failure = service.take_failure(observer);
+                let death = Death {
+                    code: status.code(),
+                    failure,
+                    can_resume: plan.can_resume(service.name),
+                };
+                match service.history.judge(&death, now) {
+                    Ok(delay) => {
+                        tell!("vigil: {name} ended ({status}); restarting");
+                        service.restart_at = Some(now + delay);
+                        observer.remove_dead_peers();
+                    }
+                    Err(reason) => {
+                        tell!("vigil: {name} ended ({status}); {reason}");
+                        self.gave_up = Some(format!("{name}: {status}; {reason}"));
+                        return true;
+                    }
                 }
-                tell!("vigil: {name} ended ({status}); restarting");
-                let delay_ms = policy.delay_ms * f64::from(2_u32.saturating_pow(count));
-                service.restart_at = Some(now + Duration::from_secs_f64(delay_ms * 1e-3));
-                observer.remove_dead_peers();
             }
             // A stop always wins over a restart.
             if service.restart_at.is_some_and(|at| now >= at) && !signal::stop_requested() {
                 service.restart_at = None;
-                service.restarts.push(now);
-                service.restart_count += 1;
-                let command = plan.command_again(service.name, observer.drive().as_ref());
-                match spawn(command, &service.report, plan.recording(service.name)) {
+                service.history.restarted(now);
+                let drive = observer.drive();
+                match spawn(plan.command_again(service.name, &service.report, drive.as_ref())) {
                     Ok(child) => {
                         service.child = child;
                         self.restarted.push(service.name);
                     }
                     Err(error) => {
-                        tell!(
-                            "vigil: {} cannot be started: {error}",
-                            service.name.as_str()
-                        );
-                        self.gave_up = Some(service.name);
+                        tell!("vigil: {name} cannot be started: {error}");
+                        self.gave_up = Some(format!("{name}: {error}"));
                         return true;
                     }
                 }
@@ -125,7 +124,7 @@ impl Children {
         false
     }
 
-    /// The services that have been restarted since this was last asked.
+    /// The services that have been restarted since the last call.
     pub fn take_restarted(&mut self) -> Vec<ServiceName> {
         std::mem::take(&mut self.restarted)
     }
@@ -136,8 +135,8 @@ impl Children {
         dead.map(|s| s.name)
     }
 
-    /// Ends a service that lives and does not do its work; it is then restarted like one that has
-    /// died. Not by a signal that it would have to handle: it may be stopped, or hang.
+    /// Kills a service that lives and does not do its work; it is then restarted like one that has
+    /// died. It may be stopped or hang: a signal that it would have to handle would not reach it.
     pub fn end(&mut self, name: ServiceName, why: &str) {
         let found = self.services.iter_mut().find(|s| s.name == name);
         if let Some(service) = found.filter(|s| s.restart_at.is_none()) {
@@ -165,34 +164,39 @@ impl Children {
         }
     }
 
-    /// The run reports that the services have left.
-    pub fn reports(&self) -> Vec<(ServiceName, Option<RunReport>)> {
-        let read = |service: &ServiceProcess| match RunReport::read(&service.report) {
-            Ok(report) => Some(report),
-            Err(error) => {
-                tell!("vigil: no report of {}: {error}", service.name.as_str());
-                None
-            }
-        };
-        self.services
-            .iter()
-            .map(|service| (service.name, read(service)))
-            .collect()
+    /// Puts the assertions into the timeline that have failed while the services stopped.
+    pub fn take_failures(&self, observer: &mut Observer) {
+        for service in &self.services {
+            service.take_failure(observer);
+        }
+    }
+
+    /// The run report that a service has left.
+    pub fn report(&self, name: ServiceName) -> Option<RunReport> {
+        let service = self.services.iter().find(|s| s.name == name)?;
+        RunReport::read(&service.report)
+            .inspect_err(|error| tell!("vigil: no report of {}: {error}", name.as_str()))
+            .ok()
     }
 
     /// Restarts of a service.
     pub fn restarts(&self, name: ServiceName) -> usize {
-        self.services
-            .iter()
-            .find(|s| s.name == name)
-            .map_or(0, |s| s.restart_count)
+        let service = self.services.iter().find(|s| s.name == name);
+        service.map_or(0, |s| s.history.count())
     }
 
-    /// The service that was given up, and how it last ended.
-    pub fn gave_up(&self) -> Option<(ServiceName, &str)> {
-        let name = self.gave_up?;
-        let service = self.services.iter().find(|s| s.name == name)?;
-        Some((name, service.last_exit.as_str()))
+    /// The service that was given up, how it last ended, and why it is not started again.
+    pub fn gave_up(&self) -> Option<&str> {
+        self.gave_up.as_deref()
+    }
+}
+
+impl ServiceProcess {
+    /// The assertion that has ended it, if one has; it is then in the timeline.
+    fn take_failure(&self, observer: &mut Observer) -> Option<Failure> {
+        let failure = Failure::take(&self.failure)?;
+        observer.add_failure(self.name, &failure);
+        Some(failure)
     }
 }
 
@@ -202,20 +206,13 @@ impl Drop for Children {
     }
 }
 
-fn spawn(
-    (program, line): (PathBuf, Vec<String>),
-    report: &Path,
-    recording: Vec<String>,
-) -> io::Result<Child> {
+fn spawn(command: CommandLine) -> Result<Child, LauncherError> {
     // A group of its own: Ctrl-C reaches the launcher alone, which stops the services in order.
-    Command::new(&program)
-        .args(line)
-        .arg("--report")
-        .arg(report)
-        .args(recording)
+    Command::new(&command.program)
+        .args(command.options)
         .process_group(0)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .spawn()
-        .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", program.display())))
+        .map_err(|cause| LauncherError::file(command.program, cause))
 }

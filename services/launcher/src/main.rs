@@ -13,11 +13,13 @@ macro_rules! tell {
 }
 
 mod children;
+mod error;
 mod observer;
 mod plan;
+mod restarts;
 mod summary;
-mod supervision;
 mod timeline;
+mod watchdog;
 mod words;
 
 use std::io::Write;
@@ -30,15 +32,16 @@ use vigil_cycle::port::Link;
 use vigil_cycle::signal;
 
 use crate::children::Children;
-use crate::observer::Observer;
+use crate::error::LauncherError;
+use crate::observer::{Observer, ServiceView};
 use crate::plan::{LauncherArgs, Plan};
-use crate::summary::Summary;
-use crate::supervision::Supervisor;
+use crate::summary::{EndReason, Run, ServiceRecord, Summary};
+use crate::watchdog::WatchdogDriver;
 
 /// Interval at which Health is read and children are looked after.
 const POLL: Duration = Duration::from_millis(4);
-/// Time that the last answers may take after the end of a recording. Shorter than the time after
-/// which the supervisor stops a robot that nobody sees.
+/// Time that the last answers may take after the end of a recording. Shorter than the time without
+/// belief after which the supervisor stops the robot, which would be an event of no meaning.
 const DRAIN: Duration = Duration::from_millis(80);
 
 fn main() -> ExitCode {
@@ -67,9 +70,12 @@ enum Outcome {
     Refused,
 }
 
-fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, Box<dyn std::error::Error>> {
+fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, LauncherError> {
     let domain = plan.setup.domain()?;
-    let Some(lock) = domain.lock()? else {
+    let lock = domain
+        .lock()
+        .map_err(|cause| LauncherError::file(domain.folder(), cause))?;
+    let Some(lock) = lock else {
         let name = domain.graph();
         let processes = std::fs::read_to_string(domain.processes_file()).unwrap_or_default();
         tell!(
@@ -90,8 +96,8 @@ fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, Box<dyn std::error::
     observer.close(DRAIN);
     children.stop();
     observer.poll(!args.json);
-    let reports = children.reports();
-    let summary = Summary::new(plan, &observer, &children, &reports, ended);
+    children.take_failures(&mut observer);
+    let summary = summary(plan, &observer, &children, ended);
     drop(observer);
     domain.remove_residue();
     let mut out = std::io::stdout().lock();
@@ -108,17 +114,35 @@ fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, Box<dyn std::error::
     })
 }
 
+fn summary(plan: &Plan, observer: &Observer, children: &Children, ended: EndReason) -> Summary {
+    let record = |service: &ServiceView| ServiceRecord {
+        name: service.name,
+        health: service.latest.clone(),
+        counters: observer.counters(service),
+        restarts: children.restarts(service.name),
+        report: children.report(service.name),
+    };
+    let records: Vec<ServiceRecord> = observer.watched().iter().map(record).collect();
+    let run = Run {
+        ended,
+        duration_s: observer.since_ready_s().unwrap_or(0.0),
+        end_ns: observer.end_ns(),
+        gave_up: children.gave_up().map(str::to_owned),
+    };
+    Summary::new(&plan.setup, observer.timeline(), &records, run)
+}
+
 /// Watches until the end; returns why it ended.
 fn watch(
     args: &LauncherArgs,
     plan: &Plan,
     observer: &mut Observer,
     children: &mut Children,
-) -> summary::EndReason {
-    use summary::EndReason;
+) -> EndReason {
     let started = Instant::now();
     let startup_limit = Duration::from_secs_f64(plan.setup.file.watchdog.startup_s);
-    let mut supervisor = Supervisor::new(plan);
+    let services = plan.services().collect();
+    let mut watchdog = WatchdogDriver::new(&plan.setup.file.watchdog, services);
     let mut recording_ended: Option<Instant> = None;
     loop {
         std::thread::sleep(POLL);
@@ -127,7 +151,7 @@ fn watch(
             return EndReason::Stopped;
         }
         if observer.timeline().has(EventKind::EndOfRecording) {
-            // What the services miss from now on, and do about it, is nothing to look after.
+            // Input that is missing from now on is no failure.
             let since = *recording_ended.get_or_insert_with(Instant::now);
             if since.elapsed() > DRAIN {
                 return EndReason::EndOfRecording;
@@ -137,7 +161,7 @@ fn watch(
         if children.look_after(plan, observer) {
             return EndReason::GaveUp;
         }
-        supervisor.look_after(observer, children);
+        watchdog.look_after(observer, children);
         if observer.ready_ns().is_none() && plan.waits_for_ready() {
             if started.elapsed() > startup_limit {
                 let limit_s = startup_limit.as_secs_f64();

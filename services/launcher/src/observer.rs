@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use vigil_blocks::{Block, Event, Health, REJECTIONS};
+use vigil_cycle::failure::Failure;
 use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Graph, Monotonic, PortError, Receiver, Topic, health};
@@ -15,7 +16,8 @@ pub struct ServiceView {
     /// Which service.
     pub name: ServiceName,
     receiver: Box<dyn Receiver<Health>>,
-    seen_events: u64,
+    /// Number of the first event that has not been read.
+    next_event: u64,
     /// The newest Health of the present process.
     pub latest: Option<Box<Health>>,
     /// Counters of processes that have died.
@@ -78,7 +80,7 @@ impl Observer {
             Ok(ServiceView {
                 name,
                 receiver,
-                seen_events: 0,
+                next_event: 0,
                 latest: None,
                 before,
             })
@@ -90,7 +92,7 @@ impl Observer {
         Ok(Self {
             watched,
             graph,
-            timeline: Timeline::new(plan),
+            timeline: Timeline::new(&plan.setup),
             is_external: !plan.waits_for_ready(),
         })
     }
@@ -112,10 +114,10 @@ impl Observer {
                     && old.header.epoch != block.header.epoch
                 {
                     service.before.add(old);
-                    service.seen_events = 0;
+                    service.next_event = 0;
                 }
                 let timeline = &mut self.timeline;
-                let overwritten = health::new_events(block, &mut service.seen_events, |event| {
+                let overwritten = health::new_events(block, &mut service.next_event, |event| {
                     timeline.add(service.name, event);
                 });
                 timeline.add_overwritten(overwritten);
@@ -168,7 +170,13 @@ impl Observer {
         &self.watched
     }
 
-    /// Adds what the launcher itself has found out about a service.
+    /// Adds an assertion of a service that has failed.
+    pub fn add_failure(&mut self, service: ServiceName, failure: &Failure) {
+        self.timeline
+            .add_failure(service, failure, Monotonic.now_ns());
+    }
+
+    /// Adds an event that the launcher itself has found out about a service.
     pub fn add_event(&mut self, service: ServiceName, event: &Event) {
         self.timeline.add(service, event);
     }
@@ -185,7 +193,7 @@ impl Observer {
             .unwrap_or_else(|| Monotonic.now_ns())
     }
 
-    /// The services are about to be stopped: what they say of that is no event.
+    /// The services are about to be stopped: what they report from now on is no event of the run.
     /// After the end of a recording they may answer for as long as `drain`.
     pub fn close(&mut self, drain: Duration) {
         let drained_ns = |end_ns: u64| end_ns.saturating_add(drain.as_nanos() as u64);
@@ -207,6 +215,24 @@ impl Observer {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn counters_of_processes_that_followed_each_other_add_up() {
+        let mut health = Health {
+            cycles: 5,
+            missed: 2,
+            lost: 1,
+            ..Health::default()
+        };
+        health.rejected[3] = 7;
+        let mut counters = Counters::default();
+        (0..2).for_each(|_| counters.add(&health));
+        assert_eq!(
+            (counters.cycles, counters.missed, counters.lost),
+            (10, 4, 2)
+        );
+        assert_eq!(counters.rejected[3], 14);
+    }
 
     #[test]
     fn instants_after_the_last_frame_are_counted_exactly() {

@@ -1,18 +1,17 @@
-//! The readable end of a run, and the same for programs.
+//! The summary of a run, for people and for programs.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
-use vigil_blocks::Rejection;
+use vigil_blocks::{Health, Rejection};
 use vigil_cycle::latency::Percentiles;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Placement, RunReport};
+use vigil_setup::Setup;
 
-use crate::children::Children;
-use crate::observer::{Counters, Observer, ServiceView};
-use crate::plan::Plan;
-use crate::timeline::TimelineEntry;
+use crate::observer::Counters;
+use crate::timeline::{Timeline, TimelineEntry};
 
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -108,62 +107,66 @@ pub struct Summary {
     gave_up: Option<String>,
 }
 
+/// What is known of a service at the end.
+#[derive(Debug, Clone)]
+pub struct ServiceRecord {
+    /// Which service.
+    pub name: ServiceName,
+    /// Its newest Health.
+    pub health: Option<Box<Health>>,
+    /// Its counters over all its processes.
+    pub counters: Counters,
+    /// How often it was started again.
+    pub restarts: usize,
+    /// The report of its last process.
+    pub report: Option<RunReport>,
+}
+
+/// How a run went.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// Why it ended.
+    pub ended: EndReason,
+    /// How long it lasted, s, from the first cycle in which every service answered.
+    pub duration_s: f64,
+    /// When it ended, ns.
+    pub end_ns: u64,
+    /// The service that was given up, and why.
+    pub gave_up: Option<String>,
+}
+
 impl Summary {
-    /// Collects what the observer, the children and their reports know.
-    pub fn new(
-        plan: &Plan,
-        observer: &Observer,
-        children: &Children,
-        reports: &[(ServiceName, Option<RunReport>)],
-        ended: EndReason,
-    ) -> Self {
-        let report = |name| {
-            reports
-                .iter()
-                .find(|(n, _)| *n == name)
-                .and_then(|(_, r)| r.as_ref())
-        };
-        let services = observer
-            .watched()
-            .iter()
-            .map(|w| {
-                (
-                    w.name.as_str(),
-                    service(
-                        w,
-                        observer.counters(w),
-                        children.restarts(w.name),
-                        report(w.name),
-                    ),
-                )
-            })
-            .collect();
-        let blind_s = observer.timeline().blind_s(observer.end_ns());
+    /// Collects what is known of a run and its services.
+    pub fn new(setup: &Setup, timeline: &Timeline, records: &[ServiceRecord], run: Run) -> Self {
+        let services = records.iter().map(|r| (r.name.as_str(), service(r)));
+        let supervisor = records.iter().find(|r| r.name == ServiceName::Supervisor);
+        let report = supervisor.and_then(|r| r.report.as_ref());
+        let end_to_end = report.map(|report| report.from_schedule.percentiles);
+        let blind_s = timeline.blind_s(run.end_ns);
         let blind = (!blind_s.is_empty()).then_some((ServiceName::Detector.as_str(), blind_s));
-        let end_to_end = report(ServiceName::Supervisor).map(|r| r.from_schedule.percentiles);
         Self {
             schema_version: 1,
-            graph: plan.setup.file.graph.name.clone(),
-            rate_hz: plan.setup.file.graph.rate_hz,
-            duration_s: observer.since_ready_s().unwrap_or(0.0),
-            ended,
+            graph: setup.file.graph.name.clone(),
+            rate_hz: setup.file.graph.rate_hz,
+            duration_s: run.duration_s,
+            ended: run.ended,
             release_build: !cfg!(debug_assertions),
-            config_hash: format!("{:016x}", plan.setup.hash),
-            services,
+            config_hash: format!("{:016x}", setup.hash),
+            services: services.collect(),
             end_to_end_us: end_to_end.unwrap_or_default().into(),
             blind: blind.into_iter().collect(),
-            events: observer.timeline().told(),
-            events_overwritten: observer.timeline().overwritten(),
-            gave_up: children
-                .gave_up()
-                .map(|(name, exit)| format!("{}: {exit}", name.as_str())),
+            events: timeline.entries(),
+            events_overwritten: timeline.overwritten(),
+            gave_up: run.gave_up,
         }
     }
 
-    /// True if the run itself failed, or nothing was seen for a part of it, or for all of it.
+    /// True if the run itself failed, an assertion did, or the graph was blind for a part of it or
+    /// for all of it.
     pub fn failed(&self) -> bool {
         matches!(self.ended, EndReason::GaveUp | EndReason::NeverReady)
             || !self.blind.is_empty()
+            || self.events.iter().any(|entry| entry.event == "assertion")
             || self.saw_nothing()
     }
 
@@ -173,14 +176,10 @@ impl Summary {
     }
 }
 
-fn service(
-    w: &ServiceView,
-    counters: Counters,
-    restarts: usize,
-    report: Option<&RunReport>,
-) -> ServiceSummary {
-    let health = w.latest.as_deref();
-    let of = |get: fn(&RunReport) -> Percentiles| report.map(|r| get(r).into());
+fn service(record: &ServiceRecord) -> ServiceSummary {
+    let (counters, report) = (&record.counters, record.report.as_ref());
+    let health = record.health.as_deref();
+    let latency = |get: fn(&RunReport) -> Percentiles| report.map(|r| get(r).into());
     ServiceSummary {
         cycles: counters.cycles,
         missed: counters.missed,
@@ -195,7 +194,7 @@ fn service(
             .map(|cause| (cause.as_str(), counters.rejected[cause as usize]))
             .filter(|(_, count)| *count > 0)
             .collect(),
-        restarts,
+        restarts: record.restarts,
         pid: health.map_or(0, |h| h.pid),
         core: health.map_or(u32::MAX, |h| h.core),
         core_wanted: health.map_or(u32::MAX, |h| h.core_wanted),
@@ -206,9 +205,9 @@ fn service(
         ),
         timer_slack_ns: report.and_then(|r| r.timer_slack_ns),
         memory_locked: health.is_some_and(|h| h.memory_locked != 0),
-        wake_up_us: of(|r| r.wake_up.percentiles),
-        step_us: of(|r| r.step.percentiles),
-        from_schedule_us: of(|r| r.from_schedule.percentiles),
+        wake_up_us: latency(|r| r.wake_up.percentiles),
+        step_us: latency(|r| r.step.percentiles),
+        from_schedule_us: latency(|r| r.from_schedule.percentiles),
         page_faults: report.and_then(|r| r.page_faults),
     }
 }
@@ -330,5 +329,101 @@ impl Summary {
             writeln!(f, "  core {core} is shared by {}", names.join(", "))?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::tests::plan;
+    use vigil_blocks::{Blindness, Event, EventKind};
+    use vigil_cycle::Timing;
+
+    const S: u64 = 1_000_000_000;
+
+    fn record(name: ServiceName) -> ServiceRecord {
+        let mut timing = Timing::new().unwrap();
+        (1..=100).for_each(|us| timing.from_schedule.record(us * 1000));
+        let health = Health {
+            core: 1,
+            core_wanted: 1,
+            pinned: 1,
+            memory_locked: 1,
+            ..Health::default()
+        };
+        ServiceRecord {
+            name,
+            health: Some(Box::new(health)),
+            counters: Counters {
+                cycles: 100,
+                missed: 3,
+                ..Counters::default()
+            },
+            restarts: 1,
+            report: Some(RunReport::new(name.as_str(), &timing, None).unwrap()),
+        }
+    }
+
+    fn run(ended: EndReason) -> Run {
+        Run {
+            ended,
+            duration_s: 4.0,
+            end_ns: 14 * S,
+            gave_up: None,
+        }
+    }
+
+    #[test]
+    fn a_run_without_a_failure_is_none_and_shows_each_service() {
+        let setup = plan(&[]).unwrap().setup;
+        let records = [ServiceName::Detector, ServiceName::Supervisor].map(record);
+        let timeline = Timeline::new(&setup);
+        let summary = Summary::new(&setup, &timeline, &records, run(EndReason::Duration));
+        assert!(!summary.failed());
+        let json = serde_json::to_value(&summary).unwrap();
+        assert_eq!(json["ended"], "duration");
+        assert_eq!(json["services"]["detector"]["missed"], 3);
+        assert_eq!(json["end_to_end_us"]["n"], 100);
+        assert_eq!(json["gave_up"], serde_json::Value::Null);
+        let text = summary.to_string();
+        assert!(
+            text.contains("core 1 is shared by detector, supervisor"),
+            "{text}"
+        );
+        assert!(text.contains("detector runs under SCHED_OTHER"), "{text}");
+        assert!(text.contains("max 100 us (n = 100)"), "{text}");
+    }
+
+    #[test]
+    fn what_was_blind_given_up_or_never_ran_is_a_failure_and_is_said() {
+        let setup = plan(&[]).unwrap().setup;
+        let mut timeline = Timeline::new(&setup);
+        timeline.begin(10 * S);
+        let blind = Event {
+            t_ns: 12 * S,
+            kind: EventKind::Blind as u32,
+            what: Blindness::Silence as u32,
+            ..Event::default()
+        };
+        timeline.add(ServiceName::Detector, &blind);
+        let summary = |timeline, run| Summary::new(&setup, timeline, &[], run);
+        let seen_late = summary(&timeline, run(EndReason::Duration));
+        assert!(seen_late.failed());
+        let text = seen_late.to_string();
+        assert!(
+            text.contains("detector was blind: 2.0 s (silence)"),
+            "{text}"
+        );
+        let quiet = Timeline::new(&setup);
+        assert!(summary(&quiet, run(EndReason::GaveUp)).failed());
+        let mut nothing = run(EndReason::Stopped);
+        nothing.duration_s = 0.0;
+        let nothing = summary(&quiet, nothing);
+        assert!(nothing.failed());
+        assert!(
+            nothing
+                .to_string()
+                .contains("no cycle ran through all services")
+        );
     }
 }

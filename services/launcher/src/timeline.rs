@@ -8,12 +8,13 @@ use vigil_blocks::{
     ActionRejection, Blindness, Channel, Event, EventKind, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
     Rejection, SizeKind,
 };
-use vigil_cycle::Supervision;
+use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
+use vigil_cycle::watchdog::Finding as WatchdogFinding;
 use vigil_robot::injection::{Change, WireChange};
 use vigil_robot::publisher_check::Finding;
+use vigil_setup::Setup;
 
-use crate::plan::Plan;
 use crate::words;
 
 /// An event in words.
@@ -52,10 +53,19 @@ impl fmt::Display for TimelineEntry {
     }
 }
 
+/// An event as it came.
+#[derive(Debug, Clone)]
+struct Record {
+    service: ServiceName,
+    event: Event,
+    /// What it says, if no block can carry that.
+    text: Option<String>,
+}
+
 /// All events of a run.
 pub struct Timeline {
     namer: Namer,
-    raw: Vec<(ServiceName, Event)>,
+    records: Vec<Record>,
     shown: usize,
     overwritten: u64,
     origin_ns: Option<u64>,
@@ -63,12 +73,12 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// An empty timeline for the services of a plan.
-    pub fn new(plan: &Plan) -> Self {
+    /// An empty timeline of a graph with these models.
+    pub fn new(setup: &Setup) -> Self {
         Self {
-            namer: Namer::new(plan),
+            namer: Namer::new(setup),
             origin_ns: None,
-            raw: Vec::new(),
+            records: Vec::new(),
             shown: 0,
             overwritten: 0,
             closed_ns: None,
@@ -84,8 +94,26 @@ impl Timeline {
             if event.kind == EventKind::Ready as u32 {
                 self.begin(event.t_ns);
             }
-            self.raw.push((service, *event));
+            self.records.push(Record {
+                service,
+                event: *event,
+                text: None,
+            });
         }
+    }
+
+    /// Adds an assertion of a service that has failed, found at `t_ns`; also while the graph is
+    /// being stopped.
+    pub fn add_failure(&mut self, service: ServiceName, failure: &Failure, t_ns: u64) {
+        self.records.push(Record {
+            service,
+            event: Event {
+                t_ns,
+                kind: EventKind::Assertion as u32,
+                ..Event::default()
+            },
+            text: Some(failure.to_string()),
+        });
     }
 
     /// Events after `t_ns` are of no interest: the services are being stopped.
@@ -120,12 +148,12 @@ impl Timeline {
 
     /// Scheduled instant of a recording's last frame, ns, once it has been played.
     pub fn recording_end_ns(&self) -> Option<u64> {
-        let end = |(_, e): &&(_, Event)| e.kind == EventKind::EndOfRecording as u32;
-        self.raw.iter().find(end).map(|(_, event)| event.value)
+        self.first_record(EventKind::EndOfRecording)
+            .map(|record| record.event.value)
     }
 
-    /// False for what a service says because the recording is at its end: that it misses input.
-    fn is_told(&self, event: &Event) -> bool {
+    /// False for what follows from the end of a recording alone: that input is missing.
+    fn is_shown(&self, event: &Event) -> bool {
         use EventKind::{InputBack, InputLost, Miss};
         let is_missing = [Miss, InputLost, InputBack]
             .map(|kind| kind as u32)
@@ -138,61 +166,53 @@ impl Timeline {
 
     /// What was broken and mended, in the words of `--inject`, with the time since the origin.
     pub fn changes(&self) -> Vec<String> {
-        let told = self.told();
-        let changes = told
-            .iter()
-            .filter(|told| ["injected", "restored"].contains(&told.event));
-        changes
-            .map(|told| format!("{}@{}", told.what, told.t_s.max(0.0)))
-            .collect()
+        let mut entries = self.entries();
+        entries.retain(|entry| ["injected", "restored"].contains(&entry.event));
+        let spec = |entry: &TimelineEntry| format!("{}@{}", entry.what, entry.t_s.max(0.0));
+        entries.iter().map(spec).collect()
     }
 
     /// Puts the newly added events in order; prints them to standard error if `show`.
     pub fn settle(&mut self, show: bool) {
         let origin_ns = self.origin_ns;
-        self.raw[self.shown..].sort_by_key(|(_, event)| event.t_ns);
+        self.records[self.shown..].sort_by_key(|record| record.event.t_ns);
         if show && origin_ns.is_some() {
-            let new = self.raw[self.shown..].iter();
-            for (service, event) in new.filter(|(_, event)| self.is_told(event)) {
-                let told = self.namer.tell(*service, event, origin_ns);
-                tell!("{told}");
+            let new = self.records[self.shown..].iter();
+            for record in new.filter(|record| self.is_shown(&record.event)) {
+                let entry = self.namer.entry(record, origin_ns);
+                tell!("{entry}");
             }
         }
         if origin_ns.is_some() || !show {
-            self.shown = self.raw.len();
+            self.shown = self.records.len();
         }
     }
 
-    /// Instant of the first event of a kind, ns.
-    pub fn first(&self, kind: EventKind) -> Option<u64> {
-        self.raw
-            .iter()
-            .find(|(_, e)| e.kind == kind as u32)
-            .map(|(_, e)| e.t_ns)
+    fn first_record(&self, kind: EventKind) -> Option<&Record> {
+        let mut records = self.records.iter();
+        records.find(|record| record.event.kind == kind as u32)
     }
 
     /// Seconds for which the detector was blind, by cause, until `end_ns`.
     pub fn blind_s(&self, end_ns: u64) -> BTreeMap<&'static str, f64> {
-        let mut sorted: Vec<&Event> = self.raw.iter().map(|(_, event)| event).collect();
+        let mut sorted: Vec<&Event> = self.records.iter().map(|record| &record.event).collect();
         sorted.sort_by_key(|event| event.t_ns);
         blind_s(sorted.into_iter(), end_ns)
     }
 
     /// True if an event of this kind is there.
     pub fn has(&self, kind: EventKind) -> bool {
-        self.first(kind).is_some()
+        self.first_record(kind).is_some()
     }
 
     /// Every event in words, in order.
-    pub fn told(&self) -> Vec<TimelineEntry> {
+    pub fn entries(&self) -> Vec<TimelineEntry> {
         let origin_ns = self.origin_ns;
-        let mut sorted = self.raw.clone();
-        sorted.sort_by_key(|(_, event)| event.t_ns);
-        sorted
-            .iter()
-            .filter(|(_, event)| self.is_told(event))
-            .map(|(service, event)| self.namer.tell(*service, event, origin_ns))
-            .collect()
+        let mut sorted: Vec<&Record> = self.records.iter().collect();
+        sorted.sort_by_key(|record| record.event.t_ns);
+        sorted.retain(|record| self.is_shown(&record.event));
+        let entry = |record: &&Record| self.namer.entry(record, origin_ns);
+        sorted.iter().map(entry).collect()
     }
 }
 
@@ -224,29 +244,26 @@ fn blind_s<'a>(
 }
 
 /// Gives names to what events are about.
-pub struct Namer {
+struct Namer {
     nodes: Vec<String>,
     actions: Vec<String>,
     robot: vigil_robot::Description,
 }
 
 impl Namer {
-    /// Names from the plan's models.
-    pub fn new(plan: &Plan) -> Self {
+    /// Names from a graph's models.
+    fn new(setup: &Setup) -> Self {
+        let nodes = setup.tree.nodes().iter();
         Self {
-            nodes: plan
-                .setup
-                .tree
-                .nodes()
-                .iter()
-                .map(|node| node.name.clone())
-                .collect(),
-            actions: plan.setup.decision.actions().to_vec(),
-            robot: plan.setup.robot.clone(),
+            nodes: nodes.map(|node| node.name.clone()).collect(),
+            actions: setup.decision.actions().to_vec(),
+            robot: setup.robot.clone(),
         }
     }
 
-    fn tell(&self, service: ServiceName, event: &Event, origin_ns: Option<u64>) -> TimelineEntry {
+    fn entry(&self, record: &Record, origin_ns: Option<u64>) -> TimelineEntry {
+        let event = &record.event;
+        let text = record.text.clone();
         let kind = EventKind::from_wire(event.kind);
         let t_s = origin_ns.map_or(0.0, |origin| (event.t_ns as f64 - origin as f64) * 1e-9);
         let has_p = matches!(
@@ -255,9 +272,11 @@ impl Namer {
         );
         TimelineEntry {
             t_s: (t_s * 1e6).round() * 1e-6,
-            service: service.as_str(),
+            service: record.service.as_str(),
             event: kind.map_or("unknown", kind_name),
-            what: kind.map_or_else(String::new, |kind| self.what(kind, event)),
+            what: text
+                .or_else(|| Some(self.what(kind?, event)))
+                .unwrap_or_default(),
             p: has_p.then_some(event.p),
             fault_set: (kind == Some(EventKind::Diagnosis) && event.what == MODE_MULTIPLE)
                 .then(|| self.set(event.value)),
@@ -343,8 +362,8 @@ impl Namer {
             }
             EventKind::Particles => format!("{} of {}", event.what, event.value),
             EventKind::Watchdog => {
-                let found = Supervision::from_wire(event.what);
-                found.map_or("?", words::failure).into()
+                let found = WatchdogFinding::from_wire(event.what);
+                found.map_or("?", words::watchdog).into()
             }
             _ => String::new(),
         }
@@ -399,12 +418,121 @@ const fn kind_name(kind: EventKind) -> &'static str {
         EventKind::Released => "released",
         EventKind::Publisher => "publisher",
         EventKind::Size => "size",
+        EventKind::Assertion => "assertion",
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plan::tests::plan;
+
+    const S: u64 = 1_000_000_000;
+
+    fn event(t_s: u64, kind: EventKind, what: u32, value: u64) -> Event {
+        Event {
+            t_ns: t_s * S,
+            kind: kind as u32,
+            what,
+            p: 0.9,
+            value,
+        }
+    }
+
+    fn timeline() -> Timeline {
+        Timeline::new(&plan(&[]).unwrap().setup)
+    }
+
+    #[test]
+    fn events_are_told_in_order_from_the_beginning_of_the_drive() {
+        let mut timeline = timeline();
+        timeline.add(ServiceName::Detector, &event(12, EventKind::Alarm, 0, 0));
+        timeline.add(ServiceName::SensorSim, &event(10, EventKind::Ready, 0, 0));
+        timeline.add(ServiceName::Supervisor, &event(13, EventKind::Miss, 0, 4));
+        timeline.add_overwritten(2);
+        let lines: Vec<String> = timeline.entries().iter().map(ToString::to_string).collect();
+        assert_eq!(
+            lines,
+            [
+                "    0.000 s  sensor-sim  ready       ",
+                "    2.000 s  detector    alarm         p=0.900",
+                "    3.000 s  supervisor  miss        4 cycles",
+            ]
+        );
+        assert_eq!(
+            (timeline.origin_ns(), timeline.overwritten()),
+            (Some(10 * S), 2)
+        );
+        assert!(timeline.has(EventKind::Alarm) && !timeline.has(EventKind::Goal));
+        timeline.begin(99);
+        assert_eq!(timeline.origin_ns(), Some(10 * S), "it begins once");
+    }
+
+    #[test]
+    fn a_failed_assertion_is_told_even_while_the_graph_stops() {
+        let mut timeline = timeline();
+        timeline.begin(10 * S);
+        timeline.close(11 * S);
+        timeline.add(ServiceName::Detector, &event(12, EventKind::Alarm, 0, 0));
+        let failure = Failure {
+            location: "deadline.rs:7:9".into(),
+            work: "at input 5 of epoch 3".into(),
+            message: "instants never go back".into(),
+        };
+        timeline.add_failure(ServiceName::Identifier, &failure, 12 * S);
+        let entries = timeline.entries();
+        assert_eq!(entries.len(), 1);
+        assert_eq!(
+            entries[0].to_string(),
+            "    2.000 s  identifier  assertion   instants never go back (deadline.rs:7:9), \
+             at input 5 of epoch 3"
+        );
+        assert_eq!(timeline.closed_ns(), Some(11 * S));
+    }
+
+    #[test]
+    fn misses_after_the_end_of_a_recording_are_no_events() {
+        let mut timeline = timeline();
+        let end = event(20, EventKind::EndOfRecording, 0, 20 * S);
+        timeline.add(ServiceName::Detector, &event(19, EventKind::Miss, 0, 1));
+        timeline.add(ServiceName::SensorSim, &end);
+        timeline.add(ServiceName::Detector, &event(21, EventKind::Miss, 0, 1));
+        timeline.settle(false);
+        let events: Vec<_> = timeline.entries().iter().map(|entry| entry.event).collect();
+        assert_eq!(events, ["miss", "end-of-recording"]);
+        assert_eq!(timeline.recording_end_ns(), Some(20 * S));
+    }
+
+    #[test]
+    fn faults_are_named_and_changes_can_be_injected_again() {
+        let mut timeline = timeline();
+        timeline.begin(10 * S);
+        let injection = vigil_robot::Injection::parse("stuck:RM@5", &timeline.namer.robot).unwrap();
+        let (what, p, value) = injection.change.to_wire().event();
+        let injected = Event {
+            p,
+            ..event(15, EventKind::Injected, what, value)
+        };
+        timeline.add(ServiceName::SensorSim, &injected);
+        assert_eq!(timeline.changes(), ["stuck:RM@5"]);
+        let leaf = |name: &str| timeline.namer.nodes.iter().position(|n| n == name).unwrap();
+        let (stuck, encoder) = (leaf("RM_STUCK"), leaf("LF_ENC"));
+        let set = 1 << stuck | 1 << encoder;
+        let several = event(16, EventKind::Diagnosis, MODE_MULTIPLE, set);
+        let one = event(17, EventKind::Diagnosis, stuck as u32, 1 << stuck);
+        timeline.add(ServiceName::Identifier, &several);
+        timeline.add(ServiceName::Identifier, &one);
+        let entries = timeline.entries();
+        assert_eq!(entries[1].what, "MULTIPLE");
+        let set = entries[1].fault_set.as_deref().unwrap();
+        let mut names: Vec<&str> = set.split('+').collect();
+        names.sort_unstable();
+        assert_eq!(names, ["LF_ENC", "RM_STUCK"]);
+        assert_eq!(
+            (entries[2].what.as_str(), entries[2].p),
+            ("RM_STUCK", Some(0.9))
+        );
+    }
 
     #[test]
     fn blind_time_is_added_up_by_cause_until_the_end() {

@@ -1,7 +1,7 @@
 //! Words for what happens to a robot on its path.
 
 use vigil_blocks::{ActionOutcome, Blindness, Degraded, Event, RecoveryKind, SizeKind, Symptoms};
-use vigil_cycle::Supervision;
+use vigil_cycle::watchdog::Finding;
 
 /// Symptoms, joined by `_` as in the decision model; `none` for the empty set.
 pub fn symptoms(set: u32) -> String {
@@ -64,17 +64,61 @@ pub fn degraded(bits: u32) -> String {
     }
 }
 
-/// Why the detector sees nothing.
+/// Why the detector is blind.
 pub fn blind(cause: u32) -> &'static str {
     Blindness::from_wire(cause).map_or("?", Blindness::as_str)
 }
 
-/// What a failure that the watchdog has found is called.
-pub const fn failure(supervision: Supervision) -> &'static str {
-    match supervision {
-        Supervision::StartUp => "did not start up in time",
-        Supervision::Alive => "has stopped reporting",
-        Supervision::Deadline => "misses its deadlines",
-        Supervision::Logical => "no longer follows its input",
+/// What the watchdog has found of a service.
+pub const fn watchdog(finding: Finding) -> &'static str {
+    match finding {
+        Finding::StartUp => "did not start up in time",
+        Finding::Alive => "has stopped reporting",
+        Finding::Deadline => "misses its deadlines",
+        Finding::Logical => "no longer follows its input",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_of_symptoms_and_reasons_are_joined_and_empty_ones_have_a_word() {
+        assert_eq!(symptoms(0), "none");
+        assert_eq!(symptoms(Symptoms::EPS | Symptoms::LD), "EPS_LD");
+        assert_eq!(degraded(0), "no longer");
+        let both = Degraded::INPUT_LOST | Degraded::LATE;
+        assert_eq!(degraded(both), "input lost, late");
+    }
+
+    #[test]
+    fn a_size_has_its_unit_and_ways_without_size_have_none() {
+        let sd = 0.02_f64.to_bits();
+        assert_eq!(size(SizeKind::Gain, 0.5, sd), "gain 0.50 (sd 0.02)");
+        assert_eq!(
+            size(SizeKind::AngleRad, 0.2, sd),
+            "angle 0.20 rad (sd 0.02)"
+        );
+        assert_eq!(size(SizeKind::Zero, 0.0, sd), "zero");
+    }
+
+    #[test]
+    fn what_this_version_does_not_know_is_a_question_mark_and_no_panic() {
+        assert_eq!(blind(Blindness::Silence as u32), "no frames");
+        assert_eq!(blind(99), "?");
+        let outcome_of = |what, value| {
+            outcome(&Event {
+                what,
+                value,
+                ..Event::default()
+            })
+        };
+        let succeeded = ActionOutcome::Succeeded as u64;
+        let path = RecoveryKind::NewPath as u32;
+        assert_eq!(outcome_of(path, succeeded), "alternative path");
+        assert_eq!(outcome_of(path, u64::MAX), "no alternative");
+        assert_eq!(outcome_of(99, succeeded), "done");
+        assert_eq!(watchdog(Finding::Alive), "has stopped reporting");
     }
 }

@@ -106,6 +106,9 @@ pub enum EventKind {
     /// fault tree + 256 x [`crate::SizeKind`]; `p`: the size; bits of `value`: its standard
     /// deviation.
     Size = 33,
+    /// An assertion of the service has failed and ended it. Only the launcher records it: no block
+    /// carries its text.
+    Assertion = 34,
 }
 
 impl EventKind {
@@ -146,6 +149,7 @@ impl EventKind {
             31 => Self::Released,
             32 => Self::Publisher,
             33 => Self::Size,
+            34 => Self::Assertion,
             _ => return None,
         })
     }

@@ -55,4 +55,4 @@ pub use source::{Source, SourceCycle, SourceOutcome};
 pub use stage::{Intake, Stage, StageCycle};
 pub use stamps::{CycleStamps, Stamps};
 pub use topic::Topic;
-pub use watchdog::{Supervision, Watchdog};
+pub use watchdog::Watchdog;

@@ -1,4 +1,4 @@
-//! Supervision of services that live, from what they say about themselves.
+//! Finds services that live and do not do their work, by the Health that they publish.
 //!
 //! The three kinds of AUTOSAR's watchdog manager (specification of Watchdog Manager, R4): *alive*,
 //! does it report as often as it should; *deadline*, does it keep its times; *logical*, does its
@@ -13,10 +13,10 @@ use vigil_blocks::{Degraded, Health, ServiceState};
 /// Window in which missed deadlines are counted, ns.
 const WINDOW_NS: u64 = 1_000_000_000;
 
-/// What a service has failed.
+/// What the watchdog finds wrong with a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Supervision {
+pub enum Finding {
     /// It did not begin to report in time.
     StartUp = 1,
     /// It has stopped reporting.
@@ -27,7 +27,7 @@ pub enum Supervision {
     Logical = 4,
 }
 
-impl Supervision {
+impl Finding {
     /// The kind behind an event's `what`.
     #[must_use]
     pub const fn from_wire(value: u32) -> Option<Self> {
@@ -74,7 +74,7 @@ pub struct Settings {
     pub deadline_percent: f64,
 }
 
-/// The settings in the units of Health; 0 for no such supervision.
+/// The settings in the units of Health; 0 for no limit.
 #[derive(Debug, Clone, Copy)]
 struct Limits {
     start_up_ns: u64,
@@ -115,12 +115,12 @@ struct Peer {
     /// It was without input at some time in this window.
     was_without_input: bool,
     has_missed_too_many: bool,
-    /// Dead, or failed and told so: nothing more until it is started anew.
+    /// Dead, or found failed: not examined until it is started anew.
     is_gone: bool,
 }
 
-/// Longest time between two looks, ns. After a longer one nobody can say who was silent meanwhile:
-/// perhaps the whole machine stood still.
+/// Longest time between two looks, ns. After a longer one the whole machine may have stood still:
+/// no service is blamed for the time between. 50 polls of the launcher.
 const LOOK_NS_MAX: u64 = 200_000_000;
 
 /// Watches the services of one graph, given in the order of the data.
@@ -192,7 +192,7 @@ impl Watchdog {
         }
     }
 
-    /// Takes a report of a service, seen at `now_ns`; one seen before says nothing.
+    /// Takes a report of a service, read at `now_ns`; one read before is ignored.
     pub fn take(&mut self, service: usize, health: &Health, now_ns: u64) {
         let Some(watched) = self.services.get_mut(service) else {
             return;
@@ -224,8 +224,8 @@ impl Watchdog {
         }
     }
 
-    /// A service that has failed, and what; each failure is told once.
-    pub fn failed(&mut self, now_ns: u64) -> Option<(usize, Supervision)> {
+    /// A service that has failed, and how; each failure is returned once.
+    pub fn failed(&mut self, now_ns: u64) -> Option<(usize, Finding)> {
         if self.is_blind {
             return None;
         }
@@ -240,7 +240,7 @@ impl Watchdog {
 }
 
 impl Peer {
-    fn examine(&mut self, limits: &Limits, now_ns: u64) -> Option<Supervision> {
+    fn examine(&mut self, limits: &Limits, now_ns: u64) -> Option<Finding> {
         assert!(
             self.started_ns <= now_ns && self.reported_ns <= now_ns,
             "a service has started and reported in the past: {} and {}, now {now_ns} ns",
@@ -253,20 +253,20 @@ impl Peer {
         let since = |then_ns: u64| now_ns - then_ns;
         if self.epoch == 0 {
             let is_late = since(self.started_ns) > limits.start_up_ns;
-            return is_late.then_some(Supervision::StartUp);
+            return is_late.then_some(Finding::StartUp);
         }
         if limits.alive_ns > 0 && since(self.reported_ns) > limits.alive_ns {
-            return Some(Supervision::Alive);
+            return Some(Finding::Alive);
         }
         // It goes on reporting all the while: silence is another failure.
         let stood_still_ns = self
             .behind_since_ns
             .map_or(0, |behind_ns| self.reported_ns.saturating_sub(behind_ns));
         if limits.logical_ns > 0 && stood_still_ns > limits.logical_ns {
-            return Some(Supervision::Logical);
+            return Some(Finding::Logical);
         }
         let misses = limits.missed_share > 0.0 && self.misses(limits.missed_share, now_ns);
-        misses.then_some(Supervision::Deadline)
+        misses.then_some(Finding::Deadline)
     }
 
     /// True once for each time that a window has too many misses after one that had not.
@@ -325,7 +325,7 @@ mod tests {
             &mut self,
             ms: u64,
             mut change: impl FnMut(usize, &mut Health) -> bool,
-        ) -> Vec<(u64, usize, Supervision)> {
+        ) -> Vec<(u64, usize, Finding)> {
             let mut found = Vec::new();
             for _ in 0..ms / 50 {
                 self.now_ns += 50 * MS;
@@ -356,15 +356,15 @@ mod tests {
         let mut services = Services::new();
         services.run(1000, |_, _| true);
         let found = services.run(3000, |service, _| service != 1);
-        assert_eq!(found, [(1550, 1, Supervision::Alive)]);
+        assert_eq!(found, [(1550, 1, Finding::Alive)]);
         services.watchdog.started(1, services.now_ns);
         // Old reports that are still about do not count for the new process.
         let found = services.run(3050, |_, _| true);
-        assert_eq!(found, [(7050, 1, Supervision::StartUp)]);
+        assert_eq!(found, [(7050, 1, Finding::StartUp)]);
         // Nor after another one that never reported.
         services.watchdog.started(1, services.now_ns);
         let found = services.run(3050, |_, _| true);
-        assert_eq!(found, [(10_100, 1, Supervision::StartUp)]);
+        assert_eq!(found, [(10_100, 1, Finding::StartUp)]);
         services.watchdog.started(1, services.now_ns);
         services.health[1].header.epoch = 77;
         assert_eq!(services.run(3050, |_, _| true), []);
@@ -384,7 +384,7 @@ mod tests {
         });
         assert_eq!(found.len(), 1, "{found:?}");
         let (at_ms, service, what) = found[0];
-        assert_eq!((service, what), (1, Supervision::Logical));
+        assert_eq!((service, what), (1, Finding::Logical));
         assert!((1400..=1550).contains(&at_ms), "{at_ms}");
     }
 
@@ -402,7 +402,7 @@ mod tests {
         assert_eq!(misses(&mut services, 5000, 2), []);
         let found = misses(&mut services, 5000, 3);
         assert_eq!(found.len(), 1, "{found:?}");
-        assert_eq!((found[0].1, found[0].2), (2, Supervision::Deadline));
+        assert_eq!((found[0].1, found[0].2), (2, Finding::Deadline));
         assert!(!found[0].2.needs_restart());
         assert_eq!(misses(&mut services, 3000, 0), []);
         assert_eq!(misses(&mut services, 3000, 5).len(), 1, "a second time");
@@ -439,7 +439,7 @@ mod tests {
             service != 1
         };
         let found = services.run(3000, &mut still);
-        assert_eq!(found, [(1550, 1, Supervision::Alive)]);
+        assert_eq!(found, [(1550, 1, Finding::Alive)]);
         services.watchdog.started(1, services.now_ns);
         assert_eq!(services.run(1000, &mut still), []);
         // It comes back and answers at once; the one behind it does so a report later.
@@ -498,14 +498,14 @@ mod tests {
     #[test]
     #[should_panic(expected = "the watchdog's time never goes back")]
     fn a_look_from_the_past_is_found() {
-        let mut watchdog = Watchdog::new(LIMITS, 1, 5 * MS);
+        let mut watchdog = Watchdog::new(&SETTINGS, 1, 5 * MS);
         watchdog.look(4 * MS);
     }
 
     #[test]
     #[should_panic(expected = "a service has started and reported in the past")]
     fn a_report_from_the_future_is_found() {
-        let mut watchdog = Watchdog::new(LIMITS, 1, 0);
+        let mut watchdog = Watchdog::new(&SETTINGS, 1, 0);
         watchdog.services[0].reported_ns = 2 * MS;
         watchdog.failed(MS);
     }

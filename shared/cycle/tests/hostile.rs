@@ -10,7 +10,7 @@ use vigil_blocks::{Action, Block, BlockId, Cause, Header, Health, Rejection, Sen
 use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::watchdog::Limits;
+use vigil_cycle::watchdog::Settings;
 use vigil_cycle::{
     Clock, CycleAccount, DeadlineMonitor, Graph, HealthBoard, InputAccount, Intake, OnMiss,
     PortError, Recorder, Schedule, Sender, Shedder, Source, SourceCycle, SourceOutcome, Stage,
@@ -233,13 +233,13 @@ proptest! {
             1..200,
         ),
     ) {
-        let limits = Limits {
-            start_up_ns: 1_000_000_000,
-            alive_ns: 500_000_000,
-            logical_ns: 400_000_000,
-            missed_share: 0.5,
+        let settings = Settings {
+            startup_s: 1.0,
+            alive_s: 0.5,
+            logical_s: 0.4,
+            deadline_percent: 50.0,
         };
-        let mut watchdog = Watchdog::new(limits, 4, START_NS);
+        let mut watchdog = Watchdog::new(&settings, 4, START_NS);
         let mut now_ns = START_NS;
         for (idle_ns, service, numbers, words, what) in reports {
             now_ns += idle_ns;

@@ -1,30 +1,26 @@
-//! Services that live and have failed all the same: found, told, ended, so that they restart.
+//! Services that live and do not do their work: found, put into the timeline, ended, so that they
+//! restart.
 
 use vigil_blocks::{Event, EventKind};
 use vigil_cycle::topic::ServiceName;
+use vigil_cycle::watchdog::Settings;
 use vigil_cycle::{Clock, Monotonic, Watchdog};
 
 use crate::children::Children;
 use crate::observer::Observer;
-use crate::plan::Plan;
 use crate::words;
 
-/// Holds the watchdog against what the services report.
-pub struct Supervisor {
+/// Feeds the watchdog with what the services report, and acts on what it finds.
+pub struct WatchdogDriver {
     watchdog: Watchdog,
     services: Vec<ServiceName>,
 }
 
-impl Supervisor {
-    /// Watches over the services of the plan, which start now.
-    pub fn new(plan: &Plan) -> Self {
-        let services: Vec<ServiceName> = plan.services().collect();
+impl WatchdogDriver {
+    /// Watches these services, which start now.
+    pub fn new(settings: &Settings, services: Vec<ServiceName>) -> Self {
         Self {
-            watchdog: Watchdog::new(
-                &plan.setup.file.watchdog,
-                services.len(),
-                Monotonic.now_ns(),
-            ),
+            watchdog: Watchdog::new(settings, services.len(), Monotonic.now_ns()),
             services,
         }
     }
@@ -45,19 +41,19 @@ impl Supervisor {
                 self.watchdog.take(service, health, now_ns);
             }
         }
-        while let Some((service, supervision)) = self.watchdog.failed(now_ns) {
+        while let Some((service, finding)) = self.watchdog.failed(now_ns) {
             let name = self.services[service];
             observer.add_event(
                 name,
                 &Event {
                     t_ns: now_ns,
                     kind: EventKind::Watchdog as u32,
-                    what: supervision as u32,
+                    what: finding as u32,
                     ..Event::default()
                 },
             );
-            if supervision.needs_restart() {
-                children.end(name, words::failure(supervision));
+            if finding.needs_restart() {
+                children.end(name, words::watchdog(finding));
             }
         }
     }
