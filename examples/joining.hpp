@@ -85,7 +85,7 @@ constexpr bool is_coming([[maybe_unused]] Error error) {
 
 // What to say of another error.
 template <typename Error>
-std::string told(Error error, const std::string &folder) {
+std::string explain(Error error, const std::string &folder) {
   const std::string text = iox2::bb::into<const char *>(error);
   if constexpr (std::is_same_v<Error, iox2::PublisherCreateError>)
     if (error == Error::ExceedsMaxSupportedPublishers)
@@ -101,7 +101,7 @@ auto wait_for(const std::string &graph, Open open) {
     if (opened.has_value()) return std::move(opened.value());
     const std::string folder = runtime_folder(graph);
     if (folder.empty()) fail("the graph '" + graph + "' has ended");
-    if (!is_coming(opened.error())) fail(told(opened.error(), folder));
+    if (!is_coming(opened.error())) fail(explain(opened.error(), folder));
     const char *error = iox2::bb::into<const char *>(opened.error());
     if (is_first) std::fprintf(stderr, "waiting for the graph's topics: %s\n", error);
     wait_a_little();

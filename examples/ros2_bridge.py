@@ -1,6 +1,6 @@
-"""A ROS 2 node that sends what /odom, /joint_states and /cmd_vel say to a graph with `--source socket`.
+"""A ROS 2 node that sends frames from /odom, /joint_states and /cmd_vel to a graph.
 
-A frame for each odometry: `scripts/up --source socket --rate HZ` with the rate of /odom.
+Each message of /odom makes a frame. Start the graph by `scripts/up --source socket --rate HZ`, with the rate of /odom.
 python3 ros2_bridge.py [ADDRESS]        (needs rclpy; the mapping is in ros2_mapping.py)
 """
 

@@ -1,4 +1,4 @@
-"""From the newest ROS 2 messages to a frame: change the names to those of your robot."""
+"""Makes a frame of the newest ROS 2 messages. Change the names to those of your robot."""
 
 import math
 

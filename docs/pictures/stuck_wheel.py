@@ -241,7 +241,7 @@ def draw_span(drawing, name, start, end, top, kind):
     strong = colour in (FAULT, ACTION)
     # About 6.3 units a letter.
     spare = end - start - 6.3 * len(name)
-    if spare > 0:
+    if spare > 2:
         drawing.text(start + min(6, spare / 2), top + 12, name, PAPER if strong else INK, 11)
 
 

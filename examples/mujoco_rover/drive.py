@@ -1,4 +1,4 @@
-"""Drives the rover in real time as Vigil's robot: publishes its sensors, obeys Vigil's actions.
+"""Drives the rover in real time as Vigil's robot: publishes its sensors and obeys Vigil's actions.
 
 pip install iceoryx2==0.10.0 mujoco==4.0.0
 scripts/up --source external              # in another window
@@ -43,7 +43,7 @@ class Obedience:
     """What the robot makes of the newest action. Without a valid one it stops."""
 
     def __init__(self, actions):
-        self.actions, self.action, self.is_valid, self.told = actions, vigil.Action(), False, ""
+        self.actions, self.action, self.is_valid, self.shown = actions, vigil.Action(), False, ""
 
     def command(self, curvature, speed):
         """The plan as the action has it: curvature, speed, share of the planned speed."""
@@ -53,11 +53,11 @@ class Obedience:
         self.is_valid = kind != "none" and time.monotonic_ns() <= action.valid_until_ns
         scale = action.speed_scale if self.is_valid and kind in DRIVING else 0.0
         bent = action.curvature_gain * curvature + action.curvature_offset if scale else curvature
-        told = f"{kind} {(*WHEELS, '')[min(action.wheel, 6)]}".strip() if self.is_valid else "nothing"
-        if told != self.told:
+        shown = f"{kind} {(*WHEELS, '')[min(action.wheel, 6)]}".strip() if self.is_valid else "nothing"
+        if shown != self.shown:
             values = f"curvature {curvature:+.2f} -> {bent:+.2f} 1/m, speed {speed:.2f} -> {scale * speed:.2f} m/s"
-            print(f"obeys {told}: {values}", flush=True)
-            self.told = told
+            print(f"obeys {shown}: {values}", flush=True)
+            self.shown = shown
         return bent, scale * speed, scale
 
     def outcome(self, has_arrived):

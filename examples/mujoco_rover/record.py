@@ -2,10 +2,10 @@
 
 pip install mujoco==4.0.0
 python3 record.py OUT [--runs 12] [--seconds 600] [--seed 1]
-Writes OUT/mujoco_frames.csv.gz and OUT/mujoco_runs.csv. Every 3 to 10 s the rover is told another curvature and
-speed, out of the range that its shipped model was learned on. `scripts/bench field --only recorded/mujoco` judges the
-runs, if OUT is $VIGIL_DATA/rover: pose and encoders by the shipped model; with gyro and currents every second run,
-by what the others teach of these.
+Writes OUT/mujoco_frames.csv.gz and OUT/mujoco_runs.csv. Every 3 to 10 s the rover gets another curvature and
+speed, within the range that its shipped model was learned on. `scripts/bench field --only recorded/mujoco` judges the
+runs, if OUT is $VIGIL_DATA/rover. Pose and encoders are judged by the shipped model. For gyro and currents every second
+run is judged by a model learned from the others.
 """
 
 import argparse
