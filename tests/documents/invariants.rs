@@ -4,6 +4,8 @@
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
+use crate::programs::root;
+
 /// A row of a table of invariants.
 #[derive(Clone)]
 struct Row<'a> {
@@ -34,14 +36,14 @@ fn rows(text: &str) -> Vec<Row<'_>> {
     .collect()
 }
 
-/// The named files, from the folder of the document, of its sources, or of the file before.
+/// The named files, from the folder of the document, of its sources, of the file before, or of the
+/// repository.
 fn find(folder: &Path, names: &[&str]) -> Result<Vec<PathBuf>, String> {
     let mut found: Vec<PathBuf> = Vec::new();
     for name in names {
-        let before = found.last().and_then(|path| path.parent());
-        let folders =
-            [Some(folder), Some(&folder.join("src")), before].map(|f| f.map(Path::to_owned));
-        let mut paths = folders.into_iter().flatten().map(|f| f.join(name));
+        let before = found.last().map_or(folder, |path| path.parent().unwrap());
+        let folders = [folder, &folder.join("src"), before, &root()];
+        let mut paths = folders.iter().map(|folder| folder.join(name));
         let path = paths.find(|path| path.is_file());
         found.push(path.ok_or_else(|| format!("no file {name}"))?);
     }
