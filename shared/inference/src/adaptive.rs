@@ -47,7 +47,8 @@ impl Adaptive {
                 self.slots[at] = (self.round, cell);
                 occupied += 1;
             }
-            // More cells than particles need the most particles anyway, and the table must not fill.
+            // More cells than particles need the most particles anyway, and the table must not
+            // fill.
             if occupied > mask / 2 + 1 {
                 break;
             }

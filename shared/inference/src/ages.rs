@@ -32,8 +32,8 @@ pub struct WhitenedResidual<const D: usize> {
     /// Change of the value by a bias of one unit: 1 at the usual noise, less where more is
     /// uncertain.
     pub exposure: f64,
-    /// Probability that it is an outlier, with or without a fault. An outlier under both is evidence
-    /// for neither.
+    /// Probability that it is an outlier, with or without a fault. An outlier under both is
+    /// evidence for neither.
     pub outlier_rate: f64,
 }
 

@@ -1,4 +1,5 @@
-//! A bounded set of weighted hypotheses: one per mode and onset, each with its own continuous state.
+//! A bounded set of weighted hypotheses: one per mode and onset, each with its own continuous
+//! state.
 //!
 //! The posterior over modes is the sum of the hypotheses' weights: no sampling, no mixing. The set
 //! is bounded: improbable hypotheses are dropped, and when a mode's places are taken its least

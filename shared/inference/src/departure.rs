@@ -195,8 +195,8 @@ impl<const K: usize> Departure<K> {
         self.log_faults() - total(self.ended.iter()).max(self.log_healthy())
     }
 
-    /// Log-likelihood ratio of the last pose for a fault that was present and stays, to one that has
-    /// ended or never was; 0 where the pose is no evidence.
+    /// Log-likelihood ratio of the last pose for a fault that was present and stays, to one that
+    /// has ended or never was; 0 where the pose is no evidence.
     #[must_use]
     pub const fn gain(&self) -> f64 {
         self.gain
@@ -241,8 +241,8 @@ impl<const K: usize> Departure<K> {
         self.track.predict(step, &self.nominal);
     }
 
-    /// While a fault is suspected no change of the ground begins: it could not be distinguished from
-    /// an end.
+    /// While a fault is suspected no change of the ground begins: it could not be distinguished
+    /// from an end.
     fn predict_change(&mut self, step: &Displacement, counts: bool) {
         let nominal = self.nominal;
         let p = -(-nominal.changes_1_m * step.travel_m.abs()).exp_m1();

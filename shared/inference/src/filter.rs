@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "an effective sample size lies between one and")]
-    fn more_effective_particles_than_particles_are_caught() {
+    fn more_effective_than_all_particles_is_caught() {
         SOUND.checked(&[1.0], 1);
     }
 

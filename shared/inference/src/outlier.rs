@@ -58,7 +58,8 @@ const FLUKE: f64 = 5e-10;
 const UNLIKELY: f64 = -7.0;
 
 /// Variances of the first pose of a track. Whether it is an outlier cannot be known yet, so its
-/// noise is taken between that of a usual pose and that of an outlier: the next pose can correct it.
+/// noise is taken between that of a usual pose and that of an outlier: the next pose can correct
+/// it.
 #[must_use]
 pub fn unvouched(variance: [f64; 3]) -> [f64; 3] {
     variance.map(|variance| SPREAD * variance)

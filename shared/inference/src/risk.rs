@@ -1,10 +1,10 @@
 //! The cost of losing track of a mode: the risk of the decision-theoretic filter.
 //!
 //! Particles either cover a mode (tracked) or do not (lost); the two change into each other with a
-//! small probability per step. While tracked, the robot takes the best action; while lost, a mixture
-//! of the worst and the average one. The risk of a mode is the difference in cost between lost and
-//! tracked (Thrun, Langford and Verma, *Risk Sensitive Particle Filters*, 2001). It follows from the
-//! recovery model by value iteration and is not set by hand.
+//! small probability per step. While tracked, the robot takes the best action; while lost, a
+//! mixture of the worst and the average one. The risk of a mode is the difference in cost between
+//! lost and tracked (Thrun, Langford and Verma, *Risk Sensitive Particle Filters*, 2001). It
+//! follows from the recovery model by value iteration and is not set by hand.
 
 /// The fully observed recovery problem: costs and transitions per action.
 #[derive(Debug, Clone, PartialEq)]

@@ -222,9 +222,9 @@ impl Track {
         Self { direction, ..self }
     }
 
-    /// The same pose in another mode, in a context. In a nominal mode, one with a bound, the context
-    /// becomes the deviations. In a fault it becomes the offsets, which keep their sign when the
-    /// direction of travel changes, plus those of the fault.
+    /// The same pose in another mode, in a context. In a nominal mode, one with a bound, the
+    /// context becomes the deviations. In a fault it becomes the offsets, which keep their sign
+    /// when the direction of travel changes, plus those of the fault.
     #[must_use]
     pub fn enter(&self, context: &Context, noise: &MotionNoise) -> Self {
         let mut track = *self;
@@ -255,9 +255,9 @@ impl Track {
         self.set(6, 6, &noise.deviation);
     }
 
-    /// Moves each mean deviation that is beyond its bound back onto it, and the rest of the state as
-    /// far as it is correlated: a Kalman filter constrained by projection (Simon, *Kalman Filtering
-    /// with State Constraints*, 2010).
+    /// Moves each mean deviation that is beyond its bound back onto it, and the rest of the state
+    /// as far as it is correlated: a Kalman filter constrained by projection (Simon, *Kalman
+    /// Filtering with State Constraints*, 2010).
     pub fn saturate(&mut self, bound: &Vector3<f64>) {
         for i in 0..3 {
             let deviation = self.mean[3 + i] + self.mean[6 + i];
@@ -291,12 +291,13 @@ impl Track {
             let beyond = 0.5 * (libm::erfc(near) + libm::erfc(far));
             within += (-beyond.min(1.0)).ln_1p();
         }
-        // One minus the product of the probabilities within, without cancellation where it is small.
+        // One minus the product of the probabilities within, without cancellation where it is
+        // small.
         (-within.exp_m1()).max(f64::MIN_POSITIVE).ln()
     }
 
-    /// Puts the pose at `pose` with `variance` and keeps the deviations: the frame in which the pose
-    /// is measured has jumped.
+    /// Puts the pose at `pose` with `variance` and keeps the deviations: the frame in which the
+    /// pose is measured has jumped.
     pub fn anchor(&mut self, pose: [f64; 3], variance: [f64; 3]) {
         self.mean
             .fixed_rows_mut::<3>(0)
@@ -395,7 +396,8 @@ impl Track {
     }
 
     /// Changes the sign of the forward and lateral deviations when the direction of travel does: a
-    /// slope pulls in one direction of the ground, so that its effect per metre driven changes sign.
+    /// slope pulls in one direction of the ground, so that its effect per metre driven changes
+    /// sign.
     fn face(&mut self, travel_m: f64) {
         let turns = turns_round(&mut self.direction, travel_m);
         for i in [N - 2, N - 1].into_iter().filter(|_| turns) {

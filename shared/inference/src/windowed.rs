@@ -2,9 +2,9 @@
 //!
 //! The last W whitened residuals, summed and divided by √W, are white again when nominal, but a
 //! constant bias with squared size λ has the size Wλ there. The blind spot of [`crate::constant`]
-//! shrinks from `λ <= τ² - d` to `λ <= (τ² - d) / W`; a large fault is detected up to W steps later.
-//! Every residual lies in W windows, so that each window counts as the W-th part of its evidence:
-//! a step adds `(|r_W|² - τ²) / 2W`.
+//! shrinks from `λ <= τ² - d` to `λ <= (τ² - d) / W`; a large fault is detected up to W steps
+//! later. Every residual lies in W windows, so that each window counts as the W-th part of its
+//! evidence: a step adds `(|r_W|² - τ²) / 2W`.
 
 use nalgebra::SVector;
 
