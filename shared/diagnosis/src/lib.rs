@@ -1,8 +1,8 @@
-//! The diagnosis as pure functions of journal entries: [`detect`] finds any deviation from nominal
-//! behaviour, [`identify`] names the fault. No transport, no clock, no files.
+#![doc = include_str!("../README.md")]
 
 pub mod detect;
 pub mod identify;
+mod invariants;
 mod sensors;
 
 pub use sensors::Sensors;

@@ -17,6 +17,7 @@ use crate::detect::publisher::Publisher;
 use crate::detect::settings::{MonitorSettings, Settings};
 use crate::detect::sight::{self, Sight};
 use crate::detect::watch::{DetectorInput, Watch};
+use crate::invariants;
 use crate::sensors::Sensors;
 
 /// Without monitors, pose log-odds beyond which the detector reports an error in position: even
@@ -217,7 +218,7 @@ impl Detector {
         belief: &mut DetectionBelief,
         hypotheses: &mut ParticleBlock,
     ) {
-        let mut missed = 0;
+        let (mut missed, alarms_before) = (0, self.alarm_count);
         match entry {
             Entry::Frame(frame) => {
                 self.sight.take(frame);
@@ -243,6 +244,12 @@ impl Detector {
         }
         self.report(missed, belief);
         self.publish(belief.log_odds, hypotheses);
+        invariants::probability(belief.p_fault);
+        invariants::finite_log_odds(belief.log_odds, &belief.channel_log_odds);
+        invariants::alarm_onset(belief.alarm != 0, belief.alarm_t_capture_ns);
+        invariants::alarm_count(alarms_before, belief.alarm_count);
+        let used = hypotheses.used().iter();
+        invariants::sums_to_one(used.map(|hypothesis| hypothesis.log_weight.exp()));
     }
 
     fn begin_run(&mut self) {
@@ -292,6 +299,7 @@ impl Detector {
         let stood = self.alarm.stands();
         // Clearing needs evidence: time at rest does not count.
         if self.armed && self.alarm.take(self.log_odds, observation.dt_s, moving) {
+            invariants::onset(observation.t_ns, self.t_last_ns);
             self.alarm_t_ns = observation.t_ns.max(1);
             self.alarm_count = self.alarm_count.saturating_add(1);
             self.endings.iter_mut().for_each(Ending::begin);

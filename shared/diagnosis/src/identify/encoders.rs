@@ -66,6 +66,17 @@ pub const SHARES: [f64; BREAKAGES.len() + WAYS] = {
     shares
 };
 
+/// Probability with which an encoder breaks in one observation, over [`SHARES`], at most: then it
+/// breaks for certain. Reached only where a robot's description has faults every second.
+pub const BIRTH_MAX: f64 = {
+    let (mut sum, mut i) = (0.0, 0);
+    while i < SHARES.len() {
+        sum += SHARES[i];
+        i += 1;
+    }
+    1.0 / sum
+};
+
 /// Log-likelihoods of one observation's readings in each state, prepared for many hypotheses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Likelihoods {
@@ -241,6 +252,12 @@ impl Encoders {
         }
         // No factor is too small for their product to need more than one logarithm.
         evidence + product.ln()
+    }
+
+    /// Probabilities of all states of this wheel's encoder.
+    #[must_use]
+    pub const fn states(&self, wheel: usize) -> &[f64; STATES] {
+        &self.p[wheel]
     }
 
     /// Probability that this wheel's encoder is broken.

@@ -22,6 +22,7 @@ use crate::identify::further_likelihood::{
 use crate::identify::further_state::State;
 use crate::identify::modes::Leaves;
 use crate::identify::node_sizes::TOLD_MIN;
+use crate::invariants;
 
 /// Offsets of a broken current sensor, in deviations of its noise: each twice the one before, as a
 /// size is told to a factor. The least lies within what a slope does to one wheel.
@@ -238,6 +239,7 @@ impl FurtherFilter {
         for p in &mut self.p {
             *p /= total;
         }
+        invariants::sums_to_one(self.p.iter().copied());
     }
 
     /// Log-likelihood of the readings in a state, over that of a whole robot; `beside` are the

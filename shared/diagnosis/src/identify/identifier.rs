@@ -1,13 +1,11 @@
 //! The identifier's `step`: watch, keep a ring, identify from it after an alarm, report.
 
-use std::collections::VecDeque;
-
 use nalgebra::Vector3;
 use vigil_blocks::{
     DetectionBelief, Entry, FaultBelief, HealthyBelief, MODE_UNKNOWN, ParticleBlock, SensorFrame,
 };
 use vigil_robot::FaultPrior;
-use vigil_robot::learned::{Healthy, NoiseScales, Observation, Observer, motion_modes};
+use vigil_robot::learned::{Healthy, Observer, motion_modes};
 
 use crate::identify::detection::Detection;
 use crate::identify::engine::Engine;
@@ -22,8 +20,10 @@ use crate::identify::node_sizes::NodeSizes;
 use crate::identify::posterior::Posterior;
 use crate::identify::reasons::Reasons;
 use crate::identify::reported::HeldName;
+use crate::identify::ring::{Ring, RingEntry};
 use crate::identify::settings::{IdentifierFilter, Settings};
 use crate::identify::trouble::believed;
+use crate::invariants;
 use crate::sensors::Sensors;
 
 /// Why another filter is refused.
@@ -42,14 +42,6 @@ pub struct Input<'a> {
     pub frame: &'a SensorFrame,
     /// The detector's belief and hypotheses of the same frame, if they are known.
     pub detection: Option<(&'a DetectionBelief, &'a ParticleBlock)>,
-}
-
-/// An observation kept for an identification, and what the detector believed after it.
-#[derive(Debug, Clone, Copy)]
-struct RingEntry {
-    observation: Observation,
-    noise: NoiseScales,
-    healthy: Option<Healthy>,
 }
 
 /// What the identifier is doing.
@@ -89,8 +81,7 @@ pub struct Identifier {
     told: Box<ParticleBlock>,
     updated: bool,
     tells_own: bool,
-    ring: VecDeque<RingEntry>,
-    capacity: usize,
+    ring: Ring,
     /// Time of an observation, s.
     interval_s: f64,
     phase: Phase,
@@ -164,8 +155,7 @@ impl Identifier {
             updated: false,
             tells_own: false,
             leaves,
-            ring: VecDeque::with_capacity(capacity),
-            capacity,
+            ring: Ring::new(capacity),
             interval_s: model.interval_s,
             phase: Phase::Watching,
             further: further.map(Box::new),
@@ -206,6 +196,7 @@ impl Identifier {
     ) {
         self.predicted = self.posterior;
         self.updated = false;
+        let is_frame = matches!(entry, Entry::Frame(_));
         let mut detected = None;
         match entry {
             Entry::Frame(input) => {
@@ -225,6 +216,11 @@ impl Identifier {
         }
         self.report(belief);
         self.publish(detected, hypotheses);
+        invariants::fault_belief(belief, self.leaves.all());
+        invariants::onset(belief.onset_t_capture_ns, self.ring.newest_ns());
+        if !is_frame {
+            invariants::held(&belief.p_predicted, &belief.p);
+        }
     }
 
     fn begin_run(&mut self) {
@@ -292,18 +288,18 @@ impl Identifier {
             let suspects = self.detection.suspects;
             stage.keep(self.observer.observation(), read, healthy, suspects);
         }
-        if self.ring.len() == self.capacity {
-            self.ring.pop_front();
-            if let Phase::Identifying(next) = self.phase {
-                // An observation that nobody has taken is taken before it goes; see catch_up.
-                self.phase = Phase::Identifying(next.saturating_sub(1));
-            }
-        }
-        self.ring.push_back(RingEntry {
+        let gave_way = self.ring.push(RingEntry {
+            run_id: self.run_id,
             observation: *self.observer.observation(),
             noise: self.detection.noise,
             healthy,
         });
+        if let Phase::Identifying(next) = self.phase
+            && gave_way
+        {
+            // An observation that nobody has taken is taken before it goes; see catch_up.
+            self.phase = Phase::Identifying(next.saturating_sub(1));
+        }
     }
 
     /// What the detector believed, or else that the pose is as it was measured.
@@ -317,11 +313,7 @@ impl Identifier {
 
     /// Starts from the oldest kept observation whose pose is known.
     fn begin(&mut self) {
-        let known = self
-            .ring
-            .iter()
-            .position(|kept| kept.healthy.is_some() || kept.observation.pose_frames > 0);
-        let start = known.unwrap_or(0);
+        let start = self.ring.start();
         let Some(kept) = self.ring.get(start) else {
             return;
         };
@@ -360,7 +352,9 @@ impl Identifier {
             return;
         }
         let prior = &self.prior;
-        let (birth, death) = (prior.suspected_1_s * moved_s, prior.mended_1_s * moved_s);
+        // Rates of up to one a second and a ring of up to 30 s: more than certain is certain.
+        let birth = (prior.suspected_1_s * moved_s).min(1.0);
+        let death = (prior.mended_1_s * moved_s).min(1.0);
         self.predicted = self
             .predicted
             .predicted(&self.leaves, self.p_unknown, birth, death);
@@ -389,9 +383,7 @@ impl Identifier {
         // The last pose from before the onset, not too long ago: the work of a cycle is bounded.
         let end = end.min(self.ring.len());
         let earliest = end.saturating_sub(REASONS_MAX);
-        let taken = self.ring.range(earliest..end);
-        let before = taken.take_while(|kept| kept.observation.t_ns <= onset_ns);
-        let start = earliest + before.count().saturating_sub(1);
+        let start = self.ring.last_by(onset_ns, earliest, end);
         let Some(kept) = self.ring.get(start) else {
             return;
         };
@@ -415,8 +407,8 @@ impl Identifier {
     fn catch_up(&self) -> usize {
         let frame_s = self.observer.observation().frame_s;
         let arriving = frame_s / self.interval_s;
-        let wanted = (self.capacity as f64 * frame_s / CATCH_UP_S).ceil() as usize;
-        wanted.max(arriving as usize + 1).min(self.capacity)
+        let wanted = (self.ring.capacity() as f64 * frame_s / CATCH_UP_S).ceil() as usize;
+        wanted.max(arriving as usize + 1).min(self.ring.capacity())
     }
 
     fn is_catching_up(&self) -> bool {

@@ -23,6 +23,7 @@ mod prepared;
 mod rate_offsets;
 mod reasons;
 mod reported;
+mod ring;
 mod risk;
 mod servo;
 mod sets;

@@ -113,7 +113,7 @@ impl Leaves {
     }
 
     /// The nodes of all leaves.
-    pub fn all(&self) -> impl Iterator<Item = usize> {
+    pub fn all(&self) -> impl Iterator<Item = usize> + Clone {
         let of_motion = self.stuck.iter().chain(&self.encoder).chain(&self.steer);
         let further = self.torque.iter().chain(&self.current);
         of_motion

@@ -23,7 +23,7 @@ use vigil_robot::learned::{
 };
 
 use crate::identify::angles::Angles;
-use crate::identify::encoders::Encoders;
+use crate::identify::encoders::{BIRTH_MAX, Encoders};
 use crate::identify::further::Fusion;
 use crate::identify::modes::Leaves;
 use crate::identify::posterior::Posterior;
@@ -33,6 +33,7 @@ use crate::identify::servo::ServoPrior;
 use crate::identify::sets::Sets;
 use crate::identify::sizes::{Sight, Sizes};
 use crate::identify::state::State;
+use crate::invariants;
 
 /// Index of the nominal motion among the modes.
 const NOMINAL: usize = 0;
@@ -155,6 +156,7 @@ impl MultipleHypothesis {
             fresh: 0,
         };
         self.bank.restart(NOMINAL, t_ns, state);
+        invariants::start(healthy.pose.into(), state.track.pose().into());
     }
 
     /// Observations that were impossible under every hypothesis, and were passed over.
@@ -216,8 +218,14 @@ impl MultipleHypothesis {
             failed = self.weigh_pose(observation, variance, noise);
             self.cut_off();
         }
-        if self.bank.normalise(FLOOR).is_none() || failed {
+        let evidence = self.bank.normalise(FLOOR);
+        if evidence.is_none() || failed {
             self.degenerate_count = self.degenerate_count.saturating_add(1);
+        }
+        if evidence.is_some() {
+            let all = self.bank.hypotheses();
+            invariants::within_capacity(all.len(), self.bank.limit());
+            invariants::hypothesis_weights(all.iter().map(|hypothesis| hypothesis.log_weight));
         }
     }
 
@@ -309,7 +317,8 @@ impl MultipleHypothesis {
         let births = |moved: Mover, encoders: &Encoders| {
             let p_other = encoders.p_other_broken();
             let factor = |wheel: usize| rates.factor(moved, p_other[wheel]);
-            std::array::from_fn(|wheel| births_1_s[wheel] * observation.dt_s * factor(wheel))
+            let born = |wheel: usize| births_1_s[wheel] * observation.dt_s * factor(wheel);
+            std::array::from_fn(|wheel| born(wheel).min(BIRTH_MAX))
         };
         let modes = &self.modes;
         let named = self.bank.best(|mode| !modes[mode].moved.is_unknown());
@@ -364,6 +373,9 @@ impl MultipleHypothesis {
         let Some(best) = self.bank.best(|_| true) else {
             return;
         };
+        for wheel in 0..WHEELS {
+            invariants::sums_to_one(best.state.encoders.states(wheel).iter().copied());
+        }
         let moved = self.modes[best.mode].moved;
         let is_settled = !is_new(observation.t_ns, best.onset);
         let is_off = matches!(moved, Mover::UnknownAny | Mover::Steer(_));

@@ -8,6 +8,7 @@ use crate::identify::identifier::{Identifier, Input};
 use crate::identify::modes::Leaves;
 use crate::identify::posterior::Posterior;
 use crate::identify::reported::HeldName;
+use crate::invariants;
 
 /// Reports ND with 1 - p(fault) of the detector and the rest as unknown.
 #[derive(Debug, Clone)]
@@ -68,6 +69,7 @@ impl Watcher {
         }
         hypotheses.count = 0;
         self.report(&predicted, belief);
+        invariants::fault_belief(belief, self.leaves.all());
     }
 
     fn begin_run(&mut self) {
@@ -171,7 +173,11 @@ impl Diagnoser {
             Of::Identifier(identifier) => identifier.step(entry, belief, hypotheses),
             Of::Watcher(watcher) => watcher.step(entry, belief, hypotheses),
         }
+        let p = belief.p;
         self.blindfold.cover(belief);
+        invariants::held(&p, &belief.p);
+        invariants::name(belief.mode, belief.node_count as usize);
+        invariants::name(belief.reported, belief.node_count as usize);
     }
 
     /// Takes a detection without a frame behind it: of its words, only those of the detector's

@@ -1,7 +1,6 @@
 //! The identifier on recorded runs that its model has not seen, and on garbage.
 
 use clap::ValueEnum;
-use proptest::prelude::*;
 use vigil_blocks::{Entry, FaultBelief, MODE_MULTIPLE, MODE_UNKNOWN, ParticleBlock, SensorFrame};
 use vigil_diagnosis::Sensors;
 use vigil_diagnosis::identify::{
@@ -389,72 +388,4 @@ fn trees_that_the_model_cannot_serve_are_refused() {
         error.to_string(),
         "leaves 'L0' and 'L1' stand for the same fault"
     );
-}
-
-fn hostile() -> impl Strategy<Value = f64> {
-    prop_oneof![
-        4 => -3.0..3.0_f64,
-        1 => any::<f64>(),
-        1 => prop::sample::select(vec![f64::NAN, f64::INFINITY, -1e308, 1e308, 0.0]),
-    ]
-}
-
-fn frame() -> impl Strategy<Value = SensorFrame> {
-    let values = prop::collection::vec(hostile(), 24);
-    (
-        any::<u64>(),
-        prop::option::of(any::<u64>()),
-        0..3_u32,
-        values,
-    )
-        .prop_map(|(step, valid, pose_reset_count, v)| {
-            let mut frame = SensorFrame {
-                pose_reset_count,
-                ..SensorFrame::default()
-            };
-            frame.valid = valid.unwrap_or(u64::MAX);
-            frame.header.t_capture_ns = if step % 8 == 0 {
-                step
-            } else {
-                step % 100_000_000
-            };
-            frame.command = [v[0], v[1], v[2], v[3]];
-            frame.pose = [v[4], v[5], v[6]];
-            frame.wheel_rate.copy_from_slice(&v[8..16]);
-            frame.steer.copy_from_slice(&v[16..24]);
-            frame
-        })
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 200,
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    })]
-    #[test]
-    fn no_input_breaks_the_belief(
-        frames in prop::collection::vec(frame(), 1..60),
-        p_fault in any::<f64>(), noise_scale in any::<f64>(), from_s in 0.0..2.0_f64,
-        filter in prop::sample::select(IdentifierFilter::value_variants()),
-    ) {
-        let alarm = Alarm::between(from_s, 1e9);
-        let mut bench = Bench::with(filter, Sensors::PoseEncoders, alarm);
-        let mut t_ns = 0_u64;
-        for (i, mut frame) in frames.into_iter().enumerate() {
-            if i % 5 != 0 {
-                t_ns = t_ns.wrapping_add(frame.header.t_capture_ns);
-                frame.header.t_capture_ns = t_ns;
-            }
-            bench.alarm.set(&frame);
-            bench.alarm.belief.p_fault = p_fault;
-            bench.alarm.belief.noise_scale = [noise_scale; 3];
-            bench.alarm.belief.noise_scale_wheels = [noise_scale; 8];
-            bench.alarm.belief.noise_scale_steer = [noise_scale; 8];
-            let detection = (i % 4 != 0).then_some((&bench.alarm.belief, &*bench.alarm.hypotheses));
-            let entry = Entry::Frame(Input { frame: &frame, detection });
-            bench.identifier.step(entry, &mut bench.belief, &mut bench.hypotheses);
-            bench.check();
-        }
-    }
 }
