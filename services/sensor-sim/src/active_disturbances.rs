@@ -1,55 +1,55 @@
-//! Which disturbances are on, and what they make of the rover.
+//! Active disturbances, and their effects on body and sensors.
 
 use vigil_robot::disturbance_kind::{KINDS, PARAMETERS};
 use vigil_robot::kinematics::{Ackermann6, ROVER_WHEELS};
 use vigil_robot::slip::{Condition, Soil, WheelCondition};
 use vigil_robot::{Disturbance, DisturbanceKind};
 
-/// Rolling resistance of firm soil, force per unit of load, that `sinkage` multiplies. The part up
-/// to 1 is in the learned models, as it is in the bearing's friction here.
+/// Rolling resistance of firm soil, force per unit of load, that `sinkage` multiplies. Chosen. The
+/// bearing's friction contains the part up to a factor of 1, so only the excess is added.
 const FIRM_RESISTANCE: f64 = 0.05;
 
 /// At most one disturbance of each kind at each place.
 #[derive(Debug, Clone)]
 pub(crate) struct ActiveDisturbances {
-    on: [[Option<[f64; PARAMETERS]>; ROVER_WHEELS]; KINDS.len()],
+    parameters: [[Option<[f64; PARAMETERS]>; ROVER_WHEELS]; KINDS.len()],
 }
 
 impl ActiveDisturbances {
-    pub(crate) const fn nothing() -> Self {
+    pub(crate) const fn none() -> Self {
         Self {
-            on: [[None; ROVER_WHEELS]; KINDS.len()],
+            parameters: [[None; ROVER_WHEELS]; KINDS.len()],
         }
     }
 
-    /// Switches one on; it takes the place of one of its kind. False if its place does not exist.
+    /// Starts one, which replaces one of its kind. False if its place does not exist.
     pub(crate) fn set(&mut self, disturbance: &Disturbance) -> bool {
-        let kind = &mut self.on[disturbance.kind.index()];
+        let kind = &mut self.parameters[disturbance.kind.index()];
         kind.get_mut(disturbance.place).is_some_and(|place| {
             *place = Some(disturbance.parameter);
             true
         })
     }
 
-    /// Switches a kind off, at one place or everywhere.
-    pub(crate) fn calm(&mut self, kind: DisturbanceKind, place: Option<usize>) {
-        for (i, on) in self.on[kind.index()].iter_mut().enumerate() {
+    /// Ends a kind, at one place or everywhere.
+    pub(crate) fn end(&mut self, kind: DisturbanceKind, place: Option<usize>) {
+        for (i, on) in self.parameters[kind.index()].iter_mut().enumerate() {
             if place.is_none_or(|place| place == i) {
                 *on = None;
             }
         }
     }
 
-    /// What is on of a kind at a place: its first parameter.
+    /// First parameter of a kind at a place, if it is active.
     pub(crate) fn at(&self, kind: DisturbanceKind, place: usize) -> Option<f64> {
-        self.on[kind.index()]
+        self.parameters[kind.index()]
             .get(place)
             .copied()
             .flatten()
             .map(|p| p[0])
     }
 
-    /// What the gyro reports of a yaw rate with this noise, rad/s.
+    /// The gyro's measurement of a yaw rate, with this noise, rad/s.
     pub(crate) fn yaw_rate(&self, true_rad_s: f64, noise_rad_s: f64) -> f64 {
         use DisturbanceKind as D;
         let bias = |kind| self.at(kind, 0).unwrap_or(0.0);
@@ -58,7 +58,7 @@ impl ActiveDisturbances {
         self.at(D::GyroScale, 0).map_or(rate, |gain| gain * rate)
     }
 
-    /// What the current sensor of a wheel reports of a current with this noise, A.
+    /// The measurement of a wheel's current, with this noise, A.
     pub(crate) fn current(&self, wheel: usize, true_a: f64, noise_a: f64) -> f64 {
         use DisturbanceKind as D;
         let noise_a = self.at(D::CurrentNoise, wheel).unwrap_or(1.0) * noise_a;
@@ -67,7 +67,7 @@ impl ActiveDisturbances {
             .map_or(current, |gain| gain * current)
     }
 
-    /// What the steering sensor of a wheel reports of a commanded angle, without noise, rad.
+    /// The measurement of a wheel's steering angle at a commanded one, without noise, rad.
     pub(crate) fn steer(&self, wheel: usize, commanded_rad: f64) -> f64 {
         use DisturbanceKind as D;
         let more = |kind| self.at(kind, wheel).unwrap_or(0.0);
@@ -79,7 +79,7 @@ impl ActiveDisturbances {
     pub(crate) fn condition(&self) -> Condition {
         use DisturbanceKind as D;
         let rover = |kind| self.at(kind, 0).unwrap_or(0.0);
-        let shift = self.on[D::PayloadShift.index()][0].unwrap_or_default();
+        let shift = self.parameters[D::PayloadShift.index()][0].unwrap_or_default();
         Condition {
             wheels: std::array::from_fn(|i| {
                 let of = |kind, otherwise| self.at(kind, i).unwrap_or(otherwise);
@@ -99,7 +99,7 @@ impl ActiveDisturbances {
         }
     }
 
-    /// `soil` with what is soft about it.
+    /// `soil` with the friction of its soft side.
     pub(crate) fn soil(&self, soil: Soil, kinematics: &Ackermann6) -> Soil {
         let share = |i: usize| {
             let side = usize::from(kinematics.y_m[i] < 0.0);

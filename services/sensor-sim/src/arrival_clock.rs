@@ -1,14 +1,16 @@
-//! When a frame of a publisher with a clock of its own was due, by this machine's clock.
+//! Capture times of a publisher with its own clock, placed on this machine's clock.
 
 use vigil_blocks::Header;
 
-/// The publisher's clock may run slower than ours by this share.
+/// Share by which the publisher's clock may run slower than ours. Chosen: five times the drift of a
+/// poor quartz (100 ppm).
 const DRIFT_MAX: f64 = 5e-4;
-/// A frame that seems to be held up by more than this, ns, tells that the clock runs otherwise.
+/// Delay of a frame, ns, beyond which its publisher's clock is taken to have changed. Chosen: a
+/// second, longer than any stall that a robot drives through.
 const HELD_UP_MAX_NS: i128 = 1_000_000_000;
 
-/// Places capture times of another clock on ours: by the shortest way that a frame ever took, so
-/// that a frame held up on its way still counts from when it was due.
+/// Converts capture times of another clock to ours by the shortest transport time of any frame so
+/// far, so that a delayed frame still counts from when it was due.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ArrivalClock {
     known: Option<ClockOffset>,
@@ -27,14 +29,14 @@ struct ClockOffset {
 pub struct ArrivalBatch<I> {
     /// Their headers.
     pub headers: I,
-    /// False if more of them wait: the newest of these may have been held up as well.
+    /// False if more of them wait: then the newest of these may be delayed as well.
     pub is_complete: bool,
 }
 
 impl ArrivalClock {
-    /// Dates a frame that is here at `now_ns`, if its publisher has left that to us; the clock as
-    /// this frame makes it. Of those that are here with it, none can have been held up for longer
-    /// than the newest of its epoch says.
+    /// Sets a frame's `t_schedule_ns`, if its publisher has left it 0, for a frame that is read at
+    /// `now_ns`; returns the clock after it. No frame of the batch can be delayed for longer than
+    /// the newest one of its epoch.
     #[must_use]
     pub fn date<'a>(
         self,

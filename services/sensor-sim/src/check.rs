@@ -1,4 +1,4 @@
-//! What a world may be made of.
+//! Ranges of a world's settings.
 
 use vigil_robot::Description;
 use vigil_robot::fault::FaultError;
@@ -6,7 +6,7 @@ use vigil_robot::kinematics::{GeometryError, ROVER_WHEELS};
 use vigil_setup::OutOfRange;
 use vigil_setup::graph_file::DriveSegment;
 
-/// Why a world cannot be made, or a fault not be injected.
+/// Why a world or a change of it was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WorldError {
     /// The robot is not one that the simulator knows.

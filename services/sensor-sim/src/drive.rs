@@ -1,10 +1,10 @@
-//! What the rover is to drive, and how fast a command may change.
+//! The planned drive, and the rates at which a command may change.
 
 use vigil_setup::graph_file::DriveSegment;
 
-/// Fastest change of the executed curvature, 1/m per s: the steering servos' limit.
+/// Fastest change of the executed curvature, 1/m per s. Chosen: the steering servos' limit.
 pub const CURVATURE_RATE_MAX_1_M_S: f64 = 0.5;
-/// Largest magnitude of acceleration, m/s².
+/// Largest magnitude of acceleration, m/s². Chosen: the rover reaches its speed within a second.
 pub const ACCELERATION_MAX_M_S2: f64 = 0.5;
 
 /// Curvature (1/m, left positive) and speed (m/s) of the body's centre.
@@ -113,20 +113,20 @@ mod tests {
     }
 
     #[test]
-    fn a_servo_reaches_its_target_exactly_and_no_faster_than_allowed() {
-        let mut servo = RateLimiter::default();
+    fn a_limited_command_reaches_its_target_exactly_and_no_faster_than_allowed() {
+        let mut limiter = RateLimiter::default();
         let target = DriveCommand {
             curvature_1_m: -0.4,
             speed_m_s: 0.2,
         };
         for tick in 1..=100 {
-            servo.follow(target, 0.01);
+            limiter.follow(target, 0.01);
             let t = f64::from(tick) * 0.01;
             let curvature = (-0.5 * t).max(-0.4);
             let speed = (0.5 * t).min(0.2);
-            assert!((servo.at.curvature_1_m - curvature).abs() < 1e-9);
-            assert!((servo.at.speed_m_s - speed).abs() < 1e-9);
+            assert!((limiter.at.curvature_1_m - curvature).abs() < 1e-9);
+            assert!((limiter.at.speed_m_s - speed).abs() < 1e-9);
         }
-        assert_eq!(servo.at, target);
+        assert_eq!(limiter.at, target);
     }
 }

@@ -13,12 +13,12 @@ pub const NOISE_MIN_RAD_S: f64 = -4.0;
 /// Rate that a noisy encoder stays below, rad/s.
 pub const NOISE_MAX_RAD_S: f64 = 8.0;
 
-/// What each encoder makes of a healthy reading.
+/// The wheel encoders, healthy, disturbed and broken.
 #[derive(Debug, Clone)]
 pub(crate) struct Encoders {
     fault: [Option<FaultKind>; ROVER_WHEELS],
     last_rad_s: [Option<f64>; ROVER_WHEELS],
-    /// What drifts have added so far.
+    /// Sum of the drifts so far.
     drifted_rad_s: [f64; ROVER_WHEELS],
     past: DelayLine<ROVER_WHEELS>,
     rng: Pcg64Mcg,
@@ -35,27 +35,27 @@ impl Encoders {
         }
     }
 
-    /// Breaks an encoder (`Some`), or mends it.
+    /// Starts an encoder's fault (`Some`), or ends it.
     pub(crate) fn set(&mut self, wheel: usize, fault: Option<FaultKind>) {
         self.fault[wheel] = fault;
     }
 
-    /// A cycle passes.
-    pub(crate) fn advance(&mut self, dt_s: f64, on: &ActiveDisturbances) {
+    /// Advances the drifts by `dt_s`.
+    pub(crate) fn advance(&mut self, dt_s: f64, active: &ActiveDisturbances) {
         for (wheel, drifted) in self.drifted_rad_s.iter_mut().enumerate() {
-            *drifted = match on.at(DisturbanceKind::EncoderDrift, wheel) {
+            *drifted = match active.at(DisturbanceKind::EncoderDrift, wheel) {
                 Some(rad_s2) => *drifted + rad_s2 * dt_s,
                 None => 0.0,
             };
         }
     }
 
-    /// The rates seen, before noise, of wheels that turn at `rate_rad_s`.
-    pub(crate) fn scaled(&self, wheel: usize, rate_rad_s: f64, on: &ActiveDisturbances) -> f64 {
-        let of = |kind, otherwise| on.at(kind, wheel).unwrap_or(otherwise);
+    /// The rate measured, before noise, of a wheel that turns at `rate_rad_s`.
+    pub(crate) fn scaled(&self, wheel: usize, rate_rad_s: f64, active: &ActiveDisturbances) -> f64 {
+        let of = |kind, otherwise| active.at(kind, wheel).unwrap_or(otherwise);
         let bias_rad_s = of(DisturbanceKind::EncoderBias, 0.0);
         let scaled = of(DisturbanceKind::EncoderScale, 1.0) * rate_rad_s;
-        let is_drifting = on.at(DisturbanceKind::EncoderDrift, wheel).is_some();
+        let is_drifting = active.at(DisturbanceKind::EncoderDrift, wheel).is_some();
         let drifted_rad_s = if is_drifting {
             self.drifted_rad_s[wheel]
         } else {
@@ -64,33 +64,33 @@ impl Encoders {
         scaled + bias_rad_s + drifted_rad_s
     }
 
-    /// What the encoders report at `t_s` when timely, unbroken ones would report `healthy_rad_s`.
+    /// Measurements at `t_s` where encoders without delay and fault would measure `healthy_rad_s`.
     pub(crate) fn report(
         &mut self,
         t_s: f64,
         healthy_rad_s: [f64; ROVER_WHEELS],
-        on: &ActiveDisturbances,
+        active: &ActiveDisturbances,
     ) -> [f64; ROVER_WHEELS] {
         self.past.push(t_s, healthy_rad_s);
         std::array::from_fn(|wheel| {
-            let seen = match on.at(DisturbanceKind::EncoderDelay, wheel) {
+            let delayed = match active.at(DisturbanceKind::EncoderDelay, wheel) {
                 Some(delay_s) => self.past.delayed(t_s, delay_s)[wheel],
                 None => healthy_rad_s[wheel],
             };
-            self.one(wheel, seen)
+            self.one(wheel, delayed)
         })
     }
 
-    /// What encoder `wheel` reports when an unbroken one would report `seen_rad_s`.
-    fn one(&mut self, wheel: usize, seen_rad_s: f64) -> f64 {
+    /// Measurement of encoder `wheel` where one without fault would measure `healthy_rad_s`.
+    fn one(&mut self, wheel: usize, healthy_rad_s: f64) -> f64 {
         let last = &mut self.last_rad_s[wheel];
         let reported = match self.fault[wheel] {
             Some(FaultKind::EncoderZero) => 0.0,
-            Some(FaultKind::EncoderFrozen) => last.unwrap_or(seen_rad_s),
+            Some(FaultKind::EncoderFrozen) => last.unwrap_or(healthy_rad_s),
             Some(FaultKind::EncoderNoise) => {
                 self.rng.random_range(NOISE_MIN_RAD_S..NOISE_MAX_RAD_S)
             }
-            Some(FaultKind::Stuck) | None => seen_rad_s,
+            Some(FaultKind::Stuck) | None => healthy_rad_s,
         };
         *last = Some(reported);
         reported

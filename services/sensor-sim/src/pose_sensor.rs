@@ -1,4 +1,4 @@
-//! The source of poses, healthy and disturbed.
+//! The pose sensor, healthy and disturbed.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -7,22 +7,29 @@ use vigil_robot::{Disturbance, DisturbanceKind};
 use crate::active_disturbances::ActiveDisturbances;
 use crate::delay_line::DelayLine;
 
-/// What the pose sensor makes of the true pose: it scales, drifts, jumps, is late, repeats itself,
-/// and misses.
+/// Measures the true pose. Disturbances scale it, let it drift, jump, come late, repeat or drop
+/// out.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseSensor {
     /// Position from which distances are scaled, m.
     anchor_m: [f64; 2],
-    /// Direction of the drift, rad, and how far it has come, m.
+    /// Direction of the drift, rad, and its length so far, m.
     drift_heading_rad: f64,
     drift_m: f64,
     yaw_drift_rad: f64,
     /// Direction of the jump, rad.
     jump_heading_rad: f64,
-    /// Since when it repeats a pose, s, and which.
-    held: Option<(f64, [f64; 3])>,
+    /// The pose that is repeated.
+    held: Option<HeldPose>,
     past: DelayLine<3>,
     rng: Pcg64Mcg,
+}
+
+/// A pose that is repeated.
+#[derive(Debug, Clone, Copy)]
+struct HeldPose {
+    since_s: f64,
+    pose: [f64; 3],
 }
 
 impl PoseSensor {
@@ -56,57 +63,57 @@ impl PoseSensor {
         }
     }
 
-    /// `dt_s` pass.
-    pub(crate) fn advance(&mut self, dt_s: f64, on: &ActiveDisturbances) {
-        self.drift_m += dt_s * on.at(DisturbanceKind::PoseDrift, 0).unwrap_or(0.0);
-        self.yaw_drift_rad += dt_s * on.at(DisturbanceKind::YawRateBias, 0).unwrap_or(0.0);
+    /// Advances the drifts by `dt_s`.
+    pub(crate) fn advance(&mut self, dt_s: f64, active: &ActiveDisturbances) {
+        self.drift_m += dt_s * active.at(DisturbanceKind::PoseDrift, 0).unwrap_or(0.0);
+        self.yaw_drift_rad += dt_s * active.at(DisturbanceKind::YawRateBias, 0).unwrap_or(0.0);
     }
 
-    /// The reading at `t_s` without noise, for the true `pose`, which is not late.
-    pub(crate) fn distort(&self, pose: [f64; 3], on: &ActiveDisturbances) -> [f64; 3] {
+    /// The measurement of the true `pose` without noise and delay.
+    pub(crate) fn distort(&self, pose: [f64; 3], active: &ActiveDisturbances) -> [f64; 3] {
         let [mut x, mut y, mut yaw] = pose;
-        if let Some(scale) = on.at(DisturbanceKind::PoseScale, 0) {
+        if let Some(scale) = active.at(DisturbanceKind::PoseScale, 0) {
             x = self.anchor_m[0] + scale * (x - self.anchor_m[0]);
             y = self.anchor_m[1] + scale * (y - self.anchor_m[1]);
         }
-        if on.at(DisturbanceKind::PoseDrift, 0).is_some() {
+        if active.at(DisturbanceKind::PoseDrift, 0).is_some() {
             let (sin, cos) = self.drift_heading_rad.sin_cos();
             x += self.drift_m * cos;
             y += self.drift_m * sin;
         }
-        if let Some(jump_m) = on.at(DisturbanceKind::PoseJump, 0) {
+        if let Some(jump_m) = active.at(DisturbanceKind::PoseJump, 0) {
             let (sin, cos) = self.jump_heading_rad.sin_cos();
             x += jump_m * cos;
             y += jump_m * sin;
         }
-        if on.at(DisturbanceKind::YawRateBias, 0).is_some() {
+        if active.at(DisturbanceKind::YawRateBias, 0).is_some() {
             yaw += self.yaw_drift_rad;
         }
         [x, y, yaw]
     }
 
-    /// What is reported at `t_s` where an undelayed sensor reports `reading`; `None` if the pose is
-    /// missing.
+    /// The measurement at `t_s` where a sensor without delay would report `reading`; `None` if it
+    /// drops out.
     pub(crate) fn report(
         &mut self,
         t_s: f64,
         reading: [f64; 3],
-        on: &ActiveDisturbances,
+        active: &ActiveDisturbances,
     ) -> Option<[f64; 3]> {
         self.past.push(t_s, reading);
-        let share = on.at(DisturbanceKind::PoseDrop, 0).unwrap_or(0.0);
+        let share = active.at(DisturbanceKind::PoseDrop, 0).unwrap_or(0.0);
         if share > 0.0 && self.rng.random::<f64>() < share {
             return None;
         }
-        let pose = match on.at(DisturbanceKind::PoseDelay, 0) {
+        let pose = match active.at(DisturbanceKind::PoseDelay, 0) {
             Some(delay_s) => self.past.delayed(t_s, delay_s),
             None => reading,
         };
-        let Some(hold_s) = on.at(DisturbanceKind::PoseHeld, 0) else {
+        let Some(hold_s) = active.at(DisturbanceKind::PoseHeld, 0) else {
             return Some(pose);
         };
-        let held = self.held.filter(|(since_s, _)| t_s - since_s < hold_s);
-        let (_, pose) = *self.held.insert(held.unwrap_or((t_s, pose)));
-        Some(pose)
+        let held = self.held.filter(|held| t_s - held.since_s < hold_s);
+        let fresh = HeldPose { since_s: t_s, pose };
+        Some(self.held.insert(held.unwrap_or(fresh)).pose)
     }
 }

@@ -7,7 +7,8 @@ use vigil_robot::kinematics::ROVER_WHEELS;
 use vigil_robot::slip::Soil;
 use vigil_setup::graph_file::Simulator;
 
-/// Share of the mean friction below which the scatter never takes it.
+/// Least friction as a share of its mean. Chosen: ten deviations of the default scatter of 0.08; it
+/// only keeps the physics valid.
 const FRICTION_SHARE_MIN: f64 = 0.2;
 
 /// Relative friction under each wheel as an Ornstein-Uhlenbeck process of the distance travelled:
@@ -49,7 +50,7 @@ impl SoilPath {
         }
     }
 
-    /// Another soil begins.
+    /// Changes the soil from here on.
     pub(crate) const fn set(&mut self, friction: f64, shear_modulus: f64) {
         self.friction = friction;
         self.shear_modulus = shear_modulus;

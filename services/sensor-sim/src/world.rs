@@ -1,4 +1,4 @@
-//! The simulated rover: drive, soil, slip, sensors, faults.
+//! The simulated rover: drive, soil, slip, sensors, faults and disturbances.
 
 use vigil_blocks::{ActionOutcome, SensorFrame, Valid};
 use vigil_robot::disturbance_kind::{KINDS, Place, SIDES};
@@ -18,17 +18,19 @@ use crate::noise::Noise;
 use crate::pose_sensor::PoseSensor;
 use crate::soil::SoilPath;
 
-/// Motor current per torque, A/(N m): the constant of the simulated motors with their gear.
+/// Motor current per torque, A/(N m). Chosen: the simulated motors with their gear.
 pub const CURRENT_PER_TORQUE_A_N_M: f64 = 2.0;
 /// Longest step of the physics, s; longer cycles are divided. Also the interval at which the slip
 /// equilibrium follows soil and command: well below the body's lag and the soil's scatter length.
 const STEP_MAX_S: f64 = 0.01;
-/// Longest cycle, s: beyond it simulated time falls behind instead of keeping the cycle busy.
+/// Longest cycle, s. Chosen: a cycle of more than a hundred steps would miss further deadlines, so
+/// simulated time falls behind instead.
 const CYCLE_MAX_S: f64 = 1.0;
-/// Velocity, m/s and rad/s, below which a stopped body stands still.
+/// Velocity, m/s and rad/s, below which a stopped body stands still. Chosen: far below what a pose
+/// shows; without it the decay of the lag would never end.
 const STILL: f64 = 1e-5;
 
-/// The true state of the rover, for tests and displays; no filter may see it.
+/// The true state of the rover, for tests and labels; no filter gets it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrueState {
     /// x m, y m, yaw rad (not wrapped).
@@ -60,8 +62,8 @@ pub struct World {
     motion: Solution,
     motion_age_s: f64,
     stuck: [bool; ROVER_WHEELS],
-    disturbed: ActiveDisturbances,
-    /// What the disturbances make of body and wheels.
+    active: ActiveDisturbances,
+    /// State of body and wheels under the disturbances.
     condition: Condition,
     pose_sensor: PoseSensor,
     encoders: Encoders,
@@ -121,7 +123,7 @@ impl World {
             motion,
             motion_age_s: f64::INFINITY,
             stuck: [false; ROVER_WHEELS],
-            disturbed: ActiveDisturbances::nothing(),
+            active: ActiveDisturbances::none(),
             condition: Condition::default(),
             pose_sensor: PoseSensor::new(rate_hz, stream(3)),
             encoders: Encoders::new(rate_hz, stream(1)),
@@ -154,8 +156,8 @@ impl World {
         let command = self.checked(command);
         let cycle_s = dt_s.min(CYCLE_MAX_S);
         self.elapsed_s += cycle_s;
-        self.pose_sensor.advance(cycle_s, &self.disturbed);
-        self.encoders.advance(cycle_s, &self.disturbed);
+        self.pose_sensor.advance(cycle_s, &self.active);
+        self.encoders.advance(cycle_s, &self.active);
         let parts = (cycle_s / STEP_MAX_S).ceil().max(1.0);
         let part_s = cycle_s / parts;
         for _ in 0..parts as u32 {
@@ -190,17 +192,17 @@ impl World {
         (frame.command[0], frame.command[1]) = (curvature_1_m, speed_m_s);
         frame.valid = Valid::command(0) | Valid::command(1);
 
-        let on = &self.disturbed;
+        let active = &self.active;
         let noise = &mut self.noise;
-        let mut pose = self.pose_sensor.distort(self.pose, on);
+        let mut pose = self.pose_sensor.distort(self.pose, active);
         pose[0] += noise.draw(noise.position_m);
         pose[1] += noise.draw(noise.position_m);
         pose[2] = wrap_angle(pose[2] + noise.draw(noise.yaw_rad));
-        if let Some(pose) = self.pose_sensor.report(self.elapsed_s, pose, on) {
+        if let Some(pose) = self.pose_sensor.report(self.elapsed_s, pose, active) {
             frame.pose = pose;
             frame.valid |= Valid::POSE;
         }
-        frame.yaw_rate = on.yaw_rate(self.velocity[2], noise.draw(noise.yaw_rate_rad_s));
+        frame.yaw_rate = active.yaw_rate(self.velocity[2], noise.draw(noise.yaw_rate_rad_s));
         let [x, y, yaw] = self.planned_pose;
         frame.planned_pose = [x, y, wrap_angle(yaw)];
         frame.valid |= Valid::PLANNED_POSE | Valid::YAW_RATE;
@@ -209,22 +211,24 @@ impl World {
         let steer_rad = kinematics.targets(curvature_1_m, speed_m_s).steer_rad;
         let mut rates_rad_s = [0.0; ROVER_WHEELS];
         for (i, &steer) in steer_rad.iter().enumerate() {
-            let rate = self.encoders.scaled(i, self.motion.wheel_rate_rad_s[i], on);
+            let rate = self
+                .encoders
+                .scaled(i, self.motion.wheel_rate_rad_s[i], active);
             rates_rad_s[i] = rate + noise.draw(noise.wheel_rate_rad_s);
             let current = CURRENT_PER_TORQUE_A_N_M * self.motion.torque_n_m[i];
-            frame.current[i] = on.current(i, current, noise.draw(noise.current_a));
+            frame.current[i] = active.current(i, current, noise.draw(noise.current_a));
             frame.valid |= Valid::wheel_rate(i) | Valid::current(i);
             if kinematics.steered[i] {
-                frame.steer[i] = on.steer(i, steer) + noise.draw(noise.steer_rad);
+                frame.steer[i] = active.steer(i, steer) + noise.draw(noise.steer_rad);
                 frame.valid |= Valid::steer(i);
             }
         }
-        let rates_rad_s = self.encoders.report(self.elapsed_s, rates_rad_s, on);
+        let rates_rad_s = self.encoders.report(self.elapsed_s, rates_rad_s, active);
         frame.wheel_rate[..ROVER_WHEELS].copy_from_slice(&rates_rad_s);
     }
 
-    /// Breaks something. A wheel may be stuck and have a broken encoder at once; a new fault of an
-    /// encoder takes the place of its old one.
+    /// Starts a fault. A wheel may be stuck and have a broken encoder at once; a new fault of an
+    /// encoder replaces its old one.
     ///
     /// # Errors
     /// [`WorldError::Wheel`].
@@ -237,7 +241,7 @@ impl World {
         Ok(())
     }
 
-    /// Begins a disturbance; it takes the place of one of its kind at its place.
+    /// Starts a disturbance; it replaces one of its kind at its place.
     ///
     /// # Errors
     /// [`WorldError`] if its place does not exist or a parameter is out of range.
@@ -251,18 +255,18 @@ impl World {
             Place::Wheel => place < ROVER_WHEELS,
             Place::SteeredWheel => kinematics.steered.get(place) == Some(&true),
         };
-        if !(there && self.disturbed.set(&disturbance)) {
+        if !(there && self.active.set(&disturbance)) {
             return Err(WorldError::Place {
                 kind: disturbance.kind.spec().form(),
                 found: place,
             });
         }
         self.pose_sensor.begin(&disturbance, self.pose);
-        self.resolve();
+        self.update_condition();
         Ok(())
     }
 
-    /// Mends everything of one wheel, and ends every disturbance of it.
+    /// Ends every fault and disturbance of one wheel.
     ///
     /// # Errors
     /// [`WorldError::Wheel`].
@@ -272,20 +276,20 @@ impl World {
         self.encoders.set(wheel, None);
         for row in &KINDS {
             if matches!(row.place, Place::Wheel | Place::SteeredWheel) {
-                self.disturbed.calm(row.kind, Some(wheel));
+                self.active.end(row.kind, Some(wheel));
             }
         }
-        self.resolve();
+        self.update_condition();
         Ok(())
     }
 
     /// Ends a kind of disturbance, at one place or everywhere.
-    pub fn calm(&mut self, kind: DisturbanceKind, place: Option<usize>) {
-        self.disturbed.calm(kind, place);
-        self.resolve();
+    pub fn end_disturbance(&mut self, kind: DisturbanceKind, place: Option<usize>) {
+        self.active.end(kind, place);
+        self.update_condition();
     }
 
-    /// Does what an injection asks for.
+    /// Makes a change.
     ///
     /// # Errors
     /// [`WorldError`] naming what does not exist or is out of range.
@@ -295,18 +299,20 @@ impl World {
             Change::Disturb(disturbance) => self.disturb(disturbance),
             Change::Clear(wheel) => self.clear(wheel),
             Change::EndDisturbance(kind, place) => {
-                self.calm(kind, place);
+                self.end_disturbance(kind, place);
                 Ok(())
             }
             Change::ClearAll => {
-                KINDS.iter().for_each(|row| self.calm(row.kind, None));
+                KINDS
+                    .iter()
+                    .for_each(|row| self.end_disturbance(row.kind, None));
                 (0..ROVER_WHEELS).try_for_each(|wheel| self.clear(wheel))
             }
         }
     }
 
-    /// Changes the ground under way: mean friction coefficient and shear modulus. The scatter about
-    /// them stays.
+    /// Changes mean friction coefficient and shear modulus during the drive. The scatter about them
+    /// stays.
     ///
     /// # Errors
     /// [`WorldError::Setting`].
@@ -337,19 +343,19 @@ impl World {
         self.run_id = run_id;
     }
 
-    /// Another run begins: every filter is reset.
+    /// Begins another run, which resets every filter.
     pub const fn begin_run(&mut self) {
         self.run_id = self.run_id.wrapping_add(1);
     }
 
-    /// Equilibria that were not found (where forces from outside exceed the soil's strength there
-    /// is none); the last one was kept.
+    /// Steps without an equilibrium, which kept the last one: there is none where forces from
+    /// outside exceed the soil's strength.
     #[must_use]
     pub const fn unsolved(&self) -> u64 {
         self.unsolved
     }
 
-    /// Steps and commands that were not finite.
+    /// Steps and commands that were not finite, and therefore not executed.
     #[must_use]
     pub const fn invalid(&self) -> u64 {
         self.invalid
@@ -360,9 +366,9 @@ impl World {
         self.motion_age_s = f64::INFINITY;
     }
 
-    /// What is on has changed: the next step finds the equilibrium anew.
-    fn resolve(&mut self) {
-        self.condition = self.disturbed.condition();
+    /// After a change of the disturbances: the next step solves the equilibrium again.
+    fn update_condition(&mut self) {
+        self.condition = self.active.condition();
         self.motion_age_s = f64::INFINITY;
     }
 
@@ -420,8 +426,8 @@ impl World {
         self.soil.advance(mean[0].hypot(mean[1]) * dt_s);
     }
 
-    /// Brings the slip equilibrium up to date: at once when the rover starts, stops, or a wheel
-    /// sticks or comes free, else every [`STEP_MAX_S`].
+    /// Solves the slip equilibrium every [`STEP_MAX_S`], and at once when the rover starts or stops
+    /// or a fault or disturbance changes.
     fn find_motion(&mut self, dt_s: f64) {
         let at = self.executed.at;
         self.motion_age_s += dt_s;
@@ -433,9 +439,7 @@ impl World {
             curvature_1_m: at.curvature_1_m,
             speed_m_s: at.speed_m_s,
             stuck: self.stuck,
-            soil: self
-                .disturbed
-                .soil(self.soil.here(), self.model.kinematics()),
+            soil: self.active.soil(self.soil.here(), self.model.kinematics()),
             condition: self.condition,
         };
         // From rest the ideal motion is the better start.

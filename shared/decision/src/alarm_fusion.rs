@@ -4,7 +4,7 @@
 use vigil_blocks::{
     Action, CauseKind, DetectionBelief, Entry, FaultBelief, MODE_BLIND, Readiness, RecoveryKind,
 };
-use vigil_robot::fused_alarm::{FusedAlarm, StageOdds};
+use vigil_robot::fused_alarm::{FusedAlarm, StageBeliefs};
 
 use crate::supervisor::Inputs;
 
@@ -122,7 +122,7 @@ impl AlarmFusion {
         let passed_s = t_ns.saturating_sub(self.t_ns) as f64 * 1e-9;
         (self.t_ns, self.readiness) = (t_ns, detection.readiness);
         let rests = self.readiness == Readiness::NotExcited as u32;
-        self.alarm.take(&StageOdds {
+        self.alarm.take(&StageBeliefs {
             t_ns,
             moved_s: if rests { 0.0 } else { passed_s.min(STEP_MAX_S) },
             alarm: detection.alarm != 0,

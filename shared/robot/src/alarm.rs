@@ -2,12 +2,12 @@
 
 use crate::model_file::ModelError;
 
-/// An alarm falls when the log-odds have stayed this far below those that raise it (e^5 = 150: no
-/// wander toggles it) ..
+/// Distance below the threshold at which an alarm falls, nats. Chosen: a factor of 150 on the odds;
+/// at half of it the wander of a healthy robot's log-odds toggles an alarm near its threshold.
 const CLEAR_BELOW: f64 = 5.0;
-/// .. and below these odds (1.8 %), whatever the threshold ..
+/// Log-odds above which no alarm falls, whatever the threshold. Chosen: a probability of 1.8 %.
 const CLEAR_LOG_ODDS: f64 = -4.0;
-/// .. for this long, s: twenty 50 ms observations in a row.
+/// Time for which the log-odds must be that low, s. Chosen: twenty 50 ms observations in a row.
 const CLEAR_S: f64 = 1.0;
 /// Slack when that time is compared, s: it is a sum of short intervals.
 const TIME_SLACK_S: f64 = 1e-6;
@@ -43,19 +43,19 @@ impl Alarm {
         self.stands
     }
 
-    /// It stands no longer.
+    /// Ends the alarm.
     pub const fn reset(&mut self) {
         (self.stands, self.quiet_s) = (false, 0.0);
     }
 
-    /// Takes the log-odds that hold for the last `dt_s`; true if it rises with them. Time that does
-    /// not `clear` (a robot that stands still tells nothing) lets no alarm fall.
-    pub fn take(&mut self, log_odds: f64, dt_s: f64, clear: bool) -> bool {
+    /// Takes the log-odds of the last `dt_s`; true if the alarm rises with them. An alarm falls
+    /// only while the robot `is_excited`: at rest low log-odds show nothing.
+    pub fn take(&mut self, log_odds: f64, dt_s: f64, is_excited: bool) -> bool {
         if !self.stands {
             (self.stands, self.quiet_s) = (log_odds > self.threshold_log_odds, 0.0);
             return self.stands;
         }
-        if clear {
+        if is_excited {
             let low = (self.threshold_log_odds - CLEAR_BELOW).min(CLEAR_LOG_ODDS);
             self.quiet_s = if log_odds < low {
                 self.quiet_s + dt_s
@@ -120,5 +120,33 @@ mod tests {
         assert!(alarm.take(4.0, 0.1, true));
         alarm.reset();
         assert!(!alarm.stands());
+    }
+
+    #[test]
+    fn an_alarm_with_a_low_threshold_falls_5_nats_below_it_and_bounds_are_exclusive() {
+        let mut alarm = Alarm::new(-1.0);
+        assert_eq!(alarm.threshold_log_odds(), -1.0);
+        assert!(!alarm.take(-1.0, 1.0, true) && alarm.take(-0.9, 1.0, true));
+        assert!(!alarm.take(-6.0, 10.0, true) && alarm.stands());
+        assert!(!alarm.take(-6.01, 0.9, true) && alarm.stands());
+        assert!(!alarm.take(-6.01, 0.1, true) && !alarm.stands());
+        // The wait begins anew with each alarm.
+        assert!(alarm.take(0.0, 0.1, true) && !alarm.take(-9.0, 0.9, true) && alarm.stands());
+    }
+
+    #[test]
+    fn no_alarm_falls_above_log_odds_of_minus_4() {
+        let mut alarm = Alarm::new(9.0);
+        assert!(alarm.take(9.1, 0.1, true));
+        assert!(!alarm.take(-4.0, 9.0, true) && alarm.stands());
+        assert!(!alarm.take(-4.01, 1.0, true) && !alarm.stands());
+    }
+
+    #[test]
+    fn log_odds_that_are_no_number_raise_no_alarm_and_keep_one() {
+        let mut alarm = Alarm::new(3.0);
+        assert!(!alarm.take(f64::NAN, 1.0, true) && !alarm.stands());
+        assert!(alarm.take(4.0, 1.0, true));
+        assert!(!alarm.take(f64::NAN, 9.0, true) && alarm.stands());
     }
 }

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What no log of steady driving tells: a learner of faults takes it into the model, where the lag
-/// is the middle of what is learned on the way.
+/// The body's response, which no log of steady driving shows. `vigil learn` copies it into the
+/// model, where the lag is the centre of the range that the detector estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Body {
@@ -16,8 +16,8 @@ pub struct Body {
 }
 
 impl Default for Body {
-    /// A small robot with geared motors: a tenth of a second, known to a factor of two, as the load
-    /// changes it; two centimetres a second are a tenth of a walk.
+    /// A small robot with geared motors. Chosen: a lag of a tenth of a second, to a factor of two
+    /// as the load changes it; standing below a tenth of the rover's usual speed.
     fn default() -> Self {
         Self {
             lag_s: 0.1,
@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_number_out_of_range_is_told_by_its_name() {
+    fn a_number_out_of_range_is_named() {
         assert_eq!(Body::default().invalid(), None);
         let body = Body {
             lag_uncertainty: 0.5,

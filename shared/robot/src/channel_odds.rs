@@ -1,10 +1,9 @@
-//! Log-odds of a fault by channel, as they are and as they were before the last observation.
+//! Log-odds of a fault by channel, after and before the last observation.
 
 use vigil_blocks::CHANNELS;
 use vigil_inference::logspace::{log_add, log_sum_exp};
 
-/// Sums over whatever shows a fault, which enters by one of them. Channels:
-/// [`vigil_blocks::Channel`].
+/// Sums over all tests of a channel ([`vigil_blocks::Channel`]): a fault shows in one of them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ChannelOdds {
     now: [f64; CHANNELS],
@@ -12,7 +11,7 @@ pub(crate) struct ChannelOdds {
 }
 
 impl ChannelOdds {
-    /// Nothing shows a fault.
+    /// No test shows a fault.
     pub(crate) const fn none() -> Self {
         Self {
             now: [f64::NEG_INFINITY; CHANNELS],
@@ -20,7 +19,7 @@ impl ChannelOdds {
         }
     }
 
-    /// Adds what shows in a channel.
+    /// Adds a test's log-odds to a channel.
     pub(crate) fn enter(&mut self, channel: usize, now: f64, before: f64) {
         self.now[channel] = log_add(self.now[channel], now);
         self.before[channel] = log_add(self.before[channel], before);
@@ -31,7 +30,7 @@ impl ChannelOdds {
         self.now
     }
 
-    /// What the observation said in each channel for a fault that was there, and is.
+    /// Evidence of the observation in each channel, for a fault that was there before and after.
     pub(crate) fn gains(&self) -> [f64; CHANNELS] {
         std::array::from_fn(|channel| finite(self.now[channel] - self.before[channel]))
     }
@@ -42,7 +41,7 @@ impl ChannelOdds {
     }
 }
 
-/// A gain; 0 where nothing shows anything.
+/// A gain; 0 where no test shows a fault.
 const fn finite(gain: f64) -> f64 {
     if gain.is_finite() { gain } else { 0.0 }
 }

@@ -1,6 +1,6 @@
 //! The rover's mechanics as its description gives them: motors, linkage, ground.
 //!
-//! The equilibrium of forces ([`crate::slip`]) computes with them.
+//! The equilibrium of forces (module `slip`) computes with them.
 
 use serde::{Deserialize, Serialize};
 

@@ -8,7 +8,7 @@ use crate::chassis::{Ground, Motor, RockerBogie};
 use crate::fault_prior::FaultPrior;
 use crate::tolerance::Tolerance;
 
-/// What kind of motion the command vector means.
+/// Kind of motion that the command vector describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kinematics {
@@ -30,11 +30,11 @@ pub struct Axis {
     pub name: String,
     /// Unit, for messages: `m/s`, `rad/s`, `1/m`.
     pub unit: String,
-    /// Largest magnitude that the robot is ever given, in that unit.
+    /// Largest magnitude commanded, in that unit.
     pub limit: f64,
 }
 
-/// Which channels are measured, besides the command.
+/// Channels that are measured, besides the command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeasuredChannels {
@@ -158,7 +158,7 @@ pub struct Description {
     /// How the body follows its command; left out: as that of a small robot.
     #[serde(default)]
     pub body: Body,
-    /// How often faults come and go; left out: as usual.
+    /// Prior rates of faults; left out: the defaults of [`FaultPrior`].
     #[serde(default)]
     pub fault_prior: FaultPrior,
     /// Limits.
@@ -166,7 +166,7 @@ pub struct Description {
 }
 
 impl Default for SensorNoise {
-    /// Small and harmless values, for a robot whose noise is learned: nothing reads them.
+    /// Valid values for a robot whose noise is learned: no filter uses them.
     fn default() -> Self {
         Self {
             reference_rate_hz: 20.0,
@@ -229,7 +229,7 @@ impl Description {
         self.kinematics == Kinematics::Ackermann6
     }
 
-    /// Velocity that a command asks for: forward m/s, left m/s, yaw rate rad/s.
+    /// Commanded velocity: forward m/s, left m/s, yaw rate rad/s.
     #[must_use]
     pub fn twist(&self, command: &[f64]) -> [f64; 3] {
         let axis = |i: usize| command.get(i).copied().unwrap_or(0.0);
@@ -248,18 +248,20 @@ impl Description {
         twist[0].hypot(twist[1]).hypot(reach_m * twist[2])
     }
 
-    /// The noise of a fault's motion, with the drift of the ground under it.
+    /// The noise of a fault's motion, with the drift of the ground's context.
     #[must_use]
-    pub fn drifting(&self, noise: MotionNoise) -> MotionNoise {
+    pub fn with_ground_drift(&self, noise: MotionNoise) -> MotionNoise {
         let tolerance = self.tolerance.as_ref();
-        tolerance.map_or(noise, |tolerance| tolerance.drifting(&noise))
+        tolerance.map_or(noise, |tolerance| tolerance.with_ground_drift(&noise))
     }
 
-    /// What is left of a steering angle's deviation (rad) beyond the tolerance, if there is one.
+    /// Part of a steering angle's residual (rad) beyond the tolerance, if there is one.
     #[must_use]
-    pub fn beyond_steer(&self, apart_rad: f64) -> f64 {
+    pub fn beyond_steer(&self, residual_rad: f64) -> f64 {
         let tolerance = self.tolerance.as_ref();
-        tolerance.map_or(apart_rad, |tolerance| tolerance.beyond_steer(apart_rad))
+        tolerance.map_or(residual_rad, |tolerance| {
+            tolerance.beyond_steer(residual_rad)
+        })
     }
 
     /// Index of the wheel called `name`.

@@ -1,32 +1,34 @@
-//! How often faults come and go, before anything is read.
+//! Prior rates at which faults begin and end.
 
 use serde::{Deserialize, Serialize};
 
-/// Prior rates of faults, per second of motion: a robot at rest neither breaks nor mends unseen.
-/// Assumed, as no log is long enough to learn them; they decide only while the readings do not.
+/// Prior rates of faults, per second of motion: at rest nothing changes them. They are assumed,
+/// since no log is long enough to learn them, and decide only while the measurements do not.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FaultPrior {
     /// The first fault, once the detector suspects one, 1/s. The rate over a robot's life would
     /// make the diagnosis slow without making it more often right.
     pub suspected_1_s: f64,
-    /// A further fault of a robot whose motion shows one, 1/s; as often as the first at most.
+    /// A further fault of a robot whose motion shows one already, 1/s; at most the first one's
+    /// rate.
     pub further_1_s: f64,
-    /// That a fault mends, 1/s.
+    /// Rate at which a fault ends, 1/s.
     pub mended_1_s: f64,
-    /// That the fault of an alarm comes again once it has ended, 1/s.
+    /// Rate at which the fault of an alarm returns once it has ended, 1/s.
     pub again_1_s: f64,
 }
 
 impl Default for FaultPrior {
     fn default() -> Self {
         Self {
+            // Chosen: its logarithm is the delay; a rate of once an hour costs 3.6 nats more.
             suspected_1_s: 0.01,
-            // One an hour.
+            // Chosen: one an hour.
             further_1_s: 1.0 / 3600.0,
-            // Five minutes: loose contacts and stones, not repairs.
+            // Chosen: after five minutes, as loose contacts and stones do.
             mended_1_s: 1.0 / 300.0,
-            // An intermittent fault, in a quarter of an hour.
+            // Chosen: an intermittent fault, in a quarter of an hour.
             again_1_s: 1e-3,
         }
     }
@@ -52,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rate_that_is_none_is_told_by_its_name() {
+    fn a_rate_out_of_range_is_named() {
         assert_eq!(FaultPrior::default().invalid(), None);
         for rate in [0.0, -1.0, 1.1, f64::NAN] {
             let prior = FaultPrior {

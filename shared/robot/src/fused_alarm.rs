@@ -1,37 +1,37 @@
-//! The alarm that a user reads: the detector's, unless the identifier has found the robot nominal
-//! since.
+//! The fused alarm: the detector's, unless the identifier has found the robot nominal since.
 //!
-//! The detector decides the onset. It is slow to take an alarm back; the identifier, which explains
-//! the same readings, may know earlier. Alarm and diagnosis contradict each other for a second of
-//! motion at most: then the identifier's word counts, until it takes that back or the detector
+//! The detector decides the onset, and its alarm falls late. The identifier explains the same
+//! measurements and may find the robot nominal earlier. The two contradict each other for a second
+//! of motion at most. After that the identifier decides, until its p(nominal) falls or the detector
 //! raises another alarm.
 
-/// A diagnosis that is nominal by more than this contradicts an alarm, and a name ..
+/// Probability of nominal above which a diagnosis contradicts an alarm. Even odds: a lower bound
+/// would end alarms that the identifier itself holds for likely.
 pub const NOMINAL: f64 = 0.5;
-/// .. and ends both after so much motion, s.
+/// Motion, s, after which such a diagnosis ends the alarm. Chosen: as long as the detector's own
+/// alarm takes to fall; shorter, and single observations toggle it.
 pub const NOMINAL_S: f64 = 1.0;
-/// An alarm that a nominal diagnosis has ended stands again once that is below this. Chosen: 0.2
-/// below what ends it, so that a diagnosis at even odds does not toggle it.
-const DOUBTED: f64 = 0.3;
-/// A set of faults that has grown is believed after so much motion, s. Four 50 ms observations
-/// agree.
+/// Probability of nominal below which an alarm that the identifier has ended stands again. Chosen:
+/// 0.2 below [`NOMINAL`], so that a diagnosis at even odds does not toggle it.
+const NOMINAL_DOUBTED: f64 = 0.3;
+/// Motion, s, after which a larger fault set counts as a further fault. Four 50 ms observations
+/// must agree.
 const GROWN_S: f64 = 0.2;
 /// Slack when times are compared, s: they are sums of short intervals.
 const SLACK_S: f64 = 1e-6;
 
-/// What both stages say of one frame.
+/// Detector's alarm and identifier's belief for one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StageOdds {
+pub struct StageBeliefs {
     /// Capture time of the frame, ns.
     pub t_ns: u64,
-    /// Time since the frame before, s; 0 while the robot stands, which shows nothing.
+    /// Time since the frame before, s; 0 while the robot stands, which excites nothing.
     pub moved_s: f64,
-    /// Whether the detector's alarm stands, since when (capture time, ns), and how many it has
-    /// raised.
+    /// True while the detector's alarm stands.
     pub alarm: bool,
-    /// See `alarm`.
+    /// Capture time of the frame that raised the detector's alarm, ns.
     pub alarm_t_ns: u64,
-    /// See `alarm`.
+    /// Alarms that the detector has raised.
     pub alarm_count: u32,
     /// The identifier's probability that nothing is wrong; 0 without an identifier.
     pub p_nominal: f64,
@@ -46,7 +46,7 @@ pub struct FusedAlarm {
     stands: bool,
     t_ns: u64,
     count: u32,
-    /// The detector's, as last heard.
+    /// The detector's alarm and its count in the frame before.
     was_raised: bool,
     raised_count: u32,
     nominal_s: f64,
@@ -80,42 +80,55 @@ impl FusedAlarm {
         self.was_raised = false;
     }
 
-    /// Takes what both stages say of the next frame.
-    pub fn take(&mut self, said: &StageOdds) {
-        let is_new = !self.was_raised || said.alarm_count != self.raised_count;
-        (self.was_raised, self.raised_count) = (said.alarm, said.alarm_count);
-        if !said.alarm {
+    /// Takes the stages' beliefs for the next frame.
+    pub fn take(&mut self, stages: &StageBeliefs) {
+        self.update(stages);
+        self.check(stages);
+    }
+
+    /// The detector decides the onset, so no other stage's word raises the fused alarm.
+    fn check(&self, stages: &StageBeliefs) {
+        assert!(
+            stages.alarm || !self.stands,
+            "the fused alarm stands only while the detector's does"
+        );
+    }
+
+    fn update(&mut self, stages: &StageBeliefs) {
+        let is_new = !self.was_raised || stages.alarm_count != self.raised_count;
+        (self.was_raised, self.raised_count) = (stages.alarm, stages.alarm_count);
+        if !stages.alarm {
             return self.fall();
         }
         if is_new {
-            return self.rise(said.alarm_t_ns.max(1), said.faults);
+            return self.rise(stages.alarm_t_ns.max(1), stages.faults);
         }
         if !self.stands {
-            if said.p_nominal < DOUBTED {
-                self.rise(said.t_ns.max(1), said.faults);
+            if stages.p_nominal < NOMINAL_DOUBTED {
+                self.rise(stages.t_ns.max(1), stages.faults);
             }
             return;
         }
-        self.nominal_s = match said.p_nominal > NOMINAL {
-            true => self.nominal_s + said.moved_s,
+        self.nominal_s = match stages.p_nominal > NOMINAL {
+            true => self.nominal_s + stages.moved_s,
             false => 0.0,
         };
         if self.nominal_s >= NOMINAL_S - SLACK_S {
             return self.fall();
         }
-        self.follow(said);
+        self.follow(stages);
     }
 
-    /// The first set that is named is what the alarm was about; a larger one is another fault.
-    fn follow(&mut self, said: &StageOdds) {
-        if self.faults == 0 || said.faults <= self.faults {
-            self.faults = self.faults.max(said.faults);
+    /// The first fault set that is named explains the alarm; a larger one is a further fault.
+    fn follow(&mut self, stages: &StageBeliefs) {
+        if self.faults == 0 || stages.faults <= self.faults {
+            self.faults = self.faults.max(stages.faults);
             self.grown_s = 0.0;
             return;
         }
-        self.grown_s += said.moved_s;
+        self.grown_s += stages.moved_s;
         if self.grown_s >= GROWN_S - SLACK_S {
-            self.rise(said.t_ns.max(1), said.faults);
+            self.rise(stages.t_ns.max(1), stages.faults);
         }
     }
 
@@ -135,9 +148,11 @@ impl FusedAlarm {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
-    const ALARM: StageOdds = StageOdds {
+    const ALARM: StageBeliefs = StageBeliefs {
         t_ns: 7,
         moved_s: 0.1,
         alarm: true,
@@ -146,7 +161,7 @@ mod tests {
         p_nominal: 0.01,
         faults: 0,
     };
-    const QUIET: StageOdds = StageOdds {
+    const QUIET: StageBeliefs = StageBeliefs {
         alarm: false,
         alarm_t_ns: 0,
         p_nominal: 1.0,
@@ -162,8 +177,8 @@ mod tests {
         alarm
     }
 
-    fn takes(alarm: &mut FusedAlarm, times: usize, said: StageOdds) {
-        (0..times).for_each(|_| alarm.take(&said));
+    fn takes(alarm: &mut FusedAlarm, times: usize, stages: StageBeliefs) {
+        (0..times).for_each(|_| alarm.take(&stages));
     }
 
     #[test]
@@ -173,7 +188,7 @@ mod tests {
         assert!(alarm.stands());
         alarm.take(&QUIET);
         assert_eq!((alarm.stands(), alarm.t_ns(), alarm.count()), (false, 0, 1));
-        alarm.take(&StageOdds {
+        alarm.take(&StageBeliefs {
             alarm_count: 2,
             ..ALARM
         });
@@ -182,7 +197,7 @@ mod tests {
 
     #[test]
     fn a_nominal_diagnosis_ends_it_after_a_second_of_motion() {
-        let nominal = StageOdds {
+        let nominal = StageBeliefs {
             p_nominal: 0.96,
             ..ALARM
         };
@@ -192,7 +207,7 @@ mod tests {
         takes(
             &mut alarm,
             50,
-            StageOdds {
+            StageBeliefs {
                 moved_s: 0.0,
                 ..nominal
             },
@@ -207,13 +222,13 @@ mod tests {
         takes(
             &mut alarm,
             50,
-            StageOdds {
+            StageBeliefs {
                 p_nominal: 0.35,
                 ..nominal
             },
         );
         assert_eq!((alarm.stands(), alarm.count()), (false, 1));
-        alarm.take(&StageOdds {
+        alarm.take(&StageBeliefs {
             p_nominal: 0.25,
             ..nominal
         });
@@ -222,19 +237,19 @@ mod tests {
 
     #[test]
     fn another_alarm_of_the_detector_is_one_whatever_the_identifier_says() {
-        let nominal = StageOdds {
+        let nominal = StageBeliefs {
             p_nominal: 1.0,
             ..ALARM
         };
         let mut alarm = standing();
         takes(&mut alarm, 10, nominal);
         assert!(!alarm.stands());
-        alarm.take(&StageOdds {
+        alarm.take(&StageBeliefs {
             alarm_count: 2,
             ..nominal
         });
         assert_eq!((alarm.stands(), alarm.count()), (true, 2));
-        alarm.take(&StageOdds {
+        alarm.take(&StageBeliefs {
             alarm_count: 3,
             ..ALARM
         });
@@ -243,7 +258,7 @@ mod tests {
 
     #[test]
     fn a_second_fault_during_the_first_is_an_alarm_of_its_own() {
-        let of = |faults| StageOdds { faults, ..ALARM };
+        let of = |faults| StageBeliefs { faults, ..ALARM };
         let mut alarm = standing();
         takes(&mut alarm, 5, of(1));
         alarm.take(&of(2));
@@ -266,5 +281,120 @@ mod tests {
         assert!(!alarm.stands());
         alarm.take(&QUIET);
         assert_eq!((alarm.stands(), alarm.count()), (false, 1));
+    }
+
+    #[test]
+    fn bounds_of_the_nominal_probability_are_exclusive() {
+        let even = StageBeliefs {
+            p_nominal: NOMINAL,
+            ..ALARM
+        };
+        let mut alarm = standing();
+        takes(&mut alarm, 100, even);
+        assert!(alarm.stands());
+        takes(
+            &mut alarm,
+            10,
+            StageBeliefs {
+                p_nominal: 0.51,
+                ..ALARM
+            },
+        );
+        assert!(!alarm.stands());
+        takes(
+            &mut alarm,
+            10,
+            StageBeliefs {
+                p_nominal: NOMINAL_DOUBTED,
+                ..ALARM
+            },
+        );
+        assert!(!alarm.stands());
+        takes(
+            &mut alarm,
+            1,
+            StageBeliefs {
+                p_nominal: 0.299,
+                ..ALARM
+            },
+        );
+        assert!(alarm.stands());
+    }
+
+    #[test]
+    fn the_first_set_that_is_named_is_no_further_fault_however_large() {
+        let mut alarm = standing();
+        takes(&mut alarm, 20, StageBeliefs { faults: 3, ..ALARM });
+        assert_eq!(alarm.count(), 1);
+        // At rest a larger set shows nothing.
+        takes(
+            &mut alarm,
+            20,
+            StageBeliefs {
+                faults: 4,
+                moved_s: 0.0,
+                ..ALARM
+            },
+        );
+        assert_eq!(alarm.count(), 1);
+        takes(
+            &mut alarm,
+            1,
+            StageBeliefs {
+                faults: 4,
+                moved_s: 0.19,
+                ..ALARM
+            },
+        );
+        assert_eq!(alarm.count(), 1);
+        takes(
+            &mut alarm,
+            1,
+            StageBeliefs {
+                faults: 4,
+                moved_s: 0.01,
+                ..ALARM
+            },
+        );
+        assert_eq!(alarm.count(), 2);
+    }
+
+    #[test]
+    fn an_alarm_that_still_stands_in_a_new_run_is_another_and_0_ns_is_told_from_no_alarm() {
+        let mut alarm = standing();
+        alarm.reset();
+        alarm.take(&StageBeliefs {
+            alarm_t_ns: 0,
+            ..ALARM
+        });
+        assert_eq!((alarm.stands(), alarm.t_ns(), alarm.count()), (true, 1, 2));
+    }
+
+    #[test]
+    #[should_panic(expected = "the fused alarm stands only while the detector's does")]
+    fn an_alarm_that_no_stage_raised_would_end_the_process() {
+        standing().check(&QUIET);
+    }
+
+    proptest! {
+        #[test]
+        fn it_follows_the_detector_whatever_the_identifier_says(
+            all in prop::collection::vec(
+                (any::<[u64; 2]>(), any::<[u32; 2]>(), any::<(u64, u64, bool)>()), 1..60),
+        ) {
+            let mut alarm = FusedAlarm::default();
+            let mut count = 0;
+            for (bits, [alarm_count, faults], (t_ns, alarm_t_ns, raised)) in all {
+                let [moved_s, p_nominal] = bits.map(f64::from_bits);
+                let stages = StageBeliefs {
+                    t_ns, moved_s, alarm: raised, alarm_t_ns, alarm_count, p_nominal, faults,
+                };
+                alarm.take(&stages);
+                prop_assert!(raised || !alarm.stands());
+                prop_assert_eq!(alarm.stands(), alarm.t_ns() != 0);
+                prop_assert!(alarm.count() >= count);
+                count = alarm.count();
+            }
+        }
     }
 }

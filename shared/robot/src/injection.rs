@@ -1,4 +1,7 @@
-//! What an operator asks for when breaking a simulated robot, and when.
+//! Injections: faults and disturbances that an operator starts or ends in the simulated rover.
+//!
+//! The text form is checked by launcher and `vigil inject` before anything starts; the numbers
+//! travel in [`vigil_blocks::Control`] and [`vigil_blocks::Event`].
 
 use vigil_blocks::Event;
 
@@ -10,15 +13,15 @@ use crate::fault::{Fault, FaultError, FaultKind};
 /// A change of the simulated robot's health.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Change {
-    /// Break something that the models contain.
+    /// Start a fault.
     Inject(Fault),
-    /// Do something that no model contains.
+    /// Start a disturbance.
     Disturb(Disturbance),
-    /// Mend everything of the wheel with this index.
+    /// End every fault and disturbance of the wheel with this index.
     Clear(usize),
     /// End a kind of disturbance, at one place or everywhere.
     EndDisturbance(DisturbanceKind, Option<usize>),
-    /// Mend and end everything.
+    /// End everything.
     ClearAll,
 }
 
@@ -94,7 +97,7 @@ impl Injection {
 /// A change as numbers, for [`vigil_blocks::Control`] and [`vigil_blocks::Event`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WireChange {
-    /// True to break, false to mend.
+    /// True to start, false to end.
     pub injects: bool,
     /// Code of a [`FaultKind`] or [`DisturbanceKind`]; 0 for everything.
     pub kind: u32,
@@ -111,7 +114,7 @@ pub const EVERYWHERE: u32 = u32::MAX;
 const EVERYWHERE_EVENT: u32 = 0xff;
 
 impl WireChange {
-    /// `what`, `p` and `value` of the event that tells of this change.
+    /// `what`, `p` and `value` of this change's event.
     #[must_use]
     pub const fn event(&self) -> (u32, f64, u64) {
         let place = if self.place < EVERYWHERE_EVENT {
@@ -123,7 +126,7 @@ impl WireChange {
         (place | (self.kind << 8), first, second.to_bits())
     }
 
-    /// What an event tells of; `injects` says of which kind the event is.
+    /// The change behind an event; `injects` says which kind of event it is.
     #[must_use]
     pub const fn from_event(injects: bool, event: &Event) -> Self {
         let place = event.what & EVERYWHERE_EVENT;

@@ -1,4 +1,4 @@
-//! Ideal kinematics: what the wheels must do so that nothing slips, and how a pose moves on.
+//! Ideal kinematics: wheel rates and steering angles without slip, and the motion of a pose.
 //!
 //! Body frame as in REP-103: x forward, y left, yaw counter-clockwise; a left turn has positive
 //! curvature.
@@ -93,7 +93,7 @@ pub enum GeometryError {
     },
 }
 
-/// What the servos and motors are told, in the order of the robot's description.
+/// Commands to servos and motors, in the order of the robot's description.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct WheelTargets {
     /// Steering angle, rad; 0 for wheels without a servo.
@@ -161,6 +161,11 @@ impl Ackermann6 {
     /// without a servo rolls at the forward part of its hub's velocity.
     #[must_use]
     pub fn targets(&self, curvature_1_m: f64, speed_m_s: f64) -> WheelTargets {
+        // The pair of the check in `new`: a rate divides by the radius.
+        assert!(
+            self.wheel_radius_m > 0.0,
+            "the radius of a wheel is above 0"
+        );
         let mut targets = WheelTargets::default();
         for i in 0..ROVER_WHEELS {
             // Hub velocity over the speed of the centre.
@@ -229,6 +234,17 @@ mod tests {
             let rate = 0.2 * 0.5 * from_centre / 0.08;
             assert!((targets.rate_rad_s[i] - rate).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    #[should_panic(expected = "the radius of a wheel is above 0")]
+    fn a_radius_that_was_not_checked_would_end_the_process() {
+        let wheel_radius_m = 0.0;
+        let rover = Ackermann6 {
+            wheel_radius_m,
+            ..rover()
+        };
+        let _ = rover.targets(0.1, 0.2);
     }
 
     #[test]

@@ -1,8 +1,4 @@
-//! Robots as models: description, kinematics, slip physics, faults, learned transitions.
-//!
-//! No I/O, no clock, no transport. A robot is described by a [`Description`] (from the
-//! configuration); its behaviour is either simulated ([`slip`]) or learned: with its faults
-//! ([`learned`]), or its nominal behaviour alone ([`nominal`]).
+#![doc = include_str!("../README.md")]
 
 pub mod alarm;
 mod body;

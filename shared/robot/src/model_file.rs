@@ -1,10 +1,10 @@
-//! What every file of a model has: a version of its layout, and a hash over its content.
+//! Model files: each has the version of its layout and a hash over its content.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use vigil_blocks::fnv1a;
 
-/// What stands for the hash in a file that a person has changed on purpose.
+/// Stands for the hash in a file that a person has changed on purpose.
 pub const EDITED: &str = "edited";
 
 /// Why a model was refused.
@@ -84,7 +84,7 @@ pub(crate) trait ModelFile: Clone + Serialize + DeserializeOwned {
     fn check(&self) -> Result<(), ModelError>;
 }
 
-/// What every layout has.
+/// The part that every layout has.
 #[derive(Deserialize)]
 struct Layout {
     /// Layout of the file.
@@ -93,7 +93,7 @@ struct Layout {
 
 /// Reads and checks a model.
 pub(crate) fn read<M: ModelFile>(text: &str) -> Result<M, ModelError> {
-    // The version comes first: what a file of another layout lacks is of no interest.
+    // The version comes first: a file of another layout would fail by some missing key.
     let layout: Layout = toml::from_str(text).map_err(|error| parse_error(text, &error))?;
     if layout.version != M::VERSION {
         return Err(ModelError::Version {

@@ -1,18 +1,19 @@
-//! The period of a sensor's frames, from the times at which they were captured.
+//! The period of a sensor's frames, from their capture times.
 
-/// Intervals remembered. Chosen: the low third, ten of them, holds the period whatever befalls the
-/// others.
+/// Intervals remembered. Chosen: the low third stands on ten of them, so that lost frames and
+/// bursts among the others do not move it; more remember an old rate for longer.
 const MEMORY: usize = 31;
-/// Intervals after which one is judged by the others, and the part of the period below which it is
-/// none. The low quantile then stands on its third smallest.
+/// Intervals from which on a frame may count as sent twice. Chosen: the quantile is then the third
+/// smallest, which two early doubles cannot be.
 const KNOWN: usize = 8;
-/// A frame sent twice follows at once; no jitter is four fifths of a period.
+/// Share of the period below which an interval is a frame sent twice. Chosen: a double follows at
+/// once, and no jitter takes four fifths of a period.
 const DOUBLE: f64 = 0.2;
 
-/// A low quantile of the last intervals between frames. Frames that are lost, late or come in
-/// bursts do not change it while a third comes in time: the noise of a sample belongs to the
-/// sensor, not to the gap before it. What jitter makes of it is too short a period, of samples
-/// believed to be noisier than they are, which the estimate of the noise puts right.
+/// A low quantile of the last intervals between frames. Lost, late and bunched frames do not change
+/// it while a third comes in time: the noise of a sample depends on the sensor, not on the gap
+/// before it. Jitter makes the period too short and the samples seem noisier, which the estimate of
+/// the noise corrects.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FramePeriod {
     recent_ns: [u64; MEMORY],
@@ -63,6 +64,44 @@ mod tests {
         assert_eq!(period.period_s(), Some(0.0099));
         (0..200).for_each(|_| period.push(1_000_000));
         assert_eq!(period.period_s(), Some(0.001));
+    }
+
+    #[test]
+    fn the_period_is_the_low_third_of_the_intervals_known_so_far() {
+        let mut period = FramePeriod::default();
+        assert_eq!(period.period_s(), None);
+        // Sorted: 10, 20, 30, 40; of n the one at n / 3.
+        for (interval_ms, expected_ms) in [(30, 30.0), (10, 10.0), (20, 20.0), (40, 20.0)] {
+            period.push(interval_ms * 1_000_000);
+            let found_ms = period.period_s().unwrap_or(f64::NAN) * 1e3;
+            assert!(
+                (found_ms - expected_ms).abs() < 1e-9,
+                "{interval_ms}: {found_ms}"
+            );
+        }
+    }
+
+    #[test]
+    fn short_intervals_are_doubles_only_below_a_fifth_and_once_eight_are_known() {
+        let filled = |count: usize| {
+            let mut period = FramePeriod::default();
+            (0..count).for_each(|_| period.push(10_000_000));
+            period
+        };
+        let mut early = filled(4);
+        (0..3).for_each(|_| early.push(1));
+        assert_eq!(early.period_s(), Some(1e-9));
+        // The ninth is a double: of 8 + 16 intervals the low third is a long one, of 9 + 16 not.
+        let mut ninth = filled(8);
+        ninth.push(1);
+        (0..16).for_each(|_| ninth.push(20_000_000));
+        assert_eq!(ninth.period_s(), Some(0.02));
+        let mut known = filled(8);
+        (0..30).for_each(|_| known.push(1_999_999));
+        assert_eq!(known.period_s(), Some(0.01));
+        let mut not_double = filled(8);
+        (0..5).for_each(|_| not_double.push(2_000_000));
+        assert_eq!(not_double.period_s(), Some(0.002));
     }
 
     proptest! {

@@ -1,4 +1,4 @@
-//! A learned model of either kind.
+//! A learned model, with or without fault modes.
 
 use crate::alarm::AlarmError;
 use crate::description::Description;
@@ -7,12 +7,12 @@ use crate::learned::monitor::Channels;
 use crate::learned::{self, Calibration, Form, ModelError};
 use crate::nominal;
 
-/// What was learned of a robot.
+/// The learned model of a robot.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RobotModel {
     /// Its nominal behaviour and its faults.
     Faults(Box<learned::Model>),
-    /// Its nominal behaviour alone: whatever else it does is unknown.
+    /// Its nominal behaviour alone: every departure is unknown.
     Nominal(Box<nominal::Model>),
 }
 

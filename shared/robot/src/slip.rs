@@ -23,6 +23,8 @@ pub use condition::{Condition, WheelCondition};
 
 use nalgebra::SVector;
 
+use loads::SideWeight;
+
 use crate::chassis::{Motor, RockerBogie};
 use crate::description::Description;
 use crate::kinematics::{Ackermann6, GeometryError, ROVER_WHEELS, WheelTargets};
@@ -261,11 +263,14 @@ impl SlipModel {
         }
     }
 
-    /// Weight on each side and how far ahead of the pivot it acts, N and m.
-    fn side_weights(&self, condition: &Condition) -> [(f64, f64); 2] {
+    /// Weight on each side.
+    fn side_weights(&self, condition: &Condition) -> [SideWeight; 2] {
         let (linkage, kinematics) = (&self.linkage, &self.kinematics);
         let sides_n = condition.sides_n(self.weight_n, linkage, kinematics, &self.sides);
-        sides_n.map(|side_n| (side_n, condition.mass_offset_m[0]))
+        sides_n.map(|weight_n| SideWeight {
+            weight_n,
+            ahead_m: condition.mass_offset_m[0],
+        })
     }
 
     fn static_loads(&self, situation: &Situation) -> [f64; ROVER_WHEELS] {

@@ -1,16 +1,16 @@
-//! The channels in which a fault is suspected.
+//! Channels in which a fault is suspected.
 
 use vigil_blocks::{CHANNELS, Channel, WHEELS};
 
-/// While an alarm stands, the channels that more likely show a fault than not: what they read is no
-/// property of a healthy robot. None without an alarm.
+/// While an alarm stands, the channels that show a fault with odds above even. Nothing is learned
+/// from them: their measurements are not those of a healthy robot. Empty without an alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Suspects(u64);
 
 const _: () = assert!(CHANNELS <= u64::BITS as usize);
 
 impl Suspects {
-    /// Those of these natural log-odds by channel; see [`Channel`].
+    /// The channels with positive log-odds; their order is that of [`Channel`].
     #[must_use]
     pub fn new(alarm: bool, log_odds: &[f64; CHANNELS]) -> Self {
         let all = log_odds.iter().enumerate();
@@ -50,5 +50,21 @@ mod tests {
         assert!(suspects.has_wheel_rate() && !suspects.has_current());
         let all: Vec<usize> = (0..CHANNELS).filter(|&c| suspects.has(c)).collect();
         assert_eq!(all, [Channel::wheel_rate(2)]);
+    }
+
+    #[test]
+    fn the_last_wheel_and_its_current_are_suspected_apart() {
+        for (channel, rate, current) in [
+            (Channel::wheel_rate(WHEELS - 1), true, false),
+            (Channel::current(WHEELS - 1), false, true),
+            (Channel::current(0), false, true),
+            (Channel::steer(0), false, false),
+        ] {
+            let mut log_odds = [-1.0; CHANNELS];
+            log_odds[channel] = 1e-9;
+            let suspects = Suspects::new(true, &log_odds);
+            let found = (suspects.has_wheel_rate(), suspects.has_current());
+            assert_eq!(found, (rate, current), "{channel}");
+        }
     }
 }

@@ -1,39 +1,39 @@
-//! How far a healthy robot may be from its model: the ground under it, and small things about it.
+//! Tolerance: how far a healthy robot may depart from its model, per channel.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use vigil_inference::slow_state::Drift;
 use vigil_inference::track::MotionNoise;
 
-/// Standard deviations of the motion's healthy variation over its tolerance. Chosen: with the
-/// slope's a tolerance is 2.4 to 4 deviations, by the axis.
+/// Standard deviation of the motion's offset over its tolerance. Chosen: together with the slope a
+/// tolerance is 2.4 to 4 deviations, by the axis.
 const OFFSET_SHARE: f64 = 0.25;
-/// A tolerance is 2.5 deviations of a side slope: 99 % of them lie within.
+/// Standard deviation of a slope over its tolerance: 2.5 deviations hold 99 % of the slopes.
 const SLOPE_SHARE: f64 = 0.4;
 /// Share of the changes of ground that are sudden; the others come little by little. Chosen: one
 /// change in ten lengths; half as many ask for 0.7 nats more evidence of each.
 const SUDDEN_SHARE: f64 = 0.1;
 
-/// Healthy variation, in physical units. Each is the largest magnitude that is no fault: it is
-/// estimated under way up to there, and is a material departure beyond.
+/// Healthy variation, in physical units. Each value is the largest magnitude that is no fault. The
+/// filters estimate the variation up to it; what is beyond is a material departure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tolerance {
     /// Yaw per metre travelled beside that of the model, rad/m.
     pub yaw_rad_m: f64,
-    /// Part of the commanded travel that slips, is lost uphill or gained downhill, m/m.
+    /// Share of the commanded travel that slips, is lost uphill or gained downhill, m/m.
     pub forward_m_m: f64,
     /// Travel to the side per metre, m/m: on a side slope.
     pub lateral_m_m: f64,
-    /// Part of its rate by which every wheel falls behind under load.
+    /// Share of its rate by which every wheel falls behind under load.
     pub wheel_ratio: f64,
     /// Rate by which one wheel differs from the others, rad/s.
     pub wheel_rate_rad_s: f64,
-    /// Angle at which a servo stands beside its command, rad.
+    /// Angle between a servo and its command, rad.
     pub steer_rad: f64,
-    /// Length over which all that changes, m.
+    /// Length over which the context changes, m.
     pub length_m: f64,
-    /// Of gyro and currents; left out: none.
+    /// Tolerance of gyro and currents; left out: none.
     #[serde(default)]
     pub further: Option<FurtherTolerance>,
 }
@@ -53,7 +53,7 @@ pub struct FurtherTolerance {
 }
 
 impl Tolerance {
-    /// The noise of nominal motion where the ground is not the one learned on.
+    /// The noise of nominal motion on any ground within the tolerance.
     #[must_use]
     pub fn widened(&self, noise: &MotionNoise) -> MotionNoise {
         let (offset, slope) = (self.offset_sd(), self.slope_sd());
@@ -68,13 +68,13 @@ impl Tolerance {
         }
     }
 
-    /// Of what the turn loses as the travel does: motors that yield. Yaw, forward, lateral.
+    /// Deviations of the motion's offset by motors that yield under load: yaw, forward, lateral.
     fn offset_sd(&self) -> Vector3<f64> {
         let half = 0.5 * self.lateral_m_m;
         Vector3::new(self.yaw_rad_m, self.forward_m_m, half) * OFFSET_SHARE
     }
 
-    /// Of what only shifts the robot: slopes, which act alike forward and to the side.
+    /// Deviations by slopes, which shift the robot and act alike forward and to the side.
     fn slope_sd(&self) -> Vector3<f64> {
         Vector3::new(0.0, self.lateral_m_m, self.lateral_m_m) * SLOPE_SHARE
     }
@@ -85,9 +85,9 @@ impl Tolerance {
         sd.component_mul(&sd) / self.length_m
     }
 
-    /// The noise of a fault's motion where the ground under it changes as it does in health.
+    /// The noise of a fault's motion, with the drift of ground and slope of a healthy robot.
     #[must_use]
-    pub fn drifting(&self, noise: &MotionNoise) -> MotionNoise {
+    pub fn with_ground_drift(&self, noise: &MotionNoise) -> MotionNoise {
         let slope = self.slope_sd();
         MotionNoise {
             // A slope, too, changes under a fault.
@@ -114,11 +114,11 @@ impl Tolerance {
         }
     }
 
-    /// What is left of a steering angle's deviation beyond the tolerance, rad. A servo gives way
-    /// as the scrub of the wheels demands, at once when the command changes: it has no slow state.
+    /// Part of a steering angle's residual beyond the tolerance, rad. A servo yields to the scrub
+    /// of its wheel as soon as the command changes, so its offset is no slow state.
     #[must_use]
-    pub fn beyond_steer(&self, apart_rad: f64) -> f64 {
-        apart_rad - apart_rad.clamp(-self.steer_rad, self.steer_rad)
+    pub fn beyond_steer(&self, residual_rad: f64) -> f64 {
+        residual_rad - residual_rad.clamp(-self.steer_rad, self.steer_rad)
     }
 
     /// The first value that is out of range, and its name.

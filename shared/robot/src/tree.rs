@@ -89,8 +89,12 @@ impl FaultTree {
         self.hash
     }
 
-    /// Indices of the leaves, in order.
+    /// Indices of the leaves, in order; all below [`FAULT_NODES`], so that a block holds each.
     pub fn leaves(&self) -> impl Iterator<Item = usize> + '_ {
+        assert!(
+            self.nodes.len() <= FAULT_NODES,
+            "a fault tree has no more nodes than a block"
+        );
         (0..self.nodes.len()).filter(|&i| self.nodes[i].fault.is_some())
     }
 
@@ -103,6 +107,62 @@ impl FaultTree {
     /// Number of ancestors of node `i`.
     #[must_use]
     pub fn depth(&self, i: usize) -> usize {
-        std::iter::successors(self.nodes[i].parent, |&p| self.nodes[p].parent).count()
+        let parent = |child: usize| {
+            let parent = self.nodes[child].parent;
+            assert!(
+                parent.is_none_or(|parent| parent < child),
+                "a parent comes before its children in a fault tree"
+            );
+            parent
+        };
+        std::iter::successors(parent(i), |&node| parent(node)).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn node(name: &str, parent: Option<usize>, fault: Option<&str>) -> Node {
+        Node {
+            name: name.to_owned(),
+            parent,
+            fault: fault.map(str::to_owned),
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "a parent comes before its children")]
+    fn a_parent_behind_its_child_would_end_the_process() {
+        let nodes = vec![node("ND", None, None), node("A", Some(1), Some("stuck:LF"))];
+        let _ = FaultTree { nodes, hash: 0 }.depth(1);
+    }
+
+    #[test]
+    #[should_panic(expected = "no more nodes than a block")]
+    fn a_tree_larger_than_a_block_would_end_the_process() {
+        let nodes = vec![node("ND", None, None); FAULT_NODES + 1];
+        let _ = FaultTree { nodes, hash: 0 }.leaves().count();
+    }
+
+    proptest! {
+        #[test]
+        fn a_tree_that_is_accepted_has_an_order_and_fits_a_block(
+            nodes in prop::collection::vec(
+                (0_u8..40, prop::option::of(0_usize..12), any::<bool>()), 0..FAULT_NODES + 3),
+        ) {
+            let nodes: Vec<Node> = nodes
+                .into_iter()
+                .map(|(name, parent, is_leaf)| {
+                    node(&name.to_string(), parent, is_leaf.then_some("stuck:LF"))
+                })
+                .collect();
+            let Ok(tree) = FaultTree::new(nodes) else { return Ok(()) };
+            for leaf in tree.leaves() {
+                prop_assert!(leaf < FAULT_NODES && tree.depth(leaf) < tree.nodes().len());
+            }
+        }
     }
 }

@@ -1,4 +1,5 @@
-//! How the robot follows, stops, looks, passes, backs and plans.
+//! The navigator's manoeuvres: follow, look, pass, back, replan. The constants are chosen by hand
+//! for a robot half a metre wide; they shape the simulated drive, no verdict.
 
 use vigil_setup::graph_file::Navigation;
 
@@ -38,7 +39,7 @@ const JOIN_M: f64 = 1.5;
 const SEARCH_M: f64 = 1.0;
 
 impl Navigator {
-    /// Along the path with the plan; slower, and not at all, before what blocks the way.
+    /// Along the path with the plan; slower before an obstacle, and never into it.
     pub(super) fn follow(&mut self, dt_s: f64, scale: f64) -> DriveCommand {
         let (slow_m, stop_m) = (self.settings.slow_m, self.settings.stop_m);
         let free_m = if self.touched {
@@ -96,7 +97,8 @@ impl Navigator {
         self.stand()
     }
 
-    /// Carefully through the opening, then back to the path; `is_phantom` if what blocked was none.
+    /// Carefully through the opening, then back to the path; `is_phantom` if the obstacle was a
+    /// phantom.
     pub(super) fn pass(
         &mut self,
         end_m: f64,
@@ -114,7 +116,7 @@ impl Navigator {
         if is_behind && self.off_path_m() <= NEAR_M {
             self.block_m = None;
             if is_phantom {
-                // What it drove past was not there.
+                // The robot has driven through it, so it is not there.
                 self.faults.phantom = None;
             }
             self.planned_m = self.along_m;
@@ -140,8 +142,8 @@ impl Navigator {
         }
     }
 
-    /// Plans from here: along the alternative, once, if the way is blocked; along the same path if
-    /// nothing blocks it.
+    /// Replans from here: along the alternative, once, if the way is blocked, else along the same
+    /// path.
     pub(super) fn replan(&mut self) {
         self.faults.wrong_heading_rad = 0.0;
         let slow_m = self.settings.slow_m;
@@ -180,7 +182,7 @@ impl Navigator {
         !self.map.is_free(place, self.t_s)
     }
 
-    /// The plan goes on from here; a robot that is off its path first goes back to it.
+    /// Restarts the plan here; a robot that is off its path first returns to it.
     pub(super) fn restart(&mut self) {
         let here = [self.pose[0], self.pose[1]];
         self.along_m = self.path.nearest(here, 0.0, self.path.length_m());
@@ -196,7 +198,7 @@ impl Navigator {
         self.planned_m = self.along_m;
     }
 
-    /// How far the robot could go on its lane, as the range sensor sees it, up to `most_m`.
+    /// Free way on the lane as the range sensor measures it, up to `most_m`.
     fn free_way(&self, most_m: f64) -> f64 {
         if self.faults.is_blind {
             return most_m;

@@ -1,4 +1,4 @@
-//! The supervisor's newest action, and the beginning of the drive.
+//! The supervisor's newest action, and the start of the drive.
 
 use vigil_blocks::{Action, Block, CauseKind};
 use vigil_cycle::{Graph, PortError, Receiver, Topic};
@@ -21,7 +21,7 @@ impl Actions {
         })
     }
 
-    /// Takes what has come until the cycle that was due at `t_schedule_ns`.
+    /// Takes the actions that have arrived, in the cycle that was due at `t_schedule_ns`.
     pub(super) fn take(&mut self, t_schedule_ns: u64, own_epoch: u64) {
         for _ in 0..self.receiver.buffer() {
             if !self.receiver.advance() {

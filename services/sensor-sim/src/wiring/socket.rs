@@ -40,9 +40,9 @@ pub struct SocketStage {
     /// Epoch of the source, and how often it has changed.
     epoch: u64,
     starts: u64,
-    /// What has arrived in this turn, and what of it goes out.
+    /// Frames that arrived in this turn.
     arrived: Vec<(SensorFrame, From)>,
-    /// Datagrams of others that have waited in the kernel and were thrown away unread.
+    /// Datagrams of other sources that waited in the kernel and were dropped unread.
     unread: usize,
     waiting: Vec<SensorFrame>,
     frames: Box<dyn Sender<SensorFrame>>,
@@ -91,7 +91,7 @@ impl SocketStage {
             }
             match datagram::decode(&buffer[..length]) {
                 Ok(frame) => self.arrived.push((frame, from)),
-                // While nobody is known, it is nobody's misbehaviour.
+                // Before a source is chosen, nobody's violations are counted.
                 Err(rejection) if self.source.is_none() => intake.count(rejection),
                 Err(rejection) => intake.reject(rejection),
             }
@@ -135,7 +135,7 @@ impl Stage for SocketStage {
             self.taken_ns = now_ns;
             self.starts += u64::from(frame.header.epoch != self.epoch);
             self.epoch = frame.header.epoch;
-            // Behind this service its own epoch is seen: a new start of the source is a new run.
+            // Readers see this service's epoch, so a new start of the source must change the run.
             frame.run_id ^= self.starts << START_SHIFT;
             self.waiting.push(frame);
             intake.stepped(&frame.header, frame.header.id());
@@ -162,7 +162,7 @@ impl Stage for SocketStage {
         self.frames.prepare()
     }
 
-    /// A frame that is not there is not made up.
+    /// A missing frame is not predicted.
     fn predicts(&self) -> bool {
         false
     }

@@ -348,7 +348,7 @@ fn every_kind_is_survived_at_its_limits_and_all_at_once_at_their_defaults() {
             assert!(all_finite(&frame), "{}", row.name);
             assert_eq!(world.unsolved(), 0, "{} {high:?}", row.name);
             if high.is_some() {
-                world.calm(kind, Some(0));
+                world.end_disturbance(kind, Some(0));
             }
         }
         world.change(Change::ClearAll).unwrap();

@@ -95,7 +95,7 @@ impl MultipleHypothesis {
             let noise = match mode.is_nominal_motion() {
                 true => model.nominal_noise(robot),
                 false if is_several => mode.noise,
-                false => robot.drifting(mode.noise),
+                false => robot.with_ground_drift(mode.noise),
             };
             MotionMode { noise, ..mode }
         };

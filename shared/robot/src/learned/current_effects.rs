@@ -19,7 +19,8 @@ pub const SHARES: [f64; 5] = [0.35, 0.5, 0.7, 0.85, 1.0];
 const KINDS: usize = SHARES.len() + 1;
 /// Kind of a stuck wheel.
 pub const STUCK: usize = SHARES.len();
-/// Curvatures, relative to the largest learned, and speeds, from the least to the largest learned.
+/// Curvatures and speeds at which the effects are solved, between the ends of the learned ranges;
+/// the effects between them are linear. Chosen: each node costs the start of a service a solution.
 const TURNS: usize = 5;
 const SPEEDS: usize = 3;
 /// Currents smaller than this are no measure of an effect, as a torque, N m.

@@ -28,7 +28,7 @@ impl Faults {
     #[must_use]
     pub fn new(model: &Model, robot: &Description) -> Self {
         let stuck = |wheel: usize| model.stuck(wheel).map(|stuck| stuck.motion);
-        let drifting = |noise| robot.drifting(noise);
+        let drifting = |noise| robot.with_ground_drift(noise);
         Self {
             anything: drifting(unknown_noise(model)),
             is_bounded: robot.tolerance.is_some(),

@@ -9,7 +9,7 @@ use vigil_blocks::{SensorFrame, Valid, WHEELS};
 use vigil_inference::angle::wrap;
 
 use super::further::{Collector, Further};
-use super::troubles::{Limits, Troubles, Watchdog};
+use super::troubles::{PlausibilityCheck, RestLimits, Troubles};
 use super::{BodyLag, Model, Observation, Reading};
 use crate::description::Description;
 use crate::period::FramePeriod;
@@ -48,7 +48,7 @@ pub struct Observer {
     speed_max: f64,
     interval_s: f64,
     standing_m_s: f64,
-    limits: Limits,
+    limits: RestLimits,
     model: Box<Model>,
     is_suspected: bool,
     state: State,
@@ -74,7 +74,7 @@ struct State {
     anchor: bool,
     wheels: [Option<f64>; WHEELS],
     steer: [Option<f64>; WHEELS],
-    watchdog: Watchdog,
+    plausibility: PlausibilityCheck,
     /// Frames in a row that were not newer than the last one taken.
     stale: u32,
     sums: Sums,
@@ -108,7 +108,7 @@ impl Observer {
             speed_max: 10.0 * robot.limits.speed_m_s,
             interval_s: model.interval_s,
             standing_m_s: model.command.standing_m_s,
-            limits: Limits::new(model),
+            limits: RestLimits::new(model),
             model: Box::new(model.clone()),
             is_suspected: false,
             state: State::default(),
@@ -346,8 +346,8 @@ impl Observer {
         // A robot that is commanded to creep is not commanded to stand.
         let is_stopped =
             command[1].abs() < STANDS * self.standing_m_s && speed.abs() < self.standing_m_s;
-        let (watchdog, observation) = (&mut state.watchdog, &mut self.observation);
-        observation.troubles = watchdog.step(observation, is_stopped, &self.limits);
+        let (plausibility, observation) = (&mut state.plausibility, &mut self.observation);
+        observation.troubles = plausibility.step(observation, is_stopped, &self.limits);
         self.learn_lag();
         let state = &mut self.state;
         // An anchor without a pose is still to come.

@@ -66,7 +66,7 @@ impl Troubles {
 
 /// Watches for troubles, observation by observation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Watchdog {
+pub struct PlausibilityCheck {
     pose_silent_s: f64,
     last_pose: Option<[f64; 3]>,
     pose_held_s: f64,
@@ -81,14 +81,14 @@ pub struct Watchdog {
     wheels_turning_s: f64,
 }
 
-impl Watchdog {
+impl PlausibilityCheck {
     /// Takes the next observation of a run; `is_stopped` if the robot is commanded to stand and
     /// the body has followed.
     pub fn step(
         &mut self,
         observation: &Observation,
         is_stopped: bool,
-        limits: &Limits,
+        limits: &RestLimits,
     ) -> Troubles {
         let dt_s = observation.dt_s;
         let lasting = |so_far_s: f64, holds: bool| if holds { so_far_s + dt_s } else { 0.0 };
@@ -156,7 +156,7 @@ impl Watchdog {
     }
 
     /// True if a pose is away from where the robot rests, which follows it slowly.
-    fn moves(&mut self, pose: [f64; 3], dt_s: f64, limits: &Limits) -> bool {
+    fn moves(&mut self, pose: [f64; 3], dt_s: f64, limits: &RestLimits) -> bool {
         // The mean of the first poses: one alone may be an outlier.
         self.rest_poses = (self.rest_poses + 1).min(REST_POSES);
         let is_found = self.rest_poses == REST_POSES;
@@ -181,12 +181,12 @@ impl Watchdog {
 
 /// How far a resting pose may be from where it was.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub struct RestLimits {
     position_m: f64,
     yaw_rad: f64,
 }
 
-impl Limits {
+impl RestLimits {
     /// Those of a model's pose sensor.
     #[must_use]
     pub fn new(model: &Model) -> Self {
@@ -202,7 +202,7 @@ mod tests {
     use super::*;
     use crate::learned::Reading;
 
-    const LIMITS: Limits = Limits {
+    const LIMITS: RestLimits = RestLimits {
         position_m: 0.08,
         yaw_rad: 0.13,
     };
@@ -224,27 +224,27 @@ mod tests {
 
     /// Observations after which `troubles` are first seen.
     fn first(
-        watchdog: &mut Watchdog,
+        check: &mut PlausibilityCheck,
         stopped: bool,
         next: impl Fn(u32) -> Observation,
         seen: impl Fn(&Troubles) -> bool,
     ) -> Option<u32> {
-        (1..=400).find(|&k| seen(&watchdog.step(&next(k), stopped, &LIMITS)))
+        (1..=400).find(|&k| seen(&check.step(&next(k), stopped, &LIMITS)))
     }
 
     #[test]
     fn a_channel_is_silent_after_two_seconds_and_no_longer_once_it_reads() {
-        let mut watchdog = Watchdog::default();
+        let mut check = PlausibilityCheck::default();
         let good = observation(0.0, &[1.0, 1.0]);
-        assert_eq!(watchdog.step(&good, false, &LIMITS), Troubles::default());
+        assert_eq!(check.step(&good, false, &LIMITS), Troubles::default());
         let mut bad = observation(0.0, &[1.0]);
         bad.pose_frames = 0;
-        let found = first(&mut watchdog, false, |_| bad, |t| t.pose_silent);
+        let found = first(&mut check, false, |_| bad, |t| t.pose_silent);
         assert_eq!(found, Some(40));
-        let troubles = watchdog.step(&bad, false, &LIMITS);
+        let troubles = check.step(&bad, false, &LIMITS);
         // The third wheel never read anything: it is not there.
         assert_eq!((troubles.wheels_silent, troubles.any(false)), (2, true));
-        assert_eq!(watchdog.step(&good, false, &LIMITS), Troubles::default());
+        assert_eq!(check.step(&good, false, &LIMITS), Troubles::default());
     }
 
     #[test]
@@ -254,45 +254,45 @@ mod tests {
             ..observation(0.01 * f64::from(k), &[2.5; 6])
         };
         for (hold, frozen) in [(1, true), (20, false), (100, false)] {
-            let mut watchdog = Watchdog::default();
+            let mut check = PlausibilityCheck::default();
             let slow = |k: u32| drives(k / hold * hold);
-            assert_eq!(first(&mut watchdog, false, slow, |t| t.any(true)), None);
+            assert_eq!(first(&mut check, false, slow, |t| t.any(true)), None);
             let held = |_| drives(9999);
-            let found = first(&mut watchdog, false, held, |t| t.pose_frozen);
+            let found = first(&mut check, false, held, |t| t.pose_frozen);
             assert_eq!(found, frozen.then_some(21), "one pose in {hold}");
-            assert!(!watchdog.step(&drives(0), false, &LIMITS).pose_frozen);
+            assert!(!check.step(&drives(0), false, &LIMITS).pose_frozen);
         }
     }
 
     #[test]
     fn a_robot_that_drives_on_though_it_should_stand_is_noticed() {
         for speed in [0.05, 0.2, -0.2] {
-            let mut watchdog = Watchdog::default();
+            let mut check = PlausibilityCheck::default();
             let drives = |k: u32| observation(speed * 0.05 * f64::from(k), &[0.1; 6]);
-            assert_eq!(first(&mut watchdog, false, drives, |t| t.any(true)), None);
-            let found = first(&mut watchdog, true, drives, |t| t.pose_moves);
+            assert_eq!(first(&mut check, false, drives, |t| t.any(true)), None);
+            let found = first(&mut check, true, drives, |t| t.pose_moves);
             let after_s = f64::from(found.unwrap_or(u32::MAX)) * 0.05;
             assert!(after_s < 1.5 + 0.1 / f64::abs(speed), "{after_s}");
         }
-        let mut watchdog = Watchdog::default();
+        let mut check = PlausibilityCheck::default();
         let spins = |_| observation(0.0, &[2.0, 2.0, 2.0, 2.0, 0.0, 0.0]);
-        let found = first(&mut watchdog, true, spins, |t| t.wheels_turn);
+        let found = first(&mut check, true, spins, |t| t.wheels_turn);
         assert_eq!(found, Some(25));
     }
 
     #[test]
     fn a_noisy_or_slowly_drifting_pose_and_one_broken_encoder_are_no_motion() {
-        let mut watchdog = Watchdog::default();
+        let mut check = PlausibilityCheck::default();
         let rests = |k: u32| {
             let noise = if k.is_multiple_of(2) { 0.02 } else { -0.02 };
             observation(noise + 0.002 * 0.05 * f64::from(k), &[5.0, 0.0, 0.0, 0.0])
         };
-        assert_eq!(first(&mut watchdog, true, rests, |t| t.any(true)), None);
+        assert_eq!(first(&mut check, true, rests, |t| t.any(true)), None);
         // A jump of the map is none either.
         let mut jump = observation(9.0, &[0.0; 4]);
         jump.anchor = true;
-        assert!(!watchdog.step(&jump, true, &LIMITS).any(true));
+        assert!(!check.step(&jump, true, &LIMITS).any(true));
         let there = |_| observation(9.0, &[0.0; 4]);
-        assert_eq!(first(&mut watchdog, true, there, |t| t.any(true)), None);
+        assert_eq!(first(&mut check, true, there, |t| t.any(true)), None);
     }
 }

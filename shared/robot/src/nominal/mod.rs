@@ -26,4 +26,4 @@ pub use joint::Joint;
 pub use model::{Model, Range};
 pub use monitor::Monitor;
 pub use observation::{History, Observation, Observer};
-pub use track::Track;
+pub use track::ResidualWhitener;

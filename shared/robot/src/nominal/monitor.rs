@@ -1,10 +1,11 @@
 //! The detection filter of a nominal model: is this still the robot that was learned?
 //!
-//! Each channel's residual is whitened by its [`Track`]. Two fault states stand against the nominal
-//! one, per channel: an unknown constant bias, which is learned ([`Form::LearnedBias`]), and the
-//! constant likelihood of any large residual, for faults that show as scatter (a taped wheel jolts
-//! the robot once a turn and has no mean). The channels' odds, each tempered by its [`Tail`], add
-//! up: a fault enters by one of them, or by all of them at once ([`super::joint`]).
+//! Each channel's residual is whitened by its [`ResidualWhitener`]. Two fault states stand against
+//! the nominal one, per channel: an unknown constant bias, which is learned
+//! ([`Form::LearnedBias`]), and the constant likelihood of any large residual, for faults that show
+//! as scatter (a taped wheel jolts the robot once a turn and has no mean). The channels' odds, each
+//! tempered by its [`Tail`], add up: a fault enters by one of them, or by all of them at once
+//! ([`super::joint`]).
 //!
 //! Two more states speak for a fault of a channel: it is not measured while the robot moves
 //! (`ABSENT_S`), as what is not looked at cannot be healthy; and the pose moves though no motion is
@@ -28,7 +29,7 @@ use super::channel::{Channel, FAULT_RATE_1_H, Quantity, REST_S, Tail};
 use super::joint::Together;
 use super::model::Model;
 use super::observation::{History, Observation};
-use super::track::Track;
+use super::track::ResidualWhitener;
 use crate::channel_odds::ChannelOdds;
 use crate::learned::Form;
 use crate::learned::form::{Evidence, TAU_SQUARED_PER_DIMENSION};
@@ -61,7 +62,7 @@ const LOG_ODDS_MIN: f64 = -700.0;
 #[derive(Debug, Clone)]
 struct ActiveChannel {
     channel: Channel,
-    track: Track,
+    track: ResidualWhitener,
     bias: Evidence<1>,
     scatter: Constant,
     /// How long it has not been measured in motion, s, and what that says.
@@ -166,7 +167,7 @@ impl Monitor {
         let used = used.filter(|channel| channel.is_among(channels));
         let watched = used.map(|channel| ActiveChannel {
             channel: channel.clone(),
-            track: Track::new(channel),
+            track: ResidualWhitener::new(channel),
             bias: Evidence::new(form, BIAS),
             scatter: Constant::default(),
             absent_s: 0.0,
@@ -201,7 +202,7 @@ impl Monitor {
     /// Forgets everything.
     pub fn reset(&mut self) {
         for watched in &mut self.watched {
-            watched.track = Track::new(&watched.channel);
+            watched.track = ResidualWhitener::new(&watched.channel);
             watched.absent_s = 0.0;
         }
         self.run_s = 0.0;

@@ -14,14 +14,14 @@ const WHITE_MIN: f64 = 0.05;
 
 /// Filter of one channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Track {
+pub struct ResidualWhitener {
     mean: [f64; 2],
     covariance: [f64; 3],
     carried: bool,
 }
 
-impl Track {
-    /// The track of a channel at the start of a run.
+impl ResidualWhitener {
+    /// The filter of a channel at the start of a run.
     #[must_use]
     pub fn new(channel: &Channel) -> Self {
         Self {
@@ -155,7 +155,7 @@ mod tests {
         let channel = channel(correlation, 3.0);
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
         let mut normal = || -> f64 { rng.sample(StandardNormal) };
-        let mut track = Track::new(&channel);
+        let mut track = ResidualWhitener::new(&channel);
         let (mut carried, mut before) = (normal(), 0.0);
         let (mut square, mut along) = (0.0, 0.0);
         let count = 20_000;
@@ -187,7 +187,7 @@ mod tests {
             let mut normal = || -> f64 { rng.sample(StandardNormal) };
             let (mut square, mut count) = (0.0, 0.0);
             for _ in 0..2000 {
-                let (offset, mut track) = (3.0 * normal(), Track::new(&channel));
+                let (offset, mut track) = (3.0 * normal(), ResidualWhitener::new(&channel));
                 let mut carried = normal();
                 if correlation < 0.0 {
                     carried *= (-correlation).sqrt();
@@ -233,7 +233,7 @@ mod tests {
                 drift_sd: 0.1,
                 ..channel(correlation, 3.0)
             };
-            let mut track = Track::new(&drifting);
+            let mut track = ResidualWhitener::new(&drifting);
             for _ in 0..200 {
                 track.step(&drifting, 2.0, 1.0, false);
             }

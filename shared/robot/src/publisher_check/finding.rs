@@ -1,11 +1,11 @@
-//! What a publisher does that the robot's description does not say.
+//! Findings of the publisher check, as events and in words.
 
 use std::f64::consts::{PI, TAU};
 
 use crate::description::Description;
 use crate::description::Kinematics;
 
-/// What is wrong. The value is its code in events.
+/// Kind of a finding. The value is its code in events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum FindingKind {
@@ -45,8 +45,8 @@ impl FindingKind {
         Self::Rate,
     ];
 
-    /// True if faults go unseen behind it: what is watched does not mean what it says. One wheel
-    /// among others is seen, as a departure.
+    /// True if it hides faults: the whole channel has another meaning. A single wheel does not: it
+    /// shows as a departure.
     #[must_use]
     pub const fn is_blinding(self) -> bool {
         matches!(
@@ -56,10 +56,10 @@ impl FindingKind {
     }
 }
 
-/// One thing that is wrong.
+/// A disagreement between frames and description.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
-    /// What.
+    /// What disagrees.
     pub kind: FindingKind,
     /// Of which wheel, where it is of one.
     pub wheel: Option<usize>,
@@ -88,7 +88,7 @@ impl Finding {
         Some(Self { kind, wheel, value })
     }
 
-    /// In words, for who wrote the publisher.
+    /// In words, for the author of the publisher.
     #[must_use]
     pub fn text(&self, robot: &Description) -> String {
         let wheel = self.wheel.and_then(|wheel| robot.wheels.get(wheel));

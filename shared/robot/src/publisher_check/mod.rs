@@ -1,14 +1,13 @@
-//! Whether a publisher's frames mean what the robot's description says: units, signs, sides.
+//! Checks that a live publisher's frames agree with the robot's description: units, signs, sides.
 //!
-//! A healthy robot does roughly what it is commanded. Where it moves a thousand times as far or
-//! turns the other way, the fields hold something else than they should. Figures are ratios to the
-//! command, summed frame by frame from the first motion on, so that noise and ground leave them
-//! near 1; a finding needs a ratio that neither ground nor a fault explains. Each is judged once,
-//! as soon as the motion shows it: straight driving shows nothing of turns, and what has not been
-//! judged is said ([`PublisherCheck::unjudged`]). Once all is judged a frame costs nothing more.
+//! A healthy robot roughly follows its command. If it moves a thousand times as far or turns the
+//! other way, a field holds another unit or sign. Each test sums measured against commanded motion
+//! from the first motion on; noise and ground leave the ratio near 1, and a finding needs a ratio
+//! that neither ground nor a fault explains. A test ends as soon as the motion excites it: straight
+//! driving shows nothing of turns. [`PublisherCheck::unjudged`] names the tests that have not
+//! ended. Once all have, a frame costs nothing more.
 //!
-//! For recordings, where all frames are at hand, `vigil import` judges by
-//! `vigil_plausibility`.
+//! `vigil import` checks recordings, where all frames are at hand, by `vigil_plausibility`.
 
 mod finding;
 mod pose;
@@ -21,25 +20,26 @@ pub use finding::{Finding, FindingKind};
 use pose::Poses;
 use wheels::Wheels;
 
-/// A ratio within this factor of 1 is nothing: ground and faults do as much. The least factor of a
-/// unit is that of feet, 3.3.
+/// Factor about 1 within which a ratio is no finding: ground and faults do as much. The smallest
+/// factor of a unit is that of feet, 3.3.
 const RATIO_MAX: f64 = 3.0;
 /// Curvature from which turns are judged, 1/m: below it a fault turns a robot as much (up to 0.32
 /// rad/m by a stuck wheel of the rover).
 const TURNING_1_M: f64 = 0.3;
 /// Commanded turn from which they are, rad. Forty deviations of a yaw noise of 5 mrad.
 const TURN_MIN_RAD: f64 = 0.2;
-/// Ratios of turns: a sign is wrong below, a unit above. A wrong sign reads -1: half-way to none
+/// Ratio of turns below which a sign is wrong. A wrong sign reads -1; chosen half-way to 0, which
 /// leaves room for ground.
 const TURN_REVERSED: f64 = -0.5;
-/// Between a right one, 1, and degrees, 57, in the geometric mean.
+/// Ratio of turns above which the unit is wrong: the geometric mean of 1 and 57 (degrees).
 const TURN_UNIT: f64 = 8.0;
 /// A pause in the frames beyond which the motion counts as interrupted, s. Six periods of a sensor
 /// of 20 Hz.
 const PAUSE_S: f64 = 0.3;
-/// A command must have stood so long before a frame counts, s: three lags of [`crate::body::Body`].
+/// Time for which a command must be constant before a frame counts, s: three lags of
+/// [`crate::body::Body`].
 const SETTLED_S: f64 = 0.3;
-/// Change of the commanded velocity that begins this anew, m/s and rad/s: chosen, a tenth of the
+/// Change of the commanded velocity that restarts this time, m/s and rad/s. Chosen: a tenth of the
 /// rover's fastest.
 const CHANGE: f64 = 0.05;
 /// Tests there may be: travel, turn, gyro, unit, and by wheel sign, steering, side.
@@ -48,14 +48,14 @@ const TESTS: usize = 4 + 3 * vigil_blocks::WHEELS;
 /// Bits of all of them.
 const ALL: u32 = (1 << TESTS) - 1;
 
-/// Outcome of one test so far.
+/// Outcome of one test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TestOutcome {
-    /// The motion has not shown it.
+    /// The motion has not excited it.
     NotYet,
-    /// As it should be.
+    /// The frames agree with the description.
     Fits,
-    /// Not so.
+    /// They do not.
     Wrong(Finding),
 }
 
@@ -65,23 +65,63 @@ pub struct PublisherCheck {
     robot: Description,
     poses: Poses,
     wheels: Wheels,
-    gyro: [f64; 3],
-    /// Run and writer of the last frame, its capture time, and the velocity commanded.
-    last: Option<((u64, u64, u32), u64)>,
+    gyro: GyroSums,
+    last: Option<LastFrame>,
+    /// Commanded velocity: forward m/s, left m/s, yaw rate rad/s.
     twist: [f64; 3],
+    /// Time for which the command has been constant, s.
     settled_s: f64,
-    /// Since the tests were looked at, s.
+    /// Time since the tests were evaluated, s.
     unlooked_s: f64,
     /// Bits of the tests that have ended.
     judged: u32,
-    /// Bits of those about what the robot does not have.
+    /// Bits of the tests of channels that the robot does not have.
     absent: u32,
-    /// Bits of those that were wrong when looked at last: twice in a row counts.
+    /// Bits of the tests that failed at the last evaluation: two failures in a row are a finding.
     suspected: u32,
     is_blinding: bool,
 }
 
-/// Time between looks at the sums, s.
+/// The frame before.
+#[derive(Debug, Clone, Copy)]
+struct LastFrame {
+    epoch: u64,
+    run_id: u64,
+    pose_reset_count: u32,
+    t_ns: u64,
+}
+
+impl LastFrame {
+    const fn new(frame: &SensorFrame) -> Self {
+        Self {
+            epoch: frame.header.epoch,
+            run_id: frame.run_id,
+            pose_reset_count: frame.pose_reset_count,
+            t_ns: frame.header.t_capture_ns,
+        }
+    }
+
+    /// True if both frames are of one run of one writer, between two resets of the pose.
+    fn is_of_track(&self, other: &Self) -> bool {
+        self.epoch == other.epoch
+            && self.run_id == other.run_id
+            && self.pose_reset_count == other.pose_reset_count
+    }
+}
+
+/// Sums of a gyro's rate against the commanded yaw rate.
+#[derive(Debug, Clone, Copy, Default)]
+struct GyroSums {
+    /// Measured times commanded rate.
+    product: f64,
+    /// Squared commanded rate.
+    square: f64,
+    /// Commanded turn, rad.
+    turn_rad: f64,
+}
+
+/// Time between evaluations of the tests, s. Chosen: four a second, so that a frame costs little
+/// and a finding, which needs two, comes within half a second.
 const LOOK_S: f64 = 0.25;
 /// Bits of the tests by their place.
 const TRAVEL: usize = 0;
@@ -100,7 +140,7 @@ impl PublisherCheck {
             robot: robot.clone(),
             poses: Poses::default(),
             wheels: Wheels::new(robot),
-            gyro: [0.0; 3],
+            gyro: GyroSums::default(),
             last: None,
             twist: [0.0; 3],
             settled_s: 0.0,
@@ -110,12 +150,12 @@ impl PublisherCheck {
             suspected: 0,
             is_blinding: false,
         }
-        .without_what_is_not_there()
+        .without_absent_channels()
     }
 
-    /// Tests of what the robot does not have have ended.
-    fn without_what_is_not_there(mut self) -> Self {
-        let (wheels, pairs) = self.wheels.counts();
+    /// Ends the tests of channels that the robot does not have.
+    fn without_absent_channels(mut self) -> Self {
+        let (wheels, pairs) = (self.wheels.wheel_count(), self.wheels.pair_count());
         let measured = self.robot.measured;
         for test in 0..TESTS {
             let is_there = match test {
@@ -135,36 +175,36 @@ impl PublisherCheck {
         self
     }
 
-    /// Begins anew, as with another publisher.
+    /// Restarts all tests, as for another publisher.
     pub fn reset(&mut self) {
         self.poses = Poses::default();
         self.wheels.reset();
-        (self.gyro, self.last) = ([0.0; 3], None);
+        (self.gyro, self.last) = (GyroSums::default(), None);
         (self.settled_s, self.unlooked_s) = (0.0, 0.0);
         (self.judged, self.suspected) = (self.absent, 0);
         self.is_blinding = false;
     }
 
-    /// True if something was found behind which faults go unseen.
+    /// True if a finding hides faults.
     #[must_use]
     pub const fn is_blinding(&self) -> bool {
         self.is_blinding
     }
 
-    /// Takes a frame; what it lets be found, one at a time.
+    /// Takes a frame; the next finding, one at a time.
     pub fn take(&mut self, frame: &SensorFrame) -> Option<Finding> {
         if self.judged == ALL {
             return None;
         }
-        let run = (frame.header.epoch, frame.run_id, frame.pose_reset_count);
-        let t_ns = frame.header.t_capture_ns;
-        let last = self.last.replace((run, t_ns));
-        let last_ns = last.filter(|(of, _)| *of == run).map(|(_, t_ns)| t_ns);
-        let dt_s = last_ns.map_or(0.0, |last_ns| t_ns.saturating_sub(last_ns) as f64 * 1e-9);
+        let now = LastFrame::new(frame);
+        let last = self.last.replace(now).filter(|last| last.is_of_track(&now));
+        let passed_ns = last.map_or(0, |last| now.t_ns.saturating_sub(last.t_ns));
+        let dt_s = passed_ns as f64 * 1e-9;
         let twist = self.robot.twist(&frame.command);
         let mut axes = 0..self.robot.command.len();
-        let is_told = axes.all(|i| frame.has(Valid::command(i)));
-        let moves = is_told && self.robot.path_speed_m_s(twist) >= self.robot.body.standing_m_s;
+        let is_commanded = axes.all(|i| frame.has(Valid::command(i)));
+        let moves =
+            is_commanded && self.robot.path_speed_m_s(twist) >= self.robot.body.standing_m_s;
         let is_broken = !moves || !(f64::MIN_POSITIVE..=PAUSE_S).contains(&dt_s);
         let mut changes = self.twist.iter().zip(twist).map(|(a, b)| (a - b).abs());
         let is_changed = changes.any(|change| change > CHANGE);
@@ -190,16 +230,20 @@ impl PublisherCheck {
         self.poses.take(frame, twist, dt_s, standing_m_s);
         let turns = twist[2].abs() >= TURNING_1_M * twist[0].hypot(twist[1]);
         if turns && frame.has(Valid::YAW_RATE) {
-            self.gyro[0] += frame.yaw_rate * twist[2] * dt_s;
-            self.gyro[1] += twist[2] * twist[2] * dt_s;
-            self.gyro[2] += twist[2].abs() * dt_s;
+            self.gyro.product += frame.yaw_rate * twist[2] * dt_s;
+            self.gyro.square += twist[2] * twist[2] * dt_s;
+            self.gyro.turn_rad += twist[2].abs() * dt_s;
         }
         self.wheels.take(&self.robot, frame, twist, dt_s);
     }
 
-    /// Looks at every test that has not ended; returns the first that is wrong, and the others at
-    /// the next looks.
+    /// Evaluates every test that has not ended; returns the first that fails, and the others at the
+    /// next evaluations.
     fn look(&mut self) -> Option<Finding> {
+        assert!(
+            self.absent & !self.judged == 0,
+            "no test of a channel that the robot does not have is evaluated"
+        );
         let (before, ended) = (self.suspected, self.judged);
         for test in (0..TESTS).filter(|test| ended >> test & 1 == 0) {
             let bit = 1 << test;
@@ -225,8 +269,8 @@ impl PublisherCheck {
         match test {
             TRAVEL => self.poses.travel(),
             TURN => self.poses.turn(),
-            GYRO if self.gyro[2] < TURN_MIN_RAD => TestOutcome::NotYet,
-            GYRO => turn(FindingKind::Gyro, self.gyro[0] / self.gyro[1]),
+            GYRO if self.gyro.turn_rad < TURN_MIN_RAD => TestOutcome::NotYet,
+            GYRO => turn(FindingKind::Gyro, self.gyro.product / self.gyro.square),
             UNIT => self.wheels.unit(),
             SIGN..STEER => self.wheels.sign(test - SIGN),
             STEER..SIDES => self.wheels.steering(test - STEER),
@@ -234,7 +278,7 @@ impl PublisherCheck {
         }
     }
 
-    /// What no motion has shown yet, in words.
+    /// Names of the tests that no motion has excited yet.
     #[must_use]
     pub fn unjudged(&self) -> Vec<&'static str> {
         let groups = [
@@ -257,5 +301,20 @@ fn turn(kind: FindingKind, ratio: f64) -> TestOutcome {
     match !(TURN_REVERSED..=TURN_UNIT).contains(&ratio) {
         true => TestOutcome::new(kind, None, ratio),
         false => TestOutcome::Fits,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[should_panic(expected = "no test of a channel that the robot does not have is evaluated")]
+    fn a_test_of_an_absent_channel_would_end_the_process() {
+        let text = include_str!("../../../../config/robots/rover.toml");
+        let robot: Description = toml::from_str(text).unwrap_or_else(|error| panic!("{error}"));
+        let mut check = PublisherCheck::new(&robot);
+        check.absent |= 1;
+        check.look();
     }
 }

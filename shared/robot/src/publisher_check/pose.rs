@@ -5,8 +5,8 @@ use vigil_inference::angle::wrap;
 
 use super::{Finding, FindingKind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
 
-/// Length of a stretch, s: a path is nearly straight over it, and noise hardly counts. At 0.2 m/s
-/// it is 0.1 m, twenty deviations of a pose of 5 mm.
+/// Length of a stretch, s. Chosen: a path is nearly straight over it, and 0.1 m at 0.2 m/s are
+/// twenty deviations of a pose of 5 mm.
 const STRETCH_S: f64 = 0.5;
 /// Stretches from which the pose is judged, and commanded travel, m (twenty deviations of 5 mm).
 /// Weighed by [`FORGET`], three count 2.31.
@@ -15,14 +15,14 @@ const TRAVEL_MIN_M: f64 = 0.1;
 /// Weight of a stretch beside the next: exchanged axes show in some headings, and not in others.
 /// The sums weigh four stretches, two seconds.
 const FORGET: f64 = 0.75;
-/// Once a robot has turned so far, rad, or come so far, m, its headings are judged. A quarter turn
-/// shows exchanged axes.
+/// Turn, rad, or travel, m, after which headings are judged: a quarter turn shows exchanged axes; a
+/// robot that never turns is judged after four metres.
 const TURNED_RAD: f64 = 1.6;
 const COME_M: f64 = 4.0;
-/// Angle to the yaw that no ground explains, rad. 0.68 m aside per metre, where a healthy rover
-/// drifts by 0.04.
+/// Angle between travel and yaw that no ground explains, rad: 0.68 m aside per metre, where a
+/// healthy rover drifts by 0.04.
 const ANGLE_MAX_RAD: f64 = 0.6;
-/// The mean displacement must exceed its standard error by this factor. By chance 6 in 100,000 do.
+/// Factor by which the mean displacement must exceed its standard error: by chance 6 in 100,000 do.
 const CERTAIN: f64 = 4.0;
 
 /// A stretch under way.
@@ -53,7 +53,7 @@ pub(super) struct Poses {
 }
 
 impl Poses {
-    /// The motion is interrupted.
+    /// Drops the stretch under way.
     pub fn interrupt(&mut self) {
         self.stretch = None;
     }
@@ -120,7 +120,7 @@ impl Poses {
         self.squares = FORGET * self.squares + moved[0] * moved[0] + moved[1] * moved[1];
     }
 
-    /// What is found of travel and heading.
+    /// Tests travel and heading.
     pub fn travel(&self) -> TestOutcome {
         if self.count < STRETCHES_MIN || self.commanded_m < TRAVEL_MIN_M {
             return TestOutcome::NotYet;
@@ -145,7 +145,7 @@ impl Poses {
         }
     }
 
-    /// What is found of turns.
+    /// Tests the turns.
     pub fn turn(&self) -> TestOutcome {
         if self.turn_rad < TURN_MIN_RAD {
             return TestOutcome::NotYet;

@@ -8,31 +8,32 @@ use crate::description::Description;
 use crate::description::Kinematics;
 use crate::learned::wheels::{rolling_rate, steering_angle};
 
-/// Time in motion from which wheels are judged, s, and how far they must be told to roll, rad.
-/// Twenty frames at 20 Hz, and forty deviations of a rate's noise of 0.05 rad/s.
+/// Time in motion, s, and commanded rolling, rad, from which wheels are judged: twenty frames at
+/// 20 Hz, and forty deviations of a rate's noise of 0.05 rad/s.
 const TIME_MIN_S: f64 = 1.0;
 const ROLLED_MIN_RAD: f64 = 2.0;
-/// Ratios from here to its inverse are of a channel of the other sign (-1, by a factor of 2.5
-/// either way for slip and gains), if ..
+/// Ratios between this and its inverse are those of a channel with the other sign: -1, by a factor
+/// of 2.5 either way for slip and gains.
 const REVERSED: f64 = -0.4;
-/// .. and only if, the channel follows the command by this square of a correlation: 0.77, which no
-/// noise reaches.
+/// Squared correlation with the command above which a channel follows it: 0.77, which no noise
+/// reaches over [`TIME_MIN_S`].
 const FOLLOWS: f64 = 0.6;
-/// Exchanged wheels must fit each other's places better by this factor. Half the deviation.
+/// Ratio of squared residuals, exchanged to as named, below which wheels are exchanged: half the
+/// deviation.
 const EXCHANGED: f64 = 0.25;
 /// Mean commanded steering angle from which its sign is judged, rad: twenty deviations of 3 mrad.
 const STEER_MIN_RAD: f64 = 0.06;
 
 /// Sums of a channel against what is expected of it.
 #[derive(Debug, Clone, Copy, Default)]
-struct Against {
+struct RegressionSums {
     time_s: f64,
     found: f64,
     expected: f64,
     squares: f64,
 }
 
-impl Against {
+impl RegressionSums {
     fn add(&mut self, value: f64, expected: f64, dt_s: f64) {
         self.time_s += dt_s;
         self.found += value * expected * dt_s;
@@ -53,33 +54,33 @@ impl Against {
     }
 }
 
-/// Two wheels opposite each other: how well they fit as named and exchanged, and how far apart what
-/// is expected of them is.
+/// Two opposite wheels: squared residuals as named and exchanged, and the squared difference of
+/// their expected rates.
 #[derive(Debug, Clone, Copy, Default)]
 struct Pair {
     wheels: [usize; 2],
     named: f64,
     exchanged: f64,
-    apart: f64,
+    difference: f64,
     turned_rad: f64,
 }
 
 /// All wheels of a robot.
 #[derive(Debug, Clone)]
 pub(super) struct Wheels {
-    rates: [Against; WHEELS],
-    steer: [Against; WHEELS],
+    rates: [RegressionSums; WHEELS],
+    steer: [RegressionSums; WHEELS],
     pairs: [Pair; WHEELS / 2],
     pair_count: usize,
     wheel_count: usize,
 }
 
 impl Wheels {
-    /// Nothing is known of them.
+    /// Wheels without any measurement.
     pub fn new(robot: &Description) -> Self {
         let mut wheels = Self {
-            rates: [Against::default(); WHEELS],
-            steer: [Against::default(); WHEELS],
+            rates: [RegressionSums::default(); WHEELS],
+            steer: [RegressionSums::default(); WHEELS],
             pairs: [Pair::default(); WHEELS / 2],
             pair_count: 0,
             wheel_count: match robot.kinematics {
@@ -101,10 +102,10 @@ impl Wheels {
         wheels
     }
 
-    /// Nothing is known of them any more.
+    /// Forgets all measurements.
     pub fn reset(&mut self) {
-        self.rates = [Against::default(); WHEELS];
-        self.steer = [Against::default(); WHEELS];
+        self.rates = [RegressionSums::default(); WHEELS];
+        self.steer = [RegressionSums::default(); WHEELS];
         for pair in &mut self.pairs {
             *pair = Pair {
                 wheels: pair.wheels,
@@ -143,19 +144,19 @@ impl Wheels {
             };
             pair.named += square(i, i) + square(j, j);
             pair.exchanged += square(i, j) + square(j, i);
-            pair.apart += (expected[i] - expected[j]).powi(2) * dt_s;
+            pair.difference += (expected[i] - expected[j]).powi(2) * dt_s;
             pair.turned_rad += turn.abs() * dt_s;
         }
     }
 
-    /// True once wheels were told to roll far enough.
+    /// True once the wheel was commanded to roll far enough.
     fn is_judged(&self, wheel: usize) -> bool {
         let rate = &self.rates[wheel];
         let rolled_rad = (rate.expected * rate.time_s).sqrt();
         rate.time_s >= TIME_MIN_S && rolled_rad >= ROLLED_MIN_RAD
     }
 
-    /// What is found of the rates' unit: all wheels agree on it.
+    /// Tests the unit of the rates: all wheels share it.
     pub fn unit(&self) -> TestOutcome {
         let mut ratios = [0.0; WHEELS];
         let mut count = 0;
@@ -165,7 +166,7 @@ impl Wheels {
                 count += 1;
             }
         }
-        // Fewer than half of the wheels speak for no unit.
+        // Half of the wheels or fewer decide no unit: a fault of one must not look like it.
         if 2 * count <= self.wheel_count {
             return TestOutcome::NotYet;
         }
@@ -178,7 +179,7 @@ impl Wheels {
         }
     }
 
-    /// What is found of one wheel's sign.
+    /// Tests the sign of one wheel's rate.
     pub fn sign(&self, wheel: usize) -> TestOutcome {
         if wheel >= self.wheel_count || !self.is_judged(wheel) {
             return TestOutcome::NotYet;
@@ -193,7 +194,7 @@ impl Wheels {
         }
     }
 
-    /// What is found of one wheel's steering.
+    /// Tests the sign of one steering angle.
     pub fn steering(&self, wheel: usize) -> TestOutcome {
         let Some(steer) = self.steer.get(wheel) else {
             return TestOutcome::NotYet;
@@ -207,7 +208,7 @@ impl Wheels {
         }
     }
 
-    /// What is found of the sides of a pair of wheels.
+    /// Tests whether two opposite wheels are exchanged.
     pub fn sides(&self, pair: usize) -> TestOutcome {
         let Some(pair) = self.pairs[..self.pair_count].get(pair) else {
             return TestOutcome::NotYet;
@@ -215,15 +216,20 @@ impl Wheels {
         if pair.turned_rad < TURN_MIN_RAD {
             return TestOutcome::NotYet;
         }
-        let is_exchanged = pair.exchanged < EXCHANGED * pair.named && pair.named > pair.apart;
+        let is_exchanged = pair.exchanged < EXCHANGED * pair.named && pair.named > pair.difference;
         match is_exchanged {
             true => TestOutcome::new(FindingKind::Sides, Some(pair.wheels[0]), 0.0),
             false => TestOutcome::Fits,
         }
     }
 
-    /// Wheels and pairs there are.
-    pub const fn counts(&self) -> (usize, usize) {
-        (self.wheel_count, self.pair_count)
+    /// Wheels that are tested.
+    pub const fn wheel_count(&self) -> usize {
+        self.wheel_count
+    }
+
+    /// Pairs of opposite wheels.
+    pub const fn pair_count(&self) -> usize {
+        self.pair_count
     }
 }

@@ -2,15 +2,20 @@
 
 use nalgebra::SMatrix;
 
-use super::shear::{Contact, Shear};
+use super::loads::SideWeight;
+use super::shear::{Contact, Heading, HubVelocity, Shear};
 use super::{Condition, Situation, SlipModel, UNKNOWNS, Unknowns};
 use crate::kinematics::{ROVER_WHEELS, WheelTargets};
 
-/// Weight of the motors' rows (N m) against the forces' (N), for conditioning.
+/// Weight of the motors' rows (N m) against the forces' (N), for conditioning. Chosen: it
+/// shapes the way to the solution, not the solution.
 pub(super) const MOTOR_SCALE: f64 = 5.0;
-/// Wheel rate within which dry bearing friction turns round smoothly, rad/s.
+/// Wheel rate within which dry bearing friction changes its sign smoothly, rad/s. Chosen: far below
+/// any driving rate; at 0 Newton's method meets a step.
 const DRY_SMOOTHING_RAD_S: f64 = 0.01;
-/// Step of the forward differences.
+/// Step of the forward differences, in the unit of the unknown: about the root of a double's
+/// resolution, where truncation and rounding errors are alike (Press et al., Numerical Recipes
+/// 5.7).
 const DIFFERENCE: f64 = 1e-7;
 
 /// Derivatives by the unknowns.
@@ -23,8 +28,7 @@ pub(super) struct Balance<'a> {
     commanded_rad_s: [f64; ROVER_WHEELS],
     stuck: [bool; ROVER_WHEELS],
     condition: &'a Condition,
-    /// Weight on each side and how far ahead of the pivot it acts, N and m.
-    side_weights: [(f64, f64); 2],
+    side_weights: [SideWeight; 2],
     /// Force and moment from outside, but for drag.
     wrench: [f64; 3],
 }
@@ -41,7 +45,7 @@ impl<'a> Balance<'a> {
             let servo_rad = wheel.steer_held_rad.unwrap_or(targets.steer_rad[i]);
             let (sin, cos) = (servo_rad + wheel.steer_offset_rad).sin_cos();
             Contact {
-                heading: (cos, sin),
+                heading: Heading { cos, sin },
                 radius_m: model.kinematics.wheel_radius_m * wheel.radius_share,
                 friction: situation.soil.friction[i],
                 shear_modulus: situation.soil.shear_modulus,
@@ -97,8 +101,8 @@ impl<'a> Balance<'a> {
         }
         for i in 0..ROVER_WHEELS {
             let drag = self.condition.wheels[i].drag(self.hub(i, unknowns));
-            let fx = loads[i] * shears[i].x + drag.0;
-            let fy = loads[i] * shears[i].y + drag.1;
+            let fx = loads[i] * shears[i].x + drag[0];
+            let fy = loads[i] * shears[i].y + drag[1];
             residual[0] += fx;
             residual[1] += fy;
             residual[2] += x[i] * fy - y[i] * fx;
@@ -173,12 +177,12 @@ impl<'a> Balance<'a> {
         self.contacts[i].shear(self.hub(i, unknowns), unknowns[3 + i])
     }
 
-    fn hub(&self, i: usize, unknowns: &Unknowns) -> (f64, f64) {
+    fn hub(&self, i: usize, unknowns: &Unknowns) -> HubVelocity {
         let kinematics = &self.model.kinematics;
-        (
-            unknowns[0] - unknowns[2] * kinematics.y_m[i],
-            unknowns[1] + unknowns[2] * kinematics.x_m[i],
-        )
+        HubVelocity {
+            forward_m_s: unknowns[0] - unknowns[2] * kinematics.y_m[i],
+            left_m_s: unknowns[1] + unknowns[2] * kinematics.x_m[i],
+        }
     }
 
     fn loads_of(&self, shears: &[Shear; ROVER_WHEELS]) -> [f64; ROVER_WHEELS] {
@@ -192,7 +196,7 @@ impl<'a> Balance<'a> {
         loads
     }
 
-    fn side_loads(&self, side: &[usize; 3], weight: (f64, f64), traction: [f64; 3]) -> [f64; 3] {
+    fn side_loads(&self, side: &[usize; 3], weight: SideWeight, traction: [f64; 3]) -> [f64; 3] {
         let model = self.model;
         model
             .linkage
@@ -203,7 +207,7 @@ impl<'a> Balance<'a> {
     fn load_sensitivity(
         &self,
         side: &[usize; 3],
-        weight: (f64, f64),
+        weight: SideWeight,
         shears: &[Shear; ROVER_WHEELS],
     ) -> [[f64; 3]; 3] {
         let traction = side.map(|i| shears[i].x);
@@ -227,8 +231,8 @@ impl<'a> Balance<'a> {
         let by = |moved: Shear| {
             [moved.x - at.x, moved.y - at.y, moved.along - at.along].map(|d| d / DIFFERENCE)
         };
-        let by_forward = by(contact.shear((hub.0 + DIFFERENCE, hub.1), rate));
-        let by_left = by(contact.shear((hub.0, hub.1 + DIFFERENCE), rate));
+        let by_forward = by(contact.shear(hub.faster_forward(DIFFERENCE), rate));
+        let by_left = by(contact.shear(hub.faster_left(DIFFERENCE), rate));
         let by_rate = by(contact.shear(hub, rate + DIFFERENCE));
         std::array::from_fn(|q| {
             let mut gradient = self.by_body(i, by_forward[q], by_left[q]);
@@ -236,6 +240,7 @@ impl<'a> Balance<'a> {
             gradient
         })
     }
+
     /// Gradients of the drag above wheel `i`, forward and left, by all unknowns.
     fn drag_gradient(&self, i: usize, unknowns: &Unknowns) -> [Unknowns; 2] {
         let wheel = &self.condition.wheels[i];
@@ -244,9 +249,9 @@ impl<'a> Balance<'a> {
         }
         let hub = self.hub(i, unknowns);
         let at = wheel.drag(hub);
-        let by = |moved: (f64, f64)| [moved.0 - at.0, moved.1 - at.1].map(|d| d / DIFFERENCE);
-        let by_forward = by(wheel.drag((hub.0 + DIFFERENCE, hub.1)));
-        let by_left = by(wheel.drag((hub.0, hub.1 + DIFFERENCE)));
+        let by = |moved: [f64; 2]| [moved[0] - at[0], moved[1] - at[1]].map(|d| d / DIFFERENCE);
+        let by_forward = by(wheel.drag(hub.faster_forward(DIFFERENCE)));
+        let by_left = by(wheel.drag(hub.faster_left(DIFFERENCE)));
         std::array::from_fn(|q| self.by_body(i, by_forward[q], by_left[q]))
     }
 

@@ -1,11 +1,9 @@
 //! What is not as built: bent steering, weak motors, shrunken wheels, soil that resists rolling,
 //! and forces from outside.
 
+use super::shear::{HubVelocity, RESISTANCE_SMOOTHING_M_S};
 use crate::chassis::RockerBogie;
 use crate::kinematics::{Ackermann6, ROVER_WHEELS};
-
-/// Speed below which a resisting force turns round smoothly, m/s.
-const RESISTANCE_SMOOTHING_M_S: f64 = 0.01;
 
 /// One wheel. The default is as built.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,18 +116,13 @@ impl Condition {
 
 impl WheelCondition {
     /// Drag on the body for the velocity of the body above the wheel: forward N, left N.
-    pub(super) fn drag(&self, hub_m_s: (f64, f64)) -> (f64, f64) {
+    pub(super) fn drag(&self, hub: HubVelocity) -> [f64; 2] {
         if self.drag_n == 0.0 {
-            return (0.0, 0.0);
+            return [0.0; 2];
         }
-        let (forward, left) = hub_m_s;
+        let (forward, left) = (hub.forward_m_s, hub.left_m_s);
         let floor = RESISTANCE_SMOOTHING_M_S;
         let speed = (forward * forward + left * left + floor * floor).sqrt();
-        (-self.drag_n * forward / speed, -self.drag_n * left / speed)
+        [-self.drag_n * forward / speed, -self.drag_n * left / speed]
     }
-}
-
-/// Share of a full resistance at a speed along the wheel, -1..1.
-pub(super) fn resisting(along_m_s: f64) -> f64 {
-    (along_m_s / RESISTANCE_SMOOTHING_M_S).tanh()
 }

@@ -7,12 +7,21 @@
 use crate::chassis::RockerBogie;
 use crate::kinematics::{Ackermann6, GeometryError, ROVER_WHEELS};
 
-/// Smallest load left on a wheel, N: a wheel never quite leaves the ground here. 1.4 % of the
-/// rover's weight.
+/// Smallest load left on a wheel, N. Chosen: 1.4 % of the rover's weight, so that the equations
+/// keep a solution; at 0 a lifted wheel's rate is undetermined.
 pub const LOAD_MIN_N: f64 = 2.0;
 /// Traction per unit of load up to which load is shifted, either way. At 0.97 (its lever over its
 /// height) the reference bogie would tip over; soils below this friction never come here.
 pub const TRACTION_MAX: f64 = 0.85;
+
+/// Weight on one side of the rover.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SideWeight {
+    /// Weight, N.
+    pub weight_n: f64,
+    /// Distance ahead of the rocker's pivot at which it acts, m.
+    pub ahead_m: f64,
+}
 
 impl RockerBogie {
     /// Wheels of the left and the right side, each as (front, middle, rear).
@@ -79,9 +88,8 @@ impl RockerBogie {
             && front - self.bogie_x_m > rocker_pull + drop_pull
     }
 
-    /// Loads on (front, middle, rear) of one side, N, for the weight `side_n` on it, which acts
-    /// `mass_x_m` ahead of the rocker's pivot, and the forward forces per unit of load, `traction`,
-    /// of the same wheels.
+    /// Loads on (front, middle, rear) of one side, N, for the weight on it and the forward forces
+    /// per unit of load, `traction`, of the same wheels.
     ///
     /// The moments about the bogie's pivot give the ratio of rear to middle load, those about the
     /// rocker's pivot the load on the bogie. Forces are linear in the loads, so no iteration is
@@ -91,9 +99,10 @@ impl RockerBogie {
         &self,
         kinematics: &Ackermann6,
         side: &[usize; 3],
-        (side_n, mass_x_m): (f64, f64),
+        weight: SideWeight,
         traction: [f64; 3],
     ) -> [f64; 3] {
+        let side_n = weight.weight_n;
         let [front_x, middle_x, rear_x] = side.map(|i| kinematics.x_m[i]);
         let traction = traction.map(|pull| pull.clamp(-TRACTION_MAX, TRACTION_MAX));
         let (middle_arm, rear_arm) = (middle_x - self.bogie_x_m, self.bogie_x_m - rear_x);
@@ -105,7 +114,7 @@ impl RockerBogie {
             (middle_arm + self.bogie_z_m * traction[1]) / (rear_arm - self.bogie_z_m * traction[2]);
         let bogie_traction = (traction[1] + ratio * traction[2]) / (1.0 + ratio);
         let front_moment = self.rocker_z_m * traction[0];
-        let bogie = side_n * (front_arm - mass_x_m + front_moment)
+        let bogie = side_n * (front_arm - weight.ahead_m + front_moment)
             / (span + front_moment - drop * bogie_traction);
         let middle = bogie / (1.0 + ratio);
         [side_n - bogie, middle, ratio * middle].map(|load| load.max(LOAD_MIN_N))

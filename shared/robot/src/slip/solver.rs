@@ -3,21 +3,24 @@
 use super::balance::{Balance, MOTOR_SCALE};
 use super::{SlipError, UNKNOWNS, Unknowns};
 
-/// Largest residual of a solution, N.
+/// Largest residual of a solution, N. Chosen: far below what any sensor shows, and above the
+/// rounding error of the sums: 1e-13 N at the rover's 140 N.
 const TOLERANCE_N: f64 = 1e-8;
-/// Newton steps before the fallback.
+/// Newton steps before the fallback. Chosen: it converges quadratically or
+/// not at all, so that more steps find no further solutions.
 const NEWTON_MAX: u32 = 25;
-/// Halvings of one Newton step.
+/// Halvings of one Newton step. Chosen: a step of 1/256 that is no better points the wrong way.
 const HALVINGS_MAX: u32 = 8;
-/// Largest Newton step of a body velocity, m/s and rad/s.
+/// Largest Newton step of a body velocity, m/s and rad/s. Chosen: half of the rover's usual speed.
 const BODY_STEP_MAX: f64 = 0.1;
-/// Largest Newton step of a wheel rate, rad/s.
+/// Largest Newton step of a wheel rate, rad/s. Chosen: about the same at the
+/// rim of a wheel.
 const RATE_STEP_MAX_RAD_S: f64 = 1.0;
-/// Pseudo-transient steps before giving up.
+/// Pseudo-transient steps before the situation counts as without equilibrium. Chosen.
 const TRANSIENT_MAX: u32 = 40;
-/// First pseudo-time step, s.
+/// First pseudo-time step, s. Chosen: a fifth of the body's lag.
 const TRANSIENT_STEP_S: f64 = 0.02;
-/// Pseudo-time step below which there is no hope, s.
+/// Pseudo-time step below which the continuation ends, s. Chosen: it moves nothing any more.
 const TRANSIENT_STEP_MIN_S: f64 = 1e-9;
 /// Mass kg, mass kg, inertia kg m² of the body, and inertia kg m² of a wheel with its gear, in
 /// pseudo-time. They shape the way, not the solution.

@@ -1,6 +1,6 @@
 //! The slip model on a rover that is not as built: forces and moments recomputed from the solution.
 
-use vigil_robot::slip::shear::Contact;
+use vigil_robot::slip::shear::{Contact, Heading, HubVelocity};
 use vigil_robot::slip::{Condition, Situation, SlipModel, Soil, WheelCondition};
 
 use crate::rover::rover;
@@ -55,12 +55,15 @@ fn forces_moments_and_torques_balance_on_a_rover_that_is_not_as_built() {
         let targets = model.kinematics().targets(0.5, 0.2);
         for i in 0..6 {
             let wheel = condition.wheels[i];
-            let hub = (vx - omega * Y[i], vy + omega * X[i]);
+            let hub = HubVelocity {
+                forward_m_s: vx - omega * Y[i],
+                left_m_s: vy + omega * X[i],
+            };
             let (sin, cos) = (targets.steer_rad[i] + wheel.steer_offset_rad).sin_cos();
             let radius_m = 0.08 * wheel.radius_share;
             let rate = found.wheel_rate_rad_s[i];
             let shear = Contact {
-                heading: (cos, sin),
+                heading: Heading { cos, sin },
                 radius_m,
                 friction: 0.65,
                 shear_modulus: 0.2,
@@ -68,11 +71,11 @@ fn forces_moments_and_torques_balance_on_a_rover_that_is_not_as_built() {
             }
             .shear(hub, rate);
             let load_n = found.load_n[i];
-            let along = hub.0 * cos + hub.1 * sin;
+            let along = hub.forward_m_s * cos + hub.left_m_s * sin;
             let ploughing = -wheel.resistance * load_n * (along / 0.01).tanh();
-            let speed = (hub.0 * hub.0 + hub.1 * hub.1 + 1e-4).sqrt();
-            let fx = load_n * shear.x + ploughing * cos - wheel.drag_n * hub.0 / speed;
-            let fy = load_n * shear.y + ploughing * sin - wheel.drag_n * hub.1 / speed;
+            let speed = (hub.forward_m_s.powi(2) + hub.left_m_s.powi(2) + 1e-4).sqrt();
+            let fx = load_n * shear.x + ploughing * cos - wheel.drag_n * hub.forward_m_s / speed;
+            let fy = load_n * shear.y + ploughing * sin - wheel.drag_n * hub.left_m_s / speed;
             sum[0] += fx;
             sum[1] += fy;
             sum[2] += X[i] * fy - Y[i] * fx;

@@ -7,6 +7,7 @@ use vigil_robot::frame_guard::{
     BEYOND_LIMITS, COMMAND_MAX, CURRENT_MAX_A, JUMP_MAX_M, PAUSE_MAX_NS, POSITION_MAX_M,
     STEER_MAX_RAD, YAW_MAX_RAD,
 };
+use vigil_robot::publisher_check::PublisherCheck;
 use vigil_robot::{Description, FrameGuard};
 
 use crate::learned::robot;
@@ -207,5 +208,24 @@ proptest! {
             value.is_finite() && (!is_marked || value.abs() <= *bound)
         });
         prop_assert_eq!(FrameGuard::new(&robot).check(&frame).is_ok(), is_good);
+    }
+
+    #[test]
+    fn no_sequence_of_frames_ends_the_process(
+        frames in prop::collection::vec(
+            (prop::array::uniform3(any_number()), any_number(), any::<u64>(), 0_u64..2), 1..20),
+        in_order in any::<bool>(),
+    ) {
+        let robot = robot();
+        let (mut guard, mut check) = (FrameGuard::new(&robot), PublisherCheck::new(&robot));
+        for (i, (pose, rate, t_ns, run_id)) in (1_u64..).zip(frames) {
+            let mut frame = SensorFrame { valid: u64::MAX, pose, run_id, ..SensorFrame::default() };
+            frame.wheel_rate = [rate; WHEELS];
+            (frame.command[0], frame.command[1]) = (0.3, 0.2);
+            frame.header.t_capture_ns = if in_order { i * 50_000_000 } else { t_ns };
+            let is_good = guard.check(&frame).is_ok();
+            prop_assert!(!is_good || pose.iter().all(|value| value.is_finite()));
+            check.take(&frame);
+        }
     }
 }

@@ -10,7 +10,7 @@ use vigil_inference::logspace::log_add;
 use vigil_robot::Description;
 use vigil_robot::learned::Form;
 use vigil_robot::learned::monitor::Channels;
-use vigil_robot::nominal::{Channel, Model, Monitor, Observer, Quantity, Track};
+use vigil_robot::nominal::{Channel, Model, Monitor, Observer, Quantity, ResidualWhitener};
 
 fn config(name: &str) -> String {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
@@ -148,7 +148,7 @@ fn log_odds(model: &Model, robot: &Description, rate_1_h: f64) -> Vec<f64> {
 
 /// Learned bias and scatter at a prior fault rate itself: births at that rate, no shift at the end.
 fn directly(channel: &Channel, model: &Model, robot: &Description, rate_1_h: f64) -> Vec<f64> {
-    let (mut ages, mut track) = (Ages::<1>::new(3.0), Track::new(channel));
+    let (mut ages, mut track) = (Ages::<1>::new(3.0), ResidualWhitener::new(channel));
     let mut scatter = Constant::default();
     let mut observer = Observer::new(robot);
     let mut out = Vec::new();

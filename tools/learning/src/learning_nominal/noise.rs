@@ -2,7 +2,7 @@
 
 use vigil_inference::logspace::log_normal;
 use vigil_robot::nominal::channel::REST_S;
-use vigil_robot::nominal::{Channel, History, Model, Residual, Track};
+use vigil_robot::nominal::{Channel, History, Model, Residual, ResidualWhitener};
 
 use super::record::Part;
 use crate::bounds::{Bounds, Limits};
@@ -182,7 +182,7 @@ fn rest_sd(channel: &Channel, records: &[Part<'_>], residuals: &[Vec<(Residual, 
 fn scatter(channel: &Channel, records: &[Vec<(Residual, bool)>], length: usize) -> f64 {
     let mut squares = Vec::new();
     for record in records {
-        let mut track = Track::new(channel);
+        let mut track = ResidualWhitener::new(channel);
         let whitened = innovations(channel, &mut track, record);
         let whitened: Vec<f64> = whitened
             .map(|(apart, spread)| apart * apart / spread)
@@ -262,7 +262,7 @@ fn drift(channel: &Channel, records: &[Vec<(Residual, bool)>]) -> f64 {
         tried.drift_sd = part * usual_sd;
         let mut likelihood = 0.0;
         for record in records {
-            let mut track = Track::new(&tried);
+            let mut track = ResidualWhitener::new(&tried);
             for (apart, spread) in innovations(&tried, &mut track, record) {
                 let most = CLIP * spread.sqrt();
                 likelihood += log_normal(apart.clamp(-most, most), spread);
@@ -277,7 +277,7 @@ fn drift(channel: &Channel, records: &[Vec<(Residual, bool)>]) -> f64 {
 
 fn innovations<'a>(
     channel: &'a Channel,
-    track: &'a mut Track,
+    track: &'a mut ResidualWhitener,
     record: &'a [(Residual, bool)],
 ) -> impl Iterator<Item = (f64, f64)> + 'a {
     record.iter().map(move |(residual, follows)| {
@@ -302,7 +302,7 @@ fn usual_size(channel: &Channel, records: &[Part<'_>]) -> f64 {
 pub(super) fn whitened_rms(channel: &Channel, records: &[Part<'_>], model: &Model) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for record in records {
-        let mut track = Track::new(channel);
+        let mut track = ResidualWhitener::new(channel);
         let record = residuals(channel, &record.histories, model);
         for (apart, spread) in innovations(channel, &mut track, &record) {
             sum += (apart * apart / spread).min(CLIP * CLIP);
