@@ -257,7 +257,7 @@ impl Description {
 
     /// Part of a steering angle's residual (rad) beyond the tolerance, if there is one.
     #[must_use]
-    pub fn beyond_steer(&self, residual_rad: f64) -> f64 {
+    pub(crate) fn beyond_steer(&self, residual_rad: f64) -> f64 {
         let tolerance = self.tolerance.as_ref();
         tolerance.map_or(residual_rad, |tolerance| {
             tolerance.beyond_steer(residual_rad)

@@ -13,7 +13,7 @@ impl DisturbanceSpec {
     ///
     /// # Errors
     /// [`FaultError`] naming the places there are.
-    pub fn place_of(&self, name: &str, robot: &Description) -> Result<usize, FaultError> {
+    pub(crate) fn place_of(&self, name: &str, robot: &Description) -> Result<usize, FaultError> {
         match self.place {
             Place::Rover => Err(FaultError::Disturbance {
                 found: format!("{}:{name}", self.name),

@@ -262,7 +262,7 @@ impl DisturbanceSpec {
 
     /// Name of the place with this index; `None` for the whole rover.
     #[must_use]
-    pub fn place_name<'a>(&self, place: usize, robot: &'a Description) -> Option<&'a str> {
+    pub(crate) fn place_name<'a>(&self, place: usize, robot: &'a Description) -> Option<&'a str> {
         match self.place {
             Place::Rover => None,
             Place::Side => SIDES.get(place).copied(),

@@ -30,7 +30,7 @@ use crate::description::Description;
 use crate::kinematics::{Ackermann6, GeometryError, ROVER_WHEELS, WheelTargets};
 
 /// Standard gravity as the weight of the reference rover assumes it, m/s².
-pub const GRAVITY_M_S2: f64 = 9.81;
+const GRAVITY_M_S2: f64 = 9.81;
 /// From this many stuck wheels on the rover cannot move: the free wheels spin in place. True of six
 /// wheels on the rover's ground.
 pub const IMMOBILE_STUCK: usize = 4;

@@ -26,7 +26,7 @@ impl Suspects {
 
     /// True if one is in a wheel's rate.
     #[must_use]
-    pub fn has_wheel_rate(self) -> bool {
+    pub(crate) fn has_wheel_rate(self) -> bool {
         (0..WHEELS).any(|wheel| self.has(Channel::wheel_rate(wheel)))
     }
 

@@ -117,7 +117,7 @@ impl Tolerance {
     /// Part of a steering angle's residual beyond the tolerance, rad. A servo yields to the scrub
     /// of its wheel as soon as the command changes, so its offset is no slow state.
     #[must_use]
-    pub fn beyond_steer(&self, residual_rad: f64) -> f64 {
+    pub(crate) fn beyond_steer(&self, residual_rad: f64) -> f64 {
         residual_rad - residual_rad.clamp(-self.steer_rad, self.steer_rad)
     }
 

@@ -1,8 +1,8 @@
 //! What the detector watches with: a model with faults, or one of nominal behaviour alone.
 
 use vigil_blocks::SensorFrame;
-use vigil_robot::learned::monitor::Report;
-use vigil_robot::learned::{Healthy, Intake, Monitor, NoiseScales, Observer};
+use vigil_robot::learned::monitor::DetectionOutput;
+use vigil_robot::learned::{FrameOutcome, Healthy, Monitor, NoiseScales, Observer};
 use vigil_robot::nominal;
 
 /// What the detector must know of an observation.
@@ -39,7 +39,7 @@ pub(crate) enum Watch {
 
 impl Watch {
     /// Takes a frame.
-    pub fn push(&mut self, frame: &SensorFrame) -> Intake {
+    pub fn push(&mut self, frame: &SensorFrame) -> FrameOutcome {
         match self {
             Self::Faults { observer, .. } => observer.push(frame),
             Self::Nominal { observer, .. } => observer.push(frame),
@@ -110,7 +110,7 @@ impl Watch {
     }
 
     /// What the last observation did.
-    pub fn report(&self) -> &Report {
+    pub fn report(&self) -> &DetectionOutput {
         match self {
             Self::Faults { monitor, .. } => monitor.report(),
             Self::Nominal { monitor, .. } => monitor.report(),

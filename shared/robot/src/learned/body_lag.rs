@@ -193,7 +193,7 @@ impl BodyLag {
     }
 
     /// Forgets where the body was in the frames since the last observation: they are dropped.
-    pub fn drop_frames(&mut self) {
+    pub(crate) fn drop_frames(&mut self) {
         self.frames = 0;
         for candidate in &mut self.candidates {
             candidate.middles = [0.0; 2];

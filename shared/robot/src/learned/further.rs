@@ -157,7 +157,7 @@ impl Collector {
     }
 
     /// What was collected is no whole observation: it is dropped.
-    pub fn drop_frames(&mut self) {
+    pub(crate) fn drop_frames(&mut self) {
         self.sums = next(&self.sums);
     }
 

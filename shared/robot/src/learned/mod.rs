@@ -73,7 +73,7 @@ pub use motion::{Curve, MotionModel};
 pub use motion_modes::{MotionMode, Mover, motion_modes, steer_modes};
 pub use noise_scale::{NoiseScales, OutlierRates};
 pub use observation::Observation;
-pub use observer::{Intake, Observer};
+pub use observer::{FrameOutcome, Observer};
 pub use reading::Reading;
 pub use steer_reading::{ANY_ANGLE_SD_RAD, SteerReading};
 pub use switching::Switching;

@@ -30,7 +30,7 @@ use super::lateness::{Lateness, Timely};
 use super::noise_scale::{NoiseScales, SensorNoise, UNSEEN_S};
 use super::repeats::Repeats;
 use super::settling::Settling;
-use super::wheel_context::{Beside, WheelContext};
+use super::wheel_context::{RateResidual, WheelContext};
 use super::wheels::rolling_rate;
 use super::{Further, Healthy, Model, Observation, SteerReading, Troubles};
 use crate::channel_odds::ChannelOdds;
@@ -89,7 +89,7 @@ pub struct Monitor {
     troubles: Troubles,
     further: Option<Box<FurtherEvidence>>,
     gains: Gains,
-    report: Report,
+    report: DetectionOutput,
 }
 
 /// What the last observation said for a fault in each group of channels.
@@ -101,9 +101,9 @@ struct Gains {
     steer: [f64; WHEELS],
 }
 
-/// What the last observation did.
+/// Result of the last observation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Report {
+pub struct DetectionOutput {
     /// Natural log-odds that the robot is not in its nominal mode.
     pub log_odds: f64,
     /// The same by each channel alone; see [`Channel`].
@@ -153,7 +153,7 @@ impl Monitor {
                 _ => None,
             },
             gains: Gains::default(),
-            report: Report {
+            report: DetectionOutput {
                 log_odds: f64::NEG_INFINITY,
                 channels: [f64::NEG_INFINITY; CHANNELS],
                 gains: [0.0; CHANNELS],
@@ -197,9 +197,9 @@ impl Monitor {
         self.sum_up();
     }
 
-    /// What the last observation did.
+    /// Result of the last observation.
     #[must_use]
-    pub const fn report(&self) -> &Report {
+    pub const fn report(&self) -> &DetectionOutput {
         &self.report
     }
 
@@ -391,8 +391,8 @@ impl Monitor {
             }
             let noise = observation.mean_variance(sample, reading.plain);
             let variance = variance + noise;
-            all[i] = Some(Beside {
-                apart_rad_s: reading.mean - rate,
+            all[i] = Some(RateResidual {
+                residual_rad_s: reading.mean - rate,
                 rolling_rad_s: rolling,
                 variance,
             });
@@ -401,7 +401,7 @@ impl Monitor {
             let whitened = WhitenedResidual::new(apart, variance, behind * behind, outlier_rate);
             timely[i] = Some(Timely {
                 read_rad_s: reading.mean,
-                apart_rad_s: apart,
+                residual_rad_s: apart,
                 variance,
                 noise,
                 outlier_rate,

@@ -26,7 +26,7 @@ impl Curve {
 
     /// `by_m_s / |v|`: what changes the speed by the same at every speed, per commanded metre.
     #[must_use]
-    pub const fn of_inverse_speed(by_m_s: f64) -> Self {
+    pub(crate) const fn of_inverse_speed(by_m_s: f64) -> Self {
         Self {
             curvature: [by_m_s / SPEED_REFERENCE_M_S, 0.0, 0.0, 0.0, 0.0],
             inverse_speed: by_m_s,

@@ -269,7 +269,7 @@ fn drives_on(model: &Model, moved: Mover) -> MotionMode {
 
 /// Noise of nominal motion with a large constant deviation: what is not known about a fault.
 #[must_use]
-pub fn unknown_noise(model: &Model) -> MotionNoise {
+pub(crate) fn unknown_noise(model: &Model) -> MotionNoise {
     let nominal = model.nominal.motion.noise();
     // As coloured as the stuck modes: an unknown fault meets the same soil.
     let coloured = model.stuck.iter().map(|s| s.motion.noise().deviation);

@@ -77,7 +77,12 @@ impl Observation {
     /// Variances of one sample of each wheel's channel whose learned deviation is `sd`, when its
     /// noise is `scales` times that.
     #[must_use]
-    pub fn sample_variances(&self, model: &Model, sd: f64, scales: [f64; WHEELS]) -> [f64; WHEELS] {
+    pub(crate) fn sample_variances(
+        &self,
+        model: &Model,
+        sd: f64,
+        scales: [f64; WHEELS],
+    ) -> [f64; WHEELS] {
         scales.map(|scale| model.sample_variance(sd * scale, self.frame_s))
     }
 

@@ -28,9 +28,9 @@ const NEARLY: f64 = 0.4;
 /// Part of the speed at which a robot counts as standing that is no command to creep: chosen.
 const STANDS: f64 = 0.1;
 
-/// What became of a frame.
+/// Effect of a frame on the observations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Intake {
+pub struct FrameOutcome {
     /// The frame completed an observation.
     pub complete: bool,
     /// The frame, or one of its channels, was refused: not finite, out of range, out of order.
@@ -155,16 +155,16 @@ impl Observer {
     }
 
     /// Takes a frame.
-    pub fn push(&mut self, frame: &SensorFrame) -> Intake {
+    pub fn push(&mut self, frame: &SensorFrame) -> FrameOutcome {
         let new_run = !self.state.started || frame.run_id != self.state.run_id;
         let t_ns = frame.header.t_capture_ns;
         let is_stale = !new_run && t_ns <= self.state.t_ns;
         self.state.stale = if is_stale { self.state.stale + 1 } else { 0 };
         let mut invalid = is_stale;
         if is_stale && self.state.stale < STALE_MAX {
-            return Intake {
+            return FrameOutcome {
                 invalid,
-                ..Intake::default()
+                ..FrameOutcome::default()
             };
         }
         if new_run {
@@ -217,7 +217,7 @@ impl Observer {
                 further.complete();
             }
         }
-        Intake {
+        FrameOutcome {
             complete,
             invalid,
             new_run,

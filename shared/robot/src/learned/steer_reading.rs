@@ -101,7 +101,7 @@ impl SteerReading {
 
     /// The same if it may be anything or as commanded, whatever it was before.
     #[must_use]
-    pub fn log_ratio_unsure(&self) -> f64 {
+    pub(crate) fn log_ratio_unsure(&self) -> f64 {
         log_add((1.0 - ANYTHING).ln(), ANYTHING.ln() + self.log_ratio_any())
     }
 }

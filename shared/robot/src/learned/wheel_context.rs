@@ -21,14 +21,14 @@ pub const FAR_SD: f64 = 4.0;
 /// A variance that no state has, (rad/s)².
 const VARIANCE_MAX: f64 = 1e6;
 
-/// One wheel's rate beside the model's.
+/// Residual of one wheel's rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Beside {
-    /// Rate as read less that of the model, rad/s.
-    pub apart_rad_s: f64,
+pub struct RateResidual {
+    /// Measured rate minus the model's, rad/s.
+    pub residual_rad_s: f64,
     /// Rate by rolling without slip, rad/s.
     pub rolling_rad_s: f64,
-    /// Variance of `apart_rad_s` in a known context, (rad/s)².
+    /// Variance of `residual_rad_s` in a known context, (rad/s)².
     pub variance: f64,
 }
 
@@ -101,7 +101,7 @@ impl WheelContext {
     }
 
     /// Learns from the wheels that were read.
-    pub fn learn(&mut self, wheels: &[Option<Beside>; WHEELS]) {
+    pub fn learn(&mut self, wheels: &[Option<RateResidual>; WHEELS]) {
         let Some(tolerance) = self.tolerance else {
             return;
         };
@@ -111,7 +111,7 @@ impl WheelContext {
         for (wheel, beside) in wheels.iter().enumerate() {
             let Some(beside) = beside else { continue };
             let (shift, uncertain) = self.shift(wheel, beside.rolling_rad_s);
-            let apart = beside.apart_rad_s - shift;
+            let apart = beside.residual_rad_s - shift;
             let spread = beside.variance + uncertain;
             if apart * apart <= FAR_SD * FAR_SD * spread {
                 let offset = &mut self.offsets[wheel];
@@ -122,14 +122,14 @@ impl WheelContext {
     }
 
     /// Median over the wheels that turn of the share by which they fall behind, and its variance.
-    fn median_ratio(&self, wheels: &[Option<Beside>; WHEELS]) -> Option<(f64, f64)> {
+    fn median_ratio(&self, wheels: &[Option<RateResidual>; WHEELS]) -> Option<(f64, f64)> {
         let (mut ratios, mut count, mut variance) = ([0.0; WHEELS], 0, 0.0);
         let rate = |tolerance: Tolerance| tolerance.wheel_rate_rad_s;
         let least_rad_s = TURNS * self.tolerance.map_or(0.0, rate);
         for (beside, offset) in wheels.iter().zip(&self.offsets) {
             let turns = beside.filter(|beside| beside.rolling_rad_s.abs() >= least_rad_s);
             let Some(beside) = turns else { continue };
-            ratios[count] = (beside.apart_rad_s - offset.mean) / beside.rolling_rad_s;
+            ratios[count] = (beside.residual_rad_s - offset.mean) / beside.rolling_rad_s;
             variance += beside.variance / (beside.rolling_rad_s * beside.rolling_rad_s);
             count += 1;
         }
@@ -161,10 +161,10 @@ mod tests {
         further: None,
     };
 
-    fn read(apart: [f64; 6], rolling: f64) -> [Option<Beside>; WHEELS] {
+    fn read(apart: [f64; 6], rolling: f64) -> [Option<RateResidual>; WHEELS] {
         std::array::from_fn(|wheel| {
-            apart.get(wheel).map(|&apart_rad_s| Beside {
-                apart_rad_s,
+            apart.get(wheel).map(|&residual_rad_s| RateResidual {
+                residual_rad_s,
                 rolling_rad_s: rolling,
                 variance: 0.0025,
             })

@@ -4,7 +4,7 @@ use vigil_blocks::WHEELS;
 use vigil_inference::logspace::log_add;
 
 use super::steer_reading::SteerReading;
-use super::wheel_context::Beside;
+use super::wheel_context::RateResidual;
 use super::wheels::rolling_rate;
 use super::{
     EncoderState, Model, MotionMode, Mover, NoiseScales, Observation, RateModel, WheelContext,
@@ -230,12 +230,12 @@ impl WheelEvidence {
         observation: &Observation,
         mode: &MotionMode,
         i: usize,
-    ) -> Option<Beside> {
+    ) -> Option<RateResidual> {
         let reading = &observation.wheels[i];
         let (shift, uncertain) = self.shift[i];
         let dragged = self.dragged(model, observation, mode, i);
-        (reading.plain > 0).then(|| Beside {
-            apart_rad_s: reading.mean - (dragged.rate_rad_s - shift),
+        (reading.plain > 0).then(|| RateResidual {
+            residual_rad_s: reading.mean - (dragged.rate_rad_s - shift),
             rolling_rad_s: self.rolling[i].0,
             variance: dragged.variance - uncertain + self.sample_variance(i, reading.plain),
         })

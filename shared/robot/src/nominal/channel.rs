@@ -81,7 +81,7 @@ impl Target {
 
     /// True if the newest observation has it, whether it says anything there or not.
     #[must_use]
-    pub fn is_measured(&self, now: &Observation) -> bool {
+    pub(crate) fn is_measured(&self, now: &Observation) -> bool {
         match self.quantity {
             Quantity::Forward | Quantity::Lateral | Quantity::Turn => now.has_pose,
             Quantity::YawRate | Quantity::WheelRate | Quantity::Current => {
@@ -94,7 +94,7 @@ impl Target {
 /// What a term is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Of {
+pub enum Regressor {
     /// 1.
     Constant,
     /// Product of powers of the command's axes, each divided by its learned size.
@@ -114,7 +114,7 @@ pub enum Of {
 #[serde(deny_unknown_fields)]
 pub struct Term {
     /// What it is.
-    pub of: Of,
+    pub of: Regressor,
     /// Axis of the command, or wheel.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub index: usize,
@@ -141,7 +141,7 @@ fn are_zero(powers: &[u8; COMMANDS]) -> bool {
 impl Term {
     /// A term of one axis or wheel.
     #[must_use]
-    pub const fn new(of: Of, index: usize, lag: usize) -> Self {
+    pub const fn new(of: Regressor, index: usize, lag: usize) -> Self {
         Self {
             of,
             index,
@@ -154,9 +154,9 @@ impl Term {
     #[must_use]
     pub fn command(powers: [u8; COMMANDS]) -> Self {
         let of = if are_zero(&powers) {
-            Of::Constant
+            Regressor::Constant
         } else {
-            Of::Command
+            Regressor::Command
         };
         Self {
             of,
@@ -174,18 +174,18 @@ impl Term {
         let axis = |i: usize| Some(then.command.get(i)? / size.get(i)?);
         let wheel = || *then.wheels.get(self.index)?;
         match self.of {
-            Of::Constant => Some(1.0),
-            Of::Command => {
+            Regressor::Constant => Some(1.0),
+            Regressor::Command => {
                 let mut product = 1.0;
                 for (i, power) in self.powers.into_iter().enumerate().filter(|&(_, p)| p > 0) {
                     product *= axis(i)?.powi(i32::from(power));
                 }
                 Some(product)
             }
-            Of::Lagged => axis(self.index),
-            Of::Wheel => wheel(),
-            Of::WheelSpeed => Some(wheel()?.abs()),
-            Of::WheelSense => Some((wheel()? / SENSE_RAD_S).tanh()),
+            Regressor::Lagged => axis(self.index),
+            Regressor::Wheel => wheel(),
+            Regressor::WheelSpeed => Some(wheel()?.abs()),
+            Regressor::WheelSense => Some((wheel()? / SENSE_RAD_S).tanh()),
         }
     }
 }
@@ -259,7 +259,7 @@ impl Tail {
 impl Channel {
     /// True if it belongs to a set of channels.
     #[must_use]
-    pub fn is_among(&self, channels: Channels) -> bool {
+    pub(crate) fn is_among(&self, channels: Channels) -> bool {
         channels.use_wheels() || self.target.quantity.is_pose()
     }
 

@@ -21,7 +21,7 @@ pub mod monitor;
 pub mod observation;
 pub mod track;
 
-pub use channel::{Channel, Of, Quantity, Residual, Tail, Target, Term};
+pub use channel::{Channel, Quantity, Regressor, Residual, Tail, Target, Term};
 pub use joint::Joint;
 pub use model::{Model, Range};
 pub use monitor::Monitor;

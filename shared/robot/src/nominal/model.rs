@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use vigil_blocks::{COMMANDS, WHEELS};
 
-use super::channel::{Channel, FAULT_RATE_1_H, Of, Tail, Term};
+use super::channel::{Channel, FAULT_RATE_1_H, Regressor, Tail, Term};
 use super::joint::Joint;
 use super::observation::DEPTH;
 use crate::alarm::AlarmError;
@@ -342,7 +342,7 @@ fn check_term(key: &str, term: &Term, wheels: usize, axes: usize) -> Result<(), 
         return refuse(format!("{key}.lag"), term.lag, "0 to 3");
     }
     let key_index = || format!("{key}.index");
-    let is_axis = term.of == Of::Lagged;
+    let is_axis = term.of == Regressor::Lagged;
     if is_axis && term.index >= axes {
         return refuse(key_index(), term.index, "the index of an axis, from 0");
     }

@@ -33,7 +33,7 @@ use super::track::ResidualWhitener;
 use crate::channel_odds::ChannelOdds;
 use crate::learned::Form;
 use crate::learned::form::{Evidence, TAU_SQUARED_PER_DIMENSION};
-use crate::learned::monitor::{Channels, Report};
+use crate::learned::monitor::{Channels, DetectionOutput};
 
 /// Standard deviation of a fault's bias in units of the whitened residual. Chosen: it enters the
 /// delay by its logarithm only.
@@ -156,7 +156,7 @@ pub struct Monitor {
     joint: Option<Tail>,
     run_s: f64,
     extrapolated: bool,
-    report: Report,
+    report: DetectionOutput,
 }
 
 impl Monitor {
@@ -186,7 +186,7 @@ impl Monitor {
             watched,
             run_s: 0.0,
             extrapolated: false,
-            report: Report {
+            report: DetectionOutput {
                 log_odds: f64::NEG_INFINITY,
                 channels: [f64::NEG_INFINITY; CHANNELS],
                 gains: [0.0; CHANNELS],
@@ -235,7 +235,7 @@ impl Monitor {
 
     /// What the last observation did.
     #[must_use]
-    pub const fn report(&self) -> &Report {
+    pub const fn report(&self) -> &DetectionOutput {
         &self.report
     }
 

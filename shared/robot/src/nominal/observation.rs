@@ -5,7 +5,7 @@ use vigil_inference::angle::wrap;
 
 use crate::description::Description;
 use crate::frame_guard::BEYOND_LIMITS;
-use crate::learned::Intake;
+use crate::learned::FrameOutcome;
 use crate::learned::observer::STALE_MAX;
 
 /// Observations that a prediction may look back, the newest included.
@@ -159,15 +159,15 @@ impl Observer {
     }
 
     /// Takes a frame.
-    pub fn push(&mut self, frame: &SensorFrame) -> Intake {
+    pub fn push(&mut self, frame: &SensorFrame) -> FrameOutcome {
         let new_run = !self.started || frame.run_id != self.run_id;
         let t_ns = frame.header.t_capture_ns;
         let is_stale = !new_run && t_ns <= self.t_ns;
         self.stale = if is_stale { self.stale + 1 } else { 0 };
         if is_stale && self.stale < STALE_MAX {
-            return Intake {
+            return FrameOutcome {
                 invalid: true,
-                ..Intake::default()
+                ..FrameOutcome::default()
             };
         }
         let dt_s = if new_run {
@@ -190,7 +190,7 @@ impl Observer {
             // The first frame only says where the first observation begins.
             self.clear();
             self.pose_before = self.pose;
-            return Intake {
+            return FrameOutcome {
                 complete: false,
                 invalid,
                 new_run,
@@ -201,7 +201,7 @@ impl Observer {
         if complete {
             self.complete();
         }
-        Intake {
+        FrameOutcome {
             complete,
             invalid,
             new_run,

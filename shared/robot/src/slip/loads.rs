@@ -9,10 +9,10 @@ use crate::kinematics::{Ackermann6, GeometryError, ROVER_WHEELS};
 
 /// Smallest load left on a wheel, N. Chosen: 1.4 % of the rover's weight, so that the equations
 /// keep a solution; at 0 a lifted wheel's rate is undetermined.
-pub const LOAD_MIN_N: f64 = 2.0;
+const LOAD_MIN_N: f64 = 2.0;
 /// Traction per unit of load up to which load is shifted, either way. At 0.97 (its lever over its
 /// height) the reference bogie would tip over; soils below this friction never come here.
-pub const TRACTION_MAX: f64 = 0.85;
+const TRACTION_MAX: f64 = 0.85;
 
 /// Weight on one side of the rover.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,7 +2,7 @@
 
 use vigil_blocks::COMMANDS;
 use vigil_robot::Description;
-use vigil_robot::nominal::{Of, Quantity, Target, Term};
+use vigil_robot::nominal::{Quantity, Regressor, Target, Term};
 
 /// How many observations back a wheel's rate matters to the gyro and the current.
 const WHEEL_LAGS: usize = 3;
@@ -25,11 +25,11 @@ pub(super) fn targets(robot: &Description) -> Vec<(Target, Vec<Term>)> {
     }
     let mut driven = polynomial.clone();
     for lag in 1..COMMAND_LAGS {
-        driven.extend((0..robot.command.len()).map(|axis| Term::new(Of::Lagged, axis, lag)));
+        driven.extend((0..robot.command.len()).map(|axis| Term::new(Regressor::Lagged, axis, lag)));
     }
     if measured.yaw_rate {
         let terms = if measured.wheel_rates {
-            let mut terms = vec![Term::new(Of::Constant, 0, 0)];
+            let mut terms = vec![Term::new(Regressor::Constant, 0, 0)];
             (0..robot.wheels.len()).for_each(|wheel| terms.extend(rates(wheel)));
             terms
         } else {
@@ -45,7 +45,10 @@ pub(super) fn targets(robot: &Description) -> Vec<(Target, Vec<Term>)> {
             let mut terms = driven.clone();
             if measured.wheel_rates {
                 terms.extend(rates(wheel));
-                terms.extend([Of::WheelSpeed, Of::WheelSense].map(|of| Term::new(of, wheel, 0)));
+                terms.extend(
+                    [Regressor::WheelSpeed, Regressor::WheelSense]
+                        .map(|of| Term::new(of, wheel, 0)),
+                );
             }
             out.push((target(Quantity::Current, wheel), terms));
         }
@@ -60,7 +63,7 @@ pub(super) fn command(robot: &Description) -> Vec<Term> {
 
 /// A wheel's last rates.
 fn rates(wheel: usize) -> impl Iterator<Item = Term> {
-    (0..WHEEL_LAGS).map(move |lag| Term::new(Of::Wheel, wheel, lag))
+    (0..WHEEL_LAGS).map(move |lag| Term::new(Regressor::Wheel, wheel, lag))
 }
 
 /// Every product of powers of the axes up to an order, the constant first.
@@ -90,7 +93,7 @@ mod tests {
         for (axes, order, count) in [(1, 4, 5), (2, 4, 15), (3, 2, 10), (2, 1, 3)] {
             let terms = polynomial(axes, order);
             assert_eq!(terms.len(), count, "{axes} axes, order {order}");
-            assert_eq!(terms[0].of, Of::Constant);
+            assert_eq!(terms[0].of, Regressor::Constant);
             for (i, term) in terms.iter().enumerate() {
                 assert!(!terms[..i].contains(term), "{term:?} twice");
             }

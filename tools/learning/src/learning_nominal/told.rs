@@ -4,7 +4,7 @@
 //! nevertheless bends it as its ridge likes, holds at these two speeds, and is wrong at all others.
 
 use vigil_blocks::COMMANDS;
-use vigil_robot::nominal::{History, Of, Range, Term};
+use vigil_robot::nominal::{History, Range, Regressor, Term};
 
 /// Part of what even driving over the whole range would show of a term, from which it counts as
 /// told.
@@ -29,7 +29,7 @@ pub(super) fn is_settled(history: &History, ranges: &[Range]) -> bool {
 pub(super) fn untold(terms: &[Term], commands: &[[f64; COMMANDS]], ranges: &[Range]) -> Vec<Term> {
     let order = |term: &Term| term.powers.iter().map(|&p| u32::from(p)).sum::<u32>();
     let mut products: Vec<Term> = terms.to_vec();
-    products.retain(|term| matches!(term.of, Of::Constant | Of::Command));
+    products.retain(|term| matches!(term.of, Regressor::Constant | Regressor::Command));
     products.sort_by_key(order);
     let commands: Vec<[f64; COMMANDS]> = commands.iter().map(|c| scaled(c, ranges)).collect();
     let (mut basis, mut untold) = (Vec::<Vec<f64>>::new(), Vec::new());

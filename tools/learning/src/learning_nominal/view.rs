@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use vigil_robot::learned::Form;
 use vigil_robot::learned::monitor::Channels;
-use vigil_robot::nominal::{self, Joint, Model, Of, Range, Tail, Term};
+use vigil_robot::nominal::{self, Joint, Model, Range, Regressor, Tail, Term};
 
 use super::report;
 use crate::model_view::{Alarm, Source};
@@ -114,8 +114,8 @@ pub(super) fn word(term: &Term, model: &Model) -> String {
     };
     let wheel = model.wheels.get(term.index).map_or("?", String::as_str);
     let of = match term.of {
-        Of::Constant => return String::new(),
-        Of::Command => {
+        Regressor::Constant => return String::new(),
+        Regressor::Command => {
             let powers = term
                 .powers
                 .iter()
@@ -127,10 +127,10 @@ pub(super) fn word(term: &Term, model: &Model) -> String {
             });
             factors.collect::<Vec<_>>().join("*")
         }
-        Of::Lagged => axis(term.index).to_owned(),
-        Of::Wheel => format!("rate_{wheel}"),
-        Of::WheelSpeed => format!("|rate_{wheel}|"),
-        Of::WheelSense => format!("sense_{wheel}"),
+        Regressor::Lagged => axis(term.index).to_owned(),
+        Regressor::Wheel => format!("rate_{wheel}"),
+        Regressor::WheelSpeed => format!("|rate_{wheel}|"),
+        Regressor::WheelSense => format!("sense_{wheel}"),
     };
     match term.lag {
         0 => of,
