@@ -17,7 +17,7 @@ pub(super) struct Timely {
     /// Mean rate that was read, rad/s.
     pub read_rad_s: f64,
     /// How far it is from what is expected now, rad/s, and its variance in all, (rad/s)².
-    pub apart_rad_s: f64,
+    pub residual_rad_s: f64,
     pub variance: f64,
     /// Variance of the reading about the wheel's rate, (rad/s)².
     pub noise: f64,
@@ -114,7 +114,7 @@ impl Odds {
         if !shows.contains(&true) {
             return;
         }
-        let timely = reading.log_density(reading.apart_rad_s, reading.variance);
+        let timely = reading.log_density(reading.residual_rad_s, reading.variance);
         let mut before = self.delays;
         for (i, (rate, variance)) in then.into_iter().enumerate().filter(|(i, _)| shows[*i]) {
             before[i] = log_add(before[i], born);
@@ -141,7 +141,7 @@ mod tests {
     fn reading(read: f64, expected: f64) -> Timely {
         Timely {
             read_rad_s: read,
-            apart_rad_s: read - expected,
+            residual_rad_s: read - expected,
             variance: NOISE + WIDTH,
             noise: NOISE,
             outlier_rate: 1e-5,
