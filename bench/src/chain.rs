@@ -51,7 +51,7 @@ pub struct Chain {
     pub cycles: u64,
 }
 
-/// One stage of a chain, as its process is told.
+/// One stage of a chain, as its process gets it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Role {
     chain: Chain,

@@ -1,5 +1,5 @@
-//! How long a cycle takes from the instant it was due to the action, under load, with the
-//! machine's own share told apart.
+//! How long a cycle takes from the instant it was due to the action, under load, and how
+//! much of it is the machine's own doing.
 //!
 //! A *cell* is one rate, load and scheduling policy. In it the floor is measured before and after
 //! the graph on the same cores: the same four processes, priorities and block sizes handed over by

@@ -66,7 +66,7 @@ impl Carrier {
         Ok(match self {
             Self::Futex => Box::new(FutexReader {
                 block: FutexBlock::open(&path, size)?,
-                seen: 0,
+                last_read: 0,
             }),
             Self::SharedMemory => payload::incoming(shared, before, size)?,
             Self::Datagram => Box::new(DatagramReader {
@@ -178,15 +178,15 @@ fn wait_for(path: &Path) -> Result<(), Box<dyn Error>> {
 
 struct FutexReader {
     block: FutexBlock,
-    seen: u32,
+    last_read: u32,
 }
 
 impl Incoming for FutexReader {
     fn receive(&mut self, limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>> {
-        self.block.wait(self.seen, limit);
+        self.block.wait(self.last_read, limit);
         let (newest, t_schedule_ns, t_publish_ns) = self.block.newest();
-        let is_new = newest != self.seen;
-        self.seen = newest;
+        let is_new = newest != self.last_read;
+        self.last_read = newest;
         Ok(is_new.then_some((t_schedule_ns, t_publish_ns)))
     }
 

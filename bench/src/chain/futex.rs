@@ -161,10 +161,10 @@ impl FutexBlock {
         }
     }
 
-    /// Waits for a block other than the one numbered `seen`, at most for `limit`.
-    pub fn wait(&self, seen: u32, limit: Duration) {
+    /// Waits for a block other than the one numbered `last_read`, at most for `limit`.
+    pub fn wait(&self, last_read: u32, limit: Duration) {
         let words = self.words();
-        if self.count() != seen {
+        if self.count() != last_read {
             return;
         }
         let limit = libc::timespec {
@@ -178,7 +178,7 @@ impl FutexBlock {
                 libc::SYS_futex,
                 words.count.as_ptr(),
                 libc::FUTEX_WAIT,
-                seen,
+                last_read,
                 &raw const limit,
             );
         }

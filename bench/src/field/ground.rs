@@ -67,9 +67,9 @@ impl Within {
         let is_within = |&curvature: &f64| {
             let here = self.per_metre(place, curvature)?;
             let usual = self.per_metre(self.usual, curvature)?;
-            let apart = here.into_iter().zip(usual).zip(most);
+            let differences = here.into_iter().zip(usual).zip(most);
             Some(
-                apart
+                differences
                     .into_iter()
                     .all(|((a, b), most)| (a - b).abs() <= most),
             )

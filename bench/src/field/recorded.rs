@@ -234,10 +234,10 @@ impl Case {
     /// Usual time between frames, s.
     fn period_s(&self) -> f64 {
         let t_s = |i: usize| self.run.frames[i].header.t_capture_ns as f64 * 1e-9;
-        let mut apart: Vec<f64> = (1..self.run.frames.len())
+        let mut gaps_s: Vec<f64> = (1..self.run.frames.len())
             .map(|i| t_s(i) - t_s(i - 1))
             .collect();
-        crate::quantile(&mut apart, 0.5)
+        crate::quantile(&mut gaps_s, 0.5)
     }
 }
 

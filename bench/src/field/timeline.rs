@@ -28,7 +28,7 @@ impl Timeline {
         let alarm = if moment.alarm { "ALARM" } else { "-" };
         let said = format!(
             "{alarm} mode {} reported {} set {} {:?}",
-            moment.mode, moment.reported, moment.set, moment.told
+            moment.mode, moment.reported, moment.set, moment.order
         );
         if said == self.said {
             return;

@@ -6,7 +6,7 @@
 //! late for tens of milliseconds. The chain passes over all its cores, one after the other, so the
 //! time counts in which a canary of any of them was overdue, beyond what nine of ten of its
 //! wake-ups keep to; time in which two were counts once. Whether one wake-up alone was late by
-//! as much is told beside it. Instants that one answer has ended share its verdict: the first of
+//! as much stands beside it. Instants that one answer has ended share its verdict: the first of
 //! them says how long it was due.
 
 use super::canary::{CanaryRecord, LateWakeUp};
@@ -42,10 +42,10 @@ pub struct Record<'a> {
 }
 
 impl<'a> Record<'a> {
-    /// Of what a canary has seen.
+    /// Of what a canary recorded.
     #[must_use]
-    pub fn from_canary(seen: &'a CanaryRecord) -> Self {
-        Self::new(&seen.late, seen.lateness.percentiles().p90_ns)
+    pub fn from_canary(canary: &'a CanaryRecord) -> Self {
+        Self::new(&canary.late, canary.lateness.percentiles().p90_ns)
     }
 
     /// Of late wake-ups in the order of their schedule.
@@ -169,7 +169,7 @@ mod tests {
             cycle(94_900, 2_600), // the same of 1600
         ];
         let found = misses(&cycles, 1_000, &canaries);
-        let told: Vec<_> = found
+        let summary: Vec<_> = found
             .iter()
             .map(|m| (m.t_schedule_ns, m.overrun_ns, m.is_machine, m.is_one_stall))
             .collect();
@@ -188,6 +188,6 @@ mod tests {
             (94_800, 1_701, false, false),
             (94_900, 1_600, true, false),
         ];
-        assert_eq!(told, expected);
+        assert_eq!(summary, expected);
     }
 }

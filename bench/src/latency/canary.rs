@@ -25,7 +25,7 @@ pub struct LateWakeUp {
     pub late_ns: u64,
 }
 
-/// What a canary has seen.
+/// What a canary recorded.
 #[derive(Debug)]
 pub struct CanaryRecord {
     /// Where it ran, as the kernel says.
@@ -68,7 +68,7 @@ impl Canary {
         })
     }
 
-    /// Ends it; what it has seen, `None` if it has died.
+    /// Ends it; its record; `None` if it has died.
     #[must_use]
     pub fn finish(mut self) -> Option<CanaryRecord> {
         self.stop.store(true, Ordering::Relaxed);
@@ -107,8 +107,8 @@ fn watch(
         clock::sleep_until(account.due_ns);
         account.wake(Monotonic.now_ns());
     }
-    account.seen.late.shrink_to_fit();
-    account.seen
+    account.record.late.shrink_to_fit();
+    account.record
 }
 
 /// An empty list with room for `capacity` wake-ups, every page of it touched.
@@ -125,18 +125,18 @@ fn touched(capacity: usize) -> Vec<LateWakeUp> {
 /// The book of a canary: what each wake-up says.
 #[derive(Debug)]
 struct Account {
-    seen: CanaryRecord,
+    record: CanaryRecord,
     room: usize,
     due_ns: u64,
     period_ns: u64,
 }
 
 impl Account {
-    /// First due at `due_ns`; room for as many late wake-ups as the list of `seen` has now.
-    const fn new(seen: CanaryRecord, due_ns: u64, period_ns: u64) -> Self {
+    /// First due at `due_ns`; room for as many late wake-ups as the list of `record` has now.
+    const fn new(record: CanaryRecord, due_ns: u64, period_ns: u64) -> Self {
         Self {
-            room: seen.late.capacity(),
-            seen,
+            room: record.late.capacity(),
+            record,
             due_ns,
             period_ns,
         }
@@ -149,17 +149,17 @@ impl Account {
             return; // A signal: nothing was due.
         };
         if late_ns >= KEPT_FROM_NS {
-            if self.seen.late.len() < self.room {
-                self.seen.late.push(LateWakeUp {
+            if self.record.late.len() < self.room {
+                self.record.late.push(LateWakeUp {
                     t_schedule_ns: self.due_ns,
                     late_ns,
                 });
             } else {
-                self.seen.not_kept += 1;
+                self.record.not_kept += 1;
             }
         }
         while self.due_ns <= now_ns {
-            self.seen.lateness.record(now_ns - self.due_ns);
+            self.record.lateness.record(now_ns - self.due_ns);
             self.due_ns += self.period_ns;
         }
     }
@@ -171,13 +171,13 @@ mod tests {
 
     #[test]
     fn a_wake_up_accounts_for_every_instant_that_it_slept_through() {
-        let seen = CanaryRecord {
+        let record = CanaryRecord {
             placement: placement::read_back(0),
             lateness: Latency::new().unwrap(),
             late: Vec::with_capacity(2),
             not_kept: 0,
         };
-        let mut account = Account::new(seen, 100_000, 100_000);
+        let mut account = Account::new(record, 100_000, 100_000);
         for now_ns in [
             100_100, // 100 ns late: usual
             150_000, // a signal
@@ -188,19 +188,19 @@ mod tests {
         ] {
             account.wake(now_ns);
         }
-        let Account { seen, due_ns, .. } = account;
+        let Account { record, due_ns, .. } = account;
         assert_eq!(due_ns, 1_000_000);
         let late = |t_schedule_ns, late_ns| LateWakeUp {
             t_schedule_ns,
             late_ns,
         };
-        assert_eq!(seen.late, [late(200_000, 300_000), late(800_000, 5_000)]);
-        assert_eq!(seen.not_kept, 1);
+        assert_eq!(record.late, [late(200_000, 300_000), late(800_000, 5_000)]);
+        assert_eq!(record.not_kept, 1);
         let mut all = Latency::new().unwrap();
         for late_ns in [100, 300_000, 200_000, 100_000, 0, 0, 4_999, 5_000, 6_000] {
             all.record(late_ns);
         }
-        assert_eq!(seen.lateness.histogram(), all.histogram());
+        assert_eq!(record.lateness.histogram(), all.histogram());
     }
 
     #[test]
@@ -213,12 +213,12 @@ mod tests {
         let from_ns = Monotonic.now_ns();
         let canary = Canary::start(wanted, period_ns, 64).unwrap();
         clock::sleep_until(from_ns + 50 * period_ns);
-        let seen = canary.finish().unwrap();
+        let record = canary.finish().unwrap();
         let lasted_ns = Monotonic.now_ns() - from_ns;
-        let instants = seen.lateness.percentiles().n;
+        let instants = record.lateness.percentiles().n;
         assert!(instants * period_ns <= lasted_ns, "{instants} instants");
         assert!(instants > 0);
-        let order = seen.late.is_sorted_by_key(|late| late.t_schedule_ns);
-        assert!(order && seen.late.iter().all(|l| l.late_ns >= KEPT_FROM_NS));
+        let order = record.late.is_sorted_by_key(|late| late.t_schedule_ns);
+        assert!(order && record.late.iter().all(|l| l.late_ns >= KEPT_FROM_NS));
     }
 }

@@ -194,8 +194,9 @@ impl Spec {
         let floor = Spectra::new(&floors.collect::<Vec<_>>())?;
         let usual_ns = graph.end_to_end.percentiles().p50_ns;
         let slack_ns = deadline_ns.saturating_sub(usual_ns);
-        let late = |seen: &CanaryRecord| {
-            seen.lateness
+        let late = |canary: &CanaryRecord| {
+            canary
+                .lateness
                 .histogram()
                 .count_between(slack_ns.max(1), u64::MAX)
         };
@@ -258,10 +259,10 @@ pub(super) fn check(
         }
     }
     let highest = wanted.iter().map(|w| u32::from(w.priority)).max();
-    let is_above = |seen: &CanaryRecord| {
-        seen.placement.pinned && seen.placement.priority > highest.unwrap_or(0)
+    let is_above = |canary: &CanaryRecord| {
+        canary.placement.pinned && canary.placement.priority > highest.unwrap_or(0)
     };
-    if canaries.iter().any(|seen| seen.not_kept > 0) {
+    if canaries.iter().any(|canary| canary.not_kept > 0) {
         return Err("a canary had no room for what it saw: nobody can say whose a miss is".into());
     }
     Ok(!canaries.is_empty() && canaries.iter().all(is_above))
@@ -376,12 +377,12 @@ impl Cell {
         let stages: serde_json::Map<String, Value> = (0..STAGES)
             .map(|i| (STAGE_NAMES[i].to_owned(), stage(i)))
             .collect();
-        let canary = |seen: &CanaryRecord| {
+        let canary_json = |canary: &CanaryRecord| {
             json!({
-                "core": seen.placement.core,
-                "scheduling": Placement::scheduling(seen.placement.policy, seen.placement.priority),
-                "lateness_us": us(&seen.lateness),
-                "not_kept": seen.not_kept,
+                "core": canary.placement.core,
+                "scheduling": Placement::scheduling(canary.placement.policy, canary.placement.priority),
+                "lateness_us": us(&canary.lateness),
+                "not_kept": canary.not_kept,
             })
         };
         json!({
@@ -412,7 +413,7 @@ impl Cell {
             "folded": self.folded(),
             "seed": self.seed,
             "stages": stages,
-            "canaries": self.canaries.iter().map(canary).collect::<Vec<_>>(),
+            "canaries": self.canaries.iter().map(canary_json).collect::<Vec<_>>(),
             "system": self.system,
             "config_hash": self.summary["config_hash"],
             "release_build": self.summary["release_build"],

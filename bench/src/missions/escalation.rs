@@ -85,19 +85,19 @@ impl Default for Escalation {
 }
 
 impl Escalation {
-    /// The rules' answer to what is seen, `dt_s` after the last cycle.
-    pub fn answer(&mut self, seen: RuleInput, dt_s: f64) -> RuleOutput {
+    /// The rules' answer, `dt_s` after the last cycle.
+    pub fn answer(&mut self, input: RuleInput, dt_s: f64) -> RuleOutput {
         self.phase = match self.phase {
-            Phase::Driving if seen.alarm => self.stop(),
+            Phase::Driving if input.alarm => self.stop(),
             Phase::Looking { for_s } if for_s + dt_s < LOOK_S => Phase::Looking {
                 for_s: for_s + dt_s,
             },
             Phase::Looking { .. } => Phase::Remedying(Remedy {
-                what: seen.explanation,
+                what: input.explanation,
                 for_s: 0.0,
                 doubt_s: 0.0,
             }),
-            Phase::Remedying(remedy) => self.remedy(seen, remedy, dt_s),
+            Phase::Remedying(remedy) => self.remedy(input, remedy, dt_s),
             Phase::Driving | Phase::Waiting => self.phase,
         };
         self.output()
@@ -111,10 +111,10 @@ impl Escalation {
         }
     }
 
-    fn remedy(&mut self, seen: RuleInput, mut remedy: Remedy, dt_s: f64) -> Phase {
-        let well = !seen.alarm && seen.explanation == Explanation::Nominal;
+    fn remedy(&mut self, input: RuleInput, mut remedy: Remedy, dt_s: f64) -> Phase {
+        let well = !input.alarm && input.explanation == Explanation::Nominal;
         remedy.for_s += dt_s;
-        remedy.doubt_s = match well || seen.explanation != remedy.what {
+        remedy.doubt_s = match well || input.explanation != remedy.what {
             true => remedy.doubt_s + dt_s,
             false => 0.0,
         };
@@ -158,9 +158,9 @@ mod tests {
         let mut said = Vec::new();
         for &(alarm, explanation, tenths) in sights {
             for _ in 0..tenths {
-                let told = rules.answer(RuleInput { alarm, explanation }, 0.1);
-                if said.last() != Some(&(told.kind, told.wheel)) {
-                    said.push((told.kind, told.wheel));
+                let output = rules.answer(RuleInput { alarm, explanation }, 0.1);
+                if said.last() != Some(&(output.kind, output.wheel)) {
+                    said.push((output.kind, output.wheel));
                 }
             }
         }

@@ -50,9 +50,12 @@ fn section(ResultFile { path, run }: &ResultFile) -> String {
     let lines = shortened(&whole, |lines| wrapped(lines).len() <= LINES_MAX);
     let folder = path.split('/').next().unwrap_or_default();
     let name = folder.strip_prefix(&format!("{}-", run.date));
-    let processor = run.machine["processor"]
+    // A count of lines depends on no machine.
+    let machine = run.machine["processor"]
         .as_str()
-        .unwrap_or("processor not known");
+        .map_or_else(String::new, |processor| {
+            format!(": {processor}, {} cores", run.machine["cores"])
+        });
     let command = if run.command.is_empty() {
         "Command: not known.".to_owned()
     } else {
@@ -64,12 +67,11 @@ fn section(ResultFile { path, run }: &ResultFile) -> String {
         "More"
     };
     let mut text = format!(
-        "\n## {}\n\n{command}\n\n{}, `{}`: {processor}, {} cores.\n{}\n\
+        "\n## {}\n\n{command}\n\n{}, `{}`{machine}.\n{}\n\
          {all}: [{path}](results/{path}).\n\n",
         run.question,
         run.date,
         name.unwrap_or(folder),
-        run.machine["cores"],
         machine::commit_in_words(run.commit.as_deref(), &run.machine),
     );
     for line in wrapped(&lines) {
@@ -140,9 +142,8 @@ mod tests {
             &["", "New.", "## Part", ""],
         );
         let text = page(&[new, old]);
-        let wanted = "\n## latency\n\n`scripts/bench latency`\n\n2026-11-22, `16-cores`: processor \
-                      not known, 2 cores.\nCommit: ab12.\nThe file: \
-                      [2026-11-22-16-cores/latency.json]\
+        let wanted = "\n## latency\n\n`scripts/bench latency`\n\n2026-11-22, `16-cores`.\n\
+                      Commit: ab12.\nThe file: [2026-11-22-16-cores/latency.json]\
                       (results/2026-11-22-16-cores/latency.json).\n\nNew.\n### Part\n";
         assert_eq!(text.strip_prefix(HEAD).unwrap(), wanted);
     }

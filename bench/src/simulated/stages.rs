@@ -139,7 +139,7 @@ impl Stages {
             size: self.size(),
             set: &self.set.1,
             reported: self.name(belief.reported),
-            told: told(action),
+            order: order(action),
             action: u64::from(action.action) << 32 | u64::from(action.wheel),
         }
     }
@@ -180,7 +180,7 @@ impl Stages {
 }
 
 /// An action as it is scored. What is not decided stops the robot.
-fn told(action: &Action) -> RobotOrder {
+fn order(action: &Action) -> RobotOrder {
     if action.control_mode == ControlMode::Safe as u32 {
         return RobotOrder::Blind;
     }

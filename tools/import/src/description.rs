@@ -209,7 +209,7 @@ pub struct LogDescription {
     #[serde(default = "one")]
     pub gap_max_s: f64,
     /// Longest time for which a value is held, s, 30 if left out: beyond it a command is no longer
-    /// known. A robot that is told only what changes may need more.
+    /// known. A robot that gets only changed commands may need more.
     #[serde(default = "thirty")]
     pub hold_max_s: f64,
     /// Beginning of the first run from which delays are estimated, s.

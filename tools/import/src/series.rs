@@ -26,7 +26,7 @@ pub(super) struct SourceTable {
     pub lacking: Option<MissingColumn>,
 }
 
-/// Rows of a file whose clock does not rise: they are put in order of time, and told.
+/// Rows of a file whose clock does not rise: they are put in order of time and counted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Disorder {
     /// The file.

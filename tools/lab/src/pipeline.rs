@@ -102,7 +102,7 @@ impl Pipeline {
         }
     }
 
-    /// Decides, too, what the robot is told.
+    /// Decides on actions, too.
     pub fn recovering(mut self, recoverer: Option<Recoverer>) -> Self {
         self.recoverer = recoverer;
         self

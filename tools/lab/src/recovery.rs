@@ -1,4 +1,4 @@
-//! The supervisor over recorded runs: what the robot would have been told.
+//! The supervisor over recorded runs: the actions that the robot would have got.
 
 use std::collections::BTreeMap;
 
@@ -115,7 +115,7 @@ impl RecoveryRun<'_> {
         &self.action
     }
 
-    /// What the robot is told: the action's name, and the wheel that it is about after a colon;
+    /// The action: its name, and the wheel that it is about after a colon;
     /// `safe_stop` where nothing usable is believed.
     pub fn name(&self) -> String {
         let action = &self.action;

@@ -19,7 +19,7 @@ const TRAVEL_MIN_M: f64 = 0.25;
 const TURN_MIN_RAD: f64 = 0.15;
 /// A ratio within this factor of 1 is no doubt: ground and faults do as much.
 const RATIO_MAX: f64 = 3.0;
-/// Curvature from which left and right wheels differ enough to be told apart, 1/m.
+/// Curvature from which left and right wheels differ enough to be distinguished, 1/m.
 const TURNING_1_M: f64 = 0.15;
 /// Frames from which wheel rates are judged.
 const FRAMES_MIN: usize = 20;
@@ -239,7 +239,7 @@ pub fn warnings<'a>(
     }
 }
 
-/// Time at which a run has been told to move for [`BEGINNING_S`], s.
+/// Time at which a run has been commanded to move for [`BEGINNING_S`], s.
 fn beginning_s(run: &Run, robot: &Description) -> f64 {
     let mut moved_s = 0.0;
     for pair in run.frames.windows(2) {
@@ -429,7 +429,7 @@ fn doubt_wheels(pieces: &[&[&SensorFrame]], robot: &Description) -> Option<Doubt
     (turning >= FRAMES_MIN && exchanged < 0.5 * as_named).then_some(Doubt::Sides)
 }
 
-/// A wheel that reads the same throughout, though it is told to roll; where that is not known, all
+/// A wheel that reads the same throughout, though it is commanded to roll; where that is not known, all
 /// of them must.
 fn constant_wheel(frames: &[&SensorFrame], robot: &Description) -> Option<Doubt> {
     let first = frames.first()?;
@@ -439,8 +439,8 @@ fn constant_wheel(frames: &[&SensorFrame], robot: &Description) -> Option<Doubt>
     };
     let mut wheels = 0..robot.wheels.len();
     let rolls = |wheel: usize| {
-        let told = |frame: &&SensorFrame| rolling(robot, wheel, &frame.command);
-        frames.iter().filter_map(told).any(|rate| rate != 0.0)
+        let commanded = |frame: &&SensorFrame| rolling(robot, wheel, &frame.command);
+        frames.iter().filter_map(commanded).any(|rate| rate != 0.0)
     };
     let constant = match robot.kinematics {
         Kinematics::Omni3 => wheels.clone().all(is_constant).then_some(0),

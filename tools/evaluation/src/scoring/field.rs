@@ -107,7 +107,7 @@ impl Size {
     }
 }
 
-/// What a robot is told to do, as far as it is scored.
+/// What the action orders the robot to do, as far as it is scored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum RobotOrder {
     /// As planned.
@@ -132,7 +132,7 @@ pub struct Moment<'a> {
     pub t_s: f64,
     /// Time since the moment before, s.
     pub dt_s: f64,
-    /// True if the robot is told to move.
+    /// True if motion is commanded.
     pub drives: bool,
     /// True while the alarm stands.
     pub alarm: bool,
@@ -148,8 +148,8 @@ pub struct Moment<'a> {
     pub set: &'a str,
     /// Mode with hysteresis.
     pub reported: &'a str,
-    /// What the robot is told.
-    pub told: RobotOrder,
+    /// What the action orders the robot to do.
+    pub order: RobotOrder,
     /// Which of the decision model's actions that is, and about which component: a change of either
     /// is another action.
     pub action: u64,

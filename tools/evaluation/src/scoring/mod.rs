@@ -85,14 +85,14 @@ pub struct Verdict {
     pub is_identifying: bool,
     /// Mode with hysteresis, named as `mode` is.
     pub reported: String,
-    /// What the robot is told, and the wheel that it is about after a colon; empty if nothing is
+    /// The action, and the wheel that it is about after a colon; empty if nothing is
     /// decided.
     pub action: String,
     /// In which way the component that `mode` names is broken, in a word; empty if none is told.
     pub size_kind: &'static str,
     /// By how much, in the unit of [`vigil_blocks::SizeKind`]; `None` if the way has no size.
     pub size: Option<f64>,
-    /// True if the robot is told to move.
+    /// True if motion is commanded.
     pub drives: bool,
 }
 

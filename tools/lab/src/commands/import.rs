@@ -168,7 +168,7 @@ fn warnings(imported: &import::ImportedLog, robot: &Description) -> Vec<String> 
     warnings
 }
 
-/// Problems of the description itself are told with its file.
+/// Problems of the description itself name its file.
 fn at(log: &Path, error: &import::ImportError) -> String {
     match error {
         import::ImportError::Description { .. } => format!("{}: {error}", log.display()),

@@ -13,7 +13,7 @@ use crate::findings::{Finding, Status};
 
 /// Commanded speed above which a robot is to move, m/s.
 const MOVING_M_S: f64 = 0.02;
-/// Frames with motion commanded from which a field that never changes is told.
+/// Frames with motion commanded from which a field that never changes is a finding.
 const MOVING_FRAMES_MIN: usize = 50;
 
 /// Largest yaw, rad: a publisher need not wrap it, but after so many turns it is no angle in rad.
@@ -81,18 +81,18 @@ fn stretch(robot: &Description, field: Field, frames: &[FrameArrival]) -> Stretc
 }
 
 fn judge(name: &str, field: Field, robot: &Description, of: Stretch, frames: usize) -> Finding {
-    let told = |status, detail: String| Finding::new(name, status, detail);
+    let finding = |status, detail: String| Finding::new(name, status, detail);
     if of.measured == 0 {
         let detail = "never marked as valid, but the robot's description says that it is \
                       measured: set its bit in `valid`, or take it out of [measured]";
-        return told(Status::Failure, detail.into());
+        return finding(Status::Failure, detail.into());
     }
     if of.not_finite > 0 {
         let detail = format!(
             "NaN or infinite in {} of {frames} frames: leave it 0 and its bit in `valid` unset",
             of.not_finite
         );
-        return told(Status::Failure, detail);
+        return finding(Status::Failure, detail);
     }
     let mut detail = format!("{:.4} to {:.4}", of.least, of.most);
     if of.measured < frames {
@@ -103,15 +103,15 @@ fn judge(name: &str, field: Field, robot: &Description, of: Stretch, frames: usi
     if let Some(limit) = limit(field, robot).filter(|limit| largest > *limit) {
         let guess = unit_guess(field);
         let detail = format!("{detail}: beyond {limit:.3}, which the description allows{guess}");
-        return told(Status::Failure, detail);
+        return finding(Status::Failure, detail);
     }
     // A steering angle may stay as it is in a steady curve.
     let may_stay = matches!(field, Field::Command(_) | Field::Steer(_));
     if !may_stay && of.moving >= MOVING_FRAMES_MIN && of.moving_least == of.moving_most {
         let detail = format!("{detail}: never changes, though motion is commanded");
-        return told(Status::Warning, detail);
+        return finding(Status::Warning, detail);
     }
-    told(Status::Ok, detail)
+    finding(Status::Ok, detail)
 }
 
 /// Largest magnitude that makes sense.
@@ -146,8 +146,8 @@ fn meanings(robot: &Description, frames: &[FrameArrival]) -> Vec<Finding> {
     let mut meaning = PublisherCheck::new(robot);
     let found = frames.iter().filter_map(|f| meaning.take(&f.frame));
     let found = found.map(|finding| finding.text(robot));
-    let told = |detail| Finding::new("meaning", Status::Failure, detail);
-    let all: Vec<Finding> = found.map(told).collect();
+    let failure = |detail| Finding::new("meaning", Status::Failure, detail);
+    let all: Vec<Finding> = found.map(failure).collect();
     if all.is_empty() {
         vec![doubts(robot, frames, &meaning.unjudged())]
     } else {

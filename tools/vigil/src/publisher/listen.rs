@@ -241,7 +241,7 @@ struct Border {
     health: Box<dyn Receiver<Health>>,
     is_socket: bool,
     /// The first report and the newest.
-    seen: Option<[Box<Health>; 2]>,
+    window: Option<[Box<Health>; 2]>,
 }
 
 impl Border {
@@ -253,7 +253,7 @@ impl Border {
         Ok(Self {
             health: graph.receiver(Topic::Health(service))?,
             is_socket: service == ServiceName::SensorSim,
-            seen: None,
+            window: None,
         })
     }
 
@@ -262,16 +262,16 @@ impl Border {
             let Some(health) = self.health.held() else {
                 break;
             };
-            let seen = self
-                .seen
+            let window = self
+                .window
                 .get_or_insert_with(|| [Box::new(*health), Box::new(*health)]);
-            *seen[1] = *health;
+            *window[1] = *health;
         }
     }
 
     /// Since the first look; counters of a service that was restarted begin anew.
     fn since(&self, of: impl Fn(&Health) -> u64) -> u64 {
-        self.seen.as_ref().map_or(0, |[first, last]| {
+        self.window.as_ref().map_or(0, |[first, last]| {
             let (before, now) = (of(first), of(last));
             now.checked_sub(before).unwrap_or(now)
         })
@@ -282,7 +282,7 @@ impl Border {
     }
 
     fn report(&self) -> Option<BorderReport> {
-        let [_, last] = self.seen.as_ref()?;
+        let [_, last] = self.window.as_ref()?;
         Some(BorderReport {
             period_ns: last.period_ns.max(1),
             lost_at_socket: self.is_socket.then(|| self.since(|health| health.lost)),

@@ -67,7 +67,7 @@ fn quiet(t_s: f64) -> Moment<'static> {
         size: Size::default(),
         set: "ND",
         reported: "ND",
-        told: RobotOrder::GoOn,
+        order: RobotOrder::GoOn,
         action: 0,
     }
 }
@@ -329,21 +329,21 @@ fn a_size_is_right_with_its_leaf_its_way_and_within_a_fifth() {
 
 #[test]
 fn actions_are_entries_and_stops_by_rule_are_counted_apart() {
-    let told = |t_s, told, action| Moment {
-        told,
+    let order = |t_s, order, action| Moment {
+        order,
         action,
         ..quiet(t_s)
     };
     let run = score(&[], 10.0, |t_s| match t_s {
         t if t < 2.0 => quiet(t),
-        t if t < 3.0 => told(t, RobotOrder::Slow, 1),
-        t if t < 4.0 => told(t, RobotOrder::Other, 2),
+        t if t < 3.0 => order(t, RobotOrder::Slow, 1),
+        t if t < 4.0 => order(t, RobotOrder::Other, 2),
         // The same kind for another wheel is another action.
-        t if t < 5.0 => told(t, RobotOrder::Other, 3),
-        t if t < 6.0 => told(t, RobotOrder::Blind, 4),
+        t if t < 5.0 => order(t, RobotOrder::Other, 3),
+        t if t < 6.0 => order(t, RobotOrder::Blind, 4),
         t if t < 7.0 => quiet(t),
-        t if t < 8.0 => told(t, RobotOrder::Stop, 4),
-        t => told(t, RobotOrder::Help, 5),
+        t if t < 8.0 => order(t, RobotOrder::Stop, 4),
+        t => order(t, RobotOrder::Help, 5),
     });
     let wanted = Actions {
         slow: 1,

@@ -57,7 +57,7 @@ impl Figure {
         }
     }
 
-    /// True if it is about what the robot was told.
+    /// True if it is about what the robot was ordered to do.
     pub(super) fn is_of_actions(&self) -> bool {
         let heads = ["actions", "slow", "stop", "help", "other", "blind_stops"];
         heads.iter().any(|head| self.name.starts_with(head))

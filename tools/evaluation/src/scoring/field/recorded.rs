@@ -79,7 +79,7 @@ fn score(case: &Case, taxonomy: &Taxonomy) -> Run {
             size: Size::default(),
             set: &verdict.fault_set,
             reported: &verdict.reported,
-            told: told(verdict),
+            order: order(verdict),
             action: action as u64,
         });
         t_before_s = Some(verdict.t_s);
@@ -87,7 +87,7 @@ fn score(case: &Case, taxonomy: &Taxonomy) -> Run {
     scorer.finish()
 }
 
-fn told(verdict: &Verdict) -> RobotOrder {
+fn order(verdict: &Verdict) -> RobotOrder {
     let name = verdict.action.split(':').next().unwrap_or_default();
     match name {
         "" | "go_on" => RobotOrder::GoOn,

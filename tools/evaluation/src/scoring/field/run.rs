@@ -82,8 +82,8 @@ impl Actions {
         self.slow + self.stop + self.help + self.other
     }
 
-    const fn add(&mut self, told: RobotOrder) {
-        match told {
+    const fn add(&mut self, order: RobotOrder) {
+        match order {
             RobotOrder::GoOn => {}
             RobotOrder::Slow => self.slow += 1,
             RobotOrder::Stop => self.stop += 1,
@@ -150,7 +150,7 @@ struct Before {
     mode: String,
     reported: String,
     action: u64,
-    told: RobotOrder,
+    order: RobotOrder,
 }
 
 /// Scores one run while it goes on.
@@ -226,14 +226,14 @@ impl<'a> Scorer<'a> {
             mode: moment.mode.to_owned(),
             reported: moment.reported.to_owned(),
             action: moment.action,
-            told: moment.told,
+            order: moment.order,
         });
     }
 
     /// What the run brought.
     #[must_use]
     pub fn finish(mut self) -> Run {
-        let helps = |before: &Before| before.told == RobotOrder::Help;
+        let helps = |before: &Before| before.order == RobotOrder::Help;
         self.run.is_help_latched =
             self.now().is_healthy() && self.before.as_ref().is_some_and(helps);
         self.run
@@ -388,11 +388,11 @@ impl<'a> Scorer<'a> {
         }
         let rises = moment.alarm && !before.alarm;
         run.alarms += usize::from(rises && truth.is_healthy());
-        let enters = moment.action != before.action || moment.told != before.told;
+        let enters = moment.action != before.action || moment.order != before.order;
         if enters || is_first {
             match truth.is_healthy() {
-                true => run.actions.add(moment.told),
-                false => run.actions_in_fault.add(moment.told),
+                true => run.actions.add(moment.order),
+                false => run.actions_in_fault.add(moment.order),
             }
         }
         let names = moment.reported != nominal && moment.reported != BLIND;
