@@ -49,13 +49,13 @@ const BAD: [(&str, &str, &str, &[&str]); 13] = [
         "rover.toml",
         "rate_hz = 100.0",
         "rate_hz = 0.0",
-        &["rover.toml:5", "rate_hz", "1 to"],
+        &["rover.toml:6", "rate_hz", "1 to"],
     ),
     (
         "rover.toml",
         "seed = 1",
         "seeds = 1",
-        &["rover.toml:6", "unknown field `seeds`"],
+        &["rover.toml:7", "unknown field `seeds`"],
     ),
     (
         "rover.toml",
