@@ -18,11 +18,14 @@ use vigil_robot::Description;
 pub use crate::table::TableError as FramesError;
 use crate::table::{Table, wrong_row};
 
-/// A gap in time longer than this many usual (median) intervals of its run is refused.
+/// A gap longer than this many median intervals of its run is refused. Chosen by hand: above any
+/// jitter of a recorder, below the loss of a second at 10 Hz.
 const GAP_INTERVALS_MAX: f64 = 10.0;
-/// A gap in time longer than this is refused whatever is usual, s.
+/// A gap longer than this is refused whatever the median, s: after a second without frames a
+/// detector is blind, so that a run with such a gap is two.
 const GAP_MAX_S: f64 = 1.0;
-/// Distance between two frames that no robot of this kind can drive, m.
+/// Distance between two frames that no ground robot drives, m: 2 m in less than a second. Larger
+/// ones are mostly wrong units.
 const JUMP_M_MAX: f64 = 2.0;
 
 /// One recorded run.
@@ -35,7 +38,7 @@ pub struct Run {
     pub frames: Vec<SensorFrame>,
 }
 
-/// What a column holds besides run and time.
+/// Content of a column other than run and time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Field {
     /// An axis of the command, in its own unit.
@@ -110,7 +113,7 @@ pub fn fields(robot: &Description) -> Vec<(String, Field)> {
     out
 }
 
-/// Gyro and currents of a robot whose model may know them and need not.
+/// Yaw rate and motor currents, which are optional for a robot with fault models.
 #[must_use]
 pub fn further(robot: &Description) -> Vec<(String, Field)> {
     if !robot.has_fault_models() {
@@ -122,7 +125,7 @@ pub fn further(robot: &Description) -> Vec<(String, Field)> {
     std::iter::once(gyro).chain(currents).collect()
 }
 
-/// Positions of the columns.
+/// Positions of the columns in a table.
 struct Columns {
     run: usize,
     t: usize,
@@ -174,6 +177,7 @@ impl Columns {
     }
 }
 
+/// Refuses an angle beyond half a turn: it is mostly in degrees.
 fn angle(table: &Table, name: &str, value: f64) -> Result<(), FramesError> {
     // Rounding may put a wrapped angle a little beyond pi.
     if value.abs() <= PI + 1e-3 {
@@ -221,8 +225,7 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
     Ok(runs)
 }
 
-/// Refuses a run with a gap of many times its median interval; `first_row`: that of its first
-/// frame.
+/// Refuses a run with a gap of many times its median interval. `first_row`: row of its first frame.
 fn even(path: &Path, run: &Run, first_row: u64) -> Result<(), FramesError> {
     let intervals_ns = intervals_ns(run);
     let Some(usual_s) = median_s(&mut intervals_ns.clone()) else {
@@ -243,22 +246,26 @@ fn even(path: &Path, run: &Run, first_row: u64) -> Result<(), FramesError> {
 /// Time between consecutive frames, ns.
 fn intervals_ns(run: &Run) -> Vec<u64> {
     let pairs = run.frames.windows(2);
-    let interval = |pair: &[SensorFrame]| pair[1].header.t_capture_ns - pair[0].header.t_capture_ns;
+    let interval = |pair: &[SensorFrame]| {
+        let [before, after] = [0, 1].map(|i| pair[i].header.t_capture_ns);
+        assert!(before < after, "time rises within a run");
+        after - before
+    };
     pairs.map(interval).collect()
 }
 
-/// The median, s, of two in the middle the shorter; none of nothing.
+/// The median, s; of two in the middle the shorter. None without intervals.
 fn median_s(intervals_ns: &mut [u64]) -> Option<f64> {
     let middle = intervals_ns.len().checked_sub(1)? / 2;
     let (_, median_ns, _) = intervals_ns.select_nth_unstable(middle);
     Some(*median_ns as f64 * 1e-9)
 }
 
-/// Rate at which recorded runs are played at `speed` times their own, Hz: from the median interval
-/// between consecutive frames. A message if it is not within 1 to 10000 Hz.
+/// Frame rate of a playback at `speed` times the recorded one, Hz, from the median interval between
+/// frames. `runs`: as [`read`] returns them.
 ///
 /// # Errors
-/// What is wrong, and what is allowed.
+/// A message with the rate and what is allowed, for a rate outside 1 to 10000 Hz or no two frames.
 pub fn playback_rate_hz(runs: &[Run], speed: f64) -> Result<f64, String> {
     let mut all_ns: Vec<u64> = runs.iter().flat_map(intervals_ns).collect();
     let Some(interval_s) = median_s(&mut all_ns) else {
@@ -274,6 +281,7 @@ pub fn playback_rate_hz(runs: &[Run], speed: f64) -> Result<f64, String> {
     ))
 }
 
+/// Refuses a frame that cannot follow the last one of its run, with the likely cause.
 fn follows(
     table: &Table,
     run: &Run,
@@ -311,4 +319,37 @@ fn follows(
         return Err(table.wrong(message));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(times_ns: &[u64]) -> Run {
+        let frame = |&t_ns: &u64| {
+            let mut frame = SensorFrame::default();
+            frame.header.t_capture_ns = t_ns;
+            frame
+        };
+        Run {
+            id: 0,
+            frames: times_ns.iter().map(frame).collect(),
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "time rises within a run")]
+    fn frames_out_of_order_are_caught() {
+        let _ = playback_rate_hz(&[run(&[0, 50_000_000, 40_000_000])], 1.0);
+    }
+
+    #[test]
+    fn the_rate_is_that_of_the_shorter_median_interval() {
+        let runs = [run(&[0, 50_000_000, 150_000_000]), run(&[7])];
+        assert_eq!(playback_rate_hz(&runs, 1.0), Ok(20.0));
+        assert_eq!(playback_rate_hz(&runs, 0.5), Ok(10.0));
+        assert!(playback_rate_hz(&runs, 0.01).is_err());
+        assert!(playback_rate_hz(&runs, 501.0).is_err());
+        assert!(playback_rate_hz(&runs[1..], 1.0).is_err());
+    }
 }

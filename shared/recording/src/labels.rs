@@ -1,4 +1,4 @@
-//! What was wrong in each recorded run.
+//! Labels: the true fault of each recorded run.
 //!
 //! CSV: `run`, `mode` (`ND`, `<WHEEL>_STUCK`, `<WHEEL>_ENC`), `kind` (`stuck`, `zero`, `frozen`,
 //! `noise`, or empty), `wheel` (or empty), `onset_s` (-1 for none), `cmd_curv`, `cmd_speed`,
@@ -53,7 +53,7 @@ const COLUMNS: [&str; 8] = [
     "dur_s",
 ];
 
-/// What is needed for a robot whose faults are not modelled.
+/// Columns for a robot without fault models.
 const NOMINAL: [&str; 3] = ["run", "mode", "onset_s"];
 
 /// Reads the labels of a file.
@@ -83,8 +83,8 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Label>, LabelsError>
     Ok(labels)
 }
 
-/// The grounds that the column `terrain` names for these runs, each once and in order, joined by
-/// `+`; empty without such a column.
+/// Names of the grounds of these runs, from the column `terrain`: sorted, without repetition, joined
+/// by `+`. Empty without such a column.
 ///
 /// # Errors
 /// [`LabelsError`].

@@ -1,5 +1,4 @@
-//! Recorded runs as tables: frames, and labels of what was true in them. Reads files; knows no
-//! transport and no clock.
+#![doc = include_str!("../README.md")]
 
 pub mod frames;
 pub mod labels;
