@@ -335,6 +335,8 @@ mod tests {
         fn log_likelihood(&self, mode: usize, _steps: &usize, z: &f64) -> f64 {
             match (mode == 0) == (*z >= 0.0) {
                 _ if z.is_nan() => f64::NEG_INFINITY,
+                // A large observation is impossible in the other mode.
+                false if z.abs() > 10.0 => f64::NEG_INFINITY,
                 true => 0.8_f64.ln(),
                 false => 0.2_f64.ln(),
             }
@@ -405,6 +407,21 @@ mod tests {
         assert!(filter.particles().all(|(_, &steps, _)| steps == 100));
         assert_eq!(filter.posterior(), [1.0, 0.0]);
         assert_eq!(filter.step(&f64::NAN).event, Some(Event::Coasted));
+    }
+
+    #[test]
+    fn an_adaptive_count_counts_the_cells_that_have_weight() {
+        let after = |z: f64| {
+            let proposal = Proposal::prior(&Sign).unwrap();
+            let filter = ParticleFilter::new(Sign, proposal, Resampling::EVERY_STEP, 200, 1);
+            let adaptive = Adaptive::new(0.05, 2.33, 10, 200);
+            let mut filter = filter.unwrap().with_adaptive_count(adaptive);
+            filter.step(&z);
+            filter.count()
+        };
+        // All states are alike: a cell for each mode. Fox's equation 12 for two cells is 67.
+        assert_eq!(after(1.0), 67);
+        assert_eq!(after(20.0), 10, "one mode is impossible");
     }
 
     #[test]
