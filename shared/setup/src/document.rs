@@ -91,7 +91,7 @@ impl Document {
     /// The document as text, for another process.
     ///
     /// # Errors
-    /// A value that TOML cannot hold: a seed above 2^63 - 1.
+    /// A value that TOML cannot hold.
     pub fn to_text(&self) -> Result<String, SetupError> {
         toml::to_string(self)
             .map_err(|error| Problem::at_line(&self.graph.path, 0, error.to_string()).into())
