@@ -6,7 +6,7 @@ use vigil_blocks::{
 };
 use vigil_robot::fused_alarm::{FusedAlarm, StageBeliefs};
 
-use crate::supervisor::Inputs;
+use crate::inputs::Inputs;
 
 /// Detections in a row without a diagnosis after which the identifier counts as lost, as every
 /// input of a service does (`vigil_cycle`).

@@ -9,11 +9,11 @@ use vigil_pomdp::{Choice, Control, Decider, Evidence, PointBased, Pomdp, Tracker
 
 use crate::action_hysteresis::hold;
 use crate::alarm_fusion::Situation;
+use crate::inputs::Inputs;
 use crate::mapping::{self, ActionMeaning, SupervisorError};
 use crate::policy::{self, Worth};
 use crate::settings::Settings;
 use crate::stage_loss::StageLossMonitor;
-use crate::supervisor::Inputs;
 
 /// A published belief sums to 1 within this: the tracker's tolerance.
 const SUM_TOLERANCE: f64 = 1e-9;

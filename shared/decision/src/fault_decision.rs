@@ -7,9 +7,9 @@ use crate::action_hysteresis::ActionHysteresis;
 use crate::alarm_fusion::Situation;
 use crate::decision_process::{DecisionProcess, DecisionRule, Instruction};
 use crate::evidence::{self, Effect, EpochEvidence};
+use crate::inputs::Inputs;
 use crate::mapping::{self, Compensation, StateMeaning, SupervisorError};
 use crate::settings::Settings;
-use crate::supervisor::Inputs;
 
 /// Tracks the belief over the leaves of the fault tree, nominal and unknown, and chooses actions.
 pub(crate) struct FaultDecision {

@@ -23,10 +23,10 @@
 //! what is unknown then is the hardware's, until an epoch of following the path was quiet and the
 //! identifier saw nothing. (A robot that finds itself elsewhere begins a new run.)
 //!
-//! While the identifier reports that something is wrong, only actions that may mend the hardware are
-//! allowed, and once those that may find a lost robot's place. Looking at what blocks the way does
-//! not change the identifier's belief, and a policy that expects to know more after any step (Q-MDP
-//! does) would look for ever.
+//! While the identifier reports that something is wrong, only actions that may mend the hardware
+//! are allowed, and once those that may find a lost robot's place. Looking at what blocks the way
+//! does not change the identifier's belief, and a policy that expects to know more after any step
+//! (Q-MDP does) would look for ever.
 //!
 //! Without the identifier, an alarm of the detector is something unknown, with its probability.
 

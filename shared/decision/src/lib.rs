@@ -7,6 +7,7 @@ mod epoch;
 mod evidence;
 mod fault_decision;
 mod hardware;
+mod inputs;
 mod mapping;
 mod observations;
 mod policy;
@@ -16,6 +17,7 @@ mod supervisor;
 mod symptom_decision;
 
 pub use alarm_fusion::fused_alarm;
+pub use inputs::Inputs;
 pub use mapping::{Compensation, SupervisorError};
 pub use settings::{Evidence, Gate, Recovery, RecoveryAction, Settings};
-pub use supervisor::{Inputs, Supervisor};
+pub use supervisor::Supervisor;

@@ -1,25 +1,16 @@
 //! One decision cycle.
 
-use vigil_blocks::{Action, DetectionBelief, Entry, FaultBelief};
+use vigil_blocks::{Action, Entry};
 use vigil_pomdp::{PointBased, Pomdp};
 use vigil_robot::{Description, FaultTree};
 
 use crate::alarm_fusion::AlarmFusion;
 use crate::decision_process::{DecisionProcess, DecisionRule};
 use crate::fault_decision::FaultDecision;
+use crate::inputs::Inputs;
 use crate::mapping::{Compensation, SupervisorError};
 use crate::settings::{self, Settings};
 use crate::symptom_decision::SymptomDecision;
-
-/// What a cycle of the supervisor takes; at least one of the two is there.
-#[derive(Debug, Clone, Copy)]
-pub struct Inputs<'a> {
-    /// The identifier's belief, if it came.
-    pub diagnosis: Option<&'a FaultBelief>,
-    /// The newest belief of the detector, if it is new. One that a missed deadline caused says
-    /// whether the detector is blind, and nothing else.
-    pub detection: Option<&'a DetectionBelief>,
-}
 
 /// Tracks the belief of the recovery POMDP and chooses actions.
 pub struct Supervisor {

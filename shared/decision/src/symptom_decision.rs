@@ -9,10 +9,10 @@ use crate::alarm_fusion::Situation;
 use crate::decision_process::{DecisionProcess, DecisionRule, Instruction};
 use crate::epoch::{End, Epoch, Limits};
 use crate::hardware::HardwareEvidence;
+use crate::inputs::Inputs;
 use crate::mapping::{self, ActionMeaning, SupervisorError};
 use crate::observations::Observations;
 use crate::settings::Settings;
-use crate::supervisor::Inputs;
 
 /// Tracks the belief over exceptions, one step an epoch, and chooses actions.
 ///

@@ -12,14 +12,19 @@ pub(crate) struct Block {
     pub others: Vec<(u32, u32, f64)>,
 }
 
+/// Outcomes of a pair (s,a).
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct BlockSize {
+    /// Next states.
+    pub next: usize,
+    pub observations: usize,
+}
+
 impl Block {
-    /// The canonical form of a block of `next` x `observations` values: `rest`, but for `others`,
+    /// The canonical form of a block of this `size`: `rest`, but for `others`,
     /// which ascend.
-    pub(crate) fn new(
-        (next, observations): (usize, usize),
-        rest: f64,
-        mut others: Vec<(u32, u32, f64)>,
-    ) -> Self {
+    pub(crate) fn new(size: BlockSize, rest: f64, mut others: Vec<(u32, u32, f64)>) -> Self {
+        let BlockSize { next, observations } = size;
         let mut counts: HashMap<u64, usize> = HashMap::new();
         counts.insert(rest.to_bits(), next * observations - others.len());
         for (_, _, value) in &others {
@@ -135,15 +140,22 @@ fn key(block: &Block) -> Vec<u64> {
 mod tests {
     use super::*;
 
+    const fn size(side: usize) -> BlockSize {
+        BlockSize {
+            next: side,
+            observations: side,
+        }
+    }
+
     #[test]
     fn a_block_is_the_same_however_it_was_written() {
         let dense = vec![(0, 0, 1.0), (0, 1, 2.0), (1, 0, 2.0), (1, 1, 2.0)];
-        let block = Block::new((2, 2), 0.0, dense);
-        assert_eq!(block, Block::new((2, 2), 2.0, vec![(0, 0, 1.0)]));
+        let block = Block::new(size(2), 0.0, dense);
+        assert_eq!(block, Block::new(size(2), 2.0, vec![(0, 0, 1.0)]));
         assert_eq!(block.others, [(0, 0, 1.0)]);
         assert_eq!((block.at(0, 0), block.at(1, 0)), (1.0, 2.0));
         // The default is not the most frequent value, and not the only one left.
-        let block = Block::new((2, 2), 5.0, vec![(0, 1, 7.0), (1, 0, 7.0), (1, 1, 7.0)]);
+        let block = Block::new(size(2), 5.0, vec![(0, 1, 7.0), (1, 0, 7.0), (1, 1, 7.0)]);
         assert_eq!((block.rest, block.at(0, 0)), (7.0, 5.0));
         assert_eq!(block.others_at(0), [(0, 0, 5.0)]);
         assert_eq!(block.others_at(1), []);
@@ -151,7 +163,7 @@ mod tests {
 
     #[test]
     fn equal_blocks_are_stored_once() {
-        let block = |r| Block::new((1, 1), r, Vec::new());
+        let block = |r| Block::new(size(1), r, Vec::new());
         let rewards = Rewards::new(2, &[2, 0, 1, 2], vec![block(1.0), block(3.0), block(3.0)]);
         assert_eq!(rewards.blocks().len(), 2);
         let got = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(s, a)| rewards.block(s, a).rest);

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::factors::{Factor, Factors};
 use super::scope::Scope;
 use super::table::Budget;
-use crate::model::rewards::{Block, Rewards};
+use crate::model::rewards::{Block, BlockSize, Rewards};
 use crate::model::sparse::Sparse;
 use crate::parse_error::{ParseError, Position};
 use crate::reader::limits::{ENTRIES_MAX, WRITES_PER_REWARD};
@@ -107,7 +107,7 @@ impl<'a> Product<'a> {
 
     pub(super) fn rewards(&mut self) -> Result<Rewards, ParseError> {
         let scope = self.scope;
-        let (n, k) = (scope.states(), scope.observations());
+        let n = scope.states();
         let (acts, before) = (slots(scope.action_slots()), slots(scope.before()));
         let used: Vec<usize> = (0..scope.before().end)
             .filter(|slot| self.factors.reward.iter().any(|t| t.slots.contains(slot)))
@@ -130,7 +130,7 @@ impl<'a> Product<'a> {
                     self.outcomes()?
                 } else {
                     self.spend(1)?;
-                    Block::new((n, k), self.reward_here(), Vec::new())
+                    Block::new(self.block_size(), self.reward_here(), Vec::new())
                 };
                 entries += block.others.len();
                 check_entries("R", entries)?;
@@ -141,6 +141,13 @@ impl<'a> Product<'a> {
             }
         }
         Ok(Rewards::new(n, &of, blocks))
+    }
+
+    fn block_size(&self) -> BlockSize {
+        BlockSize {
+            next: self.scope.states(),
+            observations: self.scope.observations(),
+        }
     }
 
     /// R(s,a,.,.) of the state and action that are set.
@@ -159,7 +166,7 @@ impl<'a> Product<'a> {
                 others.push((to as u32, z as u32, self.reward_here()));
             }
         }
-        Ok(Block::new((n, k), 0.0, others))
+        Ok(Block::new(self.block_size(), 0.0, others))
     }
 
     /// Takes work for so many evaluations of the reward.

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use super::cursor::Pick;
 use super::limits::{self, ENTRIES_MAX};
 use super::replay::Rules;
-use crate::model::rewards::{Block, Rewards};
+use crate::model::rewards::{Block, BlockSize, Rewards};
 use crate::parse_error::ParseError;
 
 /// What a rule writes into R(s,a,.,.).
@@ -88,11 +88,11 @@ impl Draft {
         }
     }
 
-    fn block(self, sizes: (usize, usize), sign: f64) -> Block {
+    fn block(self, size: BlockSize, sign: f64) -> Block {
         let others = self.others.into_iter();
         // Never a negative zero.
         let others = others.map(|((to, z), value)| (to, z, sign * value + 0.0));
-        Block::new(sizes, sign * self.rest + 0.0, others.collect())
+        Block::new(size, sign * self.rest + 0.0, others.collect())
     }
 }
 
@@ -122,7 +122,7 @@ pub(super) fn rewards(
         for number in numbers {
             draft.apply(fill(number), state, next, observations);
         }
-        let block = draft.block((next, observations), sign);
+        let block = draft.block(BlockSize { next, observations }, sign);
         kept += block.others.len();
         let at = numbers.last().map_or(rules.at, |&n| rules.rule(n).at);
         limits::check(Some(kept), ENTRIES_MAX, at, "R entries")?;

@@ -3,8 +3,20 @@
 use statrs::distribution::{Beta, ContinuousCDF};
 
 use super::layout::{Layout, Row};
-use super::learner::Iteration;
 use vigil_pomdp::Pomdp;
+
+/// Where an iteration began.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Iteration {
+    /// Start, from 0.
+    pub start: usize,
+    /// Iteration, from 0.
+    pub iteration: usize,
+    /// sum ln c over all missions, nats.
+    pub log_likelihood: f64,
+    /// sum ln c + sum kappa ln theta: what rises.
+    pub objective: f64,
+}
 
 /// A learned model and its origin.
 #[derive(Debug, Clone)]

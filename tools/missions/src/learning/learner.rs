@@ -6,7 +6,7 @@ use rand_pcg::Pcg64Mcg;
 use super::expectation::{Impossible, Passes};
 use super::information::Information;
 use super::layout::Layout;
-use super::learned::LearnedModel;
+use super::learned::{Iteration, LearnedModel};
 use super::record::{Record, RecordError};
 use super::sampling;
 use vigil_pomdp::ParseError;
@@ -75,19 +75,6 @@ pub enum LearnError {
     /// Rewards overflow with the learned probabilities.
     #[error("the learned model: {0}")]
     Model(ParseError),
-}
-
-/// Where an iteration began.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Iteration {
-    /// Start, from 0.
-    pub start: usize,
-    /// Iteration, from 0.
-    pub iteration: usize,
-    /// sum ln c over all missions, nats.
-    pub log_likelihood: f64,
-    /// sum ln c + sum kappa ln theta: what rises.
-    pub objective: f64,
 }
 
 /// Learns from missions, anchored at `prior`; `watch` is shown every iteration.

@@ -30,6 +30,6 @@ mod sampling;
 
 pub use expectation::Impossible;
 pub use layout::{Row, Table};
-pub use learned::{Entry, LearnedModel, LearnedRow};
-pub use learner::{Iteration, LearnError, Settings, learn};
+pub use learned::{Entry, Iteration, LearnedModel, LearnedRow};
+pub use learner::{LearnError, Settings, learn};
 pub use record::{Record, RecordError};

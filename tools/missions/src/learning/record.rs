@@ -1,6 +1,6 @@
 //! What was recorded of one mission.
 
-use crate::simulation::{Agent, Mission, Rules, run_watched};
+use crate::simulation::{Agent, Episode, Mission, Rules, run_watched};
 use vigil_pomdp::Pomdp;
 
 /// One mission of T steps: action t is taken in state t and leads to state t + 1, where
@@ -115,17 +115,16 @@ impl Record {
         }
     }
 
-    /// A mission of the event simulator, with its rewards and, if `labelled`, its states;
-    /// `numbers` are seed and episode.
+    /// A mission of the event simulator, with its rewards and, if `labelled`, its states.
     pub fn simulated(
         model: &Pomdp,
         agent: &mut dyn Agent,
         rules: &Rules,
-        numbers: (u64, u64),
+        episode: Episode,
         labelled: bool,
     ) -> (Self, Mission) {
         let mut record = Self::default();
-        let mission = run_watched(model, agent, rules, numbers, &mut |seen| {
+        let mission = run_watched(model, agent, rules, episode, &mut |seen| {
             record.actions.push(seen.action as u32);
             record.observations.push(seen.observation as u32);
             record.rewards.push(seen.reward);

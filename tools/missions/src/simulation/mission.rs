@@ -1,6 +1,8 @@
 //! One mission.
 
-use super::{Agent, World};
+use super::agent::Agent;
+use super::stream::Episode;
+use super::world::World;
 use vigil_pomdp::Pomdp;
 use vigil_pomdp::policy::Control;
 
@@ -61,10 +63,9 @@ pub struct HiddenStep {
     pub reward: f64,
 }
 
-/// Mission `episode` of an agent in a world that follows `model`; `numbers` are its seed and
-/// episode.
-pub fn run(model: &Pomdp, agent: &mut dyn Agent, rules: &Rules, numbers: (u64, u64)) -> Mission {
-    run_watched(model, agent, rules, numbers, &mut |_| ())
+/// The mission of an agent in a world that follows `model`.
+pub fn run(model: &Pomdp, agent: &mut dyn Agent, rules: &Rules, episode: Episode) -> Mission {
+    run_watched(model, agent, rules, episode, &mut |_| ())
 }
 
 /// As [`run`]; `watch` is shown every step.
@@ -72,10 +73,10 @@ pub fn run_watched(
     model: &Pomdp,
     agent: &mut dyn Agent,
     rules: &Rules,
-    (seed, episode): (u64, u64),
+    episode: Episode,
     watch: &mut dyn FnMut(HiddenStep),
 ) -> Mission {
-    let mut world = World::new(model, seed, episode);
+    let mut world = World::new(model, episode);
     let mut mission = Mission::default();
     let mut weight = 1.0;
     agent.begin();

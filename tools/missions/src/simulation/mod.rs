@@ -20,5 +20,5 @@ pub use agent::{Act, Agent, PolicyAgent, Random};
 pub use escalation::{Escalation, EscalationError};
 pub use mission::{HiddenStep, Mission, Rules, horizon, run, run_watched};
 pub use statistics::{PairedDifference, Summary};
-pub use stream::Stream;
+pub use stream::{Episode, Stream};
 pub use world::{Event, World};

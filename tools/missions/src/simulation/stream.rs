@@ -4,6 +4,15 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::fnv1a;
 
+/// One of many missions that are drawn alike.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Episode {
+    /// Seed of all of them.
+    pub seed: u64,
+    /// Which one.
+    pub number: u64,
+}
+
 /// Uniform numbers in [0, 1): one for the start, then three a step, whoever acts.
 #[derive(Debug, Clone)]
 pub struct Stream {
@@ -24,8 +33,8 @@ pub struct Draw {
 impl Stream {
     /// The stream of an episode.
     #[must_use]
-    pub fn new(seed: u64, episode: u64) -> Self {
-        let mixed = fnv1a::hash_u64(fnv1a::hash_u64(fnv1a::BASIS, seed), episode);
+    pub fn new(episode: Episode) -> Self {
+        let mixed = fnv1a::hash_u64(fnv1a::hash_u64(fnv1a::BASIS, episode.seed), episode.number);
         Self {
             generator: Pcg64Mcg::seed_from_u64(mixed),
         }

@@ -1,6 +1,6 @@
 //! The simulated world: a model in which things happen by chance.
 
-use super::stream::{Draw, Stream};
+use super::stream::{Draw, Episode, Stream};
 use vigil_pomdp::Pomdp;
 
 /// A world that follows a model.
@@ -24,8 +24,8 @@ pub struct Event {
 impl<'m> World<'m> {
     /// An episode of a world begins, in a state drawn from the model's start belief.
     #[must_use]
-    pub fn new(model: &'m Pomdp, seed: u64, episode: u64) -> Self {
-        let mut stream = Stream::new(seed, episode);
+    pub fn new(model: &'m Pomdp, episode: Episode) -> Self {
+        let mut stream = Stream::new(episode);
         let start = model.start().iter().copied().enumerate();
         let state = drawn(start, stream.number());
         let draw = stream.draw();

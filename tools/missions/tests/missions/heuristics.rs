@@ -1,6 +1,6 @@
 //! Rewards of the heuristics on public models, against an independent simulation.
 
-use vigil_missions::simulation::{PolicyAgent, Rules, Summary, horizon, run};
+use vigil_missions::simulation::{Episode, PolicyAgent, Rules, Summary, horizon, run};
 use vigil_pomdp::mdp;
 use vigil_pomdp::policy::{Dual, PolicyName};
 
@@ -31,7 +31,8 @@ fn heuristics_earn_on_public_models_what_another_implementation_says() {
             let policy: PolicyName = name.parse().unwrap();
             let decider = policy.build(&model, &solution, |i| Dual::new(i, 0.5));
             let mut agent = PolicyAgent::new(&model, decider.unwrap());
-            let mission = |e| run(&model, &mut agent, &rules, (1, e)).discounted;
+            let mission =
+                |e| run(&model, &mut agent, &rules, Episode { seed: 1, number: e }).discounted;
             let summary = Summary::new(&mut (0..EPISODES).map(mission).collect::<Vec<_>>());
             // Both means are known to within their intervals.
             let both = summary.half_width.hypot(half_width);

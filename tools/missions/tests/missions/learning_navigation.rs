@@ -3,7 +3,7 @@
 
 use vigil_missions::learning::{Record, Settings, check, learn};
 use vigil_missions::navigation::{self, Parameters, QUIET};
-use vigil_missions::simulation::{Agent, Escalation, PolicyAgent, Rules, horizon, run};
+use vigil_missions::simulation::{Agent, Episode, Escalation, PolicyAgent, Rules, horizon, run};
 use vigil_pomdp::policy::{Base, Decider};
 use vigil_pomdp::{Pomdp, mdp};
 
@@ -13,7 +13,7 @@ fn parameters() -> Parameters {
 }
 
 fn mean(world: &Pomdp, agent: &mut dyn Agent, missions: u64) -> f64 {
-    let one = |e| run(world, agent, &rules(world), (2, e)).discounted;
+    let one = |e| run(world, agent, &rules(world), Episode { seed: 2, number: e }).discounted;
     (0..missions).map(one).sum::<f64>() / missions as f64
 }
 
@@ -50,7 +50,16 @@ fn a_learned_model_predicts_better_than_the_one_by_hand_and_beats_the_escalation
     let ladder = ["MA", "GO", "NP", "RL", "SH", "GU"];
     let mut escalation = Escalation::new(&truth, "FP", &ladder, &QUIET, 1).unwrap();
     let rules = rules(&truth);
-    let mut record = |e| Record::simulated(&truth, &mut escalation, &rules, (1, e), false).0;
+    let mut record = |e| {
+        Record::simulated(
+            &truth,
+            &mut escalation,
+            &rules,
+            Episode { seed: 1, number: e },
+            false,
+        )
+        .0
+    };
     let records: Vec<Record> = (0..400).map(&mut record).collect();
     let settings = Settings {
         iterations_max: 40,

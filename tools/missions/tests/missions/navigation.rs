@@ -4,7 +4,7 @@ use vigil_missions::navigation::{
     ACTIONS, ENDS, ParameterError, Parameters, QUIET, STATES, generate,
 };
 use vigil_missions::simulation::{
-    Agent, Escalation, PairedDifference, PolicyAgent, Random, Rules, Summary, horizon, run,
+    Agent, Episode, Escalation, PairedDifference, PolicyAgent, Random, Rules, Summary, horizon, run,
 };
 use vigil_pomdp::policy::{Base, Dual, PolicyName};
 use vigil_pomdp::{Evidence, Pomdp, Tracker, mdp};
@@ -257,7 +257,18 @@ fn missions(agent: &mut dyn Agent, ends: bool) -> Vec<f64> {
         steps_max: horizon(model.discount(), 1000),
         is_end: ACTIONS.iter().map(is_end).collect(),
     };
-    let one = |episode| run(&model, agent, &rules, (7, episode)).discounted;
+    let one = |episode| {
+        run(
+            &model,
+            agent,
+            &rules,
+            Episode {
+                seed: 7,
+                number: episode,
+            },
+        )
+        .discounted
+    };
     (0..1000).map(one).collect()
 }
 

@@ -1,8 +1,8 @@
 //! The event simulator: random numbers in pairs, missions, statistics.
 
 use vigil_missions::simulation::{
-    Act, Agent, Escalation, EscalationError, PairedDifference, PolicyAgent, Random, Rules, Summary,
-    World, horizon, run,
+    Act, Agent, Episode, Escalation, EscalationError, PairedDifference, PolicyAgent, Random, Rules,
+    Summary, World, horizon, run,
 };
 use vigil_pomdp::policy::{Control, Dual, PolicyName};
 use vigil_pomdp::{Pomdp, mdp};
@@ -75,7 +75,13 @@ fn events_come_as_often_as_the_model_says() {
     let (mut worn, mut wears, mut used, mut rattles) = (0.0, 0.0, 0.0, 0.0);
     let episodes = 40_000;
     for episode in 0..episodes {
-        let mut world = World::new(&model, 3, episode);
+        let mut world = World::new(
+            &model,
+            Episode {
+                seed: 3,
+                number: episode,
+            },
+        );
         let before = world.state();
         worn += before as f64;
         let event = world.step(0);
@@ -101,7 +107,15 @@ fn the_same_step_of_the_same_mission_takes_the_same_numbers_whoever_acts() {
     let model = model();
     let numbers = |actions: &[usize], episode| {
         let mut agent = Scripted::new(actions);
-        run(&model, &mut agent, &endless(50), (9, episode));
+        run(
+            &model,
+            &mut agent,
+            &endless(50),
+            Episode {
+                seed: 9,
+                number: episode,
+            },
+        );
         (agent.chances, agent.heard)
     };
     let (chances, heard) = numbers(&[0], 5);
@@ -121,7 +135,17 @@ fn rewards_agree_with_the_exact_value_of_a_fixed_policy() {
     let model = model();
     let rules = endless(horizon(model.discount(), 1000));
     assert_eq!(rules.steps_max, 88);
-    let mut mission = |episode| run(&model, &mut Scripted::new(&[0]), &rules, (1, episode));
+    let mut mission = |episode| {
+        run(
+            &model,
+            &mut Scripted::new(&[0]),
+            &rules,
+            Episode {
+                seed: 1,
+                number: episode,
+            },
+        )
+    };
     let missions: Vec<_> = (0..20_000).map(&mut mission).collect();
     let summary = Summary::new(&mut missions.iter().map(|m| m.discounted).collect::<Vec<_>>());
     // Never mended: V(worn) = -1/(1 - 0.9), V(good) = (2 + 0.9 0.2 V(worn)) / (1 - 0.9 0.8).
@@ -148,11 +172,12 @@ fn an_ending_action_is_paid_for_and_is_the_last() {
         is_end: vec![false, true],
     };
     let mut agent = Scripted::new(&[0, 0, 1]);
-    let mission = run(&model, &mut agent, &rules, (1, 1));
+    let mission = run(&model, &mut agent, &rules, Episode { seed: 1, number: 1 });
     assert!(mission.is_ended && mission.steps == 3);
     assert_eq!(agent.heard.len(), 2, "nothing is observed after the end");
     let mut random = Random::new(2);
-    let shares = (0..2000).map(|e| run(&model, &mut random, &rules, (1, e)).steps as f64);
+    let shares = (0..2000)
+        .map(|e| run(&model, &mut random, &rules, Episode { seed: 1, number: e }).steps as f64);
     let mean = Summary::new(&mut shares.collect::<Vec<_>>()).mean;
     assert!((mean - 2.0).abs() < 0.2, "half of all steps end it: {mean}");
 }
@@ -218,7 +243,14 @@ fn what_the_believed_model_rules_out_is_counted_and_survived() {
     let decider = name.build(&sure, &solution, |i| Dual::new(i, 0.5)).unwrap();
     let mut agent = PolicyAgent::new(&sure, decider);
     let missions: Vec<_> = (0..200)
-        .map(|e| run(&world, &mut agent, &endless(60), (2, e)))
+        .map(|e| {
+            run(
+                &world,
+                &mut agent,
+                &endless(60),
+                Episode { seed: 2, number: e },
+            )
+        })
         .collect();
     assert!(missions.iter().map(|m| m.impossible).sum::<usize>() > 1000);
     assert!(

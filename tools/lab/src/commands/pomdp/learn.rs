@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use vigil_missions::learning::check::{Agreement, Refusal, RewardCheck};
 use vigil_missions::learning::{LearnedModel, Record, Settings, check, learn};
 use vigil_missions::simulation::{
-    PairedDifference, PolicyAgent, Rules, Summary, horizon, run as fly,
+    Episode, PairedDifference, PolicyAgent, Rules, Summary, horizon, run as fly,
 };
 use vigil_pomdp::policy::{Dual, PolicyName};
 use vigil_pomdp::{Pomdp, mdp};
@@ -205,6 +205,6 @@ fn worth(args: &Args, model: &Pomdp, world: &Pomdp) -> Result<Vec<f64>, CommandE
         is_end: vec![false; world.actions().len()],
     };
     let seed = seed::for_command("learn", args.seed);
-    let one = |mission| fly(world, &mut agent, &rules, (seed, mission)).discounted;
+    let one = |number| fly(world, &mut agent, &rules, Episode { seed, number }).discounted;
     Ok((0..args.episodes).map(one).collect())
 }

@@ -5,7 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use vigil_missions::learning::Record;
-use vigil_missions::simulation::{Rules, horizon};
+use vigil_missions::simulation::{Episode, Rules, horizon};
 use vigil_pomdp::mdp;
 
 use super::compare::contestant::{Contestant, Knowledge};
@@ -82,12 +82,12 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     missions::write_head(&mut out, contestant.label()).map_err(failed)?;
     let progress = Progress::new("missions", args.episodes as usize);
     let seed = seed::for_command("simulate", args.seed);
-    for episode in 0..args.episodes {
-        let numbers = (seed, episode);
-        let (record, _) = Record::simulated(&model, &mut *agent, &rules, numbers, args.states);
+    for number in 0..args.episodes {
+        let episode = Episode { seed, number };
+        let (record, _) = Record::simulated(&model, &mut *agent, &rules, episode, args.states);
         missions::write(&mut out, &model, &record).map_err(failed)?;
-        if episode % 64 == 0 {
-            progress.show(episode as usize);
+        if number % 64 == 0 {
+            progress.show(number as usize);
         }
     }
     out.flush().map_err(failed)?;

@@ -1,7 +1,7 @@
 //! Missions recorded from a model.
 
 use vigil_missions::learning::Record;
-use vigil_missions::simulation::{Random, Rules};
+use vigil_missions::simulation::{Episode, Random, Rules};
 use vigil_pomdp::Pomdp;
 
 /// `count` missions of `steps` actions taken at random, with the states if `labelled`.
@@ -11,6 +11,15 @@ pub fn missions(model: &Pomdp, seed: u64, count: u64, steps: usize, labelled: bo
         is_end: vec![false; model.actions().len()],
     };
     let mut agent = Random::new(model.actions().len());
-    let one = |e| Record::simulated(model, &mut agent, &rules, (seed, e), labelled).0;
+    let one = |e| {
+        Record::simulated(
+            model,
+            &mut agent,
+            &rules,
+            Episode { seed, number: e },
+            labelled,
+        )
+        .0
+    };
     (0..count).map(one).collect()
 }

@@ -4,7 +4,9 @@ use std::time::Instant;
 
 use serde::Serialize;
 use serde_json::{Value, json};
-use vigil_missions::simulation::{Act, Agent, Mission, PairedDifference, Rules, Summary, run};
+use vigil_missions::simulation::{
+    Act, Agent, Episode, Mission, PairedDifference, Rules, Summary, run,
+};
 use vigil_pomdp::Pomdp;
 
 use super::bound::Upper;
@@ -101,9 +103,9 @@ impl Contest {
                 times_ns: Vec::new(),
             };
             let mut missions = Vec::with_capacity(setting.episodes as usize);
-            for episode in 0..setting.episodes {
-                let numbers = (seed, episode);
-                missions.push(run(setting.world, &mut agent, setting.rules, numbers));
+            for number in 0..setting.episodes {
+                let episode = Episode { seed, number };
+                missions.push(run(setting.world, &mut agent, setting.rules, episode));
                 let done = rows.len() * setting.episodes as usize + missions.len();
                 if missions.len() % 64 == 0 {
                     progress.show(done);
