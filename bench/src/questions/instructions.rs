@@ -27,7 +27,7 @@ const STEPS: [(&str, &[&str]); 4] = [
         &["*Simulation::step*", "*Simulation::measure*"],
     ),
     ("detector", &["*detector::Detector::step*"]),
-    ("identifier", &["*watcher::Diagnoser::step*"]),
+    ("identifier", &["*diagnoser::Diagnoser::step*"]),
     ("supervisor", &["*supervisor::Supervisor::step*"]),
 ];
 /// The word with which the program is the process that is counted.

@@ -162,7 +162,7 @@ impl Stage for DetectorStage {
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         self.watch.tell(health, now_ns);
-        for finding in self.detector.found().into_iter().flatten() {
+        for finding in self.detector.findings().into_iter().flatten() {
             let what = finding.to_wire();
             health.event(now_ns, EventKind::Publisher, what, finding.value, 0);
         }

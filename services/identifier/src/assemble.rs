@@ -1,6 +1,8 @@
 //! From the configuration to an identifier.
 
-use vigil_diagnosis::identify::{Diagnoser, Identifier, IdentifierError, Models, Watcher};
+use vigil_diagnosis::identify::{
+    Diagnoser, Identifier, IdentifierError, Models, NominalIdentifier,
+};
 use vigil_robot::RobotModel;
 use vigil_setup::Setup;
 
@@ -19,7 +21,7 @@ pub fn assemble(setup: &Setup) -> Result<Diagnoser, IdentifierError> {
     } = setup;
     let model = match model {
         RobotModel::Faults(model) => model,
-        RobotModel::Nominal(_) => return Ok(Diagnoser::from(Watcher::new(tree))),
+        RobotModel::Nominal(_) => return Ok(Diagnoser::from(NominalIdentifier::new(tree))),
     };
     let models = Models {
         model,

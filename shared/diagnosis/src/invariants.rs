@@ -13,7 +13,7 @@ use vigil_blocks::{FAULT_NODES, FaultBelief, FaultSet, MODE_BLIND, MODE_MULTIPLE
 const ROUNDING: f64 = 1e-9;
 
 /// Probability, at most, of sets that the tree has no leaf for: the fusion with gyro and currents
-/// may leave the others 1e-9 of what they had (`further::RATIO_MAX`), beside which `sets::FLOOR` of
+/// may leave the others 1e-9 of what they had (`further::RATIO_MAX`), beside which `set_probabilities::FLOOR` of
 /// each of 25 such sets is 2.5 %.
 const UNNAMED: f64 = 0.03;
 

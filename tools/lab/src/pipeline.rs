@@ -7,7 +7,7 @@ use vigil_blocks::{
 use vigil_decision::fused_alarm;
 use vigil_diagnosis::detect::{self, Detector, DetectorError};
 use vigil_diagnosis::identify::{
-    self, Diagnoser, Identifier, IdentifierError, Input, Models, Watcher,
+    self, Diagnoser, Identifier, IdentifierError, Input, Models, NominalIdentifier,
 };
 use vigil_evaluation::scoring::field::BLIND;
 use vigil_evaluation::scoring::{MULTIPLE, Side, Taxonomy, UNKNOWN, Verdict};
@@ -77,7 +77,7 @@ impl Pipeline {
     ) -> Result<Self, PipelineError> {
         Ok(Self::assemble(
             Detector::nominal(model, robot, detector)?,
-            Diagnoser::from(Watcher::new(tree)),
+            Diagnoser::from(NominalIdentifier::new(tree)),
             Taxonomy::new(tree, robot),
             robot,
         ))

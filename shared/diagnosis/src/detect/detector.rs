@@ -1,4 +1,4 @@
-//! The detector's `step`: guard, observe, monitor, alarm, report.
+//! The detector's step: frames to observations, log-odds of a fault, alarm, report.
 
 use vigil_blocks::{
     CHANNELS, Channel, DetectionBelief, Entry, HealthyBelief, MODE_UNKNOWN, ParticleBlock,
@@ -12,11 +12,11 @@ use vigil_robot::nominal;
 use vigil_robot::publisher_check::Finding;
 use vigil_robot::{Alarm, AlarmError, Description};
 
+use crate::detect::blindness::{self, BlindnessTimer};
+use crate::detect::detection_filter::{DetectionFilter, Interval};
 use crate::detect::monitors::Monitors;
 use crate::detect::publisher::Publisher;
 use crate::detect::settings::{MonitorSettings, Settings};
-use crate::detect::sight::{self, Sight};
-use crate::detect::watch::{DetectorInput, Watch};
 use crate::invariants;
 use crate::sensors::Sensors;
 
@@ -41,17 +41,17 @@ pub enum DetectorError {
 /// the steps between repeat it. Equal entries give bit-identical beliefs.
 #[derive(Debug, Clone)]
 pub struct Detector {
-    watch: Watch,
+    filter: DetectionFilter,
     fault_rate_1_s: f64,
     alarm: Alarm,
-    /// While an alarm stands: is a fault still there, in each channel?
+    /// While an alarm stands: of each channel, whether its fault is still there.
     endings: [Ending; CHANNELS],
-    /// Of a fault now.
+    /// Log-odds of a fault now.
     log_odds: f64,
     armed: bool,
     /// Whether the last observation was of a robot in motion.
     moving: bool,
-    sight: Sight,
+    blindness: BlindnessTimer,
     /// With a live publisher.
     publisher: Option<Publisher>,
     period_s: f64,
@@ -62,10 +62,11 @@ pub struct Detector {
     invalid_count: u32,
     symptoms: u32,
     external: u32,
-    /// In a graph with a planned path: these say what the symptoms are, not the pose's log-odds.
+    /// In a graph with a planned path: symptoms come from these, not from the pose's log-odds.
     monitors: Option<Monitors>,
-    /// Last action that the robot obeyed, and its outcome, as the frame says it.
-    obeyed: (u64, u32),
+    /// Last action that the robot carried out, and its outcome, as the last frame says.
+    action_seq: u64,
+    action_outcome: u32,
 }
 
 impl Detector {
@@ -84,7 +85,7 @@ impl Detector {
         let (channels, form) = chosen(settings);
         let (rate, interval_h) = (settings.fault_rate_1_h, settings.false_alarm_interval_h);
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
-        let watch = Watch::Faults {
+        let filter = DetectionFilter::Faults {
             observer: Box::new(match channels {
                 Channels::All => Observer::new(model, robot).with_further(),
                 _ => Observer::new(model, robot),
@@ -92,12 +93,12 @@ impl Detector {
             monitor: Box::new(Monitor::new(model, robot, channels, form, rate)),
         };
         let interval_s = model.interval_s;
-        Ok(Self::watching(
+        Ok(Self::with_filter(
             interval_s,
             robot,
             alarm_log_odds,
             settings,
-            watch,
+            filter,
         ))
     }
 
@@ -114,38 +115,37 @@ impl Detector {
         let (channels, form) = chosen(settings);
         let (rate, interval_h) = (settings.fault_rate_1_h, settings.false_alarm_interval_h);
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
-        let watch = Watch::Nominal {
+        let filter = DetectionFilter::Nominal {
             observer: Box::new(nominal::Observer::new(robot)),
             monitor: Box::new(nominal::Monitor::new(model, channels, form, rate)),
-            last: DetectorInput::default(),
         };
         let interval_s = model.interval_s;
-        Ok(Self::watching(
+        Ok(Self::with_filter(
             interval_s,
             robot,
             alarm_log_odds,
             settings,
-            watch,
+            filter,
         ))
     }
 
-    fn watching(
+    fn with_filter(
         interval_s: f64,
         robot: &Description,
         alarm_log_odds: f64,
         settings: &Settings,
-        watch: Watch,
+        filter: DetectionFilter,
     ) -> Self {
         Self {
-            log_odds: watch.report().log_odds,
-            watch,
+            log_odds: filter.report().log_odds,
+            filter,
             fault_rate_1_s: settings.fault_rate_1_h / 3600.0,
             alarm: Alarm::new(alarm_log_odds),
             endings: [Ending::new(robot.fault_prior.again_1_s, robot.fault_prior.mended_1_s);
                 CHANNELS],
             armed: false,
             moving: false,
-            sight: sight_of(robot, settings),
+            blindness: blindness_timer(robot, settings),
             publisher: None,
             period_s: interval_s,
             t_last_ns: 0,
@@ -156,7 +156,8 @@ impl Detector {
             symptoms: 0,
             external: 0,
             monitors: None,
-            obeyed: (0, 0),
+            action_seq: 0,
+            action_outcome: 0,
         }
     }
 
@@ -168,25 +169,26 @@ impl Detector {
         self
     }
 
-    /// The same detector in a graph of this period, s: it tells when it sees nothing by the graph's
-    /// time; see [`Sight::in_graph`]. A publisher that is `live`, and no recording, is tested in
-    /// passing.
+    /// The same detector in a graph of this period, s: blindness counts by the graph's time, see
+    /// [`BlindnessTimer::in_graph`]. A publisher that is `live`, not a recording, is tested too.
     #[must_use]
     pub fn in_graph(mut self, robot: &Description, period_s: f64, live: bool) -> Self {
-        self.sight = self.sight.in_graph(period_s, live);
+        self.blindness = self.blindness.in_graph(period_s, live);
         self.publisher = live.then(|| Publisher::new(robot, period_s));
         self
     }
 
-    /// What was found of the publisher since it was asked last.
+    /// Findings about the publisher since the last call.
     #[must_use]
-    pub fn found(&mut self) -> [Option<Finding>; 2] {
-        self.publisher.as_mut().map_or([None; 2], Publisher::tell)
+    pub fn findings(&mut self) -> [Option<Finding>; 2] {
+        self.publisher
+            .as_mut()
+            .map_or([None; 2], Publisher::take_findings)
     }
 
-    /// A frame came, and the border refused it: an entry of the journal that changes no belief.
+    /// Counts a frame that the border refused: it changes no belief.
     pub const fn refuse(&mut self) {
-        self.sight.refuse();
+        self.blindness.refuse();
     }
 
     /// True with monitors of the planned pose.
@@ -221,15 +223,15 @@ impl Detector {
         let (mut missed, alarms_before) = (0, self.alarm_count);
         match entry {
             Entry::Frame(frame) => {
-                self.sight.take(frame);
+                self.blindness.take(frame);
                 if let Some(publisher) = &mut self.publisher {
                     publisher.take(frame);
-                    self.sight.doubt(publisher.is_blinding());
+                    self.blindness.doubt(publisher.is_blinding());
                 }
                 self.take(frame);
             }
             Entry::Missed(count) => {
-                self.sight.miss(count);
+                self.blindness.miss(count);
                 if let Some(publisher) = &mut self.publisher {
                     publisher.miss(count);
                 }
@@ -238,7 +240,7 @@ impl Detector {
             // Its cost is that of one track: there is nothing to shed.
             Entry::Budget(_) => {}
             Entry::Reset => {
-                self.watch.reset_observer();
+                self.filter.reset_observer();
                 self.begin_run();
             }
         }
@@ -253,10 +255,10 @@ impl Detector {
     }
 
     fn begin_run(&mut self) {
-        self.watch.reset();
+        self.filter.reset();
         (self.armed, self.moving) = (false, false);
         self.alarm.reset();
-        self.log_odds = self.watch.report().log_odds;
+        self.log_odds = self.filter.report().log_odds;
         (self.alarm_t_ns, self.symptoms) = (0, 0);
         if let Some(monitors) = &mut self.monitors {
             monitors.reset();
@@ -264,7 +266,7 @@ impl Detector {
     }
 
     fn take(&mut self, frame: &SensorFrame) {
-        let intake = self.watch.push(frame);
+        let intake = self.filter.push(frame);
         self.external = frame.symptoms & Symptoms::ALL;
         self.invalid_count = self.invalid_count.saturating_add(u32::from(intake.invalid));
         if intake.new_run {
@@ -276,7 +278,7 @@ impl Detector {
         }
         self.t_last_ns = frame.header.t_capture_ns;
         self.run_id = frame.run_id;
-        self.obeyed = (frame.action_seq, frame.action_outcome);
+        (self.action_seq, self.action_outcome) = (frame.action_seq, frame.action_outcome);
         if intake.complete {
             self.observe();
         }
@@ -287,13 +289,13 @@ impl Detector {
     }
 
     fn observe(&mut self) {
-        let observation = self.watch.step(self.alarm.stands());
+        let observation = self.filter.step(self.alarm.stands());
         let moving = observation.moving;
         self.moving = moving;
         if !self.armed {
             // Evidence from before the noise scale is known is no evidence.
-            self.armed = self.watch.is_ready();
-            self.watch.forget_evidence();
+            self.armed = self.filter.is_ready();
+            self.filter.forget_evidence();
         }
         self.weigh_end(&observation);
         let stood = self.alarm.stands();
@@ -308,10 +310,10 @@ impl Detector {
         }
         if stood && !self.alarm.stands() {
             // What spoke for the fault that has ended does not speak for the next one.
-            self.watch.forget_evidence();
-            self.log_odds = self.watch.report().log_odds;
+            self.filter.forget_evidence();
+            self.log_odds = self.filter.report().log_odds;
         }
-        let off_course = self.watch.report().channels[Channel::POSE] > SYMPTOM_LOG_ODDS;
+        let off_course = self.filter.report().channels[Channel::POSE] > SYMPTOM_LOG_ODDS;
         self.symptoms = if !off_course {
             0
         } else if moving {
@@ -323,8 +325,8 @@ impl Detector {
 
     /// Log-odds of a fault now: while an alarm stands, in no channel more than those that its fault
     /// has not ended there.
-    fn weigh_end(&mut self, observation: &DetectorInput) {
-        let report = self.watch.report();
+    fn weigh_end(&mut self, observation: &Interval) {
+        let report = self.filter.report();
         if !self.alarm.stands() {
             self.log_odds = report.log_odds;
             return;
@@ -343,9 +345,9 @@ impl Detector {
     }
 
     fn report(&self, missed: u32, belief: &mut DetectionBelief) {
-        let report = self.watch.report();
+        let report = self.filter.report();
         let p_now = probability(self.log_odds);
-        // The state stays at the last frame; what is told is its prediction.
+        // The state stays at the last frame; what is published is its prediction.
         let appears = self.fault_rate_1_s * self.period_s * f64::from(missed);
         let p_fault = p_now + (1.0 - p_now) * (1.0 - (-appears).exp());
         let odds = (p_fault / (1.0 - p_fault)).ln();
@@ -367,7 +369,7 @@ impl Detector {
             wheels,
             steer,
             outliers,
-        } = self.watch.scales();
+        } = self.filter.scales();
         belief.noise_scale = pose;
         belief.noise_scale_wheels = wheels;
         belief.noise_scale_steer = steer;
@@ -379,9 +381,9 @@ impl Detector {
         belief.alarm = u32::from(self.alarm.stands());
         belief.alarm_count = self.alarm_count;
         belief.symptoms = self.symptoms | self.external;
-        (belief.action_seq, belief.action_outcome) = self.obeyed;
+        (belief.action_seq, belief.action_outcome) = (self.action_seq, self.action_outcome);
         belief.invalid_count = self.invalid_count;
-        belief.blind = self.sight.blind().map_or(0, |cause| cause as u32);
+        belief.blind = self.blindness.blind().map_or(0, |cause| cause as u32);
         belief.readiness = match (self.armed, self.moving) {
             (false, _) => Readiness::Arming,
             (true, true) => Readiness::Armed,
@@ -392,7 +394,7 @@ impl Detector {
 
     /// Nominal or unknown, at these odds; where a pose is tracked, it is the healthy robot's.
     fn publish(&self, log_odds: f64, block: &mut ParticleBlock) {
-        let healthy = self.watch.healthy();
+        let healthy = self.filter.healthy();
         block.healthy = healthy.map_or_else(HealthyBelief::default, |it| it.to_block());
         let nominal = WeightedHypothesis {
             pose: block.healthy.pose,
@@ -416,11 +418,11 @@ fn chosen(settings: &Settings) -> (Channels, Form) {
 }
 
 /// What frames of `robot` must carry for these settings.
-fn sight_of(robot: &Description, settings: &Settings) -> Sight {
+fn blindness_timer(robot: &Description, settings: &Settings) -> BlindnessTimer {
     let channels = match settings.sensors {
         Sensors::Pose => Valid::POSE,
-        Sensors::PoseEncoders | Sensors::All => sight::all_channels(robot.wheels.len()),
+        Sensors::PoseEncoders | Sensors::All => blindness::all_channels(robot.wheels.len()),
     };
     let axes = 0..robot.command.len();
-    Sight::new(channels, axes.fold(0, |bits, i| bits | Valid::command(i)))
+    BlindnessTimer::new(channels, axes.fold(0, |bits, i| bits | Valid::command(i)))
 }

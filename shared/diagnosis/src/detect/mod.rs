@@ -1,14 +1,13 @@
-//! Detects any deviation from nominal behaviour: [`Detector`].
+//! Finds any departure from nominal behaviour: [`Detector`].
 
+mod blindness;
+mod detection_filter;
 mod detector;
 mod monitors;
 mod pace;
 mod publisher;
 mod settings;
-mod sight;
-mod watch;
 
 pub use detector::{Detector, DetectorError};
 pub use monitors::Monitors;
 pub use settings::{Form, MonitorSettings, Settings};
-pub use sight::Sight;

@@ -5,7 +5,7 @@
 //! - **error in position**: the pose is farther than `position_error_m` from the planned pose; it
 //!   ends below half of that. The robot is stopped (EPS) once it has stayed within 0.1 m for
 //!   `stopped_after_s`, else it moves (EPM);
-//!   A robot that had a plan and has heard of none for [`SILENT_NS`] is not where its plan wants it
+//!   A robot that had a plan and has got none for [`SILENT_NS`] is not where its plan wants it
 //!   either;
 //! - **LD**: within `loop_radius_m` of where the robot was at least `loop_travel_m` of way before,
 //!   while the planned pose is at least `2 loop_radius_m` from where it was then. Looked at every
@@ -26,17 +26,17 @@ use crate::detect::settings::MonitorSettings;
 const STILL_M: f64 = 0.1;
 /// Distance between kept places, m: chosen, so that [`PLACES`] hold 32 m of the way.
 const SPACING_M: f64 = 0.25;
-/// Without a frame with both poses for this long, ns, what was seen last is no longer so. As
-/// `sight::BLIND_S`.
+/// Without a frame with both poses for this long, ns, the last symptoms no longer hold. As
+/// `blindness::BLIND_S`.
 const SILENT_NS: u64 = 1_000_000_000;
-/// A loop or a spin ends so long after its last sign, ns. Chosen: much shorter, and one loop would
-/// fire twice.
+/// A loop or a spin ends so long after its last sign, ns. Chosen by hand: much shorter, and one loop
+/// would fire twice; longer, and a robot that is free again stays a looping one.
 const LASTS_NS: u64 = 10_000_000_000;
 /// A turn by this much more is a sign of a spin, rad. Twenty deviations of a yaw of 5 mrad.
 const TURN_STEP_RAD: f64 = 0.1;
-/// Kept places.
+/// Kept places: 32 m of way, beyond the largest `loop_travel_m` (30 m).
 const PLACES: usize = 128;
-/// Positions beyond this are no measurement, m.
+/// Positions beyond this are no measurement, m: as of the frame guard and the observer.
 const POSITION_MAX_M: f64 = 1e7;
 
 /// A place that the robot has passed.
@@ -61,8 +61,9 @@ pub struct Monitors {
 struct Trace {
     reset_count: u32,
     yaw: [f64; 2],
-    /// Where and when the robot last was more than `STILL_M` from where it had been.
-    still: ([f64; 2], u64),
+    /// Where the robot last was more than `STILL_M` from where it had been, and when, ns.
+    still_at: [f64; 2],
+    still_ns: u64,
     spin: Spin,
     /// Places kept so far.
     kept: usize,
@@ -99,10 +100,10 @@ impl Spin {
 impl Trace {
     /// True if the robot has stayed where it is for `after_s`.
     fn is_still(&mut self, at: [f64; 2], t_ns: u64, after_s: f64) -> bool {
-        if distance(at, self.still.0) > STILL_M {
-            self.still = (at, t_ns);
+        if distance(at, self.still_at) > STILL_M {
+            (self.still_at, self.still_ns) = (at, t_ns);
         }
-        t_ns.saturating_sub(self.still.1) as f64 * 1e-9 >= after_s
+        t_ns.saturating_sub(self.still_ns) as f64 * 1e-9 >= after_s
     }
 }
 
@@ -160,7 +161,8 @@ impl Monitors {
         let mut trace = self.trace.unwrap_or(Trace {
             reset_count: frame.pose_reset_count,
             yaw,
-            still: (at, t_ns),
+            still_at: at,
+            still_ns: t_ns,
             spin: Spin::new(at, t_ns),
             kept: 0,
             last: here,

@@ -2,18 +2,19 @@
 
 use vigil_robot::publisher_check::{Finding, FindingKind};
 
-/// Time that is judged at once, s, and how often in a row it must be found wrong. As long as
-/// blindness takes.
+/// Length of a window, s, and windows in a row that must agree on a finding. A window is as long as
+/// what blinds (`blindness::BLIND_S`); a single one may be the machine's doing.
 const WINDOW_S: f64 = 1.0;
 const WINDOWS: u32 = 2;
-/// Share of the deadlines of one window that may pass before their frames come. Three in ten; the
-/// odd late frame is the machine's.
+/// Share of the deadlines of a window that may pass before their frames come. Chosen by hand: three
+/// in ten. Smaller reports a loaded machine, larger hides a publisher in bursts of two.
 const LATE_MAX: f64 = 0.3;
 /// Frames this much closer together or further apart than the graph's period are of another rate.
-/// No jitter's mean over a second is half a period.
+/// Chosen by hand: the mean of a second's jitter stays far below half a period, and the next likely
+/// mistake, half or twice the rate, far beyond.
 const RATE_MAX: f64 = 1.5;
-/// A pause beyond this, in periods, is a gap and says nothing of the rate. Five frames lost in a
-/// row.
+/// A pause beyond this, in periods, is a gap and says nothing of the rate. Chosen by hand: five
+/// frames lost in a row. Smaller hides a rate of a sixth, larger counts gaps as a slow rate.
 const GAP_PERIODS: f64 = 6.0;
 
 /// Counts frames and missed deadlines by the journal.
@@ -26,7 +27,7 @@ pub(crate) struct Pace {
     t_ns: u64,
     suspected: Option<FindingKind>,
     windows: u32,
-    told: [bool; 2],
+    reported: [bool; 2],
 }
 
 impl Pace {
@@ -40,7 +41,7 @@ impl Pace {
             t_ns: 0,
             suspected: None,
             windows: 0,
-            told: [false; 2],
+            reported: [false; 2],
         }
     }
 
@@ -49,7 +50,7 @@ impl Pace {
         self.missed = self.missed.saturating_add(count);
     }
 
-    /// A frame came; what is found once a window is full.
+    /// Takes a frame; a finding once a window is full.
     pub(crate) fn take(&mut self, t_capture_ns: u64) -> Option<Finding> {
         let spacing_s = t_capture_ns.saturating_sub(self.t_ns) as f64 * 1e-9;
         self.t_ns = t_capture_ns;
@@ -80,8 +81,8 @@ impl Pace {
         };
         self.suspected = kind;
         let (kind, value) = found.filter(|_| self.windows >= WINDOWS)?;
-        let told = &mut self.told[usize::from(kind == FindingKind::Late)];
-        (!std::mem::replace(told, true)).then_some(Finding {
+        let reported = &mut self.reported[usize::from(kind == FindingKind::Late)];
+        (!std::mem::replace(reported, true)).then_some(Finding {
             kind,
             wheel: None,
             value,
@@ -115,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn bursts_late_frames_and_other_rates_are_told_within_three_seconds() {
+    fn bursts_late_frames_and_other_rates_are_reported_within_three_seconds() {
         assert_eq!(found(0, 1, PERIOD_NS), None);
         assert_eq!(found(0, 1, PERIOD_NS * 10 / 9), None);
         // One in ten is lost.
@@ -137,5 +138,27 @@ mod tests {
             found(0, 1, PERIOD_NS / 2),
             Some((FindingKind::Rate, 19..=25))
         ));
+    }
+
+    #[test]
+    fn a_finding_is_reported_once_and_a_gap_begins_the_window_anew() {
+        let mut pace = Pace::new(0.02);
+        let (mut t_ns, mut findings) = (0, 0);
+        for _ in 0..500 {
+            t_ns += PERIOD_NS / 2;
+            findings += u32::from(pace.take(t_ns).is_some());
+        }
+        assert_eq!(findings, 1);
+        let mut gaps = Pace::new(0.02);
+        t_ns = 0;
+        for k in 0..2000 {
+            // Twice as fast, with a gap each half second.
+            t_ns += if k % 50 == 0 {
+                10 * PERIOD_NS
+            } else {
+                PERIOD_NS / 2
+            };
+            assert_eq!(gaps.take(t_ns), None);
+        }
     }
 }

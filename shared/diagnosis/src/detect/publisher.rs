@@ -1,4 +1,4 @@
-//! What is found of the publisher in passing: what its frames mean, and when they come.
+//! Tests of a live publisher: whether its frames come when they are due, and mean what they should.
 
 use vigil_blocks::SensorFrame;
 use vigil_robot::Description;
@@ -13,7 +13,7 @@ pub(crate) struct Publisher {
     pace: Pace,
     epoch: u64,
     run_id: u64,
-    /// Found, and not yet told.
+    /// Findings that were not taken yet: of the pace, of the meaning.
     found: [Option<Finding>; 2],
 }
 
@@ -29,7 +29,7 @@ impl Publisher {
         }
     }
 
-    /// True if faults go unseen behind what was found.
+    /// True if what was found would hide every fault.
     pub(crate) const fn is_blinding(&self) -> bool {
         self.meaning.is_blinding()
     }
@@ -52,8 +52,8 @@ impl Publisher {
         self.pace.miss(count);
     }
 
-    /// What is to be told.
-    pub(crate) fn tell(&mut self) -> [Option<Finding>; 2] {
+    /// Findings that were not taken yet.
+    pub(crate) fn take_findings(&mut self) -> [Option<Finding>; 2] {
         std::mem::take(&mut self.found)
     }
 }

@@ -32,3 +32,15 @@ impl Angles {
         self.0[wheel].step([0.0, reading.log_ratio_any()], [changes; 2])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_reading_nothing_is_learned() {
+        let mut angles = Angles::default();
+        assert_eq!(angles.step(&[None; WHEELS], 0.1), 0.0);
+        assert_eq!(angles, Angles::default());
+    }
+}

@@ -49,3 +49,48 @@ impl Detection {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scales_and_rates_that_no_detector_reports_are_those_of_a_good_sensor() {
+        let good = OutlierRates::default().pose[0];
+        for (scale, used) in [
+            (0.1, 1.0),
+            (0.2, 0.2),
+            (99.0, 99.0),
+            (100.0, 1.0),
+            (f64::NAN, 1.0),
+        ] {
+            let mut belief = DetectionBelief::default();
+            belief.noise_scale[1] = scale;
+            belief.noise_scale_wheels[2] = scale;
+            belief.noise_scale_steer[3] = scale;
+            let noise = Detection::from_belief(&belief).noise;
+            assert_eq!([noise.pose[1], noise.wheels[2], noise.steer[3]], [used; 3]);
+        }
+        for (rate, used) in [(0.0, good), (0.2, 0.2), (0.5, good), (f64::NAN, good)] {
+            let mut belief = DetectionBelief::default();
+            belief.outlier_rate[1] = rate;
+            belief.outlier_rate_wheels[2] = rate;
+            belief.outlier_rate_steer[3] = rate;
+            let rates = Detection::from_belief(&belief).noise.outliers;
+            assert_eq!([rates.pose[1], rates.wheels[2], rates.steer[3]], [used; 3]);
+        }
+    }
+
+    #[test]
+    fn the_alarm_and_its_time_are_taken_as_they_are() {
+        let belief = DetectionBelief {
+            alarm: 1,
+            alarm_t_capture_ns: 7,
+            p_fault: 0.3,
+            ..DetectionBelief::default()
+        };
+        let found = Detection::from_belief(&belief);
+        assert_eq!((found.alarm, found.t_ns, found.p_fault), (true, 7, 0.3));
+        assert!(!Detection::from_belief(&DetectionBelief::default()).alarm);
+    }
+}

@@ -229,7 +229,7 @@ impl Encoders {
                 if p[0] * birth > p[1..OWN_RATE].iter().sum() {
                     self.onset[wheel] = t_ns;
                 }
-                exchange(p, (birth, death), stuck != 0, is_timely);
+                exchange(p, birth, death, stuck != 0, is_timely);
             } else {
                 let birth = birth * SHARES[NOISE - 1];
                 let (noisy, silent, noise) = (p[0], p[SILENT], p[NOISE]);
@@ -315,7 +315,7 @@ impl Encoders {
 
 /// The encoder of a wheel that turns breaks and recovers; not so that its size would show only
 /// poorly, as others drag, nor so that nothing shows, as it `is_timely` either way.
-fn exchange(p: &mut [f64; STATES], (birth, death): (f64, f64), others_drag: bool, is_timely: bool) {
+fn exchange(p: &mut [f64; STATES], birth: f64, death: f64, others_drag: bool, is_timely: bool) {
     let whole = p[0];
     for (i, share) in SHARES.into_iter().enumerate() {
         let state = 1 + i;
@@ -415,5 +415,89 @@ mod tests {
             assert!((evidence - expected).abs() < 1e-6, "{evidence}");
             assert_eq!(encoders.p_broken(0), 0.0);
         }
+    }
+
+    /// Encoders of which that of wheel 0 is in these states.
+    fn encoders(states: &[(usize, f64)]) -> Encoders {
+        let mut encoders = Encoders::healthy(3);
+        encoders.p[0] = [0.0; STATES];
+        for &(state, p) in states {
+            encoders.p[0][state] = p;
+        }
+        encoders
+    }
+
+    #[test]
+    fn a_wheel_that_sticks_divides_its_whole_encoder_and_turning_joins_it() {
+        let mut stuck = encoders(&[(0, 0.6), (DEAD, 0.4)]);
+        stuck.stick(0);
+        assert!((stuck.p[0][SILENT] - 0.6 * SILENT_SHARE).abs() < 1e-15);
+        assert!((stuck.p_whole(0) - 0.6 * (1.0 - SILENT_SHARE)).abs() < 1e-15);
+        stuck.release(0);
+        assert!((stuck.p_whole(0) - 0.6).abs() < 1e-15 && stuck.p[0][SILENT] == 0.0);
+        assert_eq!(stuck.p_dead(0), 0.4);
+    }
+
+    #[test]
+    fn a_size_is_forgotten_only_while_it_is_doubted() {
+        let mut doubted = encoders(&[(0, 0.6), (SIZED, 0.3), (LATE, 0.1)]);
+        doubted.forget_doubted_size(0);
+        assert!((doubted.p_whole(0) - 1.0).abs() < 1e-15 && doubted.p_sized(0, 0) == 0.0);
+        let mut believed = encoders(&[(0, 0.5), (SIZED, 0.5)]);
+        believed.forget_doubted_size(0);
+        assert_eq!((believed.p_whole(0), believed.p_sized(0, 0)), (0.5, 0.5));
+    }
+
+    #[test]
+    fn broken_is_what_is_neither_whole_nor_a_rate_of_its_own() {
+        let mixed = encoders(&[(0, 0.4), (ZERO, 0.2), (LATE, 0.1), (OWN_RATE, 0.3)]);
+        assert!((mixed.p_broken(0) - 0.3).abs() < 1e-15);
+        assert!((mixed.p_any_broken() - 0.3).abs() < 1e-15);
+        let other = mixed.p_other_broken();
+        assert!(other[0].abs() < 1e-15 && (other[1] - 0.3).abs() < 1e-15);
+        assert_eq!(mixed.ways(0).len(), WAYS_TO_BREAK.len());
+        let mut whole = mixed;
+        whole.suppose_whole(0, 9);
+        assert_eq!(
+            (whole.p_whole(0), whole.p_broken(0), whole.onset(0)),
+            (1.0, 0.0, 9)
+        );
+    }
+
+    #[test]
+    fn the_unknown_may_break_each_encoder_and_sums_to_one() {
+        let unsure = Encoders::unsure(5);
+        let sum: f64 = unsure.states(2).iter().sum();
+        assert!((sum - 1.0).abs() < 1e-12 && unsure.onset(2) == 5);
+        assert!((unsure.p_whole(2) - (1.0 - ANYTHING)).abs() < 1e-15);
+        assert_eq!(unsure.states(2)[SILENT], 0.0);
+    }
+
+    #[test]
+    fn however_often_faults_come_an_encoder_breaks_with_one_at_most() {
+        let same = Likelihoods::new(WHEELS, |_, _| 0.0);
+        let mut encoders = Encoders::healthy(0);
+        encoders.step(&[BIRTH_MAX; WHEELS], 0.0, 0, &same, 1);
+        assert!(encoders.p_whole(0).abs() < 1e-12 && (encoders.p_broken(0) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_late_encoder_neither_begins_nor_ends_while_nothing_shows_it() {
+        let timely = Likelihoods::new(1, |_, _| 0.0).timely(1);
+        let mut encoders = encoders(&[(0, 0.9), (LATE, 0.1)]);
+        encoders.step(&[1e-2; WHEELS], 0.5, 0, &timely, 1);
+        assert!((encoders.p[0][LATE] - 0.1).abs() < 1e-12);
+        assert!(encoders.p[0][ZERO] > 0.0);
+        // While others drag, none begins to be off by a size.
+        let mut dragged = Encoders::healthy(0);
+        dragged.step(
+            &[1e-2; WHEELS],
+            0.0,
+            0b10,
+            &Likelihoods::new(1, |_, _| 0.0),
+            1,
+        );
+        assert_eq!(dragged.p_sized(0, GAIN), 0.0);
+        assert!(dragged.p[0][ZERO] > 0.0);
     }
 }

@@ -3,12 +3,12 @@
 use vigil_robot::learned::{Healthy, NoiseScales, Observation};
 
 use crate::identify::further::Fusion;
-use crate::identify::generic::Generic;
 use crate::identify::hypotheses::{HypothesisList, add_hypotheses};
-use crate::identify::modes::Leaves;
+use crate::identify::leaf_map::LeafMap;
 use crate::identify::multiple_hypothesis::MultipleHypothesis;
 use crate::identify::node_sizes::NodeSizes;
-use crate::identify::posterior::Posterior;
+use crate::identify::single_fault::SingleFaultFilter;
+use crate::identify::tree_belief::TreeBelief;
 
 /// The multiple-hypothesis filter over sets of faults, or one of the library's over single faults.
 #[derive(Debug, Clone)]
@@ -16,7 +16,7 @@ pub enum Engine {
     /// Sets of faults.
     MultipleHypothesis(Box<MultipleHypothesis>),
     /// Single faults.
-    Generic(Box<Generic>),
+    SingleFault(Box<SingleFaultFilter>),
 }
 
 impl Engine {
@@ -24,7 +24,7 @@ impl Engine {
     pub fn restart(&mut self, healthy: &Healthy, t_ns: u64) {
         match self {
             Self::MultipleHypothesis(filter) => filter.restart(healthy, t_ns),
-            Self::Generic(filter) => filter.restart(healthy, t_ns),
+            Self::SingleFault(filter) => filter.restart(healthy, t_ns),
         }
     }
 
@@ -33,7 +33,7 @@ impl Engine {
     pub fn limit(&self) -> usize {
         match self {
             Self::MultipleHypothesis(filter) => filter.limit(),
-            Self::Generic(filter) => filter.limit(),
+            Self::SingleFault(filter) => filter.limit(),
         }
     }
 
@@ -41,7 +41,7 @@ impl Engine {
     pub fn set_limit(&mut self, count: usize) {
         match self {
             Self::MultipleHypothesis(filter) => filter.set_limit(count),
-            Self::Generic(filter) => filter.set_limit(count),
+            Self::SingleFault(filter) => filter.set_limit(count),
         }
     }
 
@@ -50,7 +50,7 @@ impl Engine {
     pub fn count(&self) -> usize {
         match self {
             Self::MultipleHypothesis(filter) => filter.hypotheses().len(),
-            Self::Generic(filter) => filter.count(),
+            Self::SingleFault(filter) => filter.count(),
         }
     }
 
@@ -58,25 +58,25 @@ impl Engine {
     pub fn step(&mut self, observation: &Observation, noise: NoiseScales) {
         match self {
             Self::MultipleHypothesis(filter) => filter.step(observation, noise),
-            Self::Generic(filter) => filter.step(observation, noise),
+            Self::SingleFault(filter) => filter.step(observation, noise),
         }
     }
 
     /// Fills the probabilities of nodes, sets and unknown; the first by what more channels
     /// say too.
-    pub fn posterior(&mut self, leaves: &Leaves, fusion: Option<&Fusion>, out: &mut Posterior) {
+    pub fn posterior(&mut self, leaves: &LeafMap, fusion: Option<&Fusion>, out: &mut TreeBelief) {
         match self {
             Self::MultipleHypothesis(filter) => filter.posterior(fusion, out),
-            Self::Generic(filter) => filter.posterior(leaves, out),
+            Self::SingleFault(filter) => filter.posterior(leaves, out),
         }
     }
 
     /// In which way each leaf's component is broken, and by how much: the first filter knows.
     #[must_use]
-    pub fn sizes(&self, leaves: &Leaves, posterior: &Posterior) -> NodeSizes {
+    pub fn sizes(&self, leaves: &LeafMap, posterior: &TreeBelief) -> NodeSizes {
         match self {
             Self::MultipleHypothesis(filter) => NodeSizes::new(filter, leaves, posterior),
-            Self::Generic(_) => NodeSizes::default(),
+            Self::SingleFault(_) => NodeSizes::default(),
         }
     }
 
@@ -85,7 +85,7 @@ impl Engine {
     pub fn onset(&self, node: usize) -> u64 {
         match self {
             Self::MultipleHypothesis(filter) => filter.onset(node),
-            Self::Generic(filter) => filter.onset(node),
+            Self::SingleFault(filter) => filter.onset(node),
         }
     }
 
@@ -94,7 +94,7 @@ impl Engine {
     pub fn onset_unknown(&self) -> u64 {
         match self {
             Self::MultipleHypothesis(filter) => filter.onset_unknown(),
-            Self::Generic(filter) => filter.onset_unknown(),
+            Self::SingleFault(filter) => filter.onset_unknown(),
         }
     }
 
@@ -103,15 +103,15 @@ impl Engine {
     pub const fn degenerate_count(&self) -> u32 {
         match self {
             Self::MultipleHypothesis(filter) => filter.degenerate_count(),
-            Self::Generic(filter) => filter.degenerate_count(),
+            Self::SingleFault(filter) => filter.degenerate_count(),
         }
     }
 
     /// Adds the hypotheses, or the particles.
-    pub fn hypotheses(&self, leaves: &Leaves, out: &mut HypothesisList) {
+    pub fn hypotheses(&self, leaves: &LeafMap, out: &mut HypothesisList) {
         match self {
             Self::MultipleHypothesis(filter) => add_hypotheses(filter, leaves, out),
-            Self::Generic(filter) => filter.hypotheses(out),
+            Self::SingleFault(filter) => filter.hypotheses(out),
         }
     }
 }

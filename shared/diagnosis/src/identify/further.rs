@@ -19,9 +19,9 @@ use vigil_robot::{Description, FaultPrior, Suspects};
 use crate::identify::further_likelihood::{
     Currents, dead, noisy, noisy_current, shifted, together, without_common,
 };
-use crate::identify::further_state::State;
-use crate::identify::modes::Leaves;
-use crate::identify::node_sizes::TOLD_MIN;
+use crate::identify::further_state::FurtherState;
+use crate::identify::leaf_map::LeafMap;
+use crate::identify::node_sizes::SIZE_P_MIN;
 use crate::invariants;
 
 /// Offsets of a broken current sensor, in deviations of its noise: each twice the one before, as a
@@ -50,7 +50,7 @@ const ANYTHING: f64 = 0.3;
 /// than the e^32 of [`FLOOR`]: no single one lifts a state from nothing.
 const LOG_MAX: f64 = 30.0;
 /// These channels change odds by this factor at most: what nominal motion makes impossible they do
-/// not make likely. Times `sets::FLOOR` it is 1e-3.
+/// not make likely. Times `set_probabilities::FLOOR` it is 1e-3.
 const RATIO_MAX: f64 = 1e9;
 /// No state is less probable: what can return must not be impossible.
 const FLOOR: f64 = 1e-14;
@@ -100,7 +100,7 @@ pub struct FurtherFilter {
     rates: FaultPrior,
     wide: Wide,
     effects: Option<CurrentEffects>,
-    states: Vec<State>,
+    states: Vec<FurtherState>,
     /// Share of the births that each state has.
     shares: Vec<f64>,
     /// Leaf of each state, if it is one of these channels'.
@@ -117,34 +117,38 @@ impl FurtherFilter {
     pub fn new(
         model: &Model,
         robot: &Description,
-        leaves: &Leaves,
+        leaves: &LeafMap,
         p_unknown: f64,
     ) -> Option<Self> {
         let watch = FurtherWatch::new(model, robot)?;
-        let mut groups: Vec<(Vec<State>, Option<usize>)> = Vec::new();
+        let mut groups: Vec<(Vec<FurtherState>, Option<usize>)> = Vec::new();
         for wheel in 0..watch.wheels() {
             if let Some(node) = leaves.torque[wheel] {
-                let all = (0..SHARES.len()).map(|share| State::Torque(wheel, share));
+                let all = (0..SHARES.len()).map(|share| FurtherState::Torque(wheel, share));
                 groups.push((all.collect(), Some(node)));
             }
             if let Some(node) = leaves.current[wheel] {
-                let offset = |by: f64| State::CurrentOffset(wheel, by * robot.noise.current_a);
+                let offset =
+                    |by: f64| FurtherState::CurrentOffset(wheel, by * robot.noise.current_a);
                 let offsets = OFFSETS.map(offset);
-                let gains = GAINS.map(|gain| State::CurrentGain(wheel, gain));
-                let dead = std::iter::once(State::CurrentDead(wheel));
-                let noises = NOISES.map(|factor| State::CurrentNoise(wheel, factor));
+                let gains = GAINS.map(|gain| FurtherState::CurrentGain(wheel, gain));
+                let dead = std::iter::once(FurtherState::CurrentDead(wheel));
+                let noises = NOISES.map(|factor| FurtherState::CurrentNoise(wheel, factor));
                 let ways = dead.chain(offsets).chain(gains).chain(noises);
                 groups.push((ways.collect(), Some(node)));
             }
             if leaves.stuck[wheel].is_some() {
-                groups.push((vec![State::Stuck(wheel)], None));
+                groups.push((vec![FurtherState::Stuck(wheel)], None));
             }
         }
         if let Some(node) = leaves.gyro {
-            let all = std::iter::once(State::GyroDead);
-            let bias = |by: f64| State::GyroBias(by * robot.noise.yaw_rate_rad_s);
+            let all = std::iter::once(FurtherState::GyroDead);
+            let bias = |by: f64| FurtherState::GyroBias(by * robot.noise.yaw_rate_rad_s);
             let biases = BIASES.map(bias);
-            let (gains, noises) = (GAINS.map(State::GyroGain), NOISES.map(State::GyroNoise));
+            let (gains, noises) = (
+                GAINS.map(FurtherState::GyroGain),
+                NOISES.map(FurtherState::GyroNoise),
+            );
             let ways = all.chain(biases).chain(gains).chain(noises);
             groups.push((ways.collect(), Some(node)));
         }
@@ -153,7 +157,7 @@ impl FurtherFilter {
             rates: robot.fault_prior,
             wide: Wide::new(robot),
             effects: CurrentEffects::new(model, robot),
-            states: vec![State::Whole, State::Unknown],
+            states: vec![FurtherState::Whole, FurtherState::Unknown],
             shares: vec![0.0, p_unknown],
             nodes: vec![None, None],
             p: Vec::new(),
@@ -246,7 +250,7 @@ impl FurtherFilter {
     /// currents without what they have in common.
     fn log_ratio(
         &self,
-        state: State,
+        state: FurtherState,
         observation: &Observation,
         further: &Further,
         residuals: &Residuals,
@@ -263,12 +267,12 @@ impl FurtherFilter {
         };
         let expected = |wheel: usize| currents[wheel].map_or(0.0, |residual| residual.expected);
         match state {
-            State::Whole => 0.0,
-            State::Torque(wheel, share) => {
+            FurtherState::Whole => 0.0,
+            FurtherState::Torque(wheel, share) => {
                 let by = self.effect(share, wheel, observation, expected(wheel));
                 together(beside, &by, |_| 0.0)
             }
-            State::Stuck(wheel) => {
+            FurtherState::Stuck(wheel) => {
                 let by = self.effect(STUCK, wheel, observation, expected(wheel));
                 // How a robot turns on a stuck wheel the pose says.
                 let turns = gyro(&|residual| {
@@ -278,29 +282,31 @@ impl FurtherFilter {
                 let sd = |by: f64| (TOGETHER_SD * by).abs().max(self.wide.stuck_a);
                 turns + together(beside, &by, sd)
             }
-            State::CurrentOffset(wheel, offset) => alone(wheel, offset),
-            State::CurrentGain(wheel, gain) => alone(wheel, (gain - 1.0) * expected(wheel)),
-            State::CurrentDead(wheel) => {
+            FurtherState::CurrentOffset(wheel, offset) => alone(wheel, offset),
+            FurtherState::CurrentGain(wheel, gain) => alone(wheel, (gain - 1.0) * expected(wheel)),
+            FurtherState::CurrentDead(wheel) => {
                 let learned = self.watch.model().currents.as_ref();
                 let healthy = learned.map_or(0.5, |learned| learned.repeat_rate);
                 dead(&further.currents[wheel], currents[wheel], healthy)
             }
-            State::GyroDead => {
+            FurtherState::GyroDead => {
                 let learned = self.watch.model().yaw_rate;
                 let healthy = learned.map_or(0.5, |learned| learned.repeat_rate);
                 dead(&further.yaw_rate, residuals.yaw_rate, healthy)
             }
-            State::CurrentNoise(wheel, factor) => noisy_current(beside, wheel, factor),
-            State::GyroBias(bias) => gyro(&|residual| shifted(residual, bias, residual.variance)),
-            State::GyroGain(gain) => gyro(&|residual| {
+            FurtherState::CurrentNoise(wheel, factor) => noisy_current(beside, wheel, factor),
+            FurtherState::GyroBias(bias) => {
+                gyro(&|residual| shifted(residual, bias, residual.variance))
+            }
+            FurtherState::GyroGain(gain) => gyro(&|residual| {
                 shifted(
                     residual,
                     (gain - 1.0) * residual.expected,
                     residual.variance,
                 )
             }),
-            State::GyroNoise(factor) => gyro(&|residual| noisy(residual, factor)),
-            State::Unknown => self.log_ratio_unknown(residuals, beside),
+            FurtherState::GyroNoise(factor) => gyro(&|residual| noisy(residual, factor)),
+            FurtherState::Unknown => self.log_ratio_unknown(residuals, beside),
         }
     }
 
@@ -335,12 +341,12 @@ impl FurtherFilter {
     /// Writes of each leaf of these channels in which way it is most probably broken, and how
     /// large the fault is then.
     pub fn sizes(&self, belief: &mut FaultBelief) {
-        let told = belief.p.map(|p| p >= TOLD_MIN);
+        let is_probable = belief.p.map(|p| p >= SIZE_P_MIN);
         let mut begin = 0;
         for group in self.nodes.chunk_by(|a, b| a == b) {
             let states = begin..begin + group.len();
             begin = states.end;
-            let Some(node) = group[0].filter(|&node| told[node]) else {
+            let Some(node) = group[0].filter(|&node| is_probable[node]) else {
                 continue;
             };
             let most = |kind: SizeKind| {
@@ -390,13 +396,16 @@ impl FurtherFilter {
                 true => bounded(odds / prior),
                 false => 1.0,
             };
-            let is_load = matches!(state, State::Torque(..) | State::CurrentOffset(..));
+            let is_load = matches!(
+                state,
+                FurtherState::Torque(..) | FurtherState::CurrentOffset(..)
+            );
             if is_load {
                 loads = [loads[0] + prior, loads[1] + prior * ratio];
             }
             match (state, self.nodes[at]) {
-                (State::Stuck(wheel), _) => fusion.stuck[*wheel] = ratio,
-                (State::Unknown, _) => fusion.unknown = (0.5 + 0.5 * ratio, odds),
+                (FurtherState::Stuck(wheel), _) => fusion.stuck[*wheel] = ratio,
+                (FurtherState::Unknown, _) => fusion.unknown = (0.5 + 0.5 * ratio, odds),
                 (_, Some(node)) => fusion.add(node, odds),
                 _ => {}
             }
@@ -429,5 +438,38 @@ impl Fusion {
         };
         *place = (node, if known.is_some() { place.1 } else { 0.0 } + p);
         self.count = self.count.max(at + 1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ways_of_a_leaf_add_up() {
+        let mut fusion = Fusion {
+            stuck: [1.0; WHEELS],
+            askew: 1.0,
+            unknown: (1.0, 0.0),
+            nodes: [(0, 0.0); 2 * WHEELS + 1],
+            count: 0,
+        };
+        for (node, p) in [(4, 0.1), (7, 0.2), (4, 0.3)] {
+            fusion.add(node, p);
+        }
+        assert_eq!(
+            (fusion.count, fusion.nodes[0].0, fusion.nodes[1]),
+            (2, 4, (7, 0.2))
+        );
+        assert!((fusion.nodes[0].1 - 0.4).abs() < 1e-15);
+    }
+
+    #[test]
+    fn sizes_are_as_far_apart_as_their_grids() {
+        assert_eq!(cell(SizeKind::TorqueShareLost, 0.5), 0.17);
+        assert_eq!(cell(SizeKind::Gain, -1.0), 0.5);
+        assert_eq!(cell(SizeKind::CurrentOffsetA, -2.0), 1.4);
+        assert_eq!(cell(SizeKind::RateBiasRadS, 2.0), 1.4);
+        assert_eq!(cell(SizeKind::Frozen, 2.0), 0.0);
     }
 }

@@ -8,8 +8,8 @@ use vigil_robot::learned::{Further, Healthy, Model, Observation};
 use vigil_robot::{Description, Suspects};
 
 use crate::identify::further::{FurtherFilter, Fusion};
+use crate::identify::leaf_map::LeafMap;
 use crate::identify::models::Models;
-use crate::identify::modes::Leaves;
 use crate::identify::settings::{IdentifierFilter, Settings};
 use crate::sensors::Sensors;
 
@@ -29,8 +29,9 @@ impl FurtherStage {
     #[must_use]
     pub fn new(
         models: &Models<'_>,
-        leaves: &Leaves,
-        (sensors, settings): (Sensors, &Settings),
+        leaves: &LeafMap,
+        sensors: Sensors,
+        settings: &Settings,
         capacity: usize,
     ) -> Option<Self> {
         let (model, robot, p_unknown) = (models.model, models.robot, settings.p_unknown);

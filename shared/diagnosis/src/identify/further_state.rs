@@ -6,7 +6,7 @@ use vigil_robot::learned::current_effects::SHARES;
 
 /// What may be wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum State {
+pub(crate) enum FurtherState {
     Whole,
     /// A motor: wheel, index of the share lost.
     Torque(usize, usize),
@@ -31,7 +31,7 @@ pub(crate) enum State {
     Unknown,
 }
 
-impl State {
+impl FurtherState {
     /// In which way a component is broken, and by how much.
     pub(crate) const fn size(self) -> (SizeKind, f64) {
         match self {
@@ -59,6 +59,63 @@ impl State {
             | Self::CurrentGain(wheel, _)
             | Self::CurrentNoise(wheel, _) => current(wheel),
             Self::GyroDead | Self::GyroBias(_) | Self::GyroGain(_) | Self::GyroNoise(_) => gyro,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vigil_robot::learned::Reading;
+
+    #[test]
+    fn a_state_shows_in_the_channels_that_it_changes() {
+        let read = Reading {
+            repeats: 1,
+            ..Reading::default()
+        };
+        let mut current = Further::default();
+        current.currents[2] = read;
+        let gyro = Further {
+            yaw_rate: read,
+            ..Further::default()
+        };
+        use FurtherState as S;
+        for (state, by_current, by_gyro) in [
+            (S::Whole, true, true),
+            (S::Unknown, true, true),
+            (S::Stuck(5), true, true),
+            (S::Torque(5, 0), true, false),
+            (S::CurrentDead(2), true, false),
+            (S::CurrentOffset(2, 1.0), true, false),
+            (S::CurrentGain(2, 0.5), true, false),
+            (S::CurrentNoise(2, 8.0), true, false),
+            (S::CurrentDead(3), false, false),
+            (S::GyroDead, false, true),
+            (S::GyroBias(0.1), false, true),
+            (S::GyroGain(0.5), false, true),
+            (S::GyroNoise(8.0), false, true),
+        ] {
+            let found = (state.is_read(&current), state.is_read(&gyro));
+            assert_eq!(found, (by_current, by_gyro), "{state:?}");
+            assert!(!state.is_read(&Further::default()), "{state:?}");
+        }
+    }
+
+    #[test]
+    fn each_state_has_its_way_and_size() {
+        use FurtherState as S;
+        for (state, kind, size) in [
+            (S::Torque(1, 2), SizeKind::TorqueShareLost, SHARES[2]),
+            (S::CurrentOffset(1, -0.3), SizeKind::CurrentOffsetA, -0.3),
+            (S::CurrentGain(1, 2.0), SizeKind::Gain, 2.0),
+            (S::GyroGain(0.5), SizeKind::Gain, 0.5),
+            (S::GyroBias(0.2), SizeKind::RateBiasRadS, 0.2),
+            (S::CurrentDead(1), SizeKind::Frozen, 0.0),
+            (S::GyroNoise(8.0), SizeKind::Noise, 0.0),
+            (S::Stuck(1), SizeKind::None, 0.0),
+        ] {
+            assert_eq!(state.size(), (kind, size));
         }
     }
 }

@@ -7,9 +7,9 @@ use vigil_blocks::{
 use vigil_robot::learned::{Mover, triangle};
 
 use crate::identify::encoders::Encoders;
-use crate::identify::modes::Leaves;
+use crate::identify::leaf_map::LeafMap;
 use crate::identify::multiple_hypothesis::MultipleHypothesis;
-use crate::identify::sets::NEGLIGIBLE;
+use crate::identify::set_probabilities::NEGLIGIBLE;
 
 /// Hypotheses that are collected before the least probable go.
 const ROOM: usize = 2 * PARTICLE_CAPACITY;
@@ -73,7 +73,7 @@ pub const fn mode(leaves: u64) -> u32 {
 
 /// Encoders that are broken at once.
 #[derive(Debug, Clone, Copy, Default)]
-struct Broken {
+struct EncoderSet {
     /// Their leaves, as bits.
     leaves: u64,
     /// When the last of them broke, ns.
@@ -84,8 +84,8 @@ struct Broken {
 
 /// Adds those of the multiple-hypothesis filter: each with every set of broken encoders that is not
 /// negligible, for each wheel that may move the robot so.
-pub fn add_hypotheses(filter: &MultipleHypothesis, leaves: &Leaves, out: &mut HypothesisList) {
-    let mut sets = [Broken::default(); 1 << WHEELS];
+pub fn add_hypotheses(filter: &MultipleHypothesis, leaves: &LeafMap, out: &mut HypothesisList) {
+    let mut sets = [EncoderSet::default(); 1 << WHEELS];
     for (motion, hypothesis) in filter.hypotheses() {
         let (track, p_unknown) = (&hypothesis.state.track, motion.p_unknown);
         let unknown = WeightedHypothesis {
@@ -123,7 +123,7 @@ pub fn add_hypotheses(filter: &MultipleHypothesis, leaves: &Leaves, out: &mut Hy
 }
 
 /// Leaves of what moves the robot, as bits; none of the unknown.
-fn moved_leaves(moved: Mover, leaves: &Leaves) -> Option<u64> {
+fn moved_leaves(moved: Mover, leaves: &LeafMap) -> Option<u64> {
     match moved {
         Mover::Unknown | Mover::UnknownAny => return None,
         Mover::Steer(wheel) => return Some(1 << leaves.steer[wheel]?),
@@ -137,13 +137,13 @@ fn moved_leaves(moved: Mover, leaves: &Leaves) -> Option<u64> {
 /// Fills in the sets of broken encoders that are no less probable than `least`; how many.
 fn broken(
     encoders: &Encoders,
-    leaves: &Leaves,
+    leaves: &LeafMap,
     least: f64,
-    sets: &mut [Broken; 1 << WHEELS],
+    sets: &mut [EncoderSet; 1 << WHEELS],
 ) -> usize {
-    sets[0] = Broken {
+    sets[0] = EncoderSet {
         share: 1.0,
-        ..Broken::default()
+        ..EncoderSet::default()
     };
     let mut count = 1;
     for wheel in 0..WHEELS {
@@ -157,7 +157,7 @@ fn broken(
             sets[i].share = without.share * (1.0 - p_broken);
             let share = without.share * p_broken;
             if share >= least {
-                sets[count] = Broken {
+                sets[count] = EncoderSet {
                     leaves: without.leaves | 1 << leaf,
                     onset_ns: without.onset_ns.max(encoders.onset(wheel)),
                     share,
@@ -215,5 +215,32 @@ mod tests {
         assert_eq!(places, Vec::from_iter(0..PARTICLE_CAPACITY as u64));
         ranked.drain(&mut block);
         assert_eq!(block.count, 0);
+    }
+
+    #[test]
+    fn a_set_of_one_leaf_is_its_node() {
+        assert_eq!((mode(0), mode(1 << 7), mode(0b110)), (0, 7, MODE_MULTIPLE));
+    }
+
+    #[test]
+    fn hypotheses_that_are_not_finite_are_not_repeated() {
+        let mut block = Box::<ParticleBlock>::default();
+        block.count = 2;
+        block.hypotheses[1].log_weight = -1.0;
+        block.healthy.pose = [1.0, 2.0, 3.0];
+        let mut out = Box::default();
+        copy(&block, &mut out);
+        assert_eq!((out.used(), out.healthy), (block.used(), block.healthy));
+        let spoils: [fn(&mut WeightedHypothesis); 3] = [
+            |it| it.log_weight = f64::NAN,
+            |it| it.pose[2] = f64::INFINITY,
+            |it| it.pose_covariance[5] = f64::NAN,
+        ];
+        for spoil in spoils {
+            let mut bad = block.clone();
+            spoil(&mut bad.hypotheses[1]);
+            copy(&bad, &mut out);
+            assert_eq!((out.count, out.healthy), (0, HealthyBelief::default()));
+        }
     }
 }

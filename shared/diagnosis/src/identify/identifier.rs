@@ -1,4 +1,4 @@
-//! The identifier's `step`: watch, keep a ring, identify from it after an alarm, report.
+//! The identifier over fault models: keeps a ring, identifies from it after an alarm, reports.
 
 use nalgebra::Vector3;
 use vigil_blocks::{
@@ -7,21 +7,21 @@ use vigil_blocks::{
 use vigil_robot::FaultPrior;
 use vigil_robot::learned::{Healthy, Observer, motion_modes};
 
+use crate::identify::channel_evidence::{ChannelEvidence, Drive};
 use crate::identify::detection::Detection;
 use crate::identify::engine::Engine;
 use crate::identify::fault_rates::fault_rates;
 use crate::identify::further_stage::FurtherStage;
-use crate::identify::generic::Generic;
 use crate::identify::hypotheses::{HypothesisList, copy};
+use crate::identify::leaf_map::{IdentifierError, LeafMap};
 use crate::identify::models::Models;
-use crate::identify::modes::{IdentifierError, Leaves};
 use crate::identify::multiple_hypothesis::MultipleHypothesis;
 use crate::identify::node_sizes::NodeSizes;
-use crate::identify::posterior::Posterior;
-use crate::identify::reasons::Reasons;
-use crate::identify::reported::HeldName;
+use crate::identify::reported::ReportedFault;
 use crate::identify::ring::{Ring, RingEntry};
 use crate::identify::settings::{IdentifierFilter, Settings};
+use crate::identify::single_fault::SingleFaultFilter;
+use crate::identify::tree_belief::TreeBelief;
 use crate::identify::trouble::believed;
 use crate::invariants;
 use crate::sensors::Sensors;
@@ -30,10 +30,12 @@ use crate::sensors::Sensors;
 const FURTHER_NEED_HYPOTHESES: &str =
     "leaves steer, pose, torque, current and gyro need identifier.filter = \"multiple-hypothesis\"";
 
-/// A ring is worked off in about this time after an alarm, s: the name is two observations late.
+/// A ring is worked off in about this time after an alarm, s. Chosen by hand: the name is two
+/// observations late; smaller makes the first cycles after an alarm the longest ones.
 const CATCH_UP_S: f64 = 0.1;
-/// Observations since which the reasons of a diagnosis are looked for, at most.
-const REASONS_MAX: usize = 20;
+/// Observations that the evidence of a diagnosis is summed over at its start, at most. Chosen by
+/// hand: a second of them; more would cost a cycle with a new name more than the filter does.
+const EVIDENCE_MAX: usize = 20;
 
 /// What the identifier takes each cycle.
 #[derive(Debug, Clone, Copy)]
@@ -64,10 +66,10 @@ enum Phase {
 /// and present probability equal.
 #[derive(Debug, Clone)]
 pub struct Identifier {
-    leaves: Leaves,
+    leaves: LeafMap,
     engine: Engine,
     observer: Observer,
-    /// What is known of a healthy robot of which the detector says nothing.
+    /// What is known of a healthy robot as long as the detector publishes nothing of it.
     unsure: Healthy,
     p_unknown: f64,
     prior: FaultPrior,
@@ -77,10 +79,10 @@ pub struct Identifier {
     /// Most hypotheses or particles of the engine, without a budget.
     particles: usize,
     ranked: HypothesisList,
-    /// The hypotheses after the last observation.
-    told: Box<ParticleBlock>,
+    /// The hypotheses after the last observation, as they were published.
+    published: Box<ParticleBlock>,
     updated: bool,
-    tells_own: bool,
+    publishes_own: bool,
     ring: Ring,
     /// Time of an observation, s.
     interval_s: f64,
@@ -88,13 +90,13 @@ pub struct Identifier {
     /// Gyro and currents, where they take part: a filter, and what the ring's observations hold.
     further: Option<Box<FurtherStage>>,
     detection: Detection,
-    posterior: Posterior,
-    predicted: Posterior,
+    posterior: TreeBelief,
+    predicted: TreeBelief,
     sizes: NodeSizes,
-    reasons: Reasons,
+    evidence: ChannelEvidence,
     mode: u32,
     mode_changes: u32,
-    reported: HeldName,
+    reported: ReportedFault,
     /// Motion in the last observation, s, until it has been reported.
     moved_s: f64,
     run_id: u64,
@@ -115,7 +117,7 @@ impl Identifier {
             model, robot, tree, ..
         } = *models;
         model.check_robot(robot)?;
-        let leaves = Leaves::new(tree, model, robot, sensors)?;
+        let leaves = LeafMap::new(tree, model, robot, sensors)?;
         let use_wheels = sensors != Sensors::Pose;
         let (engine, modes) = match settings.filter {
             IdentifierFilter::MultipleHypothesis => {
@@ -129,21 +131,21 @@ impl Identifier {
                 return Err(IdentifierError::Build(FURTHER_NEED_HYPOTHESES.to_owned()));
             }
             _ => {
-                let filter = Generic::new(models, &leaves, settings, use_wheels, seed)?;
+                let filter = SingleFaultFilter::new(models, &leaves, settings, use_wheels, seed)?;
                 let modes = motion_modes(model, robot, leaves.stuck_wheels(), false, false);
-                (Engine::Generic(Box::new(filter)), modes)
+                (Engine::SingleFault(Box::new(filter)), modes)
             }
         };
         let capacity = (settings.ring_s / model.interval_s).ceil().max(2.0) as usize;
         let mut observer = Observer::new(model, robot);
-        let further = FurtherStage::new(models, &leaves, (sensors, settings), capacity);
+        let further = FurtherStage::new(models, &leaves, sensors, settings, capacity);
         if further.is_some() {
             observer = observer.with_further();
         }
         Ok(Self {
             particles: engine.limit(),
             engine,
-            reasons: Reasons::new(model, robot, modes, use_wheels),
+            evidence: ChannelEvidence::new(model, robot, modes, use_wheels),
             observer,
             unsure: Healthy::unsure(model, robot),
             p_unknown: settings.p_unknown,
@@ -151,21 +153,21 @@ impl Identifier {
             use_wheels,
             in_trouble: false,
             ranked: HypothesisList::new(),
-            told: Box::default(),
+            published: Box::default(),
             updated: false,
-            tells_own: false,
+            publishes_own: false,
             leaves,
             ring: Ring::new(capacity),
             interval_s: model.interval_s,
             phase: Phase::Watching,
             further: further.map(Box::new),
             detection: Detection::default(),
-            posterior: Posterior::nominal(),
-            predicted: Posterior::nominal(),
+            posterior: TreeBelief::nominal(),
+            predicted: TreeBelief::nominal(),
             sizes: NodeSizes::default(),
             mode: 0,
             mode_changes: 0,
-            reported: HeldName::default(),
+            reported: ReportedFault::default(),
             moved_s: 0.0,
             run_id: 0,
         })
@@ -203,7 +205,7 @@ impl Identifier {
                 detected = input.detection.map(|(_, block)| block);
                 self.take(&input);
             }
-            // The state stays at the last frame: what is told is its prediction.
+            // The state stays at the last frame: what is published is its prediction.
             Entry::Missed(_) => {}
             Entry::Budget(count) => {
                 let count = (count as usize).clamp(1, self.particles);
@@ -225,14 +227,14 @@ impl Identifier {
 
     fn begin_run(&mut self) {
         self.ring.clear();
-        self.told.count = 0;
-        self.told.healthy = HealthyBelief::default();
+        self.published.count = 0;
+        self.published.healthy = HealthyBelief::default();
         self.phase = Phase::Watching;
         self.in_trouble = false;
         self.detection = Detection::default();
-        self.posterior = Posterior::nominal();
+        self.posterior = TreeBelief::nominal();
         self.predicted = self.posterior;
-        self.reasons.clear();
+        self.evidence.clear();
         self.reported.begin_run();
         if let Some(further) = &mut self.further {
             further.begin_run();
@@ -258,7 +260,7 @@ impl Identifier {
             self.phase = Phase::Watching;
             let troubles = &self.observer.observation().troubles;
             (self.posterior, self.sizes) = believed(troubles, self.use_wheels, &self.leaves);
-            self.reasons.clear();
+            self.evidence.clear();
             return;
         }
         if !self.detection.alarm {
@@ -268,8 +270,8 @@ impl Identifier {
         match self.phase {
             Phase::Watching if self.detection.alarm => self.begin(),
             Phase::Watching => {
-                self.posterior = Posterior::watching(self.detection.p_fault);
-                self.reasons.clear();
+                self.posterior = TreeBelief::watching(self.detection.p_fault);
+                self.evidence.clear();
             }
             Phase::Identifying(_) => {}
         }
@@ -324,7 +326,7 @@ impl Identifier {
         }
         self.phase = Phase::Identifying(start + 1);
         self.sizes = NodeSizes::default();
-        // What was unknown so far is now any of the faults, by their priors.
+        // What was unknown so far is any of the faults, by their priors.
         self.predicted = self.predicted.divided(&self.leaves, self.p_unknown);
     }
 
@@ -362,19 +364,19 @@ impl Identifier {
         self.engine
             .posterior(&self.leaves, fusion.as_ref(), &mut self.posterior);
         self.sizes = self.engine.sizes(&self.leaves, &self.posterior);
-        self.find_reasons(next, next + taken);
+        self.explain(next, next + taken);
         self.updated = true;
     }
 
-    /// Follows the diagnosis and its rival over the observations `first..end`, which have just been
-    /// taken: anew from the onset when the diagnosis has changed.
-    fn find_reasons(&mut self, first: usize, end: usize) {
+    /// Sums the evidence for the diagnosis against its rival over the observations `first..end`,
+    /// which have just been taken; anew from the onset when the diagnosis has changed.
+    fn explain(&mut self, first: usize, end: usize) {
         let (mode, _) = self.posterior.mode(&self.leaves);
         if mode == self.mode {
             self.follow(first, end);
             return;
         }
-        self.reasons.clear();
+        self.evidence.clear();
         let onset_ns = match mode {
             0 => return,
             MODE_UNKNOWN => self.engine.onset_unknown(),
@@ -382,7 +384,7 @@ impl Identifier {
         };
         // The last pose from before the onset, not too long ago: the work of a cycle is bounded.
         let end = end.min(self.ring.len());
-        let earliest = end.saturating_sub(REASONS_MAX);
+        let earliest = end.saturating_sub(EVIDENCE_MAX);
         let start = self.ring.last_by(onset_ns, earliest, end);
         let Some(kept) = self.ring.get(start) else {
             return;
@@ -390,8 +392,12 @@ impl Identifier {
         let healthy = self.healthy(kept);
         let (posterior, leaves) = (&self.posterior, &self.leaves);
         let at = &kept.observation;
-        let drive = (at.curvature, at.speed, at.command[0]);
-        self.reasons
+        let drive = Drive {
+            curvature_1_m: at.curvature,
+            speed_m_s: at.speed,
+            commanded_1_m: at.command[0],
+        };
+        self.evidence
             .begin(posterior, leaves, &healthy, drive, onset_ns);
         self.follow(start + 1, end);
     }
@@ -399,7 +405,7 @@ impl Identifier {
     fn follow(&mut self, first: usize, end: usize) {
         for i in first..end {
             let Some(kept) = self.ring.get(i) else { break };
-            self.reasons.follow(&kept.observation, kept.noise);
+            self.evidence.follow(&kept.observation, kept.noise);
         }
     }
 
@@ -437,8 +443,7 @@ impl Identifier {
         }
         let moved_s = std::mem::take(&mut self.moved_s);
         let (posterior, leaves) = (&self.posterior, &self.leaves);
-        self.reported
-            .take((mode, p_mode), posterior, leaves, moved_s);
+        self.reported.take(mode, p_mode, posterior, leaves, moved_s);
         belief.reported = self.reported.name();
         belief.reported_change_count = self.reported.changes();
         belief.mode = mode;
@@ -451,8 +456,8 @@ impl Identifier {
         };
         belief.onset_t_capture_ns = self.onset();
         belief.identifying = u32::from(self.phase != Phase::Watching || self.in_trouble);
-        belief.runner_up = self.reasons.runner_up();
-        belief.channel_evidence = self.reasons.channel_evidence();
+        belief.runner_up = self.evidence.runner_up();
+        belief.channel_evidence = self.evidence.channel_evidence();
         belief.degenerate_count = self.engine.degenerate_count();
         belief.particle_limit = self.engine.limit() as u32;
         let is_identifying = self.phase != Phase::Watching && !self.is_catching_up();
@@ -479,16 +484,16 @@ impl Identifier {
     fn publish(&mut self, detected: Option<&ParticleBlock>, out: &mut ParticleBlock) {
         if self.phase == Phase::Watching || self.is_catching_up() {
             if let Some(block) = detected {
-                copy(block, &mut self.told);
-            } else if self.tells_own {
-                self.told.count = 0;
+                copy(block, &mut self.published);
+            } else if self.publishes_own {
+                self.published.count = 0;
             }
-            self.tells_own = false;
+            self.publishes_own = false;
         } else if self.updated {
             self.engine.hypotheses(&self.leaves, &mut self.ranked);
-            self.ranked.drain(&mut self.told);
-            self.tells_own = true;
+            self.ranked.drain(&mut self.published);
+            self.publishes_own = true;
         }
-        copy(&self.told, out);
+        copy(&self.published, out);
     }
 }

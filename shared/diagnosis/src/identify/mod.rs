@@ -1,8 +1,14 @@
-//! Identifies the fault: [`Identifier`].
+//! Names the fault: a probability for each node of the fault tree, live and offline alike.
+//!
+//! [`Diagnoser`] is the step of the stage: an [`Identifier`] over fault models, or a
+//! [`NominalIdentifier`] where none are known, and the word BLIND over both.
 
 mod angles;
-mod blindfold;
+mod blind_override;
+mod channel_evidence;
+mod delay_belief;
 mod detection;
+mod diagnoser;
 mod encoders;
 mod engine;
 mod fault_rates;
@@ -10,34 +16,33 @@ pub mod further;
 mod further_likelihood;
 mod further_stage;
 mod further_state;
-mod generic;
 mod hypotheses;
+mod hypothesis_state;
 mod identifier;
-mod late;
+mod leaf_map;
 mod models;
-mod modes;
 mod multiple_hypothesis;
 mod node_sizes;
-mod posterior;
-mod prepared;
+mod nominal_identifier;
 mod rate_offsets;
-mod reasons;
 mod reported;
 mod ring;
 mod risk;
-mod servo;
-mod sets;
+mod servo_fault;
+mod set_probabilities;
 mod settings;
+mod single_fault;
 mod sizes;
-mod state;
+mod tree_belief;
 mod trouble;
-mod watcher;
+mod wheel_update;
 
+pub use diagnoser::Diagnoser;
 pub use identifier::{Identifier, Input};
+pub use leaf_map::{IdentifierError, LeafMap};
 pub use models::Models;
-pub use modes::{IdentifierError, Leaves};
 pub use multiple_hypothesis::MultipleHypothesis;
-pub use posterior::Posterior;
+pub use nominal_identifier::NominalIdentifier;
 pub use risk::risks;
 pub use settings::{IdentifierFilter, PARTICLES_MAX, PARTICLES_MIN, Settings};
-pub use watcher::{Diagnoser, Watcher};
+pub use tree_belief::TreeBelief;

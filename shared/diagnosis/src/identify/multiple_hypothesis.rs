@@ -25,45 +25,48 @@ use vigil_robot::learned::{
 use crate::identify::angles::Angles;
 use crate::identify::encoders::{BIRTH_MAX, Encoders};
 use crate::identify::further::Fusion;
-use crate::identify::modes::Leaves;
-use crate::identify::posterior::Posterior;
-use crate::identify::prepared::{MotionTerms, WheelObservation, is_new};
+use crate::identify::hypothesis_state::HypothesisState;
+use crate::identify::leaf_map::LeafMap;
 use crate::identify::rate_offsets::RateOffsets;
-use crate::identify::servo::ServoPrior;
-use crate::identify::sets::Sets;
-use crate::identify::sizes::{Sight, Sizes};
-use crate::identify::state::State;
+use crate::identify::servo_fault::ServoPrior;
+use crate::identify::set_probabilities::SetProbabilities;
+use crate::identify::sizes::{SizeInput, Sizes};
+use crate::identify::tree_belief::TreeBelief;
+use crate::identify::wheel_update::{WheelTerms, WheelUpdate, is_new};
 use crate::invariants;
 
 /// Index of the nominal motion among the modes.
 const NOMINAL: usize = 0;
-/// Onset hypotheses kept per mode: fewer of several stuck wheels and of what is rare, as there are
-/// many such modes. The last 1.6 s and 0.4 s, one an observation.
+/// Onset hypotheses kept per mode, one an observation. Chosen by hand: the last 1.6 s of 50 ms;
+/// fewer lose the onset of a fault that shows late, more cost time.
 const PER_MODE: usize = 32;
+/// The same of several stuck wheels and of other ground, as there are many such modes: 0.4 s.
 const PER_RARE: usize = 8;
-/// Hypotheses less probable than this are dropped (natural logarithm): 1e-13, as of sets.
+/// Hypotheses less probable than this are dropped (natural logarithm): 1e-13, as
+/// `set_probabilities::NEGLIGIBLE`.
 const FLOOR: f64 = -30.0;
+
 /// The filter.
 #[derive(Debug, Clone)]
 pub struct MultipleHypothesis {
     model: Model,
     robot: Description,
-    leaves: Leaves,
+    leaves: LeafMap,
     use_wheels: bool,
     modes: Vec<MotionMode>,
     rates: FaultRates,
     /// Of each wheel's encoder.
     births_1_s: [f64; WHEELS],
-    bank: Bank<State>,
+    bank: Bank<HypothesisState>,
     /// Of the healthy robot, from before the faults; it fades as the robot drives on.
     context: Context,
     wheels: WheelContext,
     sizes: Sizes,
     servo: ServoPrior,
     trust: Trust,
-    /// What the last observation says in each mode, where a hypothesis has asked.
-    prepared: Vec<Option<MotionTerms>>,
-    sets: Sets,
+    /// Of each mode that a hypothesis is in: the log-likelihoods of the last observation's wheels.
+    terms: Vec<Option<WheelTerms>>,
+    sets: SetProbabilities,
     degenerate_count: u32,
 }
 
@@ -73,7 +76,7 @@ impl MultipleHypothesis {
     pub fn new(
         model: &Model,
         robot: &Description,
-        leaves: &Leaves,
+        leaves: &LeafMap,
         use_wheels: bool,
         rates: FaultRates,
     ) -> Self {
@@ -113,8 +116,8 @@ impl MultipleHypothesis {
             robot: robot.clone(),
             leaves: leaves.clone(),
             use_wheels,
-            prepared: vec![None; modes.len()],
-            sets: Sets::new(&modes, leaves, robot.wheels.len().min(WHEELS)),
+            terms: vec![None; modes.len()],
+            sets: SetProbabilities::new(&modes, leaves, robot.wheels.len().min(WHEELS)),
             modes,
             rates,
             births_1_s: is_leaf.map(|leaf| if leaf { rates.fault_1_s } else { 0.0 }),
@@ -144,7 +147,7 @@ impl MultipleHypothesis {
         (self.context, self.wheels) = (healthy.context, healthy.wheels);
         self.sizes.clear();
         self.trust = Trust::default();
-        let state = State {
+        let state = HypothesisState {
             track: healthy.track(&self.modes[NOMINAL].noise),
             encoders: Encoders::healthy(t_ns),
             offsets: RateOffsets::default(),
@@ -178,7 +181,9 @@ impl MultipleHypothesis {
     }
 
     /// The hypotheses, and how the robot moves under each.
-    pub fn hypotheses(&self) -> impl ExactSizeIterator<Item = (&MotionMode, &Hypothesis<State>)> {
+    pub fn hypotheses(
+        &self,
+    ) -> impl ExactSizeIterator<Item = (&MotionMode, &Hypothesis<HypothesisState>)> {
         let all = self.bank.hypotheses().iter();
         all.map(|hypothesis| (&self.modes[hypothesis.mode], hypothesis))
     }
@@ -239,7 +244,7 @@ impl MultipleHypothesis {
         let modes = &self.modes;
         // A jump that begins with this pose, its first, explains whatever it reads, as an outlier
         // does: the next pose tells which it was.
-        let begins = |hypothesis: &Hypothesis<State>| {
+        let begins = |hypothesis: &Hypothesis<HypothesisState>| {
             let jumps = modes[hypothesis.mode].jump != [0.0; 3];
             jumps && hypothesis.state.jump_m.is_none()
         };
@@ -307,7 +312,7 @@ impl MultipleHypothesis {
     /// Weighs by the wheels' readings.
     fn weigh_wheels(&mut self, observation: &Observation, evidence: &WheelEvidence) {
         let death = self.rates.death_1_s * observation.dt_s;
-        let seen = WheelObservation {
+        let update = WheelUpdate {
             model: &self.model,
             robot: &self.robot,
             observation,
@@ -326,7 +331,7 @@ impl MultipleHypothesis {
             Some(best) => (best.mode, best.state.encoders),
             None => (NOMINAL, Encoders::healthy(observation.t_ns)),
         };
-        let sight = Sight {
+        let input = SizeInput {
             model: &self.model,
             observation,
             evidence,
@@ -334,14 +339,14 @@ impl MultipleHypothesis {
             encoders: &encoders,
             births: &births(modes[mode].moved, &encoders),
         };
-        let sized = self.sizes.take(&sight, self.robot.wheels.len().min(WHEELS));
-        self.prepared.fill(None);
+        let sized = self.sizes.take(&input, self.robot.wheels.len().min(WHEELS));
+        self.terms.fill(None);
         for hypothesis in self.bank.hypotheses_mut() {
             let index = hypothesis.mode;
-            let prepare = || seen.prepared(&self.modes[index], &sized);
-            let prepared = self.prepared[index].get_or_insert_with(prepare);
+            let compute = || update.terms(&self.modes[index], &sized);
+            let terms = self.terms[index].get_or_insert_with(compute);
             let births = births(modes[index].moved, &hypothesis.state.encoders);
-            let State {
+            let HypothesisState {
                 encoders,
                 offsets,
                 angles,
@@ -352,7 +357,7 @@ impl MultipleHypothesis {
             if !is_new(observation.t_ns, hypothesis.onset) {
                 *fresh = 0;
             }
-            let gained = seen.weigh(prepared, (&births, death), *fresh, encoders, offsets);
+            let gained = update.weigh(terms, &births, death, *fresh, encoders, offsets);
             hypothesis.log_weight += gained;
             if self.modes[index].moved == Mover::UnknownAny {
                 let changes = rates.fault_1_s * observation.dt_s;
@@ -395,7 +400,7 @@ impl MultipleHypothesis {
 
     /// Fills the probabilities of nodes, sets and unknown, by what further channels say too where
     /// there are any.
-    pub fn posterior(&mut self, fusion: Option<&Fusion>, out: &mut Posterior) {
+    pub fn posterior(&mut self, fusion: Option<&Fusion>, out: &mut TreeBelief) {
         self.sets.clear();
         for hypothesis in self.bank.hypotheses() {
             let (p, encoders) = (hypothesis.log_weight.exp(), &hypothesis.state.encoders);
@@ -407,7 +412,7 @@ impl MultipleHypothesis {
 
     /// The most probable hypothesis under which the robot is moved so.
     #[must_use]
-    pub fn best(&self, moved: Mover) -> Option<&Hypothesis<State>> {
+    pub fn best(&self, moved: Mover) -> Option<&Hypothesis<HypothesisState>> {
         self.bank.best(|mode| self.modes[mode].moved == moved)
     }
 
@@ -438,7 +443,9 @@ impl MultipleHypothesis {
         if let Some(wheel) = wheel(&self.leaves.encoder) {
             let known = self.bank.hypotheses().iter();
             let known = known.filter(|h| !self.modes[h.mode].moved.is_unknown());
-            let p = |h: &Hypothesis<State>| h.log_weight + h.state.encoders.p_broken(wheel).ln();
+            let p = |h: &Hypothesis<HypothesisState>| {
+                h.log_weight + h.state.encoders.p_broken(wheel).ln()
+            };
             let best = known.max_by(|a, b| p(a).total_cmp(&p(b)));
             return best.map_or(0, |best| best.state.encoders.onset(wheel));
         }

@@ -5,12 +5,13 @@ use vigil_blocks::{FAULT_NODES, FaultBelief, SizeKind, WHEELS};
 use vigil_robot::learned::{MotionMode, Mover};
 
 use crate::identify::encoders::{STATES, WAYS_TO_BREAK};
-use crate::identify::modes::Leaves;
+use crate::identify::leaf_map::LeafMap;
 use crate::identify::multiple_hypothesis::MultipleHypothesis;
-use crate::identify::posterior::Posterior;
+use crate::identify::tree_belief::TreeBelief;
 
-/// Of a fault that is less probable nothing is told: at the odds of a masked one a size is noise.
-pub const TOLD_MIN: f64 = 0.01;
+/// Of a less probable fault no size is reported: at 1 %, the odds of an encoder that a stuck wheel
+/// masks (`an_hour` tests them), a size is noise.
+pub const SIZE_P_MIN: f64 = 0.01;
 
 /// What is told of each node.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,14 +34,14 @@ impl Default for NodeSizes {
 impl NodeSizes {
     /// What a filter holds of the leaves that are probable enough.
     #[must_use]
-    pub fn new(filter: &MultipleHypothesis, leaves: &Leaves, posterior: &Posterior) -> Self {
+    pub fn new(filter: &MultipleHypothesis, leaves: &LeafMap, posterior: &TreeBelief) -> Self {
         let mut out = Self::default();
-        let is_told = |node: &usize| posterior.nodes[*node] >= TOLD_MIN;
-        for node in leaves.stuck.into_iter().flatten().filter(is_told) {
+        let is_probable = |node: &usize| posterior.nodes[*node] >= SIZE_P_MIN;
+        for node in leaves.stuck.into_iter().flatten().filter(is_probable) {
             out.kind[node] = SizeKind::Stuck as u32;
         }
         for (wheel, node) in leaves.encoder.into_iter().enumerate().take(WHEELS) {
-            if let Some(node) = node.filter(is_told) {
+            if let Some(node) = node.filter(is_probable) {
                 let (kind, (size, sd)) = broken(filter, wheel);
                 (out.size[node], out.sd[node], out.kind[node]) = (size, sd, kind as u32);
             }
@@ -49,12 +50,16 @@ impl NodeSizes {
             let servo = filter
                 .best(Mover::Steer(wheel))
                 .and_then(|best| best.state.servo);
-            if let Some((node, servo)) = node.filter(is_told).zip(servo) {
+            if let Some((node, servo)) = node.filter(is_probable).zip(servo) {
                 let (kind, (size, sd)) = servo.size();
                 (out.size[node], out.sd[node], out.kind[node]) = (size, sd, kind as u32);
             }
         }
-        if let Some((node, best)) = leaves.pose.filter(is_told).zip(filter.best(Mover::Pose)) {
+        if let Some((node, best)) = leaves
+            .pose
+            .filter(is_probable)
+            .zip(filter.best(Mover::Pose))
+        {
             let jump_m = best.state.jump_m.unwrap_or_default();
             (out.size[node], out.sd[node]) = jump_m;
             out.kind[node] = SizeKind::JumpM as u32;
@@ -62,8 +67,8 @@ impl NodeSizes {
         out
     }
 
-    /// Tells of a node in which way it is broken, without a size.
-    pub const fn tell(&mut self, node: usize, kind: SizeKind) {
+    /// Sets the way in which a node is broken, without a size.
+    pub const fn set_kind(&mut self, node: usize, kind: SizeKind) {
         self.kind[node] = kind as u32;
     }
 

@@ -73,10 +73,10 @@ impl RateOffsets {
     /// Takes a rate as read, rad/s, with the variance of its noise.
     fn update(&mut self, wheel: usize, dragged: &WheelDrag, rate: f64, noise: f64) {
         let (expected, variance) = self.expected(wheel, dragged);
-        let (apart, total) = (rate - expected, variance + noise);
-        if apart * apart <= FAR_SD * FAR_SD * total {
+        let (residual, total) = (rate - expected, variance + noise);
+        if residual * residual <= FAR_SD * FAR_SD * total {
             let gain = self.variance[wheel] * dragged.change_rad_s / total;
-            self.mean[wheel] += gain * apart;
+            self.mean[wheel] += gain * residual;
             self.variance[wheel] *= 1.0 - gain * dragged.change_rad_s;
         }
         let drifted = self.variance[wheel] + DRIFT_SD * DRIFT_SD;

@@ -3,7 +3,7 @@
 use vigil_inference::risk::{self, Recovery, Tracking};
 use vigil_pomdp::Pomdp;
 
-use crate::identify::modes::IdentifierError;
+use crate::identify::leaf_map::IdentifierError;
 
 /// Particles that the nominal mode keeps, whatever the risks. Their mean is known within 14 % of a
 /// deviation.

@@ -14,8 +14,8 @@ use vigil_robot::learned::wheels::STANDING_SD_RAD_S;
 use vigil_robot::learned::{Model, MotionMode, Observation, WheelEvidence};
 use vigil_robot::{Description, Tolerance};
 
+use crate::identify::delay_belief::DelayBelief;
 use crate::identify::encoders::Encoders;
-use crate::identify::late::DelayBelief;
 
 /// Ways with a size: gain, bias, drift, delay.
 pub const WAYS: usize = 4;
@@ -31,24 +31,31 @@ pub const DELAY: usize = 3;
 /// breakages; a gain costs 1 nat beside a freeze.
 pub const SIZED_SHARES: [f64; WAYS] = [0.12, 0.12, 0.04, 0.08];
 
-/// Gain of a broken encoder: mean and deviation. Lost pulses are commoner than pulses too many. Two
-/// deviations span all pulses lost to two thirds too many.
-const GAIN_PRIOR: (f64, f64) = (0.75, 0.45);
-/// Deviation of a bias, in tolerances of one wheel's rate; the same of a drift per second, and of
-/// the bias that it has reached when it is first looked for. Chosen: three times the least bias.
+/// Prior mean of the gain of a broken encoder. Chosen by hand: lost pulses are commoner than pulses
+/// too many.
+const GAIN_MEAN: f64 = 0.75;
+/// Its deviation: two span all pulses lost to two thirds too many.
+const GAIN_SD: f64 = 0.45;
+/// Prior deviation of a bias, in tolerances of one wheel's rate. Chosen by hand: three times the
+/// least bias ([`RATES`]); smaller fits large biases late, larger pays more nats for each.
 const BIAS_SD: f64 = 10.0;
+/// The same of a drift, per second: it reaches the deviation of a bias in four.
 const DRIFT_SD_1_S: f64 = 2.5;
+/// The same of the bias that a drift has reached when it is first tried: two seconds of it.
 const DRIFTED_SD: f64 = 5.0;
-/// A gain is one beyond this many tolerances of the wheels' ratio, a bias beyond so many of one
-/// wheel's rate: what load and ground make of a rate is no encoder's fault. Chosen: smaller sizes
-/// differ from load by nothing, larger ones are named later.
+/// A gain counts as a fault beyond this many tolerances of the wheels' ratio: what load and ground
+/// make of a rate is no encoder's fault. Chosen by hand: smaller takes load for a fault, larger
+/// leaves smaller faults unnamed.
 const RATIOS: f64 = 2.0;
+/// A bias counts as one beyond this many tolerances of a wheel's rate, for the same reason.
 const RATES: f64 = 3.0;
 /// A drift is one if it passes the tolerance of a rate within this time, s. Chosen: a slower one is
 /// taken up as load.
 const DRIFTS_S: f64 = 5.0;
-/// Tolerances of a robot that declares none: share of the rate, and rad/s. The rover's.
-const UNDECLARED: (f64, f64) = (0.08, 0.06);
+/// Tolerance of the wheels' ratio of a robot that declares none: the rover's.
+const UNDECLARED_RATIO: f64 = 0.08;
+/// The same of a wheel's rate, rad/s.
+const UNDECLARED_RAD_S: f64 = 0.06;
 /// Deviation by which a gain wanders from one reading to the next: 0.035 in a minute of 20 Hz, less
 /// than half a tolerance.
 const GAIN_WANDERS: f64 = 0.001;
@@ -78,7 +85,7 @@ pub struct Sizes {
 
 /// One observation, with the rates of the most probable motion that has a name.
 #[derive(Debug, Clone, Copy)]
-pub struct Sight<'a> {
+pub struct SizeInput<'a> {
     /// The model.
     pub model: &'a Model,
     /// The observation.
@@ -93,7 +100,7 @@ pub struct Sight<'a> {
     pub births: &'a [f64; WHEELS],
 }
 
-impl Sight<'_> {
+impl SizeInput<'_> {
     /// Share of the fault that began before this observation, if the encoder is broken this way.
     pub fn begun(&self, wheel: usize, way: usize) -> f64 {
         let before = self.encoders.p_sized(wheel, way);
@@ -114,13 +121,15 @@ impl Sizes {
     #[must_use]
     pub fn new(robot: &Description) -> Self {
         let declared = |t: Tolerance| (t.wheel_ratio, t.wheel_rate_rad_s);
-        let (ratio, rate) = robot.tolerance.map_or(UNDECLARED, declared);
+        let (ratio, rate) = robot
+            .tolerance
+            .map_or((UNDECLARED_RATIO, UNDECLARED_RAD_S), declared);
         let (gain, bias) = (RATIOS * ratio, RATES * rate);
         let drift = rate / DRIFTS_S;
         let priors = [
             Prior {
-                mean: [GAIN_PRIOR.0, 0.0],
-                sd: [GAIN_PRIOR.1, 0.0],
+                mean: [GAIN_MEAN, 0.0],
+                sd: [GAIN_SD, 0.0],
                 wander: [GAIN_WANDERS, 0.0],
                 healthy: [1.0 - gain, 1.0 + gain],
             },
@@ -170,58 +179,64 @@ impl Sizes {
     }
 
     /// Takes an observation of the first `wheels` wheels: what it says, and what it teaches.
-    pub fn take(&mut self, sight: &Sight<'_>, wheels: usize) -> EncoderSizes {
-        let mut said = EncoderSizes {
+    pub fn take(&mut self, input: &SizeInput<'_>, wheels: usize) -> EncoderSizes {
+        let mut sizes = EncoderSizes {
             logs: [[f64::NEG_INFINITY; WAYS]; WHEELS],
             standing: [0.0; WHEELS],
             late: 0,
         };
         let rate = |i: usize| match i < wheels {
             true => {
-                let (model, observation, mode) = (sight.model, sight.observation, sight.mode);
-                sight.evidence.rate(model, observation, mode, i)
+                let (model, observation, mode) = (input.model, input.observation, input.mode);
+                input.evidence.rate(model, observation, mode, i)
             }
             false => (0.0, 0.0, 0.0),
         };
         let rates: [_; WHEELS] = std::array::from_fn(rate);
         for (wheel, &about) in rates.iter().enumerate().take(wheels) {
             for way in 0..DELAY {
-                said.logs[wheel][way] = self.line(sight, wheel, way, about);
+                sizes.logs[wheel][way] = self.line(input, wheel, way, about);
             }
             let (bias, variance) = self.held[wheel][BIAS].expected([1.0, 0.0]);
             let spread = variance + STANDING_SD_RAD_S * STANDING_SD_RAD_S;
-            said.standing[wheel] = sight.reads(wheel, (bias, spread, about.2));
+            sizes.standing[wheel] = input.reads(wheel, (bias, spread, about.2));
         }
         let means = rates.map(|(rate, variance, _)| (rate, variance));
-        self.late.keep(sight.observation.t_ns, means);
+        self.late.keep(input.observation.t_ns, means);
         for (wheel, &about) in rates.iter().enumerate().take(wheels) {
-            let begun = sight.begun(wheel, DELAY);
-            let is_stuck = sight.mode.moved.is_stuck(wheel);
-            let reads = |about| sight.reads(wheel, about);
+            let begun = input.begun(wheel, DELAY);
+            let is_stuck = input.mode.moved.is_stuck(wheel);
+            let reads = |about| input.reads(wheel, about);
             if let Some(log) = self.late.take(wheel, about.2, begun, is_stuck, reads) {
-                said.logs[wheel][DELAY] = log;
-                said.late |= 1 << wheel;
+                sizes.logs[wheel][DELAY] = log;
+                sizes.late |= 1 << wheel;
             }
         }
-        said
+        sizes
     }
 
     /// What a wheel's readings say for a gain, bias or drift while it turns at about this rate; the
     /// estimate learns from them, unless the wheel stands.
-    fn line(&mut self, sight: &Sight<'_>, wheel: usize, way: usize, about: (f64, f64, f64)) -> f64 {
+    fn line(
+        &mut self,
+        input: &SizeInput<'_>,
+        wheel: usize,
+        way: usize,
+        about: (f64, f64, f64),
+    ) -> f64 {
         let prior = &self.priors[way];
         let mut held = self.held[wheel][way];
         let dt_s = match way {
-            DRIFT => sight.observation.dt_s,
+            DRIFT => input.observation.dt_s,
             _ => 0.0,
         };
         held.predict(dt_s, prior);
-        let begun = sight.begun(wheel, way);
-        let (log_held, held) = heard(sight, wheel, way, about, held, prior);
-        let (log_fresh, fresh) = heard(sight, wheel, way, about, self.fresh[way], prior);
+        let begun = input.begun(wheel, way);
+        let (log_held, held) = take_reading(input, wheel, way, about, held, prior);
+        let (log_fresh, fresh) = take_reading(input, wheel, way, about, self.fresh[way], prior);
         let (log_held, log_fresh) = (begun.ln() + log_held, (1.0 - begun).ln() + log_fresh);
         let log = log_add(log_held, log_fresh);
-        if !sight.mode.moved.is_stuck(wheel) && log.is_finite() {
+        if !input.mode.moved.is_stuck(wheel) && log.is_finite() {
             let share = (log_held - log).exp();
             self.held[wheel][way] = held.mixed(&fresh, share, prior);
         }
@@ -230,8 +245,8 @@ impl Sizes {
 }
 
 /// What a wheel's readings say for a size, and what it is after them.
-fn heard(
-    sight: &Sight<'_>,
+fn take_reading(
+    input: &SizeInput<'_>,
     wheel: usize,
     way: usize,
     (rate, variance, tail): (f64, f64, f64),
@@ -247,14 +262,14 @@ fn heard(
         _ => ([0.0, 1.0], rate, variance),
     };
     let (beside, uncertain) = size.expected(by);
-    let log = sight.reads(wheel, (base + beside, variance + uncertain, tail));
-    let reading = &sight.observation.wheels[wheel];
+    let log = input.reads(wheel, (base + beside, variance + uncertain, tail));
+    let reading = &input.observation.wheels[wheel];
     if reading.plain == 0 {
         return (log, size);
     }
-    let noise = variance + sight.evidence.sample_variance(wheel, reading.plain);
-    let apart = reading.mean - base - beside;
-    if apart * apart > FAR_SD * FAR_SD * (noise + uncertain) {
+    let noise = variance + input.evidence.sample_variance(wheel, reading.plain);
+    let residual = reading.mean - base - beside;
+    if residual * residual > FAR_SD * FAR_SD * (noise + uncertain) {
         return (log, size);
     }
     let before = size.log_material();

@@ -4,10 +4,10 @@
 use vigil_blocks::{FaultSet, SizeKind};
 use vigil_robot::learned::Troubles;
 
-use crate::identify::modes::Leaves;
+use crate::identify::leaf_map::LeafMap;
 use crate::identify::node_sizes::NodeSizes;
-use crate::identify::posterior::Posterior;
-use crate::identify::sets::entropy;
+use crate::identify::set_probabilities::entropy;
+use crate::identify::tree_belief::TreeBelief;
 
 /// Probability that something is wrong: what is seen needs no filter, and nothing is certain.
 const TROUBLE: f64 = 1.0 - 1e-6;
@@ -17,7 +17,11 @@ const WALKS: f64 = 0.7;
 
 /// Belief, and in which way what is named is broken. The pose is named if it is silent or frozen,
 /// and doubted if it walks while the wheels that are read stand.
-pub fn believed(troubles: &Troubles, use_wheels: bool, leaves: &Leaves) -> (Posterior, NodeSizes) {
+pub fn believed(
+    troubles: &Troubles,
+    use_wheels: bool,
+    leaves: &LeafMap,
+) -> (TreeBelief, NodeSizes) {
     let is_wheels = use_wheels && (troubles.wheels_silent != 0 || troubles.wheels_turn);
     let share = match troubles.pose_moves {
         _ if is_wheels => 0.0,
@@ -27,12 +31,12 @@ pub fn believed(troubles: &Troubles, use_wheels: bool, leaves: &Leaves) -> (Post
     };
     let mut sizes = NodeSizes::default();
     let Some(pose) = leaves.pose.filter(|_| share > 0.0) else {
-        return (Posterior::watching(TROUBLE), sizes);
+        return (TreeBelief::watching(TROUBLE), sizes);
     };
     if troubles.pose_frozen {
-        sizes.tell(pose, SizeKind::Frozen);
+        sizes.set_kind(pose, SizeKind::Frozen);
     }
-    let mut posterior = Posterior::nominal();
+    let mut posterior = TreeBelief::nominal();
     posterior.clear();
     for (set, p) in [(1 << pose, share * TROUBLE), (0, 1.0 - TROUBLE)] {
         posterior.add(FaultSet { leaves: set, p }, leaves);
@@ -47,8 +51,8 @@ mod tests {
     use super::*;
 
     /// Leaf 1, the pose.
-    fn leaves() -> Leaves {
-        let mut leaves = Leaves::none();
+    fn leaves() -> LeafMap {
+        let mut leaves = LeafMap::none();
         (leaves.pose, leaves.nodes, leaves.below[1]) = (Some(1), 2, 1 << 1);
         leaves
     }

@@ -12,7 +12,7 @@ use vigil_blocks::{DetectionBelief, Entry, FaultBelief, ParticleBlock, SensorFra
 use vigil_diagnosis::Sensors;
 use vigil_diagnosis::detect::{self, Detector, Form, MonitorSettings};
 use vigil_diagnosis::identify::{
-    self, Diagnoser, Identifier, IdentifierFilter, Input, Models, Watcher,
+    self, Diagnoser, Identifier, IdentifierFilter, Input, Models, NominalIdentifier,
 };
 use vigil_recording::frames;
 use vigil_robot::RobotModel;
@@ -60,7 +60,7 @@ impl Robot {
 
     fn identifier(&self, filter: IdentifierFilter, sensors: Sensors) -> Diagnoser {
         let RobotModel::Faults(model) = &self.model else {
-            return Diagnoser::from(Watcher::new(&self.tree));
+            return Diagnoser::from(NominalIdentifier::new(&self.tree));
         };
         let decision = vigil_setup::load_decision(&path("config/rover.pomdp")).unwrap();
         let models = Models {

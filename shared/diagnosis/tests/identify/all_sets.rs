@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::SensorFrame;
 use vigil_diagnosis::Sensors;
-use vigil_diagnosis::identify::{Leaves, MultipleHypothesis, Posterior};
+use vigil_diagnosis::identify::{LeafMap, MultipleHypothesis, TreeBelief};
 use vigil_inference::track::Track;
 use vigil_robot::Description;
 use vigil_robot::learned::wheel_evidence::{BREAKAGE_SHARES, BREAKAGES};
@@ -34,7 +34,7 @@ fn path(name: &str) -> PathBuf {
 struct Rig {
     robot: Description,
     model: Model,
-    leaves: Leaves,
+    leaves: LeafMap,
     slip: SlipModel,
     modes: Vec<MotionMode>,
 }
@@ -51,7 +51,7 @@ impl Rig {
         let tree = vigil_setup::load_tree(&path("config/trees/rover.toml")).unwrap();
         let modes = motion_modes(&model, &robot, SETS as u32 - 1, false, true);
         Self {
-            leaves: Leaves::new(&tree, &model, &robot, Sensors::PoseEncoders).unwrap(),
+            leaves: LeafMap::new(&tree, &model, &robot, Sensors::PoseEncoders).unwrap(),
             slip: SlipModel::new(&robot).unwrap(),
             modes: (0..SETS as u32)
                 .map(|set| {
@@ -96,7 +96,7 @@ impl Rig {
             ..Healthy::unsure(&self.model, &self.robot)
         };
         filter.restart(&start, first.t_ns);
-        let mut posterior = Posterior::nominal();
+        let mut posterior = TreeBelief::nominal();
         for observation in rest {
             filter.step(observation, NoiseScales::default());
         }

@@ -4,7 +4,7 @@
 use vigil_blocks::{Entry, FaultBelief, ParticleBlock};
 use vigil_diagnosis::Sensors;
 use vigil_diagnosis::identify;
-use vigil_diagnosis::identify::{Identifier, Input, Leaves, Models};
+use vigil_diagnosis::identify::{Identifier, Input, LeafMap, Models};
 use vigil_robot::Description;
 use vigil_robot::slip::SlipModel;
 
@@ -26,7 +26,7 @@ fn keeps_its_name(faults: Faults, seed: u64) {
         tree: &tree,
         decision: Some(&decision),
     };
-    let leaves = Leaves::new(&tree, &model, &robot, Sensors::PoseEncoders).unwrap();
+    let leaves = LeafMap::new(&tree, &model, &robot, Sensors::PoseEncoders).unwrap();
     let settings = identify::Settings::default();
     let mut identifier = Identifier::new(&models, &settings, Sensors::PoseEncoders, 1).unwrap();
     let slip = SlipModel::new(&robot).unwrap();

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{SensorFrame, Valid};
-use vigil_diagnosis::identify::Leaves;
+use vigil_diagnosis::identify::LeafMap;
 use vigil_robot::Description;
 use vigil_robot::slip::{Condition, Situation, SlipModel, Soil};
 
@@ -27,7 +27,7 @@ pub struct Faults {
 
 impl Faults {
     /// The nodes of these faults, as bits.
-    pub fn nodes(self, leaves: &Leaves) -> u64 {
+    pub fn nodes(self, leaves: &LeafMap) -> u64 {
         let bits = |set: u32, nodes: &[Option<usize>]| -> u64 {
             let inside = (0..WHEELS).filter(|wheel| set >> wheel & 1 == 1);
             inside.map(|wheel| 1 << nodes[wheel].unwrap()).sum()

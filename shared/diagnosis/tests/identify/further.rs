@@ -4,7 +4,7 @@ use std::path::Path;
 
 use vigil_blocks::WHEELS;
 use vigil_diagnosis::Sensors;
-use vigil_diagnosis::identify::Leaves;
+use vigil_diagnosis::identify::LeafMap;
 use vigil_diagnosis::identify::further::{FurtherFilter, Fusion};
 use vigil_robot::Description;
 use vigil_robot::FaultTree;
@@ -36,7 +36,7 @@ impl Rover {
     }
 
     fn filter(&self) -> FurtherFilter {
-        let leaves = Leaves::new(&self.tree, &self.model, &self.robot, Sensors::All).unwrap();
+        let leaves = LeafMap::new(&self.tree, &self.model, &self.robot, Sensors::All).unwrap();
         FurtherFilter::new(&self.model, &self.robot, &leaves, 0.01).unwrap()
     }
 

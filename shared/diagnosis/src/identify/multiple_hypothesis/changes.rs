@@ -10,16 +10,18 @@ use vigil_robot::learned::{Mover, Observation, WheelEvidence};
 use super::{FLOOR, MultipleHypothesis};
 use crate::identify::angles::Angles;
 use crate::identify::encoders::Encoders;
-use crate::identify::prepared::{
-    EXPLAINED_S, WheelObservation, age_s, changes_several, newly_stuck,
-};
+use crate::identify::hypothesis_state::HypothesisState;
 use crate::identify::rate_offsets::RateOffsets;
-use crate::identify::servo::Servo;
-use crate::identify::state::State;
+use crate::identify::servo_fault::ServoFault;
+use crate::identify::wheel_update::{
+    EXPLAINED_S, WheelUpdate, age_s, changes_several, newly_stuck,
+};
 
-/// Wheels that stick one after another, each so soon after the one before, s, have one cause: this
-/// many times the rate at which a wheel sticks by itself. Chosen, not measured.
+/// A wheel that sticks so soon after another, s, has the same cause. Chosen by hand: the time in
+/// which a rock or a rut reaches the next wheel at the rover's speed.
 const SOON_S: f64 = 1.0;
+/// Then it is this many times as likely as one that sticks by itself. Chosen by hand, not measured:
+/// three nats; smaller names a second stuck wheel later, larger takes a dead encoder for one.
 const SOON: f64 = 20.0;
 
 impl MultipleHypothesis {
@@ -40,13 +42,13 @@ impl MultipleHypothesis {
         for from in sources.into_iter().flatten() {
             let before = self.modes[from.mode].moved;
             let read = evidence.map_or([before.stuck(); 3], |evidence| {
-                let seen = WheelObservation {
+                let update = WheelUpdate {
                     model: &self.model,
                     robot: &self.robot,
                     observation,
                     evidence,
                 };
-                seen.changed_sets(before.stuck(), &from.state.encoders)
+                update.changed_sets(before.stuck(), &from.state.encoders)
             });
             for mode in 0..self.modes.len() {
                 let after = self.modes[mode].moved;
@@ -70,7 +72,12 @@ impl MultipleHypothesis {
     /// Probability that one observation changes `from` to another mode. An encoder that died in the
     /// last observation may as well be another wheel that stuck then: both are about equally
     /// likely before the motion tells.
-    fn p_change(&self, from: &Hypothesis<State>, mode: usize, observation: &Observation) -> f64 {
+    fn p_change(
+        &self,
+        from: &Hypothesis<HypothesisState>,
+        mode: usize,
+        observation: &Observation,
+    ) -> f64 {
         let (before, after) = (self.modes[from.mode].moved, self.modes[mode].moved);
         let p_other = from.state.encoders.p_any_broken();
         let mut p = self.rates.rate_1_s(before, after, p_other) * observation.dt_s;
@@ -91,7 +98,12 @@ impl MultipleHypothesis {
     }
 
     /// What becomes of a hypothesis when its mode changes.
-    fn changed(&self, from: &Hypothesis<State>, mode: usize, observation: &Observation) -> State {
+    fn changed(
+        &self,
+        from: &Hypothesis<HypothesisState>,
+        mode: usize,
+        observation: &Observation,
+    ) -> HypothesisState {
         let (before, after) = (self.modes[from.mode].moved, self.modes[mode].moved);
         let (curvature, speed) = (observation.curvature, observation.speed);
         let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
@@ -132,7 +144,7 @@ impl MultipleHypothesis {
                 _ => {}
             }
         }
-        State {
+        HypothesisState {
             track,
             encoders,
             offsets: RateOffsets::default(),
@@ -140,7 +152,7 @@ impl MultipleHypothesis {
             servo: match after {
                 Mover::Steer(wheel) => {
                     let angle = steering_angle(&self.robot, wheel, observation.command[0]);
-                    Some(Servo::new(&self.servo, angle))
+                    Some(ServoFault::new(&self.servo, angle))
                 }
                 _ => None,
             },
@@ -153,18 +165,23 @@ impl MultipleHypothesis {
 
     /// By how much more the robot moves at a change of its mode than it would if the new mode's
     /// motion began at once: the body follows within the lag, as if the old one lasted so long.
-    fn lagged(&self, from: &Hypothesis<State>, to: usize, at: &Observation) -> Displacement {
+    fn lagged(
+        &self,
+        from: &Hypothesis<HypothesisState>,
+        to: usize,
+        at: &Observation,
+    ) -> Displacement {
         let limit = self.model.command.curvature_max_1_m;
         let motion = |mode: usize| {
             let motion = &self.modes[mode].motion;
             Vector3::from(motion.per_metre(at.curvature, at.speed, limit))
         };
-        let apart = motion(from.mode) + from.state.track.deviation() - motion(to);
+        let excess = motion(from.mode) + from.state.track.deviation() - motion(to);
         let travel_m = at.speed * self.model.command.lag_s;
         Displacement {
-            per_metre: apart.into(),
+            per_metre: excess.into(),
             travel_m,
-            extra: (apart * travel_m).map(|apart| apart * apart).into(),
+            extra: (excess * travel_m).map(|excess| excess * excess).into(),
         }
     }
 }

@@ -4,8 +4,8 @@ use vigil_blocks::{FAULT_SETS, FaultSet, WHEELS};
 use vigil_robot::learned::{MotionMode, Mover};
 
 use crate::identify::further::Fusion;
-use crate::identify::modes::Leaves;
-use crate::identify::posterior::Posterior;
+use crate::identify::leaf_map::LeafMap;
+use crate::identify::tree_belief::TreeBelief;
 
 /// Hypotheses less probable than this are not divided among sets: a tenth of [`FLOOR`].
 pub const NEGLIGIBLE: f64 = 1e-13;
@@ -16,12 +16,12 @@ pub const FLOOR: f64 = 1e-12;
 
 /// Sums over hypotheses.
 #[derive(Debug, Clone)]
-pub struct Sets {
+pub struct SetProbabilities {
     /// Row s: the wheels `s` (bits) are stuck; after these rows one per wheel whose steering servo
     /// does not do as it is told, and one for a pose that has jumped. Column e: the encoders `e`
     /// (bits) are broken.
     p: Vec<f64>,
-    /// Of each motion mode: [`Leaves::shares`].
+    /// Of each motion mode: [`LeafMap::shares`].
     shares: Vec<Vec<(Mover, f64)>>,
     /// Per motion mode: what of it no fault describes.
     p_unknown: Vec<f64>,
@@ -30,11 +30,11 @@ pub struct Sets {
     products: Vec<f64>,
 }
 
-impl Sets {
+impl SetProbabilities {
     /// Sets over `wheels` wheels, stuck as in these modes, and their encoders. Allocates all
     /// that it will need.
     #[must_use]
-    pub fn new(modes: &[MotionMode], leaves: &Leaves, wheels: usize) -> Self {
+    pub fn new(modes: &[MotionMode], leaves: &LeafMap, wheels: usize) -> Self {
         let subsets = 1 << wheels;
         let is_other = |mode: &MotionMode| matches!(mode.moved, Mover::Steer(_) | Mover::Pose);
         let others = if modes.iter().any(is_other) {
@@ -94,7 +94,7 @@ impl Sets {
     }
 
     /// Nodes of a set; None if a fault of it is no leaf.
-    fn nodes(&self, index: usize, leaves: &Leaves) -> Option<u64> {
+    fn nodes(&self, index: usize, leaves: &LeafMap) -> Option<u64> {
         let subsets = self.products.len();
         let (row, encoders) = (index / subsets, index % subsets);
         let (stuck, mut nodes) = match row.checked_sub(subsets) {
@@ -133,7 +133,7 @@ impl Sets {
 
     /// Normalises, and fills the probabilities of nodes, sets and unknown, by what further channels
     /// say too. What they alone tell of comes with any encoders broken.
-    pub fn posterior(&mut self, leaves: &Leaves, fusion: Option<&Fusion>, out: &mut Posterior) {
+    pub fn posterior(&mut self, leaves: &LeafMap, fusion: Option<&Fusion>, out: &mut TreeBelief) {
         if let Some(fusion) = fusion {
             self.fuse(fusion);
         }
@@ -209,5 +209,39 @@ pub fn rank(sets: &mut [FaultSet; FAULT_SETS], count: &mut usize, set: FaultSet)
         *count = (*count + 1).min(FAULT_SETS);
         sets[place..*count].rotate_right(1);
         sets[place] = set;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_most_probable_sets_are_ranked_and_the_others_go() {
+        let mut sets = [FaultSet::default(); FAULT_SETS];
+        let mut count = 0;
+        for leaves in 1..=FAULT_SETS as u64 + 2 {
+            let p = if leaves % 2 == 0 { 1.0 } else { 0.5 } / leaves as f64;
+            rank(&mut sets, &mut count, FaultSet { leaves, p });
+            assert_eq!(count, FAULT_SETS.min(leaves as usize));
+        }
+        assert!(sets.is_sorted_by(|a, b| a.p >= b.p), "{sets:?}");
+        // 1/2, 1/2 of 1, 1/4, 1/6 of 3 and 6, 1/8, 1/10 of 5 and 10: of equals the first first.
+        let order: Vec<u64> = sets.iter().map(|set| set.leaves).collect();
+        assert_eq!(order, [1, 2, 4, 3, 6, 8, 5, 10]);
+    }
+
+    #[test]
+    fn faults_of_a_set_are_its_stuck_wheels_its_servo_or_pose_and_its_encoders() {
+        // Two wheels: four rows of stuck wheels, then one for each servo, then the pose.
+        for (row, encoders, count) in [(0, 0, 0), (3, 1, 3), (1, 3, 3), (4, 0, 1), (12, 2, 2)] {
+            assert_eq!(faults(row * 4 + encoders, 4), count, "{row} {encoders}");
+        }
+    }
+
+    #[test]
+    fn entropy_is_that_of_one_alternative() {
+        assert_eq!((entropy(0.0), entropy(1.0), entropy(-1.0)), (0.0, 0.0, 0.0));
+        assert!((entropy(0.5) - 0.5 * std::f64::consts::LN_2).abs() < 1e-15);
     }
 }

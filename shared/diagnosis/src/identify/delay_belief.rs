@@ -119,4 +119,15 @@ mod tests {
             assert_eq!(late.take(0, 0.0, 0.0, false, |_| 0.0), None);
         }
     }
+
+    #[test]
+    fn without_a_reading_every_delay_is_as_likely() {
+        let (mean, sd) = DelayBelief::default().estimate(3);
+        let n = DELAYS_S.len() as f64;
+        let expected = DELAYS_S.iter().sum::<f64>() / n;
+        let square = DELAYS_S.iter().map(|delay| delay * delay).sum::<f64>() / n;
+        let cell = 0.28 * expected;
+        let variance = square - expected * expected + cell * cell / 12.0;
+        assert!((mean - expected).abs() < 1e-12 && (sd - variance.sqrt()).abs() < 1e-12);
+    }
 }

@@ -1,9 +1,9 @@
-//! Why one explanation is preferred to another: the evidence of each channel.
+//! The evidence of each channel for a diagnosis against the next best explanation.
 //!
-//! When a diagnosis is made, it and the next best explanation are both followed from the onset on,
-//! each as if it alone were true, and the log-likelihoods of their readings are summed by channel.
-//! The filter's own hypotheses cannot say this: the next best of them has usually become it a
-//! moment ago, and owes its past to the best.
+//! When a diagnosis is made, it and its rival are both followed from the onset on, each as if it
+//! alone were true, and the log-likelihoods of the measurements are summed by channel. The filter's
+//! own hypotheses do not hold these sums: the second best has usually branched off the best a
+//! moment ago and shares its past.
 
 use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
 use vigil_inference::alternative::Alternatives;
@@ -18,14 +18,14 @@ use vigil_robot::learned::{
 };
 
 use crate::identify::angles::Angles;
-use crate::identify::modes::Leaves;
-use crate::identify::posterior::Posterior;
-use crate::identify::prepared::is_new;
+use crate::identify::leaf_map::LeafMap;
 use crate::identify::rate_offsets::RateOffsets;
-use crate::identify::servo::{Servo, ServoPrior};
+use crate::identify::servo_fault::{ServoFault, ServoPrior};
+use crate::identify::tree_belief::TreeBelief;
+use crate::identify::wheel_update::is_new;
 
-/// Probability that in the unknown a wheel or an angle begins or ceases to do anything, an
-/// observation: once in 1.4 h of 50 ms.
+/// Probability, per observation, that in the unknown a wheel or an angle begins or ceases to do
+/// anything. Chosen by hand: once in 1.4 h of 50 ms, so that within one fault it moves no evidence.
 const CHANGES: f64 = 1e-5;
 
 /// What a diagnosis may say.
@@ -39,24 +39,35 @@ enum Explanation {
 
 /// An explanation that is taken to be true since the onset.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Lineage {
+struct FollowedExplanation {
     /// Index of the motion mode.
     mode: usize,
     /// Wheels whose encoders are broken, as bits.
     broken: u32,
     track: Track,
     offsets: RateOffsets,
-    servo: Option<Servo>,
+    servo: Option<ServoFault>,
     /// In the unknown: which wheels and which angles do anything.
     anything: [Alternatives<2>; WHEELS],
     angles: Angles,
     /// Log-likelihood of the readings, by channel.
-    heard: [f64; CHANNELS],
+    log_likelihood: [f64; CHANNELS],
+}
+
+/// How the robot drives at an instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Drive {
+    /// Curvature that the body follows, 1/m.
+    pub curvature_1_m: f64,
+    /// Its speed, m/s.
+    pub speed_m_s: f64,
+    /// Commanded curvature, 1/m.
+    pub commanded_1_m: f64,
 }
 
 /// The diagnosis and its rival.
 #[derive(Debug, Clone)]
-pub struct Reasons {
+pub struct ChannelEvidence {
     model: Model,
     robot: Description,
     modes: Vec<MotionMode>,
@@ -64,12 +75,12 @@ pub struct Reasons {
     servo: ServoPrior,
     /// Of the wheels, from before the onset.
     wheels: WheelContext,
-    followed: Option<[Lineage; 2]>,
+    followed: Option<[FollowedExplanation; 2]>,
     onset_ns: u64,
     runner_up: u32,
 }
 
-impl Reasons {
+impl ChannelEvidence {
     /// No diagnosis yet, of a robot that may move in these ways.
     #[must_use]
     pub fn new(
@@ -109,20 +120,20 @@ impl Reasons {
     pub fn channel_evidence(&self) -> [f64; CHANNELS] {
         self.followed.map_or([0.0; CHANNELS], |[named, rival]| {
             std::array::from_fn(|i| {
-                let apart = named.heard[i] - rival.heard[i];
-                if apart.is_finite() { apart } else { 0.0 }
+                let ratio = named.log_likelihood[i] - rival.log_likelihood[i];
+                if ratio.is_finite() { ratio } else { 0.0 }
             })
         })
     }
 
     /// Begins to follow the diagnosis of `posterior` and its rival from before `onset_ns`, while
-    /// the robot drives at this curvature (1/m) and speed (m/s), and is told this curvature.
+    /// the robot drives like this.
     pub fn begin(
         &mut self,
-        posterior: &Posterior,
-        leaves: &Leaves,
+        posterior: &TreeBelief,
+        leaves: &LeafMap,
         healthy: &Healthy,
-        (curvature, speed, commanded_1_m): (f64, f64, f64),
+        drive: Drive,
         onset_ns: u64,
     ) {
         let (named, rival) = contenders(posterior);
@@ -149,22 +160,23 @@ impl Reasons {
                 }
             };
             let mode = self.modes.iter().position(|mode| mode.moved == moved)?;
-            let noise = self.modes[mode].noise_at(&self.model, curvature, speed);
-            Some(Lineage {
+            let noise =
+                self.modes[mode].noise_at(&self.model, drive.curvature_1_m, drive.speed_m_s);
+            Some(FollowedExplanation {
                 mode,
                 broken,
                 track: healthy.track(&noise),
                 offsets: RateOffsets::default(),
                 servo: match moved {
                     Mover::Steer(wheel) => {
-                        let angle = steering_angle(&self.robot, wheel, commanded_1_m);
-                        Some(Servo::new(&self.servo, angle))
+                        let angle = steering_angle(&self.robot, wheel, drive.commanded_1_m);
+                        Some(ServoFault::new(&self.servo, angle))
                     }
                     _ => None,
                 },
                 anything: [Alternatives::new([1.0 - ANYTHING, ANYTHING]); WHEELS],
                 angles: Angles::default(),
-                heard: [0.0; CHANNELS],
+                log_likelihood: [0.0; CHANNELS],
             })
         };
         self.followed = lineage(named).zip(lineage(rival)).map(<[_; 2]>::from);
@@ -177,7 +189,7 @@ impl Reasons {
         };
         self.wheels.fade(observation.travel_m);
         let variance = observation.pose_variance(&self.model, noise.pose);
-        for Lineage { mode, track, .. } in &mut followed {
+        for FollowedExplanation { mode, track, .. } in &mut followed {
             let mode = &self.modes[*mode];
             if !observation.anchor {
                 let step = observation.displacement(&self.model, &mode.motion);
@@ -188,21 +200,26 @@ impl Reasons {
         }
         if observation.moving && !observation.anchor {
             if self.use_wheels {
-                self.hear_wheels(&mut followed, observation, noise);
+                self.take_wheels(&mut followed, observation, noise);
             }
             if observation.pose_frames > 0 {
-                for Lineage { track, heard, .. } in &mut followed {
+                for FollowedExplanation {
+                    track,
+                    log_likelihood,
+                    ..
+                } in &mut followed
+                {
                     let gained = track.update(observation.pose, variance);
-                    heard[Channel::POSE] += gained.unwrap_or(0.0);
+                    log_likelihood[Channel::POSE] += gained.unwrap_or(0.0);
                 }
             }
         }
         self.followed = Some(followed);
     }
 
-    fn hear_wheels(
+    fn take_wheels(
         &self,
-        followed: &mut [Lineage; 2],
+        followed: &mut [FollowedExplanation; 2],
         observation: &Observation,
         noise: NoiseScales,
     ) {
@@ -214,7 +231,7 @@ impl Reasons {
             let moved = mode.moved;
             for wheel in 0..self.robot.wheels.len().min(WHEELS) {
                 let is_broken = lineage.broken >> wheel & 1 == 1;
-                lineage.heard[Channel::wheel_rate(wheel)] += if is_broken {
+                lineage.log_likelihood[Channel::wheel_rate(wheel)] += if is_broken {
                     // In any way, also by a size: then it reads a smooth rate of its own.
                     let ways = [evidence.broken_anyhow(wheel), evidence.own_rate[wheel]];
                     log_add(ways[0], ways[1]) - std::f64::consts::LN_2
@@ -225,17 +242,17 @@ impl Reasons {
                 } else if mode.turns_anyhow(wheel) && !is_new {
                     let dragged = evidence.dragged(&self.model, observation, mode, wheel);
                     let (model, offsets) = (&self.model, &mut lineage.offsets);
-                    let heard =
+                    let log_likelihood =
                         offsets.log_likelihood(model, observation, &evidence, wheel, &dragged);
                     offsets.learn(observation, &evidence, wheel, &dragged);
-                    heard
+                    log_likelihood
                 } else {
                     evidence.whole(&self.model, observation, mode, is_new, wheel)
                 };
             }
             for (wheel, reading) in evidence.steer.iter().enumerate() {
                 let Some(reading) = reading else { continue };
-                lineage.heard[Channel::steer(wheel)] += match (moved, &mut lineage.servo) {
+                lineage.log_likelihood[Channel::steer(wheel)] += match (moved, &mut lineage.servo) {
                     (Mover::UnknownAny, _) => lineage.angles.step_one(wheel, reading, CHANGES),
                     (Mover::Steer(askew), Some(servo)) if askew == wheel => {
                         servo.step(&self.servo, reading)
@@ -249,7 +266,7 @@ impl Reasons {
 
 /// The best explanation and the next best that is not the same faults and one more: those explain
 /// nothing else.
-fn contenders(posterior: &Posterior) -> (Explanation, Explanation) {
+fn contenders(posterior: &TreeBelief) -> (Explanation, Explanation) {
     let named = posterior.sets[0].leaves;
     let others = posterior.sets[1..posterior.set_count.max(1)].iter();
     let mut others = others.filter(|set| named == 0 || set.leaves & named != named);

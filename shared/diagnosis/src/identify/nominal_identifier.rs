@@ -1,23 +1,22 @@
-//! Diagnosis of a robot whose faults nobody has modelled: nominal, or unknown.
+//! Diagnosis of a robot without fault models: nominal, or unknown.
 
 use vigil_blocks::{DetectionBelief, Entry, FaultBelief, MODE_UNKNOWN, ParticleBlock, Readiness};
 use vigil_robot::FaultTree;
 
-use crate::identify::blindfold::Blindfold;
-use crate::identify::identifier::{Identifier, Input};
-use crate::identify::modes::Leaves;
-use crate::identify::posterior::Posterior;
-use crate::identify::reported::HeldName;
+use crate::identify::identifier::Input;
+use crate::identify::leaf_map::LeafMap;
+use crate::identify::reported::ReportedFault;
+use crate::identify::tree_belief::TreeBelief;
 use crate::invariants;
 
-/// Reports ND with 1 - p(fault) of the detector and the rest as unknown.
+/// Reports ND with 1 - p(fault) of the detector, and the rest as unknown.
 #[derive(Debug, Clone)]
-pub struct Watcher {
+pub struct NominalIdentifier {
     tree_hash: u64,
     node_count: u32,
-    posterior: Posterior,
-    leaves: Leaves,
-    reported: HeldName,
+    posterior: TreeBelief,
+    leaves: LeafMap,
+    reported: ReportedFault,
     run_id: u64,
     /// Capture time of the last frame, ns, and motion in it, s, until it has been reported.
     t_ns: u64,
@@ -25,16 +24,16 @@ pub struct Watcher {
     alarm_t_ns: u64,
 }
 
-impl Watcher {
-    /// A watcher that reports in the words of `tree`, of which it uses the nominal node alone.
+impl NominalIdentifier {
+    /// An identifier over `tree`, of which it uses the nominal node alone.
     #[must_use]
     pub fn new(tree: &FaultTree) -> Self {
         Self {
             tree_hash: tree.hash(),
             node_count: tree.nodes().len() as u32,
-            posterior: Posterior::nominal(),
-            leaves: Leaves::none(),
-            reported: HeldName::default(),
+            posterior: TreeBelief::nominal(),
+            leaves: LeafMap::none(),
+            reported: ReportedFault::default(),
             run_id: 0,
             t_ns: 0,
             moved_s: 0.0,
@@ -73,7 +72,7 @@ impl Watcher {
     }
 
     fn begin_run(&mut self) {
-        self.posterior = Posterior::nominal();
+        self.posterior = TreeBelief::nominal();
         self.reported.begin_run();
         (self.t_ns, self.alarm_t_ns) = (0, 0);
     }
@@ -81,7 +80,7 @@ impl Watcher {
     fn take(&mut self, detection: &DetectionBelief, dt_s: f64) {
         let moves = detection.readiness == Readiness::Armed as u32 && self.t_ns != 0;
         self.moved_s = if moves { dt_s } else { 0.0 };
-        self.posterior = Posterior::watching(detection.p_fault);
+        self.posterior = TreeBelief::watching(detection.p_fault);
         self.alarm_t_ns = match detection.alarm {
             0 => 0,
             _ => detection.alarm_t_capture_ns,
@@ -89,8 +88,8 @@ impl Watcher {
     }
 
     /// Before the alarm the mode is nominal, whatever the odds are in passing. Its changes are
-    /// counted where they are seen, by [`Blindfold`].
-    fn report(&mut self, predicted: &Posterior, belief: &mut FaultBelief) {
+    /// counted where they are seen, by [`BlindOverride`].
+    fn report(&mut self, predicted: &TreeBelief, belief: &mut FaultBelief) {
         let posterior = &self.posterior;
         let alarm = self.alarm_t_ns != 0;
         let (mode, p_mode) = match alarm && posterior.unknown > 0.5 {
@@ -99,7 +98,7 @@ impl Watcher {
         };
         let moved_s = std::mem::take(&mut self.moved_s);
         self.reported
-            .take((mode, p_mode), posterior, &self.leaves, moved_s);
+            .take(mode, p_mode, posterior, &self.leaves, moved_s);
         belief.run_id = self.run_id;
         belief.p = posterior.nodes;
         belief.p_unknown = posterior.unknown;
@@ -119,92 +118,6 @@ impl Watcher {
     }
 }
 
-/// An identifier of either kind, which says so while the detector is blind.
-#[derive(Debug, Clone)]
-pub struct Diagnoser {
-    of: Of,
-    blindfold: Blindfold,
-}
-
-#[derive(Debug, Clone)]
-enum Of {
-    /// Tells faults apart.
-    Identifier(Box<Identifier>),
-    /// Tells nominal from unknown.
-    Watcher(Box<Watcher>),
-}
-
-impl Diagnoser {
-    /// See [`Identifier::particles`]; 0 without any.
-    #[must_use]
-    pub fn particles(&self) -> u32 {
-        match &self.of {
-            Of::Identifier(identifier) => identifier.particles(),
-            Of::Watcher(_) => 0,
-        }
-    }
-
-    /// See [`Identifier::particles_in_use`].
-    #[must_use]
-    pub fn particles_in_use(&self) -> u32 {
-        match &self.of {
-            Of::Identifier(identifier) => identifier.particles_in_use(),
-            Of::Watcher(_) => 0,
-        }
-    }
-
-    /// Takes one entry of the journal; see [`Identifier::step`].
-    // Never merged into its caller, so that its instructions can be counted.
-    #[inline(never)]
-    pub fn step(
-        &mut self,
-        entry: Entry<Input<'_>>,
-        belief: &mut FaultBelief,
-        hypotheses: &mut ParticleBlock,
-    ) {
-        if let Entry::Frame(Input {
-            detection: Some((detection, _)),
-            ..
-        }) = entry
-        {
-            self.look(detection);
-        }
-        match &mut self.of {
-            Of::Identifier(identifier) => identifier.step(entry, belief, hypotheses),
-            Of::Watcher(watcher) => watcher.step(entry, belief, hypotheses),
-        }
-        let p = belief.p;
-        self.blindfold.cover(belief);
-        invariants::held(&p, &belief.p);
-        invariants::name(belief.mode, belief.node_count as usize);
-        invariants::name(belief.reported, belief.node_count as usize);
-    }
-
-    /// Takes a detection without a frame behind it: of its words, only those of the detector's
-    /// sight count.
-    pub const fn look(&mut self, detection: &DetectionBelief) {
-        self.blindfold.look(detection);
-    }
-}
-
-impl From<Watcher> for Diagnoser {
-    fn from(watcher: Watcher) -> Self {
-        Self {
-            of: Of::Watcher(Box::new(watcher)),
-            blindfold: Blindfold::default(),
-        }
-    }
-}
-
-impl From<Identifier> for Diagnoser {
-    fn from(identifier: Identifier) -> Self {
-        Self {
-            of: Of::Identifier(Box::new(identifier)),
-            blindfold: Blindfold::default(),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -218,7 +131,7 @@ mod tests {
             parent: None,
             fault: None,
         };
-        let mut watcher = Watcher::new(&FaultTree::new(vec![nominal]).unwrap());
+        let mut identifier = NominalIdentifier::new(&FaultTree::new(vec![nominal]).unwrap());
         let mut belief = FaultBelief::default();
         let (block, mut out) = (Box::<ParticleBlock>::default(), Box::default());
         let mut t_ns = 0;
@@ -238,7 +151,7 @@ mod tests {
                     frame: &frame,
                     detection: Some((&detection, &*block)),
                 };
-                watcher.step(Entry::Frame(input), &mut belief, &mut out);
+                identifier.step(Entry::Frame(input), &mut belief, &mut out);
             }
             (belief.mode, belief.reported)
         };

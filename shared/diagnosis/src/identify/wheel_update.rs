@@ -1,4 +1,4 @@
-//! What one observation says of the wheels in one motion mode: prepared once for all hypotheses.
+//! Log-likelihoods of one observation's wheels in one motion mode, computed once for all hypotheses.
 
 use vigil_blocks::WHEELS;
 use vigil_robot::Description;
@@ -13,7 +13,7 @@ use crate::identify::sizes::{BIAS, DRIFT, EncoderSizes};
 
 /// Of one motion mode.
 #[derive(Debug, Clone, Copy)]
-pub struct MotionTerms {
+pub struct WheelTerms {
     /// In general, and at the mode's onset.
     likelihoods: [Likelihoods; 2],
     /// Wheels that turn in a way of which nothing was learned, and how they may.
@@ -23,7 +23,7 @@ pub struct MotionTerms {
 
 /// One observation and its wheels.
 #[derive(Debug, Clone, Copy)]
-pub struct WheelObservation<'a> {
+pub struct WheelUpdate<'a> {
     /// The model.
     pub model: &'a Model,
     /// Its robot.
@@ -34,13 +34,13 @@ pub struct WheelObservation<'a> {
     pub evidence: &'a WheelEvidence,
 }
 
-impl WheelObservation<'_> {
+impl WheelUpdate<'_> {
     /// What the wheels say in one motion mode, `sized` being what they say of encoders that are off
     /// by a size.
     #[must_use]
-    pub fn prepared(&self, mode: &MotionMode, sized: &EncoderSizes) -> MotionTerms {
+    pub fn terms(&self, mode: &MotionMode, sized: &EncoderSizes) -> WheelTerms {
         let stuck = mode.moved.stuck();
-        MotionTerms {
+        WheelTerms {
             likelihoods: [false, true].map(|is_new| self.likelihoods(mode, is_new, sized)),
             dragged: std::array::from_fn(|wheel| {
                 let is_wheel = wheel < self.robot.wheels.len();
@@ -76,13 +76,13 @@ impl WheelObservation<'_> {
     }
 
     /// A wheel's readings by an encoder that is off in this way.
-    fn off(&self, mode: &MotionMode, wheel: usize, way: usize, said: &EncoderSizes) -> f64 {
+    fn off(&self, mode: &MotionMode, wheel: usize, way: usize, sizes: &EncoderSizes) -> f64 {
         let is_stuck = mode.moved.is_stuck(wheel);
         match (is_stuck, way) {
-            (true, BIAS | DRIFT) => said.standing[wheel],
+            (true, BIAS | DRIFT) => sizes.standing[wheel],
             // Any gain makes nothing of nothing.
             (true, _) => self.evidence.standing(wheel),
-            (false, _) => said.logs[wheel][way],
+            (false, _) => sizes.logs[wheel][way],
         }
     }
 
@@ -91,26 +91,27 @@ impl WheelObservation<'_> {
     /// changed.
     pub fn weigh(
         &self,
-        prepared: &MotionTerms,
-        (births, death): (&[f64; WHEELS], f64),
+        terms: &WheelTerms,
+        births: &[f64; WHEELS],
+        death: f64,
         fresh: u32,
         encoders: &mut Encoders,
         offsets: &mut RateOffsets,
     ) -> f64 {
         let (observation, evidence) = (self.observation, self.evidence);
-        let [general, at_onset] = &prepared.likelihoods;
+        let [general, at_onset] = &terms.likelihoods;
         let mut likelihoods = *general;
         for wheel in (0..WHEELS).filter(|wheel| fresh >> wheel & 1 == 1) {
             likelihoods.replace(wheel, at_onset);
         }
-        let dragged = prepared.dragged.iter().enumerate();
+        let dragged = terms.dragged.iter().enumerate();
         let dragged = dragged.filter_map(|(wheel, dragged)| Some((wheel, dragged.as_ref()?)));
         let dragged = dragged.filter(|(wheel, _)| fresh >> wheel & 1 == 0);
         for (wheel, dragged) in dragged.clone() {
             let log = offsets.log_likelihood(self.model, observation, evidence, wheel, dragged);
             likelihoods.replace_whole(wheel, log);
         }
-        let (stuck, t_ns) = (prepared.stuck, observation.t_first_ns);
+        let (stuck, t_ns) = (terms.stuck, observation.t_first_ns);
         let gained = encoders.step(births, death, stuck, &likelihoods, t_ns);
         for (wheel, dragged) in dragged {
             if encoders.p_broken(wheel) < 0.5 {
@@ -184,4 +185,41 @@ pub fn changes_several(before: Mover, after: Mover) -> bool {
 pub fn newly_stuck(before: Mover, after: Mover) -> Option<usize> {
     let new = after.stuck() & !before.stuck();
     (new != 0).then(|| new.trailing_zeros() as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn several_wheels_change_where_more_than_one_sticks_or_turns() {
+        use Mover::{Nominal, Stuck, UnknownAny};
+        for (before, after, several) in [
+            (Nominal, Stuck(0b1), false),
+            (Nominal, Stuck(0b11), true),
+            (Stuck(0b1), Stuck(0b10), false),
+            (Stuck(0b1), Stuck(0b11), false),
+            (Stuck(0b1), Stuck(0b110), true),
+            (Stuck(0b111), Stuck(0b1), true),
+            (Stuck(0b11), UnknownAny, false),
+        ] {
+            let found = changes_several(before, after);
+            assert_eq!(found, several, "{before:?} to {after:?}");
+        }
+    }
+
+    #[test]
+    fn the_new_stuck_wheel_is_the_one_that_turned() {
+        use Mover::{Nominal, Stuck};
+        assert_eq!(newly_stuck(Nominal, Stuck(0b100)), Some(2));
+        assert_eq!(newly_stuck(Stuck(0b1), Stuck(0b1001)), Some(3));
+        assert_eq!(newly_stuck(Stuck(0b11), Stuck(0b1)), None);
+    }
+
+    #[test]
+    fn an_onset_blurs_for_its_time() {
+        assert!(is_new(1_000 + ONSET_BLUR_NS - 1, 1_000) && is_new(5, 1_000));
+        assert!(!is_new(1_000 + ONSET_BLUR_NS, 1_000));
+        assert_eq!((age_s(2_500_000_000, 500_000_000), age_s(1, 2)), (2.0, 0.0));
+    }
 }

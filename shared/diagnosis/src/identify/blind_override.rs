@@ -1,10 +1,10 @@
-//! While the detector sees nothing, no diagnosis is one.
+//! While the detector is blind, no diagnosis is made: its names say BLIND.
 
 use vigil_blocks::{DetectionBelief, FaultBelief, MODE_BLIND};
 
-/// Puts [`MODE_BLIND`] over the mode that a filter reports; its probabilities are held.
+/// Puts [`MODE_BLIND`] over the names that a filter reports. The probabilities stay the filter's.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Blindfold {
+pub(crate) struct BlindOverride {
     is_blind: bool,
     mode: u32,
     mode_changes: u32,
@@ -12,13 +12,13 @@ pub(crate) struct Blindfold {
     reported_changes: u32,
 }
 
-impl Blindfold {
-    /// What the detector says of its sight.
+impl BlindOverride {
+    /// Takes whether the detector is blind.
     pub(crate) const fn look(&mut self, detection: &DetectionBelief) {
         self.is_blind = detection.blind != 0;
     }
 
-    /// Covers the belief, and counts the changes of what is then seen.
+    /// Covers the names, and counts the changes of what readers then see.
     pub(crate) const fn cover(&mut self, belief: &mut FaultBelief) {
         if self.is_blind {
             (belief.mode, belief.reported) = (MODE_BLIND, MODE_BLIND);
@@ -39,12 +39,12 @@ mod tests {
 
     #[test]
     fn a_diagnosis_is_covered_while_the_detector_is_blind_and_comes_back_as_it_was() {
-        let mut fold = Blindfold::default();
+        let mut cover = BlindOverride::default();
         let detection = |blind| DetectionBelief {
             blind,
             ..DetectionBelief::default()
         };
-        let mut said = Vec::new();
+        let mut names = Vec::new();
         for blind in [0, 0, 3, 3, 0] {
             let mut belief = FaultBelief {
                 mode: 7,
@@ -52,14 +52,14 @@ mod tests {
                 ..FaultBelief::default()
             };
             belief.p[7] = 0.9;
-            fold.look(&detection(blind));
-            fold.cover(&mut belief);
+            cover.look(&detection(blind));
+            cover.cover(&mut belief);
             assert_eq!(belief.p[7].to_bits(), 0.9_f64.to_bits());
             assert_eq!(belief.mode, belief.reported);
             assert_eq!(belief.mode_change_count, belief.reported_change_count);
-            said.push((belief.mode, belief.mode_change_count));
+            names.push((belief.mode, belief.mode_change_count));
         }
         let expected = [(7, 1), (7, 1), (MODE_BLIND, 2), (MODE_BLIND, 2), (7, 3)];
-        assert_eq!(said, expected);
+        assert_eq!(names, expected);
     }
 }

@@ -1,13 +1,13 @@
-//! What the detector watches with: a model with faults, or one of nominal behaviour alone.
+//! Observer and detection filter: of a model with faults, or of nominal behaviour alone.
 
 use vigil_blocks::SensorFrame;
 use vigil_robot::learned::monitor::DetectionOutput;
 use vigil_robot::learned::{FrameOutcome, Healthy, Monitor, NoiseScales, Observer};
 use vigil_robot::nominal;
 
-/// What the detector must know of an observation.
+/// The interval of an observation: what the detector must know of it.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct DetectorInput {
+pub(crate) struct Interval {
     /// When it ended, ns.
     pub t_ns: u64,
     /// Its length, s.
@@ -16,9 +16,10 @@ pub(crate) struct DetectorInput {
     pub moving: bool,
 }
 
-/// Observer and monitor of either kind.
+/// Observer and detection filter of either model. The models share no observation, so that no
+/// trait covers both.
 #[derive(Debug, Clone)]
-pub(crate) enum Watch {
+pub(crate) enum DetectionFilter {
     /// Of a model with faults: tracks the pose.
     Faults {
         /// Frames to observations.
@@ -32,12 +33,10 @@ pub(crate) enum Watch {
         observer: Box<nominal::Observer>,
         /// Detection filter.
         monitor: Box<nominal::Monitor>,
-        /// The last observation.
-        last: DetectorInput,
     },
 }
 
-impl Watch {
+impl DetectionFilter {
     /// Takes a frame.
     pub fn push(&mut self, frame: &SensorFrame) -> FrameOutcome {
         match self {
@@ -47,32 +46,27 @@ impl Watch {
     }
 
     /// Takes the observation that the last frame completed.
-    pub fn step(&mut self, suspected: bool) -> DetectorInput {
+    pub fn step(&mut self, suspected: bool) -> Interval {
         match self {
             Self::Faults { observer, monitor } => {
                 observer.suspect(suspected);
                 let observation = observer.observation();
                 monitor.step_with(observation, observer.further(), suspected);
-                DetectorInput {
+                Interval {
                     t_ns: observation.t_ns,
                     dt_s: observation.dt_s,
                     moving: observation.moving,
                 }
             }
-            Self::Nominal {
-                observer,
-                monitor,
-                last,
-            } => {
+            Self::Nominal { observer, monitor } => {
                 monitor.step(observer.history(), suspected);
-                if let Some(now) = observer.history().ago(0) {
-                    *last = DetectorInput {
-                        t_ns: now.t_ns,
-                        dt_s: now.dt_s,
-                        moving: now.moving,
-                    };
-                }
-                *last
+                // A complete observation is the newest of the history.
+                let newest = observer.history().ago(0);
+                newest.map_or_else(Interval::default, |now| Interval {
+                    t_ns: now.t_ns,
+                    dt_s: now.dt_s,
+                    moving: now.moving,
+                })
             }
         }
     }

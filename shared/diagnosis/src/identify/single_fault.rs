@@ -22,46 +22,50 @@ use vigil_robot::learned::{
 
 use crate::identify::fault_rates::fault_rates;
 use crate::identify::hypotheses::HypothesisList;
+use crate::identify::leaf_map::{IdentifierError, LeafMap};
 use crate::identify::models::Models;
-use crate::identify::modes::{IdentifierError, Leaves};
-use crate::identify::posterior::Posterior;
 use crate::identify::risk::risks;
-use crate::identify::sets::{FLOOR, entropy};
+use crate::identify::set_probabilities::{FLOOR, entropy};
 use crate::identify::settings::{IdentifierFilter, PARTICLES, Settings};
+use crate::identify::tree_belief::TreeBelief;
 
-/// Share of the draws that leave a mode in the raised proposals. Half at most doubles a weight's
-/// spread.
+/// Share of the draws that leave a mode in the raised proposals. Chosen by hand: half at most
+/// doubles a weight's spread; smaller finds a rare fault later.
 const RAISED: f64 = 0.5;
-/// Each particle of the look-ahead filter tries every mode: there are fewer of them.
+/// Each particle of the look-ahead filter tries every mode, so that there are fewer of them: an
+/// eighth costs about what the others do.
 const LOOK_AHEAD_SHARE: usize = 8;
-/// KLD-sampling: distance, quantile (99 %), and least number of particles. The distance is Fox's
-/// (2003); 32 are no fewer than the modes.
-const ADAPTIVE: (f64, f64, usize) = (0.05, 2.326, 32);
-/// A fault began when its probability was last below this. Chosen: later than the birth, before it
-/// has a name at 0.5.
+/// KLD-sampling (Fox 2003): largest distance between sampled and true belief, as in the paper.
+const KLD_DISTANCE: f64 = 0.05;
+/// It is kept with 99 %: that quantile of the standard normal.
+const KLD_QUANTILE: f64 = 2.326;
+/// Least number of particles: no fewer than the modes.
+const PARTICLES_MIN: usize = 32;
+/// A fault began when its probability was last below this. Chosen by hand: above what a prior alone
+/// reaches, below the 0.5 at which the fault has a name.
 const ONSET: f64 = 0.1;
 
 /// A filter and its model.
 #[derive(Debug, Clone)]
-enum Kind {
+enum LibraryFilter {
     Sampled(ParticleFilter<Switching>),
     Hierarchical(Hierarchical<Switching>),
     LookAhead(LookAhead<Switching, TRACK_DIMENSION>),
     Merged(Merged<Switching, TRACK_DIMENSION>),
 }
 
-/// What a mode is in the words of the tree.
+/// The node of the tree that a mode of the model stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Meaning {
+enum ModeNode {
     Node(usize),
     Unknown,
 }
 
 /// A filter over nominal, single faults and the unknown.
 #[derive(Debug, Clone)]
-pub struct Generic {
-    kind: Kind,
-    meanings: Vec<Meaning>,
+pub struct SingleFaultFilter {
+    kind: LibraryFilter,
+    nodes_of_modes: Vec<ModeNode>,
     use_wheels: bool,
     seed: u64,
     limit: usize,
@@ -73,21 +77,21 @@ pub struct Generic {
 
 /// A particle in a wrong mode reaches the right one only by a change of fault: that is not rarer
 /// than a first one.
-fn rates(robot: &Description, leaves: &Leaves, p_unknown: f64) -> FaultRates {
+fn rates(robot: &Description, leaves: &LeafMap, p_unknown: f64) -> FaultRates {
     FaultRates {
         further: 1.0,
         ..fault_rates(&robot.fault_prior, leaves, p_unknown)
     }
 }
 
-impl Generic {
+impl SingleFaultFilter {
     /// A filter over the leaves of a tree.
     ///
     /// # Errors
     /// [`IdentifierError`] if the models do not fit the filter.
     pub fn new(
         models: &Models<'_>,
-        leaves: &Leaves,
+        leaves: &LeafMap,
         settings: &Settings,
         use_wheels: bool,
         seed: u64,
@@ -100,7 +104,7 @@ impl Generic {
         let rates = rates(models.robot, leaves, settings.p_unknown);
         let (model, robot) = (models.model, models.robot);
         let switching = Switching::new(model, robot, leaves.stuck_wheels(), encoders, &rates);
-        let meanings: Vec<Meaning> = (0..switching.modes())
+        let nodes_of_modes: Vec<ModeNode> = (0..switching.modes())
             .map(|mode| meaning(&switching, mode, leaves))
             .collect();
         let resampling = Resampling::default();
@@ -115,41 +119,44 @@ impl Generic {
             IdentifierFilter::MultipleHypothesis => return Err(refuse(&"not one of these")),
             IdentifierFilter::Bootstrap => {
                 let proposal = Proposal::prior(&switching).map_err(|e| refuse(&e))?;
-                Kind::Sampled(sampled(proposal, switching)?)
+                LibraryFilter::Sampled(sampled(proposal, switching)?)
             }
-            IdentifierFilter::Raised => Kind::Sampled(sampled(raised(&switching)?, switching)?),
+            IdentifierFilter::Raised => {
+                LibraryFilter::Sampled(sampled(raised(&switching)?, switching)?)
+            }
             IdentifierFilter::Adaptive => {
-                let (error, quantile, least) = ADAPTIVE;
-                let adaptive = Adaptive::new(error, quantile, least, count);
+                let adaptive = Adaptive::new(KLD_DISTANCE, KLD_QUANTILE, PARTICLES_MIN, count);
                 let filter = sampled(raised(&switching)?, switching)?;
-                Kind::Sampled(filter.with_adaptive_count(adaptive))
+                LibraryFilter::Sampled(filter.with_adaptive_count(adaptive))
             }
             IdentifierFilter::RiskSensitive => {
                 let decision = models
                     .decision
                     .ok_or_else(|| refuse(&"risk-sensitive needs a decision model"))?;
                 let prior = rates.fault_1_s * settings.ring_s;
-                let named = names(models.tree, &meanings, prior);
+                let named = names(models.tree, &nodes_of_modes, prior);
                 let risks = risks(decision, &named, count)?;
                 let proposal = Proposal::risk_raised(&switching, RAISED, &risks);
-                Kind::Sampled(sampled(proposal.map_err(|e| refuse(&e))?, switching)?)
+                LibraryFilter::Sampled(sampled(proposal.map_err(|e| refuse(&e))?, switching)?)
             }
             IdentifierFilter::Hierarchical => {
-                let nodes = abstract_nodes(models.tree, leaves, &meanings);
+                let nodes = abstract_nodes(models.tree, leaves, &nodes_of_modes);
                 let filter = Hierarchical::new(switching, &nodes, resampling, count, seed);
                 let filter = filter.map_err(|e| refuse(&e))?;
-                Kind::Hierarchical(filter.with_raised_proposals(RAISED))
+                LibraryFilter::Hierarchical(filter.with_raised_proposals(RAISED))
             }
             IdentifierFilter::LookAhead => {
                 let count = count.div_ceil(LOOK_AHEAD_SHARE);
                 let filter = LookAhead::new(switching, count, seed);
-                Kind::LookAhead(filter.map_err(|e| refuse(&e))?)
+                LibraryFilter::LookAhead(filter.map_err(|e| refuse(&e))?)
             }
-            IdentifierFilter::Imm => Kind::Merged(Merged::new(switching).map_err(|e| refuse(&e))?),
+            IdentifierFilter::Imm => {
+                LibraryFilter::Merged(Merged::new(switching).map_err(|e| refuse(&e))?)
+            }
         };
         Ok(Self {
             kind,
-            meanings,
+            nodes_of_modes,
             use_wheels,
             seed,
             limit: count,
@@ -165,10 +172,10 @@ impl Generic {
         self.since_ns = [t_ns; MODES_MAX];
         self.model_mut().start_at(healthy.pose, healthy.covariance);
         match &mut self.kind {
-            Kind::Sampled(filter) => filter.restart(self.seed),
-            Kind::Hierarchical(filter) => filter.restart(self.seed),
-            Kind::LookAhead(filter) => filter.restart(self.seed),
-            Kind::Merged(filter) => filter.reset(),
+            LibraryFilter::Sampled(filter) => filter.restart(self.seed),
+            LibraryFilter::Hierarchical(filter) => filter.restart(self.seed),
+            LibraryFilter::LookAhead(filter) => filter.restart(self.seed),
+            LibraryFilter::Merged(filter) => filter.reset(),
         }
     }
 
@@ -182,10 +189,10 @@ impl Generic {
     #[must_use]
     pub fn count(&self) -> usize {
         match &self.kind {
-            Kind::Sampled(filter) => filter.count(),
-            Kind::Hierarchical(filter) => filter.particles().count(),
-            Kind::LookAhead(filter) => LOOK_AHEAD_SHARE * filter.particles().count(),
-            Kind::Merged(_) => 0,
+            LibraryFilter::Sampled(filter) => filter.count(),
+            LibraryFilter::Hierarchical(filter) => filter.particles().count(),
+            LibraryFilter::LookAhead(filter) => LOOK_AHEAD_SHARE * filter.particles().count(),
+            LibraryFilter::Merged(_) => 0,
         }
     }
 
@@ -193,38 +200,38 @@ impl Generic {
     pub fn set_limit(&mut self, count: usize) {
         self.limit = count;
         match &mut self.kind {
-            Kind::Sampled(filter) => filter.limit(count),
-            Kind::Hierarchical(filter) => filter.limit(count),
-            Kind::LookAhead(filter) => filter.limit(count.div_ceil(LOOK_AHEAD_SHARE)),
+            LibraryFilter::Sampled(filter) => filter.limit(count),
+            LibraryFilter::Hierarchical(filter) => filter.limit(count),
+            LibraryFilter::LookAhead(filter) => filter.limit(count.div_ceil(LOOK_AHEAD_SHARE)),
             // One Gaussian a mode: nothing to save.
-            Kind::Merged(_) => {}
+            LibraryFilter::Merged(_) => {}
         }
     }
 
     const fn model_mut(&mut self) -> &mut Switching {
         match &mut self.kind {
-            Kind::Sampled(filter) => filter.model_mut(),
-            Kind::Hierarchical(filter) => filter.model_mut(),
-            Kind::LookAhead(filter) => filter.model_mut(),
-            Kind::Merged(filter) => filter.model_mut(),
+            LibraryFilter::Sampled(filter) => filter.model_mut(),
+            LibraryFilter::Hierarchical(filter) => filter.model_mut(),
+            LibraryFilter::LookAhead(filter) => filter.model_mut(),
+            LibraryFilter::Merged(filter) => filter.model_mut(),
         }
     }
 
     fn filter(&self) -> &dyn Filter<Observation = SwitchingObservation> {
         match &self.kind {
-            Kind::Sampled(filter) => filter,
-            Kind::Hierarchical(filter) => filter,
-            Kind::LookAhead(filter) => filter,
-            Kind::Merged(filter) => filter,
+            LibraryFilter::Sampled(filter) => filter,
+            LibraryFilter::Hierarchical(filter) => filter,
+            LibraryFilter::LookAhead(filter) => filter,
+            LibraryFilter::Merged(filter) => filter,
         }
     }
 
     fn filter_mut(&mut self) -> &mut dyn Filter<Observation = SwitchingObservation> {
         match &mut self.kind {
-            Kind::Sampled(filter) => filter,
-            Kind::Hierarchical(filter) => filter,
-            Kind::LookAhead(filter) => filter,
-            Kind::Merged(filter) => filter,
+            LibraryFilter::Sampled(filter) => filter,
+            LibraryFilter::Hierarchical(filter) => filter,
+            LibraryFilter::LookAhead(filter) => filter,
+            LibraryFilter::Merged(filter) => filter,
         }
     }
 
@@ -245,8 +252,8 @@ impl Generic {
             return;
         }
         let use_wheels = self.use_wheels;
-        let seen = self.model_mut().look(&observation, noise, use_wheels);
-        let step = self.filter_mut().step(&seen);
+        let scaled = self.model_mut().look(&observation, noise, use_wheels);
+        let step = self.filter_mut().step(&scaled);
         if step.event.is_some() {
             self.degenerate_count = self.degenerate_count.saturating_add(1);
         }
@@ -260,16 +267,16 @@ impl Generic {
     }
 
     /// Fills the probabilities of nodes, sets and unknown.
-    pub fn posterior(&self, leaves: &Leaves, out: &mut Posterior) {
+    pub fn posterior(&self, leaves: &LeafMap, out: &mut TreeBelief) {
         let p = self.filter().posterior();
         let total: f64 = p.iter().map(|p| p.max(FLOOR)).sum();
         out.clear();
-        for (meaning, p) in self.meanings.iter().zip(p) {
+        for (meaning, p) in self.nodes_of_modes.iter().zip(p) {
             let p = p.max(FLOOR) / total;
             match *meaning {
-                Meaning::Unknown => out.unknown += p,
-                Meaning::Node(0) => out.add(FaultSet { leaves: 0, p }, leaves),
-                Meaning::Node(node) => {
+                ModeNode::Unknown => out.unknown += p,
+                ModeNode::Node(0) => out.add(FaultSet { leaves: 0, p }, leaves),
+                ModeNode::Node(node) => {
                     let leaves_in = 1 << node;
                     out.add(
                         FaultSet {
@@ -287,18 +294,19 @@ impl Generic {
     /// Onset of a leaf's fault, capture time ns; 0 if it is no leaf.
     #[must_use]
     pub fn onset(&self, node: usize) -> u64 {
-        self.onset_of(Meaning::Node(node))
+        self.onset_of_mode(ModeNode::Node(node))
     }
 
     /// Onset of the unknown, capture time ns.
     #[must_use]
     pub fn onset_unknown(&self) -> u64 {
-        self.onset_of(Meaning::Unknown)
+        self.onset_of_mode(ModeNode::Unknown)
     }
 
-    fn onset_of(&self, meaning: Meaning) -> u64 {
+    fn onset_of_mode(&self, meaning: ModeNode) -> u64 {
         let p = self.filter().posterior();
-        let modes = (0..self.meanings.len()).filter(|&mode| self.meanings[mode] == meaning);
+        let modes =
+            (0..self.nodes_of_modes.len()).filter(|&mode| self.nodes_of_modes[mode] == meaning);
         modes
             .max_by(|&a, &b| p[a].total_cmp(&p[b]))
             .map_or(0, |mode| self.since_ns[mode])
@@ -307,29 +315,31 @@ impl Generic {
     /// Adds the particles with their weights, or each mode's Gaussian.
     pub fn hypotheses(&self, out: &mut HypothesisList) {
         match &self.kind {
-            Kind::Sampled(filter) => {
+            LibraryFilter::Sampled(filter) => {
                 let total: f64 = filter.particles().map(|(_, _, weight)| weight).sum();
                 for (mode, state, weight) in filter.particles() {
-                    self.push(out, (state.pose, [0.0; 6]), mode, weight / total);
+                    self.push(out, state.pose, [0.0; 6], mode, weight / total);
                 }
             }
-            Kind::Hierarchical(filter) => {
+            LibraryFilter::Hierarchical(filter) => {
                 for (state, shares, weight) in filter.particles() {
                     for (mode, &share) in shares.iter().enumerate() {
-                        self.push(out, (state.pose, [0.0; 6]), mode, weight * share);
+                        self.push(out, state.pose, [0.0; 6], mode, weight * share);
                     }
                 }
             }
-            Kind::LookAhead(filter) => {
+            LibraryFilter::LookAhead(filter) => {
                 let weight = 1.0 / filter.particles().count() as f64;
                 for (mode, state) in filter.particles() {
-                    self.push(out, pose(state), mode, weight);
+                    let (pose, covariance) = pose(state);
+                    self.push(out, pose, covariance, mode, weight);
                 }
             }
-            Kind::Merged(filter) => {
+            LibraryFilter::Merged(filter) => {
                 let states = filter.states().iter().zip(filter.posterior());
                 for (mode, (state, &weight)) in states.enumerate() {
-                    self.push(out, pose(state), mode, weight);
+                    let (pose, covariance) = pose(state);
+                    self.push(out, pose, covariance, mode, weight);
                 }
             }
         }
@@ -339,17 +349,18 @@ impl Generic {
     fn push(
         &self,
         out: &mut HypothesisList,
-        (pose, covariance): (Vector3<f64>, [f64; 6]),
+        pose: Vector3<f64>,
+        covariance: [f64; 6],
         mode: usize,
         weight: f64,
     ) {
         if weight.is_nan() || weight <= 0.0 {
             return;
         }
-        let (leaves, index) = match self.meanings[mode] {
-            Meaning::Node(0) => (0, 0),
-            Meaning::Node(node) => (1 << node, node as u32),
-            Meaning::Unknown => (0, MODE_UNKNOWN),
+        let (leaves, index) = match self.nodes_of_modes[mode] {
+            ModeNode::Node(0) => (0, 0),
+            ModeNode::Node(node) => (1 << node, node as u32),
+            ModeNode::Unknown => (0, MODE_UNKNOWN),
         };
         out.push(WeightedHypothesis {
             leaves,
@@ -364,37 +375,41 @@ impl Generic {
 }
 
 /// Name of each mode among the states of a decision model, and its prior probability.
-fn names<'a>(tree: &'a FaultTree, meanings: &[Meaning], prior: f64) -> Vec<(&'a str, f64)> {
-    let nominal = 1.0 - prior * meanings.len().saturating_sub(1) as f64;
-    let named = meanings.iter().map(|meaning| match meaning {
-        Meaning::Node(0) => (tree.nodes()[0].name.as_str(), nominal),
-        Meaning::Node(node) => (tree.nodes()[*node].name.as_str(), prior),
-        Meaning::Unknown => ("UNKNOWN", prior),
+fn names<'a>(tree: &'a FaultTree, nodes_of_modes: &[ModeNode], prior: f64) -> Vec<(&'a str, f64)> {
+    let nominal = 1.0 - prior * nodes_of_modes.len().saturating_sub(1) as f64;
+    let named = nodes_of_modes.iter().map(|meaning| match meaning {
+        ModeNode::Node(0) => (tree.nodes()[0].name.as_str(), nominal),
+        ModeNode::Node(node) => (tree.nodes()[*node].name.as_str(), prior),
+        ModeNode::Unknown => ("UNKNOWN", prior),
     });
     named.collect()
 }
 
-fn meaning(switching: &Switching, mode: usize, leaves: &Leaves) -> Meaning {
+fn meaning(switching: &Switching, mode: usize, leaves: &LeafMap) -> ModeNode {
     let leaf = match switching.meaning(mode) {
-        (Mover::Unknown | Mover::UnknownAny, _) => return Meaning::Unknown,
+        (Mover::Unknown | Mover::UnknownAny, _) => return ModeNode::Unknown,
         (_, Some(wheel)) => leaves.encoder[wheel],
         (moved, None) => (0..WHEELS)
             .find(|&wheel| moved.is_stuck(wheel))
             .and_then(|wheel| leaves.stuck[wheel]),
     };
-    Meaning::Node(leaf.unwrap_or(0))
+    ModeNode::Node(leaf.unwrap_or(0))
 }
 
 /// Modes below each abstract node of a tree that has two or more of them; of nodes with the same
 /// modes the first.
-fn abstract_nodes(tree: &FaultTree, leaves: &Leaves, meanings: &[Meaning]) -> Vec<Vec<usize>> {
+fn abstract_nodes(
+    tree: &FaultTree,
+    leaves: &LeafMap,
+    nodes_of_modes: &[ModeNode],
+) -> Vec<Vec<usize>> {
     let mut nodes: Vec<Vec<usize>> = Vec::new();
     for (index, node) in tree.nodes().iter().enumerate().skip(1) {
-        let is_below = |meaning: &Meaning| match meaning {
-            Meaning::Node(node) => leaves.below[index] >> node & 1 == 1,
-            Meaning::Unknown => false,
+        let is_below = |meaning: &ModeNode| match meaning {
+            ModeNode::Node(node) => leaves.below[index] >> node & 1 == 1,
+            ModeNode::Unknown => false,
         };
-        let modes = (1..meanings.len()).filter(|&mode| is_below(&meanings[mode]));
+        let modes = (1..nodes_of_modes.len()).filter(|&mode| is_below(&nodes_of_modes[mode]));
         let modes: Vec<usize> = modes.collect();
         if node.fault.is_none() && modes.len() > 1 && !nodes.contains(&modes) {
             nodes.push(modes);

@@ -5,7 +5,7 @@ use vigil_inference::track::Track;
 use crate::identify::angles::Angles;
 use crate::identify::encoders::Encoders;
 use crate::identify::rate_offsets::RateOffsets;
-use crate::identify::servo::Servo;
+use crate::identify::servo_fault::ServoFault;
 
 /// Probability that a robot that may be thrown is, in an observation: after one in which it was
 /// not, and after one in which it was; and how far, x m, y m, yaw rad. Chosen: once in 2.5 s of
@@ -16,7 +16,7 @@ const THROWN_ON: f64 = 0.6;
 const THROW_SD: [f64; 3] = [0.02, 0.02, 0.1];
 /// Continuous state of a hypothesis, and what its encoders do.
 #[derive(Debug, Clone, Copy)]
-pub struct State {
+pub struct HypothesisState {
     /// Pose and deviations.
     pub track: Track,
     /// Encoders; in the unknown, encoders or wheels.
@@ -26,7 +26,7 @@ pub struct State {
     /// In the unknown: which steering angles are as commanded.
     pub angles: Angles,
     /// The steering servo that does not do as it is told.
-    pub servo: Option<Servo>,
+    pub servo: Option<ServoFault>,
     /// How far the pose has jumped, and the deviation of that, m, once it was measured since.
     pub jump_m: Option<(f64, f64)>,
     /// Part of the weight of the unknown: that its departure is material.
@@ -37,7 +37,7 @@ pub struct State {
     pub fresh: u32,
 }
 
-impl State {
+impl HypothesisState {
     /// Conditions on a measured pose; its log-density. If `is_thrown`, the robot may have been
     /// thrown since the last one: the more probable of both is what happened.
     pub fn take_pose(

@@ -20,7 +20,7 @@ const WANDERS: f64 = 0.02;
 
 /// What is believed of one servo.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Servo {
+pub struct ServoFault {
     /// Angle off the commanded one, rad: beyond the tolerance.
     offset: Size,
     /// Angle at which it stands, rad.
@@ -55,7 +55,7 @@ impl ServoPrior {
     }
 }
 
-impl Servo {
+impl ServoFault {
     /// A servo that begins to stand off a commanded angle, rad.
     #[must_use]
     pub fn new(prior: &ServoPrior, commanded_rad: f64) -> Self {
@@ -78,8 +78,8 @@ impl Servo {
             let (angle, variance) = size.expected(by);
             let log = reading.log_ratio(base_rad + angle, variance);
             let before = size.log_material();
-            let apart = reading.read_rad - base_rad - angle;
-            if apart * apart <= FAR_SD * FAR_SD * (variance + reading.variance) {
+            let residual = reading.read_rad - base_rad - angle;
+            if residual * residual <= FAR_SD * FAR_SD * (variance + reading.variance) {
                 size.update(by, reading.read_rad - base_rad, reading.variance, prior);
             }
             log + size.log_material() - before

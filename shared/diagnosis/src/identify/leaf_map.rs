@@ -55,7 +55,7 @@ pub enum LeafFault {
 
 /// The leaves of a tree, by fault.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Leaves {
+pub struct LeafMap {
     /// Node of each stuck wheel.
     pub stuck: [Option<usize>; WHEELS],
     /// Node of each broken encoder.
@@ -84,7 +84,7 @@ pub struct Leaves {
     pub hash: u64,
 }
 
-impl Leaves {
+impl LeafMap {
     /// Of a tree without any.
     pub(crate) const fn none() -> Self {
         Self {

@@ -1,16 +1,16 @@
-//! Whether the detector sees anything, and why not.
+//! Whether the detector is blind, and why.
 //!
-//! A frame is *valid* if it goes on where the one before it ended: same writer, same run, capture
-//! times that advance like the graph's clock, a command, and a reading of what is watched. Without
-//! a valid frame for [`BLIND_S`] the detector is blind: no filter behind it would notice a fault,
-//! and all of them would go on saying what they said last. So it is where one run too short for the
-//! filters follows another.
+//! A frame is *valid* if it continues the one before it: same writer, same run, capture times that
+//! advance like the graph's clock, a command, and a measurement of a channel that the detector
+//! uses. Without a valid frame for [`BLIND_S`] the detector is blind: no filter would notice a
+//! fault, and each would repeat its last belief. It is blind too while runs too short for the
+//! filters follow each other.
 //!
-//! Time is counted by the graph's schedule: a period for each frame and each missed deadline. What
-//! capture times say is held against the scheduled instants, which passed the border's clock. A
-//! frame's neighbours decide nothing about it, so that jitter, gaps and bursts leave valid frames
-//! among the others. Sight outlives a reset of the filters: a source that resets them with every
-//! frame is just what must be found.
+//! Time is counted by the graph's schedule: a period for each frame and each missed deadline.
+//! Capture times are compared with the scheduled instants, which the border has checked. Each frame
+//! is judged by its predecessor alone, so that jitter, gaps and bursts leave valid frames among the
+//! others. A reset of the filters does not end blindness: a source that resets them with every
+//! frame is one of its causes.
 
 use vigil_blocks::{Blindness, SensorFrame, Valid};
 
@@ -19,22 +19,24 @@ use vigil_blocks::{Blindness, SensorFrame, Valid};
 const BLIND_S: f64 = 1.0;
 /// Slack when that time is compared, s: it is a sum of periods.
 const SLACK_S: f64 = 1e-6;
-/// It sees again after valid frames for so long (two of the longest count), s, ..
-const SEEN_S: f64 = 0.2;
-/// .. with no longer pause between them than this, s: half of what blinds. One frame shows at most
-/// ..
+/// Blindness ends after valid frames for so long, s. Chosen by hand: two frames of
+/// [`FRAME_MAX_S`], so that a single one does not end it; larger only delays the first diagnosis.
+const VALID_S: f64 = 0.2;
+/// A longer pause between valid frames begins that time anew, s: half of what blinds, so that a
+/// source at the edge of blindness does not toggle it.
 const PAUSE_S: f64 = 0.5;
-/// .. so much time, s: no single one ends blindness.
+/// One frame counts as valid time of this at most, s: no single one ends blindness.
 const FRAME_MAX_S: f64 = 0.1;
 /// A run shorter than this, s, shows nothing: the filters begin anew with each, and count evidence
-/// after a second of motion at the least. So many in a row, and the detector is blind until one
-/// lasts: who restarts a publisher may do so twice.
+/// after a second of motion at the least. After this many in a row the detector is blind until one
+/// lasts. Chosen by hand: an operator may restart a publisher twice.
 const SHORT_S: f64 = 2.0;
 const SHORT_RUNS: u32 = 3;
-/// A clock that runs faster or slower than this is no clock. Jitter of a whole period passes.
+/// Capture times that advance by this factor faster or slower than the schedule are no clock.
+/// Chosen by hand: jitter of a whole period passes, a wrong unit does not.
 const RATE_MAX: f64 = 2.0;
 
-/// What carries over from the frame before.
+/// What the next frame is compared with.
 #[derive(Debug, Clone, Copy)]
 struct Last {
     epoch: u64,
@@ -43,9 +45,9 @@ struct Last {
     t_schedule_ns: u64,
 }
 
-/// Follows the frames of one graph.
+/// Counts the time without valid frames of one graph.
 #[derive(Debug, Clone)]
-pub struct Sight {
+pub struct BlindnessTimer {
     /// Bits of which a frame needs any, and of which it needs all.
     channels: u64,
     command: u64,
@@ -54,15 +56,15 @@ pub struct Sight {
     /// False for recorded frames: their times are the recording's.
     judges_clock: bool,
     last: Option<Last>,
-    /// Since the last valid frame, s.
-    dark_s: f64,
-    /// Part of that not yet judged, s, and by cause.
+    /// Time since the last valid frame, s.
+    invalid_s: f64,
+    /// Part of it that no verdict has used yet, s; the same by cause.
     unjudged_s: f64,
     by_cause: [f64; Blindness::ALL.len()],
     refused: bool,
-    /// Of valid frames, without a pause, s.
-    seen_s: f64,
-    /// Of this run, s; how many before it were short, and how long they were together, s.
+    /// Time of valid frames without a pause while blind, s.
+    valid_s: f64,
+    /// Length of this run, s; how many in a row before it were short, and their length, s.
     run_s: f64,
     short_runs: u32,
     short_s: f64,
@@ -70,8 +72,8 @@ pub struct Sight {
     is_doubtful: bool,
 }
 
-impl Sight {
-    /// Of frames that need any of the bits `channels` of [`SensorFrame::valid`] and all of the bits
+impl BlindnessTimer {
+    /// For frames that need any of the bits `channels` of [`SensorFrame::valid`] and all of the bits
     /// `command`.
     #[must_use]
     pub const fn new(channels: u64, command: u64) -> Self {
@@ -81,11 +83,11 @@ impl Sight {
             period_s: None,
             judges_clock: false,
             last: None,
-            dark_s: 0.0,
+            invalid_s: 0.0,
             unjudged_s: 0.0,
             by_cause: [0.0; Blindness::ALL.len()],
             refused: false,
-            seen_s: 0.0,
+            valid_s: 0.0,
             run_s: 0.0,
             short_runs: 0,
             short_s: 0.0,
@@ -103,7 +105,7 @@ impl Sight {
         self
     }
 
-    /// Why nothing is seen; none while something is.
+    /// Why the detector is blind; none while it is not.
     #[must_use]
     pub const fn blind(&self) -> Option<Blindness> {
         match self.blind {
@@ -115,7 +117,7 @@ impl Sight {
         }
     }
 
-    /// Whether what is measured cannot mean what it should.
+    /// Takes whether the measurements cannot mean what they should.
     pub const fn doubt(&mut self, is_doubtful: bool) {
         self.is_doubtful = is_doubtful;
     }
@@ -133,7 +135,7 @@ impl Sight {
         };
         let captured_s = seconds(last.t_capture_ns, now.t_capture_ns);
         let scheduled_s = match seconds(last.t_schedule_ns, now.t_schedule_ns) {
-            // Who leaves the schedule out publishes once a period.
+            // A publisher without a schedule is taken to publish once a period.
             s if s <= 0.0 => self.period_s.unwrap_or(captured_s),
             s => s,
         };
@@ -165,42 +167,42 @@ impl Sight {
         } else if !frame.has(self.command) {
             Blindness::Command
         } else {
-            return self.see(scheduled_s);
+            return self.take_valid(scheduled_s);
         };
         let span_s = self.period_s.unwrap_or(captured_s);
-        self.darken(span_s.clamp(0.0, BLIND_S), cause);
+        self.add_invalid(span_s.clamp(0.0, BLIND_S), cause);
     }
 
-    /// The deadline passed so many times without input.
+    /// Counts deadlines that passed without input.
     pub fn miss(&mut self, count: u32) {
         let cause = match self.refused {
             true => Blindness::Refused,
             false => Blindness::Silence,
         };
-        self.darken(f64::from(count) * self.period_s.unwrap_or(0.0), cause);
+        self.add_invalid(f64::from(count) * self.period_s.unwrap_or(0.0), cause);
     }
 
-    /// A frame came, and the border refused it.
+    /// Counts a frame that the border refused.
     pub const fn refuse(&mut self) {
         self.refused = true;
     }
 
-    fn see(&mut self, span_s: f64) {
-        if self.dark_s > PAUSE_S {
-            self.seen_s = 0.0;
+    fn take_valid(&mut self, span_s: f64) {
+        if self.invalid_s > PAUSE_S {
+            self.valid_s = 0.0;
         }
-        self.dark_s = 0.0;
+        self.invalid_s = 0.0;
         self.forget_causes();
         if self.blind.is_some() {
-            self.seen_s += span_s.clamp(0.0, FRAME_MAX_S);
-            if self.seen_s >= SEEN_S - SLACK_S {
-                (self.blind, self.seen_s) = (None, 0.0);
+            self.valid_s += span_s.clamp(0.0, FRAME_MAX_S);
+            if self.valid_s >= VALID_S - SLACK_S {
+                (self.blind, self.valid_s) = (None, 0.0);
             }
         }
     }
 
-    fn darken(&mut self, span_s: f64, cause: Blindness) {
-        self.dark_s += span_s;
+    fn add_invalid(&mut self, span_s: f64, cause: Blindness) {
+        self.invalid_s += span_s;
         self.unjudged_s += span_s;
         self.by_cause[cause as usize - 1] += span_s;
         if self.unjudged_s < BLIND_S - SLACK_S {
@@ -209,7 +211,7 @@ impl Sight {
         let causes = Blindness::ALL.into_iter().zip(self.by_cause);
         let most = causes.max_by(|a, b| a.1.total_cmp(&b.1));
         self.blind = most.map(|(cause, _)| cause);
-        self.seen_s = 0.0;
+        self.valid_s = 0.0;
         self.forget_causes();
     }
 
@@ -240,8 +242,8 @@ mod tests {
     const PERIOD_NS: u64 = 20_000_000;
     const COMMAND: u64 = Valid::command(0) | Valid::command(1);
 
-    fn sight() -> Sight {
-        Sight::new(all_channels(2), COMMAND).in_graph(PERIOD_S, true)
+    fn timer() -> BlindnessTimer {
+        BlindnessTimer::new(all_channels(2), COMMAND).in_graph(PERIOD_S, true)
     }
 
     fn frame(k: u64) -> SensorFrame {
@@ -256,18 +258,65 @@ mod tests {
         frame
     }
 
-    /// Seconds after which the sight is lost, of 10 s of frames; and why.
+    /// Seconds after which the timer is lost, of 10 s of frames; and why.
     fn lost(spoil: impl Fn(u64, &mut SensorFrame)) -> Option<(f64, Blindness)> {
-        let mut sight = sight();
+        let mut timer = timer();
         for k in 0..500 {
             let mut frame = frame(k);
             spoil(k, &mut frame);
-            sight.take(&frame);
-            if let Some(cause) = sight.blind() {
+            timer.take(&frame);
+            if let Some(cause) = timer.blind() {
                 return Some((k as f64 * PERIOD_S, cause));
             }
         }
         None
+    }
+
+    #[test]
+    fn a_frame_may_lack_some_channels_but_no_part_of_the_command() {
+        assert_eq!(lost(|_, f| f.valid = COMMAND | Valid::wheel_rate(1)), None);
+        let found = lost(|_, f| f.valid = Valid::command(0) | Valid::POSE);
+        assert_eq!(found.map(|(_, cause)| cause), Some(Blindness::Command));
+        // The validity is judged first.
+        let found = lost(|_, f| f.valid = Valid::command(0));
+        assert_eq!(found.map(|(_, cause)| cause), Some(Blindness::Validity));
+    }
+
+    #[test]
+    fn all_channels_are_pose_gyro_and_three_of_each_wheel() {
+        let expected = Valid::POSE
+            | Valid::YAW_RATE
+            | Valid::wheel_rate(0)
+            | Valid::steer(0)
+            | Valid::current(0);
+        assert_eq!(all_channels(1), expected);
+        assert_eq!(all_channels(2).count_ones(), 8);
+    }
+
+    #[test]
+    fn doubt_about_the_meaning_is_blindness_at_once_and_as_long_as_it_lasts() {
+        let mut timer = timer();
+        timer.take(&frame(0));
+        timer.doubt(true);
+        assert_eq!(timer.blind(), Some(Blindness::Meaning));
+        timer.doubt(false);
+        assert_eq!(timer.blind(), None);
+    }
+
+    #[test]
+    fn the_cause_of_most_of_the_time_is_named() {
+        let mut timer = timer();
+        timer.take(&frame(0));
+        for k in 0..50 {
+            if k % 3 == 0 {
+                timer.miss(1);
+            } else {
+                let mut spoilt = frame(k + 1);
+                spoilt.valid = Valid::POSE;
+                timer.take(&spoilt);
+            }
+        }
+        assert_eq!(timer.blind(), Some(Blindness::Command));
     }
 
     #[test]
@@ -301,7 +350,7 @@ mod tests {
         // Quick restarts after a long run are no second yet.
         assert_eq!(lost(|k, f| f.run_id = (k.clamp(250, 259) - 250) / 3), None);
         // Twenty times as fast, ten seconds of a recording are half a second.
-        let mut recorded = Sight::new(all_channels(2), COMMAND).in_graph(PERIOD_S, false);
+        let mut recorded = BlindnessTimer::new(all_channels(2), COMMAND).in_graph(PERIOD_S, false);
         for k in 0..500 {
             let mut frame = frame(k);
             frame.run_id = k / 25;
@@ -309,12 +358,12 @@ mod tests {
             recorded.take(&frame);
             assert_eq!(recorded.blind(), None, "frame {k}");
         }
-        let mut sight = sight();
+        let mut timer = timer();
         let mut blind = Vec::new();
         for k in 0..500 {
             let run_id = k.min(200) / 20;
-            sight.take(&SensorFrame { run_id, ..frame(k) });
-            blind.push(sight.blind().is_some());
+            timer.take(&SensorFrame { run_id, ..frame(k) });
+            blind.push(timer.blind().is_some());
         }
         assert!(
             blind[150] && blind[290] && !blind[310],
@@ -340,7 +389,7 @@ mod tests {
             lost(|k, f| f.valid = if k % 9 == 0 { f.valid } else { 0 }),
             None
         );
-        let mut slow = sight();
+        let mut slow = timer();
         for k in 0..100 {
             slow.take(&frame(5 * k));
             slow.miss(4);
@@ -350,42 +399,42 @@ mod tests {
 
     #[test]
     fn silence_is_blindness_until_frames_have_come_for_a_while() {
-        let mut sight = sight();
+        let mut timer = timer();
         for k in 0..10 {
-            sight.take(&frame(k));
+            timer.take(&frame(k));
         }
         for _ in 0..49 {
-            sight.miss(1);
+            timer.miss(1);
         }
-        assert_eq!(sight.blind(), None);
-        sight.miss(1);
-        assert_eq!(sight.blind(), Some(Blindness::Silence));
+        assert_eq!(timer.blind(), None);
+        timer.miss(1);
+        assert_eq!(timer.blind(), Some(Blindness::Silence));
         for _ in 0..20 {
-            sight.refuse();
-            sight.miss(3);
+            timer.refuse();
+            timer.miss(3);
         }
-        assert_eq!(sight.blind(), Some(Blindness::Refused));
-        // A frame a second is no sight.
+        assert_eq!(timer.blind(), Some(Blindness::Refused));
+        // A frame a second is no timer.
         for k in 2..6 {
-            sight.take(&frame(50 * k));
-            sight.miss(49);
-            assert!(sight.blind().is_some());
+            timer.take(&frame(50 * k));
+            timer.miss(49);
+            assert!(timer.blind().is_some());
         }
         let seen = (300..400).find(|&k| {
-            sight.take(&frame(k));
-            sight.blind().is_none()
+            timer.take(&frame(k));
+            timer.blind().is_none()
         });
         assert!(seen.is_some_and(|k| (303..=311).contains(&k)), "{seen:?}");
     }
 
     #[test]
     fn recorded_frames_keep_their_own_time() {
-        let mut sight = Sight::new(Valid::POSE, COMMAND).in_graph(PERIOD_S, false);
+        let mut timer = BlindnessTimer::new(Valid::POSE, COMMAND).in_graph(PERIOD_S, false);
         for k in 0..500 {
             let mut frame = frame(k);
             frame.header.t_capture_ns = k * 10 * PERIOD_NS;
-            sight.take(&frame);
-            assert_eq!(sight.blind(), None);
+            timer.take(&frame);
+            assert_eq!(timer.blind(), None);
         }
     }
 }

@@ -1,0 +1,93 @@
+//! The identifier's step: an identifier of either kind, under the detector's blindness.
+
+use vigil_blocks::{DetectionBelief, Entry, FaultBelief, ParticleBlock};
+
+use crate::identify::blind_override::BlindOverride;
+use crate::identify::identifier::{Identifier, Input};
+use crate::identify::nominal_identifier::NominalIdentifier;
+use crate::invariants;
+
+/// An identifier of either kind; while the detector is blind, its names are BLIND.
+#[derive(Debug, Clone)]
+pub struct Diagnoser {
+    identifier: EitherIdentifier,
+    blind: BlindOverride,
+}
+
+#[derive(Debug, Clone)]
+enum EitherIdentifier {
+    /// Over the faults that a model knows.
+    Faults(Box<Identifier>),
+    /// Nominal or unknown.
+    Nominal(Box<NominalIdentifier>),
+}
+
+impl Diagnoser {
+    /// See [`Identifier::particles`]; 0 without any.
+    #[must_use]
+    pub fn particles(&self) -> u32 {
+        match &self.identifier {
+            EitherIdentifier::Faults(identifier) => identifier.particles(),
+            EitherIdentifier::Nominal(_) => 0,
+        }
+    }
+
+    /// See [`Identifier::particles_in_use`].
+    #[must_use]
+    pub fn particles_in_use(&self) -> u32 {
+        match &self.identifier {
+            EitherIdentifier::Faults(identifier) => identifier.particles_in_use(),
+            EitherIdentifier::Nominal(_) => 0,
+        }
+    }
+
+    /// Takes one entry of the journal; see [`Identifier::step`].
+    // Never merged into its caller, so that its instructions can be counted.
+    #[inline(never)]
+    pub fn step(
+        &mut self,
+        entry: Entry<Input<'_>>,
+        belief: &mut FaultBelief,
+        hypotheses: &mut ParticleBlock,
+    ) {
+        if let Entry::Frame(Input {
+            detection: Some((detection, _)),
+            ..
+        }) = entry
+        {
+            self.look(detection);
+        }
+        match &mut self.identifier {
+            EitherIdentifier::Faults(identifier) => identifier.step(entry, belief, hypotheses),
+            EitherIdentifier::Nominal(nominal) => nominal.step(entry, belief, hypotheses),
+        }
+        let p = belief.p;
+        self.blind.cover(belief);
+        invariants::held(&p, &belief.p);
+        invariants::name(belief.mode, belief.node_count as usize);
+        invariants::name(belief.reported, belief.node_count as usize);
+    }
+
+    /// Takes a detection without a frame behind it: only its blindness counts.
+    pub const fn look(&mut self, detection: &DetectionBelief) {
+        self.blind.look(detection);
+    }
+}
+
+impl From<NominalIdentifier> for Diagnoser {
+    fn from(nominal: NominalIdentifier) -> Self {
+        Self {
+            identifier: EitherIdentifier::Nominal(Box::new(nominal)),
+            blind: BlindOverride::default(),
+        }
+    }
+}
+
+impl From<Identifier> for Diagnoser {
+    fn from(identifier: Identifier) -> Self {
+        Self {
+            identifier: EitherIdentifier::Faults(Box::new(identifier)),
+            blind: BlindOverride::default(),
+        }
+    }
+}
