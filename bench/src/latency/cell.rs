@@ -378,9 +378,10 @@ impl Cell {
             .map(|i| (STAGE_NAMES[i].to_owned(), stage(i)))
             .collect();
         let canary_json = |canary: &CanaryRecord| {
+            let placement = &canary.placement;
             json!({
-                "core": canary.placement.core,
-                "scheduling": Placement::scheduling(canary.placement.policy, canary.placement.priority),
+                "core": placement.core,
+                "scheduling": Placement::scheduling(placement.policy, placement.priority),
                 "lateness_us": us(&canary.lateness),
                 "not_kept": canary.not_kept,
             })

@@ -429,8 +429,8 @@ fn doubt_wheels(pieces: &[&[&SensorFrame]], robot: &Description) -> Option<Doubt
     (turning >= FRAMES_MIN && exchanged < 0.5 * as_named).then_some(Doubt::Sides)
 }
 
-/// A wheel that reads the same throughout, though it is commanded to roll; where that is not known, all
-/// of them must.
+/// A wheel that reads the same throughout, though it is commanded to roll; where that is not known,
+/// all of them must.
 fn constant_wheel(frames: &[&SensorFrame], robot: &Description) -> Option<Doubt> {
     let first = frames.first()?;
     let is_constant = |wheel: usize| {
