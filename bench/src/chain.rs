@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use vigil_cycle::placement::{self, PlacementRequest};
 use vigil_cycle::{Clock, CycleStamps, Monotonic, Stamps, clock, signal, stamps};
 
-use carriers::{Carrier, Incoming, Outgoing};
+use carriers::Carrier;
 
 pub mod carriers;
 mod futex;
@@ -168,6 +168,36 @@ impl Role {
         }
         Ok(())
     }
+}
+
+/// What a stage gets.
+pub trait Incoming {
+    /// Waits for a block, at most for `limit`; its scheduled and its publication instant, ns.
+    ///
+    /// # Errors
+    /// The system's.
+    fn receive(&mut self, limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>>;
+
+    /// Sum over one byte of each cache line of the last block: what looking at it costs.
+    fn checksum(&self) -> u64;
+}
+
+/// What a stage gives.
+pub trait Outgoing {
+    /// Fills the next block with one byte.
+    fn fill(&mut self, byte: u8);
+
+    /// Passes it on; returns the publication instant that it carries, ns.
+    ///
+    /// # Errors
+    /// The system's.
+    fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>>;
+}
+
+/// Sum over one byte of each cache line.
+#[must_use]
+pub fn sum_lines(bytes: &[u8]) -> u64 {
+    bytes.iter().step_by(64).map(|b| u64::from(*b)).sum()
 }
 
 /// Processes that end with whoever started them.

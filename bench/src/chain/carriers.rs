@@ -12,7 +12,7 @@ use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use vigil_cycle::{Clock, Monotonic};
 
-use super::payload;
+use super::{Incoming, Outgoing, payload, sum_lines};
 
 /// How blocks are handed over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
@@ -28,30 +28,6 @@ pub enum Carrier {
     Pipe,
     /// A queue between threads of one process.
     Queue,
-}
-
-/// What a stage gets.
-pub trait Incoming {
-    /// Waits for a block, at most for `limit`; its scheduled and its publication instant, ns.
-    ///
-    /// # Errors
-    /// The system's.
-    fn receive(&mut self, limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>>;
-
-    /// Sum over one byte of each cache line of the last block: what looking at it costs.
-    fn checksum(&self) -> u64;
-}
-
-/// What a stage gives.
-pub trait Outgoing {
-    /// Fills the next block with one byte.
-    fn fill(&mut self, byte: u8);
-
-    /// Passes it on; returns the publication instant that it carries, ns.
-    ///
-    /// # Errors
-    /// The system's.
-    fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>>;
 }
 
 type OpenResult<T> = Result<Box<T>, Box<dyn Error>>;
@@ -158,12 +134,6 @@ impl Message {
     pub fn checksum(&self) -> u64 {
         sum_lines(&self.0[HEAD..])
     }
-}
-
-/// Sum over one byte of each cache line.
-#[must_use]
-pub fn sum_lines(bytes: &[u8]) -> u64 {
-    bytes.iter().step_by(64).map(|b| u64::from(*b)).sum()
 }
 
 fn wait_for(path: &Path) -> Result<(), Box<dyn Error>> {

@@ -11,7 +11,7 @@ use vigil_cycle::port::{EventListener, Link};
 use vigil_cycle::wake::{self, Inputs, Timer, Wake};
 use vigil_cycle::{Clock, Domain, Graph, Monotonic, Receiver, Sender, Stamp, Topic};
 
-use super::carriers::{Incoming, Outgoing, sum_lines};
+use super::{Incoming, Outgoing, sum_lines};
 
 /// Queues as in the default graph, but for the readers: a block of 1 MiB takes its size for each
 /// place in them.

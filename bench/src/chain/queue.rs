@@ -4,8 +4,8 @@ use std::error::Error;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
-use super::carriers::{Incoming, Message, Outgoing};
-use super::{Role, STAGES};
+use super::carriers::Message;
+use super::{Incoming, Outgoing, Role, STAGES};
 
 /// Blocks that may wait.
 const DEPTH: usize = 8;
