@@ -1,4 +1,4 @@
-//! The detector as a stage of the graph.
+#![doc = include_str!("../README.md")]
 
 mod assemble;
 pub mod wiring;

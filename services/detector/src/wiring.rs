@@ -11,7 +11,7 @@ use vigil_robot::{Description, FrameGuard};
 
 use vigil_diagnosis::detect::Detector;
 
-/// A robot at rest is told of after so long, ns: one that turns round does not count.
+/// A rest is reported after so long, ns: a robot that reverses stands for less.
 const REST_NS: u64 = 1_000_000_000;
 
 /// The detector as a stage of the graph: sensor frames in, belief and hypotheses out.
@@ -24,30 +24,30 @@ pub struct DetectorStage {
     belief: Box<dyn Sender<DetectionBelief>>,
     hypotheses: Box<dyn Sender<ParticleBlock>>,
     alarm: bool,
-    alarm_told: bool,
+    alarm_reported: bool,
     p_fault: f64,
     symptoms: u32,
-    symptoms_told: u32,
-    watch: Watch,
+    symptoms_reported: u32,
+    sight: SightReport,
 }
 
-/// What the timeline says about sight and readiness.
+/// Blindness and readiness of the last belief, and what the timeline has of them.
 #[derive(Debug, Clone, Copy, Default)]
-struct Watch {
+struct SightReport {
     blind: u32,
-    blind_told: u32,
+    blind_reported: u32,
     blind_since_ns: u64,
     readiness: u32,
-    armed_told: bool,
-    /// Since when the robot rests, ns, and whether that was told.
+    armed_reported: bool,
+    /// Since when the robot rests, ns, and whether the timeline has that.
     rest_ns: Option<u64>,
-    rest_told: bool,
+    rest_reported: bool,
 }
 
-impl Watch {
-    fn tell(&mut self, health: &mut HealthBoard, now_ns: u64) {
-        if self.blind != self.blind_told {
-            if self.blind_told == 0 {
+impl SightReport {
+    fn report(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        if self.blind != self.blind_reported {
+            if self.blind_reported == 0 {
                 self.blind_since_ns = now_ns;
             }
             if self.blind == 0 {
@@ -56,26 +56,26 @@ impl Watch {
             } else {
                 health.event(now_ns, EventKind::Blind, self.blind, 0.0, 0);
             }
-            self.blind_told = self.blind;
+            self.blind_reported = self.blind;
         }
-        // Who sees nothing does not know whether the robot stands.
+        // A blind detector does not know whether the robot stands.
         let is_blind = self.blind != 0;
         let readiness = Readiness::from_wire(self.readiness).filter(|_| !is_blind);
         let is_armed = matches!(readiness, Some(Readiness::Armed | Readiness::NotExcited));
-        if is_armed && !self.armed_told {
+        if is_armed && !self.armed_reported {
             health.event(now_ns, EventKind::Armed, 0, 0.0, 0);
         }
-        self.armed_told = is_armed || is_blind && self.armed_told;
+        self.armed_reported = is_armed || is_blind && self.armed_reported;
         if readiness == Some(Readiness::NotExcited) {
             let since_ns = *self.rest_ns.get_or_insert(now_ns);
-            if !self.rest_told && now_ns.saturating_sub(since_ns) >= REST_NS {
+            if !self.rest_reported && now_ns.saturating_sub(since_ns) >= REST_NS {
                 health.event(now_ns, EventKind::NotExcited, 0, 0.0, 0);
-                self.rest_told = true;
+                self.rest_reported = true;
             }
             return;
         }
         self.rest_ns = None;
-        if std::mem::take(&mut self.rest_told) {
+        if std::mem::take(&mut self.rest_reported) {
             health.event(now_ns, EventKind::Excited, 0, 0.0, 0);
         }
     }
@@ -95,11 +95,11 @@ impl DetectorStage {
             belief: graph.sender(Topic::Detection)?,
             hypotheses: graph.sender(Topic::DetectionParticles)?,
             alarm: false,
-            alarm_told: false,
+            alarm_reported: false,
             p_fault: 0.0,
             symptoms: 0,
-            symptoms_told: 0,
-            watch: Watch::default(),
+            symptoms_reported: 0,
+            sight: SightReport::default(),
         })
     }
 }
@@ -110,7 +110,7 @@ impl Stage for DetectorStage {
             if !self.frames.advance() {
                 break;
             }
-            // A copy: what is judged must be what is stepped, whatever its writer writes meanwhile.
+            // A copy: its writer may change the shared block between the check and the step.
             let Some(frame) = self.frames.held().copied() else {
                 break;
             };
@@ -140,7 +140,7 @@ impl Stage for DetectorStage {
         belief.cause = cause;
         (self.alarm, self.p_fault) = (belief.alarm != 0, belief.p_fault);
         self.symptoms = belief.symptoms;
-        (self.watch.blind, self.watch.readiness) = (belief.blind, belief.readiness);
+        (self.sight.blind, self.sight.readiness) = (belief.blind, belief.readiness);
         self.hypotheses.block().cause = cause;
         // Hypotheses first: they are there when the belief wakes the identifier.
         self.hypotheses.send(stamp, clock)?;
@@ -161,23 +161,23 @@ impl Stage for DetectorStage {
     }
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
-        self.watch.tell(health, now_ns);
+        self.sight.report(health, now_ns);
         for finding in self.detector.findings().into_iter().flatten() {
             let what = finding.to_wire();
             health.event(now_ns, EventKind::Publisher, what, finding.value, 0);
         }
-        if self.detector.is_monitoring() && self.symptoms != self.symptoms_told {
+        if self.detector.is_monitoring() && self.symptoms != self.symptoms_reported {
             health.event(now_ns, EventKind::Symptoms, self.symptoms, 0.0, 0);
-            self.symptoms_told = self.symptoms;
+            self.symptoms_reported = self.symptoms;
         }
-        if self.alarm != self.alarm_told {
+        if self.alarm != self.alarm_reported {
             let kind = if self.alarm {
                 EventKind::Alarm
             } else {
                 EventKind::Cleared
             };
             health.event(now_ns, kind, 0, self.p_fault, 0);
-            self.alarm_told = self.alarm;
+            self.alarm_reported = self.alarm;
         }
     }
 }

@@ -1,7 +1,7 @@
-//! The identifier as a stage of the graph.
+#![doc = include_str!("../README.md")]
 
 mod assemble;
-mod told_size;
+mod size_report;
 pub mod wiring;
 
 pub use assemble::assemble;

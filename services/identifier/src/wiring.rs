@@ -13,7 +13,7 @@ use vigil_cycle::{
 
 use vigil_robot::{Description, FrameGuard};
 
-use crate::told_size::ToldSize;
+use crate::size_report::SizeReport;
 use vigil_diagnosis::identify::{Diagnoser, Input};
 
 /// Sensor frames that may wait for their detection: more than a queue of them holds by default.
@@ -38,21 +38,32 @@ pub struct IdentifierStage {
     belief: Box<dyn Sender<FaultBelief>>,
     hypotheses: Box<dyn Sender<ParticleBlock>>,
     reported: LastBelief,
-    told: u32,
-    /// The mode that was told last. That nothing is seen, the detector tells.
-    told_mode: u32,
-    size: ToldSize,
+    /// Changes of the mode that the timeline has.
+    changes_reported: u32,
+    /// The mode that the timeline has. Blindness is the detector's to report.
+    mode_reported: u32,
+    size: SizeReport,
 }
 
-/// What the last belief said, for the timeline.
+/// The last belief, for the timeline.
 #[derive(Debug, Clone, Copy, Default)]
 struct LastBelief {
     mode: u32,
     p_mode: f64,
     leaves: u64,
     changes: u32,
-    /// The channel that speaks most for the diagnosis, its evidence, and against what.
-    reason: (u32, f64, u32),
+    reason: Reason,
+}
+
+/// Why the diagnosis is not another.
+#[derive(Debug, Clone, Copy, Default)]
+struct Reason {
+    /// The channel with the most evidence for it.
+    channel: u32,
+    /// Its evidence, nats.
+    evidence: f64,
+    /// The next best mode.
+    runner_up: u32,
 }
 
 impl IdentifierStage {
@@ -78,9 +89,9 @@ impl IdentifierStage {
             belief: graph.sender(Topic::Diagnosis)?,
             hypotheses: graph.sender(Topic::DiagnosisParticles)?,
             reported: LastBelief::default(),
-            told: 0,
-            told_mode: 0,
-            size: ToldSize::default(),
+            changes_reported: 0,
+            mode_reported: 0,
+            size: SizeReport::default(),
         })
     }
 
@@ -89,7 +100,7 @@ impl IdentifierStage {
             if !self.frames.advance() {
                 break;
             }
-            // A copy: what is judged must be what is stepped, whatever its writer writes meanwhile.
+            // A copy: its writer may change the shared block between the check and the step.
             let Some(frame) = self.frames.held().copied() else {
                 break;
             };
@@ -204,7 +215,11 @@ impl Stage for IdentifierStage {
             p_mode: belief.p_mode,
             leaves: belief.sets[0].leaves,
             changes: belief.mode_change_count,
-            reason: (channel as u32, evidence, belief.runner_up),
+            reason: Reason {
+                channel: channel as u32,
+                evidence,
+                runner_up: belief.runner_up,
+            },
         };
         self.size.take(belief);
         self.hypotheses.block().cause = cause;
@@ -243,11 +258,11 @@ impl Stage for IdentifierStage {
             p_mode,
             leaves,
             changes,
-            reason: (channel, evidence, runner_up),
+            reason,
         } = self.reported;
-        if changes != self.told {
-            self.told = changes;
-            if mode == MODE_BLIND || mode == std::mem::replace(&mut self.told_mode, mode) {
+        if changes != self.changes_reported {
+            self.changes_reported = changes;
+            if mode == MODE_BLIND || mode == std::mem::replace(&mut self.mode_reported, mode) {
                 return;
             }
             let kind = if mode == 0 {
@@ -256,13 +271,14 @@ impl Stage for IdentifierStage {
                 EventKind::Diagnosis
             };
             health.event(now_ns, kind, mode, p_mode, leaves);
-            if evidence > 0.0 {
-                let against = u64::from(runner_up);
-                health.event(now_ns, EventKind::Reason, channel, evidence, against);
+            if reason.evidence > 0.0 {
+                let (evidence, against) = (reason.evidence, u64::from(reason.runner_up));
+                health.event(now_ns, EventKind::Reason, reason.channel, evidence, against);
             }
         }
-        if let Some((what, size, sd)) = self.size.news() {
-            health.event(now_ns, EventKind::Size, what, size, sd.to_bits());
+        if let Some(news) = self.size.news() {
+            let sd = news.sd.to_bits();
+            health.event(now_ns, EventKind::Size, news.what, news.size, sd);
         }
     }
 }

@@ -97,7 +97,7 @@ impl Children {
                         observer.remove_dead_peers();
                     }
                     Err(reason) => {
-                        tell!("vigil: {name} ended ({status}); {reason}");
+                        tell!("vigil: {name} ended ({status}); given up: {reason}");
                         self.gave_up = Some(format!("{name}: {status}; {reason}"));
                         return true;
                     }

@@ -172,8 +172,7 @@ impl Observer {
 
     /// Adds an assertion of a service that has failed.
     pub fn add_failure(&mut self, service: ServiceName, failure: &Failure) {
-        self.timeline
-            .add_failure(service, failure, Monotonic.now_ns());
+        self.timeline.add_failure(service, failure);
     }
 
     /// Adds an event that the launcher itself has found out about a service.

@@ -49,12 +49,12 @@ pub enum GiveUpReason {
 impl fmt::Display for GiveUpReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Restarts(count) => write!(f, "given up after {count} restarts"),
-            Self::Refused => write!(f, "given up: it refuses its configuration"),
-            Self::MissedDeadline => write!(f, "given up: it missed a deadline"),
-            Self::CannotResume => write!(f, "given up: it cannot go on within its recording"),
+            Self::Restarts(count) => write!(f, "{count} restarts within the window"),
+            Self::Refused => write!(f, "it refuses its configuration"),
+            Self::MissedDeadline => write!(f, "it missed a deadline"),
+            Self::CannotResume => write!(f, "it cannot go on within its recording"),
             Self::SameAssertion(location) => {
-                write!(f, "given up: the same assertion failed again ({location})")
+                write!(f, "the same assertion failed again ({location})")
             }
         }
     }
@@ -148,6 +148,7 @@ mod tests {
         Death {
             code: Some(70),
             failure: Some(Failure {
+                t_ns: 0,
                 location: location.into(),
                 work: "at the start".into(),
                 message: "counters add up".into(),
@@ -202,7 +203,7 @@ mod tests {
         let again = judge("deadline.rs:7:9", 9_999).unwrap_err();
         assert_eq!(
             again.to_string(),
-            "given up: the same assertion failed again (deadline.rs:7:9)"
+            "the same assertion failed again (deadline.rs:7:9)"
         );
     }
 

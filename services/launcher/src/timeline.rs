@@ -102,13 +102,12 @@ impl Timeline {
         }
     }
 
-    /// Adds an assertion of a service that has failed, found at `t_ns`; also while the graph is
-    /// being stopped.
-    pub fn add_failure(&mut self, service: ServiceName, failure: &Failure, t_ns: u64) {
+    /// Adds an assertion of a service that has failed, also while the graph is being stopped.
+    pub fn add_failure(&mut self, service: ServiceName, failure: &Failure) {
         self.records.push(Record {
             service,
             event: Event {
-                t_ns,
+                t_ns: failure.t_ns,
                 kind: EventKind::Assertion as u32,
                 ..Event::default()
             },
@@ -475,11 +474,12 @@ mod tests {
         timeline.close(11 * S);
         timeline.add(ServiceName::Detector, &event(12, EventKind::Alarm, 0, 0));
         let failure = Failure {
+            t_ns: 12 * S,
             location: "deadline.rs:7:9".into(),
             work: "at input 5 of epoch 3".into(),
             message: "instants never go back".into(),
         };
-        timeline.add_failure(ServiceName::Identifier, &failure, 12 * S);
+        timeline.add_failure(ServiceName::Identifier, &failure);
         let entries = timeline.entries();
         assert_eq!(entries.len(), 1);
         assert_eq!(

@@ -1,4 +1,4 @@
-//! The supervisor as a stage of the graph.
+#![doc = include_str!("../README.md")]
 
 mod assemble;
 mod wiring;

@@ -19,11 +19,19 @@ pub struct SupervisorStage {
     validity_ns: u64,
     action: Box<dyn Sender<Action>>,
     decided: LastDecision,
-    told: u64,
-    /// Whether the alarm stands, how many there were, and what was told of both.
-    alarm: (bool, u32),
-    alarm_told: (bool, u32),
-    latched_told: Option<usize>,
+    /// Number of the decision that the timeline has.
+    decision_reported: u64,
+    alarm: AlarmCount,
+    /// What the timeline has of `alarm`.
+    alarm_reported: AlarmCount,
+    latched_reported: Option<usize>,
+}
+
+/// Whether the fused alarm stands, and how many there were.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct AlarmCount {
+    stands: bool,
+    count: u32,
 }
 
 /// What the last block decided, for the timeline.
@@ -52,10 +60,10 @@ impl SupervisorStage {
             validity_ns,
             action: graph.sender(Topic::Action)?,
             decided: LastDecision::default(),
-            told: 0,
-            alarm: (false, 0),
-            alarm_told: (false, 0),
-            latched_told: None,
+            decision_reported: 0,
+            alarm: AlarmCount::default(),
+            alarm_reported: AlarmCount::default(),
+            latched_reported: None,
         })
     }
 
@@ -73,7 +81,7 @@ impl SupervisorStage {
             if !is_taken {
                 continue;
             }
-            // A prediction hides no word about a frame; its own is whether anything is seen.
+            // A prediction does not replace the belief about a frame, but for whether it is blind.
             if self.detection_is_new && block.cause.kind() != Some(CauseKind::Frame) {
                 self.detection.blind = block.blind;
             } else {
@@ -83,29 +91,29 @@ impl SupervisorStage {
         }
     }
 
-    /// The fused alarm, each of them, and actions that stand whatever is believed.
-    fn tell(&mut self, health: &mut HealthBoard, now_ns: u64) {
-        let (stands, count) = self.alarm;
-        if self.alarm != self.alarm_told {
+    /// Puts each fused alarm and each latched action into the timeline.
+    fn report(&mut self, health: &mut HealthBoard, now_ns: u64) {
+        let AlarmCount { stands, count } = self.alarm;
+        if self.alarm != self.alarm_reported {
             let kind = match stands {
                 true => EventKind::Alarm,
                 false => EventKind::Cleared,
             };
-            if stands || self.alarm_told.0 {
+            if stands || self.alarm_reported.stands {
                 health.event(now_ns, kind, 0, self.detection.p_fault, u64::from(count));
             }
-            self.alarm_told = self.alarm;
+            self.alarm_reported = self.alarm;
         }
         let latched = self.supervisor.latched();
-        if latched != self.latched_told {
+        if latched != self.latched_reported {
             let kind = match latched {
                 Some(_) => EventKind::Latched,
                 None => EventKind::Released,
             };
-            if let Some(action) = latched.or(self.latched_told) {
+            if let Some(action) = latched.or(self.latched_reported) {
                 health.event(now_ns, kind, action as u32, 0.0, 0);
             }
-            self.latched_told = latched;
+            self.latched_reported = latched;
         }
     }
 }
@@ -153,7 +161,10 @@ impl Stage for SupervisorStage {
         let action = self.action.block();
         action.cause = cause;
         action.valid_until_ns = clock.now_ns() + self.validity_ns;
-        self.alarm = (action.alarm != 0, action.alarm_count);
+        self.alarm = AlarmCount {
+            stands: action.alarm != 0,
+            count: action.alarm_count,
+        };
         let states = (action.state_count as usize).min(action.belief.len());
         self.decided = LastDecision {
             seq: action.decision_seq,
@@ -174,16 +185,16 @@ impl Stage for SupervisorStage {
 
     fn after(&mut self, health: &mut HealthBoard, now_ns: u64) {
         health.add_input(&self.detection_account);
-        self.tell(health, now_ns);
+        self.report(health, now_ns);
         let LastDecision {
             seq,
             action,
             wheel,
             p,
         } = self.decided;
-        if seq != self.told {
+        if seq != self.decision_reported {
             health.event(now_ns, EventKind::Action, action, p, u64::from(wheel));
-            self.told = seq;
+            self.decision_reported = seq;
         }
     }
 }

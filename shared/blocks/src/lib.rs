@@ -1,21 +1,4 @@
-//! Wire blocks of the Vigil graph.
-//!
-//! Every block is a fixed-size `#[repr(C)]` struct of plain integers and floats, natural alignment
-//! (at most 8 bytes), no padding: it is written in place in shared memory and read in place by
-//! any process, in Rust, C or Python. Nothing here has behaviour beyond reading a field.
-//!
-//! Units are SI, angles radians, times `CLOCK_MONOTONIC` nanoseconds; frames follow REP-103 and
-//! REP-105 (x forward, y left, yaw counter-clockwise; poses in a continuous frame such as `odom`).
-//!
-//! | block | written by | says |
-//! |---|---|---|
-//! | [`SensorFrame`] | sensor-sim or an external publisher | what the robot measured and did |
-//! | [`DetectionBelief`] | detector | is something wrong? |
-//! | [`ParticleBlock`] | detector, identifier | the filter's hypotheses, or its particles |
-//! | [`FaultBelief`] | identifier | what is wrong? |
-//! | [`Action`] | supervisor | what to do about it |
-//! | [`Health`] | each service | cycle, deadline and input accounting, recent events |
-//! | [`Control`] | operator's tool | inject, clear, reset |
+#![doc = include_str!("../README.md")]
 
 mod action;
 mod block;

@@ -11,6 +11,8 @@ use std::io;
 use std::panic::{self, PanicHookInfo};
 use std::path::{Path, PathBuf};
 
+use crate::clock::{Clock, Monotonic};
+
 /// Exit code of a service that a failed assertion has ended: `EX_SOFTWARE` of sysexits.h.
 pub const EXIT_ASSERTION: u8 = 70;
 
@@ -50,6 +52,8 @@ impl fmt::Display for Work {
 /// A failed assertion of a service.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Failure {
+    /// When it failed, `CLOCK_MONOTONIC` ns.
+    pub t_ns: u64,
     /// File, line and column of the assertion.
     pub location: String,
     /// What the service was working on.
@@ -65,6 +69,7 @@ impl Failure {
         let formatted = payload.downcast_ref::<String>().map(String::as_str);
         let message = literal.or(formatted).unwrap_or("no message");
         Self {
+            t_ns: Monotonic.now_ns(),
             location: panic.location().map_or("?".into(), ToString::to_string),
             work: WORK.get().to_string(),
             // An `assert_eq` has a line for each side.
@@ -74,11 +79,12 @@ impl Failure {
 
     fn write(&self, path: &Path) -> io::Result<()> {
         let Self {
+            t_ns,
             location,
             work,
             message,
         } = self;
-        fs::write(path, format!("{location}\n{work}\n{message}\n"))
+        fs::write(path, format!("{t_ns}\n{location}\n{work}\n{message}\n"))
     }
 
     /// The failure that a process has left at `path`, which is then gone; `None` if it left none.
@@ -89,6 +95,7 @@ impl Failure {
         let _ = fs::remove_file(path);
         let mut lines = text.lines().map(str::to_owned);
         Some(Self {
+            t_ns: lines.next()?.parse().ok()?,
             location: lines.next()?,
             work: lines.next()?,
             message: lines.next()?,
@@ -102,6 +109,7 @@ impl fmt::Display for Failure {
             location,
             work,
             message,
+            ..
         } = self;
         write!(f, "{message} ({location}), {work}")
     }
@@ -112,9 +120,9 @@ impl fmt::Display for Failure {
 pub(crate) fn end_on_panic(path: PathBuf) {
     let print = panic::take_hook();
     panic::set_hook(Box::new(move |info| {
-        print(info);
         // A file that cannot be written must not keep the process alive.
         let _ = Failure::new(info).write(&path);
+        print(info);
         std::process::exit(EXIT_ASSERTION.into());
     }));
 }
@@ -127,13 +135,16 @@ mod tests {
     fn a_failure_is_read_once_and_a_damaged_one_is_none() {
         let path = std::env::temp_dir().join(format!("failure-{}", std::process::id()));
         let failure = Failure {
+            t_ns: 7,
             location: "src/deadline.rs:7:9".into(),
             work: Work::Input { epoch: 5, seq: 12 }.to_string(),
             message: "instants never go back".into(),
         };
         failure.write(&path).unwrap();
+        let read = Failure::take(&path).unwrap();
+        assert_eq!(read, failure);
         assert_eq!(
-            Failure::take(&path).unwrap().to_string(),
+            read.to_string(),
             "instants never go back (src/deadline.rs:7:9), at input 12 of epoch 5"
         );
         assert_eq!(Failure::take(&path), None);

@@ -1,11 +1,4 @@
-//! The real-time cycle: absolute clock, placement, deadline monitoring, histograms, ports.
-//!
-//! Knows no robot and no filter. A service implements [`Stage`] (it is woken by input) or
-//! [`Source`] (it is woken by its schedule); [`StageCycle`] and [`SourceCycle`] do one turn at a
-//! time and know no thread, so that the same code runs on the robot (over shared memory, under the
-//! monotonic clock) and in tests (in process, under a virtual clock).
-//!
-//! One turn: wake, count deadlines that have passed, take input, check it, step, publish, account.
+#![doc = include_str!("../README.md")]
 
 pub mod allocation;
 pub mod clock;
