@@ -12,9 +12,9 @@ use vigil_blocks::{FAULT_NODES, FaultBelief, FaultSet, MODE_BLIND, MODE_MULTIPLE
 /// would end a sound process, and every real defect is larger.
 const ROUNDING: f64 = 1e-9;
 
-/// Probability, at most, of sets that the tree has no leaf for: the fusion with gyro and currents
-/// may leave the others 1e-9 of what they had (`further::RATIO_MAX`), beside which `set_probabilities::FLOOR` of
-/// each of 25 such sets is 2.5 %.
+/// Probability, at most, of sets that the tree has no leaf for. The fusion with gyro and currents may
+/// leave the others 1e-9 of what they had (`further::RATIO_MAX`); beside that, the floor of 25 such
+/// sets (`set_probabilities::FLOOR`) is 2.5 %.
 const UNNAMED: f64 = 0.03;
 
 /// The detector's log-odds are finite: of the fault and of each channel.

@@ -455,7 +455,6 @@ mod tests {
         assert!((mixed.p_any_broken() - 0.3).abs() < 1e-15);
         let other = mixed.p_other_broken();
         assert!(other[0].abs() < 1e-15 && (other[1] - 0.3).abs() < 1e-15);
-        assert_eq!(mixed.ways(0).len(), WAYS_TO_BREAK.len());
         let mut whole = mixed;
         whole.suppose_whole(0, 9);
         assert_eq!(
@@ -470,7 +469,6 @@ mod tests {
         let sum: f64 = unsure.states(2).iter().sum();
         assert!((sum - 1.0).abs() < 1e-12 && unsure.onset(2) == 5);
         assert!((unsure.p_whole(2) - (1.0 - ANYTHING)).abs() < 1e-15);
-        assert_eq!(unsure.states(2)[SILENT], 0.0);
     }
 
     #[test]
@@ -498,6 +496,5 @@ mod tests {
             1,
         );
         assert_eq!(dragged.p_sized(0, GAIN), 0.0);
-        assert!(dragged.p[0][ZERO] > 0.0);
     }
 }
