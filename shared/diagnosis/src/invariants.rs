@@ -12,7 +12,7 @@ use vigil_blocks::{FAULT_NODES, FaultBelief, FaultSet, MODE_BLIND, MODE_MULTIPLE
 /// would end a sound process, and every real defect is larger.
 const ROUNDING: f64 = 1e-9;
 
-/// Probability, at most, of sets that the tree has no leaf for. The fusion with gyro and currents may
+/// Probability, at most, of sets without a leaf in the tree. The fusion with gyro and currents may
 /// leave the others 1e-9 of what they had (`further::RATIO_MAX`); beside that, the floor of 25 such
 /// sets (`set_probabilities::FLOOR`) is 2.5 %.
 const UNNAMED: f64 = 0.03;

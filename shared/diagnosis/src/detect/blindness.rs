@@ -73,7 +73,7 @@ pub struct BlindnessTimer {
 }
 
 impl BlindnessTimer {
-    /// For frames that need any of the bits `channels` of [`SensorFrame::valid`] and all of the bits
+    /// For frames that need any bit of `channels` in [`SensorFrame::valid`] and all of the bits
     /// `command`.
     #[must_use]
     pub const fn new(channels: u64, command: u64) -> Self {

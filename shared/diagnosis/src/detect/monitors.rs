@@ -29,7 +29,7 @@ const SPACING_M: f64 = 0.25;
 /// Without a frame with both poses for this long, ns, the last symptoms no longer hold. As
 /// `blindness::BLIND_S`.
 const SILENT_NS: u64 = 1_000_000_000;
-/// A loop or a spin ends so long after its last sign, ns. Chosen by hand: much shorter, and one loop
+/// A loop or a spin ends so long after its last sign, ns. Chosen by hand: much shorter, and a loop
 /// would fire twice; longer, and a robot that is free again stays a looping one.
 const LASTS_NS: u64 = 10_000_000_000;
 /// A turn by this much more is a sign of a spin, rad. Twenty deviations of a yaw of 5 mrad.

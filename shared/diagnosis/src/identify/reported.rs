@@ -6,8 +6,8 @@ use vigil_robot::fused_alarm;
 use crate::identify::leaf_map::LeafMap;
 use crate::identify::tree_belief::TreeBelief;
 
-/// A held name is given up for another one when its own probability is below this. Chosen by hand: a
-/// rival needs half, and with 0.2 left to a third, two equal ones do not swap. Smaller holds a wrong
+/// A held name is given up for another one when its own probability is below this. Chosen by hand:
+/// a rival needs half; with 0.2 left to a third, two equal ones do not swap. Smaller holds a wrong
 /// name longer, larger lets names alternate.
 const HELD_MIN: f64 = 0.3;
 /// Slack when the nominal time is compared, s: it is a sum of short intervals.

@@ -1,4 +1,4 @@
-//! Log-likelihoods of one observation's wheels in one motion mode, computed once for all hypotheses.
+//! Log-likelihoods of one observation's wheels in one motion mode, once for all hypotheses.
 
 use vigil_blocks::WHEELS;
 use vigil_robot::Description;
