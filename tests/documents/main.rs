@@ -1,15 +1,17 @@
-//! What the documents say is so: their commands run and print the lines that stand below them, their
-//! options and links exist. A shell block says whether it runs:
+//! What the documents say is so: their commands run and print the lines that stand below them,
+//! their options and links exist. A shell block says whether it runs:
 //!
 //! | info string | means |
 //! |---|---|
-//! | `sh run` | its commands run and end with 0; `sh run exit 2` and `sh run exit any` expect another end |
+//! | `sh run` | its commands run and end with 0 |
+//! | `sh run exit 2`, `sh run exit any` | they end with 2, or with anything |
 //! | `sh run window` | its command runs beside the blocks up to the next `text shown window` |
 //! | `sh not run: REASON` | it needs what a test does not have |
 //! | `text shown` | lines that the block before prints; numbers may differ |
 //! | `text shown window` | lines that the window prints, which then ends |
 //!
-//! Times are those of the documents, but a graph of which no lines are shown ends after two seconds.
+//! Times are those of the documents, but a graph of which no lines are shown ends after two
+//! seconds.
 
 #![cfg(test)]
 

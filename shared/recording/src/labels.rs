@@ -83,8 +83,8 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Label>, LabelsError>
     Ok(labels)
 }
 
-/// Names of the grounds of these runs, from the column `terrain`: sorted, without repetition, joined
-/// by `+`. Empty without such a column.
+/// Names of the grounds of these runs, from the column `terrain`: sorted, without repetition,
+/// joined by `+`. Empty without such a column.
 ///
 /// # Errors
 /// [`LabelsError`].

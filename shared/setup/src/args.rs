@@ -29,7 +29,8 @@ pub struct GraphArgs {
     pub graph: Option<String>,
     /// Seed; replaces `graph.seed`.
     // A TOML file holds no larger one.
-    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
+    #[arg(long, value_name = "S",
+        value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub seed: Option<u64>,
     /// Identification filter; replaces `identifier.filter`.
     #[arg(long, value_name = "NAME")]

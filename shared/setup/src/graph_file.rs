@@ -42,8 +42,8 @@ pub struct GraphFile {
     /// The simulated world.
     #[serde(default)]
     pub simulator: Simulator,
-    /// A corridor with a planned path, in place of `drive`; for the simulator. Coordinates are those
-    /// of the robot's start: it stands at the origin, looking along x; y points to the left. Times
+    /// A corridor with a planned path, in place of `drive`; for the simulator. Coordinates are
+    /// those of the robot's start: it stands at the origin, looking along x; y points to the left. Times
     /// count from the first action that the robot obeys.
     pub navigation: Option<Navigation>,
     /// Monitors of the pose against the planned pose. Without them the detector's symptoms come
@@ -64,8 +64,8 @@ pub struct GraphFile {
     /// What the launcher does when a service dies.
     #[serde(default)]
     pub restart: Restart,
-    /// When the launcher takes a service that lives for failed. It then ends and restarts it, within
-    /// the bounds of `[restart]`.
+    /// When the launcher takes a service that lives for failed. It then ends and restarts it,
+    /// within the bounds of `[restart]`.
     #[serde(default)]
     pub watchdog: watchdog::Settings,
 }

@@ -9,12 +9,12 @@ use crate::schema::{allowed, schema};
 /// What stands above the tables.
 const HEAD: &str = "# Configuration
 
-Every key of a graph file (`config/*.toml`). `vigil config --reference` prints this page from the settings that
-the rooms declare, `vigil config --schema` the same as a JSON Schema. The values of one file with all defaults:
-`vigil config --config F --effective`.
+Every key of a graph file (`config/*.toml`). `vigil config --reference` prints this page from the
+settings that the rooms declare, `vigil config --schema` the same as a JSON Schema. The values of one
+file with all defaults: `vigil config --config F --effective`.
 
-Paths are relative to the graph file. An unknown key or a value out of range is an error with file and line.
-A key without default is required.
+Paths are relative to the graph file. An unknown key or a value out of range is an error with file
+and line. A key without default is required.
 ";
 
 /// Units by the end of a key; the longest end decides.

@@ -1,0 +1,131 @@
+use super::*;
+use crate::plan::tests::plan;
+
+const S: u64 = 1_000_000_000;
+
+fn event(t_s: u64, kind: EventKind, what: u32, value: u64) -> Event {
+    Event {
+        t_ns: t_s * S,
+        kind: kind as u32,
+        what,
+        p: 0.9,
+        value,
+    }
+}
+
+fn timeline() -> Timeline {
+    Timeline::new(&plan(&[]).unwrap().setup)
+}
+
+#[test]
+fn events_are_told_in_order_from_the_beginning_of_the_drive() {
+    let mut timeline = timeline();
+    timeline.add(ServiceName::Detector, &event(12, EventKind::Alarm, 0, 0));
+    timeline.add(ServiceName::SensorSim, &event(10, EventKind::Ready, 0, 0));
+    timeline.add(ServiceName::Supervisor, &event(13, EventKind::Miss, 0, 4));
+    timeline.add_overwritten(2);
+    let lines: Vec<String> = timeline.entries().iter().map(ToString::to_string).collect();
+    assert_eq!(
+        lines,
+        [
+            "    0.000 s  sensor-sim  ready       ",
+            "    2.000 s  detector    alarm         p=0.900",
+            "    3.000 s  supervisor  miss        4 cycles",
+        ]
+    );
+    assert_eq!(
+        (timeline.origin_ns(), timeline.overwritten()),
+        (Some(10 * S), 2)
+    );
+    assert!(timeline.has(EventKind::Alarm) && !timeline.has(EventKind::Goal));
+    timeline.begin(99);
+    assert_eq!(timeline.origin_ns(), Some(10 * S), "it begins once");
+}
+
+#[test]
+fn a_failed_assertion_is_told_even_while_the_graph_stops() {
+    let mut timeline = timeline();
+    timeline.begin(10 * S);
+    timeline.close(11 * S);
+    timeline.add(ServiceName::Detector, &event(12, EventKind::Alarm, 0, 0));
+    let failure = Failure {
+        t_ns: 12 * S,
+        location: "deadline.rs:7:9".into(),
+        work: "at input 5 of epoch 3".into(),
+        message: "instants never go back".into(),
+    };
+    timeline.add_failure(ServiceName::Identifier, &failure);
+    let entries = timeline.entries();
+    assert_eq!(entries.len(), 1);
+    assert_eq!(
+        entries[0].to_string(),
+        "    2.000 s  identifier  assertion   instants never go back (deadline.rs:7:9), \
+         at input 5 of epoch 3"
+    );
+    assert_eq!(timeline.closed_ns(), Some(11 * S));
+}
+
+#[test]
+fn misses_after_the_end_of_a_recording_are_no_events() {
+    let mut timeline = timeline();
+    let end = event(20, EventKind::EndOfRecording, 0, 20 * S);
+    timeline.add(ServiceName::Detector, &event(19, EventKind::Miss, 0, 1));
+    timeline.add(ServiceName::SensorSim, &end);
+    timeline.add(ServiceName::Detector, &event(21, EventKind::Miss, 0, 1));
+    timeline.settle(false);
+    let events: Vec<_> = timeline.entries().iter().map(|entry| entry.event).collect();
+    assert_eq!(events, ["miss", "end-of-recording"]);
+    assert_eq!(timeline.recording_end_ns(), Some(20 * S));
+}
+
+#[test]
+fn faults_are_named_and_changes_can_be_injected_again() {
+    let mut timeline = timeline();
+    timeline.begin(10 * S);
+    let injection = vigil_robot::Injection::parse("stuck:RM@5", &timeline.namer.robot).unwrap();
+    let (what, p, value) = injection.change.to_wire().event();
+    let injected = Event {
+        p,
+        ..event(15, EventKind::Injected, what, value)
+    };
+    timeline.add(ServiceName::SensorSim, &injected);
+    assert_eq!(timeline.changes(), ["stuck:RM@5"]);
+    let leaf = |name: &str| timeline.namer.nodes.iter().position(|n| n == name).unwrap();
+    let (stuck, encoder) = (leaf("RM_STUCK"), leaf("LF_ENC"));
+    let set = 1 << stuck | 1 << encoder;
+    let several = event(16, EventKind::Diagnosis, MODE_MULTIPLE, set);
+    let one = event(17, EventKind::Diagnosis, stuck as u32, 1 << stuck);
+    timeline.add(ServiceName::Identifier, &several);
+    timeline.add(ServiceName::Identifier, &one);
+    let entries = timeline.entries();
+    assert_eq!(entries[1].what, "MULTIPLE");
+    let set = entries[1].fault_set.as_deref().unwrap();
+    let mut names: Vec<&str> = set.split('+').collect();
+    names.sort_unstable();
+    assert_eq!(names, ["LF_ENC", "RM_STUCK"]);
+    assert_eq!(
+        (entries[2].what.as_str(), entries[2].p),
+        ("RM_STUCK", Some(0.9))
+    );
+}
+
+#[test]
+fn blind_time_is_added_up_by_cause_until_the_end() {
+    let event = |t_s: u64, kind: EventKind, what| Event {
+        t_ns: t_s * 1_000_000_000,
+        kind: kind as u32,
+        what,
+        ..Event::default()
+    };
+    let events = [
+        event(1, EventKind::Blind, Blindness::Silence as u32),
+        event(3, EventKind::Blind, Blindness::Clock as u32),
+        event(4, EventKind::BlindEnds, 0),
+        event(5, EventKind::Alarm, 0),
+        event(6, EventKind::Blind, Blindness::Clock as u32),
+        event(99, EventKind::BlindEnds, 0),
+    ];
+    let expected = BTreeMap::from([("clock", 1.0 + 2.0), ("silence", 2.0)]);
+    assert_eq!(blind_s(events.iter(), 8_000_000_000), expected);
+    assert_eq!(blind_s(events[3..4].iter(), 8_000_000_000), BTreeMap::new());
+}
