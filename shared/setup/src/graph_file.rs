@@ -43,8 +43,8 @@ pub struct GraphFile {
     #[serde(default)]
     pub simulator: Simulator,
     /// A corridor with a planned path, in place of `drive`; for the simulator. Coordinates are
-    /// those of the robot's start: it stands at the origin, looking along x; y points to the left. Times
-    /// count from the first action that the robot obeys.
+    /// those of the robot's start: it stands at the origin, looking along x; y points to the
+    /// left. Times count from the first action that the robot obeys.
     pub navigation: Option<Navigation>,
     /// Monitors of the pose against the planned pose. Without them the detector's symptoms come
     /// from its pose track.

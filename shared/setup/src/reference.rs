@@ -10,8 +10,8 @@ use crate::schema::{allowed, schema};
 const HEAD: &str = "# Configuration
 
 Every key of a graph file (`config/*.toml`). `vigil config --reference` prints this page from the
-settings that the rooms declare, `vigil config --schema` the same as a JSON Schema. The values of one
-file with all defaults: `vigil config --config F --effective`.
+settings that the rooms declare, `vigil config --schema` the same as a JSON Schema. The values of
+one file with all defaults: `vigil config --config F --effective`.
 
 Paths are relative to the graph file. An unknown key or a value out of range is an error with file
 and line. A key without default is required.
