@@ -33,7 +33,7 @@ fn trouble(kind: TroubleKind, at_s: f64, [x_m, y_m, yaw_rad]: [f64; 3]) -> Troub
     }
 }
 
-/// A robot that is told what to do.
+/// A robot that obeys one action after the other.
 struct Robot {
     simulation: Simulation,
     settings: Navigation,
@@ -60,7 +60,7 @@ impl Robot {
     }
 
     /// Does this for at most `seconds`; what happened first, and when. Nothing is ever touched.
-    fn told(&mut self, kind: RecoveryKind, seconds: f64) -> Option<(NavigatorEvent, f64)> {
+    fn obey(&mut self, kind: RecoveryKind, seconds: f64) -> Option<(NavigatorEvent, f64)> {
         self.action.kind = kind as u32;
         self.action.decision_seq += 1;
         for k in 1..=(seconds * 100.0) as u32 {
@@ -116,30 +116,30 @@ use crate::rover::{even_soil, robot};
 #[test]
 fn a_free_path_is_followed_with_the_plan_to_the_goal() {
     let mut robot = Robot::new(corridor(|_| {}));
-    let (event, t_s) = robot.told(GoOn, 60.0).unwrap();
+    let (event, t_s) = robot.obey(GoOn, 60.0).unwrap();
     assert_eq!(event, NavigatorEvent::Goal);
     // 8 m at 0.25 m/s, and what slowing down at the goal takes.
     assert!((32.0..40.0).contains(&t_s), "{t_s}");
     assert!(robot.off_plan_m() < 0.2 && robot.place()[1].abs() < 0.05);
-    assert_eq!(robot.told(GoOn, 5.0), None);
+    assert_eq!(robot.obey(GoOn, 5.0), None);
     assert!((robot.place()[0] - 7.9).abs() < 0.05, "it stays there");
 }
 
 #[test]
 fn the_robot_slows_down_and_stops_before_what_blocks_it_and_falls_behind_its_plan() {
     let mut robot = Robot::new(corridor(|c| c.obstacle.push(obstacle(5.0, 0.0, 0.8))));
-    assert_eq!(robot.told(GoOn, 60.0), None);
+    assert_eq!(robot.obey(GoOn, 60.0), None);
     // Contact at 3.75 m; it stands 0.8 m before, creeping no nearer than that.
     let [x, y, _] = robot.place();
     assert!((2.9..=3.05).contains(&x) && y.abs() < 0.05, "{x} {y}");
     assert!(robot.off_plan_m() > 4.0);
     // On each side the gap is 0.4 m wide.
-    let (event, t_s) = robot.told(GoThrough, 20.0).unwrap();
+    let (event, t_s) = robot.obey(GoThrough, 20.0).unwrap();
     assert_eq!(event, ended(GoThrough, Failed));
     assert!((t_s - robot.settings.look_s).abs() < 0.02);
     assert_eq!(robot.outcome(), (Some(Failed), 0));
     // The only path is blocked.
-    let (event, t_s) = robot.told(NewPath, 20.0).unwrap();
+    let (event, t_s) = robot.obey(NewPath, 20.0).unwrap();
     assert_eq!(event, ended(NewPath, Failed));
     assert!((t_s - robot.settings.think_s).abs() < 0.02);
     assert_eq!(robot.outcome(), (Some(Failed), Symptoms::NNA));
@@ -151,13 +151,13 @@ fn an_opening_beside_the_path_is_gone_through_and_the_path_taken_up_again() {
         c.obstacle.push(obstacle(6.0, -0.9, 0.6));
         (c.stop_m, c.slow_m) = (1.5, 3.0);
     }));
-    assert_eq!(robot.told(GoOn, 40.0), None);
-    let (event, _) = robot.told(GoThrough, 40.0).unwrap();
+    assert_eq!(robot.obey(GoOn, 40.0), None);
+    let (event, _) = robot.obey(GoThrough, 40.0).unwrap();
     assert_eq!(event, ended(GoThrough, Succeeded));
     assert_eq!(robot.outcome(), (Some(Succeeded), Symptoms::BO));
     assert!(robot.place()[1] > 0.1, "to the left of it");
     assert!(robot.off_plan_m() < 0.3, "the plan goes on from here");
-    assert_eq!(robot.told(GoOn, 40.0).unwrap().0, NavigatorEvent::Goal);
+    assert_eq!(robot.obey(GoOn, 40.0).unwrap().0, NavigatorEvent::Goal);
     assert!(robot.place()[1].abs() < 0.2);
 }
 
@@ -169,17 +169,17 @@ fn people_leave_and_the_way_is_free() {
             ..obstacle(4.0, 0.0, 1.0)
         });
     }));
-    assert_eq!(robot.told(GoOn, 22.0), None);
-    let (event, t_s) = robot.told(GoThrough, 40.0).unwrap();
+    assert_eq!(robot.obey(GoOn, 22.0), None);
+    let (event, t_s) = robot.obey(GoThrough, 40.0).unwrap();
     assert_eq!(event, ended(GoThrough, Succeeded));
     assert!(t_s > 3.0, "not before they have left");
     // Or it waits: the plan then goes on from where it is.
     let mut waits = Robot::new(robot.settings.clone());
-    assert_eq!(waits.told(GoOn, 24.5), None);
+    assert_eq!(waits.obey(GoOn, 24.5), None);
     assert!(waits.off_plan_m() > 2.0);
-    assert_eq!(waits.told(GoOn, 1.5), None);
+    assert_eq!(waits.obey(GoOn, 1.5), None);
     assert!(waits.off_plan_m() < 0.5);
-    assert_eq!(waits.told(GoOn, 60.0).unwrap().0, NavigatorEvent::Goal);
+    assert_eq!(waits.obey(GoOn, 60.0).unwrap().0, NavigatorEvent::Goal);
 }
 
 #[test]
@@ -188,12 +188,12 @@ fn what_blocks_is_not_forgotten_by_what_did_not_help() {
         c.obstacle.push(obstacle(6.0, 0.0, 1.0));
         (c.stop_m, c.slow_m) = (1.5, 3.0);
     }));
-    assert_eq!(robot.told(GoOn, 60.0), None);
+    assert_eq!(robot.obey(GoOn, 60.0), None);
     // Whatever was tried before: there is no opening, and no other path.
     for before in [NewPath, MoveAway, Relocalise] {
-        robot.told(before, 20.0).unwrap();
+        robot.obey(before, 20.0).unwrap();
         for kind in [GoThrough, NewPath] {
-            let (event, _) = robot.told(kind, 40.0).unwrap();
+            let (event, _) = robot.obey(kind, 40.0).unwrap();
             assert_eq!(event, ended(kind, Failed), "after {before:?}");
         }
     }
@@ -206,11 +206,11 @@ fn an_opening_past_an_obstacle_does_not_clear_a_phantom_elsewhere() {
         c.trouble
             .push(trouble(TroubleKind::Phantom, 0.0, [7.5, 0.0, 0.0]));
     }));
-    assert_eq!(robot.told(GoOn, 30.0), None);
-    let (event, _) = robot.told(GoThrough, 40.0).unwrap();
+    assert_eq!(robot.obey(GoOn, 30.0), None);
+    let (event, _) = robot.obey(GoThrough, 40.0).unwrap();
     assert_eq!(event, ended(GoThrough, Succeeded));
     let past_m = robot.place()[0];
-    assert_eq!(robot.told(GoOn, 40.0), None, "the phantom still stops it");
+    assert_eq!(robot.obey(GoOn, 40.0), None, "the phantom still stops it");
     assert!(
         (past_m..6.6).contains(&robot.place()[0]),
         "{:?}",
@@ -226,27 +226,27 @@ fn the_alternative_is_taken_once() {
         c.obstacle.push(obstacle(6.0, 0.0, 1.0));
         (c.stop_m, c.slow_m) = (2.0, 3.5);
     }));
-    assert_eq!(robot.told(GoOn, 15.0), None);
-    let (event, _) = robot.told(NewPath, 5.0).unwrap();
+    assert_eq!(robot.obey(GoOn, 15.0), None);
+    let (event, _) = robot.obey(NewPath, 5.0).unwrap();
     assert_eq!(event, ended(NewPath, Succeeded));
     assert_eq!(robot.outcome(), (Some(Succeeded), Symptoms::ALT));
     assert!(robot.off_plan_m() < 0.2);
-    assert_eq!(robot.told(GoOn, 120.0).unwrap().0, NavigatorEvent::Goal);
+    assert_eq!(robot.obey(GoOn, 120.0).unwrap().0, NavigatorEvent::Goal);
 }
 
 #[test]
 fn moving_away_backs_and_stops_at_what_is_behind() {
     let mut robot = Robot::new(corridor(|_| {}));
-    robot.told(GoOn, 10.0);
+    robot.obey(GoOn, 10.0);
     let before = robot.place()[0];
-    let (event, _) = robot.told(MoveAway, 20.0).unwrap();
+    let (event, _) = robot.obey(MoveAway, 20.0).unwrap();
     assert_eq!(event, ended(MoveAway, Succeeded));
     let back_m = before - robot.place()[0];
     assert!((0.5..0.75).contains(&back_m), "{back_m}");
     assert!(robot.off_plan_m() < 0.1, "the plan goes on from there");
     // A wall just behind the start.
     let mut robot = Robot::new(corridor(|c| c.walls.push([-0.6, -1.2, -0.6, 1.2])));
-    let (event, _) = robot.told(MoveAway, 20.0).unwrap();
+    let (event, _) = robot.obey(MoveAway, 20.0).unwrap();
     assert_eq!(event, ended(MoveAway, Failed));
     assert!(robot.place()[0] > -0.15, "{:?}", robot.place());
 }
@@ -258,9 +258,9 @@ fn a_jump_of_the_believed_pose_lasts_until_the_robot_finds_its_place() {
         c.trouble
             .push(trouble(TroubleKind::Mislocalised, 5.0, jump));
     }));
-    robot.told(GoOn, 4.9);
+    robot.obey(GoOn, 4.9);
     assert!(robot.off_plan_m() < 0.2);
-    robot.told(GoOn, 0.2);
+    robot.obey(GoOn, 0.2);
     let [x, y, yaw] = robot.place();
     let seen = robot.frame.pose;
     let off = [
@@ -270,14 +270,14 @@ fn a_jump_of_the_believed_pose_lasts_until_the_robot_finds_its_place() {
     ];
     assert!(off.iter().all(|off| off.abs() < 0.05), "{off:?}");
     assert_eq!(robot.frame.pose_reset_count, 0);
-    let (event, _) = robot.told(Relocalise, 5.0).unwrap();
+    let (event, _) = robot.obey(Relocalise, 5.0).unwrap();
     assert_eq!(event, ended(Relocalise, Succeeded));
     assert_eq!(robot.frame.pose_reset_count, 1);
     let ([x, y, _], seen) = (robot.place(), robot.frame.pose);
     assert!((seen[0] - x).hypot(seen[1] - y) < 0.05);
     assert!(robot.off_plan_m() < 0.3);
     // Who knows the place finds no other.
-    robot.told(Relocalise, 5.0);
+    robot.obey(Relocalise, 5.0);
     assert_eq!(robot.frame.pose_reset_count, 1);
 }
 
@@ -285,18 +285,18 @@ fn a_jump_of_the_believed_pose_lasts_until_the_robot_finds_its_place() {
 fn a_phantom_stops_the_robot_and_a_blind_one_stops_at_touch() {
     let phantom = trouble(TroubleKind::Phantom, 0.0, [4.0, 0.0, 0.0]);
     let mut robot = Robot::new(corridor(|c| c.trouble.push(phantom)));
-    assert_eq!(robot.told(GoOn, 40.0), None);
+    assert_eq!(robot.obey(GoOn, 40.0), None);
     assert!(robot.place()[0] < 2.4);
-    let (event, _) = robot.told(GoThrough, 40.0).unwrap();
+    let (event, _) = robot.obey(GoThrough, 40.0).unwrap();
     assert_eq!(event, ended(GoThrough, Succeeded));
-    assert_eq!(robot.told(GoOn, 40.0).unwrap().0, NavigatorEvent::Goal);
+    assert_eq!(robot.obey(GoOn, 40.0).unwrap().0, NavigatorEvent::Goal);
 
     let blind = trouble(TroubleKind::Blind, 0.0, [0.0; 3]);
     let mut robot = Robot::new(corridor(|c| {
         c.trouble.push(blind);
         c.obstacle.push(obstacle(5.0, 0.0, 0.8));
     }));
-    assert_eq!(robot.told(GoOn, 40.0), None);
+    assert_eq!(robot.obey(GoOn, 40.0), None);
     assert!((robot.place()[0] - 3.75).abs() < 0.1, "{:?}", robot.place());
 }
 
@@ -307,40 +307,40 @@ fn a_wrong_heading_leads_off_the_path_until_it_is_planned_anew() {
         c.walls.clear();
         c.trouble.push(wrong);
     }));
-    assert_eq!(robot.told(GoOn, 20.0), None);
+    assert_eq!(robot.obey(GoOn, 20.0), None);
     assert!(robot.place()[1] > 0.5, "{:?}", robot.place());
     assert_eq!(
-        robot.told(NewPath, 5.0).unwrap().0,
+        robot.obey(NewPath, 5.0).unwrap().0,
         ended(NewPath, Succeeded)
     );
     assert!(robot.off_plan_m() < 0.2);
-    assert_eq!(robot.told(GoOn, 60.0).unwrap().0, NavigatorEvent::Goal);
+    assert_eq!(robot.obey(GoOn, 60.0).unwrap().0, NavigatorEvent::Goal);
 }
 
 #[test]
 fn help_clears_the_way_and_begins_a_new_run() {
     let mut robot = Robot::new(corridor(|c| c.obstacle.push(obstacle(5.0, 0.0, 1.2))));
-    assert_eq!(robot.told(GoOn, 30.0), None);
+    assert_eq!(robot.obey(GoOn, 30.0), None);
     let run = robot.frame.run_id;
-    let (event, t_s) = robot.told(CallForHelp, 30.0).unwrap();
+    let (event, t_s) = robot.obey(CallForHelp, 30.0).unwrap();
     assert_eq!(event, ended(CallForHelp, Succeeded));
     assert!((t_s - robot.settings.help_s).abs() < 0.02);
     assert_ne!(robot.frame.run_id, run);
     robot.settings.obstacle.clear();
-    assert_eq!(robot.told(GoOn, 60.0).unwrap().0, NavigatorEvent::Goal);
+    assert_eq!(robot.obey(GoOn, 60.0).unwrap().0, NavigatorEvent::Goal);
 }
 
 #[test]
 fn giving_up_and_stopping_stand_and_are_done_at_once() {
     for kind in [Stop, GiveUp] {
         let mut robot = Robot::new(corridor(|_| {}));
-        robot.told(GoOn, 5.0);
+        robot.obey(GoOn, 5.0);
         assert_eq!(
-            robot.told(kind, 1.0).unwrap(),
+            robot.obey(kind, 1.0).unwrap(),
             (ended(kind, Succeeded), 0.01)
         );
         let before = robot.place()[0];
-        assert_eq!(robot.told(GoOn, 0.01), None);
+        assert_eq!(robot.obey(GoOn, 0.01), None);
         assert!(robot.place()[0] - before < 0.01);
     }
 }
