@@ -15,7 +15,8 @@ const COLUMNS_MAX: usize = 120;
 const HEAD: &str = "# Results
 
 Of each question what was measured last: written by `scripts/bench page` from `results/`, not by
-hand. How to read it stands in [docs/results.md](../docs/results.md).
+hand. Scenarios stand in [field.toml](field.toml); a question is a file in `bench/src/questions`.
+What a figure of `field` means stands in `tools/evaluation/src/scoring/field.rs`.
 
 A result is one file, `results/<date>-<machine>/<question>.json`. It holds the lines that are shown
 here, all of them if they are not too many, the command, the commit, facts about the machine,

@@ -71,3 +71,40 @@ fn replace(words: &[OsString]) -> Result<Infallible, CommandError> {
         program.display()
     )))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::COMMANDS;
+
+    /// A file of the repository.
+    fn read(path: &str) -> String {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        std::fs::read_to_string(root.join(path)).unwrap()
+    }
+
+    #[test]
+    fn the_laboratory_its_page_and_this_list_have_the_same_commands() {
+        let listed = COMMANDS.map(|(name, _)| name);
+
+        let program = read("tools/lab/src/main.rs");
+        let (_, after) = program.split_once("enum Command {\n").unwrap();
+        let (variants, _) = after.split_once("\n}").unwrap();
+        let variants = variants.lines().map(str::trim);
+        let variants = variants.filter(|line| line.starts_with(|c: char| c.is_ascii_uppercase()));
+        let names = variants.map(|line| line.split_once('(').unwrap().0.to_lowercase());
+        assert_eq!(names.collect::<Vec<_>>(), listed);
+
+        let page = read("tools/lab/README.md");
+        let rows = page.lines().filter_map(|line| line.strip_prefix("| `"));
+        let names = rows.map(|row| row.split_once('`').unwrap().0);
+        assert_eq!(names.collect::<Vec<_>>(), listed);
+
+        let commands = read("docs/commands.md");
+        for name in listed {
+            let row = format!("\n| `target/release/vigil {name} ");
+            assert!(commands.contains(&row), "docs/commands.md lacks {name}");
+        }
+    }
+}
