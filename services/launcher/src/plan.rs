@@ -25,8 +25,8 @@ pub struct LauncherArgs {
     #[arg(long, value_name = "S")]
     pub duration: Option<f64>,
     /// Break the simulated rover T seconds after the start: `stuck:RM@5`, `encoder:LF:zero@3`.
-    /// `clear:RM@9` and `clear:all@9` mend it. Some kinds are in no model, such as `tether:20@5`
-    /// and `steer-jump:LF:0.2@5`. An unknown kind prints the list of all.
+    /// `clear:RM@9` and `clear:all@9` mend it. Further kinds are disturbances, such as
+    /// `tether:20@5` and `steer-jump:LF:0.2@5`. An unknown kind prints the list of all.
     #[arg(long, value_name = "SPEC@T")]
     pub inject: Vec<String>,
     /// Keep the graph's cores from halting, with a thread of the lowest class on each. A halted

@@ -17,8 +17,10 @@ const STEP_MAX: u64 = 1_000_000;
 /// or far higher sequence number is a new start, of a counter that wraps around or of a device that
 /// always has the same epoch.
 pub const SILENT_NS: u64 = 1_000_000_000;
-/// Blocks closer to the last one than this part of a period are more than the schedule allows.
-const EARLY_PERIOD_PART: u64 = 4;
+/// Blocks closer to the last one than a period over this are more than the schedule allows. Chosen:
+/// four times the graph's rate. Smaller refuses a publisher that is merely faster or jitters.
+/// Larger lets one that floods the graph load it more.
+const EARLY_PERIOD_DIVISOR: u64 = 4;
 /// So many blocks are taken at once, whatever their schedule: a full queue of sensor frames.
 const BURST_MAX: u64 = 256;
 /// So many offences within the last [`HISTORY`] blocks put a source in quarantine: half of them.
@@ -159,7 +161,7 @@ impl InputAccount {
             return self.reject(rejection);
         }
         if self.writer != Writer::Service {
-            let earliest_ns = last.t_schedule_ns + period_ns / EARLY_PERIOD_PART;
+            let earliest_ns = last.t_schedule_ns + period_ns / EARLY_PERIOD_DIVISOR;
             let is_too_soon = last.t_schedule_ns > 0 && header.t_schedule_ns < earliest_ns;
             if is_too_soon || self.paced_ns > now_ns {
                 return self.reject(Rejection::Early);
@@ -168,7 +170,7 @@ impl InputAccount {
             if self.is_quarantined {
                 return self.reject(Rejection::Quarantined);
             }
-            let spacing_ns = period_ns / EARLY_PERIOD_PART;
+            let spacing_ns = period_ns / EARLY_PERIOD_DIVISOR;
             let burst_ns = (BURST_MAX - 1) * spacing_ns;
             self.paced_ns = self.paced_ns.max(now_ns.saturating_sub(burst_ns)) + spacing_ns;
         }

@@ -75,6 +75,7 @@ impl SourceCycle {
     /// When the next turn is due, ns.
     #[must_use]
     pub fn next_wake_ns(&self) -> u64 {
+        // After the end no frame is due any more: only the health block still goes out.
         if self.ended {
             self.account.health.due_ns()
         } else {

@@ -129,7 +129,8 @@ pub struct Watchdog {
     limits: Limits,
     services: Vec<Peer>,
     looked_ns: u64,
-    is_blind: bool,
+    /// The last look came later than [`LOOK_NS_MAX`] after the one before: it finds nobody failed.
+    looked_too_late: bool,
 }
 
 impl Watchdog {
@@ -144,7 +145,7 @@ impl Watchdog {
             limits: Limits::new(settings),
             services: vec![watched; count],
             looked_ns: now_ns,
-            is_blind: false,
+            looked_too_late: false,
         }
     }
 
@@ -158,8 +159,8 @@ impl Watchdog {
         );
         let since_ns = now_ns - self.looked_ns;
         self.looked_ns = now_ns;
-        self.is_blind = since_ns > LOOK_NS_MAX;
-        if self.is_blind {
+        self.looked_too_late = since_ns > LOOK_NS_MAX;
+        if self.looked_too_late {
             for watched in &mut self.services {
                 watched.started_ns += since_ns;
                 watched.reported_ns += since_ns;
@@ -226,7 +227,7 @@ impl Watchdog {
 
     /// A service that has failed, and how; each failure is returned once.
     pub fn failed(&mut self, now_ns: u64) -> Option<(usize, Finding)> {
-        if self.is_blind {
+        if self.looked_too_late {
             return None;
         }
         let limits = self.limits;

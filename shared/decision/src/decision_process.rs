@@ -164,6 +164,7 @@ impl DecisionProcess {
             Measure::Entropy => ValueKind::Entropy,
         } as u32;
         action.margin = self.choice.margin;
+        // A stop stands whatever its action's scale is. An action of no known meaning stands too.
         action.speed_scale = meaning.map_or(0.0, |m| if stops { 0.0 } else { m.speed_scale });
         action.action = instruction.action as u32;
         action.kind = instruction.kind as u32;

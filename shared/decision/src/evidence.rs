@@ -38,7 +38,8 @@ pub(crate) const LOG_EPOCH_MAX: f64 = 300.0;
 /// twentieth of its range. Smaller discards what the decision model knows about mending; larger
 /// lets a fault fade that the identifier still holds.
 pub(crate) const DRIFT_MAX: f64 = 0.05;
-/// A probability may exceed 1 by this much, for rounding.
+/// A probability may exceed 1 by this much, for rounding. Chosen: far beyond what sums round to.
+/// Smaller might refuse sound input; larger might take damaged input.
 pub(crate) const P_TOLERANCE: f64 = 1e-6;
 
 /// Evidence gathered since the last epoch.

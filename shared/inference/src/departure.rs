@@ -12,7 +12,7 @@
 //! lasting departure is never learned away. A fault of an unknown kind is weighted by the
 //! probability that its departure lies beyond the same bound: Bayes' rule for a prior truncated
 //! there. The ground may also change suddenly, which makes the learned context useless: each such
-//! change is a healthy hypothesis of its own, within the bound.
+//! change is a healthy hypothesis of its own. Its departure is held within the nominal bound too.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -32,7 +32,8 @@ impl Default for Tracking {
     fn default() -> Self {
         Self {
             // Chosen by hand: lost once in 50 steps; half-way between the worst and the mean
-            // action. Only ratios of risks matter, which change little with either.
+            // action. Only ratios of risks matter, which change little with either. The least risk
+            // keeps particles in harmless modes: smaller keeps fewer, larger takes others away.
             flip: 0.02,
             pessimism: 0.5,
             risk_min: 1e-3,

@@ -1,7 +1,10 @@
-//! Disturbances: what may happen to the simulated rover that no fault model contains.
+//! Disturbances: what may happen to the simulated rover beside its faults.
 //!
-//! A [`Fault`] has a leaf in the fault tree and a learned model; a [`Disturbance`] has neither.
-//! Only the simulated world carries one out, so that filters are tried on what they do not model.
+//! A [`Fault`] is a stuck wheel, or an encoder that reads zero, noise or the same for ever. A
+//! [`Disturbance`] is anything else that the simulated world can carry out. Many are of a part that
+//! may have a leaf: an encoder, a steering servo, the pose. With all sensors these are also a
+//! motor's torque, the gyro and the current sensors. Others have no leaf, such as `tether`: filters
+//! are tried on what they do not model.
 //! The text form is here because the launcher checks it before it starts anything, and prints it.
 
 use crate::description::Description;

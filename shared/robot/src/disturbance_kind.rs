@@ -7,7 +7,7 @@ pub const PARAMETERS: usize = 2;
 /// First wire code of a disturbance; fault kinds lie below.
 const FIRST_CODE: u32 = 101;
 
-/// DisturbanceSpec of a disturbance.
+/// What a disturbance does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u32)]
 pub enum DisturbanceKind {

@@ -48,7 +48,7 @@ pub enum FaultError {
     /// The form is wrong.
     #[error(
         "'{found}' is not a fault: expected stuck:WHEEL, encoder:WHEEL:zero|frozen|noise, \
-         clear:WHEEL|KIND[:PLACE]|all, or what no model contains: {disturbances}"
+         clear:WHEEL|KIND[:PLACE]|all, or a disturbance: {disturbances}"
     )]
     Form {
         /// What was given.

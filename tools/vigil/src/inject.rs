@@ -20,9 +20,8 @@ const ANSWER_LIMIT: Duration = Duration::from_secs(2);
 pub struct Args {
     #[command(flatten)]
     graph: GraphArgs,
-    /// What to break: `stuck:RM`, `encoder:LF:zero|frozen|noise`, or a kind that is in no model,
-    /// such as `tether:20`. `clear:RM` and `clear:all` mend it. An unknown kind prints the list of
-    /// all.
+    /// What to break: `stuck:RM`, `encoder:LF:zero|frozen|noise`, or a disturbance, such as
+    /// `tether:20`. `clear:RM` and `clear:all` mend it. An unknown kind prints the list of all.
     #[arg(value_name = "SPEC")]
     spec: String,
 }

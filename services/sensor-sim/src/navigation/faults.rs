@@ -4,7 +4,7 @@
 use vigil_robot::kinematics::wrap_angle;
 use vigil_setup::graph_file::{Trouble, TroubleKind};
 
-/// NavigationFaults that are due, and what they have done.
+/// Faults of the navigation: those still to come, and what those that came have done.
 #[derive(Debug, Clone)]
 pub(super) struct NavigationFaults {
     pending: Vec<Trouble>,

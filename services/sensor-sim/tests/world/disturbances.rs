@@ -1,4 +1,4 @@
-//! What no model contains: each kind changes the signals that its physics says, and nothing else.
+//! Disturbances: each kind changes the signals that its physics says, and nothing else.
 
 use vigil_blocks::{SensorFrame, Valid};
 use vigil_robot::disturbance_kind::{KINDS, Place};

@@ -5,8 +5,6 @@
 //! - **error in position**: the pose is farther than `position_error_m` from the planned pose; it
 //!   ends below half of that. The robot is stopped (EPS) once it has stayed within 0.1 m for
 //!   `stopped_after_s`, else it moves (EPM);
-//!   A robot that had a plan and has got none for [`SILENT_NS`] is not where its plan wants it
-//!   either;
 //! - **LD**: within `loop_radius_m` of where the robot was at least `loop_travel_m` of way before,
 //!   while the planned pose is at least `2 loop_radius_m` from where it was then. Looked at every
 //!   0.25 m; the last 32 m are kept. It ends where that no longer holds, or [`LASTS_NS`] after the
@@ -14,8 +12,12 @@
 //! - **SD**: since the robot was last more than `spin_radius_m` from where it began to count, it
 //!   has turned by `spin_turn_rad` more than its plan, to one side.
 //!
-//! A jump of the pose's frame and a new run begin everything anew; a frame without both poses
-//! changes nothing.
+//! A jump of the pose's frame and a new run begin everything anew.
+//!
+//! A frame without both poses changes nothing until the last one with both is [`SILENT_NS`] old.
+//! From then on loop and spin are over. A robot whose pose is known is then in error, EPS or EPM:
+//! without a plan it is not where its plan wants it. Before the first frame with both poses nothing
+//! fires, and the first one after a silence begins everything anew.
 
 use vigil_blocks::{SensorFrame, Symptoms, Valid};
 use vigil_inference::angle::wrap;
@@ -26,8 +28,8 @@ use crate::detect::settings::MonitorSettings;
 const STILL_M: f64 = 0.1;
 /// Distance between kept places, m: chosen, so that [`PLACES`] hold 32 m of the way.
 const SPACING_M: f64 = 0.25;
-/// Without a frame with both poses for this long, ns, the last symptoms no longer hold. As
-/// `blindness::BLIND_S`.
+/// Without a frame with both poses for this long, ns, the last symptoms no longer hold: see above.
+/// As `blindness::BLIND_S`.
 const SILENT_NS: u64 = 1_000_000_000;
 /// A loop or a spin ends so long after its last sign, ns. Chosen by hand: much shorter, and a loop
 /// would fire twice; longer, and a robot that is free again stays a looping one.
@@ -36,8 +38,9 @@ const LASTS_NS: u64 = 10_000_000_000;
 const TURN_STEP_RAD: f64 = 0.1;
 /// Kept places: 32 m of way, beyond the largest `loop_travel_m` (30 m).
 const PLACES: usize = 128;
-/// Positions beyond this are no measurement, m: as of the frame guard and the observer.
-const POSITION_MAX_M: f64 = 1e7;
+/// A pose with a coordinate, m, or a yaw, rad, beyond this is none: the observer's bound of a
+/// position. The frame guard bounds frames from outside more closely, at 1e6 m.
+const POSE_MAX: f64 = 1e7;
 
 /// A place that the robot has passed.
 #[derive(Debug, Clone, Copy)]
@@ -134,7 +137,7 @@ impl Monitors {
 
     /// Takes a frame.
     pub fn observe(&mut self, frame: &SensorFrame) {
-        let sound = |pose: &[f64; 3]| pose.iter().all(|value| value.abs() <= POSITION_MAX_M);
+        let sound = |pose: &[f64; 3]| pose.iter().all(|value| value.abs() <= POSE_MAX);
         let has_pose = frame.has(Valid::POSE) && sound(&frame.pose);
         let has_plan = frame.has(Valid::PLANNED_POSE) && sound(&frame.planned_pose);
         let t_ns = frame.header.t_capture_ns;

@@ -232,10 +232,11 @@ impl ChannelEvidence {
             for wheel in 0..self.robot.wheels.len().min(WHEELS) {
                 let is_broken = lineage.broken >> wheel & 1 == 1;
                 lineage.log_likelihood[Channel::wheel_rate(wheel)] += if is_broken {
-                    // In any way, also by a size: then it reads a smooth rate of its own.
+                    // In any way, or by a size: then it reads a smooth rate of its own. Half each.
                     let ways = [evidence.broken_anyhow(wheel), evidence.own_rate[wheel]];
                     log_add(ways[0], ways[1]) - std::f64::consts::LN_2
                 } else if moved == Mover::UnknownAny {
+                    // As a healthy wheel or anything: the odds of both, over the first.
                     let healthy = evidence.healthy[wheel];
                     let ratio = evidence.any[wheel] - healthy;
                     healthy + lineage.anything[wheel].step([0.0, ratio], [CHANGES; 2])
@@ -271,6 +272,8 @@ fn contenders(posterior: &TreeBelief) -> (Explanation, Explanation) {
     let others = posterior.sets[1..posterior.set_count.max(1)].iter();
     let mut others = others.filter(|set| named == 0 || set.leaves & named != named);
     let rival = others.next().copied().unwrap_or_default();
+    // With more than half the unknown is the diagnosis, and the named set its rival. With less it
+    // is a rival like any set.
     if posterior.unknown > 0.5 {
         (Explanation::Unknown, Explanation::Leaves(named))
     } else if posterior.unknown > rival.p {

@@ -61,6 +61,8 @@ impl DelayBelief {
         let joint: [f64; DELAYS_S.len()] =
             std::array::from_fn(|i| p[i] * (logs[i] - largest).exp());
         let total: f64 = joint.iter().sum();
+        // No delay makes the reading possible. It teaches nothing, and a late encoder is taken to
+        // read as a timely one.
         if !(total > 0.0 && largest.is_finite()) {
             return None;
         }
@@ -76,8 +78,8 @@ impl DelayBelief {
         let all = || self.p[wheel].iter().zip(DELAYS_S);
         let mean: f64 = all().map(|(p, delay)| p * delay).sum();
         let square: f64 = all().map(|(p, delay)| p * delay * delay).sum();
-        // Between two delays of the grid any is as good.
-        // Of a grid whose steps are a third: sqrt 1.33 - 1 / sqrt 1.33 of a delay.
+        // Between two delays of the grid any is as good. Its steps are a third, so that a cell is
+        // sqrt 1.33 - 1 / sqrt 1.33 of a delay wide.
         let cell = 0.28 * mean;
         let variance = (square - mean * mean).max(0.0) + cell * cell / 12.0;
         (mean, variance.sqrt())

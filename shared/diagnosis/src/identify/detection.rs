@@ -20,7 +20,8 @@ pub struct Detection {
 }
 
 impl Detection {
-    /// What a belief says; scales and rates that no detector reports are those of a good sensor.
+    /// What a belief says. Scales and rates beyond what a detector reports are those of a good
+    /// sensor. Chosen: a scale of 0.1 and less or 100 and more, a rate of a half and more.
     pub fn from_belief(belief: &DetectionBelief) -> Self {
         let scale = |scale: f64| match scale > 0.1 && scale < 100.0 {
             true => scale,

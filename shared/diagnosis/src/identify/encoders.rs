@@ -17,7 +17,8 @@ pub const OWN_RATE: usize = SIZED + WAYS;
 pub const SILENT: usize = OWN_RATE + 1;
 /// State of a late encoder.
 pub const LATE: usize = SIZED + DELAY;
-/// State of an encoder that reads exactly zero, the first of the breakages.
+/// State of an encoder that reads exactly zero, the first of the breakages. State 0 is whole, so
+/// that each state of these is one beyond its index among [`BREAKAGES`]: see [`breakage`].
 pub const ZERO: usize = 1;
 /// State of an encoder that repeats itself exactly, the second of the breakages.
 pub const FROZEN: usize = 2;
@@ -25,6 +26,13 @@ pub const FROZEN: usize = 2;
 const NOISE: usize = 3;
 /// State of a dead encoder, the last of the breakages.
 pub const DEAD: usize = BREAKAGES.len();
+
+/// Index of a broken state among the ways to break, which do not count a whole encoder.
+#[must_use]
+pub const fn breakage(state: usize) -> usize {
+    state - 1
+}
+
 /// Share of whole encoders that read exactly zero on a standing wheel: most read noise there too.
 /// Chosen: a silent stuck wheel waits 2.3 nats longer, a noisy one gains 0.1.
 const SILENT_SHARE: f64 = 0.1;
@@ -131,6 +139,7 @@ impl Likelihoods {
     fn scale(&mut self, wheel: usize) {
         let logs = self.logs[wheel];
         let largest = logs.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        // Else the readings say nothing more: what was said before stays, at first nothing at all.
         if largest.is_finite() {
             self.relative[wheel] = logs.map(|log| (log - largest).max(AGAINST_MAX).exp());
             self.log_largest[wheel] = largest;
@@ -231,7 +240,7 @@ impl Encoders {
                 }
                 exchange(p, birth, death, stuck != 0, is_timely);
             } else {
-                let birth = birth * SHARES[NOISE - 1];
+                let birth = birth * SHARES[breakage(NOISE)];
                 let (noisy, silent, noise) = (p[0], p[SILENT], p[NOISE]);
                 let back = noise * death;
                 p[0] = noisy * (1.0 - birth) + back * (1.0 - SILENT_SHARE);
@@ -379,13 +388,9 @@ mod tests {
     fn readings_that_cannot_tell_move_no_odds_in_an_hour() {
         // Noise about zero, then exact zeros: what a standing wheel's whole encoder may read.
         for (whole, alike) in [(0, DEAD), (SILENT, ZERO)] {
-            let likelihoods = Likelihoods::new(1, |_, state| {
-                if state == whole || state == alike {
-                    -1.0
-                } else {
-                    -9.0
-                }
-            });
+            let is_read = |state| state == whole || state == alike;
+            let log = |_, state| if is_read(state) { -1.0 } else { -9.0 };
+            let likelihoods = Likelihoods::new(1, log);
             let mut encoders = Encoders::healthy(0);
             encoders.stick(0);
             for step in 0..72_000 {
@@ -488,13 +493,8 @@ mod tests {
         assert!(encoders.p[0][ZERO] > 0.0);
         // While others drag, none begins to be off by a size.
         let mut dragged = Encoders::healthy(0);
-        dragged.step(
-            &[1e-2; WHEELS],
-            0.0,
-            0b10,
-            &Likelihoods::new(1, |_, _| 0.0),
-            1,
-        );
+        let same = Likelihoods::new(1, |_, _| 0.0);
+        dragged.step(&[1e-2; WHEELS], 0.0, 0b10, &same, 1);
         assert_eq!(dragged.p_sized(0, GAIN), 0.0);
     }
 }

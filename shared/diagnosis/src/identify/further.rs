@@ -24,8 +24,10 @@ use crate::identify::leaf_map::LeafMap;
 use crate::identify::node_sizes::SIZE_P_MIN;
 use crate::invariants;
 
-/// Offsets of a broken current sensor, in deviations of its noise: each twice the one before, as a
-/// size is told to a factor. The least lies within what a slope does to one wheel.
+/// Offsets of a broken current sensor, in deviations of its noise. Each is twice the one before,
+/// as a size is told to a factor; the largest is 2.5 times, to reach further with one state.
+/// Chosen: the least, 0.05 A of the rover, lies within what a slope does to one wheel. An offset
+/// beyond the largest, 2 A, still fits that better than none.
 const OFFSETS: [f64; 12] = [
     -40.0, -16.0, -8.0, -4.0, -2.0, -1.0, 1.0, 2.0, 4.0, 8.0, 16.0, 40.0,
 ];
@@ -34,7 +36,9 @@ const OFFSETS: [f64; 12] = [
 const GAINS: [f64; 4] = [-1.0, 0.0, 0.5, 2.0];
 /// Factors of its noise, beyond what is followed: that of a healthy sensor, up to five times.
 const NOISES: [f64; 2] = [8.0, 32.0];
-/// Biases of a broken gyro, in deviations of its noise. The least is two tolerances of the rover.
+/// Biases of a broken gyro, in deviations of its noise, in steps as of [`OFFSETS`]. Chosen: the
+/// least is two tolerances of the rover; the largest, 0.4 rad/s, is beyond its tightest
+/// turn at 0.3 m/s.
 const BIASES: [f64; 10] = [-40.0, -16.0, -8.0, -4.0, -2.0, 2.0, 4.0, 8.0, 16.0, 40.0];
 /// Least deviation of a stuck wheel's effect on a current, in deviations of the sensor's noise: as
 /// far as a healthy reading goes. An effect that is known to be small is no better known.
@@ -422,6 +426,7 @@ fn cell(kind: SizeKind, size: f64) -> f64 {
     match kind {
         // Mean spacing of the shares.
         SizeKind::TorqueShareLost => 0.17,
+        // The smallest spacing of [`GAINS`].
         SizeKind::Gain => 0.5,
         // Each is about twice the one before: sqrt 2 - 1 / sqrt 2.
         SizeKind::CurrentOffsetA | SizeKind::RateBiasRadS => 0.7 * size.abs(),

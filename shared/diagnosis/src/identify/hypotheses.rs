@@ -11,7 +11,8 @@ use crate::identify::leaf_map::LeafMap;
 use crate::identify::multiple_hypothesis::MultipleHypothesis;
 use crate::identify::set_probabilities::NEGLIGIBLE;
 
-/// Hypotheses that are collected before the least probable go.
+/// Hypotheses that are collected before the least probable go. Chosen: twice what a block holds, so
+/// that they are selected once for as many new ones. Smaller selects more often.
 const ROOM: usize = 2 * PARTICLE_CAPACITY;
 
 /// Collects hypotheses; where there are more than a block holds, the most probable.

@@ -7,13 +7,15 @@ use crate::identify::encoders::Encoders;
 use crate::identify::rate_offsets::RateOffsets;
 use crate::identify::servo_fault::ServoFault;
 
-/// Probability that a robot that may be thrown is, in an observation: after one in which it was
-/// not, and after one in which it was; and how far, x m, y m, yaw rad. Chosen: once in 2.5 s of
-/// dragging, for 2.5 observations on average.
+/// Probability that a robot that may be thrown begins to be, in an observation. Chosen: once in
+/// 2.5 s of dragging.
 const THROWN: f64 = 0.02;
+/// The same of a robot that was thrown in the last one. Chosen: for 2.5 observations on average.
 const THROWN_ON: f64 = 0.6;
-/// Chosen: a hop by a quarter of the rover's wheel radius.
+/// How far it is thrown, standard deviation of x m, y m, yaw rad. Chosen: a hop by a quarter of the
+/// rover's wheel radius.
 const THROW_SD: [f64; 3] = [0.02, 0.02, 0.1];
+
 /// Continuous state of a hypothesis, and what its encoders do.
 #[derive(Debug, Clone, Copy)]
 pub struct HypothesisState {

@@ -12,7 +12,8 @@ use vigil_blocks::PARTICLE_CAPACITY;
 pub const PARTICLES_MIN: usize = 32;
 /// Most particles: what a block carries.
 pub const PARTICLES_MAX: usize = PARTICLE_CAPACITY;
-/// Particles of a sampled filter, if the configuration does not say.
+/// Particles of a sampled filter, if the configuration does not say. Chosen: a quarter of the most.
+/// Fewer miss rare faults more often; more cost time in proportion.
 pub const PARTICLES: usize = 256;
 
 /// The identification filter.

@@ -75,8 +75,9 @@ pub struct SingleFaultFilter {
     degenerate_count: u32,
 }
 
-/// A particle in a wrong mode reaches the right one only by a change of fault: that is not rarer
-/// than a first one.
+/// This filter holds one fault at a time: a particle with a wrong one gets the right one only by a
+/// change of fault. So a change must not be as rare as a second fault is: it has the rate of a
+/// first one.
 fn rates(robot: &Description, leaves: &LeafMap, p_unknown: f64) -> FaultRates {
     FaultRates {
         further: 1.0,

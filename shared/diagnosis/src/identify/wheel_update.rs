@@ -6,7 +6,7 @@ use vigil_robot::learned::wheel_evidence::WheelDrag;
 use vigil_robot::learned::{Model, MotionMode, Mover, Observation, WheelEvidence};
 
 use crate::identify::encoders::{
-    DEAD, Encoders, FROZEN, Likelihoods, OWN_RATE, SILENT, SIZED, ZERO,
+    DEAD, Encoders, FROZEN, Likelihoods, OWN_RATE, SILENT, SIZED, ZERO, breakage,
 };
 use crate::identify::rate_offsets::RateOffsets;
 use crate::identify::sizes::{BIAS, DRIFT, EncoderSizes};
@@ -65,10 +65,10 @@ impl WheelUpdate<'_> {
                 (FROZEN, Mover::UnknownAny) if self.reads_zero(wheel) => f64::NEG_INFINITY,
                 (OWN_RATE, _) => f64::NEG_INFINITY,
                 // What reads alike shares one likelihood, broken or not.
-                (SILENT, _) if moved.is_stuck(wheel) => evidence.broken[wheel][ZERO - 1],
+                (SILENT, _) if moved.is_stuck(wheel) => evidence.broken[wheel][breakage(ZERO)],
                 (SILENT, _) => f64::NEG_INFINITY,
                 (sized, _) if sized >= SIZED => self.off(mode, wheel, sized - SIZED, off),
-                (broken, _) => evidence.broken[wheel][broken - 1],
+                (broken, _) => evidence.broken[wheel][breakage(broken)],
             }
         });
         // Whatever it was late by: a wheel that stands reads as one that stood.
@@ -141,13 +141,13 @@ impl WheelUpdate<'_> {
     /// True if a wheel's readings are exactly zero, which one that repeats itself reads as well.
     fn reads_zero(&self, wheel: usize) -> bool {
         let broken = &self.evidence.broken[wheel];
-        broken[ZERO - 1] >= broken[FROZEN - 1]
+        broken[breakage(ZERO)] >= broken[breakage(FROZEN)]
     }
 
     /// True if a wheel's readings may well be those of a standing one.
     fn stands(&self, wheel: usize) -> bool {
         let evidence = self.evidence;
-        let silent = evidence.broken[wheel][ZERO - 1];
+        let silent = evidence.broken[wheel][breakage(ZERO)];
         evidence.standing(wheel).max(silent) + DOUBT > evidence.any[wheel]
     }
 }

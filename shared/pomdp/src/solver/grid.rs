@@ -11,16 +11,22 @@ use crate::bounds::linear::{Rows, System};
 use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
-/// Largest number of beliefs.
+/// Largest number of beliefs. Chosen: in a larger tree backups alone lower the bounds. Smaller ends
+/// this help earlier; larger makes one call take longer.
 const BELIEFS_MAX: usize = 20_000;
+/// Rounds of policy iteration. Chosen: after any round the bounds hold, as what is left of the
+/// error is added to them. Smaller leaves them wider; larger may take longer.
 const ROUNDS_MAX: usize = 20;
 
-/// One action at one belief of the process: what it brings at once and where it leads.
+/// The process: a choice is one action at one expanded belief.
 struct Choices {
     /// First choice of each belief, and the end.
     starts: Vec<usize>,
+    /// Of each choice: its reward and what the beliefs outside the process are worth, discounted.
     constants: Vec<f64>,
+    /// Of each choice: the beliefs of the process that may follow, with their probabilities.
     links: Rows,
+    /// Largest probability with which a choice stays in the process.
     mass_max: f64,
 }
 
@@ -73,6 +79,8 @@ impl Tree<'_> {
         Ok(())
     }
 
+    /// The process of the expanded beliefs `ids`. A choice whose children are not known leads
+    /// nowhere, and its own upper bound is what it brings.
     fn choices(
         &mut self,
         ids: &[BeliefId],

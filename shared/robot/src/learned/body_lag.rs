@@ -32,7 +32,8 @@ const SLIP_SHARE: f64 = 0.3;
 const COHERENT_S: f64 = 3.0;
 /// Factor on the growth of its variance: a filter takes it for white noise and averages it, which
 /// an error of one sign does not do. Errors of one sign over n observations add up to n times the
-/// variance: chosen, three.
+/// variance. Chosen, three: smaller takes a lag that is not yet known for a departure; larger hides
+/// a departure that begins while the command changes.
 const COHERENCE: f64 = 3.0;
 
 /// Commanded motion between two observations, from middle to middle, as the body follows it.

@@ -146,6 +146,7 @@ impl Calibration {
         let beyond = (count / HIGH).max(MAXIMA_MIN);
         match count.checked_sub(beyond + 1).and_then(|i| maxima.get(i)) {
             Some(&level) => blank.above(level, maxima),
+            // No maxima, no level. Chosen: odds far below an alarm's.
             None => Self {
                 level_log_odds: maxima.last().copied().unwrap_or(-10.0),
                 ..blank

@@ -5,7 +5,7 @@ use super::motion::MotionModel;
 /// Wanted curvature at which the line is exact, either way, 1/m: of all lines these nodes make one
 /// that is least wrong for curvatures up to 0.5 /m (Chebyshev's nodes, 0.5/√2).
 const EXACT_AT_1_M: f64 = 0.35;
-/// Speed for which the line is made, m/s.
+/// Speed for which the line is made, m/s: the middle of what the rover's model was learned from.
 const SPEED_M_S: f64 = 0.2;
 /// Corrections of a command at most. Chosen: each leaves the error that the fault's curve makes of
 /// it, a part; a curve that is steeper than the command has no such command.

@@ -23,7 +23,8 @@ pub const STUCK: usize = SHARES.len();
 /// the effects between them are linear. Chosen: each node costs the start of a service a solution.
 const TURNS: usize = 5;
 const SPEEDS: usize = 3;
-/// Currents smaller than this are no measure of an effect, as a torque, N m.
+/// Currents smaller than this are no measure of an effect, as a torque, N m. Chosen: a twentieth of
+/// the rover's dry friction. Smaller divides by almost nothing; larger understates effects.
 const TORQUE_MIN_N_M: f64 = 1e-3;
 
 /// Changes of all currents over the current that the wheel would carry.

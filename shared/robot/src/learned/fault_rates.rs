@@ -44,6 +44,7 @@ impl FaultRates {
         let factor = self.factor(from, p_other);
         match to {
             _ if from == to => 0.0,
+            // Half for each of the two kinds of unknown.
             Mover::Unknown | Mover::UnknownAny => 0.5 * self.unknown_1_s * factor,
             // One servo or the pose, of a robot whose wheels turn.
             Mover::Steer(_) | Mover::Pose if before == 0 => self.fault_1_s * factor,

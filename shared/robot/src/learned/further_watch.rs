@@ -133,8 +133,9 @@ impl FurtherWatch {
         self.wheels
     }
 
-    /// True once the noise of one of the currents has been seen often enough: a broken sensor
-    /// shows none.
+    /// True once the noise of these channels is known: that of one of the currents has been seen
+    /// often enough, as a broken sensor shows none. A model without currents has none to wait for:
+    /// the gyro's noise is not waited for.
     #[must_use]
     pub fn is_known(&self) -> bool {
         let mut currents = self.noise[..self.wheels].iter();

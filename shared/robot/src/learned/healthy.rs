@@ -10,7 +10,7 @@ use crate::description::Description;
 /// Deviation of a pose of which nothing but a measurement is known, m and rad: twice its noise.
 const UNSURE_M: f64 = 0.01;
 
-/// Variances of a pose or a deviation that no healthy track has.
+/// Variances of a pose or a deviation that no healthy track has. Chosen: a kilometre of deviation.
 const VARIANCE_MAX: f64 = 1e6;
 
 /// Pose, and the context of motion and wheels.

@@ -238,7 +238,8 @@ impl Monitor {
         &self.noise
     }
 
-    /// Probability that a fault appears in `dt_s`, in one of the groups with this share.
+    /// Probability that a fault appears in `dt_s`, in one of the groups with this share. Chosen: at
+    /// most a tenth, as no observation is mostly faults. At least what has a logarithm.
     fn birth(&self, dt_s: f64, share: f64) -> f64 {
         (self.fault_rate_1_s * dt_s * share).clamp(1e-300, 0.1)
     }

@@ -4,7 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use vigil_inference::track::MotionNoise;
 
-/// Speed about which the effect of speed is expressed, m/s.
+/// Speed about which the effect of speed is expressed, m/s: the middle of what the rover's model
+/// was learned from. With another one learning finds another constant, and the same curve.
 const SPEED_REFERENCE_M_S: f64 = 0.2;
 /// `Σ c_i κ^i + d (1/|v| - 5 s/m)`: the paper's 4th-order polynomial in the signed curvature (the
 /// radius would have a pole straight ahead), plus the effect of speed on friction.

@@ -19,7 +19,8 @@ const UNKNOWN_DRIFT_1_M: f64 = 0.1;
 /// the noise is 5 mm.
 const JUMP_SHARE: f64 = 0.1;
 const JUMP_SD: f64 = 20.0;
-/// Correlation length of the unknown's coloured deviations, m: stuck wheels have 0.12 to 0.16 m.
+/// Correlation length of the unknown's coloured deviations, m. Chosen: somewhat longer than that of
+/// stuck wheels, 0.12 to 0.16 m.
 const UNKNOWN_LENGTH_M: f64 = 0.2;
 /// Ground not learned from. Chosen: a fifth, of 0.1 to 2.2 times a stuck wheel's effect.
 struct OtherGround {

@@ -18,7 +18,8 @@ use crate::period::FramePeriod;
 const GAP_S: f64 = 1.0;
 /// Period assumed of a run's first frame, s: as noisy as at the highest rate.
 const FRAME_UNKNOWN_S: f64 = 1e-3;
-/// Positions beyond this are no measurement, m.
+/// Positions beyond this are no measurement, m. Chosen: ten times the frame guard's bound, for
+/// frames that have not passed it.
 const POSITION_MAX_M: f64 = 1e7;
 /// So many frames in a row that are not newer than the last one taken mean that the clock was set
 /// back: the next is taken, as after a gap.

@@ -3,7 +3,8 @@
 //! Of two poses that disagree either may be the outlier. So after a gap or a jump none is evidence
 //! until some in a row agree, and one that does not agree begins anew.
 
-/// Poses in a row that must agree.
+/// Poses in a row that must agree. Chosen: with fewer, two outliers may agree by chance; with more,
+/// the pose is no evidence for longer.
 const SETTLES: u32 = 3;
 /// Poses after which it has settled whether or not they agree: what never does is no outlier. Half
 /// a second of 50 ms.

@@ -143,6 +143,7 @@ impl Switching {
             robot: robot.clone(),
             modes,
         };
+        // Deviations of 0.01 m and rad, as of a pose of which only a measurement is known.
         switching.start_at(Vector3::zeros(), Matrix3::identity() * 1e-4);
         switching
     }

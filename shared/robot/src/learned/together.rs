@@ -14,14 +14,15 @@ use crate::description::Description;
 use crate::kinematics::ROVER_WHEELS;
 use crate::slip::{Condition, IMMOBILE_STUCK, Situation, SlipModel, Soil, Unknowns};
 
-/// Curvatures, relative to the largest learned, at which the equilibrium is solved.
+/// Curvatures, relative to the largest learned, at which the equilibrium is solved. Chosen: two
+/// more than a curve of the fourth order has coefficients. Each costs the start solutions.
 const TURNS: [f64; 7] = [-1.0, -0.67, -0.33, 0.0, 0.33, 0.67, 1.0];
 /// Those of them at which it is solved on other soils too.
 const TURNS_NOISE: [usize; 3] = [1, 3, 5];
 /// Speeds at which it is: the ends of the learned range and their middle.
 const SPEEDS: usize = 3;
 const NODES: usize = TURNS.len() * SPEEDS;
-/// Terms of a wheel's droop.
+/// Terms of a wheel's droop: powers 0 to 2 of the curvature.
 const DROOP: usize = 3;
 /// Soils that the robot may drive on, relative to the described ground: friction, shear modulus.
 /// Two pairs, each one deviation up and one down. Chosen: a quarter of the friction, two thirds of
@@ -116,6 +117,8 @@ impl<'a> Together<'a> {
             motion: std::array::from_fn(|axis| motion[axis] - self.nominal.motion[axis]),
             rates: std::array::from_fn(|wheel| rates[wheel] - self.nominal.rates[wheel]),
         };
+        // Effects of single wheels add up only while the robot moves. Of an immobile one everything
+        // is `beyond`.
         let counted = if is_immobile(stuck) { 0 } else { stuck };
         for wheel in (0..WHEELS).filter(|&wheel| counted >> wheel & 1 == 1) {
             let alone = self.alone[wheel].as_ref()?;

@@ -18,7 +18,7 @@ const MEDIAN: f64 = std::f64::consts::FRAC_PI_2;
 /// Deviations from what is expected beyond which a reading teaches nothing: one healthy one in
 /// 16,000 lies so far out.
 pub const FAR_SD: f64 = 4.0;
-/// A variance that no state has, (rad/s)².
+/// A variance that no state has, (rad/s)². Chosen: a deviation of 1000 rad/s, beyond any wheel.
 const VARIANCE_MAX: f64 = 1e6;
 
 /// Residual of one wheel's rate.

@@ -18,10 +18,12 @@ pub const BREAKAGES: [EncoderState; 4] = [
     EncoderState::Noise,
     EncoderState::Standing,
 ];
-/// Index of the breakage that reads what a standing wheel's encoder does.
+/// Index among [`BREAKAGES`] of what reads as a standing wheel's encoder does. Whole is none of
+/// these: an identifier that counts it as state 0 has each breakage one further on.
 const DEAD: usize = 3;
-/// Index of noise, and the share of its observations that read right, as with a loose contact.
-/// Chosen: so two or three that chance puts there are no end of the fault; six are, in 0.3 s.
+/// Index of noise among them, and the share of its observations that read right, as with a loose
+/// contact. Chosen: so two or three that chance puts there are no end of the fault; six are, in
+/// 0.3 s.
 const NOISE: usize = 2;
 const READS_RIGHT: f64 = 0.1;
 /// Prior shares of [`BREAKAGES`]. Chosen: three alike, as nothing is known; dead is rarer, or a

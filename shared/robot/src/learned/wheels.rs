@@ -155,6 +155,7 @@ impl EncoderModel {
                 None => noise,
             },
             EncoderState::Any => {
+                // About zero, deviation 0.1 rad/s. Chosen: twice the rover's encoder noise.
                 let standing = self.common(reading, 0.0, 0.01, sample_sd);
                 log_add(log_add(standing, noise), repeats * hit + plain * miss) - 3.0_f64.ln()
             }

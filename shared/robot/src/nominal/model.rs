@@ -20,13 +20,19 @@ pub const VERSION: u32 = 2;
 pub const KIND: &str = "nominal";
 /// Limits of a file's size.
 pub(super) const CHANNELS_MAX: usize = 2 * WHEELS + 4;
+/// Terms of a channel. Chosen: of four axes to the fourth order learning makes 87 for a current at
+/// most. Smaller refuses such a model; larger only lets a file cost more time.
 const TERMS_MAX: usize = 128;
 /// Largest lag of a term: a prediction is also made for the observation before the newest.
 const LAG_MAX: usize = DEPTH - 2;
-/// Gaps of a range: each is wider than a seventh of it.
+/// Gaps of a range. Learning takes one for a gap if it is wider than 0.15 of the range (`GAP` in
+/// `learning_nominal::excitation`): six at most, one fewer than this.
 const GAPS_MAX: usize = 7;
 /// Largest order of a polynomial.
 const ORDER_MAX: u32 = 4;
+// `Model::check` names these in its messages as numbers.
+const _: () = assert!(WHEELS == 8 && COMMANDS == 4 && CHANNELS_MAX == 20);
+const _: () = assert!(TERMS_MAX == 128 && LAG_MAX == 3 && ORDER_MAX == 4);
 
 /// What was learned of one axis of the command.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,7 +4,7 @@ use vigil_blocks::{COMMANDS, SensorFrame, Valid, WHEELS};
 use vigil_inference::angle::wrap;
 
 use crate::description::Description;
-use crate::frame_guard::BEYOND_LIMITS;
+use crate::frame_guard::{BEYOND_LIMITS, CURRENT_MAX_A};
 use crate::learned::FrameOutcome;
 use crate::learned::observer::STALE_MAX;
 
@@ -13,8 +13,12 @@ pub const DEPTH: usize = 5;
 /// A pause between frames longer than this breaks the record, s. As far as a prediction looks back:
 /// five observations of 0.1 s.
 const GAP_S: f64 = 0.5;
-/// A frame that comes this part of a period early still completes an observation.
+/// A frame that comes this part of a period early still completes an observation. Half: it ends at
+/// the frame that is nearest to the learned interval.
 const NEARLY: f64 = 0.5;
+/// A pose with a coordinate, m, or a yaw, rad, of this or more is none: the observer's bound of a
+/// position. The frame guard bounds frames from outside more closely, at 1e6 m.
+const POSE_MAX: f64 = 1e7;
 /// Change of a command's axis, relative to its limit, after which the robot has to settle anew. A
 /// tenth is beyond the jitter of a planner's command.
 const CHANGE: f64 = 0.1;
@@ -245,10 +249,11 @@ impl Observer {
             let (rate, current) = (frame.wheel_rate[i], frame.current[i]);
             let largest = BEYOND_LIMITS * limits.wheel_rate_rad_s;
             push(&mut self.wheels[i], Valid::wheel_rate(i), rate, largest);
-            push(&mut self.currents[i], Valid::current(i), current, 1e4);
+            let (mean, bit) = (&mut self.currents[i], Valid::current(i));
+            push(mean, bit, current, CURRENT_MAX_A);
         }
         if frame.has(Valid::POSE) {
-            let sane = frame.pose.iter().all(|value| value.abs() < 1e7);
+            let sane = frame.pose.iter().all(|value| value.abs() < POSE_MAX);
             self.pose = sane.then_some(frame.pose);
             invalid |= !sane;
         }

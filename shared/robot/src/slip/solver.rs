@@ -16,7 +16,8 @@ const BODY_STEP_MAX: f64 = 0.1;
 /// Largest Newton step of a wheel rate, rad/s. Chosen: about the same at the
 /// rim of a wheel.
 const RATE_STEP_MAX_RAD_S: f64 = 1.0;
-/// Pseudo-transient steps before the situation counts as without equilibrium. Chosen.
+/// Pseudo-transient steps before the situation counts as without equilibrium. Chosen: a step may be
+/// twelve times the one before. Smaller gives up where the way is long; larger delays that answer.
 const TRANSIENT_MAX: u32 = 40;
 /// First pseudo-time step, s. Chosen: a fifth of the body's lag.
 const TRANSIENT_STEP_S: f64 = 0.02;
