@@ -96,12 +96,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vigil-robot", &["vigil-inference", "vigil-blocks"]),
     (
         "vigil-diagnosis",
-        &[
-            "vigil-pomdp",
-            "vigil-robot",
-            "vigil-inference",
-            "vigil-blocks",
-        ],
+        &["vigil-robot", "vigil-inference", "vigil-blocks"],
     ),
     (
         "vigil-decision",

@@ -1,10 +1,10 @@
 //! From the configuration to an identifier.
 
 use vigil_diagnosis::identify::{
-    Diagnoser, Identifier, IdentifierError, Models, NominalIdentifier,
+    Diagnoser, Identifier, IdentifierError, IdentifierFilter, Models, NominalIdentifier,
 };
 use vigil_robot::RobotModel;
-use vigil_setup::Setup;
+use vigil_setup::{Setup, state_risks};
 
 /// The identifier that a configuration describes.
 ///
@@ -23,11 +23,14 @@ pub fn assemble(setup: &Setup) -> Result<Diagnoser, IdentifierError> {
         RobotModel::Faults(model) => model,
         RobotModel::Nominal(_) => return Ok(Diagnoser::from(NominalIdentifier::new(tree))),
     };
+    let needs_risks = file.identifier.filter == IdentifierFilter::RiskSensitive;
+    let risks = needs_risks.then(|| state_risks(decision)).transpose();
+    let risks = risks.map_err(|error| IdentifierError::Build(format!("risks: {error}")))?;
     let models = Models {
         model,
         robot,
         tree,
-        decision: Some(decision),
+        risks: risks.as_ref(),
     };
     let (settings, sensors) = (&file.identifier, file.detector.sensors);
     let identifier = Identifier::new(&models, settings, sensors, file.graph.seed)?;

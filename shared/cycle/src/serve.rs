@@ -24,7 +24,8 @@ use crate::wake::Inputs;
 /// Delay between the opened ports and the first frame of a source, ns: time for the others.
 const START_DELAY_NS: u64 = 50_000_000;
 
-/// For tests: the service that this variable names fails an assertion at the end of its warm-up.
+/// For tests of what follows a failed assertion: the service that this variable names fails one at
+/// the end of its warm-up, if the configuration permits injections.
 const FAILS_VARIABLE: &str = "VIGIL_FAILS";
 
 /// What a service process is to be.
@@ -46,6 +47,8 @@ pub struct Plan {
     pub spin_ns: u64,
     /// What it leaves behind when it stops.
     pub leave: Leave,
+    /// Whether faults may be injected; never on a robot.
+    pub allow_injection: bool,
 }
 
 /// What a service leaves behind when it stops.
@@ -162,7 +165,8 @@ pub fn source<S: Source>(
 
 fn warm_up(plan: &Plan) -> WarmUp {
     let name = plan.service.as_str();
-    WarmUp::new(std::env::var_os(FAILS_VARIABLE).is_some_and(|fails| fails == name))
+    let is_named = || std::env::var_os(FAILS_VARIABLE).is_some_and(|fails| fails == name);
+    WarmUp::new(plan.allow_injection && is_named())
 }
 
 fn open(plan: &Plan) -> Result<(Graph, CycleAccount), PortError> {

@@ -12,6 +12,7 @@ mod problem;
 mod ranges;
 mod reference;
 mod schema;
+mod state_risks;
 
 pub use args::{GraphArgs, ServiceArgs};
 pub use document::Document;
@@ -20,3 +21,4 @@ pub use problem::{Problem, SetupError};
 pub use ranges::{OutOfRange, Ranges};
 pub use reference::reference;
 pub use schema::schema;
+pub use state_risks::state_risks;

@@ -55,6 +55,7 @@ impl Setup {
             on_miss: service.on_miss,
             spin_ns: (service.spin_us * 1e3).round() as u64,
             leave,
+            allow_injection: self.file.control.allow_injection,
         }
     }
 }

@@ -29,6 +29,9 @@ pub enum IdentifierError {
     /// Two leaves stand for one fault.
     #[error("leaves '{0}' and '{1}' stand for the same fault")]
     Twice(String, String),
+    /// The tree names no fault, and the model knows some.
+    #[error("the fault tree has no leaf: a model with faults needs one to name them by")]
+    NoLeaf,
     /// The filter cannot be built from these models.
     #[error("identifier.filter: {0}")]
     Build(String),
@@ -162,7 +165,8 @@ impl LeafMap {
     ///
     /// # Errors
     /// [`IdentifierError::Leaf`] for a fault that the model does not know,
-    /// [`IdentifierError::Twice`] for one that appears twice.
+    /// [`IdentifierError::Twice`] for one that appears twice, [`IdentifierError::NoLeaf`] for a
+    /// tree that names none.
     pub fn new(
         tree: &FaultTree,
         model: &Model,
@@ -205,6 +209,9 @@ impl LeafMap {
             for at in above {
                 leaves.below[at] |= 1 << i;
             }
+        }
+        if leaves.count == 0 {
+            return Err(IdentifierError::NoLeaf);
         }
         for wheel in 0..robot.wheels.len().min(WHEELS) {
             leaves.same_side[wheel] = leaves.beside(robot, wheel);

@@ -43,6 +43,6 @@ pub use leaf_map::{IdentifierError, LeafMap};
 pub use models::Models;
 pub use multiple_hypothesis::MultipleHypothesis;
 pub use nominal_identifier::NominalIdentifier;
-pub use risk::risks;
+pub use risk::StateRisks;
 pub use settings::{IdentifierFilter, PARTICLES_MAX, PARTICLES_MIN, Settings};
 pub use tree_belief::TreeBelief;

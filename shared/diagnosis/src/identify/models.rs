@@ -1,8 +1,9 @@
 //! What an identifier is built from.
 
-use vigil_pomdp::Pomdp;
 use vigil_robot::learned::Model;
 use vigil_robot::{Description, FaultTree};
+
+use crate::identify::risk::StateRisks;
 
 /// The models that an identifier is built from.
 #[derive(Debug, Clone, Copy)]
@@ -13,6 +14,6 @@ pub struct Models<'a> {
     pub robot: &'a Description,
     /// Its faults.
     pub tree: &'a FaultTree,
-    /// What faults cost; only the risk-sensitive filter needs it.
-    pub decision: Option<&'a Pomdp>,
+    /// What it costs to lose track of a fault; only the risk-sensitive filter needs it.
+    pub risks: Option<&'a StateRisks>,
 }

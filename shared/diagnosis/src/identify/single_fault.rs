@@ -131,12 +131,12 @@ impl SingleFaultFilter {
                 LibraryFilter::Sampled(filter.with_adaptive_count(adaptive))
             }
             IdentifierFilter::RiskSensitive => {
-                let decision = models
-                    .decision
+                let by_state = models
+                    .risks
                     .ok_or_else(|| refuse(&"risk-sensitive needs a decision model"))?;
                 let prior = rates.fault_1_s * settings.ring_s;
                 let named = names(models.tree, &nodes_of_modes, prior);
-                let risks = risks(decision, &named, count)?;
+                let risks = risks(by_state, &named, count)?;
                 let proposal = Proposal::risk_raised(&switching, RAISED, &risks);
                 LibraryFilter::Sampled(sampled(proposal.map_err(|e| refuse(&e))?, switching)?)
             }

@@ -63,11 +63,12 @@ impl Robot {
             return Diagnoser::from(NominalIdentifier::new(&self.tree));
         };
         let decision = vigil_setup::load_decision(&path("config/rover.pomdp")).unwrap();
+        let risks = vigil_setup::state_risks(&decision).unwrap();
         let models = Models {
             model,
             robot: &self.robot,
             tree: &self.tree,
-            decision: Some(&decision),
+            risks: Some(&risks),
         };
         let settings = identify::Settings {
             filter,

@@ -16,12 +16,13 @@ fn steady_cycles_of_every_filter_allocate_nothing() {
     let (frames, label) = recorded::unseen("RM_STUCK", "stuck");
     let tree = vigil_setup::load_tree(&recorded::path("config/trees/rover.toml")).unwrap();
     let decision = vigil_setup::load_decision(&recorded::path("config/rover.pomdp")).unwrap();
+    let risks = vigil_setup::state_risks(&decision).unwrap();
     let (model, robot) = (recorded::model(), recorded::robot());
     let models = Models {
         model: &model,
         robot: &robot,
         tree: &tree,
-        decision: Some(&decision),
+        risks: Some(&risks),
     };
     for &filter in IdentifierFilter::value_variants() {
         let settings = identify::Settings {
@@ -69,7 +70,7 @@ fn steady_cycles_with_every_channel_allocate_nothing() {
         model: &model,
         robot: &robot,
         tree: &tree,
-        decision: None,
+        risks: None,
     };
     let settings = identify::Settings::default();
     let mut identifier = Identifier::new(&models, &settings, Sensors::All, 1).unwrap();

@@ -20,11 +20,12 @@ fn keeps_its_name(faults: Faults, seed: u64) {
     let (model, robot): (_, Description) = (model(), robot());
     let tree = vigil_setup::load_tree(&path("config/trees/rover.toml")).unwrap();
     let decision = vigil_setup::load_decision(&path("config/rover.pomdp")).unwrap();
+    let risks = vigil_setup::state_risks(&decision).unwrap();
     let models = Models {
         model: &model,
         robot: &robot,
         tree: &tree,
-        decision: Some(&decision),
+        risks: Some(&risks),
     };
     let leaves = LeafMap::new(&tree, &model, &robot, Sensors::PoseEncoders).unwrap();
     let settings = identify::Settings::default();

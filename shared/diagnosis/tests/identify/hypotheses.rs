@@ -27,7 +27,7 @@ impl Bench {
             model: &recorded::model(),
             robot: &recorded::robot(),
             tree: &tree,
-            decision: None,
+            risks: None,
         };
         let settings = identify::Settings::default();
         let sensors = Sensors::PoseEncoders;

@@ -43,11 +43,12 @@ impl Bench {
             ..identify::Settings::default()
         };
         let decision = vigil_setup::load_decision(&path("config/rover.pomdp")).unwrap();
+        let risks = vigil_setup::state_risks(&decision).unwrap();
         let models = Models {
             model: &model(),
             robot: &robot(),
             tree: &tree,
-            decision: Some(&decision),
+            risks: Some(&risks),
         };
         let identifier = Identifier::new(&models, &settings, sensors, 1).unwrap();
         let belief = FaultBelief::default();
@@ -373,7 +374,7 @@ fn trees_that_the_model_cannot_serve_are_refused() {
             model: &model(),
             robot: &robot(),
             tree: &tree,
-            decision: None,
+            risks: None,
         };
         Identifier::new(&models, &settings, sensors, 1).map(|_| ())
     };
@@ -383,6 +384,8 @@ fn trees_that_the_model_cannot_serve_are_refused() {
         assert!(matches!(error, IdentifierError::Leaf { .. }), "{error}");
         assert!(error.to_string().contains("LF LM LR RF RM RR"), "{error}");
     }
+    let error = build(&[]).unwrap_err();
+    assert!(matches!(error, IdentifierError::NoLeaf), "{error}");
     let error = build(&["stuck:RM", "stuck:RM"]).unwrap_err();
     assert_eq!(
         error.to_string(),

@@ -31,7 +31,7 @@ fn belief(mut change: impl FnMut(&mut SensorFrame)) -> (FaultBelief, [usize; 2])
         model: &model,
         robot: &robot,
         tree: &tree,
-        decision: None,
+        risks: None,
     };
     let settings = identify::Settings::default();
     let sensors = Sensors::All;

@@ -28,12 +28,13 @@ fn belief(read: impl Fn(f64, f64) -> f64) -> (FaultBelief, usize) {
     let start_s = time_s(&frames[0]);
     let tree = vigil_setup::load_tree(&recorded::path("config/trees/rover.toml")).unwrap();
     let decision = vigil_setup::load_decision(&recorded::path("config/rover.pomdp")).unwrap();
+    let risks = vigil_setup::state_risks(&decision).unwrap();
     let (model, robot) = (recorded::model(), recorded::robot());
     let models = Models {
         model: &model,
         robot: &robot,
         tree: &tree,
-        decision: Some(&decision),
+        risks: Some(&risks),
     };
     let settings = identify::Settings::default();
     let sensors = Sensors::PoseEncoders;

@@ -12,7 +12,7 @@ use vigil_recording::frames::{self, Run};
 use vigil_robot::FaultTree;
 use vigil_robot::tree::Node;
 use vigil_robot::{Description, RobotModel};
-use vigil_setup::{load_decision, load_robot, load_tree};
+use vigil_setup::{load_decision, load_robot, load_tree, state_risks};
 
 use crate::pipeline::Pipeline;
 use crate::recovery::Recoverer;
@@ -212,11 +212,13 @@ impl FilterArgs {
             true => self.decision(learned)?,
             false => None,
         };
+        let risks = decision.as_ref().map(state_risks).transpose();
+        let risks = risks.map_err(|e| refuse(&format!("risks: {e}")))?;
         let models = Models {
             model,
             robot,
             tree,
-            decision: decision.as_ref(),
+            risks: risks.as_ref(),
         };
         let pipeline = Pipeline::new(&models, &detector, &identifier, self.seed);
         let recoverer = self.recoverer(learned, robot, tree)?;
