@@ -103,16 +103,15 @@ impl SingleFaultFilter {
             0
         };
         let rates = rates(models.robot, leaves, settings.p_unknown);
-        let (model, robot) = (models.model, models.robot);
-        let switching = Switching::new(model, robot, leaves.stuck_wheels(), encoders, &rates);
+        let (model, robot, stuck) = (models.model, models.robot, leaves.stuck_wheels());
+        let switching = Switching::new(model, robot, stuck, encoders, &rates);
         let nodes_of_modes: Vec<ModeNode> = (0..switching.modes())
             .map(|mode| meaning(&switching, mode, leaves))
             .collect();
-        let resampling = Resampling::default();
         let count = settings.particles.unwrap_or(PARTICLES);
         let refuse = |error: &dyn std::fmt::Display| IdentifierError::Build(error.to_string());
         let sampled = |proposal, model| {
-            let filter = ParticleFilter::new(model, proposal, resampling, count, seed);
+            let filter = ParticleFilter::new(model, proposal, Resampling::default(), count, seed);
             filter.map_err(|e| refuse(&e))
         };
         let raised = |model: &Switching| Proposal::raised(model, RAISED).map_err(|e| refuse(&e));
@@ -131,18 +130,14 @@ impl SingleFaultFilter {
                 LibraryFilter::Sampled(filter.with_adaptive_count(adaptive))
             }
             IdentifierFilter::RiskSensitive => {
-                let by_state = models
-                    .risks
-                    .ok_or_else(|| refuse(&"risk-sensitive needs a decision model"))?;
                 let prior = rates.fault_1_s * settings.ring_s;
-                let named = names(models.tree, &nodes_of_modes, prior);
-                let risks = risks(by_state, &named, count)?;
-                let proposal = Proposal::risk_raised(&switching, RAISED, &risks);
-                LibraryFilter::Sampled(sampled(proposal.map_err(|e| refuse(&e))?, switching)?)
+                let proposal = risk_raised(models, &switching, &nodes_of_modes, prior, count)?;
+                LibraryFilter::Sampled(sampled(proposal, switching)?)
             }
             IdentifierFilter::Hierarchical => {
                 let nodes = abstract_nodes(models.tree, leaves, &nodes_of_modes);
-                let filter = Hierarchical::new(switching, &nodes, resampling, count, seed);
+                let filter =
+                    Hierarchical::new(switching, &nodes, Resampling::default(), count, seed);
                 let filter = filter.map_err(|e| refuse(&e))?;
                 LibraryFilter::Hierarchical(filter.with_raised_proposals(RAISED))
             }
@@ -373,6 +368,22 @@ impl SingleFaultFilter {
             ..WeightedHypothesis::default()
         });
     }
+}
+
+/// Proposals raised by what it costs to lose track of each mode; `prior` is that of each fault.
+fn risk_raised(
+    models: &Models,
+    switching: &Switching,
+    nodes_of_modes: &[ModeNode],
+    prior: f64,
+    count: usize,
+) -> Result<Proposal, IdentifierError> {
+    let missing = || IdentifierError::Build("risk-sensitive needs a decision model".to_owned());
+    let by_state = models.risks.ok_or_else(missing)?;
+    let named = names(models.tree, nodes_of_modes, prior);
+    let risks = risks(by_state, &named, count)?;
+    Proposal::risk_raised(switching, RAISED, &risks)
+        .map_err(|error| IdentifierError::Build(error.to_string()))
 }
 
 /// Name of each mode among the states of a decision model, and its prior probability.
