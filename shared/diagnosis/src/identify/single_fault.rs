@@ -97,11 +97,8 @@ impl SingleFaultFilter {
         use_wheels: bool,
         seed: u64,
     ) -> Result<Self, IdentifierError> {
-        let encoders = if use_wheels {
-            leaves.encoder_wheels()
-        } else {
-            0
-        };
+        let encoders = use_wheels.then(|| leaves.encoder_wheels());
+        let encoders = encoders.unwrap_or_default();
         let rates = rates(models.robot, leaves, settings.p_unknown);
         let (model, robot, stuck) = (models.model, models.robot, leaves.stuck_wheels());
         let switching = Switching::new(model, robot, stuck, encoders, &rates);
