@@ -326,6 +326,19 @@ pub(crate) mod tests {
         (board, clock)
     }
 
+    #[test]
+    fn misses_are_an_event_at_once_and_summed_up_while_they_flood() {
+        let (mut board, _) = board();
+        assert_eq!(board.block.event_count, 1, "the first three");
+        board.miss(MISS_EVENT_INTERVAL_NS - 1, 2);
+        assert_eq!(board.block.event_count, 1, "too soon after those");
+        board.miss(MISS_EVENT_INTERVAL_NS, 0);
+        assert_eq!(board.block.event_count, 2);
+        assert_eq!(board.block.events[1].value, 2, "what came between");
+        board.miss(3 * MISS_EVENT_INTERVAL_NS, 0);
+        assert_eq!(board.block.event_count, 2, "nothing is no event");
+    }
+
     /// Publishes a board that was changed behind its back.
     fn publish_broken(change: impl FnOnce(&mut HealthBoard)) {
         let (mut board, clock) = board();

@@ -82,6 +82,18 @@ mod tests {
     }
 
     #[test]
+    fn two_fadings_are_one_over_both_travels() {
+        let mut at_once = SlowState::new(&DRIFT);
+        at_once.learn(0.3, 2.0, 0.05, &DRIFT);
+        let mut in_steps = at_once;
+        at_once.fade(4.0, &DRIFT);
+        in_steps.fade(1.0, &DRIFT);
+        in_steps.fade(-3.0, &DRIFT);
+        assert!((in_steps.mean - at_once.mean).abs() < 1e-15);
+        assert!((in_steps.variance - at_once.variance).abs() < 1e-15);
+    }
+
+    #[test]
     fn it_fades_to_its_stationary_deviation_and_never_beyond_its_tolerance() {
         let mut state = SlowState::new(&DRIFT);
         for _ in 0..1000 {
