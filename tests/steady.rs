@@ -10,8 +10,8 @@ use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    CycleAccount, DeadlineMonitor, Graph, HealthBoard, SourceCycle, Stage, StageCycle, Topic,
-    VirtualClock,
+    CycleAccount, DeadlineMonitor, Graph, HealthBoard, Recorder, SourceCycle, Stage, StageCycle,
+    Topic, VirtualClock,
 };
 use vigil_detector::DetectorStage;
 use vigil_identifier::IdentifierStage;
@@ -103,11 +103,12 @@ fn demand_steady(setup: &Setup) {
     let parts = |name| cycle_parts(setup, &graph, name);
     let stage = |name| {
         let (monitor, board) = parts(name);
-        StageCycle::new(CycleAccount::new(monitor, board).unwrap())
+        StageCycle::new(CycleAccount::new(monitor, board, Recorder::new().unwrap()))
     };
     let mut sensor = simulator(setup, &graph);
     let (monitor, board) = parts(SensorSim);
-    let mut source = SourceCycle::new(CycleAccount::new(monitor, board).unwrap(), period_ns);
+    let account = CycleAccount::new(monitor, board, Recorder::new().unwrap());
+    let mut source = SourceCycle::new(account, period_ns);
     let detector = vigil_detector::assemble(setup).unwrap();
     let mut detector = (
         stage(Detector),

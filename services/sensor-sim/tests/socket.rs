@@ -13,8 +13,8 @@ use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
-    Clock, CycleAccount, DeadlineMonitor, Graph, HealthBoard, OnMiss, Receiver, Schedule, Stage,
-    StageCycle, Topic, VirtualClock,
+    Clock, CycleAccount, DeadlineMonitor, Graph, HealthBoard, OnMiss, Receiver, Recorder, Schedule,
+    Stage, StageCycle, Topic, VirtualClock,
 };
 use vigil_sensor_sim::SocketStage;
 
@@ -55,8 +55,8 @@ impl Border {
         let datagrams = Rc::new(datagrams);
         let published = graph.receiver(Topic::Sensor).unwrap();
         let stage = SocketStage::new(Rc::clone(&datagrams), &robot, &graph).unwrap();
-        let account = CycleAccount::new(DeadlineMonitor::new(SCHEDULE), board)
-            .unwrap()
+        let recorder = Recorder::new().unwrap();
+        let account = CycleAccount::new(DeadlineMonitor::new(SCHEDULE), board, recorder)
             .with_on_miss(OnMiss::Count);
         Self {
             clock,

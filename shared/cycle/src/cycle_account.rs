@@ -31,31 +31,22 @@ pub(crate) struct TurnResult {
 }
 
 impl CycleAccount {
-    /// An empty account with this monitor and board.
-    ///
-    /// # Errors
-    /// None in practice; see [`crate::latency::Latency::new`].
-    pub fn new(monitor: DeadlineMonitor, health: HealthBoard) -> Result<Self, PortError> {
-        Ok(Self {
+    /// An empty account with this monitor and board, and a recorder that has recorded nothing yet.
+    #[must_use]
+    pub fn new(monitor: DeadlineMonitor, health: HealthBoard, recorder: Recorder) -> Self {
+        Self {
             monitor,
             health,
-            recorder: Recorder::new()?,
+            recorder,
             on_miss: OnMiss::default(),
             lateness: Lateness::default(),
-        })
+        }
     }
 
     /// The same account with this answer to missed deadlines.
     #[must_use]
     pub const fn with_on_miss(mut self, on_miss: OnMiss) -> Self {
         self.on_miss = on_miss;
-        self
-    }
-
-    /// The same account with this recorder, which has recorded nothing yet.
-    #[must_use]
-    pub fn with_recorder(mut self, recorder: Recorder) -> Self {
-        self.recorder = recorder;
         self
     }
 
@@ -138,7 +129,7 @@ mod tests {
             deadline_ns: 1,
             budget_ns: 1,
         });
-        let mut account = CycleAccount::new(monitor, board).unwrap();
+        let mut account = CycleAccount::new(monitor, board, Recorder::new().unwrap());
         account.count_cycle(CycleStamps::default(), 0);
     }
 }

@@ -176,9 +176,8 @@ fn open(plan: &Plan) -> Result<(Graph, CycleAccount), PortError> {
     let graph = Graph::SharedMemory(Link::join(&domain, plan.service.as_str())?);
     let sender = graph.sender(Topic::Health(plan.service))?;
     let health = HealthBoard::new(sender, plan.schedule, plan.wanted, placement);
-    let account = CycleAccount::new(DeadlineMonitor::new(plan.schedule), health)?
-        .with_on_miss(plan.on_miss)
-        .with_recorder(plan.leave.recorder()?);
+    let (monitor, recorder) = (DeadlineMonitor::new(plan.schedule), plan.leave.recorder()?);
+    let account = CycleAccount::new(monitor, health, recorder).with_on_miss(plan.on_miss);
     Ok((graph, account))
 }
 

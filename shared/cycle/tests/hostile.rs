@@ -159,10 +159,8 @@ fn account(graph: &Graph, on_miss: OnMiss) -> CycleAccount {
     };
     let sender = graph.sender(Topic::Health(ServiceName::Detector)).unwrap();
     let board = HealthBoard::new(sender, SCHEDULE, wanted, read_back(0));
-    CycleAccount::new(DeadlineMonitor::new(SCHEDULE), board)
-        .unwrap()
-        .with_on_miss(on_miss)
-        .with_recorder(Recorder::new().unwrap().with_stamps(4))
+    let recorder = Recorder::new().unwrap().with_stamps(4);
+    CycleAccount::new(DeadlineMonitor::new(SCHEDULE), board, recorder).with_on_miss(on_miss)
 }
 
 fn answers() -> impl Strategy<Value = OnMiss> {

@@ -103,10 +103,9 @@ impl World {
         };
         let sender = graph.sender(Topic::Health(ServiceName::Detector)).unwrap();
         let board = HealthBoard::new(sender, SCHEDULE, wanted, read_back(0));
-        let account = CycleAccount::new(DeadlineMonitor::new(SCHEDULE), board)
-            .unwrap()
-            .with_on_miss(on_miss)
-            .with_recorder(Recorder::new().unwrap().with_stamps(8));
+        let recorder = Recorder::new().unwrap().with_stamps(8);
+        let account = CycleAccount::new(DeadlineMonitor::new(SCHEDULE), board, recorder)
+            .with_on_miss(on_miss);
         Self {
             sensor: graph.sender(Topic::Sensor).unwrap(),
             actions: graph.receiver(Topic::Action).unwrap(),

@@ -15,8 +15,8 @@ use vigil_cycle::port::TopicBlock;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
     Clock, CycleAccount, DeadlineMonitor, Graph, HealthBoard, Intake, PortError, Receiver,
-    Schedule, Sender, Source, SourceCycle, SourceOutcome, Stage, StageCycle, Stamp, Topic,
-    VirtualClock,
+    Recorder, Schedule, Sender, Source, SourceCycle, SourceOutcome, Stage, StageCycle, Stamp,
+    Topic, VirtualClock,
 };
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -208,8 +208,8 @@ fn account(graph: &Graph, service: ServiceName) -> CycleAccount {
     CycleAccount::new(
         DeadlineMonitor::new(schedule(service)),
         board(graph, service),
+        Recorder::new().unwrap(),
     )
-    .unwrap()
 }
 
 fn stage<I: TopicBlock, O: Caused>(
