@@ -384,13 +384,7 @@ impl FurtherFilter {
     #[must_use]
     pub fn fusion(&self) -> Fusion {
         let bounded = |ratio: f64| ratio.clamp(1.0 / RATIO_MAX, RATIO_MAX);
-        let mut fusion = Fusion {
-            stuck: [1.0; WHEELS],
-            askew: 1.0,
-            unknown: (1.0, 0.0),
-            nodes: [(0, 0.0); 2 * WHEELS + 1],
-            count: 0,
-        };
+        let mut fusion = Fusion::neutral();
         // Prior, and the same times what these channels say.
         let mut loads = [0.0; 2];
         for (at, state) in self.states.iter().enumerate().skip(1) {
@@ -435,6 +429,17 @@ fn cell(kind: SizeKind, size: f64) -> f64 {
 }
 
 impl Fusion {
+    /// Changes nothing.
+    const fn neutral() -> Self {
+        Self {
+            stuck: [1.0; WHEELS],
+            askew: 1.0,
+            unknown: (1.0, 0.0),
+            nodes: [(0, 0.0); 2 * WHEELS + 1],
+            count: 0,
+        }
+    }
+
     fn add(&mut self, node: usize, p: f64) {
         let known = self.nodes[..self.count].iter().position(|it| it.0 == node);
         let at = known.unwrap_or(self.count);
@@ -452,13 +457,7 @@ mod tests {
 
     #[test]
     fn the_ways_of_a_leaf_add_up() {
-        let mut fusion = Fusion {
-            stuck: [1.0; WHEELS],
-            askew: 1.0,
-            unknown: (1.0, 0.0),
-            nodes: [(0, 0.0); 2 * WHEELS + 1],
-            count: 0,
-        };
+        let mut fusion = Fusion::neutral();
         for (node, p) in [(4, 0.1), (7, 0.2), (4, 0.3)] {
             fusion.add(node, p);
         }

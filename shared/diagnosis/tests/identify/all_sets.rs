@@ -1,8 +1,6 @@
 //! The identifier's filter against an oracle that leaves nothing out: it is told when the faults
 //! appeared, and weighs every set of stuck wheels with every set of broken encoders.
 
-use std::path::PathBuf;
-
 use nalgebra::{Matrix3, Vector3};
 use vigil_blocks::SensorFrame;
 use vigil_diagnosis::Sensors;
@@ -17,19 +15,13 @@ use vigil_robot::learned::{
 use vigil_robot::slip::SlipModel;
 
 use crate::driven::{Faults, SETTLED_S, WHEELS, drive};
+use crate::recorded::path;
 
 const SETS: usize = 1 << WHEELS;
 const END_S: f64 = 6.0;
 /// Prior of several stuck wheels beside that of one, and of each broken encoder.
 const P_AT_ONCE: f64 = 0.1;
 const P_ENCODER: f64 = 1e-4;
-
-/// A file of the project.
-fn path(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .join("../..")
-        .join(name)
-}
 
 struct Rig {
     robot: Description,
