@@ -2,7 +2,7 @@
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use vigil_setup::{Setup, SetupError, load_graph};
@@ -54,6 +54,27 @@ pub fn in_folder<T>(
     let result = work(&folder);
     let _ = std::fs::remove_dir_all(&folder);
     result
+}
+
+/// What `work` makes of a clone of the project's last commit, which is gone afterwards.
+///
+/// # Errors
+/// Git's, the file system's, and those of `work`.
+pub fn in_clone<T>(
+    name: &str,
+    work: impl FnOnce(&Path) -> Result<T, Box<dyn Error>>,
+) -> Result<T, Box<dyn Error>> {
+    in_folder(name, |folder| {
+        let clone = folder.join("vigil");
+        let status = Command::new("git")
+            .args(["clone", "--quiet", "--no-hardlinks"])
+            .args([&root(), &clone])
+            .status()?;
+        if !status.success() {
+            return Err("git clone failed".into());
+        }
+        work(&clone)
+    })
 }
 
 /// `f` of every item, in order, on all cores.

@@ -9,3 +9,4 @@ pub mod latency;
 pub mod missions;
 pub mod mutants;
 pub mod peers;
+pub mod size;

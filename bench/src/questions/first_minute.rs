@@ -21,24 +21,16 @@ const UNITS: &str = "const UNIT_DATA = ";
 
 /// Answers the question.
 pub fn run() -> Result<(), Box<dyn Error>> {
-    vigil_bench::in_folder("first-minute", measure)
+    vigil_bench::in_clone("first-minute", measure)
 }
 
-fn measure(folder: &Path) -> Result<(), Box<dyn Error>> {
-    let clone = folder.join("vigil");
-    let status = Command::new("git")
-        .args(["clone", "--quiet", "--no-hardlinks"])
-        .args([&vigil_bench::root(), &clone])
-        .status()?;
-    if !status.success() {
-        return Err("git clone failed".into());
-    }
+fn measure(clone: &Path) -> Result<(), Box<dyn Error>> {
     let mut archive = Archive::new("first-minute")?;
     let began = Instant::now();
     let mut up = Command::new(clone.join("scripts/up"))
         .args(OPTIONS)
         .env("VIGIL_BUILD_OPTIONS", "--timings")
-        .current_dir(&clone)
+        .current_dir(clone)
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()?;

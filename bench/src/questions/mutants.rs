@@ -7,9 +7,9 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::io::Write as _;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{Command, Stdio};
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -108,28 +108,22 @@ struct Survivor {
 
 /// Answers the question.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
-    vigil_bench::in_folder("mutants", |folder| measure(args, folder))
+    vigil_bench::in_clone("mutants", |clone| measure(args, clone))
 }
 
-fn measure(args: &Args, folder: &Path) -> Result<(), Box<dyn Error>> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let clone = folder.join("vigil");
-    let status = Command::new("git")
-        .args(["clone", "--quiet", "--no-hardlinks"])
-        .args([&root, &clone])
-        .status()?;
-    if !status.success() {
-        return Err("git clone failed".into());
-    }
+fn measure(args: &Args, clone: &Path) -> Result<(), Box<dyn Error>> {
+    // Read first: a file that is wrong must not cost the run.
+    let survivors = std::fs::read_to_string(vigil_bench::root().join("bench/survivors.toml"))?;
+    let survivors: Survivors = toml::from_str(&survivors)?;
     // A warning about code that a mutant no longer uses must not hide the mutant.
     let manifest = clone.join("Cargo.toml");
     let text = std::fs::read_to_string(&manifest)?;
     std::fs::write(&manifest, text.replace("\"deny\"", "\"warn\""))?;
-    let mut mutants = listed(&clone, &args.package)?;
+    let mut mutants = listed(clone, &args.package)?;
     let drawable = mutants.len();
     mutants.shuffle(&mut Pcg64Mcg::seed_from_u64(args.seed));
     for package in &args.package {
-        if !is_passed(&clone, package)? {
+        if tried(clone, package)? != Verdict::Missed {
             return Err(format!("the tests of {package} fail without any mutant").into());
         }
     }
@@ -140,7 +134,7 @@ fn measure(args: &Args, folder: &Path) -> Result<(), Box<dyn Error>> {
         if viable == args.count {
             break;
         }
-        let verdict = judged(&clone, &mutant)?;
+        let verdict = judged(clone, &mutant)?;
         viable += usize::from(verdict != Verdict::Unviable);
         eprintln!("{viable} of {}: {verdict:?}: {}", args.count, mutant.name);
         trials.push(Trial {
@@ -149,8 +143,6 @@ fn measure(args: &Args, folder: &Path) -> Result<(), Box<dyn Error>> {
             verdict,
         });
     }
-    let survivors = std::fs::read_to_string(root.join("bench/survivors.toml"))?;
-    let survivors: Survivors = toml::from_str(&survivors)?;
     let share = tell(&mut archive, args, drawable, &trials, &survivors)?;
     archive.close()?;
     if share < CAUGHT_MIN {
@@ -194,45 +186,29 @@ fn judged(clone: &Path, mutant: &Mutant) -> Result<Verdict, Box<dyn Error>> {
     if !patch.wait()?.success() {
         return Err(format!("{} cannot be applied", mutant.name).into());
     }
-    let verdict = if !cargo_test(clone, &mutant.package)
-        .arg("--no-run")
-        .status()?
-        .success()
-    {
-        Verdict::Unviable
-    } else {
-        match tests(clone, &mutant.package)?.code() {
-            Some(0) => Verdict::Missed,
-            Some(TIMED_OUT) => Verdict::TimedOut,
-            _ => Verdict::Caught,
-        }
-    };
+    let verdict = tried(clone, &mutant.package)?;
     std::fs::write(&file, original)?;
     Ok(verdict)
 }
 
-fn is_passed(clone: &Path, package: &str) -> Result<bool, Box<dyn Error>> {
-    Ok(tests(clone, package)?.success())
-}
-
-/// Runs a package's tests for as long as they may take.
-fn tests(clone: &Path, package: &str) -> Result<ExitStatus, Box<dyn Error>> {
-    let mut limited = Command::new("timeout");
-    limited.args([TIMEOUT_S, "cargo"]);
-    Ok(with_tests(limited, clone, package).status()?)
-}
-
-fn cargo_test(clone: &Path, package: &str) -> Command {
-    with_tests(Command::new("cargo"), clone, package)
-}
-
-fn with_tests(mut command: Command, clone: &Path, package: &str) -> Command {
-    command
-        .args(["test", "--quiet", "--locked", "--package", package])
-        .current_dir(clone)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null());
-    command
+/// What a package's tests make of the clone as it is.
+fn tried(clone: &Path, package: &str) -> io::Result<Verdict> {
+    let test = ["test", "--quiet", "--locked", "--package", package];
+    let status = |command: &mut Command| {
+        let command = command.current_dir(clone).stdout(Stdio::null());
+        command.stderr(Stdio::null()).status()
+    };
+    // Only the tests have a limit: what is built first takes its time.
+    if !status(Command::new("cargo").args(test).arg("--no-run"))?.success() {
+        return Ok(Verdict::Unviable);
+    }
+    let limited = [TIMEOUT_S, "cargo"];
+    let tests = status(Command::new("timeout").args(limited).args(test))?;
+    Ok(match tests.code() {
+        Some(0) => Verdict::Missed,
+        Some(TIMED_OUT) => Verdict::TimedOut,
+        _ => Verdict::Caught,
+    })
 }
 
 /// `file: what` of a mutant's `file:line:column: what`.

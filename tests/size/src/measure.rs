@@ -1,11 +1,13 @@
 //! The counts.
 
+use serde::Serialize;
+
 use crate::cargo::LinkedCrate;
 use crate::configured::Build;
 use crate::source::{Source, count};
 
 /// Lines of a set of sources.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Lines {
     /// Lines of shipped code.
     pub code: usize,
@@ -16,9 +18,10 @@ pub struct Lines {
 }
 
 /// How long functions or files are, in lines of text.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Distribution {
     /// How many there are.
+    #[serde(rename = "n")]
     pub count: usize,
     /// Half are no longer.
     pub median: usize,
