@@ -9,7 +9,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 use crate::blocks::{Block, Kind, of_document, shape};
-use crate::programs::{program, root, unknown_words};
+use crate::built::root;
+use crate::programs::{program, unknown_words};
 
 /// The documents with commands.
 pub const DOCUMENTS: [&str; 7] = [

@@ -4,7 +4,7 @@
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
-use crate::programs::root;
+use crate::built::root;
 
 /// A row of a table of invariants.
 #[derive(Clone)]

@@ -16,6 +16,8 @@
 #![cfg(test)]
 
 mod blocks;
+#[path = "../built/mod.rs"]
+mod built;
 mod follow;
 mod invariants;
 mod links;
@@ -25,7 +27,8 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use blocks::{Kind, of_document};
-use programs::{binary, root, unknown_words};
+use built::root;
+use programs::unknown_words;
 
 /// README, ARCHITECTURE and the pages in `docs`, from the root.
 fn documents() -> Vec<String> {
@@ -135,7 +138,7 @@ fn named_files_exist() {
 
 #[test]
 fn help_without_a_build_is_the_launchers() {
-    let output = Command::new(binary("vigil-launcher"))
+    let output = Command::new(built::program("vigil-launcher"))
         .arg("--help")
         .env_remove("VIGIL_CONFIG")
         .output()

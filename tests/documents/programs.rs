@@ -5,33 +5,16 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::sync::Mutex;
 
-pub fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .unwrap()
-        .to_path_buf()
-}
-
-/// A binary of the workspace, built into the same target folder as this test.
-pub fn binary(name: &str) -> PathBuf {
-    let deps = std::env::current_exe().unwrap();
-    let path = deps.parent().unwrap().with_file_name(name);
-    assert!(
-        path.exists(),
-        "{} is not built: run `cargo build --workspace`",
-        path.display()
-    );
-    path
-}
+use crate::built::{self, root};
 
 /// The program that a document's word stands for; `None` if it is none of Vigil's.
 pub fn program(word: &str) -> Option<PathBuf> {
     match word {
         // All that this script does but build and say where the default graph is.
-        "scripts/up" => Some(binary("vigil-launcher")),
-        "scripts/bench" => Some(binary("vigil-bench")),
-        "vigil" => Some(binary("vigil")),
-        _ => Some(binary(word.strip_prefix("target/release/")?)),
+        "scripts/up" => Some(built::program("vigil-launcher")),
+        "scripts/bench" => Some(built::program("vigil-bench")),
+        "vigil" => Some(built::program("vigil")),
+        _ => Some(built::program(word.strip_prefix("target/release/")?)),
     }
 }
 

@@ -15,6 +15,9 @@ use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Graph, Receiver, Topic};
 use vigil_setup::{GraphArgs, Setup};
 
+use crate::built;
+pub use crate::built::root;
+
 /// A test that hangs is ended after this long; no test passes or fails by its duration.
 const WATCHDOG: Duration = Duration::from_secs(120);
 
@@ -25,23 +28,9 @@ pub fn machine() -> MutexGuard<'static, ()> {
     MACHINE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-pub fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .unwrap()
-        .to_path_buf()
-}
-
-/// A binary of the workspace, built into the same target folder as this test.
+/// A binary of the workspace, to be run in the project's folder.
 pub fn binary(name: &str) -> Command {
-    let deps = std::env::current_exe().unwrap();
-    let path = deps.parent().unwrap().with_file_name(name);
-    assert!(
-        path.exists(),
-        "{} is not built: run `cargo build --workspace`",
-        path.display()
-    );
-    let mut command = Command::new(path);
+    let mut command = Command::new(built::program(name));
     command.current_dir(root()).env_remove("VIGIL_CONFIG");
     command
 }

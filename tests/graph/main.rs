@@ -5,6 +5,8 @@
 
 mod assertion;
 mod bad_input;
+#[path = "../built/mod.rs"]
+mod built;
 mod corridor;
 mod external;
 mod harness;
