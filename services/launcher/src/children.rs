@@ -17,6 +17,7 @@ use crate::restarts::{Death, RestartHistory};
 
 /// Time that a service may take to stop before it is killed: many cycles at the lowest rate, 1 Hz.
 const STOP_LIMIT: Duration = Duration::from_secs(3);
+/// Interval at which a stopping service is looked at: nothing waits for it but the end.
 const POLL: Duration = Duration::from_millis(5);
 
 /// One service process.

@@ -48,8 +48,8 @@ pub struct LauncherArgs {
     pub json: bool,
 }
 
-/// Changes younger than this may not be in the timeline when a simulator dies, s: Health goes out
-/// twenty times a second.
+/// Changes younger than this may not be in the timeline when a simulator dies, s: four intervals of
+/// Health, which goes out twenty times a second.
 const UNREPORTED_S: f64 = 0.2;
 
 /// What a simulator that replaces another has to know.

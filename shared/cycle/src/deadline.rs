@@ -80,6 +80,7 @@ impl DeadlineMonitor {
         };
         self.answer(schedule_ns, publish_ns, latency);
         let missed_before = self.missed;
+        // A block counts for the nearest instant: an outside schedule drifts against the grid.
         if schedule_ns + self.period_ns / 2 >= first {
             let skipped = (schedule_ns + self.period_ns / 2 - first) / self.period_ns;
             if skipped <= GAP_INSTANTS_MAX {

@@ -10,13 +10,15 @@ use crate::input::InputAccount;
 use crate::placement::{self, Placement, PlacementRequest};
 use crate::port::{PortError, Sender, Stamp};
 
-/// Health goes out at least this often, ns; at once when something happens.
+/// Health goes out at least this often, ns; at once when something happens. Chosen: twenty a second
+/// look live to a person, and cost one block a few cycles.
 pub const HEALTH_PERIOD_NS: u64 = 50_000_000;
 
 /// Events of misses are at least this far apart, ns, and sum up what came between: a flood of them
 /// must not push other events out of the ring.
 const MISS_EVENT_INTERVAL_NS: u64 = 100_000_000;
-/// Events of refused blocks are at least this far apart, ns.
+/// Events of refused blocks are at least this far apart, ns: a source that misbehaves for minutes
+/// must not fill the timeline.
 const REJECTED_EVENT_INTERVAL_NS: u64 = 1_000_000_000;
 
 /// Collects counters and events, and publishes them.

@@ -9,7 +9,7 @@ use vigil_blocks::{Block, Header, REJECTIONS, Rejection};
 /// A scheduled instant may be ahead of the reader's clock by this much at most, in periods.
 const AHEAD_PERIODS_MAX: u64 = 2;
 /// A scheduled instant may lie this far in the past, ns: older blocks are not of this drive, or of
-/// another clock.
+/// another clock. Chosen by hand: a reader that was stopped for seconds still takes what waited.
 const BEHIND_NS_MAX: u64 = 10_000_000_000;
 /// A sequence number further ahead is an error of the writer, not a gap: 17 minutes at 1 kHz.
 const STEP_MAX: u64 = 1_000_000;
@@ -21,7 +21,8 @@ pub const SILENT_NS: u64 = 1_000_000_000;
 /// four times the graph's rate. Smaller refuses a publisher that is merely faster or jitters.
 /// Larger lets one that floods the graph load it more.
 const EARLY_PERIOD_DIVISOR: u64 = 4;
-/// So many blocks are taken at once, whatever their schedule: a full queue of sensor frames.
+/// So many blocks are taken at once, whatever their schedule: the full queue of sensor frames after
+/// a reader was held up.
 const BURST_MAX: u64 = 256;
 /// So many offences within the last [`HISTORY`] blocks put a source in quarantine: half of them.
 /// With fewer, a few damaged blocks would silence a robot's only sensor; with more, the filters

@@ -8,7 +8,8 @@ use crate::source::{Source, SourceCycle};
 use crate::stage::{Stage, StageCycle};
 use crate::wake::{self, Inputs, NOTHING, Timer, Wake};
 
-/// No wait is longer than this, ns: a stop request is seen at the latest then.
+/// No wait is longer than this, ns: the interval of Health, which a source below 20 Hz sends by
+/// these wake-ups. A stop request that comes just before a wait is seen after it.
 const WAIT_NS_MAX: u64 = 50_000_000;
 
 /// Cycles after which a service is in its steady state: every page is touched, every connection

@@ -16,7 +16,8 @@ use crate::recorder::Timing;
 
 const MAGIC: [u8; 4] = *b"VGRP";
 const VERSION: u32 = 2;
-/// Largest payload that is decoded, bytes.
+/// Largest payload that is decoded, bytes: far more than a run has. A damaged length must not
+/// exhaust the memory.
 const PAYLOAD_MAX: usize = 4 << 20;
 
 /// Histograms and counters of one run of a service.

@@ -9,7 +9,8 @@
 
 use crate::deadline::Schedule;
 
-/// Share of its time above which a cycle counts as a warning.
+/// Share of its time above which a cycle counts as a warning. Chosen by hand, as are the two below:
+/// far enough apart that the number of particles does not swing.
 const WARNING: f64 = 0.8;
 /// Share of its time that a smaller number of particles is to take.
 const AIM: f64 = 0.5;
@@ -18,15 +19,19 @@ const ROOM: f64 = 0.4;
 /// Share of the deadline that a cycle has at least: who is woken later than that has been held up,
 /// and fewer particles would not help.
 const TIME_MIN: f64 = 0.5;
-/// Warnings in one window after which particles are shed: half of the observations of a second.
+/// Warnings in one window after which particles are shed: half of a second's observations. Chosen
+/// by hand: fewer shed for one stall of the machine, more leave deadlines to be missed.
 const WARNINGS: u32 = 10;
 /// Length of a window, ns, and cycles in it at least: filters work on every observation, some
-/// twenty times a second, however short the cycles between are.
+/// twenty times a second, however short the cycles between are. A second of few cycles holds too
+/// few for so many warnings: below 256 Hz a window is longer.
 const WINDOW_NS: u64 = 1_000_000_000;
 const WINDOW_CYCLES_MIN: u64 = 256;
-/// Windows with room, in a row, before particles are given back.
+/// Windows with room, in a row, before particles are given back. Chosen by hand: fewer swing
+/// between shedding and giving back under a load that comes and goes.
 const CALM_WINDOWS: u32 = 4;
-/// Factor on the particles each time they are given back.
+/// Factor on the particles each time they are given back: from [`ROOM`] to 0.6 of the time, below
+/// [`WARNING`].
 const GIVE_BACK: f64 = 1.5;
 /// Never fewer particles, unless fewer are configured.
 const PARTICLES_MIN: u32 = 32;

@@ -20,7 +20,7 @@ use product::Product;
 use scope::Scope;
 use xml::Element;
 
-/// Most elements and pieces of text of a document.
+/// Most elements and pieces of text of a document: its tree stays below a gigabyte.
 const NODES_MAX: u32 = 1 << 22;
 
 impl Pomdp {

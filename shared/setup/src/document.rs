@@ -8,7 +8,8 @@ use crate::graph_file::GraphFile;
 use crate::locate::line_of_byte;
 use crate::problem::{Problem, SetupError};
 
-/// Largest file, bytes: more than what a cycle has time for.
+/// Largest file, bytes. A policy of this size has some three million values, more than a cycle can
+/// weigh; all other files are far smaller.
 const BYTES_MAX: u64 = 64 << 20;
 
 /// A file that was read: its text, or why it has none.

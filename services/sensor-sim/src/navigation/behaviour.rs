@@ -1,5 +1,5 @@
 //! The navigator's manoeuvres: follow, look, pass, back, replan. The constants are chosen by hand
-//! for a robot half a metre wide; they shape the simulated drive, no verdict.
+//! for a robot less than a metre wide; they shape the simulated drive, no verdict.
 
 use vigil_setup::graph_file::Navigation;
 
@@ -11,13 +11,14 @@ use crate::drive::DriveCommand;
 
 /// Step in which the way ahead is looked at, m.
 const LOOK_STEP_M: f64 = 0.05;
-/// The same where many ways are looked at.
+/// The same where many ways are looked at: twice as coarse, half the work.
 const SEARCH_STEP_M: f64 = 0.1;
 /// Reach of the bumper, m: what is this near stops the robot, whatever its sensors say.
 const BUMPER_M: f64 = 0.08;
 /// Share of the speed in an opening and in moving away.
 const CAREFUL: f64 = 0.75;
-/// Below this share of the speed the robot stands.
+/// Below this share of the speed the robot stands: it would creep for seconds before `stop_m`. With
+/// a larger share it stands farther from the obstacle.
 const CREEP: f64 = 0.05;
 /// Steps of 0.1 m to either side in which an opening is looked for.
 const SIDE_STEPS: i32 = 20;
@@ -27,7 +28,8 @@ const BEYOND_M: f64 = 0.6;
 const NEAR_M: f64 = 0.4;
 /// The robot is at its goal within this distance along the path, m.
 const AT_GOAL_M: f64 = 0.1;
-/// Way before the goal on which it slows down, m.
+/// Way before the goal on which it slows down, m, to a fifth at [`AT_GOAL_M`]. Shorter brakes
+/// harder, longer takes more time.
 const SLOW_AT_GOAL_M: f64 = 0.5;
 /// A robot behind its plan makes up this share of the way per second, 1/s, at most `HURRY` of its
 /// speed faster.

@@ -4,7 +4,8 @@ use vigil_robot::kinematics::wrap_angle;
 
 use super::path::Path;
 
-/// The robot steers for the point so far ahead, m.
+/// The robot steers for the point so far ahead, m. Chosen by hand for a rover at 0.2 m/s: a nearer
+/// point makes it weave, a farther one cuts corners.
 const LOOK_AHEAD_M: f64 = 0.7;
 
 /// Offset to the left of the path: from one value to another over a length.

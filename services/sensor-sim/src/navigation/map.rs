@@ -4,7 +4,7 @@ use vigil_setup::graph_file::{Navigation, Obstacle};
 
 use super::path::distance;
 
-/// Radius of a phantom, m.
+/// Radius of a phantom, m. Chosen by hand: it blocks half of a corridor of two metres.
 const PHANTOM_RADIUS_M: f64 = 0.5;
 
 /// Walls, obstacles, people.

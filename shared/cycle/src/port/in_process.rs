@@ -11,7 +11,8 @@ use super::{PortError, Receiver, Sender, Stamp, Stamper};
 use crate::clock::{Clock, VirtualClock};
 use crate::topic::Topic;
 
-/// Blocks that a queue holds before the oldest is overwritten.
+/// Blocks that a queue holds before the oldest is overwritten: the virtual clock runs every stage
+/// before the next frame, so that one is the rule.
 const BUFFER: usize = 16;
 
 /// What waits for one reader. Blocks that were read go round, so that a steady cycle in process

@@ -17,7 +17,7 @@ use vigil_blocks::{Blindness, SensorFrame, Valid};
 /// Without a valid frame for so long, s, the detector is blind. As long as an alarm takes to clear
 /// (`alarm::CLEAR_S`).
 const BLIND_S: f64 = 1.0;
-/// Slack when that time is compared, s: it is a sum of periods.
+/// Slack when that time is compared, s: it is a sum of periods, each rounded.
 const SLACK_S: f64 = 1e-6;
 /// Blindness ends after valid frames for so long, s. Chosen by hand: two frames of
 /// [`FRAME_MAX_S`], so that a single one does not end it; larger only delays the first diagnosis.

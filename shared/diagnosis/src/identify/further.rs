@@ -34,7 +34,8 @@ const OFFSETS: [f64; 12] = [
 /// Factors of a broken current sensor or gyro: reversed, none, half, double. What lies between is
 /// told to a factor of two.
 const GAINS: [f64; 4] = [-1.0, 0.0, 0.5, 2.0];
-/// Factors of its noise, beyond what is followed: that of a healthy sensor, up to five times.
+/// Factors of its noise, beyond what is followed: that of a healthy sensor, up to five times. Each
+/// stands for two octaves around it.
 const NOISES: [f64; 2] = [8.0, 32.0];
 /// Biases of a broken gyro, in deviations of its noise, in steps as of [`OFFSETS`]. Chosen: the
 /// least is two tolerances of the rover; the largest, 0.4 rad/s, is beyond its tightest
@@ -44,6 +45,7 @@ const BIASES: [f64; 10] = [-40.0, -16.0, -8.0, -4.0, -2.0, 2.0, 4.0, 8.0, 16.0, 
 /// far as a healthy reading goes. An effect that is known to be small is no better known.
 const STUCK_SD_MIN: f64 = 4.0;
 /// Deviation of a current in the unknown, in those of its sensor's noise: beyond what slopes add.
+/// Chosen: at 0.05 A of the rover's noise, a quarter of the largest offset.
 const UNKNOWN_CURRENT: f64 = 10.0;
 /// That of the yaw rate, as a share of the fastest turn that may be commanded: two deviations are
 /// any turn that the robot can make.

@@ -7,7 +7,8 @@ use vigil_inference::outlier::SPREAD;
 use vigil_robot::learned::further_watch::Residual;
 use vigil_robot::learned::{Reading, repeats};
 
-/// Share of readings that nothing explains: one observation in 50 s.
+/// Share of readings that nothing explains: one observation in 50 s. Chosen by hand: larger weakens
+/// each reading, smaller lets a single wrong one decide.
 const OUTLIER: f64 = 1e-3;
 
 /// Residuals of the currents that were read, by wheel.

@@ -10,7 +10,8 @@ use crate::identify::servo_fault::ServoFault;
 /// Probability that a robot that may be thrown begins to be, in an observation. Chosen: once in
 /// 2.5 s of dragging.
 const THROWN: f64 = 0.02;
-/// The same of a robot that was thrown in the last one. Chosen: for 2.5 observations on average.
+/// The same of a robot that was thrown in the last one. Chosen by hand: for 2.5 observations on
+/// average. Smaller lets a long throw speak against a stuck wheel; larger learns less of the drive.
 const THROWN_ON: f64 = 0.6;
 /// How far it is thrown, standard deviation of x m, y m, yaw rad. Chosen: a hop by a quarter of the
 /// rover's wheel radius.

@@ -54,7 +54,7 @@ const RATES: f64 = 3.0;
 const DRIFTS_S: f64 = 5.0;
 /// Tolerance of the wheels' ratio of a robot that declares none: the rover's.
 const UNDECLARED_RATIO: f64 = 0.08;
-/// The same of a wheel's rate, rad/s.
+/// The same of a wheel's rate, rad/s: the rover's.
 const UNDECLARED_RAD_S: f64 = 0.06;
 /// Deviation by which a gain wanders from one reading to the next: 0.035 in a minute of 20 Hz, less
 /// than half a tolerance.

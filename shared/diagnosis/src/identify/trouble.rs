@@ -10,6 +10,7 @@ use crate::identify::set_probabilities::entropy;
 use crate::identify::tree_belief::TreeBelief;
 
 /// Probability that something is wrong: what is seen needs no filter, and nothing is certain.
+/// Chosen: above every threshold that acts, and finite as log-odds.
 const TROUBLE: f64 = 1.0 - 1e-6;
 /// Share of that which is the pose's where it walks while the wheels stand: a robot that slides or
 /// is pushed reads alike, and is rarer. Chosen: below a half the pose would have no name; near one

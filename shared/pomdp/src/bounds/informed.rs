@@ -9,11 +9,12 @@ use super::linear::{Rows, System, largest};
 use super::{SolveError, contraction, rounding};
 use crate::budget::Budget;
 
-/// Largest number of table entries (16 bytes each).
+/// Largest number of table entries (16 bytes each): 320 MB. Beyond it the bound is refused.
 pub(super) const ENTRIES_MAX: usize = 20_000_000;
 /// Rounds of policy iteration; one or two are the rule.
 const ROUNDS_MAX: usize = 100;
-/// A choice must be better by this much, relative to the values, to replace another.
+/// A choice must be better by this much, relative to the values, to replace another: rounding must
+/// not make policies alternate.
 const IMPROVEMENT_MIN: f64 = 1e-13;
 
 /// The mixtures of every (e, a, o).

@@ -9,15 +9,17 @@ use nalgebra::{DMatrix, DVector};
 use super::SolveError;
 use crate::budget::Budget;
 
-/// Up to this size the LU decomposition is the faster way.
+/// Up to this size the LU decomposition is taken at once. It decides the time alone: 48 rows take
+/// below 0.1 ms by the figure of [`DENSE_MAX`].
 const DENSE_SMALL: usize = 48;
 /// Largest size for the LU decomposition, which cannot be stopped on the way: some 50 ms.
 pub(super) const DENSE_MAX: usize = 500;
 /// A pivot below this is a singular matrix; its rows have entries of the order of 1.
 const PIVOT_MIN: f64 = 1e-14;
-/// Rounds of bi-conjugate gradients, each from the true residual.
+/// Rounds of bi-conjugate gradients, each from the true residual. Chosen by hand: what needs more
+/// does not converge, and goes to the LU decomposition.
 const ROUNDS: usize = 12;
-/// Iterations of one round.
+/// Iterations of one round. Chosen by hand: each round begins anew from the true residual.
 const ITERATIONS: usize = 400;
 /// Residual that counts as rounding error, relative to the largest value.
 const ROUNDING: f64 = 2e-15;

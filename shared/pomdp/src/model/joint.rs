@@ -3,7 +3,7 @@
 
 use super::sparse::Sparse;
 
-/// Most entries that are kept; beyond it, updates multiply T and Z themselves.
+/// Most entries that are kept, 24 MB; beyond it, updates multiply T and Z themselves.
 const ENTRIES_MAX: usize = 1 << 21;
 
 /// Compressed sparse rows per (a, z), columns and values apart.

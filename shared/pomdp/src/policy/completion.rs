@@ -9,7 +9,7 @@
 use crate::alpha_vectors::{AlphaVectors, VectorError};
 use crate::model::Pomdp;
 
-/// A better value is better by this much, relative to it or to 1.
+/// A better value is better by this much, relative to it or to 1: less is the rounding of a bound.
 const BETTER: f64 = 1e-9;
 
 /// `vectors`, and what is better at a certain state or at the start belief for some action.

@@ -5,7 +5,8 @@ use super::tree::Tree;
 use crate::alpha_vectors::{AlphaVectors, VectorError};
 use crate::sparse_beliefs::BeliefId;
 
-/// Comparisons of vectors, at most; some 20 ms.
+/// Comparisons of vectors, at most; some 20 ms. Chosen: an export is part of every stop, and must
+/// not outlast its time.
 const COMPARISONS_MAX: usize = 5_000_000;
 /// Comparisons of all that are needed with each other, at most; some 20 ms.
 const UNBEATEN_MAX: usize = 2_000_000;

@@ -12,7 +12,8 @@ use super::tree::Tree;
 use crate::budget::{Budget, StopRequest};
 use crate::sparse_beliefs::BeliefId;
 
-/// Beliefs gone through, and expanded.
+/// Beliefs gone through in one round, and expanded. Chosen by hand: a round stays a small part of
+/// the work between two looks at the bounds.
 const VISITED_MAX: usize = 1000;
 const EXPANDED_MAX: usize = 30;
 

@@ -11,13 +11,14 @@ const TARGET_SHARE: f64 = 0.5;
 const STUCK_SHARE: f64 = 1e-4;
 /// Rounds at the edge of the graph have this share of the work, at least.
 const EDGE_SHARE: f64 = 0.35;
-/// What is done now and then pays if it narrows the gap by this share.
+/// What is done now and then pays if it narrows the gap by this share. Chosen by hand, as are the
+/// pauses: they decide when a bound is reached, never which.
 const PAYS_SHARE: f64 = 0.01;
 /// Pauses of what is done now and then, in multiples of what it costs.
 const PAUSE_MIN: u64 = 4;
 const PAUSE_START: u64 = 8;
 const PAUSE_MAX: u64 = 1024;
-/// Times that a controller is tied anew while it pays.
+/// Times that a controller is tied anew while it pays: each costs a linear system.
 const CONTROLLERS_MAX: usize = 10;
 /// Vectors and points below which nothing is pruned.
 const ALPHAS_MIN: usize = 32;

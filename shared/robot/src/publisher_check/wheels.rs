@@ -21,7 +21,8 @@ const FOLLOWS: f64 = 0.6;
 /// Ratio of squared residuals, exchanged to as named, below which wheels are exchanged: half the
 /// deviation.
 const EXCHANGED: f64 = 0.25;
-/// Mean commanded steering angle from which its sign is judged, rad: twenty deviations of 3 mrad.
+/// Mean commanded steering angle from which its sign is judged, rad: twenty deviations of the
+/// rover's steering sensor, 3 mrad.
 const STEER_MIN_RAD: f64 = 0.06;
 
 /// Sums of a channel against what is expected of it.

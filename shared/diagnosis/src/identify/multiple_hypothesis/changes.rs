@@ -91,6 +91,7 @@ impl MultipleHypothesis {
             let age_s = age_s(t_ns, encoders.onset(wheel));
             // In the last observation, whose length may differ from this one's by up to a half.
             let was_last = age_s > 0.0 && age_s < 1.5 * observation.dt_s;
+            // The term is one encoder's: it makes no change of several wheels likelier.
             if was_last && !changes_several(before, after) {
                 p += encoders.p_dead(wheel);
             }
