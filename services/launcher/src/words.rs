@@ -1,4 +1,4 @@
-//! Words for what happens to a robot on its path.
+//! Words of the timeline: symptoms, sizes, outcomes, degraded services, blindness, watchdog.
 
 use vigil_blocks::{ActionOutcome, Blindness, Degraded, Event, RecoveryKind, SizeKind, Symptoms};
 use vigil_cycle::watchdog::Finding;
