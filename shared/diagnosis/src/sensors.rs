@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use vigil_robot::learned::monitor::Channels;
+use vigil_robot::learned::channels::Channels;
 
 /// Channels that the filters may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]

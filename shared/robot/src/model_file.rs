@@ -69,6 +69,32 @@ pub enum ModelError {
     },
 }
 
+/// The error of a value that is not allowed.
+pub(crate) fn refuse<T>(
+    key: impl Into<String>,
+    value: impl ToString,
+    allowed: &'static str,
+) -> Result<T, ModelError> {
+    Err(ModelError::Value {
+        key: key.into(),
+        value: value.to_string(),
+        allowed,
+    })
+}
+
+/// Refuses a number that is not finite or not within `low` to `high`.
+pub(crate) fn check_range(key: &str, value: f64, low: f64, high: f64) -> Result<(), ModelError> {
+    if value >= low && value <= high {
+        return Ok(());
+    }
+    let allowed = if value.is_finite() {
+        "outside its physical range"
+    } else {
+        "a finite number"
+    };
+    refuse(key, value, allowed)
+}
+
 /// A model that is kept in a file.
 pub(crate) trait ModelFile: Clone + Serialize + DeserializeOwned {
     /// Version of the layout that is read and written.

@@ -2,8 +2,8 @@
 
 use crate::alarm::AlarmError;
 use crate::description::Description;
+use crate::learned::channels::Channels;
 use crate::learned::model::Provenance;
-use crate::learned::monitor::Channels;
 use crate::learned::{self, Calibration, Form, ModelError};
 use crate::nominal;
 

@@ -79,7 +79,7 @@ impl Limits {
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[serde(transparent)]
 pub struct Bounds {
-    found: Vec<Bound>,
+    pub(crate) found: Vec<Bound>,
     /// Every number looked at, of which `found` are some.
     #[serde(skip)]
     looked_at: Vec<&'static str>,
@@ -129,12 +129,6 @@ impl Bounds {
                 why,
             });
         }
-    }
-
-    /// Each of them.
-    #[must_use]
-    pub fn found(&self) -> &[Bound] {
-        &self.found
     }
 
     /// A line for each kind of number and bound.
@@ -214,7 +208,7 @@ mod tests {
             bounds.look(&SD, format!("offset_sd[{i}]"), SD.hold(learned));
         }
         let told: Vec<_> = bounds
-            .found()
+            .found
             .iter()
             .map(|b| (b.key.as_str(), b.value, b.held))
             .collect();

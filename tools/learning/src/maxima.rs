@@ -2,7 +2,7 @@
 
 use vigil_robot::learned::Calibration;
 use vigil_robot::learned::Form;
-use vigil_robot::learned::monitor::Channels;
+use vigil_robot::learned::channels::Channels;
 
 /// Length of a window, s.
 pub(crate) const WINDOW_S: f64 = 2.0;

@@ -51,7 +51,7 @@ impl DetectionFilter {
             Self::Faults { observer, monitor } => {
                 observer.suspect(suspected);
                 let observation = observer.observation();
-                monitor.step_with(observation, observer.further(), suspected);
+                monitor.step(observation, observer.further(), suspected);
                 Interval {
                     t_ns: observation.t_ns,
                     dt_s: observation.dt_s,

@@ -6,7 +6,7 @@ use vigil_blocks::{
 };
 use vigil_inference::ending::Ending;
 use vigil_inference::logspace::{log_add, log_sum_exp, probability};
-use vigil_robot::learned::monitor::Channels;
+use vigil_robot::learned::channels::Channels;
 use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
 use vigil_robot::nominal;
 use vigil_robot::publisher_check::Finding;

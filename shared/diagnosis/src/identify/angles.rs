@@ -4,7 +4,7 @@
 use vigil_blocks::WHEELS;
 use vigil_inference::alternative::Alternatives;
 use vigil_robot::learned::SteerReading;
-use vigil_robot::learned::wheel_evidence::ANYTHING;
+use vigil_robot::learned::steer_reading::ANYTHING;
 
 /// Of each steered wheel: as commanded, or anything.
 #[derive(Debug, Clone, Copy, PartialEq)]

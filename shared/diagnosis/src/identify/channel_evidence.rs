@@ -11,7 +11,7 @@ use vigil_inference::logspace::log_add;
 use vigil_inference::outlier::unvouched;
 use vigil_inference::track::Track;
 use vigil_robot::Description;
-use vigil_robot::learned::wheel_evidence::ANYTHING;
+use vigil_robot::learned::steer_reading::ANYTHING;
 use vigil_robot::learned::wheels::steering_angle;
 use vigil_robot::learned::{
     Healthy, Model, MotionMode, Mover, NoiseScales, Observation, WheelContext, WheelEvidence,

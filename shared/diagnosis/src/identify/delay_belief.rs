@@ -2,6 +2,7 @@
 
 use vigil_blocks::WHEELS;
 use vigil_robot::learned::past_rates::{DELAYS_S, PastRates, Rates};
+use vigil_robot::learned::wheels::ExpectedRate;
 
 /// Probability with which a delay becomes any other from one observation to the next. Once in 1.4 h
 /// of 50 ms: nothing is forgotten within a fault.
@@ -46,17 +47,23 @@ impl DelayBelief {
         tail: f64,
         begun: f64,
         is_stuck: bool,
-        reads: impl Fn((f64, f64, f64)) -> f64,
+        reads: impl Fn(ExpectedRate) -> f64,
     ) -> Option<f64> {
         let then = self.rates.then(wheel);
-        if !then.iter().any(|&then| self.rates.differs(wheel, then)) {
+        if !then.iter().any(|then| self.rates.differs(wheel, then.0)) {
             return None;
         }
         let p = self.p[wheel].map(|p| {
             let held = (1.0 - CHANGES) * p + CHANGES * EVEN;
             begun * held + (1.0 - begun) * EVEN
         });
-        let logs = then.map(|(rate, variance)| reads((rate, variance, tail)));
+        let logs = then.map(|(mean_rad_s, variance)| {
+            reads(ExpectedRate {
+                mean_rad_s,
+                variance,
+                tail,
+            })
+        });
         let largest = logs.into_iter().fold(f64::NEG_INFINITY, f64::max);
         let joint: [f64; DELAYS_S.len()] =
             std::array::from_fn(|i| p[i] * (logs[i] - largest).exp());
@@ -107,8 +114,8 @@ mod tests {
             let t_s = k as f64 * 0.05;
             late.keep(k * PERIOD_NS, [(rate(t_s), 1e-4); WHEELS]);
             let read = rate(t_s - 0.5);
-            let said = late.take(0, 0.0, 1.0, false, |(rate, variance, _)| {
-                log_normal(read - rate, variance + SD * SD)
+            let said = late.take(0, 0.0, 1.0, false, |expected| {
+                log_normal(read - expected.mean_rad_s, expected.variance + SD * SD)
             });
             sum += said.unwrap_or(0.0) - log_normal(read - rate(t_s), SD * SD + 1e-4);
         }

@@ -4,12 +4,12 @@
 //! encoders costs no more than one.
 
 use vigil_blocks::{SizeKind, WHEELS};
-use vigil_robot::learned::wheel_evidence::{ANYTHING, BREAKAGE_SHARES, BREAKAGES};
+use vigil_robot::learned::steer_reading::ANYTHING;
+use vigil_robot::learned::wheel_evidence::{BREAKAGE_SHARES, BREAKAGES};
 
 use crate::identify::sizes::{BIAS, DELAY, DRIFT, GAIN, SIZED_SHARES, WAYS};
 
-/// First of the states of an encoder that is off by a size; see [`super::sizes`]. The states before
-/// it are whole, and the breakages.
+/// First state of an encoder that is off by a size. Those before it: whole, and the breakages.
 pub const SIZED: usize = 1 + BREAKAGES.len();
 /// State of a whole encoder whose wheel turns at a rate of its own, in the unknown.
 pub const OWN_RATE: usize = SIZED + WAYS;

@@ -107,7 +107,7 @@ impl MultipleHypothesis {
         let capacities: Vec<usize> = modes
             .iter()
             .map(|mode| {
-                let is_rare = mode.moved.stuck().count_ones() > 1 || mode.ground.0 != 1.0;
+                let is_rare = mode.moved.stuck().count_ones() > 1 || mode.ground.mean != 1.0;
                 if is_rare { PER_RARE } else { PER_MODE }
             })
             .collect();

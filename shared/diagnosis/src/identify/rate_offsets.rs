@@ -42,8 +42,8 @@ impl RateOffsets {
         wheel: usize,
         dragged: &WheelDrag,
     ) -> f64 {
-        let about = self.expected(wheel, dragged);
-        evidence.turning(model, observation, wheel, about)
+        let (rate_rad_s, variance) = self.expected(wheel, dragged);
+        evidence.turning(model, observation, wheel, rate_rad_s, variance)
     }
 
     /// Learns from a dragged wheel's readings, if there are any.

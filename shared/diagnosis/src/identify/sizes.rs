@@ -10,7 +10,7 @@ use vigil_blocks::WHEELS;
 use vigil_inference::logspace::log_add;
 use vigil_inference::size::{Prior, Size};
 use vigil_robot::learned::wheel_context::FAR_SD;
-use vigil_robot::learned::wheels::STANDING_SD_RAD_S;
+use vigil_robot::learned::wheels::{ExpectedRate, STANDING_SD_RAD_S};
 use vigil_robot::learned::{Model, MotionMode, Observation, WheelEvidence};
 use vigil_robot::{Description, Tolerance};
 
@@ -110,7 +110,7 @@ impl SizeInput<'_> {
     }
 
     /// Log-likelihood of a wheel's readings about this rate.
-    pub fn reads(&self, wheel: usize, about: (f64, f64, f64)) -> f64 {
+    pub fn reads(&self, wheel: usize, about: ExpectedRate) -> f64 {
         self.evidence
             .reads(self.model, self.observation, wheel, about)
     }
@@ -190,7 +190,11 @@ impl Sizes {
                 let (model, observation, mode) = (input.model, input.observation, input.mode);
                 input.evidence.rate(model, observation, mode, i)
             }
-            false => (0.0, 0.0, 0.0),
+            false => ExpectedRate {
+                mean_rad_s: 0.0,
+                variance: 0.0,
+                tail: 0.0,
+            },
         };
         let rates: [_; WHEELS] = std::array::from_fn(rate);
         for (wheel, &about) in rates.iter().enumerate().take(wheels) {
@@ -199,15 +203,22 @@ impl Sizes {
             }
             let (bias, variance) = self.held[wheel][BIAS].expected([1.0, 0.0]);
             let spread = variance + STANDING_SD_RAD_S * STANDING_SD_RAD_S;
-            sizes.standing[wheel] = input.reads(wheel, (bias, spread, about.2));
+            sizes.standing[wheel] = input.reads(
+                wheel,
+                ExpectedRate {
+                    mean_rad_s: bias,
+                    variance: spread,
+                    ..about
+                },
+            );
         }
-        let means = rates.map(|(rate, variance, _)| (rate, variance));
+        let means = rates.map(|rate| (rate.mean_rad_s, rate.variance));
         self.late.keep(input.observation.t_ns, means);
         for (wheel, &about) in rates.iter().enumerate().take(wheels) {
             let begun = input.begun(wheel, DELAY);
             let is_stuck = input.mode.moved.is_stuck(wheel);
             let reads = |about| input.reads(wheel, about);
-            if let Some(log) = self.late.take(wheel, about.2, begun, is_stuck, reads) {
+            if let Some(log) = self.late.take(wheel, about.tail, begun, is_stuck, reads) {
                 sizes.logs[wheel][DELAY] = log;
                 sizes.late |= 1 << wheel;
             }
@@ -222,7 +233,7 @@ impl Sizes {
         input: &SizeInput<'_>,
         wheel: usize,
         way: usize,
-        about: (f64, f64, f64),
+        about: ExpectedRate,
     ) -> f64 {
         let prior = &self.priors[way];
         let mut held = self.held[wheel][way];
@@ -249,10 +260,15 @@ fn take_reading(
     input: &SizeInput<'_>,
     wheel: usize,
     way: usize,
-    (rate, variance, tail): (f64, f64, f64),
+    about: ExpectedRate,
     mut size: Size,
     prior: &Prior,
 ) -> (f64, Size) {
+    let ExpectedRate {
+        mean_rad_s: rate,
+        variance,
+        ..
+    } = about;
     let (by, base, variance) = match way {
         GAIN => {
             let (gain, _) = size.estimate();
@@ -262,7 +278,14 @@ fn take_reading(
         _ => ([0.0, 1.0], rate, variance),
     };
     let (beside, uncertain) = size.expected(by);
-    let log = input.reads(wheel, (base + beside, variance + uncertain, tail));
+    let log = input.reads(
+        wheel,
+        ExpectedRate {
+            mean_rad_s: base + beside,
+            variance: variance + uncertain,
+            ..about
+        },
+    );
     let reading = &input.observation.wheels[wheel];
     if reading.plain == 0 {
         return (log, size);

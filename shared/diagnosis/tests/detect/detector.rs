@@ -5,7 +5,7 @@ use vigil_blocks::{Channel, DetectionBelief, Entry, MODE_UNKNOWN, ParticleBlock,
 use vigil_diagnosis::Sensors;
 use vigil_diagnosis::detect;
 use vigil_diagnosis::detect::Detector;
-use vigil_robot::learned::monitor::Channels;
+use vigil_robot::learned::channels::Channels;
 use vigil_robot::learned::{Form, Healthy, Monitor, Observer, triangle};
 
 use crate::recorded::{model, robot, unseen};
@@ -203,7 +203,7 @@ fn an_identification_starts_from_what_the_detector_believes_bit_for_bit() {
         let belief = *bench.step(frame);
         if observer.push(frame).complete {
             observer.suspect(false);
-            monitor.step_with(observer.observation(), observer.further(), false);
+            monitor.step(observer.observation(), observer.further(), false);
         }
         let block = &bench.hypotheses;
         let wheels = Healthy::unsure(&model, &robot).wheels;

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::channels::Channels;
 use super::form::Form;
-use super::monitor::Channels;
 use crate::alarm::AlarmError;
 use crate::model_file::ModelError;
 

@@ -55,7 +55,7 @@ impl CurrentEffects {
                     let curvature = curvature_max * (2.0 * along - 1.0);
                     let speed = speeds[0] + share * (speeds[1] - speeds[0]);
                     nodes.push(match wheel < ROVER_WHEELS {
-                        true => effect(&slip, (curvature, speed), kind, wheel)?,
+                        true => effect(&slip, curvature, speed, kind, wheel)?,
                         false => [0.0; WHEELS],
                     });
                 }
@@ -98,15 +98,21 @@ impl CurrentEffects {
     }
 }
 
-fn effect(slip: &SlipModel, drive: (f64, f64), kind: usize, wheel: usize) -> Option<Effect> {
+fn effect(
+    slip: &SlipModel,
+    curvature_1_m: f64,
+    speed_m_s: f64,
+    kind: usize,
+    wheel: usize,
+) -> Option<Effect> {
     let torques = |lost: f64, is_stuck: bool| {
         let mut condition = Condition::default();
         condition.wheels[wheel].torque_share = 1.0 - lost;
         let mut stuck = [false; ROVER_WHEELS];
         stuck[wheel] = is_stuck;
         let situation = Situation {
-            curvature_1_m: drive.0,
-            speed_m_s: drive.1,
+            curvature_1_m,
+            speed_m_s,
             stuck,
             soil: slip.soil(),
             condition,

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use vigil_blocks::{SensorFrame, Valid, WHEELS};
 
 use super::Reading;
-use super::model::{ModelError, check_range, refuse};
 use crate::frame_guard::CURRENT_MAX_A;
+use crate::model_file::{ModelError, check_range, refuse};
 
 /// Below this rate the dry friction of a bearing turns round, rad/s: an encoder's noise.
 const DRY_RAD_S: f64 = 0.05;

@@ -114,16 +114,18 @@ impl FurtherEvidence {
     /// Each wheel's current against the mean of the others', beside what is expected of them.
     fn weigh_currents(&mut self, all: &[Option<Residual>; WHEELS], birth: f64) {
         let known = || all.iter().flatten();
-        let sums = known().fold((0.0, 0.0), |(apart, variance), it| {
-            (apart + it.apart, variance + it.variance)
-        });
+        let mut sums = Sums::default();
+        for residual in known() {
+            sums.apart += residual.apart;
+            sums.variance += residual.variance;
+        }
         let others = known().count().saturating_sub(1) as f64;
         if others < 1.0 {
             return;
         }
         for (wheel, residual) in all.iter().enumerate() {
             let Some(residual) = residual else { continue };
-            let (apart, variance) = contrast((residual.apart, residual.variance), sums, others);
+            let (apart, variance) = sums.contrast(residual.apart, residual.variance, others);
             let whitened = whitened(apart, variance, residual.outlier_rate);
             self.currents[wheel].step(&whitened, birth);
             self.gains[wheel] = self.currents[wheel].gain();
@@ -150,11 +152,21 @@ fn whitened(apart: f64, variance: f64, outlier_rate: f64) -> WhitenedResidual<1>
     WhitenedResidual::new(apart, variance, 0.0, outlier_rate)
 }
 
-/// One of several values less the mean of the others, and the variance of that difference, from
-/// the value and its variance, the sums over all, and how many others there are.
-fn contrast(own: (f64, f64), all: (f64, f64), others: f64) -> (f64, f64) {
-    let mean = (all.0 - own.0) / others;
-    (own.0 - mean, own.1 + (all.1 - own.1) / (others * others))
+/// Sums over the residuals of all wheels.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    apart: f64,
+    variance: f64,
+}
+
+impl Sums {
+    /// One of the summed residuals less the mean of the `others` (how many), and the variance of
+    /// that difference.
+    fn contrast(self, apart: f64, variance: f64, others: f64) -> (f64, f64) {
+        let mean = (self.apart - apart) / others;
+        let rest = (self.variance - variance) / (others * others);
+        (apart - mean, variance + rest)
+    }
 }
 
 #[cfg(test)]
@@ -164,11 +176,14 @@ mod tests {
     #[test]
     fn a_wheel_stands_out_by_itself_and_what_all_have_in_common_does_not() {
         let values = [0.3 - 0.12, 0.3, 0.3, 0.3, 0.3, 0.3];
-        let all = (values.iter().sum(), 6.0 * 0.01);
-        let (apart, variance) = contrast((values[0], 0.01), all, 5.0);
+        let all = Sums {
+            apart: values.iter().sum(),
+            variance: 6.0 * 0.01,
+        };
+        let (apart, variance) = all.contrast(values[0], 0.01, 5.0);
         assert!((apart + 0.12).abs() < 1e-12);
         assert!((variance - 0.012).abs() < 1e-12);
-        let (apart, _) = contrast((values[1], 0.01), all, 5.0);
+        let (apart, _) = all.contrast(values[1], 0.01, 5.0);
         assert!((apart - 0.024).abs() < 1e-12);
     }
 }

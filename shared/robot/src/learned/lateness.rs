@@ -110,7 +110,7 @@ impl Lateness {
 impl Odds {
     fn step(&mut self, wheel: usize, reading: &Timely, past: &PastRates, born: f64) {
         let then = past.then(wheel);
-        let shows = then.map(|then| past.differs(wheel, then));
+        let shows = then.map(|then| past.differs(wheel, then.0));
         if !shows.contains(&true) {
             return;
         }

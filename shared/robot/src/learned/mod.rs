@@ -24,11 +24,12 @@
 //! | [`further_watch`] | gyro and currents beside what is expected of a healthy robot |
 //! | [`repeats`] | whether a sensor repeats itself exactly |
 //! | [`past_rates`] | the rates that the wheels had some moments ago |
+//! | [`channels`] | which channels take part |
 //! | [`monitor`] | the detection filter over observations |
 
 mod body_lag;
 pub mod calibration;
-mod channels;
+pub mod channels;
 mod compensation;
 mod current_context;
 pub mod current_effects;

@@ -6,16 +6,16 @@ use vigil_inference::departure;
 use vigil_inference::track::MotionNoise;
 
 use super::calibration::Calibration;
+use super::channels::Channels;
 use super::compensation;
 use super::form::Form;
 use super::further::FurtherModel;
-use super::monitor::Channels;
 use super::motion::{Curve, MotionModel};
 pub use super::provenance::Provenance;
 use super::wheels::{EncoderModel, RateModel};
 use crate::alarm::AlarmError;
 use crate::description::Description;
-use crate::model_file::{self, ModelFile};
+use crate::model_file::{self, ModelFile, check_range, refuse};
 pub use crate::model_file::{EDITED, ModelError};
 
 /// Version of the file's layout.
@@ -321,30 +321,6 @@ impl CommandModel {
         )?;
         check_range("command.standing_m_s", self.standing_m_s, 1e-4, 10.0)
     }
-}
-
-pub(super) fn refuse<T>(
-    key: &str,
-    value: impl ToString,
-    allowed: &'static str,
-) -> Result<T, ModelError> {
-    Err(ModelError::Value {
-        key: key.to_owned(),
-        value: value.to_string(),
-        allowed,
-    })
-}
-
-pub(super) fn check_range(key: &str, value: f64, low: f64, high: f64) -> Result<(), ModelError> {
-    if value >= low && value <= high {
-        return Ok(());
-    }
-    let allowed = if value.is_finite() {
-        "outside its physical range"
-    } else {
-        "a finite number"
-    };
-    refuse(key, value, allowed)
 }
 
 fn check_motion(key: &str, motion: &MotionModel) -> Result<(), ModelError> {

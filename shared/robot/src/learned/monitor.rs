@@ -20,7 +20,7 @@ use vigil_inference::logspace::{log_normal, log_sum_exp};
 use vigil_inference::outlier::unvouched;
 use vigil_inference::track::{Displacement, Track};
 
-pub use super::channels::Channels;
+use super::channels::Channels;
 use super::encoder_ways::{EncoderWays, Fits};
 use super::faults::{Faults, KINDS};
 use super::form::{Evidence, Form, TAU_SQUARED_PER_DIMENSION, log_ratio_any};
@@ -246,17 +246,8 @@ impl Monitor {
 
     /// Takes one observation. While `following`, the pose track gives way to the measurement, so
     /// that the return of a robot to its nominal mode is seen after a fault has led it away.
-    pub fn step(&mut self, observation: &Observation, following: bool) {
-        self.step_with(observation, None, following);
-    }
-
-    /// The same with what the observation holds of gyro and currents.
-    pub fn step_with(
-        &mut self,
-        observation: &Observation,
-        further: Option<&Further>,
-        following: bool,
-    ) {
+    /// `further`: what the observation holds of gyro and currents.
+    pub fn step(&mut self, observation: &Observation, further: Option<&Further>, following: bool) {
         let suspects = Suspects::new(following, &self.report.channels);
         if let Some(read) = further
             && let Some(mut evidence) = self.further.take()

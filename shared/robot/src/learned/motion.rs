@@ -118,15 +118,6 @@ impl MotionModel {
             changes_1_m: 0.0,
         }
     }
-
-    /// White noise (variance per metre) with the power that all deviations have at low frequency.
-    #[must_use]
-    pub fn whitened(&self) -> [f64; 3] {
-        std::array::from_fn(|i| {
-            let coloured = 2.0 * self.deviation_sd[i] * self.deviation_sd[i];
-            self.white_sd[i] * self.white_sd[i] + coloured * self.deviation_length_m
-        })
-    }
 }
 
 fn covariance(sd: [f64; 3], correlation: f64) -> Matrix3<f64> {

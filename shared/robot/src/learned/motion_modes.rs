@@ -22,20 +22,34 @@ const JUMP_SD: f64 = 20.0;
 /// Correlation length of the unknown's coloured deviations, m. Chosen: somewhat longer than that of
 /// stuck wheels, 0.12 to 0.16 m.
 const UNKNOWN_LENGTH_M: f64 = 0.2;
+/// Factor by which a ground changes the learned effect of a stuck wheel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GroundFactor {
+    /// Its mean.
+    pub mean: f64,
+    /// Its deviation.
+    pub sd: f64,
+}
+
+impl GroundFactor {
+    /// Ground like that learned from.
+    pub const LEARNED: Self = Self { mean: 1.0, sd: 0.0 };
+}
+
 /// Ground not learned from. Chosen: a fifth, of 0.1 to 2.2 times a stuck wheel's effect.
 struct OtherGround {
     /// How probable.
     share: f64,
-    /// Mean of the factor by which it changes that effect, and its deviation.
-    factor: (f64, f64),
+    /// What it makes of that effect.
+    factor: GroundFactor,
     /// Whether a dragged wheel throws the robot: on hard ground it grips and slides.
     throws: bool,
 }
 
-const fn ground(share: f64, factor: (f64, f64), throws: bool) -> OtherGround {
+const fn ground(share: f64, mean: f64, sd: f64, throws: bool) -> OtherGround {
     OtherGround {
         share,
-        factor,
+        factor: GroundFactor { mean, sd },
         throws,
     }
 }
@@ -43,14 +57,14 @@ const fn ground(share: f64, factor: (f64, f64), throws: bool) -> OtherGround {
 /// By the pose alone: harder, somewhat harder, softer, and hard enough to throw the robot. Chosen
 /// so that neighbours overlap within two deviations from none of the effect to twice.
 const OTHER_GROUNDS: [OtherGround; 4] = [
-    ground(0.08, (0.3, 0.12), false),
-    ground(0.08, (0.65, 0.2), false),
-    ground(0.04, (1.5, 0.35), false),
-    ground(0.04, (0.6, 0.6), true),
+    ground(0.08, 0.3, 0.12, false),
+    ground(0.08, 0.65, 0.2, false),
+    ground(0.04, 1.5, 0.35, false),
+    ground(0.04, 0.6, 0.6, true),
 ];
 /// Where the wheels' rates are read: these tell which wheel stands, and the motion only that it is
 /// dragged, and not how. Chosen: from none of the effect to nearly twice.
-const ANY_GROUND: [OtherGround; 1] = [ground(0.2, (0.6, 0.6), true)];
+const ANY_GROUND: [OtherGround; 1] = [ground(0.2, 0.6, 0.6, true)];
 /// Deviations of such motion beside its effect, coloured: yaw, forward, lateral. Chosen: about half
 /// of the unknown's.
 const ROUGH_SD: [f64; 3] = [0.15, 0.1, 0.05];
@@ -125,9 +139,8 @@ pub struct MotionMode {
     pub motion: MotionModel,
     /// Its noise.
     pub noise: MotionNoise,
-    /// Factor by which the ground changes the learned effect, and the factor's deviation; (1, 0) on
-    /// ground like that learned from.
-    pub ground: (f64, f64),
+    /// Factor by which the ground changes the learned effect.
+    pub ground: GroundFactor,
     /// Change of forward speed that no ground changes, m/s.
     pub kept_m_s: f64,
     /// Variance of a jump of the pose (x, y, yaw) at the onset.
@@ -163,7 +176,7 @@ impl MotionMode {
     pub fn noise_at(&self, model: &Model, curvature: f64, speed: f64) -> MotionNoise {
         let limit = model.command.curvature_max_1_m;
         let at = |motion: &MotionModel| Vector3::from(motion.per_metre(curvature, speed, limit));
-        let (factor, sd) = self.ground;
+        let GroundFactor { mean: factor, sd } = self.ground;
         if sd <= 0.0 {
             return self.noise;
         }
@@ -205,7 +218,7 @@ pub fn motion_modes(
         p_alike: 0.0,
         motion: nominal,
         noise: nominal.noise(),
-        ground: (1.0, 0.0),
+        ground: GroundFactor::LEARNED,
         kept_m_s: 0.0,
         jump: [0.0; 3],
         is_thrown: false,
@@ -260,7 +273,7 @@ fn drives_on(model: &Model, moved: Mover) -> MotionMode {
         p_alike: 0.0,
         motion: model.nominal.motion,
         noise: unknown_noise(model),
-        ground: (1.0, 0.0),
+        ground: GroundFactor::LEARNED,
         kept_m_s: 0.0,
         jump: [0.0; 3],
         is_thrown: false,
@@ -306,7 +319,7 @@ fn stuck_mode(model: &Model, wheel: usize) -> MotionMode {
         p_alike: 0.0,
         motion,
         noise: motion.noise(),
-        ground: (1.0, 0.0),
+        ground: GroundFactor::LEARNED,
         kept_m_s: 0.0,
         jump: [0.0; 3],
         is_thrown: false,
@@ -334,7 +347,7 @@ fn several_mode(together: &Together<'_>, set: u32) -> Option<MotionMode> {
         moved: Mover::Stuck(set),
         motion: several.motion,
         noise: several.noise,
-        ground: (1.0, 0.0),
+        ground: GroundFactor::LEARNED,
         kept_m_s: 0.0,
         jump: [0.0; 3],
         is_thrown: false,
@@ -349,12 +362,12 @@ fn on_other_ground(
     model: &Model,
     robot: &Description,
     wheel: usize,
-    ground: (f64, f64),
+    ground: GroundFactor,
     is_thrown: bool,
 ) -> MotionMode {
     let nominal = &model.nominal.motion;
     let mode = stuck_mode(model, wheel);
-    let (factor, sd) = ground;
+    let GroundFactor { mean: factor, sd } = ground;
     let kept_m_s = yielding_m_s(model, robot, wheel);
     let scaled = |stuck: &Curve, nominal: &Curve, kept_m_s: f64| {
         let (stuck, nominal) = (stuck.terms(), nominal.terms());

@@ -69,10 +69,10 @@ impl PastRates {
         self.then.map(|then| then[wheel])
     }
 
-    /// True if a rate of then is another than the wheel's rate now.
+    /// True if this rate, rad/s, is another than the wheel's rate now.
     #[must_use]
-    pub fn differs(&self, wheel: usize, (then, _): (f64, f64)) -> bool {
-        (then - self.past[self.last].1[wheel].0).abs() > ALIKE_RAD_S
+    pub fn differs(&self, wheel: usize, rate_rad_s: f64) -> bool {
+        (rate_rad_s - self.past[self.last].1[wheel].0).abs() > ALIKE_RAD_S
     }
 
     /// The rates `delay_s` before `t_ns`, between those kept `age` ago or longer; of what is older
@@ -109,7 +109,7 @@ mod tests {
         }
         for (then, delay_s) in rates.then(0).into_iter().zip(DELAYS_S) {
             assert!((then.0 - (199.0 - delay_s / 0.05)).abs() < 1e-6);
-            assert!(rates.differs(0, then));
+            assert!(rates.differs(0, then.0));
         }
         rates.keep(1, [(7.0, 0.0); WHEELS]);
         assert!(rates.then(0).iter().all(|then| *then == (7.0, 0.0)));

@@ -197,10 +197,11 @@ impl<'a> Together<'a> {
     fn of_soils(&self, stuck: u32, soils: &[Soil]) -> Option<Matrix3<f64>> {
         let mut sum = Matrix3::zeros();
         for turn in TURNS_NOISE {
-            let node = self.nodes[turn * SPEEDS + SPEEDS / 2];
-            let (reference, _, start) = solve(&self.slip, node, stuck, self.slip.soil(), None)?;
+            let (curvature, speed) = self.nodes[turn * SPEEDS + SPEEDS / 2];
+            let (reference, _, start) =
+                solve(&self.slip, curvature, speed, stuck, self.slip.soil(), None)?;
             for soil in soils {
-                let (motion, ..) = solve(&self.slip, node, stuck, *soil, Some(&start))?;
+                let (motion, ..) = solve(&self.slip, curvature, speed, stuck, *soil, Some(&start))?;
                 let change = motion - reference;
                 sum += change * change.transpose();
             }
@@ -237,8 +238,8 @@ fn equilibrium(slip: &SlipModel, nodes: &[(f64, f64); NODES], stuck: u32) -> Opt
         motion: [SVector::zeros(); 3],
         rates: [SVector::zeros(); WHEELS],
     };
-    for (index, &node) in nodes.iter().enumerate() {
-        let (motion, rates, _) = solve(slip, node, stuck, slip.soil(), None)?;
+    for (index, &(curvature, speed)) in nodes.iter().enumerate() {
+        let (motion, rates, _) = solve(slip, curvature, speed, stuck, slip.soil(), None)?;
         for (at_nodes, value) in found.motion.iter_mut().zip(&motion) {
             at_nodes[index] = *value;
         }
@@ -252,21 +253,22 @@ fn equilibrium(slip: &SlipModel, nodes: &[(f64, f64); NODES], stuck: u32) -> Opt
 /// Yaw, forward and lateral motion per metre, the wheels' rates, and where to start the next.
 fn solve(
     slip: &SlipModel,
-    (curvature, speed): (f64, f64),
+    curvature_1_m: f64,
+    speed_m_s: f64,
     stuck: u32,
     soil: Soil,
     start: Option<&Unknowns>,
 ) -> Option<(Vector3<f64>, [f64; ROVER_WHEELS], Unknowns)> {
     let situation = Situation {
-        curvature_1_m: curvature,
-        speed_m_s: speed,
+        curvature_1_m,
+        speed_m_s,
         stuck: std::array::from_fn(|wheel| stuck >> wheel & 1 == 1),
         soil,
         condition: Condition::default(),
     };
     let solution = slip.solve(&situation, start).ok()?;
     let [forward, lateral, yaw] = solution.velocity;
-    let motion = Vector3::new(yaw, forward, lateral) / speed;
+    let motion = Vector3::new(yaw, forward, lateral) / speed_m_s;
     Some((motion, solution.wheel_rate_rad_s, solution.unknowns()))
 }
 

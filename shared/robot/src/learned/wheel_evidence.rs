@@ -3,9 +3,9 @@
 use vigil_blocks::WHEELS;
 use vigil_inference::logspace::log_add;
 
-use super::steer_reading::SteerReading;
+use super::steer_reading::{ANYTHING, SteerReading};
 use super::wheel_context::RateResidual;
-use super::wheels::rolling_rate;
+use super::wheels::{ExpectedRate, rolling_rate};
 use super::{
     EncoderState, Model, MotionMode, Mover, NoiseScales, Observation, RateModel, WheelContext,
 };
@@ -48,9 +48,6 @@ const ASKEW: f64 = 0.25;
 /// Share of the observations at an onset that hold the very moment. Of three to four within the
 /// onset's 0.15 s, one does (a quarter, and some).
 const MOMENT: f64 = 0.2;
-/// Share of wheels that do anything, in the unknown. Chosen: one wheel that departs costs the
-/// unknown 1.6 nats, one that does not 0.2.
-pub const ANYTHING: f64 = 0.2;
 
 /// Natural log-likelihoods of one observation's wheel readings; comparable within a wheel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,7 +124,11 @@ impl WheelEvidence {
             let (mean, variance) = model.nominal.rates[i].rate(rate, command[0]);
             let variance = variance + behind + uncertain;
             evidence.nominal[i] = (mean + shift, variance);
-            evidence.healthy[i] = read(EncoderState::Turning(mean + shift, variance, TAIL));
+            evidence.healthy[i] = read(EncoderState::Turning(ExpectedRate {
+                mean_rad_s: mean + shift,
+                variance,
+                tail: TAIL,
+            }));
             // As uncertain by a change of the command as a wheel that follows it.
             evidence.own_rate[i] = read(EncoderState::OwnRate(behind));
             evidence.any[i] = read(EncoderState::Any);
@@ -167,8 +168,8 @@ impl WheelEvidence {
                     0 | 1 => 0.0,
                     _ => TOGETHER_SD * dragged.change_rad_s,
                 };
-                let about = (dragged.rate_rad_s, dragged.variance + sd * sd);
-                let dragged = self.turning(model, observation, i, about);
+                let variance = dragged.variance + sd * sd;
+                let dragged = self.turning(model, observation, i, dragged.rate_rad_s, variance);
                 either(dragged, self.healthy[i])
             }
             Mover::UnknownAny => self.unsure(i),
@@ -243,8 +244,7 @@ impl WheelEvidence {
         })
     }
 
-    /// Rate of wheel `i`, rad/s, and its variance, (rad/s)², as a mode has it turn; the share of
-    /// rates in the tail. One that is stuck in the mode is told as if it turned.
+    /// Rate of wheel `i` as a mode has it turn, also where the wheel is stuck in that mode.
     #[must_use]
     pub fn rate(
         &self,
@@ -252,46 +252,59 @@ impl WheelEvidence {
         observation: &Observation,
         mode: &MotionMode,
         i: usize,
-    ) -> (f64, f64, f64) {
+    ) -> ExpectedRate {
         if mode.moved.stuck() == 0 || mode.moved.is_stuck(i) {
-            let (rate, variance) = self.nominal[i];
-            return (rate, variance, TAIL);
+            let (mean_rad_s, variance) = self.nominal[i];
+            return ExpectedRate {
+                mean_rad_s,
+                variance,
+                tail: TAIL,
+            };
         }
         let dragged = self.dragged(model, observation, mode, i);
         let sd = match mode.moved.stuck().count_ones() {
             1 => 0.0,
             _ => TOGETHER_SD * dragged.change_rad_s,
         };
-        let variance = dragged.variance + sd * sd;
-        (dragged.rate_rad_s, variance, TAIL_DRAGGED)
+        ExpectedRate {
+            mean_rad_s: dragged.rate_rad_s,
+            variance: dragged.variance + sd * sd,
+            tail: TAIL_DRAGGED,
+        }
     }
 
-    /// Encoder `i` reads about this rate (rad/s), with this variance and share in the tail.
+    /// Encoder `i` reads about this rate.
     #[must_use]
     pub fn reads(
         &self,
         model: &Model,
         observation: &Observation,
         i: usize,
-        (rate, variance, tail): (f64, f64, f64),
+        expected: ExpectedRate,
     ) -> f64 {
-        let state = EncoderState::Turning(rate, variance, tail);
+        let state = EncoderState::Turning(expected);
         let reading = &observation.wheels[i];
         model
             .encoder
             .log_likelihood(state, reading, self.sample_sd[i])
     }
 
-    /// Wheel `i` turns at about this rate while others drag.
+    /// Wheel `i` turns at about this rate, rad/s, with this variance, while others drag.
     #[must_use]
     pub fn turning(
         &self,
         model: &Model,
         observation: &Observation,
         i: usize,
-        (rate, variance): (f64, f64),
+        mean_rad_s: f64,
+        variance: f64,
     ) -> f64 {
-        self.reads(model, observation, i, (rate, variance, TAIL_DRAGGED))
+        let expected = ExpectedRate {
+            mean_rad_s,
+            variance,
+            tail: TAIL_DRAGGED,
+        };
+        self.reads(model, observation, i, expected)
     }
 
     /// Wheel `i` stands and its encoder is whole. The very number that a dead encoder has: what

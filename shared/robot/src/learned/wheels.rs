@@ -82,12 +82,22 @@ pub struct EncoderModel {
     pub broken_sd_rad_s: f64,
 }
 
+/// A rate at which a wheel is expected to turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExpectedRate {
+    /// Its mean, rad/s.
+    pub mean_rad_s: f64,
+    /// Its variance, (rad/s)².
+    pub variance: f64,
+    /// Share of deviations up to [`EncoderState::TAIL_SD_RAD_S`].
+    pub tail: f64,
+}
+
 /// What a wheel and its encoder may be doing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum EncoderState {
-    /// Turns at about this rate with this variance (rad/s)²; the share of deviations up to
-    /// [`Self::TAIL_SD_RAD_S`] is the third value.
-    Turning(f64, f64, f64),
+    /// Turns at about this rate.
+    Turning(ExpectedRate),
     /// The encoder reports exactly zero.
     Zero,
     /// The encoder repeats its last value.
@@ -130,7 +140,12 @@ impl EncoderModel {
         // A value drawn evenly over two deviations either way of a broken encoder's.
         let miss = (FAILS * self.resolution_rad_s / (4.0 * self.broken_sd_rad_s)).ln();
         match state {
-            EncoderState::Turning(rate, variance, tail) => {
+            EncoderState::Turning(expected) => {
+                let ExpectedRate {
+                    mean_rad_s: rate,
+                    variance,
+                    tail,
+                } = expected;
                 let sharp = self.common(reading, rate, variance, sample_sd);
                 let blunt = variance + EncoderState::TAIL_SD_RAD_S * EncoderState::TAIL_SD_RAD_S;
                 let blunt = self.common(reading, rate, blunt, sample_sd);
@@ -201,6 +216,14 @@ mod tests {
         }
     }
 
+    fn turning(mean_rad_s: f64) -> EncoderState {
+        EncoderState::Turning(ExpectedRate {
+            mean_rad_s,
+            variance: 4e-4,
+            tail: 0.02,
+        })
+    }
+
     fn reading(values: &[f64]) -> Reading {
         let (mut reading, mut before) = (Reading::default(), None);
         for &value in values {
@@ -212,11 +235,9 @@ mod tests {
 
     #[test]
     fn each_pattern_is_explained_best_by_its_own_state() {
-        let turning = EncoderState::Turning(2.0, 4e-4, 0.02);
-        let standing = EncoderState::Turning(0.0, 4e-4, 0.02);
         let states = [
-            turning,
-            standing,
+            turning(2.0),
+            turning(0.0),
             EncoderState::Zero,
             EncoderState::Frozen,
             EncoderState::Noise,
@@ -241,7 +262,7 @@ mod tests {
     fn a_smooth_rate_of_its_own_is_neither_noise_nor_turning_as_commanded() {
         let states = [
             EncoderState::OwnRate(0.0),
-            EncoderState::Turning(2.0, 4e-4, 0.02),
+            turning(2.0),
             EncoderState::Noise,
             EncoderState::Standing,
         ];

@@ -1,11 +1,11 @@
 //! One channel of a nominal model: what it measures, from what it is predicted, and how well.
 
 use serde::{Deserialize, Serialize};
-use vigil_blocks::COMMANDS;
+use vigil_blocks::{COMMANDS, WHEELS};
 
 use super::observation::{History, Observation};
 use crate::learned::Form;
-use crate::learned::monitor::Channels;
+use crate::learned::channels::Channels;
 
 /// Rate at which a wheel's sense of turning counts as half decided, rad/s: friction changes its
 /// sign with it. A few deviations of a coarse encoder.
@@ -15,6 +15,9 @@ const SENSE_RAD_S: f64 = 0.5;
 pub const REST_S: f64 = 1.0;
 /// Prior fault rate at which log-odds are collected and tempered, 1/h.
 pub const FAULT_RATE_1_H: f64 = 1.0;
+
+/// Channels of a model at most.
+pub(super) const CHANNELS_MAX: usize = 2 * WHEELS + 4;
 
 /// What a channel measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

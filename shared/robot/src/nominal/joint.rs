@@ -9,8 +9,7 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 use vigil_inference::ages::Ages;
 
-use super::channel::Tail;
-use super::model::CHANNELS_MAX;
+use super::channel::{CHANNELS_MAX, Tail};
 use crate::learned::Form;
 
 /// How the joint log-odds of a set of channels behave without a fault; only

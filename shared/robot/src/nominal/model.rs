@@ -3,23 +3,21 @@
 use serde::{Deserialize, Serialize};
 use vigil_blocks::{COMMANDS, WHEELS};
 
-use super::channel::{Channel, FAULT_RATE_1_H, Regressor, Tail, Term};
+use super::channel::{CHANNELS_MAX, Channel, FAULT_RATE_1_H, Regressor, Tail, Term};
 use super::joint::Joint;
 use super::observation::DEPTH;
 use crate::alarm::AlarmError;
 use crate::description::Description;
 use crate::learned::calibration::find;
+use crate::learned::channels::Channels;
 use crate::learned::model::{EDITED, ModelError, Provenance, check_calibration};
-use crate::learned::monitor::Channels;
 use crate::learned::{Calibration, Form};
-use crate::model_file::{self, ModelFile};
+use crate::model_file::{self, ModelFile, refuse};
 
 /// Version of the file's layout.
 pub const VERSION: u32 = 2;
 /// The word by which the file is told from a model with faults.
 pub const KIND: &str = "nominal";
-/// Limits of a file's size.
-pub(super) const CHANNELS_MAX: usize = 2 * WHEELS + 4;
 /// Terms of a channel. Chosen: of four axes to the fourth order learning makes 87 for a current at
 /// most. Smaller refuses such a model; larger only lets a file cost more time.
 const TERMS_MAX: usize = 128;
@@ -244,27 +242,23 @@ impl ModelFile for Model {
 
     fn check(&self) -> Result<(), ModelError> {
         if self.kind != KIND {
-            return refuse("kind".into(), &self.kind, "nominal");
+            return refuse("kind", &self.kind, "nominal");
         }
         let count = self.wheels.len();
         if count == 0 || count > WHEELS {
-            return refuse("wheels".into(), count, "1 to 8 names");
+            return refuse("wheels", count, "1 to 8 names");
         }
         if !(0.02..=1.0).contains(&self.interval_s) {
-            return refuse("interval_s".into(), self.interval_s, "0.02 to 1");
+            return refuse("interval_s", self.interval_s, "0.02 to 1");
         }
         let ranges = self.command.iter().all(Range::is_sane);
         if self.command.is_empty() || self.command.len() > COMMANDS || !ranges {
             let found = format!("{} axes", self.command.len());
-            return refuse(
-                "command".into(),
-                found,
-                "1 to 4 axes, min up to max, gaps inside",
-            );
+            return refuse("command", found, "1 to 4 axes, min up to max, gaps inside");
         }
         if self.channel.is_empty() || self.channel.len() > CHANNELS_MAX {
             let found = format!("{} channels", self.channel.len());
-            return refuse("channel".into(), found, "1 to 20 channels");
+            return refuse("channel", found, "1 to 20 channels");
         }
         for (i, channel) in self.channel.iter().enumerate() {
             check_channel(&format!("channel.{i}"), channel, count, self.command.len())?;
@@ -273,14 +267,6 @@ impl ModelFile for Model {
         tails.try_for_each(|tail| check_tail("joint", tail))?;
         self.calibration.iter().try_for_each(check_calibration)
     }
-}
-
-fn refuse<T>(key: String, value: impl ToString, allowed: &'static str) -> Result<T, ModelError> {
-    Err(ModelError::Value {
-        key,
-        value: value.to_string(),
-        allowed,
-    })
 }
 
 /// Checks the numbers of a channel; `wheels` and `axes`: how many there are.
@@ -293,7 +279,7 @@ fn check_channel(
     let (terms, weights) = (channel.terms.len(), channel.weights.len());
     if terms != weights || terms > TERMS_MAX {
         let found = format!("{terms} terms and {weights} weights");
-        return refuse(key.into(), found, "as many weights as terms, at most 128");
+        return refuse(key, found, "as many weights as terms, at most 128");
     }
     if channel.target.wheel >= wheels {
         let (key, found) = (format!("{key}.target.wheel"), channel.target.wheel);
@@ -362,4 +348,29 @@ fn check_term(key: &str, term: &Term, wheels: usize, axes: usize) -> Result<(), 
         return refuse(key, found, "of the command's axes, at most 4 in all");
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_is_beyond_a_range_by_its_distance_from_what_was_driven() {
+        let range = Range {
+            name: "v".into(),
+            unit: "m/s".into(),
+            min: -0.5,
+            max: 1.5,
+            gaps: vec![[0.2, 0.8]],
+        };
+        for (value, beyond) in [
+            (-0.5, 0.0),
+            (0.2, 0.0),
+            (0.3, 0.05),
+            (0.7, 0.05),
+            (2.5, 0.5),
+        ] {
+            assert!((range.beyond(value) - beyond).abs() < 1e-12, "{value}");
+        }
+    }
 }

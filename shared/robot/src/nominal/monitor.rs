@@ -32,8 +32,9 @@ use super::observation::{History, Observation};
 use super::track::ResidualWhitener;
 use crate::channel_odds::ChannelOdds;
 use crate::learned::Form;
+use crate::learned::channels::Channels;
 use crate::learned::form::{Evidence, TAU_SQUARED_PER_DIMENSION};
-use crate::learned::monitor::{Channels, DetectionOutput};
+use crate::learned::monitor::DetectionOutput;
 
 /// Standard deviation of a fault's bias in units of the whitened residual. Chosen: it enters the
 /// delay by its logarithm only.
@@ -155,7 +156,6 @@ pub struct Monitor {
     /// The tail of all channels together; none while it is being learned.
     joint: Option<Tail>,
     run_s: f64,
-    extrapolated: bool,
     report: DetectionOutput,
 }
 
@@ -185,7 +185,6 @@ impl Monitor {
             joint: model.joint(channels, form).cloned(),
             watched,
             run_s: 0.0,
-            extrapolated: false,
             report: DetectionOutput {
                 log_odds: f64::NEG_INFINITY,
                 channels: [f64::NEG_INFINITY; CHANNELS],
@@ -206,7 +205,6 @@ impl Monitor {
             watched.absent_s = 0.0;
         }
         self.run_s = 0.0;
-        self.extrapolated = false;
         self.report.evidence = 0.0;
         self.forget_evidence();
     }
@@ -245,12 +243,6 @@ impl Monitor {
     pub fn is_ready(&self) -> bool {
         let mut watched = self.watched.iter();
         self.run_s >= READY_S || watched.any(|watched| watched.rest.log_odds() > 0.0)
-    }
-
-    /// True if the last command lay outside the range that was learned from.
-    #[must_use]
-    pub const fn is_extrapolating(&self) -> bool {
-        self.extrapolated
     }
 
     /// Takes the newest observation of `history`. While a fault is `suspected`, nothing is learned
@@ -304,11 +296,10 @@ impl Monitor {
     }
 
     /// Factor on all variances for a command outside the learned range.
-    fn widening(&mut self, now: &Observation) -> f64 {
+    fn widening(&self, now: &Observation) -> f64 {
         let axes = self.model.command.iter().zip(&now.command);
         let beyond = axes.map(|(range, value)| range.beyond(*value));
         let beyond = beyond.fold(0.0, f64::max);
-        self.extrapolated = beyond > 0.0;
         let factor = 1.0 + EXTRAPOLATION * beyond;
         factor * factor
     }

@@ -4,8 +4,9 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_blocks::{SensorFrame, Valid};
+use vigil_robot::learned::channels::Channels;
 use vigil_robot::learned::further_watch::Turn;
-use vigil_robot::learned::monitor::{Channels, Monitor};
+use vigil_robot::learned::monitor::Monitor;
 use vigil_robot::learned::{Form, Observation, Observer};
 
 use crate::learned::{circle, model, observe, robot};
@@ -116,7 +117,7 @@ fn log_odds_max(frames: &[SensorFrame]) -> f64 {
     let mut most = f64::NEG_INFINITY;
     for frame in frames {
         if observer.push(frame).complete {
-            monitor.step(observer.observation(), false);
+            monitor.step(observer.observation(), None, false);
         }
         if frame.header.t_capture_ns > from_ns {
             most = most.max(monitor.report().log_odds);

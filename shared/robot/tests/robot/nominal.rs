@@ -9,7 +9,7 @@ use vigil_inference::constant::Constant;
 use vigil_inference::logspace::log_add;
 use vigil_robot::Description;
 use vigil_robot::learned::Form;
-use vigil_robot::learned::monitor::Channels;
+use vigil_robot::learned::channels::Channels;
 use vigil_robot::nominal::{Channel, Model, Monitor, Observer, Quantity, ResidualWhitener};
 
 fn config(name: &str) -> String {

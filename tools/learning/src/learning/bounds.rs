@@ -285,7 +285,7 @@ mod tests {
         model.noise.yaw_rad = 3.0 * robot.noise.yaw_rad;
         let found = bounds(&model, &robot);
         let held = |key: &str| {
-            let bound = found.found().iter().find(|bound| bound.key == key);
+            let bound = found.found.iter().find(|bound| bound.key == key);
             bound.map(|bound| (bound.value, bound.held))
         };
         assert_eq!(

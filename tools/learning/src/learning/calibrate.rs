@@ -3,7 +3,8 @@
 use vigil_recording::frames::Run;
 use vigil_recording::labels::Label;
 use vigil_robot::Description;
-use vigil_robot::learned::monitor::{Channels, Monitor};
+use vigil_robot::learned::channels::Channels;
+use vigil_robot::learned::monitor::Monitor;
 use vigil_robot::learned::{Form, Model, Observer};
 
 use super::LearnError;
@@ -95,7 +96,7 @@ fn maxima(
             if observation.t_ns as f64 * 1e-9 > *until_s {
                 break;
             }
-            monitor.step_with(&observation, observer.further(), false);
+            monitor.step(&observation, observer.further(), false);
             if !monitor.is_ready() {
                 monitor.forget_evidence();
                 continue;

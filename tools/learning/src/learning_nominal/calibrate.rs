@@ -4,7 +4,7 @@ use vigil_robot::Description;
 use vigil_robot::learned::Calibration;
 use vigil_robot::learned::Form;
 use vigil_robot::learned::calibration::SLOPE_UNKNOWN;
-use vigil_robot::learned::monitor::Channels;
+use vigil_robot::learned::channels::Channels;
 use vigil_robot::nominal::channel::FAULT_RATE_1_H;
 use vigil_robot::nominal::{Joint, Model, Monitor, Tail};
 

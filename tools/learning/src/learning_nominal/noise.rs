@@ -138,7 +138,8 @@ pub(super) fn tell(
     key: &str,
     channel: &Channel,
     records: &[Part<'_>],
-    (widen, drift_sd): (f64, f64),
+    widen: f64,
+    drift_sd: f64,
 ) {
     let mut look = |limits: &Limits, field: &str, value: f64| {
         bounds.look(limits, format!("{key}.{field}"), value);

@@ -7,7 +7,7 @@ use vigil_robot::Description;
 use vigil_robot::nominal::{Channel, Model, Quantity, Target, Term};
 
 use super::LONG_ENOUGH_S;
-use super::view::word;
+use super::terms::word;
 use crate::bounds::Bounds;
 use crate::learning::RESIDUAL_BAR;
 

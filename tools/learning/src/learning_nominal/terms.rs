@@ -2,7 +2,7 @@
 
 use vigil_blocks::COMMANDS;
 use vigil_robot::Description;
-use vigil_robot::nominal::{Quantity, Regressor, Target, Term};
+use vigil_robot::nominal::{Model, Quantity, Regressor, Target, Term};
 
 /// How many observations back a wheel's rate matters to the gyro and the current.
 const WHEEL_LAGS: usize = 3;
@@ -98,5 +98,39 @@ mod tests {
                 assert!(!terms[..i].contains(term), "{term:?} twice");
             }
         }
+    }
+}
+
+/// A term in words; empty for the constant.
+pub(super) fn word(term: &Term, model: &Model) -> String {
+    let axis = |i: usize| {
+        model
+            .command
+            .get(i)
+            .map_or("?", |range| range.name.as_str())
+    };
+    let wheel = model.wheels.get(term.index).map_or("?", String::as_str);
+    let of = match term.of {
+        Regressor::Constant => return String::new(),
+        Regressor::Command => {
+            let powers = term
+                .powers
+                .iter()
+                .enumerate()
+                .filter(|(_, power)| **power > 0);
+            let factors = powers.map(|(i, power)| match power {
+                1 => axis(i).to_owned(),
+                power => format!("{}^{power}", axis(i)),
+            });
+            factors.collect::<Vec<_>>().join("*")
+        }
+        Regressor::Lagged => axis(term.index).to_owned(),
+        Regressor::Wheel => format!("rate_{wheel}"),
+        Regressor::WheelSpeed => format!("|rate_{wheel}|"),
+        Regressor::WheelSense => format!("sense_{wheel}"),
+    };
+    match term.lag {
+        0 => of,
+        lag => format!("{of}[-{lag}]"),
     }
 }

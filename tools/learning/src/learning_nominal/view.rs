@@ -4,10 +4,11 @@ use std::fmt;
 
 use serde::Serialize;
 use vigil_robot::learned::Form;
-use vigil_robot::learned::monitor::Channels;
-use vigil_robot::nominal::{self, Joint, Model, Range, Regressor, Tail, Term};
+use vigil_robot::learned::channels::Channels;
+use vigil_robot::nominal::{self, Joint, Model, Range, Tail};
 
 use super::report;
+use super::terms::word;
 use crate::model_view::{Alarm, Source};
 
 /// A nominal model, readable. `Display` prints it as text.
@@ -102,40 +103,6 @@ fn prediction(channel: &nominal::Channel, model: &Model) -> String {
         word => format!("{weight:+.4} {word}"),
     });
     terms.collect::<Vec<_>>().join(" ")
-}
-
-/// A term in words; empty for the constant.
-pub(super) fn word(term: &Term, model: &Model) -> String {
-    let axis = |i: usize| {
-        model
-            .command
-            .get(i)
-            .map_or("?", |range| range.name.as_str())
-    };
-    let wheel = model.wheels.get(term.index).map_or("?", String::as_str);
-    let of = match term.of {
-        Regressor::Constant => return String::new(),
-        Regressor::Command => {
-            let powers = term
-                .powers
-                .iter()
-                .enumerate()
-                .filter(|(_, power)| **power > 0);
-            let factors = powers.map(|(i, power)| match power {
-                1 => axis(i).to_owned(),
-                power => format!("{}^{power}", axis(i)),
-            });
-            factors.collect::<Vec<_>>().join("*")
-        }
-        Regressor::Lagged => axis(term.index).to_owned(),
-        Regressor::Wheel => format!("rate_{wheel}"),
-        Regressor::WheelSpeed => format!("|rate_{wheel}|"),
-        Regressor::WheelSense => format!("sense_{wheel}"),
-    };
-    match term.lag {
-        0 => of,
-        lag => format!("{of}[-{lag}]"),
-    }
 }
 
 impl fmt::Display for View {

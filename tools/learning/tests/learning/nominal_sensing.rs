@@ -8,7 +8,7 @@ use vigil_learning::learning_nominal::learn;
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::learned::Form;
-use vigil_robot::learned::monitor::Channels;
+use vigil_robot::learned::channels::Channels;
 use vigil_robot::nominal::{Model, Monitor, Observer};
 
 const RATE_HZ: f64 = 20.0;
