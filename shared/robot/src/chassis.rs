@@ -2,10 +2,11 @@
 //!
 //! The equilibrium of forces (module `slip`) computes with them.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Drive motors: torque = `gain` (commanded rate - rate), limited; bearing friction against it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Motor {
     /// Gain of the rate controller, N m s/rad.
@@ -19,7 +20,7 @@ pub struct Motor {
 }
 
 /// Pivots of the linkage, m, in `base_link` (z up from the ground); the same on both sides.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RockerBogie {
     /// Rocker pivot, forward.
@@ -34,7 +35,7 @@ pub struct RockerBogie {
 
 /// The ground on which a robot's equilibria are solved: that of the runs which its model learned
 /// from.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ground {
     /// Friction coefficient.

@@ -1,6 +1,8 @@
 //! Description of a robot, as read from `config/robots/*.toml`.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use vigil_blocks::WHEELS;
 use vigil_inference::track::MotionNoise;
 
 use crate::body::Body;
@@ -8,8 +10,13 @@ use crate::chassis::{Ground, Motor, RockerBogie};
 use crate::fault_prior::FaultPrior;
 use crate::tolerance::Tolerance;
 
+/// Shortest and longest interval of a nominal model, s. Chosen by hand: a frame of 50 Hz; beyond a
+/// second a detector is blind.
+pub(crate) const INTERVAL_MIN_S: f64 = 0.02;
+pub(crate) const INTERVAL_MAX_S: f64 = 1.0;
+
 /// Kind of motion that the command vector describes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kinematics {
     /// Six wheels on rocker-bogies, corner wheels steered about a common centre; the command is
@@ -23,7 +30,7 @@ pub enum Kinematics {
 }
 
 /// One axis of the command vector.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
     /// Name: of its column in recorded frames, and in messages.
@@ -31,11 +38,12 @@ pub struct Axis {
     /// Unit, for messages: `m/s`, `rad/s`, `1/m`.
     pub unit: String,
     /// Largest magnitude commanded, in that unit.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub limit: f64,
 }
 
 /// Channels that are measured, besides the command.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeasuredChannels {
     /// Pose: columns `x`, `y`, `yaw`.
@@ -63,7 +71,7 @@ impl Default for MeasuredChannels {
 }
 
 /// One wheel. Lengths in m from `base_link` (ground projection of the centre; x forward, y left).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wheel {
     /// Name, as used in faults and reports (`LF`).
@@ -78,42 +86,53 @@ pub struct Wheel {
 
 /// Standard deviations of the sensors' white noise per sample at `reference_rate_hz`. At another
 /// rate they scale so that the information per second is the same.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SensorNoise {
     /// Rate for which the deviations hold, Hz.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub reference_rate_hz: f64,
     /// Position, m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub position_m: f64,
     /// Yaw, rad.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub yaw_rad: f64,
     /// Yaw rate, rad/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub yaw_rate_rad_s: f64,
     /// Wheel rate, rad/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub wheel_rate_rad_s: f64,
     /// Steering angle, rad.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub steer_rad: f64,
     /// Motor current, A.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub current_a: f64,
 }
 
 /// Limits beyond which a command or a measurement is impossible.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
     /// Largest magnitude of commanded curvature, 1/m; only an `ackermann6` has one.
     #[serde(default = "any_curvature_1_m")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub curvature_1_m: f64,
     /// Largest speed, m/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub speed_m_s: f64,
     /// Largest yaw rate, rad/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub yaw_rate_rad_s: f64,
     /// Largest wheel rate that an encoder can report, rad/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub wheel_rate_rad_s: f64,
 }
 
 /// A robot. Wheel order here is the order of every per-wheel array in the blocks.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Description {
     /// Name of the robot.
@@ -121,9 +140,11 @@ pub struct Description {
     /// Kind of motion.
     pub kinematics: Kinematics,
     /// Radius of the wheels, m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub wheel_radius_m: f64,
     /// Mass, kg; only the simulator needs it, which drives an `ackermann6`.
     #[serde(default = "unknown_mass_kg")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub mass_kg: f64,
     /// Axes of the command, in the order that the kinematics give; left out: those of the rover,
     /// `cmd_curv` and `cmd_speed`.
@@ -132,13 +153,16 @@ pub struct Description {
     /// Measured channels; left out: those of the rover.
     #[serde(default)]
     pub measured: MeasuredChannels,
-    /// Order of the polynomials of the command in a nominal model, 1 to 4.
+    /// Order of the polynomials of the command in a nominal model.
     #[serde(default = "four")]
+    #[schemars(range(min = 1, max = 4))]
     pub polynomial_order: usize,
-    /// Interval over which a nominal model averages frames into one observation, s, 0.02 to 1.
+    /// Interval over which a nominal model averages frames into one observation, s.
     #[serde(default = "tenth")]
+    #[schemars(range(min = INTERVAL_MIN_S, max = INTERVAL_MAX_S))]
     pub interval_s: f64,
-    /// Wheels, at most [`vigil_blocks::WHEELS`].
+    /// Wheels.
+    #[schemars(length(min = 1, max = WHEELS))]
     pub wheels: Vec<Wheel>,
     /// Sensor noise; left out, or "estimate": a nominal model learns it from the log.
     #[serde(default, deserialize_with = "given_or_estimated")]

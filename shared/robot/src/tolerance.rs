@@ -1,6 +1,7 @@
 //! Tolerance: how far a healthy robot may depart from its model, per channel.
 
 use nalgebra::{Matrix3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use vigil_inference::slow_state::Drift;
 use vigil_inference::track::MotionNoise;
@@ -16,22 +17,29 @@ const SUDDEN_SHARE: f64 = 0.1;
 
 /// Healthy variation, in physical units. Each value is the largest magnitude that is no fault. The
 /// filters estimate the variation up to it; what is beyond is a material departure.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tolerance {
     /// Yaw per metre travelled beside that of the model, rad/m.
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0))]
     pub yaw_rad_m: f64,
     /// Share of the commanded travel that slips, is lost uphill or gained downhill, m/m.
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0))]
     pub forward_m_m: f64,
     /// Travel to the side per metre, m/m: on a side slope.
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0))]
     pub lateral_m_m: f64,
     /// Share of its rate by which every wheel falls behind under load.
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0))]
     pub wheel_ratio: f64,
     /// Rate by which one wheel differs from the others, rad/s.
+    #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0))]
     pub wheel_rate_rad_s: f64,
     /// Angle between a servo and its command, rad.
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0))]
     pub steer_rad: f64,
     /// Length over which the context changes, m.
+    #[schemars(range(max = 1e4), extend("exclusiveMinimum" = 0))]
     pub length_m: f64,
     /// Tolerance of gyro and currents; left out: none.
     #[serde(default)]
@@ -39,16 +47,20 @@ pub struct Tolerance {
 }
 
 /// Healthy variation of gyro and currents.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FurtherTolerance {
     /// Bias of the gyro, rad/s.
+    #[schemars(range(max = 10.0), extend("exclusiveMinimum" = 0))]
     pub yaw_rate_rad_s: f64,
     /// What slopes add to the current of every wheel, A.
+    #[schemars(range(max = 1e3), extend("exclusiveMinimum" = 0))]
     pub current_a: f64,
     /// By how much one wheel's current differs from the model on level ground, A, ..
+    #[schemars(range(max = 1e3), extend("exclusiveMinimum" = 0))]
     pub current_wheel_a: f64,
     /// .. and on slopes besides, as a share of what these add.
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0))]
     pub current_share: f64,
 }
 
@@ -119,32 +131,5 @@ impl Tolerance {
     #[must_use]
     pub(crate) fn beyond_steer(&self, residual_rad: f64) -> f64 {
         residual_rad - residual_rad.clamp(-self.steer_rad, self.steer_rad)
-    }
-
-    /// The first value that is out of range, and its name.
-    #[must_use]
-    pub fn invalid(&self) -> Option<(&'static str, f64)> {
-        let all = [
-            ("yaw_rad_m", self.yaw_rad_m, 1.0),
-            ("forward_m_m", self.forward_m_m, 1.0),
-            ("lateral_m_m", self.lateral_m_m, 1.0),
-            ("wheel_ratio", self.wheel_ratio, 1.0),
-            ("wheel_rate_rad_s", self.wheel_rate_rad_s, 100.0),
-            ("steer_rad", self.steer_rad, 1.0),
-            ("length_m", self.length_m, 1e4),
-        ];
-        let further = self.further.map(|further| {
-            [
-                ("further.yaw_rate_rad_s", further.yaw_rate_rad_s, 10.0),
-                ("further.current_a", further.current_a, 1e3),
-                ("further.current_wheel_a", further.current_wheel_a, 1e3),
-                ("further.current_share", further.current_share, 1.0),
-            ]
-        });
-        let wrong = all
-            .into_iter()
-            .chain(further.into_iter().flatten())
-            .find(|&(_, value, most)| !(value > 0.0 && value <= most));
-        wrong.map(|(name, value, _)| (name, value))
     }
 }

@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use vigil_blocks::WHEELS;
 use vigil_cycle::service;
 use vigil_robot::description::Kinematics;
 use vigil_robot::kinematics::GeometryError;
 use vigil_robot::slip::SlipModel;
-use vigil_robot::{AlarmError, Description, RobotModel, Tolerance};
+use vigil_robot::{AlarmError, Description, RobotModel};
 
 use crate::graph_file::{GraphFile, Socket, Source};
 
@@ -202,14 +201,9 @@ pub(crate) fn alarm(file: &GraphFile, model: &RobotModel, mut report: impl FnMut
     }
 }
 
-/// Checks a robot's description; `report` gets the key and a message for each problem.
+/// Checks a robot's description beyond the ranges of its values; `report` gets the key and a
+/// message for each problem.
 pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
-    if robot.wheels.is_empty() || robot.wheels.len() > WHEELS {
-        report(
-            "wheels",
-            format!("{} wheels: allowed are 1 to {WHEELS}", robot.wheels.len()),
-        );
-    }
     for (i, wheel) in robot.wheels.iter().enumerate() {
         if robot.wheels[..i]
             .iter()
@@ -220,22 +214,8 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
                 format!("wheel '{}' appears twice", wheel.name),
             );
         }
-        if !wheel.x.is_finite() || !wheel.y.is_finite() {
-            report(&format!("wheels.{i}"), "x and y must be finite".into());
-        }
     }
     command(robot, &mut report);
-    if let Some((key, value)) = robot.tolerance.as_ref().and_then(Tolerance::invalid) {
-        let allowed = "any value above 0 that a healthy robot can show";
-        report(
-            &format!("tolerance.{key}"),
-            format!("{value} is out of range: allowed is {allowed}"),
-        );
-    }
-    if let Some((key, value)) = robot.body.invalid() {
-        let message = format!("{value} is out of range: allowed is 0 or more, a factor from 1");
-        report(&format!("body.{key}"), message);
-    }
     match SlipModel::new(robot) {
         Err(error @ GeometryError::Table { table, .. }) if robot.has_fault_models() => {
             report(table, error.to_string());
@@ -245,44 +225,9 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
         }
         _ => {}
     }
-    if let Some((key, value)) = robot.fault_prior.invalid() {
-        report(
-            &format!("fault_prior.{key}"),
-            format!("{value} is out of range: allowed is above 0 to 1"),
-        );
-    }
-    positive(robot, &mut report);
 }
 
-/// Quantities that must be above 0.
-fn positive(robot: &Description, report: &mut impl FnMut(&str, String)) {
-    let (noise, limits) = (&robot.noise, &robot.limits);
-    let positive = [
-        ("wheel_radius_m", robot.wheel_radius_m),
-        ("mass_kg", robot.mass_kg),
-        ("noise.reference_rate_hz", noise.reference_rate_hz),
-        ("noise.position_m", noise.position_m),
-        ("noise.yaw_rad", noise.yaw_rad),
-        ("noise.yaw_rate_rad_s", noise.yaw_rate_rad_s),
-        ("noise.wheel_rate_rad_s", noise.wheel_rate_rad_s),
-        ("noise.steer_rad", noise.steer_rad),
-        ("noise.current_a", noise.current_a),
-        ("limits.curvature_1_m", limits.curvature_1_m),
-        ("limits.speed_m_s", limits.speed_m_s),
-        ("limits.yaw_rate_rad_s", limits.yaw_rate_rad_s),
-        ("limits.wheel_rate_rad_s", limits.wheel_rate_rad_s),
-    ];
-    for (key, value) in positive {
-        if !(value.is_finite() && value > 0.0) {
-            report(
-                key,
-                format!("{value} is out of range: allowed is any finite value above 0"),
-            );
-        }
-    }
-}
-
-/// Axes of the command, and what a nominal model takes from a description.
+/// Number and names of the command's axes.
 fn command(robot: &Description, report: &mut impl FnMut(&str, String)) {
     let axes = robot.command.len();
     let (needed, shown) = match robot.kinematics {
@@ -297,28 +242,10 @@ fn command(robot: &Description, report: &mut impl FnMut(&str, String)) {
         report("command", format!("{axes} axes: allowed are {shown}"));
     }
     for (i, axis) in robot.command.iter().enumerate() {
-        if !(axis.limit.is_finite() && axis.limit > 0.0) {
-            let message = format!("{}: allowed is any finite value above 0", axis.limit);
-            report(&format!("command.{i}.limit"), message);
-        }
         if axis.name.is_empty() || matches!(axis.name.as_str(), "run" | "t" | "x" | "y" | "yaw") {
             let message = format!("'{}' cannot be the name of an axis", axis.name);
             report(&format!("command.{i}.name"), message);
         }
-    }
-    if !(1..=4).contains(&robot.polynomial_order) {
-        let order = robot.polynomial_order;
-        report(
-            "polynomial_order",
-            format!("{order} is out of range: allowed is 1 to 4"),
-        );
-    }
-    if !(0.02..=1.0).contains(&robot.interval_s) {
-        let interval_s = robot.interval_s;
-        report(
-            "interval_s",
-            format!("{interval_s} is out of range: allowed is 0.02 to 1 s"),
-        );
     }
 }
 

@@ -13,7 +13,7 @@ use vigil_robot::{Description, RobotModel};
 use crate::document::{Document, TextFile, resolve};
 use crate::graph_file::{GraphFile, TreeFile};
 use crate::problem::{Problem, SetupError};
-use crate::schema::schema;
+use crate::schema::{schema, schema_of};
 use crate::{check, hash, ranges};
 
 /// A checked configuration.
@@ -141,9 +141,14 @@ fn robot(file: &TextFile) -> Result<Description, SetupError> {
     let robot: Description = file.parse()?;
     let text = file.text()?;
     let mut problems = Vec::new();
-    check::robot(&robot, |key, message| {
+    let mut report = |key: &str, message| {
         problems.push(Problem::at_key(&file.path, text, key, message));
-    });
+    };
+    match toml::Value::try_from(&robot) {
+        Ok(value) => ranges::check(&schema_of::<Description>(), &value, "", &mut report),
+        Err(error) => report("", error.to_string()),
+    }
+    check::robot(&robot, report);
     if problems.is_empty() {
         Ok(robot)
     } else {

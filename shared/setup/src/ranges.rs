@@ -103,7 +103,10 @@ fn count(schema: &Schema, count: usize, key: &str, report: &mut impl FnMut(&str,
 fn number(schema: &Schema, value: f64, key: &str, report: &mut impl FnMut(&str, String)) {
     let is_off = schema["x-off"].as_f64() == Some(value);
     // No comparison with NaN holds.
-    let is_low = schema["minimum"].as_f64().is_some_and(|low| value < low);
+    let is_low = schema["minimum"].as_f64().is_some_and(|low| value < low)
+        || schema["exclusiveMinimum"]
+            .as_f64()
+            .is_some_and(|low| value <= low);
     let is_high = schema["maximum"].as_f64().is_some_and(|high| value > high);
     if !value.is_finite() || !is_off && (is_low || is_high) {
         let allowed = allowed(schema).unwrap_or_else(|| "any finite number".to_owned());
@@ -143,6 +146,13 @@ mod tests {
         }
         let y = "y: 0 is out of range: allowed is 1 or more";
         assert_eq!(problems(&schema, "y = 0"), [y]);
+        let above = json!({"exclusiveMinimum": 0, "maximum": 1});
+        let schema_above = json!({"properties": {"x": above}});
+        assert_eq!(problems(&schema_above, "x = 1e-9"), [""; 0]);
+        for value in ["0", "-1", "1.5"] {
+            let expected = format!("x: {value} is out of range: allowed is above 0 to 1");
+            assert_eq!(problems(&schema_above, &format!("x = {value}")), [expected]);
+        }
         let z = "z: NaN is out of range: allowed is any finite number";
         assert_eq!(problems(&schema, "z = nan"), [z]);
     }

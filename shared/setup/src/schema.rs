@@ -30,11 +30,14 @@ pub(crate) fn allowed(schema: &Value) -> Option<String> {
     let number = |key: &str| schema[key].as_f64();
     let low = number("minimum").or(number("minItems"));
     let high = number("maximum").or(number("maxItems"));
-    let range = match (low, high) {
-        (Some(low), Some(high)) => format!("{low} to {high}"),
-        (Some(low), None) => format!("{low} or more"),
-        (None, Some(high)) => format!("at most {high}"),
-        (None, None) => return None,
+    let above = number("exclusiveMinimum");
+    let range = match (above, low, high) {
+        (Some(above), _, Some(high)) => format!("above {above} to {high}"),
+        (Some(above), _, None) => format!("above {above}"),
+        (None, Some(low), Some(high)) => format!("{low} to {high}"),
+        (None, Some(low), None) => format!("{low} or more"),
+        (None, None, Some(high)) => format!("at most {high}"),
+        (None, None, None) => return None,
     };
     Some(match number("x-off") {
         Some(off) => format!("{range}, or {off} for none"),

@@ -109,3 +109,47 @@ fn a_model_of_another_robot_is_refused() {
     let error = load_model(&model, Some(&rover)).unwrap_err().to_string();
     assert!(error.contains("kobuki"), "{error}");
 }
+
+#[test]
+fn a_robot_out_of_its_ranges_is_refused_by_line_and_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.toml");
+    let shipped = std::fs::read_to_string(config().join("robots/rover.toml")).unwrap();
+    for (from, to, line, problem) in [
+        (
+            "yaw_rad = 0.005",
+            "yaw_rad = 0.0",
+            20,
+            "noise.yaw_rad: 0 is out of range: allowed is above 0",
+        ),
+        (
+            "length_m = 8.0 ",
+            "length_m = -1 ",
+            35,
+            "tolerance.length_m: -1 is out of range: allowed is above 0 to 10000",
+        ),
+        (
+            "current_a = 0.3 ",
+            "current_a = 2e3 ",
+            41,
+            "tolerance.further.current_a: 2000 is out of range: allowed is above 0 to 1000",
+        ),
+        (
+            "mass_kg = 14.2",
+            "interval_s = 0.01",
+            6,
+            "interval_s: 0.01 is out of range: allowed is 0.02 to 1",
+        ),
+        (
+            "y = 0.30, steered = true },\n  { name = \"LM\"",
+            "y = nan, steered = true },\n  { name = \"LM\"",
+            9,
+            "wheels.0.y: NaN is out of range: allowed is any finite number",
+        ),
+    ] {
+        std::fs::write(&path, shipped.replacen(from, to, 1)).unwrap();
+        let error = load_robot(&path).unwrap_err().to_string();
+        let wanted = format!("{}:{line}: {problem}", path.display());
+        assert!(error.contains(&wanted), "{error}\n{wanted}");
+    }
+}

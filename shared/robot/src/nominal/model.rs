@@ -7,12 +7,12 @@ use super::channel::{CHANNELS_MAX, Channel, FAULT_RATE_1_H, Regressor, Tail, Ter
 use super::joint::Joint;
 use super::observation::DEPTH;
 use crate::alarm::AlarmError;
-use crate::description::Description;
+use crate::description::{Description, INTERVAL_MAX_S, INTERVAL_MIN_S};
 use crate::learned::calibration::find;
 use crate::learned::channels::Channels;
 use crate::learned::model::{EDITED, ModelError, Provenance, check_calibration};
 use crate::learned::{Calibration, Form};
-use crate::model_file::{self, ModelFile, refuse};
+use crate::model_file::{self, ModelFile, check_range, refuse};
 
 /// Version of the file's layout.
 pub const VERSION: u32 = 2;
@@ -248,9 +248,12 @@ impl ModelFile for Model {
         if count == 0 || count > WHEELS {
             return refuse("wheels", count, "1 to 8 names");
         }
-        if !(0.02..=1.0).contains(&self.interval_s) {
-            return refuse("interval_s", self.interval_s, "0.02 to 1");
-        }
+        check_range(
+            "interval_s",
+            self.interval_s,
+            INTERVAL_MIN_S,
+            INTERVAL_MAX_S,
+        )?;
         let ranges = self.command.iter().all(Range::is_sane);
         if self.command.is_empty() || self.command.len() > COMMANDS || !ranges {
             let found = format!("{} axes", self.command.len());
