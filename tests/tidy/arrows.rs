@@ -75,7 +75,6 @@ const SERVICES: &[&str] = &[
 const TOOLS: &[&str] = &[
     "vigil-terminal",
     "vigil-pages",
-    "vigil-plausibility",
     "vigil-learning",
     "vigil-evaluation",
     "vigil-import",
@@ -85,7 +84,7 @@ const TOOLS: &[&str] = &[
 ];
 
 /// The tools that the door may link: it starts the others.
-const OF_THE_DOOR: &[&str] = &["vigil-terminal", "vigil-plausibility"];
+const OF_THE_DOOR: &[&str] = &["vigil-terminal"];
 
 /// For each shared crate, the crates of the workspace that it may see.
 const ALLOWED: &[(&str, &[&str])] = &[

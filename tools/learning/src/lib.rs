@@ -7,6 +7,7 @@ pub mod learning;
 pub mod learning_nominal;
 mod maxima;
 pub mod model_view;
+pub mod plausibility;
 pub mod split;
 
 pub use correlation::correlation;

@@ -6,8 +6,6 @@
 //! that neither ground nor a fault explains. A test ends as soon as the motion excites it: straight
 //! driving shows nothing of turns. [`PublisherCheck::unjudged`] names the tests that have not
 //! ended. Once all have, a frame costs nothing more.
-//!
-//! `vigil import` checks recordings, where all frames are at hand, by `vigil_plausibility`.
 
 mod finding;
 mod pose;
@@ -276,6 +274,12 @@ impl PublisherCheck {
             STEER..SIDES => self.wheels.steering(test - STEER),
             _ => self.wheels.sides(test - SIDES),
         }
+    }
+
+    /// True once a test has ended.
+    #[must_use]
+    pub const fn has_judged(&self) -> bool {
+        self.judged != self.absent
     }
 
     /// Names of the tests that no motion has excited yet.

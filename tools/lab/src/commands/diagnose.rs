@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::PathBuf;
 
 use vigil_evaluation::scoring::Verdict;
-use vigil_plausibility as plausible;
+use vigil_learning::plausibility;
 
 use super::offline::{FilterArgs, OfflineModels};
 use vigil_terminal::output::Progress;
@@ -51,7 +51,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         ..
     } = args.filter.prepare()?;
     let all = runs.iter().map(|run| (run, f64::INFINITY));
-    for warning in plausible::warnings(all, &robot) {
+    for warning in plausibility::warnings(all, &robot) {
         eprintln!("warning: {}: {warning}", args.filter.frames.display());
     }
     let at_out = |error: &dyn std::fmt::Display| format!("{}: {error}", args.out.display());

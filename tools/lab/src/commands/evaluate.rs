@@ -12,7 +12,7 @@ use serde::Serialize;
 use vigil_diagnosis::identify::IdentifierFilter;
 use vigil_evaluation::report::{Report, SensorSet};
 use vigil_learning::data_hash;
-use vigil_plausibility as plausible;
+use vigil_learning::plausibility;
 use vigil_recording::frames::Run;
 use vigil_recording::labels::{self, Label};
 use vigil_robot::RobotModel;
@@ -149,7 +149,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let runs = args.cases(&prepared)?;
     let healthy = |label: &Label| label.onset_s.unwrap_or(f64::INFINITY);
     let beginnings = runs.iter().map(|(run, label)| (run, healthy(label)));
-    for warning in plausible::warnings(beginnings, &prepared.robot) {
+    for warning in plausibility::warnings(beginnings, &prepared.robot) {
         eprintln!("warning: {}: {warning}", args.filter.frames.display());
     }
     let (sets, entrants) = (args.sets(&prepared.model), args.entrants());

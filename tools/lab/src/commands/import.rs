@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use vigil_import::{self as import, LogDescription};
-use vigil_plausibility as plausible;
+use vigil_learning::plausibility;
 use vigil_robot::Description;
 use vigil_setup::load_robot;
 
@@ -134,7 +134,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 /// What is doubtful about the frames: columns that mean something else, rows out of order.
 fn warnings(imported: &import::ImportedLog, robot: &Description) -> Vec<String> {
     let frames = imported.frames(robot);
-    let mut warnings = plausible::warnings(frames.iter().map(|run| (run, f64::INFINITY)), robot);
+    let mut warnings = plausibility::warnings(frames.iter().map(|run| (run, f64::INFINITY)), robot);
     let lacking = imported.runs.iter().flat_map(|run| &run.lacking);
     warnings.extend(lacking.map(|found| {
         let import::MissingColumn {

@@ -147,7 +147,7 @@ fn drive(to: &Path, runs: u32, factor: f64) {
             let rate = 2.5 + 1e-3 * f64::from(k);
             let rates = format!("{rate},{rate},{rate},{rate},{rate},{rate}");
             let yaw = factor * yaw;
-            rows += &format!("{run},{t_s},{x},{y},{yaw},{rates},.1,.1,.1,.1,0.5,0.2\n");
+            rows += &format!("{run},{t_s},{x},{y},{yaw},{rates},.1,-.1,.1,-.1,0.5,0.2\n");
         }
     }
     fs::write(to, rows).unwrap();
@@ -169,10 +169,10 @@ fn diagnose_warns_of_columns_that_mean_something_else() {
     assert_eq!(diagnose(1.0), "");
     let message = diagnose(-1.0);
     assert!(
-        message.contains("run 0: yaw turns -1.000 times the commanded angle"),
+        message.contains("run 0: signs: yaw turns -1.00 times the commanded angle"),
         "{message}"
     );
-    let judged = "3 of 3 runs that can be judged begin like this";
+    let judged = "3 of 3 runs that can be judged are like this";
     assert!(message.contains(judged), "{message}");
 }
 

@@ -146,9 +146,9 @@ fn columns_that_mean_something_else_are_told() {
     let output = evaluate(folder.path(), SHIPPED, &[]);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
-        errors.contains("is yaw_rate or cmd_yaw_rate positive to the right?"),
+        errors.contains("is it or cmd_yaw_rate positive to the right?"),
         "{errors}"
     );
-    let judged = "2 of 2 runs that can be judged begin like this";
+    let judged = "2 of 2 runs that can be judged are like this";
     assert!(errors.contains(judged), "{errors}");
 }

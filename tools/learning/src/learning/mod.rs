@@ -29,10 +29,10 @@ use vigil_robot::learned::model::{
 use vigil_robot::learned::{Curve, EncoderModel, MotionModel, RateModel};
 
 use crate::data_hash::data_hash;
+use crate::plausibility::{RunCheck, RunDoubt};
 pub use report::{ModeError, RESIDUAL_BAR, Report, Residual};
 use segments::Segments;
 pub use view::View;
-use vigil_plausibility::{self as plausible, RunDoubt};
 
 /// How to learn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +69,7 @@ pub enum LearnError {
         needed: usize,
     },
     /// A run cannot mean what its columns say.
-    #[error("{0}")]
+    #[error(transparent)]
     Doubtful(RunDoubt),
     /// All runs turn to one side.
     #[error("the runs of {mode} turn only {side}, runs that turn to either side are needed")]
@@ -201,7 +201,7 @@ fn check_columns(runs: &[&Run], labels: &[Label], robot: &Description) -> Result
     for run in runs {
         let label = labels.get(&run.id).ok_or(LearnError::Label(run.id))?;
         let until_s = label.onset_s.unwrap_or(f64::INFINITY);
-        if let Some(doubt) = plausible::doubt(run, robot, until_s) {
+        if let Some(doubt) = RunCheck::new(run, robot, until_s).doubt {
             return Err(LearnError::Doubtful(doubt));
         }
     }

@@ -23,10 +23,11 @@ use vigil_robot::nominal::model::{KIND, VERSION};
 use vigil_robot::nominal::{Channel, Model, Range, Target, Term};
 
 use crate::data_hash::data_hash;
+use crate::plausibility::RunCheck;
+use crate::plausibility::RunDoubt;
 use record::{Part, Record};
 pub use report::{ChannelError, Report};
 pub use view::View;
-use vigil_plausibility::{self as plausible, RunDoubt};
 
 /// Logs shorter than this are learned from with a warning and wider deviations, s.
 const LONG_ENOUGH_S: f64 = 600.0;
@@ -40,7 +41,7 @@ pub enum NominalError {
     #[error("there are no runs to learn from")]
     NoRuns,
     /// Half of the runs, or more, cannot mean what their columns say: one of them.
-    #[error("{0}")]
+    #[error(transparent)]
     Doubtful(RunDoubt),
     /// The robot hardly moves.
     #[error("the robot moves for {found_s:.1} s, at least {needed_s:.0} s are needed")]
@@ -158,7 +159,7 @@ pub fn learn(
         channel.rest_sd *= widen;
         report.add(&name, &channel, widen);
         let key = format!("channel[{}]", model.channel.len());
-        noise::tell(&mut report.bounds, &key, &channel, &all, (widen, drift_sd));
+        noise::tell(&mut report.bounds, &key, &channel, &all, widen, drift_sd);
         model.channel.push(channel);
     }
     calibrate::fit(&mut model, &records, robot);
@@ -198,10 +199,11 @@ fn blank(
 /// What is doubtful about a few of the runs, as on ground that lets a robot slip; where half of
 /// them and more are doubtful, the columns are, and refused.
 fn doubt(runs: &[&Run], until_s: f64, robot: &Description) -> Result<Option<String>, NominalError> {
-    let of = |run: &&Run| plausible::doubt(run, robot, until_s);
-    let doubts: Vec<RunDoubt> = runs.iter().filter_map(of).collect();
-    let judged = |run: &&&Run| plausible::is_judged(run, robot, until_s);
-    let (found, all) = (doubts.len(), runs.iter().filter(judged).count());
+    let checks = runs.iter().map(|run| RunCheck::new(run, robot, until_s));
+    let judged: Vec<RunCheck> = checks.filter(|check| check.is_judged).collect();
+    let all = judged.len();
+    let doubts: Vec<RunDoubt> = judged.into_iter().filter_map(|c| c.doubt).collect();
+    let found = doubts.len();
     match doubts.into_iter().next() {
         Some(doubt) if 2 * found >= all => Err(NominalError::Doubtful(doubt)),
         Some(doubt) => Ok(Some(format!(

@@ -3,7 +3,7 @@
 
 use vigil_blocks::SensorFrame;
 use vigil_learning::learning::{Options, learn};
-use vigil_plausibility::doubt;
+use vigil_learning::plausibility::RunCheck;
 use vigil_recording::frames::{self, Run};
 use vigil_recording::labels::{self, Label};
 use vigil_robot::Description;
@@ -100,52 +100,36 @@ fn scale_rates(factor: f64) -> impl Fn(&mut SensorFrame) {
 #[test]
 fn units_are_told_by_their_factor() {
     let data = Data::read();
-    let in_ms = |frame: &mut SensorFrame| frame.header.t_capture_ns *= 1000;
     let degrees = 180.0 / std::f64::consts::PI;
     let in_degrees = |frame: &mut SensorFrame| {
         // Wrapped to half a turn, as a compass in degrees is, but to a radian's range.
         frame.pose[2] = (frame.pose[2] * degrees + 3.2).rem_euclid(6.4) - 3.2;
     };
     let rpm = 60.0 / std::f64::consts::TAU;
-    let cases: [(String, f64, &str); 8] = [
-        (
-            data.changed(scale_position(1000.0)),
-            1000.0,
-            "x and y in mm",
-        ),
-        (data.changed(scale_position(100.0)), 100.0, "x and y in cm"),
-        (
-            data.changed(scale_position(3.281)),
-            3.281,
-            "x and y in feet",
-        ),
-        (data.changed(in_ms), 0.001, "t in ms"),
-        (
-            data.changed(scale_rates(degrees)),
-            degrees,
-            "rates in deg/s",
-        ),
-        (data.changed(scale_rates(rpm)), rpm, "rates in rpm"),
+    let cases: [(String, f64, &str); 6] = [
+        (data.changed(scale_position(1000.0)), 1000.0, "in mm?"),
+        (data.changed(scale_position(100.0)), 100.0, "in cm?"),
+        (data.changed(scale_position(3.281)), 3.281, "in feet?"),
+        (data.changed(scale_rates(degrees)), degrees, "in deg/s?"),
+        (data.changed(scale_rates(rpm)), rpm, "in rpm?"),
         (
             data.changed(scale_rates(1.0 / std::f64::consts::TAU)),
             0.159,
-            "revolutions per",
-        ),
-        (
-            data.changed(scale_rates(-1.0)),
-            -1.0,
-            "rates of the other sign",
+            "in revolutions per second?",
         ),
     ];
     for (message, factor, unit) in &cases {
         let (found, after) = ratio(message);
-        assert!((found / factor - 1.0).abs() < 0.05, "{message}");
-        assert!(
-            after.contains("1 is expected") && after.contains(unit),
-            "{message}"
-        );
+        assert!((found / factor - 1.0).abs() < 0.1, "{message}");
+        assert!(after.ends_with(unit), "{message}");
     }
     assert!(data.changed(in_degrees).contains("yaw turns"));
+    let fast = data.changed(|frame| frame.command[1] *= 1000.0);
+    let wanted = "; allowed is 0.5 m/s: is it in another unit?";
+    assert!(
+        fast.starts_with("cmd_speed is up to ") && fast.ends_with(wanted),
+        "{fast}"
+    );
 }
 
 #[test]
@@ -154,10 +138,7 @@ fn signs_sides_and_silent_sensors_are_told() {
     let mirrored_yaw = data.changed(|frame| frame.pose[2] = -frame.pose[2]);
     let (turned, after) = ratio(&mirrored_yaw);
     assert!((turned + 1.0).abs() < 0.05, "{mirrored_yaw}");
-    assert!(
-        after.contains("positive to the right? Left is positive"),
-        "{mirrored_yaw}"
-    );
+    assert!(after.contains("positive to the right?"), "{mirrored_yaw}");
     let exact = [
         (
             data.changed(|frame| frame.pose[2] = 0.25),
@@ -172,9 +153,13 @@ fn signs_sides_and_silent_sensors_are_told() {
             "enc_RM is 1.5 throughout, though motion is commanded",
         ),
         (
+            data.changed(scale_rates(-1.0)),
+            "signs: enc_RF has the other sign",
+        ),
+        (
             data.changed(|frame| frame.wheel_rate[..6].rotate_left(3)),
-            "left wheels turn as right ones should and right as left: are their columns \
-             exchanged, or is cmd_curv positive to the right?",
+            "sides: enc_LF and the wheel opposite turn as each other should: are they exchanged, \
+             or is cmd_curv positive to the right?",
         ),
     ];
     for (found, wanted) in exact {
@@ -184,17 +169,24 @@ fn signs_sides_and_silent_sensors_are_told() {
         let [x, y, yaw] = frame.pose;
         frame.pose = [-y, x, yaw];
     });
-    assert!(sideways.starts_with("x and y move at 1.5"), "{sideways}");
+    assert!(
+        sideways.starts_with("axes: x and y move at 1.5"),
+        "{sideways}"
+    );
 }
 
 #[test]
 fn recorded_runs_raise_no_doubt_before_their_faults() {
     let data = Data::read();
+    let mut judged = 0;
     for (run, label) in data.runs.iter().zip(&data.labels) {
         assert_eq!(run.id, label.run);
         let until_s = label.onset_s.unwrap_or(f64::INFINITY);
-        assert_eq!(doubt(run, &data.robot, until_s), None);
+        let check = RunCheck::new(run, &data.robot, until_s);
+        assert_eq!(check.doubt, None);
+        judged += usize::from(check.is_judged);
     }
+    assert!(2 * judged > data.runs.len(), "{judged}");
 }
 
 #[test]

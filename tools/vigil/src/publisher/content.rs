@@ -3,8 +3,7 @@
 use std::f64::consts::PI;
 
 use vigil_blocks::SensorFrame;
-use vigil_plausibility as plausible;
-use vigil_recording::frames::{Field, Run, fields};
+use vigil_recording::frames::{Field, fields};
 use vigil_robot::Description;
 use vigil_robot::publisher_check::PublisherCheck;
 
@@ -141,54 +140,30 @@ const fn unit_guess(field: Field) -> &'static str {
 }
 
 /// Units, signs and sides, from what the frames say about each other: the tests that run in the
-/// graph, then those of recordings.
+/// graph.
 fn meanings(robot: &Description, frames: &[FrameArrival]) -> Vec<Finding> {
-    let mut meaning = PublisherCheck::new(robot);
-    let found = frames.iter().filter_map(|f| meaning.take(&f.frame));
+    let mut check = PublisherCheck::new(robot);
+    let found = frames.iter().filter_map(|f| check.take(&f.frame));
     let found = found.map(|finding| finding.text(robot));
     let failure = |detail| Finding::new("meaning", Status::Failure, detail);
     let all: Vec<Finding> = found.map(failure).collect();
-    if all.is_empty() {
-        vec![doubts(robot, frames, &meaning.unjudged())]
-    } else {
-        all
+    if !all.is_empty() {
+        return all;
     }
-}
-
-fn doubts(robot: &Description, frames: &[FrameArrival], unjudged: &[&str]) -> Finding {
-    let mut run = Run {
-        id: 0,
-        frames: Vec::new(),
-    };
-    let newest = frames
-        .last()
-        .map(|f| (f.frame.header.epoch, f.frame.run_id));
-    let of_newest = frames
-        .iter()
-        .filter(|f| Some((f.frame.header.epoch, f.frame.run_id)) == newest);
-    run.frames.extend(of_newest.map(|f| f.frame));
-    match plausible::doubt(&run, robot, f64::INFINITY) {
-        Some(doubt) => {
-            let detail = doubt.to_string();
-            let detail = detail.strip_prefix("run 0: ").unwrap_or(&detail).to_owned();
-            Finding::new("meaning", Status::Failure, detail)
-        }
-        None if plausible::is_judged(&run, robot, f64::INFINITY) => {
-            let mut detail = String::from("what the motion shows fits the command");
-            if !unjudged.is_empty() {
-                detail = format!(
-                    "{detail}; NOT judged: {} (drive curves both ways, and look longer)",
-                    unjudged.join(", ")
-                );
-            }
-            Finding::new("meaning", Status::Ok, detail)
-        }
-        None => {
-            let detail =
-                "too little motion to judge units, signs and sides: drive a curve, and look longer";
-            Finding::new("meaning", Status::Warning, detail)
-        }
+    if !check.has_judged() {
+        let detail =
+            "too little motion to judge units, signs and sides: drive a curve, and look longer";
+        return vec![Finding::new("meaning", Status::Warning, detail)];
     }
+    let mut detail = String::from("what the motion shows fits the command");
+    let unjudged = check.unjudged();
+    if !unjudged.is_empty() {
+        detail = format!(
+            "{detail}; NOT judged: {} (drive curves both ways, and look longer)",
+            unjudged.join(", ")
+        );
+    }
+    vec![Finding::new("meaning", Status::Ok, detail)]
 }
 
 #[cfg(test)]
