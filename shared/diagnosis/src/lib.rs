@@ -3,6 +3,8 @@
 pub mod detect;
 pub mod identify;
 mod invariants;
+#[cfg(test)]
+mod rover;
 mod sensors;
 
 pub use sensors::Sensors;

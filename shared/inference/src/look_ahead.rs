@@ -232,3 +232,78 @@ impl<M: Conditional<N>, const N: usize> Filter for LookAhead<M, N> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hybrid::Modes;
+    use nalgebra::{SMatrix, SVector};
+
+    /// Two modes by turns, which move by 1 and by 10; no observation is possible.
+    struct Turns;
+
+    impl Modes for Turns {
+        fn modes(&self) -> usize {
+            2
+        }
+
+        fn transition(&self, from: usize, to: usize) -> f64 {
+            f64::from(u8::from(from != to))
+        }
+    }
+
+    impl Conditional<1> for Turns {
+        type Observation = ();
+
+        fn prior(&self, _mode: usize) -> Gaussian<1> {
+            Gaussian {
+                mean: SVector::zeros(),
+                covariance: SMatrix::identity(),
+            }
+        }
+
+        fn enter(&self, _from: usize, _to: usize, state: &mut Gaussian<1>) {
+            state.mean[0] += 100.0;
+        }
+
+        fn predict(&self, mode: usize, state: &mut Gaussian<1>) {
+            state.mean[0] += [1.0, 10.0][mode];
+        }
+
+        fn update(&self, _mode: usize, _state: &mut Gaussian<1>, _z: &()) -> Option<f64> {
+            None
+        }
+    }
+
+    #[test]
+    fn without_a_possible_observation_particles_follow_the_chain() {
+        let mut filter = LookAhead::<_, 1>::new(Turns, 4, 1).unwrap();
+        for (posterior, mode, mean) in [([0.0, 1.0], 1, 110.0), ([1.0, 0.0], 0, 211.0)] {
+            let step = filter.step(&());
+            assert_eq!((step.event, step.log_evidence), (Some(Event::Coasted), 0.0));
+            assert_eq!(filter.posterior(), posterior);
+            let all: Vec<_> = filter
+                .particles()
+                .map(|(mode, g)| (mode, g.mean[0]))
+                .collect();
+            assert_eq!(all, [(mode, mean); 4]);
+        }
+    }
+
+    #[test]
+    fn an_index_is_drawn_where_the_cumulative_probability_passes_u() {
+        let log_p = [0.125_f64, 0.0, 0.25, 0.625].map(f64::ln);
+        for (u, index) in [
+            (0.0, 0),
+            (0.124, 0),
+            (0.126, 2),
+            (0.374, 2),
+            (0.376, 3),
+            (0.999, 3),
+        ] {
+            assert_eq!(draw_index(&log_p, 0.0, u), index, "{u}");
+            let halved = log_p.map(|log_p| log_p - 2.0_f64.ln());
+            assert_eq!(draw_index(&halved, -2.0_f64.ln(), u), index, "{u}");
+        }
+    }
+}

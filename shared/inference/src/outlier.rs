@@ -187,16 +187,6 @@ mod tests {
 
     #[test]
     fn a_pose_is_trusted_as_far_as_one_hypothesis_explains_it() {
-        let noise = MotionNoise {
-            offset: Matrix3::zeros(),
-            deviation: Matrix3::zeros(),
-            length_m: 1.0,
-            white: Vector3::zeros(),
-            drift: Vector3::zeros(),
-            bound: Vector3::repeat(f64::INFINITY),
-            changes_1_m: 0.0,
-        };
-        let at = |x: f64| Track::new(Vector3::new(x, 0.0, 0.0), Matrix3::zeros(), &noise);
         let (near, far) = (at(0.0), at(0.1));
         let (pose, variance, rates) = ([0.1, 0.0, 0.0], [1e-4; 3], [0.01; 3]);
         let trusted = |tracks: &[Track], pose| {
@@ -224,5 +214,56 @@ mod tests {
             });
             assert_eq!(doubted.count(), believed_after, "{rate}");
         }
+    }
+
+    /// A track on the x axis, known exactly.
+    fn at(x: f64) -> Track {
+        let noise = MotionNoise {
+            offset: Matrix3::zeros(),
+            deviation: Matrix3::zeros(),
+            length_m: 1.0,
+            white: Vector3::zeros(),
+            drift: Vector3::zeros(),
+            bound: Vector3::repeat(f64::INFINITY),
+            changes_1_m: 0.0,
+        };
+        Track::new(Vector3::new(x, 0.0, 0.0), Matrix3::zeros(), &noise)
+    }
+
+    #[test]
+    fn a_variance_grows_by_the_probability_of_an_outlier() {
+        let (track, rate) = (at(0.0), 0.01);
+        let residuals = [0.035, 0.0, -0.12];
+        let alone = std::iter::once((&track, 0.0));
+        let found = Trust::default().variance(alone, residuals, [1e-4; 3], [rate; 3]);
+        let normal = |residual: f64, variance: f64| {
+            (-0.5 * residual * residual / variance).exp()
+                / (std::f64::consts::TAU * variance).sqrt()
+        };
+        for (found, residual) in found.into_iter().zip(residuals) {
+            let usual = (1.0 - rate) * normal(residual, 1e-4);
+            let outlier = rate * normal(residual, 1e-2);
+            let p = outlier / (usual + outlier);
+            let wide = (residual * residual / 1e-4).max(100.0);
+            let expected = 1e-4 / (1.0 - p + p / wide);
+            assert!((found / expected - 1.0).abs() < 1e-9, "{residual}: {found}");
+        }
+    }
+
+    #[test]
+    fn a_usual_pose_keeps_its_variance_to_the_bit_and_ends_a_streak() {
+        let track = at(0.0);
+        let mut trust = Trust { streak: [2, 0, 1] };
+        let alone = std::iter::once((&track, 0.0));
+        let variance = [1e-4, 2e-4, 3e-4];
+        let found = trust.variance(alone, [0.0; 3], variance, [1e-4; 3]);
+        // After an outlier another one is less improbable than this.
+        assert!(found[0] > variance[0] && found[1] >= variance[1]);
+        assert_eq!(trust, Trust::default());
+        let alone = std::iter::once((&track, 0.0));
+        assert_eq!(
+            trust.variance(alone, [0.0; 3], variance, [1e-4; 3]),
+            variance
+        );
     }
 }

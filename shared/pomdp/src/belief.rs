@@ -218,7 +218,9 @@ mod tests {
     #[test]
     #[should_panic(expected = "a belief sums to 1 and holds no negative number: 2")]
     fn a_belief_that_does_not_sum_to_one_is_caught() {
-        broken().1.assert_belief();
+        let (_, mut tracker) = broken();
+        tracker.next.set([1.0, 1.0].into_iter());
+        tracker.accept(1.0);
     }
 
     #[test]

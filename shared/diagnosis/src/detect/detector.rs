@@ -426,3 +426,6 @@ fn blindness_timer(robot: &Description, settings: &Settings) -> BlindnessTimer {
     let axes = 0..robot.command.len();
     BlindnessTimer::new(channels, axes.fold(0, |bits, i| bits | Valid::command(i)))
 }
+
+#[cfg(test)]
+mod tests;

@@ -115,3 +115,38 @@ impl Engine {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Sensors;
+    use crate::identify::fault_rates::fault_rates;
+    use crate::rover::Rover;
+
+    #[test]
+    fn the_onset_of_the_unknown_is_the_first_frame_that_it_may_explain() {
+        let rover = Rover::new();
+        let (model, robot) = (&rover.model, &rover.robot);
+        let leaves = rover.leaves(Sensors::PoseEncoders);
+        let rates = fault_rates(&robot.fault_prior, &leaves, 0.01);
+        let filter = MultipleHypothesis::new(model, robot, &leaves, true, rates);
+        let mut engine = Engine::MultipleHypothesis(Box::new(filter));
+        engine.restart(&Healthy::unsure(model, robot), 7);
+        assert_eq!((engine.onset_unknown(), engine.count()), (0, 1));
+        let observation = Observation {
+            t_ns: 500,
+            t_first_ns: 460,
+            dt_s: 0.05,
+            moving: true,
+            ..Observation::default()
+        };
+        engine.step(&observation, NoiseScales::default());
+        assert_eq!(
+            (engine.onset_unknown(), engine.degenerate_count()),
+            (460, 0)
+        );
+        engine.set_limit(1);
+        engine.step(&observation, NoiseScales::default());
+        assert_eq!((engine.count(), engine.limit()), (1, 1));
+    }
+}

@@ -21,7 +21,7 @@ use crate::identify::further_likelihood::{
 };
 use crate::identify::further_state::FurtherState;
 use crate::identify::leaf_map::LeafMap;
-use crate::identify::node_sizes::SIZE_P_MIN;
+use crate::identify::tree_belief::SIZE_P_MIN;
 use crate::invariants;
 
 /// Offsets of a broken current sensor, in deviations of its noise. Each is twice the one before,
@@ -432,7 +432,7 @@ fn cell(kind: SizeKind, size: f64) -> f64 {
 
 impl Fusion {
     /// Changes nothing.
-    const fn neutral() -> Self {
+    pub(crate) const fn neutral() -> Self {
         Self {
             stuck: [1.0; WHEELS],
             askew: 1.0,
@@ -454,28 +454,4 @@ impl Fusion {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_ways_of_a_leaf_add_up() {
-        let mut fusion = Fusion::neutral();
-        for (node, p) in [(4, 0.1), (7, 0.2), (4, 0.3)] {
-            fusion.add(node, p);
-        }
-        assert_eq!(
-            (fusion.count, fusion.nodes[0].0, fusion.nodes[1]),
-            (2, 4, (7, 0.2))
-        );
-        assert!((fusion.nodes[0].1 - 0.4).abs() < 1e-15);
-    }
-
-    #[test]
-    fn sizes_are_as_far_apart_as_their_grids() {
-        assert_eq!(cell(SizeKind::TorqueShareLost, 0.5), 0.17);
-        assert_eq!(cell(SizeKind::Gain, -1.0), 0.5);
-        assert_eq!(cell(SizeKind::CurrentOffsetA, -2.0), 1.4);
-        assert_eq!(cell(SizeKind::RateBiasRadS, 2.0), 1.4);
-        assert_eq!(cell(SizeKind::Frozen, 2.0), 0.0);
-    }
-}
+mod tests;

@@ -208,8 +208,8 @@ impl Identifier {
             // The state stays at the last frame: what is published is its prediction.
             Entry::Missed(_) => {}
             Entry::Budget(count) => {
-                let count = (count as usize).clamp(1, self.particles);
-                self.engine.set_limit(count);
+                self.engine
+                    .set_limit((count as usize).clamp(1, self.particles));
             }
             Entry::Reset => {
                 self.observer.reset();
@@ -353,10 +353,9 @@ impl Identifier {
         if taken == 0 {
             return;
         }
-        let prior = &self.prior;
         // Rates of up to one a second and a ring of up to 30 s: more than certain is certain.
-        let birth = (prior.suspected_1_s * moved_s).min(1.0);
-        let death = (prior.mended_1_s * moved_s).min(1.0);
+        let birth = (self.prior.suspected_1_s * moved_s).min(1.0);
+        let death = (self.prior.mended_1_s * moved_s).min(1.0);
         self.predicted = self
             .predicted
             .predicted(&self.leaves, self.p_unknown, birth, death);
@@ -442,17 +441,16 @@ impl Identifier {
             self.mode_changes = self.mode_changes.saturating_add(1);
         }
         let moved_s = std::mem::take(&mut self.moved_s);
-        let (posterior, leaves) = (&self.posterior, &self.leaves);
-        self.reported.take(mode, p_mode, posterior, leaves, moved_s);
+        self.reported
+            .take(mode, p_mode, &self.posterior, &self.leaves, moved_s);
         belief.reported = self.reported.name();
         belief.reported_change_count = self.reported.changes();
         belief.mode = mode;
         belief.p_mode = p_mode;
         belief.mode_change_count = self.mode_changes;
-        belief.alarm_t_capture_ns = if self.detection.alarm {
-            self.detection.t_ns
-        } else {
-            0
+        belief.alarm_t_capture_ns = match self.detection.alarm {
+            true => self.detection.t_ns,
+            false => 0,
         };
         belief.onset_t_capture_ns = self.onset();
         belief.identifying = u32::from(self.phase != Phase::Watching || self.in_trouble);
@@ -497,3 +495,6 @@ impl Identifier {
         copy(&self.published, out);
     }
 }
+
+#[cfg(test)]
+mod tests;

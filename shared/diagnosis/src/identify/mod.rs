@@ -32,6 +32,7 @@ mod servo_fault;
 mod set_probabilities;
 mod settings;
 mod single_fault;
+mod sized_ways;
 mod sizes;
 mod tree_belief;
 mod trouble;

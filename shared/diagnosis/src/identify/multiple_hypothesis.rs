@@ -452,3 +452,6 @@ impl MultipleHypothesis {
         0
     }
 }
+
+#[cfg(test)]
+mod tests;

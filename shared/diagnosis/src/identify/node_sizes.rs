@@ -1,19 +1,14 @@
 //! In which way the component of each node is broken, and by how much.
 
 use vigil_blocks::{FAULT_NODES, FaultBelief, SizeKind, WHEELS};
-
 use vigil_robot::learned::{MotionMode, Mover};
 
 use crate::identify::encoders::{STATES, WAYS_TO_BREAK};
 use crate::identify::leaf_map::LeafMap;
 use crate::identify::multiple_hypothesis::MultipleHypothesis;
-use crate::identify::tree_belief::TreeBelief;
+use crate::identify::tree_belief::{SIZE_P_MIN, TreeBelief};
 
-/// Of a less probable fault no size is reported: at 1 %, the odds of an encoder that a stuck wheel
-/// masks (`an_hour` tests them), a size is noise.
-pub const SIZE_P_MIN: f64 = 0.01;
-
-/// What is told of each node.
+/// Kind and size of each node's fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NodeSizes {
     size: [f64; FAULT_NODES],

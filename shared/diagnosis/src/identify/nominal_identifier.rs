@@ -124,14 +124,30 @@ mod tests {
     use vigil_blocks::SensorFrame;
     use vigil_robot::tree::Node;
 
-    #[test]
-    fn the_reported_name_outlasts_a_doubt_of_less_than_a_second_of_motion() {
+    fn identifier() -> NominalIdentifier {
         let nominal = Node {
             name: "ND".into(),
             parent: None,
             fault: None,
         };
-        let mut identifier = NominalIdentifier::new(&FaultTree::new(vec![nominal]).unwrap());
+        NominalIdentifier::new(&FaultTree::new(vec![nominal]).unwrap())
+    }
+
+    #[test]
+    #[should_panic(expected = "nominal, faults and unknown account for one")]
+    fn a_belief_that_leaves_some_out_ends_the_process() {
+        let mut identifier = identifier();
+        identifier.posterior.nodes[0] = 0.5;
+        identifier.step(
+            Entry::Missed(1),
+            &mut FaultBelief::default(),
+            &mut Box::default(),
+        );
+    }
+
+    #[test]
+    fn the_reported_name_outlasts_a_doubt_of_less_than_a_second_of_motion() {
+        let mut identifier = identifier();
         let mut belief = FaultBelief::default();
         let (block, mut out) = (Box::<ParticleBlock>::default(), Box::default());
         let mut t_ns = 0;

@@ -181,4 +181,14 @@ mod tests {
             ..entry(2, 0)
         });
     }
+
+    #[test]
+    #[should_panic(expected = "no more are kept than the capacity")]
+    fn a_ring_that_holds_more_than_its_capacity_ends_the_process() {
+        let mut ring = Ring::new(3);
+        ring.push(entry(1, 0));
+        ring.push(entry(2, 0));
+        ring.capacity = 1;
+        ring.push(entry(3, 0));
+    }
 }

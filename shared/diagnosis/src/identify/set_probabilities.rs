@@ -1,11 +1,11 @@
 //! Probabilities of all sets of faults, from hypotheses about motion and encoders.
 
-use vigil_blocks::{FAULT_SETS, FaultSet, WHEELS};
+use vigil_blocks::{FaultSet, WHEELS};
 use vigil_robot::learned::{MotionMode, Mover};
 
 use crate::identify::further::Fusion;
 use crate::identify::leaf_map::LeafMap;
-use crate::identify::tree_belief::TreeBelief;
+use crate::identify::tree_belief::{TreeBelief, entropy};
 
 /// Hypotheses less probable than this are not divided among sets: a tenth of [`FLOOR`].
 pub const NEGLIGIBLE: f64 = 1e-13;
@@ -196,40 +196,9 @@ const fn faults(index: usize, subsets: usize) -> u32 {
     others + encoders.count_ones()
 }
 
-/// `-p ln p`; 0 for 0.
-pub fn entropy(p: f64) -> f64 {
-    if p > 0.0 { -p * p.ln() } else { 0.0 }
-}
-
-/// Puts a set among the most probable ones.
-pub fn rank(sets: &mut [FaultSet; FAULT_SETS], count: &mut usize, set: FaultSet) {
-    let place = sets[..*count].iter().position(|other| other.p < set.p);
-    let place = place.unwrap_or(*count);
-    if place < FAULT_SETS {
-        *count = (*count + 1).min(FAULT_SETS);
-        sets[place..*count].rotate_right(1);
-        sets[place] = set;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_most_probable_sets_are_ranked_and_the_others_go() {
-        let mut sets = [FaultSet::default(); FAULT_SETS];
-        let mut count = 0;
-        for leaves in 1..=FAULT_SETS as u64 + 2 {
-            let p = if leaves % 2 == 0 { 1.0 } else { 0.5 } / leaves as f64;
-            rank(&mut sets, &mut count, FaultSet { leaves, p });
-            assert_eq!(count, FAULT_SETS.min(leaves as usize));
-        }
-        assert!(sets.is_sorted_by(|a, b| a.p >= b.p), "{sets:?}");
-        // 1/2, 1/2 of 1, 1/4, 1/6 of 3 and 6, 1/8, 1/10 of 5 and 10: of equals the first first.
-        let order: Vec<u64> = sets.iter().map(|set| set.leaves).collect();
-        assert_eq!(order, [1, 2, 4, 3, 6, 8, 5, 10]);
-    }
 
     #[test]
     fn faults_of_a_set_are_its_stuck_wheels_its_servo_or_pose_and_its_encoders() {
@@ -239,9 +208,70 @@ mod tests {
         }
     }
 
+    /// Over one wheel that sticks, or whose servo is off.
+    fn sums(p: &[f64], unknown: f64) -> SetProbabilities {
+        SetProbabilities {
+            p: p.to_vec(),
+            shares: Vec::new(),
+            p_unknown: Vec::new(),
+            wheels: 1,
+            unknown,
+            products: vec![0.0; 2],
+        }
+    }
+
     #[test]
-    fn entropy_is_that_of_one_alternative() {
-        assert_eq!((entropy(0.0), entropy(1.0), entropy(-1.0)), (0.0, 0.0, 0.0));
-        assert!((entropy(0.5) - 0.5 * std::f64::consts::LN_2).abs() < 1e-15);
+    fn further_channels_weigh_each_row_and_share_what_is_nominal_with_the_unknown() {
+        let mut fusion = Fusion::neutral();
+        (fusion.stuck[0], fusion.askew, fusion.unknown) = (4.0, 0.5, (2.0, 0.25));
+        // Nominal, stuck, the servos of eight wheels, and the pose; each with a whole encoder and
+        // with a broken one.
+        let mut p = vec![0.125; 2 * (2 + WHEELS + 1)];
+        p[..4].copy_from_slice(&[0.5, 0.25, 0.0625, 0.03125]);
+        let mut sums = sums(&p, 0.375);
+        sums.fuse(&fusion);
+        assert_eq!(sums.unknown, 0.375 * 2.0 + 0.5 * 0.25);
+        assert_eq!(sums.p[..4], [0.5, 0.25, 0.25, 0.125]);
+        let (servos, pose) = sums.p[4..].split_at(2 * WHEELS);
+        assert_eq!((servos, pose), (&[0.0625; 2 * WHEELS][..], &[0.125; 2][..]));
+    }
+
+    #[test]
+    fn stuck_wheels_weigh_by_the_mean_of_their_factors() {
+        let mut fusion = Fusion::neutral();
+        (fusion.stuck[0], fusion.stuck[1]) = (4.0, 2.0);
+        let mut sums = SetProbabilities {
+            wheels: 2,
+            products: vec![0.0; 4],
+            ..sums(&[0.25; 16], 0.0)
+        };
+        sums.fuse(&fusion);
+        for (row, factor) in sums.p.chunks(4).zip([1.0, 4.0, 2.0, 3.0]) {
+            assert_eq!(row, [0.25 * factor; 4]);
+        }
+    }
+
+    #[test]
+    fn a_hypothesis_is_divided_among_the_sets_of_broken_encoders() {
+        let mut sums = SetProbabilities {
+            shares: vec![vec![(Mover::Nominal, 1.0)], vec![(Mover::Unknown, 1.0)]],
+            p_unknown: vec![0.25, 1.0],
+            wheels: 2,
+            products: vec![0.0; 4],
+            ..sums(&[0.0; 16], 0.0)
+        };
+        sums.add(0, 0.5, |wheel| [0.5, 0.25][wheel]);
+        let named = 0.5 * 0.75;
+        let expected = [0.5 * 0.75, 0.5 * 0.75, 0.5 * 0.25, 0.5 * 0.25];
+        assert_eq!(sums.p[..4], expected.map(|share| named * share));
+        sums.add(1, 0.125, |_| {
+            unreachable!("in the unknown no encoder is asked for")
+        });
+        assert_eq!(sums.unknown, 0.5 * 0.25 + 0.125);
+        // Too little to be divided, or no number.
+        for p in [0.5 * NEGLIGIBLE, f64::NAN] {
+            sums.add(0, p, |_| unreachable!("not divided"));
+        }
+        assert_eq!(sums.p[4..], [0.0; 12]);
     }
 }

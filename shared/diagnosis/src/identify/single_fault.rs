@@ -25,9 +25,9 @@ use crate::identify::hypotheses::HypothesisList;
 use crate::identify::leaf_map::{IdentifierError, LeafMap};
 use crate::identify::models::Models;
 use crate::identify::risk::risks;
-use crate::identify::set_probabilities::{FLOOR, entropy};
+use crate::identify::set_probabilities::FLOOR;
 use crate::identify::settings::{IdentifierFilter, PARTICLES, Settings};
-use crate::identify::tree_belief::TreeBelief;
+use crate::identify::tree_belief::{TreeBelief, entropy};
 
 /// Share of the draws that leave a mode in the raised proposals. Chosen by hand: half at most
 /// doubles a weight's spread; smaller finds a rare fault later.

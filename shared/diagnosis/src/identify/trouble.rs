@@ -6,8 +6,7 @@ use vigil_robot::learned::Troubles;
 
 use crate::identify::leaf_map::LeafMap;
 use crate::identify::node_sizes::NodeSizes;
-use crate::identify::set_probabilities::entropy;
-use crate::identify::tree_belief::TreeBelief;
+use crate::identify::tree_belief::{TreeBelief, entropy};
 
 /// Probability that something is wrong: what is seen needs no filter, and nothing is certain.
 /// Chosen: above every threshold that acts, and finite as log-odds.

@@ -9,7 +9,8 @@ use crate::identify::encoders::{
     DEAD, Encoders, FROZEN, Likelihoods, OWN_RATE, SILENT, SIZED, ZERO, breakage,
 };
 use crate::identify::rate_offsets::RateOffsets;
-use crate::identify::sizes::{BIAS, DRIFT, EncoderSizes};
+use crate::identify::sized_ways::{BIAS, DRIFT};
+use crate::identify::sizes::EncoderSizes;
 
 /// Of one motion mode.
 #[derive(Debug, Clone, Copy)]

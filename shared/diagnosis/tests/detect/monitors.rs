@@ -219,3 +219,26 @@ fn a_loop_and_a_spin_end_when_the_robot_stands() {
 fn wrapped(yaw_rad: f64) -> f64 {
     (yaw_rad + PI).rem_euclid(TAU) - PI
 }
+
+#[test]
+fn of_more_places_than_are_kept_the_oldest_are_forgotten() {
+    let mut robot = Frames::new();
+    // 140 places, 12 more than are kept; then 1.8 m aside and back.
+    for k in 0..140 {
+        let pose = [0.3 * f64::from(k), 0.0, 0.0];
+        assert_eq!(robot.at(pose, pose) & Symptoms::LD, 0);
+    }
+    let aside = [0.3, 0.6, 0.9, 1.2, 1.5, 1.8, 1.5, 1.2, 0.9, 0.6];
+    for y in aside {
+        assert_eq!(robot.at([41.7, y, 0.0], [50.0, y, 0.0]) & Symptoms::LD, 0);
+    }
+    assert_eq!(
+        robot.at([41.7, 0.2, 0.0], [50.0, 0.0, 0.0]) & Symptoms::LD,
+        Symptoms::LD
+    );
+    // The start is no longer known.
+    assert_eq!(
+        robot.at([0.0, 0.0, 0.0], [50.0, 0.0, 0.0]) & Symptoms::LD,
+        0
+    );
+}

@@ -123,3 +123,18 @@ fn raised_draws_leave_as_often_as_asked_and_are_paid_for() {
     filter.mass.copy_from_slice(&[0.7, 0.0, 0.0, 0.0]);
     assert_eq!(filter.propose(0), 0);
 }
+
+#[test]
+fn a_split_moves_each_particle_to_one_leaf_by_its_shares() {
+    let mut filter = filter(&[vec![1, 2]]);
+    for row in filter.shares.chunks_exact_mut(4) {
+        row.copy_from_slice(&[0.0, 0.75, 0.25, 0.0]);
+    }
+    filter.nodes[0].merged = false;
+    filter.split(0);
+    let rows = || filter.shares.chunks_exact(4);
+    let first = rows().filter(|row| **row == [0.0, 1.0, 0.0, 0.0]).count();
+    let second = rows().filter(|row| **row == [0.0, 0.0, 1.0, 0.0]).count();
+    assert_eq!(first + second, 1000);
+    assert!((700..800).contains(&first), "{first}");
+}

@@ -72,7 +72,7 @@ impl MultipleHypothesis {
     /// Probability that one observation changes `from` to another mode. An encoder that died in the
     /// last observation may as well be another wheel that stuck then: both are about equally
     /// likely before the motion tells.
-    fn p_change(
+    pub(super) fn p_change(
         &self,
         from: &Hypothesis<HypothesisState>,
         mode: usize,
