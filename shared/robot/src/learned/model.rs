@@ -360,7 +360,7 @@ fn check_curve(key: &str, curve: &Curve) -> Result<(), ModelError> {
 
 fn check_rates(key: &str, rates: &[RateModel], count: usize) -> Result<(), ModelError> {
     if rates.len() != count {
-        return refuse(&format!("{key}.rates"), rates.len(), "one entry per wheel");
+        return refuse(format!("{key}.rates"), rates.len(), "one entry per wheel");
     }
     for rate in rates {
         check_range(&format!("{key}.ratio"), rate.ratio, -10.0, 10.0)?;

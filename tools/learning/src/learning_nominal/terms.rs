@@ -84,23 +84,6 @@ fn polynomial(axes: usize, order: usize) -> Vec<Term> {
     products.into_iter().map(Term::command).collect()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_polynomial_has_every_product_once() {
-        for (axes, order, count) in [(1, 4, 5), (2, 4, 15), (3, 2, 10), (2, 1, 3)] {
-            let terms = polynomial(axes, order);
-            assert_eq!(terms.len(), count, "{axes} axes, order {order}");
-            assert_eq!(terms[0].of, Regressor::Constant);
-            for (i, term) in terms.iter().enumerate() {
-                assert!(!terms[..i].contains(term), "{term:?} twice");
-            }
-        }
-    }
-}
-
 /// A term in words; empty for the constant.
 pub(super) fn word(term: &Term, model: &Model) -> String {
     let axis = |i: usize| {
@@ -132,5 +115,22 @@ pub(super) fn word(term: &Term, model: &Model) -> String {
     match term.lag {
         0 => of,
         lag => format!("{of}[-{lag}]"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_polynomial_has_every_product_once() {
+        for (axes, order, count) in [(1, 4, 5), (2, 4, 15), (3, 2, 10), (2, 1, 3)] {
+            let terms = polynomial(axes, order);
+            assert_eq!(terms.len(), count, "{axes} axes, order {order}");
+            assert_eq!(terms[0].of, Regressor::Constant);
+            for (i, term) in terms.iter().enumerate() {
+                assert!(!terms[..i].contains(term), "{term:?} twice");
+            }
+        }
     }
 }
