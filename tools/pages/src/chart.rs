@@ -1,14 +1,6 @@
 //! Curves as SVG inside a page: colours are the page's, so that they follow light and dark.
 
-use std::fmt::Write;
-
-use plotters::coord::ranged1d::{KeyPointHint, Ranged};
-use plotters::prelude::*;
-
-/// The drawing library's reason not to draw.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("a chart cannot be drawn: {0}")]
-pub struct ChartError(String);
+use super::svg::{Anchor, Drawing, Pen};
 
 /// Colours of lines in the page (`--c1` ..).
 pub const COLOURS: usize = 6;
@@ -69,10 +61,14 @@ impl Axis {
         }
     }
 
-    fn label(&self, value: f64) -> String {
-        let near = |tick: &&(f64, String)| (tick.0 - value).abs() < 1e-9;
-        let tick = self.ticks.iter().find(near);
-        tick.map(|tick| tick.1.clone()).unwrap_or_default()
+    /// Where a value lies between the ends, 0 to 1.
+    fn share_of(&self, value: f64) -> f64 {
+        let [from, to] = self.range;
+        if to > from {
+            (value - from) / (to - from)
+        } else {
+            0.0
+        }
     }
 }
 
@@ -115,126 +111,104 @@ pub struct Chart {
     pub curves: Vec<Curve>,
 }
 
-/// Marks in the drawing that become colours of the page.
-fn marker(colour: usize) -> RGBColor {
-    RGBColor(1, 0, colour as u8)
-}
-
-const GRID: RGBColor = RGBColor(2, 0, 0);
+/// Height of a letter.
 const LETTER: i32 = 22;
+const GRID: &str = "var(--grid)";
 
-/// An axis with labels at chosen values.
-#[derive(Clone)]
-struct LabelledAxis {
-    coordinate: plotters::coord::types::RangedCoordf64,
-    at: Vec<f64>,
+/// Where the curves lie in a chart.
+struct Plot<'a> {
+    chart: &'a Chart,
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
 }
 
-impl LabelledAxis {
-    fn new(axis: &Axis) -> Self {
+impl<'a> Plot<'a> {
+    /// Between the labels and titles of the axes.
+    fn new(chart: &'a Chart) -> Self {
+        let letter = f64::from(LETTER);
+        let title = |axis: &Axis| if axis.title.is_empty() { 0.0 } else { letter };
+        let (width, height) = chart.size;
         Self {
-            coordinate: (axis.range[0]..axis.range[1]).into(),
-            at: axis.ticks.iter().map(|tick| tick.0).collect(),
+            chart,
+            left: 2.5 * letter + 16.0 + title(&chart.y),
+            right: f64::from(width) - letter,
+            top: 0.5 * letter,
+            bottom: f64::from(height) - 1.5 * letter - 12.0 - title(&chart.x),
         }
     }
-}
 
-impl Ranged for LabelledAxis {
-    type FormatOption = plotters::coord::ranged1d::NoDefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        self.coordinate.map(value, limit)
+    fn x(&self, value: f64) -> f64 {
+        self.left + self.chart.x.share_of(value) * (self.right - self.left)
     }
 
-    fn key_points<Hint: KeyPointHint>(&self, _: Hint) -> Vec<f64> {
-        self.at.clone()
+    fn y(&self, value: f64) -> f64 {
+        self.bottom - self.chart.y.share_of(value) * (self.bottom - self.top)
     }
 
-    fn range(&self) -> std::ops::Range<f64> {
-        self.coordinate.range()
+    fn axes(&self, drawing: &mut Drawing) {
+        let pen = |width: f64| Pen {
+            colour: GRID,
+            width,
+            is_dashed: false,
+        };
+        let letter = f64::from(LETTER);
+        let &Self {
+            left,
+            right,
+            top,
+            bottom,
+            ..
+        } = self;
+        for (value, label) in &self.chart.x.ticks {
+            let x = self.x(*value);
+            drawing.line(&[(x, top), (x, bottom)], pen(1.0));
+            drawing.text(label, (x, bottom + letter), LETTER, Anchor::Middle);
+        }
+        for (value, label) in &self.chart.y.ticks {
+            let y = self.y(*value);
+            drawing.line(&[(left, y), (right, y)], pen(1.0));
+            drawing.text(label, (left - 10.0, y), LETTER, Anchor::End);
+        }
+        drawing.line(&[(left, top), (left, bottom), (right, bottom)], pen(2.0));
+        let (middle, centre) = (0.5 * (left + right), 0.5 * (top + bottom));
+        let (x, y) = (self.chart.x.title, self.chart.y.title);
+        let below = (middle, bottom + 2.0 * letter + 6.0);
+        drawing.text(x, below, LETTER, Anchor::Middle);
+        drawing.upward_text(y, (letter, centre), LETTER);
     }
-}
 
-impl plotters::coord::ranged1d::ValueFormatter<f64> for LabelledAxis {
-    fn format_ext(&self, value: &f64) -> String {
-        value.to_string()
+    fn curve(&self, curve: &Curve, drawing: &mut Drawing) {
+        let colour = match curve.colour {
+            INK => "currentColor".to_owned(),
+            colour => format!("var(--c{colour})"),
+        };
+        let points = curve.points.iter().map(|(x, y)| (self.x(*x), self.y(*y)));
+        if curve.stroke == Stroke::Dots {
+            points.for_each(|at| drawing.dot(at, 7.0, &colour));
+            return;
+        }
+        let is_thin = curve.colour == INK || curve.stroke == Stroke::Thin;
+        let pen = Pen {
+            colour: &colour,
+            width: if is_thin { 2.0 } else { 4.0 },
+            is_dashed: curve.stroke == Stroke::Dashed,
+        };
+        drawing.line(&points.collect::<Vec<_>>(), pen);
     }
 }
 
 impl Chart {
     /// The chart as an SVG element for a page that defines `--c1` .. and `--grid`.
-    ///
-    /// # Errors
-    /// [`ChartError`], the drawing library's.
-    pub fn svg(&self) -> Result<String, ChartError> {
-        let mut text = String::new();
-        self.draw(&mut text)
-            .map_err(|error| ChartError(error.to_string()))?;
-        Ok(self.adopted(&text))
-    }
-
-    fn draw(&self, text: &mut String) -> Result<(), Box<dyn std::error::Error + '_>> {
-        let root = SVGBackend::with_string(text, self.size).into_drawing_area();
-        let title = |axis: &Axis| if axis.title.is_empty() { 0 } else { LETTER };
-        let mut chart = ChartBuilder::on(&root)
-            .margin(LETTER / 2)
-            .margin_right(LETTER)
-            .x_label_area_size(LETTER + 12 + title(&self.x))
-            .y_label_area_size(2 * LETTER + 16 + title(&self.y))
-            .build_cartesian_2d(LabelledAxis::new(&self.x), LabelledAxis::new(&self.y))?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(GRID.stroke_width(1))
-            .axis_style(GRID.stroke_width(2))
-            .label_style(("sans-serif", LETTER).into_font().color(&marker(INK)))
-            .axis_desc_style(("sans-serif", LETTER).into_font().color(&marker(INK)))
-            .x_label_formatter(&|x| self.x.label(*x))
-            .y_label_formatter(&|y| self.y.label(*y))
-            .x_desc(self.x.title)
-            .y_desc(self.y.title)
-            .draw()?;
+    #[must_use]
+    pub fn svg(&self) -> String {
+        let mut drawing = Drawing::new("currentColor");
+        let plot = Plot::new(self);
+        plot.axes(&mut drawing);
         for curve in &self.curves {
-            let (points, colour) = (curve.points.iter().copied(), marker(curve.colour));
-            let is_thin = curve.colour == INK || curve.stroke == Stroke::Thin;
-            let width = if is_thin { 2 } else { 4 };
-            let style = colour.stroke_width(width);
-            match curve.stroke {
-                Stroke::Solid | Stroke::Thin => {
-                    chart.draw_series(LineSeries::new(points, style))?;
-                }
-                Stroke::Dashed => {
-                    chart.draw_series(DashedLineSeries::new(points, 10, 8, style))?;
-                }
-                Stroke::Dots => {
-                    chart.draw_series(points.map(|at| Circle::new(at, 7, colour.filled())))?;
-                }
-            }
+            plot.curve(curve, &mut drawing);
         }
-        root.present()?;
-        drop(chart);
-        drop(root);
-        Ok(())
-    }
-
-    /// The drawing as an element of a page: its colours, its width, no address of a name space.
-    fn adopted(&self, text: &str) -> String {
-        let start = text.find('>').map_or(0, |end| end + 1);
-        let (width, height) = self.size;
-        let mut svg = String::new();
-        let caption = super::page::escaped(&self.caption);
-        let _ = write!(
-            svg,
-            "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{caption}\">"
-        );
-        svg.push_str(text.get(start..).unwrap_or_default());
-        svg = svg.replace("\"#020000\"", "\"var(--grid)\"");
-        svg = svg.replace("\"#010000\"", "\"currentColor\"");
-        for colour in 1..=COLOURS {
-            let found = format!("\"#0100{colour:02X}\"");
-            svg = svg.replace(&found, &format!("\"var(--c{colour})\""));
-        }
-        svg
+        drawing.element(self.size.0, self.size.1, &self.caption)
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Report, words};
 use crate::scoring::{Case, Taxonomy, UNKNOWN, Verdict};
-use vigil_pages::chart::{Axis, Chart, ChartError, Curve, INK, Stroke};
+use vigil_pages::chart::{Axis, Chart, Curve, INK, Stroke};
 use vigil_pages::page::{beside, escaped, key, section as page_section};
 
 /// Modes drawn of a run.
@@ -86,7 +86,7 @@ fn thinned(case: &Case, of: Explanation) -> Vec<(f64, f64)> {
     kept
 }
 
-fn chart(case: &Case, taxonomy: &Taxonomy, set: &str) -> Result<String, ChartError> {
+fn chart(case: &Case, taxonomy: &Taxonomy, set: &str) -> String {
     let modes = leading(case, taxonomy);
     let end_s = case.verdicts.last().map_or(1.0, |last| last.t_s);
     let mut curves = Vec::new();
@@ -114,11 +114,11 @@ fn chart(case: &Case, taxonomy: &Taxonomy, set: &str) -> Result<String, ChartErr
         curves,
     };
     let names: Vec<_> = modes.iter().map(|m| (m.colour, m.name, false)).collect();
-    Ok(format!("{}{}\n", key(&names), chart.svg()?))
+    format!("{}{}\n", key(&names), chart.svg())
 }
 
 /// The same run in all sets.
-fn run(report: &Report<'_>, i: usize) -> Result<String, ChartError> {
+fn run(report: &Report<'_>, i: usize) -> String {
     let mut parts = Vec::new();
     let mut heading = String::new();
     for set in &report.sets {
@@ -136,13 +136,11 @@ fn run(report: &Report<'_>, i: usize) -> Result<String, ChartError> {
         parts.push(format!(
             "<span class=\"soft\">{}</span>\n{}",
             escaped(words(set.name)),
-            chart(case, report.taxonomy, set.name)?
+            chart(case, report.taxonomy, set.name)
         ));
     }
     let (heading, charts) = (escaped(&heading), beside(&parts));
-    Ok(format!(
-        "<div class=\"run\"><h3>{heading}</h3>\n{charts}</div>\n"
-    ))
+    format!("<div class=\"run\"><h3>{heading}</h3>\n{charts}</div>\n")
 }
 
 /// True if anything was wrong about the run: a false alarm, a fault missed, a wrong leaf after 2 s.
@@ -163,7 +161,7 @@ fn is_wrong(report: &Report<'_>, i: usize) -> bool {
 }
 
 /// All runs, the wrong ones first.
-pub fn section(report: &Report<'_>) -> Result<String, ChartError> {
+pub fn section(report: &Report<'_>) -> String {
     let count = report.sets.first().map_or(0, |set| set.cases.len());
     let (wrong, right): (Vec<usize>, Vec<usize>) = (0..count).partition(|i| is_wrong(report, *i));
     let (mut inside, mut left_out) = (String::new(), Vec::new());
@@ -174,7 +172,7 @@ pub fn section(report: &Report<'_>) -> Result<String, ChartError> {
         ));
         for i in runs {
             if inside.len() < BYTES_MAX {
-                inside.push_str(&run(report, i)?);
+                inside.push_str(&run(report, i));
             } else {
                 let case = report.sets.first().and_then(|set| set.cases.get(i));
                 left_out.extend(case.map(|case| case.label.run.to_string()));
@@ -193,5 +191,5 @@ pub fn section(report: &Report<'_>) -> Result<String, ChartError> {
                  driving and unknown. The first name is the true one; the broken line is the \
                  onset. First the runs with a false alarm, a missed fault or a wrong leaf 2 s \
                  after the onset, with any of the channels.";
-    Ok(page_section("belief", "Belief over time", about, &inside))
+    page_section("belief", "Belief over time", about, &inside)
 }

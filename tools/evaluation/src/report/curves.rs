@@ -3,7 +3,7 @@
 use super::summary::{number, types};
 use super::{Report, SensorSet, words};
 use crate::scoring::{Bin, ClassDetection, Point, Score};
-use vigil_pages::chart::{Axis, COLOURS, Chart, ChartError, Curve, INK, Stroke};
+use vigil_pages::chart::{Axis, COLOURS, Chart, Curve, INK, Stroke};
 use vigil_pages::page::{beside, escaped, key, section};
 
 const SIZE: (u32, u32) = (900, 560);
@@ -13,16 +13,12 @@ const DELAYS_S: [f64; 9] = [0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0];
 const ALARMS_1_H: [f64; 6] = [0.0, 1.0, 10.0, 100.0, 1000.0, 10000.0];
 
 /// One chart per set beside each other.
-fn pair(
-    report: &Report<'_>,
-    draw: impl Fn(&SensorSet<'_>) -> Result<String, ChartError>,
-) -> Result<String, ChartError> {
+fn pair(report: &Report<'_>, draw: impl Fn(&SensorSet<'_>) -> String) -> String {
     let part = |set: &SensorSet<'_>| {
         let heading = escaped(words(set.name));
-        draw(set).map(|chart| format!("<h3>{heading}</h3>\n{chart}\n"))
+        format!("<h3>{heading}</h3>\n{}\n", draw(set))
     };
-    let parts = report.sets.iter().map(part);
-    Ok(beside(&parts.collect::<Result<Vec<_>, _>>()?))
+    beside(&report.sets.iter().map(part).collect::<Vec<_>>())
 }
 
 /// Colour of the type of fault at this place.
@@ -39,7 +35,7 @@ fn curve(colour: usize, stroke: Stroke, points: Vec<(f64, f64)>) -> Curve {
 }
 
 /// Reliability: how often claims of like probability were true.
-pub fn calibration(report: &Report<'_>) -> Result<String, ChartError> {
+pub fn calibration(report: &Report<'_>) -> String {
     let names = types(report);
     // All of them are the sum of what is drawn.
     let drawn = |class: &str| class != "all" || names.len() == 1;
@@ -67,15 +63,15 @@ pub fn calibration(report: &Report<'_>) -> Result<String, ChartError> {
             curves,
         };
         let tables = format!("<details><summary>as tables</summary>\n{tables}</details>\n");
-        Ok(format!("{}{tables}", chart.svg()?))
-    })?;
+        format!("{}{tables}", chart.svg())
+    });
     let about = "The probability that came with the name 2 s after the onset, in ten bins of \
                  equal width, against the share that was true, with 95 % bounds. An abstract \
                  node above the true leaf is true. Below the broken line names are less often true \
                  than they claim, above it more often.";
     let legend = legend(&names, drawn, &[("", false)]);
     let inside = format!("{legend}{charts}");
-    Ok(section("calibration", "Calibration", about, &inside))
+    section("calibration", "Calibration", about, &inside)
 }
 
 fn reliability(class: &str, bins: &[Bin]) -> String {
@@ -100,7 +96,7 @@ fn reliability(class: &str, bins: &[Bin]) -> String {
 }
 
 /// Share of faults found within a time.
-pub fn delays(report: &Report<'_>) -> Result<String, ChartError> {
+pub fn delays(report: &Report<'_>) -> String {
     let names = types(report);
     let charts = pair(report, |set| {
         let curves = names.iter().enumerate().filter_map(|(i, class)| {
@@ -123,10 +119,10 @@ pub fn delays(report: &Report<'_>) -> Result<String, ChartError> {
             curves: curves.collect(),
         };
         chart.svg()
-    })?;
+    });
     let about = "From the onset of the fault to the alarm, at the configured threshold.";
     let inside = format!("{}{charts}", legend(&names, |_| true, &[("", false)]));
-    Ok(section("delay", "Time to the alarm", about, &inside))
+    section("delay", "Time to the alarm", about, &inside)
 }
 
 fn legend(names: &[String], drawn: impl Fn(&str) -> bool, strokes: &[(&str, bool)]) -> String {
@@ -180,7 +176,7 @@ fn over_thresholds(
 }
 
 /// Delay and misses against false alarms.
-pub fn trade_off(report: &Report<'_>) -> Result<String, ChartError> {
+pub fn trade_off(report: &Report<'_>) -> String {
     let names = types(report);
     let charts = pair(report, |set| {
         let score = set.score;
@@ -211,13 +207,13 @@ pub fn trade_off(report: &Report<'_>) -> Result<String, ChartError> {
             y: Axis::share("share missed"),
             curves: missed,
         };
-        Ok(format!(
+        format!(
             "{}{}{}",
-            delay.svg()?,
-            missed.svg()?,
+            delay.svg(),
+            missed.svg(),
             configured(score, &names)
-        ))
-    })?;
+        )
+    });
     let about = "All thresholds of the detector over one pass, the alarm armed again after each; \
                  the dots are the configured threshold. An alarm that already stands at the onset \
                  finds nothing, so that misses rise again where false alarms are many. Delays are \
@@ -226,12 +222,7 @@ pub fn trade_off(report: &Report<'_>) -> Result<String, ChartError> {
                  follows the robot and gathers less evidence.";
     let legend = legend(&names, |_| true, &[("median", false), ("mean", true)]);
     let inside = format!("{legend}{charts}");
-    Ok(section(
-        "trade-off",
-        "Delay against false alarms",
-        about,
-        &inside,
-    ))
+    section("trade-off", "Delay against false alarms", about, &inside)
 }
 
 fn configured(score: &Score, names: &[String]) -> String {

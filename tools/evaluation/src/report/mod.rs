@@ -10,7 +10,6 @@ mod matrix;
 mod summary;
 
 use crate::scoring::{Case, Contest, Score, Taxonomy};
-pub use vigil_pages::chart::ChartError;
 
 /// What was found with one set of channels.
 #[derive(Debug, Clone, Copy)]
@@ -43,21 +42,19 @@ impl Report<'_> {
     }
 
     /// The page.
-    ///
-    /// # Errors
-    /// [`ChartError`], the drawing library's.
-    pub fn html(&self) -> Result<String, ChartError> {
+    #[must_use]
+    pub fn html(&self) -> String {
         let mut body = summary::section(self);
         body.push_str(&contest::section(self));
         body.push_str(&matrix::section(self));
         if self.identifies() {
-            body.push_str(&curves::calibration(self)?);
+            body.push_str(&curves::calibration(self));
         }
-        body.push_str(&curves::delays(self)?);
-        body.push_str(&curves::trade_off(self)?);
-        body.push_str(&belief::section(self)?);
+        body.push_str(&curves::delays(self));
+        body.push_str(&curves::trade_off(self));
+        body.push_str(&belief::section(self));
         body.push_str(&summary::facts(self));
-        Ok(vigil_pages::page::page("Vigil: evaluation", &body))
+        vigil_pages::page::page("Vigil: evaluation", &body)
     }
 }
 

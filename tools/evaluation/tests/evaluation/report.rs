@@ -74,7 +74,7 @@ fn the_page_is_well_formed_and_loads_nothing() {
         sets: vec![set("pose", 1, &bad), set("pose+encoders", 0, &good)],
         taxonomy: &taxonomy,
     };
-    let html = report.html().unwrap();
+    let html = report.html();
     let options = ParsingOptions {
         allow_dtd: true,
         ..ParsingOptions::default()

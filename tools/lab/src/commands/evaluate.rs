@@ -4,7 +4,7 @@ mod document;
 mod passes;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser};
@@ -17,7 +17,7 @@ use vigil_recording::frames::Run;
 use vigil_recording::labels::{self, Label};
 use vigil_robot::RobotModel;
 
-use super::learn::write_whole;
+use super::files::{check_place, write_whole};
 use super::offline::{FilterArgs, FilterSettings, OfflineModels};
 use document::{Document, filters_text};
 use passes::{Passes, SensorSetResult};
@@ -140,7 +140,7 @@ impl Args {
 /// An input that is refused; an output that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     if let Some(out) = &args.report {
-        check_place(out)?;
+        check_place("--report", out)?;
     }
     let prepared = args.filter.prepare()?;
     if matches!(prepared.model, RobotModel::Nominal(_)) && !args.filters.is_empty() {
@@ -156,26 +156,11 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let passes = Passes::new(args, &prepared, &runs);
     let found = passes.run(&sets, &entrants)?;
     if let Some(out) = &args.report {
-        let page = page(args, &prepared, &runs, &found)?;
-        write_whole(out, &page)
-            .map_err(|error| CommandError::failure(format!("{}: {error}", out.display())))?;
+        let page = page(args, &prepared, &runs, &found);
+        write_whole(out, &page)?;
     }
     print(args, &prepared, &found)?;
     Ok(Outcome::Done)
-}
-
-/// Refuses a report that could not be written, before the work.
-fn check_place(out: &Path) -> Result<(), CommandError> {
-    let folder = out.parent().filter(|f| !f.as_os_str().is_empty());
-    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-        let refused = format!("--report: there is no folder {}", folder.display());
-        return Err(CommandError::usage(refused));
-    }
-    if out.is_dir() {
-        let refused = format!("--report: {} is a folder, a file is wanted", out.display());
-        return Err(CommandError::usage(refused));
-    }
-    Ok(())
 }
 
 fn print(
@@ -207,7 +192,7 @@ fn page(
     prepared: &OfflineModels,
     runs: &[(Run, Label)],
     found: &[SensorSetResult],
-) -> Result<String, CommandError> {
+) -> String {
     let sets = found.iter().map(|set| SensorSet {
         name: &set.name,
         score: &set.score,
@@ -219,7 +204,7 @@ fn page(
         sets: sets.collect(),
         taxonomy: prepared.pipeline.taxonomy(),
     };
-    report.html().map_err(CommandError::failure)
+    report.html()
 }
 
 /// What the report says of its origin.

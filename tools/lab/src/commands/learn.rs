@@ -1,8 +1,6 @@
 //! `vigil learn`: learns a robot's model, from labelled runs or healthy ones alone, or shows one.
 
 use std::fmt::Display;
-use std::fs::{self, File};
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use vigil_diagnosis::detect;
 
@@ -17,6 +15,7 @@ use vigil_robot::learned::Model;
 use vigil_robot::learned::model::Provenance;
 use vigil_robot::{Description, RobotModel};
 
+use super::files::{check_place, file_name, write_whole};
 use super::offline::{RobotArgs, load_model};
 use vigil_terminal::{CommandError, Outcome};
 
@@ -147,20 +146,8 @@ fn print_view<V: Serialize + Display>(
     Ok(Outcome::Done)
 }
 
-/// Refuses a file to write into a folder that is not there.
-fn check_folder(out: &Path) -> Result<(), CommandError> {
-    let folder = out.parent().filter(|f| !f.as_os_str().is_empty());
-    match folder.filter(|folder| !folder.is_dir()) {
-        Some(folder) => {
-            let refused = format!("--out: there is no folder {}", folder.display());
-            Err(CommandError::usage(refused))
-        }
-        None => Ok(()),
-    }
-}
-
 fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, CommandError> {
-    check_folder(out)?;
+    check_place("--out", out)?;
     let robot = args.robot.load()?;
     let Some(labels_file) = &args.runs else {
         if robot.has_fault_models() {
@@ -210,8 +197,7 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
     let model = model.sealed();
     report.bounds = learning::bounds::bounds(&model, &robot);
     let text = model.to_toml().map_err(CommandError::failure)?;
-    write_whole(out, &text)
-        .map_err(|error| CommandError::failure(format!("{}: {error}", out.display())))?;
+    write_whole(out, &text)?;
     let printed = if args.json {
         output::json(&Document {
             schema_version: 1,
@@ -250,12 +236,6 @@ fn learn_further(
         .map_err(|error| CommandError::usage(format!("{}: {error}", file.display())))
 }
 
-/// The last part of a path: where a file lay is of no interest to others.
-pub(super) fn file_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
-}
-
 /// Learns from runs without labels.
 fn unlabelled(
     args: &Args,
@@ -281,23 +261,6 @@ fn unlabelled(
         seed: args.seed,
         until_s: args.until.unwrap_or(f64::INFINITY),
         json: args.json,
-    })
-}
-
-/// Writes a file so that its place holds either the old one or the whole new one.
-pub(super) fn write_whole(path: &Path, text: &str) -> io::Result<()> {
-    let mut name = path.as_os_str().to_owned();
-    name.push(format!(".{}.part", std::process::id()));
-    let part = PathBuf::from(name);
-    let write = || {
-        let mut file = File::create(&part)?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
-        fs::rename(&part, path)
-    };
-    write().inspect_err(|_| {
-        // Nothing is left behind; that there may be nothing to remove is no error.
-        let _ = fs::remove_file(&part);
     })
 }
 

@@ -9,6 +9,7 @@ use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::learned::model::Provenance;
 
+use super::files::{file_name, write_whole};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
 
@@ -59,7 +60,7 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
         learning_nominal::learn(task.runs, &held_out, task.until_s, task.robot)
             .map_err(|error| CommandError::usage(format!("{}: {error}", task.frames.display())))?;
     model.provenance = Provenance {
-        frames_file: super::learn::file_name(task.frames),
+        frames_file: file_name(task.frames),
         seed: task.seed,
         test_fraction: task.test_fraction,
         software_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -67,8 +68,7 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
     };
     let model = model.sealed();
     let text = model.to_toml().map_err(CommandError::failure)?;
-    super::learn::write_whole(task.out, &text)
-        .map_err(|error| CommandError::failure(format!("{}: {error}", task.out.display())))?;
+    write_whole(task.out, &text)?;
     for warning in &report.warnings {
         eprintln!("warning: {warning}");
     }

@@ -2,6 +2,7 @@
 
 pub mod diagnose;
 pub mod evaluate;
+mod files;
 pub mod import;
 pub mod learn;
 mod learn_nominal;

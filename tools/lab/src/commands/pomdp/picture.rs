@@ -75,9 +75,9 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             let limits = limits(args)?;
             let graph = PolicyGraph::new(&model, &mut decider, limits);
             if is_dot {
-                Ok(graph::dot(&model, &graph))
+                Ok(graph::dot(&model, &graph, &graph.edges))
             } else {
-                graph::draw(&model, &graph, &title)
+                graph::draw(&model, &graph)
             }
         }
     };

@@ -3,7 +3,8 @@
 use vigil_pomdp::Pomdp;
 use vigil_pomdp::policy::Decider;
 
-use super::canvas::{Anchor, Canvas, INK, Point, colour, drawing};
+use super::canvas::{AXIS, INK, colour, legend};
+use vigil_pages::svg::{Anchor, Drawing, Pen, Point};
 
 /// Cells along a line, and along a side of a triangle.
 const CELLS: [usize; 2] = [800, 120];
@@ -14,12 +15,14 @@ pub fn draw(model: &Pomdp, decider: &mut Decider, title: &str) -> Result<String,
     let svg = match model.states().len() {
         2 => line(model, decider, title),
         3 => triangle(model, decider, title),
-        n => Err(format!(
-            "--regions: a model of {n} states; allowed are 2 and 3"
-        )),
+        n => {
+            return Err(format!(
+                "--regions: a model of {n} states; allowed are 2 and 3"
+            ));
+        }
     };
     // Without smoothing: cells meet without a seam.
-    svg.map(|svg| svg.replacen("<svg ", "<svg shape-rendering=\"crispEdges\" ", 1))
+    Ok(svg.replacen("<svg ", "<svg shape-rendering=\"crispEdges\" ", 1))
 }
 
 /// The action; a policy that remembers is asked as at the beginning of a mission.
@@ -28,72 +31,77 @@ fn action(decider: &mut Decider, belief: &[f64]) -> usize {
     decider.decide(belief).action
 }
 
-fn legend(canvas: &mut Canvas<'_>, model: &Pomdp, seen: &[bool], at: Point) {
+fn actions_legend(canvas: &mut Drawing, model: &Pomdp, seen: &[bool], at: Point) {
     let names = model.actions().iter().enumerate();
     let names: Vec<(usize, &str)> = names
         .filter(|(index, _)| seen[*index])
         .map(|(index, name)| (index, name.as_str()))
         .collect();
-    canvas.legend(&names, at);
+    legend(canvas, &names, at);
 }
 
-fn line(model: &Pomdp, decider: &mut Decider, title: &str) -> Result<String, String> {
+fn line(model: &Pomdp, decider: &mut Decider, title: &str) -> String {
     let middle = |cell: usize| (cell as f64 + 0.5) / CELLS[0] as f64;
     let belief = |p: f64| [1.0 - p, p];
     let actions = (0..CELLS[0]).map(|cell| action(decider, &belief(middle(cell))));
     let actions: Vec<usize> = actions.collect();
     let mut seen = vec![false; model.actions().len()];
     actions.iter().for_each(|a| seen[*a] = true);
-    let rows = seen.iter().filter(|seen| **seen).count() as u32;
+    let rows = seen.iter().filter(|seen| **seen).count() as f64;
     let (top, height, width) = (60.0, 70.0, 800.0);
     let x = |p: f64| LEFT + width * p;
-    drawing((920, 250 + 24 * rows), |canvas| {
-        canvas.text(&format!("Regions, {title}"), (LEFT, 24.0), 20, Anchor::Left);
-        let mut first = 0;
-        for end in 1..=CELLS[0] {
-            if end < CELLS[0] && actions[end] == actions[first] {
-                continue;
-            }
-            let [a, b] = [first, end].map(|cell| x(cell as f64 / CELLS[0] as f64));
-            let base = top + height;
-            let corners = [(a, top), (b, top), (b, base), (a, base)];
-            canvas.area(&corners, colour(actions[first]), 0.8);
-            if first > 0 {
-                canvas.line(&[(a, base), (a, base + 22.0)], INK, 1);
-                let p = first as f64 / CELLS[0] as f64;
-                canvas.text(&format!("{p:.3}"), (a, base + 32.0), 14, Anchor::Middle);
-            }
-            first = end;
+    let mut canvas = Drawing::new(INK);
+    canvas.text(
+        &format!("Regions, {title}"),
+        (LEFT, 24.0),
+        20,
+        Anchor::Start,
+    );
+    let mut first = 0;
+    for end in 1..=CELLS[0] {
+        if end < CELLS[0] && actions[end] == actions[first] {
+            continue;
         }
-        let ends = [(0.0, "0"), (1.0, "1")];
-        for (p, label) in ends {
-            canvas.text(label, (x(p), top + height + 14.0), 16, Anchor::Middle);
+        let [a, b] = [first, end].map(|cell| x(cell as f64 / CELLS[0] as f64));
+        let base = top + height;
+        let corners = [(a, top), (b, top), (b, base), (a, base)];
+        canvas.area(&corners, colour(actions[first]), 0.8);
+        if first > 0 {
+            canvas.line(&[(a, base), (a, base + 22.0)], AXIS);
+            let p = first as f64 / CELLS[0] as f64;
+            canvas.text(&format!("{p:.3}"), (a, base + 32.0), 14, Anchor::Middle);
         }
-        let start = x(model.start()[1]);
-        canvas.area(
-            &[
-                (start, top),
-                (start - 7.0, top - 12.0),
-                (start + 7.0, top - 12.0),
-            ],
-            INK,
-            1.0,
-        );
-        let what = format!(
-            "probability of {} (triangle: start belief)",
-            model.states()[1]
-        );
-        canvas.text(
-            &what,
-            (LEFT + 0.5 * width, top + height + 62.0),
-            16,
-            Anchor::Middle,
-        );
-        legend(canvas, model, &seen, (LEFT, top + height + 96.0));
-    })
+        first = end;
+    }
+    let ends = [(0.0, "0"), (1.0, "1")];
+    for (p, label) in ends {
+        canvas.text(label, (x(p), top + height + 14.0), 16, Anchor::Middle);
+    }
+    let start = x(model.start()[1]);
+    canvas.area(
+        &[
+            (start, top),
+            (start - 7.0, top - 12.0),
+            (start + 7.0, top - 12.0),
+        ],
+        INK,
+        1.0,
+    );
+    let what = format!(
+        "probability of {} (triangle: start belief)",
+        model.states()[1]
+    );
+    canvas.text(
+        &what,
+        (LEFT + 0.5 * width, top + height + 62.0),
+        16,
+        Anchor::Middle,
+    );
+    actions_legend(&mut canvas, model, &seen, (LEFT, top + height + 96.0));
+    canvas.file(920.0, 250.0 + 24.0 * rows)
 }
 
-fn triangle(model: &Pomdp, decider: &mut Decider, title: &str) -> Result<String, String> {
+fn triangle(model: &Pomdp, decider: &mut Decider, title: &str) -> String {
     let side = 620.0;
     let high = side * 0.75_f64.sqrt();
     let corners = [
@@ -117,23 +125,31 @@ fn triangle(model: &Pomdp, decider: &mut Decider, title: &str) -> Result<String,
         })
         .collect();
     actions.iter().for_each(|a| seen[*a] = true);
-    drawing((900, 700), |canvas| {
-        canvas.text(&format!("Regions, {title}"), (LEFT, 24.0), 20, Anchor::Left);
-        for (cell, action) in cells.iter().zip(&actions) {
-            canvas.area(&cell.map(at), colour(*action), 0.8);
-        }
-        canvas.line(&[corners[0], corners[1], corners[2], corners[0]], INK, 2);
-        for (k, (x, y)) in corners.into_iter().enumerate() {
-            let y = if k == 2 { y - 16.0 } else { y + 20.0 };
-            canvas.text(&model.states()[k], (x, y), 16, Anchor::Middle);
-        }
-        let (x, y) = at([model.start()[0], model.start()[1], model.start()[2]]);
-        let mark = [(x, y - 7.0), (x + 7.0, y), (x, y + 7.0), (x - 7.0, y)];
-        canvas.area(&mark, INK, 1.0);
-        let what = "each corner: certain of its state; diamond: start belief";
-        canvas.text(what, (LEFT, 80.0 + high + 52.0), 14, Anchor::Left);
-        legend(canvas, model, &seen, (LEFT + side + 40.0, 100.0));
-    })
+    let mut canvas = Drawing::new(INK);
+    canvas.text(
+        &format!("Regions, {title}"),
+        (LEFT, 24.0),
+        20,
+        Anchor::Start,
+    );
+    for (cell, action) in cells.iter().zip(&actions) {
+        canvas.area(&cell.map(at), colour(*action), 0.8);
+    }
+    canvas.line(
+        &[corners[0], corners[1], corners[2], corners[0]],
+        Pen { width: 2.0, ..AXIS },
+    );
+    for (k, (x, y)) in corners.into_iter().enumerate() {
+        let y = if k == 2 { y - 16.0 } else { y + 20.0 };
+        canvas.text(&model.states()[k], (x, y), 16, Anchor::Middle);
+    }
+    let (x, y) = at([model.start()[0], model.start()[1], model.start()[2]]);
+    let mark = [(x, y - 7.0), (x + 7.0, y), (x, y + 7.0), (x - 7.0, y)];
+    canvas.area(&mark, INK, 1.0);
+    let what = "each corner: certain of its state; diamond: start belief";
+    canvas.text(what, (LEFT, 80.0 + high + 52.0), 14, Anchor::Start);
+    actions_legend(&mut canvas, model, &seen, (LEFT + side + 40.0, 100.0));
+    canvas.file(900.0, 700.0)
 }
 
 /// Small triangles that fill the large one, as beliefs at their corners.
