@@ -28,9 +28,3 @@ pub use recorded::{Library, Material, library};
 pub use report::{Outcome, barred_lines, document, lines};
 pub use run::{Graph, jobs, run, select};
 pub use scenario::{Departure, Draw, File, Frames, Scenario, Source, World};
-
-/// Words and priors of a graph's faults.
-fn taxonomy(setup: &vigil_setup::Setup) -> vigil_evaluation::scoring::Taxonomy {
-    let words = vigil_evaluation::scoring::Taxonomy::new(&setup.tree, &setup.robot);
-    words.with_prior_unknown(setup.file.identifier.p_unknown)
-}

@@ -1,15 +1,14 @@
 //! The simulated rover through detector and identifier in one process, as they run live.
 
-mod stages;
-
-pub use stages::Stages;
-
 use std::error::Error;
 
 use vigil_diagnosis::Sensors;
+use vigil_evaluation::scoring::Taxonomy;
+use vigil_evaluation::stages::{Stages, Vocabulary};
 use vigil_robot::Description;
 use vigil_robot::FaultTree;
 use vigil_robot::learned::Model;
+use vigil_setup::Setup;
 
 /// The two sets of channels, and their names.
 pub const SENSOR_SETS: [(Sensors, &str); 2] = [
@@ -45,4 +44,38 @@ impl Rover {
             tree: setup.tree,
         })
     }
+}
+
+/// Words and priors of a graph's faults.
+#[must_use]
+pub fn taxonomy(setup: &Setup) -> Taxonomy {
+    let words = Taxonomy::new(&setup.tree, &setup.robot);
+    words.with_prior_unknown(setup.file.identifier.p_unknown)
+}
+
+/// The stages of a configuration, but for the sensors they use, the rate and the seed.
+///
+/// # Errors
+/// If model, robot, tree and settings do not fit together.
+pub fn stages(
+    setup: &Setup,
+    sensors: Sensors,
+    rate_hz: f64,
+    seed: u64,
+) -> Result<Stages, Box<dyn Error>> {
+    let mut setup = setup.clone();
+    setup.file.graph.rate_hz = rate_hz;
+    setup.file.graph.seed = seed;
+    setup.file.detector.sensors = sensors;
+    let vocabulary = Vocabulary {
+        taxonomy: taxonomy(&setup),
+        robot: setup.robot.clone(),
+        actions: setup.decision.actions().to_vec(),
+    };
+    Ok(Stages::new(
+        vigil_detector::assemble(&setup)?,
+        vigil_identifier::assemble(&setup)?,
+        Some(vigil_supervisor::assemble(&setup)?),
+        vocabulary,
+    ))
 }

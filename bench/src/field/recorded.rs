@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Taxonomy;
-use vigil_evaluation::scoring::field::{Scorer, Stretch, Truth};
+use vigil_evaluation::scoring::field::{Scorer, Stretch};
 use vigil_learning::learning_nominal;
 use vigil_recording::{frames, labels};
 use vigil_robot::RobotModel;
@@ -17,13 +17,10 @@ use super::ground::stream;
 use super::job::{Job, ScoredRun};
 use super::scenario::{Scenario, Source};
 use super::timeline::Timeline;
-use super::watch::{Instant, Watch};
+use super::watch::Watch;
 use super::{husky, logs};
-use crate::simulated::Stages;
+use crate::simulated::{self, stages};
 use crate::{load, root};
-
-/// Velocity from which a robot counts as driving, m/s and rad/s.
-const DRIVES: f64 = 0.005;
 
 /// A run, and what is true in it.
 #[derive(Debug, Clone)]
@@ -172,7 +169,7 @@ fn rover(data: &Path, log: &str) -> Result<Material, Box<dyn Error>> {
         });
     }
     Ok(Material {
-        taxonomy: super::taxonomy(&setup),
+        taxonomy: simulated::taxonomy(&setup),
         setup,
         cases,
     })
@@ -199,30 +196,18 @@ fn learned(
     setup.robot = robot;
     Ok(Material {
         cases: cases.collect(),
-        taxonomy: super::taxonomy(&setup),
+        taxonomy: simulated::taxonomy(&setup),
         setup,
     })
 }
 
 impl Case {
     fn truth(&self, sensors: Sensors, taxonomy: &Taxonomy) -> Vec<Stretch> {
-        let begins = Stretch {
-            from_s: f64::NEG_INFINITY,
-            truth: Truth::Healthy,
-            size: None,
-        };
         // By the pose alone nothing can be seen of an encoder.
         let sees = |leaf: &str| sensors != Sensors::Pose || taxonomy.class(leaf) != Some("encoder");
         let fault = self.fault.as_ref().filter(|(leaf, _)| sees(leaf));
-        let breaks = fault.map(|(leaf, from_s)| Stretch {
-            from_s: *from_s,
-            truth: match taxonomy.index(leaf) {
-                Some(_) => Truth::Faults(vec![leaf.clone()]),
-                None => Truth::Unmodelled { own: None },
-            },
-            size: None,
-        });
-        std::iter::once(begins).chain(breaks).collect()
+        let (leaf, onset_s) = fault.map_or(("", None), |(leaf, s)| (leaf.as_str(), Some(*s)));
+        Stretch::of_label(leaf, onset_s, taxonomy)
     }
 
     /// Times of the first and the last frame, s.
@@ -258,7 +243,7 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<ScoredRun>, Box<dy
         let seed = u64::from(case.run.id);
         let truth = case.truth(sensors, taxonomy);
         let mut watch = Watch {
-            stages: Stages::new(setup, sensors, 1.0 / period_s, seed)?,
+            stages: stages(setup, sensors, 1.0 / period_s, seed)?,
             scorer: Scorer::new(&truth, taxonomy, case.span_s(), seed),
             timeline: Timeline::asked_for(job, seed, name),
         };
@@ -272,17 +257,13 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<ScoredRun>, Box<dy
             later_s,
         };
         let mut way = Way::new(&job.scenario.frames, &setup.robot, conditions, rng);
-        let (mut t_before_s, mut held) = (None, None);
+        let mut held = None;
         for frame in &case.run.frames {
             let t_s = frame.header.t_capture_ns as f64 * 1e-9;
             let fate = way.fate(t_s);
             watch.deliver(frame, fate, held.as_ref());
             held = (fate == Fate::Overtaken).then_some(*frame);
-            let velocity = setup.robot.twist(&frame.command);
-            let drives = velocity.iter().any(|value| value.abs() >= DRIVES);
-            let dt_s = t_s - t_before_s.unwrap_or(t_s);
-            watch.score(Instant { t_s, dt_s }, drives, frame);
-            t_before_s = Some(t_s);
+            watch.score(t_s, frame);
         }
         scored.push(ScoredRun {
             sensors: name,

@@ -20,12 +20,9 @@ use super::job::{Job, ScoredRun};
 use super::recorded::{self, Library, Material};
 use super::scenario::{File, Scenario};
 use super::timeline::Timeline;
-use super::watch::{Instant, Watch};
+use super::watch::Watch;
 use crate::load;
-use crate::simulated::Stages;
-
-/// Commanded speed from which a robot drives, m/s.
-const DRIVES_M_S: f64 = 0.005;
+use crate::simulated::{stages, taxonomy};
 
 /// Every run of the scenarios; `scale` multiplies their number, at least one each stays. Recorded
 /// runs are all played, whatever the scale, and none without their files. Of a `timeline` only the
@@ -72,9 +69,9 @@ impl Graph {
         let model = setup.model.clone().with_faults();
         Ok(Self {
             model: model.ok_or("the rover's model has no faults")?,
-            taxonomy: super::taxonomy(&setup),
+            taxonomy: taxonomy(&setup),
             setup,
-            all: Box::new((all.clone(), super::taxonomy(&all))),
+            all: Box::new((all.clone(), taxonomy(&all))),
         })
     }
 
@@ -222,7 +219,7 @@ fn drive(
     let mut watches = Vec::new();
     for ((sensors, name), truth) in sets.iter().zip(&truths) {
         watches.push(Watch {
-            stages: Stages::new(graph.setup(*sensors).0, *sensors, rate_hz, seed)?,
+            stages: stages(graph.setup(*sensors).0, *sensors, rate_hz, seed)?,
             scorer: Scorer::new(truth, graph.setup(*sensors).1, [0.0, scenario.run_s], seed),
             timeline: Timeline::asked_for(job, seed, name),
         });
@@ -254,11 +251,10 @@ fn drive(
         frame.header.epoch = 1;
         frame.header.seq = k;
         frame.header.t_capture_ns = (1e9 * way.stamp_s(t_s)).round() as u64;
-        let drives = frame.command[1].abs() >= DRIVES_M_S;
         let fate = way.fate(t_s);
         for watch in &mut watches {
             watch.deliver(&frame, fate, held.as_ref());
-            watch.score(Instant { t_s, dt_s }, drives, &frame);
+            watch.score(t_s, &frame);
         }
         held = (fate == Fate::Overtaken).then_some(frame);
     }

@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use vigil_evaluation::scoring::field::Moment;
+use vigil_evaluation::scoring::Verdict;
+use vigil_evaluation::stages::Stages;
 
 use super::job::Job;
-use crate::simulated::Stages;
 
 /// Prints a line on standard error for every change of alarm, name, set of faults or action.
 #[derive(Debug)]
@@ -23,25 +23,30 @@ impl Timeline {
         })
     }
 
-    /// Takes the next moment.
-    pub(super) fn take(&mut self, moment: &Moment<'_>, stages: &Stages, command: &[f64]) {
-        let alarm = if moment.alarm { "ALARM" } else { "-" };
+    /// Takes the next verdict.
+    pub(super) fn take(&mut self, verdict: &Verdict, stages: &Stages, command: &[f64]) {
+        let alarm = if verdict.alarm { "ALARM" } else { "-" };
         let said = format!(
             "{alarm} mode {} reported {} set {} {:?}",
-            moment.mode, moment.reported, moment.set, moment.order
+            verdict.mode, verdict.reported, verdict.fault_set, verdict.order
         );
         if said == self.said {
             return;
         }
-        let mut line = format!("{} {:.2} s: {said}, p", self.head, moment.t_s);
-        let nodes = stages
-            .node_names()
-            .zip(moment.belief.p_nodes.iter().copied());
-        for (name, p) in highest(nodes).chain([("UNKNOWN", moment.belief.p_unknown)]) {
+        let mut line = format!("{} {:.2} s: {said}, p", self.head, verdict.t_s);
+        let name = |node| stages.taxonomy().name(node).unwrap_or("?");
+        let nodes = verdict.p_nodes.iter().enumerate();
+        let nodes = nodes.map(|(node, p)| (name(node), *p));
+        for (name, p) in highest(nodes).chain([("UNKNOWN", verdict.p_unknown)]) {
             let _ = write!(line, " {name} {p:.3}");
         }
         line.push_str(", log-odds by channel");
-        let channels = stages.channel_log_odds().iter().copied().enumerate();
+        let channels = stages
+            .detection()
+            .channel_log_odds
+            .iter()
+            .copied()
+            .enumerate();
         for (channel, log_odds) in highest(channels) {
             let _ = write!(line, " {channel}: {log_odds:.1}");
         }

@@ -1,18 +1,12 @@
 //! The stages of a run, scored.
 
 use vigil_blocks::SensorFrame;
+use vigil_evaluation::scoring::Verdict;
 use vigil_evaluation::scoring::field::Scorer;
+use vigil_evaluation::stages::Stages;
 
 use super::frames::Fate;
 use super::timeline::Timeline;
-use crate::simulated::Stages;
-
-/// When a frame came, s, and how long after the one before.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Instant {
-    pub t_s: f64,
-    pub dt_s: f64,
-}
 
 /// The stages of one set of sensors, and their score.
 pub(super) struct Watch<'a> {
@@ -22,12 +16,15 @@ pub(super) struct Watch<'a> {
 }
 
 impl Watch<'_> {
-    /// Scores what is said after a frame, `dt_s` after what was scored before.
-    pub(super) fn score(&mut self, at: Instant, drives: bool, frame: &SensorFrame) {
-        let moment = self.stages.moment(at.t_s, at.dt_s, drives);
-        self.scorer.take(&moment);
+    /// Scores what is said at `t_s`, after a frame that was captured then.
+    pub(super) fn score(&mut self, t_s: f64, frame: &SensorFrame) {
+        let verdict = Verdict {
+            t_s,
+            ..self.stages.verdict(frame)
+        };
+        self.scorer.take(&verdict);
         if let Some(timeline) = &mut self.timeline {
-            timeline.take(&moment, &self.stages, &frame.command);
+            timeline.take(&verdict, &self.stages, &frame.command);
         }
     }
 

@@ -7,7 +7,8 @@ use vigil_blocks::{Action, FaultBelief, RecoveryKind, SensorFrame};
 use super::arm::Arm;
 use super::escalation::{Escalation, Explanation, RuleInput, RuleOutput};
 use super::{ShippedGraph, Truth};
-use crate::simulated::Stages;
+use crate::simulated;
+use vigil_evaluation::stages::Stages;
 
 /// One of the commanders.
 pub(super) struct Commander<'a> {
@@ -34,7 +35,7 @@ impl<'a> Commander<'a> {
     ) -> Result<Self, Box<dyn Error>> {
         let file = &shipped.setup.file;
         let (sensors, rate_hz) = (file.detector.sensors, file.graph.rate_hz);
-        let stages = || Stages::new(&shipped.setup, sensors, rate_hz, seed).map(Box::new);
+        let stages = || simulated::stages(&shipped.setup, sensors, rate_hz, seed).map(Box::new);
         let mind = match arm {
             Arm::Vigil => Mind::Vigil(stages()?),
             Arm::Without => Mind::Without,
@@ -64,14 +65,13 @@ impl<'a> Commander<'a> {
             Mind::Without => order(RecoveryKind::GoOn),
             Mind::Escalation(stages, rules) => {
                 stages.take(frame);
-                let (detection, diagnosis, _) = stages.blocks();
-                let alarm = detection.alarm != 0;
-                let explanation = most_probable(&self.leaves, diagnosis);
+                let alarm = stages.detection().alarm != 0;
+                let explanation = most_probable(&self.leaves, stages.diagnosis());
                 rules.answer(RuleInput { alarm, explanation }, dt_s)
             }
             Mind::StopAndCall(stages) => {
                 stages.take(frame);
-                match stages.blocks().0.alarm {
+                match stages.detection().alarm {
                     0 => order(RecoveryKind::GoOn),
                     _ => order(RecoveryKind::CallForHelp),
                 }

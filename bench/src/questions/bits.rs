@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::error::Error;
 
 use clap::ValueEnum;
-use vigil_bench::simulated::{ALL_SETS, Stages};
+use vigil_bench::simulated::{ALL_SETS, stages};
 use vigil_bench::{load, root};
 use vigil_blocks::{Action, DetectionBelief, FaultBelief, fnv1a};
 use vigil_diagnosis::Sensors;
@@ -84,13 +84,12 @@ fn hash_runs(
     setup.file.identifier.filter = filter;
     let mut hash = fnv1a::BASIS;
     for run in runs {
-        let mut stages = Stages::new(&setup, sensors, RATE_HZ, SEED)?;
+        let mut stages = stages(&setup, sensors, RATE_HZ, SEED)?;
         for frame in &run.frames {
             stages.take(frame);
-            let (detection, diagnosis, action) = stages.blocks();
-            hash = hash_detection(hash, detection);
-            hash = hash_diagnosis(hash, diagnosis);
-            hash = hash_action(hash, action);
+            hash = hash_detection(hash, stages.detection());
+            hash = hash_diagnosis(hash, stages.diagnosis());
+            hash = hash_action(hash, stages.action());
         }
     }
     Ok(hash)

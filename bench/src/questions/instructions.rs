@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use serde::Deserialize;
 use serde_json::json;
 use vigil_bench::archive::Archive;
-use vigil_bench::simulated::Stages;
+use vigil_bench::simulated;
 use vigil_blocks::SensorFrame;
 use vigil_robot::Injection;
 use vigil_sensor_sim::SensorSource;
@@ -53,7 +53,7 @@ pub fn run_cycles() -> Result<(), Box<dyn Error>> {
         return Err("the default graph does not simulate".into());
     };
     let graph = &setup.file.graph;
-    let mut stages = Stages::new(
+    let mut stages = simulated::stages(
         &setup,
         setup.file.detector.sensors,
         graph.rate_hz,

@@ -1,8 +1,6 @@
 //! `vigil-lab`: what is done at the desk. `vigil COMMAND` starts it.
 
 mod commands;
-mod pipeline;
-mod recovery;
 
 use std::process::ExitCode;
 

@@ -1,6 +1,6 @@
 //! Scores long runs as a user lives through them: what is said at every instant, not only at a few.
 //!
-//! A run is a series of [`Moment`]s against the truth, a series of [`Stretch`]es. Definitions:
+//! A run is a series of [`super::Verdict`]s against the truth, a series of [`Stretch`]es. Definitions:
 //!
 //! - *onset*: the truth changes to a fault, or to another fault; it is judged until the truth
 //!   changes again. From healthy, the *delay* runs to the next rise of the alarm; an alarm that
@@ -89,6 +89,25 @@ pub struct Stretch {
     pub size: Option<Size>,
 }
 
+impl Stretch {
+    /// A run that is healthy until `onset_s`, if there is an onset; then `mode` is true.
+    #[must_use]
+    pub fn of_label(mode: &str, onset_s: Option<f64>, taxonomy: &Taxonomy) -> Vec<Self> {
+        let stretch = |from_s, truth| Self {
+            from_s,
+            truth,
+            size: None,
+        };
+        let fault = || match taxonomy.index(mode) {
+            Some(_) => Truth::Faults(vec![mode.to_owned()]),
+            None => Truth::Unmodelled { own: None },
+        };
+        let begins = stretch(f64::NEG_INFINITY, Truth::Healthy);
+        let breaks = onset_s.map(|from_s| stretch(from_s, fault()));
+        std::iter::once(begins).chain(breaks).collect()
+    }
+}
+
 /// In which way something is broken, and by how much.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Size {
@@ -123,36 +142,6 @@ pub enum RobotOrder {
     Help,
     /// Anything else: a remedy for one component, another path.
     Other,
-}
-
-/// What was reported at one instant.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moment<'a> {
-    /// Time, s.
-    pub t_s: f64,
-    /// Time since the moment before, s.
-    pub dt_s: f64,
-    /// True if motion is commanded.
-    pub drives: bool,
-    /// True while the alarm stands.
-    pub alarm: bool,
-    /// What is believed.
-    pub belief: Belief<'a>,
-    /// Memoryless mode.
-    pub mode: &'a str,
-    /// Its probability.
-    pub p_mode: f64,
-    /// What is said of the size of the fault that `mode` names.
-    pub size: Size,
-    /// Most probable set of leaves, joined by `+`.
-    pub set: &'a str,
-    /// Mode with hysteresis.
-    pub reported: &'a str,
-    /// What the action orders the robot to do.
-    pub order: RobotOrder,
-    /// Which of the decision model's actions that is, and about which component: a change of either
-    /// is another action.
-    pub action: u64,
 }
 
 impl Truth {

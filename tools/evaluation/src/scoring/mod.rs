@@ -88,10 +88,10 @@ pub struct Verdict {
     /// The action, and the wheel that it is about after a colon; empty if nothing is
     /// decided.
     pub action: String,
-    /// In which way the component that `mode` names is broken, in a word; empty if none is told.
-    pub size_kind: &'static str,
-    /// By how much, in the unit of [`vigil_blocks::SizeKind`]; `None` if the way has no size.
-    pub size: Option<f64>,
+    /// What the action orders the robot to do, as far as it is scored.
+    pub order: field::RobotOrder,
+    /// In which way the component that `mode` names is broken, and by how much.
+    pub size: field::Size,
     /// True if motion is commanded.
     pub drives: bool,
 }

@@ -44,14 +44,10 @@ const COLUMNS: [&str; 15] = [
 /// # Errors
 /// An input that is refused; an output that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let OfflineModels {
-        robot,
-        mut pipeline,
-        runs,
-        ..
-    } = args.filter.prepare()?;
+    let models = args.filter.prepare()?;
+    let OfflineModels { robot, runs, .. } = &models;
     let all = runs.iter().map(|run| (run, f64::INFINITY));
-    for warning in plausibility::warnings(all, &robot) {
+    for warning in plausibility::warnings(all, robot) {
         eprintln!("warning: {}: {warning}", args.filter.frames.display());
     }
     let at_out = |error: &dyn std::fmt::Display| format!("{}: {error}", args.out.display());
@@ -61,11 +57,13 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let progress = Progress::new("runs", runs.len());
     for (done, run) in runs.iter().enumerate() {
         progress.show(done);
-        pipeline.run(run, |verdict| {
-            if written.is_ok() {
-                written = writer.write_record(row(run.id, &verdict));
-            }
-        });
+        let (set, filter) = (&args.filter.sensors, args.filter.identifier);
+        let mut stages = args.filter.stages(&models, set, filter)?;
+        for frame in &run.frames {
+            stages.take(frame);
+            let row = row(run.id, &stages.verdict(frame));
+            written = written.and_then(|()| writer.write_record(row));
+        }
     }
     written
         .and_then(|()| writer.flush().map_err(csv::Error::from))
@@ -74,7 +72,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 }
 
 fn row(run: u32, verdict: &Verdict) -> [String; 15] {
-    let p = |value: f64| format!("{value:.6}");
+    let (p, size) = (|value: f64| format!("{value:.6}"), verdict.size);
     [
         run.to_string(),
         verdict.t_s.to_string(),
@@ -89,7 +87,7 @@ fn row(run: u32, verdict: &Verdict) -> [String; 15] {
         verdict.reported.clone(),
         String::new(),
         verdict.action.clone(),
-        verdict.size.map_or_else(String::new, p),
-        verdict.size_kind.to_owned(),
+        size.kind.unit().map_or_else(String::new, |_| p(size.value)),
+        size.kind.word().to_owned(),
     ]
 }

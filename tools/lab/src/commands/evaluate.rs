@@ -202,7 +202,7 @@ fn page(
     let report = Report {
         facts: facts(args, prepared, runs),
         sets: sets.collect(),
-        taxonomy: prepared.pipeline.taxonomy(),
+        taxonomy: &prepared.taxonomy,
     };
     report.html()
 }

@@ -3,10 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use clap::builder::PossibleValuesParser;
-use serde::Serialize;
+use serde::de::IntoDeserializer;
+use serde::de::value::{Error as Refused, StrDeserializer};
+use serde::{Deserialize, Serialize};
+use vigil_decision::{Compensation, Recovery, RecoveryAction, Supervisor, SupervisorError};
 use vigil_diagnosis::Sensors;
-use vigil_diagnosis::detect::{self, Form};
-use vigil_diagnosis::identify::{self, IdentifierFilter, Models, PARTICLES_MAX, PARTICLES_MIN};
+use vigil_diagnosis::detect::{self, Detector, Form};
+use vigil_diagnosis::identify::{
+    self, Diagnoser, Identifier, IdentifierFilter, Models, NominalIdentifier, PARTICLES_MAX,
+    PARTICLES_MIN,
+};
+use vigil_evaluation::scoring::Taxonomy;
+use vigil_evaluation::stages::{Stages, Vocabulary};
 use vigil_pomdp::Pomdp;
 use vigil_recording::frames::{self, Run};
 use vigil_robot::FaultTree;
@@ -14,12 +22,14 @@ use vigil_robot::tree::Node;
 use vigil_robot::{Description, RobotModel};
 use vigil_setup::{load_decision, load_robot, load_tree, state_risks};
 
-use crate::pipeline::Pipeline;
-use crate::recovery::Recoverer;
 use vigil_terminal::CommandError;
 
 /// Decision model of a robot with faults unless another is given.
 const DECISION: &str = "config/rover.pomdp";
+
+/// Misses in a row without any detection after which no belief is usable. Recorded frames have no
+/// deadlines, so none is ever missed.
+const BLIND_MISSES: u32 = 1;
 
 /// Sets of channels, as `--sensors` names them.
 pub const SENSOR_SETS: [&str; 3] = ["pose", "pose+encoders", "all"];
@@ -112,8 +122,10 @@ pub struct OfflineModels {
     pub model: RobotModel,
     /// The fault tree.
     pub tree: FaultTree,
-    /// Detector and identifier.
-    pub pipeline: Pipeline,
+    /// Sides and types of its faults.
+    pub taxonomy: Taxonomy,
+    /// Chooses the action of each row; none without faults.
+    decision: Option<Pomdp>,
     /// All runs of the frames file.
     pub runs: Vec<Run>,
     /// What was used.
@@ -136,25 +148,27 @@ impl FilterArgs {
             }
             RobotModel::Nominal(_) => return Err(self.names_nothing("--identifier")),
         };
-        let pipeline = self.pipeline(&model, &robot, &tree, &self.sensors, self.identifier)?;
-        let runs = frames::read(&self.frames, &robot).map_err(CommandError::usage)?;
-        let used = FilterSettings {
-            model_hash: format!("{:016x}", model.hash()),
-            tree_hash: format!("{:016x}", tree.hash()),
-            sensors: self.sensors.clone(),
-            detector: self.detector.to_string(),
-            identifier,
-            particles: pipeline.particles(),
-            seed: self.seed,
-        };
-        Ok(OfflineModels {
+        let identify::Settings { p_unknown, .. } = identify::Settings::default();
+        let mut models = OfflineModels {
+            taxonomy: Taxonomy::new(&tree, &robot).with_prior_unknown(p_unknown),
+            decision: self.decision(&model)?,
+            runs: frames::read(&self.frames, &robot).map_err(CommandError::usage)?,
+            used: FilterSettings {
+                model_hash: format!("{:016x}", model.hash()),
+                tree_hash: format!("{:016x}", tree.hash()),
+                sensors: self.sensors.clone(),
+                detector: self.detector.to_string(),
+                identifier,
+                particles: 0,
+                seed: self.seed,
+            },
             robot,
             model,
             tree,
-            pipeline,
-            runs,
-            used,
-        })
+        };
+        let stages = self.stages(&models, &self.sensors, self.identifier)?;
+        models.used.particles = stages.particles();
+        Ok(models)
     }
 
     /// Refuses an option that is about filters that name faults, on a model that knows none.
@@ -177,16 +191,15 @@ impl FilterArgs {
         SENSOR_SETS.into_iter().filter(asked).filter(has).collect()
     }
 
-    /// Detector and identifier with the settings given, but for channels and filter.
-    pub fn pipeline(
+    /// The stages at the beginning of a run, with the settings given but for channels and filter.
+    pub fn stages(
         &self,
-        learned: &RobotModel,
-        robot: &Description,
-        tree: &FaultTree,
+        of: &OfflineModels,
         sensors: &str,
         filter: IdentifierFilter,
-    ) -> Result<Pipeline, CommandError> {
-        let detector = detect::Settings {
+    ) -> Result<Stages, CommandError> {
+        let (robot, tree) = (&of.robot, &of.tree);
+        let settings = detect::Settings {
             sensors: channels(sensors),
             form: self.detector,
             ..detect::Settings::default()
@@ -194,67 +207,62 @@ impl FilterArgs {
         let refuse = |error: &dyn std::fmt::Display| {
             CommandError::usage(format!("{}: {error}", self.model.display()))
         };
-        let model = match learned {
-            RobotModel::Faults(model) => model,
-            RobotModel::Nominal(model) => {
-                let pipeline = Pipeline::nominal(model, robot, tree, &detector);
-                let recoverer = self.recoverer(learned, robot, tree)?;
-                return Ok(pipeline.map_err(|e| refuse(&e))?.recovering(recoverer));
+        let (detector, identifier) = match &of.model {
+            RobotModel::Nominal(model) => (
+                Detector::nominal(model, robot, &settings),
+                Diagnoser::from(NominalIdentifier::new(tree)),
+            ),
+            RobotModel::Faults(model) => {
+                let is_asked = filter == IdentifierFilter::RiskSensitive;
+                let decision = of.decision.as_ref().filter(|_| is_asked);
+                let risks = decision.map(state_risks).transpose();
+                let risks = risks.map_err(|e| refuse(&format!("risks: {e}")))?;
+                let models = Models {
+                    model,
+                    robot,
+                    tree,
+                    risks: risks.as_ref(),
+                };
+                let identifier = identify::Settings {
+                    filter,
+                    particles: self.particles.map(usize::from),
+                    ..identify::Settings::default()
+                };
+                let identifier = Identifier::new(&models, &identifier, settings.sensors, self.seed);
+                (
+                    Detector::new(model, robot, &settings),
+                    Diagnoser::from(identifier.map_err(|e| refuse(&e))?),
+                )
             }
         };
-        let identifier = identify::Settings {
-            filter,
-            particles: self.particles.map(usize::from),
-            ..identify::Settings::default()
+        let supervisor = self.supervisor(of)?;
+        let actions = of.decision.as_ref().map(Pomdp::actions);
+        let vocabulary = Vocabulary {
+            taxonomy: of.taxonomy.clone(),
+            robot: robot.clone(),
+            actions: actions.unwrap_or_default().to_vec(),
         };
-        let needs_decision = identifier.filter == IdentifierFilter::RiskSensitive;
-        let decision = match needs_decision {
-            true => self.decision(learned)?,
-            false => None,
-        };
-        let risks = decision.as_ref().map(state_risks).transpose();
-        let risks = risks.map_err(|e| refuse(&format!("risks: {e}")))?;
-        let models = Models {
-            model,
-            robot,
-            tree,
-            risks: risks.as_ref(),
-        };
-        let pipeline = Pipeline::new(&models, &detector, &identifier, self.seed);
-        let recoverer = self.recoverer(learned, robot, tree)?;
-        Ok(pipeline.map_err(|e| refuse(&e))?.recovering(recoverer))
+        let detector = detector.map_err(|e| refuse(&e))?;
+        Ok(Stages::new(detector, identifier, supervisor, vocabulary))
     }
 
-    /// The decision model given, or the rover's for a model with faults.
+    /// The decision model given, or the rover's for a model with faults, if it is there.
     fn decision(&self, learned: &RobotModel) -> Result<Option<Pomdp>, CommandError> {
-        let usual = match learned {
-            RobotModel::Faults(_) => Some(Path::new(DECISION)),
-            RobotModel::Nominal(_) => None,
-        };
-        let path = self.decision.as_deref().or(usual);
+        let usual = Path::new(DECISION);
+        let has_usual = matches!(learned, RobotModel::Faults(_)) && usual.is_file();
+        let path = self.decision.as_deref().or(has_usual.then_some(usual));
         let decision = path.map(load_decision).transpose();
         decision.map_err(CommandError::usage)
     }
 
     /// The supervisor of a decision model. One that was not asked for and does not fit this robot
     /// is left out: another robot than the rover has its own.
-    fn recoverer(
-        &self,
-        learned: &RobotModel,
-        robot: &Description,
-        tree: &FaultTree,
-    ) -> Result<Option<Recoverer>, CommandError> {
-        if self.decision.is_none() && !Path::new(DECISION).is_file() {
-            return Ok(None);
-        }
-        let Some(decision) = self.decision(learned)? else {
+    fn supervisor(&self, of: &OfflineModels) -> Result<Option<Supervisor>, CommandError> {
+        let Some(decision) = &of.decision else {
             return Ok(None);
         };
-        match (
-            Recoverer::new(decision, tree, robot, learned),
-            &self.decision,
-        ) {
-            (Ok(recoverer), _) => Ok(Some(recoverer)),
+        match (supervisor(decision, of), &self.decision) {
+            (Ok(supervisor), _) => Ok(Some(supervisor)),
             (Err(_), None) => Ok(None),
             (Err(error), Some(path)) => {
                 let message = format!("--decision {}: {error}", path.display());
@@ -262,6 +270,40 @@ impl FilterArgs {
             }
         }
     }
+}
+
+/// For a decision model whose states are the leaves of the tree and whose actions have the names of
+/// what they make the robot do (`go_on`, `slow_down`, `compensate`, ...).
+fn supervisor(decision: &Pomdp, of: &OfflineModels) -> Result<Supervisor, SupervisorError> {
+    let named = |name: &String| {
+        let word: StrDeserializer<'_, Refused> = name.as_str().into_deserializer();
+        let action = RecoveryAction {
+            kind: Recovery::deserialize(word).ok()?,
+            speed_scale: None,
+        };
+        Some((name.clone(), action))
+    };
+    let settings = vigil_decision::Settings {
+        actions: decision.actions().iter().filter_map(named).collect(),
+        ..vigil_decision::Settings::default()
+    };
+    let compensation = (0..of.robot.wheels.len()).map(|wheel| {
+        let (curvature_gain, curvature_offset_1_m) = of.model.compensation(wheel);
+        Compensation {
+            wheel,
+            curvature_gain,
+            curvature_offset_1_m,
+        }
+    });
+    Supervisor::new(
+        decision.clone(),
+        None,
+        &of.tree,
+        &of.robot,
+        &settings,
+        compensation.collect(),
+        BLIND_MISSES,
+    )
 }
 
 fn channels(set: &str) -> Sensors {

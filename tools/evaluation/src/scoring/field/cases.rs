@@ -1,6 +1,7 @@
 //! Runs made by hand, with the figures that they must have.
 
 use super::*;
+use crate::scoring::Verdict;
 use vigil_blocks::SizeKind;
 use vigil_robot::Description;
 use vigil_robot::FaultTree;
@@ -46,7 +47,7 @@ fn fault(name: &str) -> Truth {
 const HEALTHY: [f64; 7] = [0.99, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 const FAULTY: [f64; 7] = [0.01, 0.01, 0.97, 0.01, 0.0, 0.97, 0.0];
 
-fn belief(p_nodes: &'static [f64], p_unknown: f64, is_identifying: bool) -> Belief<'static> {
+fn belief(p_nodes: &[f64], p_unknown: f64, is_identifying: bool) -> Belief<'_> {
     Belief {
         p_nodes,
         p_unknown,
@@ -55,40 +56,38 @@ fn belief(p_nodes: &'static [f64], p_unknown: f64, is_identifying: bool) -> Beli
 }
 
 /// What is said in a nominal moment.
-fn quiet(t_s: f64) -> Moment<'static> {
-    Moment {
+fn quiet(t_s: f64) -> Verdict {
+    Verdict {
         t_s,
-        dt_s: DT_S,
         drives: true,
-        alarm: false,
-        belief: belief(&HEALTHY, 0.01, false),
-        mode: "ND",
+        p_nodes: HEALTHY.to_vec(),
+        p_unknown: 0.01,
+        mode: "ND".to_owned(),
         p_mode: 0.99,
-        size: Size::default(),
-        set: "ND",
-        reported: "ND",
-        order: RobotOrder::GoOn,
-        action: 0,
+        fault_set: "ND".to_owned(),
+        reported: "ND".to_owned(),
+        ..Verdict::default()
     }
 }
 
 /// A fault is said.
-fn said(t_s: f64, mode: &'static str) -> Moment<'static> {
-    Moment {
+fn said(t_s: f64, mode: &'static str) -> Verdict {
+    Verdict {
         alarm: true,
-        belief: belief(&FAULTY, 0.01, true),
-        mode,
+        p_nodes: FAULTY.to_vec(),
+        is_identifying: true,
+        mode: mode.to_owned(),
         p_mode: 0.95,
-        set: mode,
-        reported: mode,
+        fault_set: mode.to_owned(),
+        reported: mode.to_owned(),
         ..quiet(t_s)
     }
 }
 
 /// Scores moments at every half second up to `end_s`.
-fn score(truth: &[Stretch], end_s: f64, moment: impl Fn(f64) -> Moment<'static>) -> Run {
+fn score(truth: &[Stretch], end_s: f64, moment: impl Fn(f64) -> Verdict) -> Run {
     let taxonomy = taxonomy();
-    let mut scorer = Scorer::new(truth, &taxonomy, [0.0, end_s], 7);
+    let mut scorer = Scorer::new(truth, &taxonomy, [-DT_S, end_s], 7);
     let mut t_s = 0.0;
     while t_s < end_s {
         scorer.take(&moment(t_s));
@@ -142,8 +141,8 @@ fn a_name_that_flaps_is_wrong_for_as_long_and_each_change_counts() {
             t if t < 5.0 => said(t, "LF_STUCK"),
             t if t < 7.0 => said(t, "LM_STUCK"),
             t if t < 8.0 => said(t, "LSS"),
-            t if t < 9.0 => Moment {
-                set: "LF_STUCK+RM_ENC",
+            t if t < 9.0 => Verdict {
+                fault_set: "LF_STUCK+RM_ENC".to_owned(),
                 ..said(t, "MULTIPLE")
             },
             t => said(t, "LF_STUCK"),
@@ -220,8 +219,8 @@ fn a_second_fault_is_announced_by_a_new_name() {
     let run = score(&truth, 30.0, |t_s| match t_s {
         t if t < 5.0 => quiet(t),
         t if t < 16.0 => said(t, "RM_STUCK"),
-        t => Moment {
-            set: "RM_ENC+RM_STUCK",
+        t => Verdict {
+            fault_set: "RM_ENC+RM_STUCK".to_owned(),
             ..said(t, "MULTIPLE")
         },
     });
@@ -248,7 +247,7 @@ fn clearing_is_counted_in_driven_seconds_and_may_never_happen() {
             } else {
                 quiet(t_s)
             };
-            Moment {
+            Verdict {
                 alarm: (5.0..alarm_s).contains(&t_s),
                 // It stands for two seconds after the end.
                 drives: !(10.0..12.0).contains(&t_s),
@@ -304,11 +303,11 @@ fn a_size_is_right_with_its_leaf_its_way_and_within_a_fifth() {
         let run = score(&truth, 20.0, move |t_s| match t_s {
             t if t < 6.0 => quiet(t),
             // At 3 s and no later.
-            t if t > 8.0 => Moment {
+            t if t > 8.0 => Verdict {
                 size: gain(2.0),
                 ..said(t, name)
             },
-            t => Moment {
+            t => Verdict {
                 size,
                 ..said(t, name)
             },
@@ -329,9 +328,9 @@ fn a_size_is_right_with_its_leaf_its_way_and_within_a_fifth() {
 
 #[test]
 fn actions_are_entries_and_stops_by_rule_are_counted_apart() {
-    let order = |t_s, order, action| Moment {
+    let order = |t_s, order, action: u32| Verdict {
         order,
-        action,
+        action: action.to_string(),
         ..quiet(t_s)
     };
     let run = score(&[], 10.0, |t_s| match t_s {
@@ -361,14 +360,14 @@ fn actions_are_entries_and_stops_by_rule_are_counted_apart() {
 fn a_reported_fault_without_alarm_contradicts_and_blind_is_no_name() {
     let run = score(&[], 10.0, |t_s| match t_s {
         t if t < 2.0 => quiet(t),
-        t if t < 3.0 => Moment {
-            reported: "LSS",
+        t if t < 3.0 => Verdict {
+            reported: "LSS".to_owned(),
             ..quiet(t)
         },
         t if t < 4.0 => quiet(t),
-        t if t < 6.0 => Moment {
-            mode: BLIND,
-            reported: BLIND,
+        t if t < 6.0 => Verdict {
+            mode: BLIND.to_owned(),
+            reported: BLIND.to_owned(),
             ..quiet(t)
         },
         t => quiet(t),
@@ -436,8 +435,9 @@ fn what_no_model_describes_claims_the_unknown_or_its_own_leaf() {
     let own = |own: Option<&str>| Truth::Unmodelled {
         own: own.map(str::to_owned),
     };
-    let moment = move |t_s: f64| Moment {
-        belief: belief(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.2, 0.4], 0.3, true),
+    let moment = move |t_s: f64| Verdict {
+        p_nodes: vec![0.1, 0.0, 0.0, 0.0, 0.0, 0.2, 0.4],
+        p_unknown: 0.3,
         ..said(t_s, "RM_ENC")
     };
     let run = score(&healthy_until(0.0, own(Some("RM_ENC"))), 20.0, moment);

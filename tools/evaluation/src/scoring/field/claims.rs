@@ -3,8 +3,8 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use super::{BLIND, JUDGED_S, Moment, Run, Stretch, Truth};
-use crate::scoring::{TIME_SLACK_S, Taxonomy, log_score_nats};
+use super::{BLIND, JUDGED_S, Run, Stretch, Truth};
+use crate::scoring::{TIME_SLACK_S, Taxonomy, Verdict, log_score_nats};
 
 /// Times after the first onset at which a belief is taken, s.
 pub const CLAIMED_S: [f64; 5] = [0.5, 1.0, 2.0, 5.0, 10.0];
@@ -67,19 +67,19 @@ impl Instants {
     /// Takes what is believed if an instant has come; `at` is the stretch that holds.
     pub(super) fn take(
         &mut self,
-        moment: &Moment<'_>,
+        verdict: &Verdict,
         (at, truth): (usize, &Truth),
         taxonomy: &Taxonomy,
         run: &mut Run,
     ) {
-        let is_due = |instant: &mut Instant| instant.t_s <= moment.t_s + TIME_SLACK_S;
+        let is_due = |instant: &mut Instant| instant.t_s <= verdict.t_s + TIME_SLACK_S;
         while let Some(instant) = self.due.pop_if(is_due) {
-            if moment.mode == BLIND || instant.stretch != at {
+            if verdict.mode == BLIND || instant.stretch != at {
                 continue;
             }
-            run.claims.push(truth.claim(&moment.belief, taxonomy));
+            run.claims.push(truth.claim(&verdict.belief(), taxonomy));
             if instant.is_scored {
-                let p = truth.p(&moment.belief, taxonomy);
+                let p = truth.p(&verdict.belief(), taxonomy);
                 run.log_score_2_s_nats = p.map(log_score_nats);
             }
         }

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::{Figure, Moment, RobotOrder, Run, Scorer, Size, Stretch, Truth, figures};
-use crate::scoring::{Case, Taxonomy, Verdict};
+use super::{Figure, Run, Scorer, Stretch, figures};
+use crate::scoring::{Case, Taxonomy};
 
 /// Name of a stop by rule, without a usable belief, among the actions of verdicts.
 pub const SAFE_STOP: &str = "safe_stop";
@@ -39,62 +39,12 @@ pub fn of_cases(cases: &[Case], taxonomy: &Taxonomy) -> BTreeMap<String, Figures
 }
 
 fn score(case: &Case, taxonomy: &Taxonomy) -> Run {
-    let mode = &case.label.mode;
-    let truth = match (case.label.onset_s, taxonomy.index(mode)) {
-        (None, _) => Truth::Healthy,
-        (Some(_), Some(_)) => Truth::Faults(vec![mode.clone()]),
-        (Some(_), None) => Truth::Unmodelled { own: None },
-    };
-    let begins = Stretch {
-        from_s: f64::NEG_INFINITY,
-        truth: Truth::Healthy,
-        size: None,
-    };
-    let breaks = case.label.onset_s.map(|from_s| Stretch {
-        from_s,
-        truth,
-        size: None,
-    });
-    let truth: Vec<Stretch> = std::iter::once(begins).chain(breaks).collect();
+    let truth = Stretch::of_label(&case.label.mode, case.label.onset_s, taxonomy);
     let ends = [case.verdicts.first(), case.verdicts.last()];
     let span_s = ends.map(|verdict| verdict.map_or(0.0, |verdict| verdict.t_s));
     let mut scorer = Scorer::new(&truth, taxonomy, span_s, u64::from(case.label.run));
-    let mut actions: Vec<&str> = Vec::new();
-    let mut t_before_s = None;
-    for verdict in &case.verdicts {
-        let action = actions.iter().position(|&action| action == verdict.action);
-        let action = action.unwrap_or_else(|| {
-            actions.push(&verdict.action);
-            actions.len() - 1
-        });
-        scorer.take(&Moment {
-            t_s: verdict.t_s,
-            dt_s: verdict.t_s - t_before_s.unwrap_or(verdict.t_s),
-            drives: verdict.drives,
-            alarm: verdict.alarm,
-            belief: verdict.belief(),
-            mode: &verdict.mode,
-            p_mode: verdict.p_mode,
-            // No label has a size.
-            size: Size::default(),
-            set: &verdict.fault_set,
-            reported: &verdict.reported,
-            order: order(verdict),
-            action: action as u64,
-        });
-        t_before_s = Some(verdict.t_s);
-    }
+    case.verdicts
+        .iter()
+        .for_each(|verdict| scorer.take(verdict));
     scorer.finish()
-}
-
-fn order(verdict: &Verdict) -> RobotOrder {
-    let name = verdict.action.split(':').next().unwrap_or_default();
-    match name {
-        "" | "go_on" => RobotOrder::GoOn,
-        "slow_down" => RobotOrder::Slow,
-        "stop" | "give_up" => RobotOrder::Stop,
-        "call_for_help" => RobotOrder::Help,
-        SAFE_STOP => RobotOrder::Blind,
-        _ => RobotOrder::Other,
-    }
 }

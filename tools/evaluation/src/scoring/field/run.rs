@@ -1,8 +1,8 @@
-//! One run, moment by moment.
+//! One run, verdict by verdict.
 
 use super::claims::{Claim, Instants};
-use super::{BLIND, CONFIDENT, HELD_S, JUDGED_S, Moment, RobotOrder, SIZED_S, Stretch, Truth};
-use crate::scoring::{TIME_SLACK_S, Taxonomy};
+use super::{BLIND, CONFIDENT, HELD_S, JUDGED_S, RobotOrder, SIZED_S, Stretch, Truth};
+use crate::scoring::{TIME_SLACK_S, Taxonomy, Verdict};
 
 /// One onset of a fault.
 #[derive(Debug, Clone, PartialEq)]
@@ -143,16 +143,6 @@ pub struct Run {
     pub blind_s: f64,
 }
 
-/// What was said a moment ago.
-#[derive(Debug, Clone, PartialEq, Default)]
-struct Before {
-    alarm: bool,
-    mode: String,
-    reported: String,
-    action: u64,
-    order: RobotOrder,
-}
-
 /// Scores one run while it goes on.
 #[derive(Debug, Clone)]
 pub struct Scorer<'a> {
@@ -160,7 +150,10 @@ pub struct Scorer<'a> {
     taxonomy: &'a Taxonomy,
     /// The stretch that holds now.
     at: usize,
-    before: Option<Before>,
+    before: Option<Verdict>,
+    /// Time of the last verdict, s, and how long after the one before.
+    t_s: f64,
+    dt_s: f64,
     instants: Instants,
     contradiction_s: f64,
     /// Driven time after the last end at which alarm and name were down, and since when in time.
@@ -178,6 +171,8 @@ impl<'a> Scorer<'a> {
             taxonomy,
             at: 0,
             before: None,
+            t_s: span_s[0],
+            dt_s: 0.0,
             instants: Instants::new(truth, span_s, seed),
             contradiction_s: 0.0,
             down: [None; 2],
@@ -195,45 +190,40 @@ impl<'a> Scorer<'a> {
         stretch.map_or(&Truth::Healthy, |stretch| &stretch.truth)
     }
 
-    /// Takes the next moment; moments come in order of time.
-    pub fn take(&mut self, moment: &Moment<'_>) {
-        let begins = |stretch: &Stretch| stretch.from_s <= moment.t_s + TIME_SLACK_S;
+    /// Takes the next verdict; verdicts come in order of time.
+    pub fn take(&mut self, verdict: &Verdict) {
+        let begins = |stretch: &Stretch| stretch.from_s <= verdict.t_s + TIME_SLACK_S;
         while self.truth.get(self.at + 1).is_some_and(begins) {
             let before = self.now();
             self.at += 1;
             self.begin_stretch(before);
         }
-        let run = &mut self.run;
-        run.duration_s += moment.dt_s;
-        if moment.drives {
-            run.driven_s += moment.dt_s;
+        self.dt_s = verdict.t_s - self.t_s;
+        self.t_s = verdict.t_s;
+        self.run.duration_s += self.dt_s;
+        if verdict.drives {
+            self.run.driven_s += self.dt_s;
         }
         let is_first = self.before.is_none();
-        let before = self.before.take().unwrap_or_else(|| Before {
-            mode: moment.mode.to_owned(),
-            reported: moment.reported.to_owned(),
-            ..Before::default()
+        let before = self.before.take().unwrap_or_else(|| Verdict {
+            mode: verdict.mode.clone(),
+            reported: verdict.reported.clone(),
+            ..Verdict::default()
         });
-        self.judge_onset(moment, &before);
-        self.judge_end(moment);
-        self.judge_names(moment);
+        self.judge_onset(verdict, &before);
+        self.judge_end(verdict);
+        self.judge_names(verdict);
         let now = (self.at, self.now());
         let (taxonomy, run) = (self.taxonomy, &mut self.run);
-        self.instants.take(moment, now, taxonomy, run);
-        self.count(moment, &before, is_first);
-        self.before = Some(Before {
-            alarm: moment.alarm,
-            mode: moment.mode.to_owned(),
-            reported: moment.reported.to_owned(),
-            action: moment.action,
-            order: moment.order,
-        });
+        self.instants.take(verdict, now, taxonomy, run);
+        self.count(verdict, &before, is_first);
+        self.before = Some(verdict.clone());
     }
 
     /// What the run brought.
     #[must_use]
     pub fn finish(mut self) -> Run {
-        let helps = |before: &Before| before.order == RobotOrder::Help;
+        let helps = |before: &Verdict| before.order == RobotOrder::Help;
         self.run.is_help_latched =
             self.now().is_healthy() && self.before.as_ref().is_some_and(helps);
         self.run
@@ -274,7 +264,7 @@ impl<'a> Scorer<'a> {
         before.is_some_and(|stretch| !stretch.truth.is_healthy())
     }
 
-    fn judge_onset(&mut self, moment: &Moment<'_>, before: &Before) {
+    fn judge_onset(&mut self, verdict: &Verdict, before: &Verdict) {
         let (truth, taxonomy) = (self.now(), self.taxonomy);
         if truth.is_healthy() {
             return;
@@ -284,30 +274,30 @@ impl<'a> Scorer<'a> {
         let Some(onset) = self.run.onsets.last_mut() else {
             return;
         };
-        onset.until_s = moment.t_s;
-        let since_s = (moment.t_s - onset.t_s).max(0.0);
-        let rises = moment.alarm && !before.alarm;
-        let changes = follows && moment.mode != before.mode;
+        onset.until_s = verdict.t_s;
+        let since_s = (verdict.t_s - onset.t_s).max(0.0);
+        let rises = verdict.alarm && !before.alarm;
+        let changes = follows && verdict.mode != before.mode;
         if onset.delay_s.is_none() && (rises || changes) {
             onset.delay_s = Some(since_s);
         }
-        // The last moment up to each instant counts: it is overwritten until the instant is past.
+        // The last verdict up to each instant counts: it is overwritten until the instant is past.
         for (i, judged_s) in JUDGED_S.into_iter().enumerate() {
             let due = since_s + TIME_SLACK_S >= judged_s;
             if due && onset.leaf[i].is_none() {
-                let (name, set) = (moment.mode, moment.set);
+                let (name, set) = (verdict.mode.as_str(), verdict.fault_set.as_str());
                 onset.leaf[i] = Some(truth.is_leaf(name, set, taxonomy));
                 onset.side[i] = Some(truth.is_side(name, set, taxonomy));
             }
         }
         let is_due = since_s + TIME_SLACK_S >= SIZED_S && onset.size.is_none();
         if let Some(size) = size.filter(|_| is_due) {
-            let is_leaf = truth.is_leaf(moment.mode, moment.set, taxonomy);
-            onset.size = Some(is_leaf && size.is(&moment.size));
+            let is_leaf = truth.is_leaf(&verdict.mode, &verdict.fault_set, taxonomy);
+            onset.size = Some(is_leaf && size.is(&verdict.size));
         }
     }
 
-    fn judge_end(&mut self, moment: &Moment<'_>) {
+    fn judge_end(&mut self, verdict: &Verdict) {
         if !self.now().is_healthy() {
             return;
         }
@@ -315,9 +305,9 @@ impl<'a> Scorer<'a> {
         let Some(end) = self.run.ends.last_mut() else {
             return;
         };
-        let named = moment.mode != nominal || moment.reported != nominal;
+        let named = verdict.mode != nominal || verdict.reported != nominal;
         let slots = [&mut end.alarm_s, &mut end.name_s];
-        for ((is_up, slot), down) in [moment.alarm, named]
+        for ((is_up, slot), down) in [verdict.alarm, named]
             .into_iter()
             .zip(slots)
             .zip(&mut self.down)
@@ -326,36 +316,36 @@ impl<'a> Scorer<'a> {
                 *down = None;
                 continue;
             }
-            let (driven_s, since_s) = *down.get_or_insert((end.driven_s, moment.t_s));
-            if slot.is_none() && moment.t_s - since_s + TIME_SLACK_S >= HELD_S {
+            let (driven_s, since_s) = *down.get_or_insert((end.driven_s, verdict.t_s));
+            if slot.is_none() && verdict.t_s - since_s + TIME_SLACK_S >= HELD_S {
                 *slot = Some(driven_s);
             }
         }
-        end.driven_s += if moment.drives { moment.dt_s } else { 0.0 };
+        end.driven_s += if verdict.drives { self.dt_s } else { 0.0 };
     }
 
-    fn judge_names(&mut self, moment: &Moment<'_>) {
-        let (truth, taxonomy, dt_s) = (self.now(), self.taxonomy, moment.dt_s);
+    fn judge_names(&mut self, verdict: &Verdict) {
+        let (truth, taxonomy, dt_s) = (self.now(), self.taxonomy, self.dt_s);
         let run = &mut self.run;
-        if moment.mode == BLIND {
+        if verdict.mode == BLIND {
             run.blind_s += dt_s;
         }
-        let (name, set) = (moment.mode, moment.set);
+        let (name, set) = (verdict.mode.as_str(), verdict.fault_set.as_str());
         let is_leaf = truth.is_leaf(name, set, taxonomy);
         let is_wrong = !is_leaf && name != BLIND;
         run.wrong_s += if is_wrong { dt_s } else { 0.0 };
-        if !moment.drives {
+        if !verdict.drives {
             return;
         }
         if truth.is_healthy() {
             run.healthy_driven_s += dt_s;
             run.healthy_wrong_s += if is_wrong { dt_s } else { 0.0 };
-            run.healthy_alarm_s += if moment.alarm { dt_s } else { 0.0 };
+            run.healthy_alarm_s += if verdict.alarm { dt_s } else { 0.0 };
             return;
         }
         let onset_s = run.onsets.last().map_or(f64::INFINITY, |onset| onset.t_s);
-        let since_s = moment.t_s - onset_s + TIME_SLACK_S;
-        let confident = moment.p_mode > CONFIDENT && truth.is_wrong_leaf(name, set, taxonomy);
+        let since_s = verdict.t_s - onset_s + TIME_SLACK_S;
+        let confident = verdict.p_mode > CONFIDENT && truth.is_wrong_leaf(name, set, taxonomy);
         for (seen, from_s) in [
             (&mut run.from_2_s, JUDGED_S[0]),
             (&mut run.from_10_s, JUDGED_S[2]),
@@ -367,42 +357,42 @@ impl<'a> Scorer<'a> {
             seen.driven_s += dt_s;
             seen.leaf_s += of(is_leaf);
             seen.side_s += of(truth.is_side(name, set, taxonomy));
-            seen.reported_s += of(truth.is_leaf(moment.reported, set, taxonomy));
-            seen.alarm_s += of(moment.alarm);
+            seen.reported_s += of(truth.is_leaf(&verdict.reported, set, taxonomy));
+            seen.alarm_s += of(verdict.alarm);
             seen.confident_wrong_s += of(confident);
         }
     }
 
-    fn count(&mut self, moment: &Moment<'_>, before: &Before, is_first: bool) {
+    fn count(&mut self, verdict: &Verdict, before: &Verdict, is_first: bool) {
         let truth = self.now();
         let nominal = self.taxonomy.name(0).unwrap_or_default();
         let run = &mut self.run;
         let onset_s = run.onsets.last().map_or(f64::INFINITY, |onset| onset.t_s);
-        let is_settled = !truth.is_healthy() && moment.t_s - onset_s + TIME_SLACK_S >= JUDGED_S[0];
+        let is_settled = !truth.is_healthy() && verdict.t_s - onset_s + TIME_SLACK_S >= JUDGED_S[0];
         for (changes, is) in [
-            (&mut run.mode, moment.mode != before.mode),
-            (&mut run.reported, moment.reported != before.reported),
+            (&mut run.mode, verdict.mode != before.mode),
+            (&mut run.reported, verdict.reported != before.reported),
         ] {
             changes.all += usize::from(is);
             changes.settled += usize::from(is && is_settled);
         }
-        let rises = moment.alarm && !before.alarm;
+        let rises = verdict.alarm && !before.alarm;
         run.alarms += usize::from(rises && truth.is_healthy());
-        let enters = moment.action != before.action || moment.order != before.order;
+        let enters = verdict.action != before.action || verdict.order != before.order;
         if enters || is_first {
             match truth.is_healthy() {
-                true => run.actions.add(moment.order),
-                false => run.actions_in_fault.add(moment.order),
+                true => run.actions.add(verdict.order),
+                false => run.actions_in_fault.add(verdict.order),
             }
         }
-        let names = moment.reported != nominal && moment.reported != BLIND;
-        let contradicts = (moment.alarm && moment.belief.node(0, self.taxonomy) > 0.5)
-            || (names && !moment.alarm);
+        let names = verdict.reported != nominal && verdict.reported != BLIND;
+        let contradicts = (verdict.alarm && verdict.belief().node(0, self.taxonomy) > 0.5)
+            || (names && !verdict.alarm);
         self.contradiction_s = match contradicts {
-            true => self.contradiction_s + moment.dt_s,
+            true => self.contradiction_s + self.dt_s,
             false => 0.0,
         };
-        run.contradiction_s += if contradicts { moment.dt_s } else { 0.0 };
+        run.contradiction_s += if contradicts { self.dt_s } else { 0.0 };
         run.contradiction_longest_s = run.contradiction_longest_s.max(self.contradiction_s);
     }
 }

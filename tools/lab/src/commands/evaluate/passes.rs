@@ -72,7 +72,7 @@ impl<'a> Passes<'a> {
         entrants: &[IdentifierFilter],
         progress: &Progress,
     ) -> Result<SensorSetResult, CommandError> {
-        let taxonomy = self.prepared.pipeline.taxonomy();
+        let taxonomy = &self.prepared.taxonomy;
         let chosen = self.args.filter.identifier;
         let pass = self.pass(set, chosen, progress)?;
         let score = scoring::score(&pass.cases, taxonomy, pass.alarm_log_odds);
@@ -102,24 +102,24 @@ impl<'a> Passes<'a> {
         filter: IdentifierFilter,
         progress: &Progress,
     ) -> Result<Pass, CommandError> {
-        let OfflineModels {
-            model, robot, tree, ..
-        } = self.prepared;
-        let mut pipeline = self.args.filter.pipeline(model, robot, tree, set, filter)?;
+        let begin = || self.args.filter.stages(self.prepared, set, filter);
+        let alarm_log_odds = begin()?.alarm_log_odds();
         let cases = self.runs.iter().map(|(run, label)| {
             progress.show(self.done.get());
             self.done.set(self.done.get() + 1);
-            let mut verdicts = Vec::with_capacity(run.frames.len());
-            pipeline.run(run, |verdict| verdicts.push(verdict));
-            Case {
+            let mut stages = begin()?;
+            let verdicts = run.frames.iter().map(|frame| {
+                stages.take(frame);
+                stages.verdict(frame)
+            });
+            Ok(Case {
                 label: label.clone(),
-                verdicts,
-            }
+                verdicts: verdicts.collect(),
+            })
         });
-        let cases = cases.collect();
         Ok(Pass {
-            cases,
-            alarm_log_odds: pipeline.alarm_log_odds(),
+            cases: cases.collect::<Result<_, CommandError>>()?,
+            alarm_log_odds,
         })
     }
 }
