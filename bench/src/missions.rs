@@ -15,7 +15,6 @@
 
 mod arm;
 mod commander;
-mod course;
 mod drive;
 mod escalation;
 mod plan;
@@ -24,7 +23,6 @@ mod score;
 mod table;
 
 pub use arm::Arm;
-pub use course::Course;
 pub use drive::{Mission, drive};
 pub use escalation::{Escalation, Explanation, RuleInput, RuleOutput};
 pub use plan::{Fault, Kind, Plan};

@@ -114,23 +114,25 @@ impl Run {
     /// The file: a line of the summary, a figure and a raw file are a line each.
     #[must_use]
     pub fn text(&self) -> String {
-        let lines = self.summary.iter().map(|line| json!(line).to_string());
-        let remarks = self.remarks.iter().map(|line| json!(line).to_string());
+        let listed = |lines: &[String]| block(["[", "]"], lines.iter().map(|line| json!(line)));
         let figures = self.figures.iter();
         let figures = figures.map(|(name, value)| format!("{}: {value}", json!(name)));
-        let raw = self.raw.iter().map(|of| json!(of).to_string());
         let parts = [
-            format!("\"schema_version\": {}", self.schema_version),
-            format!("\"question\": {}", json!(self.question)),
-            format!("\"command\": {}", json!(self.command)),
-            format!("\"commit\": {}", json!(self.commit)),
-            format!("\"date\": {}", json!(self.date)),
-            format!("\"machine\": {}", self.machine),
-            format!("\"summary\": {}", block(["[", "]"], lines)),
-            format!("\"remarks\": {}", block(["[", "]"], remarks)),
-            format!("\"figures\": {}", block(["{", "}"], figures)),
-            format!("\"raw\": {}", block(["[", "]"], raw)),
+            ("schema_version", self.schema_version.to_string()),
+            ("question", json!(self.question).to_string()),
+            ("command", json!(self.command).to_string()),
+            ("commit", json!(self.commit).to_string()),
+            ("date", json!(self.date).to_string()),
+            ("machine", self.machine.to_string()),
+            ("summary", listed(&self.summary)),
+            ("remarks", listed(&self.remarks)),
+            ("figures", block(["{", "}"], figures)),
+            (
+                "raw",
+                block(["[", "]"], self.raw.iter().map(|of| json!(of))),
+            ),
         ];
+        let parts = parts.map(|(key, value)| format!("\"{key}\": {value}"));
         format!("{{\n{}\n}}\n", parts.join(",\n"))
     }
 
@@ -166,8 +168,8 @@ impl Run {
 }
 
 /// Items in brackets, one a line.
-fn block([open, close]: [&str; 2], items: impl Iterator<Item = String>) -> String {
-    let items: Vec<String> = items.collect();
+fn block([open, close]: [&str; 2], items: impl Iterator<Item = impl ToString>) -> String {
+    let items: Vec<String> = items.map(|item| item.to_string()).collect();
     if items.is_empty() {
         return format!("{open}{close}");
     }

@@ -1,7 +1,8 @@
 //! Ways to hand a block to another process.
 
 use std::error::Error;
-use std::io::{ErrorKind, Read, Write};
+use std::fs::File;
+use std::io::{self, ErrorKind, Read, Write};
 use std::os::unix::fs::FileTypeExt;
 use std::os::unix::net::UnixDatagram;
 use std::path::Path;
@@ -45,14 +46,14 @@ impl Carrier {
                 last_read: 0,
             }),
             Self::SharedMemory => payload::incoming(shared, before, size)?,
-            Self::Datagram => Box::new(DatagramReader {
-                socket: UnixDatagram::bind(&path)?,
-                message: Message::new(size),
-            }),
-            Self::Pipe => Box::new(PipeReader {
-                pipe: open_pipe(&path, false)?,
-                message: Message::new(size),
-            }),
+            Self::Datagram => {
+                let socket = UnixDatagram::bind(&path)?;
+                copy_reader(size, move |bytes, limit| receive(&socket, bytes, limit))
+            }
+            Self::Pipe => {
+                let mut pipe = open_pipe(&path, false)?;
+                copy_reader(size, move |bytes, _| read_pipe(&mut pipe, bytes))
+            }
             Self::Queue => return Err("a queue lies within one process".into()),
         })
     }
@@ -71,22 +72,17 @@ impl Carrier {
             }),
             Self::SharedMemory => payload::outgoing(shared, stage, size)?,
             Self::Queue => return Err("a queue lies within one process".into()),
-            _ if is_last => Box::new(Sink {
-                message: Message::new(size),
-            }),
+            _ if is_last => copy_writer(size, |_| Ok(())),
             Self::Datagram => {
                 let socket = UnixDatagram::unbound()?;
                 wait_for(&path)?;
                 socket.connect(&path)?;
-                Box::new(DatagramWriter {
-                    socket,
-                    message: Message::new(size),
-                })
+                copy_writer(size, move |bytes| socket.send(bytes).map(|_| ()))
             }
-            Self::Pipe => Box::new(PipeWriter {
-                pipe: open_pipe(&path, true)?,
-                message: Message::new(size),
-            }),
+            Self::Pipe => {
+                let mut pipe = open_pipe(&path, true)?;
+                copy_writer(size, move |bytes| pipe.write_all(bytes))
+            }
         })
     }
 }
@@ -181,34 +177,17 @@ impl Outgoing for FutexWriter {
     }
 }
 
-/// The end of a chain over copies.
-struct Sink {
+/// Reads messages by copying them out of what the system holds.
+struct CopyReader<R> {
+    /// Fills a message within the limit; false if none came.
+    read: R,
     message: Message,
 }
 
-impl Outgoing for Sink {
-    fn fill(&mut self, byte: u8) {
-        self.message.fill(byte);
-    }
-
-    fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>> {
-        Ok(self.message.stamp(t_schedule_ns))
-    }
-}
-
-struct DatagramReader {
-    socket: UnixDatagram,
-    message: Message,
-}
-
-impl Incoming for DatagramReader {
+impl<R: FnMut(&mut [u8], Duration) -> io::Result<bool>> Incoming for CopyReader<R> {
     fn receive(&mut self, limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>> {
-        self.socket.set_read_timeout(Some(limit))?;
-        match self.socket.recv(&mut self.message.0) {
-            Ok(_) => Ok(Some(self.message.instants())),
-            Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => Ok(None),
-            Err(error) => Err(error.into()),
-        }
+        let has_come = (self.read)(&mut self.message.0, limit)?;
+        Ok(has_come.then(|| self.message.instants()))
     }
 
     fn checksum(&self) -> u64 {
@@ -216,25 +195,61 @@ impl Incoming for DatagramReader {
     }
 }
 
-struct DatagramWriter {
-    socket: UnixDatagram,
+/// Writes messages by having the system copy them.
+struct CopyWriter<W> {
+    write: W,
     message: Message,
 }
 
-impl Outgoing for DatagramWriter {
+impl<W: FnMut(&[u8]) -> io::Result<()>> Outgoing for CopyWriter<W> {
     fn fill(&mut self, byte: u8) {
         self.message.fill(byte);
     }
 
     fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>> {
         let t_publish_ns = self.message.stamp(t_schedule_ns);
-        self.socket.send(&self.message.0)?;
+        (self.write)(&self.message.0)?;
         Ok(t_publish_ns)
     }
 }
 
+fn copy_reader<R>(size: usize, read: R) -> Box<dyn Incoming>
+where
+    R: FnMut(&mut [u8], Duration) -> io::Result<bool> + 'static,
+{
+    let message = Message::new(size);
+    Box::new(CopyReader { read, message })
+}
+
+fn copy_writer<W>(size: usize, write: W) -> Box<dyn Outgoing>
+where
+    W: FnMut(&[u8]) -> io::Result<()> + 'static,
+{
+    let message = Message::new(size);
+    Box::new(CopyWriter { write, message })
+}
+
+/// Reads one datagram.
+fn receive(socket: &UnixDatagram, bytes: &mut [u8], limit: Duration) -> io::Result<bool> {
+    socket.set_read_timeout(Some(limit))?;
+    match socket.recv(bytes) {
+        Ok(_) => Ok(true),
+        Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// Waits until a message has come or the writer has gone: a pipe has no time limit.
+fn read_pipe(pipe: &mut File, bytes: &mut [u8]) -> io::Result<bool> {
+    match pipe.read_exact(bytes) {
+        Ok(()) => Ok(true),
+        Err(e) if e.kind() == ErrorKind::UnexpectedEof => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
 /// Opens a named pipe, which the first of its users makes.
-fn open_pipe(path: &Path, is_writer: bool) -> Result<std::fs::File, Box<dyn Error>> {
+fn open_pipe(path: &Path, is_writer: bool) -> Result<File, Box<dyn Error>> {
     let is_there = || std::fs::metadata(path).is_ok_and(|m| m.file_type().is_fifo());
     if !is_there() {
         // The other side may have been quicker.
@@ -249,41 +264,4 @@ fn open_pipe(path: &Path, is_writer: bool) -> Result<std::fs::File, Box<dyn Erro
     let mut options = std::fs::OpenOptions::new();
     // Opening waits for the other side.
     Ok(options.read(!is_writer).write(is_writer).open(path)?)
-}
-
-struct PipeReader {
-    pipe: std::fs::File,
-    message: Message,
-}
-
-impl Incoming for PipeReader {
-    /// Waits until the writer goes: a pipe has no time limit.
-    fn receive(&mut self, _limit: Duration) -> Result<Option<(u64, u64)>, Box<dyn Error>> {
-        match self.pipe.read_exact(&mut self.message.0) {
-            Ok(()) => Ok(Some(self.message.instants())),
-            Err(e) if e.kind() == ErrorKind::UnexpectedEof => Ok(None),
-            Err(error) => Err(error.into()),
-        }
-    }
-
-    fn checksum(&self) -> u64 {
-        self.message.checksum()
-    }
-}
-
-struct PipeWriter {
-    pipe: std::fs::File,
-    message: Message,
-}
-
-impl Outgoing for PipeWriter {
-    fn fill(&mut self, byte: u8) {
-        self.message.fill(byte);
-    }
-
-    fn publish(&mut self, t_schedule_ns: u64) -> Result<u64, Box<dyn Error>> {
-        let t_publish_ns = self.message.stamp(t_schedule_ns);
-        self.pipe.write_all(&self.message.0)?;
-        Ok(t_publish_ns)
-    }
 }

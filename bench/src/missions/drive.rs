@@ -8,13 +8,9 @@ use vigil_sensor_sim::{ActionGate, World};
 
 use super::arm::Arm;
 use super::commander::Commander;
-use super::course::{Course, distance};
 use super::plan::Plan;
-use super::score::{ObeyedOrder, Pay, Place, Score, Step, Tally, Truth};
+use super::score::{ObeyedOrder, Pay, Score, Step, Tally, Truth};
 use super::{HELP_S, LIMIT_S, ShippedGraph};
-
-/// Time between two places that are remembered, s.
-const REMEMBER_S: f64 = 0.1;
 
 /// A mission, driven.
 #[derive(Debug, Clone)]
@@ -25,37 +21,16 @@ pub struct Mission {
     pub scores: [Score; Arm::ALL.len()],
 }
 
-/// What one commander made of it.
-pub(super) struct CommanderRun {
-    tally: Tally,
-    pub(super) places: Vec<Place>,
-    /// The planned positions, m.
-    planned: Vec<[f64; 2]>,
-    done: bool,
-}
-
 /// Drives a mission with every commander.
 ///
 /// # Errors
 /// A world or commander that cannot be made.
 pub fn drive(shipped: &ShippedGraph, plan: Plan) -> Result<Mission, Box<dyn Error>> {
-    // Who goes on whatever happens drives the whole plan: its planned positions are the path.
-    let without = ride(shipped, &plan, Arm::Without)?;
-    let course = Course::new(without.planned.iter().copied());
     let mut scores = [Score::default(); Arm::ALL.len()];
     for (score, arm) in scores.iter_mut().zip(Arm::ALL) {
-        *score = match arm {
-            Arm::Without => without.score(&course),
-            _ => ride(shipped, &plan, arm)?.score(&course),
-        };
+        *score = ride(shipped, &plan, arm)?;
     }
     Ok(Mission { plan, scores })
-}
-
-impl CommanderRun {
-    fn score(&self, course: &Course) -> Score {
-        Score::new(&self.tally, &self.places, course, self.done)
-    }
 }
 
 /// The world of a mission, what is wrong in it, and who helps.
@@ -145,11 +120,7 @@ fn state(shipped: &ShippedGraph, name: &str) -> Result<usize, Box<dyn Error>> {
 }
 
 /// Drives a mission with one commander.
-pub(super) fn ride(
-    shipped: &ShippedGraph,
-    plan: &Plan,
-    arm: Arm,
-) -> Result<CommanderRun, Box<dyn Error>> {
+fn ride(shipped: &ShippedGraph, plan: &Plan, arm: Arm) -> Result<Score, Box<dyn Error>> {
     let rate_hz = shipped.setup.file.graph.rate_hz;
     let dt_s = 1.0 / rate_hz;
     let period_ns = (1e9 / rate_hz).round() as u64;
@@ -157,14 +128,8 @@ pub(super) fn ride(
     let mut commander = Commander::new(shipped, arm, plan.seed)?;
     let mut gate = ActionGate::new(&shipped.setup.robot.limits);
     let pay = Pay::new(shipped);
-    let mut driven = CommanderRun {
-        tally: Tally::default(),
-        places: Vec::new(),
-        planned: Vec::new(),
-        done: false,
-    };
-    let (mut frame, mut planned_s, mut planned_m) = (SensorFrame::default(), 0.0, 0.0);
-    let each = (REMEMBER_S * rate_hz).round().max(1.0) as u64;
+    let mut tally = Tally::default();
+    let (mut frame, mut planned_s) = (SensorFrame::default(), 0.0);
     field.world.measure(&mut frame);
     for k in 0..(LIMIT_S * rate_hz) as u64 {
         frame.header.epoch = 1;
@@ -175,32 +140,26 @@ pub(super) fn ride(
         let obeyed = ObeyedOrder::new(action);
         let planned = field.world.planned();
         let command = gate.apply(planned, Some(action), frame.header.t_capture_ns);
-        let (before, was_planned) = (field.world.true_state().pose, frame.planned_pose);
+        let before = field.world.true_state().pose;
         field.world.step(dt_s, command);
         field.world.measure(&mut frame);
-        let (pose, at) = (field.world.true_state().pose, frame.planned_pose);
-        planned_m += distance([was_planned[0], was_planned[1]], [at[0], at[1]]);
+        let pose = field.world.true_state().pose;
         let step = Step {
             truth: field.truth,
             obeyed,
             may_stand: shipped.may_stand(field.truth.state),
-            moved_m: distance([before[0], before[1]], [pose[0], pose[1]]),
+            moved_m: (pose[0] - before[0]).hypot(pose[1] - before[1]),
             dt_s,
         };
-        driven.tally.add(&pay, &step);
-        driven.planned.push([at[0], at[1]]);
+        tally.add(&pay, &step);
         planned_s += command.progress * dt_s;
-        driven.done = planned_s >= plan.duration_s();
-        if k % each == 0 || driven.done {
-            let at = [pose[0], pose[1]];
-            driven.places.push(Place { at, planned_m });
-        }
-        if driven.done {
+        if planned_s >= plan.duration_s() {
+            tally.score.done = 1.0;
             break;
         }
         if field.help(obeyed, dt_s)? {
             commander.begin_anew();
         }
     }
-    Ok(driven)
+    Ok(tally.score)
 }

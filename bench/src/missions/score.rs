@@ -3,12 +3,6 @@
 use vigil_blocks::{Action, RecoveryKind};
 
 use super::ShippedGraph;
-use super::course::{Course, distance};
-
-/// The path is looked for from so far behind the planned place to so far ahead of it, m: a rover
-/// that drags a wheel falls behind by a tenth of what it drives.
-const BEHIND_M: f64 = 6.0;
-const AHEAD_M: f64 = 2.0;
 
 /// The true state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,14 +85,9 @@ impl<'a> Pay<'a> {
 /// What adds up while a mission is driven.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tally {
-    reward: f64,
-    dragged_m: f64,
-    unnecessary_stops: u32,
-    unnecessary_s: f64,
-    calls: u32,
+    pub score: Score,
     stood: bool,
     called: bool,
-    time_s: f64,
 }
 
 /// A step of a drive.
@@ -116,27 +105,20 @@ pub(super) struct Step {
 impl Tally {
     pub(super) fn add(&mut self, pay: &Pay<'_>, step: &Step) {
         let Step { truth, obeyed, .. } = *step;
-        self.time_s += step.dt_s;
-        self.reward += pay.reward(truth, obeyed, step.dt_s);
-        self.dragged_m += step.moved_m * truth.dragged as f64;
+        let score = &mut self.score;
+        score.time_s += step.dt_s;
+        score.reward += pay.reward(truth, obeyed, step.dt_s);
+        score.dragged_m += step.moved_m * truth.dragged as f64;
+        let count = |is: bool| f64::from(u8::from(is));
         let stands = obeyed.stands();
         if stands && !step.may_stand {
-            self.unnecessary_stops += u32::from(!self.stood);
-            self.unnecessary_s += step.dt_s;
+            score.unnecessary_stops += count(!self.stood);
+            score.unnecessary_s += step.dt_s;
         }
         let calls = obeyed.kind == RecoveryKind::CallForHelp;
-        self.calls += u32::from(calls && !self.called);
+        score.calls += count(calls && !self.called);
         (self.stood, self.called) = (stands, calls);
     }
-}
-
-/// Where the rover was.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
-    /// True position, m.
-    pub at: [f64; 2],
-    /// Place of the plan along its path, m.
-    pub planned_m: f64,
 }
 
 /// A mission of one commander, measured.
@@ -144,12 +126,6 @@ pub(super) struct Place {
 pub struct Score {
     /// Reward of the decision model, summed over the epochs.
     pub reward: f64,
-    /// From the end of the plan, at the end, m.
-    pub to_goal_m: f64,
-    /// Root mean square of the distance off the path, per metre driven, m.
-    pub path_rms_m: f64,
-    /// Greatest distance off the path, m.
-    pub path_max_m: f64,
     /// Metres with a stuck wheel.
     pub dragged_m: f64,
     /// Times the rover stopped though it could have driven on.
@@ -162,42 +138,6 @@ pub struct Score {
     pub time_s: f64,
     /// 1 if the plan was driven to its end.
     pub done: f64,
-}
-
-impl Score {
-    pub(super) fn new(tally: &Tally, places: &[Place], course: &Course, done: bool) -> Self {
-        let (mut squares, mut way_m, mut max_m) = (0.0, 0.0, 0.0_f64);
-        let mut last = None;
-        for place in places {
-            let (from_m, to_m) = (place.planned_m - BEHIND_M, place.planned_m + AHEAD_M);
-            let off_m = course.off_m(place.at, from_m, to_m);
-            let step_m = last.map_or(0.0, |last| distance(last, place.at));
-            last = Some(place.at);
-            squares += off_m * off_m * step_m;
-            way_m += step_m;
-            max_m = max_m.max(off_m);
-        }
-        let end = places.last().map(|place| place.at);
-        let to_goal_m = end
-            .zip(course.goal())
-            .map_or(f64::NAN, |(a, b)| distance(a, b));
-        Self {
-            reward: tally.reward,
-            to_goal_m,
-            path_rms_m: if way_m > 0.0 {
-                (squares / way_m).sqrt()
-            } else {
-                0.0
-            },
-            path_max_m: max_m,
-            dragged_m: tally.dragged_m,
-            unnecessary_stops: f64::from(tally.unnecessary_stops),
-            unnecessary_s: tally.unnecessary_s,
-            calls: f64::from(tally.calls),
-            time_s: tally.time_s,
-            done: f64::from(u8::from(done)),
-        }
-    }
 }
 
 /// A figure of a mission.
@@ -228,11 +168,8 @@ const fn measure(
 }
 
 /// What is reported of a mission; the reward first.
-pub const MEASURES: [Measure; 10] = [
+pub const MEASURES: [Measure; 7] = [
     measure("reward", "mission reward", |s| s.reward, 0),
-    measure("to_goal_m", "to the goal, m", |s| s.to_goal_m, 2),
-    measure("path_rms_m", "off the path, rms m", |s| s.path_rms_m, 2),
-    measure("path_max_m", "off the path, max m", |s| s.path_max_m, 2),
     measure("dragged_m", "wheel dragged, m", |s| s.dragged_m, 2),
     measure(
         "unnecessary_stops",
@@ -342,8 +279,7 @@ mod tests {
             };
             (0..100).for_each(|_| tally.add(&pay, &step));
         }
-        let course = Course::new([[0.0, 0.0], [1.0, 0.0]]);
-        let score = Score::new(&tally, &[], &course, true);
+        let score = tally.score;
         let reward = 20.0 * (1.0 - 1.2 - 1.2 + 0.5 - 6.0 - 6.0 - 0.5);
         assert!((score.reward - reward).abs() < 1e-9, "{}", score.reward);
         assert!((score.dragged_m - 0.2).abs() < 1e-9);
@@ -351,30 +287,6 @@ mod tests {
         // is the best that can be done.
         assert_eq!((score.unnecessary_stops, score.calls), (2.0, 2.0));
         assert!((score.unnecessary_s - 6.0).abs() < 1e-9);
-        assert!((score.time_s - 14.0).abs() < 1e-9 && score.done == 1.0);
-    }
-
-    #[test]
-    fn path_error_is_per_metre_driven() {
-        let tally = Tally::default();
-        let course = Course::new((0..=1000).map(|k| [f64::from(k) * 0.01, 0.0]));
-        let place = |x: f64, y: f64| Place {
-            at: [x, y],
-            planned_m: x,
-        };
-        // 2 m on the path, then 2 m beside it by 0.3 m, standing there for long.
-        let mut places = vec![place(0.0, 0.0), place(2.0, 0.0), place(2.0, 0.3)];
-        places.push(place(4.0, 0.3));
-        places.extend([place(4.0, 0.3); 500]);
-        let score = Score::new(&tally, &places, &course, false);
-        let expected = (0.09 * (0.3 + 2.0) / 4.3_f64).sqrt();
-        assert!(
-            (score.path_rms_m - expected).abs() < 1e-12,
-            "{}",
-            score.path_rms_m
-        );
-        assert!((score.path_max_m - 0.3).abs() < 1e-12);
-        assert!((score.to_goal_m - 6.0_f64.hypot(0.3)).abs() < 1e-12);
-        assert_eq!(score.done, 0.0);
+        assert!((score.time_s - 14.0).abs() < 1e-9);
     }
 }

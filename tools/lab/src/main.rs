@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use vigil_terminal::exit_code;
 
-use commands::{diagnose, evaluate, import, learn, pomdp};
+use commands::{diagnose, evaluate, import, learn, pomdp, report};
 
 /// Learns models, imports logs, diagnoses and scores recorded runs, solves decision models.
 ///
@@ -25,6 +25,7 @@ enum Command {
     Learn(learn::Args),
     Diagnose(diagnose::Args),
     Evaluate(evaluate::Args),
+    Report(report::Args),
     Pomdp(pomdp::Args),
 }
 
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
         Command::Learn(args) => learn::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::Pomdp(args) => pomdp::run(&args),
     })
 }

@@ -11,11 +11,12 @@ use vigil_terminal::{CommandError, Outcome};
 /// The program's name.
 const PROGRAM: &str = "vigil-lab";
 /// Its commands, and what each does.
-const COMMANDS: [(&str, &str); 5] = [
+const COMMANDS: [(&str, &str); 6] = [
     ("import", "Turns another program's log into frames"),
     ("learn", "Learns a model from recorded frames, or shows one"),
     ("diagnose", "Diagnoses recorded runs"),
     ("evaluate", "Scores the diagnosis on labelled runs"),
+    ("report", "Writes a page about recorded runs"),
     (
         "pomdp",
         "Checks, solves, compares and learns decision models",

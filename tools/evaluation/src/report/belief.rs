@@ -45,9 +45,11 @@ fn leading<'a>(case: &Case, taxonomy: &'a Taxonomy) -> Vec<Mode<'a>> {
         .map(|(i, name)| (Explanation::Node(i), name));
     let all = nodes.chain([(Explanation::Unknown, UNKNOWN)]);
     let highest = |of: Explanation| case.verdicts.iter().map(|v| of.p(v)).fold(0.0, f64::max);
-    let expected = taxonomy.expected(&case.label.mode);
+    // Of a run without a label nothing is known to be true.
+    let label = Some(case.label.mode.as_str()).filter(|mode| !mode.is_empty());
+    let expected = label.map(|mode| taxonomy.expected(mode));
     let mut found: Vec<(f64, Explanation, &str)> = all
-        .map(|(of, name)| match name == expected {
+        .map(|(of, name)| match expected == Some(name) {
             true => (f64::INFINITY, of, name),
             false => (highest(of), of, name),
         })
@@ -141,6 +143,42 @@ fn run(report: &Report<'_>, i: usize) -> String {
     }
     let (heading, charts) = (escaped(&heading), beside(&parts));
     format!("<div class=\"run\"><h3>{heading}</h3>\n{charts}</div>\n")
+}
+
+/// When the alarm, the reported name or the action changed in a run, as a table.
+fn changes(case: &Case) -> String {
+    let said = |verdict: &Verdict| {
+        let alarm = if verdict.alarm { "alarm" } else { "" };
+        [alarm, &verdict.reported, &verdict.action].map(escaped)
+    };
+    let mut rows = String::new();
+    let mut last = None;
+    for verdict in &case.verdicts {
+        let now = said(verdict);
+        if last.as_ref() != Some(&now) {
+            let (t_s, cells) = (verdict.t_s, now.join("</td><td>"));
+            rows.push_str(&format!("<tr><td>{t_s:.2}</td><td>{cells}</td></tr>\n"));
+            last = Some(now);
+        }
+    }
+    format!(
+        "<table><thead><tr><th>s</th><th></th><th>reported</th><th>action</th></tr></thead>\n\
+         <tbody>\n{rows}</tbody></table>\n"
+    )
+}
+
+/// Runs without labels: what was believed in each, and what changed.
+pub fn unlabelled(cases: &[Case], set: &str, taxonomy: &Taxonomy) -> String {
+    let run = |case: &Case| {
+        let (id, changes) = (case.label.run, changes(case));
+        let chart = chart(case, taxonomy, set);
+        format!("<div class=\"run\"><h3>run {id}</h3>\n{chart}{changes}</div>\n")
+    };
+    let inside: String = cases.iter().map(run).collect();
+    let about = "Probability of the leading modes over time, s; before an alarm, of nominal \
+                 driving and unknown. Below it, each change of the alarm, the reported name and \
+                 the action.";
+    page_section("belief", "Runs", about, &inside)
 }
 
 /// True if anything was wrong about the run: a false alarm, a fault missed, a wrong leaf after 2 s.

@@ -53,9 +53,26 @@ impl Report<'_> {
         body.push_str(&curves::delays(self));
         body.push_str(&curves::trade_off(self));
         body.push_str(&belief::section(self));
-        body.push_str(&summary::facts(self));
+        body.push_str(&summary::facts(&self.facts));
         vigil_pages::page::page("Vigil: evaluation", &body)
     }
+}
+
+/// The page of recorded runs without labels, diagnosed with the channels of `set`; `facts` say what
+/// was diagnosed and how.
+#[must_use]
+pub fn unlabelled(
+    facts: &[(&'static str, String)],
+    cases: &[Case],
+    set: &str,
+    taxonomy: &Taxonomy,
+) -> String {
+    let body = format!(
+        "<header><h1>Vigil: diagnosis</h1></header>\n{}{}",
+        belief::unlabelled(cases, set, taxonomy),
+        summary::facts(facts)
+    );
+    vigil_pages::page::page("Vigil: diagnosis", &body)
 }
 
 /// Name of a set of channels in words.

@@ -240,14 +240,14 @@ pub fn section(report: &Report<'_>) -> String {
 }
 
 /// What was evaluated and how.
-pub fn facts(report: &Report<'_>) -> String {
+pub fn facts(facts: &[(&str, String)]) -> String {
     let row = |(name, value): &(&str, String)| {
         format!(
             "<tr><th>{name}</th><td><code>{}</code></td></tr>\n",
             escaped(value)
         )
     };
-    let rows: String = report.facts.iter().map(row).collect();
+    let rows: String = facts.iter().map(row).collect();
     let inside = format!("<div class=\"wide\"><table>\n<tbody>\n{rows}</tbody>\n</table></div>\n");
     let about = "Enough to repeat it.";
     vigil_pages::page::section("provenance", "What was evaluated, and how", about, &inside)

@@ -1,6 +1,7 @@
 //! Scores long runs as a user lives through them: what is said at every instant, not only at a few.
 //!
-//! A run is a series of [`super::Verdict`]s against the truth, a series of [`Stretch`]es. Definitions:
+//! A run is a series of verdicts ([`super::Verdict`]) against the truth, a series of [`Stretch`]es.
+//! Definitions:
 //!
 //! - *onset*: the truth changes to a fault, or to another fault; it is judged until the truth
 //!   changes again. From healthy, the *delay* runs to the next rise of the alarm; an alarm that

@@ -11,14 +11,13 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde::Serialize;
 use vigil_diagnosis::identify::IdentifierFilter;
 use vigil_evaluation::report::{Report, SensorSet};
-use vigil_learning::data_hash;
 use vigil_learning::plausibility;
 use vigil_recording::frames::Run;
 use vigil_recording::labels::{self, Label};
 use vigil_robot::RobotModel;
 
 use super::files::{check_place, write_whole};
-use super::offline::{FilterArgs, FilterSettings, OfflineModels};
+use super::offline::{FilterArgs, OfflineModels};
 use document::{Document, filters_text};
 use passes::{Passes, SensorSetResult};
 use vigil_terminal::output;
@@ -213,50 +212,16 @@ fn facts(
     prepared: &OfflineModels,
     runs: &[(Run, Label)],
 ) -> Vec<(&'static str, String)> {
-    let FilterSettings {
-        model_hash,
-        tree_hash,
-        detector,
-        identifier,
-        particles,
-        seed,
-        ..
-    } = &prepared.used;
-    let filter = &args.filter;
-    let words: Vec<String> = std::env::args_os()
-        .map(|word| word.to_string_lossy().into_owned())
-        .collect();
     let part = match args.part {
         Part::Heldout => "those that learning left out",
         Part::All => "all of the frames file",
     };
     let ids: Vec<String> = runs.iter().map(|(run, _)| run.id.to_string()).collect();
-    let all: Vec<&Run> = prepared.runs.iter().collect();
-    let settings =
-        format!("detector {detector}, identifier {identifier}, {particles} particles, seed {seed}");
-    vec![
-        ("command", words.join(" ")),
-        ("version", env!("CARGO_PKG_VERSION").to_owned()),
-        (
-            "model",
-            format!("{}, hash {model_hash}", filter.model.display()),
-        ),
-        (
-            "learned from",
-            prepared.model.provenance().data_hash.clone(),
-        ),
-        (
-            "frames",
-            format!(
-                "{}, {}",
-                filter.frames.display(),
-                data_hash(&all, f64::INFINITY)
-            ),
-        ),
+    let mut facts = args.filter.facts(prepared);
+    facts.extend([
         ("labels", args.runs.display().to_string()),
-        ("fault tree", format!("hash {tree_hash}")),
-        ("settings", settings),
         ("runs", format!("{}, {part}", runs.len())),
         ("run ids", ids.join(" ")),
-    ]
+    ]);
+    facts
 }

@@ -8,3 +8,4 @@ pub mod learn;
 mod learn_nominal;
 mod offline;
 pub mod pomdp;
+pub mod report;

@@ -13,8 +13,9 @@ use vigil_diagnosis::identify::{
     self, Diagnoser, Identifier, IdentifierFilter, Models, NominalIdentifier, PARTICLES_MAX,
     PARTICLES_MIN,
 };
-use vigil_evaluation::scoring::Taxonomy;
+use vigil_evaluation::scoring::{Taxonomy, Verdict};
 use vigil_evaluation::stages::{Stages, Vocabulary};
+use vigil_learning::data_hash;
 use vigil_pomdp::Pomdp;
 use vigil_recording::frames::{self, Run};
 use vigil_robot::FaultTree;
@@ -244,6 +245,46 @@ impl FilterArgs {
         };
         let detector = detector.map_err(|e| refuse(&e))?;
         Ok(Stages::new(detector, identifier, supervisor, vocabulary))
+    }
+
+    /// What is reported of each frame of a run.
+    pub fn verdicts(
+        &self,
+        of: &OfflineModels,
+        run: &Run,
+        sensors: &str,
+        filter: IdentifierFilter,
+    ) -> Result<Vec<Verdict>, CommandError> {
+        let mut stages = self.stages(of, sensors, filter)?;
+        let verdicts = run.frames.iter().map(|frame| {
+            stages.take(frame);
+            stages.verdict(frame)
+        });
+        Ok(verdicts.collect())
+    }
+
+    /// What a page says of its origin.
+    pub fn facts(&self, of: &OfflineModels) -> Vec<(&'static str, String)> {
+        let words: Vec<String> = std::env::args_os()
+            .map(|word| word.to_string_lossy().into_owned())
+            .collect();
+        let used = &of.used;
+        let settings = format!(
+            "detector {}, identifier {}, {} particles, seed {}",
+            used.detector, used.identifier, used.particles, used.seed
+        );
+        let (model, frames) = (self.model.display(), self.frames.display());
+        let all: Vec<&Run> = of.runs.iter().collect();
+        let data = data_hash(&all, f64::INFINITY);
+        vec![
+            ("command", words.join(" ")),
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("model", format!("{model}, hash {}", used.model_hash)),
+            ("learned from", of.model.provenance().data_hash.clone()),
+            ("frames", format!("{frames}, {data}")),
+            ("fault tree", format!("hash {}", used.tree_hash)),
+            ("settings", settings),
+        ]
     }
 
     /// The decision model given, or the rover's for a model with faults, if it is there.

@@ -248,3 +248,33 @@ fn a_page_that_cannot_be_written_and_a_filter_that_does_not_exist_are_refused_fi
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+/// A page of the same runs without their labels: a chart and a table of changes for each.
+#[test]
+fn unlabelled_runs_have_a_page_too() {
+    let folder = TempDir::new().unwrap();
+    let frames = frames(folder.path());
+    let out = folder.path().join("runs.html").display().to_string();
+    let output = Command::new(env!("CARGO_BIN_EXE_vigil-lab"))
+        .args([
+            "report", "--model", MODEL, "--frames", &frames, "--out", &out,
+        ])
+        .current_dir(root())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let html = fs::read_to_string(&out).unwrap();
+    let options = ParsingOptions {
+        allow_dtd: true,
+        ..ParsingOptions::default()
+    };
+    let page = Document::parse_with_options(&html, options).unwrap();
+    let drawings = page.descendants().filter(|node| node.has_tag_name("svg"));
+    assert_eq!(drawings.count(), IDS.len());
+    // Run 3 has a stuck wheel: its table says so, with the alarm.
+    let stuck = rows(&page, "belief");
+    let stuck = stuck
+        .iter()
+        .filter(|row| row.get(1).is_some_and(|alarm| alarm == "alarm"));
+    assert!(stuck.into_iter().any(|row| row[2].ends_with("_STUCK")));
+}

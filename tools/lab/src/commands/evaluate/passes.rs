@@ -102,19 +102,14 @@ impl<'a> Passes<'a> {
         filter: IdentifierFilter,
         progress: &Progress,
     ) -> Result<Pass, CommandError> {
-        let begin = || self.args.filter.stages(self.prepared, set, filter);
-        let alarm_log_odds = begin()?.alarm_log_odds();
+        let (prepared, args) = (self.prepared, &self.args.filter);
+        let alarm_log_odds = args.stages(prepared, set, filter)?.alarm_log_odds();
         let cases = self.runs.iter().map(|(run, label)| {
             progress.show(self.done.get());
             self.done.set(self.done.get() + 1);
-            let mut stages = begin()?;
-            let verdicts = run.frames.iter().map(|frame| {
-                stages.take(frame);
-                stages.verdict(frame)
-            });
             Ok(Case {
                 label: label.clone(),
-                verdicts: verdicts.collect(),
+                verdicts: args.verdicts(prepared, run, set, filter)?,
             })
         });
         Ok(Pass {

@@ -1,4 +1,4 @@
-//! Colours of pictures, in middle tones that are readable on light and dark alike, and their legend.
+//! Colours of pictures, in middle tones that are readable on light and dark, and their legend.
 
 use vigil_pages::svg::{Anchor, Drawing, Pen, Point};
 
