@@ -9,9 +9,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
 use vigil_cycle::Latency;
+use vigil_cycle::PortError;
 use vigil_cycle::clock::{self, Clock, Monotonic};
 use vigil_cycle::placement::{self, Placement, PlacementRequest};
-use vigil_cycle::port::PortError;
 
 /// Lateness from which a wake-up is kept one by one, ns.
 pub const KEPT_FROM_NS: u64 = 5_000;
@@ -56,12 +56,12 @@ impl Canary {
         capacity: usize,
     ) -> Result<Self, PortError> {
         let stop = Arc::new(AtomicBool::new(false));
-        let lateness = Latency::new().map_err(|e| PortError::setup("histogram", &e))?;
+        let lateness = Latency::new().map_err(|e| PortError::setup("histogram", e))?;
         let asked = Arc::clone(&stop);
         let thread = std::thread::Builder::new()
             .name(format!("canary-{}", wanted.core))
             .spawn(move || watch(wanted, period_ns.max(1), capacity, lateness, &asked))
-            .map_err(|e| PortError::setup("canary", &e))?;
+            .map_err(|e| PortError::setup("canary", e))?;
         Ok(Self {
             stop,
             thread: Some(thread),

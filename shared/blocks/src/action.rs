@@ -1,7 +1,7 @@
 //! The supervisor's decision: what to do.
 
 use crate::block::block;
-use crate::{Cause, Header};
+use crate::header::{Cause, Header};
 
 /// Capacity of the decision model's states.
 pub const DECISION_STATES: usize = 64;

@@ -2,7 +2,7 @@
 
 use bytemuck::Pod;
 
-use crate::Header;
+use crate::header::Header;
 
 /// A fixed-size wire block. Implement it with the [`block!`](crate::block!) macro only: it derives
 /// the schema hash from the names, types and offsets of the fields, so that two sides whose layouts

@@ -1,7 +1,7 @@
 //! Commands from the operator.
 
-use crate::Header;
 use crate::block::block;
+use crate::header::Header;
 
 block! {
     /// Written by the operator's tool; refused unless the configuration permits it.

@@ -18,7 +18,8 @@
 
 use crc::{CRC_32_ISCSI, Crc};
 
-use crate::{Rejection, SensorFrame};
+use crate::rejection::Rejection;
+use crate::sensor::SensorFrame;
 
 #[cfg(target_endian = "big")]
 compile_error!("blocks and datagrams are little-endian");

@@ -1,7 +1,8 @@
 //! The detector's belief: is something wrong?
 
 use crate::block::block;
-use crate::{Cause, Header, WHEELS};
+use crate::header::{Cause, Header};
+use crate::sensor::WHEELS;
 
 /// Capacity of the per-channel evidence.
 pub const CHANNELS: usize = 32;

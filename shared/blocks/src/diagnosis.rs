@@ -1,8 +1,9 @@
 //! The identifier's belief: what is wrong?
 
 use crate::block::block;
+use crate::detection::CHANNELS;
+use crate::header::{Cause, Header};
 use crate::layout::part;
-use crate::{CHANNELS, Cause, Header};
 
 /// Capacity of nodes of the fault tree.
 pub const FAULT_NODES: usize = 64;

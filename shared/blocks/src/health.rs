@@ -1,7 +1,7 @@
 //! What each service says about itself.
 
-use crate::Header;
 use crate::block::block;
+use crate::header::Header;
 use crate::layout::part;
 use crate::rejection::REJECTIONS;
 

@@ -1,8 +1,9 @@
 //! Weighted hypotheses as they travel: what a filter believes, and its reader starts from.
 
 use crate::block::block;
+use crate::header::{Cause, Header};
 use crate::layout::part;
-use crate::{Cause, Header, WHEELS};
+use crate::sensor::WHEELS;
 
 /// Largest number of hypotheses in a block.
 pub const PARTICLE_CAPACITY: usize = 1024;

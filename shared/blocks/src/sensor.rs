@@ -1,7 +1,7 @@
 //! What the robot measured, independent of its kind.
 
-use crate::Header;
 use crate::block::block;
+use crate::header::Header;
 
 /// Capacity of per-wheel arrays.
 pub const WHEELS: usize = 8;

@@ -8,7 +8,7 @@ use crate::clock::Clock;
 use crate::deadline::DeadlineMonitor;
 use crate::health::HealthBoard;
 use crate::on_miss::{Lateness, OnMiss};
-use crate::port::PortError;
+use crate::port_error::PortError;
 use crate::recorder::Recorder;
 use crate::stamps::CycleStamps;
 

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 use vigil_blocks::{Action, Block, SensorFrame};
 
-use crate::port::PortError;
+use crate::port_error::PortError;
 use crate::topic::{ServiceName, Topic};
 
 /// Version of the transport, as the workspace's manifest demands it.
@@ -80,7 +80,7 @@ impl Domain {
             .mode(0o700)
             .create(&folder)
             .map_err(|e| {
-                PortError::setup("runtime folder", &format!("{}: {e}", folder.display()))
+                PortError::setup("runtime folder", format!("{}: {e}", folder.display()))
             })?;
         Ok(Self {
             graph: graph.to_owned(),
@@ -158,10 +158,10 @@ impl Domain {
     pub fn transport_config(&self) -> Result<Config, PortError> {
         let mut config = Config::default();
         config.global.prefix = FileName::new(self.prefix().as_bytes())
-            .map_err(|e| PortError::setup("shared-memory prefix", &e))?;
+            .map_err(|e| PortError::setup("shared-memory prefix", e))?;
         let root = self.folder.join("t");
         let root = iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes())
-            .map_err(|e| PortError::setup("transport folder", &e))?;
+            .map_err(|e| PortError::setup("transport folder", e))?;
         config.global.set_root_path(&root);
         Ok(config)
     }

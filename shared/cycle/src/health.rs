@@ -8,7 +8,8 @@ use crate::clock::Clock;
 use crate::deadline::Schedule;
 use crate::input::InputAccount;
 use crate::placement::{self, Placement, PlacementRequest};
-use crate::port::{PortError, Sender, Stamp};
+use crate::port::{Sender, Stamp};
+use crate::port_error::PortError;
 
 /// Health goes out at least this often, ns; at once when something happens. Chosen: twenty a second
 /// look live to a person, and cost one block a few cycles.

@@ -2,7 +2,7 @@
 
 use crate::clock::{self, Clock, Monotonic};
 use crate::placement::{self, Placement, PlacementRequest};
-use crate::port::PortError;
+use crate::port_error::PortError;
 use crate::signal;
 use crate::source::{Source, SourceCycle};
 use crate::stage::{Stage, StageCycle};
@@ -80,7 +80,7 @@ pub(crate) fn run_stage(
     spin_ns: u64,
     mut warm_up: WarmUp,
 ) -> Result<Run, PortError> {
-    let timer = Timer::new().map_err(|e| PortError::setup("timer", &e))?;
+    let timer = Timer::new().map_err(|e| PortError::setup("timer", e))?;
     let mut ended = ServiceEnd::Stopped;
     cycle.account_mut().ready(&Monotonic)?;
     while !signal::stop_requested() {

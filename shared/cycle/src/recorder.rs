@@ -1,7 +1,7 @@
 //! What a service keeps of its own cycles: histograms, and, if wanted, their stamps.
 
 use crate::latency::Latency;
-use crate::port::PortError;
+use crate::port_error::PortError;
 use crate::stamps::{CycleStamps, Stamps};
 
 /// The histograms of a service.
@@ -22,7 +22,7 @@ impl Timing {
     /// # Errors
     /// None in practice; see [`Latency::new`].
     pub fn new() -> Result<Self, PortError> {
-        let new = || Latency::new().map_err(|error| PortError::setup("histogram", &error));
+        let new = || Latency::new().map_err(|error| PortError::setup("histogram", error));
         Ok(Self {
             wake_up: new()?,
             step: new()?,

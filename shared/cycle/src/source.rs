@@ -7,7 +7,7 @@ use crate::cycle_account::{CycleAccount, TurnResult};
 use crate::deadline::GAP_INSTANTS_MAX;
 use crate::failure::{Work, work_on};
 use crate::health::HealthBoard;
-use crate::port::PortError;
+use crate::port_error::PortError;
 use crate::stamps::CycleStamps;
 
 /// What a source did at an instant of its schedule.

@@ -9,7 +9,8 @@ use crate::cycle_account::{CycleAccount, TurnResult};
 use crate::failure::{Work, work_on};
 use crate::health::HealthBoard;
 use crate::input::{Arrival, InputAccount, Writer};
-use crate::port::{PortError, Stamp};
+use crate::port::Stamp;
+use crate::port_error::PortError;
 use crate::shed::Shedder;
 use crate::stamps::CycleStamps;
 

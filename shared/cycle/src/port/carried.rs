@@ -4,7 +4,8 @@ use vigil_blocks::{
     Action, Block, Control, DetectionBelief, FaultBelief, Health, ParticleBlock, SensorFrame,
 };
 
-use super::{Link, PortError, Receiver, Sender};
+use super::{Link, Receiver, Sender};
+use crate::port_error::PortError;
 use crate::topic::Topic;
 
 /// A block that topics carry; [`carried`](crate::carried) implements it. The transport is generic

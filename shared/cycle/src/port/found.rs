@@ -6,8 +6,8 @@ use iceoryx2::config::Config;
 use iceoryx2::prelude::*;
 use iceoryx2::service::static_config::messaging_pattern::MessagingPattern;
 
-use super::PortError;
 use crate::domain::Domain;
+use crate::port_error::PortError;
 
 /// A topic that exists, as its first user has made it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -60,7 +60,7 @@ impl FoundTopic {
             }
             CallbackProgression::Continue
         })
-        .map_err(|e| PortError::setup("list of topics", &e))?;
+        .map_err(|e| PortError::setup("list of topics", e))?;
         Ok(found)
     }
 }

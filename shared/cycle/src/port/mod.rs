@@ -8,6 +8,7 @@ mod shared_memory;
 use vigil_blocks::{Block, Header};
 
 use crate::clock::Clock;
+use crate::port_error::PortError;
 use crate::topic::Topic;
 
 pub use carried::TopicBlock;
@@ -74,51 +75,6 @@ impl Stamp {
         Self {
             t_schedule_ns: header.t_schedule_ns,
             t_capture_ns: header.t_capture_ns,
-        }
-    }
-}
-
-/// Why a port could not be opened or used.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum PortError {
-    /// The topic could not be opened.
-    #[error("topic {topic} (type {type_name}, {size} bytes) cannot be opened: {cause}")]
-    Open {
-        /// Full name of the topic.
-        topic: String,
-        /// Type name that this side expects.
-        type_name: &'static str,
-        /// Size of the block.
-        size: usize,
-        /// What the transport said.
-        cause: String,
-    },
-    /// A block could not be loaned, sent or received.
-    #[error("topic {topic}: {operation} failed: {cause}")]
-    Transfer {
-        /// Full name of the topic.
-        topic: String,
-        /// `loan`, `send`, `notify` or `receive`.
-        operation: &'static str,
-        /// What the transport said.
-        cause: String,
-    },
-    /// Something that the ports need could not be set up.
-    #[error("{what} cannot be set up: {cause}")]
-    Setup {
-        /// What it is.
-        what: &'static str,
-        /// What the system said.
-        cause: String,
-    },
-}
-
-impl PortError {
-    /// A [`PortError::Setup`] from any error.
-    pub fn setup(what: &'static str, cause: &impl std::fmt::Debug) -> Self {
-        Self::Setup {
-            what,
-            cause: format!("{cause:?}"),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Ports over iceoryx2: blocks loaned, written and read in place in shared memory.
 
+use std::error::Error;
 use std::os::fd::RawFd;
 
 use iceoryx2::port::listener::Listener;
@@ -11,9 +12,10 @@ use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
 use vigil_blocks::Block;
 
-use super::{FoundTopic, PortError, Receiver, Sender, Stamp, Stamper};
+use super::{FoundTopic, Receiver, Sender, Stamp, Stamper};
 use crate::clock::{Clock, Monotonic};
 use crate::domain::{Domain, Queues};
+use crate::port_error::PortError;
 use crate::topic::Topic;
 use crate::wake::{Inputs, NOTHING};
 
@@ -67,13 +69,13 @@ impl Link {
         // Its warnings are about files that another process has just cleaned up.
         set_log_level(LogLevel::Error);
         let config = domain.transport_config()?;
-        let node_name = NodeName::new(name).map_err(|e| PortError::setup("node name", &e))?;
+        let node_name = NodeName::new(name).map_err(|e| PortError::setup("node name", e))?;
         let node = NodeBuilder::new()
             .config(&config)
             .name(&node_name)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
-            .map_err(|e| PortError::setup("node", &e))?;
+            .map_err(|e| PortError::setup("node", e))?;
         Ok(Self {
             node,
             graph: domain.graph().to_owned(),
@@ -98,7 +100,7 @@ impl Link {
             .history_size(queues.history)
             .enable_safe_overflow(true)
             .open_or_create()
-            .map_err(|e| self.open_error(topic, WireType::new::<T>(), &e))
+            .map_err(|e| self.open_error(topic, WireType::new::<T>(), e))
     }
 
     fn event(&self, topic: Topic, wire: WireType) -> Result<EventFactory, PortError> {
@@ -111,27 +113,29 @@ impl Link {
             .max_nodes(self.queues.max_subscribers + 4)
             .event_id_max_value(15)
             .open_or_create()
-            .map_err(|e| self.open_error(topic, wire, &e))
+            .map_err(|e| self.open_error(topic, wire, e))
     }
 
     fn name(&self, topic: Topic, wire: WireType) -> Result<ServiceName, PortError> {
         let path = topic.path(&self.graph);
-        ServiceName::new(&path).map_err(|e| self.open_error(topic, wire, &e))
+        ServiceName::new(&path).map_err(|e| self.open_error(topic, wire, e))
     }
 
-    fn open_error(&self, topic: Topic, wire: WireType, cause: &impl std::fmt::Debug) -> PortError {
+    fn open_error(
+        &self,
+        topic: Topic,
+        wire: WireType,
+        cause: impl Error + Send + Sync + 'static,
+    ) -> PortError {
         let path = topic.path(&self.graph);
-        let mut cause = format!("{cause:?}");
         let found = FoundTopic::listed(self.node.config()).unwrap_or_default();
         let other = |found: &&FoundTopic| found.path == path && found.type_name != wire.name;
-        if let Some(found) = found.iter().find(other) {
-            cause.push_str(&format!("; somebody has made it as {found}"));
-        }
         PortError::Open {
+            other: found.iter().find(other).map(FoundTopic::to_string),
             topic: path,
             type_name: wire.name,
             size: wire.size,
-            cause,
+            cause: cause.into(),
         }
     }
 
@@ -146,7 +150,7 @@ impl Link {
             .max_loaned_samples(2)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
-            .map_err(|e| self.open_error(topic, wire, &e))?;
+            .map_err(|e| self.open_error(topic, wire, e))?;
         let notifier = self.event_notifier(topic, wire)?;
         let path = topic.path(&self.graph);
         let loaned = loan(&publisher, &path)?;
@@ -175,7 +179,7 @@ impl Link {
             .subscriber_builder()
             .buffer_size(buffer)
             .create()
-            .map_err(|e| self.open_error(topic, wire, &e))?;
+            .map_err(|e| self.open_error(topic, wire, e))?;
         Ok(Box::new(SharedReceiver {
             subscriber,
             held: None,
@@ -196,7 +200,7 @@ impl Link {
             .event(topic, wire)?
             .listener_builder()
             .create()
-            .map_err(|e| self.open_error(topic, wire, &e))?;
+            .map_err(|e| self.open_error(topic, wire, e))?;
         Ok(EventListener { listener })
     }
 
@@ -218,7 +222,7 @@ impl Link {
         self.event(topic, wire)?
             .notifier_builder()
             .create()
-            .map_err(|e| self.open_error(topic, wire, &e))
+            .map_err(|e| self.open_error(topic, wire, e))
     }
 
     /// Removes what dead processes of this graph left behind. File-system work: never on a
@@ -267,7 +271,7 @@ fn loan<T: Block>(
 ) -> Result<LoanedSample<T>, PortError> {
     let mut sample = publisher
         .loan_uninit()
-        .map_err(|e| transfer(path, "loan", &e))?;
+        .map_err(|e| transfer(path, "loan", e))?;
     // Zeroed in place: a block of 80 KiB must not travel over the stack.
     // SAFETY: the slot is writable memory of exactly one `Wire<T>`; all-zero bytes are a valid `T`.
     #[allow(unsafe_code)]
@@ -277,11 +281,15 @@ fn loan<T: Block>(
     }
 }
 
-fn transfer(path: &str, operation: &'static str, cause: &impl std::fmt::Debug) -> PortError {
+fn transfer(
+    path: &str,
+    operation: &'static str,
+    cause: impl Into<Box<dyn Error + Send + Sync>>,
+) -> PortError {
     PortError::Transfer {
         topic: path.to_owned(),
         operation,
-        cause: format!("{cause:?}"),
+        cause: cause.into(),
     }
 }
 
@@ -319,7 +327,7 @@ impl<T: Block> Sender<T> for SharedSender<T> {
     fn send(&mut self, stamp: Stamp, clock: &dyn Clock) -> Result<u64, PortError> {
         if std::mem::take(&mut self.has_refused) {
             let what = "a block was refused when it was to be written";
-            return Err(transfer(&self.path, "send", &what));
+            return Err(transfer(&self.path, "send", what));
         }
         let mut sample = match self.loaned.take() {
             Some(sample) => sample,
@@ -328,12 +336,10 @@ impl<T: Block> Sender<T> for SharedSender<T> {
         let published_ns = self
             .stamper
             .stamp(&mut sample.payload_mut().0, stamp, clock);
-        sample
-            .send()
-            .map_err(|e| transfer(&self.path, "send", &e))?;
+        sample.send().map_err(|e| transfer(&self.path, "send", e))?;
         self.notifier
             .notify()
-            .map_err(|e| transfer(&self.path, "notify", &e))?;
+            .map_err(|e| transfer(&self.path, "notify", e))?;
         Ok(published_ns)
     }
 

@@ -33,7 +33,7 @@ const SLEEP_NS: u64 = 50_000_000;
 pub fn listen(setup: &Setup, seconds: f64) -> Result<(Reception, Option<PortError>), PortError> {
     let domain = setup.domain()?;
     // Held as long as this listens: no graph is started meanwhile.
-    let lock = domain.lock().map_err(|e| PortError::setup("lock", &e))?;
+    let lock = domain.lock().map_err(|e| PortError::setup("lock", e))?;
     let mut heard = Reception {
         is_graph_running: lock.is_none(),
         ..Reception::default()
@@ -42,7 +42,7 @@ pub fn listen(setup: &Setup, seconds: f64) -> Result<(Reception, Option<PortErro
     let sign = if lock.is_some() {
         domain
             .tell_types()
-            .map_err(|e| PortError::setup("runtime folder", &e))?;
+            .map_err(|e| PortError::setup("runtime folder", e))?;
         Some(Sign::put(domain.processes_file())?)
     } else {
         None
@@ -67,7 +67,7 @@ struct Sign(PathBuf);
 
 impl Sign {
     fn put(path: PathBuf) -> Result<Self, PortError> {
-        fs::write(&path, "").map_err(|e| PortError::setup("runtime folder", &e))?;
+        fs::write(&path, "").map_err(|e| PortError::setup("runtime folder", e))?;
         Ok(Self(path))
     }
 }
@@ -123,7 +123,7 @@ fn while_it_lasts(
     heard: &mut Reception,
     mut take: impl FnMut(&mut Reception),
 ) -> Result<(), PortError> {
-    let timer = Timer::new().map_err(|e| PortError::setup("timer", &e))?;
+    let timer = Timer::new().map_err(|e| PortError::setup("timer", e))?;
     let from_ns = Monotonic.now_ns();
     let until_ns = from_ns + (seconds * 1e9) as u64;
     while Monotonic.now_ns() < until_ns && !signal::stop_requested() {
@@ -199,9 +199,9 @@ fn sockets(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), Por
     let unix = (!socket.unix.is_empty()).then(|| folder.join(&socket.unix));
     let udp = socket
         .udp_address()
-        .map_err(|e| PortError::setup("sensor.socket.udp", &e))?;
+        .map_err(|e| PortError::setup("sensor.socket.udp", e))?;
     let datagrams = Datagrams::bind(udp, unix.as_deref());
-    let datagrams = datagrams.map_err(|e| PortError::setup("sensor.socket", &e))?;
+    let datagrams = datagrams.map_err(|e| PortError::setup("sensor.socket", e))?;
     let datagrams = std::rc::Rc::new(datagrams);
     let (mut guard, mut clock) = (Guard::new(setup), ArrivalClock::default());
     let mut arrived = Vec::with_capacity(DATAGRAMS_MAX);
