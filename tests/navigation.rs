@@ -117,7 +117,7 @@ impl Corridor {
         self.supervisor.step(Entry::Frame(inputs), action);
         action.valid_until_ns = u64::MAX;
         if action.decision_seq != before {
-            let kind = RecoveryKind::from_wire(action.kind).unwrap();
+            let kind = RecoveryKind::from_repr(action.kind).unwrap();
             let name = Self::name(kind);
             self.told.push(name);
         }

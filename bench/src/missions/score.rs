@@ -32,7 +32,7 @@ impl ObeyedOrder {
     pub fn new(action: &Action) -> Self {
         Self {
             action: action.action as usize,
-            kind: RecoveryKind::from_wire(action.kind).unwrap_or(RecoveryKind::None),
+            kind: RecoveryKind::from_repr(action.kind).unwrap_or(RecoveryKind::None),
             wheel: (action.wheel != u32::MAX).then_some(action.wheel as usize),
         }
     }

@@ -60,7 +60,7 @@ impl SightReport {
         }
         // A blind detector does not know whether the robot stands.
         let is_blind = self.blind != 0;
-        let readiness = Readiness::from_wire(self.readiness).filter(|_| !is_blind);
+        let readiness = Readiness::from_repr(self.readiness).filter(|_| !is_blind);
         let is_armed = matches!(readiness, Some(Readiness::Armed | Readiness::NotExcited));
         if is_armed && !self.armed_reported {
             health.event(now_ns, EventKind::Armed, 0, 0.0, 0);

@@ -190,8 +190,8 @@ fn service(record: &ServiceRecord) -> ServiceSummary {
         duplicate: counters.duplicate,
         invalid: counters.invalid,
         rejected: Rejection::ALL
-            .into_iter()
-            .map(|cause| (cause.as_str(), counters.rejected[cause as usize]))
+            .iter()
+            .map(|cause| (cause.as_str(), counters.rejected[*cause as usize]))
             .filter(|(_, count)| *count > 0)
             .collect(),
         restarts: record.restarts,

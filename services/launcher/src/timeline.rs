@@ -224,12 +224,12 @@ fn blind_s<'a>(
     let mut since: Option<(u64, u32)> = None;
     let mut close = |since: &mut Option<(u64, u32)>, t_ns: u64| {
         if let Some((from_ns, cause)) = since.take() {
-            let name = Blindness::from_wire(cause).map_or("unknown", Blindness::name);
+            let name = Blindness::from_repr(cause).map_or("unknown", Blindness::name);
             *sums.entry(name).or_insert(0.0) += t_ns.saturating_sub(from_ns) as f64 * 1e-9;
         }
     };
     for event in events.take_while(|event| event.t_ns <= end_ns) {
-        match EventKind::from_wire(event.kind) {
+        match EventKind::from_repr(event.kind) {
             Some(EventKind::Blind) => {
                 close(&mut since, event.t_ns);
                 since = Some((event.t_ns, event.what));
@@ -263,7 +263,7 @@ impl Namer {
     fn entry(&self, record: &Record, origin_ns: Option<u64>) -> TimelineEntry {
         let event = &record.event;
         let text = record.text.clone();
-        let kind = EventKind::from_wire(event.kind);
+        let kind = EventKind::from_repr(event.kind);
         let t_s = origin_ns.map_or(0.0, |origin| (event.t_ns as f64 - origin as f64) * 1e-9);
         let has_p = matches!(
             kind,
@@ -272,7 +272,7 @@ impl Namer {
         TimelineEntry {
             t_s: (t_s * 1e6).round() * 1e-6,
             service: record.service.as_str(),
-            event: kind.map_or("unknown", kind_name),
+            event: kind.map_or("unknown", EventKind::name),
             what: text
                 .or_else(|| Some(self.what(kind?, event)))
                 .unwrap_or_default(),
@@ -330,7 +330,7 @@ impl Namer {
                 Change::from_wire(&wire).map_or("?".into(), |change| change.text(&self.robot))
             }
             EventKind::Miss => format!("{} cycles", event.value),
-            EventKind::SafeStop => match ActionRejection::from_wire(event.what) {
+            EventKind::SafeStop => match ActionRejection::from_repr(event.what) {
                 Some(ActionRejection::Nothing) => "no action".into(),
                 Some(ActionRejection::Expired) => "the action has expired".into(),
                 Some(ActionRejection::UnknownKind) => "the action's kind is unknown".into(),
@@ -343,7 +343,7 @@ impl Namer {
             EventKind::Outcome => words::outcome(event),
             EventKind::Degraded => words::degraded(event.what),
             EventKind::Rejected => {
-                let cause = Rejection::from_wire(event.what).map_or("?", Rejection::as_str);
+                let cause = Rejection::from_repr(event.what).map_or("?", Rejection::as_str);
                 format!("{} frames: {cause}", event.value)
             }
             EventKind::Publisher => Finding::from_wire(event.what, event.p)
@@ -361,7 +361,7 @@ impl Namer {
             }
             EventKind::Particles => format!("{} of {}", event.what, event.value),
             EventKind::Watchdog => {
-                let found = WatchdogFinding::from_wire(event.what);
+                let found = WatchdogFinding::from_repr(event.what);
                 found.map_or("?", words::watchdog).into()
             }
             _ => String::new(),
@@ -379,45 +379,6 @@ impl Namer {
                 .cloned()
                 .unwrap_or_else(|| "?".into()),
         }
-    }
-}
-
-const fn kind_name(kind: EventKind) -> &'static str {
-    match kind {
-        EventKind::Ready => "ready",
-        EventKind::Injected => "injected",
-        EventKind::Restored => "restored",
-        EventKind::Alarm => "alarm",
-        EventKind::Cleared => "cleared",
-        EventKind::Diagnosis => "diagnosis",
-        EventKind::Action => "action",
-        EventKind::Miss => "miss",
-        EventKind::InputLost => "input-lost",
-        EventKind::InputBack => "input-back",
-        EventKind::SafeStop => "safe-stop",
-        EventKind::SafeStopEnds => "safe-stop-ends",
-        EventKind::Refused => "refused",
-        EventKind::Run => "run",
-        EventKind::EndOfRecording => "end-of-recording",
-        EventKind::Obeys => "obeys",
-        EventKind::Reason => "reason",
-        EventKind::Symptoms => "symptoms",
-        EventKind::Outcome => "outcome",
-        EventKind::Goal => "goal",
-        EventKind::Degraded => "degraded",
-        EventKind::Particles => "particles",
-        EventKind::Watchdog => "watchdog",
-        EventKind::Rejected => "rejected",
-        EventKind::Blind => "blind",
-        EventKind::BlindEnds => "blind-ends",
-        EventKind::Armed => "armed",
-        EventKind::NotExcited => "not-excited",
-        EventKind::Excited => "excited",
-        EventKind::Latched => "latched",
-        EventKind::Released => "released",
-        EventKind::Publisher => "publisher",
-        EventKind::Size => "size",
-        EventKind::Assertion => "assertion",
     }
 }
 

@@ -30,7 +30,7 @@ pub fn outcome(event: &Event) -> String {
     use RecoveryKind as K;
     let outcome = u32::try_from(event.value).ok();
     let succeeded = outcome == Some(ActionOutcome::Succeeded as u32);
-    let words = match (K::from_wire(event.what), succeeded) {
+    let words = match (K::from_repr(event.what), succeeded) {
         (Some(K::GoThrough), true) => "blockage overtaken",
         (Some(K::GoThrough), false) => "no opening",
         (Some(K::NewPath), true) => "alternative path",
@@ -66,7 +66,7 @@ pub fn degraded(bits: u32) -> String {
 
 /// Why the detector is blind.
 pub fn blind(cause: u32) -> &'static str {
-    Blindness::from_wire(cause).map_or("?", Blindness::as_str)
+    Blindness::from_repr(cause).map_or("?", Blindness::as_str)
 }
 
 /// What the watchdog has found of a service.

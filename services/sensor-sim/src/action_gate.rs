@@ -128,7 +128,7 @@ fn admit(
     if now_ns > action.valid_until_ns {
         return Err(ActionRejection::Expired);
     }
-    let kind = RecoveryKind::from_wire(action.kind).ok_or(ActionRejection::UnknownKind)?;
+    let kind = RecoveryKind::from_repr(action.kind).ok_or(ActionRejection::UnknownKind)?;
     let (scale, gain) = (action.speed_scale, action.curvature_gain);
     let offset = action.curvature_offset;
     if ![scale, gain, offset].iter().all(|value| value.is_finite()) {

@@ -85,7 +85,7 @@ impl Simulation {
 /// What an action asks of the navigation; `None` for a kind that this version does not know.
 fn request(action: &Action) -> Option<ActionRequest> {
     Some(ActionRequest {
-        kind: RecoveryKind::from_wire(action.kind)?,
+        kind: RecoveryKind::from_repr(action.kind)?,
         decision: DecisionId {
             epoch: action.header.epoch,
             seq: action.decision_seq,

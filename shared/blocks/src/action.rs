@@ -1,5 +1,7 @@
 //! The supervisor's decision: what to do.
 
+use strum::FromRepr;
+
 use crate::block::block;
 use crate::header::{Cause, Header};
 
@@ -74,7 +76,7 @@ block! {
 }
 
 /// What the robot is to do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
 #[repr(u32)]
 pub enum RecoveryKind {
     /// Nothing decided: the robot stops.
@@ -103,30 +105,8 @@ pub enum RecoveryKind {
     GiveUp = 11,
 }
 
-impl RecoveryKind {
-    /// The kind behind a block's `kind`, if this version knows it.
-    #[must_use]
-    pub const fn from_wire(value: u32) -> Option<Self> {
-        Some(match value {
-            0 => Self::None,
-            1 => Self::GoOn,
-            2 => Self::SlowDown,
-            3 => Self::Stop,
-            4 => Self::Compensate,
-            5 => Self::IgnoreEncoder,
-            6 => Self::CallForHelp,
-            7 => Self::NewPath,
-            8 => Self::Relocalise,
-            9 => Self::GoThrough,
-            10 => Self::MoveAway,
-            11 => Self::GiveUp,
-            _ => return None,
-        })
-    }
-}
-
 /// Why a robot does not obey an action, and stops itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
 #[repr(u32)]
 pub enum ActionRejection {
     /// There is no action, or it says that nothing is decided.
@@ -139,21 +119,6 @@ pub enum ActionRejection {
     NotFinite = 4,
     /// The speed factor is not within 0..1.
     OutOfRange = 5,
-}
-
-impl ActionRejection {
-    /// The rejection behind an event's code, if this version knows it.
-    #[must_use]
-    pub const fn from_wire(value: u32) -> Option<Self> {
-        Some(match value {
-            1 => Self::Nothing,
-            2 => Self::Expired,
-            3 => Self::UnknownKind,
-            4 => Self::NotFinite,
-            5 => Self::OutOfRange,
-            _ => return None,
-        })
-    }
 }
 
 /// What the values of actions are.

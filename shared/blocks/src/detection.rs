@@ -1,5 +1,7 @@
 //! The detector's belief: is something wrong?
 
+use strum::{FromRepr, IntoStaticStr, VariantArray};
+
 use crate::block::block;
 use crate::header::{Cause, Header};
 use crate::sensor::WHEELS;
@@ -93,7 +95,8 @@ block! {
 }
 
 /// Why no valid frame has been seen for a second. A robot that stands by command is not blind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 #[repr(u32)]
 pub enum Blindness {
     /// No frame comes.
@@ -117,46 +120,12 @@ pub enum Blindness {
 
 impl Blindness {
     /// All causes, in the order of their codes, which begin with 1.
-    pub const ALL: [Self; 8] = [
-        Self::Silence,
-        Self::Clock,
-        Self::Validity,
-        Self::Run,
-        Self::Command,
-        Self::Epoch,
-        Self::Refused,
-        Self::Meaning,
-    ];
+    pub const ALL: &[Self] = Self::VARIANTS;
 
     /// Name, as in reports.
     #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Silence => "silence",
-            Self::Clock => "clock",
-            Self::Validity => "validity",
-            Self::Run => "run",
-            Self::Command => "command",
-            Self::Epoch => "epoch",
-            Self::Refused => "refused",
-            Self::Meaning => "meaning",
-        }
-    }
-
-    /// The cause behind a block's `blind`, if this version knows it; none for 0.
-    #[must_use]
-    pub const fn from_wire(value: u32) -> Option<Self> {
-        Some(match value {
-            1 => Self::Silence,
-            2 => Self::Clock,
-            3 => Self::Validity,
-            4 => Self::Run,
-            5 => Self::Command,
-            6 => Self::Epoch,
-            7 => Self::Refused,
-            8 => Self::Meaning,
-            _ => return None,
-        })
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
     /// In few words.
@@ -176,7 +145,7 @@ impl Blindness {
 }
 
 /// Whether an alarm could rise now.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
 #[repr(u32)]
 pub enum Readiness {
     /// Not yet: the track settles, and the noise becomes known.
@@ -185,17 +154,4 @@ pub enum Readiness {
     Armed = 2,
     /// Armed, but the robot stands by command and shows nothing: the belief is held.
     NotExcited = 3,
-}
-
-impl Readiness {
-    /// The readiness behind a block's word, if this version knows it.
-    #[must_use]
-    pub const fn from_wire(value: u32) -> Option<Self> {
-        Some(match value {
-            1 => Self::Arming,
-            2 => Self::Armed,
-            3 => Self::NotExcited,
-            _ => return None,
-        })
-    }
 }

@@ -1,5 +1,7 @@
 //! What every block begins with, and what caused it.
 
+use strum::FromRepr;
+
 use crate::layout::part;
 
 part! {
@@ -62,7 +64,7 @@ pub struct Cause, size 24 {
 }
 
 /// Kind of a journal entry, as carried in [`Cause::kind`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
 #[repr(u32)]
 pub enum CauseKind {
     /// A sensor frame was taken.
@@ -84,10 +86,6 @@ impl Cause {
     /// The kind, if it is one that this version knows.
     #[must_use]
     pub const fn kind(&self) -> Option<CauseKind> {
-        match self.kind {
-            1 => Some(CauseKind::Frame),
-            2 => Some(CauseKind::Missed),
-            _ => None,
-        }
+        CauseKind::from_repr(self.kind)
     }
 }

@@ -1,5 +1,7 @@
 //! What each service says about itself.
 
+use strum::{FromRepr, IntoStaticStr};
+
 use crate::block::block;
 use crate::header::Header;
 use crate::layout::part;
@@ -25,7 +27,8 @@ pub struct Event, size 32 {
 }
 
 /// Kind of an [`Event`], and the meaning of its `what` and `value`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr, IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 #[repr(u32)]
 pub enum EventKind {
     /// The drive begins: every stage answers. `value`: the sensor's sequence number.
@@ -112,46 +115,10 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// The kind behind an event's `kind`, if this version knows it.
+    /// Name, as in reports.
     #[must_use]
-    pub const fn from_wire(value: u32) -> Option<Self> {
-        Some(match value {
-            1 => Self::Ready,
-            2 => Self::Injected,
-            3 => Self::Restored,
-            4 => Self::Alarm,
-            5 => Self::Cleared,
-            6 => Self::Diagnosis,
-            7 => Self::Action,
-            8 => Self::Miss,
-            9 => Self::InputLost,
-            10 => Self::InputBack,
-            11 => Self::SafeStop,
-            12 => Self::SafeStopEnds,
-            13 => Self::Refused,
-            14 => Self::Run,
-            15 => Self::EndOfRecording,
-            16 => Self::Obeys,
-            17 => Self::Reason,
-            18 => Self::Symptoms,
-            19 => Self::Outcome,
-            20 => Self::Goal,
-            21 => Self::Degraded,
-            22 => Self::Particles,
-            23 => Self::Watchdog,
-            24 => Self::Rejected,
-            25 => Self::Blind,
-            26 => Self::BlindEnds,
-            27 => Self::Armed,
-            28 => Self::NotExcited,
-            29 => Self::Excited,
-            30 => Self::Latched,
-            31 => Self::Released,
-            32 => Self::Publisher,
-            33 => Self::Size,
-            34 => Self::Assertion,
-            _ => return None,
-        })
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 }
 

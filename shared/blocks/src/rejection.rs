@@ -1,11 +1,16 @@
 //! Why a block from outside a service was refused.
 
+use strum::{FromRepr, IntoStaticStr, VariantArray};
+
 /// Capacity of the counters of refused blocks, one for each [`Rejection`].
 pub const REJECTIONS: usize = 16;
 
 /// Why a block was refused at a service's border. The value is the index of its counter in
 /// [`crate::Health::rejected`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, FromRepr, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "kebab-case")]
 #[repr(u32)]
 pub enum Rejection {
     /// Another block, or another version of it.
@@ -42,50 +47,12 @@ pub enum Rejection {
 
 impl Rejection {
     /// All of them, in the order of their counters.
-    pub const ALL: [Self; 15] = [
-        Self::Schema,
-        Self::NoEpoch,
-        Self::OtherWriter,
-        Self::Repeated,
-        Self::WrongSequence,
-        Self::Ahead,
-        Self::Behind,
-        Self::Early,
-        Self::NotFinite,
-        Self::OutOfRange,
-        Self::Jump,
-        Self::Quarantined,
-        Self::Malformed,
-        Self::Corrupt,
-        Self::Clock,
-    ];
+    pub const ALL: &[Self] = Self::VARIANTS;
 
     /// Name, as in reports.
     #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Schema => "schema",
-            Self::NoEpoch => "no-epoch",
-            Self::OtherWriter => "other-writer",
-            Self::Repeated => "repeated",
-            Self::WrongSequence => "wrong-sequence",
-            Self::Ahead => "ahead",
-            Self::Behind => "behind",
-            Self::Early => "early",
-            Self::NotFinite => "not-finite",
-            Self::OutOfRange => "out-of-range",
-            Self::Jump => "jump",
-            Self::Quarantined => "quarantined",
-            Self::Malformed => "malformed",
-            Self::Corrupt => "corrupt",
-            Self::Clock => "clock",
-        }
-    }
-
-    /// The rejection behind an event's code, if this version knows it.
-    #[must_use]
-    pub fn from_wire(value: u32) -> Option<Self> {
-        Self::ALL.get(usize::try_from(value).ok()?).copied()
+    pub fn as_str(self) -> &'static str {
+        self.into()
     }
 
     /// True if it speaks against the source: what it sends cannot be trusted. A block that comes
@@ -110,11 +77,11 @@ mod tests {
 
     #[test]
     fn every_rejection_has_a_counter_of_its_own() {
-        for (i, rejection) in Rejection::ALL.into_iter().enumerate() {
-            assert_eq!(rejection as usize, i);
+        for (i, rejection) in Rejection::ALL.iter().enumerate() {
+            assert_eq!(*rejection as usize, i);
             assert!(i < REJECTIONS);
-            assert_eq!(Rejection::from_wire(i as u32), Some(rejection));
+            assert_eq!(Rejection::from_repr(i as u32), Some(*rejection));
         }
-        assert_eq!(Rejection::from_wire(Rejection::ALL.len() as u32), None);
+        assert_eq!(Rejection::from_repr(Rejection::ALL.len() as u32), None);
     }
 }

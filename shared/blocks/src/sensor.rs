@@ -1,5 +1,7 @@
 //! What the robot measured, independent of its kind.
 
+use strum::FromRepr;
+
 use crate::block::block;
 use crate::header::Header;
 
@@ -117,7 +119,7 @@ impl Symptoms {
 }
 
 /// Outcome of the last action, as the robot reports it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
 #[repr(u32)]
 pub enum ActionOutcome {
     /// No action was taken.
@@ -128,20 +130,6 @@ pub enum ActionOutcome {
     Succeeded = 2,
     /// Could not be done.
     Failed = 3,
-}
-
-impl ActionOutcome {
-    /// The outcome behind a block's value, if this version knows it.
-    #[must_use]
-    pub const fn from_wire(value: u32) -> Option<Self> {
-        Some(match value {
-            0 => Self::None,
-            1 => Self::Running,
-            2 => Self::Succeeded,
-            3 => Self::Failed,
-            _ => return None,
-        })
-    }
 }
 
 impl SensorFrame {

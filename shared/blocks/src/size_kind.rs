@@ -1,10 +1,12 @@
 //! In which way a component is broken, and what the size of its fault is.
 
+use strum::{FromRepr, VariantArray};
+
 /// The way in which a component is most probably broken: it gives the fault's size its unit.
 ///
 /// A size is what a sensor's reading or an actuator does beside what it should. Some ways have no
 /// size: their name says all.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, FromRepr, VariantArray)]
 #[repr(u32)]
 pub enum SizeKind {
     /// Nothing is said of the way or the size.
@@ -44,29 +46,12 @@ pub enum SizeKind {
 
 impl SizeKind {
     /// Every kind, in the order of the codes.
-    pub const ALL: [Self; 16] = [
-        Self::None,
-        Self::Gain,
-        Self::BiasRadS,
-        Self::DriftRadS2,
-        Self::DelayS,
-        Self::AngleRad,
-        Self::TorqueShareLost,
-        Self::CurrentOffsetA,
-        Self::RateBiasRadS,
-        Self::Zero,
-        Self::Frozen,
-        Self::Noise,
-        Self::Dead,
-        Self::Stuck,
-        Self::HeldAtRad,
-        Self::JumpM,
-    ];
+    pub const ALL: &[Self] = Self::VARIANTS;
 
     /// The kind behind a block's code, [`Self::None`] for one that this version does not know.
     #[must_use]
     pub fn from_wire(code: u32) -> Self {
-        Self::ALL.get(code as usize).copied().unwrap_or_default()
+        Self::from_repr(code).unwrap_or_default()
     }
 
     /// One word for the way, empty for [`Self::None`].
@@ -114,9 +99,9 @@ mod tests {
 
     #[test]
     fn codes_are_the_places_in_the_list() {
-        for (code, kind) in SizeKind::ALL.into_iter().enumerate() {
-            assert_eq!(kind as usize, code);
-            assert_eq!(SizeKind::from_wire(code as u32), kind);
+        for (code, kind) in SizeKind::ALL.iter().enumerate() {
+            assert_eq!(*kind as usize, code);
+            assert_eq!(SizeKind::from_wire(code as u32), *kind);
         }
         assert_eq!(SizeKind::from_wire(99), SizeKind::None);
     }

@@ -192,7 +192,7 @@ impl HealthBoard {
         if account.rejected == self.rejected_in_events || now_ns < self.next_rejected_event_ns {
             return;
         }
-        for rejection in Rejection::ALL {
+        for &rejection in Rejection::ALL {
             let i = rejection as usize;
             let count = account.rejected[i] - self.rejected_in_events[i];
             if count > 0 {

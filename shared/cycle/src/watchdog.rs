@@ -8,13 +8,14 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
+use strum::FromRepr;
 use vigil_blocks::{Degraded, Health, ServiceState};
 
 /// Window in which missed deadlines are counted, ns.
 const WINDOW_NS: u64 = 1_000_000_000;
 
 /// What the watchdog finds wrong with a service.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
 #[repr(u32)]
 pub enum Finding {
     /// It did not begin to report in time.
@@ -28,18 +29,6 @@ pub enum Finding {
 }
 
 impl Finding {
-    /// The kind behind an event's `what`.
-    #[must_use]
-    pub const fn from_wire(value: u32) -> Option<Self> {
-        Some(match value {
-            1 => Self::StartUp,
-            2 => Self::Alive,
-            3 => Self::Deadline,
-            4 => Self::Logical,
-            _ => return None,
-        })
-    }
-
     /// True if only a new process can mend it. Missed deadlines are no such case: a restart would
     /// cost more of them.
     #[must_use]

@@ -280,7 +280,7 @@ proptest! {
         series in prop::collection::vec(sent(), 1..200),
     ) {
         let (account, history) = judged(writer, &series);
-        for cause in Rejection::ALL {
+        for &cause in Rejection::ALL {
             let counted = history.iter().filter(|came| came.rejection == Some(cause)).count();
             prop_assert_eq!(account.rejected[cause as usize], counted as u64, "{:?}", cause);
         }

@@ -181,7 +181,7 @@ impl FrameGuard {
             && pose(Valid::POSE, frame.pose)
             && pose(Valid::PLANNED_POSE, frame.planned_pose)
             && within(Valid::YAW_RATE, frame.yaw_rate, self.yaw_rate_max_rad_s)
-            && ActionOutcome::from_wire(frame.action_outcome).is_some()
+            && ActionOutcome::from_repr(frame.action_outcome).is_some()
             && frame.safe_stop <= 1
     }
 }

@@ -99,7 +99,7 @@ impl Robot {
     }
 
     fn outcome(&self) -> (Option<ActionOutcome>, u32) {
-        let outcome = ActionOutcome::from_wire(self.frame.action_outcome);
+        let outcome = ActionOutcome::from_repr(self.frame.action_outcome);
         (outcome, self.frame.symptoms)
     }
 }

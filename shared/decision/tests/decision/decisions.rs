@@ -422,7 +422,7 @@ proptest! {
             prop_assert!(action.value.iter().all(|v| v.is_finite()));
             prop_assert!(action.entropy.is_finite() && action.margin.is_finite());
             prop_assert!((0.0..=1.0).contains(&action.speed_scale));
-            prop_assert!(RecoveryKind::from_wire(action.kind).is_some());
+            prop_assert!(RecoveryKind::from_repr(action.kind).is_some());
         }
     }
 }

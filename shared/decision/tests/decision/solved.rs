@@ -112,7 +112,7 @@ fn faults_are_met_by_a_solved_policy_without_allocating() {
             assert_eq!(allocations() - before, 0);
             demand_complete(&action);
         }
-        RecoveryKind::from_wire(action.kind).unwrap()
+        RecoveryKind::from_repr(action.kind).unwrap()
     };
     assert_eq!(kind_after(&mut first, 0.0, 1e-4, 50), RecoveryKind::GoOn);
     assert_eq!(
@@ -149,7 +149,7 @@ fn exceptions_are_met_by_a_solved_policy_without_allocating() {
         assert_eq!(allocations() - before, 0);
         demand_complete(&action);
         assert_eq!(action.control_mode, ControlMode::Policy as u32);
-        let kind = RecoveryKind::from_wire(action.kind).unwrap();
+        let kind = RecoveryKind::from_repr(action.kind).unwrap();
         if kinds.last() != Some(&kind) {
             kinds.push(kind);
         }

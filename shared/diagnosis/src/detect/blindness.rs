@@ -208,9 +208,9 @@ impl BlindnessTimer {
         if self.unjudged_s < BLIND_S - SLACK_S {
             return;
         }
-        let causes = Blindness::ALL.into_iter().zip(self.by_cause);
+        let causes = Blindness::ALL.iter().zip(self.by_cause);
         let most = causes.max_by(|a, b| a.1.total_cmp(&b.1));
-        self.blind = most.map(|(cause, _)| cause);
+        self.blind = most.map(|(cause, _)| *cause);
         self.valid_s = 0.0;
         self.forget_causes();
     }

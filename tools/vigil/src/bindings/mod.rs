@@ -99,7 +99,9 @@ fn constants() -> Vec<(&'static str, String, u64)> {
         ("SAFE", ControlMode::Safe),
     ];
     all.extend(modes.map(|(name, value)| ("CONTROL", name.to_owned(), value as u64)));
-    let sizes = SizeKind::ALL.map(|kind| (format!("{kind:?}"), kind as u64));
+    let sizes = SizeKind::ALL
+        .iter()
+        .map(|kind| (format!("{kind:?}"), *kind as u64));
     all.extend(sizes.map(|(name, value)| ("SIZE", upper(&name), value)));
     let causes = [("FRAME", CauseKind::Frame), ("MISSED", CauseKind::Missed)];
     all.extend(causes.map(|(name, value)| ("CAUSE", name.to_owned(), value as u64)));

@@ -9,7 +9,8 @@ use crate::findings::{Finding, Status};
 pub fn findings(heard: &Reception) -> Vec<Finding> {
     let count = |cause: &Rejection| heard.rejected[*cause as usize];
     let causes: Vec<Rejection> = Rejection::ALL
-        .into_iter()
+        .iter()
+        .copied()
         .filter(|cause| count(cause) > 0)
         .collect();
     if causes.is_empty() {

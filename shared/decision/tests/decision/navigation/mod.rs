@@ -101,7 +101,7 @@ impl Navigation {
     }
 
     pub fn kind(&self) -> RecoveryKind {
-        RecoveryKind::from_wire(self.action.kind).unwrap()
+        RecoveryKind::from_repr(self.action.kind).unwrap()
     }
 
     pub fn hp(&self) -> f64 {

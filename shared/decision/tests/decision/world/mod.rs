@@ -133,7 +133,7 @@ impl World {
 
     /// What the robot is to do.
     pub fn kind(&self) -> RecoveryKind {
-        RecoveryKind::from_wire(self.action.kind).unwrap()
+        RecoveryKind::from_repr(self.action.kind).unwrap()
     }
 
     /// Belief in a state.
