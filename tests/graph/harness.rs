@@ -193,8 +193,8 @@ pub fn eventually<T>(what: &str, mut condition: impl FnMut() -> Option<T>) -> T 
 
 /// Takes every waiting block.
 pub fn drain<T: Block>(receiver: &mut dyn Receiver<T>, mut take: impl FnMut(&T)) {
-    while receiver.advance() {
-        take(receiver.held().unwrap());
+    while let Some(block) = receiver.take_next() {
+        take(block);
     }
 }
 

@@ -161,9 +161,8 @@ impl<T: Payload> Incoming for Reader<T> {
         }
         // The newest, as a stage does.
         let mut newest = None;
-        while self.receiver.advance() {
-            let block = self.receiver.held();
-            newest = block.map(|block| (block.header().t_schedule_ns, block.header().t_publish_ns));
+        while let Some(block) = self.receiver.take_next() {
+            newest = Some((block.header().t_schedule_ns, block.header().t_publish_ns));
             if !self.receiver.is_waiting() {
                 break; // Keep holding it: it is looked at in place.
             }

@@ -107,11 +107,8 @@ impl DetectorStage {
 impl Stage for DetectorStage {
     fn take(&mut self, intake: &mut Intake<'_>) {
         for _ in 0..self.frames.buffer() {
-            if !self.frames.advance() {
-                break;
-            }
             // A copy: its writer may change the shared block between the check and the step.
-            let Some(frame) = self.frames.held().copied() else {
+            let Some(frame) = self.frames.take_next().copied() else {
                 break;
             };
             let content = || self.guard.check(&frame);

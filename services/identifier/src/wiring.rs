@@ -97,11 +97,8 @@ impl IdentifierStage {
 
     fn take_frames(&mut self, intake: &Intake<'_>) {
         for _ in 0..self.frames.buffer() {
-            if !self.frames.advance() {
-                break;
-            }
             // A copy: its writer may change the shared block between the check and the step.
-            let Some(frame) = self.frames.held().copied() else {
+            let Some(frame) = self.frames.take_next().copied() else {
                 break;
             };
             let (account, content) = (&mut self.frame_account, || self.guard.check(&frame));
@@ -135,7 +132,7 @@ impl IdentifierStage {
             .held()
             .is_none_or(|p| precedes(&p.cause, &detection.cause))
         {
-            if !self.detected.advance() {
+            if self.detected.take_next().is_none() {
                 break;
             }
         }
@@ -171,10 +168,7 @@ impl Stage for IdentifierStage {
     fn take(&mut self, intake: &mut Intake<'_>) {
         self.take_frames(intake);
         for _ in 0..self.detections.buffer() {
-            if !self.detections.advance() {
-                break;
-            }
-            let Some(detection) = self.detections.held() else {
+            let Some(detection) = self.detections.take_next() else {
                 break;
             };
             let (header, cause) = (detection.header, detection.cause);

@@ -196,7 +196,7 @@ impl ServiceProcess {
     /// The assertion that has ended it, if one has; it is then in the timeline.
     fn take_failure(&self, observer: &mut Observer) -> Option<Failure> {
         let failure = Failure::take(&self.failure)?;
-        observer.add_failure(self.name, &failure);
+        observer.timeline.add_failure(self.name, &failure);
         Some(failure)
     }
 }

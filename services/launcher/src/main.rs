@@ -130,7 +130,7 @@ fn summary(plan: &Plan, observer: &Observer, children: &Children, ended: EndReas
         end_ns: observer.end_ns(),
         gave_up: children.gave_up().map(str::to_owned),
     };
-    Summary::new(&plan.setup, observer.timeline(), &records, run)
+    Summary::new(&plan.setup, &observer.timeline, &records, run)
 }
 
 /// Watches until the end; returns why it ended.
@@ -151,7 +151,7 @@ fn watch(
         if signal::stop_requested() {
             return EndReason::Stopped;
         }
-        if observer.timeline().has(EventKind::EndOfRecording) {
+        if observer.timeline.has(EventKind::EndOfRecording) {
             // Input that is missing from now on is no failure.
             let since = *recording_ended.get_or_insert_with(Instant::now);
             if since.elapsed() > DRAIN {

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use vigil_blocks::{Block, Event, Health, REJECTIONS};
-use vigil_cycle::failure::Failure;
+use serde::Serialize;
+use vigil_blocks::{Block, Health, REJECTIONS};
 use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Graph, Monotonic, PortError, Receiver, Topic, health};
@@ -25,7 +25,7 @@ pub struct ServiceView {
 }
 
 /// Counters that add up over restarts.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Counters {
     pub cycles: u64,
     pub missed: u64,
@@ -35,7 +35,8 @@ pub struct Counters {
     pub late: u64,
     pub duplicate: u64,
     pub invalid: u64,
-    /// Refused input by cause, see [`vigil_blocks::Rejection`].
+    /// Refused input by cause, see [`vigil_blocks::Rejection`]. The summary names the causes.
+    #[serde(skip)]
     pub rejected: [u64; REJECTIONS],
 }
 
@@ -66,7 +67,8 @@ fn accounted_after(health: &Health, end_ns: u64) -> u64 {
 pub struct Observer {
     graph: Graph,
     watched: Vec<ServiceView>,
-    timeline: Timeline,
+    /// What has happened.
+    pub timeline: Timeline,
     is_external: bool,
 }
 
@@ -101,10 +103,7 @@ impl Observer {
     pub fn poll(&mut self, show: bool) {
         for service in &mut self.watched {
             for _ in 0..service.receiver.buffer() {
-                if !service.receiver.advance() {
-                    break;
-                }
-                let Some(block) = service.receiver.held() else {
+                let Some(block) = service.receiver.take_next() else {
                     break;
                 };
                 if block.header.schema != Health::SCHEMA {
@@ -168,21 +167,6 @@ impl Observer {
     /// Every service watched.
     pub fn watched(&self) -> &[ServiceView] {
         &self.watched
-    }
-
-    /// Adds an assertion of a service that has failed.
-    pub fn add_failure(&mut self, service: ServiceName, failure: &Failure) {
-        self.timeline.add_failure(service, failure);
-    }
-
-    /// Adds an event that the launcher itself has found out about a service.
-    pub fn add_event(&mut self, service: ServiceName, event: &Event) {
-        self.timeline.add(service, event);
-    }
-
-    /// What has happened.
-    pub const fn timeline(&self) -> &Timeline {
-        &self.timeline
     }
 
     /// Instant at which the run ended, ns: now, unless it was closed before.

@@ -4,10 +4,7 @@ use std::fmt;
 use std::time::{Duration, Instant};
 
 use vigil_cycle::failure::Failure;
-use vigil_cycle::serve::EXIT_MISSED;
-
-/// Exit code of a service that refuses its options or configuration.
-const EXIT_REFUSED: i32 = 2;
+use vigil_cycle::serve::{EXIT_MISSED, EXIT_REFUSED};
 
 /// When a service is given up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,7 +89,7 @@ impl RestartHistory {
             }
             self.failed_at.push(failure.location.clone());
         }
-        if death.code == Some(EXIT_REFUSED) {
+        if death.code == Some(EXIT_REFUSED.into()) {
             return Err(GiveUpReason::Refused);
         }
         if death.code == Some(EXIT_MISSED.into()) {

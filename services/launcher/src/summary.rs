@@ -57,14 +57,8 @@ impl From<Percentiles> for Microseconds {
 /// What one service did.
 #[derive(Debug, Clone, Serialize)]
 pub struct ServiceSummary {
-    cycles: u64,
-    missed: u64,
-    over_budget: u64,
-    slips: u64,
-    lost: u64,
-    late: u64,
-    duplicate: u64,
-    invalid: u64,
+    #[serde(flatten)]
+    counters: Counters,
     /// Refused input by cause; causes that did not occur are left out.
     rejected: BTreeMap<&'static str, u64>,
     restarts: usize,
@@ -181,14 +175,7 @@ fn service(record: &ServiceRecord) -> ServiceSummary {
     let health = record.health.as_deref();
     let latency = |get: fn(&RunReport) -> Percentiles| report.map(|r| get(r).into());
     ServiceSummary {
-        cycles: counters.cycles,
-        missed: counters.missed,
-        over_budget: counters.over_budget,
-        slips: counters.slips,
-        lost: counters.lost,
-        late: counters.late,
-        duplicate: counters.duplicate,
-        invalid: counters.invalid,
+        counters: *counters,
         rejected: Rejection::ALL
             .iter()
             .map(|cause| (cause.as_str(), counters.rejected[*cause as usize]))
@@ -231,6 +218,7 @@ impl fmt::Display for Summary {
              restarts  step p99"
         )?;
         for (name, s) in self.in_order() {
+            let counters = &s.counters;
             let step = s
                 .step_us
                 .map_or_else(|| "-".into(), |l| format!("{:.0} us", l.p99));
@@ -239,12 +227,12 @@ impl fmt::Display for Summary {
                 "  {name:<11} {:>5}  {:<10} {:>8} {:>7} {:>12} {:>6} {:>5} {:>5} {:>9}  {step}",
                 s.core,
                 s.scheduling,
-                s.cycles,
-                s.missed,
-                s.over_budget,
-                s.slips,
-                s.lost,
-                s.late,
+                counters.cycles,
+                counters.missed,
+                counters.over_budget,
+                counters.slips,
+                counters.lost,
+                counters.late,
                 s.restarts
             )?;
         }

@@ -43,7 +43,7 @@ impl WatchdogDriver {
         }
         while let Some((service, finding)) = self.watchdog.failed(now_ns) {
             let name = self.services[service];
-            observer.add_event(
+            observer.timeline.add(
                 name,
                 &Event {
                     t_ns: now_ns,

@@ -1,7 +1,6 @@
 //! `vigil-sensor-sim`: the simulated rover, recorded frames, or frames from a socket, as a process
-//! of the graph. Exit codes: 0 stopped, 1 failed, 2 configuration.
+//! of the graph. Exit codes: 0 stopped, 1 failed, 2 configuration, 3 a deadline was missed that ends it.
 
-use std::error::Error;
 use std::process::ExitCode;
 use std::rc::Rc;
 
@@ -31,29 +30,15 @@ struct Args {
 
 fn main() -> ExitCode {
     let args = Args::parse();
-    let (setup, source) = match prepare(&args) {
-        Ok(prepared) => prepared,
-        Err(error) => {
-            eprintln!("{error}");
-            return ExitCode::from(2);
-        }
+    let prepare = || {
+        let setup = args.service.load()?;
+        let source = assemble(&setup, &args.inject)?;
+        Ok((setup, source))
     };
-    if args.service.check {
-        return ExitCode::SUCCESS;
-    }
-    match serve(&setup, source, &args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("sensor-sim: {error}");
-            ExitCode::from(error.exit_code())
-        }
-    }
-}
-
-fn prepare(args: &Args) -> Result<(Setup, SensorSource), Box<dyn Error>> {
-    let setup = args.service.load()?;
-    let source = assemble(&setup, &args.inject)?;
-    Ok((setup, source))
+    let check = args.service.check;
+    serve::process(ServiceName::SensorSim, check, prepare, |(setup, source)| {
+        serve(&setup, source, &args)
+    })
 }
 
 fn serve(setup: &Setup, source: SensorSource, args: &Args) -> Result<(), ServeError> {

@@ -73,8 +73,8 @@ impl Border {
         let next = self.cycle.turn(&mut self.stage, &self.clock).unwrap();
         assert!(next.is_continue());
         let mut runs = Vec::new();
-        while self.published.advance() {
-            runs.push(self.published.held().unwrap().run_id);
+        while let Some(frame) = self.published.take_next() {
+            runs.push(frame.run_id);
         }
         self.clock.advance(PERIOD_NS);
         runs

@@ -69,10 +69,7 @@ impl SupervisorStage {
 
     fn take_detections(&mut self, intake: &Intake<'_>) {
         for _ in 0..self.detections.buffer() {
-            if !self.detections.advance() {
-                break;
-            }
-            let Some(block) = self.detections.held() else {
+            let Some(block) = self.detections.take_next() else {
                 break;
             };
             let account = &mut self.detection_account;
@@ -122,10 +119,7 @@ impl Stage for SupervisorStage {
     fn take(&mut self, intake: &mut Intake<'_>) {
         self.take_detections(intake);
         for _ in 0..self.diagnoses.buffer() {
-            if !self.diagnoses.advance() {
-                break;
-            }
-            let Some(diagnosis) = self.diagnoses.held() else {
+            let Some(diagnosis) = self.diagnoses.take_next() else {
                 break;
             };
             let (header, cause) = (&diagnosis.header, &diagnosis.cause);

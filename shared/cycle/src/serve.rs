@@ -1,7 +1,9 @@
 //! The life of a service process: place, open ports, warm up, cycle, report.
 
+use std::error::Error;
 use std::io;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use crate::clock::{Clock, Monotonic};
 use crate::cycle_account::CycleAccount;
@@ -110,6 +112,35 @@ impl ServeError {
 
 /// Exit code of a service that a missed deadline has ended: not to be restarted.
 pub const EXIT_MISSED: u8 = 3;
+/// Exit code of a service that refuses its options or configuration.
+pub const EXIT_REFUSED: u8 = 2;
+
+/// The `main` of a service: `prepare` reads and checks all that it needs, `serve` runs it until it
+/// is stopped. With `checks_only` it ends in between. Errors go to standard error.
+pub fn process<P>(
+    service: ServiceName,
+    checks_only: bool,
+    prepare: impl FnOnce() -> Result<P, Box<dyn Error>>,
+    serve: impl FnOnce(P) -> Result<(), ServeError>,
+) -> ExitCode {
+    let prepared = match prepare() {
+        Ok(prepared) => prepared,
+        Err(error) => {
+            eprintln!("{error}");
+            return ExitCode::from(EXIT_REFUSED);
+        }
+    };
+    if checks_only {
+        return ExitCode::SUCCESS;
+    }
+    match serve(prepared) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{}: {error}", service.as_str());
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
 
 /// Runs a stage that waits for blocks of `T` on `input`, until SIGINT or SIGTERM.
 ///

@@ -35,8 +35,8 @@ struct Worker {
 
 impl Stage for Worker {
     fn take(&mut self, intake: &mut Intake<'_>) {
-        while self.input.advance() {
-            let header = self.input.held().unwrap().header;
+        while let Some(frame) = self.input.take_next() {
+            let header = frame.header;
             if intake.accept::<SensorFrame>(&header) {
                 self.clock
                     .advance(self.ns_a_particle * u64::from(self.particles));
@@ -146,8 +146,8 @@ impl World {
     /// Kinds of the blocks that went out.
     fn published(&mut self) -> Vec<CauseKind> {
         let mut kinds = Vec::new();
-        while self.actions.advance() {
-            kinds.extend(self.actions.held().unwrap().cause.kind());
+        while let Some(action) = self.actions.take_next() {
+            kinds.extend(action.cause.kind());
         }
         kinds
     }
@@ -242,8 +242,8 @@ fn what_came_while_a_stage_was_held_up_in_its_turn_is_taken_in_that_turn() {
     world.worker.held_up = Some((world.graph.sender(Topic::Sensor).unwrap(), 6));
     assert!(world.instant(true).is_continue());
     let mut answered_ns = 0;
-    while world.actions.advance() {
-        answered_ns = world.actions.held().unwrap().header.t_schedule_ns;
+    while let Some(action) = world.actions.take_next() {
+        answered_ns = action.header.t_schedule_ns;
     }
     // The first of the turn took 10 us before the others came.
     assert_eq!(answered_ns, 8 * PERIOD_NS + 10_000);

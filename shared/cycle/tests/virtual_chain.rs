@@ -61,10 +61,9 @@ struct Relay<I: TopicBlock, O: Caused> {
 impl<I: TopicBlock, O: Caused> Stage for Relay<I, O> {
     fn take(&mut self, intake: &mut Intake<'_>) {
         for _ in 0..self.input.buffer() {
-            if !self.input.advance() {
+            let Some(block) = self.input.take_next() else {
                 break;
-            }
-            let block = self.input.held().unwrap();
+            };
             let identity = (self.identity)(block);
             if let (true, Some(identity)) = (intake.accept::<I>(block.header()), identity) {
                 self.clock
@@ -136,8 +135,7 @@ impl<T: TopicBlock> Tap<T> {
     }
 
     fn drain(&mut self) {
-        while self.receiver.advance() {
-            let block = self.receiver.held().unwrap();
+        while let Some(block) = self.receiver.take_next() {
             if (self.is_frame)(block) {
                 let Header {
                     t_schedule_ns,

@@ -80,8 +80,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 fn answer(health: &mut dyn Receiver<Health>, epoch: u64, seq: u64) -> Option<bool> {
     let started = Instant::now();
     while started.elapsed() < ANSWER_LIMIT {
-        while health.advance() {
-            let Some(block) = health.held() else { break };
+        while let Some(block) = health.take_next() {
             if (block.control_epoch, block.control_seq) == (epoch, seq) {
                 return Some(block.control_result == 1);
             }

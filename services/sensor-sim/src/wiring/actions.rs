@@ -24,10 +24,7 @@ impl Actions {
     /// Takes the actions that have arrived, in the cycle that was due at `t_schedule_ns`.
     pub(super) fn take(&mut self, t_schedule_ns: u64, own_epoch: u64) {
         for _ in 0..self.receiver.buffer() {
-            if !self.receiver.advance() {
-                break;
-            }
-            let Some(action) = self.receiver.held() else {
+            let Some(action) = self.receiver.take_next() else {
                 break;
             };
             if action.header.schema != Action::SCHEMA {

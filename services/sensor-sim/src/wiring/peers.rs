@@ -32,10 +32,9 @@ impl Peers {
         }
         for (up, receiver) in self.up.iter_mut().zip(&mut self.health) {
             for _ in 0..receiver.buffer() {
-                if !receiver.advance() {
+                let Some(health) = receiver.take_next() else {
                     break;
-                }
-                let Some(health) = receiver.held() else { break };
+                };
                 let open = [ServiceState::Ready as u32, ServiceState::Running as u32];
                 *up |= health.header.schema == Health::SCHEMA && open.contains(&health.state);
             }

@@ -104,10 +104,7 @@ impl SimulatorSource {
 
     fn take_control(&mut self, health: &mut HealthBoard, now_ns: u64) {
         for _ in 0..self.control.buffer() {
-            if !self.control.advance() {
-                break;
-            }
-            let Some(command) = self.control.held().copied() else {
+            let Some(command) = self.control.take_next().copied() else {
                 break;
             };
             let wanted = change_of(&command);

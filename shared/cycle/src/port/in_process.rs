@@ -144,7 +144,7 @@ pub(super) struct LocalReceiver<T> {
 }
 
 impl<T: Block> Receiver<T> for LocalReceiver<T> {
-    fn advance(&mut self) -> bool {
+    fn take_next(&mut self) -> Option<&T> {
         let mut queue = self.queue.borrow_mut();
         let now_ns = self.clock.now_ns();
         let is_out = |block: &T| block.header().t_publish_ns <= now_ns;
@@ -160,7 +160,7 @@ impl<T: Block> Receiver<T> for LocalReceiver<T> {
             schema.is_none_or(|schema| schema == T::SCHEMA),
             "a queue holds the blocks of its topic, stamped"
         );
-        visible
+        self.held()
     }
 
     fn held(&self) -> Option<&T> {
@@ -189,6 +189,6 @@ mod tests {
         let bus = Bus::new(VirtualClock::default());
         let mut receiver = bus.receiver::<SensorFrame>(Topic::Sensor);
         receiver.queue.borrow_mut().push(&SensorFrame::default());
-        receiver.advance();
+        receiver.take_next();
     }
 }

@@ -45,9 +45,9 @@ pub trait Sender<T: Block> {
 
 /// Receives the blocks of one topic.
 pub trait Receiver<T: Block> {
-    /// Drops the held block and takes the next waiting one; false if none waits. Call it at most
-    /// [`Self::buffer`] times a turn, so that a flood cannot hold the cycle.
-    fn advance(&mut self) -> bool;
+    /// Drops the held block, and takes and holds the next waiting one; `None` if none waits. Call it
+    /// at most [`Self::buffer`] times a turn, so that a flood cannot hold the cycle.
+    fn take_next(&mut self) -> Option<&T>;
 
     /// The held block, read in place.
     fn held(&self) -> Option<&T>;

@@ -359,12 +359,12 @@ pub(super) struct SharedReceiver<T: Block> {
 }
 
 impl<T: Block> Receiver<T> for SharedReceiver<T> {
-    fn advance(&mut self) -> bool {
+    fn take_next(&mut self) -> Option<&T> {
         // Dropped before the next is taken, so that one borrowed block is the most ever held.
         self.held = None;
         // A failed read looks like silence: the deadline then counts it.
         self.held = self.subscriber.receive().unwrap_or(None);
-        self.held.is_some()
+        self.held()
     }
 
     fn held(&self) -> Option<&T> {

@@ -165,10 +165,9 @@ fn topic(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), PortE
     while_it_lasts(seconds, &listener, heard, |heard| {
         border.look();
         for _ in 0..frames.buffer() {
-            if !frames.advance() {
+            let Some(frame) = frames.take_next() else {
                 break;
-            }
-            let Some(frame) = frames.held() else { break };
+            };
             arrived.push((*frame, Monotonic.now_ns()));
         }
         // Who joins is given frames that were sent before: of the first batch the newest counts.
@@ -258,10 +257,7 @@ impl Border {
     }
 
     fn look(&mut self) {
-        while self.health.advance() {
-            let Some(health) = self.health.held() else {
-                break;
-            };
+        while let Some(health) = self.health.take_next() {
             let window = self
                 .window
                 .get_or_insert_with(|| [Box::new(*health), Box::new(*health)]);
