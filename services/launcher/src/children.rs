@@ -11,7 +11,7 @@ use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Domain, RunReport, signal};
 
 use crate::error::LauncherError;
-use crate::observer::Observer;
+use crate::observer::HealthObserver;
 use crate::plan::{CommandLine, Plan};
 use crate::restarts::{Death, RestartHistory};
 
@@ -80,7 +80,7 @@ impl Children {
     }
 
     /// Restarts what has died; true if a service had to be given up.
-    pub fn look_after(&mut self, plan: &Plan, observer: &mut Observer) -> bool {
+    pub fn look_after(&mut self, plan: &Plan, observer: &mut HealthObserver) -> bool {
         for service in &mut self.services {
             let now = Instant::now();
             let name = service.name.as_str();
@@ -166,7 +166,7 @@ impl Children {
     }
 
     /// Puts the assertions into the timeline that have failed while the services stopped.
-    pub fn take_failures(&self, observer: &mut Observer) {
+    pub fn take_failures(&self, observer: &mut HealthObserver) {
         for service in &self.services {
             service.take_failure(observer);
         }
@@ -194,7 +194,7 @@ impl Children {
 
 impl ServiceProcess {
     /// The assertion that has ended it, if one has; it is then in the timeline.
-    fn take_failure(&self, observer: &mut Observer) -> Option<Failure> {
+    fn take_failure(&self, observer: &mut HealthObserver) -> Option<Failure> {
         let failure = Failure::take(&self.failure)?;
         observer.timeline.add_failure(self.name, &failure);
         Some(failure)
@@ -217,3 +217,6 @@ fn spawn(command: CommandLine) -> Result<Child, LauncherError> {
         .spawn()
         .map_err(|cause| LauncherError::file(command.program, cause))
 }
+
+#[cfg(test)]
+mod tests;

@@ -33,9 +33,9 @@ use vigil_cycle::signal;
 
 use crate::children::Children;
 use crate::error::LauncherError;
-use crate::observer::{Observer, ServiceView};
+use crate::observer::{HealthObserver, ServiceView};
 use crate::plan::{LauncherArgs, Plan};
-use crate::summary::{EndReason, Run, ServiceRecord, Summary};
+use crate::summary::{EndReason, RunEnd, ServiceRecord, Summary};
 use crate::watchdog::WatchdogDriver;
 
 /// Interval at which Health is read and children are looked after: a death is seen within a fifth
@@ -90,7 +90,7 @@ fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, LauncherError> {
     domain.remove_residue();
     signal::install();
     let link = Link::join(&domain, "launcher")?;
-    let mut observer = Observer::new(link, plan)?;
+    let mut observer = HealthObserver::new(link, plan)?;
     let _awake = args.keep_awake.then(|| plan.keep_awake()).transpose()?;
     let mut children = Children::start(plan, &domain)?;
     let ended = watch(args, plan, &mut observer, &mut children);
@@ -115,7 +115,12 @@ fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, LauncherError> {
     })
 }
 
-fn summary(plan: &Plan, observer: &Observer, children: &Children, ended: EndReason) -> Summary {
+fn summary(
+    plan: &Plan,
+    observer: &HealthObserver,
+    children: &Children,
+    ended: EndReason,
+) -> Summary {
     let record = |service: &ServiceView| ServiceRecord {
         name: service.name,
         health: service.latest.clone(),
@@ -124,7 +129,7 @@ fn summary(plan: &Plan, observer: &Observer, children: &Children, ended: EndReas
         report: children.report(service.name),
     };
     let records: Vec<ServiceRecord> = observer.watched().iter().map(record).collect();
-    let run = Run {
+    let run = RunEnd {
         ended,
         duration_s: observer.since_ready_s().unwrap_or(0.0),
         end_ns: observer.end_ns(),
@@ -137,7 +142,7 @@ fn summary(plan: &Plan, observer: &Observer, children: &Children, ended: EndReas
 fn watch(
     args: &LauncherArgs,
     plan: &Plan,
-    observer: &mut Observer,
+    observer: &mut HealthObserver,
     children: &mut Children,
 ) -> EndReason {
     let started = Instant::now();

@@ -8,7 +8,7 @@ use vigil_cycle::port::Link;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Clock, Graph, Monotonic, PortError, Receiver, Topic, health};
 
-use crate::plan::{Drive, Plan};
+use crate::plan::{DriveProgress, Plan};
 use crate::timeline::Timeline;
 
 /// What the launcher knows of one service.
@@ -64,7 +64,7 @@ fn accounted_after(health: &Health, end_ns: u64) -> u64 {
 }
 
 /// Reads Health and keeps the timeline.
-pub struct Observer {
+pub struct HealthObserver {
     graph: Graph,
     watched: Vec<ServiceView>,
     /// What has happened.
@@ -72,7 +72,7 @@ pub struct Observer {
     is_external: bool,
 }
 
-impl Observer {
+impl HealthObserver {
     /// Opens the Health topics, before any service has written there.
     pub fn new(link: Link, plan: &Plan) -> Result<Self, PortError> {
         let graph = Graph::SharedMemory(link);
@@ -131,8 +131,8 @@ impl Observer {
     }
 
     /// What a simulator that replaces another has to know; `None` before the drive has begun.
-    pub fn drive(&self) -> Option<Drive> {
-        Some(Drive {
+    pub fn drive(&self) -> Option<DriveProgress> {
+        Some(DriveProgress {
             began_ns: self.ready_ns()?,
             t_s: self.since_ready_s()?,
             changes: self.timeline.changes(),
@@ -198,6 +198,47 @@ impl Observer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plan::tests::plan;
+    use vigil_blocks::{Event, EventKind};
+    use vigil_cycle::Stamp;
+
+    #[test]
+    fn what_a_service_reports_over_a_restart_adds_up_from_the_first_cycle_on() {
+        let plan = plan(&["--graph", "test-observer"]).unwrap();
+        let domain = plan.setup.domain().unwrap();
+        let link = || Link::join(&domain, "test").unwrap();
+        let mut observer = HealthObserver::new(link(), &plan).unwrap();
+        assert_eq!(observer.since_ready_s(), None);
+        let service = Graph::SharedMemory(link());
+        let mut report = |cycles, began_ns| {
+            let topic = Topic::Health(ServiceName::SensorSim);
+            let mut sender = service.sender::<Health>(topic).unwrap();
+            let health = sender.block();
+            (health.cycles, health.event_count) = (cycles, 1);
+            health.events[0] = Event {
+                t_ns: began_ns,
+                kind: EventKind::Ready as u32,
+                ..Event::default()
+            };
+            sender.send(Stamp::default(), &Monotonic).unwrap();
+            // What a writer that is gone has sent cannot be read any more.
+            observer.poll(false);
+        };
+        report(5, 7);
+        report(3, 9);
+        // The drive began with the first process.
+        assert_eq!(observer.ready_ns(), Some(7));
+        assert_eq!(observer.drive().unwrap().began_ns, 7);
+        assert!(observer.since_ready_s().is_some());
+        let watched = &observer.watched()[0];
+        assert_eq!(watched.name, ServiceName::SensorSim);
+        assert_eq!(observer.counters(watched).cycles, 8);
+        observer.remove_dead_peers();
+        observer.close(Duration::ZERO);
+        assert_eq!(observer.timeline.closed_ns(), Some(observer.end_ns()));
+        drop((observer, service));
+        domain.remove_residue();
+    }
 
     #[test]
     fn counters_of_processes_that_followed_each_other_add_up() {

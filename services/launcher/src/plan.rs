@@ -54,7 +54,7 @@ const UNREPORTED_S: f64 = 0.2;
 
 /// What a simulator that replaces another has to know.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Drive {
+pub struct DriveProgress {
     /// When the drive began, ns.
     pub began_ns: u64,
     /// Seconds since then.
@@ -85,6 +85,8 @@ pub struct Plan {
     pub setup: Setup,
     /// What every service reads: the same bytes at each restart, even if a file was edited.
     document: SealedText,
+    /// Folder of the services' programs: the launcher's own.
+    pub programs: PathBuf,
     inject: Vec<String>,
     stamps: Option<StampsRequest>,
     no_timing: bool,
@@ -125,6 +127,9 @@ impl Plan {
         Ok(Self {
             document: SealedText::new(&document.to_text()?).map_err(LauncherError::Document)?,
             setup,
+            programs: std::env::current_exe()
+                .unwrap_or_default()
+                .with_file_name(""),
             inject: args.inject.clone(),
             stamps: args.stamps.as_ref().map(stamps),
             no_timing: args.no_timing,
@@ -219,7 +224,7 @@ impl Plan {
         &self,
         name: ServiceName,
         report: &Path,
-        drive: Option<&Drive>,
+        drive: Option<&DriveProgress>,
     ) -> CommandLine {
         let (ServiceName::SensorSim, Some(drive)) = (name, drive) else {
             return self.command(name, report);
@@ -240,7 +245,7 @@ impl Plan {
     }
 
     /// What is still to come after this part of a drive, and what it has changed so far.
-    fn injections_after(&self, drive: &Drive) -> Vec<String> {
+    fn injections_after(&self, drive: &DriveProgress) -> Vec<String> {
         let parse = |spec: &String| Injection::parse(spec, &self.setup.robot).ok();
         // What was due just now may not be among the changes yet.
         let is_to_come = |spec: &&String| {
@@ -265,9 +270,7 @@ impl Plan {
             options.extend(["--inject".into(), spec.clone()]);
         }
         CommandLine {
-            program: std::env::current_exe()
-                .unwrap_or_default()
-                .with_file_name(program),
+            program: self.programs.join(program),
             options,
         }
     }
@@ -326,7 +329,7 @@ pub(crate) mod tests {
         let specs = ["--inject", "stuck:RM@5", "--inject", "clear:RM@9"];
         let plan = plan(&specs).unwrap();
         let again = |t_s, changes: &[&str]| {
-            let drive = Drive {
+            let drive = DriveProgress {
                 began_ns: 7,
                 t_s,
                 changes: changes.iter().map(|c| (*c).to_owned()).collect(),
@@ -343,6 +346,15 @@ pub(crate) mod tests {
         assert_eq!(again(5.1, &[]), format!("{early} {rest}"));
         let detector = plan.command_again(ServiceName::Detector, Path::new("r"), None);
         assert_eq!(options(detector), "--report r");
+    }
+
+    #[test]
+    fn the_cores_of_the_services_can_be_kept_awake() {
+        let mut plan = plan(&[]).unwrap();
+        assert!(plan.keep_awake().is_ok());
+        plan.setup.file.services.detector.core = 100_000;
+        let refusal = plan.keep_awake().err().unwrap().to_string();
+        assert_eq!(refusal, "--keep-awake: core 100000 is not permitted");
     }
 
     #[test]

@@ -118,7 +118,7 @@ pub struct ServiceRecord {
 
 /// How a run went.
 #[derive(Debug, Clone)]
-pub struct Run {
+pub struct RunEnd {
     /// Why it ended.
     pub ended: EndReason,
     /// How long it lasted, s, from the first cycle in which every service answered.
@@ -131,7 +131,7 @@ pub struct Run {
 
 impl Summary {
     /// Collects what is known of a run and its services.
-    pub fn new(setup: &Setup, timeline: &Timeline, records: &[ServiceRecord], run: Run) -> Self {
+    pub fn new(setup: &Setup, timeline: &Timeline, records: &[ServiceRecord], run: RunEnd) -> Self {
         let services = records.iter().map(|r| (r.name.as_str(), service(r)));
         let supervisor = records.iter().find(|r| r.name == ServiceName::Supervisor);
         let report = supervisor.and_then(|r| r.report.as_ref());
@@ -352,8 +352,8 @@ mod tests {
         }
     }
 
-    fn run(ended: EndReason) -> Run {
-        Run {
+    fn run(ended: EndReason) -> RunEnd {
+        RunEnd {
             ended,
             duration_s: 4.0,
             end_ns: 14 * S,

@@ -10,7 +10,7 @@ use vigil_blocks::{
 };
 use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::watchdog::Finding as WatchdogFinding;
+use vigil_cycle::watchdog::WatchdogFinding;
 use vigil_robot::injection::{Change, WireChange};
 use vigil_robot::publisher_check::Finding;
 use vigil_setup::Setup;

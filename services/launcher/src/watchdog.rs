@@ -7,7 +7,7 @@ use vigil_cycle::watchdog::Settings;
 use vigil_cycle::{Clock, Monotonic, Watchdog};
 
 use crate::children::Children;
-use crate::observer::Observer;
+use crate::observer::HealthObserver;
 use crate::words;
 
 /// Feeds the watchdog with what the services report, and acts on what it finds.
@@ -26,7 +26,7 @@ impl WatchdogDriver {
     }
 
     /// Takes what is new, and ends the services that only a new process can mend.
-    pub fn look_after(&mut self, observer: &mut Observer, children: &mut Children) {
+    pub fn look_after(&mut self, observer: &mut HealthObserver, children: &mut Children) {
         let now_ns = Monotonic.now_ns();
         self.watchdog.look(now_ns);
         let position = |name| self.services.iter().position(|s| *s == name);

@@ -1,7 +1,7 @@
 //! Words of the timeline: symptoms, sizes, outcomes, degraded services, blindness, watchdog.
 
 use vigil_blocks::{ActionOutcome, Blindness, Degraded, Event, RecoveryKind, SizeKind, Symptoms};
-use vigil_cycle::watchdog::Finding;
+use vigil_cycle::watchdog::WatchdogFinding;
 
 /// Symptoms, joined by `_` as in the decision model; `none` for the empty set.
 pub fn symptoms(set: u32) -> String {
@@ -70,12 +70,12 @@ pub fn blind(cause: u32) -> &'static str {
 }
 
 /// What the watchdog has found of a service.
-pub const fn watchdog(finding: Finding) -> &'static str {
+pub const fn watchdog(finding: WatchdogFinding) -> &'static str {
     match finding {
-        Finding::StartUp => "did not start up in time",
-        Finding::Alive => "has stopped reporting",
-        Finding::Deadline => "misses its deadlines",
-        Finding::Logical => "no longer follows its input",
+        WatchdogFinding::StartUp => "did not start up in time",
+        WatchdogFinding::Alive => "has stopped reporting",
+        WatchdogFinding::Deadline => "misses its deadlines",
+        WatchdogFinding::Logical => "no longer follows its input",
     }
 }
 
@@ -119,6 +119,6 @@ mod tests {
         assert_eq!(outcome_of(path, succeeded), "alternative path");
         assert_eq!(outcome_of(path, u64::MAX), "no alternative");
         assert_eq!(outcome_of(99, succeeded), "done");
-        assert_eq!(watchdog(Finding::Alive), "has stopped reporting");
+        assert_eq!(watchdog(WatchdogFinding::Alive), "has stopped reporting");
     }
 }

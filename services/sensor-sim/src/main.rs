@@ -1,12 +1,13 @@
 //! `vigil-sensor-sim`: the simulated rover, recorded frames, or frames from a socket, as a process
-//! of the graph. Exit codes: 0 stopped, 1 failed, 2 configuration, 3 a deadline was missed that ends it.
+//! of the graph. Exit codes: 0 stopped, 1 failed, 2 configuration, 3 a deadline was missed that
+//! ends it.
 
 use std::process::ExitCode;
 use std::rc::Rc;
 
 use clap::Parser;
 use vigil_cycle::datagrams::Datagrams;
-use vigil_cycle::serve::{self, Plan, ServeError};
+use vigil_cycle::serve::{self, ServeError, ServicePlan};
 use vigil_cycle::topic::ServiceName;
 use vigil_sensor_sim::{
     ListenAddresses, PlaybackSource, SensorSource, SimulatorSource, SocketStage, assemble,
@@ -59,7 +60,11 @@ fn serve(setup: &Setup, source: SensorSource, args: &Args) -> Result<(), ServeEr
     }
 }
 
-fn serve_socket(setup: &Setup, listen: &ListenAddresses, mut plan: Plan) -> Result<(), ServeError> {
+fn serve_socket(
+    setup: &Setup,
+    listen: &ListenAddresses,
+    mut plan: ServicePlan,
+) -> Result<(), ServeError> {
     // There is nothing to look at without a system call.
     plan.spin_ns = 0;
     serve::woken_by(&plan, |graph| {

@@ -115,12 +115,8 @@ impl InputAccount {
         self.is_quarantined
     }
 
-    /// Accounts a block by its header, at `now_ns`, for a schedule of `period_ns`.
-    pub fn arrive<T: Block>(&mut self, header: &Header, now_ns: u64, period_ns: u64) -> Arrival {
-        self.admit::<T>(header, now_ns, period_ns, || Ok(()))
-    }
-
-    /// Accounts a block by its header and, if that passes, by what `content` finds in it.
+    /// Accounts a block by its header, at `now_ns`, for a schedule of `period_ns`, and, if that
+    /// passes, by what `content` finds in it.
     pub fn admit<T: Block>(
         &mut self,
         header: &Header,

@@ -27,7 +27,7 @@ pub enum ServiceEnd {
 
 /// What a run has shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Run {
+pub struct FinishedRun {
     /// Why it ended.
     pub ended: ServiceEnd,
     /// Minor and major page faults in the steady state; `None` if it was never reached.
@@ -58,10 +58,10 @@ impl WarmUp {
         }
     }
 
-    fn run(&self, ended: ServiceEnd) -> Run {
+    fn run(&self, ended: ServiceEnd) -> FinishedRun {
         let after = page_faults();
         let since = |before: [u64; 2]| [after[0] - before[0], after[1] - before[1]];
-        Run {
+        FinishedRun {
             ended,
             page_faults: self.faults_before.map(since),
         }
@@ -79,7 +79,7 @@ pub(crate) fn run_stage(
     inputs: &impl Inputs,
     spin_ns: u64,
     mut warm_up: WarmUp,
-) -> Result<Run, PortError> {
+) -> Result<FinishedRun, PortError> {
     let timer = Timer::new().map_err(|e| PortError::setup("timer", e))?;
     let mut ended = ServiceEnd::Stopped;
     cycle.account_mut().ready(&Monotonic)?;
@@ -162,7 +162,7 @@ pub(crate) fn run_source(
     source: &mut impl Source,
     spin_ns: u64,
     mut warm_up: WarmUp,
-) -> Result<Run, PortError> {
+) -> Result<FinishedRun, PortError> {
     let mut ended = ServiceEnd::Stopped;
     cycle.account_mut().ready(&Monotonic)?;
     while !signal::stop_requested() {

@@ -11,7 +11,7 @@ use crate::deadline::{DeadlineMonitor, Schedule};
 use crate::domain::{Domain, Queues};
 use crate::failure;
 use crate::health::HealthBoard;
-use crate::live::{self, Run, ServiceEnd, WarmUp};
+use crate::live::{self, FinishedRun, ServiceEnd, WarmUp};
 use crate::on_miss::OnMiss;
 use crate::placement::PlacementRequest;
 use crate::port::{Graph, Link};
@@ -33,7 +33,7 @@ const FAILS_VARIABLE: &str = "VIGIL_FAILS";
 
 /// What a service process is to be.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct ServicePlan {
     /// Which service.
     pub service: ServiceName,
     /// Name of the graph.
@@ -147,7 +147,7 @@ pub fn process<P>(
 /// # Errors
 /// [`ServeError`]; what it did until then stays visible in Health.
 pub fn stage<T: vigil_blocks::Block, S: Stage>(
-    plan: &Plan,
+    plan: &ServicePlan,
     input: Topic,
     build: impl FnOnce(&Graph) -> Result<S, ServeError>,
 ) -> Result<(), ServeError> {
@@ -165,7 +165,7 @@ pub fn stage<T: vigil_blocks::Block, S: Stage>(
 /// # Errors
 /// As [`stage`].
 pub fn woken_by<S: Stage, I: Inputs>(
-    plan: &Plan,
+    plan: &ServicePlan,
     build: impl FnOnce(&Graph) -> Result<(S, I), ServeError>,
 ) -> Result<(), ServeError> {
     let (graph, account) = open(plan)?;
@@ -184,7 +184,7 @@ pub fn woken_by<S: Stage, I: Inputs>(
 /// # Errors
 /// [`ServeError`]; what it did until then stays visible in Health.
 pub fn source<S: Source>(
-    plan: &Plan,
+    plan: &ServicePlan,
     build: impl FnOnce(&Graph) -> Result<S, ServeError>,
 ) -> Result<(), ServeError> {
     let (graph, account) = open(plan)?;
@@ -195,13 +195,13 @@ pub fn source<S: Source>(
     leave(plan, cycle.account().recorder(), run)
 }
 
-fn warm_up(plan: &Plan) -> WarmUp {
+fn warm_up(plan: &ServicePlan) -> WarmUp {
     let name = plan.service.as_str();
     let is_named = || std::env::var_os(FAILS_VARIABLE).is_some_and(|fails| fails == name);
     WarmUp::new(plan.allow_injection && is_named())
 }
 
-fn open(plan: &Plan) -> Result<(Graph, CycleAccount), PortError> {
+fn open(plan: &ServicePlan) -> Result<(Graph, CycleAccount), PortError> {
     let domain = Domain::new(&plan.graph, plan.queues)?;
     failure::end_on_panic(domain.failure_file(plan.service));
     let placement = live::place(plan.wanted);
@@ -213,7 +213,7 @@ fn open(plan: &Plan) -> Result<(Graph, CycleAccount), PortError> {
     Ok((graph, account))
 }
 
-fn leave(plan: &Plan, recorder: &Recorder, run: Run) -> Result<(), ServeError> {
+fn leave(plan: &ServicePlan, recorder: &Recorder, run: FinishedRun) -> Result<(), ServeError> {
     if let (Some((path, _)), Some(stamps)) = (&plan.leave.stamps, recorder.stamps()) {
         stamps.write(path)?;
     }

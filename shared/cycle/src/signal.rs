@@ -1,4 +1,4 @@
-//! Orderly stop on SIGINT, SIGTERM, SIGHUP and SIGQUIT, and signals to others.
+//! Orderly stop on SIGINT, SIGTERM, SIGHUP and SIGQUIT, and a request to others.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -31,24 +31,10 @@ pub fn stop_requested() -> bool {
 
 /// Asks a process to stop (SIGTERM).
 pub fn terminate(pid: u32) {
-    send(pid, libc::SIGTERM);
-}
-
-/// Holds a process up, as a debugger does (SIGSTOP).
-pub fn hold(pid: u32) {
-    send(pid, libc::SIGSTOP);
-}
-
-/// Lets a process go on that was held up (SIGCONT).
-pub fn release(pid: u32) {
-    send(pid, libc::SIGCONT);
-}
-
-fn send(pid: u32, signal: libc::c_int) {
     // SAFETY: a plain system call; the caller names a process that it has not reaped yet, so the
     // number cannot belong to anybody else.
     #[allow(unsafe_code)]
     unsafe {
-        libc::kill(pid.cast_signed(), signal);
+        libc::kill(pid.cast_signed(), libc::SIGTERM);
     }
 }

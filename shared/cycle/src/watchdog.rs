@@ -17,7 +17,7 @@ const WINDOW_NS: u64 = 1_000_000_000;
 /// What the watchdog finds wrong with a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
 #[repr(u32)]
-pub enum Finding {
+pub enum WatchdogFinding {
     /// It did not begin to report in time.
     StartUp = 1,
     /// It has stopped reporting.
@@ -28,7 +28,7 @@ pub enum Finding {
     Logical = 4,
 }
 
-impl Finding {
+impl WatchdogFinding {
     /// True if only a new process can mend it. Missed deadlines are no such case: a restart would
     /// cost more of them.
     #[must_use]
@@ -65,14 +65,14 @@ pub struct Settings {
 
 /// The settings in the units of Health; 0 for no limit.
 #[derive(Debug, Clone, Copy)]
-struct Limits {
+struct WatchdogLimits {
     start_up_ns: u64,
     alive_ns: u64,
     logical_ns: u64,
     missed_share: f64,
 }
 
-impl Limits {
+impl WatchdogLimits {
     fn new(settings: &Settings) -> Self {
         let ns = |s: f64| (s * 1e9).round() as u64;
         Self {
@@ -115,7 +115,7 @@ const LOOK_NS_MAX: u64 = 200_000_000;
 /// Watches the services of one graph, given in the order of the data.
 #[derive(Debug, Clone)]
 pub struct Watchdog {
-    limits: Limits,
+    limits: WatchdogLimits,
     services: Vec<Peer>,
     looked_ns: u64,
     /// The last look came later than [`LOOK_NS_MAX`] after the one before: it finds nobody failed.
@@ -131,7 +131,7 @@ impl Watchdog {
             ..Peer::default()
         };
         Self {
-            limits: Limits::new(settings),
+            limits: WatchdogLimits::new(settings),
             services: vec![watched; count],
             looked_ns: now_ns,
             looked_too_late: false,
@@ -215,7 +215,7 @@ impl Watchdog {
     }
 
     /// A service that has failed, and how; each failure is returned once.
-    pub fn failed(&mut self, now_ns: u64) -> Option<(usize, Finding)> {
+    pub fn failed(&mut self, now_ns: u64) -> Option<(usize, WatchdogFinding)> {
         if self.looked_too_late {
             return None;
         }
@@ -230,7 +230,7 @@ impl Watchdog {
 }
 
 impl Peer {
-    fn examine(&mut self, limits: &Limits, now_ns: u64) -> Option<Finding> {
+    fn examine(&mut self, limits: &WatchdogLimits, now_ns: u64) -> Option<WatchdogFinding> {
         assert!(
             self.started_ns <= now_ns && self.reported_ns <= now_ns,
             "a service has started and reported in the past: {} and {}, now {now_ns} ns",
@@ -243,20 +243,20 @@ impl Peer {
         let since = |then_ns: u64| now_ns - then_ns;
         if self.epoch == 0 {
             let is_late = since(self.started_ns) > limits.start_up_ns;
-            return is_late.then_some(Finding::StartUp);
+            return is_late.then_some(WatchdogFinding::StartUp);
         }
         if limits.alive_ns > 0 && since(self.reported_ns) > limits.alive_ns {
-            return Some(Finding::Alive);
+            return Some(WatchdogFinding::Alive);
         }
         // It goes on reporting all the while: silence is another failure.
         let stood_still_ns = self
             .behind_since_ns
             .map_or(0, |behind_ns| self.reported_ns.saturating_sub(behind_ns));
         if limits.logical_ns > 0 && stood_still_ns > limits.logical_ns {
-            return Some(Finding::Logical);
+            return Some(WatchdogFinding::Logical);
         }
         let misses = limits.missed_share > 0.0 && self.misses(limits.missed_share, now_ns);
-        misses.then_some(Finding::Deadline)
+        misses.then_some(WatchdogFinding::Deadline)
     }
 
     /// True once for each time that a window has too many misses after one that had not.

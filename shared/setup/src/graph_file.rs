@@ -25,7 +25,7 @@ pub use simulator::{DriveSegment, Simulator};
 #[serde(deny_unknown_fields)]
 pub struct GraphFile {
     /// Identity of the graph and its schedule.
-    pub graph: Graph,
+    pub graph: GraphSettings,
     /// The models that the graph runs on; paths relative to the graph file.
     pub files: Files,
     /// Placement and deadlines, one table per service.
@@ -60,7 +60,7 @@ pub struct GraphFile {
     pub supervisor: vigil_decision::Settings,
     /// Control commands at run time.
     #[serde(default)]
-    pub control: Control,
+    pub control: ControlSettings,
     /// What the launcher does when a service dies.
     #[serde(default)]
     pub restart: Restart,
@@ -73,18 +73,18 @@ pub struct GraphFile {
 /// Identity of the graph and its schedule.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Graph {
+pub struct GraphSettings {
     /// Name; two graphs with one name cannot run on one machine. Letters, digits, `-`, at most 24.
     pub name: String,
     /// Rate of the sensor's schedule. A playback has the recording's own instead.
     #[schemars(range(min = 1.0, max = 10_000.0))]
     pub rate_hz: f64,
     /// Seed from which every generator starts.
-    #[serde(default = "Graph::seed")]
+    #[serde(default = "GraphSettings::seed")]
     pub seed: u64,
 }
 
-impl Graph {
+impl GraphSettings {
     /// Default: any number would do.
     const fn seed() -> u64 {
         1
@@ -123,7 +123,7 @@ pub struct Services {
 /// Control commands at run time.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Control {
+pub struct ControlSettings {
     /// True to let `vigil inject` and `--inject` break the simulated rover.
     pub allow_injection: bool,
 }

@@ -1,7 +1,7 @@
 //! From the configuration to what the cycle needs.
 
 use vigil_cycle::placement::PlacementRequest;
-use vigil_cycle::serve::{Leave, Plan};
+use vigil_cycle::serve::{Leave, ServicePlan};
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Domain, PortError, Schedule, service};
 
@@ -36,10 +36,10 @@ impl Setup {
 
     /// What the process of a service is to be, and what it is to leave behind.
     #[must_use]
-    pub fn plan(&self, name: ServiceName, leave: Leave) -> Plan {
+    pub fn plan(&self, name: ServiceName, leave: Leave) -> ServicePlan {
         let (service, period_ns) = (self.service(name), self.period_ns());
         let share_ns = |percent: f64| (period_ns as f64 * percent * 1e-2).round() as u64;
-        Plan {
+        ServicePlan {
             service: name,
             graph: self.file.graph.name.clone(),
             queues: self.file.transport,

@@ -223,7 +223,7 @@ fn order(action: &Action) -> RobotOrder {
     if action.control_mode == ControlMode::Safe as u32 {
         return RobotOrder::Blind;
     }
-    match RecoveryKind::from_wire(action.kind).unwrap_or(RecoveryKind::None) {
+    match RecoveryKind::from_repr(action.kind).unwrap_or(RecoveryKind::None) {
         RecoveryKind::GoOn => RobotOrder::GoOn,
         RecoveryKind::SlowDown => RobotOrder::Slow,
         RecoveryKind::None | RecoveryKind::Stop | RecoveryKind::GiveUp => RobotOrder::Stop,

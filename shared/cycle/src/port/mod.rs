@@ -45,8 +45,8 @@ pub trait Sender<T: Block> {
 
 /// Receives the blocks of one topic.
 pub trait Receiver<T: Block> {
-    /// Drops the held block, and takes and holds the next waiting one; `None` if none waits. Call it
-    /// at most [`Self::buffer`] times a turn, so that a flood cannot hold the cycle.
+    /// Drops the held block, and takes and holds the next waiting one; `None` if none waits.
+    /// Call it at most [`Self::buffer`] times a turn, so that a flood cannot hold the cycle.
     fn take_next(&mut self) -> Option<&T>;
 
     /// The held block, read in place.

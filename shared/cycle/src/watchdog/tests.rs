@@ -35,7 +35,7 @@ impl Services {
         &mut self,
         ms: u64,
         mut change: impl FnMut(usize, &mut Health) -> bool,
-    ) -> Vec<(u64, usize, Finding)> {
+    ) -> Vec<(u64, usize, WatchdogFinding)> {
         let mut found = Vec::new();
         for _ in 0..ms / 50 {
             self.now_ns += 50 * MS;
@@ -66,15 +66,15 @@ fn silence_is_found_within_its_limit_and_told_once_until_the_next_start() {
     let mut services = Services::new();
     services.run(1000, |_, _| true);
     let found = services.run(3000, |service, _| service != 1);
-    assert_eq!(found, [(1550, 1, Finding::Alive)]);
+    assert_eq!(found, [(1550, 1, WatchdogFinding::Alive)]);
     services.watchdog.started(1, services.now_ns);
     // Old reports that are still about do not count for the new process.
     let found = services.run(3050, |_, _| true);
-    assert_eq!(found, [(7050, 1, Finding::StartUp)]);
+    assert_eq!(found, [(7050, 1, WatchdogFinding::StartUp)]);
     // Nor after another one that never reported.
     services.watchdog.started(1, services.now_ns);
     let found = services.run(3050, |_, _| true);
-    assert_eq!(found, [(10_100, 1, Finding::StartUp)]);
+    assert_eq!(found, [(10_100, 1, WatchdogFinding::StartUp)]);
     services.watchdog.started(1, services.now_ns);
     services.health[1].header.epoch = 77;
     assert_eq!(services.run(3050, |_, _| true), []);
@@ -94,7 +94,7 @@ fn an_output_that_stands_still_while_its_input_moves_is_found_and_only_there() {
     });
     assert_eq!(found.len(), 1, "{found:?}");
     let (at_ms, service, what) = found[0];
-    assert_eq!((service, what), (1, Finding::Logical));
+    assert_eq!((service, what), (1, WatchdogFinding::Logical));
     assert!((1400..=1550).contains(&at_ms), "{at_ms}");
 }
 
@@ -112,7 +112,7 @@ fn too_many_misses_are_told_when_they_begin_and_restart_nothing() {
     assert_eq!(misses(&mut services, 5000, 2), []);
     let found = misses(&mut services, 5000, 3);
     assert_eq!(found.len(), 1, "{found:?}");
-    assert_eq!((found[0].1, found[0].2), (2, Finding::Deadline));
+    assert_eq!((found[0].1, found[0].2), (2, WatchdogFinding::Deadline));
     assert!(!found[0].2.needs_restart());
     assert_eq!(misses(&mut services, 3000, 0), []);
     assert_eq!(misses(&mut services, 3000, 5).len(), 1, "a second time");
@@ -149,7 +149,7 @@ fn an_outage_of_one_service_is_not_held_against_those_behind_it() {
         service != 1
     };
     let found = services.run(3000, &mut still);
-    assert_eq!(found, [(1550, 1, Finding::Alive)]);
+    assert_eq!(found, [(1550, 1, WatchdogFinding::Alive)]);
     services.watchdog.started(1, services.now_ns);
     assert_eq!(services.run(1000, &mut still), []);
     // It comes back and answers at once; the one behind it does so a report later.

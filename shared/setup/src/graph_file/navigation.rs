@@ -87,7 +87,7 @@ impl Navigation {
 
     /// The longest that an action but waiting for help may run, s.
     #[must_use]
-    pub const fn longest_action_s(&self) -> f64 {
+    pub(crate) const fn longest_action_s(&self) -> f64 {
         let through_s = self.look_s + Self::PASS_MAX_S;
         through_s.max(self.think_s).max(Self::AWAY_MAX_S)
     }

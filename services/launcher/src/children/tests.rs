@@ -1,0 +1,157 @@
+//! Children that are real processes: shell scripts in place of the services.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::PathBuf;
+
+use vigil_blocks::EventKind;
+use vigil_cycle::port::Link;
+use vigil_cycle::watchdog::Settings;
+
+use super::*;
+use crate::plan::tests::plan;
+use crate::watchdog::WatchdogDriver;
+
+/// A graph whose services sleep, in folders of its own.
+struct SleepingGraph {
+    plan: Plan,
+    domain: Domain,
+    observer: HealthObserver,
+}
+
+impl SleepingGraph {
+    fn new(name: &str) -> Self {
+        let mut plan = plan(&["--graph", name]).unwrap();
+        plan.programs = programs(name);
+        fs::create_dir_all(&plan.programs).unwrap();
+        for service in plan.services() {
+            let program = plan.programs.join(format!("vigil-{}", service.as_str()));
+            fs::write(&program, "#!/bin/sh\nexec sleep 3600\n").unwrap();
+            fs::set_permissions(program, fs::Permissions::from_mode(0o700)).unwrap();
+        }
+        let domain = plan.setup.domain().unwrap();
+        let link = Link::join(&domain, "launcher").unwrap();
+        let observer = HealthObserver::new(link, &plan).unwrap();
+        Self {
+            plan,
+            domain,
+            observer,
+        }
+    }
+
+    fn start(&self) -> Children {
+        Children::start(&self.plan, &self.domain).unwrap()
+    }
+
+    /// Looks after the children until the detector has been started again.
+    fn await_restart(&mut self, children: &mut Children) {
+        while !children.restarted.contains(&ServiceName::Detector) {
+            assert!(!children.look_after(&self.plan, &mut self.observer));
+            std::thread::sleep(POLL);
+        }
+    }
+
+    fn events(&self, kind: EventKind) -> Vec<String> {
+        let entries = self.observer.timeline.entries().into_iter();
+        let of_kind = entries.filter(|entry| entry.event == kind.name());
+        of_kind.map(|entry| entry.what).collect()
+    }
+}
+
+impl Drop for SleepingGraph {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.plan.programs);
+        self.domain.remove_residue();
+    }
+}
+
+fn programs(name: &str) -> PathBuf {
+    std::env::temp_dir().join(format!("{name}-{}", std::process::id()))
+}
+
+#[test]
+fn a_service_that_is_killed_is_started_again_and_all_are_stopped() {
+    let mut graph = SleepingGraph::new("test-killed");
+    let mut children = graph.start();
+    let listed = fs::read_to_string(graph.domain.processes_file()).unwrap();
+    let ids = children.services.iter().map(|s| s.child.id());
+    let expected = ServiceName::ALL.iter().zip(ids);
+    let expected = expected.map(|(name, id)| format!("{} {id}\n", name.as_str()));
+    assert_eq!(listed, expected.collect::<String>());
+
+    children.end(ServiceName::Detector, "is killed by a test");
+    children.services[1].child.wait().unwrap();
+    assert!(!children.look_after(&graph.plan, &mut graph.observer));
+    assert!(children.dead().eq([ServiceName::Detector]));
+    graph.await_restart(&mut children);
+    assert_eq!(children.take_restarted(), [ServiceName::Detector]);
+    assert_eq!(children.take_restarted(), []);
+    assert_eq!(children.dead().count(), 0);
+    let restarts = ServiceName::ALL.map(|name| children.restarts(name));
+    assert_eq!(restarts, [0, 1, 0, 0]);
+
+    children.stop();
+    for service in &mut children.services {
+        assert!(service.child.try_wait().unwrap().is_some());
+    }
+    assert!(children.report(ServiceName::Detector).is_none());
+    assert_eq!(children.gave_up(), None);
+}
+
+#[test]
+fn a_service_whose_assertion_fails_again_is_given_up_and_the_timeline_says_why() {
+    let mut graph = SleepingGraph::new("test-assertion");
+    let mut children = graph.start();
+    let fail = |children: &mut Children| {
+        fs::write(
+            &children.services[1].failure,
+            "7\na.rs:1:2\nat work\nx is y\n",
+        )
+        .unwrap();
+        children.services[1].child.kill().unwrap();
+        children.services[1].child.wait().unwrap();
+    };
+    fail(&mut children);
+    graph.await_restart(&mut children);
+    fail(&mut children);
+    assert!(children.look_after(&graph.plan, &mut graph.observer));
+    let reason = children.gave_up().unwrap();
+    assert!(
+        reason.ends_with("the same assertion failed again (a.rs:1:2)"),
+        "{reason}"
+    );
+    // One that fails while the graph is being stopped is in the timeline, too.
+    fs::write(&children.services[3].failure, "8\nb.rs:3:4\nat work\nz\n").unwrap();
+    children.take_failures(&mut graph.observer);
+    let detector = "x is y (a.rs:1:2), at work";
+    let expected = [detector, detector, "z (b.rs:3:4), at work"];
+    assert_eq!(graph.events(EventKind::Assertion), expected);
+}
+
+#[test]
+fn a_program_that_is_not_there_is_named() {
+    let graph = SleepingGraph::new("test-missing");
+    let supervisor = graph.plan.programs.join("vigil-supervisor");
+    fs::remove_file(&supervisor).unwrap();
+    let error = Children::start(&graph.plan, &graph.domain).err().unwrap();
+    let name = supervisor.display().to_string();
+    assert!(error.to_string().starts_with(&name), "{error}");
+}
+
+#[test]
+fn a_service_that_never_reports_is_ended_by_the_watchdog_and_started_again() {
+    let mut graph = SleepingGraph::new("test-silent");
+    let mut children = graph.start();
+    let settings = Settings {
+        startup_s: 0.0,
+        ..Settings::default()
+    };
+    let mut watchdog = WatchdogDriver::new(&settings, vec![ServiceName::Detector]);
+    while graph.events(EventKind::Watchdog).is_empty() {
+        watchdog.look_after(&mut graph.observer, &mut children);
+    }
+    let found = graph.events(EventKind::Watchdog);
+    assert_eq!(found, ["did not start up in time"]);
+    children.services[1].child.wait().unwrap();
+    graph.await_restart(&mut children);
+}
