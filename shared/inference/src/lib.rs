@@ -16,7 +16,7 @@ pub mod hybrid;
 pub mod logspace;
 pub mod look_ahead;
 pub mod merged;
-pub mod onsets;
+mod onsets;
 pub mod outlier;
 pub mod proposal;
 pub mod resample;

@@ -154,13 +154,9 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
         let share = 1.0 / self.particles.len() as f64;
         self.posterior.fill(0.0);
         for particle in &mut self.particles {
-            let mut left = self.rng.random::<f64>();
-            let from = particle.mode;
-            let drawn = (0..self.model.modes()).find(|&to| {
-                left -= hybrid::transition(&self.model, from, to);
-                left < 0.0
-            });
-            particle.mode = drawn.unwrap_or(from);
+            let (u, from) = (self.rng.random(), particle.mode);
+            let row = |to| hybrid::transition(&self.model, from, to);
+            particle.mode = draw_mode(self.model.modes(), u, row).unwrap_or(from);
             if particle.mode != from {
                 self.model.enter(from, particle.mode, &mut particle.state);
             }
@@ -168,6 +164,14 @@ impl<M: Conditional<N>, const N: usize> LookAhead<M, N> {
             self.posterior[particle.mode] += share;
         }
     }
+}
+
+/// Mode at which the cumulative probability passes `u`; none if rounding leaves it short.
+fn draw_mode(modes: usize, mut u: f64, p: impl Fn(usize) -> f64) -> Option<usize> {
+    (0..modes).find(|&mode| {
+        u -= p(mode);
+        u < 0.0
+    })
 }
 
 /// Index drawn with the probabilities `exp(log_p - log_sum)` by a uniform `u` in [0, 1).
@@ -221,12 +225,9 @@ impl<M: Conditional<N>, const N: usize> Filter for LookAhead<M, N> {
         let count = self.particles.len();
         for (i, particle) in self.particles.iter_mut().enumerate() {
             // Evenly over the prior's cumulative probabilities.
-            let mut left = (i as f64 + 0.5) / count as f64;
-            let drawn = (0..self.model.modes()).find(|&mode| {
-                left -= self.model.initial(mode);
-                left < 0.0
-            });
-            particle.mode = drawn.unwrap_or(0);
+            let u = (i as f64 + 0.5) / count as f64;
+            let initial = |mode| self.model.initial(mode);
+            particle.mode = draw_mode(self.model.modes(), u, initial).unwrap_or(0);
             particle.state = self.model.prior(particle.mode);
             self.posterior[particle.mode] += 1.0 / count as f64;
         }

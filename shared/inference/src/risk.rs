@@ -31,9 +31,9 @@ pub struct Tracking {
 impl Default for Tracking {
     fn default() -> Self {
         Self {
-            // Chosen by hand: lost once in 50 steps; half-way between the worst and the mean
-            // action. Only ratios of risks matter, which change little with either. The least risk
-            // keeps particles in harmless modes: smaller keeps fewer, larger takes others away.
+            // Chosen by hand: lost once in 50 steps, half-way between worst and mean action. Only
+            // ratios of risks matter, which change little with either. A smaller least risk keeps
+            // fewer particles in harmless modes, a larger one takes others away.
             flip: 0.02,
             pessimism: 0.5,
             risk_min: 1e-3,

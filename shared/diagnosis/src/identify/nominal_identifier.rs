@@ -12,8 +12,6 @@ use crate::invariants;
 /// Reports ND with 1 - p(fault) of the detector, and the rest as unknown.
 #[derive(Debug, Clone)]
 pub struct NominalIdentifier {
-    tree_hash: u64,
-    node_count: u32,
     posterior: TreeBelief,
     leaves: LeafMap,
     reported: ReportedFault,
@@ -29,10 +27,12 @@ impl NominalIdentifier {
     #[must_use]
     pub fn new(tree: &FaultTree) -> Self {
         Self {
-            tree_hash: tree.hash(),
-            node_count: tree.nodes().len() as u32,
             posterior: TreeBelief::nominal(),
-            leaves: LeafMap::none(),
+            leaves: LeafMap {
+                hash: tree.hash(),
+                nodes: tree.nodes().len(),
+                ..LeafMap::none()
+            },
             reported: ReportedFault::default(),
             run_id: 0,
             t_ns: 0,
@@ -100,15 +100,9 @@ impl NominalIdentifier {
         self.reported
             .take(mode, p_mode, posterior, &self.leaves, moved_s);
         belief.run_id = self.run_id;
-        belief.p = posterior.nodes;
-        belief.p_unknown = posterior.unknown;
+        posterior.write(&self.leaves, belief);
         belief.p_predicted = predicted.nodes;
         belief.p_unknown_predicted = predicted.unknown;
-        belief.node_count = self.node_count;
-        belief.tree_hash = self.tree_hash;
-        belief.entropy = posterior.entropy;
-        belief.sets = posterior.sets;
-        belief.set_count = posterior.set_count as u32;
         belief.mode = mode;
         belief.reported = self.reported.name();
         belief.p_mode = p_mode;

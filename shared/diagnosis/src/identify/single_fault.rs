@@ -268,16 +268,9 @@ impl SingleFaultFilter {
             let p = p.max(FLOOR) / total;
             match *meaning {
                 ModeNode::Unknown => out.unknown += p,
-                ModeNode::Node(0) => out.add(FaultSet { leaves: 0, p }, leaves),
                 ModeNode::Node(node) => {
-                    let leaves_in = 1 << node;
-                    out.add(
-                        FaultSet {
-                            leaves: leaves_in,
-                            p,
-                        },
-                        leaves,
-                    );
+                    let set = leaves_of(node);
+                    out.add(FaultSet { leaves: set, p }, leaves);
                 }
             }
         }
@@ -351,8 +344,7 @@ impl SingleFaultFilter {
             return;
         }
         let (leaves, index) = match self.nodes_of_modes[mode] {
-            ModeNode::Node(0) => (0, 0),
-            ModeNode::Node(node) => (1 << node, node as u32),
+            ModeNode::Node(node) => (leaves_of(node), node as u32),
             ModeNode::Unknown => (0, MODE_UNKNOWN),
         };
         out.push(WeightedHypothesis {
@@ -365,6 +357,11 @@ impl SingleFaultFilter {
             ..WeightedHypothesis::default()
         });
     }
+}
+
+/// The set of faults, as bits, that a mode's node is; the nominal one is none.
+const fn leaves_of(node: usize) -> u64 {
+    if node == 0 { 0 } else { 1 << node }
 }
 
 /// Proposals raised by what it costs to lose track of each mode; `prior` is that of each fault.

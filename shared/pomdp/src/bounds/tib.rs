@@ -16,16 +16,9 @@ pub struct Tib {
     table: Vec<f64>,
     /// R(s,a) at [a][s].
     rewards: Vec<f64>,
-    beliefs: usize,
 }
 
 impl Tib {
-    /// Number of different beliefs one step from the corners.
-    #[must_use]
-    pub const fn belief_count(&self) -> usize {
-        self.beliefs
-    }
-
     /// Q(b,a) = R(b,a) + gamma sum_o max_a' sum_s b(s) p(o|s,a) Q(b_sao,a').
     #[must_use]
     pub fn q(&self, belief: &[f64], action: usize) -> f64 {
@@ -216,6 +209,5 @@ pub fn solve_from(
         observations: steps.observations,
         table,
         rewards: pairs.map(|(a, s)| model.reward(s, a)).collect(),
-        beliefs: steps.beliefs.len(),
     })
 }
