@@ -8,7 +8,6 @@ mod arrows;
 mod modules;
 mod names;
 mod pure;
-mod ratchet;
 mod sentences;
 mod signatures;
 mod sizes;

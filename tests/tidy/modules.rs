@@ -4,8 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use vigil_size::{Import, Source};
 
-use crate::ratchet::demand_no_more;
-use crate::{sample, workspace};
+use crate::{demand_none, sample, workspace};
 
 /// A module: `robot`, `learned`, `form` of `shared/robot/src/learned/form.rs`.
 type Path = Vec<String>;
@@ -184,8 +183,7 @@ fn sibling_modules_see_each_other_one_way() {
             .iter()
             .any(|one| one.folder == "shared/cycle")
     );
-    demand_no_more(
-        "circles",
+    demand_none(
         "Move what both need to a module of its own, or pass it in.",
         &circles(workspace()),
     );
@@ -193,8 +191,7 @@ fn sibling_modules_see_each_other_one_way() {
 
 #[test]
 fn no_file_imports_through_the_face_of_its_own_crate() {
-    demand_no_more(
-        "face-imports",
+    demand_none(
         "Name the module that defines it: crate::room::Name.",
         &face_imports(workspace()),
     );

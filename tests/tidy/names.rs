@@ -2,8 +2,7 @@
 
 use vigil_size::Source;
 
-use crate::ratchet::demand_no_more;
-use crate::{sample, workspace};
+use crate::{demand_none, sample, workspace};
 
 /// Participles and the like that say nothing as the name of a type.
 const NO_NOUNS: [&str; 25] = [
@@ -68,8 +67,7 @@ fn in_workspace(check: fn(&Source) -> Vec<String>) -> Vec<String> {
 
 #[test]
 fn types_are_nouns_and_no_function_is_called_of() {
-    demand_no_more(
-        "names",
+    demand_none(
         "Name the type after what it holds, and the function after what it does.",
         &in_workspace(names),
     );

@@ -2,8 +2,7 @@
 
 use vigil_size::Source;
 
-use crate::ratchet::demand_no_more;
-use crate::{sample, workspace};
+use crate::{demand_none, sample, workspace};
 
 fn violations(sources: &[Source]) -> Vec<String> {
     let of = |source: &Source| {
@@ -22,11 +21,7 @@ fn violations(sources: &[Source]) -> Vec<String> {
 
 #[test]
 fn parameters_are_no_tuples_or_arrays_of_unlike_values() {
-    demand_no_more(
-        "unlike-parameters",
-        "Give the values names: a struct.",
-        &violations(workspace()),
-    );
+    demand_none("Give the values names: a struct.", &violations(workspace()));
 }
 
 #[test]
