@@ -6,6 +6,7 @@
 use std::error::Error;
 use std::path::Path;
 
+use clap::ValueEnum as _;
 use serde_json::Value;
 use vigil_bench::archive::Archive;
 use vigil_bench::latency::cell::{Cell, Scheduling, Spec};
@@ -18,17 +19,6 @@ use vigil_cycle::latency::Percentiles;
 const SECONDS_MIN: f64 = 4.0;
 /// Rates of the matrix, Hz.
 const RATES_HZ: [f64; 3] = [100.0, 1000.0, 5000.0];
-/// Loads of the matrix.
-const LOADS: [Load; 8] = [
-    Load::Idle,
-    Load::KeepAwake,
-    Load::Cpu,
-    Load::Memory,
-    Load::Io,
-    Load::Switch,
-    Load::SensorFlood,
-    Load::Timer,
-];
 
 /// Measures the latency from the schedule to the action.
 #[derive(Debug, clap::Args)]
@@ -106,7 +96,14 @@ fn specs(args: &Args) -> Vec<Spec> {
     let is_matrix = is_matrix(args);
     let both = [Scheduling::Fifo, Scheduling::Other];
     let rates = or(&args.rate, if is_matrix { &RATES_HZ } else { &[1000.0] });
-    let loads = or(&args.load, if is_matrix { &LOADS } else { &[Load::Idle] });
+    let loads = or(
+        &args.load,
+        if is_matrix {
+            Load::value_variants()
+        } else {
+            &[Load::Idle]
+        },
+    );
     let scheduling = or(&args.scheduling, if is_matrix { &both } else { &both[..1] });
     let mut specs = Vec::new();
     for &rate_hz in rates {

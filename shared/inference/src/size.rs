@@ -114,8 +114,7 @@ impl Size {
         self.cut_off(prior);
     }
 
-    /// The Gaussian with the first two moments of the mixture of this one, with the weight `share`,
-    /// and another one.
+    /// Moment-matched mixture: this belief with the weight `share`, `other` with the rest.
     #[must_use]
     pub fn mixed(&self, other: &Self, share: f64, prior: &Prior) -> Self {
         let rest = 1.0 - share;

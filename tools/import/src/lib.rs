@@ -165,7 +165,7 @@ pub fn import(
         }
         for (channel, series) in log.in_order(&columns).zip(&mut series) {
             let estimated = delays.iter().find(|(name, _)| *name == channel.name);
-            series.advance(
+            series.shift_earlier(
                 channel
                     .delay_s
                     .given_s(estimated.map(|(_, delay_s)| *delay_s)),

@@ -299,7 +299,7 @@ impl Series {
     }
 
     /// Moves all samples to earlier times, s.
-    pub fn advance(&mut self, by_s: f64) {
+    pub fn shift_earlier(&mut self, by_s: f64) {
         self.time_s.iter_mut().for_each(|time_s| *time_s -= by_s);
     }
 

@@ -56,7 +56,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     ]);
     findings.push(residue(&setup));
     findings.push(build());
-    let ok = findings::are_ok(&findings);
+    let ok = findings::have_no_failure(&findings);
     if args.json {
         let document = Document {
             schema_version: 1,

@@ -61,7 +61,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     }
     // What is to be changed comes last, where it is read first.
     found.sort_by_key(|finding| finding.status);
-    let ok = findings::are_ok(&found);
+    let ok = findings::have_no_failure(&found);
     if args.json {
         let document = Document {
             schema_version: 1,

@@ -40,7 +40,7 @@ impl Finding {
 }
 
 /// True if none of them is a failure.
-pub fn are_ok(findings: &[Finding]) -> bool {
+pub fn have_no_failure(findings: &[Finding]) -> bool {
     findings.iter().all(|f| f.status != Status::Failure)
 }
 

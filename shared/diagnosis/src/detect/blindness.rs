@@ -201,6 +201,7 @@ impl BlindnessTimer {
         }
     }
 
+    /// Adds invalid time. Each full second names the cause with most of it and counts anew.
     fn add_invalid(&mut self, span_s: f64, cause: Blindness) {
         self.invalid_s += span_s;
         self.unjudged_s += span_s;

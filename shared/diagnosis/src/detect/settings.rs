@@ -71,7 +71,8 @@ pub struct MonitorSettings {
     #[default(0.5)]
     #[schemars(range(min = 0.05, max = 10.0))]
     pub position_error_m: f64,
-    /// A robot that stays within 0.1 m for this long is stopped: the error is EPS, else EPM.
+    /// A robot that stays within 0.1 m for this long counts as stopped: its position error is then
+    /// EPS, otherwise EPM.
     #[default(2.0)]
     #[schemars(range(min = 0.1, max = 60.0))]
     pub stopped_after_s: f64,

@@ -40,7 +40,8 @@ impl Initial {
         })
     }
 
-    /// Narrows the bracket to these bounds.
+    /// Narrows the bracket by the blind and the fast bound, and keeps the blind policy's vectors.
+    /// The tighter bound works in the tree ([`Self::corners`]).
     pub(super) fn narrow(&self, model: &Pomdp, found: &mut SearchResult) {
         let actions = model.actions().len();
         if let Some(blind) = &self.blind {

@@ -37,9 +37,8 @@ pub struct Agreement {
     pub is_weak: bool,
 }
 
-/// Refuses a prediction that is off by more than [`ERROR_MAX`] of what was measured whatever
-/// chance did: |predicted - measured| > 0.2 |measured| + `half_width`, the last one that of the
-/// 95 % interval of their difference.
+/// Refuses a prediction whose error exceeds [`ERROR_MAX`] of the measured reward plus `half_width`,
+/// half the 95 % interval of their difference.
 ///
 /// # Errors
 /// [`Refusal`], also if one of the numbers is not finite.

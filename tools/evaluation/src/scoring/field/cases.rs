@@ -379,7 +379,7 @@ fn a_reported_fault_without_alarm_contradicts_and_blind_is_no_name() {
 }
 
 #[test]
-fn a_belief_before_an_alarm_is_divided_by_the_priors() {
+fn a_belief_before_an_alarm_is_shared_out_by_the_priors() {
     let taxonomy = taxonomy().with_prior_unknown(0.2);
     // Four leaves have 0.2 each of what is not nominal, the unknown 0.2.
     let before = belief(&[0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0.6, false);

@@ -56,7 +56,7 @@ pub struct JudgedTime {
 pub struct Changes {
     /// In the whole run.
     pub all: usize,
-    /// From 2 s after an onset on, while the fault persists.
+    /// From 2 s after an onset until the fault ends.
     pub settled: usize,
 }
 
