@@ -100,5 +100,10 @@ pub fn draw(model: &Pomdp, graph: &PolicyGraph) -> Result<String, String> {
         .do_it(is_debugging, is_quick, is_unplaced, &mut writer);
     // The library's texts are black: these are readable on dark pages, too.
     let ink = format!("<style>\ntext {{ fill: {INK}; }}\n");
-    Ok(writer.finalize().replacen("<style>\n", &ink, 1))
+    let drawn = writer.finalize().replacen("<style>\n", &ink, 1);
+    // Its arrowheads grow with the line and would cover the texts.
+    let small = "orient=\"auto\" markerUnits=\"userSpaceOnUse\"";
+    Ok(drawn
+        .replace("orient=\"auto\"", small)
+        .replace("context-stroke", INK))
 }
