@@ -15,7 +15,8 @@ use crate::observer::HealthObserver;
 use crate::plan::{CommandLine, Plan};
 use crate::restarts::{Death, RestartHistory};
 
-/// Time that a service may take to stop before it is killed: many cycles at the lowest rate, 1 Hz.
+/// Time that a service may take to stop before it is killed: three cycles at the lowest rate,
+/// 1 Hz, as a service ends between two cycles.
 const STOP_LIMIT: Duration = Duration::from_secs(3);
 /// Interval at which a stopping service is looked at: nothing waits for it but the end.
 const POLL: Duration = Duration::from_millis(5);

@@ -19,7 +19,7 @@ pub const HEALTH_PERIOD_NS: u64 = 50_000_000;
 /// must not push other events out of the ring.
 const MISS_EVENT_INTERVAL_NS: u64 = 100_000_000;
 /// Events of refused blocks are at least this far apart, ns: a source that misbehaves for minutes
-/// must not fill the timeline.
+/// must not fill the timeline. Chosen: a line each second; a longer time delays the news.
 const REJECTED_EVENT_INTERVAL_NS: u64 = 1_000_000_000;
 
 /// Collects counters and events, and publishes them.

@@ -4,6 +4,7 @@ use hdrhistogram::{CreationError, Histogram};
 use serde::{Deserialize, Serialize};
 
 /// Largest latency that is resolved, ns; longer ones count as this long, and in `over_range`.
+/// Chosen: a minute is far beyond any cycle, and the range costs a histogram hardly any memory.
 pub const LATENCY_NS_MAX: u64 = 60_000_000_000;
 
 /// Histogram of latencies in ns, three significant digits.

@@ -24,7 +24,8 @@ use crate::stage::{Stage, StageCycle};
 use crate::topic::{ServiceName, Topic};
 use crate::wake::Inputs;
 
-/// Delay between the opened ports and the first frame of a source, ns: time for the others.
+/// Delay between the opened ports and the first frame of a source, ns: time for the others. Chosen
+/// by hand: shorter loses first frames on a slow machine; longer only delays the start.
 const START_DELAY_NS: u64 = 50_000_000;
 
 /// For tests of what follows a failed assertion: the service that this variable names fails one at

@@ -16,8 +16,9 @@ const WARNING: f64 = 0.8;
 const AIM: f64 = 0.5;
 /// Share of its time below which there is room for more.
 const ROOM: f64 = 0.4;
-/// Share of the deadline that a cycle has at least: who is woken later than that has been held up,
-/// and fewer particles would not help.
+/// Share of the deadline that a cycle has at least: a later wake-up is the machine's, and fewer
+/// particles would not help. Chosen by hand: smaller sheds particles for late wake-ups; larger
+/// overlooks late input that leaves too little time.
 const TIME_MIN: f64 = 0.5;
 /// Warnings in one window after which particles are shed: half of a second's observations. Chosen
 /// by hand: fewer shed for one stall of the machine, more leave deadlines to be missed.
@@ -33,7 +34,8 @@ const CALM_WINDOWS: u32 = 4;
 /// Factor on the particles each time they are given back: from [`ROOM`] to 0.6 of the time, below
 /// [`WARNING`].
 const GIVE_BACK: f64 = 1.5;
-/// Never fewer particles, unless fewer are configured.
+/// Never fewer particles, unless fewer are configured: as many as the modes of a rover's faults, so
+/// that most have one.
 const PARTICLES_MIN: u32 = 32;
 
 /// Decides how many particles the time allows.

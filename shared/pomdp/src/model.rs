@@ -7,6 +7,8 @@ pub(crate) mod rewards;
 pub(crate) mod sparse;
 
 pub use build::Probabilities;
+#[cfg(feature = "solver")]
+pub(crate) use build::ROW_SUM_WARNING;
 pub(crate) use build::{Parts, ROW_SUM_TOLERANCE, refuse_sum};
 
 use crate::parse_error::Position;

@@ -7,7 +7,8 @@ use crate::model_file::ModelError;
 const CLEAR_BELOW: f64 = 5.0;
 /// Log-odds above which no alarm falls, whatever the threshold. Chosen: a probability of 1.8 %.
 const CLEAR_LOG_ODDS: f64 = -4.0;
-/// Time for which the log-odds must be that low, s. Chosen: twenty 50 ms observations in a row.
+/// Time for which the log-odds must be that low, s. Chosen: twenty 50 ms observations in a
+/// row. Shorter, and a lull ends the alarm of a lasting fault; longer keeps that of a mended one.
 const CLEAR_S: f64 = 1.0;
 /// Slack when that time is compared, s: it is a sum of short intervals.
 const TIME_SLACK_S: f64 = 1e-6;

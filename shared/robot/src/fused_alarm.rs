@@ -12,12 +12,14 @@ pub const NOMINAL: f64 = 0.5;
 /// alarm takes to fall; shorter, and single observations toggle it.
 pub const NOMINAL_S: f64 = 1.0;
 /// Probability of nominal below which an alarm that the identifier has ended stands again. Chosen:
-/// 0.2 below [`NOMINAL`], so that a diagnosis at even odds does not toggle it.
+/// 0.2 below [`NOMINAL`], so that a diagnosis at even odds does not toggle it. A lower one
+/// keeps an alarm down that was ended wrongly.
 const NOMINAL_DOUBTED: f64 = 0.3;
-/// Motion, s, after which a larger fault set counts as a further fault. Four 50 ms observations
-/// must agree.
+/// Motion, s, after which a larger fault set counts as a further fault. Chosen: four 50 ms
+/// observations must agree. With fewer, one wrong set raises an alarm; with more, the alarm of a
+/// second fault comes later.
 const GROWN_S: f64 = 0.2;
-/// Slack when times are compared, s: they are sums of short intervals.
+/// Slack when times are compared, s: they are sums of short intervals, each rounded.
 const SLACK_S: f64 = 1e-6;
 
 /// Detector's alarm and identifier's belief for one frame.

@@ -35,7 +35,8 @@ const SLOW_AT_GOAL_M: f64 = 0.5;
 /// speed faster.
 const MAKE_UP_1_S: f64 = 0.5;
 const HURRY: f64 = 0.25;
-/// A robot that is off its path comes back to it so far ahead, m.
+/// A robot that is off its path comes back to it so far ahead, m. Shorter turns it hard towards the
+/// path; longer leaves more of the path out.
 const JOIN_M: f64 = 1.5;
 /// From one cycle to the next the robot comes no farther along its path than this, m.
 const SEARCH_M: f64 = 1.0;

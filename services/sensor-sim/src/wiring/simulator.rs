@@ -15,6 +15,7 @@ use crate::navigation::{DecisionId, NavigatorEvent};
 use crate::simulation::Simulation;
 
 /// Changes that become events in one cycle; further ones are made without an event.
+/// A specification has a handful.
 const CHANGES_MAX: usize = 16;
 
 /// Publishes the simulated rover's frames and executes actions, injections and control commands.

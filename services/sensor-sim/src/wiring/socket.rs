@@ -15,7 +15,8 @@ use vigil_robot::{Description, FrameGuard};
 
 use crate::arrival_clock::{ArrivalBatch, ArrivalClock};
 
-/// Datagrams that one turn takes at most: a flood must not hold it.
+/// Datagrams that one turn takes at most: a flood must not hold it. At the
+/// highest rate, a turn of 6 ms of them.
 const TURN_MAX: usize = 64;
 /// Starts of the source are counted in the bits of `run_id` from this one on.
 const START_SHIFT: u32 = 48;

@@ -13,8 +13,9 @@ const THROWN: f64 = 0.02;
 /// The same of a robot that was thrown in the last one. Chosen by hand: for 2.5 observations on
 /// average. Smaller lets a long throw speak against a stuck wheel; larger learns less of the drive.
 const THROWN_ON: f64 = 0.6;
-/// How far it is thrown, standard deviation of x m, y m, yaw rad. Chosen: a hop by a quarter of the
-/// rover's wheel radius.
+/// How far it is thrown, standard deviation of x m, y m, yaw rad. Chosen by hand: a hop by a
+/// quarter of the rover's wheel radius, and a turn of 6 degrees. Smaller leaves large throws
+/// unexplained; larger makes small ones improbable.
 const THROW_SD: [f64; 3] = [0.02, 0.02, 0.1];
 
 /// Continuous state of a hypothesis, and what its encoders do.

@@ -23,8 +23,8 @@ use crate::identify::sized_ways::{BIAS, DELAY, DRIFT, GAIN, SIZED_SHARES, WAYS};
 const GAIN_MEAN: f64 = 0.75;
 /// Its deviation: two span all pulses lost to two thirds too many.
 const GAIN_SD: f64 = 0.45;
-/// Prior deviation of a bias, in tolerances of one wheel's rate. Chosen by hand: three times the
-/// least bias ([`RATES`]); smaller fits large biases late, larger pays more nats for each.
+/// Prior deviation of a bias, in tolerances of one wheel's rate. Chosen by hand: some three times
+/// the least bias ([`RATES`]); smaller fits large biases late, larger pays more nats for each.
 const BIAS_SD: f64 = 10.0;
 /// The same of a drift, per second: it reaches the deviation of a bias in four.
 const DRIFT_SD_1_S: f64 = 2.5;

@@ -11,7 +11,7 @@ use crate::parse_error::{ParseError, Position};
 /// written with six digits.
 pub(crate) const ROW_SUM_TOLERANCE: f64 = 1e-5;
 /// Row sums that differ from 1 by more than this are worth a warning.
-const ROW_SUM_WARNING: f64 = 1e-9;
+pub(crate) const ROW_SUM_WARNING: f64 = 1e-9;
 /// Most warnings of one model; the rest is counted: nobody reads more.
 const WARNINGS_MAX: usize = 100;
 

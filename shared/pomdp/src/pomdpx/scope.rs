@@ -7,7 +7,7 @@ use super::xml::{Element, short};
 use crate::parse_error::ParseError;
 use crate::reader::limits::{NAMES_MAX, check};
 
-/// Most variables of a model.
+/// Most variables of a model: their product is larger than any table long before.
 const VARIABLES_MAX: usize = 64;
 /// Longest name of a state, an action or an observation, bytes.
 const NAME_BYTES_MAX: usize = 256;

@@ -5,13 +5,8 @@ use crate::alpha_vectors::AlphaVectors;
 use crate::bounds::tib::{self, Tib};
 use crate::bounds::{ActionValues, SolveError, blind, fib};
 use crate::budget::Budget;
-use crate::model::Pomdp;
+use crate::model::{Pomdp, ROW_SUM_TOLERANCE, ROW_SUM_WARNING};
 use crate::sparse_beliefs::MERGED;
-
-/// The reader lets row sums of T and of Z be off by this much each, with a warning ...
-const ROWS_WARNED: f64 = 1e-5;
-/// ... and by this much without.
-const ROWS_SILENT: f64 = 1e-9;
 
 /// What the budget allowed.
 #[derive(Debug)]
@@ -102,11 +97,12 @@ pub(super) fn trivial(model: &Pomdp) -> Bracket {
         most = most.max(reward);
     }
     let off = if model.warnings().is_empty() {
-        ROWS_SILENT
+        ROW_SUM_WARNING
     } else {
-        ROWS_WARNED
+        ROW_SUM_TOLERANCE
     };
-    // Mass that is gained or lost in a step, whichever makes the bracket wider.
+    // Mass that is gained or lost in a step, whichever makes the bracket wider: a row of T and one
+    // of Z may each be off, and their product by a little more than the sum.
     let for_ever = |reward: f64, outward: f64| {
         let sign = outward * reward.signum();
         let discount = model.discount() * (1.0 + sign * 2.1 * off);

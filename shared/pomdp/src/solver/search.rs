@@ -8,6 +8,7 @@ use crate::sparse_beliefs::BeliefId;
 /// A walk aims at this share of the gap at the start belief.
 const TARGET_SHARE: f64 = 0.5;
 /// A walk that expands nothing and narrows the gap by less than this share goes in circles.
+/// Chosen by hand, as is the next: both decide when a bound is reached, never which.
 const STUCK_SHARE: f64 = 1e-4;
 /// Rounds at the edge of the graph have this share of the work, at least.
 const EDGE_SHARE: f64 = 0.35;
@@ -20,7 +21,7 @@ const PAUSE_START: u64 = 8;
 const PAUSE_MAX: u64 = 1024;
 /// Times that a controller is tied anew while it pays: each costs a linear system.
 const CONTROLLERS_MAX: usize = 10;
-/// Vectors and points below which nothing is pruned.
+/// Vectors and points below which nothing is pruned. Chosen by hand: so few are cheap to keep.
 const ALPHAS_MIN: usize = 32;
 const POINTS_MIN: usize = 200;
 

@@ -52,6 +52,7 @@ fn write_block(model: &Pomdp, text: &mut String, (action, state): (&str, &str), 
             );
         }
     };
+    // What no rule names is 0. The rest comes first, as later rules win.
     if block.rest != 0.0 {
         rule("*", "*", block.rest);
     }

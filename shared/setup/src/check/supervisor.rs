@@ -5,7 +5,8 @@ use vigil_pomdp::policy::PolicyKind;
 
 use crate::graph_file::{GraphFile, Navigation, Source};
 
-/// With symptoms, the shortest epoch, ms: a manoeuvre must have time to show an outcome.
+/// With symptoms, the shortest epoch, ms. Chosen: no manoeuvre shows an outcome sooner. A larger
+/// one refuses quick robots.
 const EPOCH_MIN_MS: f64 = 1000.0;
 
 /// Policy, evidence, and actions that only a robot with a path can take.

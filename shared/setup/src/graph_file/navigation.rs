@@ -6,7 +6,8 @@ use smart_default::SmartDefault;
 
 /// Coordinates beyond this are no corridor, m.
 const COORDINATE_MAX_M: f64 = 1e3;
-/// Points of a path, walls, obstacles: what a cycle may have to look at.
+/// Points of a path, walls, obstacles: what a cycle may have to look at. Chosen by hand: far
+/// more than a corridor has.
 const COUNT_MAX: usize = 256;
 /// Half a turn, rounded up so that a written 3.1416 is allowed, rad.
 const YAW_MAX_RAD: f64 = 3.15;
