@@ -1,5 +1,5 @@
-//! The tables of invariants: the file that is named asserts something, and the test that is named
-//! exists in the same crate.
+//! The tables of invariants: code of the file that is named asserts something, and the test that is
+//! named, in the same crate, sees a panic.
 
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
@@ -71,30 +71,39 @@ fn crate_of(file: &Path) -> &Path {
         .unwrap()
 }
 
-fn asserts(file: &Path) -> bool {
-    let text = read_to_string(file).unwrap();
+/// True if code that is no test asserts something.
+fn asserts(text: &str) -> bool {
+    let shipped = text.split("#[cfg(test)]").next().unwrap_or_default();
     ["assert!(", "assert_eq!(", "assert_ne!(", "invariants::"]
         .iter()
-        .any(|word| text.contains(word))
+        .any(|word| shipped.contains(word))
+}
+
+/// True if the text holds this test, and it waits for a panic.
+fn breaks(text: &str, test: &str) -> bool {
+    text.match_indices(&format!("fn {test}(")).any(|(at, _)| {
+        let before = text[..at].rsplit('\n').skip(1);
+        let mut attributes = before.take_while(|line| !line.trim().is_empty() && *line != "}");
+        attributes.any(|line| line.contains("should_panic"))
+    })
 }
 
 fn problem(row: &Row<'_>, folder: &Path) -> Result<(), String> {
     let files = find(folder, &row.files)?;
     let first = files.first().ok_or("no file is named")?;
-    if let Some(silent) = files.iter().find(|file| !asserts(file)) {
+    let is_silent = |file: &&PathBuf| !asserts(&read_to_string(file).unwrap());
+    if let Some(silent) = files.iter().find(is_silent) {
         return Err(format!("{} asserts nothing", silent.display()));
     }
     let texts: Vec<String> = sources(crate_of(first))
         .iter()
         .map(|path| read_to_string(path).unwrap())
         .collect();
-    let is_there = |test: &str| {
-        texts
-            .iter()
-            .any(|text| text.contains(&format!("fn {test}(")))
-    };
-    let missing = row.tests.iter().find(|test| !is_there(test));
-    missing.map_or(Ok(()), |test| Err(format!("no test {test}")))
+    let is_broken = |test: &str| texts.iter().any(|text| breaks(text, test));
+    let missing = row.tests.iter().find(|test| !is_broken(test));
+    missing.map_or(Ok(()), |test| {
+        Err(format!("no test {test} that sees a panic"))
+    })
 }
 
 /// The number of invariants in a document, and those of which something is missing.
@@ -116,22 +125,35 @@ pub fn check(document: &Path) -> (usize, Vec<String>) {
 #[test]
 fn rows_are_read_and_what_is_missing_is_found() {
     let text = "# A\n\n## Invariants\n\n| statement | file | test |\n|---|---|---|\n\
-                | sums to 1 | `invariants.rs` | `nobody_wrote_this` |\n\n## B\n| a | `b` | `c` |\n";
+                | never back | `shared/cycle/src/deadline.rs` | `an_account_that_goes_back_is_found` |\n\
+                \n## B\n| a | `b` | `c` |\n";
     let rows = rows(text);
     assert_eq!(rows.len(), 1);
-    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("documents");
-    let missing = Err("no test nobody_wrote_this".into());
-    assert_eq!(problem(&rows[0], &here), missing);
-    let tests = vec!["rows_are_read_and_what_is_missing_is_found"];
-    let row = Row {
-        tests,
-        ..rows[0].clone()
-    };
-    assert_eq!(problem(&row, &here), Ok(()));
-    let files = vec!["missing.rs"];
-    let row = Row {
+    let judged = |row: Row<'_>| problem(&row, &root());
+    assert_eq!(judged(rows[0].clone()), Ok(()));
+    let changed = |files, tests| Row {
+        statement: "never back",
         files,
-        ..rows[0].clone()
+        tests,
     };
-    assert_eq!(problem(&row, &here), Err("no file missing.rs".into()));
+    let (file, unknown) = (rows[0].files.clone(), vec!["nobody_wrote_this"]);
+    let missing = Err("no test nobody_wrote_this that sees a panic".into());
+    assert_eq!(judged(changed(file, unknown)), missing);
+    let (gone, test) = (vec!["missing.rs"], rows[0].tests.clone());
+    assert_eq!(
+        judged(changed(gone, test)),
+        Err("no file missing.rs".into())
+    );
+}
+
+#[test]
+fn only_shipped_assertions_and_tests_that_see_a_panic_count() {
+    assert!(asserts("fn f() {\n    assert!(x, \"so\");\n}\n"));
+    assert!(!asserts(
+        "fn f() {}\n#[cfg(test)]\nmod tests { assert!(x); }\n"
+    ));
+    let quiet = "}\n\n#[test]\nfn a() {\n}\n";
+    assert!(!breaks(quiet, "a"));
+    let loud = "}\n\n#[test]\n#[should_panic(expected = \"so\")]\nfn a() {\n}\n";
+    assert!(breaks(loud, "a") && !breaks(loud, "b"));
 }

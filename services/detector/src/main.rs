@@ -1,5 +1,5 @@
 //! `vigil-detector`: the detector as a process of the graph. Exit codes: 0 stopped, 1 failed,
-//! 2 configuration, 3 a deadline was missed that ends it.
+//! 2 configuration, 3 a missed deadline under `on_miss = "stop"`, 70 a failed assertion.
 
 use std::process::ExitCode;
 

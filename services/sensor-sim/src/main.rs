@@ -1,6 +1,6 @@
 //! `vigil-sensor-sim`: the simulated rover, recorded frames, or frames from a socket, as a process
-//! of the graph. Exit codes: 0 stopped, 1 failed, 2 configuration, 3 a deadline was missed that
-//! ends it.
+//! of the graph. Exit codes: 0 stopped, 1 failed, 2 configuration, 3 a missed deadline under
+//! `on_miss = "stop"`, 70 a failed assertion.
 
 use std::process::ExitCode;
 use std::rc::Rc;
