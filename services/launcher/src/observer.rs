@@ -204,7 +204,8 @@ mod tests {
 
     #[test]
     fn what_a_service_reports_over_a_restart_adds_up_from_the_first_cycle_on() {
-        let plan = plan(&["--graph", "test-observer"]).unwrap();
+        let graph = format!("t{}-observer", std::process::id());
+        let plan = plan(&["--graph", &graph]).unwrap();
         let domain = plan.setup.domain().unwrap();
         let link = || Link::join(&domain, "test").unwrap();
         let mut observer = HealthObserver::new(link(), &plan).unwrap();

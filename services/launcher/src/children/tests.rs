@@ -1,8 +1,9 @@
-//! Children that are real processes: shell scripts in place of the services.
+//! Children that are real processes: a shell script in place of the services.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
-use std::path::PathBuf;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::time::Instant;
 
 use vigil_blocks::EventKind;
 use vigil_cycle::port::Link;
@@ -11,6 +12,19 @@ use vigil_cycle::watchdog::Settings;
 use super::*;
 use crate::plan::tests::plan;
 use crate::watchdog::WatchdogDriver;
+
+const SLEEPING_SERVICE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/sleeping-service");
+/// What has not happened by then never will.
+const NEVER: Duration = Duration::from_secs(120);
+
+/// Repeats `look` until it is true.
+fn until(mut look: impl FnMut() -> bool) {
+    let began = Instant::now();
+    while !look() {
+        assert!(began.elapsed() < NEVER, "it never happened");
+        std::thread::sleep(POLL);
+    }
+}
 
 /// A graph whose services sleep, in folders of its own.
 struct SleepingGraph {
@@ -21,13 +35,14 @@ struct SleepingGraph {
 
 impl SleepingGraph {
     fn new(name: &str) -> Self {
-        let mut plan = plan(&["--graph", name]).unwrap();
-        plan.programs = programs(name);
+        let graph = format!("t{}-{name}", std::process::id());
+        let mut plan = plan(&["--graph", &graph]).unwrap();
+        plan.programs = std::env::temp_dir().join(graph);
         fs::create_dir_all(&plan.programs).unwrap();
         for service in plan.services() {
             let program = plan.programs.join(format!("vigil-{}", service.as_str()));
-            fs::write(&program, "#!/bin/sh\nexec sleep 3600\n").unwrap();
-            fs::set_permissions(program, fs::Permissions::from_mode(0o700)).unwrap();
+            // Linked, not written: what another test's fork holds open cannot be executed.
+            symlink(Path::new(SLEEPING_SERVICE), program).unwrap();
         }
         let domain = plan.setup.domain().unwrap();
         let link = Link::join(&domain, "launcher").unwrap();
@@ -45,10 +60,10 @@ impl SleepingGraph {
 
     /// Looks after the children until the detector has been started again.
     fn await_restart(&mut self, children: &mut Children) {
-        while !children.restarted.contains(&ServiceName::Detector) {
+        until(|| {
             assert!(!children.look_after(&self.plan, &mut self.observer));
-            std::thread::sleep(POLL);
-        }
+            children.restarted.contains(&ServiceName::Detector)
+        });
     }
 
     fn events(&self, kind: EventKind) -> Vec<String> {
@@ -65,13 +80,9 @@ impl Drop for SleepingGraph {
     }
 }
 
-fn programs(name: &str) -> PathBuf {
-    std::env::temp_dir().join(format!("{name}-{}", std::process::id()))
-}
-
 #[test]
 fn a_service_that_is_killed_is_started_again_and_all_are_stopped() {
-    let mut graph = SleepingGraph::new("test-killed");
+    let mut graph = SleepingGraph::new("killed");
     let mut children = graph.start();
     let listed = fs::read_to_string(graph.domain.processes_file()).unwrap();
     let ids = children.services.iter().map(|s| s.child.id());
@@ -100,7 +111,7 @@ fn a_service_that_is_killed_is_started_again_and_all_are_stopped() {
 
 #[test]
 fn a_service_whose_assertion_fails_again_is_given_up_and_the_timeline_says_why() {
-    let mut graph = SleepingGraph::new("test-assertion");
+    let mut graph = SleepingGraph::new("assertion");
     let mut children = graph.start();
     let fail = |children: &mut Children| {
         fs::write(
@@ -130,7 +141,7 @@ fn a_service_whose_assertion_fails_again_is_given_up_and_the_timeline_says_why()
 
 #[test]
 fn a_program_that_is_not_there_is_named() {
-    let graph = SleepingGraph::new("test-missing");
+    let graph = SleepingGraph::new("missing");
     let supervisor = graph.plan.programs.join("vigil-supervisor");
     fs::remove_file(&supervisor).unwrap();
     let error = Children::start(&graph.plan, &graph.domain).err().unwrap();
@@ -140,16 +151,17 @@ fn a_program_that_is_not_there_is_named() {
 
 #[test]
 fn a_service_that_never_reports_is_ended_by_the_watchdog_and_started_again() {
-    let mut graph = SleepingGraph::new("test-silent");
+    let mut graph = SleepingGraph::new("silent");
     let mut children = graph.start();
     let settings = Settings {
         startup_s: 0.0,
         ..Settings::default()
     };
     let mut watchdog = WatchdogDriver::new(&settings, vec![ServiceName::Detector]);
-    while graph.events(EventKind::Watchdog).is_empty() {
+    until(|| {
         watchdog.look_after(&mut graph.observer, &mut children);
-    }
+        !graph.events(EventKind::Watchdog).is_empty()
+    });
     let found = graph.events(EventKind::Watchdog);
     assert_eq!(found, ["did not start up in time"]);
     children.services[1].child.wait().unwrap();

@@ -162,7 +162,7 @@ fn changes(case: &Case) -> String {
         }
     }
     format!(
-        "<table><thead><tr><th>s</th><th></th><th>reported</th><th>action</th></tr></thead>\n\
+        "<table><thead><tr><th>s</th><th>alarm</th><th>reported</th><th>action</th></tr></thead>\n\
          <tbody>\n{rows}</tbody></table>\n"
     )
 }
@@ -174,7 +174,15 @@ pub fn unlabelled(cases: &[Case], set: &str, taxonomy: &Taxonomy) -> String {
         let chart = chart(case, taxonomy, set);
         format!("<div class=\"run\"><h3>run {id}</h3>\n{chart}{changes}</div>\n")
     };
-    let inside: String = cases.iter().map(run).collect();
+    let (mut inside, mut left_out) = (String::new(), Vec::new());
+    for case in cases {
+        if inside.len() < BYTES_MAX {
+            inside.push_str(&run(case));
+        } else {
+            left_out.push(case.label.run.to_string());
+        }
+    }
+    inside.push_str(&not_drawn(&left_out));
     let about = "Probability of the leading modes over time, s; before an alarm, of nominal \
                  driving and unknown. Below it, each change of the alarm, the reported name and \
                  the action.";
@@ -198,6 +206,15 @@ fn is_wrong(report: &Report<'_>, i: usize) -> bool {
     })
 }
 
+/// A line that names the runs beyond [`BYTES_MAX`]; nothing if there are none.
+fn not_drawn(runs: &[String]) -> String {
+    if runs.is_empty() {
+        return String::new();
+    }
+    let list = escaped(&runs.join(", "));
+    format!("<p class=\"soft\">Not drawn, to keep the file small: runs {list}.</p>\n")
+}
+
 /// All runs, the wrong ones first.
 pub fn section(report: &Report<'_>) -> String {
     let count = report.sets.first().map_or(0, |set| set.cases.len());
@@ -218,13 +235,7 @@ pub fn section(report: &Report<'_>) -> String {
         }
         inside.push_str("</details>\n");
     }
-    if !left_out.is_empty() {
-        let text = format!(
-            "Not drawn, to keep the file small: runs {}.",
-            left_out.join(", ")
-        );
-        inside.push_str(&format!("<p class=\"soft\">{}</p>\n", escaped(&text)));
-    }
+    inside.push_str(&not_drawn(&left_out));
     let about = "Probability of the leading modes over time, s; before an alarm, of nominal \
                  driving and unknown. The first name is the true one; the broken line is the \
                  onset. First the runs with a false alarm, a missed fault or a wrong leaf 2 s \

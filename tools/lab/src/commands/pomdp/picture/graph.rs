@@ -1,6 +1,7 @@
 //! A policy's graph, as DOT and drawn.
 
 use std::fmt::Write;
+use std::panic::AssertUnwindSafe;
 
 use layout::backends::svg::SVGWriter;
 use layout::gv::{DotParser, GraphBuilder};
@@ -95,9 +96,12 @@ pub fn draw(model: &Pomdp, graph: &PolicyGraph) -> Result<String, String> {
     let mut writer = SVGWriter::new();
     // Without its search for fewer crossings, which takes minutes for graphs of 60 nodes.
     let (is_debugging, is_quick, is_unplaced) = (false, true, false);
-    builder
-        .get()
-        .do_it(is_debugging, is_quick, is_unplaced, &mut writer);
+    let mut placed = builder.get();
+    // The library asserts that no two boxes overlap, whatever the model.
+    let place = || placed.do_it(is_debugging, is_quick, is_unplaced, &mut writer);
+    if std::panic::catch_unwind(AssertUnwindSafe(place)).is_err() {
+        return Err("the graph cannot be laid out: write it as .dot, for Graphviz".to_owned());
+    }
     // The library's texts are black: these are readable on dark pages, too.
     let ink = format!("<style>\ntext {{ fill: {INK}; }}\n");
     let drawn = writer.finalize().replacen("<style>\n", &ink, 1);
