@@ -5,6 +5,8 @@
 //! description takes, and a channel that never changes. The tests do not judge frames of a slow
 //! log; [`slow`] says so.
 
+use std::f64::consts::PI;
+
 use vigil_blocks::SensorFrame;
 use vigil_recording::frames::{Field, Run, fields};
 use vigil_robot::Description;
@@ -148,6 +150,26 @@ fn seconds(frame: &SensorFrame) -> f64 {
     frame.header.t_capture_ns as f64 * 1e-9
 }
 
+/// Units of a speed and of a yaw rate that a command may be in instead, and their factors.
+const SPEEDS: [(f64, &str); 3] = [(3.281, "feet/s"), (100.0, "cm/s"), (1000.0, "mm/s")];
+const YAW_RATES: [(f64, &str); 2] = [(180.0 / PI, "deg/s"), (1000.0, "mrad/s")];
+
+/// The units in which a command that is `ratio` times its limit would be within it, as a question.
+fn units_within(ratio: f64, unit: &str) -> String {
+    let units: &[(f64, &str)] = match unit {
+        "m/s" => &SPEEDS,
+        "rad/s" => &YAW_RATES,
+        _ => &[],
+    };
+    // A command may be a little beyond its limit.
+    let within = units.iter().filter(|(factor, _)| ratio <= 1.001 * factor);
+    let names: Vec<&str> = within.map(|(_, name)| *name).collect();
+    match names.is_empty() {
+        true => "another unit".to_owned(),
+        false => names.join(" or "),
+    }
+}
+
 /// A command far beyond the description's limit.
 fn beyond_limits(frames: &[&SensorFrame], robot: &Description) -> Option<String> {
     robot.command.iter().enumerate().find_map(|(i, axis)| {
@@ -155,7 +177,8 @@ fn beyond_limits(frames: &[&SensorFrame], robot: &Description) -> Option<String>
         let largest = sizes.map(f64::abs).fold(0.0, f64::max);
         (largest > LIMIT_FACTOR * axis.limit).then(|| {
             let (name, limit, unit) = (&axis.name, axis.limit, &axis.unit);
-            format!("{name} is up to {largest}; allowed is {limit} {unit}: is it in another unit?")
+            let asked = units_within(largest / limit, unit);
+            format!("{name} is up to {largest}; allowed is {limit} {unit}: is it in {asked}?")
         })
     })
 }

@@ -124,12 +124,23 @@ fn units_are_told_by_their_factor() {
         assert!(after.ends_with(unit), "{message}");
     }
     assert!(data.changed(in_degrees).contains("yaw turns"));
-    let fast = data.changed(|frame| frame.command[1] *= 1000.0);
-    let wanted = "; allowed is 0.5 m/s: is it in another unit?";
-    assert!(
-        fast.starts_with("cmd_speed is up to ") && fast.ends_with(wanted),
-        "{fast}"
-    );
+}
+
+#[test]
+fn a_command_beyond_its_limit_is_asked_for_the_units_that_fit() {
+    let data = Data::read();
+    let refused = |speed: f64| data.changed(|frame| frame.command[1] = speed);
+    for (speed, wanted) in [
+        (
+            1.6,
+            "1.6; allowed is 0.5 m/s: is it in feet/s or cm/s or mm/s?",
+        ),
+        (20.0, "20; allowed is 0.5 m/s: is it in cm/s or mm/s?"),
+        (200.0, "200; allowed is 0.5 m/s: is it in mm/s?"),
+        (2e6, "2000000; allowed is 0.5 m/s: is it in another unit?"),
+    ] {
+        assert_eq!(refused(speed), format!("cmd_speed is up to {wanted}"));
+    }
 }
 
 #[test]
