@@ -43,7 +43,7 @@ pub enum ModelError {
         /// What was found.
         value: String,
         /// What is allowed.
-        allowed: &'static str,
+        allowed: String,
     },
     /// The model is of another robot.
     #[error("the model is of robot '{model}' ({model_wheels}), not of '{robot}' ({robot_wheels})")]
@@ -73,12 +73,12 @@ pub enum ModelError {
 pub(crate) fn refuse<T>(
     key: impl Into<String>,
     value: impl ToString,
-    allowed: &'static str,
+    allowed: impl Into<String>,
 ) -> Result<T, ModelError> {
     Err(ModelError::Value {
         key: key.into(),
         value: value.to_string(),
-        allowed,
+        allowed: allowed.into(),
     })
 }
 
@@ -87,12 +87,12 @@ pub(crate) fn check_range(key: &str, value: f64, low: f64, high: f64) -> Result<
     if value >= low && value <= high {
         return Ok(());
     }
-    let allowed = if value.is_finite() {
-        "outside its physical range"
-    } else {
-        "a finite number"
+    // Exponents keep numbers like 1e-12 short.
+    let bound = |bound: f64| match bound.abs() {
+        0.0 | 1e-3..=1e4 => bound.to_string(),
+        _ => format!("{bound:e}"),
     };
-    refuse(key, value, allowed)
+    refuse(key, value, format!("{} to {}", bound(low), bound(high)))
 }
 
 /// A model that is kept in a file.

@@ -2,16 +2,20 @@
 //!
 //! A healthy robot does roughly what it is commanded. [`PublisherCheck`] tests a recording as it
 //! tests a live publisher. Two things show only over a whole run: a command that no robot of this
-//! description takes, and a channel that never changes.
+//! description takes, and a channel that never changes. The tests do not judge frames of a slow
+//! log; [`slow`] says so.
+
+use std::f64::consts::PI;
 
 use vigil_blocks::SensorFrame;
 use vigil_recording::frames::{Field, Run, fields};
 use vigil_robot::Description;
 use vigil_robot::description::Kinematics;
-use vigil_robot::publisher_check::{FindingKind, PublisherCheck};
+use vigil_robot::publisher_check::{FindingKind, PAUSE_S, PublisherCheck};
 
-/// Frames in motion from which a channel that never changes is a doubt: a second at 20 Hz. With
-/// fewer, a coarse encoder at a steady speed is doubted; more leave short runs unchecked.
+/// Frames in motion from which a channel that never changes is a doubt, and pairs of frames from
+/// which their spacing is known: a second at 20 Hz. With fewer, a coarse encoder at a steady speed
+/// is doubted; more leave short runs unchecked.
 const FRAMES_MIN: usize = 20;
 /// Commanded turn from which a constant yaw is a doubt, rad: thirty deviations of a yaw noise of
 /// 5 mrad.
@@ -43,8 +47,7 @@ impl RunCheck {
     /// Checks the first `until_s` seconds of a run, in which the robot is taken to be healthy.
     #[must_use]
     pub fn new(run: &Run, robot: &Description, until_s: f64) -> Self {
-        let is_used = |frame: &&SensorFrame| seconds(frame) <= until_s;
-        let used: Vec<&SensorFrame> = run.frames.iter().take_while(is_used).collect();
+        let used = beginning(run, until_s);
         let mut check = PublisherCheck::new(robot);
         let findings: Vec<_> = used.iter().filter_map(|frame| check.take(frame)).collect();
         // A yaw of the wrong sign or unit puts the direction of travel in doubt too.
@@ -63,19 +66,21 @@ impl RunCheck {
 }
 
 /// What most runs have in common, so that single faulty runs are no reason to doubt the columns.
-/// Each run comes with the time until which it may be healthy, s.
+/// Runs that are too slow to be judged are named too. Each run comes with the time until which it
+/// may be healthy, s.
 #[must_use]
 pub fn warnings<'a>(
     runs: impl IntoIterator<Item = (&'a Run, f64)>,
     robot: &Description,
 ) -> Vec<String> {
+    let runs: Vec<(&Run, f64)> = runs.into_iter().collect();
     let checks = runs
-        .into_iter()
-        .map(|(run, healthy_s)| RunCheck::new(run, robot, healthy_s));
+        .iter()
+        .map(|(run, healthy_s)| RunCheck::new(run, robot, *healthy_s));
     let judged: Vec<RunCheck> = checks.filter(|check| check.is_judged).collect();
     let doubts: Vec<&RunDoubt> = judged.iter().filter_map(|c| c.doubt.as_ref()).collect();
     let (found, all) = (doubts.len(), judged.len());
-    match doubts.first().filter(|_| 2 * found >= all) {
+    let mut warnings = match doubts.first().filter(|_| 2 * found >= all) {
         None => Vec::new(),
         Some(first) => vec![
             first.to_string(),
@@ -84,11 +89,85 @@ pub fn warnings<'a>(
                  verdicts are wrong"
             ),
         ],
+    };
+    warnings.extend(slow(runs, robot));
+    warnings
+}
+
+/// That runs are not judged, as their frames are further apart than [`PAUSE_S`]: the tests take
+/// each for the first after a pause. None if no run is like this. Each run comes with the time
+/// until which it may be healthy, s.
+#[must_use]
+pub fn slow<'a>(
+    runs: impl IntoIterator<Item = (&'a Run, f64)>,
+    robot: &Description,
+) -> Option<String> {
+    let spacing = |(run, healthy_s): (&Run, f64)| {
+        let spacing_s = spacing_s(&beginning(run, healthy_s), robot)?;
+        Some((run.id, spacing_s))
+    };
+    let spacings: Vec<(u32, f64)> = runs.into_iter().filter_map(spacing).collect();
+    let mut slow = spacings
+        .iter()
+        .filter(|(_, spacing_s)| *spacing_s > PAUSE_S);
+    let (all, found) = (spacings.len(), slow.clone().count());
+    let (run, spacing_s) = slow.next()?;
+    Some(format!(
+        "units, signs and sides of {found} of {all} runs are NOT judged: in run {run} t advances \
+         by {spacing_s:.3} s from frame to frame, allowed is {PAUSE_S} s; is t in ms?"
+    ))
+}
+
+/// Median time between consecutive frames in motion, s; of two in the middle the longer. None if
+/// there are too few.
+fn spacing_s(frames: &[&SensorFrame], robot: &Description) -> Option<f64> {
+    let pairs = frames.windows(2);
+    let moving = pairs.filter(|pair| pair.iter().all(|frame| moves(frame, robot)));
+    let t_ns = |frame: &SensorFrame| frame.header.t_capture_ns;
+    let mut spacings_ns: Vec<u64> = moving
+        .map(|pair| t_ns(pair[1]).saturating_sub(t_ns(pair[0])))
+        .collect();
+    if spacings_ns.len() < FRAMES_MIN {
+        return None;
     }
+    let middle = spacings_ns.len() / 2;
+    let (_, median_ns, _) = spacings_ns.select_nth_unstable(middle);
+    Some(*median_ns as f64 * 1e-9)
+}
+
+/// The frames of the first `until_s` seconds.
+fn beginning(run: &Run, until_s: f64) -> Vec<&SensorFrame> {
+    let is_used = |frame: &&SensorFrame| seconds(frame) <= until_s;
+    run.frames.iter().take_while(is_used).collect()
+}
+
+/// True if the frame's command asks for motion.
+fn moves(frame: &SensorFrame, robot: &Description) -> bool {
+    robot.path_speed_m_s(robot.twist(&frame.command)) >= robot.body.standing_m_s
 }
 
 fn seconds(frame: &SensorFrame) -> f64 {
     frame.header.t_capture_ns as f64 * 1e-9
+}
+
+/// Units of a speed and of a yaw rate that a command may be in instead, and their factors.
+const SPEEDS: [(f64, &str); 3] = [(3.281, "feet/s"), (100.0, "cm/s"), (1000.0, "mm/s")];
+const YAW_RATES: [(f64, &str); 2] = [(180.0 / PI, "deg/s"), (1000.0, "mrad/s")];
+
+/// The units in which a command that is `ratio` times its limit would be within it, as a question.
+fn units_within(ratio: f64, unit: &str) -> String {
+    let units: &[(f64, &str)] = match unit {
+        "m/s" => &SPEEDS,
+        "rad/s" => &YAW_RATES,
+        _ => &[],
+    };
+    // A command may be a little beyond its limit.
+    let within = units.iter().filter(|(factor, _)| ratio <= 1.001 * factor);
+    let names: Vec<&str> = within.map(|(_, name)| *name).collect();
+    match names.is_empty() {
+        true => "another unit".to_owned(),
+        false => names.join(" or "),
+    }
 }
 
 /// A command far beyond the description's limit.
@@ -98,17 +177,16 @@ fn beyond_limits(frames: &[&SensorFrame], robot: &Description) -> Option<String>
         let largest = sizes.map(f64::abs).fold(0.0, f64::max);
         (largest > LIMIT_FACTOR * axis.limit).then(|| {
             let (name, limit, unit) = (&axis.name, axis.limit, &axis.unit);
-            format!("{name} is up to {largest}; allowed is {limit} {unit}: is it in another unit?")
+            let asked = units_within(largest / limit, unit);
+            format!("{name} is up to {largest}; allowed is {limit} {unit}: is it in {asked}?")
         })
     })
 }
 
 /// A channel that reads the same throughout, though the command moves it.
 fn constant_channel(frames: &[&SensorFrame], robot: &Description) -> Option<String> {
-    let moves = |frame: &&&SensorFrame| {
-        robot.path_speed_m_s(robot.twist(&frame.command)) >= robot.body.standing_m_s
-    };
-    let moving: Vec<&SensorFrame> = frames.iter().filter(moves).copied().collect();
+    let moving = frames.iter().filter(|frame| moves(frame, robot));
+    let moving: Vec<&SensorFrame> = moving.copied().collect();
     if moving.len() < FRAMES_MIN {
         return None;
     }

@@ -95,11 +95,12 @@ impl Finding {
         let wheel = wheel.map_or("?", |wheel| wheel.name.as_str());
         let turn = turning(robot);
         let v = self.value;
-        let unit = |units: &[(f64, &str)]| unit(v, units);
+        let are_they = |units| unit(v, "are they", units);
+        let is_it = |units| unit(v, "is it", units);
         match self.kind {
             FindingKind::Travel => format!(
                 "units: x and y move {v:.3} times the commanded travel{}",
-                unit(&TRAVEL)
+                are_they(&TRAVEL)
             ),
             FindingKind::Heading => format!(
                 "axes: x and y move at {v:.2} rad to yaw, 0 is commanded: is yaw 0 along x, y to \
@@ -111,7 +112,7 @@ impl Finding {
             ),
             FindingKind::Turn => format!(
                 "units: yaw turns {v:.2} times the commanded angle{}",
-                unit(&TURN)
+                is_it(&TURN)
             ),
             FindingKind::Gyro if v < 0.0 => format!(
                 "signs: yaw_rate is {v:.2} times the commanded one: is it or {turn} positive to \
@@ -119,11 +120,11 @@ impl Finding {
             ),
             FindingKind::Gyro => format!(
                 "units: yaw_rate is {v:.2} times the commanded one{}",
-                unit(&TURN)
+                is_it(&GYRO)
             ),
             FindingKind::Rates => format!(
                 "units: the wheels turn {v:.3} times as fast as the command makes them roll{}",
-                unit(&RATES)
+                are_they(&RATES)
             ),
             FindingKind::RateSign => format!("signs: enc_{wheel} has the other sign"),
             FindingKind::Sides => format!(
@@ -162,17 +163,18 @@ const TRAVEL: [(f64, &str); 4] = [
     (3.281, "feet"),
 ];
 const TURN: [(f64, &str); 2] = [(180.0 / PI, "degrees"), (1000.0, "thousandths of a rad")];
+const GYRO: [(f64, &str); 2] = [(180.0 / PI, "deg/s"), (1000.0, "mrad/s")];
 const RATES: [(f64, &str); 3] = [
     (180.0 / PI, "deg/s"),
     (60.0 / TAU, "rpm"),
     (1.0 / TAU, "revolutions per second"),
 ];
 
-/// The unit whose factor is within a fifth of the ratio.
-fn unit(ratio: f64, units: &[(f64, &str)]) -> String {
+/// The question for the unit whose factor is within a fifth of the ratio. `asked`: its beginning.
+fn unit(ratio: f64, asked: &str, units: &[(f64, &str)]) -> String {
     let near = |factor: f64| (0.8..1.25).contains(&(ratio / factor));
     let found = units.iter().find(|(factor, _)| near(*factor));
-    found.map_or_else(String::new, |(_, name)| format!(": are they in {name}?"))
+    found.map_or_else(String::new, |(_, name)| format!(": {asked} in {name}?"))
 }
 
 /// True if the ratio is what the rates' units make of 1.
@@ -184,6 +186,51 @@ pub(super) fn is_rate_unit(ratio: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_finding_asks_for_the_unit_of_its_own_channel() {
+        let text = include_str!("../../../../config/robots/rover.toml");
+        let robot: Description = toml::from_str(text).unwrap_or_else(|error| panic!("{error}"));
+        let text = |kind: FindingKind, value: f64| {
+            let wheel = None;
+            Finding { kind, wheel, value }.text(&robot)
+        };
+        for (kind, value, wanted) in [
+            (
+                FindingKind::Gyro,
+                57.3,
+                "units: yaw_rate is 57.30 times the commanded one: is it in deg/s?",
+            ),
+            (
+                FindingKind::Gyro,
+                1010.0,
+                "units: yaw_rate is 1010.00 times the commanded one: is it in mrad/s?",
+            ),
+            (
+                FindingKind::Gyro,
+                20.0,
+                "units: yaw_rate is 20.00 times the commanded one",
+            ),
+            (
+                FindingKind::Turn,
+                57.3,
+                "units: yaw turns 57.30 times the commanded angle: is it in degrees?",
+            ),
+            (
+                FindingKind::Travel,
+                990.0,
+                "units: x and y move 990.000 times the commanded travel: are they in mm?",
+            ),
+            (
+                FindingKind::Rates,
+                57.3,
+                "units: the wheels turn 57.300 times as fast as the command makes them roll: are \
+                 they in deg/s?",
+            ),
+        ] {
+            assert_eq!(text(kind, value), wanted);
+        }
+    }
 
     #[test]
     fn findings_survive_the_wire() {

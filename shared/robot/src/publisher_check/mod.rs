@@ -33,7 +33,7 @@ const TURN_REVERSED: f64 = -0.5;
 const TURN_UNIT: f64 = 8.0;
 /// A pause in the frames beyond which the motion counts as interrupted, s. Six periods of a sensor
 /// of 20 Hz.
-const PAUSE_S: f64 = 0.3;
+pub const PAUSE_S: f64 = 0.3;
 /// Time for which a command must be constant before a frame counts, s: three lags of
 /// [`crate::body::Body`].
 const SETTLED_S: f64 = 0.3;

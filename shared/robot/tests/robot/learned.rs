@@ -48,12 +48,17 @@ fn broken_models_are_refused_by_key() {
         (
             "interval_s = 0.05",
             "interval_s = nan",
-            "interval_s: NaN is not allowed",
+            "interval_s: NaN is not allowed: 0.001 to 1",
         ),
         (
             "interval_s = 0.05",
             "interval_s = 50.0",
-            "interval_s: 50 is not allowed",
+            "interval_s: 50 is not allowed: 0.001 to 1",
+        ),
+        (
+            "fault_rate_1_h = 1.0",
+            "fault_rate_1_h = -1.0",
+            ".fault_rate_1_h: -1 is not allowed: 1e-12 to 1e6",
         ),
         (
             "interval_s = 0.05",

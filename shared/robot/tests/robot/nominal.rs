@@ -59,6 +59,21 @@ fn a_file_that_was_changed_by_accident_is_refused() {
 }
 
 #[test]
+fn an_interval_out_of_range_is_refused_with_what_is_allowed() {
+    for (interval, found) in [
+        ("5.0", "5"),
+        ("0.01", "0.01"),
+        ("inf", "inf"),
+        ("nan", "NaN"),
+    ] {
+        let changed = edited("interval_s = 0.1", &format!("interval_s = {interval}"));
+        let message = Model::from_toml(&changed).unwrap_err().to_string();
+        let wanted = format!("interval_s: {found} is not allowed: 0.02 to 1");
+        assert_eq!(message, wanted);
+    }
+}
+
+#[test]
 fn terms_that_point_at_nothing_are_refused_by_name() {
     for (from, to, key) in [
         ("lag = 1", "lag = 4", "channel.0.terms.2.lag: 4"),

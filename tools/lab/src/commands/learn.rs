@@ -8,6 +8,7 @@ use serde::Serialize;
 use vigil_learning::learning::further;
 use vigil_learning::learning::{self, Options, RESIDUAL_BAR, Report, Residual, View};
 use vigil_learning::learning_nominal;
+use vigil_learning::plausibility;
 use vigil_learning::split::split;
 use vigil_recording::frames::{self, Run};
 use vigil_recording::labels::{self, Label};
@@ -164,6 +165,7 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
     }
     let labels = labels::read(labels_file, &robot).map_err(CommandError::usage)?;
     let runs = frames::read(frames_file, &robot).map_err(CommandError::usage)?;
+    warn_slow(&runs, &labels, frames_file, &robot);
     let with_frames: Vec<_> = labels
         .iter()
         .filter(|label| runs.iter().any(|run| run.id == label.run))
@@ -213,6 +215,17 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
     printed
         .map_err(CommandError::failure)
         .map(|()| Outcome::Done)
+}
+
+/// Says on the error stream that runs are too slow to be judged.
+fn warn_slow(runs: &[Run], labels: &[Label], file: &Path, robot: &Description) {
+    let labelled = runs.iter().filter_map(|run| {
+        let label = labels.iter().find(|label| label.run == run.id)?;
+        Some((run, label.onset_s.unwrap_or(f64::INFINITY)))
+    });
+    if let Some(warning) = plausibility::slow(labelled, robot) {
+        eprintln!("warning: {}: {warning}", file.display());
+    }
 }
 
 /// The runs without a fault that a model was learned from.

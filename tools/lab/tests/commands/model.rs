@@ -133,8 +133,9 @@ fn an_edited_model_is_refused_unless_it_says_that_it_is_edited() {
     assert!(refused(&show).contains("learn it again with `vigil learn`"));
 }
 
-/// Writes a straight or curved drive of 4 s at .2 m/s, its yaw changed by `factor`.
-fn drive(to: &Path, runs: u32, factor: f64) {
+/// Writes a curved drive of 4 s at .2 m/s, its yaw multiplied by `factor`, its times as if frames
+/// were `spacing_s` apart.
+fn drive(to: &Path, runs: u32, factor: f64, spacing_s: f64) {
     let mut rows = String::from(
         "run,t,x,y,yaw,enc_LF,enc_LM,enc_LR,enc_RF,enc_RM,enc_RR,steer_LF,steer_LR,steer_RF,\
          steer_RR,cmd_curv,cmd_speed\n",
@@ -147,6 +148,7 @@ fn drive(to: &Path, runs: u32, factor: f64) {
             let rate = 2.5 + 1e-3 * f64::from(k);
             let rates = format!("{rate},{rate},{rate},{rate},{rate},{rate}");
             let yaw = factor * yaw;
+            let t_s = spacing_s * f64::from(k);
             rows += &format!("{run},{t_s},{x},{y},{yaw},{rates},.1,-.1,.1,-.1,0.5,0.2\n");
         }
     }
@@ -158,7 +160,7 @@ fn diagnose_warns_of_columns_that_mean_something_else() {
     let folder = TempDir::new().unwrap();
     let [frames, out] = ["frames.csv", "out.csv"].map(|name| folder.path().join(name));
     let diagnose = |factor: f64| {
-        drive(&frames, 3, factor);
+        drive(&frames, 3, factor, 0.05);
         let names = [&frames, &out].map(|path| path.display().to_string());
         let output = run(&[
             "diagnose", "--model", MODEL, "--frames", &names[0], "--out", &names[1],
@@ -174,6 +176,34 @@ fn diagnose_warns_of_columns_that_mean_something_else() {
     );
     let judged = "3 of 3 runs that can be judged are like this";
     assert!(message.contains(judged), "{message}");
+}
+
+#[test]
+fn learning_faults_says_that_a_slow_log_is_not_judged() {
+    let folder = TempDir::new().unwrap();
+    let [frames, runs, out] =
+        ["frames.csv", "runs.csv", "model.toml"].map(|name| folder.path().join(name));
+    drive(&frames, 1, 1.0, 0.4);
+    let labels = "run,mode,kind,wheel,onset_s,cmd_curv,cmd_speed,dur_s\n0,ND,,,-1,.5,.2,4\n";
+    fs::write(&runs, labels).unwrap();
+    let names = [&frames, &runs, &out].map(|path| path.display().to_string());
+    let message = refused(&[
+        "learn",
+        "--robot",
+        "config/robots/rover.toml",
+        "--frames",
+        &names[0],
+        "--runs",
+        &names[1],
+        "--out",
+        &names[2],
+    ]);
+    let wanted = format!(
+        "warning: {}: units, signs and sides of 1 of 1 runs are NOT judged: in run 0 t advances by \
+         0.400 s from frame to frame, allowed is 0.3 s; is t in ms?\n",
+        names[0]
+    );
+    assert!(message.starts_with(&wanted), "{message}");
 }
 
 #[test]

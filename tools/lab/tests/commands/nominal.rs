@@ -139,6 +139,63 @@ fn what_has_no_meaning_there_is_refused_by_name() {
     }
 }
 
+/// Multiplies the frames' times.
+fn restamp(folder: &Path, factor: f64) {
+    let path = folder.join("frames.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    let (mut restamped, rows) = text
+        .split_once('\n')
+        .map(|(h, r)| (h.to_owned(), r))
+        .unwrap();
+    for row in rows.lines() {
+        let mut cells = row.splitn(3, ',');
+        let [run, t, values] = [0; 3].map(|_| cells.next().unwrap());
+        let t_s = factor * t.parse::<f64>().unwrap();
+        write!(restamped, "\n{run},{t_s},{values}").unwrap();
+    }
+    fs::write(path, restamped).unwrap();
+}
+
+/// What learning, diagnosing and evaluating say on the error stream, and their exit status.
+fn every_command(folder: &Path) -> [(String, Option<i32>); 3] {
+    let [model, out] = ["model.toml", "out.csv"].map(|name| folder.join(name));
+    let [model, out] = [&model, &out].map(|path| path.display().to_string());
+    let outputs = [
+        vigil("learn", folder, &["--only", "0", "--out", &model]),
+        vigil("diagnose", folder, &["--model", SHIPPED, "--out", &out]),
+        evaluate(folder, SHIPPED, &[]),
+    ];
+    outputs.map(|output| {
+        let errors = String::from_utf8(output.stderr).unwrap();
+        (errors, output.status.code())
+    })
+}
+
+#[test]
+fn time_in_ms_is_refused_by_every_command() {
+    let folder = TempDir::new().unwrap();
+    record(folder.path(), 1.0);
+    restamp(folder.path(), 1000.0);
+    let wanted = "row 2: run 0: a gap of 20.000 s, allowed is 1 s: start a new run; or is t in ms?";
+    for (errors, status) in every_command(folder.path()) {
+        assert_eq!(status, Some(2), "{errors}");
+        assert!(errors.trim_end().ends_with(wanted), "{errors}");
+    }
+}
+
+#[test]
+fn every_command_says_that_a_slow_log_is_not_judged() {
+    let folder = TempDir::new().unwrap();
+    // A gyro of the wrong sign, which nothing finds.
+    record(folder.path(), -1.0);
+    restamp(folder.path(), 20.0);
+    let wanted = "t advances by 0.400 s from frame to frame, allowed is 0.3 s; is t in ms?";
+    for (errors, status) in every_command(folder.path()) {
+        assert_eq!(status, Some(0), "{errors}");
+        assert!(errors.contains(wanted), "{errors}");
+    }
+}
+
 #[test]
 fn columns_that_mean_something_else_are_told() {
     let folder = TempDir::new().unwrap();

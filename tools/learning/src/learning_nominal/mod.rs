@@ -23,8 +23,7 @@ use vigil_robot::nominal::model::{KIND, VERSION};
 use vigil_robot::nominal::{Channel, Model, Range, Target, Term};
 
 use crate::data_hash::data_hash;
-use crate::plausibility::RunCheck;
-use crate::plausibility::RunDoubt;
+use crate::plausibility::{self, RunCheck, RunDoubt};
 use record::{Part, Record};
 pub use report::{ChannelError, Report};
 pub use view::View;
@@ -138,6 +137,10 @@ pub fn learn(
     let mut model = blank(robot, exposure_s, command, provenance);
     let mut report = Report::new(&model, runs.len() - left_out.len(), left_out.len());
     report.warnings.extend(doubt);
+    let beginnings = learned.iter().map(|run| (*run, until_s));
+    report
+        .warnings
+        .extend(plausibility::slow(beginnings, robot));
     let targets = terms::targets(robot);
     if targets.is_empty() {
         return Err(NominalError::NoChannels);

@@ -257,7 +257,10 @@ fn columns_that_mean_something_else_are_refused_in_the_words_of_the_description(
         refused.to_string()
     };
     let message = refused(&|frame| frame.yaw_rate = frame.yaw_rate.to_degrees());
-    assert!(message.contains("are they in degrees?"), "{message}");
+    assert!(
+        message.ends_with("commanded one: is it in deg/s?"),
+        "{message}"
+    );
     let message = refused(&|frame| frame.yaw_rate *= -1.0);
     assert!(
         message.contains(
@@ -272,7 +275,12 @@ fn columns_that_mean_something_else_are_refused_in_the_words_of_the_description(
     );
     let message = refused(&|frame| frame.command[0] *= 1000.0);
     assert!(
-        message.contains("allowed is 1 m/s: is it in another unit?"),
+        message.ends_with("; allowed is 1 m/s: is it in mm/s?"),
+        "{message}"
+    );
+    let message = refused(&|frame| frame.command[1] = frame.command[1].to_degrees());
+    assert!(
+        message.ends_with("allowed is 2 rad/s: is it in deg/s or mrad/s?"),
         "{message}"
     );
     let message = refused(&|frame| frame.wheel_rate[1] = 3.0);

@@ -3,7 +3,7 @@
 
 use vigil_blocks::SensorFrame;
 use vigil_learning::learning::{Options, learn};
-use vigil_learning::plausibility::RunCheck;
+use vigil_learning::plausibility::{self, RunCheck};
 use vigil_recording::frames::{self, Run};
 use vigil_recording::labels::{self, Label};
 use vigil_robot::Description;
@@ -124,12 +124,23 @@ fn units_are_told_by_their_factor() {
         assert!(after.ends_with(unit), "{message}");
     }
     assert!(data.changed(in_degrees).contains("yaw turns"));
-    let fast = data.changed(|frame| frame.command[1] *= 1000.0);
-    let wanted = "; allowed is 0.5 m/s: is it in another unit?";
-    assert!(
-        fast.starts_with("cmd_speed is up to ") && fast.ends_with(wanted),
-        "{fast}"
-    );
+}
+
+#[test]
+fn a_command_beyond_its_limit_is_asked_for_the_units_that_fit() {
+    let data = Data::read();
+    let refused = |speed: f64| data.changed(|frame| frame.command[1] = speed);
+    for (speed, wanted) in [
+        (
+            1.6,
+            "1.6; allowed is 0.5 m/s: is it in feet/s or cm/s or mm/s?",
+        ),
+        (20.0, "20; allowed is 0.5 m/s: is it in cm/s or mm/s?"),
+        (200.0, "200; allowed is 0.5 m/s: is it in mm/s?"),
+        (2e6, "2000000; allowed is 0.5 m/s: is it in another unit?"),
+    ] {
+        assert_eq!(refused(speed), format!("cmd_speed is up to {wanted}"));
+    }
 }
 
 #[test]
@@ -173,6 +184,28 @@ fn signs_sides_and_silent_sensors_are_told() {
         sideways.starts_with("axes: x and y move at 1.5"),
         "{sideways}"
     );
+}
+
+#[test]
+fn frames_too_far_apart_to_be_judged_are_told_by_their_spacing() {
+    let data = Data::read();
+    let told = |factor: u64| {
+        let mut runs = data.runs[..4].to_vec();
+        let slowed = runs[2..].iter_mut().flat_map(|run| &mut run.frames);
+        slowed.for_each(|frame| frame.header.t_capture_ns *= factor);
+        plausibility::slow(runs.iter().map(|run| (run, f64::INFINITY)), &data.robot)
+    };
+    let wanted = |spacing_s: &str| {
+        Some(format!(
+            "units, signs and sides of 2 of 4 runs are NOT judged: in run 2 t advances by \
+             {spacing_s} s from frame to frame, allowed is 0.3 s; is t in ms?"
+        ))
+    };
+    // 20 Hz in ms, and 3 Hz in s. At 4 Hz there is nothing to tell.
+    assert_eq!(told(1000), wanted("50.000"));
+    assert_eq!(told(7), wanted("0.350"));
+    assert_eq!(told(5), None);
+    assert_eq!(told(1), None);
 }
 
 #[test]
