@@ -281,3 +281,38 @@ fn tempfile_works(folder: &Path) -> bool {
     let _ = fs::remove_file(probe);
     works
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_graphs_files_lie_in_its_folder_under_names_of_their_own() {
+        let graph = format!("t{}-files", std::process::id());
+        let domain = Domain::new(&graph, Queues::default()).unwrap();
+        let files = [
+            domain.processes_file(),
+            domain.types_file(),
+            domain.failure_file(ServiceName::Detector),
+        ];
+        for (i, file) in files.iter().enumerate() {
+            assert_eq!(file.parent(), Some(domain.folder()));
+            assert!(!files[..i].contains(file), "{}", file.display());
+        }
+        std::fs::remove_dir_all(domain.folder()).unwrap();
+    }
+
+    #[test]
+    fn eight_times_as_many_sensor_frames_may_wait_and_memory_is_reserved_for_all() {
+        let queues = Queues {
+            buffer: 16,
+            history: 1,
+            max_subscribers: 8,
+        };
+        let sensor = queues.for_topic(Topic::Sensor);
+        assert_eq!((sensor.buffer, sensor.history), (128, 1));
+        assert_eq!(queues.for_topic(Topic::Diagnosis), queues);
+        // Eight readers, of which each may leave 16 blocks and hold two; one of history; two loaned.
+        assert_eq!(queues.reserved_bytes(100), (8 * 18 + 1 + 2) * 100);
+    }
+}

@@ -143,7 +143,7 @@ impl Intake<'_> {
     /// the output answers its instant of the schedule.
     pub fn stepped(&mut self, header: &Header, frame: BlockId) {
         // An old frame never moves the schedule back.
-        if self.frames == 0 || header.t_schedule_ns >= self.newest.t_schedule_ns || self.new_epoch {
+        if header.t_schedule_ns >= self.newest.t_schedule_ns || self.new_epoch {
             self.newest = *header;
             self.new_epoch = false;
         }

@@ -292,6 +292,21 @@ mod tests {
     }
 
     #[test]
+    fn a_restart_begins_from_the_prior() {
+        let mut filter = LookAhead::<_, 1>::new(Turns, 4, 1).unwrap();
+        for _ in 0..2 {
+            filter.restart(1);
+            filter.step(&());
+            assert_eq!(filter.posterior(), [0.0, 1.0]);
+            assert!(
+                filter
+                    .particles()
+                    .all(|(mode, g)| mode == 1 && g.mean[0] == 110.0)
+            );
+        }
+    }
+
+    #[test]
     fn an_index_is_drawn_where_the_cumulative_probability_passes_u() {
         let log_p = [0.125_f64, 0.0, 0.25, 0.625].map(f64::ln);
         for (u, index) in [

@@ -74,3 +74,39 @@ impl fmt::Display for FoundTopic {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use vigil_blocks::Health;
+    use vigil_blocks::layout::Layout;
+
+    use super::*;
+    use crate::domain::Queues;
+    use crate::port::{Graph, Link};
+    use crate::topic::{ServiceName, Topic};
+
+    #[test]
+    fn a_topic_is_found_as_its_writer_has_made_it() {
+        let graph = format!("t{}-found", std::process::id());
+        let domain = Domain::new(&graph, Queues::default()).unwrap();
+        assert_eq!(FoundTopic::all(&domain).unwrap(), []);
+        let service = Graph::SharedMemory(Link::join(&domain, "test").unwrap());
+        let topic = Topic::Health(ServiceName::Detector);
+        let sender = service.sender::<Health>(topic).unwrap();
+        let found = FoundTopic::all(&domain).unwrap();
+        let [found] = found.as_slice() else {
+            panic!("{found:?}");
+        };
+        assert!(found.path.ends_with("health/detector"), "{}", found.path);
+        assert_eq!(found.size, size_of::<Health>());
+        assert_eq!(found.buffer, Queues::default().buffer);
+        assert_eq!((found.max_publishers, found.max_subscribers), (1, 8));
+        assert!(
+            found.type_name.contains(Health::NAME),
+            "{}",
+            found.type_name
+        );
+        drop((sender, service));
+        domain.remove_residue();
+    }
+}

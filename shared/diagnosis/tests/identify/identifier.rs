@@ -310,6 +310,10 @@ fn every_filter_names_single_faults() {
                 (found_s - onset_s).abs() < 1.0,
                 "{filter}, {mode}: {found_s} s"
             );
+            for hypothesis in bench.hypotheses.used() {
+                let (is_fault, onset) = (hypothesis.mode != 0, hypothesis.onset_t_capture_ns);
+                assert_eq!(onset != 0, is_fault, "{filter}, {mode}: {onset} ns");
+            }
         }
     }
 }

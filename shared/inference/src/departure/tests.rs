@@ -73,6 +73,17 @@ fn filter() -> Departure<2> {
     filter
 }
 
+#[test]
+fn a_usual_pose_keeps_its_variance_and_a_far_one_is_trusted_less() {
+    let rates = [1e-3; 3];
+    assert_eq!(
+        filter().trusted([0.01, 0.0, 0.0], VARIANCE, rates),
+        VARIANCE
+    );
+    let far = filter().trusted([5.0, 0.0, 0.0], VARIANCE, rates);
+    assert!(far[0] > 100.0 * VARIANCE[0], "{far:?}");
+}
+
 /// The log-odds from one track per onset and kind, none merged.
 fn every_onset(poses: &[[f64; 3]]) -> f64 {
     let mut nominal = filter().track;

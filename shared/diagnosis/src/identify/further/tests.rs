@@ -45,6 +45,35 @@ fn states_that_do_not_sum_to_one_end_the_process() {
 }
 
 #[test]
+fn faults_that_are_read_come_and_go_at_their_rates_and_the_others_are_held() {
+    let mut filter = filter();
+    let mut further = Further::default();
+    further.yaw_rate.push(0.1, None);
+    let observation = Observation {
+        dt_s: 0.5,
+        ..Observation::default()
+    };
+    let all = filter.prior.len();
+    filter.prior.fill(0.2 / (all - 1) as f64);
+    filter.prior[0] = 0.8;
+    let before = filter.prior.clone();
+    filter.step(&observation, &further, &Residuals::default());
+    let (born, mended) = (filter.rates.suspected_1_s, filter.rates.mended_1_s);
+    assert!(born > 0.0 && mended > 0.0);
+    for (at, &held) in before.iter().enumerate().skip(1) {
+        let gained = 0.5 * (0.8 * born * filter.shares[at] - held * mended);
+        let gained = if filter.states[at].is_read(&further) {
+            gained
+        } else {
+            0.0
+        };
+        assert!((filter.prior[at] - held - gained).abs() < 1e-15, "{at}");
+    }
+    let total: f64 = filter.prior.iter().sum();
+    assert!((total - 1.0).abs() < 1e-12, "{total}");
+}
+
+#[test]
 fn in_the_unknown_each_channel_is_healthy_or_reads_anything() {
     let filter = filter();
     let residual = |apart: f64, variance: f64| Residual {

@@ -100,7 +100,7 @@ impl MultipleHypothesis {
     }
 
     /// What becomes of a hypothesis when its mode changes.
-    fn changed(
+    pub(super) fn changed(
         &self,
         from: &Hypothesis<HypothesisState>,
         mode: usize,

@@ -48,6 +48,32 @@ fn a_fault_that_may_begin_with_an_observation_has_its_first_frame_as_onset() {
 }
 
 #[test]
+fn in_the_unknown_any_encoder_may_be_broken_and_after_it_all_are_whole() {
+    let filter = filter();
+    let all = filter.modes.iter();
+    let unknown = all
+        .clone()
+        .position(|mode| mode.moved == Mover::UnknownAny)
+        .unwrap();
+    let nominal = all
+        .clone()
+        .position(|mode| mode.moved == Mover::Nominal)
+        .unwrap();
+    let (_, start) = filter.hypotheses().next().unwrap();
+    let inside = Hypothesis {
+        state: filter.changed(start, unknown, &drive()),
+        mode: unknown,
+        ..*start
+    };
+    let p_broken = |encoders: &Encoders| encoders.p_broken(2);
+    let p = p_broken(&inside.state.encoders);
+    assert!(p > 0.01, "{p}");
+    assert_eq!(inside.state.encoders.onset(2), 460_000_000);
+    let after = filter.changed(&inside, nominal, &drive());
+    assert!(p_broken(&after.encoders) < 1e-9);
+}
+
+#[test]
 #[should_panic(expected = "probabilities of all alternatives sum to one")]
 fn an_encoder_whose_states_do_not_sum_to_one_ends_the_process() {
     let mut filter = filter();
