@@ -312,7 +312,7 @@ mod tests {
         let sensor = queues.for_topic(Topic::Sensor);
         assert_eq!((sensor.buffer, sensor.history), (128, 1));
         assert_eq!(queues.for_topic(Topic::Diagnosis), queues);
-        // Eight readers, of which each may leave 16 blocks and hold two; one of history; two loaned.
+        // Eight readers may each leave 16 blocks and hold two; one of history; two loaned.
         assert_eq!(queues.reserved_bytes(100), (8 * 18 + 1 + 2) * 100);
     }
 }
