@@ -125,7 +125,8 @@ pub fn check(document: &Path) -> (usize, Vec<String>) {
 #[test]
 fn rows_are_read_and_what_is_missing_is_found() {
     let text = "# A\n\n## Invariants\n\n| statement | file | test |\n|---|---|---|\n\
-                | never back | `shared/cycle/src/deadline.rs` | `an_account_that_goes_back_is_found` |\n\
+                | never back | `shared/cycle/src/deadline.rs` | \
+                `an_account_that_goes_back_is_found` |\n\
                 \n## B\n| a | `b` | `c` |\n";
     let rows = rows(text);
     assert_eq!(rows.len(), 1);

@@ -18,8 +18,9 @@ use vigil_terminal::{CommandError, Outcome};
 ///
 /// --graph draws the policy from the start belief on; it is written as DOT if the name ends in
 /// .dot. The drawing leaves out edges below 10 % but for the first into each box; .dot has all.
-/// Broken edges lead to the nearest box. --regions draws which action the policy takes at which belief, for models of two or three
-/// states. --belief draws the belief over given actions and observations as stacked areas.
+/// Broken edges lead to the nearest box. --regions draws which action the policy takes at which
+/// belief, for models of two or three states. --belief draws the belief over given actions and
+/// observations as stacked areas.
 #[derive(Debug, clap::Args)]
 #[command(group(clap::ArgGroup::new("what").required(true)))]
 pub struct Args {
