@@ -5,8 +5,9 @@ use vigil_robot::kinematics::{Ackermann6, ROVER_WHEELS};
 use vigil_robot::slip::{Condition, Soil, WheelCondition};
 use vigil_robot::{Disturbance, DisturbanceKind};
 
-/// Rolling resistance of firm soil, force per unit of load, that `sinkage` multiplies. Chosen. The
-/// bearing's friction contains the part up to a factor of 1, so only the excess is added.
+/// Rolling resistance of firm soil, force per unit of load, that `sinkage` multiplies. Chosen by
+/// hand: with a larger one the same `sinkage` brakes harder. The bearing's friction contains the
+/// part up to a factor of 1, so only the excess is added.
 const FIRM_RESISTANCE: f64 = 0.05;
 
 /// At most one disturbance of each kind at each place.

@@ -21,6 +21,11 @@ const TRANSPORT_VERSION: &str = "0.10.0";
 /// more of them may wait.
 const SENSOR_BUFFERS: usize = 8;
 
+/// Blocks that a reader may hold at once: the one it works on, and the next.
+pub(crate) const BORROWED: usize = 2;
+/// Blocks that a writer may hold at once: the one it fills, and one more while that is sent.
+pub(crate) const LOANED: usize = 2;
+
 /// Sizes of the shared-memory queues; the same for every peer of a graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -232,11 +237,9 @@ impl Queues {
     }
 
     /// Bytes of shared memory that one writer of blocks of `size` bytes reserves: a slot for
-    /// every block that may wait or be held, and one of history and loan.
+    /// every block that may wait or be held, and those of history and on loan.
     #[must_use]
     pub const fn reserved_bytes(&self, size: usize) -> u64 {
-        const BORROWED: usize = 2;
-        const LOANED: usize = 2;
         let slots = self.max_subscribers * (self.buffer + BORROWED) + self.history + LOANED;
         (slots * size) as u64
     }

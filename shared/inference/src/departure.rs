@@ -242,11 +242,11 @@ impl<const K: usize> Departure<K> {
     }
 
     /// While a fault is suspected no change of the ground begins: it could not be distinguished
-    /// from an end.
-    fn predict_change(&mut self, step: &Displacement, counts: bool) {
+    /// from an end. Where no fault may begin either, nothing does.
+    fn predict_change(&mut self, step: &Displacement, may_begin: bool) {
         let nominal = self.nominal;
         let p = -(-nominal.changes_1_m * step.travel_m.abs()).exp_m1();
-        if counts && p > 0.0 && !self.is_suspected {
+        if may_begin && p > 0.0 && !self.is_suspected {
             self.log_change = p.ln();
             self.changed.enter(Hypothesis {
                 log_weight: p.ln(),

@@ -32,7 +32,8 @@ const AT_GOAL_M: f64 = 0.1;
 /// harder, longer takes more time.
 const SLOW_AT_GOAL_M: f64 = 0.5;
 /// A robot behind its plan makes up this share of the way per second, 1/s, at most `HURRY` of its
-/// speed faster.
+/// speed faster. Larger shares make the speed jump with every small lag; smaller ones leave the
+/// robot behind its plan for longer.
 const MAKE_UP_1_S: f64 = 0.5;
 const HURRY: f64 = 0.25;
 /// A robot that is off its path comes back to it so far ahead, m. Shorter turns it hard towards the

@@ -14,7 +14,7 @@ use vigil_blocks::Block;
 
 use super::{FoundTopic, Receiver, Sender, Stamp, Stamper};
 use crate::clock::{Clock, Monotonic};
-use crate::domain::{Domain, Queues};
+use crate::domain::{BORROWED, Domain, LOANED, Queues};
 use crate::port_error::PortError;
 use crate::topic::Topic;
 use crate::wake::{Inputs, NOTHING};
@@ -96,7 +96,7 @@ impl Link {
             .max_subscribers(queues.max_subscribers)
             .max_nodes(queues.max_subscribers + 4)
             .subscriber_max_buffer_size(queues.buffer)
-            .subscriber_max_borrowed_samples(2)
+            .subscriber_max_borrowed_samples(BORROWED)
             .history_size(queues.history)
             .enable_safe_overflow(true)
             .open_or_create()
@@ -147,7 +147,7 @@ impl Link {
         let publisher = self
             .topic::<T>(topic)?
             .publisher_builder()
-            .max_loaned_samples(2)
+            .max_loaned_samples(LOANED)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|e| self.open_error(topic, wire, e))?;

@@ -1,5 +1,5 @@
-//! What a text may ask for. Together these bound memory to about 1 GB and ten times the text, and
-//! time to seconds.
+//! What a text may ask for. Together these bound memory to about 1 GB for the model and ten times
+//! the text for its reading, and time to seconds.
 
 use crate::parse_error::{ParseError, Position};
 
