@@ -121,18 +121,6 @@ impl Stages {
         &self.action
     }
 
-    /// Most hypotheses of the identifier, or particles of a sampled one; 0 without any.
-    #[must_use]
-    pub fn particles(&self) -> u32 {
-        self.identifier.particles()
-    }
-
-    /// Log-odds at which the detector's alarm rises, nats.
-    #[must_use]
-    pub const fn alarm_log_odds(&self) -> f64 {
-        self.detector.alarm_log_odds()
-    }
-
     /// Sides and types of the faults that the verdicts name.
     #[must_use]
     pub const fn taxonomy(&self) -> &Taxonomy {

@@ -55,10 +55,11 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut writer = csv::Writer::from_writer(file);
     let mut written = writer.write_record(COLUMNS);
     let progress = Progress::new("runs", runs.len());
+    let (set, filter) = (&args.filter.sensors, args.filter.identifier);
+    let initial = args.filter.initial(&models, set, filter)?;
     for (done, run) in runs.iter().enumerate() {
         progress.show(done);
-        let (set, filter) = (&args.filter.sensors, args.filter.identifier);
-        let mut stages = args.filter.stages(&models, set, filter)?;
+        let mut stages = initial.begin()?;
         for frame in &run.frames {
             stages.take(frame);
             let row = row(run.id, &stages.verdict(frame));

@@ -167,8 +167,8 @@ impl FilterArgs {
             model,
             tree,
         };
-        let stages = self.stages(&models, &self.sensors, self.identifier)?;
-        models.used.particles = stages.particles();
+        let initial = self.initial(&models, &self.sensors, self.identifier)?;
+        models.used.particles = initial.identifier.particles();
         Ok(models)
     }
 
@@ -192,13 +192,13 @@ impl FilterArgs {
         SENSOR_SETS.into_iter().filter(asked).filter(has).collect()
     }
 
-    /// The stages at the beginning of a run, with the settings given but for channels and filter.
-    pub fn stages(
-        &self,
-        of: &OfflineModels,
+    /// The stages before any run, with the settings given but for channels and filter.
+    pub fn initial<'a>(
+        &'a self,
+        of: &'a OfflineModels,
         sensors: &str,
         filter: IdentifierFilter,
-    ) -> Result<Stages, CommandError> {
+    ) -> Result<InitialStages<'a>, CommandError> {
         let (robot, tree) = (&of.robot, &of.tree);
         let settings = detect::Settings {
             sensors: channels(sensors),
@@ -236,31 +236,14 @@ impl FilterArgs {
                 )
             }
         };
-        let supervisor = self.supervisor(of)?;
-        let actions = of.decision.as_ref().map(Pomdp::actions);
-        let vocabulary = Vocabulary {
-            taxonomy: of.taxonomy.clone(),
-            robot: robot.clone(),
-            actions: actions.unwrap_or_default().to_vec(),
-        };
-        let detector = detector.map_err(|e| refuse(&e))?;
-        Ok(Stages::new(detector, identifier, supervisor, vocabulary))
-    }
-
-    /// What is reported of each frame of a run.
-    pub fn verdicts(
-        &self,
-        of: &OfflineModels,
-        run: &Run,
-        sensors: &str,
-        filter: IdentifierFilter,
-    ) -> Result<Vec<Verdict>, CommandError> {
-        let mut stages = self.stages(of, sensors, filter)?;
-        let verdicts = run.frames.iter().map(|frame| {
-            stages.take(frame);
-            stages.verdict(frame)
-        });
-        Ok(verdicts.collect())
+        // That it can be built is asked before any run.
+        self.supervisor(of)?;
+        Ok(InitialStages {
+            args: self,
+            models: of,
+            detector: detector.map_err(|e| refuse(&e))?,
+            identifier,
+        })
     }
 
     /// What a page says of its origin.
@@ -310,6 +293,48 @@ impl FilterArgs {
                 Err(CommandError::usage(message))
             }
         }
+    }
+}
+
+/// Detector and identifier as they begin every run: to build them takes far longer than to copy.
+pub struct InitialStages<'a> {
+    args: &'a FilterArgs,
+    models: &'a OfflineModels,
+    detector: Detector,
+    identifier: Diagnoser,
+}
+
+impl InitialStages<'_> {
+    /// Log-odds at which the detector's alarm rises, nats.
+    pub const fn alarm_log_odds(&self) -> f64 {
+        self.detector.alarm_log_odds()
+    }
+
+    /// The stages at the beginning of a run.
+    pub fn begin(&self) -> Result<Stages, CommandError> {
+        let of = self.models;
+        let actions = of.decision.as_ref().map(Pomdp::actions);
+        let vocabulary = Vocabulary {
+            taxonomy: of.taxonomy.clone(),
+            robot: of.robot.clone(),
+            actions: actions.unwrap_or_default().to_vec(),
+        };
+        Ok(Stages::new(
+            self.detector.clone(),
+            self.identifier.clone(),
+            self.args.supervisor(of)?,
+            vocabulary,
+        ))
+    }
+
+    /// What is reported of each frame of a run.
+    pub fn verdicts(&self, run: &Run) -> Result<Vec<Verdict>, CommandError> {
+        let mut stages = self.begin()?;
+        let verdicts = run.frames.iter().map(|frame| {
+            stages.take(frame);
+            stages.verdict(frame)
+        });
+        Ok(verdicts.collect())
     }
 }
 

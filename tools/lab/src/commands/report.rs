@@ -30,13 +30,14 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     check_place("--out", &args.out)?;
     let models = args.filter.prepare()?;
     let (set, filter) = (&args.filter.sensors, args.filter.identifier);
+    let initial = args.filter.initial(&models, set, filter)?;
     let progress = Progress::new("runs", models.runs.len());
     let mut cases = Vec::new();
     for run in &models.runs {
         progress.show(cases.len());
         cases.push(Case {
             label: unlabelled(run.id),
-            verdicts: args.filter.verdicts(&models, run, set, filter)?,
+            verdicts: initial.verdicts(run)?,
         });
     }
     let facts = args.filter.facts(&models);

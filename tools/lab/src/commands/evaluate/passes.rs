@@ -102,19 +102,18 @@ impl<'a> Passes<'a> {
         filter: IdentifierFilter,
         progress: &Progress,
     ) -> Result<Pass, CommandError> {
-        let (prepared, args) = (self.prepared, &self.args.filter);
-        let alarm_log_odds = args.stages(prepared, set, filter)?.alarm_log_odds();
+        let initial = self.args.filter.initial(self.prepared, set, filter)?;
         let cases = self.runs.iter().map(|(run, label)| {
             progress.show(self.done.get());
             self.done.set(self.done.get() + 1);
             Ok(Case {
                 label: label.clone(),
-                verdicts: args.verdicts(prepared, run, set, filter)?,
+                verdicts: initial.verdicts(run)?,
             })
         });
         Ok(Pass {
             cases: cases.collect::<Result<_, CommandError>>()?,
-            alarm_log_odds,
+            alarm_log_odds: initial.alarm_log_odds(),
         })
     }
 }
