@@ -21,15 +21,10 @@ struct Args {
 
 fn main() -> ExitCode {
     let args = Args::parse().service;
-    let prepare = || {
-        let setup = args.load()?;
-        let detector = assemble(&setup).map_err(|e| format!("{}: {e}", setup.path.display()))?;
-        Ok((setup, detector))
-    };
     serve::process(
         ServiceName::Detector,
         args.check,
-        prepare,
+        || args.prepare(assemble),
         |(setup, detector)| {
             let plan = setup.plan(ServiceName::Detector, args.leave());
             serve::stage::<SensorFrame, _>(&plan, Topic::Sensor, |graph| {

@@ -21,15 +21,10 @@ struct Args {
 
 fn main() -> ExitCode {
     let args = Args::parse().service;
-    let prepare = || {
-        let setup = args.load()?;
-        let identifier = assemble(&setup).map_err(|e| format!("{}: {e}", setup.path.display()))?;
-        Ok((setup, identifier))
-    };
     serve::process(
         ServiceName::Identifier,
         args.check,
-        prepare,
+        || args.prepare(assemble),
         |(setup, identifier)| {
             let plan = setup.plan(ServiceName::Identifier, args.leave());
             serve::stage::<DetectionBelief, _>(&plan, Topic::Detection, |graph| {

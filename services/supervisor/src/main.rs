@@ -21,15 +21,10 @@ struct Args {
 
 fn main() -> ExitCode {
     let args = Args::parse().service;
-    let prepare = || {
-        let setup = args.load()?;
-        let supervisor = assemble(&setup).map_err(|e| format!("{}: {e}", setup.path.display()))?;
-        Ok((setup, supervisor))
-    };
     serve::process(
         ServiceName::Supervisor,
         args.check,
-        prepare,
+        || args.prepare(assemble),
         |(setup, supervisor)| {
             let plan = setup.plan(ServiceName::Supervisor, args.leave());
             serve::stage::<FaultBelief, _>(&plan, Topic::Diagnosis, |graph| {

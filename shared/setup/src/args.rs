@@ -1,5 +1,7 @@
 //! Command-line options that every program of the graph shares.
 
+use std::error::Error;
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use vigil_cycle::serve::Leave;
@@ -87,6 +89,20 @@ impl ServiceArgs {
             Some(document) => Document::read_text(document)?.check(),
             None => self.graph.load(),
         }
+    }
+
+    /// Reads and checks as [`Self::load`], and assembles what the service runs.
+    ///
+    /// # Errors
+    /// Every problem of the files; what does not fit together, with the graph file's name.
+    pub fn prepare<T, E: Display>(
+        &self,
+        assemble: impl FnOnce(&Setup) -> Result<T, E>,
+    ) -> Result<(Setup, T), Box<dyn Error>> {
+        let setup = self.load()?;
+        let assembled =
+            assemble(&setup).map_err(|error| format!("{}: {error}", setup.path.display()))?;
+        Ok((setup, assembled))
     }
 
     /// What the service is to leave behind when it stops.
