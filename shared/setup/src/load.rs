@@ -73,12 +73,9 @@ impl Document {
         let decision = keep(decision(&self.decision), &mut problems);
         let text = self.graph.text()?;
         let at = |key: &str, message| Problem::at_key(path, text, key, message);
-        match toml::Value::try_from(file) {
-            Ok(value) => ranges::check(&schema(), &value, "", &mut |key, message| {
-                problems.push(at(key, message));
-            }),
-            Err(error) => problems.push(Problem::at_line(path, 0, error.to_string())),
-        }
+        ranges::check_all(&schema(), file, &mut |key, message| {
+            problems.push(at(key, message));
+        });
         check::graph(file, robot.as_ref(), path, |key, message| {
             problems.push(at(key, message));
         });
@@ -144,10 +141,7 @@ fn robot(file: &TextFile) -> Result<Description, SetupError> {
     let mut report = |key: &str, message| {
         problems.push(Problem::at_key(&file.path, text, key, message));
     };
-    match toml::Value::try_from(&robot) {
-        Ok(value) => ranges::check(&schema_of::<Description>(), &value, "", &mut report),
-        Err(error) => report("", error.to_string()),
-    }
+    ranges::check_all(&schema_of::<Description>(), &robot, &mut report);
     check::robot(&robot, report);
     if problems.is_empty() {
         Ok(robot)

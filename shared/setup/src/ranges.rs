@@ -41,12 +41,8 @@ impl<T: JsonSchema + Serialize> Ranges<T> {
     /// # Errors
     /// The first value out of its range.
     pub fn check(&self, settings: &T) -> Result<(), OutOfRange> {
-        let value = Value::try_from(settings).map_err(|error| OutOfRange {
-            key: String::new(),
-            message: error.to_string(),
-        })?;
         let mut first = None;
-        check(&self.schema, &value, "", &mut |key, message| {
+        check_all(&self.schema, settings, &mut |key, message| {
             let key = key.to_owned();
             first.get_or_insert(OutOfRange { key, message });
         });
@@ -54,13 +50,20 @@ impl<T: JsonSchema + Serialize> Ranges<T> {
     }
 }
 
-/// Checks a value and all below it; `report` gets the key and a message for each problem.
-pub(crate) fn check(
+/// Checks settings; `report` gets the key and a message for each problem.
+pub(crate) fn check_all(
     schema: &Schema,
-    value: &Value,
-    key: &str,
+    settings: &impl Serialize,
     report: &mut impl FnMut(&str, String),
 ) {
+    match Value::try_from(settings) {
+        Ok(value) => check(schema, &value, "", report),
+        Err(error) => report("", error.to_string()),
+    }
+}
+
+/// Checks a value and all below it; `report` gets the key and a message for each problem.
+fn check(schema: &Schema, value: &Value, key: &str, report: &mut impl FnMut(&str, String)) {
     // What may be left out is a schema or null.
     for choice in schema["anyOf"].as_array().into_iter().flatten() {
         check(choice, value, key, report);
