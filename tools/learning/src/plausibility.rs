@@ -5,13 +5,11 @@
 //! description takes, and a channel that never changes. The tests do not judge frames of a slow
 //! log; [`slow`] says so.
 
-use std::f64::consts::PI;
-
 use vigil_blocks::SensorFrame;
 use vigil_recording::frames::{Field, Run, fields};
 use vigil_robot::Description;
 use vigil_robot::description::Kinematics;
-use vigil_robot::publisher_check::{FindingKind, PAUSE_S, PublisherCheck};
+use vigil_robot::publisher_check::{FindingKind, PAUSE_S, PublisherCheck, YAW_RATE_UNITS};
 
 /// Frames in motion from which a channel that never changes is a doubt, and pairs of frames from
 /// which their spacing is known: a second at 20 Hz. With fewer, a coarse encoder at a steady speed
@@ -150,15 +148,14 @@ fn seconds(frame: &SensorFrame) -> f64 {
     frame.header.t_capture_ns as f64 * 1e-9
 }
 
-/// Units of a speed and of a yaw rate that a command may be in instead, and their factors.
+/// Units that a speed may be in instead of m/s, and how much larger it then reads.
 const SPEEDS: [(f64, &str); 3] = [(3.281, "feet/s"), (100.0, "cm/s"), (1000.0, "mm/s")];
-const YAW_RATES: [(f64, &str); 2] = [(180.0 / PI, "deg/s"), (1000.0, "mrad/s")];
 
 /// The units in which a command that is `ratio` times its limit would be within it, as a question.
 fn units_within(ratio: f64, unit: &str) -> String {
     let units: &[(f64, &str)] = match unit {
         "m/s" => &SPEEDS,
-        "rad/s" => &YAW_RATES,
+        "rad/s" => &YAW_RATE_UNITS,
         _ => &[],
     };
     // A command may be a little beyond its limit.

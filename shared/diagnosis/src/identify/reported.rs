@@ -10,8 +10,7 @@ use crate::identify::tree_belief::TreeBelief;
 /// a rival needs half; with 0.2 left to a third, two equal ones do not swap. Smaller holds a wrong
 /// name longer, larger lets names alternate.
 const HELD_MIN: f64 = 0.3;
-/// Slack when the nominal time is compared, s: it is a sum of short intervals, each
-/// rounded.
+/// Slack when the nominal time is compared, s: it is a sum of short intervals, each rounded.
 const SLACK_S: f64 = 1e-6;
 
 /// The name that is held: index of a node, [`MODE_UNKNOWN`] or [`MODE_MULTIPLE`].

@@ -120,7 +120,7 @@ impl Finding {
             ),
             FindingKind::Gyro => format!(
                 "units: yaw_rate is {v:.2} times the commanded one{}",
-                is_it(&GYRO)
+                is_it(&YAW_RATE_UNITS)
             ),
             FindingKind::Rates => format!(
                 "units: the wheels turn {v:.3} times as fast as the command makes them roll{}",
@@ -163,7 +163,8 @@ const TRAVEL: [(f64, &str); 4] = [
     (3.281, "feet"),
 ];
 const TURN: [(f64, &str); 2] = [(180.0 / PI, "degrees"), (1000.0, "thousandths of a rad")];
-const GYRO: [(f64, &str); 2] = [(180.0 / PI, "deg/s"), (1000.0, "mrad/s")];
+/// Units that a yaw rate may be in instead of rad/s, and how much larger it then reads.
+pub const YAW_RATE_UNITS: [(f64, &str); 2] = [(180.0 / PI, "deg/s"), (1000.0, "mrad/s")];
 const RATES: [(f64, &str); 3] = [
     (180.0 / PI, "deg/s"),
     (60.0 / TAU, "rpm"),

@@ -14,7 +14,7 @@ mod wheels;
 use vigil_blocks::{SensorFrame, Valid};
 
 use crate::description::Description;
-pub use finding::{Finding, FindingKind};
+pub use finding::{Finding, FindingKind, YAW_RATE_UNITS};
 use pose::Poses;
 use wheels::Wheels;
 
