@@ -75,6 +75,11 @@ impl Drawing {
         ));
     }
 
+    /// A filled rectangle between two corners across from each other.
+    pub fn rectangle(&mut self, a: Point, b: Point, colour: &str, opacity: f64) {
+        self.area(&[a, (b.0, a.1), b, (a.0, b.1)], colour, opacity);
+    }
+
     /// A filled circle.
     pub fn dot(&mut self, (x, y): Point, radius: f64, colour: &str) {
         self.push(format_args!(

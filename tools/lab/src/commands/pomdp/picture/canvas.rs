@@ -25,13 +25,7 @@ pub const fn colour(index: usize) -> &'static str {
 pub fn legend(drawing: &mut Drawing, names: &[(usize, &str)], (x, y): Point) {
     for (row, (index, name)) in names.iter().enumerate() {
         let y = y + 24.0 * row as f64;
-        let corners = [
-            (x, y - 8.0),
-            (x + 16.0, y - 8.0),
-            (x + 16.0, y + 8.0),
-            (x, y + 8.0),
-        ];
-        drawing.area(&corners, colour(*index), 0.8);
+        drawing.rectangle((x, y - 8.0), (x + 16.0, y + 8.0), colour(*index), 0.8);
         drawing.text(name, (x + 24.0, y), 16, Anchor::Start);
     }
 }

@@ -40,23 +40,30 @@ fn actions_legend(canvas: &mut Drawing, model: &Pomdp, seen: &[bool], at: Point)
     legend(canvas, &names, at);
 }
 
+/// A drawing with its heading.
+fn titled(title: &str) -> Drawing {
+    let mut canvas = Drawing::new(INK);
+    let title = format!("Regions, {title}");
+    canvas.text(&title, (LEFT, 24.0), 20, Anchor::Start);
+    canvas
+}
+
+/// Of each action of the model: whether it is among those taken.
+fn taken_actions(model: &Pomdp, actions: &[usize]) -> Vec<bool> {
+    let all = 0..model.actions().len();
+    all.map(|action| actions.contains(&action)).collect()
+}
+
 fn line(model: &Pomdp, decider: &mut Decider, title: &str) -> String {
     let middle = |cell: usize| (cell as f64 + 0.5) / CELLS[0] as f64;
     let belief = |p: f64| [1.0 - p, p];
     let actions = (0..CELLS[0]).map(|cell| action(decider, &belief(middle(cell))));
     let actions: Vec<usize> = actions.collect();
-    let mut seen = vec![false; model.actions().len()];
-    actions.iter().for_each(|a| seen[*a] = true);
+    let seen = taken_actions(model, &actions);
     let rows = seen.iter().filter(|seen| **seen).count() as f64;
     let (top, height, width) = (60.0, 70.0, 800.0);
     let x = |p: f64| LEFT + width * p;
-    let mut canvas = Drawing::new(INK);
-    canvas.text(
-        &format!("Regions, {title}"),
-        (LEFT, 24.0),
-        20,
-        Anchor::Start,
-    );
+    let mut canvas = titled(title);
     let mut first = 0;
     for end in 1..=CELLS[0] {
         if end < CELLS[0] && actions[end] == actions[first] {
@@ -64,8 +71,7 @@ fn line(model: &Pomdp, decider: &mut Decider, title: &str) -> String {
         }
         let [a, b] = [first, end].map(|cell| x(cell as f64 / CELLS[0] as f64));
         let base = top + height;
-        let corners = [(a, top), (b, top), (b, base), (a, base)];
-        canvas.area(&corners, colour(actions[first]), 0.8);
+        canvas.rectangle((a, top), (b, base), colour(actions[first]), 0.8);
         if first > 0 {
             canvas.line(&[(a, base), (a, base + 22.0)], AXIS);
             let p = first as f64 / CELLS[0] as f64;
@@ -115,7 +121,6 @@ fn triangle(model: &Pomdp, decider: &mut Decider, title: &str) -> String {
         };
         (sum(|c| c.0), sum(|c| c.1))
     };
-    let mut seen = vec![false; model.actions().len()];
     let cells = cells();
     let actions: Vec<usize> = cells
         .iter()
@@ -124,14 +129,8 @@ fn triangle(model: &Pomdp, decider: &mut Decider, title: &str) -> String {
             action(decider, &[mean(0), mean(1), mean(2)])
         })
         .collect();
-    actions.iter().for_each(|a| seen[*a] = true);
-    let mut canvas = Drawing::new(INK);
-    canvas.text(
-        &format!("Regions, {title}"),
-        (LEFT, 24.0),
-        20,
-        Anchor::Start,
-    );
+    let seen = taken_actions(model, &actions);
+    let mut canvas = titled(title);
     for (cell, action) in cells.iter().zip(&actions) {
         canvas.area(&cell.map(at), colour(*action), 0.8);
     }
