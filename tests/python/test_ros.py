@@ -69,9 +69,14 @@ def messages(row):
 
 class Ros(unittest.TestCase):
     def test_a_recording_is_imported_as_it_was_driven(self):
+        for storage, ending in [(StoragePlugin.MCAP, "mcap"), (StoragePlugin.SQLITE3, "db3")]:
+            with self.subTest(ending):
+                self.imported_as_driven(storage, ending)
+
+    def imported_as_driven(self, storage, ending):
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)
-            with Writer(folder / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            with Writer(folder / "bag", version=9, storage_plugin=storage) as writer:
                 open_topics = {}
                 for i, row in enumerate(rows()):
                     for topic, message in messages(row):
@@ -84,7 +89,10 @@ class Ros(unittest.TestCase):
                         t_ns = round((1000.0 + float(row["t"])) * 1e9)
                         writer.write(open_topics[topic], t_ns, STORE.serialize_cdr(message, kind))
             out = folder / "frames.csv"
-            arguments = ["--log", ROOT / "config/logs/ros2-rover.toml", "--from", folder / "bag", "--out", out]
+            log = (ROOT / "config/logs/ros2-rover.toml").read_text().replace("*.mcap", f"*.{ending}")
+            log = log.replace("../robots/rover.toml", str(ROOT / "config/robots/rover.toml"))
+            (folder / "log.toml").write_text(log)
+            arguments = ["--log", folder / "log.toml", "--from", folder / "bag", "--out", out]
             done = vigil("import", *arguments, "--json")
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(len(json.loads(done.stdout)["runs"]), 1)

@@ -69,8 +69,9 @@ pub struct Source {
     /// File within a run's folder; left out: the run is the file.
     #[serde(default)]
     pub file: Option<String>,
-    /// Topic of ROS 2 messages in an MCAP file, whose fields are the columns (`pose.yaw`,
-    /// `velocity[left_front_wheel]`; every name: `ros.rs` beside this file); left out: a CSV file.
+    /// Topic of ROS 2 messages in a recording (MCAP or SQLite, a file or rosbag2's folder), whose
+    /// fields are the columns (`pose.yaw`, `velocity[left_front_wheel]`; every name: `ros.rs`
+    /// beside this file); left out: a CSV file.
     #[serde(default)]
     pub topic: Option<String>,
     /// Separator of columns.

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod bag;
 mod check;
 mod delay;
 mod description;
@@ -11,6 +12,7 @@ mod write;
 
 use std::path::{Path, PathBuf};
 
+pub use bag::CutBag;
 pub use description::{ChannelSource, Clock, Delay, LogDescription, Method, Source, Unit};
 use resample::Grid;
 pub use ros::MissingColumn;
@@ -118,6 +120,10 @@ pub struct ImportedRun {
     pub disorder: Vec<Disorder>,
     /// Messages of which nothing was made.
     pub lacking: Vec<MissingColumn>,
+    /// Topics without stamps: the recorder's time took their place.
+    pub unstamped: Vec<String>,
+    /// Files that are cut off: what comes before the cut was used.
+    pub cut: Vec<CutBag>,
     /// Channels that are differentiated, with the rows of which nothing was made as their stamp
     /// repeats or precedes the one before: repeated packets.
     pub repeated: Vec<(String, usize)>,
@@ -132,6 +138,13 @@ pub struct ImportedLog {
     pub runs: Vec<ImportedRun>,
     /// Channels whose delay was estimated, and the delay, s.
     pub delays_s: Vec<(String, f64)>,
+}
+
+/// Files of a run that are cut off, each once: several sources may read one file.
+fn cut_files(tables: &[series::SourceTable]) -> Vec<CutBag> {
+    let mut files: Vec<CutBag> = tables.iter().filter_map(|t| t.cut.clone()).collect();
+    files.dedup();
+    files
 }
 
 /// Reads every run below `folder` that the description names.
@@ -176,6 +189,8 @@ pub fn import(
         let repeated = columns.iter().zip(&series);
         let repeated = repeated.filter(|(_, series)| series.repeated > 0);
         runs.push(ImportedRun {
+            cut: cut_files(&tables),
+            unstamped: tables.iter().filter_map(|t| t.unstamped.clone()).collect(),
             lacking: tables.iter().filter_map(|t| t.lacking.clone()).collect(),
             disorder: tables
                 .into_iter()

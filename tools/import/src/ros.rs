@@ -1,4 +1,4 @@
-//! ROS 2 messages in MCAP files: the fields of a topic's messages as columns.
+//! ROS 2 messages in recordings: the fields of a topic's messages as columns.
 //!
 //! | message | columns |
 //! |---|---|
@@ -6,11 +6,10 @@
 //! | `sensor_msgs/msg/JointState` | `position[NAME]`, `velocity[NAME]`, `effort[NAME]` |
 //! | `geometry_msgs/msg/Twist`, `TwistStamped` | `linear.x`, `linear.y`, `angular.z`, `curvature` |
 //! | `sensor_msgs/msg/Imu` | `angular_velocity.z`, `yaw` |
-//! | all | `log_time`; those with a header also `stamp`; both in ns |
+//! | all | `log_time`: when recorded, ns; `stamp`: when measured, without a header the same |
 //!
 //! `curvature` is the yaw rate over the forward speed, 0 at rest.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use byteorder::{BigEndian, LittleEndian};
@@ -19,9 +18,8 @@ use serde::de::DeserializeOwned;
 use vigil_recording::table::wrong_row;
 
 use super::ImportError;
+use super::bag::{self, BagMessage, CutBag};
 
-/// Largest file that is read, bytes.
-const FILE_BYTES_MAX: u64 = 4 << 30;
 /// Forward speed below which a twist has no curvature, m/s.
 const REST_M_S: f64 = 1e-3;
 
@@ -168,10 +166,9 @@ impl Message {
     }
 
     /// Reads a message of a recording.
-    fn decode(message: &mcap::Message<'_>) -> Result<Self, String> {
-        let schema = message.channel.schema.as_ref();
-        let kind = schema.map_or("", |schema| schema.name.as_str());
-        match Self::read(kind, &message.data) {
+    fn decode(message: &BagMessage<'_>) -> Result<Self, String> {
+        let kind = message.kind;
+        match Self::read(kind, message.data) {
             Some(read) => read.map_err(|e| format!("{kind}: {e}")),
             None => Err(format!(
                 "messages of '{kind}'; known are {}",
@@ -188,6 +185,21 @@ impl Message {
             Self::Imu(m) => &m.header,
             Self::Twist(_) => return None,
         })
+    }
+
+    /// Names of its columns.
+    fn columns(&self) -> String {
+        const TWIST: &str = "linear.x, linear.y, angular.z, curvature";
+        match self {
+            Self::Odometry(_) => format!("stamp, log_time, pose.x, pose.y, pose.yaw, {TWIST}"),
+            Self::JointState(m) => format!(
+                "stamp, log_time, and position, velocity, effort, as far as they are published, \
+                 of [{}]",
+                m.name.join("], [")
+            ),
+            Self::Twist(_) | Self::TwistStamped(_) => format!("stamp, log_time, {TWIST}"),
+            Self::Imu(_) => "stamp, log_time, angular_velocity.z, yaw".to_owned(),
+        }
     }
 
     /// Value of a column.
@@ -274,8 +286,19 @@ pub struct MissingColumn {
     pub of: usize,
 }
 
-/// The values of `columns` in every message of `topic` that has them all, column by column; and
-/// the messages that have not.
+/// What the messages of a topic hold.
+pub(super) struct TopicColumns {
+    /// Column by column.
+    pub values: Vec<Vec<f64>>,
+    /// Messages that lack a column.
+    pub lacking: Option<MissingColumn>,
+    /// True if `stamp` was asked of messages without a header: the recorder's time took its place.
+    pub is_unstamped: bool,
+    /// Where the file is cut off, if it is.
+    pub cut: Option<CutBag>,
+}
+
+/// The values of `columns` in every message of `topic` that has them all.
 ///
 /// # Errors
 /// With the file, the message (from 1) and what is known, if the file or a message cannot be read,
@@ -284,43 +307,38 @@ pub(super) fn columns(
     path: &Path,
     topic: &str,
     columns: &[String],
-) -> Result<(Vec<Vec<f64>>, Option<MissingColumn>), ImportError> {
-    let io = |error| ImportError::Io {
-        path: path.to_owned(),
-        error,
-    };
-    let bytes = fs::metadata(path).map_err(io)?.len();
+) -> Result<TopicColumns, ImportError> {
     let wrong = |row: u64, message: String| ImportError::from(wrong_row(path, row, message));
-    if bytes > FILE_BYTES_MAX {
-        let allowed = format!("{bytes} bytes: allowed are {FILE_BYTES_MAX}");
-        return Err(wrong(0, allowed));
-    }
-    let content = fs::read(path).map_err(io)?;
-    let stream = mcap::MessageStream::new(&content).map_err(|e| wrong(0, e.to_string()))?;
     let mut values = vec![Vec::new(); columns.len()];
     let (mut row, mut others, mut lacking) = (0, Vec::<String>::new(), None::<MissingColumn>);
-    for message in stream {
-        let message = message.map_err(|e| wrong(row, e.to_string()))?;
-        if message.channel.topic != topic {
-            if !others.contains(&message.channel.topic) {
-                others.push(message.channel.topic.clone());
+    let (mut known, mut is_unstamped) = (String::new(), false);
+    let cut = bag::visit(path, &mut |message: &BagMessage<'_>| {
+        if message.topic != topic {
+            if !others.iter().any(|other| other == message.topic) {
+                others.push(message.topic.to_owned());
             }
-            continue;
+            return Ok(());
         }
         row += 1;
-        let decoded = Message::decode(&message).map_err(|e| wrong(row, format!("{topic}: {e}")))?;
+        let decoded = Message::decode(message).map_err(|e| wrong(row, format!("{topic}: {e}")))?;
+        let has_stamp = decoded.header().is_some();
+        is_unstamped |= !has_stamp && columns.iter().any(|column| column == "stamp");
         let value = |column: &String| match column.as_str() {
-            "log_time" => Some(message.log_time as f64),
+            "log_time" => Some(message.log_time_ns as f64),
+            "stamp" if !has_stamp => Some(message.log_time_ns as f64),
             name => decoded.value(name).filter(|value| value.is_finite()),
         };
         match columns.iter().find(|column| value(column).is_none()) {
             Some(column) => {
-                let lacking = lacking.get_or_insert_with(|| MissingColumn {
-                    path: path.to_owned(),
-                    topic: topic.to_owned(),
-                    column: column.clone(),
-                    messages: 0,
-                    of: 0,
+                let lacking = lacking.get_or_insert_with(|| {
+                    known = decoded.columns();
+                    MissingColumn {
+                        path: path.to_owned(),
+                        topic: topic.to_owned(),
+                        column: column.clone(),
+                        messages: 0,
+                        of: 0,
+                    }
                 });
                 lacking.messages += 1;
             }
@@ -332,18 +350,27 @@ pub(super) fn columns(
                     .for_each(|(all, value)| all.push(value));
             }
         }
-    }
+        Ok(())
+    })?;
     if values.iter().all(Vec::is_empty) {
         let why = lacking.map_or_else(
             || format!("no message on {topic}; there are {}", others.join(", ")),
-            |lacking| format!("there is no finite '{}' on {topic}", lacking.column),
+            |lacking| {
+                let column = &lacking.column;
+                format!("there is no finite '{column}' on {topic}; its messages have {known}")
+            },
         );
         return Err(wrong(row, why));
     }
     if let Some(lacking) = &mut lacking {
         lacking.of = row as usize;
     }
-    Ok((values, lacking))
+    Ok(TopicColumns {
+        values,
+        lacking,
+        is_unstamped,
+        cut,
+    })
 }
 
 #[cfg(test)]

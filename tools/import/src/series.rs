@@ -7,8 +7,9 @@ use vigil_inference::angle::wrap;
 use vigil_recording::table::{Layout, Table};
 
 use super::ImportError;
+use super::bag::CutBag;
 use super::description::{ChannelSource, Clock, LogDescription, Source};
-use super::ros::{self, MissingColumn};
+use super::ros::{self, MissingColumn, TopicColumns};
 
 /// Columns of one source that are needed, with their rows.
 pub(super) struct SourceTable {
@@ -24,6 +25,10 @@ pub(super) struct SourceTable {
     pub disorder: Vec<Disorder>,
     /// Messages of which nothing was made.
     pub lacking: Option<MissingColumn>,
+    /// Its topic, if the recorder's time took the place of stamps.
+    pub unstamped: Option<String>,
+    /// Where its file is cut off, if it is.
+    pub cut: Option<CutBag>,
 }
 
 /// Rows of a file whose clock does not rise: they are put in order of time and counted.
@@ -112,9 +117,19 @@ fn read(log: &LogDescription, source: &Source, run: &Path) -> Result<SourceTable
     others
         .filter(|[name, _]| *name == source.name)
         .for_each(|[_, column]| add(column));
-    let (values, lacking) = match &source.topic {
+    let TopicColumns {
+        values,
+        lacking,
+        is_unstamped,
+        cut,
+    } = match &source.topic {
         Some(topic) => ros::columns(&path, topic, &columns)?,
-        None => (table_columns(&path, source, &columns)?, None),
+        None => TopicColumns {
+            values: table_columns(&path, source, &columns)?,
+            lacking: None,
+            is_unstamped: false,
+            cut: None,
+        },
     };
     let mut out = SourceTable {
         name: source.name.clone(),
@@ -125,6 +140,8 @@ fn read(log: &LogDescription, source: &Source, run: &Path) -> Result<SourceTable
         device_s: Vec::new(),
         disorder: Vec::new(),
         lacking,
+        unstamped: source.topic.clone().filter(|_| is_unstamped),
+        cut,
     };
     let (time_s, disorder) = clock(&out, &source.time)?;
     out.disorder.extend(disorder);

@@ -150,6 +150,24 @@ fn warnings(imported: &import::ImportedLog, robot: &Description) -> Vec<String> 
             path.display()
         )
     }));
+    let mut unstamped: Vec<&String> = imported.runs.iter().flat_map(|r| &r.unstamped).collect();
+    unstamped.sort();
+    unstamped.dedup();
+    warnings.extend(unstamped.into_iter().map(|topic| {
+        format!("messages on {topic} have no stamp: the time of recording took its place")
+    }));
+    let cut = imported.runs.iter().flat_map(|run| &run.cut);
+    warnings.extend(cut.map(|found| {
+        let import::CutBag {
+            path,
+            messages,
+            found,
+        } = found;
+        format!(
+            "{}: cut off after {messages} messages ({found}): what comes before was used",
+            path.display()
+        )
+    }));
     let runs = imported.runs.iter();
     warnings.extend(runs.flat_map(|run| &run.disorder).map(|found| {
         let import::Disorder {
