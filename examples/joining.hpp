@@ -1,5 +1,6 @@
 // Joins a running graph through shared memory; waits until there is one. Version 0.10.0 of iceoryx2's C++ binding.
 #pragma once
+#include "channels.hpp"
 #include "vigil_types.h"
 
 #include <cerrno>
@@ -22,11 +23,6 @@ IOX2_DEFINE_TYPE_NAME(vigil_action, VIGIL_ACTION_TYPE_NAME);
 namespace vigil {
 
 using Node = iox2::Node<iox2::ServiceType::Ipc>;
-
-[[noreturn]] inline void fail(const std::string &why) {
-  std::fprintf(stderr, "%s\n", why.c_str());
-  std::exit(1);
-}
 
 inline void wait_a_little() { std::this_thread::sleep_for(std::chrono::milliseconds(100)); }
 
@@ -118,6 +114,9 @@ inline Node join(const std::string &graph) {
   config.global().set_root_path(iox2::bb::Path::create((folder + "/t").c_str()).value());
   return wait_for(graph, [&] { return iox2::NodeBuilder().config(config).create<iox2::ServiceType::Ipc>(); });
 }
+
+// Channel list of a graph that was joined.
+inline Channels channel_list(const std::string &graph) { return Channels(runtime_folder(graph) + "/channels"); }
 
 // Builder of a topic of the graph: "sensor", "action".
 inline auto topic(const Node &node, const std::string &graph, const char *name) {

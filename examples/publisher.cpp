@@ -13,11 +13,12 @@ int main(int count, char **words) {
   auto bells = vigil::wait_for(graph, [&] { return sensor().event().open(); });
   auto publisher = vigil::wait_for(graph, [&] { return frames.publisher_builder().create(); });
   auto bell = vigil::wait_for(graph, [&] { return bells.notifier_builder().create(); });
+  const vigil::Channels channels = vigil::channel_list(graph);
   std::puts("publishing at 20 Hz; scripts/up shows 'alarm' and 'diagnosis' when the wheel sticks");
   auto due = steady_clock::now();  // CLOCK_MONOTONIC
   const uint64_t epoch = due.time_since_epoch().count();
   vigil_sensor_frame frame;
-  for (uint64_t seq = 0; next_frame(frame); seq++) {
+  for (uint64_t seq = 0; next_frame(channels, frame); seq++) {
     std::this_thread::sleep_until(due += milliseconds(50));
     frame.header.epoch = epoch, frame.header.seq = seq;
     frame.header.t_schedule_ns = due.time_since_epoch().count();

@@ -8,13 +8,14 @@ import sys
 import time
 
 import recording
+import vigil_types as vigil
 from joining import join, sensor
 
 path, run = sys.argv[1], int(sys.argv[2])
 hz = float(sys.argv[3]) if len(sys.argv) > 3 else 20.0
 graph = sys.argv[4] if len(sys.argv) > 4 else "rover"
-frames = list(recording.frames(path, run))
 node, (publisher, bell) = join(graph, sensor)
+frames = list(recording.frames(path, run, vigil.channel_list(graph)))
 print(f"publishing {len(frames)} frames at {hz} Hz; scripts/up shows 'alarm' and 'diagnosis'")
 epoch = due = time.monotonic_ns()
 for seq, frame in enumerate(frames):

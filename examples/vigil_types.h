@@ -2,8 +2,8 @@
  * Made by `vigil types c`; do not edit.
  *
  * Units are SI, angles radians, times CLOCK_MONOTONIC nanoseconds; x forward, y left, yaw
- * counter-clockwise. All numbers little-endian, no padding. VIGIL_VALID_..._0 is the bit of the
- * first element of an array; shift it left for the others. */
+ * counter-clockwise. All numbers little-endian, no padding. Which place of a frame's command and
+ * channels means what: the file `channels` of the running graph, or `vigil channels`. */
 #ifndef VIGIL_TYPES_H
 #define VIGIL_TYPES_H
 
@@ -21,13 +21,6 @@
 #define VIGIL_ASSERT(condition) _Static_assert(condition, #condition)
 #endif
 
-#define VIGIL_VALID_COMMAND_0 1u
-#define VIGIL_VALID_POSE 16u
-#define VIGIL_VALID_PLANNED_POSE 32u
-#define VIGIL_VALID_YAW_RATE 64u
-#define VIGIL_VALID_WHEEL_RATE_0 256u
-#define VIGIL_VALID_STEER_0 65536u
-#define VIGIL_VALID_CURRENT_0 16777216u
 #define VIGIL_SYMPTOM_EPS 1u
 #define VIGIL_SYMPTOM_EPM 2u
 #define VIGIL_SYMPTOM_LD 4u
@@ -73,7 +66,7 @@
 #define VIGIL_SIZE_JUMP_M 15u
 #define VIGIL_CAUSE_FRAME 1u
 #define VIGIL_CAUSE_MISSED 2u
-#define VIGIL_DATAGRAM_SIZE 424u
+#define VIGIL_DATAGRAM_SIZE 592u
 
 typedef struct {
   /* Schema hash of the block (Block::SCHEMA). */
@@ -195,15 +188,17 @@ VIGIL_ASSERT(offsetof(vigil_event, what) == 12);
 VIGIL_ASSERT(offsetof(vigil_event, p) == 16);
 VIGIL_ASSERT(offsetof(vigil_event, value) == 24);
 
-#define VIGIL_SENSOR_FRAME_SCHEMA 0x6b44d8438af199afull
-#define VIGIL_SENSOR_FRAME_TYPE_NAME "vigil.SensorFrame.v1.6b44d8438af199af"
+#define VIGIL_SENSOR_FRAME_SCHEMA 0xe54ee7c97147decdull
+#define VIGIL_SENSOR_FRAME_TYPE_NAME "vigil.SensorFrame.v1.e54ee7c97147decd"
 typedef struct {
   /* Common header; t_schedule_ns is when this cycle was due. */
   vigil_header header;
   /* Identity of the run; a new value resets every filter. */
   uint64_t run_id;
-  /* Which fields hold a measurement: bits of Valid. */
-  uint64_t valid;
+  /* Which command and channels the numbers mean: the hash of the robot's channel list. A frame with another one is refused. */
+  uint64_t robot_hash;
+  /* Bit i: channel[i] holds a measurement. */
+  uint64_t channel_valid;
   /* decision_seq of the last Action that the robot obeyed; 0 for none. */
   uint64_t action_seq;
   /* Outcome of that action: an ActionOutcome. */
@@ -214,43 +209,35 @@ typedef struct {
   uint32_t pose_reset_count;
   /* 1 while the robot holds itself stopped because it has no valid action. */
   uint32_t safe_stop;
-  /* The command as executed; its meaning is given by the robot's description. Rover: signed curvature 1/m (left +), speed m/s. */
-  double command[4];
-  /* Pose x m, y m, yaw rad (wrapped to ±π), in a continuous frame. */
-  double pose[3];
-  /* Planned pose x m, y m, yaw rad, same frame as pose. */
+  /* Bit i: command[i] is known. */
+  uint32_t command_valid;
+  /* 1 if planned_pose is known. */
+  uint32_t planned_pose_valid;
+  /* The command as executed; the robot's description gives its axes and units. Rover: signed curvature 1/m (left +), speed m/s. */
+  double command[8];
+  /* Measurements, in the order of the robot's channel list, in the units that it gives; 0 where nothing was measured. */
+  double channel[48];
+  /* Planned pose x m, y m, yaw rad, in the frame of the pose's channels. */
   double planned_pose[3];
-  /* Yaw rate, rad/s. */
-  double yaw_rate;
-  /* Wheel rates, rad/s, in the order of the robot's description. */
-  double wheel_rate[8];
-  /* Steering angles, rad, in the order of the robot's description (same index as wheel). */
-  double steer[8];
-  /* Motor currents, A, in the order of the robot's description. */
-  double current[8];
-  /* Reserved, zero. */
-  double reserved[5];
 } vigil_sensor_frame;
-VIGIL_ASSERT(sizeof(vigil_sensor_frame) == 408);
+VIGIL_ASSERT(sizeof(vigil_sensor_frame) == 576);
 VIGIL_ASSERT(offsetof(vigil_sensor_frame, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_sensor_frame, run_id) == 48);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, valid) == 56);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, action_seq) == 64);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, action_outcome) == 72);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, symptoms) == 76);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, pose_reset_count) == 80);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, safe_stop) == 84);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, command) == 88);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, pose) == 120);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, planned_pose) == 144);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, yaw_rate) == 168);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, wheel_rate) == 176);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, steer) == 240);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, current) == 304);
-VIGIL_ASSERT(offsetof(vigil_sensor_frame, reserved) == 368);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, robot_hash) == 56);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, channel_valid) == 64);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, action_seq) == 72);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, action_outcome) == 80);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, symptoms) == 84);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, pose_reset_count) == 88);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, safe_stop) == 92);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, command_valid) == 96);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, planned_pose_valid) == 100);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, command) == 104);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, channel) == 168);
+VIGIL_ASSERT(offsetof(vigil_sensor_frame, planned_pose) == 552);
 
-#define VIGIL_DETECTION_BELIEF_SCHEMA 0x1ebb57d56d932a4bull
-#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.1ebb57d56d932a4b"
+#define VIGIL_DETECTION_BELIEF_SCHEMA 0xe98dc1e4b698e1c9ull
+#define VIGIL_DETECTION_BELIEF_TYPE_NAME "vigil.DetectionBelief.v1.e98dc1e4b698e1c9"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -278,8 +265,8 @@ typedef struct {
   double outlier_rate_wheels[8];
   /* The same for each steering angle. */
   double outlier_rate_steer[8];
-  /* Log-odds of a fault seen by each channel alone (see Channel). */
-  double channel_log_odds[32];
+  /* Log-odds of a fault seen by each channel alone (see Evidence). */
+  double channel_log_odds[50];
   /* decision_seq of the last action that the robot obeyed, as the frame says it. */
   uint64_t action_seq;
   /* Capture time of the frame that raised the present alarm, ns; 0 without alarm. */
@@ -301,7 +288,7 @@ typedef struct {
   /* Whether an alarm could rise now: a Readiness. */
   uint32_t readiness;
 } vigil_detection_belief;
-VIGIL_ASSERT(sizeof(vigil_detection_belief) == 720);
+VIGIL_ASSERT(sizeof(vigil_detection_belief) == 864);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, cause) == 48);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, run_id) == 72);
@@ -316,16 +303,16 @@ VIGIL_ASSERT(offsetof(vigil_detection_belief, outlier_rate) == 264);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, outlier_rate_wheels) == 288);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, outlier_rate_steer) == 352);
 VIGIL_ASSERT(offsetof(vigil_detection_belief, channel_log_odds) == 416);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, action_seq) == 672);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_t_capture_ns) == 680);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm) == 688);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_count) == 692);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, symptoms) == 696);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, invalid_count) == 700);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, degenerate_count) == 704);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, action_outcome) == 708);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, blind) == 712);
-VIGIL_ASSERT(offsetof(vigil_detection_belief, readiness) == 716);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, action_seq) == 816);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_t_capture_ns) == 824);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm) == 832);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, alarm_count) == 836);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, symptoms) == 840);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, invalid_count) == 844);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, degenerate_count) == 848);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, action_outcome) == 852);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, blind) == 856);
+VIGIL_ASSERT(offsetof(vigil_detection_belief, readiness) == 860);
 
 #define VIGIL_PARTICLE_BLOCK_SCHEMA 0x60e41525a1aef4b2ull
 #define VIGIL_PARTICLE_BLOCK_TYPE_NAME "vigil.ParticleBlock.v1.60e41525a1aef4b2"
@@ -351,8 +338,8 @@ VIGIL_ASSERT(offsetof(vigil_particle_block, reserved) == 76);
 VIGIL_ASSERT(offsetof(vigil_particle_block, healthy) == 80);
 VIGIL_ASSERT(offsetof(vigil_particle_block, hypotheses) == 376);
 
-#define VIGIL_FAULT_BELIEF_SCHEMA 0x70d08c3016f8de2full
-#define VIGIL_FAULT_BELIEF_TYPE_NAME "vigil.FaultBelief.v1.70d08c3016f8de2f"
+#define VIGIL_FAULT_BELIEF_SCHEMA 0x43a94bf286deb000ull
+#define VIGIL_FAULT_BELIEF_TYPE_NAME "vigil.FaultBelief.v1.43a94bf286deb000"
 typedef struct {
   /* Common header. */
   vigil_header header;
@@ -374,8 +361,8 @@ typedef struct {
   vigil_fault_set sets[8];
   /* Entropy of the distribution over sets and unknown, nats. */
   double entropy;
-  /* Why this diagnosis and not the next best one: by channel, how much more the readings since the onset are expected under it than under runner_up, natural log-likelihood; see Channel. 0 while nothing is diagnosed. */
-  double channel_evidence[32];
+  /* Why this diagnosis and not the next best one: by channel, how much more the readings since the onset are expected under it than under runner_up, natural log-likelihood; see Evidence. 0 while nothing is diagnosed. */
+  double channel_evidence[50];
   /* Expected size of each node's fault, given that it is present, in the unit of its size_kind; 0 without a size. */
   double size[64];
   /* Standard deviation of size, in the same unit. */
@@ -409,7 +396,7 @@ typedef struct {
   /* In which way each node's component is most probably broken, given that it is: a SizeKind, which gives size its unit. */
   uint32_t size_kind[64];
 } vigil_fault_belief;
-VIGIL_ASSERT(sizeof(vigil_fault_belief) == 2864);
+VIGIL_ASSERT(sizeof(vigil_fault_belief) == 3008);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, header) == 0);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, cause) == 48);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, run_id) == 72);
@@ -421,22 +408,22 @@ VIGIL_ASSERT(offsetof(vigil_fault_belief, p_unknown_predicted) == 1120);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, sets) == 1128);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, entropy) == 1256);
 VIGIL_ASSERT(offsetof(vigil_fault_belief, channel_evidence) == 1264);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, size) == 1520);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, size_sd) == 2032);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, p_mode) == 2544);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, alarm_t_capture_ns) == 2552);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, onset_t_capture_ns) == 2560);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, mode) == 2568);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, reported) == 2572);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, reported_change_count) == 2576);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, runner_up) == 2580);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, particle_limit) == 2584);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, mode_change_count) == 2588);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, node_count) == 2592);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, set_count) == 2596);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, identifying) == 2600);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, degenerate_count) == 2604);
-VIGIL_ASSERT(offsetof(vigil_fault_belief, size_kind) == 2608);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, size) == 1664);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, size_sd) == 2176);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, p_mode) == 2688);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, alarm_t_capture_ns) == 2696);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, onset_t_capture_ns) == 2704);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, mode) == 2712);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, reported) == 2716);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, reported_change_count) == 2720);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, runner_up) == 2724);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, particle_limit) == 2728);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, mode_change_count) == 2732);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, node_count) == 2736);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, set_count) == 2740);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, identifying) == 2744);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, degenerate_count) == 2748);
+VIGIL_ASSERT(offsetof(vigil_fault_belief, size_kind) == 2752);
 
 #define VIGIL_ACTION_SCHEMA 0x608fc64b66c4f8b7ull
 #define VIGIL_ACTION_TYPE_NAME "vigil.Action.v1.608fc64b66c4f8b7"
@@ -655,7 +642,7 @@ static inline uint32_t vigil_crc32c(uint32_t crc, const uint8_t *bytes, size_t c
  * header.t_schedule_ns at 0 unless it runs on Vigil's machine and has its CLOCK_MONOTONIC. */
 static inline void vigil_datagram(const vigil_sensor_frame *frame,
                                   uint8_t bytes[VIGIL_DATAGRAM_SIZE]) {
-  const uint8_t head[12] = {'V', 'G', 'I', 'L', 1, 0, 1, 0,
+  const uint8_t head[12] = {'V', 'G', 'I', 'L', 2, 0, 1, 0,
                             sizeof *frame & 0xff, sizeof *frame >> 8, 0, 0};
   memcpy(bytes, head, 12);
   memcpy(bytes + 16, frame, sizeof *frame);

@@ -1,8 +1,8 @@
 """Wire blocks of Vigil, as ctypes. Made by `vigil types python`; do not edit.
 
 Units are SI, angles radians, times CLOCK_MONOTONIC nanoseconds; x forward, y left, yaw
-counter-clockwise. All numbers little-endian, no padding. VALID_..._0 is the bit of the first
-element of an array; shift it left for the others.
+counter-clockwise. All numbers little-endian, no padding. Channels finds the places of a frame's
+command and channels by their names.
 """
 
 import ctypes
@@ -11,13 +11,6 @@ import os
 import struct
 import tempfile
 
-VALID_COMMAND_0 = 1
-VALID_POSE = 16
-VALID_PLANNED_POSE = 32
-VALID_YAW_RATE = 64
-VALID_WHEEL_RATE_0 = 256
-VALID_STEER_0 = 65536
-VALID_CURRENT_0 = 16777216
 SYMPTOM_EPS = 1
 SYMPTOM_EPM = 2
 SYMPTOM_LD = 4
@@ -210,8 +203,8 @@ assert Event.value.offset == 24
 
 
 class SensorFrame(ctypes.LittleEndianStructure):
-    SCHEMA = 0x6B44D8438AF199AF
-    TYPE_NAME = "vigil.SensorFrame.v1.6b44d8438af199af"
+    SCHEMA = 0xE54EE7C97147DECD
+    TYPE_NAME = "vigil.SensorFrame.v1.e54ee7c97147decd"
 
     @staticmethod
     def type_name():
@@ -222,8 +215,10 @@ class SensorFrame(ctypes.LittleEndianStructure):
         ("header", Header),
         # Identity of the run; a new value resets every filter.
         ("run_id", ctypes.c_uint64),
-        # Which fields hold a measurement: bits of Valid.
-        ("valid", ctypes.c_uint64),
+        # Which command and channels the numbers mean: the hash of the robot's channel list. A frame with another one is refused.
+        ("robot_hash", ctypes.c_uint64),
+        # Bit i: channel[i] holds a measurement.
+        ("channel_valid", ctypes.c_uint64),
         # decision_seq of the last Action that the robot obeyed; 0 for none.
         ("action_seq", ctypes.c_uint64),
         # Outcome of that action: an ActionOutcome.
@@ -234,47 +229,39 @@ class SensorFrame(ctypes.LittleEndianStructure):
         ("pose_reset_count", ctypes.c_uint32),
         # 1 while the robot holds itself stopped because it has no valid action.
         ("safe_stop", ctypes.c_uint32),
-        # The command as executed; its meaning is given by the robot's description. Rover: signed curvature 1/m (left +), speed m/s.
-        ("command", ctypes.c_double * 4),
-        # Pose x m, y m, yaw rad (wrapped to ±π), in a continuous frame.
-        ("pose", ctypes.c_double * 3),
-        # Planned pose x m, y m, yaw rad, same frame as pose.
+        # Bit i: command[i] is known.
+        ("command_valid", ctypes.c_uint32),
+        # 1 if planned_pose is known.
+        ("planned_pose_valid", ctypes.c_uint32),
+        # The command as executed; the robot's description gives its axes and units. Rover: signed curvature 1/m (left +), speed m/s.
+        ("command", ctypes.c_double * 8),
+        # Measurements, in the order of the robot's channel list, in the units that it gives; 0 where nothing was measured.
+        ("channel", ctypes.c_double * 48),
+        # Planned pose x m, y m, yaw rad, in the frame of the pose's channels.
         ("planned_pose", ctypes.c_double * 3),
-        # Yaw rate, rad/s.
-        ("yaw_rate", ctypes.c_double),
-        # Wheel rates, rad/s, in the order of the robot's description.
-        ("wheel_rate", ctypes.c_double * 8),
-        # Steering angles, rad, in the order of the robot's description (same index as wheel).
-        ("steer", ctypes.c_double * 8),
-        # Motor currents, A, in the order of the robot's description.
-        ("current", ctypes.c_double * 8),
-        # Reserved, zero.
-        ("reserved", ctypes.c_double * 5),
     ]
 
 
-assert ctypes.sizeof(SensorFrame) == 408
+assert ctypes.sizeof(SensorFrame) == 576
 assert SensorFrame.header.offset == 0
 assert SensorFrame.run_id.offset == 48
-assert SensorFrame.valid.offset == 56
-assert SensorFrame.action_seq.offset == 64
-assert SensorFrame.action_outcome.offset == 72
-assert SensorFrame.symptoms.offset == 76
-assert SensorFrame.pose_reset_count.offset == 80
-assert SensorFrame.safe_stop.offset == 84
-assert SensorFrame.command.offset == 88
-assert SensorFrame.pose.offset == 120
-assert SensorFrame.planned_pose.offset == 144
-assert SensorFrame.yaw_rate.offset == 168
-assert SensorFrame.wheel_rate.offset == 176
-assert SensorFrame.steer.offset == 240
-assert SensorFrame.current.offset == 304
-assert SensorFrame.reserved.offset == 368
+assert SensorFrame.robot_hash.offset == 56
+assert SensorFrame.channel_valid.offset == 64
+assert SensorFrame.action_seq.offset == 72
+assert SensorFrame.action_outcome.offset == 80
+assert SensorFrame.symptoms.offset == 84
+assert SensorFrame.pose_reset_count.offset == 88
+assert SensorFrame.safe_stop.offset == 92
+assert SensorFrame.command_valid.offset == 96
+assert SensorFrame.planned_pose_valid.offset == 100
+assert SensorFrame.command.offset == 104
+assert SensorFrame.channel.offset == 168
+assert SensorFrame.planned_pose.offset == 552
 
 
 class DetectionBelief(ctypes.LittleEndianStructure):
-    SCHEMA = 0x1EBB57D56D932A4B
-    TYPE_NAME = "vigil.DetectionBelief.v1.1ebb57d56d932a4b"
+    SCHEMA = 0xE98DC1E4B698E1C9
+    TYPE_NAME = "vigil.DetectionBelief.v1.e98dc1e4b698e1c9"
 
     @staticmethod
     def type_name():
@@ -307,8 +294,8 @@ class DetectionBelief(ctypes.LittleEndianStructure):
         ("outlier_rate_wheels", ctypes.c_double * 8),
         # The same for each steering angle.
         ("outlier_rate_steer", ctypes.c_double * 8),
-        # Log-odds of a fault seen by each channel alone (see Channel).
-        ("channel_log_odds", ctypes.c_double * 32),
+        # Log-odds of a fault seen by each channel alone (see Evidence).
+        ("channel_log_odds", ctypes.c_double * 50),
         # decision_seq of the last action that the robot obeyed, as the frame says it.
         ("action_seq", ctypes.c_uint64),
         # Capture time of the frame that raised the present alarm, ns; 0 without alarm.
@@ -332,7 +319,7 @@ class DetectionBelief(ctypes.LittleEndianStructure):
     ]
 
 
-assert ctypes.sizeof(DetectionBelief) == 720
+assert ctypes.sizeof(DetectionBelief) == 864
 assert DetectionBelief.header.offset == 0
 assert DetectionBelief.cause.offset == 48
 assert DetectionBelief.run_id.offset == 72
@@ -347,16 +334,16 @@ assert DetectionBelief.outlier_rate.offset == 264
 assert DetectionBelief.outlier_rate_wheels.offset == 288
 assert DetectionBelief.outlier_rate_steer.offset == 352
 assert DetectionBelief.channel_log_odds.offset == 416
-assert DetectionBelief.action_seq.offset == 672
-assert DetectionBelief.alarm_t_capture_ns.offset == 680
-assert DetectionBelief.alarm.offset == 688
-assert DetectionBelief.alarm_count.offset == 692
-assert DetectionBelief.symptoms.offset == 696
-assert DetectionBelief.invalid_count.offset == 700
-assert DetectionBelief.degenerate_count.offset == 704
-assert DetectionBelief.action_outcome.offset == 708
-assert DetectionBelief.blind.offset == 712
-assert DetectionBelief.readiness.offset == 716
+assert DetectionBelief.action_seq.offset == 816
+assert DetectionBelief.alarm_t_capture_ns.offset == 824
+assert DetectionBelief.alarm.offset == 832
+assert DetectionBelief.alarm_count.offset == 836
+assert DetectionBelief.symptoms.offset == 840
+assert DetectionBelief.invalid_count.offset == 844
+assert DetectionBelief.degenerate_count.offset == 848
+assert DetectionBelief.action_outcome.offset == 852
+assert DetectionBelief.blind.offset == 856
+assert DetectionBelief.readiness.offset == 860
 
 
 class ParticleBlock(ctypes.LittleEndianStructure):
@@ -393,8 +380,8 @@ assert ParticleBlock.hypotheses.offset == 376
 
 
 class FaultBelief(ctypes.LittleEndianStructure):
-    SCHEMA = 0x70D08C3016F8DE2F
-    TYPE_NAME = "vigil.FaultBelief.v1.70d08c3016f8de2f"
+    SCHEMA = 0x43A94BF286DEB000
+    TYPE_NAME = "vigil.FaultBelief.v1.43a94bf286deb000"
 
     @staticmethod
     def type_name():
@@ -421,8 +408,8 @@ class FaultBelief(ctypes.LittleEndianStructure):
         ("sets", FaultSet * 8),
         # Entropy of the distribution over sets and unknown, nats.
         ("entropy", ctypes.c_double),
-        # Why this diagnosis and not the next best one: by channel, how much more the readings since the onset are expected under it than under runner_up, natural log-likelihood; see Channel. 0 while nothing is diagnosed.
-        ("channel_evidence", ctypes.c_double * 32),
+        # Why this diagnosis and not the next best one: by channel, how much more the readings since the onset are expected under it than under runner_up, natural log-likelihood; see Evidence. 0 while nothing is diagnosed.
+        ("channel_evidence", ctypes.c_double * 50),
         # Expected size of each node's fault, given that it is present, in the unit of its size_kind; 0 without a size.
         ("size", ctypes.c_double * 64),
         # Standard deviation of size, in the same unit.
@@ -458,7 +445,7 @@ class FaultBelief(ctypes.LittleEndianStructure):
     ]
 
 
-assert ctypes.sizeof(FaultBelief) == 2864
+assert ctypes.sizeof(FaultBelief) == 3008
 assert FaultBelief.header.offset == 0
 assert FaultBelief.cause.offset == 48
 assert FaultBelief.run_id.offset == 72
@@ -470,22 +457,22 @@ assert FaultBelief.p_unknown_predicted.offset == 1120
 assert FaultBelief.sets.offset == 1128
 assert FaultBelief.entropy.offset == 1256
 assert FaultBelief.channel_evidence.offset == 1264
-assert FaultBelief.size.offset == 1520
-assert FaultBelief.size_sd.offset == 2032
-assert FaultBelief.p_mode.offset == 2544
-assert FaultBelief.alarm_t_capture_ns.offset == 2552
-assert FaultBelief.onset_t_capture_ns.offset == 2560
-assert FaultBelief.mode.offset == 2568
-assert FaultBelief.reported.offset == 2572
-assert FaultBelief.reported_change_count.offset == 2576
-assert FaultBelief.runner_up.offset == 2580
-assert FaultBelief.particle_limit.offset == 2584
-assert FaultBelief.mode_change_count.offset == 2588
-assert FaultBelief.node_count.offset == 2592
-assert FaultBelief.set_count.offset == 2596
-assert FaultBelief.identifying.offset == 2600
-assert FaultBelief.degenerate_count.offset == 2604
-assert FaultBelief.size_kind.offset == 2608
+assert FaultBelief.size.offset == 1664
+assert FaultBelief.size_sd.offset == 2176
+assert FaultBelief.p_mode.offset == 2688
+assert FaultBelief.alarm_t_capture_ns.offset == 2696
+assert FaultBelief.onset_t_capture_ns.offset == 2704
+assert FaultBelief.mode.offset == 2712
+assert FaultBelief.reported.offset == 2716
+assert FaultBelief.reported_change_count.offset == 2720
+assert FaultBelief.runner_up.offset == 2724
+assert FaultBelief.particle_limit.offset == 2728
+assert FaultBelief.mode_change_count.offset == 2732
+assert FaultBelief.node_count.offset == 2736
+assert FaultBelief.set_count.offset == 2740
+assert FaultBelief.identifying.offset == 2744
+assert FaultBelief.degenerate_count.offset == 2748
+assert FaultBelief.size_kind.offset == 2752
 
 
 class Action(ctypes.LittleEndianStructure):
@@ -755,6 +742,57 @@ def difference(graph="rover"):
     return f"the types are the same; the graph has iceoryx2 {there}, this program {here}"
 
 
+class Channels:
+    """Which place of a frame's command and channels has which name: a robot's channel list.
+
+    Made of the text that `vigil channels --robot F` prints; Channels.read(path) makes it of a file.
+    `axes` and `channels` are the places by name, `units` the units by name, `-` for none.
+    """
+
+    def __init__(self, text):
+        self.robot_hash, self.axes, self.channels, self.units = 0, {}, {}, {}
+        for line in text.splitlines():
+            kind, number, name, *unit = line.split()
+            if kind == "robot":
+                self.robot_hash = int(number, 16)
+            elif kind in ("command", "channel"):
+                (self.axes if kind == "command" else self.channels)[name] = int(number)
+                self.units[name] = " ".join(unit)
+        if self.robot_hash == 0:
+            raise ValueError("no channel list: it has no line 'robot HASH NAME'")
+
+    @staticmethod
+    def read(path):
+        """The list of a file."""
+        with open(path) as file:
+            return Channels(file.read())
+
+    def set(self, frame, name, value):
+        """Writes a channel and marks it as measured; KeyError with the names that there are."""
+        place = self._place(self.channels, name)
+        frame.channel[place] = value
+        frame.channel_valid |= 1 << place
+        frame.robot_hash = self.robot_hash
+
+    def command(self, frame, name, value):
+        """Writes an axis of the command and marks it as known; KeyError as above."""
+        place = self._place(self.axes, name)
+        frame.command[place] = value
+        frame.command_valid |= 1 << place
+        frame.robot_hash = self.robot_hash
+
+    @staticmethod
+    def _place(places, name):
+        if name not in places:
+            raise KeyError(f"'{name}' is none of {', '.join(places)}")
+        return places[name]
+
+
+def channel_list(graph="rover"):
+    """The Channels of a running graph."""
+    return Channels.read(f"{runtime_folder(graph)}/channels")
+
+
 def _table():
     for byte in range(256):
         for _ in range(8):
@@ -781,5 +819,5 @@ def datagram(frame):
     """
     frame.header.schema = SensorFrame.SCHEMA
     body = bytes(frame)
-    head = b"VGIL" + struct.pack("<HHI", 1, 1, len(body))
+    head = b"VGIL" + struct.pack("<HHI", 2, 1, len(body))
     return head + struct.pack("<I", crc32c(head + body)) + body

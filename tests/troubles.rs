@@ -4,7 +4,7 @@
 
 mod watched;
 
-use vigil_blocks::{MODE_UNKNOWN, SensorFrame, Valid};
+use vigil_blocks::{MODE_UNKNOWN, SensorFrame};
 use watched::WatchedRover;
 
 /// True once the alarm stands and the diagnosis is unknown.
@@ -19,12 +19,13 @@ fn is_well(watched: &WatchedRover) -> bool {
 }
 
 fn without(bits: u64) -> impl Fn(&mut SensorFrame) {
-    move |frame| frame.valid &= !bits
+    move |frame| frame.channel_valid &= !bits
 }
 
 #[test]
 fn a_sensor_that_falls_silent_is_noticed_and_forgiven_when_it_reads_again() {
-    for bits in [Valid::POSE, Valid::wheel_rate(2)] {
+    let (pose, encoder_lr) = (0b111, 1 << 5);
+    for bits in [pose, encoder_lr] {
         let mut watched = WatchedRover::new(31);
         watched.drive(8.0);
         watched.drive_with(1.5, without(bits));

@@ -27,8 +27,9 @@ try:
 except ModuleNotFoundError as error:
     raise SystemExit(f"{error}: pip install iceoryx2==0.10.0 mujoco==4.0.0")
 
-VALID = vigil.VALID_POSE | 3 * vigil.VALID_COMMAND_0 | 0x3F * vigil.VALID_WHEEL_RATE_0
-VALID |= sum(vigil.VALID_STEER_0 << i for i in STEERED)
+# What Rover.state() returns, by the names of the robot's channels; a wheel that does not steer has no angle.
+SENSED = ["x", "y", "yaw", *(f"enc_{w}" for w in WHEELS)]
+SENSED += [f"steer_{w}" if i in STEERED else None for i, w in enumerate(WHEELS)]
 KINDS = {value: name[9:].lower() for name, value in vars(vigil).items() if name.startswith("RECOVERY_")}
 DRIVING = ("go_on", "slow_down", "compensate", "ignore_encoder", "go_through", "move_away")
 
@@ -87,6 +88,7 @@ def typed():
 
 def drive(options, rover, viewer):
     node, (publisher, bell, actions) = join(options.graph, ports)
+    channels = vigil.channel_list(options.graph)
     obedience, random = Obedience(actions), numpy.random.default_rng(options.seed)
     noise = NOISE * math.sqrt(options.hz / NOISE_HZ)
     period, plan_s, seq, skipped, pending = round(1e9 / options.hz), 0.0, 0, 0, list(options.breaks)
@@ -105,11 +107,14 @@ def drive(options, rover, viewer):
         has_arrived = rover.drive(curvature, speed, seconds)
         plan_s += share * seconds
         # Another start is another run: its pose begins anew.
-        frame = vigil.SensorFrame(run_id=began, valid=VALID, safe_stop=not obedience.is_valid)
+        frame = vigil.SensorFrame(run_id=began, safe_stop=not obedience.is_valid)
         frame.action_seq, frame.action_outcome = obedience.action.decision_seq, obedience.outcome(has_arrived)
         sensed = rover.state() + noise * random.standard_normal(15)
-        frame.command[:2], frame.pose[:] = rover.command, sensed[:3]
-        frame.wheel_rate[:6], frame.steer[:6] = sensed[3:9], sensed[9:]
+        for name, value in zip(["cmd_curv", "cmd_speed"], rover.command):
+            channels.command(frame, name, value)
+        for name, value in zip(SENSED, sensed):
+            if name is not None:
+                channels.set(frame, name, value)
         frame.header.schema, frame.header.epoch, frame.header.seq = vigil.SensorFrame.SCHEMA, began, seq
         frame.header.t_schedule_ns = frame.header.t_capture_ns = due
         time.sleep(max(0, due - time.monotonic_ns()) * 1e-9)

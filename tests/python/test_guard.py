@@ -51,6 +51,8 @@ def change(frame, **fields):
     return frame
 
 
+# Places of some of the rover's channels.
+ENC_RF, ENC_RM, STEER_LF = 6, 7, 9
 # Cause, and how a good frame that is due now is made bad.
 BAD = [
     ("no-epoch", lambda f: change(f, header_epoch=0)),
@@ -60,11 +62,13 @@ BAD = [
     ("ahead", lambda f: change(f, header_t_schedule_ns=f.header.t_schedule_ns + 10**12)),
     ("behind", lambda f: change(f, header_t_schedule_ns=f.header.t_schedule_ns - 11 * 10**9)),
     ("early", lambda f: change(f, header_t_schedule_ns=f.header.t_schedule_ns - PERIOD_NS + 1000)),
-    ("not-finite", lambda f: change(f, wheel_rate=(3, float("nan")))),
-    ("not-finite", lambda f: change(f, pose=(1, float("inf")))),
-    ("out-of-range", lambda f: change(f, steer=(0, 25.0))),
+    ("not-finite", lambda f: change(f, channel=(ENC_RF, float("nan")))),
+    ("not-finite", lambda f: change(f, channel=(1, float("inf")))),
+    ("out-of-range", lambda f: change(f, channel=(STEER_LF, 25.0))),
     ("out-of-range", lambda f: change(f, action_outcome=77)),
-    ("jump", lambda f: change(f, pose=(0, f.pose[0] + 5000.0))),
+    ("out-of-range", lambda f: change(f, channel_valid=f.channel_valid | 1 << 40)),
+    ("robot", lambda f: change(f, robot_hash=f.robot_hash ^ 1)),
+    ("jump", lambda f: change(f, channel=(0, f.channel[0] + 5000.0))),
 ]
 
 
@@ -109,7 +113,7 @@ class Guard(unittest.TestCase):
             source = Source(lambda frame: to.sendto(vigil.datagram(frame), str(address)))
             source.good(100)
             for _ in range(8):
-                source.send(change(source.next(), yaw_rate=float("nan")))
+                source.send(change(source.next(), channel=(ENC_RF, float("nan"))))
             source.good(100)
             summary = graph.stop()
         # The sixteenth good one in a row is taken again.
@@ -146,8 +150,8 @@ class Guard(unittest.TestCase):
 # Cause of blindness, and how every frame of a drive is made to show nothing.
 BLINDING = [
     ("clock", lambda f: change(f, header_t_capture_ns=f.header.t_capture_ns // 1000)),
-    ("validity", lambda f: change(f, valid=0)),
-    ("command", lambda f: change(f, valid=f.valid & ~3)),
+    ("validity", lambda f: change(f, channel_valid=0)),
+    ("command", lambda f: change(f, command_valid=0)),
     ("run", lambda f: change(f, run_id=1 + f.header.seq)),
 ]
 
@@ -182,14 +186,14 @@ class Blind(unittest.TestCase):
 
     def test_fields_of_another_unit_or_sign_are_told_by_the_graph(self):
         def millimetres(frame):
-            frame.pose[0], frame.pose[1] = 1000 * frame.pose[0], 1000 * frame.pose[1]
+            frame.channel[0], frame.channel[1] = 1000 * frame.channel[0], 1000 * frame.channel[1]
             return frame
 
         summary = self.drive(4, 20, millimetres)
         told = [e["what"] for e in summary["events"] if e["event"] == "publisher"]
         self.assertTrue(any("are they in mm?" in what for what in told), told)
         self.assertEqual(list(summary["blind"]["detector"]), ["meaning"])
-        summary = self.drive(3, 20, lambda f: change(f, wheel_rate=(4, -f.wheel_rate[4])))
+        summary = self.drive(3, 20, lambda f: change(f, channel=(ENC_RM, -f.channel[ENC_RM])))
         told = [e["what"] for e in summary["events"] if e["event"] == "publisher"]
         self.assertEqual(told, ["signs: enc_RM has the other sign"])
 

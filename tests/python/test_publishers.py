@@ -108,7 +108,7 @@ class Publishers(unittest.TestCase):
             done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
             self.assertEqual(done.returncode, 1)
             self.assertIn("the graph has vigil.SensorFrame.v1.", done.stderr)
-            self.assertIn("this program has vigil.SensorFrame.v0.0123456789abcdef, 408 bytes", done.stderr)
+            self.assertIn("this program has vigil.SensorFrame.v0.0123456789abcdef, 576 bytes", done.stderr)
 
 
 class CheckPublisher(unittest.TestCase):
@@ -191,7 +191,7 @@ class CheckPublisher(unittest.TestCase):
         (found,) = [f for f in document["findings"] if f["check"] == "type"]
         self.assertEqual(found["status"], "failure")
         self.assertIn("the schema hash is '0123456789abcdef', not '", found["detail"])
-        self.assertIn("its size is 56 bytes, not 408", found["detail"])
+        self.assertIn("its size is 56 bytes, not 576", found["detail"])
         self.assertIn("iceoryx2 0.10", found["detail"])
 
     def test_without_a_publisher_it_says_what_to_do(self):

@@ -14,7 +14,6 @@ from rosbags.typesys import Stores, get_typestore
 from harness import FRAMES, ROOT, STUCK_RUN, vigil
 
 import ros2_mapping
-import vigil_types
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 TYPE = STORE.types
@@ -115,20 +114,19 @@ class Ros(unittest.TestCase):
     def test_the_bridge_maps_messages_to_a_frame(self):
         row = rows()[200]
         frame = ros2_mapping.frame(*(message for _, message in messages(row)))
-        self.assertAlmostEqual(frame.pose[2], float(row["yaw"]), places=9)
+        self.assertAlmostEqual(frame.channel[2], float(row["yaw"]), places=9)
         self.assertAlmostEqual(frame.command[0], float(row["cmd_curv"]), places=9)
-        self.assertEqual(frame.wheel_rate[4], float(row["enc_RM"]))
-        self.assertEqual(frame.steer[3], float(row["steer_RF"]))
-        self.assertEqual(frame.steer[1], 0.0)
+        self.assertEqual(frame.channel[7], float(row["enc_RM"]))
+        self.assertEqual(frame.channel[11], float(row["steer_RF"]))
         self.assertEqual(frame.header.t_capture_ns, round((1000.0 + float(row["t"])) * 1e9))
-        for bit in [vigil_types.VALID_POSE, vigil_types.VALID_WHEEL_RATE_0 << 5, vigil_types.VALID_STEER_0 << 5]:
-            self.assertTrue(frame.valid & bit)
-        self.assertFalse(frame.valid & (vigil_types.VALID_STEER_0 << 1))
-        self.assertEqual(ros2_mapping.frame(None, None, None).valid, 0)
+        # Pose, six rates, four angles; no gyro, no currents.
+        self.assertEqual((frame.command_valid, frame.channel_valid), (0b11, 0b1111111111111))
+        nothing = ros2_mapping.frame(None, None, None)
+        self.assertEqual((nothing.command_valid, nothing.channel_valid), (0, 0))
         joints = messages(row)[1][1]
         joints.velocity, joints.position[9] = joints.velocity[:0], math.nan
         frame = ros2_mapping.frame(None, joints, None)
-        self.assertEqual(frame.valid, 0b1101 * vigil_types.VALID_STEER_0)
+        self.assertEqual(frame.channel_valid, 0b111 << 9)
 
 
 if __name__ == "__main__":

@@ -19,9 +19,9 @@ class Types(unittest.TestCase):
             self.assertEqual((EXAMPLES / name).read_text(), made.stdout, hint)
 
     def test_the_header_compiles_and_makes_the_same_datagram_as_python(self):
-        frame = vigil_types.SensorFrame(run_id=7, valid=vigil_types.VALID_POSE)
+        frame = vigil_types.SensorFrame(run_id=7, channel_valid=0b111)
         frame.header.epoch, frame.header.seq = 3, 11
-        frame.pose[:] = 1.5, -2.0, 0.25
+        frame.channel[:3] = 1.5, -2.0, 0.25
         source = """
             #include "vigil_types.h"
             #include <stdio.h>
@@ -29,9 +29,9 @@ class Types(unittest.TestCase):
               vigil_sensor_frame frame;
               uint8_t bytes[VIGIL_DATAGRAM_SIZE];
               memset(&frame, 0, sizeof frame);
-              frame.run_id = 7, frame.valid = VIGIL_VALID_POSE;
+              frame.run_id = 7, frame.channel_valid = 7;
               frame.header.epoch = 3, frame.header.seq = 11;
-              frame.pose[0] = 1.5, frame.pose[1] = -2.0, frame.pose[2] = 0.25;
+              frame.channel[0] = 1.5, frame.channel[1] = -2.0, frame.channel[2] = 0.25;
               vigil_datagram(&frame, bytes);
               return fwrite(bytes, sizeof bytes, 1, stdout) != 1;
             }"""

@@ -3,9 +3,9 @@
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal, StudentT};
 use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{SensorFrame, Valid};
-use vigil_robot::Description;
+use vigil_blocks::SensorFrame;
 use vigil_robot::kinematics::wrap_angle;
+use vigil_robot::{ChannelMap, Description};
 
 use super::scenario::{Draw, Frames};
 
@@ -60,6 +60,7 @@ pub struct Way {
     /// Standard deviations of the world's noise at this rate: position m, yaw rad, rate rad/s.
     noise: [f64; 3],
     wheels: usize,
+    map: ChannelMap,
     /// The one encoder with noise of its own.
     encoder: usize,
     burst_until_s: f64,
@@ -142,6 +143,7 @@ impl Way {
                 factor * robot.noise.wheel_rate_rad_s,
             ],
             wheels: robot.wheels.len(),
+            map: ChannelMap::new(robot),
             encoder: run % robot.wheels.len().max(1),
             burst_until_s: f64::NEG_INFINITY,
             odometry: drifts.then_some([0.0; 3]),
@@ -214,22 +216,23 @@ impl Way {
     /// Puts noise and drift on a frame; the true pose is that of its capture, `dt_s` after the last
     /// one.
     pub fn blur(&mut self, frame: &mut SensorFrame, pose: [f64; 3], dt_s: f64) {
-        if let Some(at) = self.drift(pose, dt_s) {
-            for (axis, value) in frame.pose.iter_mut().enumerate() {
-                *value += at[axis] - pose[axis];
-            }
-        }
+        let drifted = self.drift(pose, dt_s);
         let [position_m, yaw_rad, rate_rad_s] = self.noise;
-        if frame.has(Valid::POSE) {
+        if let Some(mut measured) = self.map.pose(frame) {
             for (axis, scale) in [position_m, position_m, yaw_rad].into_iter().enumerate() {
-                frame.pose[axis] += self.noise(scale, self.drawn.pose[axis]);
+                measured[axis] += drifted.map_or(0.0, |at| at[axis] - pose[axis]);
+                measured[axis] += self.noise(scale, self.drawn.pose[axis]);
             }
+            measured[2] = wrap_angle(measured[2]);
+            self.map.set_pose(frame, measured);
         }
-        frame.pose[2] = wrap_angle(frame.pose[2]);
         for wheel in 0..self.wheels {
             let own = wheel == self.encoder;
             let factor = if own { self.drawn.encoder } else { 1.0 };
-            frame.wheel_rate[wheel] += self.noise(rate_rad_s, factor);
+            let noise = self.noise(rate_rad_s, factor);
+            if let Some(rate) = self.map.wheel_rate(frame, wheel) {
+                self.map.set_wheel_rate(frame, wheel, rate + noise);
+            }
         }
     }
 

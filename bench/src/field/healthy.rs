@@ -8,7 +8,7 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use vigil_blocks::SensorFrame;
-use vigil_recording::frames::{Field, fields, further};
+use vigil_recording::frames::{Field, fields};
 use vigil_sensor_sim::{EffectiveCommand, World};
 use vigil_setup::graph_file::Simulator;
 
@@ -29,7 +29,7 @@ const FIRST_SEED: u64 = 90_000;
 /// A world that cannot be driven, a file that cannot be written.
 pub fn record(rover: &Rover, path: &Path) -> Result<(), Box<dyn Error>> {
     let robot = &rover.robot;
-    let columns: Vec<(String, Field)> = fields(robot).into_iter().chain(further(robot)).collect();
+    let columns: Vec<(String, Field)> = fields(robot);
     let mut out = GzEncoder::new(File::create(path)?, Compression::best());
     let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
     writeln!(out, "run,t,{}", names.join(","))?;

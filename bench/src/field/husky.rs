@@ -4,9 +4,9 @@ use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::SensorFrame;
 use vigil_recording::frames::Run;
-use vigil_robot::Description;
+use vigil_robot::{ChannelMap, Description};
 
 /// Half the distance between the wheels' centres, m.
 fn half_track_m(robot: &Description) -> f64 {
@@ -61,6 +61,7 @@ fn table(path: &Path) -> Result<Vec<Vec<f64>>, Box<dyn Error>> {
 /// One frame for each row of the wheels; the yaw rate is the gyro's mean since the row before.
 fn frames(wheels: &[Vec<f64>], gyro: &[Vec<f64>], robot: &Description) -> Vec<SensorFrame> {
     let half_track_m = half_track_m(robot);
+    let map = ChannelMap::new(robot);
     let (mut at, mut frames) = (0, Vec::new());
     for row in wheels {
         let &[t_s, current_left, current_right, left_m_s, right_m_s, ..] = row.as_slice() else {
@@ -73,16 +74,15 @@ fn frames(wheels: &[Vec<f64>], gyro: &[Vec<f64>], robot: &Description) -> Vec<Se
         let mut frame = SensorFrame::default();
         // 0 is no time.
         frame.header.t_capture_ns = (1e9 * (t_s + 1.0)).round() as u64;
-        frame.command[0] = 0.5 * (left_m_s + right_m_s);
-        frame.command[1] = 0.5 * (right_m_s - left_m_s) / half_track_m;
-        frame.valid = Valid::command(0) | Valid::command(1);
+        frame.robot_hash = map.hash();
+        frame.set_command(0, 0.5 * (left_m_s + right_m_s));
+        frame.set_command(1, 0.5 * (right_m_s - left_m_s) / half_track_m);
         if let Some(samples) = gyro.get(from..at).filter(|samples| !samples.is_empty()) {
             let sum: f64 = samples.iter().map(|sample| sample[3]).sum();
-            frame.yaw_rate = sum / samples.len() as f64;
-            frame.valid |= Valid::YAW_RATE;
+            map.set_yaw_rate(&mut frame, sum / samples.len() as f64);
         }
-        (frame.current[0], frame.current[1]) = (current_left, current_right);
-        frame.valid |= Valid::current(0) | Valid::current(1);
+        map.set_current(&mut frame, 0, current_left);
+        map.set_current(&mut frame, 1, current_right);
         frames.push(frame);
     }
     frames

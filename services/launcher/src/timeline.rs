@@ -5,12 +5,13 @@ use std::fmt;
 
 use serde::Serialize;
 use vigil_blocks::{
-    ActionRejection, Blindness, Channel, Event, EventKind, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
-    Rejection, SizeKind,
+    ActionRejection, Blindness, Event, EventKind, Evidence, MODE_BLIND, MODE_MULTIPLE,
+    MODE_UNKNOWN, Rejection, SizeKind,
 };
 use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::watchdog::WatchdogFinding;
+use vigil_robot::channel::{Role, channels};
 use vigil_robot::injection::{Change, WireChange};
 use vigil_robot::publisher_check::Finding;
 use vigil_setup::Setup;
@@ -291,16 +292,20 @@ impl Namer {
     }
 
     fn channel(&self, channel: usize) -> String {
-        let wheel = |first: usize| self.robot.wheels.get(channel - first);
-        let named = |kind: &str, first| match wheel(first) {
-            Some(wheel) => format!("{kind} {}", wheel.name),
-            None => "?".into(),
-        };
         match channel {
-            Channel::POSE => "pose".into(),
-            8..16 => named("wheel rate", Channel::wheel_rate(0)),
-            16..24 => "steering".into(),
-            _ => "?".into(),
+            Evidence::POSE => return "pose".into(),
+            Evidence::ANY => return "all channels".into(),
+            _ => {}
+        }
+        let channels = channels(&self.robot);
+        let Some(channel) = channels.get(channel) else {
+            return "?".into();
+        };
+        let wheel = channel.wheel.and_then(|i| self.robot.wheels.get(i));
+        match (channel.role, wheel) {
+            (Role::WheelRate, Some(wheel)) => format!("wheel rate {}", wheel.name),
+            (Role::SteeringAngle, Some(wheel)) => format!("steering {}", wheel.name),
+            _ => channel.name.clone(),
         }
     }
 

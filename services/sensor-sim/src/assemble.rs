@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::Path;
 
 use vigil_recording::frames;
-use vigil_robot::Injection;
+use vigil_robot::{ChannelMap, Injection};
 use vigil_setup::Setup;
 use vigil_setup::graph_file::Source;
 
@@ -39,7 +39,8 @@ pub fn assemble(setup: &Setup, injections: &[String]) -> Result<SensorSource, Bo
             let world = World::new(&setup.robot, &file.simulator, &file.drive, rate_hz, seed)
                 .map_err(|e| format!("{path}: simulator: {e}"))?;
             let gate = ActionGate::new(&setup.robot.limits);
-            let navigator = file.navigation.as_ref().map(Navigator::new);
+            let navigator = file.navigation.as_ref();
+            let navigator = navigator.map(|it| Navigator::new(it, ChannelMap::new(&setup.robot)));
             let simulation = Simulation::new(world, gate, navigator);
             SensorSource::Simulator(Box::new(simulation), schedule)
         }

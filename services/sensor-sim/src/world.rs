@@ -1,11 +1,11 @@
 //! The simulated rover: drive, soil, slip, sensors, faults and disturbances.
 
-use vigil_blocks::{ActionOutcome, SensorFrame, Valid};
+use vigil_blocks::{ActionOutcome, SensorFrame};
 use vigil_robot::disturbance_kind::{KINDS, Place, SIDES};
 use vigil_robot::injection::Change;
 use vigil_robot::kinematics::{ROVER_WHEELS, advance, wrap_angle};
 use vigil_robot::slip::{Condition, Situation, SlipModel, Solution};
-use vigil_robot::{Description, Disturbance, DisturbanceKind, Fault, FaultKind};
+use vigil_robot::{ChannelMap, Description, Disturbance, DisturbanceKind, Fault, FaultKind};
 use vigil_setup::Ranges;
 use vigil_setup::graph_file::{DriveSegment, Simulator};
 
@@ -48,6 +48,7 @@ pub struct TrueState {
 /// The simulated rover in its world.
 #[derive(Debug, Clone)]
 pub struct World {
+    map: ChannelMap,
     ranges: Ranges<Simulator>,
     model: SlipModel,
     drive: Drive,
@@ -110,6 +111,7 @@ impl World {
         // One stream each, so that a fault changes no healthy channel's noise.
         let stream = |n: u64| seed.wrapping_mul(4).wrapping_add(n);
         Ok(Self {
+            map: ChannelMap::new(robot),
             ranges,
             model,
             drive: Drive::new(drive),
@@ -174,12 +176,13 @@ impl World {
         };
     }
 
-    /// Reads the sensors into `frame`; its header is left to the caller. Bits of `valid` are set
-    /// for exactly what this rover measures.
+    /// Reads the sensors into `frame`; its header is left to the caller. Exactly
+    /// what this rover measures is marked as measured.
     pub fn measure(&mut self, frame: &mut SensorFrame) {
         *frame = SensorFrame {
             header: frame.header,
             run_id: self.run_id,
+            robot_hash: self.map.hash(),
             action_seq: self.action_seq,
             action_outcome: self.outcome as u32,
             safe_stop: u32::from(self.safe_stop),
@@ -189,8 +192,8 @@ impl World {
             curvature_1_m,
             speed_m_s,
         } = self.executed.at;
-        (frame.command[0], frame.command[1]) = (curvature_1_m, speed_m_s);
-        frame.valid = Valid::command(0) | Valid::command(1);
+        frame.set_command(0, curvature_1_m);
+        frame.set_command(1, speed_m_s);
 
         let active = &self.active;
         let noise = &mut self.noise;
@@ -199,13 +202,12 @@ impl World {
         pose[1] += noise.draw(noise.position_m);
         pose[2] = wrap_angle(pose[2] + noise.draw(noise.yaw_rad));
         if let Some(pose) = self.pose_sensor.report(self.elapsed_s, pose, active) {
-            frame.pose = pose;
-            frame.valid |= Valid::POSE;
+            self.map.set_pose(frame, pose);
         }
-        frame.yaw_rate = active.yaw_rate(self.velocity[2], noise.draw(noise.yaw_rate_rad_s));
+        let yaw_rate = active.yaw_rate(self.velocity[2], noise.draw(noise.yaw_rate_rad_s));
+        self.map.set_yaw_rate(frame, yaw_rate);
         let [x, y, yaw] = self.planned_pose;
-        frame.planned_pose = [x, y, wrap_angle(yaw)];
-        frame.valid |= Valid::PLANNED_POSE | Valid::YAW_RATE;
+        frame.set_planned([x, y, wrap_angle(yaw)]);
 
         let kinematics = self.model.kinematics();
         let steer_rad = kinematics.targets(curvature_1_m, speed_m_s).steer_rad;
@@ -216,15 +218,17 @@ impl World {
                 .scaled(i, self.motion.wheel_rate_rad_s[i], active);
             rates_rad_s[i] = rate + noise.draw(noise.wheel_rate_rad_s);
             let current = CURRENT_PER_TORQUE_A_N_M * self.motion.torque_n_m[i];
-            frame.current[i] = active.current(i, current, noise.draw(noise.current_a));
-            frame.valid |= Valid::wheel_rate(i) | Valid::current(i);
+            let current = active.current(i, current, noise.draw(noise.current_a));
+            self.map.set_current(frame, i, current);
             if kinematics.steered[i] {
-                frame.steer[i] = active.steer(i, steer) + noise.draw(noise.steer_rad);
-                frame.valid |= Valid::steer(i);
+                let steer = active.steer(i, steer) + noise.draw(noise.steer_rad);
+                self.map.set_steer(frame, i, steer);
             }
         }
         let rates_rad_s = self.encoders.report(self.elapsed_s, rates_rad_s, active);
-        frame.wheel_rate[..ROVER_WHEELS].copy_from_slice(&rates_rad_s);
+        for (wheel, rate_rad_s) in rates_rad_s.into_iter().enumerate() {
+            self.map.set_wheel_rate(frame, wheel, rate_rad_s);
+        }
     }
 
     /// Starts a fault. A wheel may be stuck and have a broken encoder at once; a new fault of an

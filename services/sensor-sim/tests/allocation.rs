@@ -79,7 +79,10 @@ fn a_robot_on_its_path_allocates_nothing_whatever_it_is_told() {
     let text = std::fs::read_to_string(config.join("corridor-obstacle.toml")).unwrap();
     let file: GraphFile = toml::from_str(&text).unwrap();
     let world = World::new(&robot, &file.simulator, &[], 100.0, 1).unwrap();
-    let navigator = Navigator::new(file.navigation.as_ref().unwrap());
+    let navigator = Navigator::new(
+        file.navigation.as_ref().unwrap(),
+        vigil_robot::ChannelMap::new(&robot),
+    );
     let gate = ActionGate::new(&robot.limits);
     let mut simulation = Simulation::new(world, gate, Some(navigator));
     let mut action = Action {

@@ -16,6 +16,7 @@ use vigil_cycle::{
     Clock, CycleAccount, DeadlineMonitor, Graph, HealthBoard, OnMiss, Receiver, Recorder, Schedule,
     Stage, StageCycle, Topic, VirtualClock,
 };
+use vigil_robot::ChannelMap;
 use vigil_sensor_sim::SocketStage;
 
 const PERIOD_NS: u64 = 10_000_000;
@@ -33,6 +34,7 @@ struct Border {
     published: Box<dyn Receiver<SensorFrame>>,
     datagrams: Rc<Datagrams>,
     file: PathBuf,
+    robot_hash: u64,
 }
 
 impl Border {
@@ -65,6 +67,7 @@ impl Border {
             published,
             datagrams,
             file,
+            robot_hash: ChannelMap::new(&robot).hash(),
         }
     }
 
@@ -84,6 +87,7 @@ impl Border {
     fn frame(&self, epoch: u64, seq: u64) -> [u8; datagram::DATAGRAM_SIZE] {
         let mut frame = SensorFrame {
             run_id: 5,
+            robot_hash: self.robot_hash,
             ..SensorFrame::default()
         };
         frame.header.schema = SensorFrame::SCHEMA;

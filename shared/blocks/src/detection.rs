@@ -4,44 +4,28 @@ use strum::{FromRepr, IntoStaticStr, VariantArray};
 
 use crate::block::block;
 use crate::header::{Cause, Header};
-use crate::sensor::WHEELS;
+use crate::sensor::{CHANNELS, WHEELS};
 
-/// Capacity of the per-channel evidence.
-pub const CHANNELS: usize = 32;
+/// Capacity of the evidence by channel: one place for each channel of a frame, in the same order,
+/// and two for several channels at once ([`Evidence`]).
+pub const EVIDENCE: usize = CHANNELS + 2;
 
-/// Index into [`DetectionBelief::channel_log_odds`].
+/// Places in [`DetectionBelief::channel_log_odds`] and [`crate::FaultBelief::channel_evidence`]
+/// after those of the channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Channel;
+pub struct Evidence;
 
-impl Channel {
-    /// Motion: the pose track.
-    pub const POSE: usize = 0;
-    /// Yaw rate.
-    pub const YAW_RATE: usize = 1;
+impl Evidence {
+    /// Motion: the pose's channels taken together.
+    pub const POSE: usize = CHANNELS;
     /// Deviation of any kind: without a constant direction (the paper's constant likelihood), or
-    /// in all channels of a robot with a nominal model at once.
-    pub const ANY: usize = 2;
-
-    /// Wheel rate of wheel `i`.
-    #[must_use]
-    pub const fn wheel_rate(i: usize) -> usize {
-        8 + i
-    }
-    /// Steering angle of wheel `i`.
-    #[must_use]
-    pub const fn steer(i: usize) -> usize {
-        16 + i
-    }
-    /// Motor current of wheel `i`.
-    #[must_use]
-    pub const fn current(i: usize) -> usize {
-        24 + i
-    }
+    /// in all channels at once.
+    pub const ANY: usize = CHANNELS + 1;
 }
 
 block! {
     /// Written by the detector every cycle.
-    pub struct DetectionBelief, size 720 {
+    pub struct DetectionBelief, size 864 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -69,8 +53,8 @@ block! {
         pub outlier_rate_wheels: [f64; WHEELS],
         /// The same for each steering angle.
         pub outlier_rate_steer: [f64; WHEELS],
-        /// Log-odds of a fault seen by each channel alone (see [`Channel`]).
-        pub channel_log_odds: [f64; CHANNELS],
+        /// Log-odds of a fault seen by each channel alone (see [`Evidence`]).
+        pub channel_log_odds: [f64; EVIDENCE],
         /// `decision_seq` of the last action that the robot obeyed, as the frame says it.
         pub action_seq: u64,
         /// Capture time of the frame that raised the present alarm, ns; 0 without alarm.

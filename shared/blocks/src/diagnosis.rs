@@ -1,7 +1,7 @@
 //! The identifier's belief: what is wrong?
 
 use crate::block::block;
-use crate::detection::CHANNELS;
+use crate::detection::EVIDENCE;
 use crate::header::{Cause, Header};
 use crate::layout::part;
 
@@ -29,7 +29,7 @@ pub struct FaultSet, size 16 {
 block! {
     /// Written by the identifier every cycle. Before an alarm it reports nominal with
     /// probability 1 - p_fault and the rest as unknown.
-    pub struct FaultBelief, size 2864 {
+    pub struct FaultBelief, size 3008 {
         /// Common header.
         pub header: Header,
         /// The journal entry behind this belief.
@@ -53,8 +53,8 @@ block! {
         pub entropy: f64,
         /// Why this diagnosis and not the next best one: by channel, how much more the readings
         /// since the onset are expected under it than under `runner_up`, natural log-likelihood;
-        /// see [`crate::Channel`]. 0 while nothing is diagnosed.
-        pub channel_evidence: [f64; CHANNELS],
+        /// see [`crate::Evidence`]. 0 while nothing is diagnosed.
+        pub channel_evidence: [f64; EVIDENCE],
         /// Expected size of each node's fault, given that it is present, in the unit of its
         /// `size_kind`; 0 without a size.
         pub size: [f64; FAULT_NODES],

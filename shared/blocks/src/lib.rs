@@ -23,7 +23,7 @@ pub use block::{Block, fnv1a};
 #[doc(hidden)]
 pub use block::{ascii, name_with_hash};
 pub use control::{Control, ControlCommand};
-pub use detection::{Blindness, CHANNELS, Channel, DetectionBelief, Readiness};
+pub use detection::{Blindness, DetectionBelief, EVIDENCE, Evidence, Readiness};
 pub use diagnosis::{
     FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
 };
@@ -32,5 +32,5 @@ pub use health::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
 pub use journal::Entry;
 pub use particles::{HealthyBelief, PARTICLE_CAPACITY, ParticleBlock, WeightedHypothesis};
 pub use rejection::{REJECTIONS, Rejection};
-pub use sensor::{ActionOutcome, COMMANDS, SensorFrame, Symptoms, Valid, WHEELS};
+pub use sensor::{ActionOutcome, CHANNELS, COMMANDS, SensorFrame, Symptoms, WHEELS};
 pub use size_kind::SizeKind;

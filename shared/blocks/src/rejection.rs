@@ -43,6 +43,8 @@ pub enum Rejection {
     Corrupt = 13,
     /// Its capture time is not after that of the one before it, or leaps.
     Clock = 14,
+    /// Its numbers are those of another channel list: another robot, or another description.
+    Robot = 15,
 }
 
 impl Rejection {

@@ -5,20 +5,25 @@ use strum::FromRepr;
 use crate::block::block;
 use crate::header::Header;
 
-/// Capacity of per-wheel arrays.
+/// Capacity of per-wheel arrays of other blocks.
 pub const WHEELS: usize = 8;
 /// Capacity of the command vector.
-pub const COMMANDS: usize = 4;
+pub const COMMANDS: usize = 8;
+/// Capacity of measured channels.
+pub const CHANNELS: usize = 48;
 
 block! {
     /// One sensor frame. Written by sensor-sim or an external publisher, once per cycle.
-    pub struct SensorFrame, size 408 {
+    pub struct SensorFrame, size 576 {
         /// Common header; `t_schedule_ns` is when this cycle was due.
         pub header: Header,
         /// Identity of the run; a new value resets every filter.
         pub run_id: u64,
-        /// Which fields hold a measurement: bits of [`Valid`].
-        pub valid: u64,
+        /// Which command and channels the numbers mean: the hash of the robot's channel list. A
+        /// frame with another one is refused.
+        pub robot_hash: u64,
+        /// Bit i: `channel[i]` holds a measurement.
+        pub channel_valid: u64,
         /// `decision_seq` of the last [`crate::Action`] that the robot obeyed; 0 for none.
         pub action_seq: u64,
         /// Outcome of that action: an [`ActionOutcome`].
@@ -29,59 +34,18 @@ block! {
         pub pose_reset_count: u32,
         /// 1 while the robot holds itself stopped because it has no valid action.
         pub safe_stop: u32,
-        /// The command as executed; its meaning is given by the robot's description. Rover:
-        /// signed curvature 1/m (left +), speed m/s.
+        /// Bit i: `command[i]` is known.
+        pub command_valid: u32,
+        /// 1 if `planned_pose` is known.
+        pub planned_pose_valid: u32,
+        /// The command as executed; the robot's description gives its axes and units. Rover: signed
+        /// curvature 1/m (left +), speed m/s.
         pub command: [f64; COMMANDS],
-        /// Pose x m, y m, yaw rad (wrapped to ±π), in a continuous frame.
-        pub pose: [f64; 3],
-        /// Planned pose x m, y m, yaw rad, same frame as `pose`.
+        /// Measurements, in the order of the robot's channel list, in the units that it gives; 0
+        /// where nothing was measured.
+        pub channel: [f64; CHANNELS],
+        /// Planned pose x m, y m, yaw rad, in the frame of the pose's channels.
         pub planned_pose: [f64; 3],
-        /// Yaw rate, rad/s.
-        pub yaw_rate: f64,
-        /// Wheel rates, rad/s, in the order of the robot's description.
-        pub wheel_rate: [f64; WHEELS],
-        /// Steering angles, rad, in the order of the robot's description (same index as wheel).
-        pub steer: [f64; WHEELS],
-        /// Motor currents, A, in the order of the robot's description.
-        pub current: [f64; WHEELS],
-        /// Reserved, zero.
-        pub reserved: [f64; 5],
-    }
-}
-
-/// Bits of [`SensorFrame::valid`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Valid;
-
-impl Valid {
-    /// `command[0]`; the others follow.
-    pub const COMMAND: u64 = 1;
-    /// x, y and yaw of `pose`.
-    pub const POSE: u64 = 1 << 4;
-    /// `planned_pose`.
-    pub const PLANNED_POSE: u64 = 1 << 5;
-    /// `yaw_rate`.
-    pub const YAW_RATE: u64 = 1 << 6;
-
-    /// `command[i]`.
-    #[must_use]
-    pub const fn command(i: usize) -> u64 {
-        1 << i
-    }
-    /// `wheel_rate[i]`.
-    #[must_use]
-    pub const fn wheel_rate(i: usize) -> u64 {
-        1 << (8 + i)
-    }
-    /// `steer[i]`.
-    #[must_use]
-    pub const fn steer(i: usize) -> u64 {
-        1 << (16 + i)
-    }
-    /// `current[i]`.
-    #[must_use]
-    pub const fn current(i: usize) -> u64 {
-        1 << (24 + i)
     }
 }
 
@@ -133,9 +97,78 @@ pub enum ActionOutcome {
 }
 
 impl SensorFrame {
-    /// True if every bit of `mask` is set in `valid`.
+    /// The measurement of channel `i`; none if it is not marked as measured, or beyond capacity.
     #[must_use]
-    pub const fn has(&self, mask: u64) -> bool {
-        self.valid & mask == mask
+    pub const fn measured(&self, i: usize) -> Option<f64> {
+        if i < CHANNELS && self.channel_valid >> i & 1 == 1 {
+            Some(self.channel[i])
+        } else {
+            None
+        }
+    }
+
+    /// Axis `i` of the command; none if it is not marked as known, or beyond capacity.
+    #[must_use]
+    pub const fn commanded(&self, i: usize) -> Option<f64> {
+        if i < COMMANDS && self.command_valid >> i & 1 == 1 {
+            Some(self.command[i])
+        } else {
+            None
+        }
+    }
+
+    /// Writes channel `i` and marks it as measured; nothing happens beyond capacity.
+    pub const fn set_channel(&mut self, i: usize, value: f64) {
+        if i < CHANNELS {
+            self.channel[i] = value;
+            self.channel_valid |= 1 << i;
+        }
+    }
+
+    /// Writes axis `i` of the command and marks it as known; nothing happens beyond capacity.
+    pub const fn set_command(&mut self, i: usize, value: f64) {
+        if i < COMMANDS {
+            self.command[i] = value;
+            self.command_valid |= 1 << i;
+        }
+    }
+
+    /// The planned pose, if it is known.
+    #[must_use]
+    pub const fn planned(&self) -> Option<[f64; 3]> {
+        if self.planned_pose_valid == 1 {
+            Some(self.planned_pose)
+        } else {
+            None
+        }
+    }
+
+    /// Writes the planned pose and marks it as known.
+    pub const fn set_planned(&mut self, pose: [f64; 3]) {
+        self.planned_pose = pose;
+        self.planned_pose_valid = 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_is_marked_is_read_and_nothing_lies_beyond_capacity() {
+        let mut frame = SensorFrame::default();
+        frame.set_channel(47, 2.5);
+        frame.set_command(7, -1.0);
+        frame.set_channel(CHANNELS, 9.0);
+        frame.set_command(COMMANDS, 9.0);
+        assert_eq!(frame.channel_valid, 1 << 47);
+        assert_eq!(frame.command_valid, 1 << 7);
+        assert_eq!(frame.measured(47), Some(2.5));
+        assert_eq!(frame.commanded(7), Some(-1.0));
+        assert_eq!([frame.measured(0), frame.measured(CHANNELS)], [None; 2]);
+        assert_eq!([frame.commanded(0), frame.commanded(COMMANDS)], [None; 2]);
+        assert_eq!(frame.planned(), None);
+        frame.set_planned([1.0, 2.0, 3.0]);
+        assert_eq!(frame.planned(), Some([1.0, 2.0, 3.0]));
     }
 }

@@ -142,6 +142,12 @@ impl Domain {
         fs::write(self.types_file(), frame + &action)
     }
 
+    /// File that tells publishers which command and channels the graph's frames carry.
+    #[must_use]
+    pub fn channels_file(&self) -> PathBuf {
+        self.folder.join("channels")
+    }
+
     /// Sizes of the queues.
     #[must_use]
     pub const fn queues(&self) -> Queues {
@@ -211,6 +217,7 @@ impl Domain {
         let _ = fs::remove_dir_all(self.folder.join("t"));
         let _ = fs::remove_file(self.processes_file());
         let _ = fs::remove_file(self.types_file());
+        let _ = fs::remove_file(self.channels_file());
     }
 }
 
@@ -296,6 +303,7 @@ mod tests {
         let files = [
             domain.processes_file(),
             domain.types_file(),
+            domain.channels_file(),
             domain.failure_file(ServiceName::Detector),
         ];
         for (i, file) in files.iter().enumerate() {

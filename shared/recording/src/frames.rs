@@ -3,8 +3,9 @@
 //! CSV, plain or gzip: `run, t` (s), the axes of the robot's command by their names (rover:
 //! `cmd_curv` 1/m, left positive, and `cmd_speed` m/s), and what the robot's description says is
 //! measured: `x, y` (m), `yaw` (rad, wrapped), `enc_<WHEEL>` (rad/s) for every wheel,
-//! `steer_<WHEEL>` (rad) for every steered wheel, `yaw_rate` (rad/s), `current_<WHEEL>` (A). Of a
-//! robot with fault models the last two are read where they are there, whatever it says.
+//! `steer_<WHEEL>` (rad) for every steered wheel, `yaw_rate` (rad/s), `current_<WHEEL>` (A), and
+//! the description's `[[channel]]` tables by their names. Of a robot with fault models gyro and
+//! currents are read where they are there, whatever it says.
 //! Columns are found by name, in any order; others are ignored. The rows of a run are contiguous
 //! and in order of time. Several runs may follow each other.
 
@@ -12,8 +13,9 @@ use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::path::Path;
 
-use vigil_blocks::{COMMANDS, SensorFrame, Valid, WHEELS};
-use vigil_robot::Description;
+use vigil_blocks::{COMMANDS, SensorFrame};
+use vigil_robot::channel::{Role, channels};
+use vigil_robot::{ChannelMap, Description};
 
 pub use crate::table::TableError as FramesError;
 use crate::table::{Table, wrong_row};
@@ -43,90 +45,79 @@ pub struct Run {
 pub enum Field {
     /// An axis of the command, in its own unit.
     Command(usize),
-    /// x m, y m or yaw rad.
-    Pose(usize),
-    /// Rate of a wheel, rad/s.
-    WheelRate(usize),
-    /// Angle of a steered wheel, rad.
-    Steer(usize),
-    /// Yaw rate, rad/s.
-    YawRate,
-    /// Motor current of a wheel, A.
-    Current(usize),
+    /// A channel, by its place in the robot's channel list.
+    Channel {
+        /// The place.
+        place: usize,
+        /// What it measures.
+        role: Role,
+        /// True if a file may lack its column.
+        is_optional: bool,
+    },
 }
 
 impl Field {
     /// Its value in a frame; `None` if it is not marked as measured.
     #[must_use]
     pub const fn get(self, frame: &SensorFrame) -> Option<f64> {
-        let (value, bit) = match self {
-            Self::Command(i) => (frame.command[i], Valid::command(i)),
-            Self::Pose(i) => (frame.pose[i], Valid::POSE),
-            Self::WheelRate(i) => (frame.wheel_rate[i], Valid::wheel_rate(i)),
-            Self::Steer(i) => (frame.steer[i], Valid::steer(i)),
-            Self::YawRate => (frame.yaw_rate, Valid::YAW_RATE),
-            Self::Current(i) => (frame.current[i], Valid::current(i)),
-        };
-        if frame.has(bit) { Some(value) } else { None }
+        match self {
+            Self::Command(i) => frame.commanded(i),
+            Self::Channel { place, .. } => frame.measured(place),
+        }
     }
 
     /// Writes a value to its place in a frame, and marks it as measured.
-    pub fn put(self, value: f64, frame: &mut SensorFrame) {
-        let (place, bit) = match self {
-            Self::Command(i) => (&mut frame.command[i], Valid::command(i)),
-            Self::Pose(i) => (&mut frame.pose[i], Valid::POSE),
-            Self::WheelRate(i) => (&mut frame.wheel_rate[i], Valid::wheel_rate(i)),
-            Self::Steer(i) => (&mut frame.steer[i], Valid::steer(i)),
-            Self::YawRate => (&mut frame.yaw_rate, Valid::YAW_RATE),
-            Self::Current(i) => (&mut frame.current[i], Valid::current(i)),
-        };
-        *place = value;
-        frame.valid |= bit;
+    pub const fn put(self, value: f64, frame: &mut SensorFrame) {
+        match self {
+            Self::Command(i) => frame.set_command(i, value),
+            Self::Channel { place, .. } => frame.set_channel(place, value),
+        }
+    }
+
+    /// True if a file may lack its column.
+    #[must_use]
+    pub const fn is_optional(self) -> bool {
+        matches!(
+            self,
+            Self::Channel {
+                is_optional: true,
+                ..
+            }
+        )
+    }
+
+    const fn is_angle(self) -> bool {
+        matches!(
+            self,
+            Self::Channel {
+                role: Role::PoseYaw | Role::SteeringAngle,
+                ..
+            }
+        )
     }
 }
 
-/// Names and contents of the columns of a robot's frames, after `run` and `t`.
+/// Names and contents of the columns of a robot's frames, after `run` and `t`: command, then
+/// channels.
 #[must_use]
 pub fn fields(robot: &Description) -> Vec<(String, Field)> {
-    let mut out = Vec::new();
-    let measured = &robot.measured;
-    if measured.pose {
-        let names = ["x", "y", "yaw"].into_iter().enumerate();
-        out.extend(names.map(|(i, name)| (name.to_owned(), Field::Pose(i))));
-    }
     let axes = robot.command.iter().enumerate().take(COMMANDS);
-    out.extend(axes.map(|(i, axis)| (axis.name.clone(), Field::Command(i))));
-    let wheels = || robot.wheels.iter().enumerate().take(WHEELS);
-    if measured.wheel_rates {
-        out.extend(wheels().map(|(i, w)| (format!("enc_{}", w.name), Field::WheelRate(i))));
-    }
-    if measured.steer {
-        let steered = wheels().filter(|(_, w)| w.steered);
-        out.extend(steered.map(|(i, w)| (format!("steer_{}", w.name), Field::Steer(i))));
-    }
-    if measured.yaw_rate {
-        out.push(("yaw_rate".to_owned(), Field::YawRate));
-    }
-    if measured.currents {
-        out.extend(wheels().map(|(i, w)| (format!("current_{}", w.name), Field::Current(i))));
-    }
-    out
-}
-
-/// Yaw rate and motor currents, which are optional for a robot with fault models.
-#[must_use]
-pub fn further(robot: &Description) -> Vec<(String, Field)> {
-    if !robot.has_fault_models() {
-        return Vec::new();
-    }
-    let wheels = robot.wheels.iter().enumerate().take(WHEELS);
-    let currents = wheels.map(|(i, w)| (format!("current_{}", w.name), Field::Current(i)));
-    let gyro = ("yaw_rate".to_owned(), Field::YawRate);
-    std::iter::once(gyro).chain(currents).collect()
+    let axes = axes.map(|(i, axis)| (axis.name.clone(), Field::Command(i)));
+    let channels = channels(robot).into_iter().enumerate();
+    let channels = channels.map(|(place, channel)| {
+        let field = Field::Channel {
+            place,
+            role: channel.role,
+            is_optional: channel.is_optional,
+        };
+        (channel.name, field)
+    });
+    axes.chain(channels).collect()
 }
 
 /// Positions of the columns in a table.
 struct Columns {
+    map: ChannelMap,
     run: usize,
     t: usize,
     fields: Vec<(usize, String, Field)>,
@@ -134,7 +125,9 @@ struct Columns {
 
 impl Columns {
     fn find(table: &Table, robot: &Description) -> Result<Self, FramesError> {
-        let fields = fields(robot);
+        let (optional, fields): (Vec<_>, Vec<_>) = fields(robot)
+            .into_iter()
+            .partition(|(_, field)| field.is_optional());
         let mut names = vec!["run".to_owned(), "t".to_owned()];
         names.extend(fields.iter().map(|(name, _)| name.clone()));
         let at = table.require(&names)?;
@@ -144,13 +137,14 @@ impl Columns {
         let fields = fields.into_iter().zip(at);
         let fields = fields.map(|((name, field), &at)| (at, name, field));
         let mut fields: Vec<(usize, String, Field)> = fields.collect();
-        for (name, field) in further(robot) {
-            let is_new = fields.iter().all(|(_, known, _)| *known != name);
-            if let (true, Some(at)) = (is_new, table.position(&name)) {
+        for (name, field) in optional {
+            if let Some(at) = table.position(&name) {
                 fields.push((at, name, field));
             }
         }
+        let map = ChannelMap::new(robot);
         Ok(Self {
+            map,
             run: *run,
             t: *t,
             fields,
@@ -160,7 +154,7 @@ impl Columns {
     fn frame(&self, table: &Table) -> Result<(u32, SensorFrame), FramesError> {
         let mut frame = SensorFrame::default();
         let id = table.whole(self.run)?;
-        frame.run_id = u64::from(id) + 1;
+        (frame.run_id, frame.robot_hash) = (u64::from(id) + 1, self.map.hash());
         let t_s = table.number(self.t)?;
         if !(0.0..=1e9).contains(&t_s) {
             return Err(table.wrong(format!("t is {t_s}, allowed is 0 to 1e9 s")));
@@ -169,7 +163,7 @@ impl Columns {
         for (column, name, field) in &self.fields {
             let value = table.number(*column)?;
             field.put(value, &mut frame);
-            if matches!(field, Field::Pose(2) | Field::Steer(_)) {
+            if field.is_angle() {
                 angle(table, name, value)?;
             }
         }
@@ -214,7 +208,7 @@ pub fn read(path: &Path, robot: &Description) -> Result<Vec<Run>, FramesError> {
             });
         }
         let Some(run) = runs.last_mut() else { continue };
-        follows(&table, run, &frame, robot)?;
+        follows(&table, run, &frame, (robot, &columns.map))?;
         frame.header.seq = run.frames.len() as u64;
         run.frames.push(frame);
     }
@@ -286,7 +280,7 @@ fn follows(
     table: &Table,
     run: &Run,
     frame: &SensorFrame,
-    robot: &Description,
+    (robot, map): (&Description, &ChannelMap),
 ) -> Result<(), FramesError> {
     let Some(before) = run.frames.last() else {
         return Ok(());
@@ -307,7 +301,10 @@ fn follows(
         );
         return Err(table.wrong(format!("{message}: start a new run; or is t in ms?")));
     }
-    let moved = (frame.pose[0] - before.pose[0]).hypot(frame.pose[1] - before.pose[1]);
+    let Some(([x, y, _], [last_x, last_y, _])) = map.pose(frame).zip(map.pose(before)) else {
+        return Ok(());
+    };
+    let moved = (x - last_x).hypot(y - last_y);
     if moved > JUMP_M_MAX {
         let mut message = format!("the pose jumps by {moved:.2} m; allowed are {JUMP_M_MAX} m");
         let [forward, left, _] = robot.twist(&before.command);

@@ -8,7 +8,6 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use proptest::prelude::*;
 use tempfile::NamedTempFile;
-use vigil_blocks::Valid;
 use vigil_recording::{frames, labels};
 use vigil_robot::Description;
 
@@ -75,14 +74,14 @@ fn columns_are_found_by_name_and_only_present_channels_are_valid() {
         (frame.run_id, frame.header.seq, frame.header.t_capture_ns),
         (42, 1, 100_000_000)
     );
-    assert_eq!(frame.pose, [1.5, 2.0, -3.1]);
-    assert_eq!(frame.command, [-0.5, 0.2, 0.0, 0.0]);
-    assert_eq!(frame.wheel_rate, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.0, 0.0]);
-    assert_eq!(frame.steer, [0.1, 0.0, 0.2, 0.3, 0.0, 0.4, 0.0, 0.0]);
-    let mut valid = Valid::POSE | Valid::command(0) | Valid::command(1);
-    valid |= (0..6).map(Valid::wheel_rate).sum::<u64>();
-    valid |= [0, 2, 3, 5].map(Valid::steer).iter().sum::<u64>();
-    assert_eq!(frame.valid, valid);
+    assert_eq!(frame.command[..3], [-0.5, 0.2, 0.0]);
+    assert_eq!(frame.command_valid, 0b11);
+    // Pose, wheel rates, steering angles; the columns of gyro and currents are not there.
+    let channels = [
+        1.5, 2.0, -3.1, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.1, 0.2, 0.3, 0.4, 0.0,
+    ];
+    assert_eq!(frame.channel[..14], channels);
+    assert_eq!(frame.channel_valid, (1 << 13) - 1);
 }
 
 #[test]
@@ -136,8 +135,8 @@ fn malformed_tables_are_refused_with_row_column_and_what_is_allowed() {
     let cases = [
         (
             "run,t,x,y,enc_LF,cmd_curv\n".to_owned(),
-            "missing columns yaw, cmd_speed, enc_LM, enc_LR, enc_RF, enc_RM, enc_RR, steer_LF, \
-             steer_LR, steer_RF, steer_RR; expected are run, t, x, y, yaw, cmd_curv, cmd_speed, \
+            "missing columns cmd_speed, yaw, enc_LM, enc_LR, enc_RF, enc_RM, enc_RR, steer_LF, \
+             steer_LR, steer_RF, steer_RR; expected are run, t, cmd_curv, cmd_speed, x, y, yaw, \
              enc_LF, enc_LM, enc_LR, enc_RF, enc_RM, enc_RR, steer_LF, steer_LR, steer_RF, \
              steer_RR",
         ),
@@ -263,8 +262,8 @@ fn the_rover_data_is_read_whole() {
     assert_eq!(of_runs, ids(labels.iter().map(|label| label.run).collect()));
     let first = &runs[0].frames[0];
     assert_eq!(
-        (first.header.t_capture_ns, first.pose),
-        (50_000_000, [-0.0074, 0.0014, -2.3416])
+        (first.header.t_capture_ns, &first.channel[..3]),
+        (50_000_000, [-0.0074, 0.0014, -2.3416].as_slice())
     );
     assert_eq!(labels.iter().filter(|label| label.is_nominal()).count(), 60);
 }
@@ -297,8 +296,8 @@ proptest! {
         match frames::read(file.path(), &robot()) {
             Ok(runs) => {
                 let frame = &runs[0].frames[0];
-                let values = frame.pose.iter().chain(&frame.wheel_rate).chain(&frame.steer);
-                prop_assert!(values.chain(&frame.command).all(|value| value.is_finite()));
+                let mut values = frame.channel.iter().chain(&frame.command);
+                prop_assert!(values.all(|value| value.is_finite()));
             }
             Err(error) => prop_assert!(error.to_string().contains("row 1: ")),
         }
@@ -322,7 +321,7 @@ proptest! {
         prop_assert_eq!(&plain, &compressed);
         prop_assert_eq!(plain[0].frames.len(), poses.len());
         for (frame, (x, yaw)) in plain[0].frames.iter().zip(&poses) {
-            prop_assert_eq!(frame.pose, [*x, 0.5, *yaw]);
+            prop_assert_eq!(&frame.channel[..3], [*x, 0.5, *yaw]);
         }
     }
 }

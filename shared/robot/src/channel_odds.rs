@@ -1,21 +1,22 @@
 //! Log-odds of a fault by channel, after and before the last observation.
 
-use vigil_blocks::CHANNELS;
 use vigil_inference::logspace::{log_add, log_sum_exp};
 
-/// Sums over all tests of a channel ([`vigil_blocks::Channel`]): a fault shows in one of them.
+use crate::slot::SLOTS;
+
+/// Sums over all tests of a channel ([`crate::slot::Slot`]): a fault shows in one of them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ChannelOdds {
-    now: [f64; CHANNELS],
-    before: [f64; CHANNELS],
+    now: [f64; SLOTS],
+    before: [f64; SLOTS],
 }
 
 impl ChannelOdds {
     /// No test shows a fault.
     pub(crate) const fn none() -> Self {
         Self {
-            now: [f64::NEG_INFINITY; CHANNELS],
-            before: [f64::NEG_INFINITY; CHANNELS],
+            now: [f64::NEG_INFINITY; SLOTS],
+            before: [f64::NEG_INFINITY; SLOTS],
         }
     }
 
@@ -26,12 +27,12 @@ impl ChannelOdds {
     }
 
     /// Log-odds by channel.
-    pub(crate) const fn by_channel(&self) -> [f64; CHANNELS] {
+    pub(crate) const fn by_channel(&self) -> [f64; SLOTS] {
         self.now
     }
 
     /// Evidence of the observation in each channel, for a fault that was there before and after.
-    pub(crate) fn gains(&self) -> [f64; CHANNELS] {
+    pub(crate) fn gains(&self) -> [f64; SLOTS] {
         std::array::from_fn(|channel| finite(self.now[channel] - self.before[channel]))
     }
 
@@ -53,7 +54,7 @@ mod tests {
     #[test]
     fn a_gain_is_of_its_channel_and_none_where_nothing_shows() {
         let mut odds = ChannelOdds::none();
-        assert_eq!((odds.gains(), odds.gain()), ([0.0; CHANNELS], 0.0));
+        assert_eq!((odds.gains(), odds.gain()), ([0.0; SLOTS], 0.0));
         odds.enter(3, 2.0, 1.0);
         odds.enter(5, -1.0, -0.5);
         let gains = odds.gains();

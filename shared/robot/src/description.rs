@@ -6,6 +6,7 @@ use vigil_blocks::WHEELS;
 use vigil_inference::track::MotionNoise;
 
 use crate::body::Body;
+use crate::channel_table::FurtherChannel;
 use crate::chassis::{Ground, Motor, RockerBogie};
 use crate::fault_prior::FaultPrior;
 use crate::tolerance::Tolerance;
@@ -153,6 +154,9 @@ pub struct Description {
     /// Measured channels; left out: those of the rover.
     #[serde(default)]
     pub measured: MeasuredChannels,
+    /// Channels beside the standard ones.
+    #[serde(default)]
+    pub channel: Vec<FurtherChannel>,
     /// Order of the polynomials of the command in a nominal model.
     #[serde(default = "four")]
     #[schemars(range(min = 1, max = 4))]

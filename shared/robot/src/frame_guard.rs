@@ -10,9 +10,11 @@
 
 use std::f64::consts::PI;
 
-use vigil_blocks::{ActionOutcome, COMMANDS, Rejection, SensorFrame, Valid, WHEELS};
+use vigil_blocks::{ActionOutcome, CHANNELS, COMMANDS, Rejection, SensorFrame};
 
-use crate::description::Description;
+use crate::channel::{Channel, Role, channels};
+use crate::channel_map::ChannelMap;
+use crate::description::{Description, Limits};
 
 /// Largest coordinate of a pose, m. Chosen: a thousand kilometres, beyond the map of any robot.
 pub const POSITION_MAX_M: f64 = 1e6;
@@ -40,10 +42,11 @@ pub const PAUSE_MAX_NS: u64 = 3_600_000_000_000;
 /// Checks the frames of one robot.
 #[derive(Debug, Clone)]
 pub struct FrameGuard {
+    map: ChannelMap,
     command_max: [f64; COMMANDS],
+    /// By channel; beyond the robot's channels infinite.
+    channel_max: [f64; CHANNELS],
     speed_max_m_s: f64,
-    yaw_rate_max_rad_s: f64,
-    wheel_rate_max_rad_s: f64,
     /// The last frame with a pose.
     last: Option<Position>,
     captured: Option<Capture>,
@@ -90,12 +93,15 @@ impl FrameGuard {
         for (max, axis) in command_max.iter_mut().zip(&robot.command) {
             *max = BEYOND_LIMITS * axis.limit;
         }
-        let limits = &robot.limits;
+        let mut channel_max = [f64::INFINITY; CHANNELS];
+        for (max, channel) in channel_max.iter_mut().zip(channels(robot)) {
+            *max = largest(&channel, &robot.limits);
+        }
         Self {
+            map: ChannelMap::new(robot),
             command_max,
-            speed_max_m_s: BEYOND_LIMITS * limits.speed_m_s,
-            yaw_rate_max_rad_s: BEYOND_LIMITS * limits.yaw_rate_rad_s,
-            wheel_rate_max_rad_s: BEYOND_LIMITS * limits.wheel_rate_rad_s,
+            channel_max,
+            speed_max_m_s: BEYOND_LIMITS * robot.limits.speed_m_s,
             last: None,
             captured: None,
         }
@@ -105,9 +111,12 @@ impl FrameGuard {
     /// be within bounds.
     ///
     /// # Errors
-    /// [`Rejection::NotFinite`], [`Rejection::OutOfRange`], [`Rejection::Clock`] or
-    /// [`Rejection::Jump`].
+    /// [`Rejection::Robot`], [`Rejection::NotFinite`], [`Rejection::OutOfRange`],
+    /// [`Rejection::Clock`] or [`Rejection::Jump`].
     pub fn check(&mut self, frame: &SensorFrame) -> Result<(), Rejection> {
+        if frame.robot_hash != self.map.hash() {
+            return Err(Rejection::Robot);
+        }
         if !is_finite(frame) {
             return Err(Rejection::NotFinite);
         }
@@ -117,15 +126,15 @@ impl FrameGuard {
         if !self.follows(frame) {
             return Err(Rejection::Clock);
         }
-        if !frame.has(Valid::POSE) {
+        let Some([x_m, y_m, _]) = self.map.pose(frame) else {
             return Ok(());
-        }
+        };
         let position = Position {
             run: RunKey::new(frame),
             pose_reset_count: frame.pose_reset_count,
             t_ns: frame.header.t_capture_ns,
-            x_m: frame.pose[0],
-            y_m: frame.pose[1],
+            x_m,
+            y_m,
         };
         let has_jumped = self.last.is_some_and(|last| self.jumps(&last, &position));
         // The next frame is measured by this one, so that one jump is one rejection.
@@ -161,45 +170,39 @@ impl FrameGuard {
     }
 
     fn is_in_range(&self, frame: &SensorFrame) -> bool {
-        let within = |valid: u64, value: f64, max: f64| !frame.has(valid) || value.abs() <= max;
-        let pose = |valid: u64, [x, y, yaw]: [f64; 3]| {
-            within(valid, x, POSITION_MAX_M)
-                && within(valid, y, POSITION_MAX_M)
-                && within(valid, yaw, YAW_MAX_RAD)
-        };
-        let wheel = |i: usize| {
-            within(
-                Valid::wheel_rate(i),
-                frame.wheel_rate[i],
-                self.wheel_rate_max_rad_s,
-            ) && within(Valid::steer(i), frame.steer[i], STEER_MAX_RAD)
-                && within(Valid::current(i), frame.current[i], CURRENT_MAX_A)
-        };
-        let command = |i: usize| within(Valid::command(i), frame.command[i], self.command_max[i]);
-        (0..COMMANDS).all(command)
-            && (0..WHEELS).all(wheel)
-            && pose(Valid::POSE, frame.pose)
-            && pose(Valid::PLANNED_POSE, frame.planned_pose)
-            && within(Valid::YAW_RATE, frame.yaw_rate, self.yaw_rate_max_rad_s)
+        let within = |value: Option<f64>, max: f64| value.is_none_or(|value| value.abs() <= max);
+        let planned = frame
+            .planned()
+            .map(|[x, y, yaw]| x.abs().max(y.abs()) <= POSITION_MAX_M && yaw.abs() <= YAW_MAX_RAD);
+        (0..COMMANDS).all(|i| within(frame.commanded(i), self.command_max[i]))
+            && (0..CHANNELS).all(|i| within(frame.measured(i), self.channel_max[i]))
+            && planned.unwrap_or(true)
             && ActionOutcome::from_repr(frame.action_outcome).is_some()
             && frame.safe_stop <= 1
+            && frame.planned_pose_valid <= 1
+            && frame.channel_valid & !self.map.channel_bits() == 0
+    }
+}
+
+/// Largest magnitude of a channel that a robot of these limits may report.
+fn largest(channel: &Channel, limits: &Limits) -> f64 {
+    if let Some(limit) = channel.limit {
+        return BEYOND_LIMITS * limit;
+    }
+    match channel.role {
+        Role::PoseX | Role::PoseY => POSITION_MAX_M,
+        Role::PoseYaw => YAW_MAX_RAD,
+        Role::BodyRate => BEYOND_LIMITS * limits.yaw_rate_rad_s,
+        Role::WheelRate => BEYOND_LIMITS * limits.wheel_rate_rad_s,
+        Role::SteeringAngle => STEER_MAX_RAD,
+        Role::Current => CURRENT_MAX_A,
+        _ => f64::MAX,
     }
 }
 
 fn is_finite(frame: &SensorFrame) -> bool {
-    let groups: [&[f64]; 8] = [
-        &frame.command,
-        &frame.pose,
-        &frame.planned_pose,
-        &[frame.yaw_rate],
-        &frame.wheel_rate,
-        &frame.steer,
-        &frame.current,
-        &frame.reserved,
-    ];
-    groups
-        .iter()
-        .all(|group| group.iter().all(|v| v.is_finite()))
+    let mut values = frame.command.iter().chain(&frame.channel);
+    values.all(|value| value.is_finite()) && frame.planned_pose.iter().all(|v| v.is_finite())
 }
 
 #[cfg(test)]
@@ -209,14 +212,9 @@ mod tests {
     #[test]
     #[should_panic(expected = "the frame guard passes only positions that are finite")]
     fn a_position_that_passed_without_the_check_would_end_the_process() {
-        let guard = FrameGuard {
-            command_max: [0.0; COMMANDS],
-            speed_max_m_s: 1.0,
-            yaw_rate_max_rad_s: 1.0,
-            wheel_rate_max_rad_s: 1.0,
-            last: None,
-            captured: None,
-        };
+        let text = include_str!("../../../config/robots/rover.toml");
+        let robot: Description = toml::from_str(text).unwrap_or_else(|error| panic!("{error}"));
+        let guard = FrameGuard::new(&robot);
         let position = Position {
             run: RunKey::new(&SensorFrame::default()),
             pose_reset_count: 0,

@@ -2,7 +2,10 @@
 
 pub mod alarm;
 mod body;
+pub mod channel;
+mod channel_map;
 mod channel_odds;
+pub mod channel_table;
 pub mod chassis;
 pub mod description;
 pub mod disturbance;
@@ -20,12 +23,14 @@ pub mod period;
 pub mod publisher_check;
 mod robot_model;
 pub mod slip;
+pub mod slot;
 mod suspects;
 pub mod tolerance;
 pub mod tree;
 
 pub use alarm::{Alarm, AlarmError};
 pub use body::Body;
+pub use channel_map::ChannelMap;
 pub use description::{Description, MeasuredChannels};
 pub use disturbance::Disturbance;
 pub use disturbance_kind::DisturbanceKind;

@@ -79,23 +79,27 @@ impl ImportedLog {
     /// file, but for its rounding and its checks.
     #[must_use]
     pub fn frames(&self, robot: &Description) -> Vec<Run> {
-        let fields = fields(robot);
+        let mut fields = fields(robot);
+        fields.retain(|(name, _)| self.columns.contains(name));
+        let robot_hash = vigil_robot::channel::hash(robot);
         let run = |run: &ImportedRun| Run {
             id: run.id,
             frames: run
                 .rows
                 .iter()
                 .enumerate()
-                .map(|(seq, row)| frame(&fields, run.id, seq, row))
+                .map(|(seq, row)| frame(&fields, [u64::from(run.id) + 1, robot_hash], seq, row))
                 .collect(),
         };
         self.runs.iter().map(run).collect()
     }
 }
 
-fn frame(fields: &[(String, Field)], run: u32, seq: usize, row: &[f64]) -> SensorFrame {
+fn frame(fields: &[(String, Field)], identity: [u64; 2], seq: usize, row: &[f64]) -> SensorFrame {
+    let [run_id, robot_hash] = identity;
     let mut frame = SensorFrame {
-        run_id: u64::from(run) + 1,
+        run_id,
+        robot_hash,
         ..SensorFrame::default()
     };
     frame.header.seq = seq as u64;
@@ -156,7 +160,12 @@ pub fn import(
     robot: &Description,
     folder: &Path,
 ) -> Result<ImportedLog, ImportError> {
-    let columns: Vec<String> = fields(robot).into_iter().map(|(name, _)| name).collect();
+    // A column that frames may lack is there if the log describes it.
+    let is_wanted = |(name, field): &(String, Field)| {
+        !field.is_optional() || log.channel.iter().any(|channel| channel.name == *name)
+    };
+    let columns = fields(robot).into_iter().filter(is_wanted);
+    let columns: Vec<String> = columns.map(|(name, _)| name).collect();
     log.check(&columns)?;
     let found = find::runs(folder, &log.runs)?;
     let (mut runs, mut delays) = (Vec::new(), Vec::new());

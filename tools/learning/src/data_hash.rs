@@ -1,11 +1,11 @@
 //! One number by which to know recorded frames again.
 
-use vigil_blocks::{SensorFrame, Valid, WHEELS, fnv1a};
+use vigil_blocks::{CHANNELS, COMMANDS, SensorFrame, fnv1a};
 
 use vigil_recording::frames::Run;
 
-/// Hash of what the frames up to `until_s` hold: ids of the runs, times, poses, commands, wheel
-/// rates, and yaw rates and motor currents where they were measured.
+/// Hash of what the frames up to `until_s` hold: ids of the runs, times, commands and channels, as
+/// far as they were measured.
 #[must_use]
 pub fn data_hash(runs: &[&Run], until_s: f64) -> String {
     let mut hash = fnv1a::BASIS;
@@ -14,16 +14,9 @@ pub fn data_hash(runs: &[&Run], until_s: f64) -> String {
         let until = |frame: &&SensorFrame| frame.header.t_capture_ns as f64 * 1e-9 <= until_s;
         for frame in run.frames.iter().take_while(until) {
             hash = fnv1a::hash_u64(hash, frame.header.t_capture_ns);
-            let values = frame
-                .pose
-                .iter()
-                .chain(&frame.command)
-                .chain(&frame.wheel_rate);
-            let yaw_rate = frame.has(Valid::YAW_RATE).then_some(&frame.yaw_rate);
-            let has_current = |&i: &usize| frame.has(Valid::current(i));
-            let currents = (0..WHEELS).filter(has_current);
-            let currents = currents.filter_map(|i| frame.current.get(i));
-            for value in values.chain(yaw_rate).chain(currents) {
+            let command = (0..COMMANDS).filter_map(|i| frame.commanded(i));
+            let channels = (0..CHANNELS).filter_map(|i| frame.measured(i));
+            for value in command.chain(channels) {
                 hash = fnv1a::hash_u64(hash, value.to_bits());
             }
         }
@@ -51,22 +44,18 @@ mod tests {
         let hash = |run: &Run, until_s| data_hash(&[run], until_s);
         let plain = hash(&run(|_| ()), f64::INFINITY);
         let late = |frame: &mut SensorFrame| {
-            frame.pose[0] = if frame.header.t_capture_ns > 2_000_000_000 {
-                1.0
-            } else {
-                0.0
-            };
+            let is_late = frame.header.t_capture_ns > 2_000_000_000;
+            frame.set_channel(0, if is_late { 1.0 } else { 0.0 });
         };
         assert_ne!(hash(&run(late), f64::INFINITY), plain);
-        assert_eq!(hash(&run(late), 2.5), hash(&run(|_| ()), 2.5));
+        let early = run(|frame| frame.set_channel(0, 0.0));
+        assert_eq!(hash(&run(late), 2.5), hash(&early, 2.5));
         assert_ne!(hash(&run(|_| ()), 2.5), plain);
-        let unmeasured = run(|frame| (frame.yaw_rate, frame.current[1]) = (0.3, 2.0));
+        let unmeasured = run(|frame| (frame.channel[13], frame.command[7]) = (0.3, 2.0));
         assert_eq!(hash(&unmeasured, f64::INFINITY), plain);
-        for bit in [Valid::YAW_RATE, Valid::current(1)] {
-            let measured = run(|frame| {
-                (frame.yaw_rate, frame.current[1], frame.valid) = (0.3, 2.0, bit);
-            });
-            assert_ne!(hash(&measured, f64::INFINITY), plain);
-        }
+        let measured = run(|frame| frame.set_channel(13, 0.3));
+        assert_ne!(hash(&measured, f64::INFINITY), plain);
+        let commanded = run(|frame| frame.set_command(7, 2.0));
+        assert_ne!(hash(&commanded, f64::INFINITY), plain);
     }
 }

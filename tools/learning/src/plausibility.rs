@@ -8,6 +8,7 @@
 use vigil_blocks::SensorFrame;
 use vigil_recording::frames::{Field, Run, fields};
 use vigil_robot::Description;
+use vigil_robot::channel::Role;
 use vigil_robot::description::Kinematics;
 use vigil_robot::publisher_check::{FindingKind, PAUSE_S, PublisherCheck, YAW_RATE_UNITS};
 
@@ -203,12 +204,18 @@ fn constant_channel(frames: &[&SensorFrame], robot: &Description) -> Option<Stri
             continue;
         };
         match field {
-            Field::Pose(2) if turns => {
+            Field::Channel {
+                role: Role::PoseYaw,
+                ..
+            } if turns => {
                 return Some(format!(
                     "yaw is {value} throughout, though a turn is commanded"
                 ));
             }
-            Field::WheelRate(_) => still_wheels.push(format!(
+            Field::Channel {
+                role: Role::WheelRate,
+                ..
+            } => still_wheels.push(format!(
                 "{name} is {value} throughout, though motion is commanded"
             )),
             _ => {}

@@ -7,6 +7,7 @@ mod config;
 mod findings;
 mod inject;
 mod laboratory;
+mod print_channels;
 mod print_types;
 mod publisher;
 
@@ -32,6 +33,8 @@ enum Command {
     CheckPublisher(check_publisher::Args),
     Config(config::Args),
     Inject(inject::Args),
+    #[command(name = "channels")]
+    PrintChannels(print_channels::Args),
     #[command(name = "types")]
     PrintTypes(print_types::Args),
     /// A command of the laboratory.
@@ -45,6 +48,7 @@ fn main() -> ExitCode {
         Command::CheckPublisher(args) => check_publisher::run(&args),
         Command::Config(args) => config::run(&args),
         Command::Inject(args) => inject::run(&args),
+        Command::PrintChannels(args) => print_channels::run(&args),
         Command::PrintTypes(args) => print_types::run(&args),
         Command::Laboratory(words) => laboratory::run(&words),
     })

@@ -1,6 +1,7 @@
 //! From requested actions to commands.
 
-use vigil_blocks::{ActionOutcome, RecoveryKind, SensorFrame, Valid};
+use vigil_blocks::{ActionOutcome, RecoveryKind, SensorFrame};
+use vigil_robot::ChannelMap;
 use vigil_setup::graph_file::Navigation;
 
 use super::faults::NavigationFaults;
@@ -42,6 +43,7 @@ pub enum NavigatorEvent {
 /// The robot's navigation, and the world around it.
 #[derive(Debug, Clone)]
 pub struct Navigator {
+    channels: ChannelMap,
     pub(super) settings: Navigation,
     pub(super) map: Map,
     pub(super) faults: NavigationFaults,
@@ -79,11 +81,12 @@ pub struct Navigator {
 }
 
 impl Navigator {
-    /// For a checked configuration.
+    /// For a checked configuration, with frames of this channel map.
     #[must_use]
-    pub fn new(settings: &Navigation) -> Self {
+    pub fn new(settings: &Navigation, channels: ChannelMap) -> Self {
         let other = &settings.alternative;
         Self {
+            channels,
             map: Map::new(settings),
             faults: NavigationFaults::new(&settings.trouble),
             path: Path::new(&settings.path),
@@ -148,21 +151,21 @@ impl Navigator {
     /// Writes pose, planned pose, outcome and symptoms into a measured frame, and takes its own
     /// pose from it.
     pub fn report(&mut self, frame: &mut SensorFrame) {
-        if frame.has(Valid::POSE) {
-            frame.pose = self.faults.to_believed(frame.pose);
-            self.pose = frame.pose;
+        if let Some(pose) = self.channels.pose(frame) {
+            self.pose = self.faults.to_believed(pose);
+            self.channels.set_pose(frame, self.pose);
             if std::mem::take(&mut self.restarts) {
                 self.restart();
             }
         }
-        frame.planned_pose = match self.task {
+        let planned = match self.task {
             // A manoeuvre away from the path is its own plan.
             Task::Back { .. } => self.pose,
             _ => self
                 .path
                 .beside(self.planned_m, self.lane.at(self.planned_m)),
         };
-        frame.valid |= Valid::PLANNED_POSE;
+        frame.set_planned(planned);
         frame.pose_reset_count = self.resets;
         frame.action_outcome = self.outcome as u32;
         frame.symptoms |= self.symptoms;

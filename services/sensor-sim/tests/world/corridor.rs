@@ -1,6 +1,7 @@
 //! The robot on its path: each request, what comes of it, and that nothing is driven through.
 
 use vigil_blocks::{Action, ActionOutcome, RecoveryKind, SensorFrame, Symptoms};
+use vigil_robot::ChannelMap;
 use vigil_sensor_sim::{ActionGate, Navigator, NavigatorEvent, Simulation, World};
 use vigil_setup::graph_file::{Navigation, Obstacle, Trouble, TroubleKind};
 
@@ -44,7 +45,7 @@ struct Robot {
 impl Robot {
     fn new(settings: Navigation) -> Self {
         let world = World::new(&robot(), &even_soil(), &[], 100.0, 1).unwrap();
-        let navigator = Navigator::new(&settings);
+        let navigator = Navigator::new(&settings, ChannelMap::new(&robot()));
         let gate = ActionGate::new(&robot().limits);
         Self {
             simulation: Simulation::new(world, gate, Some(navigator)),
@@ -93,7 +94,7 @@ impl Robot {
 
     /// Distance of measured and planned pose.
     fn off_plan_m(&self) -> f64 {
-        let [x, y, _] = self.frame.pose;
+        let [x, y] = [self.frame.channel[0], self.frame.channel[1]];
         let [planned_x, planned_y, _] = self.frame.planned_pose;
         (x - planned_x).hypot(y - planned_y)
     }
@@ -262,7 +263,7 @@ fn a_jump_of_the_believed_pose_lasts_until_the_robot_finds_its_place() {
     assert!(robot.off_plan_m() < 0.2);
     robot.obey(GoOn, 0.2);
     let [x, y, yaw] = robot.place();
-    let seen = robot.frame.pose;
+    let seen = robot.frame.channel;
     let off = [
         seen[0] - x - jump[0],
         seen[1] - y - jump[1],
@@ -273,7 +274,7 @@ fn a_jump_of_the_believed_pose_lasts_until_the_robot_finds_its_place() {
     let (event, _) = robot.obey(Relocalise, 5.0).unwrap();
     assert_eq!(event, ended(Relocalise, Succeeded));
     assert_eq!(robot.frame.pose_reset_count, 1);
-    let ([x, y, _], seen) = (robot.place(), robot.frame.pose);
+    let ([x, y, _], seen) = (robot.place(), robot.frame.channel);
     assert!((seen[0] - x).hypot(seen[1] - y) < 0.05);
     assert!(robot.off_plan_m() < 0.3);
     // Who knows the place finds no other.
@@ -359,6 +360,6 @@ fn without_an_action_the_robot_stands_and_its_time_does_too() {
         (robot.place(), robot.frame.planned_pose),
         ([0.0; 3], [0.0; 3])
     );
-    assert!(robot.frame.pose[0].abs() < 0.1);
+    assert!(robot.frame.channel[0].abs() < 0.1);
     assert_eq!(robot.frame.safe_stop, 1);
 }

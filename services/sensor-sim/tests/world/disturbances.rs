@@ -1,6 +1,6 @@
 //! Disturbances: each kind changes the signals that its physics says, and nothing else.
 
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::SensorFrame;
 use vigil_robot::disturbance_kind::{KINDS, Place};
 use vigil_robot::injection::Change;
 use vigil_robot::{Disturbance, DisturbanceKind, Injection};
@@ -57,18 +57,19 @@ type Undo = fn(&mut SensorFrame, &SensorFrame);
 
 #[test]
 fn disturbances_of_sensors_touch_their_own_channel_only_and_end_without_a_trace() {
-    let pose: Undo = |frame, healthy| frame.pose = healthy.pose;
-    let position: Undo = |frame, healthy| frame.pose[..2].copy_from_slice(&healthy.pose[..2]);
+    let pose: Undo = |frame, healthy| frame.channel[..3].copy_from_slice(&healthy.channel[..3]);
+    let position: Undo = |frame, healthy| frame.channel[..2].copy_from_slice(&healthy.channel[..2]);
     let yaw: Undo = |frame, healthy| {
-        (frame.pose[2], frame.yaw_rate) = (healthy.pose[2], healthy.yaw_rate);
+        (frame.channel[2], frame.channel[13]) = (healthy.channel[2], healthy.channel[13]);
     };
     let missing: Undo = |frame, healthy| {
-        (frame.pose, frame.valid) = (healthy.pose, healthy.valid);
+        frame.channel[..3].copy_from_slice(&healthy.channel[..3]);
+        frame.channel_valid = healthy.channel_valid;
     };
-    let encoder: Undo = |frame, healthy| frame.wheel_rate[1] = healthy.wheel_rate[1];
-    let gyro: Undo = |frame, healthy| frame.yaw_rate = healthy.yaw_rate;
-    let current: Undo = |frame, healthy| frame.current[1] = healthy.current[1];
-    let steer: Undo = |frame, healthy| frame.steer[0] = healthy.steer[0];
+    let encoder: Undo = |frame, healthy| frame.channel[3 + 1] = healthy.channel[3 + 1];
+    let gyro: Undo = |frame, healthy| frame.channel[13] = healthy.channel[13];
+    let current: Undo = |frame, healthy| frame.channel[14 + 1] = healthy.channel[14 + 1];
+    let steer: Undo = |frame, healthy| frame.channel[9] = healthy.channel[9];
     let kinds: [(&str, Undo); 17] = [
         ("steer-bias:LF:0.1", steer),
         ("pose-jump:0.3", position),
@@ -113,64 +114,69 @@ fn disturbed_sensors_are_off_by_what_was_asked_for() {
     let seconds = |step: usize| (step + 1) as f64 / RATE_HZ;
     let with = |spec: &str| pairs(0.0, &[spec]);
     for (step, [(healthy, _), (frame, _)]) in with("yaw-rate-bias:0.02").iter().enumerate() {
-        assert!((frame.yaw_rate - healthy.yaw_rate - 0.02).abs() < 1e-12);
-        assert!((frame.pose[2] - healthy.pose[2] - 0.02 * seconds(step)).abs() < 1e-12);
+        assert!((frame.channel[13] - healthy.channel[13] - 0.02).abs() < 1e-12);
+        assert!((frame.channel[2] - healthy.channel[2] - 0.02 * seconds(step)).abs() < 1e-12);
     }
     for (step, [(healthy, _), (frame, _)]) in with("pose-drift:0.02").iter().enumerate() {
         // Straight ahead: to the left is along y.
-        assert!((frame.pose[1] - healthy.pose[1] - 0.02 * seconds(step)).abs() < 1e-9);
-        assert!((frame.pose[0] - healthy.pose[0]).abs() < 1e-9);
+        assert!((frame.channel[1] - healthy.channel[1] - 0.02 * seconds(step)).abs() < 1e-9);
+        assert!((frame.channel[0] - healthy.channel[0]).abs() < 1e-9);
     }
     let late = with("pose-delay:0.3");
     for step in 6..100 {
-        assert_eq!(late[step][1].0.pose, late[step - 6][0].0.pose);
+        let [now, before] = [&late[step][1].0, &late[step - 6][0].0];
+        assert_eq!(now.channel[..3], before.channel[..3]);
     }
     let scaled = with("pose-scale:1.05");
-    let [first, last] = [scaled[0], scaled[99]]
-        .map(|[healthy, broken]| (broken.0.pose[0] - healthy.0.pose[0], healthy.1.pose[0]));
+    let [first, last] = [scaled[0], scaled[99]].map(|[healthy, broken]| {
+        (
+            broken.0.channel[0] - healthy.0.channel[0],
+            healthy.1.pose[0],
+        )
+    });
     assert_near(last.0 - first.0, 0.05 * (last.1 - first.1), 1e-9);
     let missing = |spec| {
-        let missing = |pair: &&[(SensorFrame, TrueState); 2]| pair[1].0.valid & Valid::POSE == 0;
+        let missing = |pair: &&[(SensorFrame, TrueState); 2]| pair[1].0.channel_valid & 0b111 == 0;
         with(spec).iter().filter(missing).count()
     };
     assert_eq!(missing("pose-drop"), 100);
     assert!((15..45).contains(&missing("pose-drop:0.3")));
     for [(healthy, truth), (frame, _)] in with("encoder-scale:LM:1.2") {
-        let added = frame.wheel_rate[1] - healthy.wheel_rate[1];
+        let added = frame.channel[3 + 1] - healthy.channel[3 + 1];
         assert_near(added, 0.2 * truth.wheel_rate_rad_s[1], 1e-9);
     }
     for [(healthy, _), (frame, _)] in with("encoder-bias:LM:0.6") {
-        assert_near(frame.wheel_rate[1] - healthy.wheel_rate[1], 0.6, 1e-12);
+        assert_near(frame.channel[3 + 1] - healthy.channel[3 + 1], 0.6, 1e-12);
     }
     let drifting = with("encoder-drift:LM:0.2");
     let added = drifting
         .iter()
-        .map(|[(healthy, _), (frame, _)]| frame.wheel_rate[1] - healthy.wheel_rate[1]);
+        .map(|[(healthy, _), (frame, _)]| frame.channel[3 + 1] - healthy.channel[3 + 1]);
     let added: Vec<f64> = added.collect();
     assert!((0.0..0.011).contains(&added[0]));
     assert_near(added[99] - added[0], 0.2 * 99.0 * 0.05, 1e-9);
     for [(healthy, _), (frame, _)] in with("gyro-bias:0.05") {
-        assert_near(frame.yaw_rate - healthy.yaw_rate, 0.05, 1e-12);
+        assert_near(frame.channel[13] - healthy.channel[13], 0.05, 1e-12);
     }
     for [(healthy, _), (frame, _)] in with("current-bias:LM:0.5") {
-        assert_near(frame.current[1] - healthy.current[1], 0.5, 1e-12);
+        assert_near(frame.channel[14 + 1] - healthy.channel[14 + 1], 0.5, 1e-12);
     }
     // What is dead reports exactly zero.
     assert!(
         with("gyro-scale")
             .iter()
-            .all(|pair| pair[1].0.yaw_rate == 0.0)
+            .all(|pair| pair[1].0.channel[13] == 0.0)
     );
     assert!(
         with("current-scale:LM")
             .iter()
-            .all(|pair| pair[1].0.current[1] == 0.0)
+            .all(|pair| pair[1].0.channel[15] == 0.0)
     );
     let late = with("encoder-delay:LM:0.3");
     for step in 6..100 {
         assert_eq!(
-            late[step][1].0.wheel_rate[1],
-            late[step - 6][0].0.wheel_rate[1]
+            late[step][1].0.channel[3 + 1],
+            late[step - 6][0].0.channel[3 + 1]
         );
     }
 }
@@ -240,7 +246,7 @@ fn a_weak_motor_or_soft_soil_leaves_the_pull_to_the_other_side() {
     );
     let [(frame, _), (broken, _)] = pairs(0.0, &["torque-loss:RM:0.7"])[99];
     // The wheel keeps turning with the ground, its motor gives less.
-    assert!((broken.wheel_rate[4] - frame.wheel_rate[4]).abs() < 0.1);
+    assert!((broken.channel[3 + 4] - frame.channel[3 + 4]).abs() < 0.1);
     let (torque, weak) = {
         let [(_, healthy), (_, broken)] = pairs(0.0, &["tether:20", "torque-loss:RM:0.7"])[99];
         (healthy.torque_n_m[4], broken.torque_n_m)
@@ -256,8 +262,8 @@ fn bent_steering_turns_the_rover_whether_its_sensor_sees_it_or_not() {
     let hidden = pairs(0.0, &["steer-offset-hidden:LF:0.2"]);
     for (seen, hidden) in seen.iter().zip(&hidden) {
         let [(healthy, _), (seen, moved)] = seen;
-        assert!((seen.steer[0] - healthy.steer[0] - 0.2).abs() < 1e-12);
-        assert_eq!(hidden[1].0.steer, healthy.steer);
+        assert!((seen.channel[9] - healthy.channel[9] - 0.2).abs() < 1e-12);
+        assert_eq!(hidden[1].0.channel[9..13], healthy.channel[9..13]);
         assert_eq!(*moved, hidden[1].1, "the same motion");
     }
     assert!(seen[99][1].1.velocity[2] > 0.002);
@@ -283,7 +289,7 @@ fn a_moved_payload_loads_the_wheels_where_it_lies() {
 #[test]
 fn a_noisy_gyro_has_so_many_times_its_noise() {
     for [(healthy, at), (frame, _)] in pairs(0.5, &["gyro-noise:20"]) {
-        let noise = |frame: &SensorFrame| frame.yaw_rate - at.velocity[2];
+        let noise = |frame: &SensorFrame| frame.channel[13] - at.velocity[2];
         assert!((noise(&frame) - 20.0 * noise(&healthy)).abs() < 1e-12);
     }
 }
@@ -306,10 +312,10 @@ fn noise_of_every_channel_is_the_same_with_and_without_a_disturbance() {
         for [(healthy, at), (frame, moved)] in moves {
             assert!(at != moved, "{spec} moves the rover");
             let noise = |frame: &SensorFrame, truth: &TrueState| {
-                let turned = frame.wheel_rate[0] - truth.wheel_rate_rad_s[0];
+                let turned = frame.channel[3] - truth.wheel_rate_rad_s[0];
                 [
-                    frame.pose[0] - truth.pose[0],
-                    frame.yaw_rate - truth.velocity[2],
+                    frame.channel[0] - truth.pose[0],
+                    frame.channel[13] - truth.velocity[2],
                     turned,
                 ]
             };

@@ -57,8 +57,12 @@ fn a_stuck_wheel_settles_at_the_models_equilibrium_and_mends() {
     assert_eq!(truth.wheel_rate_rad_s[4], 0.0);
     // Its motor pushes at its limit: 6 N m, 12 A; noise at 1 kHz is 0.35 A.
     let frame = measure(&mut world);
-    assert!((frame.current[4] - 12.0).abs() < 2.0, "{:?}", frame.current);
-    assert!(frame.wheel_rate[4].abs() < 2.0 && frame.wheel_rate[4] != 0.0);
+    assert!(
+        (frame.channel[18] - 12.0).abs() < 2.0,
+        "{:?}",
+        frame.channel
+    );
+    assert!(frame.channel[7].abs() < 2.0 && frame.channel[7] != 0.0);
     world.clear(4).unwrap();
     drive(&mut world, 1000.0, 2000);
     assert!((world.true_state().velocity[2] - 0.09959).abs() < 6e-6);
@@ -84,7 +88,7 @@ fn broken_encoders_touch_their_own_channel_only() {
     drive(&mut broken, 100.0, 200);
     let before = (measure(&mut healthy), measure(&mut broken));
     assert!(before.0 == before.1);
-    let held = before.1.wheel_rate[5].to_bits();
+    let held = before.1.channel[8].to_bits();
     broken.inject(fault(EncoderZero, 0)).unwrap();
     broken.inject(fault(EncoderFrozen, 5)).unwrap();
     broken.inject(fault(EncoderNoise, 3)).unwrap();
@@ -93,11 +97,11 @@ fn broken_encoders_touch_their_own_channel_only() {
         drive(&mut healthy, 100.0, 1);
         drive(&mut broken, 100.0, 1);
         let (expected, mut frame) = (measure(&mut healthy), measure(&mut broken));
-        assert_eq!(frame.wheel_rate[0].to_bits(), 0.0_f64.to_bits());
-        assert_eq!(frame.wheel_rate[5].to_bits(), held);
-        noise.push(frame.wheel_rate[3]);
+        assert_eq!(frame.channel[3].to_bits(), 0.0_f64.to_bits());
+        assert_eq!(frame.channel[8].to_bits(), held);
+        noise.push(frame.channel[6]);
         for wheel in [0, 3, 5] {
-            frame.wheel_rate[wheel] = expected.wheel_rate[wheel];
+            frame.channel[3 + wheel] = expected.channel[3 + wheel];
         }
         assert!(frame == expected, "all else is bit-identical");
     }
@@ -122,9 +126,9 @@ fn broken_encoders_touch_their_own_channel_only() {
 fn an_encoder_frozen_before_its_first_reading_repeats_the_first() {
     let mut world = steady(0.5, 100.0);
     world.inject(fault(EncoderFrozen, 2)).unwrap();
-    let first = measure(&mut world).wheel_rate[2].to_bits();
+    let first = measure(&mut world).channel[5].to_bits();
     drive(&mut world, 100.0, 100);
-    assert_eq!(measure(&mut world).wheel_rate[2].to_bits(), first);
+    assert_eq!(measure(&mut world).channel[5].to_bits(), first);
 }
 
 #[test]
@@ -132,13 +136,13 @@ fn a_wheel_may_be_stuck_and_its_encoder_broken() {
     let mut world = steady(0.0, 100.0);
     drive(&mut world, 100.0, 200);
     world.inject(fault(EncoderFrozen, 1)).unwrap();
-    let held = measure(&mut world).wheel_rate[1];
+    let held = measure(&mut world).channel[4];
     world.inject(fault(Stuck, 1)).unwrap();
     drive(&mut world, 100.0, 200);
     assert!((world.true_state().velocity[2] - 0.0364).abs() < 1e-4);
     let frame = measure(&mut world);
     assert_eq!(
-        (frame.wheel_rate[1], world.true_state().stuck[1]),
+        (frame.channel[4], world.true_state().stuck[1]),
         (held, true)
     );
     world.clear(1).unwrap();

@@ -21,7 +21,7 @@ fn action(kind: RecoveryKind, decision_seq: u64) -> Action {
 fn the_executed_command_changes_no_faster_than_the_servos() {
     let segments = [segment(3.0, 0.8, 0.3), segment(3.0, -0.8, 0.1)];
     let mut world = World::new(&robot(), &even_soil(), &segments, 100.0, 1).unwrap();
-    let mut before = [0.0; 4];
+    let mut before = [0.0; 8];
     let mut reached = false;
     for _ in 0..1200 {
         drive(&mut world, 100.0, 1);

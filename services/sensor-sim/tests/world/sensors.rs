@@ -1,7 +1,7 @@
 //! Noise, validity, determinism.
 
-use vigil_blocks::{SensorFrame, Valid};
-use vigil_robot::FaultKind;
+use vigil_blocks::{CHANNELS, SensorFrame};
+use vigil_robot::{ChannelMap, FaultKind};
 use vigil_sensor_sim::World;
 use vigil_setup::graph_file::Simulator;
 
@@ -32,13 +32,13 @@ fn moments(samples: &[f64]) -> (f64, f64, f64) {
 fn noise_carries_equal_information_per_second_at_any_rate() {
     let noise = robot().noise;
     let channels: [(&str, f64, Channel); 7] = [
-        ("x", noise.position_m, |f| f.pose[0]),
-        ("y", noise.position_m, |f| f.pose[1]),
-        ("yaw", noise.yaw_rad, |f| f.pose[2]),
-        ("yaw rate", noise.yaw_rate_rad_s, |f| f.yaw_rate),
-        ("wheel rate", noise.wheel_rate_rad_s, |f| f.wheel_rate[4]),
-        ("steer", noise.steer_rad, |f| f.steer[5]),
-        ("current", noise.current_a, |f| f.current[1]),
+        ("x", noise.position_m, |f| f.channel[0]),
+        ("y", noise.position_m, |f| f.channel[1]),
+        ("yaw", noise.yaw_rad, |f| f.channel[2]),
+        ("yaw rate", noise.yaw_rate_rad_s, |f| f.channel[13]),
+        ("wheel rate", noise.wheel_rate_rad_s, |f| f.channel[3 + 4]),
+        ("steer", noise.steer_rad, |f| f.channel[12]),
+        ("current", noise.current_a, |f| f.channel[14 + 1]),
     ];
     for rate_hz in [20.0, 100.0, 1000.0] {
         for (name, sigma, channel) in channels {
@@ -81,15 +81,16 @@ fn without_noise_every_channel_tells_the_truth() {
     let mut world = World::new(&robot(), &settings, &segments, 100.0, 1).unwrap();
     drive(&mut world, 100.0, 1000);
     let (frame, truth) = (measure(&mut world), world.true_state());
-    assert_eq!(frame.pose, truth.pose);
-    assert_eq!(frame.yaw_rate, truth.velocity[2]);
-    assert_eq!(frame.wheel_rate[..6], truth.wheel_rate_rad_s);
-    assert_eq!(frame.command, [0.5, 0.2, 0.0, 0.0]);
+    assert_eq!(frame.channel[..3], truth.pose);
+    assert_eq!(frame.channel[13], truth.velocity[2]);
+    assert_eq!(frame.channel[3..9], truth.wheel_rate_rad_s);
+    assert_eq!(frame.command[..3], [0.5, 0.2, 0.0]);
     let inner = f64::atan2(0.35, 1.7);
-    assert!((frame.steer[0] - inner).abs() < 1e-12 && (frame.steer[2] + inner).abs() < 1e-12);
+    let [front, rear] = [frame.channel[9], frame.channel[10]];
+    assert!((front - inner).abs() < 1e-12 && (rear + inner).abs() < 1e-12);
     // The reference values of a left turn of 2 m.
-    assert!((frame.wheel_rate[0] - 2.159).abs() < 6e-4, "{frame:?}");
-    assert!((frame.yaw_rate - 0.09959).abs() < 6e-6, "{frame:?}");
+    assert!((frame.channel[3] - 2.159).abs() < 6e-4, "{frame:?}");
+    assert!((frame.channel[13] - 0.09959).abs() < 6e-6, "{frame:?}");
 }
 
 #[test]
@@ -97,26 +98,19 @@ fn exactly_what_is_measured_is_valid() {
     let mut world = World::new(&robot(), &Simulator::default(), &[], 100.0, 1).unwrap();
     let mut frame = SensorFrame {
         symptoms: 3,
-        reserved: [7.0; 5],
+        channel: [7.0; CHANNELS],
+        channel_valid: u64::MAX,
         ..SensorFrame::default()
     };
     frame.header.seq = 42;
     world.measure(&mut frame);
-    let mut expected = Valid::command(0) | Valid::command(1);
-    expected |= Valid::POSE | Valid::PLANNED_POSE | Valid::YAW_RATE;
-    for wheel in 0..6 {
-        expected |= Valid::wheel_rate(wheel) | Valid::current(wheel);
-    }
-    for corner in [0, 2, 3, 5] {
-        expected |= Valid::steer(corner);
-    }
-    assert_eq!(frame.valid, expected);
+    // Pose, six rates, four angles, gyro, six currents.
+    assert_eq!(frame.channel_valid, (1 << (3 + 6 + 4 + 1 + 6)) - 1);
+    assert_eq!((frame.command_valid, frame.planned_pose_valid), (0b11, 1));
+    assert_eq!(frame.robot_hash, ChannelMap::new(&robot()).hash());
     assert_eq!((frame.header.seq, frame.run_id), (42, 1));
-    assert_eq!((frame.symptoms, frame.reserved), (0, [0.0; 5]));
-    assert_eq!(
-        (frame.steer[1], frame.wheel_rate[6], frame.current[7]),
-        (0.0, 0.0, 0.0)
-    );
+    assert_eq!(frame.symptoms, 0);
+    assert_eq!(frame.channel[20..], [0.0; CHANNELS - 20]);
     world.set_run_id(9);
     assert_eq!(measure(&mut world).run_id, 9);
 }
@@ -139,9 +133,7 @@ fn equal_seeds_give_equal_bits_and_others_do_not() {
         frames
     };
     let bits = |frames: &[SensorFrame]| -> Vec<u64> {
-        let numbers = frames
-            .iter()
-            .flat_map(|f| f.pose.into_iter().chain(f.wheel_rate));
+        let numbers = frames.iter().flat_map(|f| f.channel);
         numbers.map(f64::to_bits).collect()
     };
     let (first, again, other) = (run(3), run(3), run(4));
@@ -158,7 +150,7 @@ fn yaw_stays_wrapped_on_a_long_turn() {
     for _ in 0..1000 {
         drive(&mut world, 20.0, 1);
         let frame = measure(&mut world);
-        assert!(frame.pose[2].abs() <= std::f64::consts::PI);
+        assert!(frame.channel[2].abs() <= std::f64::consts::PI);
         assert!(frame.planned_pose[2].abs() <= std::f64::consts::PI);
     }
     assert!(world.true_state().pose[2] > 15.0);

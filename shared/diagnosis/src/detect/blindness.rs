@@ -12,7 +12,7 @@
 //! others. A reset of the filters does not end blindness: a source that resets them with every
 //! frame is one of its causes.
 
-use vigil_blocks::{Blindness, SensorFrame, Valid};
+use vigil_blocks::{Blindness, SensorFrame};
 
 /// Without a valid frame for so long, s, the detector is blind. As long as an alarm takes to clear
 /// (`alarm::CLEAR_S`).
@@ -50,7 +50,7 @@ struct Last {
 pub struct BlindnessTimer {
     /// Bits of which a frame needs any, and of which it needs all.
     channels: u64,
-    command: u64,
+    command: u32,
     /// Period of the graph, s; none offline, where capture times are the only time there is.
     period_s: Option<f64>,
     /// False for recorded frames: their times are the recording's.
@@ -73,10 +73,10 @@ pub struct BlindnessTimer {
 }
 
 impl BlindnessTimer {
-    /// For frames that need any bit of `channels` in [`SensorFrame::valid`] and all of the bits
-    /// `command`.
+    /// For frames that need any bit of `channels` in [`SensorFrame::channel_valid`] and all bits
+    /// of `command` in [`SensorFrame::command_valid`].
     #[must_use]
-    pub const fn new(channels: u64, command: u64) -> Self {
+    pub const fn new(channels: u64, command: u32) -> Self {
         Self {
             channels,
             command,
@@ -162,9 +162,9 @@ impl BlindnessTimer {
             Blindness::Run
         } else if self.judges_clock && !is_clock {
             Blindness::Clock
-        } else if frame.valid & self.channels == 0 {
+        } else if frame.channel_valid & self.channels == 0 {
             Blindness::Validity
-        } else if !frame.has(self.command) {
+        } else if frame.command_valid & self.command != self.command {
             Blindness::Command
         } else {
             return self.take_valid(scheduled_s);
@@ -223,13 +223,6 @@ impl BlindnessTimer {
     }
 }
 
-/// The bits of everything that a robot of `wheels` wheels may measure.
-#[must_use]
-pub fn all_channels(wheels: usize) -> u64 {
-    let wheel = |i: usize| Valid::wheel_rate(i) | Valid::steer(i) | Valid::current(i);
-    (0..wheels).fold(Valid::POSE | Valid::YAW_RATE, |bits, i| bits | wheel(i))
-}
-
 /// From one instant to another, s; negative if time went back.
 fn seconds(from_ns: u64, to_ns: u64) -> f64 {
     to_ns.wrapping_sub(from_ns).cast_signed() as f64 * 1e-9
@@ -241,16 +234,20 @@ mod tests {
 
     const PERIOD_S: f64 = 0.02;
     const PERIOD_NS: u64 = 20_000_000;
-    const COMMAND: u64 = Valid::command(0) | Valid::command(1);
+    const COMMAND: u32 = 0b11;
+    /// Pose and two wheel rates.
+    const CHANNELS: u64 = 0b1_1111;
+    const POSE: u64 = 0b111;
 
     fn timer() -> BlindnessTimer {
-        BlindnessTimer::new(all_channels(2), COMMAND).in_graph(PERIOD_S, true)
+        BlindnessTimer::new(CHANNELS, COMMAND).in_graph(PERIOD_S, true)
     }
 
     fn frame(k: u64) -> SensorFrame {
         let mut frame = SensorFrame {
             run_id: 1,
-            valid: COMMAND | Valid::POSE,
+            command_valid: COMMAND,
+            channel_valid: POSE,
             ..SensorFrame::default()
         };
         (frame.header.epoch, frame.header.seq) = (9, k);
@@ -275,23 +272,12 @@ mod tests {
 
     #[test]
     fn a_frame_may_lack_some_channels_but_no_part_of_the_command() {
-        assert_eq!(lost(|_, f| f.valid = COMMAND | Valid::wheel_rate(1)), None);
-        let found = lost(|_, f| f.valid = Valid::command(0) | Valid::POSE);
+        assert_eq!(lost(|_, f| f.channel_valid = 1 << 4), None);
+        let found = lost(|_, f| f.command_valid = 1);
         assert_eq!(found.map(|(_, cause)| cause), Some(Blindness::Command));
         // The validity is judged first.
-        let found = lost(|_, f| f.valid = Valid::command(0));
+        let found = lost(|_, f| (f.command_valid, f.channel_valid) = (1, 0));
         assert_eq!(found.map(|(_, cause)| cause), Some(Blindness::Validity));
-    }
-
-    #[test]
-    fn all_channels_are_pose_gyro_and_three_of_each_wheel() {
-        let expected = Valid::POSE
-            | Valid::YAW_RATE
-            | Valid::wheel_rate(0)
-            | Valid::steer(0)
-            | Valid::current(0);
-        assert_eq!(all_channels(1), expected);
-        assert_eq!(all_channels(2).count_ones(), 8);
     }
 
     #[test]
@@ -313,7 +299,7 @@ mod tests {
                 timer.miss(1);
             } else {
                 let mut spoilt = frame(k + 1);
-                spoilt.valid = Valid::POSE;
+                spoilt.command_valid = 0;
                 timer.take(&spoilt);
             }
         }
@@ -328,8 +314,8 @@ mod tests {
             (|_, f| f.header.t_capture_ns /= 1_000_000, Blindness::Clock),
             (|_, f| f.header.t_capture_ns *= 3, Blindness::Clock),
             (|_, f| f.header.t_capture_ns = 5, Blindness::Clock),
-            (|_, f| f.valid = COMMAND, Blindness::Validity),
-            (|_, f| f.valid = Valid::POSE, Blindness::Command),
+            (|_, f| f.channel_valid = 0, Blindness::Validity),
+            (|_, f| f.command_valid = 0, Blindness::Command),
             (|k, f| f.run_id = k, Blindness::Run),
             (|k, f| f.header.epoch = 1 + k, Blindness::Epoch),
         ];
@@ -351,7 +337,7 @@ mod tests {
         // Quick restarts after a long run are no second yet.
         assert_eq!(lost(|k, f| f.run_id = (k.clamp(250, 259) - 250) / 3), None);
         // Twenty times as fast, ten seconds of a recording are half a second.
-        let mut recorded = BlindnessTimer::new(all_channels(2), COMMAND).in_graph(PERIOD_S, false);
+        let mut recorded = BlindnessTimer::new(CHANNELS, COMMAND).in_graph(PERIOD_S, false);
         for k in 0..500 {
             let mut frame = frame(k);
             frame.run_id = k / 25;
@@ -387,7 +373,7 @@ mod tests {
         assert_eq!(lost(|_, f| f.header.t_schedule_ns = 0), None);
         assert_eq!(lost(|k, f| f.run_id = k / 150), None);
         assert_eq!(
-            lost(|k, f| f.valid = if k % 9 == 0 { f.valid } else { 0 }),
+            lost(|k, f| f.command_valid = if k % 9 == 0 { COMMAND } else { 0 }),
             None
         );
         let mut slow = timer();
@@ -430,7 +416,7 @@ mod tests {
 
     #[test]
     fn recorded_frames_keep_their_own_time() {
-        let mut timer = BlindnessTimer::new(Valid::POSE, COMMAND).in_graph(PERIOD_S, false);
+        let mut timer = BlindnessTimer::new(POSE, COMMAND).in_graph(PERIOD_S, false);
         for k in 0..500 {
             let mut frame = frame(k);
             frame.header.t_capture_ns = k * 10 * PERIOD_NS;

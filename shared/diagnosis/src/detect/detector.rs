@@ -1,8 +1,8 @@
 //! The detector's step: frames to observations, log-odds of a fault, alarm, report.
 
 use vigil_blocks::{
-    CHANNELS, Channel, DetectionBelief, Entry, HealthyBelief, MODE_UNKNOWN, ParticleBlock,
-    Readiness, SensorFrame, Symptoms, Valid, WeightedHypothesis,
+    DetectionBelief, Entry, HealthyBelief, MODE_UNKNOWN, ParticleBlock, Readiness, SensorFrame,
+    Symptoms, WeightedHypothesis,
 };
 use vigil_inference::ending::Ending;
 use vigil_inference::logspace::{log_add, log_sum_exp, probability};
@@ -10,9 +10,10 @@ use vigil_robot::learned::channels::Channels;
 use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
 use vigil_robot::nominal;
 use vigil_robot::publisher_check::Finding;
-use vigil_robot::{Alarm, AlarmError, Description};
+use vigil_robot::slot::{SLOTS, Slot};
+use vigil_robot::{Alarm, AlarmError, ChannelMap, Description};
 
-use crate::detect::blindness::{self, BlindnessTimer};
+use crate::detect::blindness::BlindnessTimer;
 use crate::detect::detection_filter::{DetectionFilter, Interval};
 use crate::detect::monitors::Monitors;
 use crate::detect::publisher::Publisher;
@@ -23,6 +24,8 @@ use crate::sensors::Sensors;
 /// Without monitors, pose log-odds beyond which the detector reports an error in position: even
 /// odds, as the planner weighs the symptom by its own model.
 const SYMPTOM_LOG_ODDS: f64 = 0.0;
+/// Log-odds of channels that the robot does not have: those of the filters without any evidence.
+const NO_EVIDENCE: f64 = -700.0;
 
 /// Why a detector was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -45,7 +48,8 @@ pub struct Detector {
     fault_rate_1_s: f64,
     alarm: Alarm,
     /// While an alarm stands: of each channel, whether its fault is still there.
-    endings: [Ending; CHANNELS],
+    map: ChannelMap,
+    endings: [Ending; SLOTS],
     /// Log-odds of a fault now.
     log_odds: f64,
     armed: bool,
@@ -142,7 +146,8 @@ impl Detector {
             fault_rate_1_s: settings.fault_rate_1_h / 3600.0,
             alarm: Alarm::new(alarm_log_odds),
             endings: [Ending::new(robot.fault_prior.again_1_s, robot.fault_prior.mended_1_s);
-                CHANNELS],
+                SLOTS],
+            map: ChannelMap::new(robot),
             armed: false,
             moving: false,
             blindness: blindness_timer(robot, settings),
@@ -165,7 +170,7 @@ impl Detector {
     /// the place of its own; with `None`, as it was.
     #[must_use]
     pub fn with_monitors(mut self, settings: Option<&MonitorSettings>) -> Self {
-        self.monitors = settings.map(Monitors::new);
+        self.monitors = settings.map(|settings| Monitors::new(settings, self.map));
         self
     }
 
@@ -313,7 +318,7 @@ impl Detector {
             self.filter.forget_evidence();
             self.log_odds = self.filter.report().log_odds;
         }
-        let off_course = self.filter.report().channels[Channel::POSE] > SYMPTOM_LOG_ODDS;
+        let off_course = self.filter.report().channels[Slot::POSE] > SYMPTOM_LOG_ODDS;
         self.symptoms = if !off_course {
             0
         } else if moving {
@@ -376,7 +381,7 @@ impl Detector {
         belief.outlier_rate = outliers.pose;
         belief.outlier_rate_wheels = outliers.wheels;
         belief.outlier_rate_steer = outliers.steer;
-        belief.channel_log_odds = report.channels;
+        belief.channel_log_odds = self.map.to_evidence(&report.channels, NO_EVIDENCE);
         belief.alarm_t_capture_ns = self.alarm_t_ns;
         belief.alarm = u32::from(self.alarm.stands());
         belief.alarm_count = self.alarm_count;
@@ -419,12 +424,12 @@ fn chosen(settings: &Settings) -> (Channels, Form) {
 
 /// What frames of `robot` must carry for these settings.
 fn blindness_timer(robot: &Description, settings: &Settings) -> BlindnessTimer {
+    let map = ChannelMap::new(robot);
     let channels = match settings.sensors {
-        Sensors::Pose => Valid::POSE,
-        Sensors::PoseEncoders | Sensors::All => blindness::all_channels(robot.wheels.len()),
+        Sensors::Pose => map.pose_bits(),
+        Sensors::PoseEncoders | Sensors::All => map.channel_bits(),
     };
-    let axes = 0..robot.command.len();
-    BlindnessTimer::new(channels, axes.fold(0, |bits, i| bits | Valid::command(i)))
+    BlindnessTimer::new(channels, map.command_bits())
 }
 
 #[cfg(test)]

@@ -19,8 +19,9 @@
 //! without a plan it is not where its plan wants it. Before the first frame with both poses nothing
 //! fires, and the first one after a silence begins everything anew.
 
-use vigil_blocks::{SensorFrame, Symptoms, Valid};
+use vigil_blocks::{SensorFrame, Symptoms};
 use vigil_inference::angle::wrap;
+use vigil_robot::ChannelMap;
 
 use crate::detect::settings::MonitorSettings;
 
@@ -53,6 +54,7 @@ struct Place {
 /// The four monitors. Allocates nothing after the start.
 #[derive(Debug, Clone)]
 pub struct Monitors {
+    map: ChannelMap,
     settings: MonitorSettings,
     places: Vec<Place>,
     trace: Option<Trace>,
@@ -111,10 +113,11 @@ impl Trace {
 }
 
 impl Monitors {
-    /// With these thresholds.
+    /// With these thresholds, for frames of this channel map.
     #[must_use]
-    pub fn new(settings: &MonitorSettings) -> Self {
+    pub fn new(settings: &MonitorSettings, map: ChannelMap) -> Self {
         Self {
+            map,
             settings: settings.clone(),
             places: Vec::with_capacity(PLACES),
             trace: None,
@@ -138,22 +141,22 @@ impl Monitors {
     /// Takes a frame.
     pub fn observe(&mut self, frame: &SensorFrame) {
         let sound = |pose: &[f64; 3]| pose.iter().all(|value| value.abs() <= POSE_MAX);
-        let has_pose = frame.has(Valid::POSE) && sound(&frame.pose);
-        let has_plan = frame.has(Valid::PLANNED_POSE) && sound(&frame.planned_pose);
+        let pose = self.map.pose(frame).filter(sound);
+        let plan = frame.planned().filter(sound);
         let t_ns = frame.header.t_capture_ns;
         let silent = |trace: Trace| t_ns.saturating_sub(trace.whole_ns) >= SILENT_NS;
         let is_silent = self.trace.is_some_and(silent);
-        if !(has_pose && has_plan) {
+        let (Some(at_pose), Some(at_plan)) = (pose, plan) else {
             if is_silent {
-                self.miss_plan(has_pose.then_some(frame.pose), t_ns);
+                self.miss_plan(pose, t_ns);
             }
             return;
-        }
+        };
         let jumped = |trace: Trace| trace.reset_count != frame.pose_reset_count;
         if is_silent || self.trace.is_some_and(jumped) {
             self.reset();
         }
-        let poses = [frame.pose, frame.planned_pose];
+        let poses = [at_pose, at_plan];
         let [at, planned] = poses.map(|[x, y, _]| [x, y]);
         let yaw = poses.map(|pose| pose[2]);
         let here = Place {

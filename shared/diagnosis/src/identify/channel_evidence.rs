@@ -5,17 +5,18 @@
 //! own hypotheses do not hold these sums: the second best has usually branched off the best a
 //! moment ago and shares its past.
 
-use vigil_blocks::{CHANNELS, Channel, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
+use vigil_blocks::{EVIDENCE, MODE_MULTIPLE, MODE_UNKNOWN, WHEELS};
 use vigil_inference::alternative::Alternatives;
 use vigil_inference::logspace::log_add;
 use vigil_inference::outlier::unvouched;
 use vigil_inference::track::Track;
-use vigil_robot::Description;
 use vigil_robot::learned::steer_reading::ANYTHING;
 use vigil_robot::learned::wheels::steering_angle;
 use vigil_robot::learned::{
     Healthy, Model, MotionMode, Mover, NoiseScales, Observation, WheelContext, WheelEvidence,
 };
+use vigil_robot::slot::{SLOTS, Slot};
+use vigil_robot::{ChannelMap, Description};
 
 use crate::identify::angles::Angles;
 use crate::identify::leaf_map::LeafMap;
@@ -51,7 +52,7 @@ struct FollowedExplanation {
     anything: [Alternatives<2>; WHEELS],
     angles: Angles,
     /// Log-likelihood of the readings, by channel.
-    log_likelihood: [f64; CHANNELS],
+    log_likelihood: [f64; SLOTS],
 }
 
 /// How the robot drives at an instant.
@@ -70,6 +71,7 @@ pub struct Drive {
 pub struct ChannelEvidence {
     model: Model,
     robot: Description,
+    map: ChannelMap,
     modes: Vec<MotionMode>,
     use_wheels: bool,
     servo: ServoPrior,
@@ -92,6 +94,7 @@ impl ChannelEvidence {
         Self {
             model: model.clone(),
             robot: robot.clone(),
+            map: ChannelMap::new(robot),
             modes,
             use_wheels,
             servo: ServoPrior::new(robot),
@@ -114,16 +117,22 @@ impl ChannelEvidence {
         self.runner_up
     }
 
+    /// Where the robot's channels lie in its frames.
+    pub const fn map(&self) -> &ChannelMap {
+        &self.map
+    }
+
     /// By channel: how much more the readings since the onset are expected under the diagnosis than
     /// under its rival, natural log-likelihood.
     #[must_use]
-    pub fn channel_evidence(&self) -> [f64; CHANNELS] {
-        self.followed.map_or([0.0; CHANNELS], |[named, rival]| {
+    pub fn channel_evidence(&self) -> [f64; EVIDENCE] {
+        let slots = self.followed.map_or([0.0; SLOTS], |[named, rival]| {
             std::array::from_fn(|i| {
                 let ratio = named.log_likelihood[i] - rival.log_likelihood[i];
                 if ratio.is_finite() { ratio } else { 0.0 }
             })
-        })
+        });
+        self.map.to_evidence(&slots, 0.0)
     }
 
     /// Begins to follow the diagnosis of `posterior` and its rival from before `onset_ns`, while
@@ -176,7 +185,7 @@ impl ChannelEvidence {
                 },
                 anything: [Alternatives::new([1.0 - ANYTHING, ANYTHING]); WHEELS],
                 angles: Angles::default(),
-                log_likelihood: [0.0; CHANNELS],
+                log_likelihood: [0.0; SLOTS],
             })
         };
         self.followed = lineage(named).zip(lineage(rival)).map(<[_; 2]>::from);
@@ -210,7 +219,7 @@ impl ChannelEvidence {
                 } in &mut followed
                 {
                     let gained = track.update(observation.pose, variance);
-                    log_likelihood[Channel::POSE] += gained.unwrap_or(0.0);
+                    log_likelihood[Slot::POSE] += gained.unwrap_or(0.0);
                 }
             }
         }
@@ -231,7 +240,7 @@ impl ChannelEvidence {
             let moved = mode.moved;
             for wheel in 0..self.robot.wheels.len().min(WHEELS) {
                 let is_broken = lineage.broken >> wheel & 1 == 1;
-                lineage.log_likelihood[Channel::wheel_rate(wheel)] += if is_broken {
+                lineage.log_likelihood[Slot::wheel_rate(wheel)] += if is_broken {
                     // In any way, or by a size: then it reads a smooth rate of its own. Half each.
                     let ways = [evidence.broken_anyhow(wheel), evidence.own_rate[wheel]];
                     log_add(ways[0], ways[1]) - std::f64::consts::LN_2
@@ -253,7 +262,7 @@ impl ChannelEvidence {
             }
             for (wheel, reading) in evidence.steer.iter().enumerate() {
                 let Some(reading) = reading else { continue };
-                lineage.log_likelihood[Channel::steer(wheel)] += match (moved, &mut lineage.servo) {
+                lineage.log_likelihood[Slot::steer(wheel)] += match (moved, &mut lineage.servo) {
                     (Mover::UnknownAny, _) => lineage.angles.step_one(wheel, reading, CHANGES),
                     (Mover::Steer(askew), Some(servo)) if askew == wheel => {
                         servo.step(&self.servo, reading)

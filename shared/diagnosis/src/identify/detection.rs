@@ -1,8 +1,8 @@
 //! What the identifier takes of the detector's belief.
 
 use vigil_blocks::DetectionBelief;
-use vigil_robot::Suspects;
 use vigil_robot::learned::{NoiseScales, OutlierRates};
+use vigil_robot::{ChannelMap, Suspects};
 
 /// The last detection.
 #[derive(Debug, Clone, Copy, Default)]
@@ -22,7 +22,7 @@ pub struct Detection {
 impl Detection {
     /// What a belief says. Scales and rates beyond what a detector reports are those of a good
     /// sensor. Chosen: a scale of 0.1 and less or 100 and more, a rate of a half and more.
-    pub fn from_belief(belief: &DetectionBelief) -> Self {
+    pub fn from_belief(belief: &DetectionBelief, map: &ChannelMap) -> Self {
         let scale = |scale: f64| match scale > 0.1 && scale < 100.0 {
             true => scale,
             false => 1.0,
@@ -32,9 +32,10 @@ impl Detection {
             false => OutlierRates::default().pose[0],
         };
         let alarm = belief.alarm != 0;
+        let channels = map.from_evidence(&belief.channel_log_odds, f64::NEG_INFINITY);
         Self {
             alarm,
-            suspects: Suspects::new(alarm, &belief.channel_log_odds),
+            suspects: Suspects::new(alarm, &channels),
             t_ns: belief.alarm_t_capture_ns,
             p_fault: belief.p_fault,
             noise: NoiseScales {
@@ -55,6 +56,15 @@ impl Detection {
 mod tests {
     use super::*;
 
+    fn map() -> ChannelMap {
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../config/robots/rover.toml"
+        );
+        let robot = vigil_setup::load_robot(path.as_ref());
+        ChannelMap::new(&robot.unwrap_or_else(|error| panic!("{error}")))
+    }
+
     #[test]
     fn scales_and_rates_that_no_detector_reports_are_those_of_a_good_sensor() {
         let good = OutlierRates::default().pose[0];
@@ -69,7 +79,7 @@ mod tests {
             belief.noise_scale[1] = scale;
             belief.noise_scale_wheels[2] = scale;
             belief.noise_scale_steer[3] = scale;
-            let noise = Detection::from_belief(&belief).noise;
+            let noise = Detection::from_belief(&belief, &map()).noise;
             assert_eq!([noise.pose[1], noise.wheels[2], noise.steer[3]], [used; 3]);
         }
         for (rate, used) in [(0.0, good), (0.2, 0.2), (0.5, good), (f64::NAN, good)] {
@@ -77,7 +87,7 @@ mod tests {
             belief.outlier_rate[1] = rate;
             belief.outlier_rate_wheels[2] = rate;
             belief.outlier_rate_steer[3] = rate;
-            let rates = Detection::from_belief(&belief).noise.outliers;
+            let rates = Detection::from_belief(&belief, &map()).noise.outliers;
             assert_eq!([rates.pose[1], rates.wheels[2], rates.steer[3]], [used; 3]);
         }
     }
@@ -90,8 +100,8 @@ mod tests {
             p_fault: 0.3,
             ..DetectionBelief::default()
         };
-        let found = Detection::from_belief(&belief);
+        let found = Detection::from_belief(&belief, &map());
         assert_eq!((found.alarm, found.t_ns, found.p_fault), (true, 7, 0.3));
-        assert!(!Detection::from_belief(&DetectionBelief::default()).alarm);
+        assert!(!Detection::from_belief(&DetectionBelief::default(), &map()).alarm);
     }
 }

@@ -249,7 +249,7 @@ impl Identifier {
         }
         self.run_id = input.frame.run_id;
         if let Some((belief, _)) = input.detection {
-            self.detection = Detection::from_belief(belief);
+            self.detection = Detection::from_belief(belief, self.evidence.map());
         }
         if intake.complete {
             self.in_trouble = self.observer.observation().troubles.any(self.use_wheels);

@@ -1,7 +1,7 @@
 //! The detector on recorded runs that its model has not seen, and on garbage.
 
 use proptest::prelude::*;
-use vigil_blocks::{Channel, DetectionBelief, Entry, MODE_UNKNOWN, ParticleBlock, SensorFrame};
+use vigil_blocks::{DetectionBelief, Entry, MODE_UNKNOWN, ParticleBlock, SensorFrame};
 use vigil_diagnosis::Sensors;
 use vigil_diagnosis::detect;
 use vigil_diagnosis::detect::Detector;
@@ -85,7 +85,7 @@ fn the_channel_at_fault_is_named() {
     let wheel = label.wheel.unwrap();
     let channels = bench.belief.channel_log_odds;
     let best = (0..channels.len()).max_by(|&a, &b| channels[a].total_cmp(&channels[b]));
-    assert_eq!(best, Some(Channel::wheel_rate(wheel)));
+    assert_eq!(best, Some(3 + wheel));
 }
 
 /// A nominal run in which the encoder of wheel 2 reports zero from 4 to 6 s.
@@ -95,7 +95,7 @@ fn dropout() -> Vec<SensorFrame> {
         .iter_mut()
         .filter(|frame| (4.0..6.0).contains(&time_s(frame)))
     {
-        frame.wheel_rate[2] = 0.0;
+        frame.channel[3 + 2] = 0.0;
     }
     frames
 }
@@ -122,7 +122,7 @@ fn a_standing_robot_is_no_evidence() {
         if t_s >= 5.0 {
             // It stops, and its encoders read what encoders at rest read.
             frame.command[1] = 0.0;
-            frame.wheel_rate = [0.01; 8];
+            frame.channel[3..9].fill(0.01);
         }
         let belief = bench.step(&frame);
         if t_s > 5.1 {
@@ -137,7 +137,7 @@ fn a_standing_robot_is_no_evidence() {
 fn a_jump_of_the_pose_frame_is_no_fault() {
     let (mut frames, _) = unseen("ND", "");
     for frame in frames.iter_mut().filter(|frame| time_s(frame) >= 7.0) {
-        frame.pose[0] += 25.0;
+        frame.channel[0] += 25.0;
         frame.pose_reset_count += 1;
     }
     assert_eq!(Bench::new(Sensors::PoseEncoders).alarm_s(&frames), None);

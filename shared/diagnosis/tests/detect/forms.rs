@@ -113,7 +113,7 @@ fn an_encoder_that_is_a_little_off_is_in_the_blind_spot_of_the_constant_only() {
         let mut frames = run.frames.clone();
         for frame in &mut frames {
             if frame.header.t_capture_ns >= 2_000_000_000 {
-                frame.wheel_rate[2] += 0.035;
+                frame.channel[3 + 2] += 0.035;
             }
         }
         drives.push(frames);

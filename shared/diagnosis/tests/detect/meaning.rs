@@ -47,25 +47,29 @@ fn what_is_wrong_is_found_in_the_motion_that_shows_it() {
     type Spoil = fn(&mut SensorFrame);
     let spoils: [(FindingKind, Spoil); 10] = [
         (FindingKind::Travel, |f| {
-            (f.pose[0], f.pose[1]) = (1e3 * f.pose[0], 1e3 * f.pose[1])
+            (f.channel[0], f.channel[1]) = (1e3 * f.channel[0], 1e3 * f.channel[1])
         }),
-        (FindingKind::Heading, |f| f.pose.swap(0, 1)),
-        (FindingKind::Turn, |f| f.pose[2] = f.pose[2].to_degrees()),
-        (FindingKind::Turn, |f| f.pose[2] = -f.pose[2]),
+        (FindingKind::Heading, |f| f.channel.swap(0, 1)),
+        (FindingKind::Turn, |f| {
+            f.channel[2] = f.channel[2].to_degrees()
+        }),
+        (FindingKind::Turn, |f| f.channel[2] = -f.channel[2]),
         (FindingKind::Rates, |f| {
-            f.wheel_rate = f.wheel_rate.map(f64::to_degrees)
+            f.channel[3..9].iter_mut().for_each(|r| *r = r.to_degrees())
         }),
         (FindingKind::RateSign, |f| {
-            f.wheel_rate[4] = -f.wheel_rate[4]
+            f.channel[3 + 4] = -f.channel[3 + 4]
         }),
         (FindingKind::RateSign, |f| {
-            f.wheel_rate[3..6].iter_mut().for_each(|r| *r = -*r)
+            f.channel[6..9].iter_mut().for_each(|r| *r = -*r)
         }),
-        (FindingKind::Sides, |f| f.wheel_rate.swap(1, 4)),
+        (FindingKind::Sides, |f| f.channel.swap(4, 7)),
         (FindingKind::SteerSign, |f| {
-            f.steer = f.steer.map(|angle| -angle)
+            f.channel[9..13]
+                .iter_mut()
+                .for_each(|angle| *angle = -*angle)
         }),
-        (FindingKind::SteerSign, |f| f.steer.swap(0, 2)),
+        (FindingKind::SteerSign, |f| f.channel.swap(9, 10)),
     ];
     let (runs, labels) = runs(&robot());
     let nominal = labels.iter().filter(|label| label.mode == "ND");

@@ -3,11 +3,33 @@
 use std::f64::consts::{PI, TAU};
 use vigil_diagnosis::detect::MonitorSettings;
 
-use vigil_blocks::{SensorFrame, Symptoms, Valid};
+use vigil_blocks::{SensorFrame, Symptoms};
 use vigil_diagnosis::detect::Monitors;
+use vigil_robot::{ChannelMap, Description};
 
 /// Time between frames.
 const STEP_S: f64 = 0.1;
+
+/// Validity of the pose, whose channels come first.
+const POSE: u64 = 0b111;
+
+/// Channels of a robot that measures nothing but its pose.
+fn map() -> ChannelMap {
+    let text = r#"
+name = "point"
+kinematics = "differential"
+wheel_radius_m = 0.1
+command = [{ name = "v", unit = "m/s", limit = 1.0 }, { name = "w", unit = "rad/s", limit = 2.0 }]
+wheels = [
+  { name = "L", x = 0.0, y = 0.1, steered = false },
+  { name = "R", x = 0.0, y = -0.1, steered = false },
+]
+measured = { pose = true, wheel_rates = false, steer = false }
+limits = { speed_m_s = 1.0, yaw_rate_rad_s = 2.0, wheel_rate_rad_s = 50.0 }
+"#;
+    let robot: Description = toml::from_str(text).unwrap();
+    ChannelMap::new(&robot)
+}
 
 struct Frames {
     monitors: Monitors,
@@ -25,19 +47,21 @@ impl Frames {
             spin_radius_m: 0.5,
         };
         let mut frame = SensorFrame {
-            valid: Valid::POSE | Valid::PLANNED_POSE,
+            channel_valid: POSE,
+            planned_pose_valid: 1,
             ..SensorFrame::default()
         };
         frame.header.t_capture_ns = 1_000_000_000;
         Self {
-            monitors: Monitors::new(&settings),
+            monitors: Monitors::new(&settings, map()),
             frame,
         }
     }
 
     /// One frame; what fires then.
     fn at(&mut self, pose: [f64; 3], planned: [f64; 3]) -> u32 {
-        (self.frame.pose, self.frame.planned_pose) = (pose, planned);
+        self.frame.channel[..3].copy_from_slice(&pose);
+        self.frame.planned_pose = planned;
         self.frame.header.t_capture_ns += (STEP_S * 1e9) as u64;
         self.monitors.observe(&self.frame);
         self.monitors.symptoms()
@@ -127,19 +151,15 @@ fn a_jump_of_the_frame_begins_anew_and_half_a_frame_changes_nothing() {
     let mut robot = Frames::new();
     assert_eq!(robot.at([0.0; 3], [0.0; 3]), 0);
     assert_eq!(robot.at([2.0, 0.0, 0.0], [0.0; 3]), Symptoms::EPM);
-    for (valid, x) in [
-        (Valid::POSE, 0.0),
-        (Valid::PLANNED_POSE, 0.0),
-        (!0, f64::NAN),
-    ] {
-        robot.frame.valid = valid;
+    for (valid, x) in [((POSE, 0), 0.0), ((0, 1), 0.0), ((POSE, 1), f64::NAN)] {
+        (robot.frame.channel_valid, robot.frame.planned_pose_valid) = valid;
         assert_eq!(
             robot.at([x, 0.0, 0.0], [0.0; 3]),
             Symptoms::EPM,
-            "{valid} {x}"
+            "{valid:?} {x}"
         );
     }
-    robot.frame.valid = Valid::POSE | Valid::PLANNED_POSE;
+    (robot.frame.channel_valid, robot.frame.planned_pose_valid) = (POSE, 1);
     robot.frame.pose_reset_count += 1;
     assert_eq!(robot.at([0.3, 0.0, 0.0], [0.0; 3]), 0);
     // With the old trace, this would be a stop for a long time.
@@ -150,14 +170,13 @@ fn a_jump_of_the_frame_begins_anew_and_half_a_frame_changes_nothing() {
 #[test]
 fn without_a_plan_for_long_the_robot_is_not_where_it_should_be() {
     let mut robot = Frames::new();
-    let whole = robot.frame.valid;
     // A planner that has never spoken says nothing.
-    robot.frame.valid = Valid::POSE;
+    robot.frame.planned_pose_valid = 0;
     assert!((0..50).all(|_| robot.at([0.0; 3], [0.0; 3]) == 0));
-    robot.frame.valid = whole;
+    robot.frame.planned_pose_valid = 1;
     assert_eq!(robot.at([0.0; 3], [0.0; 3]), 0);
     // It dies. The robot goes on, then stops.
-    robot.frame.valid = Valid::POSE;
+    robot.frame.planned_pose_valid = 0;
     let fired: Vec<u32> = (1..=12)
         .map(|k| robot.at([0.05 * f64::from(k), 0.0, 0.0], [0.0; 3]))
         .collect();
@@ -166,10 +185,10 @@ fn without_a_plan_for_long_the_robot_is_not_where_it_should_be() {
     let stopped = (1..=40).find(|_| robot.at([0.6, 0.0, 0.0], [0.0; 3]) == Symptoms::EPS);
     assert!(stopped.is_some_and(|k| k > 15), "{stopped:?}");
     // Without a pose nothing can be said.
-    robot.frame.valid = Valid::PLANNED_POSE;
+    (robot.frame.channel_valid, robot.frame.planned_pose_valid) = (0, 1);
     assert_eq!(robot.at([0.6, 0.0, 0.0], [0.0; 3]), 0);
     // Both are back: everything begins anew.
-    robot.frame.valid = whole;
+    robot.frame.channel_valid = POSE;
     assert_eq!(robot.at([0.6, 0.0, 0.0], [0.3, 0.0, 0.0]), 0);
     assert_eq!(robot.at([0.6, 0.0, 0.0], [0.0; 3]), Symptoms::EPM);
 }
@@ -179,7 +198,7 @@ fn an_error_in_position_does_not_outlive_the_pose() {
     let mut robot = Frames::new();
     robot.at([0.0; 3], [0.0; 3]);
     assert_eq!(robot.at([2.0, 0.0, 0.0], [0.0; 3]), Symptoms::EPM);
-    robot.frame.valid = Valid::PLANNED_POSE;
+    robot.frame.channel_valid = 0;
     let fired: Vec<u32> = (0..11)
         .map(|_| robot.at([2.0, 0.0, 0.0], [0.0; 3]))
         .collect();

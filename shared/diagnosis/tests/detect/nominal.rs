@@ -6,9 +6,7 @@ use vigil_diagnosis::detect;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{
-    Channel, DetectionBelief, Entry, HealthyBelief, ParticleBlock, SensorFrame, Valid,
-};
+use vigil_blocks::{DetectionBelief, Entry, HealthyBelief, ParticleBlock, SensorFrame};
 use vigil_cycle::allocation::allocations;
 use vigil_diagnosis::detect::Detector;
 use vigil_learning::learning_nominal::learn;
@@ -51,21 +49,20 @@ fn frame(i: u64, stuck_s: f64) -> SensorFrame {
         ..SensorFrame::default()
     };
     frame.header.t_capture_ns = (t_s * 1e9).round() as u64;
-    frame.command[0] = 0.25 + 0.1 * (0.5 * t_s).sin();
-    frame.command[1] = 0.5 * (0.37 * t_s).sin();
+    frame.set_command(0, 0.25 + 0.1 * (0.5 * t_s).sin());
+    frame.set_command(1, 0.5 * (0.37 * t_s).sin());
     let mut rng = Pcg64Mcg::seed_from_u64(i);
     let mut noise = |sd: f64| sd * rng.sample::<f64, _>(StandardNormal);
     for (wheel, side) in [(0, -1.0), (1, 1.0)] {
         let stands = stuck && wheel == 0;
         let speed = frame.command[0] + side * 0.5 * TRACK_M * frame.command[1];
         let rate = if stands { 0.0 } else { speed / RADIUS_M };
-        frame.wheel_rate[wheel] = rate + noise(0.1);
-        frame.current[wheel] = if stands { 1.5 } else { 0.03 } + noise(0.005);
-        frame.valid |= Valid::wheel_rate(wheel) | Valid::current(wheel);
+        frame.set_channel(wheel, rate + noise(0.1));
+        let current = if stands { 1.5 } else { 0.03 } + noise(0.005);
+        frame.set_channel(3 + wheel, current);
     }
-    let rates = frame.wheel_rate;
-    frame.yaw_rate = (rates[1] - rates[0]) * RADIUS_M / TRACK_M + noise(0.02);
-    frame.valid |= Valid::command(0) | Valid::command(1) | Valid::YAW_RATE;
+    let difference = frame.channel[1] - frame.channel[0];
+    frame.set_channel(2, difference * RADIUS_M / TRACK_M + noise(0.02));
     frame
 }
 
@@ -82,7 +79,7 @@ fn a_stuck_wheel_alarms_within_a_second_and_nothing_is_allocated() {
         if belief.alarm != 0 && alarm_s.is_none() {
             alarm_s = Some(i as f64 / RATE_HZ);
             let channels = belief.channel_log_odds;
-            assert!(channels[Channel::wheel_rate(0)] > channels[Channel::wheel_rate(1)]);
+            assert!(channels[0] > channels[1]);
         }
     }
     detector.step(Entry::Reset, &mut belief, &mut hypotheses);
@@ -141,7 +138,7 @@ fn a_constant_fault_keeps_its_alarm_for_ten_minutes_and_its_end_is_seen() {
     for i in 0..(end_s * RATE_HZ) as u64 {
         let t_s = i as f64 / RATE_HZ;
         let mut frame = frame(i, f64::INFINITY);
-        frame.yaw_rate += match (from_s..to_s).contains(&t_s) {
+        frame.channel[2] += match (from_s..to_s).contains(&t_s) {
             true => 0.055,
             false => 0.0,
         };

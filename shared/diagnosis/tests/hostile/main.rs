@@ -113,16 +113,16 @@ impl Spoiling {
         match self {
             Self::Sound => {}
             Self::Numbers(v) => {
-                frame.command[..4].copy_from_slice(&v[..4]);
-                frame.pose.copy_from_slice(&v[4..7]);
-                frame.planned_pose.copy_from_slice(&v[7..10]);
-                frame.yaw_rate = v[10];
-                frame.wheel_rate.copy_from_slice(&v[11..19]);
-                frame.steer.copy_from_slice(&v[19..27]);
-                frame.current.copy_from_slice(&v[27..35]);
-                frame.valid = u64::MAX;
+                frame.command.copy_from_slice(&v[..8]);
+                frame.planned_pose.copy_from_slice(&v[8..11]);
+                frame.channel = std::array::from_fn(|i| v[i % v.len()]);
+                frame.channel_valid = u64::MAX;
+                (frame.command_valid, frame.planned_pose_valid) = (u32::MAX, 1);
             }
-            Self::Validity(valid) => frame.valid = *valid,
+            Self::Validity(valid) => {
+                frame.channel_valid = *valid;
+                frame.command_valid = (*valid >> 48) as u32;
+            }
             Self::Time(t_ns) => frame.header.t_capture_ns = *t_ns,
             Self::Back(by_ns) => {
                 let t_ns = &mut frame.header.t_capture_ns;
@@ -354,12 +354,12 @@ proptest! {
 fn driving(k: u64) -> SensorFrame {
     let mut frame = SensorFrame {
         run_id: 1,
-        valid: u64::MAX,
+        channel_valid: 0b11111,
+        command_valid: 0b11,
         ..SensorFrame::default()
     };
     frame.header.t_capture_ns = (k + 1) * 20_000_000;
     frame.command[0] = 0.2;
-    frame.pose[0] = 0.2 * k as f64 * 0.02;
-    frame.wheel_rate[..2].fill(0.2 / 0.035);
+    frame.channel[..2].fill(0.2 / 0.035);
     frame
 }

@@ -1,7 +1,7 @@
 //! A steady cycle of the identifier allocates nothing.
 
 use clap::ValueEnum;
-use vigil_blocks::{Entry, FaultBelief, ParticleBlock, Valid};
+use vigil_blocks::{Entry, FaultBelief, ParticleBlock};
 use vigil_cycle::allocation::allocations;
 use vigil_diagnosis::Sensors;
 use vigil_diagnosis::identify;
@@ -62,7 +62,7 @@ fn steady_cycles_of_every_filter_allocate_nothing() {
 
 #[test]
 fn steady_cycles_with_every_channel_allocate_nothing() {
-    const RF: usize = 3;
+    const STEER_RF: usize = 11;
     let (mut frames, label) = recorded::unseen("RM_STUCK", "stuck");
     let tree = vigil_setup::load_tree(&recorded::path("config/trees/rover-all.toml")).unwrap();
     let (model, robot) = (recorded::model(), recorded::robot());
@@ -83,10 +83,10 @@ fn steady_cycles_with_every_channel_allocate_nothing() {
         // A servo slips, and the pose is silent for a while.
         let t_s = frame.header.t_capture_ns as f64 * 1e-9;
         if t_s > onset_s + 3.0 {
-            frame.steer[RF] += 0.2;
+            frame.channel[STEER_RF] += 0.2;
         }
         if t_s > onset_s + 5.0 && t_s < onset_s + 6.0 {
-            frame.valid &= !Valid::POSE;
+            frame.channel_valid &= !0b111;
         }
         alarm.set(frame);
         let detection = Some((&alarm.belief, &*alarm.hypotheses));

@@ -3,10 +3,10 @@
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::SensorFrame;
 use vigil_diagnosis::identify::LeafMap;
-use vigil_robot::Description;
 use vigil_robot::slip::{Condition, Situation, SlipModel, Soil};
+use vigil_robot::{ChannelMap, Description};
 
 pub const WHEELS: usize = 6;
 pub const ONSET_S: f64 = 2.0;
@@ -63,6 +63,7 @@ pub fn drive(
         let drawn: f64 = StandardNormal.sample(&mut rng);
         sd * drawn
     };
+    let map = ChannelMap::new(robot);
     let frame = |k: usize| {
         let t_s = k as f64 / RATE_HZ;
         let faulty = t_s >= ONSET_S;
@@ -82,18 +83,15 @@ pub fn drive(
         let mut frame = SensorFrame::default();
         frame.header.t_capture_ns = (k as u64 + 1) * 50_000_000;
         frame.run_id = 1;
-        frame.valid = Valid::POSE | Valid::command(0) | Valid::command(1);
-        (frame.command[0], frame.command[1]) = (curvature, speed);
-        frame.pose = pose.map(|value| value + noise(POSE_SD));
+        frame.set_command(0, curvature);
+        frame.set_command(1, speed);
+        map.set_pose(&mut frame, pose.map(|value| value + noise(POSE_SD)));
         for wheel in 0..WHEELS {
             let silent = faulty && faults.dead >> wheel & 1 == 1;
             let read = now.wheel_rate_rad_s[wheel] + noise(RATE_SD);
-            frame.wheel_rate[wheel] = if silent { 0.0 } else { read };
-            frame.steer[wheel] = targets.steer_rad[wheel] + noise(STEER_SD);
-            frame.valid |= Valid::wheel_rate(wheel);
-            if robot.wheels[wheel].steered {
-                frame.valid |= Valid::steer(wheel);
-            }
+            map.set_wheel_rate(&mut frame, wheel, if silent { 0.0 } else { read });
+            let angle_rad = targets.steer_rad[wheel] + noise(STEER_SD);
+            map.set_steer(&mut frame, wheel, angle_rad);
         }
         frame
     };

@@ -161,7 +161,7 @@ fn a_fault_that_goes_is_let_go() {
         .iter_mut()
         .filter(|frame| (4.0..6.0).contains(&time_s(frame)))
     {
-        frame.wheel_rate[2] = 0.0;
+        frame.channel[3 + 2] = 0.0;
     }
     let mut bench = Bench::new(Sensors::PoseEncoders, Alarm::between(4.1, 7.5));
     for frame in &frames {
@@ -189,8 +189,9 @@ fn no_fault_fades_while_the_robot_stands() {
         .filter(|frame| time_s(frame) > onset_s + 2.0)
     {
         frame.command[1] = 0.0;
-        frame.wheel_rate = [0.0; 8];
-        frame.pose = *rest.get_or_insert(frame.pose);
+        frame.channel[3..9].fill(0.0);
+        let pose: [f64; 3] = [frame.channel[0], frame.channel[1], frame.channel[2]];
+        frame.channel[..3].copy_from_slice(rest.get_or_insert(pose));
     }
     let alarm = Alarm::between(onset_s + 0.2, 99.0);
     let mut bench = Bench::new(Sensors::PoseEncoders, alarm);
@@ -212,8 +213,8 @@ fn a_motion_that_no_fault_explains_is_unknown() {
     let (mut frames, _) = unseen("ND", "");
     for frame in frames.iter_mut().filter(|frame| time_s(frame) >= 5.0) {
         let t_s = time_s(frame) - 5.0;
-        frame.pose[0] += 0.03 * t_s;
-        frame.pose[1] += 0.03 * t_s;
+        frame.channel[0] += 0.03 * t_s;
+        frame.channel[1] += 0.03 * t_s;
     }
     let mut bench = Bench::new(Sensors::PoseEncoders, Alarm::between(5.5, 99.0));
     for frame in &frames {
@@ -228,7 +229,7 @@ fn a_motion_that_no_fault_explains_is_unknown() {
 fn a_steering_angle_that_nobody_commanded_is_unknown() {
     let (mut frames, _) = unseen("ND", "");
     for frame in frames.iter_mut().filter(|frame| time_s(frame) >= 5.0) {
-        frame.steer[0] += 0.2;
+        frame.channel[9] += 0.2;
     }
     let mut bench = Bench::new(Sensors::PoseEncoders, Alarm::between(5.1, 99.0));
     for frame in &frames {

@@ -1,7 +1,7 @@
 //! A steering servo that does not do as it is told, and a pose that is wrong, on a recorded healthy
 //! run whose readings are changed.
 
-use vigil_blocks::{Entry, FaultBelief, ParticleBlock, SensorFrame, SizeKind, Valid};
+use vigil_blocks::{Entry, FaultBelief, ParticleBlock, SensorFrame, SizeKind};
 use vigil_diagnosis::Sensors;
 use vigil_diagnosis::identify;
 use vigil_diagnosis::identify::{Identifier, Input, Models};
@@ -11,7 +11,8 @@ use crate::recorded;
 
 /// When it breaks, s after the first frame.
 const ONSET_S: f64 = 3.0;
-const RF: usize = 3;
+/// Place of its channel.
+const STEER_RF: usize = 11;
 /// A healthy run in which the rover turns left, after 8 s right.
 const RUN: u32 = 0;
 
@@ -71,7 +72,7 @@ fn check(change: impl FnMut(&mut SensorFrame), kind: SizeKind, size: f64) {
 fn a_servo_that_slipped_is_named_with_its_angle() {
     for angle_rad in [0.2, -0.1, 0.04] {
         check(
-            |frame| frame.steer[RF] += angle_rad,
+            |frame| frame.channel[STEER_RF] += angle_rad,
             SizeKind::AngleRad,
             angle_rad,
         );
@@ -84,7 +85,7 @@ fn a_servo_that_stands_at_an_angle_is_named_with_it() {
         let mut k = 0.0_f64;
         let stands = |frame: &mut SensorFrame| {
             k += 1.0;
-            frame.steer[RF] = angle_rad + 0.003 * k.sin();
+            frame.channel[STEER_RF] = angle_rad + 0.003 * k.sin();
         };
         check(stands, SizeKind::HeldAtRad, angle_rad);
     }
@@ -92,7 +93,7 @@ fn a_servo_that_stands_at_an_angle_is_named_with_it() {
 
 #[test]
 fn a_pose_that_jumped_is_named_with_its_distance() {
-    check(|frame| frame.pose[1] += 0.3, SizeKind::JumpM, 0.3);
+    check(|frame| frame.channel[1] += 0.3, SizeKind::JumpM, 0.3);
 }
 
 #[test]
@@ -102,9 +103,9 @@ fn a_single_pose_that_is_far_off_is_no_jump() {
         let mut count = 0;
         let (belief, [_, pose]) = belief(|frame| {
             count += 1;
-            frame.pose[1] += if count == every { apart_m } else { 0.0 };
+            frame.channel[1] += if count == every { apart_m } else { 0.0 };
             if count % every > 0 {
-                frame.valid &= !Valid::POSE;
+                frame.channel_valid &= !0b111;
             }
         });
         let (p, p_unknown) = (belief.p[pose], belief.p_unknown);
@@ -114,6 +115,6 @@ fn a_single_pose_that_is_far_off_is_no_jump() {
 
 #[test]
 fn a_servo_within_its_tolerance_is_none() {
-    let (belief, [servo, _]) = belief(|frame| frame.steer[RF] += 0.007);
+    let (belief, [servo, _]) = belief(|frame| frame.channel[STEER_RF] += 0.007);
     assert!(belief.p[servo] < 0.05, "{}", belief.p[servo]);
 }

@@ -45,7 +45,7 @@ fn belief(read: impl Fn(f64, f64) -> f64) -> (FaultBelief, usize) {
     for frame in &mut frames {
         let since_s = time_s(frame) - start_s - ONSET_S;
         if since_s >= 0.0 {
-            frame.wheel_rate[LM] = read(frame.wheel_rate[LM], since_s);
+            frame.channel[3 + LM] = read(frame.channel[3 + LM], since_s);
         }
         alarm.set(frame);
         let detection = Some((&alarm.belief, &*alarm.hypotheses));

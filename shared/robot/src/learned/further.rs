@@ -2,9 +2,10 @@
 //! learned of them, and what one observation holds of them.
 
 use serde::{Deserialize, Serialize};
-use vigil_blocks::{SensorFrame, Valid, WHEELS};
+use vigil_blocks::{SensorFrame, WHEELS};
 
 use super::Reading;
+use crate::channel_map::ChannelMap;
 use crate::frame_guard::CURRENT_MAX_A;
 use crate::model_file::{ModelError, check_range, refuse};
 
@@ -137,21 +138,20 @@ pub(super) struct Collector {
 
 impl Collector {
     /// Takes a frame; true if a channel is no measurement.
-    pub fn take(&mut self, frame: &SensorFrame, wheels: usize) -> bool {
+    pub fn take(&mut self, frame: &SensorFrame, map: &ChannelMap) -> bool {
         let mut invalid = false;
-        let mut push = |bit, value: f64, most, sum: &mut Reading, last: &mut Option<f64>| {
-            if frame.has(bit) && value.abs() <= most {
-                sum.push(value, last.replace(value));
-            } else {
-                invalid |= frame.has(bit);
-            }
-        };
+        let mut push =
+            |value: Option<f64>, most, sum: &mut Reading, last: &mut Option<f64>| match value {
+                Some(value) if value.abs() <= most => sum.push(value, last.replace(value)),
+                Some(_) => invalid = true,
+                None => {}
+            };
         let (sums, (gyro, currents)) = (&mut self.sums, &mut self.last);
-        let (rate, most) = (frame.yaw_rate, YAW_RATE_MAX_RAD_S);
-        push(Valid::YAW_RATE, rate, most, &mut sums.yaw_rate, gyro);
-        for (i, last) in currents.iter_mut().enumerate().take(wheels) {
-            let (current, sum) = (frame.current[i], &mut sums.currents[i]);
-            push(Valid::current(i), current, CURRENT_MAX_A, sum, last);
+        let rate = map.yaw_rate(frame);
+        push(rate, YAW_RATE_MAX_RAD_S, &mut sums.yaw_rate, gyro);
+        for (i, last) in currents.iter_mut().enumerate() {
+            let (current, sum) = (map.current(frame, i), &mut sums.currents[i]);
+            push(current, CURRENT_MAX_A, sum, last);
         }
         invalid
     }
@@ -178,6 +178,9 @@ fn next(sums: &Further) -> Further {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::description::Description;
+
+    const ROVER: &str = include_str!("../../../../config/robots/rover.toml");
 
     #[test]
     fn dry_friction_turns_round_with_the_wheel_and_viscous_grows_with_its_rate() {
@@ -195,15 +198,14 @@ mod tests {
     #[test]
     fn each_channel_is_read_where_it_is_valid() {
         let mut collector = Collector::default();
-        let mut frame = SensorFrame {
-            valid: Valid::YAW_RATE | Valid::current(1),
-            yaw_rate: 0.25,
-            ..SensorFrame::default()
-        };
-        frame.current = [7.0; WHEELS];
-        assert!(!collector.take(&frame, 6));
-        frame.yaw_rate = f64::NAN;
-        assert!(collector.take(&frame, 6));
+        let robot: Description = toml::from_str(ROVER).unwrap_or_else(|error| panic!("{error}"));
+        let map = ChannelMap::new(&robot);
+        let mut frame = SensorFrame::default();
+        map.set_yaw_rate(&mut frame, 0.25);
+        map.set_current(&mut frame, 1, 7.0);
+        assert!(!collector.take(&frame, &map));
+        map.set_yaw_rate(&mut frame, f64::NAN);
+        assert!(collector.take(&frame, &map));
         collector.complete();
         let found = collector.found;
         assert_eq!((found.yaw_rate.plain, found.yaw_rate.mean), (1, 0.25));

@@ -5,7 +5,7 @@
 //! held against the turn of the pose's track. Each has a learned departure of its own, and a flag
 //! of exact repeats.
 
-use vigil_blocks::{Channel, WHEELS};
+use vigil_blocks::WHEELS;
 use vigil_inference::ages::WhitenedResidual;
 
 use super::form::{Evidence, Form};
@@ -14,6 +14,7 @@ use super::further_watch::{FurtherWatch, GYRO, Residual, Turn};
 use super::repeats::Repeats;
 use super::{Model, Observation};
 use crate::description::Description;
+use crate::slot::Slot;
 use crate::suspects::Suspects;
 
 /// Shares of the prior beside those of the other channels: how a fault of these first shows. A
@@ -132,12 +133,12 @@ impl FurtherEvidence {
         }
     }
 
-    /// Log-odds and last gain of each channel: `(index, log_odds, gain)`; see [`Channel`].
+    /// Log-odds and last gain of each channel: `(index, log_odds, gain)`; see [`Slot`].
     pub fn channels(&self, mut enter: impl FnMut(usize, f64, f64)) {
         for at in (0..self.watch.wheels()).chain([GYRO]) {
             let (channel, evidence) = match at {
-                GYRO => (Channel::YAW_RATE, &self.gyro),
-                wheel => (Channel::current(wheel), &self.currents[wheel]),
+                GYRO => (Slot::YAW_RATE, &self.gyro),
+                wheel => (Slot::current(wheel), &self.currents[wheel]),
             };
             enter(channel, evidence.log_odds(), self.gains[at]);
             let repeats = &self.repeats[at];

@@ -3,7 +3,7 @@
 //! Of a current: what the model says at this command, and what the slopes add. Of the gyro: the
 //! turn of the pose's track, and the gyro's bias. Noise and context are learned on the way.
 
-use vigil_blocks::{Channel, WHEELS};
+use vigil_blocks::WHEELS;
 use vigil_inference::slow_state::{Drift, SlowState};
 use vigil_inference::track::Displacement;
 
@@ -13,6 +13,7 @@ use super::noise_scale::{NoiseScale, STEADY_COMMAND};
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Model, Observation, Reading};
 use crate::description::Description;
+use crate::slot::Slot;
 use crate::suspects::Suspects;
 
 /// What the pose's track says of the gyro.
@@ -160,7 +161,7 @@ impl FurtherWatch {
         }
         // What all currents have in common is known only if none is suspected.
         let learns = !suspects.has_current();
-        let learns_bias = !suspects.has(Channel::YAW_RATE);
+        let learns_bias = !suspects.has(Slot::YAW_RATE);
         Some(Residuals {
             currents: self.currents(model, robot, observation, further, learns),
             yaw_rate: self.yaw_rate(model, observation, &further.yaw_rate, turn, learns_bias),
@@ -281,14 +282,10 @@ impl FurtherWatch {
         let gyro = self.model.yaw_rate.map_or(0.0, |gyro| gyro.noise_rad_s);
         for at in (0..self.wheels).chain([GYRO]) {
             let (channel, sd, readings) = match at {
-                GYRO => (
-                    Channel::YAW_RATE,
-                    gyro,
-                    [&before.yaw_rate, &further.yaw_rate],
-                ),
+                GYRO => (Slot::YAW_RATE, gyro, [&before.yaw_rate, &further.yaw_rate]),
                 wheel => {
                     let readings = [&before.currents[wheel], &further.currents[wheel]];
-                    (Channel::current(wheel), current, readings)
+                    (Slot::current(wheel), current, readings)
                 }
             };
             if sd > 0.0 {

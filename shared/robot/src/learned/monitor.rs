@@ -12,7 +12,7 @@
 //! The belief about the pose is as good as Gaussian, so no particles are needed to find the
 //! residuals: 256 of them were too few to tell a misjudged first heading from a fault.
 
-use vigil_blocks::{CHANNELS, Channel, WHEELS};
+use vigil_blocks::WHEELS;
 use vigil_inference::ages::WhitenedResidual;
 use vigil_inference::constant::Constant;
 use vigil_inference::departure::{Departure, Suspicion};
@@ -35,6 +35,7 @@ use super::wheels::rolling_rate;
 use super::{Further, Healthy, Model, Observation, SteerReading, Troubles};
 use crate::channel_odds::ChannelOdds;
 use crate::description::Description;
+use crate::slot::{SLOTS, Slot};
 use crate::suspects::Suspects;
 
 /// Shares of the prior: how a fault first shows. Chosen: one counts by its logarithm only, half as
@@ -106,11 +107,11 @@ struct Gains {
 pub struct DetectionOutput {
     /// Natural log-odds that the robot is not in its nominal mode.
     pub log_odds: f64,
-    /// The same by each channel alone; see [`Channel`].
-    pub channels: [f64; CHANNELS],
+    /// The same by each channel alone; see [`Slot`].
+    pub channels: [f64; SLOTS],
     /// What the observation said in each channel for a fault that was there, and is: the logarithm
     /// of the likelihoods' ratio; 0 where nothing is evidence.
-    pub gains: [f64; CHANNELS],
+    pub gains: [f64; SLOTS],
     /// Log-likelihood of the observation under the nominal mode.
     pub evidence: f64,
     /// Observations that the track could not take.
@@ -155,8 +156,8 @@ impl Monitor {
             gains: Gains::default(),
             report: DetectionOutput {
                 log_odds: f64::NEG_INFINITY,
-                channels: [f64::NEG_INFINITY; CHANNELS],
-                gains: [0.0; CHANNELS],
+                channels: [f64::NEG_INFINITY; SLOTS],
+                gains: [0.0; SLOTS],
                 evidence: 0.0,
                 degenerate_count: 0,
             },
@@ -440,16 +441,16 @@ impl Monitor {
             Form::Constant | Form::Windowed => self.pose.log_odds(),
         };
         let gains = &self.gains;
-        enter(Channel::POSE, pose, gains.pose);
-        enter(Channel::ANY, self.any.log_odds(), gains.any);
+        enter(Slot::POSE, pose, gains.pose);
+        enter(Slot::ANY, self.any.log_odds(), gains.any);
         if self.channels.use_wheels() {
             for i in 0..self.robot.wheels.len() {
-                let channel = Channel::wheel_rate(i);
+                let channel = Slot::wheel_rate(i);
                 enter(channel, self.wheels[i].log_odds(), gains.wheels[i]);
                 enter(channel, self.repeats[i].log_odds, gains.wheels[i]);
                 enter(channel, self.late.odds(i).0, gains.wheels[i]);
                 if self.robot.wheels[i].steered {
-                    enter(Channel::steer(i), self.steer[i].log_odds(), gains.steer[i]);
+                    enter(Slot::steer(i), self.steer[i].log_odds(), gains.steer[i]);
                 }
             }
         }
@@ -471,11 +472,11 @@ impl Monitor {
             wheels_stand: _,
         } = self.troubles;
         if pose_silent || pose_frozen || pose_moves {
-            trouble(Channel::POSE);
+            trouble(Slot::POSE);
         }
         if self.channels.use_wheels() {
             for wheel in (0..WHEELS).filter(|w| wheels_turn || wheels_silent >> w & 1 == 1) {
-                trouble(Channel::wheel_rate(wheel));
+                trouble(Slot::wheel_rate(wheel));
             }
         }
         self.report.log_odds = log_sum_exp(&channels).max(LOG_ODDS_MIN);

@@ -1,11 +1,12 @@
 //! How much noisier the sensors are than the learned ones.
 
-use vigil_blocks::{Channel, WHEELS};
+use vigil_blocks::WHEELS;
 use vigil_inference::angle::wrap;
 
 use super::wheels::{rolling_rate, steering_angle};
 use super::{Model, Observation, Reading};
 use crate::description::Description;
+use crate::slot::Slot;
 use crate::suspects::Suspects;
 
 /// Squares above this many times the believed variance say nothing about noise (a jump, a fault).
@@ -359,11 +360,11 @@ impl SensorNoise {
             for i in 0..count {
                 let expected = turns(now, i) - turns(&last, i);
                 let readings = [&last.wheels[i], &now.wheels[i]];
-                let suspected = suspects.has(Channel::wheel_rate(i));
+                let suspected = suspects.has(Slot::wheel_rate(i));
                 self.wheels[i].push_step(model, now, rate, readings, expected, suspected);
                 let expected = steers(now, i) - steers(&last, i);
                 let readings = [&last.steer[i], &now.steer[i]];
-                let suspected = suspects.has(Channel::steer(i));
+                let suspected = suspects.has(Slot::steer(i));
                 self.steer[i].push_step(model, now, angle, readings, expected, suspected);
             }
         }

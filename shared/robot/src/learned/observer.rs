@@ -5,12 +5,13 @@
 //! thresholds mean the same at 20 Hz, 100 Hz and 1 kHz; between observations a belief is its own
 //! prediction. Exact repeats of an encoder are counted frame by frame, before averaging.
 
-use vigil_blocks::{SensorFrame, Valid, WHEELS};
+use vigil_blocks::{SensorFrame, WHEELS};
 use vigil_inference::angle::wrap;
 
 use super::further::{Collector, Further};
 use super::troubles::{PlausibilityCheck, RestLimits, Troubles};
 use super::{BodyLag, Model, Observation, Reading};
+use crate::channel_map::ChannelMap;
 use crate::description::Description;
 use crate::period::FramePeriod;
 
@@ -43,6 +44,7 @@ pub struct FrameOutcome {
 /// Builds observations from frames.
 #[derive(Debug, Clone)]
 pub struct Observer {
+    map: ChannelMap,
     wheel_count: usize,
     wheel_rate_max: f64,
     curvature_max: f64,
@@ -102,6 +104,7 @@ impl Observer {
     #[must_use]
     pub fn new(model: &Model, robot: &Description) -> Self {
         Self {
+            map: ChannelMap::new(robot),
             wheel_count: robot.wheels.len().min(WHEELS),
             wheel_rate_max: robot.limits.wheel_rate_rad_s,
             // Generous: a command beyond the limits is the robot's affair, garbage is not.
@@ -208,7 +211,7 @@ impl Observer {
         invalid |= self.take_pose(frame);
         invalid |= self.take_wheels(frame);
         if let Some(further) = &mut self.further {
-            invalid |= further.take(frame, self.wheel_count);
+            invalid |= further.take(frame, &self.map);
         }
         let enough = self.state.sums.elapsed_s + NEARLY * self.period_s() >= self.interval_s;
         let complete = new_run || enough || jumped;
@@ -246,7 +249,7 @@ impl Observer {
 
     fn take_command(&mut self, frame: &SensorFrame, dt_s: f64, new_run: bool) -> bool {
         let [curvature, speed, ..] = frame.command;
-        let valid = frame.has(Valid::command(0) | Valid::command(1));
+        let valid = frame.commanded(0).is_some() && frame.commanded(1).is_some();
         let sane = curvature.abs() <= self.curvature_max && speed.abs() <= self.speed_max;
         let state = &mut self.state;
         if valid && sane {
@@ -263,17 +266,16 @@ impl Observer {
     }
 
     fn take_pose(&mut self, frame: &SensorFrame) -> bool {
-        if !frame.has(Valid::POSE) {
+        let Some([x, y, yaw]) = self.map.pose(frame) else {
             return false;
-        }
-        let [x, y, yaw] = frame.pose;
+        };
         let sane = x.abs() <= POSITION_MAX_M && y.abs() <= POSITION_MAX_M && yaw.abs() <= 1e3;
         if !sane {
             return true;
         }
         let sums = &mut self.state.sums;
         if sums.pose_frames == 0 {
-            sums.first_pose = frame.pose;
+            sums.first_pose = [x, y, yaw];
         }
         sums.pose_frames += 1;
         sums.pose[0] += x - sums.first_pose[0];
@@ -286,16 +288,14 @@ impl Observer {
         let mut invalid = false;
         let state = &mut self.state;
         for i in 0..self.wheel_count {
-            if frame.has(Valid::wheel_rate(i)) {
-                let rate = frame.wheel_rate[i];
+            if let Some(rate) = self.map.wheel_rate(frame, i) {
                 if rate.abs() <= self.wheel_rate_max {
                     state.sums.wheels[i].push(rate, state.wheels[i].replace(rate));
                 } else {
                     invalid = true;
                 }
             }
-            if frame.has(Valid::steer(i)) {
-                let angle = frame.steer[i];
+            if let Some(angle) = self.map.steer(frame, i) {
                 if angle.abs() <= std::f64::consts::PI {
                     state.sums.steer[i].push(angle, state.steer[i].replace(angle));
                 } else {

@@ -1,8 +1,9 @@
 //! One channel of a nominal model: what it measures, from what it is predicted, and how well.
 
 use serde::{Deserialize, Serialize};
-use vigil_blocks::{COMMANDS, WHEELS};
+use vigil_blocks::WHEELS;
 
+use super::AXES;
 use super::observation::{History, Observation};
 use crate::learned::Form;
 use crate::learned::channels::Channels;
@@ -126,7 +127,7 @@ pub struct Term {
     pub lag: usize,
     /// Powers, one per axis of the block's command vector; for `command`.
     #[serde(default, skip_serializing_if = "are_zero")]
-    pub powers: [u8; COMMANDS],
+    pub powers: [u8; AXES],
 }
 
 fn is_zero(value: &usize) -> bool {
@@ -137,7 +138,7 @@ fn is_unknown(deviation: &f64) -> bool {
     *deviation == 0.0
 }
 
-fn are_zero(powers: &[u8; COMMANDS]) -> bool {
+fn are_zero(powers: &[u8; AXES]) -> bool {
     powers.iter().all(|&power| power == 0)
 }
 
@@ -149,13 +150,13 @@ impl Term {
             of,
             index,
             lag,
-            powers: [0; COMMANDS],
+            powers: [0; AXES],
         }
     }
 
     /// A product of powers of the command's axes; without any, the constant.
     #[must_use]
-    pub fn command(powers: [u8; COMMANDS]) -> Self {
+    pub fn command(powers: [u8; AXES]) -> Self {
         let of = if are_zero(&powers) {
             Regressor::Constant
         } else {
@@ -172,7 +173,7 @@ impl Term {
     /// Its value `ago` observations before the newest; `size` holds the learned size of each axis.
     /// None if it was not measured.
     #[must_use]
-    pub fn value(&self, history: &History, ago: usize, size: &[f64; COMMANDS]) -> Option<f64> {
+    pub fn value(&self, history: &History, ago: usize, size: &[f64; AXES]) -> Option<f64> {
         let then = history.ago(ago + self.lag)?;
         let axis = |i: usize| Some(then.command.get(i)? / size.get(i)?);
         let wheel = || *then.wheels.get(self.index)?;
@@ -282,7 +283,7 @@ impl Channel {
     /// Measured less predicted value, and how much the prediction has changed since the last
     /// observation; none if one of them is not known.
     #[must_use]
-    pub fn residual(&self, history: &History, size: &[f64; COMMANDS]) -> Option<Residual> {
+    pub fn residual(&self, history: &History, size: &[f64; AXES]) -> Option<Residual> {
         let now = history.ago(0)?;
         let predicted = self.predict(history, 0, size)?;
         let change = predicted - self.predict(history, 1, size)?;
@@ -295,7 +296,7 @@ impl Channel {
         })
     }
 
-    fn predict(&self, history: &History, ago: usize, size: &[f64; COMMANDS]) -> Option<f64> {
+    fn predict(&self, history: &History, ago: usize, size: &[f64; AXES]) -> Option<f64> {
         let mut predicted = 0.0;
         for (term, weight) in self.terms.iter().zip(&self.weights) {
             predicted += weight * term.value(history, ago, size)?;

@@ -14,6 +14,9 @@
 //! | [`track`] | a run's offset and the noise's colour: residuals become white |
 //! | [`monitor`] | the detection filter over observations |
 
+/// Axes of a command that a nominal model may have.
+pub const AXES: usize = 4;
+
 pub mod channel;
 pub mod joint;
 pub mod model;

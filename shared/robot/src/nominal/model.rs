@@ -1,8 +1,9 @@
 //! The file of a nominal model.
 
 use serde::{Deserialize, Serialize};
-use vigil_blocks::{COMMANDS, WHEELS};
+use vigil_blocks::WHEELS;
 
+use super::AXES;
 use super::channel::{CHANNELS_MAX, Channel, FAULT_RATE_1_H, Regressor, Tail, Term};
 use super::joint::Joint;
 use super::observation::DEPTH;
@@ -29,7 +30,7 @@ const GAPS_MAX: usize = 7;
 /// Largest order of a polynomial.
 const ORDER_MAX: u32 = 4;
 // `Model::check` names these in its messages as numbers.
-const _: () = assert!(WHEELS == 8 && COMMANDS == 4 && CHANNELS_MAX == 20);
+const _: () = assert!(WHEELS == 8 && AXES == 4 && CHANNELS_MAX == 20);
 const _: () = assert!(TERMS_MAX == 128 && LAG_MAX == 3 && ORDER_MAX == 4);
 
 /// What was learned of one axis of the command.
@@ -220,8 +221,8 @@ impl Model {
 
     /// Size of each axis of the command; 1 for axes that do not exist.
     #[must_use]
-    pub fn sizes(&self) -> [f64; COMMANDS] {
-        let mut sizes = [1.0; COMMANDS];
+    pub fn sizes(&self) -> [f64; AXES] {
+        let mut sizes = [1.0; AXES];
         for (size, range) in sizes.iter_mut().zip(&self.command) {
             *size = range.size();
         }
@@ -255,7 +256,7 @@ impl ModelFile for Model {
             INTERVAL_MAX_S,
         )?;
         let ranges = self.command.iter().all(Range::is_sane);
-        if self.command.is_empty() || self.command.len() > COMMANDS || !ranges {
+        if self.command.is_empty() || self.command.len() > AXES || !ranges {
             let found = format!("{} axes", self.command.len());
             return refuse("command", found, "1 to 4 axes, min up to max, gaps inside");
         }

@@ -20,7 +20,7 @@
 //! shown is a symptom and is not explained away.
 
 use nalgebra::SVector;
-use vigil_blocks::{CHANNELS, Channel as Slot, WHEELS};
+use vigil_blocks::WHEELS;
 use vigil_inference::ages::WhitenedResidual;
 use vigil_inference::constant::Constant;
 use vigil_inference::logspace::{log_add, log_normal, log_sum_exp};
@@ -35,6 +35,7 @@ use crate::learned::Form;
 use crate::learned::channels::Channels;
 use crate::learned::form::{Evidence, TAU_SQUARED_PER_DIMENSION};
 use crate::learned::monitor::DetectionOutput;
+use crate::slot::{SLOTS, Slot};
 
 /// Standard deviation of a fault's bias in units of the whitened residual. Chosen: it enters the
 /// delay by its logarithm only.
@@ -147,7 +148,7 @@ impl ActiveChannel {
 #[derive(Debug, Clone)]
 pub struct Monitor {
     model: Model,
-    sizes: [f64; vigil_blocks::COMMANDS],
+    sizes: [f64; super::AXES],
     form: Form,
     /// What the prior fault rate adds to the log-odds.
     prior_log_odds: f64,
@@ -187,8 +188,8 @@ impl Monitor {
             run_s: 0.0,
             report: DetectionOutput {
                 log_odds: f64::NEG_INFINITY,
-                channels: [f64::NEG_INFINITY; CHANNELS],
-                gains: [0.0; CHANNELS],
+                channels: [f64::NEG_INFINITY; SLOTS],
+                gains: [0.0; SLOTS],
                 evidence: 0.0,
                 degenerate_count: 0,
             },
@@ -209,13 +210,17 @@ impl Monitor {
         self.forget_evidence();
     }
 
-    /// Forgets what speaks for a fault, and keeps what is known of the run.
+    /// Forgets what speaks for a fault, and keeps what is known of the run. Motion at rest is kept
+    /// until the robot has moved as told: it is what makes the evidence of such a run count.
     pub fn forget_evidence(&mut self) {
+        let has_moved = self.run_s >= READY_S;
         for watched in &mut self.watched {
             watched.bias = Evidence::new(self.form, BIAS);
             watched.scatter = Constant::default();
             watched.absent = Evidence::new(self.form, BIAS);
-            watched.rest = Evidence::new(self.form, BIAS);
+            if has_moved {
+                watched.rest = Evidence::new(self.form, BIAS);
+            }
             watched.gains = [0.0; 3];
         }
         if let Some(together) = &mut self.together {

@@ -1,8 +1,10 @@
 //! Frames averaged into observations, for robots of any kind.
 
-use vigil_blocks::{COMMANDS, SensorFrame, Valid, WHEELS};
+use vigil_blocks::{SensorFrame, WHEELS};
 use vigil_inference::angle::wrap;
 
+use super::AXES;
+use crate::channel_map::ChannelMap;
 use crate::description::Description;
 use crate::frame_guard::{BEYOND_LIMITS, CURRENT_MAX_A};
 use crate::learned::FrameOutcome;
@@ -31,7 +33,7 @@ pub struct Observation {
     /// Its length, s.
     pub dt_s: f64,
     /// Mean command, in the units of the robot's description.
-    pub command: [f64; COMMANDS],
+    pub command: [f64; AXES],
     /// Commanded speed of the fastest point of the robot, m/s.
     pub path_speed_m_s: f64,
     /// Mean yaw rate, rad/s.
@@ -113,13 +115,14 @@ impl Mean {
 #[derive(Debug, Clone)]
 pub struct Observer {
     robot: Description,
+    map: ChannelMap,
     history: History,
     started: bool,
     run_id: u64,
     t_ns: u64,
     reset_count: u32,
     elapsed_s: f64,
-    command: [Mean; COMMANDS],
+    command: [Mean; AXES],
     yaw_rate: Mean,
     wheels: [Mean; WHEELS],
     currents: [Mean; WHEELS],
@@ -134,6 +137,7 @@ impl Observer {
     #[must_use]
     pub fn new(robot: &Description) -> Self {
         Self {
+            map: ChannelMap::new(robot),
             robot: robot.clone(),
             history: History::default(),
             started: false,
@@ -141,7 +145,7 @@ impl Observer {
             t_ns: 0,
             reset_count: 0,
             elapsed_s: 0.0,
-            command: [Mean::default(); COMMANDS],
+            command: [Mean::default(); AXES],
             yaw_rate: Mean::default(),
             wheels: [Mean::default(); WHEELS],
             currents: [Mean::default(); WHEELS],
@@ -219,7 +223,7 @@ impl Observer {
 
     fn clear(&mut self) {
         self.elapsed_s = 0.0;
-        self.command = [Mean::default(); COMMANDS];
+        self.command = [Mean::default(); AXES];
         self.yaw_rate = Mean::default();
         self.wheels = [Mean::default(); WHEELS];
         self.currents = [Mean::default(); WHEELS];
@@ -228,33 +232,27 @@ impl Observer {
     /// Adds a frame's readings; true if one was refused.
     fn collect(&mut self, frame: &SensorFrame) -> bool {
         let mut invalid = false;
-        let mut push = |mean: &mut Mean, bit: u64, value: f64, largest: f64| {
-            if !frame.has(bit) {
-                return;
-            }
-            if value.abs() <= largest {
-                mean.push(value);
-            } else {
-                invalid = true;
-            }
+        let mut push = |mean: &mut Mean, value: Option<f64>, largest: f64| match value {
+            Some(value) if value.abs() <= largest => mean.push(value),
+            Some(_) => invalid = true,
+            None => {}
         };
-        for (i, axis) in self.robot.command.iter().enumerate().take(COMMANDS) {
-            let (bit, value) = (Valid::command(i), frame.command[i]);
-            push(&mut self.command[i], bit, value, BEYOND_LIMITS * axis.limit);
+        for (i, axis) in self.robot.command.iter().enumerate().take(AXES) {
+            let largest = BEYOND_LIMITS * axis.limit;
+            push(&mut self.command[i], frame.commanded(i), largest);
         }
         let limits = &self.robot.limits;
         let largest = BEYOND_LIMITS * limits.yaw_rate_rad_s;
-        push(&mut self.yaw_rate, Valid::YAW_RATE, frame.yaw_rate, largest);
+        push(&mut self.yaw_rate, self.map.yaw_rate(frame), largest);
         for i in 0..self.robot.wheels.len().min(WHEELS) {
-            let (rate, current) = (frame.wheel_rate[i], frame.current[i]);
+            let (rate, current) = (self.map.wheel_rate(frame, i), self.map.current(frame, i));
             let largest = BEYOND_LIMITS * limits.wheel_rate_rad_s;
-            push(&mut self.wheels[i], Valid::wheel_rate(i), rate, largest);
-            let (mean, bit) = (&mut self.currents[i], Valid::current(i));
-            push(mean, bit, current, CURRENT_MAX_A);
+            push(&mut self.wheels[i], rate, largest);
+            push(&mut self.currents[i], current, CURRENT_MAX_A);
         }
-        if frame.has(Valid::POSE) {
-            let sane = frame.pose.iter().all(|value| value.abs() < POSE_MAX);
-            self.pose = sane.then_some(frame.pose);
+        if let Some(pose) = self.map.pose(frame) {
+            let sane = pose.iter().all(|value| value.abs() < POSE_MAX);
+            self.pose = sane.then_some(pose);
             invalid |= !sane;
         }
         invalid
@@ -292,7 +290,7 @@ impl Observer {
         }
         self.pose_before = self.pose.take();
         let changed = last.is_none_or(|last| {
-            let axes = self.robot.command.iter().enumerate().take(COMMANDS);
+            let axes = self.robot.command.iter().enumerate().take(AXES);
             let mut apart = axes.map(|(i, a)| (now.command[i] - last.command[i]).abs() / a.limit);
             apart.any(|apart| apart > CHANGE)
         });

@@ -11,8 +11,9 @@ mod finding;
 mod pose;
 mod wheels;
 
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::SensorFrame;
 
+use crate::channel_map::ChannelMap;
 use crate::description::Description;
 pub use finding::{Finding, FindingKind, YAW_RATE_UNITS};
 use pose::Poses;
@@ -63,6 +64,7 @@ pub struct PublisherCheck {
     robot: Description,
     poses: Poses,
     wheels: Wheels,
+    map: ChannelMap,
     gyro: GyroSums,
     last: Option<LastFrame>,
     /// Commanded velocity: forward m/s, left m/s, yaw rate rad/s.
@@ -138,6 +140,7 @@ impl PublisherCheck {
             robot: robot.clone(),
             poses: Poses::default(),
             wheels: Wheels::new(robot),
+            map: ChannelMap::new(robot),
             gyro: GyroSums::default(),
             last: None,
             twist: [0.0; 3],
@@ -200,7 +203,7 @@ impl PublisherCheck {
         let dt_s = passed_ns as f64 * 1e-9;
         let twist = self.robot.twist(&frame.command);
         let mut axes = 0..self.robot.command.len();
-        let is_commanded = axes.all(|i| frame.has(Valid::command(i)));
+        let is_commanded = axes.all(|i| frame.commanded(i).is_some());
         let moves =
             is_commanded && self.robot.path_speed_m_s(twist) >= self.robot.body.standing_m_s;
         let is_broken = !moves || !(f64::MIN_POSITIVE..=PAUSE_S).contains(&dt_s);
@@ -225,14 +228,16 @@ impl PublisherCheck {
 
     fn add(&mut self, frame: &SensorFrame, twist: [f64; 3], dt_s: f64) {
         let standing_m_s = self.robot.body.standing_m_s;
-        self.poses.take(frame, twist, dt_s, standing_m_s);
+        self.poses
+            .take(self.map.pose(frame), twist, dt_s, standing_m_s);
         let turns = twist[2].abs() >= TURNING_1_M * twist[0].hypot(twist[1]);
-        if turns && frame.has(Valid::YAW_RATE) {
-            self.gyro.product += frame.yaw_rate * twist[2] * dt_s;
+        if let Some(yaw_rate) = self.map.yaw_rate(frame).filter(|_| turns) {
+            self.gyro.product += yaw_rate * twist[2] * dt_s;
             self.gyro.square += twist[2] * twist[2] * dt_s;
             self.gyro.turn_rad += twist[2].abs() * dt_s;
         }
-        self.wheels.take(&self.robot, frame, twist, dt_s);
+        self.wheels
+            .take(&self.robot, &self.map, frame, (twist, dt_s));
     }
 
     /// Evaluates every test that has not ended; returns the first that fails, and the others at the

@@ -1,6 +1,5 @@
 //! Pose against command, over stretches of half a second.
 
-use vigil_blocks::{SensorFrame, Valid};
 use vigil_inference::angle::wrap;
 
 use super::{Finding, FindingKind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
@@ -58,19 +57,18 @@ impl Poses {
         self.stretch = None;
     }
 
-    /// Takes a frame of a robot in motion, `dt_s` after the last; true if a stretch is complete.
+    /// Takes the pose of a robot in motion, `dt_s` after the last; true if a stretch is complete.
     pub fn take(
         &mut self,
-        frame: &SensorFrame,
+        pose: Option<[f64; 3]>,
         twist: [f64; 3],
         dt_s: f64,
         standing_m_s: f64,
     ) -> bool {
-        if !frame.has(Valid::POSE) {
+        let Some(pose) = pose else {
             self.stretch = None;
             return false;
-        }
-        let pose = frame.pose;
+        };
         let stretch = self.stretch.get_or_insert(Stretch {
             from: pose,
             last_yaw: pose[2],

@@ -1,9 +1,10 @@
 //! Wheel rates and steering angles against the command, wheel by wheel.
 
-use vigil_blocks::{SensorFrame, Valid, WHEELS};
+use vigil_blocks::{SensorFrame, WHEELS};
 
 use super::finding::is_rate_unit;
 use super::{FindingKind, RATIO_MAX, TURN_MIN_RAD, TURNING_1_M, TestOutcome};
+use crate::channel_map::ChannelMap;
 use crate::description::Description;
 use crate::description::Kinematics;
 use crate::learned::wheels::{rolling_rate, steering_angle};
@@ -116,20 +117,25 @@ impl Wheels {
     }
 
     /// Takes a frame of a robot in motion.
-    pub fn take(&mut self, robot: &Description, frame: &SensorFrame, twist: [f64; 3], dt_s: f64) {
-        let [speed, _, turn] = twist;
+    pub fn take(
+        &mut self,
+        robot: &Description,
+        map: &ChannelMap,
+        frame: &SensorFrame,
+        ([speed, _, turn], dt_s): ([f64; 3], f64),
+    ) {
         let mut expected = [0.0; WHEELS];
         for (wheel, expected) in expected.iter_mut().enumerate().take(self.wheel_count) {
             *expected = match robot.kinematics {
                 Kinematics::Ackermann6 => rolling_rate(robot, wheel, frame.command[0], speed),
                 _ => (speed - robot.wheels[wheel].y * turn) / robot.wheel_radius_m,
             };
-            if frame.has(Valid::wheel_rate(wheel)) {
-                self.rates[wheel].add(frame.wheel_rate[wheel], *expected, dt_s);
+            if let Some(rate) = map.wheel_rate(frame, wheel) {
+                self.rates[wheel].add(rate, *expected, dt_s);
             }
-            if frame.has(Valid::steer(wheel)) && robot.wheels[wheel].steered {
+            if let Some(measured) = map.steer(frame, wheel) {
                 let angle = steering_angle(robot, wheel, frame.command[0]);
-                self.steer[wheel].add(frame.steer[wheel], angle, dt_s);
+                self.steer[wheel].add(measured, angle, dt_s);
             }
         }
         if turn.abs() < TURNING_1_M * speed.abs() {
@@ -137,14 +143,13 @@ impl Wheels {
         }
         for pair in &mut self.pairs[..self.pair_count] {
             let [i, j] = pair.wheels;
-            if !frame.has(Valid::wheel_rate(i) | Valid::wheel_rate(j)) {
+            let rates = (map.wheel_rate(frame, i), map.wheel_rate(frame, j));
+            let (Some(left), Some(right)) = rates else {
                 continue;
-            }
-            let square = |wheel: usize, place: usize| {
-                (frame.wheel_rate[wheel] - expected[place]).powi(2) * dt_s
             };
-            pair.named += square(i, i) + square(j, j);
-            pair.exchanged += square(i, j) + square(j, i);
+            let square = |rate: f64, place: usize| (rate - expected[place]).powi(2) * dt_s;
+            pair.named += square(left, i) + square(right, j);
+            pair.exchanged += square(left, j) + square(right, i);
             pair.difference += (expected[i] - expected[j]).powi(2) * dt_s;
             pair.turned_rad += turn.abs() * dt_s;
         }

@@ -1,6 +1,7 @@
 //! An encoder that reads noise reads right now and then: that is no end of its fault.
 
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::SensorFrame;
+use vigil_robot::ChannelMap;
 use vigil_robot::learned::wheel_evidence::{BREAKAGES, WheelEvidence};
 use vigil_robot::learned::wheels::rolling_rate;
 use vigil_robot::learned::{EncoderState, NoiseScales, Observer, WheelContext};
@@ -11,24 +12,26 @@ use crate::learned::{model, robot};
 /// whole, where it is off by `off_rad_s`.
 fn log_ratio(off_rad_s: f64) -> f64 {
     let (robot, model) = (robot(), model());
+    let map = ChannelMap::new(&robot);
     let mut observer = Observer::new(&model, &robot);
     let mut t_ns = 1_000_000_000;
     loop {
         t_ns += 10_000_000;
         let mut frame = SensorFrame {
             run_id: 1,
-            command: [0.0, 0.2, 0.0, 0.0],
             ..SensorFrame::default()
         };
         frame.header.t_capture_ns = t_ns;
-        frame.pose[0] = 0.2 * t_ns as f64 * 1e-9;
+        frame.set_command(0, 0.0);
+        frame.set_command(1, 0.2);
+        map.set_pose(&mut frame, [0.2 * t_ns as f64 * 1e-9, 0.0, 0.0]);
         // No two samples of an encoder are the same.
         let dither = 1e-3 * (t_ns / 10_000_000 % 7) as f64;
         for wheel in 0..robot.wheels.len() {
-            frame.wheel_rate[wheel] = rolling_rate(&robot, wheel, 0.0, 0.2) + dither;
+            let rate = rolling_rate(&robot, wheel, 0.0, 0.2) + dither;
+            map.set_wheel_rate(&mut frame, wheel, rate);
         }
-        frame.wheel_rate[2] += off_rad_s;
-        frame.valid = Valid::POSE | Valid::command(0) | Valid::command(1) | 0x3f00;
+        frame.channel[3 + 2] += off_rad_s;
         if observer.push(&frame).complete && t_ns > 3_000_000_000 {
             break;
         }

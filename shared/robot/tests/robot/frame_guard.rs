@@ -2,62 +2,63 @@
 //! nothing else.
 
 use proptest::prelude::*;
-use vigil_blocks::{COMMANDS, Rejection, SensorFrame, Valid, WHEELS};
+use vigil_blocks::{Rejection, SensorFrame};
+use vigil_robot::channel::channels;
 use vigil_robot::frame_guard::{
-    BEYOND_LIMITS, COMMAND_MAX, CURRENT_MAX_A, JUMP_MAX_M, PAUSE_MAX_NS, POSITION_MAX_M,
-    STEER_MAX_RAD, YAW_MAX_RAD,
+    BEYOND_LIMITS, CURRENT_MAX_A, JUMP_MAX_M, PAUSE_MAX_NS, POSITION_MAX_M, STEER_MAX_RAD,
+    YAW_MAX_RAD,
 };
 use vigil_robot::publisher_check::PublisherCheck;
-use vigil_robot::{Description, FrameGuard};
+use vigil_robot::{ChannelMap, Description, FrameGuard};
 
 use crate::learned::robot;
 
 /// A number of a frame: its name, how to get at it, which of an array, and its bound.
 type Place = (String, fn(&mut SensorFrame, usize) -> &mut f64, usize, f64);
 
-/// Every number but the pose.
+/// Every number of a frame that has a meaning.
 fn places(robot: &Description) -> Vec<Place> {
     let mut all: Vec<Place> = Vec::new();
-    for i in 0..COMMANDS {
-        let bound = robot
-            .command
-            .get(i)
-            .map_or(COMMAND_MAX, |a| BEYOND_LIMITS * a.limit);
-        all.push((format!("command {i}"), |f, i| &mut f.command[i], i, bound));
+    for (i, axis) in robot.command.iter().enumerate() {
+        let bound = BEYOND_LIMITS * axis.limit;
+        all.push((axis.name.clone(), |f, i| &mut f.command[i], i, bound));
     }
-    for i in 0..3 {
-        let bound = if i == 2 { YAW_MAX_RAD } else { POSITION_MAX_M };
-        all.push((
-            format!("planned pose {i}"),
-            |f, i| &mut f.planned_pose[i],
-            i,
-            bound,
-        ));
+    let pose = [POSITION_MAX_M, POSITION_MAX_M, YAW_MAX_RAD];
+    for (i, bound) in pose.into_iter().enumerate() {
+        let name = format!("planned pose {i}");
+        all.push((name, |f, i| &mut f.planned_pose[i], i, bound));
     }
     let limits = &robot.limits;
-    all.push((
-        "yaw rate".into(),
-        |f, _| &mut f.yaw_rate,
-        0,
-        10.0 * limits.yaw_rate_rad_s,
-    ));
-    for i in 0..WHEELS {
-        let rate = BEYOND_LIMITS * limits.wheel_rate_rad_s;
-        all.push((format!("rate {i}"), |f, i| &mut f.wheel_rate[i], i, rate));
-        all.push((
-            format!("steer {i}"),
-            |f, i| &mut f.steer[i],
-            i,
-            STEER_MAX_RAD,
-        ));
-        all.push((
-            format!("current {i}"),
-            |f, i| &mut f.current[i],
-            i,
-            CURRENT_MAX_A,
-        ));
+    let rates = [BEYOND_LIMITS * limits.wheel_rate_rad_s; 6];
+    let gyro = [BEYOND_LIMITS * limits.yaw_rate_rad_s];
+    let bounds = [
+        &pose[..],
+        &rates,
+        &[STEER_MAX_RAD; 4],
+        &gyro,
+        &[CURRENT_MAX_A; 6],
+    ]
+    .concat();
+    assert_eq!(channels(robot).len(), bounds.len());
+    for ((i, channel), bound) in channels(robot).into_iter().enumerate().zip(bounds) {
+        all.push((channel.name, |f, i| &mut f.channel[i], i, bound));
     }
     all
+}
+
+/// A frame of the robot in which every number is 0 and, where asked for, marked.
+fn blank(robot: &Description, is_marked: bool) -> SensorFrame {
+    let map = ChannelMap::new(robot);
+    let mut frame = SensorFrame {
+        robot_hash: map.hash(),
+        ..SensorFrame::default()
+    };
+    if is_marked {
+        frame.channel_valid = map.channel_bits();
+        frame.command_valid = map.command_bits();
+        frame.planned_pose_valid = 1;
+    }
+    frame
 }
 
 #[test]
@@ -74,17 +75,15 @@ fn each_number_has_its_bound_and_only_where_it_is_marked_valid() {
             (f64::NAN, Err(Rejection::NotFinite)),
             (f64::INFINITY, Err(Rejection::NotFinite)),
         ] {
-            let mut frame = SensorFrame {
-                valid: u64::MAX,
-                ..SensorFrame::default()
-            };
+            let mut frame = blank(&robot, true);
             *place(&mut frame, i) = value;
             assert_eq!(
                 FrameGuard::new(&robot).check(&frame),
                 expected,
                 "{name}: {value}"
             );
-            frame.valid = 0;
+            frame = blank(&robot, false);
+            *place(&mut frame, i) = value;
             let unmarked = FrameGuard::new(&robot).check(&frame);
             let is_finite = if value.is_finite() { Ok(()) } else { expected };
             assert_eq!(unmarked, is_finite, "{name}, not marked: {value}");
@@ -95,7 +94,7 @@ fn each_number_has_its_bound_and_only_where_it_is_marked_valid() {
 #[test]
 fn words_without_a_meaning_are_refused() {
     let robot = robot();
-    let good = SensorFrame::default();
+    let good = blank(&robot, true);
     for bad in [
         SensorFrame {
             action_outcome: 4,
@@ -105,6 +104,15 @@ fn words_without_a_meaning_are_refused() {
             safe_stop: 2,
             ..good
         },
+        SensorFrame {
+            planned_pose_valid: 2,
+            ..good
+        },
+        // A channel that the robot does not have.
+        SensorFrame {
+            channel_valid: good.channel_valid | 1 << 20,
+            ..good
+        },
     ] {
         assert_eq!(
             FrameGuard::new(&robot).check(&bad),
@@ -112,17 +120,19 @@ fn words_without_a_meaning_are_refused() {
         );
     }
     assert_eq!(FrameGuard::new(&robot).check(&good), Ok(()));
+    let other = SensorFrame {
+        robot_hash: good.robot_hash ^ 1,
+        ..good
+    };
+    assert_eq!(FrameGuard::new(&robot).check(&other), Err(Rejection::Robot));
 }
 
 #[test]
 fn a_jump_is_measured_from_the_frame_before_and_a_new_track_has_none() {
     let robot = robot();
     let at = |x: f64, t_s: u64| {
-        let mut frame = SensorFrame {
-            valid: Valid::POSE,
-            pose: [x, 0.0, 0.0],
-            ..SensorFrame::default()
-        };
+        let mut frame = blank(&robot, true);
+        frame.channel[0] = x;
         frame.header.t_capture_ns = t_s * 1_000_000_000;
         frame
     };
@@ -150,10 +160,8 @@ fn a_capture_time_that_stands_goes_back_or_leaps_is_refused_once_for_each_settin
     let robot = robot();
     let mut guard = FrameGuard::new(&robot);
     let mut check = |run_id: u64, t_capture_ns: u64| {
-        let mut frame = SensorFrame {
-            run_id,
-            ..SensorFrame::default()
-        };
+        let mut frame = blank(&robot, false);
+        frame.run_id = run_id;
         frame.header.t_capture_ns = t_capture_ns;
         guard.check(&frame)
     };
@@ -197,8 +205,7 @@ proptest! {
     ) {
         let robot = robot();
         let places = places(&robot);
-        let valid = if is_marked { u64::MAX } else { 0 };
-        let mut frame = SensorFrame { valid, ..SensorFrame::default() };
+        let mut frame = blank(&robot, is_marked);
         for (which, value) in &spoilt {
             let (_, place, i, _) = which.get(&places);
             *place(&mut frame, *i) = *value;
@@ -219,8 +226,10 @@ proptest! {
         let robot = robot();
         let (mut guard, mut check) = (FrameGuard::new(&robot), PublisherCheck::new(&robot));
         for (i, (pose, rate, t_ns, run_id)) in (1_u64..).zip(frames) {
-            let mut frame = SensorFrame { valid: u64::MAX, pose, run_id, ..SensorFrame::default() };
-            frame.wheel_rate = [rate; WHEELS];
+            let mut frame = blank(&robot, true);
+            frame.run_id = run_id;
+            frame.channel[..3].copy_from_slice(&pose);
+            frame.channel[3..9].fill(rate);
             (frame.command[0], frame.command[1]) = (0.3, 0.2);
             frame.header.t_capture_ns = if in_order { i * 50_000_000 } else { t_ns };
             let is_good = guard.check(&frame).is_ok();

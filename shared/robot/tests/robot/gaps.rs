@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::SensorFrame;
 use vigil_robot::learned::channels::Channels;
 use vigil_robot::learned::further_watch::Turn;
 use vigil_robot::learned::monitor::Monitor;
@@ -94,13 +94,12 @@ fn drive(change_s: f64, gap_s: [f64; 2], seed: u64) -> Vec<SensorFrame> {
             ..SensorFrame::default()
         };
         frame.header.t_capture_ns = 1_000_000_000 + (t_s * 1e9).round() as u64;
-        frame.command = [curvature, speed, 0.0, 0.0];
-        frame.pose = [
-            pose[0] + noise(position),
-            pose[1] + noise(position),
-            pose[2] + noise(yaw),
-        ];
-        frame.valid = Valid::POSE | Valid::command(0) | Valid::command(1);
+        frame.set_command(0, curvature);
+        frame.set_command(1, speed);
+        let sd = [position, position, yaw];
+        for i in 0..3 {
+            frame.set_channel(i, pose[i] + noise(sd[i]));
+        }
         if !(gap_s[0]..gap_s[1]).contains(&t_s) {
             frames.push(frame);
         }
@@ -152,7 +151,7 @@ fn an_outlier_among_the_first_poses_after_a_gap_is_no_fault() {
                 .iter()
                 .position(|f| f.header.t_capture_ns >= 23_000_000_000);
             let frame = &mut frames[first.unwrap() + which];
-            frame.pose[1] += deviations * model().noise.position_m * 5.0_f64.sqrt();
+            frame.channel[1] += deviations * model().noise.position_m * 5.0_f64.sqrt();
             let log_odds = log_odds_max(&frames);
             assert!(log_odds < 0.0, "pose {which} by {deviations}: {log_odds}");
         }

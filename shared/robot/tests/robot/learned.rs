@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use vigil_blocks::{SensorFrame, Valid};
-use vigil_robot::Description;
+use vigil_blocks::SensorFrame;
 use vigil_robot::learned::{Model, ModelError, Observation, Observer};
+use vigil_robot::{ChannelMap, Description};
 
 fn read(name: &str) -> String {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config");
@@ -121,6 +121,7 @@ fn compensation_makes_a_stuck_robot_drive_the_commanded_curvature() {
 /// Frames of a robot on a circle of curvature .5 at .2 m/s, `rate_hz` times a second.
 pub fn circle(rate_hz: f64, duration_s: f64) -> Vec<SensorFrame> {
     let (curvature, speed) = (0.5, 0.2);
+    let map = ChannelMap::new(&robot());
     (0..=(duration_s * rate_hz) as u64)
         .map(|k| {
             let t_s = k as f64 / rate_hz;
@@ -130,10 +131,13 @@ pub fn circle(rate_hz: f64, duration_s: f64) -> Vec<SensorFrame> {
                 ..SensorFrame::default()
             };
             frame.header.t_capture_ns = (t_s * 1e9).round() as u64;
-            frame.command = [curvature, speed, 0.0, 0.0];
-            frame.pose = [yaw.sin() / curvature, (1.0 - yaw.cos()) / curvature, yaw];
-            frame.wheel_rate = [2.0 + 1e-6 * k as f64; 8];
-            frame.valid = Valid::POSE | Valid::command(0) | Valid::command(1) | 0x3f00;
+            frame.set_command(0, curvature);
+            frame.set_command(1, speed);
+            let pose = [yaw.sin() / curvature, (1.0 - yaw.cos()) / curvature, yaw];
+            map.set_pose(&mut frame, pose);
+            for wheel in 0..6 {
+                map.set_wheel_rate(&mut frame, wheel, 2.0 + 1e-6 * k as f64);
+            }
             frame
         })
         .collect()
@@ -192,11 +196,11 @@ fn frames_out_of_order_and_channels_out_of_range_are_told() {
         frame
     };
     let cases: [fn(&mut SensorFrame); 5] = [
-        |frame| frame.pose[1] = f64::NAN,
-        |frame| frame.pose[0] = 1e300,
-        |frame| frame.wheel_rate[3] = f64::INFINITY,
+        |frame| frame.channel[1] = f64::NAN,
+        |frame| frame.channel[0] = 1e300,
+        |frame| frame.channel[3 + 3] = f64::INFINITY,
         |frame| frame.command[1] = f64::NAN,
-        |frame| frame.valid &= !Valid::command(0),
+        |frame| frame.command_valid &= !1,
     ];
     for change in cases {
         assert!(observer.clone().push(&next(change)).invalid);
@@ -205,8 +209,8 @@ fn frames_out_of_order_and_channels_out_of_range_are_told() {
     assert!(
         !observer
             .push(&next(|frame| {
-                frame.pose[1] = f64::NAN;
-                frame.valid &= !Valid::POSE;
+                frame.channel[1] = f64::NAN;
+                frame.channel_valid &= !0b111;
             }))
             .invalid
     );

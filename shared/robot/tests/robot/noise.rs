@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::SensorFrame;
 use vigil_robot::Suspects;
 use vigil_robot::learned::noise_scale::{NoiseScale, SensorNoise};
 use vigil_robot::learned::wheels::rolling_rate;
@@ -34,7 +34,8 @@ fn scales(jitter: f64, loss: f64) -> NoiseScales {
             ..SensorFrame::default()
         };
         frame.header.t_capture_ns = (t_s * 1e9).round() as u64;
-        frame.command = [curvature, speed, 0.0, 0.0];
+        frame.set_command(0, curvature);
+        frame.set_command(1, speed);
         let yaw = curvature * speed * t_s;
         let pose = [yaw.sin() / curvature, (1.0 - yaw.cos()) / curvature, yaw];
         let sd = [
@@ -42,17 +43,18 @@ fn scales(jitter: f64, loss: f64) -> NoiseScales {
             model.noise.position_m,
             model.noise.yaw_rad,
         ];
-        frame.pose = std::array::from_fn(|i| pose[i] + normal(sd[i]));
-        for wheel in 0..WHEELS {
-            let rate = rolling_rate(&robot, wheel, curvature, speed);
-            frame.wheel_rate[wheel] = rate + normal(model.noise.wheel_rate_rad_s);
+        for i in 0..3 {
+            frame.set_channel(i, pose[i] + normal(sd[i]));
         }
-        for wheel in 0..WHEELS {
+        for wheel in 0..robot.wheels.len() {
+            let rate = rolling_rate(&robot, wheel, curvature, speed);
+            frame.set_channel(3 + wheel, rate + normal(model.noise.wheel_rate_rad_s));
+        }
+        for wheel in 0..robot.wheels.len() {
             if rng.random::<f64>() < OUTLIERS {
-                frame.wheel_rate[wheel] += FAR * model.noise.wheel_rate_rad_s;
+                frame.channel[3 + wheel] += FAR * model.noise.wheel_rate_rad_s;
             }
         }
-        frame.valid = Valid::POSE | Valid::command(0) | Valid::command(1) | 0x3f00;
         if rng.random::<f64>() >= loss && observer.push(&frame).complete {
             noise.update(&model, &robot, observer.observation(), Suspects::default());
         }

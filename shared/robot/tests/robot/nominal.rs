@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use nalgebra::SVector;
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::SensorFrame;
 use vigil_inference::ages::Ages;
 use vigil_inference::constant::Constant;
 use vigil_inference::logspace::log_add;
@@ -132,16 +132,17 @@ fn frames() -> Vec<SensorFrame> {
             ..SensorFrame::default()
         };
         frame.header.t_capture_ns = u64::from(i) * 20_000_000;
-        (frame.command[0], frame.command[1]) = (0.3, -0.3 + 0.1 * (0.4 * t_s).sin());
+        frame.set_command(0, 0.3);
+        frame.set_command(1, -0.3 + 0.1 * (0.4 * t_s).sin());
         let side = 0.115 * frame.command[1] / 0.035;
-        (frame.wheel_rate[0], frame.wheel_rate[1]) = (8.6 - side, 8.6 + side);
+        frame.set_channel(0, 8.6 - side);
+        frame.set_channel(1, 8.6 + side);
         let noise = 0.02 * (f64::from(i * 7919 % 1000) / 500.0 - 1.0);
         // The geometry as the model has learned it.
-        let [left, right, ..] = frame.wheel_rate;
+        let [left, right, ..] = frame.channel;
         let turn = -0.0038 - 0.14654 * left + 0.14707 * right;
-        frame.yaw_rate = turn + noise + if t_s < 20.0 { 0.0 } else { 0.02 };
-        frame.valid = Valid::command(0) | Valid::command(1) | Valid::YAW_RATE;
-        frame.valid |= Valid::wheel_rate(0) | Valid::wheel_rate(1);
+        let wrong = if t_s < 20.0 { 0.0 } else { 0.02 };
+        frame.set_channel(2, turn + noise + wrong);
         frame
     };
     (0..1500).map(frame).collect()
@@ -289,8 +290,7 @@ fn with_joint(model: &Model, robot: &Description, rate_1_h: f64) -> Vec<(f64, f6
     let mut out = Vec::new();
     for mut frame in frames() {
         for wheel in 0..2 {
-            frame.current[wheel] = 0.05;
-            frame.valid |= Valid::current(wheel);
+            frame.set_channel(3 + wheel, 0.05);
         }
         if observer.push(&frame).complete {
             monitor.step(observer.history(), false);

@@ -191,7 +191,7 @@ fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, Command
             let runs = frames::read(more, &robot).map_err(CommandError::usage)?;
             learn_further(&mut model, &runs.iter().collect::<Vec<_>>(), more, &robot)?;
         }
-        None if further::is_in(&healthy) => {
+        None if further::is_in(&healthy, &robot) => {
             learn_further(&mut model, &healthy, frames_file, &robot)?;
         }
         None => {}

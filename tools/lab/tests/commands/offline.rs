@@ -256,7 +256,7 @@ fn wrong_input_is_refused_with_its_name_and_exit_code_2() {
         ),
         (
             [&learn[..], &["--frames", &no_pose]].concat(),
-            "frames.csv: missing columns x, y, yaw",
+            "frames.csv: missing columns cmd_curv, cmd_speed, x, y, yaw",
         ),
         (
             [&learn[..], &["--frames", FRAMES, "--test-fraction", "1"]].concat(),

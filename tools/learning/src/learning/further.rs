@@ -2,10 +2,10 @@
 
 use vigil_blocks::WHEELS;
 use vigil_recording::frames::Run;
-use vigil_robot::Description;
 use vigil_robot::learned::further::{CurrentModel, CurrentsModel, YawRateModel};
 use vigil_robot::learned::wheels::rolling_rate;
 use vigil_robot::learned::{Further, FurtherModel, Model, Observation, Observer, Reading};
+use vigil_robot::{ChannelMap, Description};
 
 use super::bounds::{REPEAT_RATE, current_sd};
 use super::least_squares::LeastSquares;
@@ -25,11 +25,10 @@ type HealthyObservation = (Observation, Further);
 
 /// True if any frame holds a yaw rate or a current.
 #[must_use]
-pub fn is_in(runs: &[&Run]) -> bool {
-    use vigil_blocks::Valid;
-    let bits = (0..WHEELS).fold(Valid::YAW_RATE, |bits, i| bits | Valid::current(i));
+pub fn is_in(runs: &[&Run], robot: &Description) -> bool {
+    let bits = ChannelMap::new(robot).further_bits();
     let mut frames = runs.iter().flat_map(|run| &run.frames);
-    frames.any(|frame| frame.valid & bits != 0)
+    frames.any(|frame| frame.channel_valid & bits != 0)
 }
 
 /// Learns what healthy `runs` of the model's robot hold of these channels, and calibrates the alarm

@@ -1,7 +1,7 @@
 //! Whether a log shows what a model must know.
 
-use vigil_blocks::COMMANDS;
 use vigil_robot::Description;
+use vigil_robot::nominal::AXES;
 use vigil_robot::nominal::{History, Range};
 
 use super::NominalError;
@@ -89,7 +89,7 @@ pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Rang
 }
 
 /// Commands that were kept up in motion, for `steady_s` at least.
-pub(super) fn settled(records: &[Record], ranges: &[Range], steady_s: f64) -> Vec<[f64; COMMANDS]> {
+pub(super) fn settled(records: &[Record], ranges: &[Range], steady_s: f64) -> Vec<[f64; AXES]> {
     let histories = records.iter().flat_map(|record| &record.histories);
     let command = |history: &History| {
         let now = history.ago(0)?;

@@ -1,7 +1,7 @@
 //! Ridge regression with Huber weights.
 
 use nalgebra::{DMatrix, DVector};
-use vigil_blocks::COMMANDS;
+use vigil_robot::nominal::AXES;
 use vigil_robot::nominal::Channel;
 
 use super::NominalError;
@@ -22,7 +22,7 @@ const PER_WEIGHT: usize = 3;
 pub(super) fn fit(
     channel: &mut Channel,
     records: &[Part<'_>],
-    sizes: &[f64; COMMANDS],
+    sizes: &[f64; AXES],
     name: &str,
 ) -> Result<(), NominalError> {
     let (mut rows, mut values) = (Vec::new(), Vec::new());

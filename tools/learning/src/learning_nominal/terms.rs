@@ -1,7 +1,7 @@
 //! Which channels a robot's description allows, and from what each is predicted.
 
-use vigil_blocks::COMMANDS;
 use vigil_robot::Description;
+use vigil_robot::nominal::AXES;
 use vigil_robot::nominal::{Model, Quantity, Regressor, Target, Term};
 
 /// How many observations back a wheel's rate matters to the gyro and the current.
@@ -68,8 +68,8 @@ fn rates(wheel: usize) -> impl Iterator<Item = Term> {
 
 /// Every product of powers of the axes up to an order, the constant first.
 fn polynomial(axes: usize, order: usize) -> Vec<Term> {
-    let mut products = vec![[0_u8; COMMANDS]];
-    for axis in 0..axes.min(COMMANDS) {
+    let mut products = vec![[0_u8; AXES]];
+    for axis in 0..axes.min(AXES) {
         let mut more = Vec::new();
         for powers in &products {
             let used: usize = powers.iter().map(|&power| usize::from(power)).sum();

@@ -3,7 +3,7 @@
 //! Two speeds tell a line and no curve, however long each was driven. A fit that has a curve's term
 //! nevertheless bends it as its ridge likes, holds at these two speeds, and is wrong at all others.
 
-use vigil_blocks::COMMANDS;
+use vigil_robot::nominal::AXES;
 use vigil_robot::nominal::{History, Range, Regressor, Term};
 
 /// Part of what even driving over the whole range would show of a term, from which it counts as
@@ -26,12 +26,12 @@ pub(super) fn is_settled(history: &History, ranges: &[Range]) -> bool {
 /// The products of powers among `terms` that these commands do not tell from those of lower order
 /// (and from those before them), in order, with all products of which they are a factor; none
 /// without commands. Each axis counts from -1 to 1 over its range.
-pub(super) fn untold(terms: &[Term], commands: &[[f64; COMMANDS]], ranges: &[Range]) -> Vec<Term> {
+pub(super) fn untold(terms: &[Term], commands: &[[f64; AXES]], ranges: &[Range]) -> Vec<Term> {
     let order = |term: &Term| term.powers.iter().map(|&p| u32::from(p)).sum::<u32>();
     let mut products: Vec<Term> = terms.to_vec();
     products.retain(|term| matches!(term.of, Regressor::Constant | Regressor::Command));
     products.sort_by_key(order);
-    let commands: Vec<[f64; COMMANDS]> = commands.iter().map(|c| scaled(c, ranges)).collect();
+    let commands: Vec<[f64; AXES]> = commands.iter().map(|c| scaled(c, ranges)).collect();
     let (mut basis, mut untold) = (Vec::<Vec<f64>>::new(), Vec::new());
     if commands.is_empty() {
         return untold;
@@ -76,15 +76,15 @@ pub(super) fn single(term: &Term) -> Option<usize> {
     (order == 1).then_some(axis)
 }
 
-fn scaled(command: &[f64; COMMANDS], ranges: &[Range]) -> [f64; COMMANDS] {
-    let mut out = [0.0; COMMANDS];
+fn scaled(command: &[f64; AXES], ranges: &[Range]) -> [f64; AXES] {
+    let mut out = [0.0; AXES];
     for ((out, value), range) in out.iter_mut().zip(command).zip(ranges) {
         *out = 2.0 * (value - range.min) / (range.max - range.min).max(1e-9) - 1.0;
     }
     out
 }
 
-fn product(term: &Term, command: &[f64; COMMANDS]) -> f64 {
+fn product(term: &Term, command: &[f64; AXES]) -> f64 {
     let powers = term.powers.iter().zip(command);
     powers.map(|(&p, value)| value.powi(i32::from(p))).product()
 }

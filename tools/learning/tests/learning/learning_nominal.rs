@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use vigil_blocks::{SensorFrame, Valid};
+use vigil_blocks::SensorFrame;
 use vigil_learning::learning_nominal::{NominalError, learn};
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
@@ -54,18 +54,16 @@ fn run(id: u32, length_s: f64, drive: impl Fn(f64) -> [f64; 2], fault: Fault) ->
         let mut frame = SensorFrame::default();
         frame.header.t_capture_ns = (t * 1e9) as u64;
         (frame.header.seq, frame.run_id) = (i, u64::from(id) + 1);
-        frame.command[0] = v;
-        frame.command[1] = w;
-        frame.wheel_rate[0] = (v - 0.5 * TRACK_M * w) / RADIUS_M + noise();
-        frame.wheel_rate[1] = (v + 0.5 * TRACK_M * w) / RADIUS_M + noise();
+        frame.set_command(0, v);
+        frame.set_command(1, w);
+        frame.set_channel(0, (v - 0.5 * TRACK_M * w) / RADIUS_M + noise());
+        frame.set_channel(1, (v + 0.5 * TRACK_M * w) / RADIUS_M + noise());
         let wrong = match fault {
             Fault::Bias(from_s, size) if t >= from_s => size,
             Fault::Scatter(from_s, size) if t >= from_s => size * noise() / NOISE_RAD_S,
             _ => 0.0,
         };
-        frame.yaw_rate = w + noise() + wrong;
-        frame.valid = Valid::command(0) | Valid::command(1) | Valid::YAW_RATE;
-        frame.valid |= Valid::wheel_rate(0) | Valid::wheel_rate(1);
+        frame.set_channel(2, w + noise() + wrong);
         frames.push(frame);
     }
     Run { id, frames }
@@ -210,7 +208,7 @@ fn speeds_between_those_of_the_log_are_no_fault_and_what_it_does_not_tell_is_sai
     // A drive that takes a few frames to follow: a fit may explain its steps by a curve.
     let lagged = |id: u32, drive: &dyn Fn(f64) -> [f64; 2], length_s: f64| {
         let mut run = run(id, length_s, drive, Fault::None);
-        let mut state = [run.frames[0].wheel_rate[0], run.frames[0].wheel_rate[1]];
+        let mut state = [run.frames[0].channel[0], run.frames[0].channel[1]];
         for frame in &mut run.frames {
             let commanded = [
                 (frame.command[0] - 0.5 * TRACK_M * frame.command[1]) / RADIUS_M,
@@ -218,9 +216,9 @@ fn speeds_between_those_of_the_log_are_no_fault_and_what_it_does_not_tell_is_sai
             ];
             for (i, state) in state.iter_mut().enumerate() {
                 *state += 0.15 * (commanded[i] - *state);
-                frame.wheel_rate[i] += *state - commanded[i];
+                frame.channel[i] += *state - commanded[i];
             }
-            frame.yaw_rate += (state[1] - state[0]) * RADIUS_M / TRACK_M - frame.command[1];
+            frame.channel[2] += (state[1] - state[0]) * RADIUS_M / TRACK_M - frame.command[1];
         }
         run
     };
@@ -241,7 +239,7 @@ fn speeds_between_those_of_the_log_are_no_fault_and_what_it_does_not_tell_is_sai
     // Noise is widened there, but a fault is still seen.
     let mut stuck = lagged(50, &|t: f64| [0.35, two_speeds(t)[1]], 25.0);
     for frame in stuck.frames.iter_mut().skip(500) {
-        frame.wheel_rate[0] = 0.0;
+        frame.channel[0] = 0.0;
     }
     let found_s = alarm(&model, &stuck).unwrap();
     assert!((10.0..11.0).contains(&found_s), "{found_s}");
@@ -256,19 +254,19 @@ fn columns_that_mean_something_else_are_refused_in_the_words_of_the_description(
         assert!(matches!(refused, NominalError::Doubtful(_)), "{refused}");
         refused.to_string()
     };
-    let message = refused(&|frame| frame.yaw_rate = frame.yaw_rate.to_degrees());
+    let message = refused(&|frame| frame.channel[2] = frame.channel[2].to_degrees());
     assert!(
         message.ends_with("commanded one: is it in deg/s?"),
         "{message}"
     );
-    let message = refused(&|frame| frame.yaw_rate *= -1.0);
+    let message = refused(&|frame| frame.channel[2] *= -1.0);
     assert!(
         message.contains(
             "yaw_rate is -1.00 times the commanded one: is it or w positive to the right?"
         ),
         "{message}"
     );
-    let message = refused(&|frame| frame.wheel_rate.swap(0, 1));
+    let message = refused(&|frame| frame.channel.swap(0, 1));
     assert!(
         message.contains("exchanged, or is w positive to the right?"),
         "{message}"
@@ -283,7 +281,7 @@ fn columns_that_mean_something_else_are_refused_in_the_words_of_the_description(
         message.ends_with("allowed is 2 rad/s: is it in deg/s or mrad/s?"),
         "{message}"
     );
-    let message = refused(&|frame| frame.wheel_rate[1] = 3.0);
+    let message = refused(&|frame| frame.channel[1] = 3.0);
     assert!(message.contains("enc_R is 3 throughout"), "{message}");
 }
 
@@ -293,7 +291,7 @@ fn one_doubtful_run_among_many_is_told_and_learned_from() {
     runs[2]
         .frames
         .iter_mut()
-        .for_each(|frame| frame.yaw_rate *= -1.0);
+        .for_each(|frame| frame.channel[2] *= -1.0);
     let (_, report) = learn(&runs, &[], f64::INFINITY, &robot()).unwrap();
     let told = |w: &String| {
         w.starts_with("1 of 5 runs are doubtful") && w.contains("run 2: signs: yaw_rate")

@@ -84,14 +84,14 @@ fn ratio(message: &str) -> (f64, &str) {
 
 fn scale_position(factor: f64) -> impl Fn(&mut SensorFrame) {
     move |frame| {
-        frame.pose[0] *= factor;
-        frame.pose[1] *= factor;
+        frame.channel[0] *= factor;
+        frame.channel[1] *= factor;
     }
 }
 
 fn scale_rates(factor: f64) -> impl Fn(&mut SensorFrame) {
     move |frame| {
-        frame.wheel_rate[..6]
+        frame.channel[3..9]
             .iter_mut()
             .for_each(|rate| *rate *= factor)
     }
@@ -103,7 +103,7 @@ fn units_are_told_by_their_factor() {
     let degrees = 180.0 / std::f64::consts::PI;
     let in_degrees = |frame: &mut SensorFrame| {
         // Wrapped to half a turn, as a compass in degrees is, but to a radian's range.
-        frame.pose[2] = (frame.pose[2] * degrees + 3.2).rem_euclid(6.4) - 3.2;
+        frame.channel[2] = (frame.channel[2] * degrees + 3.2).rem_euclid(6.4) - 3.2;
     };
     let rpm = 60.0 / std::f64::consts::TAU;
     let cases: [(String, f64, &str); 6] = [
@@ -146,21 +146,21 @@ fn a_command_beyond_its_limit_is_asked_for_the_units_that_fit() {
 #[test]
 fn signs_sides_and_silent_sensors_are_told() {
     let data = Data::read();
-    let mirrored_yaw = data.changed(|frame| frame.pose[2] = -frame.pose[2]);
+    let mirrored_yaw = data.changed(|frame| frame.channel[2] = -frame.channel[2]);
     let (turned, after) = ratio(&mirrored_yaw);
     assert!((turned + 1.0).abs() < 0.05, "{mirrored_yaw}");
     assert!(after.contains("positive to the right?"), "{mirrored_yaw}");
     let exact = [
         (
-            data.changed(|frame| frame.pose[2] = 0.25),
+            data.changed(|frame| frame.channel[2] = 0.25),
             "yaw is 0.25 throughout, though a turn is commanded",
         ),
         (
-            data.changed(|frame| frame.wheel_rate = [0.0; 8]),
+            data.changed(|frame| frame.channel[3..9].fill(0.0)),
             "enc_LF is 0 throughout, though motion is commanded",
         ),
         (
-            data.changed(|frame| frame.wheel_rate[4] = 1.5),
+            data.changed(|frame| frame.channel[3 + 4] = 1.5),
             "enc_RM is 1.5 throughout, though motion is commanded",
         ),
         (
@@ -168,7 +168,7 @@ fn signs_sides_and_silent_sensors_are_told() {
             "signs: enc_RF has the other sign",
         ),
         (
-            data.changed(|frame| frame.wheel_rate[..6].rotate_left(3)),
+            data.changed(|frame| frame.channel[3..9].rotate_left(3)),
             "sides: enc_LF and the wheel opposite turn as each other should: are they exchanged, \
              or is cmd_curv positive to the right?",
         ),
@@ -177,8 +177,7 @@ fn signs_sides_and_silent_sensors_are_told() {
         assert_eq!(found, wanted);
     }
     let sideways = data.changed(|frame| {
-        let [x, y, yaw] = frame.pose;
-        frame.pose = [-y, x, yaw];
+        (frame.channel[0], frame.channel[1]) = (-frame.channel[1], frame.channel[0]);
     });
     assert!(
         sideways.starts_with("axes: x and y move at 1.5"),
@@ -247,7 +246,9 @@ fn one_speed_is_refused() {
             let t_ns = frame.header.t_capture_ns as f64 * slower;
             frame.header.t_capture_ns = t_ns.round() as u64;
             frame.command[1] = 0.2;
-            frame.wheel_rate.iter_mut().for_each(|rate| *rate /= slower);
+            frame.channel[3..9]
+                .iter_mut()
+                .for_each(|rate| *rate /= slower);
         }
         label.onset_s = label.onset_s.map(|onset_s| onset_s * slower);
     });

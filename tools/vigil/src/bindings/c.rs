@@ -10,8 +10,8 @@ const HEAD: &str = r#"/* Wire blocks of Vigil, for C11 and C++17.
  * Made by `vigil types c`; do not edit.
  *
  * Units are SI, angles radians, times CLOCK_MONOTONIC nanoseconds; x forward, y left, yaw
- * counter-clockwise. All numbers little-endian, no padding. VIGIL_VALID_..._0 is the bit of the
- * first element of an array; shift it left for the others. */
+ * counter-clockwise. All numbers little-endian, no padding. Which place of a frame's command and
+ * channels means what: the file `channels` of the running graph, or `vigil channels`. */
 #ifndef VIGIL_TYPES_H
 #define VIGIL_TYPES_H
 
@@ -48,7 +48,7 @@ static inline uint32_t vigil_crc32c(uint32_t crc, const uint8_t *bytes, size_t c
  * header.t_schedule_ns at 0 unless it runs on Vigil's machine and has its CLOCK_MONOTONIC. */
 static inline void vigil_datagram(const vigil_sensor_frame *frame,
                                   uint8_t bytes[VIGIL_DATAGRAM_SIZE]) {
-  const uint8_t head[12] = {'V', 'G', 'I', 'L', 1, 0, 1, 0,
+  const uint8_t head[12] = {'V', 'G', 'I', 'L', 2, 0, 1, 0,
                             sizeof *frame & 0xff, sizeof *frame >> 8, 0, 0};
   memcpy(bytes, head, 12);
   memcpy(bytes + 16, frame, sizeof *frame);

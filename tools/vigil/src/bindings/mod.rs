@@ -7,7 +7,7 @@ use vigil_blocks::layout::{Field, Layout};
 use vigil_blocks::{
     Action, ActionOutcome, Block, Cause, CauseKind, ControlMode, DetectionBelief, Event,
     FaultBelief, FaultSet, Header, Health, HealthyBelief, ParticleBlock, RecoveryKind, SensorFrame,
-    SizeKind, Symptoms, Valid, WeightedHypothesis,
+    SizeKind, Symptoms, WeightedHypothesis,
 };
 
 pub use c::header;
@@ -58,15 +58,7 @@ fn structs() -> Vec<Struct> {
 
 /// Named values of fields: prefix, name, value.
 fn constants() -> Vec<(&'static str, String, u64)> {
-    let mut all = vec![
-        ("VALID", "COMMAND_0".to_owned(), Valid::COMMAND),
-        ("VALID", "POSE".to_owned(), Valid::POSE),
-        ("VALID", "PLANNED_POSE".to_owned(), Valid::PLANNED_POSE),
-        ("VALID", "YAW_RATE".to_owned(), Valid::YAW_RATE),
-        ("VALID", "WHEEL_RATE_0".to_owned(), Valid::wheel_rate(0)),
-        ("VALID", "STEER_0".to_owned(), Valid::steer(0)),
-        ("VALID", "CURRENT_0".to_owned(), Valid::current(0)),
-    ];
+    let mut all = Vec::new();
     for (name, bit) in Symptoms::NAMED {
         all.push(("SYMPTOM", name.to_owned(), u64::from(bit)));
     }
@@ -162,10 +154,13 @@ mod tests {
     fn arrays_and_documentation_are_read_from_the_structs() {
         let field = |name| SensorFrame::FIELDS.iter().find(|f| f.name == name);
         let of = |name| field(name).map(|f| (elements(f), doc(f)));
-        let rates = "Wheel rates, rad/s, in the order of the robot's description.".to_owned();
-        assert_eq!(of("wheel_rate"), Some((("f64", Some(8)), rates)));
-        let yaw_rate = "Yaw rate, rad/s.".to_owned();
-        assert_eq!(of("yaw_rate"), Some((("f64", None), yaw_rate)));
+        let pose = "Planned pose x m, y m, yaw rad, in the frame of the pose's channels.";
+        assert_eq!(
+            of("planned_pose"),
+            Some((("f64", Some(3)), pose.to_owned()))
+        );
+        let known = "1 if planned_pose is known.".to_owned();
+        assert_eq!(of("planned_pose_valid"), Some((("u32", None), known)));
         let events = Health::FIELDS.iter().find(|f| f.name == "events");
         assert_eq!(events.map(elements), Some(("Event", Some(32))));
     }

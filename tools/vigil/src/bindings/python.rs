@@ -7,8 +7,8 @@ use super::{Struct, constants, doc, elements, structs};
 const HEAD: &str = r#""""Wire blocks of Vigil, as ctypes. Made by `vigil types python`; do not edit.
 
 Units are SI, angles radians, times CLOCK_MONOTONIC nanoseconds; x forward, y left, yaw
-counter-clockwise. All numbers little-endian, no padding. VALID_..._0 is the bit of the first
-element of an array; shift it left for the others.
+counter-clockwise. All numbers little-endian, no padding. Channels finds the places of a frame's
+command and channels by their names.
 """
 
 import ctypes
@@ -70,6 +70,57 @@ def difference(graph="rover"):
     return f"the types are the same; the graph has iceoryx2 {there}, this program {here}"
 
 
+class Channels:
+    """Which place of a frame's command and channels has which name: a robot's channel list.
+
+    Made of the text that `vigil channels --robot F` prints; Channels.read(path) makes it of a file.
+    `axes` and `channels` are the places by name, `units` the units by name, `-` for none.
+    """
+
+    def __init__(self, text):
+        self.robot_hash, self.axes, self.channels, self.units = 0, {}, {}, {}
+        for line in text.splitlines():
+            kind, number, name, *unit = line.split()
+            if kind == "robot":
+                self.robot_hash = int(number, 16)
+            elif kind in ("command", "channel"):
+                (self.axes if kind == "command" else self.channels)[name] = int(number)
+                self.units[name] = " ".join(unit)
+        if self.robot_hash == 0:
+            raise ValueError("no channel list: it has no line 'robot HASH NAME'")
+
+    @staticmethod
+    def read(path):
+        """The list of a file."""
+        with open(path) as file:
+            return Channels(file.read())
+
+    def set(self, frame, name, value):
+        """Writes a channel and marks it as measured; KeyError with the names that there are."""
+        place = self._place(self.channels, name)
+        frame.channel[place] = value
+        frame.channel_valid |= 1 << place
+        frame.robot_hash = self.robot_hash
+
+    def command(self, frame, name, value):
+        """Writes an axis of the command and marks it as known; KeyError as above."""
+        place = self._place(self.axes, name)
+        frame.command[place] = value
+        frame.command_valid |= 1 << place
+        frame.robot_hash = self.robot_hash
+
+    @staticmethod
+    def _place(places, name):
+        if name not in places:
+            raise KeyError(f"'{name}' is none of {', '.join(places)}")
+        return places[name]
+
+
+def channel_list(graph="rover"):
+    """The Channels of a running graph."""
+    return Channels.read(f"{runtime_folder(graph)}/channels")
+
+
 def _table():
     for byte in range(256):
         for _ in range(8):
@@ -96,7 +147,7 @@ def datagram(frame):
     """
     frame.header.schema = SensorFrame.SCHEMA
     body = bytes(frame)
-    head = b"VGIL" + struct.pack("<HHI", 1, 1, len(body))
+    head = b"VGIL" + struct.pack("<HHI", 2, 1, len(body))
     return head + struct.pack("<I", crc32c(head + body)) + body
 "#;
 

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use vigil_blocks::SensorFrame;
 use vigil_recording::frames::{Field, fields};
 use vigil_robot::Description;
+use vigil_robot::channel::{Role, channels};
 use vigil_robot::publisher_check::PublisherCheck;
 
 use super::FrameArrival;
@@ -31,19 +32,16 @@ struct Stretch {
     moving_most: f64,
 }
 
-/// One finding for each field of the robot, and one about what they mean together.
+/// One finding for each field of the robot, and one about what they mean together. A field that a
+/// recording may lack may be lacking here.
 pub fn findings(robot: &Description, frames: &[FrameArrival]) -> Vec<Finding> {
     let fields = fields(robot);
     let one = |(name, field): &(String, Field)| {
-        judge(
-            name,
-            *field,
-            robot,
-            stretch(robot, *field, frames),
-            frames.len(),
-        )
+        let of = stretch(robot, *field, frames);
+        let is_there = of.measured > 0 || !field.is_optional();
+        is_there.then(|| judge(name, (*field, limit(*field, robot)), of, frames.len()))
     };
-    let mut all: Vec<Finding> = fields.iter().map(one).collect();
+    let mut all: Vec<Finding> = fields.iter().filter_map(one).collect();
     all.extend(meanings(robot, frames));
     all
 }
@@ -79,17 +77,22 @@ fn stretch(robot: &Description, field: Field, frames: &[FrameArrival]) -> Stretc
     found
 }
 
-fn judge(name: &str, field: Field, robot: &Description, of: Stretch, frames: usize) -> Finding {
+fn judge(name: &str, by: (Field, Option<f64>), of: Stretch, frames: usize) -> Finding {
+    let (field, limit) = by;
     let finding = |status, detail: String| Finding::new(name, status, detail);
     if of.measured == 0 {
-        let detail = "never marked as valid, but the robot's description says that it is \
-                      measured: set its bit in `valid`, or take it out of [measured]";
-        return finding(Status::Failure, detail.into());
+        let detail = format!(
+            "never marked as valid, but the robot's description says that it is measured: set its \
+             bit in `{}`, or take it out of the description",
+            bits(field)
+        );
+        return finding(Status::Failure, detail);
     }
     if of.not_finite > 0 {
         let detail = format!(
-            "NaN or infinite in {} of {frames} frames: leave it 0 and its bit in `valid` unset",
-            of.not_finite
+            "NaN or infinite in {} of {frames} frames: leave it 0 and its bit in `{}` unset",
+            of.not_finite,
+            bits(field)
         );
         return finding(Status::Failure, detail);
     }
@@ -99,13 +102,13 @@ fn judge(name: &str, field: Field, robot: &Description, of: Stretch, frames: usi
         detail.push_str(&format!(", valid in {share:.0} % of the frames"));
     }
     let largest = of.least.abs().max(of.most.abs());
-    if let Some(limit) = limit(field, robot).filter(|limit| largest > *limit) {
+    if let Some(limit) = limit.filter(|limit| largest > *limit) {
         let guess = unit_guess(field);
         let detail = format!("{detail}: beyond {limit:.3}, which the description allows{guess}");
         return finding(Status::Failure, detail);
     }
     // A steering angle may stay as it is in a steady curve.
-    let may_stay = matches!(field, Field::Command(_) | Field::Steer(_));
+    let may_stay = matches!(field, Field::Command(_)) || role(field) == Some(Role::SteeringAngle);
     if !may_stay && of.moving >= MOVING_FRAMES_MIN && of.moving_least == of.moving_most {
         let detail = format!("{detail}: never changes, though motion is commanded");
         return finding(Status::Warning, detail);
@@ -113,26 +116,46 @@ fn judge(name: &str, field: Field, robot: &Description, of: Stretch, frames: usi
     finding(Status::Ok, detail)
 }
 
-/// Largest magnitude that makes sense.
-fn limit(field: Field, robot: &Description) -> Option<f64> {
-    let limits = &robot.limits;
+/// What a channel measures; none of a command.
+const fn role(field: Field) -> Option<Role> {
     match field {
-        Field::Command(i) => robot.command.get(i).map(|axis| 1.001 * axis.limit),
-        // A wrapped angle may be rounded up.
-        Field::Steer(_) => Some(PI + 1e-3),
-        Field::Pose(2) => Some(YAW_MAX_RAD),
-        Field::WheelRate(_) => Some(limits.wheel_rate_rad_s),
-        Field::YawRate => Some(limits.yaw_rate_rad_s),
-        Field::Pose(_) | Field::Current(_) => None,
+        Field::Command(_) => None,
+        Field::Channel { role, .. } => Some(role),
     }
 }
 
-const fn unit_guess(field: Field) -> &'static str {
+/// The frame's field that says whether it is there.
+const fn bits(field: Field) -> &'static str {
     match field {
-        Field::Pose(2) => ": looks like degrees, rad is wanted",
-        Field::Steer(_) => ". Looks like degrees: rad is wanted",
-        Field::YawRate => ". Looks like degrees per second: rad/s is wanted",
-        Field::WheelRate(_) => {
+        Field::Command(_) => "command_valid",
+        Field::Channel { .. } => "channel_valid",
+    }
+}
+
+/// Largest magnitude that makes sense.
+fn limit(field: Field, robot: &Description) -> Option<f64> {
+    let limits = &robot.limits;
+    let (place, role) = match field {
+        Field::Command(i) => return robot.command.get(i).map(|axis| 1.001 * axis.limit),
+        Field::Channel { place, role, .. } => (place, role),
+    };
+    let declared = channels(robot).get(place).and_then(|channel| channel.limit);
+    declared.or(match role {
+        // A wrapped angle may be rounded up.
+        Role::SteeringAngle => Some(PI + 1e-3),
+        Role::PoseYaw => Some(YAW_MAX_RAD),
+        Role::WheelRate => Some(limits.wheel_rate_rad_s),
+        Role::BodyRate => Some(limits.yaw_rate_rad_s),
+        _ => None,
+    })
+}
+
+const fn unit_guess(field: Field) -> &'static str {
+    match role(field) {
+        Some(Role::PoseYaw) => ": looks like degrees, rad is wanted",
+        Some(Role::SteeringAngle) => ". Looks like degrees: rad is wanted",
+        Some(Role::BodyRate) => ". Looks like degrees per second: rad/s is wanted",
+        Some(Role::WheelRate) => {
             ". Looks like degrees per second or revolutions per minute: rad/s is wanted"
         }
         _ => ". Is the unit right?",
@@ -170,9 +193,12 @@ fn meanings(robot: &Description, frames: &[FrameArrival]) -> Vec<Finding> {
 mod tests {
     use std::path::PathBuf;
 
-    use vigil_blocks::Valid;
+    use vigil_robot::ChannelMap;
 
     use super::*;
+
+    /// Place of `steer_LF`: after the pose and six wheel rates.
+    const STEER_LF: usize = 9;
 
     /// A recorded run without a fault, in a curve, as a good publisher would send it.
     fn recorded() -> (Description, Vec<FrameArrival>) {
@@ -189,14 +215,15 @@ mod tests {
     }
 
     /// What is found once every frame was changed.
-    fn found(change: impl Fn(&mut SensorFrame)) -> Vec<Finding> {
+    fn found(change: impl Fn(&mut SensorFrame, &ChannelMap)) -> Vec<Finding> {
         let (robot, mut frames) = recorded();
-        frames.iter_mut().for_each(|f| change(&mut f.frame));
+        let map = ChannelMap::new(&robot);
+        frames.iter_mut().for_each(|f| change(&mut f.frame, &map));
         findings(&robot, &frames)
     }
 
     /// The one finding that is not good: its name, how bad it is, and its text.
-    fn only_bad(change: impl Fn(&mut SensorFrame)) -> (String, Status, String) {
+    fn only_bad(change: impl Fn(&mut SensorFrame, &ChannelMap)) -> (String, Status, String) {
         let mut bad = found(change);
         bad.retain(|f| f.status != Status::Ok);
         assert_eq!(bad.len(), 1, "{bad:?}");
@@ -206,7 +233,7 @@ mod tests {
 
     #[test]
     fn a_good_publisher_has_nothing_but_good_findings() {
-        let found = found(|_| ());
+        let found = found(|_, _| ());
         assert!(found.iter().all(|f| f.status == Status::Ok), "{found:?}");
         // Pose, command, six wheels, four steered, and what they mean together.
         assert_eq!(found.len(), 3 + 2 + 6 + 4 + 1);
@@ -215,29 +242,34 @@ mod tests {
     #[test]
     fn a_field_that_is_missing_broken_or_still_is_told_under_its_name() {
         let failure = |name: &str| (name.to_owned(), Status::Failure);
-        let of = |change: fn(&mut SensorFrame)| {
+        let of = |change: fn(&mut SensorFrame, &ChannelMap)| {
             let (check, status, detail) = only_bad(change);
             ((check, status), detail)
         };
-        let (missing, detail) = of(|f| f.valid &= !Valid::steer(0));
+        let (missing, detail) = of(|f, _| f.channel_valid &= !(1 << STEER_LF));
         assert_eq!(missing, failure("steer_LF"));
         assert!(detail.starts_with("never marked as valid"), "{detail}");
-        let (broken, detail) = of(|f| f.wheel_rate[4] = f64::NAN);
+        let (broken, detail) = of(|f, map| map.set_wheel_rate(f, 4, f64::NAN));
         assert_eq!(broken, failure("enc_RM"));
         assert!(
             detail.starts_with("NaN or infinite in 300 of 300"),
             "{detail}"
         );
-        let (degrees, detail) = of(|f| f.steer[3] = f.steer[3].to_degrees());
+        let (degrees, detail) = of(|f, map| {
+            let steer = map.steer(f, 3).unwrap();
+            map.set_steer(f, 3, steer.to_degrees());
+        });
         assert_eq!(degrees, failure("steer_RF"));
         assert!(detail.contains("Looks like degrees"), "{detail}");
     }
 
     #[test]
     fn what_the_fields_mean_together_is_told() {
-        let swapped = |f: &mut SensorFrame| {
+        let swapped = |f: &mut SensorFrame, map: &ChannelMap| {
             for left in 0..3 {
-                f.wheel_rate.swap(left, left + 3);
+                let rates = [left, left + 3].map(|wheel| map.wheel_rate(f, wheel).unwrap());
+                map.set_wheel_rate(f, left, rates[1]);
+                map.set_wheel_rate(f, left + 3, rates[0]);
             }
         };
         let mut bad = found(swapped);
@@ -252,20 +284,23 @@ mod tests {
             assert_eq!((check.as_str(), *status), ("meaning", Status::Failure));
             assert!(detail.contains("turn as each other should"), "{detail}");
         }
-        let reversed = |f: &mut SensorFrame| f.wheel_rate[4] = -f.wheel_rate[4];
+        let reversed = |f: &mut SensorFrame, map: &ChannelMap| {
+            let rate = map.wheel_rate(f, 4).unwrap();
+            map.set_wheel_rate(f, 4, -rate);
+        };
         let (check, _, detail) = only_bad(reversed);
         assert_eq!(
             (check.as_str(), detail.as_str()),
             ("meaning", "signs: enc_RM has the other sign")
         );
-        let millimetres = |f: &mut SensorFrame| {
-            f.pose[0] *= 1e3;
-            f.pose[1] *= 1e3;
+        let millimetres = |f: &mut SensorFrame, map: &ChannelMap| {
+            let [x, y, yaw] = map.pose(f).unwrap();
+            map.set_pose(f, [x * 1e3, y * 1e3, yaw]);
         };
         let (check, _, detail) = only_bad(millimetres);
         assert_eq!(check, "meaning");
         assert!(detail.contains("are they in mm?"), "{detail}");
-        let still = |f: &mut SensorFrame| f.wheel_rate[2] = 1.25;
+        let still = |f: &mut SensorFrame, map: &ChannelMap| map.set_wheel_rate(f, 2, 1.25);
         let bad = found(still);
         let bad: Vec<_> = bad.iter().filter(|f| f.status != Status::Ok).collect();
         assert_eq!(bad[0].check, "enc_LR");

@@ -62,8 +62,8 @@ const fn advice(cause: Rejection) -> &'static str {
              is left at 0, header.t_capture_ns, in ns"
         }
         Rejection::NotFinite => {
-            "a value is NaN or infinite: leave what was not measured at 0 and its bit in `valid` \
-             unset"
+            "a value is NaN or infinite: leave what was not measured at 0 and its bit in \
+             `channel_valid` unset"
         }
         Rejection::OutOfRange => {
             "a value is beyond all that the robot's description allows: is the unit right (rad, \
@@ -82,6 +82,11 @@ const fn advice(cause: Rejection) -> &'static str {
         Rejection::Clock => {
             "header.t_capture_ns is not after that of the frame before, or leaps by more than an \
              hour: set it to when the data was captured, in ns, by a clock that runs evenly"
+        }
+        Rejection::Robot => {
+            "made for another channel list than that of the robot's description: robot_hash is not \
+             its hash. Read the graph's file `channels`, or what `vigil channels` prints, and set \
+             robot_hash and the channels by it"
         }
         Rejection::Corrupt => "the checksum of a datagram does not fit: CRC-32C (Castagnoli)",
     }

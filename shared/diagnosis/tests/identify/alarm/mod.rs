@@ -28,8 +28,9 @@ impl Alarm {
         }
     }
 
-    /// Sets belief and hypotheses for a frame.
+    /// Sets belief and hypotheses for a frame, whose first channels are the pose.
     pub fn set(&mut self, frame: &SensorFrame) {
+        let pose = [frame.channel[0], frame.channel[1], frame.channel[2]];
         let t_s = frame.header.t_capture_ns as f64 * 1e-9;
         let alarm = (self.from_s..self.to_s).contains(&t_s);
         self.belief.alarm = u32::from(alarm);
@@ -37,7 +38,7 @@ impl Alarm {
         self.belief.p_fault = if alarm { 0.999 } else { 1e-6 };
         // On the ground learned on, and known well.
         self.hypotheses.healthy = HealthyBelief {
-            pose: frame.pose,
+            pose,
             pose_covariance: [2.5e-5, 0.0, 0.0, 2.5e-5, 0.0, 2.5e-5],
             deviation_covariance: [1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-6],
             wheel_ratio: [0.0, 1e-6],
@@ -46,7 +47,7 @@ impl Alarm {
         };
         self.hypotheses.count = 1;
         self.hypotheses.hypotheses[0] = WeightedHypothesis {
-            pose: frame.pose,
+            pose,
             ..WeightedHypothesis::default()
         };
     }

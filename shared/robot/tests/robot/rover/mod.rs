@@ -20,6 +20,7 @@ pub fn rover() -> Description {
         wheel_radius_m: 0.08,
         mass_kg: 14.2,
         command: Vec::new(),
+        channel: Vec::new(),
         measured: vigil_robot::description::MeasuredChannels::default(),
         polynomial_order: 4,
         interval_s: 0.1,
