@@ -182,6 +182,11 @@ impl Table {
         Ok(names.iter().filter_map(|n| self.position(n)).collect())
     }
 
+    /// Names of all columns, as they stand in the file.
+    pub fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
     /// Position of a column, if it exists.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column == name)

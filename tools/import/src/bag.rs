@@ -1,6 +1,7 @@
 //! Recordings of ROS 2 message by message: MCAP, and rosbag2's SQLite (`.db3`), plain or under
 //! zstd (`.db3.zstd`, `.mcap.zstd`).
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -23,6 +24,8 @@ pub(super) struct BagMessage<'a> {
     pub topic: &'a str,
     /// Its type: `nav_msgs/msg/Odometry`.
     pub kind: &'a str,
+    /// What the recording says its type is; empty if it says nothing.
+    pub definition: &'a str,
     /// When it was recorded, ns.
     pub log_time_ns: u64,
     /// The message in CDR, its encapsulation included.
@@ -147,9 +150,13 @@ fn visit_mcap(
             Err(error) => return Err(wrong(messages, error.to_string())),
         };
         let kind = message.channel.schema.as_ref();
+        // Of the languages of definitions only that of `.msg` files is read.
+        let definition = kind.filter(|schema| schema.encoding == "ros2msg");
+        let definition = definition.and_then(|schema| std::str::from_utf8(&schema.data).ok());
         take(&BagMessage {
             topic: &message.channel.topic,
             kind: kind.map_or("", |schema| schema.name.as_str()),
+            definition: definition.unwrap_or(""),
             log_time_ns: message.log_time,
             data: &message.data,
         })?;
@@ -182,6 +189,7 @@ fn visit_sqlite(
     let mut bag = Connection::open_in_memory().map_err(wrong)?;
     bag.deserialize_read_exact(MAIN_DB, content, content.len(), true)
         .map_err(wrong)?;
+    let definitions = definitions(&bag);
     let mut rows = bag
         .prepare(
             "SELECT topics.name, topics.type, messages.timestamp, messages.data FROM messages \
@@ -192,12 +200,28 @@ fn visit_sqlite(
     while let Some(row) = rows.next().map_err(wrong)? {
         let text = |i: usize| row.get_ref(i)?.as_str().map_err(rusqlite::Error::from);
         let data = row.get_ref(3).map_err(wrong)?.as_blob();
+        let kind = text(1).map_err(wrong)?;
         take(&BagMessage {
             topic: text(0).map_err(wrong)?,
-            kind: text(1).map_err(wrong)?,
+            kind,
+            definition: definitions.get(kind).map_or("", String::as_str),
             log_time_ns: row.get::<_, i64>(2).map_err(wrong)?.max(0) as u64,
             data: data.map_err(|error| wrong(error.into()))?,
         })?;
     }
     Ok(())
+}
+
+/// Definitions of types, which newer recordings of rosbag2 carry; older ones have no such table.
+fn definitions(bag: &Connection) -> BTreeMap<String, String> {
+    let sql = "SELECT topic_type, encoded_message_definition FROM message_definitions \
+               WHERE encoding = 'ros2msg'";
+    let Ok(mut rows) = bag.prepare(sql) else {
+        return BTreeMap::new();
+    };
+    let pair = |row: &rusqlite::Row<'_>| Ok((row.get(0)?, row.get(1)?));
+    match rows.query_map([], pair) {
+        Ok(found) => found.filter_map(Result::ok).collect(),
+        Err(_) => BTreeMap::new(),
+    }
 }

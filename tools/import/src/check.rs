@@ -63,6 +63,10 @@ impl LogDescription {
             let message = format!("there is no source '{}'", channel.source);
             return wrong(format!("{key}.source"), message);
         }
+        if channel.column.is_empty() == channel.columns.is_empty() {
+            let message = "is required, or `columns`, and not both";
+            return wrong(format!("{key}.column"), message);
+        }
         if channel.delay_s == Delay::Estimate && channel.delay_against.is_empty() {
             let message = "is required for delay_s = \"estimate\"";
             return wrong(format!("{key}.delay_against"), message);
@@ -92,6 +96,9 @@ impl LogDescription {
         finite("scale", channel.scale)?;
         finite("offset", channel.offset)?;
         finite("initial", channel.initial)?;
+        for (name, factor) in &channel.columns {
+            finite(&format!("columns.{name}"), *factor)?;
+        }
         for (name, factor) in &channel.delay_against {
             finite(&format!("delay_against.{name}"), *factor)?;
         }
@@ -104,6 +111,10 @@ impl LogDescription {
         {
             let message = format!("there is no source '{other}'");
             return wrong(format!("{key}.time_as"), message);
+        }
+        if self.run_column.is_some() && source.topic.is_some() {
+            let message = "parts CSV files only: a recording is one run";
+            return wrong("run_column", message);
         }
         if !source.delimiter.is_ascii() {
             let message = "a single ASCII character is needed";

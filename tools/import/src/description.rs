@@ -66,12 +66,13 @@ pub struct Clock {
 pub struct Source {
     /// Name, by which channels refer to it.
     pub name: String,
-    /// File within a run's folder; left out: the run is the file.
+    /// File within a run's folder, or beside a run's file; `*` stands for what the first `*` of the
+    /// run's pattern does: `imu_*.csv` beside `pro_*.csv`. Left out: the run is the file.
     #[serde(default)]
     pub file: Option<String>,
     /// Topic of ROS 2 messages in a recording (MCAP or SQLite, a file or rosbag2's folder), whose
-    /// fields are the columns (`pose.yaw`, `velocity[left_front_wheel]`; every name: `ros.rs`
-    /// beside this file); left out: a CSV file.
+    /// fields are the columns (`pose.yaw`, `velocity[left_front_wheel]`; the rules: `ros.rs` beside
+    /// this file; the names: `vigil import --look`); left out: a CSV file.
     #[serde(default)]
     pub topic: Option<String>,
     /// Separator of columns.
@@ -160,8 +161,13 @@ pub struct ChannelSource {
     pub name: String,
     /// Source.
     pub source: String,
-    /// Column of the source.
+    /// Column of the source; left out: `columns`.
+    #[serde(default)]
     pub column: String,
+    /// Several columns of the source, each with a factor, of which the channel is the sum: the mean
+    /// of two wheels is `{ left = 0.5, right = 0.5 }`. Counters are unwrapped one by one.
+    #[serde(default)]
+    pub columns: BTreeMap<String, f64>,
     /// Unit of the column: `si`, `deg`, `mm`, `rpm`.
     #[serde(default)]
     pub unit: Unit,
@@ -206,6 +212,10 @@ pub struct LogDescription {
     /// Runs: folders or files below the log's folder, in this order; `*` stands for any part of a
     /// name. Each match is one run.
     pub runs: Vec<String>,
+    /// Column of CSV files that hold several runs: rows with the same value are one run. Left out:
+    /// each match of `runs` is one.
+    #[serde(default)]
+    pub run_column: Option<String>,
     /// Longest pause of a measured channel, s.
     #[serde(default = "one")]
     pub gap_max_s: f64,
@@ -236,6 +246,24 @@ fn thirty() -> f64 {
 
 fn forty() -> f64 {
     40.0
+}
+
+impl ChannelSource {
+    /// Its columns, each with its factor.
+    pub(super) fn terms(&self) -> impl Iterator<Item = (&String, f64)> {
+        let one = Some((&self.column, 1.0)).filter(|(column, _)| !column.is_empty());
+        one.into_iter().chain(
+            self.columns
+                .iter()
+                .map(|(column, factor)| (column, *factor)),
+        )
+    }
+
+    /// Its columns as messages name them.
+    pub(super) fn column_names(&self) -> String {
+        let names: Vec<&str> = self.terms().map(|(column, _)| column.as_str()).collect();
+        names.join(", ")
+    }
 }
 
 impl LogDescription {

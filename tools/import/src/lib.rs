@@ -1,23 +1,32 @@
 #![doc = include_str!("../README.md")]
 
+mod agreement;
 mod bag;
 mod check;
 mod delay;
 mod description;
 mod find;
+mod message;
+mod place;
 mod resample;
 mod ros;
 mod series;
+mod suggest;
+mod survey;
 mod write;
 
 use std::path::{Path, PathBuf};
 
+pub use agreement::{Agreement, agreements};
 pub use bag::CutBag;
 pub use description::{ChannelSource, Clock, Delay, LogDescription, Method, Source, Unit};
+use place::RunPlace;
 use resample::Grid;
 pub use ros::MissingColumn;
 pub use series::Disorder;
 use series::Series;
+pub use suggest::{Suggestion, suggest};
+pub use survey::{Survey, SurveyTable, Values, survey};
 use vigil_blocks::SensorFrame;
 use vigil_robot::Description;
 pub use write::write;
@@ -122,7 +131,7 @@ pub struct ImportedRun {
     pub rows: Vec<Vec<f64>>,
     /// Clocks that do not rise in its files.
     pub disorder: Vec<Disorder>,
-    /// Messages of which nothing was made.
+    /// Messages or rows that lack a column.
     pub lacking: Vec<MissingColumn>,
     /// Topics without stamps: the recorder's time took their place.
     pub unstamped: Vec<String>,
@@ -167,11 +176,14 @@ pub fn import(
     let columns = fields(robot).into_iter().filter(is_wanted);
     let columns: Vec<String> = columns.map(|(name, _)| name).collect();
     log.check(&columns)?;
-    let found = find::runs(folder, &log.runs)?;
+    let mut found = Vec::new();
+    for place in find::runs(folder, &log.runs)? {
+        found.extend(RunPlace::all(log, place)?);
+    }
     let (mut runs, mut delays) = (Vec::new(), Vec::new());
-    for (id, path) in found.iter().enumerate() {
+    for (id, place) in found.iter().enumerate() {
         let mut series = Vec::with_capacity(columns.len());
-        let tables = series::tables(log, path)?;
+        let tables = series::tables(log, place)?;
         for column in &columns {
             let channel = log
                 .channel
@@ -193,8 +205,7 @@ pub fn import(
                     .given_s(estimated.map(|(_, delay_s)| *delay_s)),
             );
         }
-        let grid = Grid::new(log, &columns, &series, path)?;
-        let name = path.strip_prefix(folder).unwrap_or(path);
+        let grid = Grid::new(log, &columns, &series, &place.path)?;
         let repeated = columns.iter().zip(&series);
         let repeated = repeated.filter(|(_, series)| series.repeated > 0);
         runs.push(ImportedRun {
@@ -209,7 +220,7 @@ pub fn import(
                 .map(|(column, series)| (column.clone(), series.repeated))
                 .collect(),
             id: id as u32,
-            name: name.display().to_string(),
+            name: place.name(folder),
             rows: grid.rows(log, &columns, &series)?,
         });
     }

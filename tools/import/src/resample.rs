@@ -96,7 +96,7 @@ impl Grid {
         channel: &ChannelSource,
         series: &Series,
     ) -> Result<(), ImportError> {
-        let column = &channel.column;
+        let column = channel.column_names();
         let pairs = series.time_s.windows(2).map(|pair| pair[1] - pair[0]);
         if channel.method != Method::Hold {
             let mut pauses = pairs.enumerate();

@@ -1,14 +1,14 @@
 //! One channel of one run, as measured: times and values in SI.
 
 use std::f64::consts::PI;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use vigil_inference::angle::wrap;
-use vigil_recording::table::{Layout, Table};
 
 use super::ImportError;
 use super::bag::CutBag;
 use super::description::{ChannelSource, Clock, LogDescription, Source};
+use super::place::{RunPlace, table_columns};
 use super::ros::{self, MissingColumn, TopicColumns};
 
 /// Columns of one source that are needed, with their rows.
@@ -17,6 +17,8 @@ pub(super) struct SourceTable {
     path: PathBuf,
     columns: Vec<String>,
     values: Vec<Vec<f64>>,
+    /// Which row of the file, or message of the topic, each is; from 1, the header not counted.
+    rows: Vec<usize>,
     /// When each row was measured, s, on the common clock.
     time_s: Vec<f64>,
     /// The device's clock, s.
@@ -56,12 +58,41 @@ impl SourceTable {
     }
 
     fn wrong(&self, row: usize, message: String) -> ImportError {
-        vigil_recording::table::wrong_row(&self.path, row as u64 + 1, message).into()
+        let row = self.rows.get(row).copied().unwrap_or(0);
+        vigil_recording::table::wrong_row(&self.path, row as u64, message).into()
+    }
+
+    /// A channel's rows, where all its columns have a value, and the sum of these.
+    fn sum(&self, channel: &ChannelSource) -> Option<(Vec<usize>, Vec<f64>)> {
+        let terms = channel
+            .terms()
+            .map(|(name, factor)| Some((self.column(name)?, factor)));
+        let terms = terms.collect::<Option<Vec<_>>>()?;
+        let whole = |row: &usize| {
+            let mut values = terms.iter().map(|(column, _)| column.get(*row));
+            values.all(|value| value.is_some_and(|value| value.is_finite()))
+        };
+        let rows: Vec<usize> = (0..self.time_s.len()).filter(whole).collect();
+        let mut sums = vec![0.0; rows.len()];
+        for (column, factor) in terms {
+            let values = rows.iter().filter_map(|&row| column.get(row).copied());
+            let mut values: Vec<f64> = values.collect();
+            if let Some(modulus) = channel.modulus {
+                values = unwrap(&values, modulus);
+            }
+            sums.iter_mut()
+                .zip(values)
+                .for_each(|(sum, value)| *sum += factor * value);
+        }
+        Some((rows, sums))
     }
 }
 
 /// Reads what the channels need from every source of a run.
-pub(super) fn tables(log: &LogDescription, run: &Path) -> Result<Vec<SourceTable>, ImportError> {
+pub(super) fn tables(
+    log: &LogDescription,
+    run: &RunPlace,
+) -> Result<Vec<SourceTable>, ImportError> {
     let mut tables = Vec::with_capacity(log.source.len());
     for source in &log.source {
         tables.push(read(log, source, run)?);
@@ -76,12 +107,8 @@ pub(super) fn tables(log: &LogDescription, run: &Path) -> Result<Vec<SourceTable
             .and_then(|table| {
                 let factor = source.time.unit.factor();
                 let theirs = table.column(column)?.iter().map(|value| value * factor);
-                let mut apart: Vec<f64> = table
-                    .time_s
-                    .iter()
-                    .zip(theirs)
-                    .map(|(a, b)| a - b)
-                    .collect();
+                let apart = table.time_s.iter().zip(theirs).map(|(a, b)| a - b);
+                let mut apart: Vec<f64> = apart.filter(|apart| apart.is_finite()).collect();
                 apart.sort_by(f64::total_cmp);
                 apart.get(apart.len() / 2).copied()
             })
@@ -96,11 +123,8 @@ pub(super) fn tables(log: &LogDescription, run: &Path) -> Result<Vec<SourceTable
     Ok(tables)
 }
 
-fn read(log: &LogDescription, source: &Source, run: &Path) -> Result<SourceTable, ImportError> {
-    let path = source
-        .file
-        .as_ref()
-        .map_or(run.to_path_buf(), |file| run.join(file));
+fn read(log: &LogDescription, source: &Source, run: &RunPlace) -> Result<SourceTable, ImportError> {
+    let path = run.file(source);
     let mut columns: Vec<String> = vec![source.time.column.clone()];
     let mut add = |name: &String| {
         if !columns.contains(name) {
@@ -112,30 +136,29 @@ fn read(log: &LogDescription, source: &Source, run: &Path) -> Result<SourceTable
         .iter()
         .for_each(|clock| add(&clock.column));
     let channels = log.channel.iter().filter(|c| c.source == source.name);
-    channels.for_each(|channel| add(&channel.column));
+    channels.for_each(|channel| channel.terms().for_each(|(column, _)| add(column)));
     let others = log.source.iter().filter_map(|other| other.time_as.as_ref());
     others
         .filter(|[name, _]| *name == source.name)
         .for_each(|[_, column]| add(column));
     let TopicColumns {
-        values,
+        mut values,
+        mut rows,
         lacking,
         is_unstamped,
         cut,
     } = match &source.topic {
         Some(topic) => ros::columns(&path, topic, &columns)?,
-        None => TopicColumns {
-            values: table_columns(&path, source, &columns)?,
-            lacking: None,
-            is_unstamped: false,
-            cut: None,
-        },
+        None => table_columns(&path, source, &columns, run.part.as_ref())?,
     };
+    let clocks = if source.device_clock.is_some() { 2 } else { 1 };
+    drop_timeless(&mut values, &mut rows, clocks);
     let mut out = SourceTable {
         name: source.name.clone(),
         path,
         columns,
         values,
+        rows,
         time_s: Vec::new(),
         device_s: Vec::new(),
         disorder: Vec::new(),
@@ -160,25 +183,23 @@ fn read(log: &LogDescription, source: &Source, run: &Path) -> Result<SourceTable
     Ok(out)
 }
 
-/// Columns of a CSV file.
-fn table_columns(
-    path: &Path,
-    source: &Source,
-    columns: &[String],
-) -> Result<Vec<Vec<f64>>, ImportError> {
-    let layout = Layout {
-        delimiter: source.delimiter as u8,
-        skip_rows: source.skip_rows,
+/// Drops the rows without a time; the first `clocks` columns are times.
+fn drop_timeless(values: &mut [Vec<f64>], rows: &mut Vec<usize>, clocks: usize) {
+    let (times, _) = values.split_at(clocks.min(values.len()));
+    let has_time = |row| {
+        let mut times = times.iter().map(|time| time.get(row));
+        times.all(|time| time.is_some_and(|t: &f64| t.is_finite()))
     };
-    let mut table = Table::open_as(path, layout)?;
-    let at = table.require(columns)?;
-    let mut values = vec![Vec::new(); at.len()];
-    while table.advance()? {
-        for (values, &at) in values.iter_mut().zip(&at) {
-            values.push(table.number(at)?);
-        }
+    let kept: Vec<bool> = (0..rows.len()).map(has_time).collect();
+    if kept.iter().all(|kept| *kept) {
+        return;
     }
-    Ok(values)
+    for column in values {
+        let mut kept = kept.iter();
+        column.retain(|_| kept.next() == Some(&true));
+    }
+    let mut kept = kept.iter();
+    rows.retain(|_| kept.next() == Some(&true));
 }
 
 /// Times of a clock column, s, unwrapped, and what is out of order among them.
@@ -262,11 +283,11 @@ impl Series {
         let missing = || ImportError::description(&channel.name, "its source is missing");
         let mut sources = tables.iter().filter(|table| table.name == channel.source);
         let table = sources.next().ok_or_else(missing)?;
-        let raw = table.column(&channel.column).ok_or_else(missing)?;
-        let mut values = match channel.modulus {
-            Some(modulus) => unwrap(raw, modulus),
-            None => raw.clone(),
-        };
+        let (rows, mut values) = table.sum(channel).ok_or_else(missing)?;
+        if values.is_empty() {
+            let message = format!("column {}: there is no value", channel.column_names());
+            return Err(table.wrong(0, message));
+        }
         let factor = channel.unit.factor();
         values.iter_mut().for_each(|value| *value *= factor);
         if channel.angle {
@@ -281,7 +302,8 @@ impl Series {
             repeated: 0,
         };
         let mut last: Option<(f64, f64)> = None;
-        for (row, (&time_s, value)) in table.time_s.iter().zip(values).enumerate() {
+        for (row, value) in rows.into_iter().zip(values) {
+            let time_s = table.time_s.get(row).copied().unwrap_or(f64::NAN);
             let device_s = table.device_s.get(row).copied().unwrap_or(time_s);
             let result = match (channel.differentiate, last) {
                 (false, _) => Some(value),
@@ -296,7 +318,8 @@ impl Series {
                 last = Some((device_s, value));
             }
             let Some(result) = result else { continue };
-            out.insert(time_s, finish(result), row + 1);
+            let row = table.rows.get(row).copied().unwrap_or(0);
+            out.insert(time_s, finish(result), row);
         }
         Ok(out)
     }

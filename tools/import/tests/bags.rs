@@ -244,7 +244,7 @@ fn what_is_wrong_is_told_with_what_there_is() {
         .unwrap_err()
         .to_string();
     assert!(
-        error.contains("velocity[rihgt]") && error.contains("[left], [right]"),
+        error.contains("velocity[rihgt]") && error.contains("velocity[left], velocity[right]"),
         "{error}"
     );
     fs::create_dir(folder.path().join("empty")).unwrap();

@@ -186,7 +186,10 @@ fn what_does_not_fit_is_refused_with_its_place() {
         "{message}"
     );
     let message = refused(&|text| text.replace("left", "links"));
-    assert!(message.contains("missing columns left"), "{message}");
+    assert!(
+        message.contains("there is no column 'left'; there are stamp, ticks_ms"),
+        "{message}"
+    );
     let message = refused(&|text| {
         text.lines()
             .take(20)

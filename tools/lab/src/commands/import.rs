@@ -1,5 +1,8 @@
 //! `vigil import`: recordings of other programs as Vigil's frames.
 
+mod look;
+mod suggest;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -16,14 +19,21 @@ use vigil_terminal::{CommandError, Outcome};
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Description of the log (TOML): which columns of which files are which channels.
-    #[arg(long, value_name = "LOG")]
-    log: PathBuf,
+    #[arg(long, value_name = "LOG", required_unless_present_any = ["look", "suggest"])]
+    log: Option<PathBuf>,
     /// Folder of the log.
-    #[arg(long, value_name = "DIR")]
-    from: PathBuf,
-    /// Where to write the frames (CSV; compressed if the name ends in .gz).
-    #[arg(long, value_name = "F")]
-    out: PathBuf,
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["look", "suggest"])]
+    from: Option<PathBuf>,
+    /// Where to write the frames (CSV; compressed if the name ends in .gz); with --suggest, the
+    /// descriptions: F-log.toml and F-robot.toml.
+    #[arg(long, value_name = "F", required_unless_present = "look")]
+    out: Option<PathBuf>,
+    /// Say what there is in a log: its topics or files, with rates, columns and ranges.
+    #[arg(long, value_name = "LOG", conflicts_with_all = ["log", "from", "out", "suggest"])]
+    look: Option<PathBuf>,
+    /// Write a first description of a log and of its robot, to be corrected by hand.
+    #[arg(long, value_name = "LOG", conflicts_with_all = ["log", "from"])]
+    suggest: Option<PathBuf>,
     /// Print one JSON document.
     #[arg(long)]
     json: bool,
@@ -37,7 +47,17 @@ struct Document {
     rate_hz: f64,
     columns: Vec<String>,
     delays: Vec<DelayEstimate>,
+    agreements: Vec<Agreement>,
     runs: Vec<Run>,
+}
+
+/// How one channel reads against another that measures the same.
+#[derive(Debug, Serialize)]
+struct Agreement {
+    measured: String,
+    against: String,
+    ratio: f64,
+    correlation: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -84,12 +104,39 @@ impl From<&import::Disorder> for DisorderCount {
 /// # Errors
 /// An input that is refused; an output that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let log = LogDescription::load(&args.log).map_err(CommandError::usage)?;
-    let robot = load_robot(&log.robot_path(&args.log)).map_err(CommandError::usage)?;
-    let imported = import::import(&log, &robot, &args.from)
-        .map_err(|error| at(&args.log, &error))
+    if let Some(path) = &args.look {
+        return look::run(path, args.json);
+    }
+    let out = args.out.as_deref().unwrap_or_else(|| Path::new(""));
+    if let Some(path) = &args.suggest {
+        return suggest::run(path, out, args.json);
+    }
+    match (&args.log, &args.from) {
+        (Some(log), Some(from)) => import(&Paths { log, from, out }, args.json),
+        _ => Err(CommandError::usage("--log and --from are required")),
+    }
+}
+
+/// Files of an import.
+struct Paths<'a> {
+    log: &'a Path,
+    from: &'a Path,
+    out: &'a Path,
+}
+
+/// Reads, writes and reports.
+fn import(paths: &Paths<'_>, is_json: bool) -> Result<Outcome, CommandError> {
+    let Paths {
+        log: path,
+        from,
+        out,
+    } = *paths;
+    let log = LogDescription::load(path).map_err(CommandError::usage)?;
+    let robot = load_robot(&log.robot_path(path)).map_err(CommandError::usage)?;
+    let imported = import::import(&log, &robot, from)
+        .map_err(|error| at(path, &error))
         .map_err(CommandError::usage)?;
-    import::write(&imported, &args.out).map_err(CommandError::failure)?;
+    import::write(&imported, out).map_err(CommandError::failure)?;
     for warning in warnings(&imported, &robot) {
         eprintln!("warning: {warning}");
     }
@@ -113,16 +160,27 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             channel: channel.clone(),
             delay_s: *delay_s,
         });
+    let agreements = import::agreements(&imported, &robot);
+    for doubt in agreements.iter().filter_map(import::Agreement::doubt) {
+        eprintln!("warning: {doubt}");
+    }
+    let agreements = agreements.into_iter().map(|found| Agreement {
+        measured: found.measured,
+        against: found.against,
+        ratio: found.ratio,
+        correlation: found.correlation,
+    });
     let document = Document {
         schema_version: 1,
         robot: robot.name,
-        frames: args.out.display().to_string(),
+        frames: out.display().to_string(),
         rate_hz: log.rate_hz,
         columns: imported.columns.clone(),
         delays: delays.collect(),
+        agreements: agreements.collect(),
         runs: runs.collect(),
     };
-    let printed = if args.json {
+    let printed = if is_json {
         output::json(&document)
     } else {
         output::line(&table(&document))
@@ -141,12 +199,15 @@ fn warnings(imported: &import::ImportedLog, robot: &Description) -> Vec<String> 
             path,
             topic,
             column,
-            messages,
+            rows,
             of,
         } = found;
+        let which = match topic {
+            Some(topic) => format!("messages on {topic}"),
+            None => "rows".to_owned(),
+        };
         format!(
-            "{}: {messages} of {of} messages on {topic} have no finite '{column}': nothing was \
-             made of them",
+            "{}: {rows} of {of} {which} lack a value, the first of them '{column}'",
             path.display()
         )
     }));
@@ -156,18 +217,8 @@ fn warnings(imported: &import::ImportedLog, robot: &Description) -> Vec<String> 
     warnings.extend(unstamped.into_iter().map(|topic| {
         format!("messages on {topic} have no stamp: the time of recording took its place")
     }));
-    let cut = imported.runs.iter().flat_map(|run| &run.cut);
-    warnings.extend(cut.map(|found| {
-        let import::CutBag {
-            path,
-            messages,
-            found,
-        } = found;
-        format!(
-            "{}: cut off after {messages} messages ({found}): what comes before was used",
-            path.display()
-        )
-    }));
+    let found = imported.runs.iter().flat_map(|run| &run.cut);
+    warnings.extend(found.map(cut));
     let runs = imported.runs.iter();
     warnings.extend(runs.flat_map(|run| &run.disorder).map(|found| {
         let import::Disorder {
@@ -184,6 +235,19 @@ fn warnings(imported: &import::ImportedLog, robot: &Description) -> Vec<String> 
         )
     }));
     warnings
+}
+
+/// That a recording is cut off, and where.
+fn cut(cut: &import::CutBag) -> String {
+    let import::CutBag {
+        path,
+        messages,
+        found,
+    } = cut;
+    format!(
+        "{}: cut off after {messages} messages ({found}): what comes before was used",
+        path.display()
+    )
 }
 
 /// Problems of the description itself name its file.
@@ -203,6 +267,17 @@ fn table(document: &Document) -> String {
         lines.push(format!(
             "{} comes {:.3} s late; a live publisher must hold the others back by as much",
             delay.channel, delay.delay_s
+        ));
+    }
+    for found in &document.agreements {
+        let Agreement {
+            measured,
+            against,
+            ratio,
+            correlation,
+        } = found;
+        lines.push(format!(
+            "{measured} is {ratio:.3} times {against} (correlation {correlation:.2})"
         ));
     }
     lines.push(format!(

@@ -2,6 +2,7 @@
 
 #![cfg(test)]
 
+mod import;
 mod model;
 mod nominal;
 mod offline;
