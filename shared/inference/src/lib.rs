@@ -8,6 +8,7 @@ pub mod bank;
 pub mod bootstrap;
 pub mod constant;
 pub mod departure;
+pub mod e_detector;
 pub mod ending;
 pub mod filter;
 pub mod gaussian;
