@@ -7,6 +7,7 @@ mod channel_map;
 mod channel_odds;
 pub mod channel_table;
 pub mod chassis;
+pub mod declared;
 pub mod description;
 pub mod disturbance;
 pub mod disturbance_kind;

@@ -6,7 +6,7 @@ use vigil_cycle::service;
 use vigil_robot::description::Kinematics;
 use vigil_robot::kinematics::GeometryError;
 use vigil_robot::slip::SlipModel;
-use vigil_robot::{AlarmError, Description, RobotModel};
+use vigil_robot::{AlarmError, Description, RobotModel, declared};
 
 use crate::graph_file::{GraphFile, Socket, Source};
 
@@ -188,9 +188,19 @@ fn drive(file: &GraphFile, robot: Option<&Description>, report: &mut impl FnMut(
 }
 
 /// Checks that the detector's alarm can rise with this model.
-pub(crate) fn alarm(file: &GraphFile, model: &RobotModel, mut report: impl FnMut(&str, String)) {
+pub(crate) fn alarm(
+    file: &GraphFile,
+    (model, robot): (&RobotModel, &Description),
+    mut report: impl FnMut(&str, String),
+) {
     let detector = &file.detector;
-    let of = (detector.sensors.into(), detector.form.into());
+    let Some(form) = detector.form.calibrated() else {
+        if let Err(error) = declared::tolerance(model, robot) {
+            report("detector.form", error.to_string());
+        }
+        return;
+    };
+    let of = (detector.sensors.into(), form);
     let (interval_h, rate_1_h) = (detector.false_alarm_interval_h, detector.fault_rate_1_h);
     match model.alarm_log_odds(of, interval_h, rate_1_h) {
         Ok(_) => {}

@@ -79,8 +79,10 @@ impl Document {
         check::graph(file, robot.as_ref(), path, |key, message| {
             problems.push(at(key, message));
         });
-        if let Some(model) = model.as_ref().filter(|_| problems.is_empty()) {
-            check::alarm(file, model, |key, message| problems.push(at(key, message)));
+        if let (Some(model), Some(robot), true) = (&model, &robot, problems.is_empty()) {
+            check::alarm(file, (model, robot), |key, message| {
+                problems.push(at(key, message))
+            });
         }
         let mut solved = None;
         if let (Some(policy), Some(decision)) = (&self.policy, &decision)

@@ -22,6 +22,13 @@ fn an_alarm_that_could_never_rise_is_refused_with_line_key_and_bound() {
         rest.contains("'windowed'") && rest.contains("at the highest"),
         "{message}"
     );
+    let with_proof = |file: &mut GraphFile| file.detector.form = Form::EDetector;
+    assert_eq!(load("rover.toml", with_proof), Ok(()));
+    let message = load("kobuki.toml", with_proof).unwrap_err();
+    assert!(
+        message.contains("detector.form: the form 'e-detector' needs a model with a motion"),
+        "{message}"
+    );
     let seldom = |file: &mut GraphFile| {
         file.detector.form = Form::Windowed;
         file.detector.false_alarm_interval_h = 5.0;

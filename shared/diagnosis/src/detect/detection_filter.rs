@@ -2,8 +2,8 @@
 
 use vigil_blocks::SensorFrame;
 use vigil_robot::learned::monitor::DetectionOutput;
-use vigil_robot::learned::{FrameOutcome, Healthy, Monitor, NoiseScales, Observer};
-use vigil_robot::nominal;
+use vigil_robot::learned::{FrameOutcome, Healthy, Monitor, NoiseScales, Observation, Observer};
+use vigil_robot::{declared, nominal};
 
 /// The interval of an observation: what the detector must know of it.
 #[derive(Debug, Clone, Copy, Default)]
@@ -16,6 +16,16 @@ pub(crate) struct Interval {
     pub moving: bool,
 }
 
+impl From<&Observation> for Interval {
+    fn from(observation: &Observation) -> Self {
+        Self {
+            t_ns: observation.t_ns,
+            dt_s: observation.dt_s,
+            moving: observation.moving,
+        }
+    }
+}
+
 /// Observer and detection filter of either model. The models share no observation, so that no
 /// trait covers both.
 #[derive(Debug, Clone)]
@@ -26,6 +36,15 @@ pub(crate) enum DetectionFilter {
         observer: Box<Observer>,
         /// Detection filter.
         monitor: Box<Monitor>,
+    },
+    /// Of a model with faults, against a declared null.
+    Declared {
+        /// Frames to observations.
+        observer: Box<Observer>,
+        /// Tracks the pose and the noise, from which a diagnosis begins. Its evidence is not used.
+        tracking: Box<Monitor>,
+        /// E-detectors.
+        monitor: Box<declared::Monitor>,
     },
     /// Of a nominal model.
     Nominal {
@@ -40,7 +59,7 @@ impl DetectionFilter {
     /// Takes a frame.
     pub fn push(&mut self, frame: &SensorFrame) -> FrameOutcome {
         match self {
-            Self::Faults { observer, .. } => observer.push(frame),
+            Self::Faults { observer, .. } | Self::Declared { observer, .. } => observer.push(frame),
             Self::Nominal { observer, .. } => observer.push(frame),
         }
     }
@@ -52,11 +71,18 @@ impl DetectionFilter {
                 observer.suspect(suspected);
                 let observation = observer.observation();
                 monitor.step(observation, observer.further(), suspected);
-                Interval {
-                    t_ns: observation.t_ns,
-                    dt_s: observation.dt_s,
-                    moving: observation.moving,
-                }
+                observation.into()
+            }
+            Self::Declared {
+                observer,
+                tracking,
+                monitor,
+            } => {
+                observer.suspect(suspected);
+                let observation = observer.observation();
+                tracking.step(observation, observer.further(), suspected);
+                monitor.step(observation, suspected);
+                observation.into()
             }
             Self::Nominal { observer, monitor } => {
                 monitor.step(observer.history(), suspected);
@@ -74,7 +100,7 @@ impl DetectionFilter {
     /// The next frame begins a new run.
     pub fn reset_observer(&mut self) {
         match self {
-            Self::Faults { observer, .. } => observer.reset(),
+            Self::Faults { observer, .. } | Self::Declared { observer, .. } => observer.reset(),
             Self::Nominal { observer, .. } => observer.reset(),
         }
     }
@@ -83,6 +109,12 @@ impl DetectionFilter {
     pub fn reset(&mut self) {
         match self {
             Self::Faults { monitor, .. } => monitor.reset(),
+            Self::Declared {
+                tracking, monitor, ..
+            } => {
+                tracking.reset();
+                monitor.reset();
+            }
             Self::Nominal { monitor, .. } => monitor.reset(),
         }
     }
@@ -91,6 +123,12 @@ impl DetectionFilter {
     pub fn forget_evidence(&mut self) {
         match self {
             Self::Faults { monitor, .. } => monitor.forget_evidence(),
+            Self::Declared {
+                tracking, monitor, ..
+            } => {
+                tracking.forget_evidence();
+                monitor.forget_evidence();
+            }
             Self::Nominal { monitor, .. } => monitor.forget_evidence(),
         }
     }
@@ -99,6 +137,7 @@ impl DetectionFilter {
     pub fn is_ready(&self) -> bool {
         match self {
             Self::Faults { monitor, .. } => monitor.is_ready(),
+            Self::Declared { monitor, .. } => monitor.is_ready(),
             Self::Nominal { monitor, .. } => monitor.is_ready(),
         }
     }
@@ -107,6 +146,7 @@ impl DetectionFilter {
     pub fn report(&self) -> &DetectionOutput {
         match self {
             Self::Faults { monitor, .. } => monitor.report(),
+            Self::Declared { monitor, .. } => monitor.report(),
             Self::Nominal { monitor, .. } => monitor.report(),
         }
     }
@@ -115,6 +155,7 @@ impl DetectionFilter {
     pub fn scales(&self) -> NoiseScales {
         match self {
             Self::Faults { monitor, .. } => monitor.noise().scales(),
+            Self::Declared { tracking, .. } => tracking.noise().scales(),
             Self::Nominal { .. } => NoiseScales::default(),
         }
     }
@@ -123,6 +164,7 @@ impl DetectionFilter {
     pub fn healthy(&self) -> Option<Healthy> {
         match self {
             Self::Faults { monitor, .. } => monitor.healthy(),
+            Self::Declared { tracking, .. } => tracking.healthy(),
             Self::Nominal { .. } => None,
         }
     }

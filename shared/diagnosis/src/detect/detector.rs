@@ -6,6 +6,7 @@ use vigil_blocks::{
 };
 use vigil_inference::ending::Ending;
 use vigil_inference::logspace::{log_add, log_sum_exp, probability};
+use vigil_robot::declared::{self, Promise, UndeclaredError};
 use vigil_robot::learned::channels::Channels;
 use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
 use vigil_robot::nominal;
@@ -36,6 +37,9 @@ pub enum DetectorError {
     /// There is no threshold for the alarm, or it could never rise.
     #[error("detector: {0}")]
     Alarm(#[from] AlarmError),
+    /// Nothing is declared of the robot that its form needs.
+    #[error("detector: {0}")]
+    Undeclared(#[from] UndeclaredError),
 }
 
 /// The detection filter at frame rate.
@@ -79,22 +83,40 @@ impl Detector {
     ///
     /// # Errors
     /// [`DetectorError`] if the model is of another robot, or has no calibration for channels and
-    /// form.
+    /// form, or the form needs what nobody has declared.
     pub fn new(
         model: &Model,
         robot: &Description,
         settings: &Settings,
     ) -> Result<Self, DetectorError> {
         model.check_robot(robot)?;
-        let (channels, form) = chosen(settings);
         let (rate, interval_h) = (settings.fault_rate_1_h, settings.false_alarm_interval_h);
-        let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
-        let filter = DetectionFilter::Faults {
-            observer: Box::new(match channels {
-                Channels::All => Observer::new(model, robot).with_further(),
-                _ => Observer::new(model, robot),
-            }),
-            monitor: Box::new(Monitor::new(model, robot, channels, form, rate)),
+        let channels = settings.sensors.into();
+        let observer = Box::new(match channels {
+            Channels::All => Observer::new(model, robot).with_further(),
+            _ => Observer::new(model, robot),
+        });
+        let monitor = |form| Box::new(Monitor::new(model, robot, channels, form, rate));
+        let (alarm_log_odds, filter) = if let Some(form) = settings.form.calibrated() {
+            let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
+            let monitor = monitor(form);
+            (
+                alarm_log_odds,
+                DetectionFilter::Faults { observer, monitor },
+            )
+        } else {
+            let promise = Promise {
+                interval_h,
+                fault_rate_1_h: rate,
+            };
+            let null = (&settings.null).into();
+            let declared = declared::Monitor::new(model, robot, channels, null, promise)?;
+            let filter = DetectionFilter::Declared {
+                observer,
+                tracking: monitor(Form::default()),
+                monitor: Box::new(declared),
+            };
+            (promise.alarm_log_odds(), filter)
         };
         let interval_s = model.interval_s;
         Ok(Self::with_filter(
@@ -116,7 +138,11 @@ impl Detector {
         settings: &Settings,
     ) -> Result<Self, DetectorError> {
         model.check_robot(robot)?;
-        let (channels, form) = chosen(settings);
+        let form = settings.form.calibrated();
+        let form = form.ok_or_else(|| UndeclaredError::Model {
+            robot: robot.name.clone(),
+        })?;
+        let channels = settings.sensors.into();
         let (rate, interval_h) = (settings.fault_rate_1_h, settings.false_alarm_interval_h);
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
         let filter = DetectionFilter::Nominal {
@@ -416,10 +442,6 @@ impl Detector {
         block.hypotheses[..2].copy_from_slice(&[nominal, unknown]);
         block.count = 2;
     }
-}
-
-fn chosen(settings: &Settings) -> (Channels, Form) {
-    (settings.sensors.into(), settings.form.into())
 }
 
 /// What frames of `robot` must carry for these settings.

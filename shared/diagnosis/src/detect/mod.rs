@@ -10,4 +10,4 @@ mod settings;
 
 pub use detector::{Detector, DetectorError};
 pub use monitors::Monitors;
-pub use settings::{Form, MonitorSettings, Settings};
+pub use settings::{Form, MonitorSettings, NullSettings, Settings};

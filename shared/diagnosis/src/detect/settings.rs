@@ -6,6 +6,7 @@ use clap::ValueEnum;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
+use vigil_robot::declared::Null;
 use vigil_robot::learned;
 
 use crate::sensors::Sensors;
@@ -25,8 +26,33 @@ pub struct Settings {
     pub fault_rate_1_h: f64,
     /// Channels that detector and identifier use.
     pub sensors: Sensors,
-    /// What a fault is taken for. The model holds a calibration for each.
+    /// What a fault is taken for. The model holds a calibration for each but `e-detector`.
     pub form: Form,
+    /// What the form `e-detector` takes for healthy, beside the robot's tolerances.
+    pub null: NullSettings,
+}
+
+/// The noise under which the form `e-detector` keeps its promise: the largest that is healthy.
+#[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct NullSettings {
+    /// Largest deviation of a sensor's noise over the learned one.
+    #[default(1.25)]
+    #[schemars(range(min = 1.0, max = 10.0))]
+    pub noise_ratio: f64,
+    /// Largest magnitude of the correlation of noise from one observation to the next.
+    #[default(0.1)]
+    #[schemars(range(min = 0.0, max = 0.9))]
+    pub correlation: f64,
+}
+
+impl From<&NullSettings> for Null {
+    fn from(settings: &NullSettings) -> Self {
+        Self {
+            noise_ratio: settings.noise_ratio,
+            correlation: settings.correlation,
+        }
+    }
 }
 
 /// What the detection filter takes a fault for.
@@ -43,14 +69,20 @@ pub enum Form {
     Constant,
     /// A constant likelihood over windows of ten observations: that size is ten times smaller.
     Windowed,
+    /// What no healthy robot does, by declared tolerances and noise. The mean time between false
+    /// alarms has a proof (Shin, Ramdas, Rinaldo 2024) and needs no calibration; alarms come later.
+    EDetector,
 }
 
-impl From<Form> for learned::Form {
-    fn from(form: Form) -> Self {
-        match form {
-            Form::LearnedBias => Self::LearnedBias,
-            Form::Constant => Self::Constant,
-            Form::Windowed => Self::Windowed,
+impl Form {
+    /// The form whose threshold is calibrated; None for `e-detector`, which has a proof instead.
+    #[must_use]
+    pub const fn calibrated(self) -> Option<learned::Form> {
+        match self {
+            Self::LearnedBias => Some(learned::Form::LearnedBias),
+            Self::Constant => Some(learned::Form::Constant),
+            Self::Windowed => Some(learned::Form::Windowed),
+            Self::EDetector => None,
         }
     }
 }

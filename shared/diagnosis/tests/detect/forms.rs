@@ -48,7 +48,7 @@ fn alarm_s(detector: &Detector, frames: &[SensorFrame]) -> Option<f64> {
 fn delay_s(sensors: Sensors, form: Form) -> f64 {
     let (runs, labels) = runs(&robot());
     let robot = match form {
-        Form::LearnedBias => robot(),
+        Form::LearnedBias | Form::EDetector => robot(),
         Form::Constant | Form::Windowed => on_one_ground(),
     };
     let detector = detector(&robot, sensors, form);
@@ -134,6 +134,7 @@ fn an_alarm_that_could_never_rise_is_refused() {
         sensors: Sensors::Pose,
         false_alarm_interval_h: 1e4,
         fault_rate_1_h: 3600.0,
+        ..detect::Settings::default()
     };
     let build = |form| Detector::new(&model(), &robot(), &settings(form)).map(|_| ());
     assert!(build(Form::LearnedBias).is_ok());
@@ -142,6 +143,26 @@ fn an_alarm_that_could_never_rise_is_refused() {
         error.contains("constant") && error.contains("fault_rate_1_h"),
         "{error}"
     );
+}
+
+#[test]
+fn the_form_with_a_proof_sees_every_stuck_wheel_by_its_encoders_and_alarms_at_its_promise() {
+    // That no healthy run left out raises an alarm is asserted in `delay_s`.
+    let delay_s = delay_s(Sensors::PoseEncoders, Form::EDetector);
+    assert!(delay_s < 0.5, "{delay_s}");
+    let detector = detector(&robot(), Sensors::PoseEncoders, Form::EDetector);
+    assert!((detector.alarm_log_odds() - 24.0_f64.ln()).abs() < 1e-12);
+}
+
+#[test]
+fn the_form_with_a_proof_needs_tolerances() {
+    let settings = detect::Settings {
+        form: Form::EDetector,
+        ..detect::Settings::default()
+    };
+    let error = Detector::new(&model(), &on_one_ground(), &settings).map(|_| ());
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("rover has none: add [tolerance]"), "{error}");
 }
 
 #[test]

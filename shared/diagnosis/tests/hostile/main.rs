@@ -326,12 +326,13 @@ proptest! {
         at in 0..100_usize,
         filter in prop::sample::select(IdentifierFilter::value_variants()),
         sensors in prop::sample::select(vec![Sensors::Pose, Sensors::PoseEncoders, Sensors::All]),
+        form in prop::sample::select(vec![Form::LearnedBias, Form::EDetector]),
     ) {
         let robot = match filter {
             IdentifierFilter::MultipleHypothesis if sensors == Sensors::All => &ROVER_ALL,
             _ => &ROVER,
         };
-        let mut chain = Chain::new(robot, filter, sensors, Form::LearnedBias);
+        let mut chain = Chain::new(robot, filter, sensors, form);
         // Sound frames first, so that the filters have something to lose.
         let sound = vec![(Turn::Frame(Spoiling::Sound), Forgery::Sound); at];
         run(&mut chain, &RECORDED, &sound);
@@ -341,7 +342,7 @@ proptest! {
     #[test]
     fn no_input_breaks_a_guarantee_of_the_nominal_steps(
         turns in prop::collection::vec((turn(), forgery()), 1..200),
-        form in prop::sample::select(Form::value_variants()),
+        form in prop::sample::select(vec![Form::LearnedBias, Form::Constant, Form::Windowed]),
     ) {
         let (filter, sensors) = (IdentifierFilter::default(), Sensors::PoseEncoders);
         let mut chain = Chain::new(&KOBUKI, filter, sensors, form);

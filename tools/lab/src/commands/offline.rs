@@ -185,7 +185,9 @@ impl FilterArgs {
     pub fn sets(&self, model: &RobotModel) -> Vec<&'static str> {
         let has = |set: &&str| {
             let channels = channels(set).into();
-            model.calibration(channels, self.detector.into()).is_ok()
+            let form = self.detector.calibrated();
+            // Without one, all that it reads are declared: pose and encoders.
+            form.map_or(*set != "all", |form| model.calibration(channels, form).is_ok())
         };
         // Few frames hold everything: this set is one for which one asks.
         let asked = |set: &&str| *set != "all" || self.sensors == "all";
