@@ -7,6 +7,7 @@
 
 mod bar;
 mod course;
+mod delays;
 mod fault;
 mod frames;
 mod ground;
@@ -22,6 +23,7 @@ mod timeline;
 mod watch;
 
 pub use bar::{Bar, Comparison};
+pub use delays::{Detected, MISSED_S, detect};
 pub use healthy::record;
 pub use job::{Job, ScoredRun};
 pub use recorded::{Library, Material, library};

@@ -13,6 +13,7 @@ pub mod field;
 pub mod latency;
 pub mod machine;
 pub mod missions;
+pub mod null_drive;
 pub mod results;
 pub mod simulated;
 

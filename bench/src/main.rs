@@ -49,6 +49,8 @@ enum Question {
     Mutants(mutants::Args),
     /// Where does zero-copy pay?
     Peers(peers::Args),
+    /// Are false alarms as rare as `e-detector` promises, and how much later are its alarms?
+    Promise(promise::Args),
     /// How many lines of code does each room have, and what do the services link?
     Size(size::Args),
     /// Writes bench/README.md anew from the results
@@ -80,6 +82,7 @@ impl Question {
             Self::Missions(args) => missions::run(args),
             Self::Mutants(args) => mutants::run(args),
             Self::Peers(args) => peers::run(args),
+            Self::Promise(args) => promise::run(args),
             Self::Size(args) => size::run(args),
             Self::Page => write_page(),
             Self::Role(role) => role.play(),

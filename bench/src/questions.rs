@@ -9,4 +9,5 @@ pub mod latency;
 pub mod missions;
 pub mod mutants;
 pub mod peers;
+pub mod promise;
 pub mod size;

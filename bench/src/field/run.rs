@@ -76,7 +76,7 @@ impl Graph {
     }
 
     /// Setup and words for a set of sensors.
-    fn setup(&self, sensors: Sensors) -> (&Setup, &Taxonomy) {
+    pub(super) fn setup(&self, sensors: Sensors) -> (&Setup, &Taxonomy) {
         match sensors {
             Sensors::All => (&self.all.0, &self.all.1),
             _ => (&self.setup, &self.taxonomy),
@@ -85,20 +85,21 @@ impl Graph {
 }
 
 /// What is the same for every set of sensors in a run.
-struct Conditions {
-    rate_hz: f64,
-    simulator: Simulator,
-    drive: Vec<vigil_setup::graph_file::DriveSegment>,
+pub(super) struct Conditions {
+    pub(super) rate_hz: f64,
+    pub(super) simulator: Simulator,
+    pub(super) drive: Vec<vigil_setup::graph_file::DriveSegment>,
     /// Faults, which count as such, and everything that changes in the world.
-    faults: Vec<Injection>,
-    changes: Vec<Injection>,
-    ground: Ground,
-    way: Way,
-    seed: u64,
+    pub(super) faults: Vec<Injection>,
+    pub(super) changes: Vec<Injection>,
+    pub(super) ground: Ground,
+    pub(super) way: Way,
+    pub(super) seed: u64,
 }
 
 impl Conditions {
-    fn draw(graph: &Graph, job: &Job<'_>) -> Result<Self, String> {
+    /// Draws those of a run.
+    pub(super) fn draw(graph: &Graph, job: &Job<'_>) -> Result<Self, String> {
         let Job { scenario, run, .. } = *job;
         let seed = scenario.first_seed + run as u64;
         let (robot, rng) = (&graph.setup.robot, &mut stream(seed, 0));
