@@ -4,7 +4,7 @@
 //! other way, a field holds another unit or sign. Each test sums measured against commanded motion
 //! from the first motion on; noise and ground leave the ratio near 1, and a finding needs a ratio
 //! that neither ground nor a fault explains. A test ends as soon as the motion excites it: straight
-//! driving shows nothing of turns. [`PublisherCheck::unjudged`] names the tests that have not
+//! driving shows nothing of turns. [`PublisherCheck::scope`] names the tests that have not
 //! ended. Once all have, a frame costs nothing more.
 
 mod finding;
@@ -131,6 +131,46 @@ const UNIT: usize = 3;
 const SIGN: usize = 4;
 const STEER: usize = SIGN + vigil_blocks::WHEELS;
 const SIDES: usize = STEER + vigil_blocks::WHEELS;
+
+/// Tests of one kind, what they are about, and the motion that excites them.
+const GROUPS: [(std::ops::Range<usize>, &str, &str); 7] = [
+    (
+        TRAVEL..TURN,
+        "travel of the pose",
+        "drive straight on, a few lengths of the robot",
+    ),
+    (
+        TURN..GYRO,
+        "sign and unit of yaw",
+        "turn to either side on the way",
+    ),
+    (
+        GYRO..UNIT,
+        "sign and unit of yaw_rate",
+        "turn to either side on the way",
+    ),
+    (
+        UNIT..SIGN,
+        "unit of the wheel rates",
+        "drive for a second or two at one speed",
+    ),
+    (
+        SIGN..STEER,
+        "signs of",
+        "drive for a second or two at one speed",
+    ),
+    (STEER..SIDES, "signs of", "drive a curve"),
+    (SIDES..TESTS, "sides of wheels", "drive a curve"),
+];
+
+/// How much of a publisher's frames the motion has shown, in words.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Scope {
+    /// What has been judged.
+    pub judged: Vec<String>,
+    /// What has not, and the motion that would show it.
+    pub unjudged: Vec<(String, &'static str)>,
+}
 
 impl PublisherCheck {
     /// The tests for frames of `robot`.
@@ -287,22 +327,53 @@ impl PublisherCheck {
         self.judged != self.absent
     }
 
-    /// Names of the tests that no motion has excited yet.
+    /// What has been judged, and what no motion has excited yet: in words, with the motion that
+    /// would. What the robot does not have is in neither.
     #[must_use]
-    pub fn unjudged(&self) -> Vec<&'static str> {
-        let groups = [
-            (TRAVEL..TURN, "travel of the pose"),
-            (TURN..GYRO, "sign and unit of yaw"),
-            (GYRO..UNIT, "sign and unit of yaw_rate"),
-            (UNIT..STEER, "unit and signs of the wheel rates"),
-            (STEER..SIDES, "signs of the steering angles"),
-            (SIDES..TESTS, "sides of the wheels"),
-        ];
-        let lacks = |test: usize| self.judged >> test & 1 == 0;
-        let groups = groups.into_iter();
-        let lacking = groups.filter(|(tests, _)| tests.clone().any(lacks));
-        lacking.map(|(_, name)| name).collect()
+    pub fn scope(&self) -> Scope {
+        let mut scope = Scope::default();
+        for (tests, what, motion) in GROUPS {
+            let of = |wanted: u32| -> Vec<String> {
+                let tests = tests.clone().filter(|test| self.absent >> test & 1 == 0);
+                let tests = tests.filter(|test| self.judged >> test & 1 == wanted);
+                tests.map(|test| self.channel_of(test)).collect()
+            };
+            let (judged, unjudged) = (of(1), of(0));
+            if !judged.is_empty() {
+                scope.judged.push(in_words(what, &judged));
+            }
+            if !unjudged.is_empty() {
+                scope.unjudged.push((in_words(what, &unjudged), motion));
+            }
+        }
+        scope
     }
+
+    /// The channel that a test is about; empty where its name says so.
+    fn channel_of(&self, test: usize) -> String {
+        let wheel = |wheel: usize| {
+            self.robot
+                .wheels
+                .get(wheel)
+                .map_or("?", |wheel| &wheel.name)
+        };
+        match test {
+            SIGN..STEER => format!("enc_{}", wheel(test - SIGN)),
+            STEER..SIDES => format!("steer_{}", wheel(test - STEER)),
+            SIDES..TESTS => {
+                let [left, right] = self.wheels.pair(test - SIDES);
+                format!("{}/{}", wheel(left), wheel(right))
+            }
+            _ => String::new(),
+        }
+    }
+}
+
+/// `what`, and the channels that it is about, if it names them.
+fn in_words(what: &str, channels: &[String]) -> String {
+    let named: Vec<&str> = channels.iter().map(String::as_str).collect();
+    let text = format!("{what} {}", named.join(", "));
+    text.trim_end().to_owned()
 }
 
 /// A ratio of turns.

@@ -234,6 +234,11 @@ impl Wheels {
         self.wheel_count
     }
 
+    /// The wheels of a pair, left and right.
+    pub fn pair(&self, pair: usize) -> [usize; 2] {
+        self.pairs.get(pair).map_or([0; 2], |pair| pair.wheels)
+    }
+
     /// Pairs of opposite wheels.
     pub const fn pair_count(&self) -> usize {
         self.pair_count
