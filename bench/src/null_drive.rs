@@ -230,7 +230,7 @@ impl Drive<'_> {
         match self.law.context {
             Context::Edge => {}
             Context::Swings => {
-                let is_up = self.step / SWING % 2 == 0;
+                let is_up = (self.step / SWING).is_multiple_of(2);
                 self.signs = [if is_up { 1.0 } else { -1.0 }; 3];
             }
             Context::Follows => {

@@ -143,13 +143,13 @@ fn upper(count: u32) -> f64 {
 }
 
 /// What one form did in all runs of a scenario with one set of sensors.
-struct Told {
+struct FormResult {
     delays_s: Vec<f64>,
     healthy_h: f64,
     false_alarms: u32,
 }
 
-impl Told {
+impl FormResult {
     fn new(found: &[Detected], sensors: &str, form: Form) -> Self {
         let mine = || {
             let is_mine = |it: &&Detected| it.sensors == sensors && it.form == form;
@@ -200,7 +200,7 @@ fn delays(args: &Args) -> Result<(Vec<String>, Value), Box<dyn Error>> {
             .flat_map(|(_, found)| found.clone())
             .collect();
         for sensors in ["pose", "pose+encoders"] {
-            let told = FORMS.map(|form| Told::new(&mine, sensors, form));
+            let told = FORMS.map(|form| FormResult::new(&mine, sensors, form));
             if told[0].healthy_h == 0.0 {
                 continue;
             }
@@ -233,7 +233,7 @@ fn delays(args: &Args) -> Result<(Vec<String>, Value), Box<dyn Error>> {
 }
 
 /// A line of the table.
-fn compared(name: &str, sensors: &str, told: &[Told; 2]) -> (String, Value) {
+fn compared(name: &str, sensors: &str, told: &[FormResult; 2]) -> (String, Value) {
     let [calibrated, proved] = told;
     let (before, after) = (calibrated.quantiles(), proved.quantiles());
     let pair = |i: usize| format!("{:.2} / {:.2}", before[i], after[i]);

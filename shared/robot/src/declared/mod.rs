@@ -37,11 +37,11 @@
 //! For the same reason a block vouches for an alarm only at its end: until one stands, the log-odds
 //! rise and fall with the blocks, while those of each channel hold what the last block has shown.
 //!
-//! Silent and frozen sensors and a robot that moves unbidden ([`Troubles`]) are no part of the null:
-//! they alarm at once, as with every form of detection. Gyro and currents have no declared null yet
-//! and say nothing here.
+//! Silent and frozen sensors and a robot that moves unbidden ([`Troubles`]) are no part of the
+//! null: they alarm at once, as with every form of detection. Gyro and currents have no declared
+//! null yet and say nothing here.
 
-mod follows;
+mod lag_bounds;
 mod pose;
 
 use vigil_blocks::WHEELS;
@@ -56,7 +56,7 @@ use crate::learned::{Model, Observation, Troubles};
 use crate::robot_model::RobotModel;
 use crate::slot::{SLOTS, Slot};
 use crate::tolerance::Tolerance;
-use follows::Follows;
+use lag_bounds::LagBounds;
 use pose::{PoseBlocks, PoseStep};
 
 /// Shares of the groups: how a fault first shows. Chosen, as those of the calibrated form: one
@@ -166,7 +166,7 @@ pub struct Monitor {
     null: Null,
     use_wheels: bool,
     promise: Promise,
-    follows: Follows,
+    lag: LagBounds,
     pose: PoseBlocks,
     wheels: [Wheel; WHEELS],
     is_ready: bool,
@@ -196,7 +196,7 @@ impl Monitor {
             null,
             use_wheels: channels.use_wheels(),
             promise,
-            follows: Follows::new(model.command.lag_s * model.command.lag_uncertainty),
+            lag: LagBounds::new(model.command.lag_s * model.command.lag_uncertainty),
             pose: PoseBlocks::new(null.correlation),
             wheels: [Wheel {
                 rate: Level::new(correlation),
@@ -218,7 +218,7 @@ impl Monitor {
 
     /// Forgets everything.
     pub fn reset(&mut self) {
-        self.follows.reset();
+        self.lag.reset();
         self.is_ready = false;
         self.interrupt();
         self.forget_evidence();
@@ -257,8 +257,7 @@ impl Monitor {
     /// has shown until the next one ends: there is nothing to promise then.
     pub fn step(&mut self, observation: &Observation, standing: bool) {
         self.is_ready = true;
-        self.follows
-            .advance(observation.command, observation.middles_s);
+        self.lag.advance(observation.command, observation.middles_s);
         if observation.moving && observation.dt_s > 0.0 {
             self.step_pose(observation);
             if self.use_wheels {
@@ -288,7 +287,7 @@ impl Monitor {
         let limit = self.model.command.curvature_max_1_m;
         let motion = &self.model.nominal.motion;
         let travel_m = speed * observation.middles_s;
-        let behind = self.follows.behind();
+        let behind = self.lag.behind();
         let lag_m = behind.speed_m_s * observation.middles_s;
         let lag_rad = behind.yaw_rate_rad_s * observation.middles_s;
         let per_metre = motion.per_metre(curvature, speed, limit);
@@ -351,7 +350,7 @@ impl Monitor {
             .get(wheel)?
             .rate(rolling, curvature);
         let at = self.robot.wheels.get(wheel)?;
-        let behind = self.follows.behind();
+        let behind = self.lag.behind();
         let lag_m_s = behind.speed_m_s + behind.yaw_rate_rad_s * at.x.hypot(at.y);
         let lag = lag_m_s / self.robot.wheel_radius_m;
         let tolerance = &self.tolerance;
@@ -376,7 +375,7 @@ impl Monitor {
             return None;
         }
         let commanded = steering_angle(&self.robot, wheel, observation.command[0]);
-        let behind = self.follows.behind().curvature_1_m;
+        let behind = self.lag.behind().curvature_1_m;
         // The angle grows or falls with the curvature throughout.
         let lag = [-behind, behind].map(|by| {
             let curvature = observation.command[0] + by;

@@ -187,7 +187,9 @@ impl FilterArgs {
             let channels = channels(set).into();
             let form = self.detector.calibrated();
             // Without one, all that it reads are declared: pose and encoders.
-            form.map_or(*set != "all", |form| model.calibration(channels, form).is_ok())
+            form.map_or(*set != "all", |form| {
+                model.calibration(channels, form).is_ok()
+            })
         };
         // Few frames hold everything: this set is one for which one asks.
         let asked = |set: &&str| *set != "all" || self.sensors == "all";

@@ -258,8 +258,8 @@ mod tests {
         assert_eq!(
             details(Status::Ok),
             [
-                "the motion fits the command: travel of the pose; unit of the wheel rates; signs of \
-              enc_LF, enc_LM, enc_LR, enc_RF, enc_RM, enc_RR"
+                "the motion fits the command: travel of the pose; unit of the wheel rates; signs \
+                 of enc_LF, enc_LM, enc_LR, enc_RF, enc_RM, enc_RR"
             ]
         );
         assert_eq!(

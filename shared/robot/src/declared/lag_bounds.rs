@@ -11,10 +11,10 @@ pub(super) struct Behind {
     pub yaw_rate_rad_s: f64,
 }
 
-/// Follows the bounds. Each change of the command adds its magnitude, which fades with the longest
+/// The bounds. Each change of the command adds its magnitude, which fades with the longest
 /// time constant: of a body with a shorter one, whatever it is, less is left.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Follows {
+pub(super) struct LagBounds {
     lag_s: f64,
     before: [f64; 3],
     /// At the end of the last observation.
@@ -23,7 +23,7 @@ pub(super) struct Follows {
     behind: [f64; 3],
 }
 
-impl Follows {
+impl LagBounds {
     /// Of a body whose time constant is so long at most, s.
     pub fn new(lag_s: f64) -> Self {
         Self {
@@ -42,7 +42,8 @@ impl Follows {
     /// Takes the mean command (curvature 1/m, speed m/s) of an observation, `dt_s` after the last.
     /// Between two observations the command goes from one to the other, at any time: neither the
     /// change nor what was left before it has faded for all of that.
-    pub fn advance(&mut self, [curvature, speed]: [f64; 2], dt_s: f64) {
+    pub fn advance(&mut self, command: [f64; 2], dt_s: f64) {
+        let [curvature, speed] = command;
         let now = [curvature, speed, curvature * speed];
         let before = std::mem::replace(&mut self.before, now);
         let stays = (-dt_s.max(0.0) / self.lag_s).exp();
@@ -66,14 +67,14 @@ impl Follows {
 
 #[cfg(test)]
 mod tests {
-    use super::Follows;
+    use super::LagBounds;
 
     #[test]
     fn a_body_of_any_lag_up_to_the_longest_stays_within_the_bounds() {
         const FINE: u32 = 100;
         for lag_s in [0.01, 0.05, 0.1, 0.2] {
             // It stands as yet.
-            let (mut follows, mut body) = (Follows::new(0.2), [0.0_f64; 3]);
+            let (mut lag, mut body) = (LagBounds::new(0.2), [0.0_f64; 3]);
             let mut before = [0.0; 3];
             let mut tight = 0;
             for step in 0..400_u32 {
@@ -81,8 +82,8 @@ mod tests {
                 let curvature = f64::from(step / 13 * 7919 % 10) / 10.0 - 0.4;
                 let speed = 0.1 + 0.2 * f64::from(step / 17 % 3);
                 let now = [curvature, speed, curvature * speed];
-                follows.advance([curvature, speed], 0.05);
-                let behind = follows.behind();
+                lag.advance([curvature, speed], 0.05);
+                let behind = lag.behind();
                 let most = [
                     behind.curvature_1_m,
                     behind.speed_m_s,
