@@ -237,7 +237,11 @@ fn compared(name: &str, sensors: &str, told: &[FormResult; 2]) -> (String, Value
     let [calibrated, proved] = told;
     let (before, after) = (calibrated.quantiles(), proved.quantiles());
     let pair = |i: usize| format!("{:.2} / {:.2}", before[i], after[i]);
-    let ratios = [after[0] / before[0], after[1] / before[1]];
+    let ratio = |i: usize| match before[i].is_finite() {
+        true => format!("{:.2}", after[i] / before[i]),
+        // What neither sees, or only the form with a proof, has no ratio.
+        false => "-".to_owned(),
+    };
     let runs = calibrated.delays_s.len();
     let false_alarms = format!("{} / {}", calibrated.false_alarms, proved.false_alarms);
     let line = match runs {
@@ -246,13 +250,13 @@ fn compared(name: &str, sensors: &str, told: &[FormResult; 2]) -> (String, Value
             proved.healthy_h
         ),
         _ => format!(
-            "| {name} | {sensors} | {runs} | {} / {} | {} | {} | {:.2} | {:.2} | {false_alarms} |",
+            "| {name} | {sensors} | {runs} | {} / {} | {} | {} | {} | {} | {false_alarms} |",
             calibrated.seen(),
             proved.seen(),
             pair(0),
             pair(1),
-            ratios[0],
-            ratios[1],
+            ratio(0),
+            ratio(1),
         ),
     };
     let row = json!({
