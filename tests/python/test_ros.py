@@ -95,7 +95,7 @@ class Ros(unittest.TestCase):
             done = vigil("import", *arguments, "--json")
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(len(json.loads(done.stdout)["runs"]), 1)
-            lacking = "messages on /joint_states have no finite 'velocity[LF_wheel]'"
+            lacking = "messages on /joint_states lack a value, the first of them 'velocity[LF_wheel]'"
             self.assertIn(f"1 of {len(rows())} {lacking}", done.stderr)
             with open(out) as file:
                 imported = list(csv.DictReader(file))

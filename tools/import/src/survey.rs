@@ -19,6 +19,8 @@ const NAMED_MESSAGES: usize = 100;
 const HEAD_BYTES: u64 = 1 << 16;
 /// Rows there, beyond which no header is looked for.
 const HEADER_ROWS_MAX: usize = 20;
+/// Folders within folders in which files are looked for.
+const DEPTH_MAX: usize = 6;
 /// Separators that are tried.
 const DELIMITERS: [char; 4] = [',', ';', '\t', ' '];
 
@@ -73,7 +75,7 @@ pub(super) fn is_table(path: &Path) -> bool {
         .any(|ending| name.ends_with(ending))
 }
 
-/// Surveys one recording (a file, or rosbag2's folder), or tables: one file, or all of a folder.
+/// Surveys one recording (a file, or rosbag2's folder), or tables: one file, or all below a folder.
 ///
 /// # Errors
 /// What cannot be read.
@@ -83,19 +85,51 @@ pub fn survey(path: &Path) -> Result<Survey, ImportError> {
         return topics(path);
     }
     let tables = if path.is_dir() {
-        files.into_iter().filter(|file| is_table(file)).collect()
+        let of_folders = tables_below(path)?.into_iter();
+        of_folders
+            .flat_map(|(folder, names)| names.into_iter().map(move |name| folder.join(name)))
+            .collect()
     } else {
         vec![path.to_owned()]
     };
     if tables.is_empty() {
-        let message = "no .mcap, .db3, .csv, .tsv or .txt file is in this folder".to_owned();
-        return Err(wrong_row(path, 0, message).into());
+        return Err(no_log(path));
     }
     let tables = tables
         .iter()
         .map(|file| table(file))
         .collect::<Result<_, _>>()?;
     Ok(Survey { tables, cut: None })
+}
+
+/// A folder in which there is nothing to read.
+pub(super) fn no_log(folder: &Path) -> ImportError {
+    let message = "no .mcap, .db3, .csv, .tsv or .txt file is in this folder".to_owned();
+    wrong_row(folder, 0, message).into()
+}
+
+/// Names of the tables of a folder and of those within it, by folder.
+pub(super) fn tables_below(folder: &Path) -> Result<BTreeMap<PathBuf, Vec<String>>, ImportError> {
+    let mut found = BTreeMap::new();
+    collect_tables(folder, 0, &mut found)?;
+    Ok(found)
+}
+
+fn collect_tables(
+    folder: &Path,
+    depth: usize,
+    out: &mut BTreeMap<PathBuf, Vec<String>>,
+) -> Result<(), ImportError> {
+    for path in children(folder)? {
+        if path.is_dir() && depth < DEPTH_MAX {
+            collect_tables(&path, depth + 1, out)?;
+        } else if path.is_file() && is_table(&path) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            let names = out.entry(folder.to_owned()).or_default();
+            names.push(name.into_owned());
+        }
+    }
+    Ok(())
 }
 
 /// What is in a folder, by name; nothing in a file.

@@ -137,7 +137,7 @@ const GROUPS: [(std::ops::Range<usize>, &str, &str); 7] = [
     (
         TRAVEL..TURN,
         "travel of the pose",
-        "drive straight on, a few lengths of the robot",
+        "drive four metres, or a quarter turn",
     ),
     (
         TURN..GYRO,

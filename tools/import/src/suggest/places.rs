@@ -4,11 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::ImportError;
-use crate::survey::{children, is_bag, is_table};
-use vigil_recording::table::wrong_row;
-
-/// Folders within folders in which files are looked for.
-const DEPTH_MAX: usize = 6;
+use crate::survey::{children, is_bag, no_log, tables_below};
 
 /// The runs of a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,13 +68,11 @@ pub(super) fn places(path: &Path) -> Result<Places, ImportError> {
             others: 0,
         });
     }
-    let mut files = BTreeMap::new();
-    tables(path, 0, &mut files)?;
+    let files = tables_below(path)?;
     let all: usize = files.values().map(Vec::len).sum();
     let group = numbered(&files).or_else(|| named(&files));
     let Some((folders, stems, numbers)) = group else {
-        let message = "no .mcap, .db3, .csv, .tsv or .txt file is in this folder".to_owned();
-        return Err(wrong_row(path, 0, message).into());
+        return Err(no_log(path));
     };
     Ok(group_places(path, (folders, stems, numbers), all))
 }
@@ -89,27 +83,6 @@ fn parent(path: &Path) -> &Path {
         .parent()
         .filter(|parent| !parent.as_os_str().is_empty());
     parent.unwrap_or(Path::new("."))
-}
-
-/// Tables by their folder.
-fn tables(
-    folder: &Path,
-    depth: usize,
-    out: &mut BTreeMap<PathBuf, Vec<String>>,
-) -> Result<(), ImportError> {
-    for path in children(folder)? {
-        if path.is_dir() && depth < DEPTH_MAX {
-            tables(&path, depth + 1, out)?;
-        } else if path.is_file() && is_table(&path) {
-            let name = path
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
-            out.entry(folder.to_owned()).or_default().push(name);
-        }
-    }
-    Ok(())
 }
 
 /// Folders, the patterns of files in each, and the numbers of each folder's runs.

@@ -104,6 +104,8 @@ fn the_page_names_every_step() {
         .collect();
     let wanted = [
         "import",
+        "import",
+        "import",
         "learn",
         "learn",
         "diagnose",

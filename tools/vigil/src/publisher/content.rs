@@ -258,13 +258,15 @@ mod tests {
         assert_eq!(
             details(Status::Ok),
             [
-                "the motion fits the command: travel of the pose; unit of the wheel rates; signs \
-                 of enc_LF, enc_LM, enc_LR, enc_RF, enc_RM, enc_RR"
+                "the motion fits the command: unit of the wheel rates; signs of enc_LF, enc_LM, \
+                 enc_LR, enc_RF, enc_RM, enc_RR"
             ]
         );
         assert_eq!(
             details(Status::Warning),
             [
+                "not judged yet: travel of the pose; drive four metres, or a quarter turn while \
+                 this listens",
                 "not judged yet: sign and unit of yaw; turn to either side on the way while \
                  this listens",
                 "not judged yet: signs of steer_LF, steer_LR, steer_RF, steer_RR; drive a curve \
