@@ -16,7 +16,8 @@ def frames(path, run, channels=None):
                 continue
             frame = vigil.SensorFrame(run_id=1 + run)
             frame.header.schema = vigil.SensorFrame.SCHEMA
-            frame.header.t_capture_ns = round(float(row["t"]) * 1e9)
+            # From 1 on: a capture time of 0 is none.
+            frame.header.t_capture_ns = 1 + round(float(row["t"]) * 1e9)
             # What is measured is set by its name, what is not stays 0.
             for name in channels.axes:
                 channels.command(frame, name, float(row[name]))

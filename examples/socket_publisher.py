@@ -1,35 +1,26 @@
 """Sends a recorded drive to a graph with `--source socket`: nothing but Python's own library.
 
-python3 socket_publisher.py FRAMES.csv.gz RUN [HZ] [ADDRESS] [CHANNELS]
-ADDRESS: host:port of the graph's UDP socket, or the path of its Unix socket.
-CHANNELS: file with what `vigil channels --robot F` printed; rover.channels if it is not given.
+python3 socket_publisher.py FRAMES.csv.gz RUN [GRAPH] [HZ] [CHANNELS]
+GRAPH: the graph's name; or host:port of its UDP socket, or the path of its Unix socket.
+CHANNELS: with an address, the file with what `vigil channels --robot F` printed; rover.channels if it is not given.
 """
 
-import socket
 import sys
 import time
 
 import recording
-import vigil_types as vigil
+from sending import ROVER, SocketPublisher
 
-path, run = sys.argv[1], int(sys.argv[2])
-hz = float(sys.argv[3]) if len(sys.argv) > 3 else 20.0
-address = sys.argv[4] if len(sys.argv) > 4 else "127.0.0.1:7401"
-channels = vigil.Channels.read(sys.argv[5]) if len(sys.argv) > 5 else None
-
-if "/" in address:
-    sender, to = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM), address
-else:
-    host, port = address.rsplit(":", 1)
-    sender, to = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), (host, int(port))
-frames = list(recording.frames(path, run, channels))
-print(f"sending {len(frames)} frames at {hz} Hz to {address}; scripts/up shows 'alarm' and 'diagnosis'")
-
-epoch = due = time.monotonic_ns()
-for seq, frame in enumerate(frames):
+path, run, *words = sys.argv[1:]
+graph = words[0] if words else "rover"
+hz = float(words[1]) if len(words) > 1 else 20.0
+publisher = SocketPublisher(graph, words[2] if len(words) > 2 else ROVER)
+frames = list(recording.frames(path, int(run), publisher.channels))
+print(f"sending {len(frames)} frames at {hz} Hz to {graph}; scripts/up shows 'alarm' and 'diagnosis'")
+due = time.monotonic_ns()
+for frame in frames:
     due += round(1e9 / hz)
     time.sleep(max(0, due - time.monotonic_ns()) / 1e9)
-    frame.header.epoch, frame.header.seq = epoch, seq
-    # Left at 0, as from another machine: t_schedule_ns. The capture times are the recording's.
-    sender.sendto(vigil.datagram(frame), to)
+    # The due time is left out, as from another machine. The capture times are the recording's.
+    publisher.publish(frame)
 print("done")

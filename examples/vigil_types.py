@@ -694,19 +694,50 @@ assert Health.event_count.offset == 384
 assert Health.events.offset == 392
 
 
+def _folders():
+    """Where the folders of graphs lie."""
+    user = os.environ.get("XDG_RUNTIME_DIR")
+    folders = ["/run/vigil"] + ([f"{user}/vigil"] if user else [])
+    return folders + [f"{tempfile.gettempdir()}/vigil-{os.getuid()}"]
+
+
+def _is_running(folder):
+    """True if a launcher or a service holds the lock of a graph: what was killed left its files."""
+    import fcntl
+
+    try:
+        os.stat(f"{folder}/processes")
+        with open(f"{folder}/lock") as lock:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        pass
+    return False
+
+
+def running_graphs():
+    """Names of the running graphs that this user may join."""
+    found = []
+    for folder in _folders():
+        try:
+            found += [name for name in os.listdir(folder) if _is_running(f"{folder}/{name}")]
+        except OSError:
+            pass
+    return sorted(found)
+
+
 def runtime_folder(graph="rover"):
     """Folder of a running graph: its sockets and the files of its transport.
 
     Raises FileNotFoundError while there is none: the graph cleans up what joins before it.
     """
-    user = os.environ.get("XDG_RUNTIME_DIR")
-    candidates = ["/run/vigil"] + ([f"{user}/vigil"] if user else [])
-    candidates.append(f"{tempfile.gettempdir()}/vigil-{os.getuid()}")
     closed = None
-    for folder in candidates:
+    for folder in _folders():
         try:
             os.stat(f"{folder}/{graph}/processes")
-            return f"{folder}/{graph}"
+            if _is_running(f"{folder}/{graph}"):
+                return f"{folder}/{graph}"
         except FileNotFoundError:
             pass
         except PermissionError:
@@ -714,16 +745,23 @@ def runtime_folder(graph="rover"):
     if closed is not None:
         other = f"{closed} is another user's"
         raise PermissionError(f"no graph '{graph}' of yours is running, and {other}")
-    raise FileNotFoundError(f"DoesNotExist: no graph '{graph}' is running (looked in {candidates})")
+    raise FileNotFoundError(f"no graph '{graph}' is running (looked in {_folders()})")
 
 
 def transport(graph="rover"):
     """Configuration of iceoryx2 (package `iceoryx2`, version 0.10) with which to join the graph."""
     import iceoryx2
 
+    folder, start = runtime_folder(graph), ""
+    try:
+        # Each start of a graph has files of its own names.
+        with open(f"{folder}/start") as file:
+            start = file.read()
+    except FileNotFoundError:
+        pass
     config = iceoryx2.config.default()
-    config.global_cfg.prefix = iceoryx2.FileName.new(f"vigil_{graph}_")
-    config.global_cfg.root_path = iceoryx2.Path.new(f"{runtime_folder(graph)}/t")
+    config.global_cfg.prefix = iceoryx2.FileName.new(f"vigil_{graph}_{start}")
+    config.global_cfg.root_path = iceoryx2.Path.new(f"{folder}/t")
     return config
 
 
@@ -791,6 +829,20 @@ class Channels:
 def channel_list(graph="rover"):
     """The Channels of a running graph."""
     return Channels.read(f"{runtime_folder(graph)}/channels")
+
+
+def addresses(graph="rover"):
+    """Where a running graph takes datagrams: host:port or a path. LookupError if it takes none."""
+    try:
+        with open(f"{runtime_folder(graph)}/addresses") as file:
+            found = [line.split(None, 1)[1].strip() for line in file]
+    except FileNotFoundError:
+        # That there is no graph is another answer.
+        runtime_folder(graph)
+        found = []
+    if not found:
+        raise LookupError(f"graph '{graph}' takes no datagrams")
+    return found
 
 
 def _table():

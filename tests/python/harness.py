@@ -37,8 +37,8 @@ def publisher(name, *arguments):
 class Graph:
     """A graph of its own name on the default configuration; stopped at the end of a `with`."""
 
-    def __init__(self, *options):
-        self.name = f"py{os.getpid()}-{uuid.uuid4().hex[:6]}"
+    def __init__(self, *options, name=None):
+        self.name = name or f"py{os.getpid()}-{uuid.uuid4().hex[:6]}"
         self.options = options
         # A port of its own: another graph may be taking datagrams on this machine.
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:

@@ -36,7 +36,7 @@ class Publishers(unittest.TestCase):
 
     def test_python_through_shared_memory(self):
         with Graph("--source", "external", "--rate", str(RATE_HZ)) as graph:
-            self.run_to_its_end(publisher("publisher.py", FRAMES, STUCK_RUN, RATE_HZ, graph.name))
+            self.run_to_its_end(publisher("publisher.py", FRAMES, STUCK_RUN, graph.name, RATE_HZ))
             self.assert_found(graph.stop(), "detector")
 
     def test_rust_through_shared_memory(self):
@@ -50,7 +50,7 @@ class Publishers(unittest.TestCase):
         # At the recording's own rate: due times are found from its capture times.
         with Graph("--source", "socket", "--rate", "20") as graph:
             socket = graph.wait_for_socket()
-            self.run_to_its_end(publisher("socket_publisher.py", FRAMES, STUCK_RUN, 20, socket))
+            self.run_to_its_end(publisher("socket_publisher.py", FRAMES, STUCK_RUN, socket, 20))
             self.assert_found(graph.stop(), "sensor-sim")
 
     def rows(self):
@@ -100,11 +100,11 @@ class Publishers(unittest.TestCase):
         text = code + (EXAMPLES / "publisher.py").read_text()
         with Graph("--source", "external") as graph, tempfile.TemporaryDirectory() as folder:
             graph.wait_until_up()
-            for name in ["joining.py", "recording.py", "vigil_types.py"]:
+            for name in ["joining.py", "recording.py", "vigil_types.py", "waiting.py"]:
                 (pathlib.Path(folder) / name).write_text((EXAMPLES / name).read_text())
             file = pathlib.Path(folder) / "publisher.py"
             file.write_text(text)
-            command = [sys.executable, file, FRAMES, str(STUCK_RUN), "20", graph.name]
+            command = [sys.executable, file, FRAMES, str(STUCK_RUN), graph.name, "20"]
             done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
             self.assertEqual(done.returncode, 1)
             self.assertIn("the graph has vigil.SensorFrame.v1.", done.stderr)
@@ -123,7 +123,7 @@ class CheckPublisher(unittest.TestCase):
 
     def test_a_good_publisher_fits(self):
         with Graph("--source", "external", "--rate", str(RATE_HZ)) as graph:
-            process = publisher("publisher.py", FRAMES, STUCK_RUN, RATE_HZ, graph.name)
+            process = publisher("publisher.py", FRAMES, STUCK_RUN, graph.name, RATE_HZ)
             graph.wait_until_up()
             document = self.check(graph.name, "--source", "external", "--rate", str(RATE_HZ))
             self.run_it(process)
@@ -133,7 +133,7 @@ class CheckPublisher(unittest.TestCase):
 
     def test_a_good_publisher_fits_where_there_is_no_graph(self):
         name = f"py{os.getpid()}-alone"
-        process = publisher("publisher.py", FRAMES, STUCK_RUN, RATE_HZ, name)
+        process = publisher("publisher.py", FRAMES, STUCK_RUN, name, RATE_HZ)
         document = self.check(name, "--source", "external", "--rate", str(RATE_HZ))
         self.run_it(process)
         self.assertTrue(document["ok"], document)
@@ -141,7 +141,7 @@ class CheckPublisher(unittest.TestCase):
     def test_beside_a_graph_it_knows_how_that_was_started(self):
         # At the recording's own rate: its capture times are right as well.
         with Graph("--source", "external", "--rate", "20") as graph:
-            process = publisher("publisher.py", FRAMES, STUCK_RUN, 20, graph.name)
+            process = publisher("publisher.py", FRAMES, STUCK_RUN, graph.name, 20)
             graph.wait_until_up()
             document = self.check(graph.name)
             self.run_it(process)
@@ -150,13 +150,15 @@ class CheckPublisher(unittest.TestCase):
         self.assertEqual([found for found in judged if found["status"] != "ok"], [])
 
     def test_an_epoch_for_each_frame_is_told(self):
-        text = (EXAMPLES / "publisher.py").read_text().replace("seq = epoch, seq", "seq = epoch + seq, seq")
+        text = (EXAMPLES / "publisher.py").read_text()
+        text = text.replace("    publisher.publish", "    publisher._epoch += 1\n    publisher.publish")
+        self.assertIn("_epoch", text)
         with Graph("--source", "external", "--rate", str(RATE_HZ)) as graph, tempfile.TemporaryDirectory() as folder:
-            for name in ["joining.py", "recording.py", "vigil_types.py"]:
+            for name in ["joining.py", "recording.py", "vigil_types.py", "waiting.py"]:
                 (pathlib.Path(folder) / name).write_text((EXAMPLES / name).read_text())
             file = pathlib.Path(folder) / "publisher.py"
             file.write_text(text)
-            command = [sys.executable, file, FRAMES, str(STUCK_RUN), str(RATE_HZ), graph.name]
+            command = [sys.executable, file, FRAMES, str(STUCK_RUN), graph.name, str(RATE_HZ)]
             process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
             graph.wait_until_up()
             document = self.check(graph.name)

@@ -9,7 +9,6 @@ use std::time::{Duration, Instant};
 use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{Domain, RunReport, signal};
-use vigil_robot::channel::channel_list_text;
 
 use crate::error::LauncherError;
 use crate::observer::HealthObserver;
@@ -67,18 +66,17 @@ impl Children {
         }
         let list = domain.processes_file();
         children
-            .list(domain, &channel_list_text(&plan.setup.robot))
+            .list(plan, domain)
             .map_err(|cause| LauncherError::file(list, cause))?;
         Ok(children)
     }
 
     /// Leaves the process ids where whoever finds the graph running can read them.
-    fn list(&self, domain: &Domain, channels: &str) -> io::Result<()> {
+    fn list(&self, plan: &Plan, domain: &Domain) -> io::Result<()> {
         let line = |s: &ServiceProcess| format!("{} {}\n", s.name.as_str(), s.child.id());
         let text: String = self.services.iter().map(line).collect();
-        // First: a publisher that finds the graph may ask for its types and channels.
-        domain.tell_types()?;
-        std::fs::write(domain.channels_file(), channels)?;
+        // First: a publisher that finds the graph may ask for them.
+        plan.setup.tell_publishers(domain)?;
         std::fs::write(domain.processes_file(), text)
     }
 

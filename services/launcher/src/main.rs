@@ -88,11 +88,20 @@ fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, LauncherError> {
     };
     lock.share_with_children();
     domain.remove_residue();
+    domain
+        .begin()
+        .map_err(|cause| LauncherError::file(domain.folder(), cause))?;
     signal::install();
     let link = Link::join(&domain, "launcher")?;
     let mut observer = HealthObserver::new(link, plan)?;
     let _awake = args.keep_awake.then(|| plan.keep_awake()).transpose()?;
     let mut children = Children::start(plan, &domain)?;
+    for address in plan.setup.addresses(domain.folder()) {
+        tell!(
+            "vigil: graph '{}' takes datagrams at {address}",
+            domain.graph()
+        );
+    }
     let ended = watch(args, plan, &mut observer, &mut children);
     observer.close(DRAIN);
     children.stop();

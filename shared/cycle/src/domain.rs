@@ -3,8 +3,9 @@
 use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::os::fd::AsRawFd;
-use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use iceoryx2::prelude::{Config, FileName, SemanticString};
 use schemars::JsonSchema;
@@ -12,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 use vigil_blocks::{Action, Block, SensorFrame};
 
+use crate::clock::{Clock, Monotonic};
 use crate::port_error::PortError;
 use crate::topic::{ServiceName, Topic};
 
@@ -20,6 +22,11 @@ const TRANSPORT_VERSION: &str = "0.10.0";
 /// Sensor frames are small, and a publisher that was held up sends many at once: so many times
 /// more of them may wait.
 const SENSOR_BUFFERS: usize = 8;
+
+/// A publisher that asks whether a graph runs holds its lock for some microseconds.
+const LOCK_ATTEMPTS: usize = 3;
+/// Time between two attempts.
+const LOCK_PAUSE: Duration = Duration::from_millis(5);
 
 /// Blocks that a reader may hold at once: the one it works on, and the next.
 pub(crate) const BORROWED: usize = 2;
@@ -94,6 +101,40 @@ impl Domain {
         })
     }
 
+    /// The place of the running graph of this name; `None` while there is none. Nothing is made.
+    #[must_use]
+    pub fn running(graph: &str) -> Option<Self> {
+        let domain = Self {
+            graph: graph.to_owned(),
+            folder: runtime_folder().join(graph),
+            queues: Queues::default(),
+        };
+        (domain.processes_file().exists() && domain.is_locked()).then_some(domain)
+    }
+
+    /// Names of the running graphs, sorted.
+    #[must_use]
+    pub fn all_running() -> Vec<String> {
+        let folders = fs::read_dir(runtime_folder()).into_iter().flatten();
+        let names = folders.flatten().map(|entry| entry.file_name());
+        let names = names.filter_map(|name| name.into_string().ok());
+        let mut names: Vec<_> = names.filter(|name| Self::running(name).is_some()).collect();
+        names.sort();
+        names
+    }
+
+    /// True while a launcher or one of its services lives. What was killed has left its files.
+    fn is_locked(&self) -> bool {
+        let file = File::open(self.folder.join("lock"));
+        file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(fs::TryLockError::WouldBlock)))
+    }
+
+    /// What is different after each start of the graph: when its list of processes was written.
+    pub(crate) fn start(&self) -> Option<(u64, i64, i64)> {
+        let list = fs::metadata(self.processes_file()).ok()?;
+        Some((list.ino(), list.mtime(), list.mtime_nsec()))
+    }
+
     /// Name of the graph.
     #[must_use]
     pub fn graph(&self) -> &str {
@@ -148,16 +189,46 @@ impl Domain {
         self.folder.join("channels")
     }
 
+    /// File that tells publishers where a graph takes datagrams: `udp ADDRESS` or `unix PATH` a
+    /// line.
+    #[must_use]
+    pub fn addresses_file(&self) -> PathBuf {
+        self.folder.join("addresses")
+    }
+
     /// Sizes of the queues.
     #[must_use]
     pub const fn queues(&self) -> Queues {
         self.queues
     }
 
-    /// Beginning of the names of the graph's files in /dev/shm.
-    #[must_use]
-    pub fn prefix(&self) -> String {
+    /// Gives the transport's files of this start names of their own. Only for the holder of the
+    /// lock, before anybody joins: a peer of an earlier start that lets go of its ports removes
+    /// files by their names, and must not meet those of this one.
+    ///
+    /// # Errors
+    /// The file system's.
+    pub fn begin(&self) -> io::Result<()> {
+        // Shortened, for names are limited: no two starts follow each other by whole 70 minutes.
+        let start = Monotonic.now_ns() / 1000 & 0xffff_ffff;
+        fs::write(self.start_file(), format!("{start:08x}_"))
+    }
+
+    /// File with what the names of this start's files have in addition.
+    fn start_file(&self) -> PathBuf {
+        self.folder.join("start")
+    }
+
+    /// Beginning of the names of the graph's files in /dev/shm, whatever start they are of.
+    fn prefix(&self) -> String {
         format!("vigil_{}_", self.graph)
+    }
+
+    /// The same of the present start.
+    #[must_use]
+    pub fn transport_prefix(&self) -> String {
+        // Without a launcher nothing has begun, and nothing is to be told apart.
+        self.prefix() + &fs::read_to_string(self.start_file()).unwrap_or_default()
     }
 
     /// The transport's configuration, built here and handed to every node: a file found through
@@ -168,7 +239,7 @@ impl Domain {
     /// [`PortError::Setup`] when a name is too long for the transport.
     pub fn transport_config(&self) -> Result<Config, PortError> {
         let mut config = Config::default();
-        config.global.prefix = FileName::new(self.prefix().as_bytes())
+        config.global.prefix = FileName::new(self.transport_prefix().as_bytes())
             .map_err(|e| PortError::setup("shared-memory prefix", e))?;
         let root = self.folder.join("t");
         let root = iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes())
@@ -188,11 +259,14 @@ impl Domain {
             .write(true)
             .mode(0o600)
             .open(self.folder.join("lock"))?;
-        match file.try_lock() {
-            Ok(()) => Ok(Some(GraphLock { file })),
-            Err(fs::TryLockError::WouldBlock) => Ok(None),
-            Err(fs::TryLockError::Error(error)) => Err(error),
+        for _ in 0..LOCK_ATTEMPTS {
+            match file.try_lock() {
+                Ok(()) => return Ok(Some(GraphLock { file })),
+                Err(fs::TryLockError::WouldBlock) => std::thread::sleep(LOCK_PAUSE),
+                Err(fs::TryLockError::Error(error)) => return Err(error),
+            }
         }
+        Ok(None)
     }
 
     /// Files of this graph in /dev/shm and in the transport's folder.
@@ -215,9 +289,15 @@ impl Domain {
             let _ = fs::remove_file(path);
         }
         let _ = fs::remove_dir_all(self.folder.join("t"));
-        let _ = fs::remove_file(self.processes_file());
-        let _ = fs::remove_file(self.types_file());
-        let _ = fs::remove_file(self.channels_file());
+        for file in [
+            self.processes_file(),
+            self.types_file(),
+            self.channels_file(),
+            self.addresses_file(),
+            self.start_file(),
+        ] {
+            let _ = fs::remove_file(file);
+        }
     }
 }
 
@@ -304,6 +384,8 @@ mod tests {
             domain.processes_file(),
             domain.types_file(),
             domain.channels_file(),
+            domain.addresses_file(),
+            domain.start_file(),
             domain.failure_file(ServiceName::Detector),
         ];
         for (i, file) in files.iter().enumerate() {
@@ -311,6 +393,31 @@ mod tests {
             assert!(!files[..i].contains(file), "{}", file.display());
         }
         std::fs::remove_dir_all(domain.folder()).unwrap();
+    }
+
+    #[test]
+    fn each_start_has_file_names_of_its_own_and_only_a_locked_graph_is_running() {
+        let graph = format!("t{}-starts", std::process::id());
+        let domain = Domain::new(&graph, Queues::default()).unwrap();
+        let prefix = || domain.transport_config().unwrap().global.prefix.to_string();
+        domain.begin().unwrap();
+        let first = prefix();
+        std::thread::sleep(Duration::from_millis(1));
+        domain.begin().unwrap();
+        assert_ne!(first, prefix());
+        assert!(first.starts_with(&domain.prefix()), "{first}");
+
+        fs::write(domain.processes_file(), "").unwrap();
+        assert_eq!(Domain::running(&graph), None);
+        let lock = domain.lock().unwrap().unwrap();
+        assert_eq!(Domain::running(&graph), Some(domain.clone()));
+        assert!(Domain::all_running().contains(&graph));
+        drop(lock);
+        assert_eq!(Domain::running(&graph), None);
+
+        domain.remove_residue();
+        assert_eq!(prefix(), domain.prefix());
+        fs::remove_dir_all(domain.folder()).unwrap();
     }
 
     #[test]

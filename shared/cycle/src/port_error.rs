@@ -2,6 +2,9 @@
 
 use std::error::Error;
 
+use iceoryx2::service::builder::event::EventOpenError;
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
+
 /// What the transport or the system said. The transport has an error type for each operation;
 /// they are boxed, so that they are no part of this crate's face.
 type Cause = Box<dyn Error + Send + Sync>;
@@ -48,6 +51,35 @@ pub enum PortError {
 }
 
 impl PortError {
+    /// True if the graph is just making the topic, or just taking it away: it may be there later.
+    #[must_use]
+    pub fn is_coming(&self) -> bool {
+        use EventOpenError as Event;
+        use PublishSubscribeOpenError as Blocks;
+        let Self::Open { cause, .. } = self else {
+            return false;
+        };
+        let are_blocks = matches!(
+            cause.downcast_ref(),
+            Some(
+                Blocks::DoesNotExist
+                    | Blocks::HangsInCreation
+                    | Blocks::IsMarkedForDestruction
+                    | Blocks::ServiceInCorruptedState
+            )
+        );
+        let is_event = matches!(
+            cause.downcast_ref(),
+            Some(
+                Event::DoesNotExist
+                    | Event::HangsInCreation
+                    | Event::IsMarkedForDestruction
+                    | Event::ServiceInCorruptedState
+            )
+        );
+        are_blocks || is_event
+    }
+
     /// A [`PortError::Setup`] from any error.
     pub fn setup(what: &'static str, cause: impl Into<Cause>) -> Self {
         Self::Setup {

@@ -40,6 +40,11 @@ pub struct GraphArgs {
     /// Where sensor frames come from; replaces `sensor.source`.
     #[arg(long, value_name = "SOURCE", conflicts_with = "replay")]
     pub source: Option<Source>,
+    /// Address of the UDP socket for `--source socket`, such as 127.0.0.1:7402; replaces
+    /// `sensor.socket.udp`. Without it a graph that `--graph` names has a port of its own, by its
+    /// name.
+    #[arg(long, value_name = "ADDRESS")]
+    pub socket: Option<String>,
     /// Play these recorded frames (CSV or CSV.gz) instead of the simulator.
     #[arg(long, value_name = "F")]
     pub replay: Option<PathBuf>,
@@ -135,8 +140,14 @@ impl GraphArgs {
             if let Some(rate_hz) = self.rate {
                 file.graph.rate_hz = rate_hz;
             }
-            if let Some(name) = &self.graph {
+            if let Some(name) = &self.graph
+                && *name != file.graph.name
+            {
                 file.graph.name.clone_from(name);
+                file.sensor.socket.rename(name);
+            }
+            if let Some(address) = &self.socket {
+                file.sensor.socket.udp = address.strip_prefix("udp:").unwrap_or(address).into();
             }
             if let Some(seed) = self.seed {
                 file.graph.seed = seed;

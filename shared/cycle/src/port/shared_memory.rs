@@ -38,6 +38,8 @@ pub struct Link {
     node: Node<ipc::Service>,
     graph: String,
     queues: Queues,
+    /// Opens what the graph has made, whatever its settings, and makes nothing.
+    is_guest: bool,
 }
 
 /// What peers must agree on, without the type itself.
@@ -80,6 +82,20 @@ impl Link {
             node,
             graph: domain.graph().to_owned(),
             queues: domain.queues(),
+            is_guest: false,
+        })
+    }
+
+    /// Joins a running graph, of whose settings nothing is known: only what its services have made
+    /// can be opened.
+    ///
+    /// # Errors
+    /// [`PortError::Setup`].
+    pub fn join_as_guest(domain: &Domain, name: &str) -> Result<Self, PortError> {
+        let link = Self::join(domain, name)?;
+        Ok(Self {
+            is_guest: true,
+            ..link
         })
     }
 
@@ -89,9 +105,15 @@ impl Link {
             self.name(topic, WireType::new::<T>())?,
             self.queues.for_topic(topic),
         );
-        self.node
+        let builder = self
+            .node
             .service_builder(&name)
-            .publish_subscribe::<Wire<T>>()
+            .publish_subscribe::<Wire<T>>();
+        if self.is_guest {
+            let error = |e| self.open_error(topic, WireType::new::<T>(), e);
+            return builder.open().map_err(error);
+        }
+        builder
             .max_publishers(1)
             .max_subscribers(queues.max_subscribers)
             .max_nodes(queues.max_subscribers + 4)
@@ -105,9 +127,11 @@ impl Link {
 
     fn event(&self, topic: Topic, wire: WireType) -> Result<EventFactory, PortError> {
         let name = self.name(topic, wire)?;
-        self.node
-            .service_builder(&name)
-            .event()
+        let builder = self.node.service_builder(&name).event();
+        if self.is_guest {
+            return builder.open().map_err(|e| self.open_error(topic, wire, e));
+        }
+        builder
             .max_notifiers(4)
             .max_listeners(self.queues.max_subscribers)
             .max_nodes(self.queues.max_subscribers + 4)

@@ -7,6 +7,7 @@ use clap::ValueEnum;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
+use vigil_blocks::fnv1a;
 
 /// Where sensor frames come from.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -31,7 +32,8 @@ pub struct Sensor {
 #[serde(deny_unknown_fields, default)]
 pub struct Socket {
     /// Address and port of a UDP socket; empty for none. The default is for this machine alone;
-    /// with another address every machine that reaches it may send frames.
+    /// with another address every machine that reaches it may send frames. `--socket` replaces it;
+    /// a graph that `--graph` names has, instead of the default, a port that follows from its name.
     #[default = "127.0.0.1:7401"]
     pub udp: String,
     /// Name of a Unix datagram socket in the graph's runtime folder; empty for none.
@@ -39,7 +41,19 @@ pub struct Socket {
     pub unix: String,
 }
 
+/// Ports of graphs that are told apart by their names alone: below those that the kernel gives.
+const NAMED_PORTS: std::ops::Range<u64> = 20_000..30_000;
+
 impl Socket {
+    /// Gives the graph of this name a port of its own, unless the file has chosen one.
+    pub(crate) fn rename(&mut self, graph: &str) {
+        if self.udp == Self::default().udp {
+            let count = NAMED_PORTS.end - NAMED_PORTS.start;
+            let port = NAMED_PORTS.start + fnv1a::hash(fnv1a::BASIS, graph.as_bytes()) % count;
+            self.udp = format!("127.0.0.1:{port}");
+        }
+    }
+
     /// The address of the UDP socket; `None` for none.
     ///
     /// # Errors

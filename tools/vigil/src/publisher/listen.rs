@@ -13,7 +13,6 @@ use vigil_cycle::{
     Clock, Graph, InputAccount, Monotonic, PortError, Receiver, Topic, Writer, signal,
 };
 use vigil_robot::FrameGuard;
-use vigil_robot::channel::channel_list_text;
 use vigil_sensor_sim::{ArrivalBatch, ArrivalClock};
 use vigil_setup::Setup;
 use vigil_setup::graph_file::Source;
@@ -41,10 +40,8 @@ pub fn listen(setup: &Setup, seconds: f64) -> Result<(Reception, Option<PortErro
     };
     signal::install();
     let sign = if lock.is_some() {
-        let text = channel_list_text(&setup.robot);
-        domain
-            .tell_types()
-            .and_then(|()| fs::write(domain.channels_file(), text))
+        setup
+            .tell_publishers(&domain)
             .map_err(|e| PortError::setup("runtime folder", e))?;
         Some(Sign::put(domain.processes_file())?)
     } else {

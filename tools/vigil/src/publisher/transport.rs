@@ -141,9 +141,12 @@ fn frames(setup: &Setup, heard: &Reception) -> Finding {
         return Finding::new("frames", Status::Failure, detail);
     }
     let sensor = &setup.file.sensor;
-    let folder = setup
+    let (folder, prefix) = setup
         .domain()
-        .map(|domain| domain.folder().display().to_string())
+        .map(|domain| {
+            let folder = domain.folder().display().to_string();
+            (folder, domain.transport_prefix())
+        })
         .unwrap_or_default();
     let graph = &setup.file.graph.name;
     let how = if sensor.source == Source::Socket {
@@ -156,8 +159,8 @@ fn frames(setup: &Setup, heard: &Reception) -> Finding {
         )
     } else {
         format!(
-            "publish on '{}' with iceoryx2 0.10, prefix 'vigil_{graph}_', root path '{folder}/t', \
-             and notify the event service of the same name; a publisher with another type or \
+            "publish on '{}' with iceoryx2 0.10, prefix '{prefix}', root path '{folder}/t', and \
+             notify the event service of the same name; a publisher with another type or \
              version is refused by the transport and never seen here",
             Topic::Sensor.path(graph)
         )
