@@ -1,21 +1,15 @@
-// Joins a running graph through shared memory; waits until there is one. Version 0.10.0 of iceoryx2's C++ binding.
+// Publishes into a graph through shared memory; waits for it aloud, and joins it again after a restart. Version 0.10.0 of
+// iceoryx2's C++ binding.
 #pragma once
-#include "channels.hpp"
 #include "vigil_types.h"
+#include "waiting.hpp"
 
-#include <cerrno>
-#include <chrono>
-#include <cstdio>
-#include <cstdlib>
 #include <fstream>
 #include <iox2/iceoryx2.hpp>
+#include <memory>
 #include <string>
-#include <sys/stat.h>
-#include <thread>
 #include <type_traits>
-#include <unistd.h>
 #include <utility>
-#include <vector>
 
 IOX2_DEFINE_TYPE_NAME(vigil_sensor_frame, VIGIL_SENSOR_FRAME_TYPE_NAME);
 IOX2_DEFINE_TYPE_NAME(vigil_action, VIGIL_ACTION_TYPE_NAME);
@@ -23,28 +17,6 @@ IOX2_DEFINE_TYPE_NAME(vigil_action, VIGIL_ACTION_TYPE_NAME);
 namespace vigil {
 
 using Node = iox2::Node<iox2::ServiceType::Ipc>;
-
-inline void wait_a_little() { std::this_thread::sleep_for(std::chrono::milliseconds(100)); }
-
-// Folder of the running graph of this name; empty while there is none: the graph cleans up what joins before it.
-inline std::string runtime_folder(const std::string &graph) {
-  auto variable = [](const char *name) {
-    const char *value = std::getenv(name);
-    return std::string(value ? value : "");
-  };
-  const std::string user = variable("XDG_RUNTIME_DIR"), temporary = variable("TMPDIR");
-  std::vector<std::string> folders = {"/run/vigil"};
-  if (!user.empty()) folders.push_back(user + "/vigil");
-  folders.push_back((temporary.empty() ? "/tmp" : temporary) + "/vigil-" + std::to_string(getuid()));
-  std::string closed;
-  for (const std::string &folder : folders) {
-    struct stat found;
-    if (stat((folder + "/" + graph + "/processes").c_str(), &found) == 0) return folder + "/" + graph;
-    if (errno == EACCES) closed = folder;
-  }
-  if (!closed.empty()) fail("no graph '" + graph + "' of yours is running, and " + closed + " is another user's");
-  return "";
-}
 
 // What is different between a running graph's types and ours: a sentence.
 inline std::string difference(const std::string &folder) {
@@ -89,39 +61,110 @@ std::string explain(Error error, const std::string &folder) {
   return text + ": " + difference(folder);
 }
 
-// What `open` returns once the graph has made it; ends the program, and says why, if it never will.
-template <typename Open>
-auto wait_for(const std::string &graph, Open open) {
-  for (bool is_first = true;; is_first = false) {
-    auto opened = open();
-    if (opened.has_value()) return std::move(opened.value());
-    const std::string folder = runtime_folder(graph);
-    if (folder.empty()) fail("the graph '" + graph + "' has ended");
-    if (!is_coming(opened.error())) fail(explain(opened.error(), folder));
-    const char *error = iox2::bb::into<const char *>(opened.error());
-    if (is_first) std::fprintf(stderr, "waiting for the graph's topics: %s\n", error);
-    wait_a_little();
-  }
-}
-
-// A node in the running graph of this name; waits for it.
-inline Node join(const std::string &graph) {
-  std::string folder = runtime_folder(graph);
-  if (folder.empty()) std::fprintf(stderr, "waiting for a graph named '%s'\n", graph.c_str());
-  for (; folder.empty(); folder = runtime_folder(graph)) wait_a_little();
-  iox2::Config config;
-  config.global().set_prefix(iox2::bb::FileName::create(("vigil_" + graph + "_").c_str()).value());
-  config.global().set_root_path(iox2::bb::Path::create((folder + "/t").c_str()).value());
-  return wait_for(graph, [&] { return iox2::NodeBuilder().config(config).create<iox2::ServiceType::Ipc>(); });
-}
-
-// Channel list of a graph that was joined.
-inline Channels channel_list(const std::string &graph) { return Channels(runtime_folder(graph) + "/channels"); }
-
 // Builder of a topic of the graph: "sensor", "action".
 inline auto topic(const Node &node, const std::string &graph, const char *name) {
   const std::string full = "vigil/" + graph + "/" + name;
   return node.service_builder(iox2::ServiceName::create(full.c_str()).value());
 }
+
+// Publishes the frames of a robot into the graph of this name. Ends the program, and says why, if no waiting helps: if
+// the graph has other types, or a publisher.
+class Publisher {
+ public:
+  // Waits for the graph.
+  explicit Publisher(const std::string &graph) : waiting(graph) {
+    while (!try_to_join()) wait_a_little();
+  }
+
+  // The channel list, which sets values by their names.
+  const Channels &channels() const { return *list; }
+
+  // Fills in the header and sends the frame, which was due then; false if there is no graph to take it. It never waits:
+  // if the graph has ended it says so, and joins the next one. A capture time of 0 becomes `due`.
+  bool publish(vigil_sensor_frame frame, std::chrono::steady_clock::time_point due = std::chrono::steady_clock::now()) {
+    using namespace std::chrono;
+    if (steady_clock::now() >= look && !is_joined()) {
+      joined.reset();
+      if (!try_to_join()) return false;
+    }
+    if (!joined) return false;
+    vigil_header &header = frame.header;
+    header.schema = VIGIL_SENSOR_FRAME_SCHEMA, header.epoch = epoch, header.seq = seq;
+    header.t_schedule_ns = due.time_since_epoch().count();
+    if (header.t_capture_ns == 0) header.t_capture_ns = header.t_schedule_ns;
+    header.t_publish_ns = steady_clock::now().time_since_epoch().count();
+    auto sample = joined->frames.loan_uninit();
+    if (sample.has_value() && iox2::send(sample.value().write_payload(std::move(frame))).has_value() &&
+        joined->bell.notify().has_value()) {
+      seq++;
+      return true;
+    }
+    // Between two looks the graph may have taken its files away.
+    if (is_joined()) fail("graph '" + waiting.graph + "': the transport refuses a frame");
+    return false;
+  }
+
+ private:
+  // Ports of one start of the graph; they go before their node.
+  struct Joined {
+    Node node;
+    iox2::Publisher<iox2::ServiceType::Ipc, vigil_sensor_frame, void> frames;
+    iox2::Notifier<iox2::ServiceType::Ipc> bell;
+  };
+  Waiting waiting;
+  std::unique_ptr<Joined> joined;
+  std::unique_ptr<Channels> list;
+  std::string start;
+  std::chrono::steady_clock::time_point look;
+  uint64_t epoch = 0, seq = 0;
+
+  bool is_joined() {
+    look = std::chrono::steady_clock::now() + std::chrono::milliseconds(200);
+    return joined && graph_start(runtime_folder(waiting.graph)) == start;
+  }
+
+  // True if `opened` is an error to wait after; ends the program if it is one of another kind.
+  template <typename Opened>
+  bool is_missing(const Opened &opened, const std::string &folder) {
+    if (opened.has_value()) return false;
+    // Of a graph that has ended meanwhile nothing can be said.
+    if (!is_coming(opened.error()) && graph_start(folder) == start) fail(explain(opened.error(), folder));
+    waiting.tell("the topics of graph '" + waiting.graph + "'");
+    return true;
+  }
+
+  bool try_to_join() {
+    const std::string folder = runtime_folder(waiting.graph), graph = waiting.graph;
+    start = graph_start(folder);
+    if (start.empty()) {
+      waiting.tell();
+      return false;
+    }
+    // Each start of a graph has files of its own names.
+    std::string prefix;
+    std::ifstream(folder + "/start") >> prefix;
+    prefix = "vigil_" + graph + "_" + prefix;
+    iox2::Config config;
+    config.global().set_prefix(iox2::bb::FileName::create(prefix.c_str()).value());
+    config.global().set_root_path(iox2::bb::Path::create((folder + "/t").c_str()).value());
+    auto node = iox2::NodeBuilder().config(config).create<iox2::ServiceType::Ipc>();
+    if (is_missing(node, folder)) return false;
+    auto frames = topic(node.value(), graph, "sensor").publish_subscribe<vigil_sensor_frame>().open();
+    if (is_missing(frames, folder)) return false;
+    auto bells = topic(node.value(), graph, "sensor").event().open();
+    if (is_missing(bells, folder)) return false;
+    auto publisher = frames.value().publisher_builder().create();
+    if (is_missing(publisher, folder)) return false;
+    auto bell = bells.value().notifier_builder().create();
+    if (is_missing(bell, folder)) return false;
+    list = std::make_unique<Channels>(folder + "/channels");
+    joined = std::unique_ptr<Joined>(
+        new Joined{std::move(node.value()), std::move(publisher.value()), std::move(bell.value())});
+    epoch = std::chrono::steady_clock::now().time_since_epoch().count(), seq = 0;
+    look = std::chrono::steady_clock::now() + std::chrono::milliseconds(200);
+    waiting.end();
+    return true;
+  }
+};
 
 }  // namespace vigil

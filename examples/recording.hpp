@@ -2,7 +2,19 @@
 #pragma once
 #include "channels.hpp"
 
+#include <chrono>
 #include <cmath>
+
+namespace vigil {
+
+// Time between two frames at this many Hz.
+inline std::chrono::nanoseconds period_of(const char *hz) {
+  const double rate = std::atof(hz);
+  if (!(rate > 0.001 && rate < 1e6)) fail(std::string(hz) + ": no rate in Hz");
+  return std::chrono::nanoseconds(std::llround(1e9 / rate));
+}
+
+}  // namespace vigil
 
 // The next row as a frame; false at the end.
 inline bool next_frame(const vigil::Channels &channels, vigil_sensor_frame &frame) {
@@ -22,6 +34,7 @@ inline bool next_frame(const vigil::Channels &channels, vigil_sensor_frame &fram
   }
   frame.run_id = 1 + uint64_t(run);
   frame.header.schema = VIGIL_SENSOR_FRAME_SCHEMA;
-  frame.header.t_capture_ns = uint64_t(std::llround(t * 1e9));
+  // From 1 on: a capture time of 0 is none.
+  frame.header.t_capture_ns = 1 + uint64_t(std::llround(t * 1e9));
   return true;
 }

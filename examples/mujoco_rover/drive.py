@@ -20,9 +20,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 import vigil_types as vigil
 
 try:
-    import iceoryx2
     import numpy
-    from joining import join, sensor
+    from joining import Publisher, sensor
     from rover import NOISE, NOISE_HZ, STEERED, WHEELS, Rover, planned
 except ModuleNotFoundError as error:
     raise SystemExit(f"{error}: pip install iceoryx2==0.10.0 mujoco==4.0.0")
@@ -38,6 +37,10 @@ def ports(topic):
     """Publisher of frames, its bell, and subscriber to actions."""
     actions = topic("action").publish_subscribe(vigil.Action).open().subscriber_builder().create()
     return *sensor(topic), actions
+
+
+class GraphEnded(Exception):
+    """Nobody watches any more."""
 
 
 class Obedience:
@@ -87,8 +90,8 @@ def typed():
 
 
 def drive(options, rover, viewer):
-    node, (publisher, bell, actions) = join(options.graph, ports)
-    channels = vigil.channel_list(options.graph)
+    publisher = Publisher(options.graph, ports)
+    channels, (actions,) = publisher.channels, publisher.further
     obedience, random = Obedience(actions), numpy.random.default_rng(options.seed)
     noise = NOISE * math.sqrt(options.hz / NOISE_HZ)
     period, plan_s, seq, skipped, pending = round(1e9 / options.hz), 0.0, 0, 0, list(options.breaks)
@@ -115,18 +118,12 @@ def drive(options, rover, viewer):
         for name, value in zip(SENSED, sensed):
             if name is not None:
                 channels.set(frame, name, value)
-        frame.header.schema, frame.header.epoch, frame.header.seq = vigil.SensorFrame.SCHEMA, began, seq
-        frame.header.t_schedule_ns = frame.header.t_capture_ns = due
         time.sleep(max(0, due - time.monotonic_ns()) * 1e-9)
-        frame.header.t_publish_ns = time.monotonic_ns()
-        publisher.loan_uninit().write_payload(frame).send()
-        bell.notify()
+        if not publisher.publish(frame, due):
+            raise GraphEnded
         seq += 1
         if viewer is not None and seq % 4 == 0:
             viewer.sync()
-        if seq % 100 == 0:
-            # Raises FileNotFoundError once the graph has ended.
-            vigil.runtime_folder(options.graph)
     print(f"{seq} frames; {skipped} periods were slept through")
 
 
@@ -149,10 +146,8 @@ def main():
         drive(options, rover, viewer)
     except KeyboardInterrupt:
         print("interrupted")
-    except FileNotFoundError:
+    except GraphEnded:
         print(f"graph '{options.graph}' has ended")
-        # It has cleaned up; what iceoryx2 misses then is no news.
-        iceoryx2.set_log_level(iceoryx2.LogLevel.Fatal)
 
 
 if __name__ == "__main__":

@@ -59,7 +59,7 @@ class Publishers(unittest.TestCase):
         return "".join(row + "\n" for row in rows.split("\n") if row.startswith(f"{STUCK_RUN},"))
 
     def feed(self, *command):
-        subprocess.run(command, input=self.rows(), text=True, check=True, timeout=60, stdout=subprocess.DEVNULL)
+        subprocess.run(command, cwd=ROOT, input=self.rows(), text=True, check=True, timeout=60, stdout=subprocess.DEVNULL)
 
     def test_cpp_through_udp(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -68,7 +68,7 @@ class Publishers(unittest.TestCase):
             subprocess.run(["c++", *flags, EXAMPLES / "socket_publisher.cpp", "-o", program], check=True)
             with Graph("--source", "socket", "--rate", "20") as graph:
                 graph.wait_for_socket()
-                self.feed(program, str(graph.udp_port))
+                self.feed(program, f"127.0.0.1:{graph.udp_port}")
                 self.assert_found(graph.stop(), "sensor-sim")
 
     def has_binding(self, folder):

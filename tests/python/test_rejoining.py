@@ -1,9 +1,13 @@
 """Publishers of examples/ outlive their graph: they say what they wait for, and are heard by the next one."""
 
+import gzip
+import json
 import os
 import pathlib
+import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import unittest
 
@@ -27,8 +31,8 @@ while True:
 class Speaker:
     """A publisher as a process, and the lines that it says."""
 
-    def __init__(self, *command):
-        pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    def __init__(self, *command, stdin=None):
+        pipes = {"stdin": stdin, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
         self.process = subprocess.Popen(command, cwd=ROOT, text=True, **pipes)
         self.lines, self.changed = [], threading.Condition()
         self.reader = threading.Thread(target=self._read)
@@ -58,9 +62,50 @@ class Speaker:
         self.process.stderr.close()
 
 
+def long_run():
+    """Lines of a recording, run 0 round and round: longer than a test may take."""
+    with gzip.open(FRAMES, "rt") as file:
+        head, *rows = file.read().splitlines()
+    rows = [row.split(",", 2)[2] for row in rows if row.startswith("0,")]
+    return [head, *(f"0,{0.05 * i},{rows[i % len(rows)]}" for i in range(20 * WATCHDOG_S))]
+
+
 def python(module, publisher, graph):
     names = {"examples": str(EXAMPLES), "frames": str(FRAMES)}
     return Speaker(sys.executable, "-c", FOR_EVER.format(module=module, publisher=publisher, **names), graph)
+
+
+class SideBySide(unittest.TestCase):
+    def test_two_graphs_on_one_file_take_datagrams_each_from_its_own_publisher(self):
+        """One option each: the name."""
+        names = [f"py{os.getpid()}-left", f"py{os.getpid()}-right"]
+        line = [BINARIES / "vigil-launcher", "--json", "--config", ROOT / "config" / "rover.toml"]
+        line += ["--source", "socket", "--rate", "20", "--duration", "2", "--graph"]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": ROOT}
+        graphs = [subprocess.Popen([*line, name], **pipes) for name in names]
+        try:
+            speakers = [python("sending", "SocketPublisher", name) for name in names]
+            with speakers[0], speakers[1]:
+                for name, graph in zip(names, graphs):
+                    out, err = graph.communicate(timeout=WATCHDOG_S)
+                    self.assertIn(f"graph '{name}' takes datagrams at udp 127.0.0.1:2", err)
+                    summary = json.loads(out)
+                    self.assertEqual(summary["ended"], "duration", err)
+                    # Frames of the other's publisher would be refused: one sender is a graph's.
+                    self.assertEqual(summary["services"]["sensor-sim"]["rejected"], {})
+        finally:
+            for graph in graphs:
+                graph.kill()
+                graph.communicate()
+
+    def test_an_address_may_be_given(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+            free.bind(("127.0.0.1", 0))
+            address = "127.0.0.1:%d" % free.getsockname()[1]
+        options = ["--source", "socket", "--rate", "20", "--socket", address, "--duration", "1"]
+        with Graph(*options) as graph, python("sending", "SocketPublisher", address):
+            summary = graph.finish()
+        self.assertEqual(summary["ended"], "duration")
 
 
 class Rejoining(unittest.TestCase):
@@ -89,9 +134,24 @@ class Rejoining(unittest.TestCase):
 
     def test_rust_through_shared_memory(self):
         name = f"py{os.getpid()}-rust"
-        # At a rate at which it publishes as long as this test may take.
-        speaker = Speaker(BINARIES / "publisher", FRAMES, "0", name, "2")
-        self.hears_each_start(speaker, name, "--source", "external")
+        with tempfile.TemporaryDirectory() as folder:
+            recording = pathlib.Path(folder) / "long.csv.gz"
+            with gzip.open(recording, "wt") as file:
+                file.write("\n".join(long_run()) + "\n")
+            speaker = Speaker(BINARIES / "publisher", recording, "0", name)
+            self.hears_each_start(speaker, name, "--source", "external", "--rate", "20")
+
+    def test_cpp_through_a_socket(self):
+        name = f"py{os.getpid()}-cpp"
+        with tempfile.TemporaryDirectory() as folder:
+            program = pathlib.Path(folder) / "publisher"
+            flags = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Werror", f"-I{EXAMPLES}"]
+            subprocess.run(["c++", *flags, EXAMPLES / "socket_publisher.cpp", "-o", program], check=True)
+            rows = pathlib.Path(folder) / "rows"
+            rows.write_text("\n".join(long_run()[1:]) + "\n")
+            with open(rows) as file:
+                speaker = Speaker(program, name, stdin=file)
+            self.hears_each_start(speaker, name, "--source", "socket", "--rate", "20")
 
     def test_a_graph_that_was_killed_is_none(self):
         name = f"py{os.getpid()}-killed"
