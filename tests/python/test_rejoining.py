@@ -108,6 +108,16 @@ class SideBySide(unittest.TestCase):
         self.assertEqual(summary["ended"], "duration")
 
 
+    def test_an_address_that_is_taken_is_refused(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+            taken.bind(("127.0.0.1", 0))
+            address = "127.0.0.1:%d" % taken.getsockname()[1]
+            with Graph("--source", "socket", "--socket", address) as graph:
+                _, told = graph.launcher.communicate(timeout=WATCHDOG_S)
+        self.assertEqual(graph.launcher.returncode, 2)
+        self.assertRegex(told, f"udp {address}: .*; another address: --socket")
+
+
 class Rejoining(unittest.TestCase):
     def hears_each_start(self, speaker, name, *options):
         """Three graphs of one name, one after the other; each ends by itself when it has had frames for a while."""

@@ -86,6 +86,10 @@ fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, LauncherError> {
         );
         return Ok(Outcome::Refused);
     };
+    if let Err(refusal) = plan.check_address() {
+        tell!("vigil: {refusal}");
+        return Ok(Outcome::Refused);
+    }
     lock.share_with_children();
     domain.remove_residue();
     domain

@@ -1,5 +1,6 @@
 //! What is to be started: options, configuration and every model, checked before anything starts.
 
+use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -175,6 +176,20 @@ impl Plan {
             options.extend(["--stamped-cycles".into(), cycles.to_string()]);
         }
         options
+    }
+
+    /// That nobody else takes datagrams at this graph's address.
+    ///
+    /// # Errors
+    /// What to say.
+    pub fn check_address(&self) -> Result<(), String> {
+        let sensor = &self.setup.file.sensor;
+        let (Source::Socket, Ok(Some(address))) = (sensor.source, sensor.socket.udp_address())
+        else {
+            return Ok(());
+        };
+        let told = |error| format!("udp {address}: {error}; another address: --socket");
+        UdpSocket::bind(address).map(|_| ()).map_err(told)
     }
 
     /// When a service is given up.

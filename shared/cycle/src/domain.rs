@@ -210,7 +210,7 @@ impl Domain {
     /// The file system's.
     pub fn begin(&self) -> io::Result<()> {
         // Shortened, for names are limited: no two starts follow each other by whole 70 minutes.
-        let start = Monotonic.now_ns() / 1000 & 0xffff_ffff;
+        let start = (Monotonic.now_ns() / 1000) & 0xffff_ffff;
         fs::write(self.start_file(), format!("{start:08x}_"))
     }
 

@@ -3,6 +3,7 @@
 
 mod channels;
 
+use std::io::Write as _;
 use std::time::Duration;
 
 use vigil_blocks::SensorFrame;
@@ -140,7 +141,7 @@ impl Publisher {
             start,
         });
         if self.told_ns.take().is_some() {
-            eprintln!("joined graph '{}'", self.graph);
+            say(&format!("joined graph '{}'", self.graph));
         }
         Ok(true)
     }
@@ -156,6 +157,11 @@ impl Publisher {
             none if none.is_empty() => "none".to_owned(),
             names => names.join(", "),
         };
-        eprintln!("waiting for {what}; running: {running}");
+        say(&format!("waiting for {what}; running: {running}"));
     }
+}
+
+/// That nobody reads it is no reason to end a robot's program.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
