@@ -1,5 +1,5 @@
-// Publishes into a graph through shared memory; waits for it aloud, and joins it again after a restart. Version 0.10.0 of
-// iceoryx2's C++ binding.
+// Publishes into a graph through shared memory; waits for it aloud, and joins it again after a restart. Version 0.10.0
+// of iceoryx2's C++ binding.
 #pragma once
 #include "vigil_types.h"
 #include "waiting.hpp"
@@ -73,6 +73,8 @@ class Publisher {
  public:
   // Waits for the graph.
   explicit Publisher(const std::string &graph) : waiting(graph) {
+    // Its warnings are about files that the graph has just cleaned up.
+    iox2::set_log_level(iox2::LogLevel::Error);
     while (!try_to_join()) wait_a_little();
   }
 

@@ -76,6 +76,8 @@ class Publisher:
 
     def __init__(self, graph="rover", open_ports=sensor):
         """`open_ports` may open more than the publisher and its bell; `further` is the rest."""
+        # Its warnings are about files that the graph has just cleaned up.
+        iceoryx2.set_log_level(iceoryx2.LogLevel.Error)
         self.graph, self.waiting, self._open_ports, self._node = graph, Waiting(graph), open_ports, None
         while not self._try_to_join():
             time.sleep(0.1)
@@ -111,15 +113,8 @@ class Publisher:
         self._look_ns = now_ns + LOOK_NS
         if self._node is not None and self._start == _start(self.graph):
             return True
-        self._leave()
+        self._publisher = self._bell = self.further = self._node = None
         return self._try_to_join()
-
-    def _leave(self):
-        if self._node is not None:
-            # The graph has cleaned up; what iceoryx2 misses then is no news.
-            iceoryx2.set_log_level(iceoryx2.LogLevel.Fatal)
-            self._publisher = self._bell = self.further = self._node = None
-            iceoryx2.set_log_level(iceoryx2.LogLevel.Warn)
 
     def _try_to_join(self):
         start = _start(self.graph)

@@ -59,7 +59,8 @@ class Publishers(unittest.TestCase):
         return "".join(row + "\n" for row in rows.split("\n") if row.startswith(f"{STUCK_RUN},"))
 
     def feed(self, *command):
-        subprocess.run(command, cwd=ROOT, input=self.rows(), text=True, check=True, timeout=60, stdout=subprocess.DEVNULL)
+        options = {"cwd": ROOT, "text": True, "check": True, "timeout": 60}
+        subprocess.run(command, input=self.rows(), stdout=subprocess.DEVNULL, **options)
 
     def test_cpp_through_udp(self):
         with tempfile.TemporaryDirectory() as folder:
