@@ -23,6 +23,9 @@ const TRANSPORT_VERSION: &str = "0.10.0";
 /// more of them may wait.
 const SENSOR_BUFFERS: usize = 8;
 
+/// Characters of a start's name, and how many there are.
+const START_DIGITS: &[u8; 62] = b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz";
+const START_LENGTH: usize = 3;
 /// A publisher that asks whether a graph runs holds its lock for some microseconds.
 const LOCK_ATTEMPTS: usize = 3;
 /// Time between two attempts.
@@ -209,9 +212,14 @@ impl Domain {
     /// # Errors
     /// The file system's.
     pub fn begin(&self) -> io::Result<()> {
-        // Shortened, for names are limited: no two starts follow each other by whole 70 minutes.
-        let start = (Monotonic.now_ns() / 1000) & 0xffff_ffff;
-        fs::write(self.start_file(), format!("{start:08x}_"))
+        // Short, for the path of a socket has 107 characters: two starts have one name in 200,000.
+        let mut rest = Monotonic.now_ns() / 1_000_000;
+        let name = [(); START_LENGTH].map(|()| {
+            let digit = START_DIGITS[(rest % START_DIGITS.len() as u64) as usize];
+            rest /= START_DIGITS.len() as u64;
+            digit
+        });
+        fs::write(self.start_file(), name)
     }
 
     /// File with what the names of this start's files have in addition.
@@ -402,7 +410,7 @@ mod tests {
         let prefix = || domain.transport_config().unwrap().global.prefix.to_string();
         domain.begin().unwrap();
         let first = prefix();
-        std::thread::sleep(Duration::from_millis(1));
+        std::thread::sleep(Duration::from_millis(2));
         domain.begin().unwrap();
         assert_ne!(first, prefix());
         assert!(first.starts_with(&domain.prefix()), "{first}");
