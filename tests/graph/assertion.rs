@@ -12,7 +12,7 @@ const TEXT: &str = "an assertion fails because a test wants it (shared/cycle/src
 /// Runs a graph in which this service fails an assertion soon after each of its starts, until the
 /// launcher ends it.
 fn fail(service: ServiceName, options: &[&str]) -> String {
-    let name = unique(&format!("fails-{}", service.as_str()));
+    let name = unique(&format!("f-{}", service.as_str()));
     let output = binary("vigil-launcher")
         .env("VIGIL_FAILS", service.as_str())
         .args(["--rate", "500", "--duration", "60", "--graph", &name])
