@@ -15,6 +15,7 @@ mod healthy;
 mod husky;
 mod job;
 mod logs;
+mod passage;
 mod recorded;
 mod report;
 mod run;

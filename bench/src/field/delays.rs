@@ -6,10 +6,9 @@ use vigil_blocks::{DetectionBelief, Entry, ParticleBlock, SensorFrame};
 use vigil_diagnosis::Sensors;
 use vigil_diagnosis::detect::{Detector, Form};
 use vigil_evaluation::scoring::field::Truth;
-use vigil_sensor_sim::{EffectiveCommand, World};
+use vigil_sensor_sim::EffectiveCommand;
 
 use super::fault;
-use super::frames::Fate;
 use super::job::Job;
 use super::run::{Conditions, Graph};
 
@@ -45,7 +44,9 @@ struct Watcher {
 }
 
 impl Watcher {
-    fn take(&mut self, t_s: f64, entry: Entry<&SensorFrame>) {
+    /// Takes what arrived in place of the frame of `t_s`; none for one that is missed.
+    fn take(&mut self, t_s: f64, frame: Option<&SensorFrame>) {
+        let entry = frame.map_or(Entry::Missed(1), Entry::Frame);
         self.detector
             .step(entry, &mut self.belief, &mut self.hypotheses);
         let risen = self.belief.alarm_count > self.alarms;
@@ -60,23 +61,6 @@ impl Watcher {
                 *delay_s = delay_s.min(t_s - onset_s);
             }
             Some(_) => {}
-        }
-    }
-
-    fn deliver(&mut self, t_s: f64, frame: &SensorFrame, fate: Fate, held: Option<&SensorFrame>) {
-        match fate {
-            Fate::Lost | Fate::Overtaken => self.take(t_s, Entry::Missed(1)),
-            Fate::Late => {
-                self.take(t_s, Entry::Missed(1));
-                self.take(t_s, Entry::Frame(frame));
-            }
-            Fate::Comes | Fate::Doubled => self.take(t_s, Entry::Frame(frame)),
-        }
-        if let Some(held) = held {
-            self.take(t_s, Entry::Frame(held));
-        }
-        if fate == Fate::Doubled {
-            self.take(t_s, Entry::Frame(frame));
         }
     }
 }
@@ -145,36 +129,14 @@ fn drive(
         true => last_s + MISSED_S,
         false => HEALTHY_S,
     };
-    let Conditions { rate_hz, seed, .. } = *conditions;
     let robot = &graph.setup(Sensors::PoseEncoders).0.robot;
-    let (simulator, segments) = (&conditions.simulator, &conditions.drive);
-    let mut world = World::new(robot, simulator, segments, rate_hz, seed)?;
-    let (mut ground, mut way) = (conditions.ground.clone(), conditions.way.clone());
-    ground.begin(&mut world)?;
-    let mut pending = conditions.changes.iter().peekable();
-    let mut held: Option<SensorFrame> = None;
-    let (mut frame, mut t_s) = (SensorFrame::default(), 0.0);
-    let steps = job.scenario.run_s.min(until_s) * rate_hz;
-    for k in 0..steps.round() as u64 {
-        while let Some(injection) = pending.next_if(|change| change.at_s <= t_s) {
-            world.change(injection.change)?;
-        }
-        let (planned, before) = (world.planned(), world.true_state().pose);
-        let dt_s = way.instant_s(t_s, (k + 1) as f64 / rate_hz) - t_s;
-        world.step(dt_s, EffectiveCommand::as_planned(planned));
-        t_s += dt_s;
-        world.measure(&mut frame);
-        let pose = world.true_state().pose;
-        ground.advance((pose[0] - before[0]).hypot(pose[1] - before[1]), &mut world)?;
-        way.blur(&mut frame, pose, dt_s);
-        frame.header.epoch = 1;
-        frame.header.seq = k;
-        frame.header.t_capture_ns = (1e9 * way.stamp_s(t_s)).round() as u64;
-        let fate = way.fate(t_s);
+    let mut passage = conditions.begin(robot)?;
+    let steps = job.scenario.run_s.min(until_s) * conditions.rate_hz;
+    for _ in 0..steps.round() as u64 {
+        passage.advance(EffectiveCommand::as_planned)?;
         for watcher in &mut watchers {
-            watcher.deliver(t_s, &frame, fate, held.as_ref());
+            passage.deliver(&mut |frame| watcher.take(passage.t_s, frame));
         }
-        held = (fate == Fate::Overtaken).then_some(frame);
     }
     Ok(watchers.into_iter().map(|watcher| watcher.found).collect())
 }

@@ -51,6 +51,32 @@ pub enum Fate {
     Doubled,
 }
 
+impl Fate {
+    /// Calls `take` with what arrives in place of `frame`, none for one that is missed; `held` is
+    /// one that this one has overtaken.
+    pub fn deliver(
+        self,
+        frame: &SensorFrame,
+        held: Option<&SensorFrame>,
+        take: &mut dyn FnMut(Option<&SensorFrame>),
+    ) {
+        match self {
+            Self::Lost | Self::Overtaken => take(None),
+            Self::Late => {
+                take(None);
+                take(Some(frame));
+            }
+            Self::Comes | Self::Doubled => take(Some(frame)),
+        }
+        if held.is_some() {
+            take(held);
+        }
+        if self == Self::Doubled {
+            take(Some(frame));
+        }
+    }
+}
+
 /// The way of the frames of one run.
 #[derive(Debug, Clone)]
 pub struct Way {

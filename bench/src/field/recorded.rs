@@ -261,7 +261,7 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<ScoredRun>, Box<dy
         for frame in &case.run.frames {
             let t_s = frame.header.t_capture_ns as f64 * 1e-9;
             let fate = way.fate(t_s);
-            watch.deliver(frame, fate, held.as_ref());
+            fate.deliver(frame, held.as_ref(), &mut |frame| watch.take(frame));
             held = (fate == Fate::Overtaken).then_some(*frame);
             watch.score(t_s, frame);
         }

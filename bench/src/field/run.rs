@@ -2,21 +2,21 @@
 
 use std::error::Error;
 
-use vigil_blocks::SensorFrame;
 use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Taxonomy;
 use vigil_evaluation::scoring::field::{Scorer, Stretch};
-use vigil_robot::Injection;
 use vigil_robot::learned::Model;
+use vigil_robot::{Description, Injection};
 use vigil_sensor_sim::{ActionGate, EffectiveCommand, World};
 use vigil_setup::Setup;
 use vigil_setup::graph_file::Simulator;
 
 use super::course::{Range, course};
 use super::fault::{self, Places};
-use super::frames::{Fate, RunConditions, Way};
+use super::frames::{RunConditions, Way};
 use super::ground::{Ground, stream};
 use super::job::{Job, ScoredRun};
+use super::passage::Passage;
 use super::recorded::{self, Library, Material};
 use super::scenario::{File, Scenario};
 use super::timeline::Timeline;
@@ -159,6 +159,19 @@ impl Conditions {
     }
 }
 
+impl Conditions {
+    /// The rover at the beginning of the run.
+    ///
+    /// # Errors
+    /// A simulator that is refused.
+    pub(super) fn begin(&self, robot: &Description) -> Result<Passage<'_>, Box<dyn Error>> {
+        let (simulator, segments) = (&self.simulator, &self.drive);
+        let world = World::new(robot, simulator, segments, self.rate_hz, self.seed)?;
+        let ways = (self.ground.clone(), self.way.clone());
+        Passage::begin(world, ways, &self.changes, self.rate_hz)
+    }
+}
+
 impl std::fmt::Display for Conditions {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { rate_hz, way, .. } = self;
@@ -225,39 +238,19 @@ fn drive(
             timeline: Timeline::asked_for(job, seed, name),
         });
     }
-    let (simulator, segments) = (&conditions.simulator, &conditions.drive);
-    let mut world = World::new(robot, simulator, segments, rate_hz, seed)?;
-    let (mut ground, mut way) = (conditions.ground.clone(), conditions.way.clone());
-    ground.begin(&mut world)?;
-    let mut pending = conditions.changes.iter().peekable();
+    let mut passage = conditions.begin(robot)?;
     let mut gate = ActionGate::new(&robot.limits);
-    let mut held: Option<SensorFrame> = None;
-    let (mut frame, mut t_s) = (SensorFrame::default(), 0.0);
     for k in 0..(scenario.run_s * rate_hz).round() as u64 {
-        while let Some(injection) = pending.next_if(|change| change.at_s <= t_s) {
-            world.change(injection.change)?;
-        }
-        let (planned, before) = (world.planned(), world.true_state().pose);
-        let command = match watches.first().filter(|_| scenario.obeys && k > 0) {
-            Some(watch) => gate.apply(planned, Some(watch.stages.action()), 0),
-            None => EffectiveCommand::as_planned(planned),
-        };
-        let dt_s = way.instant_s(t_s, (k + 1) as f64 / rate_hz) - t_s;
-        world.step(dt_s, command);
-        t_s += dt_s;
-        world.measure(&mut frame);
-        let pose = world.true_state().pose;
-        ground.advance((pose[0] - before[0]).hypot(pose[1] - before[1]), &mut world)?;
-        way.blur(&mut frame, pose, dt_s);
-        frame.header.epoch = 1;
-        frame.header.seq = k;
-        frame.header.t_capture_ns = (1e9 * way.stamp_s(t_s)).round() as u64;
-        let fate = way.fate(t_s);
+        passage.advance(
+            |planned| match watches.first().filter(|_| scenario.obeys && k > 0) {
+                Some(watch) => gate.apply(planned, Some(watch.stages.action()), 0),
+                None => EffectiveCommand::as_planned(planned),
+            },
+        )?;
         for watch in &mut watches {
-            watch.deliver(&frame, fate, held.as_ref());
-            watch.score(t_s, &frame);
+            passage.deliver(&mut |frame| watch.take(frame));
+            watch.score(passage.t_s, &passage.frame);
         }
-        held = (fate == Fate::Overtaken).then_some(frame);
     }
     let named = watches.into_iter().zip(sets);
     Ok(named

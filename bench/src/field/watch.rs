@@ -5,7 +5,6 @@ use vigil_evaluation::scoring::Verdict;
 use vigil_evaluation::scoring::field::Scorer;
 use vigil_evaluation::stages::Stages;
 
-use super::frames::Fate;
 use super::timeline::Timeline;
 
 /// The stages of one set of sensors, and their score.
@@ -28,22 +27,11 @@ impl Watch<'_> {
         }
     }
 
-    /// What comes of a frame; `held` is one that this one has overtaken.
-    pub(super) fn deliver(&mut self, frame: &SensorFrame, fate: Fate, held: Option<&SensorFrame>) {
-        let stages = &mut self.stages;
-        match fate {
-            Fate::Lost | Fate::Overtaken => stages.miss(),
-            Fate::Late => {
-                stages.miss();
-                stages.take(frame);
-            }
-            Fate::Comes | Fate::Doubled => stages.take(frame),
-        }
-        if let Some(held) = held {
-            stages.take(held);
-        }
-        if fate == Fate::Doubled {
-            stages.take(frame);
+    /// Takes what arrived in place of a frame; none for one that is missed.
+    pub(super) fn take(&mut self, frame: Option<&SensorFrame>) {
+        match frame {
+            Some(frame) => self.stages.take(frame),
+            None => self.stages.miss(),
         }
     }
 }

@@ -51,8 +51,8 @@ pub struct Detector {
     filter: DetectionFilter,
     fault_rate_1_s: f64,
     alarm: Alarm,
-    /// While an alarm stands: of each channel, whether its fault is still there.
     map: ChannelMap,
+    /// While an alarm stands: of each channel, whether its fault is still there.
     endings: [Ending; SLOTS],
     /// Log-odds of a fault now.
     log_odds: f64,
