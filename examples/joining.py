@@ -4,17 +4,14 @@ pip install iceoryx2==0.10.0
 """
 
 import importlib.metadata
-import os
 import time
 
 import iceoryx2
 
 import vigil_types as vigil
-from waiting import Waiting
+from waiting import LOOK_NS, Waiting, graph_start
 
 COMING = ["DoesNotExist", "HangsInCreation", "IsMarkedForDestruction", "ServiceInCorruptedState"]
-# A publisher looks this often whether its graph is still the one that it has joined.
-LOOK_NS = 200_000_000
 
 
 def join(graph, open_ports):
@@ -102,7 +99,7 @@ class Publisher:
             self._bell.notify()
         except (iceoryx2.LoanError, iceoryx2.SendError, iceoryx2.NotifierNotifyError):
             # Between two looks the graph has taken its files away.
-            if self._start == _start(self.graph):
+            if self._start == graph_start(self.graph):
                 raise
             return False
         self._seq += 1
@@ -111,13 +108,13 @@ class Publisher:
     def _is_joined(self, now_ns):
         """Looks for the graph; joins the one that there is."""
         self._look_ns = now_ns + LOOK_NS
-        if self._node is not None and self._start == _start(self.graph):
+        if self._node is not None and self._start == graph_start(self.graph):
             return True
         self._publisher = self._bell = self.further = self._node = None
         return self._try_to_join()
 
     def _try_to_join(self):
-        start = _start(self.graph)
+        start = graph_start(self.graph)
         joined = _try_to_join(self.graph, self._open_ports, self.waiting)
         if joined is None:
             return False
@@ -130,12 +127,3 @@ class Publisher:
         self._start, self._epoch, self._seq = start, time.monotonic_ns(), 0
         self._look_ns = self._epoch + LOOK_NS
         return True
-
-
-def _start(graph):
-    """What is different after each start of the graph; None while it does not run."""
-    try:
-        file = os.stat(f"{vigil.runtime_folder(graph)}/processes")
-        return file.st_ino, file.st_mtime_ns
-    except FileNotFoundError:
-        return None

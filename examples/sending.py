@@ -1,17 +1,14 @@
 """Sends frames as datagrams to a graph with `--source socket`: nothing but Python's own library."""
 
-import os
 import pathlib
 import socket
 import time
 
 import vigil_types as vigil
-from waiting import Waiting
+from waiting import LOOK_NS, Waiting, graph_start
 
 # Channel list where no graph of this machine tells its own.
 ROVER = pathlib.Path(__file__).with_name("rover.channels")
-# A sender looks this often whether its graph is still the one that it knows.
-LOOK_NS = 200_000_000
 
 
 class SocketPublisher:
@@ -60,23 +57,27 @@ class SocketPublisher:
     def _is_found(self, now_ns):
         """Looks for the graph of this name; takes the address of the one that there is."""
         self._look_ns = now_ns + LOOK_NS
-        try:
-            folder = vigil.runtime_folder(self.waiting.graph)
-            file = os.stat(f"{folder}/processes")
-            start = file.st_ino, file.st_mtime_ns
-            if start != self._start:
-                address = vigil.addresses(self.waiting.graph)[0]
-                self.channels = vigil.channel_list(self.waiting.graph)
-                self._aim(address)
-                self._start = start
-                self.waiting.end()
+        start = graph_start(self.waiting.graph)
+        if start is None:
+            return self._lose()
+        if start == self._start:
             return True
+        try:
+            address = vigil.addresses(self.waiting.graph)[0]
+            self.channels = vigil.channel_list(self.waiting.graph)
         except FileNotFoundError:
-            self._sender = self._start = None
-            self.waiting.tell()
+            return self._lose()
         except LookupError:
-            self._sender = self._start = None
-            self.waiting.tell(f"graph '{self.waiting.graph}' with '--source socket'")
+            return self._lose(f"graph '{self.waiting.graph}' with '--source socket'")
+        self._aim(address)
+        self._start = start
+        self.waiting.end()
+        return True
+
+    def _lose(self, what=None):
+        """There is no graph to send to; says what it waits for."""
+        self._sender = self._start = None
+        self.waiting.tell(what)
         return False
 
     def _aim(self, to):

@@ -1,10 +1,13 @@
-"""Says what a publisher waits for."""
+"""Says what a publisher waits for, and tells one start of a graph from the next."""
 
+import os
 import sys
 import time
 
 import vigil_types as vigil
 
+# A publisher looks this often whether its graph is still the one that it knows.
+LOOK_NS = 200_000_000
 # A wait is told at once, and then this often.
 REPEAT_S = 5
 
@@ -29,3 +32,12 @@ class Waiting:
         if self.told_s is not None:
             print(f"joined graph '{self.graph}'", file=sys.stderr, flush=True)
         self.told_s = None
+
+
+def graph_start(graph):
+    """What is different after each start of the graph; None while it does not run."""
+    try:
+        file = os.stat(f"{vigil.runtime_folder(graph)}/processes")
+        return file.st_ino, file.st_mtime_ns
+    except FileNotFoundError:
+        return None
