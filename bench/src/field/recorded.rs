@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use vigil_diagnosis::Sensors;
 use vigil_evaluation::scoring::Taxonomy;
 use vigil_evaluation::scoring::field::{Scorer, Stretch};
-use vigil_learning::learning_nominal;
+use vigil_learning::channel_learning;
 use vigil_recording::{frames, labels};
 use vigil_robot::RobotModel;
 use vigil_setup::{Setup, load_robot};
@@ -185,14 +185,14 @@ fn learned(
     let is_judged = |run: &frames::Run| run.id as usize % 2 == judged;
     let others = runs.iter().filter(|(_, run)| !is_judged(run));
     let others: Vec<frames::Run> = others.map(|(_, run)| run.clone()).collect();
-    let (model, _) = learning_nominal::learn(&others, &[], f64::INFINITY, &robot)?;
+    let (model, _) = channel_learning::learn(&others, &[], f64::INFINITY, &robot)?;
     let cases = runs.into_iter().filter(|(_, run)| is_judged(run));
     let cases = cases.map(|(ground, run)| Case {
         run,
         ground,
         fault: None,
     });
-    setup.model = RobotModel::Nominal(Box::new(model));
+    setup.model = RobotModel::Channels(Box::new(model));
     setup.robot = robot;
     Ok(Material {
         cases: cases.collect(),

@@ -15,7 +15,7 @@ pub fn assemble(setup: &Setup) -> Result<Detector, DetectorError> {
     let file = &setup.file;
     let detector = match &setup.model {
         RobotModel::Faults(model) => Detector::new(model, &setup.robot, &file.detector),
-        RobotModel::Nominal(model) => Detector::nominal(model, &setup.robot, &file.detector),
+        RobotModel::Channels(model) => Detector::of_channels(model, &setup.robot, &file.detector),
     }?;
     // Recorded frames come at the recording's pace, times the speed.
     let live = file.sensor.source != Source::Playback;

@@ -1,7 +1,7 @@
 //! From the configuration to an identifier.
 
 use vigil_diagnosis::identify::{
-    Diagnoser, Identifier, IdentifierError, IdentifierFilter, Models, NominalIdentifier,
+    ChannelIdentifier, Diagnoser, Identifier, IdentifierError, IdentifierFilter, Models,
 };
 use vigil_robot::RobotModel;
 use vigil_setup::{Setup, state_risks};
@@ -21,7 +21,11 @@ pub fn assemble(setup: &Setup) -> Result<Diagnoser, IdentifierError> {
     } = setup;
     let model = match model {
         RobotModel::Faults(model) => model,
-        RobotModel::Nominal(_) => return Ok(Diagnoser::from(NominalIdentifier::new(tree))),
+        RobotModel::Channels(model) => {
+            let settings = (file.detector.sensors, file.detector.fault_rate_1_h);
+            let identifier = ChannelIdentifier::new(model, robot, tree, settings)?;
+            return Ok(Diagnoser::from(identifier));
+        }
     };
     let needs_risks = file.identifier.filter == IdentifierFilter::RiskSensitive;
     let risks = needs_risks.then(|| state_risks(decision)).transpose();

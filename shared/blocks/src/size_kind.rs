@@ -42,6 +42,22 @@ pub enum SizeKind {
     HeldAtRad = 14,
     /// A pose has jumped by this much, m.
     JumpM = 15,
+    /// A reading has this much added, in its unit.
+    Bias = 16,
+    /// A reading has an addition that grows by this much each second, in its unit.
+    Drift = 17,
+    /// Noise is this many times as large.
+    NoiseRatio = 18,
+    /// A sensor is silent; no size.
+    Missing = 19,
+    /// A sensor reads what no kind of fault explains; no size.
+    Erratic = 20,
+    /// A drive lacks this share of its commanded speed.
+    EffectShareLost = 21,
+    /// The robot lacks this share of the speed with which a drive turns.
+    GripShareLost = 22,
+    /// A drive has this share of its largest speed beside what is commanded.
+    SpeedShareAdded = 23,
 }
 
 impl SizeKind {
@@ -74,6 +90,14 @@ impl SizeKind {
             Self::Stuck => "stuck",
             Self::HeldAtRad => "held",
             Self::JumpM => "jump",
+            Self::Bias => "bias",
+            Self::Drift => "drift",
+            Self::NoiseRatio => "noise",
+            Self::Missing => "missing",
+            Self::Erratic => "erratic",
+            Self::EffectShareLost => "loss",
+            Self::GripShareLost => "slip",
+            Self::SpeedShareAdded => "offset",
         }
     }
 
@@ -81,14 +105,28 @@ impl SizeKind {
     #[must_use]
     pub const fn unit(self) -> Option<&'static str> {
         match self {
-            Self::Gain | Self::TorqueShareLost => Some(""),
+            Self::Gain
+            | Self::TorqueShareLost
+            | Self::Bias
+            | Self::Drift
+            | Self::NoiseRatio
+            | Self::EffectShareLost
+            | Self::GripShareLost
+            | Self::SpeedShareAdded => Some(""),
             Self::BiasRadS | Self::RateBiasRadS => Some("rad/s"),
             Self::DriftRadS2 => Some("rad/s2"),
             Self::DelayS => Some("s"),
             Self::AngleRad | Self::HeldAtRad => Some("rad"),
             Self::CurrentOffsetA => Some("A"),
             Self::JumpM => Some("m"),
-            Self::None | Self::Zero | Self::Frozen | Self::Noise | Self::Dead | Self::Stuck => None,
+            Self::None
+            | Self::Zero
+            | Self::Frozen
+            | Self::Noise
+            | Self::Dead
+            | Self::Stuck
+            | Self::Missing
+            | Self::Erratic => None,
         }
     }
 }

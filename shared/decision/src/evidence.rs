@@ -131,6 +131,16 @@ pub(crate) fn assert_likelihoods(likelihood: &[f64]) {
 fn probabilities(diagnosis: &FaultBelief, meaning: StateMeaning, alarm: bool) -> (f64, f64) {
     let unknown = (diagnosis.p_unknown, diagnosis.p_unknown_predicted);
     match meaning.node {
+        None if meaning.leaves != 0 => {
+            let leaves = || (0..64).filter(|leaf| meaning.leaves >> leaf & 1 == 1);
+            let sum = |p: &[f64]| {
+                leaves()
+                    .filter_map(|leaf| p.get(leaf))
+                    .sum::<f64>()
+                    .min(1.0)
+            };
+            (sum(&diagnosis.p), sum(&diagnosis.p_predicted))
+        }
         None if alarm => unknown,
         None => (0.0, 0.0),
         Some(0) if !alarm => (
@@ -176,19 +186,21 @@ fn reported(diagnosis: &FaultBelief) -> impl Iterator<Item = &FaultSet> {
 /// Takes the probability of a set of several faults from its leaves, and gives it to the one state
 /// that it is.
 fn divide(set: &FaultSet, states: &[StateMeaning], weights: &mut [f64]) {
-    let is_in = |meaning: &StateMeaning| {
-        let bit = meaning.node.and_then(|node| 1_u64.checked_shl(node as u32));
-        bit.is_some_and(|bit| set.leaves & bit != 0)
-    };
+    let is_in = |meaning: &StateMeaning| set.leaves & meaning.leaves != 0;
     let stuck = states.iter().filter(|m| is_in(m) && m.stuck).count();
     let share = match stuck {
         0 => set.p / f64::from(set.leaves.count_ones()),
         _ => 0.0,
     };
     for (weight, meaning) in weights.iter_mut().zip(states) {
-        if is_in(meaning) && !(stuck == 1 && meaning.stuck) {
+        if is_in(meaning) && meaning.node.is_none() {
+            // Several leaves of one state: the set counts once.
+            let own = f64::from((set.leaves & meaning.leaves).count_ones());
+            let kept = if stuck == 0 { own * share } else { 0.0 };
+            *weight = (*weight - own * set.p).max(0.0) + kept;
+        } else if is_in(meaning) && !(stuck == 1 && meaning.stuck) {
             *weight = (*weight - set.p).max(0.0) + share;
-        } else if stuck > 1 && meaning.node.is_none() {
+        } else if stuck > 1 && meaning.is_unknown() {
             *weight += set.p;
         }
     }
@@ -227,8 +239,44 @@ mod tests {
     const fn state(node: Option<usize>, stuck: bool) -> StateMeaning {
         StateMeaning {
             node,
+            leaves: match node {
+                None | Some(0) => 0,
+                Some(node) => 1 << node,
+            },
             wheel: None,
             stuck,
+        }
+    }
+
+    #[test]
+    fn the_state_of_all_faults_has_the_probability_of_any_of_them() {
+        let any = StateMeaning {
+            leaves: 0b110,
+            ..state(None, false)
+        };
+        let states = [state(Some(0), false), any, state(None, false)];
+        let mut said = FaultBelief {
+            p_unknown: 0.1,
+            set_count: 3,
+            ..FaultBelief::default()
+        };
+        (said.p[0], said.p[1], said.p[2]) = (0.2, 0.5, 0.4);
+        said.sets[0] = FaultSet {
+            leaves: 0b10,
+            p: 0.3,
+        };
+        said.sets[1] = FaultSet {
+            leaves: 0b110,
+            p: 0.2,
+        };
+        said.sets[2] = FaultSet {
+            leaves: 0b100,
+            p: 0.2,
+        };
+        let mut found = [0.0; 3];
+        weights(&said, &states, true, &mut found);
+        for (found, expected) in found.into_iter().zip([0.2, 0.7, 0.1]) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }
     }
 

@@ -12,6 +12,8 @@ use vigil_robot::FaultTree;
 
 /// Name of the decision model's state for deviations that no fault model explains.
 const UNKNOWN: &str = "UNKNOWN";
+/// Name of the state of all named faults that have no state of their own.
+const FAULT: &str = "FAULT";
 
 /// Counter-steering that lets a robot with a stuck wheel drive the commanded curvature.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,10 +41,13 @@ pub enum SupervisorError {
         actions: usize,
     },
     /// A leaf of the fault tree, nominal or unknown has no state.
-    #[error("the decision model has no state '{0}'; it needs one for every leaf, ND and UNKNOWN")]
+    #[error(
+        "the decision model has no state '{0}'; it needs ND, UNKNOWN, and one for every leaf or \
+         FAULT for those without"
+    )]
     NoState(String),
     /// A state means nothing in the fault tree.
-    #[error("state '{0}' of the decision model is no leaf of the fault tree, ND or UNKNOWN")]
+    #[error("state '{0}' of the decision model is no leaf of the fault tree, ND, FAULT or UNKNOWN")]
     NoLeaf(String),
     /// An action of the model is not mapped.
     #[error("action '{0}' of the decision model is missing in [supervisor.actions]")]
@@ -123,12 +128,21 @@ pub(crate) fn state(
 /// Which node of the fault tree, and which wheel, a state of the decision model stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct StateMeaning {
-    /// Node of the fault tree; `None` for UNKNOWN.
+    /// Node of the fault tree; `None` for UNKNOWN and FAULT.
     pub node: Option<usize>,
+    /// The leaves that it stands for, as bits.
+    pub leaves: u64,
     /// Wheel of the fault.
     pub wheel: Option<usize>,
     /// True if the fault is a stuck wheel.
     pub stuck: bool,
+}
+
+impl StateMeaning {
+    /// True for the state of what no modelled fault explains.
+    pub const fn is_unknown(self) -> bool {
+        self.node.is_none() && self.leaves == 0
+    }
 }
 
 /// Checks that a block can carry the model's belief and values.
@@ -147,18 +161,19 @@ pub(crate) fn states(
     robot: &Description,
 ) -> Result<Vec<StateMeaning>, SupervisorError> {
     check_size(model)?;
-    let names = std::iter::once(0)
-        .chain(tree.leaves())
-        .map(|i| tree.nodes()[i].name.as_str());
-    for name in names.chain([UNKNOWN]) {
-        if !model.states().iter().any(|state| state == name) {
-            return Err(SupervisorError::NoState(name.to_owned()));
-        }
+    let has = |name: &str| model.states().iter().any(|state| state == name);
+    let name = |node: usize| tree.nodes()[node].name.as_str();
+    let leaves = tree.leaves().filter(|_| !has(FAULT));
+    let needed = std::iter::once(0).chain(leaves).map(name);
+    if let Some(missing) = needed.chain([UNKNOWN]).find(|name| !has(name)) {
+        return Err(SupervisorError::NoState(missing.to_owned()));
     }
+    let others = tree.leaves().filter(|&leaf| !has(name(leaf)));
+    let others = others.fold(0, |bits, leaf| bits | 1 << leaf);
     model
         .states()
         .iter()
-        .map(|name| meaning(name, tree, robot))
+        .map(|name| meaning(name, tree, robot, others))
         .collect()
 }
 
@@ -166,10 +181,12 @@ fn meaning(
     name: &str,
     tree: &FaultTree,
     robot: &Description,
+    others: u64,
 ) -> Result<StateMeaning, SupervisorError> {
-    if name == UNKNOWN {
+    if name == UNKNOWN || name == FAULT {
         return Ok(StateMeaning {
             node: None,
+            leaves: if name == FAULT { others } else { 0 },
             wheel: None,
             stuck: false,
         });
@@ -187,6 +204,7 @@ fn meaning(
     let stuck = fault.is_some_and(|f| f.starts_with("stuck:"));
     Ok(StateMeaning {
         node: Some(node),
+        leaves: if node == 0 { 0 } else { 1 << node },
         wheel,
         stuck,
     })
@@ -325,6 +343,7 @@ mod tests {
             speed_scale: 0.7,
         };
         let states = [Some(3), Some(4)].map(|wheel| StateMeaning {
+            leaves: 0,
             node: wheel,
             wheel,
             stuck: wheel == Some(4),

@@ -17,6 +17,8 @@ pub struct ChannelMap {
     wheel_rate: [Option<usize>; WHEELS],
     steer: [Option<usize>; WHEELS],
     current: [Option<usize>; WHEELS],
+    /// Bits of the channels that are none of these.
+    others: u64,
 }
 
 impl ChannelMap {
@@ -32,6 +34,7 @@ impl ChannelMap {
             wheel_rate: [None; WHEELS],
             steer: [None; WHEELS],
             current: [None; WHEELS],
+            others: 0,
         };
         for (place, channel) in channels(robot).iter().enumerate() {
             map.all |= 1 << place;
@@ -43,7 +46,10 @@ impl ChannelMap {
                 (Role::WheelRate, Some(wheel)) => &mut map.wheel_rate[wheel],
                 (Role::SteeringAngle, Some(wheel)) => &mut map.steer[wheel],
                 (Role::Current, Some(wheel)) => &mut map.current[wheel],
-                _ => continue,
+                _ => {
+                    map.others |= 1 << place;
+                    continue;
+                }
             };
             *entry = entry.or(Some(place));
         }
@@ -151,7 +157,8 @@ impl ChannelMap {
             Slot::YAW_RATE => self.yaw_rate,
             8..16 => self.wheel_rate[slot - 8],
             16..24 => self.steer[slot - 16],
-            24..SLOTS => self.current[slot - 24],
+            24..32 => self.current[slot - 24],
+            32..SLOTS => Some(slot - 32).filter(|place| self.others >> place & 1 == 1),
             _ => None,
         }
     }

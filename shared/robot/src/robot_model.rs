@@ -1,23 +1,23 @@
-//! A learned model, with or without fault modes.
+//! A learned model: of the rover's kind, or of channels.
 
 use crate::alarm::AlarmError;
+use crate::channel_model;
 use crate::description::Description;
 use crate::learned::channels::Channels;
 use crate::learned::model::Provenance;
 use crate::learned::{self, Calibration, Form, ModelError};
-use crate::nominal;
 
 /// The learned model of a robot.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RobotModel {
     /// Its nominal behaviour and its faults.
     Faults(Box<learned::Model>),
-    /// Its nominal behaviour alone: every departure is unknown.
-    Nominal(Box<nominal::Model>),
+    /// Its channels, and what faults of its sensors and drives would change of them.
+    Channels(Box<channel_model::Model>),
 }
 
 impl RobotModel {
-    /// Reads and checks a model; a nominal one says so by its first key, `kind = "nominal"`.
+    /// Reads and checks a model; one of channels says so by its first key, `kind = "channels"`.
     ///
     /// # Errors
     /// [`ModelError`] naming the key, what was found and what is allowed.
@@ -25,7 +25,9 @@ impl RobotModel {
         let is_kind = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
         let first = text.lines().find(is_kind).unwrap_or("");
         if first.trim_start().starts_with("kind") {
-            return Ok(Self::Nominal(Box::new(nominal::Model::from_toml(text)?)));
+            return Ok(Self::Channels(Box::new(channel_model::Model::from_toml(
+                text,
+            )?)));
         }
         Ok(Self::Faults(Box::new(learned::Model::from_toml(text)?)))
     }
@@ -35,7 +37,7 @@ impl RobotModel {
     pub fn with_faults(self) -> Option<learned::Model> {
         match self {
             Self::Faults(model) => Some(*model),
-            Self::Nominal(_) => None,
+            Self::Channels(_) => None,
         }
     }
 
@@ -44,7 +46,7 @@ impl RobotModel {
     pub fn hash(&self) -> u64 {
         match self {
             Self::Faults(model) => model.hash(),
-            Self::Nominal(model) => model.hash(),
+            Self::Channels(model) => model.hash(),
         }
     }
 
@@ -55,7 +57,7 @@ impl RobotModel {
     pub fn check_robot(&self, robot: &Description) -> Result<(), ModelError> {
         match self {
             Self::Faults(model) => model.check_robot(robot),
-            Self::Nominal(model) => model.check_robot(robot),
+            Self::Channels(model) => model.check_robot(robot),
         }
     }
 
@@ -64,7 +66,7 @@ impl RobotModel {
     pub fn provenance(&self) -> &Provenance {
         match self {
             Self::Faults(model) => &model.provenance,
-            Self::Nominal(model) => &model.provenance,
+            Self::Channels(model) => &model.provenance,
         }
     }
 
@@ -75,7 +77,7 @@ impl RobotModel {
     pub fn calibration(&self, channels: Channels, form: Form) -> Result<&Calibration, ModelError> {
         match self {
             Self::Faults(model) => model.calibration(channels, form),
-            Self::Nominal(model) => model.calibration(channels, form),
+            Self::Channels(model) => model.calibration(channels, form),
         }
     }
 
@@ -92,17 +94,17 @@ impl RobotModel {
     ) -> Result<f64, AlarmError> {
         match self {
             Self::Faults(model) => model.alarm_log_odds(of, interval_h, fault_rate_1_h),
-            Self::Nominal(model) => model.alarm_log_odds(of, interval_h, fault_rate_1_h),
+            Self::Channels(model) => model.alarm_log_odds(of, interval_h, fault_rate_1_h),
         }
     }
 
-    /// Counter-steering for a stuck wheel, see [`learned::Model::compensation`]; none (1, 0) where
-    /// no fault is modelled.
+    /// Counter-steering for a stuck wheel, see [`learned::Model::compensation`]; none (1, 0) for a
+    /// model of channels.
     #[must_use]
     pub fn compensation(&self, wheel: usize) -> (f64, f64) {
         match self {
             Self::Faults(model) => model.compensation(wheel),
-            Self::Nominal(_) => (1.0, 0.0),
+            Self::Channels(_) => (1.0, 0.0),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Fixed places of evidence inside the models of wheeled robots.
 
 /// Number of slots.
-pub const SLOTS: usize = 32;
+pub const SLOTS: usize = 64;
 
 /// Index of a slot. A belief carries evidence by the robot's own channels instead, see
 /// [`crate::ChannelMap`].
@@ -14,7 +14,7 @@ impl Slot {
     /// Yaw rate.
     pub const YAW_RATE: usize = 1;
     /// Deviation of any kind: without a constant direction (the paper's constant likelihood), or
-    /// in all channels of a robot with a nominal model at once.
+    /// that no single channel of a model of channels explains.
     pub const ANY: usize = 2;
 
     /// Wheel rate of wheel `i`.
@@ -31,5 +31,10 @@ impl Slot {
     #[must_use]
     pub const fn current(i: usize) -> usize {
         24 + i
+    }
+    /// The channel at a place of the frame that is none of these. A model has fewer than 32 places.
+    #[must_use]
+    pub const fn further(place: usize) -> usize {
+        if place < 32 { 32 + place } else { Self::ANY }
     }
 }

@@ -6,8 +6,9 @@ use vigil_blocks::fnv1a;
 use vigil_pomdp::policy_file::PolicyFile;
 use vigil_pomdp::{PointBased, Pomdp};
 use vigil_robot::FaultTree;
+use vigil_robot::channel_model;
 use vigil_robot::learned::ModelError;
-use vigil_robot::tree::Node;
+use vigil_robot::tree::{Node, TreeError};
 use vigil_robot::{Description, RobotModel};
 
 use crate::document::{Document, TextFile, resolve};
@@ -70,6 +71,12 @@ impl Document {
         let robot = keep(robot(&self.robot), &mut problems);
         let tree = keep(tree(&self.tree), &mut problems);
         let model = keep(model(&self.model, robot.as_ref()), &mut problems);
+        let tree = match (tree, &model, &robot) {
+            (Some(tree), Some(RobotModel::Channels(_)), Some(robot)) => {
+                keep(completed(tree, robot, &self.tree), &mut problems)
+            }
+            (tree, ..) => tree,
+        };
         let decision = keep(decision(&self.decision), &mut problems);
         let text = self.graph.text()?;
         let at = |key: &str, message| Problem::at_key(path, text, key, message);
@@ -180,6 +187,19 @@ fn tree(file: &TextFile) -> Result<FaultTree, SetupError> {
         });
     }
     FaultTree::new(nodes).map_err(|error| problem("node", error.to_string()).into())
+}
+
+/// A tree without a leaf becomes the one that follows from the robot's description.
+fn completed(
+    tree: FaultTree,
+    robot: &Description,
+    file: &TextFile,
+) -> Result<FaultTree, SetupError> {
+    if tree.leaves().next().is_some() {
+        return Ok(tree);
+    }
+    let problem = |error: TreeError| Problem::at_line(&file.path, 0, error.to_string());
+    Ok(channel_model::tree::tree(robot).map_err(problem)?)
 }
 
 /// Reads a learned model; checks that it is one of `robot`.

@@ -1,10 +1,11 @@
 //! Models of robots, learned from recorded runs. Reads no file itself.
 
 pub mod bounds;
+pub mod channel_learning;
 mod correlation;
 mod data_hash;
 pub mod learning;
-pub mod learning_nominal;
+
 mod maxima;
 pub mod model_view;
 pub mod plausibility;

@@ -1,9 +1,9 @@
-//! Observer and detection filter: of a model with faults, or of nominal behaviour alone.
+//! Observer and detection filter: of the rover's model, or of a model of channels.
 
 use vigil_blocks::SensorFrame;
 use vigil_robot::learned::monitor::DetectionOutput;
 use vigil_robot::learned::{FrameOutcome, Healthy, Monitor, NoiseScales, Observation, Observer};
-use vigil_robot::{declared, nominal};
+use vigil_robot::{channel_model, declared};
 
 /// The interval of an observation: what the detector must know of it.
 #[derive(Debug, Clone, Copy, Default)]
@@ -46,12 +46,12 @@ pub(crate) enum DetectionFilter {
         /// E-detectors.
         monitor: Box<declared::Monitor>,
     },
-    /// Of a nominal model.
-    Nominal {
+    /// Of a model of channels.
+    Channels {
         /// Frames to observations.
-        observer: Box<nominal::Observer>,
+        observer: Box<channel_model::Observer>,
         /// Detection filter.
-        monitor: Box<nominal::Monitor>,
+        monitor: Box<channel_model::Monitor>,
     },
 }
 
@@ -60,7 +60,7 @@ impl DetectionFilter {
     pub fn push(&mut self, frame: &SensorFrame) -> FrameOutcome {
         match self {
             Self::Faults { observer, .. } | Self::Declared { observer, .. } => observer.push(frame),
-            Self::Nominal { observer, .. } => observer.push(frame),
+            Self::Channels { observer, .. } => observer.push(frame),
         }
     }
 
@@ -84,8 +84,8 @@ impl DetectionFilter {
                 monitor.step(observation, suspected);
                 observation.into()
             }
-            Self::Nominal { observer, monitor } => {
-                monitor.step(observer.history(), suspected);
+            Self::Channels { observer, monitor } => {
+                monitor.step(observer.history());
                 // A complete observation is the newest of the history.
                 let newest = observer.history().ago(0);
                 newest.map_or_else(Interval::default, |now| Interval {
@@ -101,7 +101,7 @@ impl DetectionFilter {
     pub fn reset_observer(&mut self) {
         match self {
             Self::Faults { observer, .. } | Self::Declared { observer, .. } => observer.reset(),
-            Self::Nominal { observer, .. } => observer.reset(),
+            Self::Channels { observer, .. } => observer.reset(),
         }
     }
 
@@ -115,7 +115,7 @@ impl DetectionFilter {
                 tracking.reset();
                 monitor.reset();
             }
-            Self::Nominal { monitor, .. } => monitor.reset(),
+            Self::Channels { monitor, .. } => monitor.reset(),
         }
     }
 
@@ -129,8 +129,14 @@ impl DetectionFilter {
                 tracking.forget_evidence();
                 monitor.forget_evidence();
             }
-            Self::Nominal { monitor, .. } => monitor.forget_evidence(),
+            // Its evidence is that of the last seconds.
+            Self::Channels { .. } => {}
         }
+    }
+
+    /// True if the evidence is that of the last seconds, and so ends by itself.
+    pub const fn is_windowed(&self) -> bool {
+        matches!(self, Self::Channels { .. })
     }
 
     /// True once evidence counts.
@@ -138,7 +144,7 @@ impl DetectionFilter {
         match self {
             Self::Faults { monitor, .. } => monitor.is_ready(),
             Self::Declared { monitor, .. } => monitor.is_ready(),
-            Self::Nominal { monitor, .. } => monitor.is_ready(),
+            Self::Channels { monitor, .. } => monitor.is_ready(),
         }
     }
 
@@ -147,16 +153,16 @@ impl DetectionFilter {
         match self {
             Self::Faults { monitor, .. } => monitor.report(),
             Self::Declared { monitor, .. } => monitor.report(),
-            Self::Nominal { monitor, .. } => monitor.report(),
+            Self::Channels { monitor, .. } => monitor.report(),
         }
     }
 
-    /// How noisy the sensors are; a nominal model does not explain noise away.
+    /// How noisy the sensors are; a model of channels does not explain noise away.
     pub fn scales(&self) -> NoiseScales {
         match self {
             Self::Faults { monitor, .. } => monitor.noise().scales(),
             Self::Declared { tracking, .. } => tracking.noise().scales(),
-            Self::Nominal { .. } => NoiseScales::default(),
+            Self::Channels { .. } => NoiseScales::default(),
         }
     }
 
@@ -165,7 +171,7 @@ impl DetectionFilter {
         match self {
             Self::Faults { monitor, .. } => monitor.healthy(),
             Self::Declared { tracking, .. } => tracking.healthy(),
-            Self::Nominal { .. } => None,
+            Self::Channels { .. } => None,
         }
     }
 }

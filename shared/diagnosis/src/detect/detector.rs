@@ -6,10 +6,10 @@ use vigil_blocks::{
 };
 use vigil_inference::ending::Ending;
 use vigil_inference::logspace::{log_add, log_sum_exp, probability};
+use vigil_robot::channel_model;
 use vigil_robot::declared::{self, Promise, UndeclaredError};
 use vigil_robot::learned::channels::Channels;
 use vigil_robot::learned::{Form, Model, ModelError, Monitor, NoiseScales, Observer};
-use vigil_robot::nominal;
 use vigil_robot::publisher_check::Finding;
 use vigil_robot::slot::{SLOTS, Slot};
 use vigil_robot::{Alarm, AlarmError, ChannelMap, Description};
@@ -128,12 +128,12 @@ impl Detector {
         ))
     }
 
-    /// A detector for a robot of which only the nominal behaviour is known.
+    /// A detector by a model of channels.
     ///
     /// # Errors
     /// As [`Detector::new`].
-    pub fn nominal(
-        model: &nominal::Model,
+    pub fn of_channels(
+        model: &channel_model::Model,
         robot: &Description,
         settings: &Settings,
     ) -> Result<Self, DetectorError> {
@@ -145,9 +145,15 @@ impl Detector {
         let channels = settings.sensors.into();
         let (rate, interval_h) = (settings.fault_rate_1_h, settings.false_alarm_interval_h);
         let alarm_log_odds = model.alarm_log_odds((channels, form), interval_h, rate)?;
-        let filter = DetectionFilter::Nominal {
-            observer: Box::new(nominal::Observer::new(robot)),
-            monitor: Box::new(nominal::Monitor::new(model, channels, form, rate)),
+        let monitor = channel_model::Monitor::new(model, robot, channels, rate);
+        let monitor = monitor.ok_or_else(|| ModelError::Value {
+            key: "direction".to_owned(),
+            value: format!("{} directions", model.direction.len()),
+            allowed: "those of a covariance of the channels in use".to_owned(),
+        })?;
+        let filter = DetectionFilter::Channels {
+            observer: Box::new(channel_model::Observer::new(robot)),
+            monitor: Box::new(monitor),
         };
         let interval_s = model.interval_s;
         Ok(Self::with_filter(
@@ -358,7 +364,7 @@ impl Detector {
     /// has not ended there.
     fn weigh_end(&mut self, observation: &Interval) {
         let report = self.filter.report();
-        if !self.alarm.stands() {
+        if !self.alarm.stands() || self.filter.is_windowed() && observation.moving {
             self.log_odds = report.log_odds;
             return;
         }

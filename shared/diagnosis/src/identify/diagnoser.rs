@@ -3,8 +3,8 @@
 use vigil_blocks::{DetectionBelief, Entry, FaultBelief, ParticleBlock};
 
 use crate::identify::blind_override::BlindOverride;
+use crate::identify::channel_identifier::ChannelIdentifier;
 use crate::identify::identifier::{Identifier, Input};
-use crate::identify::nominal_identifier::NominalIdentifier;
 use crate::invariants;
 
 /// An identifier of either kind; while the detector is blind, its names are BLIND.
@@ -16,10 +16,10 @@ pub struct Diagnoser {
 
 #[derive(Debug, Clone)]
 enum EitherIdentifier {
-    /// Over the faults that a model knows.
+    /// Over the faults that the rover's model knows.
     Faults(Box<Identifier>),
-    /// Nominal or unknown.
-    Nominal(Box<NominalIdentifier>),
+    /// Over the components of a model of channels.
+    Channels(Box<ChannelIdentifier>),
 }
 
 impl Diagnoser {
@@ -28,7 +28,7 @@ impl Diagnoser {
     pub fn particles(&self) -> u32 {
         match &self.identifier {
             EitherIdentifier::Faults(identifier) => identifier.particles(),
-            EitherIdentifier::Nominal(_) => 0,
+            EitherIdentifier::Channels(_) => 0,
         }
     }
 
@@ -37,7 +37,7 @@ impl Diagnoser {
     pub fn particles_in_use(&self) -> u32 {
         match &self.identifier {
             EitherIdentifier::Faults(identifier) => identifier.particles_in_use(),
-            EitherIdentifier::Nominal(_) => 0,
+            EitherIdentifier::Channels(_) => 0,
         }
     }
 
@@ -59,7 +59,7 @@ impl Diagnoser {
         }
         match &mut self.identifier {
             EitherIdentifier::Faults(identifier) => identifier.step(entry, belief, hypotheses),
-            EitherIdentifier::Nominal(nominal) => nominal.step(entry, belief, hypotheses),
+            EitherIdentifier::Channels(channels) => channels.step(entry, belief, hypotheses),
         }
         let p = belief.p;
         self.blind.cover(belief);
@@ -74,10 +74,10 @@ impl Diagnoser {
     }
 }
 
-impl From<NominalIdentifier> for Diagnoser {
-    fn from(nominal: NominalIdentifier) -> Self {
+impl From<ChannelIdentifier> for Diagnoser {
+    fn from(channels: ChannelIdentifier) -> Self {
         Self {
-            identifier: EitherIdentifier::Nominal(Box::new(nominal)),
+            identifier: EitherIdentifier::Channels(Box::new(channels)),
             blind: BlindOverride::default(),
         }
     }

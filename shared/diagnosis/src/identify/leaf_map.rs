@@ -26,6 +26,16 @@ pub enum IdentifierError {
         /// Wheels whose faults the model knows.
         wheels: String,
     },
+    /// A leaf's fault is of no component of the robot.
+    #[error("leaf '{leaf}': fault '{fault}' is of no component of the robot, which has {known}")]
+    Component {
+        /// Name of the leaf.
+        leaf: String,
+        /// Its fault.
+        fault: String,
+        /// Faults that the robot can have.
+        known: String,
+    },
     /// Two leaves stand for one fault.
     #[error("leaves '{0}' and '{1}' stand for the same fault")]
     Twice(String, String),
@@ -107,6 +117,28 @@ impl LeafMap {
         }
     }
 
+    /// Of a tree, without its leaves yet.
+    pub(crate) fn of_tree(tree: &FaultTree) -> Self {
+        let mut leaves = Self {
+            nodes: tree.nodes().len(),
+            hash: tree.hash(),
+            ..Self::none()
+        };
+        for i in 0..tree.nodes().len() {
+            leaves.depths[i] = tree.depth(i);
+        }
+        leaves
+    }
+
+    /// Counts a leaf of the tree.
+    pub(crate) fn add(&mut self, tree: &FaultTree, leaf: usize) {
+        self.count += 1;
+        let above = std::iter::successors(Some(leaf), |&at| tree.nodes()[at].parent);
+        for at in above {
+            self.below[at] |= 1 << leaf;
+        }
+    }
+
     /// Whether there are leaves of which the paper's filters know nothing: of steering servos and
     /// pose, and those that gyro and currents alone can show.
     #[must_use]
@@ -173,14 +205,7 @@ impl LeafMap {
         robot: &Description,
         sensors: Sensors,
     ) -> Result<Self, IdentifierError> {
-        let mut leaves = Self {
-            nodes: tree.nodes().len(),
-            hash: tree.hash(),
-            ..Self::none()
-        };
-        for i in 0..tree.nodes().len() {
-            leaves.depths[i] = tree.depth(i);
-        }
+        let mut leaves = Self::of_tree(tree);
         for i in tree.leaves() {
             let node = &tree.nodes()[i];
             let fault = node.fault.as_deref().unwrap_or_default();
@@ -204,11 +229,7 @@ impl LeafMap {
                 let other = tree.nodes()[other].name.clone();
                 return Err(IdentifierError::Twice(other, node.name.clone()));
             }
-            leaves.count += 1;
-            let above = std::iter::successors(Some(i), |&at| tree.nodes()[at].parent);
-            for at in above {
-                leaves.below[at] |= 1 << i;
-            }
+            leaves.add(tree, i);
         }
         if leaves.count == 0 {
             return Err(IdentifierError::NoLeaf);

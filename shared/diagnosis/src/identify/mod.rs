@@ -1,11 +1,12 @@
 //! Names the fault: a probability for each node of the fault tree, live and offline alike.
 //!
-//! [`Diagnoser`] is the step of the stage: an [`Identifier`] over fault models, or a
-//! [`NominalIdentifier`] where none are known, and the word BLIND over both.
+//! [`Diagnoser`] is the step of the stage: an [`Identifier`] over the rover's fault models, or a
+//! [`ChannelIdentifier`] over a model of channels, and the word BLIND over both.
 
 mod angles;
 mod blind_override;
 mod channel_evidence;
+mod channel_identifier;
 mod delay_belief;
 mod detection;
 mod diagnoser;
@@ -23,7 +24,6 @@ mod leaf_map;
 mod models;
 mod multiple_hypothesis;
 mod node_sizes;
-mod nominal_identifier;
 mod rate_offsets;
 mod reported;
 mod ring;
@@ -38,12 +38,12 @@ mod tree_belief;
 mod trouble;
 mod wheel_update;
 
+pub use channel_identifier::ChannelIdentifier;
 pub use diagnoser::Diagnoser;
 pub use identifier::{Identifier, Input};
 pub use leaf_map::{IdentifierError, LeafMap};
 pub use models::Models;
 pub use multiple_hypothesis::MultipleHypothesis;
-pub use nominal_identifier::NominalIdentifier;
 pub use risk::StateRisks;
 pub use settings::{IdentifierFilter, PARTICLES_MAX, PARTICLES_MIN, Settings};
 pub use tree_belief::TreeBelief;

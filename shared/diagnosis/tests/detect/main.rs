@@ -5,11 +5,11 @@
 use vigil_cycle::allocation::CountingAllocator;
 
 mod allocation;
+mod channels;
 mod detector;
 mod forms;
 mod meaning;
 mod monitors;
-mod nominal;
 mod recorded;
 
 #[global_allocator]

@@ -137,7 +137,7 @@ pub enum UndeclaredError {
 pub fn tolerance(model: &RobotModel, robot: &Description) -> Result<Tolerance, UndeclaredError> {
     match model {
         RobotModel::Faults(_) => of_rover(robot),
-        RobotModel::Nominal(_) => Err(UndeclaredError::Model {
+        RobotModel::Channels(_) => Err(UndeclaredError::Model {
             robot: robot.name.clone(),
         }),
     }

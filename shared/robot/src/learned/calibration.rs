@@ -145,12 +145,28 @@ impl Calibration {
         let blank = Self::blank(channels, form, fault_rate_1_h, count.max(1), window_s);
         let beyond = (count / HIGH).max(MAXIMA_MIN);
         match count.checked_sub(beyond + 1).and_then(|i| maxima.get(i)) {
-            Some(&level) => blank.above(level, maxima),
+            Some(&level) => blank.above(level, maxima).not_below(maxima.last().copied()),
             // No maxima, no level. Chosen: odds far below an alarm's.
             None => Self {
                 level_log_odds: maxima.last().copied().unwrap_or(-10.0),
                 ..blank
             },
+        }
+    }
+
+    /// A tail that is heavier than an exponential one begins at its highest maximum, which was seen
+    /// once.
+    fn not_below(self, highest: Option<f64>) -> Self {
+        let Some(highest) = highest.filter(|&highest| {
+            let apart = self.tail_slope * (highest - self.level_log_odds);
+            self.interval_at_level_h * apart.exp() > self.exposure_h
+        }) else {
+            return self;
+        };
+        Self {
+            level_log_odds: highest,
+            interval_at_level_h: self.exposure_h,
+            ..self
         }
     }
 

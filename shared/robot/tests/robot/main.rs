@@ -2,6 +2,7 @@
 
 #![cfg(test)]
 
+mod channel_model;
 mod condition;
 mod encoder_noise;
 mod frame_guard;
@@ -9,7 +10,6 @@ mod gaps;
 mod injection;
 mod learned;
 mod noise;
-mod nominal;
 mod rover;
 mod slip;
 mod stuck_sets;

@@ -142,7 +142,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         check_place("--report", out)?;
     }
     let prepared = args.filter.prepare()?;
-    if matches!(prepared.model, RobotModel::Nominal(_)) && !args.filters.is_empty() {
+    if matches!(prepared.model, RobotModel::Channels(_)) && !args.filters.is_empty() {
         return Err(args.filter.names_nothing("--filters"));
     }
     let runs = args.cases(&prepared)?;

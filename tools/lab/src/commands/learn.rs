@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use vigil_diagnosis::detect;
 
 use serde::Serialize;
+use vigil_learning::channel_learning;
 use vigil_learning::learning::further;
 use vigil_learning::learning::{self, Options, RESIDUAL_BAR, Report, Residual, View};
-use vigil_learning::learning_nominal;
 use vigil_learning::plausibility;
 use vigil_learning::split::split;
 use vigil_recording::frames::{self, Run};
@@ -20,7 +20,7 @@ use super::files::{check_place, file_name, write_whole};
 use super::offline::{RobotArgs, load_model};
 use vigil_terminal::{CommandError, Outcome};
 
-use super::learn_nominal;
+use super::learn_channels;
 use vigil_terminal::output;
 
 /// Largest part of the runs that may be left out.
@@ -122,8 +122,8 @@ fn show(path: &Path, is_json: bool) -> Result<Outcome, CommandError> {
     let rate_1_h = detect::Settings::default().fault_rate_1_h;
     match load_model(path)? {
         RobotModel::Faults(model) => print_view(&View::new(&model, rate_1_h), path, is_json),
-        RobotModel::Nominal(model) => {
-            let view = learning_nominal::View::new(&model, rate_1_h);
+        RobotModel::Channels(model) => {
+            let view = channel_learning::View::new(&model, rate_1_h);
             print_view(&view, path, is_json)
         }
     }
@@ -265,7 +265,7 @@ fn unlabelled(
     if !args.only.is_empty() {
         runs.retain(|run| args.only.contains(&run.id));
     }
-    learn_nominal::run(&learn_nominal::Task {
+    learn_channels::run(&learn_channels::Task {
         robot,
         runs: &runs,
         frames: frames_file,

@@ -5,7 +5,7 @@ pub mod evaluate;
 mod files;
 pub mod import;
 pub mod learn;
-mod learn_nominal;
+mod learn_channels;
 mod offline;
 pub mod pomdp;
 pub mod report;

@@ -10,7 +10,7 @@ use vigil_decision::{Compensation, Recovery, RecoveryAction, Supervisor, Supervi
 use vigil_diagnosis::Sensors;
 use vigil_diagnosis::detect::{self, Detector, Form};
 use vigil_diagnosis::identify::{
-    self, Diagnoser, Identifier, IdentifierFilter, Models, NominalIdentifier, PARTICLES_MAX,
+    self, ChannelIdentifier, Diagnoser, Identifier, IdentifierFilter, Models, PARTICLES_MAX,
     PARTICLES_MIN,
 };
 use vigil_evaluation::scoring::{Taxonomy, Verdict};
@@ -19,8 +19,7 @@ use vigil_learning::data_hash;
 use vigil_pomdp::Pomdp;
 use vigil_recording::frames::{self, Run};
 use vigil_robot::FaultTree;
-use vigil_robot::tree::Node;
-use vigil_robot::{Description, RobotModel};
+use vigil_robot::{Description, RobotModel, channel_model};
 use vigil_setup::{load_decision, load_robot, load_tree, state_risks};
 
 use vigil_terminal::CommandError;
@@ -107,7 +106,7 @@ pub struct FilterSettings {
     pub sensors: String,
     /// Form of the detection filter.
     pub detector: String,
-    /// Identification filter; `none` on a model of nominal behaviour alone.
+    /// Identification filter; `channels` on a model of channels.
     pub identifier: String,
     /// Most hypotheses of the identification filter, or its particles.
     pub particles: u32,
@@ -140,14 +139,16 @@ impl FilterArgs {
         let model = load_model(&self.model)?;
         let tree = match &model {
             RobotModel::Faults(_) => load_tree(&self.tree).map_err(CommandError::usage)?,
-            RobotModel::Nominal(_) => nominal_tree()?,
+            RobotModel::Channels(_) => {
+                channel_model::tree::tree(&robot).map_err(CommandError::usage)?
+            }
         };
         let identifier = match &model {
             RobotModel::Faults(_) => self.identifier.to_string(),
-            RobotModel::Nominal(_) if self.identifier == IdentifierFilter::default() => {
-                "none".to_owned()
+            RobotModel::Channels(_) if self.identifier == IdentifierFilter::default() => {
+                "channels".to_owned()
             }
-            RobotModel::Nominal(_) => return Err(self.names_nothing("--identifier")),
+            RobotModel::Channels(_) => return Err(self.names_nothing("--identifier")),
         };
         let identify::Settings { p_unknown, .. } = identify::Settings::default();
         let mut models = OfflineModels {
@@ -172,11 +173,10 @@ impl FilterArgs {
         Ok(models)
     }
 
-    /// Refuses an option that is about filters that name faults, on a model that knows none.
+    /// Refuses an option that is about the rover's filters, on a model of channels.
     pub fn names_nothing(&self, option: &str) -> CommandError {
         CommandError::usage(format!(
-            "{option}: {} is a model of nominal behaviour alone: there are no faults for a filter \
-             to name, only fault or no fault; leave it out",
+            "{option}: {} is a model of channels, which has one filter of its own; leave it out",
             self.model.display()
         ))
     }
@@ -213,9 +213,17 @@ impl FilterArgs {
             CommandError::usage(format!("{}: {error}", self.model.display()))
         };
         let (detector, identifier) = match &of.model {
-            RobotModel::Nominal(model) => (
-                Detector::nominal(model, robot, &settings),
-                Diagnoser::from(NominalIdentifier::new(tree)),
+            RobotModel::Channels(model) => (
+                Detector::of_channels(model, robot, &settings),
+                Diagnoser::from(
+                    ChannelIdentifier::new(
+                        model,
+                        robot,
+                        tree,
+                        (settings.sensors, settings.fault_rate_1_h),
+                    )
+                    .map_err(|e| refuse(&e))?,
+                ),
             ),
             RobotModel::Faults(model) => {
                 let is_asked = filter == IdentifierFilter::RiskSensitive;
@@ -382,16 +390,6 @@ fn channels(set: &str) -> Sensors {
         "all" => Sensors::All,
         _ => Sensors::PoseEncoders,
     }
-}
-
-/// The tree of a robot whose faults nobody has modelled.
-fn nominal_tree() -> Result<FaultTree, CommandError> {
-    let nominal = Node {
-        name: "ND".to_owned(),
-        parent: None,
-        fault: None,
-    };
-    FaultTree::new(vec![nominal]).map_err(CommandError::failure)
 }
 
 /// Reads a learned model of either kind.

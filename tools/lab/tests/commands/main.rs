@@ -2,9 +2,9 @@
 
 #![cfg(test)]
 
+mod channels;
 mod import;
 mod model;
-mod nominal;
 mod offline;
 mod pomdp;
 mod pomdp_compare;

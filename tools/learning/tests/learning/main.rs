@@ -2,8 +2,8 @@
 
 #![cfg(test)]
 
+mod channel_learning;
+mod channel_sensing;
 mod learning;
-mod learning_nominal;
-mod nominal_sensing;
 mod refusals;
 mod rover;

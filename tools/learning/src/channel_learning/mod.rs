@@ -1,13 +1,13 @@
-//! Learns the nominal behaviour of any described robot from its own log, without labels.
+//! Learns the behaviour of any described robot from its own log of healthy driving.
 //!
-//! Every measured channel is regressed on the command and on the other channels (ridge, Huber
-//! weights); what is left gets a variance that may grow with speed, a colour, and the scatter of
-//! its mean from run to run. The runs left out (one run: every
-//! third block of it) tell whether all this
-//! holds; a short log widens the deviations. Last comes the tail of the detector's log-odds.
+//! Every channel is regressed on the command (ridge, Huber weights). The log is divided into parts,
+//! and each part predicted by a model of the others: what is left there gives the noise, the joint
+//! law of all channels in time, and the tails of the log-odds without a fault. A short log widens
+//! the deviations.
 
 mod calibrate;
 mod excitation;
+mod joint;
 mod noise;
 mod record;
 mod regression;
@@ -18,24 +18,23 @@ mod view;
 
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
+use vigil_robot::channel_model::model::{KIND, VERSION};
+use vigil_robot::channel_model::scatter::Scatter;
+use vigil_robot::channel_model::{Channel, Model, Range, Scales, Target, Term, drives, targets};
 use vigil_robot::learned::model::Provenance;
-use vigil_robot::nominal::model::{KIND, VERSION};
-use vigil_robot::nominal::{Channel, Model, Range, Target, Term};
 
 use crate::data_hash::data_hash;
 use crate::plausibility::{self, RunCheck, RunDoubt};
-use record::{Part, Record};
-pub use report::{ChannelError, Report};
+use record::{FOLDS, Record};
+pub use report::{ChannelFit, Report};
 pub use view::View;
 
 /// Logs shorter than this are learned from with a warning and wider deviations, s.
 const LONG_ENOUGH_S: f64 = 600.0;
-/// Blocks into which a single run is cut; every third is left out for the test.
-const BLOCKS: usize = 9;
 
-/// Why a nominal model could not be learned.
+/// Why a log supports no model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NominalError {
+pub enum LogError {
     /// Nothing to learn from.
     #[error("there are no runs to learn from")]
     NoRuns,
@@ -106,27 +105,25 @@ pub enum NominalError {
     },
 }
 
-/// Learns a model from the runs that are not in `held_out`, up to `until_s` of each, and tests it
-/// on the others (a single run: on every third block of it, from which the final model learns too).
+/// Learns a model from the runs that are not in `held_out`, up to `until_s` of each.
 ///
 /// # Errors
-/// [`NominalError`] naming what is missing.
+/// [`LogError`] naming what is missing.
 pub fn learn(
     runs: &[Run],
     held_out: &[u32],
     until_s: f64,
     robot: &Description,
-) -> Result<(Model, Report), NominalError> {
+) -> Result<(Model, Report), LogError> {
     let (left_out, learned): (Vec<&Run>, Vec<&Run>) =
         runs.iter().partition(|run| held_out.contains(&run.id));
     if learned.is_empty() {
-        return Err(NominalError::NoRuns);
+        return Err(LogError::NoRuns);
     }
     let doubt = doubt(&learned, until_s, robot)?;
     let records = record::all(&learned, until_s, robot);
-    let tests = record::all(&left_out, until_s, robot);
     let command = excitation::ranges(&records, robot)?;
-    let exposure_s = records.iter().map(|record| record.moving_s()).sum();
+    let exposure_s = records.iter().map(Record::moving_s).sum();
     let provenance = Provenance {
         data_hash: data_hash(&learned, until_s),
         runs_learned: learned.iter().map(|run| run.id).collect(),
@@ -141,31 +138,30 @@ pub fn learn(
     report
         .warnings
         .extend(plausibility::slow(beginnings, robot));
-    let targets = terms::targets(robot);
-    if targets.is_empty() {
-        return Err(NominalError::NoChannels);
+    let all = targets(robot);
+    if all.is_empty() {
+        return Err(LogError::NoChannels);
     }
     let untold = untold(&records, &model, robot)?;
-    report.untold(&untold, &model, robot);
-    let (train, test) = parts(&records, &tests);
-    let all = whole(&records);
-    for (target, mut terms) in targets {
-        let name = report::name(target, &model.wheels);
-        let untold = &untold[usize::from(target.quantity.is_pose())];
+    report.untold(&untold, &model);
+    let scales = Scales::new(model.sizes(), drives(robot), robot.interval_s);
+    let mut models = excitation::of_parts(&records, &model);
+    for (place, target) in all.iter().enumerate() {
+        let mut terms = terms::of(target, robot);
         terms.retain(|term| !untold.contains(term));
-        let (trial, _) = fit(&model, target, &terms, &train, &name)?;
-        let ratio = noise::whitened_rms(&trial, &test, &model);
-        let (mut channel, drift_sd) = fit(&model, target, &terms, &all, &name)?;
-        channel.held_out_ratio = ratio;
-        let widen = model.widened * ratio.max(1.0);
-        channel.variance = channel.variance.map(|variance| variance * widen * widen);
-        channel.rest_sd *= widen;
-        report.add(&name, &channel, widen);
-        let key = format!("channel[{}]", model.channel.len());
-        noise::tell(&mut report.bounds, &key, &channel, &all, widen, drift_sd);
+        let (channel, of_parts) = fit(target, place, &terms, &records, (&models, &scales))?;
+        report.add(&channel, &target.unit);
         model.channel.push(channel);
+        for (part, channel) in models.iter_mut().zip(of_parts) {
+            part.channel.push(channel);
+        }
     }
-    calibrate::fit(&mut model, &records, robot);
+    joint::fit(&mut model, &models, &records, &scales);
+    for part in &mut models {
+        part.direction.clone_from(&model.direction);
+        part.scatter.clone_from(&model.scatter);
+    }
+    calibrate::fit(&mut model, &mut models, &records, robot);
     calibrate::tell(&mut report.bounds, &model);
     report.finish(&model);
     Ok((model.sealed(), report))
@@ -183,32 +179,29 @@ fn blank(
         version: VERSION,
         hash: String::new(),
         robot: robot.name.clone(),
-        wheels: robot
-            .wheels
-            .iter()
-            .map(|wheel| wheel.name.clone())
-            .collect(),
         interval_s: robot.interval_s,
         exposure_s,
         widened: widening(exposure_s, robot.interval_s),
         provenance,
         command,
         channel: Vec::new(),
-        joint: Vec::new(),
+        direction: Vec::new(),
+        scatter: Scatter::default(),
+        tail: Vec::new(),
         calibration: Vec::new(),
     }
 }
 
 /// What is doubtful about a few of the runs, as on ground that lets a robot slip; where half of
 /// them and more are doubtful, the columns are, and refused.
-fn doubt(runs: &[&Run], until_s: f64, robot: &Description) -> Result<Option<String>, NominalError> {
+fn doubt(runs: &[&Run], until_s: f64, robot: &Description) -> Result<Option<String>, LogError> {
     let checks = runs.iter().map(|run| RunCheck::new(run, robot, until_s));
     let judged: Vec<RunCheck> = checks.filter(|check| check.is_judged).collect();
     let all = judged.len();
     let doubts: Vec<RunDoubt> = judged.into_iter().filter_map(|c| c.doubt).collect();
     let found = doubts.len();
     match doubts.into_iter().next() {
-        Some(doubt) if 2 * found >= all => Err(NominalError::Doubtful(doubt)),
+        Some(doubt) if 2 * found >= all => Err(LogError::Doubtful(doubt)),
         Some(doubt) => Ok(Some(format!(
             "{found} of {all} runs are doubtful and learned from nevertheless: {doubt}"
         ))),
@@ -216,62 +209,48 @@ fn doubt(runs: &[&Run], until_s: f64, robot: &Description) -> Result<Option<Stri
     }
 }
 
-/// Products of powers of the command that the log does not tell: for what is looked at in all
-/// motion, and for a pose.
-fn untold(
-    records: &[Record],
-    model: &Model,
-    robot: &Description,
-) -> Result<[Vec<Term>; 2], NominalError> {
-    let untold = [0.0, noise::SETTLED_S].map(|steady_s| {
-        let commands = excitation::settled(records, &model.command, steady_s);
-        told::untold(&terms::command(robot), &commands, &model.command)
-    });
-    let axis = untold[0].iter().find_map(told::single);
+/// Products of powers of the command that the log does not tell.
+fn untold(records: &[Record], model: &Model, robot: &Description) -> Result<Vec<Term>, LogError> {
+    let commands = excitation::settled(records, &model.command);
+    let untold = told::untold(&terms::command(robot), &commands, &model.command);
+    let axis = untold.iter().find_map(told::single);
     match axis.and_then(|axis| model.command.get(axis)) {
-        Some(range) => Err(NominalError::Follows {
+        Some(range) => Err(LogError::Follows {
             axis: range.name.clone(),
         }),
         None => Ok(untold),
     }
 }
 
-/// What to learn from and what to test on: runs left out, or every third block of each.
-fn parts<'a>(records: &'a [Record], tests: &'a [Record]) -> (Vec<Part<'a>>, Vec<Part<'a>>) {
-    match tests.is_empty() {
-        true => records.iter().map(|record| record.split(BLOCKS)).unzip(),
-        false => (whole(records), whole(tests)),
-    }
-}
-
-fn whole(records: &[Record]) -> Vec<Part<'_>> {
-    records.iter().map(Record::whole).collect()
-}
-
-/// Fits weights and noise of one channel; with the drift of its offset that the log shows.
+/// Fits weights and noise of one channel; with its models of the parts' others.
 fn fit(
-    model: &Model,
-    target: Target,
+    target: &Target,
+    place: usize,
     terms: &[Term],
-    records: &[Part<'_>],
-    name: &str,
-) -> Result<(Channel, f64), NominalError> {
+    records: &[Record],
+    (parts, scales): (&[Model], &Scales),
+) -> Result<(Channel, Vec<Channel>), LogError> {
     let mut channel = Channel {
-        target,
+        name: target.name.clone(),
         terms: terms.to_vec(),
         weights: vec![0.0; terms.len()],
-        variance: [1.0, 0.0, 0.0],
-        correlation: 0.0,
-        offset_sd: 0.0,
-        drift_sd: 0.0,
-        rest_sd: 0.0,
-        scatter: 1.0,
+        variance: [0.0; 3],
+        context_sd: [0.0; 2],
+        usual: 0.0,
         held_out_ratio: 1.0,
-        tails: Vec::new(),
     };
-    regression::fit(&mut channel, records, &model.sizes(), name)?;
-    let drift_sd = noise::fit(&mut channel, records, model);
-    Ok((channel, drift_sd))
+    let mut models = vec![channel.clone(); FOLDS];
+    regression::fit(&mut channel, place, records, None, scales)?;
+    for (fold, model) in models.iter_mut().enumerate() {
+        regression::fit(model, place, records, Some(fold), scales)?;
+    }
+    let ranges: Vec<&[Range]> = parts.iter().map(|part| part.command.as_slice()).collect();
+    noise::fit(&mut channel, (&models, &ranges), place, records, scales);
+    for model in &mut models {
+        model.context_sd = channel.context_sd;
+        (model.variance, model.usual) = (channel.variance, channel.usual);
+    }
+    Ok((channel, models))
 }
 
 /// Factor on the deviations of a short log: two standard errors of a deviation from so many

@@ -1,17 +1,15 @@
-//! A nominal model for people to read: text, or the same as one document.
+//! A model of channels for people to read: text, or the same as one document.
 
 use std::fmt;
 
 use serde::Serialize;
-use vigil_robot::learned::Form;
-use vigil_robot::learned::channels::Channels;
-use vigil_robot::nominal::{self, Joint, Model, Range, Tail};
+use vigil_robot::channel_model::model::Tail;
+use vigil_robot::channel_model::{self, Model, Range};
 
-use super::report;
 use super::terms::word;
 use crate::model_view::{Alarm, Source};
 
-/// A nominal model, readable. `Display` prints it as text.
+/// A model of channels, readable. `Display` prints it as text.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct View {
     /// What it is of, and where it comes from.
@@ -27,36 +25,20 @@ pub struct View {
     pub command: Vec<Range>,
     /// Channels.
     pub channels: Vec<Channel>,
-    /// Tails of all channels of a set together.
-    pub joint: Vec<Joint>,
+    /// Tails of the classes of faults.
+    pub tails: Vec<Tail>,
     /// Alarm thresholds.
     pub alarms: Vec<Alarm>,
-    /// For each form of the detection filter the highest log-odds that a lasting fault reaches: an
-    /// alarm above them is refused.
-    pub reachable: Vec<Reachable>,
-}
-
-/// The highest log-odds of a form.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Reachable {
-    /// Form of the detection filter.
-    pub form: &'static str,
-    /// The highest log-odds, by all channels.
-    pub log_odds: f64,
 }
 
 /// One channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Channel {
-    /// Name.
-    pub name: String,
-    /// Its unit.
-    pub unit: &'static str,
     /// The prediction in words.
     pub prediction: String,
     /// Everything as the file has it.
     #[serde(flatten)]
-    pub learned: nominal::Channel,
+    pub learned: channel_model::Channel,
 }
 
 impl View {
@@ -65,21 +47,15 @@ impl View {
     pub fn new(model: &Model, fault_rate_1_h: f64) -> Self {
         let source = Source {
             robot: model.robot.clone(),
-            wheels: model.wheels.clone(),
+            wheels: Vec::new(),
             layout_version: model.version,
             model_hash: format!("{:016x}", model.hash()),
             edited: model.is_edited(),
             provenance: model.provenance.clone(),
         };
-        let channel = |channel: &nominal::Channel| Channel {
-            name: report::name(channel.target, &model.wheels),
-            unit: report::unit(channel.target.quantity),
+        let channel = |channel: &channel_model::Channel| Channel {
             prediction: prediction(channel, model),
             learned: channel.clone(),
-        };
-        let reachable = |form: Form| Reachable {
-            form: form.name(),
-            log_odds: model.log_odds_max(Channels::PoseEncoders, form, fault_rate_1_h),
         };
         Self {
             source,
@@ -88,15 +64,14 @@ impl View {
             widened: model.widened,
             command: model.command.clone(),
             channels: model.channel.iter().map(channel).collect(),
-            joint: model.joint.clone(),
+            tails: model.tail.clone(),
             alarms: Alarm::all(&model.calibration, fault_rate_1_h),
-            reachable: Form::ALL.map(reachable).to_vec(),
         }
     }
 }
 
 /// Weights and terms of a channel.
-fn prediction(channel: &nominal::Channel, model: &Model) -> String {
+fn prediction(channel: &channel_model::Channel, model: &Model) -> String {
     let terms = channel.terms.iter().zip(&channel.weights);
     let terms = terms.map(|(term, weight)| match word(term, model) {
         word if word.is_empty() => format!("{weight:+.4}"),
@@ -131,56 +106,36 @@ impl fmt::Display for View {
         writeln!(
             f,
             "\nchannels, each a mean over {} s and predicted by weights of the command (each axis \
-             divided by the\nlargest value learned from) and of wheel rates (rad/s); [-k]: k \
-             observations earlier; sd: at rest, of a\nrun's offset, and of its drift from one \
-             observation to the next",
+             divided by the\nlargest value learned from); [-k]: k observations earlier",
             self.interval_s
         )?;
-        for channel in &self.channels {
-            channel.write(f)?;
-        }
-        for joint in &self.joint {
-            let Tail {
-                level_log_odds,
-                interval_h,
-                slope,
-                ..
-            } = joint.tail;
+        for Channel {
+            prediction,
+            learned,
+        } in &self.channels
+        {
             writeln!(
                 f,
-                "\nall channels of {} together: log-odds above {level_log_odds:.2} every \
-                 {interval_h:.3} h without a fault, and more rarely by exp(-{slope:.2}) per unit",
-                joint.sensors
+                "\n{}\n  = {prediction}\n  sd {:.5} at rest; usual size {:.5}; on parts left out \
+                 {:.2} times as much",
+                learned.name,
+                learned.variance[0].sqrt(),
+                learned.usual,
+                learned.held_out_ratio
             )?;
         }
-        Alarm::write(&self.alarms, f)?;
-        write!(
-            f,
-            "\nhighest log-odds of a lasting fault, above which no alarm may lie"
-        )?;
-        for reachable in &self.reachable {
-            let Reachable { form, log_odds } = reachable;
-            write!(f, "\n  {form:<13} {log_odds:6.2}")?;
+        writeln!(f, "\nlog-odds without a fault, by class of faults")?;
+        for tail in &self.tails {
+            writeln!(
+                f,
+                "  {:<14} {:<8} above {:6.2} every {:.3} h, and more rarely by exp(-{:.2}) per unit",
+                tail.sensors,
+                format!("{:?}", tail.class).to_lowercase(),
+                tail.level_log_odds,
+                tail.interval_h,
+                tail.slope
+            )?;
         }
-        Ok(())
-    }
-}
-
-impl Channel {
-    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let learned = &self.learned;
-        writeln!(f, "\n{}, {}", self.name, self.unit)?;
-        writeln!(f, "  = {}", self.prediction)?;
-        writeln!(
-            f,
-            "  sd {:.5}, {:.5}, {:.5}; successive residuals correlated {:+.2}; scatter {:.2}; on \
-             the part left out {:.2} times as much",
-            learned.variance[0].sqrt(),
-            learned.offset_sd,
-            learned.drift_sd,
-            learned.correlation,
-            learned.scatter,
-            learned.held_out_ratio
-        )
+        Alarm::write(&self.alarms, f)
     }
 }

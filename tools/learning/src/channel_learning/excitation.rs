@@ -1,12 +1,12 @@
 //! Whether a log shows what a model must know.
 
 use vigil_robot::Description;
-use vigil_robot::nominal::AXES;
-use vigil_robot::nominal::{History, Range};
+use vigil_robot::channel_model::AXES;
+use vigil_robot::channel_model::{History, Model, Range};
 
-use super::NominalError;
+use super::LogError;
 use super::noise::MOVING_S;
-use super::record::Record;
+use super::record::{FOLDS, Record};
 use super::told::is_settled;
 use crate::correlation::correlation;
 
@@ -25,10 +25,10 @@ const DRIVEN_PART: f64 = 0.002;
 const GAP: f64 = 0.15;
 
 /// Ranges of the command in motion, and what was left out within them.
-pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Range>, NominalError> {
+pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Range>, LogError> {
     let found_s: f64 = records.iter().map(Record::moving_s).sum();
     if found_s < MOVING_MIN_S {
-        return Err(NominalError::Still {
+        return Err(LogError::Still {
             found_s,
             needed_s: MOVING_MIN_S,
         });
@@ -49,7 +49,7 @@ pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Rang
         );
         let needed = WIDTH_MIN * axis.limit;
         if max - min < needed {
-            return Err(NominalError::Unexcited {
+            return Err(LogError::Unexcited {
                 axis: axis.name.clone(),
                 unit: axis.unit.clone(),
                 min,
@@ -72,7 +72,7 @@ pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Rang
                 .collect();
             let correlation = correlation(&pairs);
             if correlation.abs() > TOGETHER {
-                return Err(NominalError::Together {
+                return Err(LogError::Together {
                     one: ranges[j].name.clone(),
                     other: ranges[i].name.clone(),
                     correlation,
@@ -80,7 +80,7 @@ pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Rang
             }
         }
     }
-    let settled = settled(records, &ranges, 0.0);
+    let settled = settled(records, &ranges);
     for (i, range) in ranges.iter_mut().enumerate() {
         let mut values: Vec<f64> = settled.iter().map(|command| command[i]).collect();
         range.gaps = gaps(&mut values, range);
@@ -88,12 +88,37 @@ pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Rang
     Ok(ranges)
 }
 
-/// Commands that were kept up in motion, for `steady_s` at least.
-pub(super) fn settled(records: &[Record], ranges: &[Range], steady_s: f64) -> Vec<[f64; AXES]> {
+/// For each part of the log a model with the ranges that were driven in the others.
+pub(super) fn of_parts(records: &[Record], model: &Model) -> Vec<Model> {
+    let part = |fold: usize| {
+        let mut part = model.clone();
+        let others = || {
+            let all = records
+                .iter()
+                .flat_map(|r| r.histories.iter().zip(&r.folds));
+            let others = all.filter(move |(_, other)| **other != fold);
+            others.filter_map(|(history, _)| history.ago(0).filter(|now| now.moving))
+        };
+        for (i, range) in part.command.iter_mut().enumerate() {
+            let values = others().map(|now| now.command[i]);
+            let (min, max) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), x| {
+                (min.min(x), max.max(x))
+            });
+            if min < max {
+                (range.min, range.max) = (min, max);
+            }
+        }
+        part
+    };
+    (0..FOLDS).map(part).collect()
+}
+
+/// Commands that were kept up in motion.
+pub(super) fn settled(records: &[Record], ranges: &[Range]) -> Vec<[f64; AXES]> {
     let histories = records.iter().flat_map(|record| &record.histories);
     let command = |history: &History| {
         let now = history.ago(0)?;
-        let counts = now.moving && now.moving_s >= MOVING_S && now.steady_s >= steady_s;
+        let counts = now.moving && now.moving_s >= MOVING_S;
         (counts && is_settled(history, ranges)).then_some(now.command)
     };
     histories.filter_map(command).collect()

@@ -1,19 +1,19 @@
 //! Frames averaged into observations, for robots of any kind.
 
-use vigil_blocks::{SensorFrame, WHEELS};
+use vigil_blocks::{CHANNELS, SensorFrame};
 use vigil_inference::angle::wrap;
 
-use super::AXES;
+use super::component::{Quantity, Target, targets};
+use super::{AXES, CHANNELS_MAX};
 use crate::channel_map::ChannelMap;
 use crate::description::Description;
-use crate::frame_guard::{BEYOND_LIMITS, CURRENT_MAX_A};
+use crate::frame_guard::BEYOND_LIMITS;
 use crate::learned::FrameOutcome;
 use crate::learned::observer::STALE_MAX;
 
 /// Observations that a prediction may look back, the newest included.
-pub const DEPTH: usize = 5;
-/// A pause between frames longer than this breaks the record, s. As far as a prediction looks back:
-/// five observations of 0.1 s.
+pub const DEPTH: usize = 9;
+/// A pause between frames longer than this breaks the record, s, unless an observation is longer.
 const GAP_S: f64 = 0.5;
 /// A frame that comes this part of a period early still completes an observation. Half: it ends at
 /// the frame that is nearest to the learned interval.
@@ -26,7 +26,7 @@ const POSE_MAX: f64 = 1e7;
 const CHANGE: f64 = 0.1;
 
 /// What was measured over one interval.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
     /// Capture time of its last frame, ns.
     pub t_ns: u64,
@@ -36,28 +36,29 @@ pub struct Observation {
     pub command: [f64; AXES],
     /// Commanded speed of the fastest point of the robot, m/s.
     pub path_speed_m_s: f64,
-    /// Mean yaw rate, rad/s.
-    pub yaw_rate: Option<f64>,
-    /// Mean wheel rates, rad/s.
-    pub wheels: [Option<f64>; WHEELS],
-    /// Mean motor currents, A.
-    pub currents: [Option<f64>; WHEELS],
-    /// Displacement along and across (left) the commanded direction, and turn (rad), each per
-    /// commanded metre of path; none without pose or command.
-    pub per_metre: Option<[f64; 3]>,
-    /// True if a pose was measured at its beginning and at its end.
-    pub has_pose: bool,
-    /// Velocity of the pose while no motion is commanded: forward m/s, left m/s, turn rad/s; none
-    /// without pose.
-    pub drift: Option<[f64; 3]>,
+    /// What each channel measured, in the order of [`targets`]; none if it did not.
+    pub values: [Option<f64>; CHANNELS_MAX],
     /// True if the robot is told to move, or its wheels turn.
     pub moving: bool,
     /// How long it has been moving, s.
     pub moving_s: f64,
     /// How long the command has hardly changed, s.
     pub steady_s: f64,
-    /// How long no motion has been commanded, s.
-    pub rest_s: f64,
+}
+
+impl Default for Observation {
+    fn default() -> Self {
+        Self {
+            t_ns: 0,
+            dt_s: 0.0,
+            command: [0.0; AXES],
+            path_speed_m_s: 0.0,
+            values: [None; CHANNELS_MAX],
+            moving: false,
+            moving_s: 0.0,
+            steady_s: 0.0,
+        }
+    }
 }
 
 /// The last few observations of one unbroken record.
@@ -76,6 +77,12 @@ impl History {
         } else {
             None
         }
+    }
+
+    /// The command so many observations before the newest; before the record began the first one.
+    #[must_use]
+    pub fn command(&self, lag: usize) -> &[f64; AXES] {
+        &self.last[lag.min(self.count.max(1) - 1)].command
     }
 
     /// Adds the newest.
@@ -116,6 +123,7 @@ impl Mean {
 pub struct Observer {
     robot: Description,
     map: ChannelMap,
+    targets: Vec<Target>,
     history: History,
     started: bool,
     run_id: u64,
@@ -123,9 +131,7 @@ pub struct Observer {
     reset_count: u32,
     elapsed_s: f64,
     command: [Mean; AXES],
-    yaw_rate: Mean,
-    wheels: [Mean; WHEELS],
-    currents: [Mean; WHEELS],
+    means: [Mean; CHANNELS_MAX],
     pose: Option<[f64; 3]>,
     pose_before: Option<[f64; 3]>,
     /// Frames in a row that were not newer than the last one taken.
@@ -138,6 +144,7 @@ impl Observer {
     pub fn new(robot: &Description) -> Self {
         Self {
             map: ChannelMap::new(robot),
+            targets: targets(robot),
             robot: robot.clone(),
             history: History::default(),
             started: false,
@@ -146,9 +153,7 @@ impl Observer {
             reset_count: 0,
             elapsed_s: 0.0,
             command: [Mean::default(); AXES],
-            yaw_rate: Mean::default(),
-            wheels: [Mean::default(); WHEELS],
-            currents: [Mean::default(); WHEELS],
+            means: [Mean::default(); CHANNELS_MAX],
             pose: None,
             pose_before: None,
             stale: 0,
@@ -183,10 +188,11 @@ impl Observer {
         } else {
             t_ns.saturating_sub(self.t_ns) as f64 * 1e-9
         };
-        let broken = new_run || is_stale || dt_s > GAP_S;
+        let broken = new_run || is_stale || dt_s > GAP_S.max(2.0 * self.robot.interval_s);
         self.stale = 0;
         if broken {
-            self.begin();
+            self.history.clear();
+            self.clear();
         }
         if broken || frame.pose_reset_count != self.reset_count {
             (self.pose, self.pose_before) = (None, None);
@@ -216,17 +222,10 @@ impl Observer {
         }
     }
 
-    fn begin(&mut self) {
-        self.history.clear();
-        self.clear();
-    }
-
     fn clear(&mut self) {
         self.elapsed_s = 0.0;
         self.command = [Mean::default(); AXES];
-        self.yaw_rate = Mean::default();
-        self.wheels = [Mean::default(); WHEELS];
-        self.currents = [Mean::default(); WHEELS];
+        self.means = [Mean::default(); CHANNELS_MAX];
     }
 
     /// Adds a frame's readings; true if one was refused.
@@ -241,14 +240,10 @@ impl Observer {
             let largest = BEYOND_LIMITS * axis.limit;
             push(&mut self.command[i], frame.commanded(i), largest);
         }
-        let limits = &self.robot.limits;
-        let largest = BEYOND_LIMITS * limits.yaw_rate_rad_s;
-        push(&mut self.yaw_rate, self.map.yaw_rate(frame), largest);
-        for i in 0..self.robot.wheels.len().min(WHEELS) {
-            let (rate, current) = (self.map.wheel_rate(frame, i), self.map.current(frame, i));
-            let largest = BEYOND_LIMITS * limits.wheel_rate_rad_s;
-            push(&mut self.wheels[i], rate, largest);
-            push(&mut self.currents[i], current, CURRENT_MAX_A);
+        for (target, mean) in self.targets.iter().zip(&mut self.means) {
+            if target.place < CHANNELS {
+                push(mean, frame.measured(target.place), target.largest);
+            }
         }
         if let Some(pose) = self.map.pose(frame) {
             let sane = pose.iter().all(|value| value.abs() < POSE_MAX);
@@ -263,31 +258,28 @@ impl Observer {
         let mut now = Observation {
             t_ns: self.t_ns,
             dt_s: std::mem::take(&mut self.elapsed_s),
-            yaw_rate: self.yaw_rate.take(),
             ..Observation::default()
         };
         for (i, mean) in self.command.iter_mut().enumerate() {
             let before = last.map_or(0.0, |last| last.command[i]);
             now.command[i] = mean.take().unwrap_or(before);
         }
-        for i in 0..WHEELS {
-            now.wheels[i] = self.wheels[i].take();
-            now.currents[i] = self.currents[i].take();
+        let moved = self.moved();
+        let mut rolls = false;
+        let standing_m_s = self.robot.body.standing_m_s;
+        for (i, target) in self.targets.iter().enumerate() {
+            now.values[i] = match target.quantity {
+                Quantity::Forward => moved.map(|moved| moved[0] / now.dt_s),
+                Quantity::Lateral => moved.map(|moved| moved[1] / now.dt_s),
+                Quantity::Turn => moved.map(|moved| moved[2] / now.dt_s),
+                _ => self.means[i].take(),
+            };
+            let rate = now.values[i].filter(|_| target.quantity == Quantity::WheelRate);
+            rolls |= rate.is_some_and(|rate| rate.abs() * self.robot.wheel_radius_m > standing_m_s);
         }
         let twist = self.robot.twist(&now.command);
         now.path_speed_m_s = self.robot.path_speed_m_s(twist);
-        let standing_m_s = self.robot.body.standing_m_s;
-        let rolls = |rate: &f64| rate.abs() * self.robot.wheel_radius_m > standing_m_s;
-        now.moving = now.path_speed_m_s > standing_m_s || now.wheels.iter().flatten().any(rolls);
-        let moved = self.moved(twist);
-        now.has_pose = moved.is_some();
-        if now.path_speed_m_s < standing_m_s {
-            now.drift = moved.map(|moved| moved.map(|value| value / now.dt_s));
-            now.rest_s = last.map_or(0.0, |last| last.rest_s) + now.dt_s;
-        } else {
-            let path_m = now.path_speed_m_s * now.dt_s;
-            now.per_metre = moved.map(|moved| moved.map(|value| value / path_m));
-        }
+        now.moving = now.path_speed_m_s > standing_m_s || rolls;
         self.pose_before = self.pose.take();
         let changed = last.is_none_or(|last| {
             let axes = self.robot.command.iter().enumerate().take(AXES);
@@ -304,16 +296,11 @@ impl Observer {
         self.history.push(now);
     }
 
-    /// Displacement along and across the commanded direction, m, and turn, rad.
-    fn moved(&self, twist: [f64; 3]) -> Option<[f64; 3]> {
+    /// Displacement along and across (left) the mean heading, m, and turn, rad.
+    fn moved(&self) -> Option<[f64; 3]> {
         let (from, to) = (self.pose_before?, self.pose?);
         let turn = wrap(to[2] - from[2]);
-        let along = if twist[0].hypot(twist[1]) > self.robot.body.standing_m_s {
-            twist[1].atan2(twist[0])
-        } else {
-            0.0
-        };
-        let (sin, cos) = (from[2] + 0.5 * turn + along).sin_cos();
+        let (sin, cos) = (from[2] + 0.5 * turn).sin_cos();
         let (x, y) = (to[0] - from[0], to[1] - from[1]);
         Some([x * cos + y * sin, y * cos - x * sin, turn])
     }

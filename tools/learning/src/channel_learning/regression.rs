@@ -1,12 +1,11 @@
 //! Ridge regression with Huber weights.
 
 use nalgebra::{DMatrix, DVector};
-use vigil_robot::nominal::AXES;
-use vigil_robot::nominal::Channel;
+use vigil_robot::channel_model::{Channel, Scales};
 
-use super::NominalError;
+use super::LogError;
 use super::noise::counts;
-use super::record::Part;
+use super::record::Record;
 
 /// Ridge, per observation, on standardised terms: keeps terms that move together from growing
 /// against each other.
@@ -14,40 +13,35 @@ const RIDGE: f64 = 1e-4;
 /// Residuals beyond so many robust deviations get less weight.
 const HUBER: f64 = 3.0;
 /// Rounds of reweighting.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 4;
 /// Observations per weight.
 const PER_WEIGHT: usize = 3;
 
-/// Fits the channel's weights.
+/// Fits the channel's weights to all parts of the log but `left_out`.
 pub(super) fn fit(
     channel: &mut Channel,
-    records: &[Part<'_>],
-    sizes: &[f64; AXES],
-    name: &str,
-) -> Result<(), NominalError> {
+    place: usize,
+    records: &[Record],
+    left_out: Option<usize>,
+    scales: &Scales,
+) -> Result<(), LogError> {
     let (mut rows, mut values) = (Vec::new(), Vec::new());
-    for history in records
-        .iter()
-        .flat_map(|part| part.histories.iter().copied())
-    {
-        if !counts(history, channel) {
-            continue;
-        }
-        let value = history.ago(0).and_then(|now| channel.target.value(now));
-        let row: Option<Vec<f64>> = channel
-            .terms
-            .iter()
-            .map(|t| t.value(history, 0, sizes))
-            .collect();
-        if let (Some(value), Some(row)) = (value, row) {
-            rows.extend(row);
+    for record in records {
+        for (history, fold) in record.histories.iter().zip(&record.folds) {
+            let value = history.ago(0).and_then(|now| now.values[place]);
+            let Some(value) =
+                value.filter(|_| Some(*fold) != left_out && counts(history, scales.lags))
+            else {
+                continue;
+            };
+            rows.extend(channel.terms.iter().map(|term| term.value(history, scales)));
             values.push(value);
         }
     }
     let terms = channel.terms.len();
     if values.len() < PER_WEIGHT * terms {
-        return Err(NominalError::Few {
-            channel: name.to_owned(),
+        return Err(LogError::Few {
+            channel: channel.name.clone(),
             found: values.len(),
             needed: PER_WEIGHT * terms,
         });
@@ -77,11 +71,11 @@ fn solve(matrix: &DMatrix<f64>, values: &DVector<f64>) -> Option<DVector<f64>> {
         for (mut row, trust) in weighted.row_iter_mut().zip(trust.iter()) {
             row *= *trust;
         }
-        let mut normal = scaled.transpose() * &weighted;
+        let mut normal = scaled.tr_mul(&weighted);
         for i in 0..scale.len() {
             normal[(i, i)] += RIDGE * count;
         }
-        solution = normal.cholesky()?.solve(&(weighted.transpose() * values));
+        solution = normal.cholesky()?.solve(&weighted.tr_mul(values));
         let residual = values - &scaled * &solution;
         let mut sizes: Vec<f64> = residual.iter().map(|value| value.abs()).collect();
         let middle = sizes.len() / 2;

@@ -3,8 +3,8 @@
 //! Two speeds tell a line and no curve, however long each was driven. A fit that has a curve's term
 //! nevertheless bends it as its ridge likes, holds at these two speeds, and is wrong at all others.
 
-use vigil_robot::nominal::AXES;
-use vigil_robot::nominal::{History, Range, Regressor, Term};
+use vigil_robot::channel_model::AXES;
+use vigil_robot::channel_model::{History, Range, Regressor, Term};
 
 /// Part of what even driving over the whole range would show of a term, from which it counts as
 /// told.

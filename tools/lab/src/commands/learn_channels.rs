@@ -1,9 +1,9 @@
-//! `vigil learn` without labels: the nominal behaviour of any described robot.
+//! `vigil learn` without labels: a model of the channels of any described robot.
 
 use std::path::Path;
 
 use serde::Serialize;
-use vigil_learning::learning_nominal::{self, Report};
+use vigil_learning::channel_learning::{self, Report};
 use vigil_learning::split::split_runs;
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
@@ -57,7 +57,7 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
         false => split_runs(&ids, task.test_fraction, task.seed),
     };
     let (mut model, report) =
-        learning_nominal::learn(task.runs, &held_out, task.until_s, task.robot)
+        channel_learning::learn(task.runs, &held_out, task.until_s, task.robot)
             .map_err(|error| CommandError::usage(format!("{}: {error}", task.frames.display())))?;
     model.provenance = Provenance {
         frames_file: file_name(task.frames),

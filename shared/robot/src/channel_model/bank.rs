@@ -1,0 +1,472 @@
+//! Every fault of every component, weighed over the last few seconds.
+
+use vigil_inference::logspace::log_sum_exp;
+
+use super::component::{Quantity, Target};
+use super::fault_kind::{DRIVE_KINDS, FaultKind, SENSOR_KINDS};
+use super::law::{BLOCK_S, BLOCKS, Law, Row};
+use super::scatter::ScatterLaw;
+use super::window::{DELAY_BLOCKS, Window};
+use super::{CHANNELS_MAX, COMPONENTS_MAX};
+
+/// Kinds of a component at most.
+pub const KINDS_MAX: usize = SENSOR_KINDS.len();
+/// Log-ratio of what cannot be: no evidence for it at all.
+pub const IMPOSSIBLE: f64 = -700.0;
+
+/// Blocks of the window from which on a fault may have been there.
+const ONSETS: [usize; 6] = [0, 2, 4, 5, 6, 7];
+/// The same of faults that show in several channels.
+const JOINT_ONSETS: [usize; 3] = [0, 4, 6];
+/// Deviation of a gain from one.
+const GAIN_SD: f64 = 1.0;
+/// Deviation of a drive's share that is lost.
+const SHARE_SD: f64 = 0.5;
+/// Deviation of a bias over the channel's usual size in motion.
+const BIAS_SD: f64 = 0.5;
+const BIAS_DEVIATIONS: f64 = 10.0;
+/// Time in which a drift grows as large as a bias, s.
+const DRIFT_S: f64 = 4.0;
+/// Delays that are looked for, in blocks; one with a size of its own between them.
+const DELAYS: [f64; 4] = [0.5, 1.0, 2.0, DELAY_BLOCKS as f64];
+/// Deviation of an erratic sensor's readings, relative to that of a whole one given all others.
+const ERRATIC: f64 = 6.0;
+/// The value at which a sensor has frozen is one number more: its price in nats.
+const HELD: f64 = 2.0;
+/// Silence after which a channel is missing, s, and how much that says.
+const MISSING_S: f64 = 1.0;
+const MISSING: f64 = 30.0;
+/// Deviations of a robot with which something is wrong that no single fault explains, relative to
+/// those of a healthy one.
+const UNKNOWN: f64 = 2.0;
+
+/// What the window says of a fault.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Weighed {
+    /// Logarithm of how much more likely the window is with it than without.
+    pub log_ratio: f64,
+    /// Its size.
+    pub size: f64,
+    /// Deviation of the size.
+    pub size_sd: f64,
+    /// For how long it has been there at most, s.
+    pub age_s: f64,
+}
+
+impl Weighed {
+    const NONE: Self = Self {
+        log_ratio: IMPOSSIBLE,
+        size: 0.0,
+        size_sd: 0.0,
+        age_s: 0.0,
+    };
+
+    /// A mean over onsets that are equally probable: the likeliest one gives the size.
+    fn over<const N: usize>(onsets: [Self; N]) -> Self {
+        let best = onsets.into_iter().fold(Self::NONE, |best, one| {
+            if one.log_ratio > best.log_ratio {
+                one
+            } else {
+                best
+            }
+        });
+        Self {
+            log_ratio: log_sum_exp(&onsets.map(|one| one.log_ratio)) - (N as f64).ln(),
+            ..best
+        }
+    }
+}
+
+/// The bank.
+#[derive(Debug, Clone)]
+pub struct Bank {
+    window: Window,
+    /// The law of windows that begin with each block.
+    laws: Vec<Law>,
+    first: usize,
+    scatter: Option<ScatterLaw>,
+    /// Of each channel: what it is, its component, and its usual size.
+    channels: Vec<(Target, usize, f64)>,
+    /// Component of each drive, and its wheel.
+    drives: Vec<(usize, Option<usize>)>,
+    silent_s: [f64; CHANNELS_MAX],
+    weighed: [[Weighed; KINDS_MAX]; COMPONENTS_MAX],
+    unknown: f64,
+}
+
+impl Bank {
+    /// A bank over a window and its laws.
+    #[must_use]
+    pub fn new(
+        window: Window,
+        (laws, scatter): (Vec<Law>, Option<ScatterLaw>),
+        channels: Vec<(Target, usize, f64)>,
+        drives: Vec<(usize, Option<usize>)>,
+    ) -> Self {
+        Self {
+            window,
+            laws,
+            first: 0,
+            scatter,
+            channels,
+            drives,
+            silent_s: [0.0; CHANNELS_MAX],
+            weighed: [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX],
+            unknown: IMPOSSIBLE,
+        }
+    }
+
+    /// Forgets the run.
+    pub fn reset(&mut self) {
+        self.clear();
+        self.window.reset();
+    }
+
+    /// Component of each channel.
+    pub fn components(&self) -> impl Iterator<Item = usize> + '_ {
+        self.channels.iter().map(|(_, component, _)| *component)
+    }
+
+    /// Begins a new record.
+    pub fn clear(&mut self) {
+        self.window.clear();
+        self.silent_s = [0.0; CHANNELS_MAX];
+        self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
+        self.unknown = IMPOSSIBLE;
+    }
+
+    /// The window, to be filled.
+    pub const fn window_mut(&mut self) -> &mut Window {
+        &mut self.window
+    }
+
+    /// The window.
+    #[must_use]
+    pub const fn window(&self) -> &Window {
+        &self.window
+    }
+
+    /// What is said of each kind of a component's faults.
+    #[must_use]
+    pub const fn weighed(&self, component: usize) -> &[Weighed; KINDS_MAX] {
+        &self.weighed[component]
+    }
+
+    /// What is said of faults that are none of these.
+    #[must_use]
+    pub const fn unknown(&self) -> f64 {
+        self.unknown
+    }
+
+    /// Square of the residuals over their number.
+    #[must_use]
+    pub fn mean_square(&self) -> f64 {
+        self.law().square() / self.law().values() as f64
+    }
+
+    /// The law of the window as it is.
+    fn law(&self) -> &Law {
+        &self.laws[self.first.min(self.laws.len() - 1)]
+    }
+
+    /// Weighs all faults; `measured`: what of the channels the newest observation holds, which
+    /// lasted `dt_s`.
+    pub fn weigh(&mut self, measured: impl Fn(usize) -> bool, dt_s: f64) {
+        let n = self.channels.len();
+        self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
+        self.unknown = IMPOSSIBLE;
+        self.first = BLOCKS - self.window.whole_blocks();
+        if self.first >= self.laws.len() {
+            return;
+        }
+        let first = self.first;
+        self.laws[first].take(&self.window.z[..n]);
+        if let Some(scatter) = &mut self.scatter {
+            scatter.take(&self.window.roughness[..n]);
+        }
+        for channel in 0..n {
+            self.silent_s[channel] = match measured(channel) {
+                true => 0.0,
+                false => self.silent_s[channel] + dt_s,
+            };
+            self.weigh_sensor(channel);
+        }
+        for drive in 0..self.drives.len() {
+            self.weigh_drive(drive);
+        }
+        self.unknown = self.law().log_ratio_scaled(UNKNOWN);
+    }
+
+    fn weigh_sensor(&mut self, channel: usize) {
+        let (target, component, usual) = &self.channels[channel];
+        let (quantity, component) = (target.quantity, *component);
+        let usual = *usual;
+        // The velocities of one pose share a component.
+        let shares = self
+            .channels
+            .iter()
+            .filter(|(_, other, _)| *other == component);
+        let price = (shares.count().max(1) as f64).ln();
+        let found: [Weighed; KINDS_MAX] =
+            std::array::from_fn(|k| self.sensor(channel, SENSOR_KINDS[k], (quantity, usual)));
+        for (slot, found) in self.weighed[component].iter_mut().zip(found) {
+            let log_ratio = found.log_ratio - price;
+            let sum = log_sum_exp(&[slot.log_ratio, log_ratio]);
+            if log_ratio > slot.log_ratio {
+                *slot = found;
+            }
+            slot.log_ratio = sum.max(IMPOSSIBLE);
+        }
+    }
+
+    fn sensor(
+        &self,
+        channel: usize,
+        kind: FaultKind,
+        (quantity, usual): (Quantity, f64),
+    ) -> Weighed {
+        let window = &self.window;
+        let (unit, predicted) = (&window.unit[channel], &window.predicted[channel]);
+        // A sensor that repeats itself is not as rough as it was.
+        let still = || {
+            let newest = self.window.newest_roughness[channel];
+            self.scatter
+                .as_ref()
+                .map_or(0.0, |scatter| scatter.still(channel, newest))
+        };
+        // A bias may be as large as what is measured, or as many deviations.
+        let units = unit
+            .iter()
+            .fold(0.0, |sum, unit| sum + unit / BLOCKS as f64);
+        let deviation = if units > 0.0 { 1.0 / units } else { 0.0 };
+        let bias_sd = BIAS_SD * usual.hypot(BIAS_DEVIATIONS * deviation);
+        match kind {
+            FaultKind::Bias => self.added(channel, unit, bias_sd),
+            FaultKind::Gain => {
+                let change = self.added(channel, predicted, GAIN_SD);
+                Weighed {
+                    size: 1.0 + change.size,
+                    ..change
+                }
+            }
+            // The velocity of a pose that drifts is biased, and one that stands is zero.
+            FaultKind::Drift | FaultKind::Frozen if quantity.is_pose() => Weighed::NONE,
+            FaultKind::Drift => self.drifting(channel, bias_sd / DRIFT_S),
+            FaultKind::Frozen => self.replaced(
+                channel,
+                |first, block| {
+                    let (mut sum, mut count) = (0.0, 0.0);
+                    for k in first..BLOCKS {
+                        if unit[k] > 0.0 {
+                            sum += (self.law().row(channel)[k] + predicted[k]) / unit[k];
+                            count += 1.0;
+                        }
+                    }
+                    let held = if count > 0.0 { sum / count } else { 0.0 };
+                    held * unit[block] - predicted[block]
+                },
+                HELD - still(),
+            ),
+            FaultKind::Zero => self.replaced(channel, |_, block| -predicted[block], -still()),
+            FaultKind::Delay => self.delayed(channel),
+            FaultKind::Erratic => self.erratic(channel),
+            FaultKind::Noise => self.scatter.as_ref().map_or(Weighed::NONE, |scatter| {
+                let (log_ratio, size, size_sd) = scatter.rise(|i| i == channel);
+                Weighed {
+                    log_ratio,
+                    size,
+                    size_sd,
+                    age_s: BLOCK_S * BLOCKS as f64,
+                }
+            }),
+            FaultKind::Missing if self.silent_s[channel] > MISSING_S => Weighed {
+                log_ratio: MISSING,
+                age_s: self.silent_s[channel],
+                ..Weighed::NONE
+            },
+            _ => Weighed::NONE,
+        }
+    }
+
+    /// A change of so much times the signature, with a size of this deviation.
+    fn sized(&self, [b, a]: [f64; 2], size_sd: f64, first: usize) -> Weighed {
+        let prior = 1.0 / (size_sd * size_sd).max(1e-300);
+        let (precision, penalty) = (a + prior, 0.5 * (1.0 + a / prior).ln());
+        let less = b * b / precision;
+        Weighed {
+            log_ratio: self.law().log_ratio(less, penalty),
+            size: b / precision,
+            size_sd: (self.law().variance_scale(less) / precision).sqrt(),
+            age_s: BLOCK_S * self.law().blocks(first) as f64,
+        }
+    }
+
+    fn added(&self, channel: usize, signature: &Row, size_sd: f64) -> Weighed {
+        let changes = self.law().change(channel, signature);
+        Weighed::over(ONSETS.map(|first| self.sized(changes[first], size_sd, first)))
+    }
+
+    fn drifting(&self, channel: usize, size_sd: f64) -> Weighed {
+        let unit = &self.window.unit[channel];
+        Weighed::over(JOINT_ONSETS.map(|first| {
+            let grown: Row = std::array::from_fn(|block| {
+                let blocks = block.saturating_sub(first) as f64 + 0.5;
+                if block < first {
+                    0.0
+                } else {
+                    unit[block] * BLOCK_S * blocks
+                }
+            });
+            self.sized(self.law().change(channel, &grown)[0], size_sd, first)
+        }))
+    }
+
+    fn delayed(&self, channel: usize) -> Weighed {
+        let tried = DELAYS.map(|blocks| {
+            let late = self.window.delayed(channel, blocks);
+            let changes = self.law().change(channel, &late);
+            let of = |first: usize| {
+                let [b, a] = changes[first];
+                self.law().log_ratio(2.0 * b - a, 0.0)
+            };
+            Weighed {
+                log_ratio: log_sum_exp(&JOINT_ONSETS.map(of)) - (JOINT_ONSETS.len() as f64).ln(),
+                size: BLOCK_S * blocks,
+                size_sd: 0.25 * BLOCK_S * blocks,
+                age_s: BLOCK_S * BLOCKS as f64,
+            }
+        });
+        let weights = tried.map(|one| one.log_ratio);
+        let total = log_sum_exp(&weights);
+        let share = |one: &Weighed| (one.log_ratio - total).exp();
+        let size: f64 = tried.iter().map(|one| share(one) * one.size).sum();
+        let apart = |one: &Weighed| {
+            let apart = one.size - size;
+            share(one) * (apart * apart + one.size_sd * one.size_sd)
+        };
+        Weighed {
+            log_ratio: total - (DELAYS.len() as f64).ln(),
+            size,
+            size_sd: tried.iter().map(apart).sum::<f64>().sqrt(),
+            age_s: BLOCK_S * BLOCKS as f64,
+        }
+    }
+
+    /// Readings that say nothing of the truth, but are this.
+    fn replaced(&self, channel: usize, read: impl Fn(usize, usize) -> f64, price: f64) -> Weighed {
+        let z = self.law().row(channel);
+        Weighed::over(ONSETS.map(|first| {
+            let (less, _) = self.law().deviation(channel, first);
+            let apart: Row = std::array::from_fn(|block| match block < first {
+                true => 0.0,
+                false => z[block] - read(first, block),
+            });
+            let left = self.law().own_square(channel, &apart);
+            Weighed {
+                log_ratio: self.law().log_ratio(less - left, price),
+                age_s: BLOCK_S * self.law().blocks(first) as f64,
+                ..Weighed::NONE
+            }
+        }))
+    }
+
+    fn erratic(&self, channel: usize) -> Weighed {
+        Weighed::over(ONSETS.map(|first| {
+            let (less, _) = self.law().deviation(channel, first);
+            let penalty = self.law().blocks(first) as f64 * ERRATIC.ln();
+            let less = less * (1.0 - 1.0 / (ERRATIC * ERRATIC));
+            Weighed {
+                log_ratio: self.law().log_ratio(less, penalty),
+                age_s: BLOCK_S * self.law().blocks(first) as f64,
+                ..Weighed::NONE
+            }
+        }))
+    }
+
+    fn weigh_drive(&mut self, drive: usize) {
+        let (component, wheel) = self.drives[drive];
+        for (k, kind) in DRIVE_KINDS.into_iter().enumerate() {
+            self.weighed[component][k] = self.drive(drive, wheel, kind);
+        }
+    }
+
+    fn drive(&self, drive: usize, wheel: Option<usize>, kind: FaultKind) -> Weighed {
+        let is_own = |i: usize| wheel.is_some() && self.channels[i].0.wheel == wheel;
+        let own_rate = |i: usize| is_own(i) && self.channels[i].0.quantity == Quantity::WheelRate;
+        match kind {
+            FaultKind::Stuck => self.stuck(drive, wheel),
+            FaultKind::Loss => self.moved(&self.window.share[drive], -1.0, |_| true),
+            // Where nothing tells the wheel's rate, this is the same as a loss.
+            FaultKind::Slip if !(0..self.channels.len()).any(own_rate) => Weighed::NONE,
+            FaultKind::Slip => self.moved(&self.window.share[drive], -1.0, |i| !own_rate(i)),
+            FaultKind::Offset => {
+                let found = self.moved(&self.window.offset[drive], 1.0, |_| true);
+                Weighed {
+                    size: 0.1 * found.size,
+                    size_sd: 0.1 * found.size_sd,
+                    ..found
+                }
+            }
+            FaultKind::Rough if (0..self.channels.len()).any(is_own) => {
+                self.scatter.as_ref().map_or(Weighed::NONE, |scatter| {
+                    let (log_ratio, size, size_sd) = scatter.rise(is_own);
+                    Weighed {
+                        log_ratio,
+                        size,
+                        size_sd,
+                        age_s: BLOCK_S * BLOCKS as f64,
+                    }
+                })
+            }
+            _ => Weighed::NONE,
+        }
+    }
+
+    /// A drive that stands still: what it moves lacks its whole part, and its motor's current says
+    /// nothing.
+    fn stuck(&self, drive: usize, wheel: Option<usize>) -> Weighed {
+        let n = self.channels.len();
+        let share = &self.window.share[drive];
+        let of_motor = |i: &usize| {
+            let target = &self.channels[*i].0;
+            wheel.is_some() && target.wheel == wheel && target.quantity == Quantity::Current
+        };
+        let silent = (0..n).find(of_motor);
+        let (free, price) = silent.map_or((0.0, 0.0), |silent| {
+            let (less, _) = self.law().deviation(silent, 0);
+            let less = less * (1.0 - 1.0 / (ERRATIC * ERRATIC));
+            (less, self.law().blocks(0) as f64 * ERRATIC.ln())
+        });
+        let mut rows = [[0.0; BLOCKS]; CHANNELS_MAX];
+        Weighed::over(JOINT_ONSETS.map(|first| {
+            for i in (0..n).filter(|i| Some(*i) != silent) {
+                rows[i] = std::array::from_fn(|block| match block >= first {
+                    true => -share[i][block],
+                    false => 0.0,
+                });
+            }
+            let [b, a] = self.law().joint_change(&rows[..n], silent);
+            Weighed {
+                log_ratio: self.law().log_ratio(free + 2.0 * b - a, price),
+                age_s: BLOCK_S * self.law().blocks(first) as f64,
+                ..Weighed::NONE
+            }
+        }))
+    }
+
+    /// A change of several channels.
+    fn moved(&self, signature: &[Row], sign: f64, shows: impl Fn(usize) -> bool) -> Weighed {
+        let n = self.channels.len();
+        let mut rows = [[0.0; BLOCKS]; CHANNELS_MAX];
+        Weighed::over(JOINT_ONSETS.map(|first| {
+            for i in 0..n {
+                let shown = shows(i);
+                rows[i] = std::array::from_fn(|block| match shown && block >= first {
+                    true => sign * signature[i][block],
+                    false => 0.0,
+                });
+            }
+            self.sized(self.law().joint_change(&rows[..n], None), SHARE_SD, first)
+        }))
+    }
+}

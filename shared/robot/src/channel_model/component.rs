@@ -1,0 +1,225 @@
+//! What of a robot is modelled: its channels, the drives behind its command, and the components
+//! whose faults are named.
+
+use nalgebra::DMatrix;
+use vigil_blocks::CHANNELS;
+
+use super::{AXES, CHANNELS_MAX, DRIVES_MAX};
+use crate::channel::{Role, channels};
+use crate::description::{Description, Kinematics};
+use crate::frame_guard::{BEYOND_LIMITS, CURRENT_MAX_A};
+
+/// What a channel measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Velocity of the pose along its heading, m/s.
+    Forward,
+    /// Velocity of the pose to the left of its heading, m/s.
+    Lateral,
+    /// Rate at which the pose turns, rad/s.
+    Turn,
+    /// Rate of the body about its vertical axis, rad/s.
+    YawRate,
+    /// Rate of a wheel, rad/s.
+    WheelRate,
+    /// Current of a wheel's motor, A.
+    Current,
+    /// Any other channel of the description, in its unit.
+    Other,
+}
+
+impl Quantity {
+    /// True for what is taken from the pose.
+    #[must_use]
+    pub const fn is_pose(self) -> bool {
+        matches!(self, Self::Forward | Self::Lateral | Self::Turn)
+    }
+}
+
+/// A measured quantity of a robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Target {
+    /// Name: `forward`, `lateral` and `turn` of the pose, else that of the frame's channel.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// What it is.
+    pub quantity: Quantity,
+    /// Place of its channel in a frame; [`CHANNELS`] for what is taken from the pose.
+    pub place: usize,
+    /// Wheel that it belongs to, if any.
+    pub wheel: Option<usize>,
+    /// Largest magnitude that it can have.
+    pub largest: f64,
+}
+
+/// What is modelled of a robot, in order: at most [`CHANNELS_MAX`]. The axes of a pose become the
+/// velocities between two of them.
+#[must_use]
+pub fn targets(robot: &Description) -> Vec<Target> {
+    let mut out = Vec::new();
+    if robot.measured.pose {
+        let pose = [
+            ("forward", "m/s", Quantity::Forward),
+            ("lateral", "m/s", Quantity::Lateral),
+            ("turn", "rad/s", Quantity::Turn),
+        ];
+        out.extend(pose.map(|(name, unit, quantity)| Target {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            quantity,
+            place: CHANNELS,
+            wheel: None,
+            largest: f64::INFINITY,
+        }));
+    }
+    let limits = &robot.limits;
+    for (place, channel) in channels(robot).into_iter().enumerate() {
+        let (quantity, largest) = match channel.role {
+            Role::PoseX | Role::PoseY | Role::PoseYaw => continue,
+            Role::BodyRate if channel.name == "yaw_rate" => {
+                (Quantity::YawRate, BEYOND_LIMITS * limits.yaw_rate_rad_s)
+            }
+            Role::WheelRate => (Quantity::WheelRate, BEYOND_LIMITS * limits.wheel_rate_rad_s),
+            Role::Current if channel.wheel.is_some() => (Quantity::Current, CURRENT_MAX_A),
+            _ => (
+                Quantity::Other,
+                channel
+                    .limit
+                    .map_or(f64::MAX, |limit| BEYOND_LIMITS * limit),
+            ),
+        };
+        out.push(Target {
+            name: channel.name,
+            unit: channel.unit,
+            quantity,
+            place,
+            wheel: channel.wheel,
+            largest,
+        });
+    }
+    out.truncate(CHANNELS_MAX);
+    out
+}
+
+/// What turns a part of the command into motion: a wheel's motor, or an axis of the command where
+/// the description does not say how the wheels share it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drive {
+    /// Name: that of its wheel or axis.
+    pub name: String,
+    /// Wheel, if it is one's.
+    pub wheel: Option<usize>,
+    /// Commanded speed by the command's axes: its product with the command.
+    pub speed: [f64; AXES],
+    /// Change of the command that is as good as one unit more of this drive's speed.
+    pub effect: [f64; AXES],
+}
+
+/// The drives of a robot, at most [`DRIVES_MAX`].
+#[must_use]
+pub fn drives(robot: &Description) -> Vec<Drive> {
+    let axes = robot.command.len().min(AXES);
+    // Speed of a wheel's contact along the direction that it is driven in.
+    let row = |x: f64, y: f64| match robot.kinematics {
+        Kinematics::Differential => vec![1.0, -y],
+        Kinematics::Omni3 => {
+            let reach = x.hypot(y).max(1e-9);
+            vec![-y / reach, x / reach, reach]
+        }
+        Kinematics::Ackermann6 => Vec::new(),
+    };
+    let rows: Vec<Vec<f64>> = robot.wheels.iter().map(|w| row(w.x, w.y)).collect();
+    let wheels = rows.len().min(DRIVES_MAX);
+    let shares = wheels > 0 && rows.iter().all(|row| row.len() >= axes);
+    let inverse = shares.then(|| {
+        let matrix = DMatrix::from_fn(wheels, axes, |i, axis| rows[i][axis]);
+        matrix.pseudo_inverse(1e-9).ok()
+    });
+    let Some(inverse) = inverse.flatten() else {
+        let unit = |i: usize| std::array::from_fn(|axis| f64::from(u8::from(axis == i)));
+        let axis = |(i, axis): (usize, &crate::description::Axis)| Drive {
+            name: axis.name.clone(),
+            wheel: None,
+            speed: unit(i),
+            effect: unit(i),
+        };
+        return robot
+            .command
+            .iter()
+            .enumerate()
+            .take(axes)
+            .map(axis)
+            .collect();
+    };
+    let of = |i: usize| Drive {
+        name: robot.wheels[i].name.clone(),
+        wheel: Some(i),
+        speed: std::array::from_fn(|axis| {
+            rows[i]
+                .get(axis)
+                .copied()
+                .filter(|_| axis < axes)
+                .unwrap_or(0.0)
+        }),
+        effect: std::array::from_fn(|axis| inverse.get((axis, i)).copied().unwrap_or(0.0)),
+    };
+    (0..wheels).map(of).collect()
+}
+
+impl Drive {
+    /// Its commanded speed.
+    #[must_use]
+    pub fn commanded(&self, command: &[f64; AXES]) -> f64 {
+        self.speed.iter().zip(command).map(|(a, b)| a * b).sum()
+    }
+
+    /// The command that the robot gets if this drive stands still.
+    #[must_use]
+    pub fn without(&self, command: &[f64; AXES]) -> [f64; AXES] {
+        let speed = self.commanded(command);
+        std::array::from_fn(|axis| command[axis] - speed * self.effect[axis])
+    }
+}
+
+/// What can be broken, and is named.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Component {
+    /// Name of its leaf: `pose`, a channel's name, or `drive_<WHEEL>`.
+    pub name: String,
+    /// Its fault in the words of a fault tree: `sensor:<CHANNEL>` or `drive:<WHEEL>`.
+    pub fault: String,
+    /// Abstract node above it: its wheel's, or that of all further sensors.
+    pub group: String,
+}
+
+/// The components of a robot: its sensors in the order of [`targets`], those of the pose as one,
+/// then its drives.
+#[must_use]
+pub fn components(robot: &Description) -> Vec<Component> {
+    let group = |wheel: Option<usize>| {
+        let wheel = wheel.and_then(|wheel| robot.wheels.get(wheel));
+        wheel.map_or("BODY".to_owned(), |wheel| format!("WHEEL_{}", wheel.name))
+    };
+    let mut out: Vec<Component> = Vec::new();
+    for target in targets(robot) {
+        let name = match target.quantity.is_pose() {
+            true => "pose".to_owned(),
+            false => target.name,
+        };
+        if out.iter().any(|component| component.name == name) {
+            continue;
+        }
+        out.push(Component {
+            fault: format!("sensor:{name}"),
+            group: group(target.wheel),
+            name,
+        });
+    }
+    out.extend(drives(robot).into_iter().map(|drive| Component {
+        name: format!("drive_{}", drive.name),
+        fault: format!("drive:{}", drive.name),
+        group: group(drive.wheel),
+    }));
+    out
+}

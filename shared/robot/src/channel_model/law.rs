@@ -1,0 +1,323 @@
+//! The joint law of all channels over the last few seconds.
+//!
+//! Whitened residuals, averaged over blocks of half a second, are jointly Gaussian with a scale
+//! that is not known (a Student law): along each principal direction of their covariance they have
+//! a correlation in time of its own. What a healthy robot does slowly (its ground, its battery) and
+//! what it does in several channels at once is so no evidence for a fault; what no direction of its
+//! own explains is.
+//!
+//! With `P` the precision of the law and `z` the residuals, a change by `x·s` is weighed by
+//! `b = sᵀPz` and `a = sᵀPs`: it lessens `zᵀPz` by `b²/a`.
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use super::CHANNELS_MAX;
+
+/// Blocks of a window.
+pub const BLOCKS: usize = 8;
+/// Length of each, s.
+pub const BLOCK_S: f64 = 0.5;
+/// Degrees of freedom of the law. Chosen on logs of a Husky, a Robotino and a Kobuki: with 4 a large
+/// fault of one sensor passes for a rough moment of all, with 100 rough moments pass for faults.
+const FREEDOM: f64 = 30.0;
+/// Sweeps over channels that were not measured, by which each gets the mean that the others give.
+const SWEEPS: usize = 3;
+
+/// A value for each block, the oldest first.
+pub type Row = [f64; BLOCKS];
+/// A square of such.
+pub type Square = [[f64; BLOCKS]; BLOCKS];
+
+/// A principal direction of the residuals.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Direction {
+    /// Unit vector over the channels.
+    pub vector: Vec<f64>,
+    /// Variance of a block's mean along it.
+    pub variance: f64,
+    /// Correlation with the blocks before, nearest first.
+    pub correlation: [f64; BLOCKS - 1],
+}
+
+impl Direction {
+    /// Covariance of its values in time.
+    #[must_use]
+    pub fn covariance(&self) -> Square {
+        let at = |lag: usize| match lag {
+            0 => self.variance,
+            lag => self.variance * self.correlation[lag - 1],
+        };
+        std::array::from_fn(|i| std::array::from_fn(|j| at(i.abs_diff(j))))
+    }
+}
+
+/// Inverse of the lower right part of a positive definite square, from `first` on.
+fn inverse(square: &Square, first: usize) -> Option<Square> {
+    let n = BLOCKS - first;
+    let matrix = DMatrix::from_fn(n, n, |i, j| square[first + i][first + j]);
+    let inverse = matrix.cholesky()?.inverse();
+    let at = |i: usize, j: usize| match (i.checked_sub(first), j.checked_sub(first)) {
+        (Some(i), Some(j)) => inverse[(i, j)],
+        _ => 0.0,
+    };
+    Some(std::array::from_fn(|i| std::array::from_fn(|j| at(i, j))))
+}
+
+/// The law at work: what the last window says.
+#[derive(Debug, Clone)]
+pub struct Law {
+    channels: usize,
+    /// The first block of the window that is there.
+    first: usize,
+    directions: Vec<Direction>,
+    precision: Vec<Square>,
+    /// Inverse of the covariance of one block, by rows.
+    spatial: Vec<f64>,
+    /// Precision of each channel's blocks given all others, and its inverse from each block on.
+    own: Vec<Square>,
+    own_inverse: Vec<[Square; BLOCKS]>,
+    /// The window, completed: residuals by channel, and `Pz`.
+    z: [Row; CHANNELS_MAX],
+    /// One where a reading is there, else zero.
+    read: [Row; CHANNELS_MAX],
+    gradient: [Row; CHANNELS_MAX],
+    square: f64,
+}
+
+impl Law {
+    /// A law of so many channels for windows that begin with block `first`; none if the directions
+    /// are none of a covariance.
+    #[must_use]
+    pub fn new(directions: &[Direction], channels: usize, first: usize) -> Option<Self> {
+        let fits = (1..=CHANNELS_MAX).contains(&channels) && first < BLOCKS;
+        if !fits || directions.len() != channels {
+            return None;
+        }
+        let whole = |d: &Direction| d.vector.len() == channels && d.variance > 0.0;
+        if !directions.iter().all(whole) {
+            return None;
+        }
+        let precision = directions.iter().map(|d| inverse(&d.covariance(), first));
+        let precision: Option<Vec<Square>> = precision.collect();
+        let precision = precision?;
+        let mut spatial = vec![0.0; channels * channels];
+        let mut own = vec![[[0.0; BLOCKS]; BLOCKS]; channels];
+        for (direction, precision) in directions.iter().zip(&precision) {
+            for i in 0..channels {
+                let share = direction.vector[i] * direction.vector[i];
+                for (row, from) in own[i].iter_mut().zip(precision) {
+                    row.iter_mut().zip(from).for_each(|(a, b)| *a += share * b);
+                }
+                for j in 0..channels {
+                    spatial[i * channels + j] +=
+                        direction.vector[i] * direction.vector[j] / direction.variance;
+                }
+            }
+        }
+        let mut own_inverse = Vec::with_capacity(channels);
+        for square in &own {
+            let mut all = [[[0.0; BLOCKS]; BLOCKS]; BLOCKS];
+            for (from, slot) in all.iter_mut().enumerate() {
+                *slot = inverse(square, from.max(first))?;
+            }
+            own_inverse.push(all);
+        }
+        Some(Self {
+            channels,
+            first,
+            directions: directions.to_vec(),
+            precision,
+            spatial,
+            own,
+            own_inverse,
+            z: [[0.0; BLOCKS]; CHANNELS_MAX],
+            read: [[0.0; BLOCKS]; CHANNELS_MAX],
+            gradient: [[0.0; BLOCKS]; CHANNELS_MAX],
+            square: 0.0,
+        })
+    }
+
+    /// Its principal directions.
+    #[must_use]
+    pub fn directions(&self) -> &[Direction] {
+        &self.directions
+    }
+
+    /// Takes a window. What was not measured takes the value that the other channels of its block
+    /// give, where there are any, and none else.
+    pub fn take(&mut self, window: &[[Option<f64>; BLOCKS]]) {
+        let n = self.channels;
+        for (i, values) in window.iter().enumerate().take(n) {
+            self.z[i] = values.map(|value| value.unwrap_or(0.0));
+            self.read[i] = values.map(|value| f64::from(u8::from(value.is_some())));
+        }
+        for block in 0..BLOCKS {
+            let missing = |i: usize| window.get(i).is_none_or(|row| row[block].is_none());
+            if (0..n).all(missing) || !(0..n).any(missing) {
+                continue;
+            }
+            for _ in 0..SWEEPS {
+                for i in (0..n).filter(|&i| missing(i)) {
+                    let row = &self.spatial[i * n..(i + 1) * n];
+                    let others = row.iter().zip(&self.z).enumerate();
+                    let others = others.filter(|&(j, _)| j != i);
+                    let sum: f64 = others.map(|(_, (k, z))| k * z[block]).sum();
+                    self.z[i][block] = -sum / row[i];
+                }
+            }
+        }
+        self.gradient = [[0.0; BLOCKS]; CHANNELS_MAX];
+        self.square = 0.0;
+        for (direction, precision) in self.directions.iter().zip(&self.precision) {
+            let along = along(&direction.vector, &self.z);
+            let weighed = product(precision, &along);
+            self.square += dot(&along, &weighed);
+            for (share, row) in direction.vector.iter().zip(&mut self.gradient) {
+                row.iter_mut()
+                    .zip(weighed)
+                    .for_each(|(a, b)| *a += share * b);
+            }
+        }
+        // What was not measured speaks for nothing.
+        for (row, read) in self.gradient.iter_mut().zip(&self.read) {
+            *row = masked(row, read);
+        }
+    }
+
+    /// The residuals of a channel, completed.
+    #[must_use]
+    pub fn row(&self, channel: usize) -> &Row {
+        &self.z[channel]
+    }
+
+    /// Square of the window under the law: its expectation is the number of its values.
+    #[must_use]
+    pub const fn square(&self) -> f64 {
+        self.square
+    }
+
+    /// Number of values of a window.
+    #[must_use]
+    pub const fn values(&self) -> usize {
+        self.channels * (BLOCKS - self.first)
+    }
+
+    /// Blocks of a window from `from` on.
+    #[must_use]
+    pub fn blocks(&self, from: usize) -> usize {
+        BLOCKS - from.max(self.first)
+    }
+
+    /// `b` and `a` of a change of one channel, from each block on.
+    #[must_use]
+    pub fn change(&self, channel: usize, signature: &Row) -> [[f64; 2]; BLOCKS] {
+        let (own, gradient) = (&self.own[channel], &self.gradient[channel]);
+        let signature = masked(signature, &self.read[channel]);
+        let (mut b, mut a) = (0.0, 0.0);
+        let mut out = [[0.0; 2]; BLOCKS];
+        for first in (0..BLOCKS).rev() {
+            let cross: f64 = (first + 1..BLOCKS)
+                .map(|k| own[first][k] * signature[k])
+                .sum();
+            b += signature[first] * gradient[first];
+            a += signature[first] * (own[first][first] * signature[first] + 2.0 * cross);
+            out[first] = [b, a];
+        }
+        out
+    }
+
+    /// `b` and `a` of a change of several channels at once, where the readings of one channel may
+    /// say nothing.
+    #[must_use]
+    pub fn joint_change(&self, signature: &[Row], silent: Option<usize>) -> [f64; 2] {
+        let mut shown = [[0.0; BLOCKS]; CHANNELS_MAX];
+        for (i, (row, read)) in signature.iter().zip(&self.read).enumerate() {
+            shown[i] = masked(row, read);
+        }
+        let signature = &shown[..signature.len().min(CHANNELS_MAX)];
+        let rows = signature.iter().zip(&self.gradient);
+        let mut b = rows.map(|(s, gradient)| dot(s, gradient)).sum();
+        let (mut a, mut at_silent) = (0.0, [0.0; BLOCKS]);
+        for (direction, precision) in self.directions.iter().zip(&self.precision) {
+            let along = along(&direction.vector, signature);
+            let weighed = product(precision, &along);
+            a += dot(&along, &weighed);
+            if let Some(silent) = silent {
+                let share = direction.vector[silent];
+                at_silent
+                    .iter_mut()
+                    .zip(weighed)
+                    .for_each(|(sum, value)| *sum += share * value);
+            }
+        }
+        if let Some(silent) = silent {
+            let known = product(&self.own_inverse[silent][0], &at_silent);
+            b -= dot(&known, &self.gradient[silent]);
+            a -= dot(&known, &at_silent);
+        }
+        [b, a]
+    }
+
+    /// By how much the square lessens if a channel's readings from `first` on say nothing; the
+    /// blocks from there are expected at `z - deviation`.
+    #[must_use]
+    pub fn deviation(&self, channel: usize, first: usize) -> (f64, Row) {
+        let mut gradient = self.gradient[channel];
+        gradient[..first].fill(0.0);
+        let deviation = product(&self.own_inverse[channel][first], &gradient);
+        (dot(&gradient, &deviation), deviation)
+    }
+
+    /// Square of a row of a channel under the law, given all other readings.
+    #[must_use]
+    pub fn own_square(&self, channel: usize, row: &Row) -> f64 {
+        dot(row, &product(&self.own[channel], row))
+    }
+
+    /// Natural logarithm of how much more likely the window is if its square were less by `less`
+    /// and its density lower by the exponent of `penalty`.
+    #[must_use]
+    pub fn log_ratio(&self, less: f64, penalty: f64) -> f64 {
+        let least = self.square - less.min(self.square);
+        let half = 0.5 * (FREEDOM + self.values() as f64);
+        half * ((FREEDOM + self.square) / (FREEDOM + least)).ln() - penalty
+    }
+
+    /// The same if all deviations were larger by a factor.
+    #[must_use]
+    pub fn log_ratio_scaled(&self, factor: f64) -> f64 {
+        let square = self.square / (factor * factor);
+        let half = 0.5 * (FREEDOM + self.values() as f64);
+        half * ((FREEDOM + self.square) / (FREEDOM + square)).ln()
+            - self.values() as f64 * factor.ln()
+    }
+
+    /// Scale of the variances that the rest of the window shows, with a square less by `less`.
+    #[must_use]
+    pub fn variance_scale(&self, less: f64) -> f64 {
+        let least = self.square - less.min(self.square);
+        (FREEDOM + least) / (FREEDOM + self.values() as f64)
+    }
+}
+
+fn masked(row: &Row, read: &Row) -> Row {
+    std::array::from_fn(|block| row[block] * read[block])
+}
+
+fn along(vector: &[f64], rows: &[Row]) -> Row {
+    let mut out = [0.0; BLOCKS];
+    for (share, row) in vector.iter().zip(rows) {
+        out.iter_mut().zip(row).for_each(|(a, b)| *a += share * b);
+    }
+    out
+}
+
+fn product(square: &Square, row: &Row) -> Row {
+    std::array::from_fn(|i| dot(&square[i], row))
+}
+
+fn dot(a: &Row, b: &Row) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,47 @@
+//! The behaviour of any described robot, learned from its own log of healthy driving, and what each
+//! fault of a sensor or a drive would change of it.
+//!
+//! Every channel is predicted from the command. What is left over the last four seconds is weighed
+//! under the joint law of all channels, against each way in which each component can fail.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`component`] | channels, drives and components of a robot |
+//! | [`observation`] | frames averaged into observations, and the last few of them |
+//! | [`channel`] | one channel: terms, weights, noise |
+//! | [`window`] | the last seconds of residuals and predictions, in blocks |
+//! | [`law`], [`directions`] | the joint law of the residuals, and its principal directions |
+//! | [`scatter`] | the law of how rough they are |
+//! | [`fault_kind`] | the ways in which a component fails |
+//! | [`bank`] | all faults, weighed |
+//! | [`monitor`] | detection, and what is believed of each component |
+//! | [`model`] | the model file |
+//! | [`tree`] | the fault tree of a robot |
+
+/// Axes of a command that a model may have.
+pub const AXES: usize = 4;
+/// Channels of a model at most.
+pub const CHANNELS_MAX: usize = 28;
+/// Drives at most: one for each wheel, or each axis.
+pub const DRIVES_MAX: usize = 8;
+/// Components at most.
+pub const COMPONENTS_MAX: usize = CHANNELS_MAX + DRIVES_MAX;
+
+pub mod bank;
+pub mod channel;
+pub mod component;
+pub mod directions;
+pub mod fault_kind;
+pub mod law;
+pub mod model;
+pub mod monitor;
+pub mod observation;
+pub mod scatter;
+pub mod tree;
+pub mod window;
+
+pub use channel::{Channel, Regressor, Scales, Term};
+pub use component::{Component, Quantity, Target, components, drives, targets};
+pub use model::{Model, Range};
+pub use monitor::Monitor;
+pub use observation::{History, Observation, Observer};

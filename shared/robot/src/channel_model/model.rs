@@ -1,0 +1,470 @@
+//! The file of a model of channels.
+
+use serde::{Deserialize, Serialize};
+
+use super::channel::{Channel, Regressor, Term};
+use super::component::targets;
+use super::fault_kind::FaultKind;
+use super::law::{Direction, Law};
+use super::observation::{DEPTH, History, Observation};
+use super::scatter::Scatter;
+use super::{AXES, CHANNELS_MAX, DRIVES_MAX};
+use crate::alarm::AlarmError;
+use crate::description::{Description, INTERVAL_MAX_S, INTERVAL_MIN_S};
+use crate::learned::channels::Channels;
+use crate::learned::model::{EDITED, ModelError, Provenance, check_calibration};
+use crate::learned::{Calibration, Form};
+use crate::model_file::{self, ModelFile, check_range, refuse};
+
+/// Version of the file's layout.
+pub const VERSION: u32 = 3;
+/// The word by which the file is told from a model of the rover's kind.
+pub const KIND: &str = "channels";
+/// Prior fault rate at which log-odds are collected and tempered, 1/h.
+pub const FAULT_RATE_1_H: f64 = 1.0;
+/// Growth of the deviation per width of the learned range by which a command lies outside it.
+/// Chosen: a quarter of the range outside doubles it.
+const EXTRAPOLATION: f64 = 4.0;
+/// Terms of a channel. Chosen: of four axes to the fourth order learning makes 115 at most. Smaller
+/// refuses such a model; larger only lets a file cost more time.
+const TERMS_MAX: usize = 128;
+/// Gaps of a range. Learning takes one for a gap if it is wider than 0.15 of the range (`GAP` in
+/// `channel_learning::excitation`): six at most, one fewer than this.
+const GAPS_MAX: usize = 7;
+/// Largest order of a polynomial.
+const ORDER_MAX: u32 = 4;
+// `Model::check` names these in its messages as numbers.
+const _: () = assert!(AXES == 4 && CHANNELS_MAX == 28 && DRIVES_MAX == 8);
+const _: () = assert!(TERMS_MAX == 128 && DEPTH == 9 && ORDER_MAX == 4);
+
+/// What was learned of one axis of the command.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Range {
+    /// Name of the axis.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Smallest value learned from.
+    pub min: f64,
+    /// Largest value learned from.
+    pub max: f64,
+    /// Stretches within these bounds in which nothing was learned from, each from the last value
+    /// below to the first above.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gaps: Vec<[f64; 2]>,
+}
+
+impl Range {
+    /// Size by which the axis is divided in polynomials.
+    #[must_use]
+    pub fn size(&self) -> f64 {
+        self.min.abs().max(self.max.abs()).max(1e-9)
+    }
+
+    /// How far a command lies outside the range, or from the ends of the gap that it lies in, in
+    /// units of the range's width.
+    #[must_use]
+    pub fn beyond(&self, value: f64) -> f64 {
+        let outside = (self.min - value).max(value - self.max).max(0.0);
+        let within = self
+            .gaps
+            .iter()
+            .map(|[from, to]| (value - from).min(to - value));
+        within.fold(outside, f64::max) / (self.max - self.min).max(1e-9)
+    }
+
+    /// True if its numbers make sense.
+    fn is_sane(&self) -> bool {
+        let inside = |[from, to]: &[f64; 2]| self.min <= *from && from < to && *to <= self.max;
+        let bounds = self.min.is_finite() && self.max.is_finite() && self.max >= self.min;
+        bounds && self.gaps.len() <= GAPS_MAX && self.gaps.iter().all(inside)
+    }
+}
+
+/// Factor on all deviations for a command outside the ranges learned from.
+#[must_use]
+pub fn widening(ranges: &[Range], now: &Observation) -> f64 {
+    // A robot at rest is known.
+    if !now.moving {
+        return 1.0;
+    }
+    let axes = ranges.iter().zip(&now.command);
+    let beyond = axes.map(|(range, value)| range.beyond(*value));
+    1.0 + EXTRAPOLATION * beyond.fold(0.0, f64::max)
+}
+
+/// Faults whose log-odds behave alike without a fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Class {
+    /// A sensor's readings are changed in a steady way.
+    Steady,
+    /// A sensor repeats a value, or reads zero.
+    Still,
+    /// A sensor is late.
+    Late,
+    /// A sensor reads anything.
+    Erratic,
+    /// A drive does not do as it is told.
+    Drive,
+    /// More noise.
+    Noise,
+    /// What no single fault explains.
+    Unknown,
+}
+
+impl Class {
+    /// Every class.
+    pub const ALL: [Self; 7] = [
+        Self::Steady,
+        Self::Still,
+        Self::Late,
+        Self::Erratic,
+        Self::Drive,
+        Self::Noise,
+        Self::Unknown,
+    ];
+
+    /// The class of a kind of fault; none for what no healthy robot ever shows.
+    #[must_use]
+    pub const fn of(kind: FaultKind) -> Option<Self> {
+        match kind {
+            FaultKind::Missing => None,
+            FaultKind::Bias | FaultKind::Gain | FaultKind::Drift => Some(Self::Steady),
+            FaultKind::Frozen | FaultKind::Zero => Some(Self::Still),
+            FaultKind::Delay => Some(Self::Late),
+            FaultKind::Erratic => Some(Self::Erratic),
+            FaultKind::Stuck | FaultKind::Loss | FaultKind::Slip | FaultKind::Offset => {
+                Some(Self::Drive)
+            }
+            FaultKind::Noise | FaultKind::Rough => Some(Self::Noise),
+        }
+    }
+}
+
+/// How often the log-odds of a class exceed a level without a fault: more rarely by `exp(-slope)`
+/// per unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tail {
+    /// Set of channels: `pose` or `pose+encoders`.
+    pub sensors: String,
+    /// Class.
+    pub class: Class,
+    /// Level, natural log-odds at [`FAULT_RATE_1_H`].
+    pub level_log_odds: f64,
+    /// Mean time between exceedances of it, h.
+    pub interval_h: f64,
+    /// Slope.
+    pub slope: f64,
+}
+
+impl Tail {
+    /// The log-odds that a law without flaw would give for an event as rare. For such a one they
+    /// grow as the logarithm of the time between exceedances, at a prior rate of 1/h.
+    #[must_use]
+    pub fn tempered(&self, log_odds: f64) -> f64 {
+        self.interval_h.ln() + self.slope * (log_odds - self.level_log_odds)
+    }
+}
+
+/// Everything learned about one robot without a fault.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Model {
+    /// `channels`.
+    pub kind: String,
+    /// Layout of the file.
+    pub version: u32,
+    /// Hash over everything else in the file, as that of the rover's model: `fnv1a64:` and 16
+    /// digits, or [`EDITED`].
+    pub hash: String,
+    /// Name of the robot.
+    pub robot: String,
+    /// Interval over which frames are averaged into one observation, s.
+    pub interval_s: f64,
+    /// Time in motion that was learned from, s.
+    pub exposure_s: f64,
+    /// Factor by which all deviations were widened because the log is short.
+    pub widened: f64,
+    /// Where the model comes from.
+    pub provenance: Provenance,
+    /// Axes of the command, and the ranges learned from.
+    pub command: Vec<Range>,
+    /// Channels, in the order of [`targets`].
+    pub channel: Vec<Channel>,
+    /// The joint law of their residuals.
+    pub direction: Vec<Direction>,
+    /// The law of their roughness.
+    pub scatter: Scatter,
+    /// Tails of the classes of faults.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tail: Vec<Tail>,
+    /// Alarm thresholds, one per set of channels.
+    pub calibration: Vec<Calibration>,
+}
+
+impl Model {
+    /// Reads and checks a model.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming the key, what was found and what is allowed.
+    pub fn from_toml(text: &str) -> Result<Self, ModelError> {
+        model_file::read(text)
+    }
+
+    /// The file's text.
+    ///
+    /// # Errors
+    /// [`ModelError::Parse`] if the model cannot be written.
+    pub fn to_toml(&self) -> Result<String, ModelError> {
+        model_file::text(self)
+    }
+
+    /// Hash over the content; equal for equal models.
+    #[must_use]
+    pub fn hash(&self) -> u64 {
+        model_file::hash(self)
+    }
+
+    /// The same with the hash that its content has, as [`Self::from_toml`] expects it.
+    #[must_use]
+    pub fn sealed(self) -> Self {
+        model_file::sealed(self)
+    }
+
+    /// True if the file says that a person has changed it.
+    #[must_use]
+    pub fn is_edited(&self) -> bool {
+        self.hash == EDITED
+    }
+
+    /// Checks that the model is of this robot: by its name, the axes of its command, its channels
+    /// and its interval.
+    ///
+    /// # Errors
+    /// [`ModelError::Robot`].
+    pub fn check_robot(&self, robot: &Description) -> Result<(), ModelError> {
+        let all = targets(robot);
+        let shown = |axes: Vec<&str>, channels: Vec<&str>, interval_s: f64| {
+            let (axes, channels) = (axes.join(" "), channels.join(" "));
+            format!("command {axes}; channels {channels}; {interval_s} s")
+        };
+        let of_model = shown(
+            self.command.iter().map(|axis| axis.name.as_str()).collect(),
+            self.channel
+                .iter()
+                .map(|channel| channel.name.as_str())
+                .collect(),
+            self.interval_s,
+        );
+        let of_robot = shown(
+            robot
+                .command
+                .iter()
+                .map(|axis| axis.name.as_str())
+                .collect(),
+            all.iter().map(|target| target.name.as_str()).collect(),
+            robot.interval_s,
+        );
+        if self.robot == robot.name && of_model == of_robot {
+            return Ok(());
+        }
+        Err(ModelError::Robot {
+            model: self.robot.clone(),
+            model_wheels: of_model,
+            robot: robot.name.clone(),
+            robot_wheels: of_robot,
+        })
+    }
+
+    /// The calibration for a set of channels; a model of channels has one form.
+    ///
+    /// # Errors
+    /// [`ModelError::Calibration`].
+    pub fn calibration(&self, channels: Channels, form: Form) -> Result<&Calibration, ModelError> {
+        crate::learned::calibration::find(&self.calibration, channels, form)
+    }
+
+    /// The tail of a class of faults in a set of channels.
+    #[must_use]
+    pub fn tail(&self, channels: Channels, class: Class) -> Option<&Tail> {
+        let mut tails = self.tail.iter();
+        tails.find(|tail| tail.sensors == channels.name() && tail.class == class)
+    }
+
+    /// Log-odds at which to alarm, so that `interval_h` pass on average between false alarms at a
+    /// prior fault rate of `fault_rate_1_h`.
+    ///
+    /// # Errors
+    /// [`AlarmError`] if there is no calibration.
+    pub fn alarm_log_odds(
+        &self,
+        (channels, form): (Channels, Form),
+        interval_h: f64,
+        fault_rate_1_h: f64,
+    ) -> Result<f64, AlarmError> {
+        let calibration = self.calibration(channels, form)?;
+        Ok(calibration.alarm_log_odds(interval_h, fault_rate_1_h))
+    }
+
+    /// Factor on all deviations for the newest command of `history`.
+    #[must_use]
+    pub fn widening(&self, history: &History) -> f64 {
+        history
+            .ago(0)
+            .map_or(1.0, |now| widening(&self.command, now))
+    }
+
+    /// Size of each axis of the command; 1 for axes that do not exist.
+    #[must_use]
+    pub fn sizes(&self) -> [f64; AXES] {
+        let mut sizes = [1.0; AXES];
+        for (size, range) in sizes.iter_mut().zip(&self.command) {
+            *size = range.size();
+        }
+        sizes
+    }
+}
+
+impl ModelFile for Model {
+    const VERSION: u32 = VERSION;
+
+    fn stored(&self) -> &str {
+        &self.hash
+    }
+
+    fn stored_mut(&mut self) -> &mut String {
+        &mut self.hash
+    }
+
+    fn check(&self) -> Result<(), ModelError> {
+        if self.kind != KIND {
+            return refuse("kind", &self.kind, KIND);
+        }
+        check_range(
+            "interval_s",
+            self.interval_s,
+            INTERVAL_MIN_S,
+            INTERVAL_MAX_S,
+        )?;
+        let ranges = self.command.iter().all(Range::is_sane);
+        if self.command.len() > AXES || !ranges {
+            let found = format!("{} axes", self.command.len());
+            return refuse("command", found, "0 to 4 axes, min up to max, gaps inside");
+        }
+        let count = self.channel.len();
+        if count == 0 || count > CHANNELS_MAX {
+            return refuse("channel", format!("{count} channels"), "1 to 28 channels");
+        }
+        for (i, channel) in self.channel.iter().enumerate() {
+            check_channel(&format!("channel.{i}"), channel, self.command.len())?;
+        }
+        for (i, direction) in self.direction.iter().enumerate() {
+            let values = direction.vector.iter().chain(&direction.correlation);
+            let numbers = values.chain([&direction.variance]).all(|v| v.is_finite());
+            if !numbers || direction.vector.len() != count || direction.variance <= 0.0 {
+                let found = format!("{direction:?}");
+                return refuse(
+                    format!("direction.{i}"),
+                    found,
+                    "a number for each channel, and a variance above 0",
+                );
+            }
+        }
+        if Law::new(&self.direction, count, 0).is_none() {
+            let found = format!("{} directions", self.direction.len());
+            return refuse("direction", found, "one for each channel, of a covariance");
+        }
+        check_scatter(&self.scatter, count)?;
+        self.tail.iter().try_for_each(check_tail)?;
+        self.calibration.iter().try_for_each(check_calibration)
+    }
+}
+
+/// Checks the numbers of a channel; `axes`: how many there are.
+fn check_channel(key: &str, channel: &Channel, axes: usize) -> Result<(), ModelError> {
+    let (terms, weights) = (channel.terms.len(), channel.weights.len());
+    if terms != weights || terms > TERMS_MAX {
+        let found = format!("{terms} terms and {weights} weights");
+        return refuse(key, found, "as many weights as terms, at most 128");
+    }
+    for (i, term) in channel.terms.iter().enumerate() {
+        check_term(&format!("{key}.terms.{i}"), term, axes)?;
+    }
+    if let Some(weight) = channel.weights.iter().find(|weight| !weight.is_finite()) {
+        return refuse(format!("{key}.weights"), weight, "finite numbers");
+    }
+    if !channel.variance[0].is_normal() {
+        let found = channel.variance[0];
+        return refuse(format!("{key}.variance"), found, "above 0 at first");
+    }
+    let variance = channel.variance.iter().map(|value| ("variance", value));
+    let others = [
+        ("usual", &channel.usual),
+        ("held_out_ratio", &channel.held_out_ratio),
+    ];
+    let context = channel.context_sd.iter().map(|value| ("context_sd", value));
+    for (name, value) in variance.chain(others).chain(context) {
+        if !(value.is_finite() && *value >= 0.0) {
+            return refuse(format!("{key}.{name}"), value, "a finite number from 0");
+        }
+    }
+    Ok(())
+}
+
+/// Checks the law of the roughness.
+fn check_scatter(scatter: &Scatter, channels: usize) -> Result<(), ModelError> {
+    let rows = scatter.covariance.iter().all(|row| row.len() == channels);
+    let sizes = scatter.mean.len() == channels && scatter.covariance.len() == channels && rows;
+    let mut values = scatter
+        .mean
+        .iter()
+        .chain(scatter.covariance.iter().flatten());
+    if sizes && values.all(|value| value.is_finite()) {
+        return Ok(());
+    }
+    let found = format!("{} means", scatter.mean.len());
+    refuse(
+        "scatter",
+        found,
+        "a finite mean and a row of covariances for each channel",
+    )
+}
+
+/// Checks the numbers of a tail.
+fn check_tail(tail: &Tail) -> Result<(), ModelError> {
+    let positive = tail.slope > 0.0 && tail.interval_h > 0.0 && tail.interval_h.is_finite();
+    if positive && tail.slope.is_finite() && tail.level_log_odds.is_finite() {
+        return Ok(());
+    }
+    let found = format!("{tail:?}");
+    refuse("tail", found, "finite numbers, interval and slope above 0")
+}
+
+/// Checks that a term points at what exists.
+fn check_term(key: &str, term: &Term, axes: usize) -> Result<(), ModelError> {
+    if term.lag >= DEPTH {
+        return refuse(format!("{key}.lag"), term.lag, "0 to 8");
+    }
+    let is_axis = term.of == Regressor::Lagged;
+    if is_axis && term.index >= axes {
+        let key = format!("{key}.index");
+        return refuse(key, term.index, "the index of an axis, from 0");
+    }
+    if term.index >= DRIVES_MAX {
+        return refuse(
+            format!("{key}.index"),
+            term.index,
+            "the index of a drive, 0 to 7",
+        );
+    }
+    let beyond = term.powers.iter().skip(axes).any(|&power| power > 0);
+    let order: u32 = term.powers.iter().map(|&power| u32::from(power)).sum();
+    if beyond || order > ORDER_MAX {
+        let (key, found) = (format!("{key}.powers"), format!("{:?}", term.powers));
+        return refuse(key, found, "powers of the axes, their sum at most 4");
+    }
+    Ok(())
+}

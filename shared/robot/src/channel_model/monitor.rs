@@ -1,0 +1,382 @@
+//! Is this still the robot that was learned, and if not, what of it is broken?
+//!
+//! The faults of the [`Bank`] fall into four classes: changes of a sensor's readings, changes of a
+//! drive, more noise, and what no single fault explains. No class is as regular as its law: the odds
+//! of each are tempered by the tail that they have on the log ([`Tail`]). Their sum is the log-odds
+//! of a fault; their parts say of which component.
+//!
+//! All this is done at the prior fault rate at which the tails were found ([`FAULT_RATE_1_H`]).
+//! Another rate adds its logarithm afterwards. Alarms do not depend on it, as their threshold moves
+//! by as much.
+
+use vigil_blocks::{SizeKind, WHEELS};
+use vigil_inference::logspace::{log_add, log_sum_exp};
+
+use super::bank::{Bank, IMPOSSIBLE, KINDS_MAX};
+use super::channel::{Scales, commands, lags};
+use super::component::{Quantity, Target, components, drives, targets};
+use super::directions::{covariances, directions};
+use super::fault_kind::{DRIVE_KINDS, FaultKind, SENSOR_KINDS};
+use super::law::{BLOCK_S, BLOCKS, Law};
+use super::model::{Class, FAULT_RATE_1_H, Model, Tail, widening};
+use super::observation::History;
+use super::scatter::ScatterLaw;
+use super::window::Window;
+use super::{CHANNELS_MAX, COMPONENTS_MAX};
+use crate::description::Description;
+use crate::learned::channels::Channels;
+use crate::learned::monitor::DetectionOutput;
+use crate::slot::{SLOTS, Slot};
+
+/// Fewest blocks of a window that say anything.
+const BLOCKS_MIN: usize = 2;
+/// Observed motion after which evidence counts, s.
+const READY_S: f64 = 1.0;
+/// Log-odds of a component from which on it may be broken.
+const SUSPECT_LOG_ODDS: f64 = -2.0;
+/// Confidence in the likelihoods that tell one kind of fault from another: the law is less certain
+/// of the form of a change than of its being there.
+const KIND_CONFIDENCE: f64 = 0.2;
+
+/// What is believed of one component, given that something is wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ComponentBelief {
+    /// Probability that it is this one.
+    pub p: f64,
+    /// Most probable kind.
+    pub kind: FaultKind,
+    /// Its probability among the kinds.
+    pub p_kind: f64,
+    /// The same with the unit of its size.
+    pub size_kind: SizeKind,
+    /// Size.
+    pub size: f64,
+    /// Deviation of the size.
+    pub size_sd: f64,
+    /// For how long it has been there at most, s.
+    pub age_s: f64,
+}
+
+const NO_BELIEF: ComponentBelief = ComponentBelief {
+    p: 0.0,
+    kind: FaultKind::Erratic,
+    p_kind: 0.0,
+    size_kind: SizeKind::None,
+    size: 0.0,
+    size_sd: 0.0,
+    age_s: 0.0,
+};
+
+/// A component at work.
+#[derive(Debug, Clone, Copy)]
+struct Watched {
+    /// Whether the channels in use show it.
+    is_seen: bool,
+    /// What its sensor measures; none for a drive.
+    quantity: Option<Quantity>,
+    /// Slot of its evidence.
+    slot: usize,
+}
+
+/// The detection filter, and what names its faults.
+#[derive(Debug, Clone)]
+pub struct Monitor {
+    bank: Bank,
+    ranges: Vec<super::model::Range>,
+    /// Observations that a prediction looks back.
+    lags: usize,
+    /// Places of the channels in an observation.
+    places: Vec<usize>,
+    watched: Vec<Watched>,
+    tails: [Option<Tail>; Class::ALL.len()],
+    /// What the prior fault rate adds to the log-odds.
+    prior_log_odds: f64,
+    run_s: f64,
+    /// Channels, as bits, of which no context is learned: something may be wrong with them.
+    suspects: u64,
+    classes: [f64; Class::ALL.len()],
+    beliefs: [ComponentBelief; COMPONENTS_MAX],
+    p_unknown: f64,
+    report: DetectionOutput,
+}
+
+impl Monitor {
+    /// A monitor of the channels of `model` that are among `channels`, with a prior fault rate;
+    /// none if the model is not of this robot.
+    #[must_use]
+    pub fn new(
+        model: &Model,
+        robot: &Description,
+        channels: Channels,
+        fault_rate_1_h: f64,
+    ) -> Option<Self> {
+        let all = targets(robot);
+        let is_used = |target: &Target| channels.use_wheels() || target.quantity.is_pose();
+        let places: Vec<usize> = (0..all.len()).filter(|&i| is_used(&all[i])).collect();
+        let names = components(robot);
+        let scales = Scales::new(model.sizes(), drives(robot), model.interval_s);
+        let used: Option<Vec<_>> = places
+            .iter()
+            .map(|&place| Some((place, model.channel.get(place)?.clone())))
+            .collect();
+        let used = used?;
+        let found = directions(&covariances(&model.direction, &places));
+        let laws = (0..=BLOCKS - BLOCKS_MIN).map(|first| Law::new(&found, places.len(), first));
+        let laws: Option<Vec<Law>> = laws.collect();
+        let laws = laws?;
+        let scatter = ScatterLaw::new(&model.scatter, &places);
+        let of_target = |target: &Target| {
+            let name = if target.quantity.is_pose() {
+                "pose"
+            } else {
+                &target.name
+            };
+            names.iter().position(|component| component.name == name)
+        };
+        let channel = |(place, channel): &(usize, super::Channel)| {
+            let target = all[*place].clone();
+            let component = of_target(&target)?;
+            Some((target, component, channel.usual))
+        };
+        let of_channels: Option<Vec<_>> = used.iter().map(channel).collect();
+        let of_channels = of_channels?;
+        let first_drive = names.len() - scales.drives.len();
+        let of_drives = scales.drives.iter().enumerate();
+        let of_drives: Vec<_> = of_drives.map(|(i, d)| (first_drive + i, d.wheel)).collect();
+        let watched = (0..names.len()).map(|i| {
+            let sensor = of_channels.iter().find(|(_, component, _)| *component == i);
+            Watched {
+                is_seen: sensor.is_some() || i >= first_drive,
+                quantity: sensor.map(|(target, ..)| target.quantity),
+                slot: sensor.map_or(Slot::ANY, |(target, ..)| slot(target)),
+            }
+        });
+        let tail = |class: Class| model.tail(channels, class).cloned();
+        let mut monitor = Self {
+            watched: watched.collect(),
+            bank: Bank::new(
+                Window::new(used, scales, model.interval_s),
+                (laws, scatter),
+                of_channels,
+                of_drives,
+            ),
+            ranges: model.command.clone(),
+            lags: lags(model.interval_s),
+            places,
+            tails: Class::ALL.map(tail),
+            prior_log_odds: (fault_rate_1_h / FAULT_RATE_1_H).ln(),
+            run_s: 0.0,
+            suspects: 0,
+            classes: [IMPOSSIBLE; Class::ALL.len()],
+            beliefs: [NO_BELIEF; COMPONENTS_MAX],
+            p_unknown: 1.0,
+            report: DetectionOutput {
+                log_odds: IMPOSSIBLE,
+                channels: [IMPOSSIBLE; SLOTS],
+                gains: [0.0; SLOTS],
+                evidence: 0.0,
+                degenerate_count: 0,
+            },
+        };
+        monitor.reset();
+        Some(monitor)
+    }
+
+    /// Forgets everything.
+    pub fn reset(&mut self) {
+        self.bank.reset();
+        self.run_s = 0.0;
+        self.sum_up();
+    }
+
+    /// What the last observation did.
+    #[must_use]
+    pub const fn report(&self) -> &DetectionOutput {
+        &self.report
+    }
+
+    /// True once evidence counts.
+    #[must_use]
+    pub fn is_ready(&self) -> bool {
+        self.run_s >= READY_S
+    }
+
+    /// What is believed of each component, in the order of [`components`].
+    #[must_use]
+    pub fn beliefs(&self) -> &[ComponentBelief] {
+        &self.beliefs[..self.watched.len()]
+    }
+
+    /// Probability that no single fault explains the window, given that something is wrong.
+    #[must_use]
+    pub const fn p_unknown(&self) -> f64 {
+        self.p_unknown
+    }
+
+    /// Log-odds of each class of faults at [`FAULT_RATE_1_H`], not tempered.
+    #[must_use]
+    pub const fn classes(&self) -> [f64; Class::ALL.len()] {
+        self.classes
+    }
+
+    /// The bank.
+    #[must_use]
+    pub const fn bank(&self) -> &Bank {
+        &self.bank
+    }
+
+    /// Takes the newest observation of `history`.
+    pub fn step(&mut self, history: &History) {
+        let Some(now) = history.ago(0) else { return };
+        // Before, nobody knows what was commanded.
+        if history.ago(self.lags).is_none() {
+            self.bank.clear();
+            return;
+        }
+        self.run_s += now.dt_s;
+        let widening = widening(&self.ranges, now);
+        self.bank
+            .window_mut()
+            .push(history, &commands(history), (widening, self.suspects));
+        let places = &self.places;
+        self.bank
+            .weigh(|channel| now.values[places[channel]].is_some(), now.dt_s);
+        self.sum_up();
+        self.report.evidence = -0.5 * self.bank.mean_square();
+    }
+
+    fn sum_up(&mut self) {
+        let shares = 1.0
+            + self
+                .watched
+                .iter()
+                .filter(|watched| watched.is_seen)
+                .count() as f64;
+        let prior = (FAULT_RATE_1_H / 3600.0 * BLOCK_S * BLOCKS as f64 / shares).ln();
+        // Log-odds by component and class, before and after tempering.
+        let mut raw = [[IMPOSSIBLE; Class::ALL.len()]; COMPONENTS_MAX];
+        let mut certain = [IMPOSSIBLE; COMPONENTS_MAX];
+        for (i, watched) in self.watched.iter().enumerate() {
+            for (k, found) in self.bank.weighed(i).iter().enumerate() {
+                let Some(kind) = kind(watched.quantity, k) else {
+                    continue;
+                };
+                let log_odds = prior + found.log_ratio - (KINDS_MAX as f64).ln();
+                match Class::of(kind) {
+                    Some(class) => {
+                        let slot = &mut raw[i][class as usize];
+                        *slot = log_add(*slot, log_odds);
+                    }
+                    None => certain[i] = log_add(certain[i], log_odds),
+                }
+            }
+        }
+        let n = self.watched.len();
+        let unknown = prior + self.bank.unknown();
+        let mut odds = certain;
+        let mut odds_unknown = IMPOSSIBLE;
+        for (class, tail) in self.tails.iter().enumerate() {
+            let mut all = [IMPOSSIBLE; COMPONENTS_MAX];
+            for (slot, raw) in all.iter_mut().zip(&raw[..n]) {
+                *slot = raw[class];
+            }
+            if class == Class::Unknown as usize {
+                self.classes[class] = unknown.max(IMPOSSIBLE);
+                odds_unknown = tail.as_ref().map_or(unknown, |tail| tail.tempered(unknown));
+                continue;
+            }
+            let total = log_sum_exp(&all).max(IMPOSSIBLE);
+            self.classes[class] = total;
+            let (tempered, slope) = tail
+                .as_ref()
+                .map_or((total, 1.0), |tail| (tail.tempered(total), tail.slope));
+            // The likelihoods tell the components apart no better than health from faults.
+            let sharpened = all.map(|value| slope * (value - total));
+            let sharpened_total = log_sum_exp(&sharpened[..n]);
+            for (slot, value) in odds.iter_mut().zip(sharpened).take(n) {
+                *slot = log_add(*slot, tempered + value - sharpened_total);
+            }
+        }
+        self.report_odds(&odds, odds_unknown);
+    }
+
+    fn report_odds(&mut self, odds: &[f64; COMPONENTS_MAX], unknown: f64) {
+        let n = self.watched.len();
+        let mut channels = [IMPOSSIBLE; SLOTS];
+        channels[Slot::ANY] = unknown.max(IMPOSSIBLE);
+        for (watched, odds) in self.watched.iter().zip(odds) {
+            let slot = &mut channels[watched.slot];
+            *slot = log_add(*slot, *odds).max(IMPOSSIBLE);
+        }
+        let total = log_sum_exp(&channels);
+        self.p_unknown = (unknown - total).exp().clamp(0.0, 1.0);
+        for (i, (watched, odds)) in self.watched.iter().zip(odds).enumerate() {
+            let quantity = watched.quantity;
+            self.beliefs[i] = ComponentBelief {
+                p: (odds - total).exp().clamp(0.0, 1.0),
+                ..likeliest(self.bank.weighed(i), quantity)
+            };
+        }
+        let is_suspect = |i: usize| odds[i] > SUSPECT_LOG_ODDS;
+        let drives = (0..n).any(|i| self.watched[i].quantity.is_none() && is_suspect(i));
+        let channels_of = self.bank.components().enumerate();
+        self.suspects = channels_of
+            .filter(|&(_, component)| drives || unknown > SUSPECT_LOG_ODDS || is_suspect(component))
+            .fold(0, |bits, (channel, _)| bits | 1 << channel);
+        let prior = self.prior_log_odds;
+        self.report.log_odds = (total + prior).max(IMPOSSIBLE);
+        let per_observation = 1.0 / (BLOCKS * self.bank.window().per_block()) as f64;
+        self.report.channels = channels.map(|value| (value + prior).max(IMPOSSIBLE));
+        self.report.gains = channels.map(|value| value * per_observation);
+    }
+}
+
+/// Kind behind a place of a component's faults.
+fn kind(quantity: Option<Quantity>, place: usize) -> Option<FaultKind> {
+    match quantity {
+        Some(_) => SENSOR_KINDS.get(place).copied(),
+        None => DRIVE_KINDS.get(place).copied(),
+    }
+}
+
+/// The most probable kind of a component's fault.
+fn likeliest(
+    weighed: &[super::bank::Weighed; KINDS_MAX],
+    quantity: Option<Quantity>,
+) -> ComponentBelief {
+    let ratios = weighed.map(|one| KIND_CONFIDENCE * one.log_ratio);
+    let total = log_sum_exp(&ratios);
+    let mut best = 0;
+    for k in 1..KINDS_MAX {
+        if ratios[k] > ratios[best] {
+            best = k;
+        }
+    }
+    let Some(kind) = kind(quantity, best) else {
+        return NO_BELIEF;
+    };
+    ComponentBelief {
+        p: 0.0,
+        kind,
+        p_kind: (ratios[best] - total).exp(),
+        size_kind: kind.size_kind(quantity),
+        size: weighed[best].size,
+        size_sd: weighed[best].size_sd,
+        age_s: weighed[best].age_s,
+    }
+}
+
+/// Slot of a channel's evidence.
+fn slot(target: &Target) -> usize {
+    let wheel = target.wheel.unwrap_or(0).min(WHEELS - 1);
+    match target.quantity {
+        Quantity::Forward | Quantity::Lateral | Quantity::Turn => Slot::POSE,
+        Quantity::YawRate => Slot::YAW_RATE,
+        Quantity::WheelRate => Slot::wheel_rate(wheel),
+        Quantity::Current => Slot::current(wheel),
+        Quantity::Other => Slot::further(target.place),
+    }
+}
+
+// Each channel has a place in the arrays of a law.
+const _: () = assert!(CHANNELS_MAX <= COMPONENTS_MAX);

@@ -1,0 +1,112 @@
+//! The tails of the log-odds without a fault.
+
+use vigil_robot::Description;
+use vigil_robot::channel_model::model::{Class, FAULT_RATE_1_H, Tail};
+use vigil_robot::channel_model::{Model, Monitor};
+use vigil_robot::learned::Form;
+use vigil_robot::learned::calibration::SLOPE_UNKNOWN;
+use vigil_robot::learned::channels::Channels;
+
+use super::joint::CONTEXT_BLOCKS;
+use super::record::Record;
+use crate::bounds::Bounds;
+use crate::learning::bounds::SLOPE_LIMIT;
+use crate::maxima::Maxima;
+
+/// Adds the tail of each class, then, on these, a calibration for each set of channels. Each part of
+/// the log is seen through the model that has not seen it.
+pub(super) fn fit(
+    model: &mut Model,
+    models: &mut [Model],
+    records: &[Record],
+    robot: &Description,
+) {
+    let mut sets = vec![Channels::PoseEncoders];
+    if robot.measured.pose {
+        sets.push(Channels::Pose);
+    }
+    let form = Form::LearnedBias;
+    for channels in sets {
+        let tail = |class: Class| {
+            let of = |monitor: &Monitor| monitor.classes()[class as usize];
+            let mut found = maxima(models, records, (robot, channels), of);
+            let found = found.high_tail(channels, form, FAULT_RATE_1_H);
+            Tail {
+                sensors: found.sensors,
+                class,
+                level_log_odds: found.level_log_odds,
+                interval_h: found.interval_at_level_h,
+                slope: found.tail_slope,
+            }
+        };
+        let mut tails = Class::ALL.map(tail);
+        // The same residuals feed all classes but that of noise, and few moments show their tail.
+        let shared = |tail: &&mut Tail| tail.class != Class::Noise;
+        let slopes = tails.iter_mut().filter(shared).map(|tail| tail.slope);
+        let least = slopes.fold(f64::INFINITY, f64::min);
+        for tail in tails.iter_mut().filter(shared) {
+            tail.slope = least;
+        }
+        for each in models.iter_mut().chain([&mut *model]) {
+            each.tail.extend(tails.iter().cloned());
+        }
+        let of = |monitor: &Monitor| monitor.report().log_odds;
+        let mut found = maxima(models, records, (robot, channels), of);
+        let found = found.high_tail(channels, form, FAULT_RATE_1_H);
+        model.calibration.push(found);
+    }
+}
+
+/// Tells which slopes stand on a bound, or were not learned.
+pub(super) fn tell(bounds: &mut Bounds, model: &Model) {
+    let tails = model.tail.iter().enumerate();
+    let tails = tails.map(|(i, tail)| (format!("tail[{i}].slope"), tail.slope));
+    let all = model.calibration.iter().enumerate();
+    let all = all.map(|(i, found)| (format!("calibration[{i}].tail_slope"), found.tail_slope));
+    for (key, slope) in tails.chain(all) {
+        if slope == SLOPE_UNKNOWN {
+            let number = (SLOPE_LIMIT.number, key);
+            bounds.given(true, number, slope, "the log is too short to show a tail");
+        } else {
+            bounds.look(&SLOPE_LIMIT, key, slope);
+        }
+    }
+}
+
+/// Highest log-odds, as `of` takes them, of each window of motion.
+fn maxima(
+    models: &[Model],
+    records: &[Record],
+    (robot, channels): (&Description, Channels),
+    of: impl Fn(&Monitor) -> f64,
+) -> Maxima {
+    let mut maxima = Maxima::new();
+    for (fold, model) in models.iter().enumerate() {
+        let Some(mut monitor) = Monitor::new(model, robot, channels, FAULT_RATE_1_H) else {
+            continue;
+        };
+        let ahead = CONTEXT_BLOCKS * monitor.bank().window().per_block();
+        for record in records {
+            maxima.begin();
+            let mut is_new = true;
+            for (k, history) in record.histories.iter().enumerate() {
+                let last = (k + ahead).min(record.folds.len() - 1);
+                if !record.folds[k..=last].contains(&fold) {
+                    is_new = true;
+                    continue;
+                }
+                if std::mem::take(&mut is_new) {
+                    monitor.reset();
+                }
+                monitor.step(history);
+                let Some(now) = history.ago(0).filter(|now| now.moving) else {
+                    continue;
+                };
+                if record.folds[k] == fold && monitor.is_ready() {
+                    maxima.push(of(&monitor), now.dt_s);
+                }
+            }
+        }
+    }
+    maxima
+}

@@ -1,0 +1,54 @@
+//! A run as observations, each with what came before it, and the parts that are predicted by models
+//! that have not seen them.
+
+use vigil_recording::frames::Run;
+use vigil_robot::Description;
+use vigil_robot::channel_model::{History, Observer};
+
+/// Parts into which a log is divided: each is judged by what was learned from the others.
+pub(super) const FOLDS: usize = 5;
+/// Pieces of a run that is divided itself, as there are too few runs.
+const PIECES: usize = 2 * FOLDS;
+
+/// One run.
+#[derive(Debug, Clone)]
+pub(super) struct Record {
+    /// After each observation: it and those before it.
+    pub histories: Vec<History>,
+    /// The part that each belongs to.
+    pub folds: Vec<usize>,
+}
+
+impl Record {
+    /// Time in motion, s.
+    pub fn moving_s(&self) -> f64 {
+        let newest = self.histories.iter().filter_map(|history| history.ago(0));
+        newest.filter(|now| now.moving).map(|now| now.dt_s).sum()
+    }
+}
+
+/// The runs up to a time, s.
+pub(super) fn all(runs: &[&Run], until_s: f64, robot: &Description) -> Vec<Record> {
+    let record = |(i, run): (usize, &&Run)| {
+        let mut observer = Observer::new(robot);
+        let mut histories = Vec::new();
+        for frame in &run.frames {
+            if frame.header.t_capture_ns as f64 * 1e-9 > until_s {
+                break;
+            }
+            if observer.push(frame).complete {
+                histories.push(*observer.history());
+            }
+        }
+        let length = histories.len().div_ceil(PIECES).max(1);
+        let fold = |k: usize| match runs.len() < FOLDS {
+            true => (i + k / length) % FOLDS,
+            false => i % FOLDS,
+        };
+        Record {
+            folds: (0..histories.len()).map(fold).collect(),
+            histories,
+        }
+    };
+    runs.iter().enumerate().map(record).collect()
+}
