@@ -39,6 +39,8 @@ const MISSING: f64 = 30.0;
 /// Deviations of a robot with which something is wrong that no single fault explains, relative to
 /// those of a healthy one.
 const UNKNOWN: f64 = 2.0;
+/// The same of the roughness.
+const UNKNOWN_NOISE: f64 = 3.0;
 
 /// What the window says of a fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,6 +94,7 @@ pub struct Bank {
     silent_s: [f64; CHANNELS_MAX],
     weighed: [[Weighed; KINDS_MAX]; COMPONENTS_MAX],
     unknown: f64,
+    unknown_noise: f64,
 }
 
 impl Bank {
@@ -113,6 +116,7 @@ impl Bank {
             silent_s: [0.0; CHANNELS_MAX],
             weighed: [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX],
             unknown: IMPOSSIBLE,
+            unknown_noise: IMPOSSIBLE,
         }
     }
 
@@ -132,7 +136,7 @@ impl Bank {
         self.window.clear();
         self.silent_s = [0.0; CHANNELS_MAX];
         self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
-        self.unknown = IMPOSSIBLE;
+        (self.unknown, self.unknown_noise) = (IMPOSSIBLE, IMPOSSIBLE);
     }
 
     /// The window, to be filled.
@@ -158,6 +162,12 @@ impl Bank {
         self.unknown
     }
 
+    /// What is said of noise in several channels at once.
+    #[must_use]
+    pub const fn unknown_noise(&self) -> f64 {
+        self.unknown_noise
+    }
+
     /// Square of the residuals over their number.
     #[must_use]
     pub fn mean_square(&self) -> f64 {
@@ -174,7 +184,7 @@ impl Bank {
     pub fn weigh(&mut self, measured: impl Fn(usize) -> bool, dt_s: f64) {
         let n = self.channels.len();
         self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
-        self.unknown = IMPOSSIBLE;
+        (self.unknown, self.unknown_noise) = (IMPOSSIBLE, IMPOSSIBLE);
         self.first = BLOCKS - self.window.whole_blocks();
         if self.first >= self.laws.len() {
             return;
@@ -195,6 +205,8 @@ impl Bank {
             self.weigh_drive(drive);
         }
         self.unknown = self.law().log_ratio_scaled(UNKNOWN);
+        let scatter = self.scatter.as_ref();
+        self.unknown_noise = scatter.map_or(IMPOSSIBLE, |scatter| scatter.any(UNKNOWN_NOISE));
     }
 
     fn weigh_sensor(&mut self, channel: usize) {

@@ -20,6 +20,9 @@ pub fn directions(covariances: &[DMatrix<f64>]) -> Vec<Direction> {
     let Some(now) = covariances.first() else {
         return Vec::new();
     };
+    if now.is_empty() {
+        return Vec::new();
+    }
     let symmetric = (now + now.transpose()) * 0.5;
     let eigen = symmetric.symmetric_eigen();
     let largest = eigen.eigenvalues.max();

@@ -282,17 +282,25 @@ impl Monitor {
             }
             if class == Class::Unknown as usize {
                 self.classes[class] = unknown.max(IMPOSSIBLE);
-                odds_unknown = tail.as_ref().map_or(unknown, |tail| tail.tempered(unknown));
+                let tempered = tail.as_ref().map_or(unknown, |tail| tail.tempered(unknown));
+                odds_unknown = log_add(odds_unknown, tempered);
                 continue;
             }
-            let total = log_sum_exp(&all).max(IMPOSSIBLE);
+            // Noise of several channels at once is of no component.
+            let of_none = match class == Class::Noise as usize {
+                true => prior + self.bank.unknown_noise(),
+                false => IMPOSSIBLE,
+            };
+            let total = log_add(log_sum_exp(&all), of_none).max(IMPOSSIBLE);
             self.classes[class] = total;
             let (tempered, slope) = tail
                 .as_ref()
                 .map_or((total, 1.0), |tail| (tail.tempered(total), tail.slope));
             // The likelihoods tell the components apart no better than health from faults.
             let sharpened = all.map(|value| slope * (value - total));
-            let sharpened_total = log_sum_exp(&sharpened[..n]);
+            let none = slope * (of_none - total);
+            let sharpened_total = log_add(log_sum_exp(&sharpened[..n]), none);
+            odds_unknown = log_add(odds_unknown, tempered + none - sharpened_total);
             for (slot, value) in odds.iter_mut().zip(sharpened).take(n) {
                 *slot = log_add(*slot, tempered + value - sharpened_total);
             }

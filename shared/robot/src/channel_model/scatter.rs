@@ -14,7 +14,7 @@ const RISE: f64 = 2.0;
 /// Added to a mean square, so that its logarithm is bounded.
 const LEAST: f64 = 1e-3;
 /// Fewest changes in a window that say anything.
-const CHANGES_MIN: usize = 6;
+const CHANGES_MIN: usize = 12;
 
 /// Fewest changes in the last second that say anything, and the most that they say, nats.
 const STILL_CHANGES_MIN: usize = 4;
@@ -91,6 +91,15 @@ impl ScatterLaw {
             self.gradient[i] = row.iter().zip(&self.apart).map(|(k, x)| k * x).sum();
             self.square += self.gradient[i] * self.apart[i];
         }
+    }
+
+    /// The same if it departs in any way, by deviations larger by a factor.
+    #[must_use]
+    pub fn any(&self, factor: f64) -> f64 {
+        let half = 0.5 * (FREEDOM + self.channels as f64);
+        let square = self.square / (factor * factor);
+        half * ((FREEDOM + self.square) / (FREEDOM + square)).ln()
+            - self.channels as f64 * factor.ln()
     }
 
     /// Logarithm of how much more likely the roughness of the last second is if a sensor adds none

@@ -11,6 +11,8 @@ pub const DELAY_BLOCKS: usize = 4;
 /// Observations of a block at most.
 const BLOCK_MAX: usize = (BLOCK_S / INTERVAL_MIN_S + 0.5) as usize;
 const RING: usize = BLOCK_MAX * (BLOCKS + DELAY_BLOCKS);
+/// Motion after which a robot no longer speeds up, s.
+const MOVES_S: f64 = 0.5;
 /// Part of a drive's largest commanded speed that is added to show what an offset of it does.
 const OFFSET: f64 = 0.1;
 
@@ -70,6 +72,8 @@ impl Context {
 struct Moment {
     /// False for what came before the record began.
     is_there: bool,
+    /// True if the robot has moved for a while: at rest nothing jolts.
+    moves: bool,
     /// Whitened residuals.
     z: [Option<f64>; CHANNELS_MAX],
     /// One over the residuals' deviations.
@@ -83,6 +87,7 @@ struct Moment {
 
 const NOTHING: Moment = Moment {
     is_there: false,
+    moves: false,
     z: [None; CHANNELS_MAX],
     unit: [0.0; CHANNELS_MAX],
     predicted: [0.0; CHANNELS_MAX],
@@ -110,7 +115,7 @@ pub struct Window {
     pub share: [[Row; CHANNELS_MAX]; DRIVES_MAX],
     /// That of an offset of a tenth of each drive's largest speed.
     pub offset: [[Row; CHANNELS_MAX]; DRIVES_MAX],
-    /// Mean square of the change from one residual to the next, and how many there were.
+    /// Mean square of the change from one residual to the next in motion, and how many there were.
     pub roughness: [(f64, usize); CHANNELS_MAX],
     /// The same of the last second alone, and what it would be if nothing but the prediction had
     /// changed.
@@ -188,6 +193,7 @@ impl Window {
         let (was_there, last) = (moment_before.is_there, moment_before.predicted);
         let mut moment = NOTHING;
         moment.is_there = true;
+        moment.moves = now.moving && now.moving_s >= MOVES_S;
         for (i, (place, channel)) in self.channels.iter().enumerate() {
             let predicted = channel.predict(commands, &self.scales);
             let before = if was_there { last[i] } else { predicted };
@@ -264,9 +270,8 @@ impl Window {
                         sums.share[d][i] += moment.share[d][i];
                         sums.offset[d][i] += moment.offset[d][i];
                     }
-                    let Some(before) = older.z[i].filter(|_| older.is_there) else {
-                        continue;
-                    };
+                    let before = older.z[i].filter(|_| older.is_there && moment.moves);
+                    let Some(before) = before else { continue };
                     let of_prediction = (moment.predicted[i] - older.predicted[i]) * moment.unit[i];
                     let squares = [value - before, of_prediction]
                         .map(|x| 0.5 * (x * x).min(4.0 * CLIP * CLIP));

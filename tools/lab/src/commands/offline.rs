@@ -213,18 +213,14 @@ impl FilterArgs {
             CommandError::usage(format!("{}: {error}", self.model.display()))
         };
         let (detector, identifier) = match &of.model {
-            RobotModel::Channels(model) => (
-                Detector::of_channels(model, robot, &settings),
-                Diagnoser::from(
-                    ChannelIdentifier::new(
-                        model,
-                        robot,
-                        tree,
-                        (settings.sensors, settings.fault_rate_1_h),
-                    )
-                    .map_err(|e| refuse(&e))?,
-                ),
-            ),
+            RobotModel::Channels(model) => {
+                let detector = Detector::of_channels(model, robot, &settings);
+                let detector = detector.map_err(|e| refuse(&e))?;
+                let used = (settings.sensors, settings.fault_rate_1_h);
+                let identifier = ChannelIdentifier::new(model, robot, tree, used);
+                let identifier = identifier.map_err(|e| refuse(&e))?;
+                (Ok(detector), Diagnoser::from(identifier))
+            }
             RobotModel::Faults(model) => {
                 let is_asked = filter == IdentifierFilter::RiskSensitive;
                 let decision = of.decision.as_ref().filter(|_| is_asked);

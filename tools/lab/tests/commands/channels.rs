@@ -1,5 +1,4 @@
-//! `vigil evaluate` on a robot of which only the nominal behaviour is known: what it says, and what
-//! it refuses.
+//! `vigil evaluate` on a robot with a model of channels: what it says, and what it refuses.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -76,7 +75,7 @@ fn labels_count_as_fault_or_no_fault_and_the_page_has_what_applies() {
     let score: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(
         (&score["identifies"], &score["identifier"]),
-        (&false.into(), &"none".into())
+        (&true.into(), &"channels".into())
     );
     let found = &score["detection"]["STUCK"];
     assert_eq!((&found["n"], &found["detected"]), (&1.into(), &1.into()));
@@ -117,17 +116,20 @@ fn what_has_no_meaning_there_is_refused_by_name() {
     for (more, wanted) in [
         (
             ["--filters", "all"],
-            "--filters: config/models/kobuki.toml is a model of nominal",
+            "--filters: config/models/kobuki.toml is a model of channels",
         ),
         (
             ["--identifier", "imm"],
-            "--identifier: config/models/kobuki.toml is a model of nominal",
+            "--identifier: config/models/kobuki.toml is a model of channels",
         ),
         (
             ["--sensors", "pose"],
             "no calibration for 'pose' and 'learned-bias', only for",
         ),
-        (["--detector", "windowed"], "reach 8.64 at the highest"),
+        (
+            ["--detector", "windowed"],
+            "no calibration for 'pose+encoders' and 'windowed', only for",
+        ),
     ] {
         let output = evaluate(folder.path(), SHIPPED, &more);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -207,31 +207,32 @@ fn learning_faults_says_that_a_slow_log_is_not_judged() {
 }
 
 #[test]
-fn a_nominal_model_is_shown_and_an_edited_one_refused_in_the_same_way() {
-    const NOMINAL: &str = "config/models/kobuki.toml";
-    let shown = text(&["learn", "--show", "--model", NOMINAL]);
+fn a_model_of_channels_is_shown_and_an_edited_one_refused_in_the_same_way() {
+    const CHANNELS: &str = "config/models/kobuki.toml";
+    let shown = text(&["learn", "--show", "--model", CHANNELS]);
     for wanted in [
-        "robot          kobuki (L R)",
-        "file layout    version 2",
+        "robot          kobuki",
+        "file layout    version 3",
         "frames         kobuki.csv.gz",
         "runs learned   1: 0",
         "of each run    the first 40 s",
         "learned range  cmd_yaw_rate -1.320 to 0.330 rad/s",
-        "\nwheel rate L, rad/s\n",
+        "\nenc_L\n",
         "cmd_speed*cmd_yaw_rate",
-        "pose+encoders  windowed",
-        "highest log-odds of a lasting fault",
+        "pose+encoders  learned-bias",
+        "log-odds without a fault, by class of faults",
+        "steady   above",
     ] {
         assert!(shown.contains(wanted), "{wanted}\n{shown}");
     }
-    let json = text(&["learn", "--show", "--model", NOMINAL, "--json"]);
+    let json = text(&["learn", "--show", "--model", CHANNELS, "--json"]);
     let json: Value = serde_json::from_str(&json).unwrap();
     assert!(shown.contains(&format!(
         "model hash     {}",
         json["model_hash"].as_str().unwrap()
     )));
     assert_eq!(json["channels"].as_array().unwrap().len(), 5);
-    assert_eq!(json["channels"][0]["name"], "yaw rate");
+    assert_eq!(json["channels"][0]["name"], "enc_L");
     assert_eq!(json["edited"], false);
     assert!(json["alarms"][0]["alarm_log_odds_24_h"].as_f64().unwrap() > 0.0);
 
@@ -239,7 +240,7 @@ fn a_nominal_model_is_shown_and_an_edited_one_refused_in_the_same_way() {
     let path = folder.path().join("model.toml");
     let name = path.display().to_string();
     let show = ["learn", "--show", "--model", &name];
-    let shipped = fs::read_to_string(root().join(NOMINAL)).unwrap();
+    let shipped = fs::read_to_string(root().join(CHANNELS)).unwrap();
     let changed = shipped.replacen("widened = 1.08", "widened = 1.18", 1);
     assert_ne!(changed, shipped);
     fs::write(&path, &changed).unwrap();

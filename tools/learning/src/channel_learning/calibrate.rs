@@ -52,7 +52,12 @@ pub(super) fn fit(
         }
         let of = |monitor: &Monitor| monitor.report().log_odds;
         let mut found = maxima(models, records, (robot, channels), of);
-        let found = found.high_tail(channels, form, FAULT_RATE_1_H);
+        let mut found = found.high_tail(channels, form, FAULT_RATE_1_H);
+        // Where the log is too short to show it: tempered log-odds have this slope, if those of the
+        // classes are right.
+        if found.tail_slope == SLOPE_UNKNOWN {
+            found.tail_slope = 1.0;
+        }
         model.calibration.push(found);
     }
 }
