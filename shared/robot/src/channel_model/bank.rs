@@ -4,7 +4,7 @@ use vigil_inference::logspace::log_sum_exp;
 
 use super::component::{Quantity, Target};
 use super::fault_kind::{DRIVE_KINDS, FaultKind, SENSOR_KINDS};
-use super::law::{BLOCK_S, BLOCKS, Law, Row};
+use super::law::{BLOCK_S, BLOCKS, Change, Law, Row};
 use super::scatter::ScatterLaw;
 use super::window::{DELAY_BLOCKS, Window};
 use super::{CHANNELS_MAX, COMPONENTS_MAX};
@@ -79,18 +79,43 @@ impl Weighed {
     }
 }
 
+/// A channel that is predicted.
+#[derive(Debug, Clone)]
+pub struct ChannelPlace {
+    /// What it measures.
+    pub target: Target,
+    /// Place of its component.
+    pub component: usize,
+    /// Its usual size in motion, in its unit.
+    pub usual: f64,
+}
+
+/// A drive.
+#[derive(Debug, Clone, Copy)]
+pub struct DrivePlace {
+    /// Place of its component.
+    pub component: usize,
+    /// The wheel that it turns; none if it moves the whole robot.
+    pub wheel: Option<usize>,
+}
+
+/// What is usual of a window, in its size and in its roughness.
+#[derive(Debug, Clone)]
+pub struct Laws {
+    /// The law of windows that begin with each block.
+    pub mean: Vec<Law>,
+    /// None if the log does not tell it.
+    pub scatter: Option<ScatterLaw>,
+}
+
 /// The bank.
 #[derive(Debug, Clone)]
 pub struct Bank {
     window: Window,
-    /// The law of windows that begin with each block.
-    laws: Vec<Law>,
+    laws: Laws,
     first: usize,
-    scatter: Option<ScatterLaw>,
-    /// Of each channel: what it is, its component, and its usual size.
-    channels: Vec<(Target, usize, f64)>,
-    /// Component of each drive, and its wheel.
-    drives: Vec<(usize, Option<usize>)>,
+    channels: Vec<ChannelPlace>,
+    drives: Vec<DrivePlace>,
     silent_s: [f64; CHANNELS_MAX],
     weighed: [[Weighed; KINDS_MAX]; COMPONENTS_MAX],
     unknown: f64,
@@ -102,15 +127,14 @@ impl Bank {
     #[must_use]
     pub fn new(
         window: Window,
-        (laws, scatter): (Vec<Law>, Option<ScatterLaw>),
-        channels: Vec<(Target, usize, f64)>,
-        drives: Vec<(usize, Option<usize>)>,
+        laws: Laws,
+        channels: Vec<ChannelPlace>,
+        drives: Vec<DrivePlace>,
     ) -> Self {
         Self {
             window,
             laws,
             first: 0,
-            scatter,
             channels,
             drives,
             silent_s: [0.0; CHANNELS_MAX],
@@ -128,7 +152,7 @@ impl Bank {
 
     /// Component of each channel.
     pub fn components(&self) -> impl Iterator<Item = usize> + '_ {
-        self.channels.iter().map(|(_, component, _)| *component)
+        self.channels.iter().map(|channel| channel.component)
     }
 
     /// Begins a new record.
@@ -176,7 +200,7 @@ impl Bank {
 
     /// The law of the window as it is.
     fn law(&self) -> &Law {
-        &self.laws[self.first.min(self.laws.len() - 1)]
+        &self.laws.mean[self.first.min(self.laws.mean.len() - 1)]
     }
 
     /// Weighs all faults; `measured`: what of the channels the newest observation holds, which
@@ -186,12 +210,11 @@ impl Bank {
         self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
         (self.unknown, self.unknown_noise) = (IMPOSSIBLE, IMPOSSIBLE);
         self.first = BLOCKS - self.window.whole_blocks();
-        if self.first >= self.laws.len() {
+        let Some(law) = self.laws.mean.get_mut(self.first) else {
             return;
-        }
-        let first = self.first;
-        self.laws[first].take(&self.window.z[..n]);
-        if let Some(scatter) = &mut self.scatter {
+        };
+        law.take(&self.window.z[..n]);
+        if let Some(scatter) = &mut self.laws.scatter {
             scatter.take(&self.window.roughness[..n]);
         }
         for channel in 0..n {
@@ -205,22 +228,16 @@ impl Bank {
             self.weigh_drive(drive);
         }
         self.unknown = self.law().log_ratio_scaled(UNKNOWN);
-        let scatter = self.scatter.as_ref();
+        let scatter = self.laws.scatter.as_ref();
         self.unknown_noise = scatter.map_or(IMPOSSIBLE, |scatter| scatter.any(UNKNOWN_NOISE));
     }
 
     fn weigh_sensor(&mut self, channel: usize) {
-        let (target, component, usual) = &self.channels[channel];
-        let (quantity, component) = (target.quantity, *component);
-        let usual = *usual;
+        let component = self.channels[channel].component;
         // The velocities of one pose share a component.
-        let shares = self
-            .channels
-            .iter()
-            .filter(|(_, other, _)| *other == component);
+        let shares = self.components().filter(|&other| other == component);
         let price = (shares.count().max(1) as f64).ln();
-        let found: [Weighed; KINDS_MAX] =
-            std::array::from_fn(|k| self.sensor(channel, SENSOR_KINDS[k], (quantity, usual)));
+        let found = SENSOR_KINDS.map(|kind| self.sensor(channel, kind));
         for (slot, found) in self.weighed[component].iter_mut().zip(found) {
             let log_ratio = found.log_ratio - price;
             let sum = log_sum_exp(&[slot.log_ratio, log_ratio]);
@@ -231,20 +248,15 @@ impl Bank {
         }
     }
 
-    fn sensor(
-        &self,
-        channel: usize,
-        kind: FaultKind,
-        (quantity, usual): (Quantity, f64),
-    ) -> Weighed {
+    fn sensor(&self, channel: usize, kind: FaultKind) -> Weighed {
+        let ChannelPlace { target, usual, .. } = &self.channels[channel];
         let window = &self.window;
         let (unit, predicted) = (&window.unit[channel], &window.predicted[channel]);
         // A sensor that repeats itself is not as rough as it was.
         let still = || {
             let newest = self.window.newest_roughness[channel];
-            self.scatter
-                .as_ref()
-                .map_or(0.0, |scatter| scatter.still(channel, newest))
+            let scatter = self.laws.scatter.as_ref();
+            scatter.map_or(0.0, |scatter| scatter.still(channel, newest))
         };
         // A bias may be as large as what is measured, or as many deviations.
         let units = unit
@@ -262,7 +274,7 @@ impl Bank {
                 }
             }
             // The velocity of a pose that drifts is biased, and one that stands is zero.
-            FaultKind::Drift | FaultKind::Frozen if quantity.is_pose() => Weighed::NONE,
+            FaultKind::Drift | FaultKind::Frozen if target.quantity.is_pose() => Weighed::NONE,
             FaultKind::Drift => self.drifting(channel, bias_sd / DRIFT_S),
             FaultKind::Frozen => self.replaced(
                 channel,
@@ -282,15 +294,7 @@ impl Bank {
             FaultKind::Zero => self.replaced(channel, |_, block| -predicted[block], -still()),
             FaultKind::Delay => self.delayed(channel),
             FaultKind::Erratic => self.erratic(channel),
-            FaultKind::Noise => self.scatter.as_ref().map_or(Weighed::NONE, |scatter| {
-                let (log_ratio, size, size_sd) = scatter.rise(|i| i == channel);
-                Weighed {
-                    log_ratio,
-                    size,
-                    size_sd,
-                    age_s: BLOCK_S * BLOCKS as f64,
-                }
-            }),
+            FaultKind::Noise => self.noisier(|i| i == channel),
             FaultKind::Missing if self.silent_s[channel] > MISSING_S => Weighed {
                 log_ratio: MISSING,
                 age_s: self.silent_s[channel],
@@ -300,8 +304,23 @@ impl Bank {
         }
     }
 
+    /// More noise of some channels.
+    fn noisier(&self, shows: impl Fn(usize) -> bool) -> Weighed {
+        let Some(scatter) = &self.laws.scatter else {
+            return Weighed::NONE;
+        };
+        let (log_ratio, size, size_sd) = scatter.rise(shows);
+        Weighed {
+            log_ratio,
+            size,
+            size_sd,
+            age_s: BLOCK_S * BLOCKS as f64,
+        }
+    }
+
     /// A change of so much times the signature, with a size of this deviation.
-    fn sized(&self, [b, a]: [f64; 2], size_sd: f64, first: usize) -> Weighed {
+    fn sized(&self, change: Change, size_sd: f64, first: usize) -> Weighed {
+        let Change { b, a } = change;
         let prior = 1.0 / (size_sd * size_sd).max(1e-300);
         let (precision, penalty) = (a + prior, 0.5 * (1.0 + a / prior).ln());
         let less = b * b / precision;
@@ -337,10 +356,7 @@ impl Bank {
         let tried = DELAYS.map(|blocks| {
             let late = self.window.delayed(channel, blocks);
             let changes = self.law().change(channel, &late);
-            let of = |first: usize| {
-                let [b, a] = changes[first];
-                self.law().log_ratio(2.0 * b - a, 0.0)
-            };
+            let of = |first: usize| self.law().log_ratio(changes[first].less(), 0.0);
             Weighed {
                 log_ratio: log_sum_exp(&JOINT_ONSETS.map(of)) - (JOINT_ONSETS.len() as f64).ln(),
                 size: BLOCK_S * blocks,
@@ -396,15 +412,16 @@ impl Bank {
     }
 
     fn weigh_drive(&mut self, drive: usize) {
-        let (component, wheel) = self.drives[drive];
+        let DrivePlace { component, wheel } = self.drives[drive];
         for (k, kind) in DRIVE_KINDS.into_iter().enumerate() {
             self.weighed[component][k] = self.drive(drive, wheel, kind);
         }
     }
 
     fn drive(&self, drive: usize, wheel: Option<usize>, kind: FaultKind) -> Weighed {
-        let is_own = |i: usize| wheel.is_some() && self.channels[i].0.wheel == wheel;
-        let own_rate = |i: usize| is_own(i) && self.channels[i].0.quantity == Quantity::WheelRate;
+        let is_own = |i: usize| wheel.is_some() && self.channels[i].target.wheel == wheel;
+        let own_rate =
+            |i: usize| is_own(i) && self.channels[i].target.quantity == Quantity::WheelRate;
         match kind {
             FaultKind::Stuck => self.stuck(drive, wheel),
             FaultKind::Loss => self.moved(&self.window.share[drive], -1.0, |_| true),
@@ -419,17 +436,7 @@ impl Bank {
                     ..found
                 }
             }
-            FaultKind::Rough if (0..self.channels.len()).any(is_own) => {
-                self.scatter.as_ref().map_or(Weighed::NONE, |scatter| {
-                    let (log_ratio, size, size_sd) = scatter.rise(is_own);
-                    Weighed {
-                        log_ratio,
-                        size,
-                        size_sd,
-                        age_s: BLOCK_S * BLOCKS as f64,
-                    }
-                })
-            }
+            FaultKind::Rough if (0..self.channels.len()).any(is_own) => self.noisier(is_own),
             _ => Weighed::NONE,
         }
     }
@@ -440,7 +447,7 @@ impl Bank {
         let n = self.channels.len();
         let share = &self.window.share[drive];
         let of_motor = |i: &usize| {
-            let target = &self.channels[*i].0;
+            let target = &self.channels[*i].target;
             wheel.is_some() && target.wheel == wheel && target.quantity == Quantity::Current
         };
         let silent = (0..n).find(of_motor);
@@ -457,9 +464,9 @@ impl Bank {
                     false => 0.0,
                 });
             }
-            let [b, a] = self.law().joint_change(&rows[..n], silent);
+            let change = self.law().joint_change(&rows[..n], silent);
             Weighed {
-                log_ratio: self.law().log_ratio(free + 2.0 * b - a, price),
+                log_ratio: self.law().log_ratio(free + change.less(), price),
                 age_s: BLOCK_S * self.law().blocks(first) as f64,
                 ..Weighed::NONE
             }

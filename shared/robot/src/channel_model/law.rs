@@ -18,8 +18,9 @@ use super::CHANNELS_MAX;
 pub const BLOCKS: usize = 8;
 /// Length of each, s.
 pub const BLOCK_S: f64 = 0.5;
-/// Degrees of freedom of the law. Chosen on logs of a Husky, a Robotino and a Kobuki: with 4 a large
-/// fault of one sensor passes for a rough moment of all, with 100 rough moments pass for faults.
+/// Degrees of freedom of the law. Chosen on logs of a Husky, a Robotino and a Kobuki: with 4 a
+/// large fault of one sensor passes for a rough moment of all, with 100 rough moments pass for
+/// faults.
 const FREEDOM: f64 = 30.0;
 /// Sweeps over channels that were not measured, by which each gets the mean that the others give.
 const SWEEPS: usize = 3;
@@ -63,6 +64,26 @@ fn inverse(square: &Square, first: usize) -> Option<Square> {
         _ => 0.0,
     };
     Some(std::array::from_fn(|i| std::array::from_fn(|j| at(i, j))))
+}
+
+/// What a window `z`, whose precision matrix is `P`, says of a change `s`: the square of `z - x s`
+/// is that of `z` less `2 x b - x^2 a`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// `s' P z`.
+    pub b: f64,
+    /// `s' P s`.
+    pub a: f64,
+}
+
+impl Change {
+    const NONE: Self = Self { b: 0.0, a: 0.0 };
+
+    /// By how much the square lessens if the change is there in full.
+    #[must_use]
+    pub fn less(&self) -> f64 {
+        2.0 * self.b - self.a
+    }
 }
 
 /// The law at work: what the last window says.
@@ -210,28 +231,28 @@ impl Law {
         BLOCKS - from.max(self.first)
     }
 
-    /// `b` and `a` of a change of one channel, from each block on.
+    /// What a window says of a change of one channel, from each block on.
     #[must_use]
-    pub fn change(&self, channel: usize, signature: &Row) -> [[f64; 2]; BLOCKS] {
+    pub fn change(&self, channel: usize, signature: &Row) -> [Change; BLOCKS] {
         let (own, gradient) = (&self.own[channel], &self.gradient[channel]);
         let signature = masked(signature, &self.read[channel]);
         let (mut b, mut a) = (0.0, 0.0);
-        let mut out = [[0.0; 2]; BLOCKS];
+        let mut out = [Change::NONE; BLOCKS];
         for first in (0..BLOCKS).rev() {
             let cross: f64 = (first + 1..BLOCKS)
                 .map(|k| own[first][k] * signature[k])
                 .sum();
             b += signature[first] * gradient[first];
             a += signature[first] * (own[first][first] * signature[first] + 2.0 * cross);
-            out[first] = [b, a];
+            out[first] = Change { b, a };
         }
         out
     }
 
-    /// `b` and `a` of a change of several channels at once, where the readings of one channel may
-    /// say nothing.
+    /// What a window says of a change of several channels at once, where the readings of one
+    /// channel may say nothing.
     #[must_use]
-    pub fn joint_change(&self, signature: &[Row], silent: Option<usize>) -> [f64; 2] {
+    pub fn joint_change(&self, signature: &[Row], silent: Option<usize>) -> Change {
         let mut shown = [[0.0; BLOCKS]; CHANNELS_MAX];
         for (i, (row, read)) in signature.iter().zip(&self.read).enumerate() {
             shown[i] = masked(row, read);
@@ -257,7 +278,7 @@ impl Law {
             b -= dot(&known, &self.gradient[silent]);
             a -= dot(&known, &at_silent);
         }
-        [b, a]
+        Change { b, a }
     }
 
     /// By how much the square lessens if a channel's readings from `first` on say nothing; the

@@ -128,7 +128,7 @@ impl Class {
 
     /// The class of a kind of fault; none for what no healthy robot ever shows.
     #[must_use]
-    pub const fn of(kind: FaultKind) -> Option<Self> {
+    pub const fn from_kind(kind: FaultKind) -> Option<Self> {
         match kind {
             FaultKind::Missing => None,
             FaultKind::Bias | FaultKind::Gain | FaultKind::Drift => Some(Self::Steady),

@@ -1,9 +1,8 @@
 //! Is this still the robot that was learned, and if not, what of it is broken?
 //!
-//! The faults of the [`Bank`] fall into four classes: changes of a sensor's readings, changes of a
-//! drive, more noise, and what no single fault explains. No class is as regular as its law: the odds
-//! of each are tempered by the tail that they have on the log ([`Tail`]). Their sum is the log-odds
-//! of a fault; their parts say of which component.
+//! The faults of the [`Bank`] fall into classes ([`Class`]). No class is as regular as its law: the
+//! odds of each are tempered by the tail that they have on the log ([`Tail`]). Their sum is the
+//! log-odds of a fault; their parts say of which component.
 //!
 //! All this is done at the prior fault rate at which the tails were found ([`FAULT_RATE_1_H`]).
 //! Another rate adds its logarithm afterwards. Alarms do not depend on it, as their threshold moves
@@ -12,8 +11,8 @@
 use vigil_blocks::{SizeKind, WHEELS};
 use vigil_inference::logspace::{log_add, log_sum_exp};
 
-use super::bank::{Bank, IMPOSSIBLE, KINDS_MAX};
-use super::channel::{Scales, commands, lags};
+use super::bank::{Bank, ChannelPlace, DrivePlace, IMPOSSIBLE, KINDS_MAX, Laws, Weighed};
+use super::channel::{Channel, Scales, commands, lags};
 use super::component::{Quantity, Target, components, drives, targets};
 use super::directions::{covariances, directions};
 use super::fault_kind::{DRIVE_KINDS, FaultKind, SENSOR_KINDS};
@@ -69,7 +68,7 @@ const NO_BELIEF: ComponentBelief = ComponentBelief {
 
 /// A component at work.
 #[derive(Debug, Clone, Copy)]
-struct Watched {
+struct Watch {
     /// Whether the channels in use show it.
     is_seen: bool,
     /// What its sensor measures; none for a drive.
@@ -87,7 +86,7 @@ pub struct Monitor {
     lags: usize,
     /// Places of the channels in an observation.
     places: Vec<usize>,
-    watched: Vec<Watched>,
+    watched: Vec<Watch>,
     tails: [Option<Tail>; Class::ALL.len()],
     /// What the prior fault rate adds to the log-odds.
     prior_log_odds: f64,
@@ -113,53 +112,36 @@ impl Monitor {
         let all = targets(robot);
         let is_used = |target: &Target| channels.use_wheels() || target.quantity.is_pose();
         let places: Vec<usize> = (0..all.len()).filter(|&i| is_used(&all[i])).collect();
-        let names = components(robot);
         let scales = Scales::new(model.sizes(), drives(robot), model.interval_s);
-        let used: Option<Vec<_>> = places
+        let used = places
             .iter()
-            .map(|&place| Some((place, model.channel.get(place)?.clone())))
-            .collect();
-        let used = used?;
-        let found = directions(&covariances(&model.direction, &places));
-        let laws = (0..=BLOCKS - BLOCKS_MIN).map(|first| Law::new(&found, places.len(), first));
-        let laws: Option<Vec<Law>> = laws.collect();
-        let laws = laws?;
-        let scatter = ScatterLaw::new(&model.scatter, &places);
-        let of_target = |target: &Target| {
-            let name = if target.quantity.is_pose() {
-                "pose"
-            } else {
-                &target.name
-            };
-            names.iter().position(|component| component.name == name)
-        };
-        let channel = |(place, channel): &(usize, super::Channel)| {
-            let target = all[*place].clone();
-            let component = of_target(&target)?;
-            Some((target, component, channel.usual))
-        };
-        let of_channels: Option<Vec<_>> = used.iter().map(channel).collect();
-        let of_channels = of_channels?;
-        let first_drive = names.len() - scales.drives.len();
-        let of_drives = scales.drives.iter().enumerate();
-        let of_drives: Vec<_> = of_drives.map(|(i, d)| (first_drive + i, d.wheel)).collect();
-        let watched = (0..names.len()).map(|i| {
-            let sensor = of_channels.iter().find(|(_, component, _)| *component == i);
-            Watched {
+            .map(|&place| Some((place, model.channel.get(place)?.clone())));
+        let used = used.collect::<Option<Vec<_>>>()?;
+        let sensed = sensed(robot, &used)?;
+        let count = components(robot).len();
+        let first_drive = count - scales.drives.len();
+        let driven = scales
+            .drives
+            .iter()
+            .enumerate()
+            .map(|(i, drive)| DrivePlace {
+                component: first_drive + i,
+                wheel: drive.wheel,
+            });
+        let driven = driven.collect();
+        let watched = (0..count).map(|i| {
+            let sensor = sensed.iter().find(|sensed| sensed.component == i);
+            Watch {
                 is_seen: sensor.is_some() || i >= first_drive,
-                quantity: sensor.map(|(target, ..)| target.quantity),
-                slot: sensor.map_or(Slot::ANY, |(target, ..)| slot(target)),
+                quantity: sensor.map(|sensed| sensed.target.quantity),
+                slot: sensor.map_or(Slot::ANY, |sensed| slot(&sensed.target)),
             }
         });
         let tail = |class: Class| model.tail(channels, class).cloned();
+        let window = Window::new(used, scales, model.interval_s);
         let mut monitor = Self {
             watched: watched.collect(),
-            bank: Bank::new(
-                Window::new(used, scales, model.interval_s),
-                (laws, scatter),
-                of_channels,
-                of_drives,
-            ),
+            bank: Bank::new(window, laws(model, &places)?, sensed, driven),
             ranges: model.command.clone(),
             lags: lags(model.interval_s),
             places,
@@ -262,7 +244,7 @@ impl Monitor {
                     continue;
                 };
                 let log_odds = prior + found.log_ratio - (KINDS_MAX as f64).ln();
-                match Class::of(kind) {
+                match Class::from_kind(kind) {
                     Some(class) => {
                         let slot = &mut raw[i][class as usize];
                         *slot = log_add(*slot, log_odds);
@@ -339,6 +321,35 @@ impl Monitor {
     }
 }
 
+/// The channels at these places of a description, with their components.
+fn sensed(robot: &Description, used: &[(usize, Channel)]) -> Option<Vec<ChannelPlace>> {
+    let (all, names) = (targets(robot), components(robot));
+    let one = |(place, channel): &(usize, Channel)| {
+        let target = all[*place].clone();
+        let name = match target.quantity.is_pose() {
+            true => "pose",
+            false => &target.name,
+        };
+        let component = names.iter().position(|one| one.name == name)?;
+        Some(ChannelPlace {
+            target,
+            component,
+            usual: channel.usual,
+        })
+    };
+    used.iter().map(one).collect()
+}
+
+/// The laws of the channels at these places; none if the model holds no laws.
+fn laws(model: &Model, places: &[usize]) -> Option<Laws> {
+    let found = directions(&covariances(&model.direction, places));
+    let mean = (0..=BLOCKS - BLOCKS_MIN).map(|first| Law::new(&found, places.len(), first));
+    Some(Laws {
+        mean: mean.collect::<Option<_>>()?,
+        scatter: ScatterLaw::new(&model.scatter, places),
+    })
+}
+
 /// Kind behind a place of a component's faults.
 fn kind(quantity: Option<Quantity>, place: usize) -> Option<FaultKind> {
     match quantity {
@@ -348,10 +359,7 @@ fn kind(quantity: Option<Quantity>, place: usize) -> Option<FaultKind> {
 }
 
 /// The most probable kind of a component's fault.
-fn likeliest(
-    weighed: &[super::bank::Weighed; KINDS_MAX],
-    quantity: Option<Quantity>,
-) -> ComponentBelief {
+fn likeliest(weighed: &[Weighed; KINDS_MAX], quantity: Option<Quantity>) -> ComponentBelief {
     let ratios = weighed.map(|one| KIND_CONFIDENCE * one.log_ratio);
     let total = log_sum_exp(&ratios);
     let mut best = 0;

@@ -40,7 +40,9 @@ impl Context {
         value: [0.0; 2],
     };
 
-    fn learn(&mut self, [of_offset, of_gain]: [f64; 2], z: f64, weight: f64, dt_s: f64) {
+    /// Takes a residual `z`, to which an offset of one adds `of[0]` and a gain `of[1]`.
+    fn learn(&mut self, of: [f64; 2], z: f64, weight: f64, dt_s: f64) {
+        let [of_offset, of_gain] = of;
         let keep = (-dt_s / CONTEXT_S).exp();
         let products = [
             of_offset * of_offset,
@@ -49,7 +51,7 @@ impl Context {
         ];
         let information = self.information.iter_mut().zip(products);
         information.for_each(|(sum, product)| *sum = keep * *sum + weight * product);
-        let vector = self.vector.iter_mut().zip([of_offset, of_gain]);
+        let vector = self.vector.iter_mut().zip(of);
         vector.for_each(|(sum, of)| *sum = keep * *sum + weight * of * z);
     }
 

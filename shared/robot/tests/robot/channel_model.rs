@@ -8,7 +8,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_robot::Description;
 use vigil_robot::channel_model::directions::{covariances, directions};
-use vigil_robot::channel_model::law::{BLOCKS, Direction, Law, Row};
+use vigil_robot::channel_model::law::{BLOCKS, Change, Direction, Law, Row};
 use vigil_robot::channel_model::tree::tree;
 use vigil_robot::channel_model::{Model, Monitor, Observer, components, drives};
 use vigil_robot::learned::Form;
@@ -156,11 +156,11 @@ fn the_law_says_what_its_whole_covariance_says() {
         let (z, s) = (draw(), draw());
         law.take(&rows(&z).iter().map(|row| row.map(Some)).collect::<Vec<_>>());
         near(law.square(), z.dot(&(&precision * &z)));
-        let [b, a] = law.joint_change(&rows(&s), None);
+        let Change { b, a } = law.joint_change(&rows(&s), None);
         near(b, s.dot(&(&precision * &z)));
         near(a, s.dot(&(&precision * &s)));
         // Without the first channel: under the law of the others alone.
-        let [b, a] = law.joint_change(&rows(&without_first(&s)), Some(0));
+        let Change { b, a } = law.joint_change(&rows(&without_first(&s)), Some(0));
         let others = 2 * BLOCKS;
         let of_others = covariance
             .view((BLOCKS, BLOCKS), (others, others))
@@ -171,7 +171,7 @@ fn the_law_says_what_its_whole_covariance_says() {
         near(a, s_others.dot(&(&of_others * s_others)));
         for channel in 0..3 {
             let changes = law.change(channel, &rows(&s)[channel]);
-            for (first, [b, a]) in changes.into_iter().enumerate() {
+            for (first, Change { b, a }) in changes.into_iter().enumerate() {
                 let (from, to) = (channel * BLOCKS + first, (channel + 1) * BLOCKS);
                 let alone = DVector::from_fn(3 * BLOCKS, |i, _| match (from..to).contains(&i) {
                     true => s[i],
@@ -220,7 +220,7 @@ fn a_window_that_has_just_begun_is_judged_by_the_law_of_what_is_there() {
     }
     short.take(&window);
     assert!((short.square() - z.dot(&(&precision * &z))).abs() < 1e-9);
-    let [b, a] = short.change(1, &[1.0; BLOCKS])[0];
+    let Change { b, a } = short.change(1, &[1.0; BLOCKS])[0];
     let shift = DVector::from_fn(there.len(), |i, _| {
         f64::from(u8::from(there[i] / BLOCKS == 1))
     });

@@ -13,8 +13,8 @@ use crate::bounds::Bounds;
 use crate::learning::bounds::SLOPE_LIMIT;
 use crate::maxima::Maxima;
 
-/// Adds the tail of each class, then, on these, a calibration for each set of channels. Each part of
-/// the log is seen through the model that has not seen it.
+/// Adds the tail of each class, then, on these, a calibration for each set of channels. Each part
+/// of the log is seen through the model that has not seen it.
 pub(super) fn fit(
     model: &mut Model,
     models: &mut [Model],

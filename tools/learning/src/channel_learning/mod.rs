@@ -147,7 +147,7 @@ pub fn learn(
     let scales = Scales::new(model.sizes(), drives(robot), robot.interval_s);
     let mut models = excitation::of_parts(&records, &model);
     for (place, target) in all.iter().enumerate() {
-        let mut terms = terms::of(target, robot);
+        let mut terms = terms::predictors(target, robot);
         terms.retain(|term| !untold.contains(term));
         let (channel, of_parts) = fit(target, place, &terms, &records, (&models, &scales))?;
         report.add(&channel, &target.unit);

@@ -8,7 +8,7 @@ use vigil_robot::channel_model::{AXES, Model, Quantity, Regressor, Target, Term,
 const ORDER_MAX: usize = 4;
 
 /// The terms of a channel.
-pub(super) fn of(target: &Target, robot: &Description) -> Vec<Term> {
+pub(super) fn predictors(target: &Target, robot: &Description) -> Vec<Term> {
     let mut terms = command(robot);
     let axes = robot.command.len().min(AXES);
     for lag in 1..=lags(robot.interval_s) {

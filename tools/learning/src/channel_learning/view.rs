@@ -128,7 +128,8 @@ impl fmt::Display for View {
         for tail in &self.tails {
             writeln!(
                 f,
-                "  {:<14} {:<8} above {:6.2} every {:.3} h, and more rarely by exp(-{:.2}) per unit",
+                "  {:<14} {:<8} above {:6.2} every {:.3} h, \
+                 and more rarely by exp(-{:.2}) per unit",
                 tail.sensors,
                 format!("{:?}", tail.class).to_lowercase(),
                 tail.level_log_odds,

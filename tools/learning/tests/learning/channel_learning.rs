@@ -1,4 +1,4 @@
-//! A model of the channels of a synthetic robot: what it finds, what it refuses, what it then detects.
+//! A model of the channels of a synthetic robot: what it finds, refuses, and then detects.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
