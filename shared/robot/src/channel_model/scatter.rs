@@ -93,13 +93,19 @@ impl ScatterLaw {
         }
     }
 
-    /// The same if it departs in any way, by deviations larger by a factor.
+    /// Logarithm of how much more likely the roughness is if that of several channels has risen, by
+    /// deviations larger by `factor`; those that are less rough than usual count as usual.
     #[must_use]
     pub fn any(&self, factor: f64) -> f64 {
-        let half = 0.5 * (FREEDOM + self.channels as f64);
-        let square = self.square / (factor * factor);
-        half * ((FREEDOM + self.square) / (FREEDOM + square)).ln()
-            - self.channels as f64 * factor.ln()
+        let n = self.channels;
+        let risen = self.apart.map(|x| x.max(0.0));
+        let rows = self.precision.chunks_exact(n).zip(risen);
+        let square: f64 = rows
+            .map(|(row, x)| x * row.iter().zip(risen).map(|(k, y)| k * y).sum::<f64>())
+            .sum();
+        let half = 0.5 * (FREEDOM + n as f64);
+        half * ((FREEDOM + square) / (FREEDOM + square / (factor * factor))).ln()
+            - n as f64 * factor.ln()
     }
 
     /// Logarithm of how much more likely the roughness of the last second is if a sensor adds none

@@ -138,7 +138,7 @@ fn a_short_log_warns_and_widens_by_what_it_says() {
 #[test]
 fn bias_and_scatter_are_found_and_healthy_driving_is_not() {
     let (model, _) = model(700.0);
-    let faults = [Fault::Bias(20.0, 0.08), Fault::Scatter(20.0, 0.15)];
+    let faults = [Fault::Bias(20.0, 0.08), Fault::Scatter(20.0, 0.2)];
     for (i, fault) in faults.into_iter().enumerate() {
         let found = alarm(&model, &run(10 + i as u32, 40.0, weave, fault));
         let found = found.unwrap_or_else(|| panic!("fault {i}"));
