@@ -241,7 +241,10 @@ mod tests {
             node,
             leaves: match node {
                 None | Some(0) => 0,
-                Some(node) => 1 << node,
+                Some(node) => match 1_u64.checked_shl(node as u32) {
+                    Some(bit) => bit,
+                    None => 0,
+                },
             },
             wheel: None,
             stuck,

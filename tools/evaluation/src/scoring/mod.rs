@@ -10,8 +10,8 @@
 //! - *at h seconds*: the last verdict at or before onset + h; runs that end earlier do not count;
 //! - *right leaf*: the reported mode is the true one (`UNKNOWN` if the tree does not know the true
 //!   one); an abstract node is a wrong leaf, and a right side or type if all its leaves are of it;
-//! - a model of nominal behaviour alone names no faults: its verdicts are *fault* (`UNKNOWN`) or
-//!   *no fault* (`ND`), labels count as no more than that, and only detection is scored;
+//! - labels that name no leaf and no kind of fault, say `taped`, count as *fault* or *no fault*: if
+//!   all do, only detection is scored;
 //! - *isolation*: the time from the onset until the right leaf is named for good, of the runs
 //!   that end with it.
 
@@ -131,12 +131,18 @@ impl Case {
             .find(|verdict| verdict.t_s <= t_s)
     }
 
+    /// True if the label says which fault it is: a leaf of the tree, or a kind that it lacks.
+    fn is_named(&self, taxonomy: &Taxonomy) -> bool {
+        let is_leaf = taxonomy.index(&self.label.mode).is_some();
+        taxonomy.has_faults() && (is_leaf || !self.label.kind.is_empty())
+    }
+
     /// Classes under which a faulty run is counted: all, its type, its kind.
     fn classes(&self, taxonomy: &Taxonomy) -> Vec<String> {
         let class = taxonomy.class_or_unmodelled(&self.label.mode);
         let mut classes = vec!["all".to_owned(), class.to_owned()];
-        // Where no fault is modelled, the label's own name is all there is.
-        let kind = match taxonomy.has_faults() {
+        // Where it names no kind, its own name is all there is.
+        let kind = match self.is_named(taxonomy) {
             true => &self.label.kind,
             false => &self.label.mode,
         };
@@ -152,7 +158,7 @@ impl Case {
 pub struct Score {
     /// Runs by kind; nominal ones are `nominal`.
     pub runs: BTreeMap<String, usize>,
-    /// False for a model of nominal behaviour alone, which names no faults: identification, the
+    /// False if the tree has no faults, or if no faulty run's label names one: identification, the
     /// confusion of sides and types, and calibration do not apply and are empty.
     pub identifies: bool,
     /// Alarms without a fault.
@@ -195,7 +201,9 @@ pub fn score(cases: &[Case], taxonomy: &Taxonomy, alarm_log_odds: f64) -> Score 
     let detection = classes
         .iter()
         .map(|(class, of)| (class.clone(), Detection::new(of)));
-    let identifies = taxonomy.has_faults();
+    let mut faulty = cases.iter().filter(|case| !case.label.is_nominal());
+    let identifies = taxonomy.has_faults()
+        && (classes.is_empty() || faulty.any(|case| case.is_named(taxonomy)));
     let named = || classes.iter().filter(|_| identifies);
     let identification =
         named().map(|(class, of)| (class.clone(), Identification::new(of, taxonomy)));

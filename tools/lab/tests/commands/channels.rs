@@ -75,7 +75,7 @@ fn labels_count_as_fault_or_no_fault_and_the_page_has_what_applies() {
     let score: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(
         (&score["identifies"], &score["identifier"]),
-        (&true.into(), &"channels".into())
+        (&false.into(), &"channels".into())
     );
     let found = &score["detection"]["STUCK"];
     assert_eq!((&found["n"], &found["detected"]), (&1.into(), &1.into()));
