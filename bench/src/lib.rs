@@ -14,6 +14,7 @@ pub mod latency;
 pub mod machine;
 pub mod missions;
 pub mod null_drive;
+pub mod real_logs;
 pub mod results;
 pub mod simulated;
 

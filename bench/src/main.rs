@@ -51,6 +51,8 @@ enum Question {
     Peers(peers::Args),
     /// Are false alarms as rare as `e-detector` promises, and how much later are its alarms?
     Promise(promise::Args),
+    /// Are broken sensors found, named and sized in the logs of real robots?
+    RealLogs(real_logs::Args),
     /// How many lines of code does each room have, and what do the services link?
     Size(size::Args),
     /// Writes bench/README.md anew from the results
@@ -83,6 +85,7 @@ impl Question {
             Self::Mutants(args) => mutants::run(args),
             Self::Peers(args) => peers::run(args),
             Self::Promise(args) => promise::run(args),
+            Self::RealLogs(args) => real_logs::run(args),
             Self::Size(args) => size::run(args),
             Self::Page => write_page(),
             Self::Role(role) => role.play(),

@@ -10,4 +10,5 @@ pub mod missions;
 pub mod mutants;
 pub mod peers;
 pub mod promise;
+pub mod real_logs;
 pub mod size;

@@ -9,7 +9,6 @@ use vigil_evaluation::scoring::Taxonomy;
 use vigil_evaluation::scoring::field::{Scorer, Stretch};
 use vigil_learning::channel_learning;
 use vigil_recording::{frames, labels};
-use vigil_robot::RobotModel;
 use vigil_setup::{Setup, load_robot};
 
 use super::frames::{Fate, RunConditions, Way};
@@ -18,7 +17,7 @@ use super::job::{Job, ScoredRun};
 use super::scenario::{Scenario, Source};
 use super::timeline::Timeline;
 use super::watch::Watch;
-use super::{husky, logs};
+use crate::real_logs::{self, husky, logs};
 use crate::simulated::{self, stages};
 use crate::{load, root};
 
@@ -181,7 +180,6 @@ fn learned(
     runs: Vec<(String, frames::Run)>,
     judged: usize,
 ) -> Result<Material, Box<dyn Error>> {
-    let mut setup = load("kobuki.toml")?;
     let is_judged = |run: &frames::Run| run.id as usize % 2 == judged;
     let others = runs.iter().filter(|(_, run)| !is_judged(run));
     let others: Vec<frames::Run> = others.map(|(_, run)| run.clone()).collect();
@@ -192,8 +190,7 @@ fn learned(
         ground,
         fault: None,
     });
-    setup.model = RobotModel::Channels(Box::new(model));
-    setup.robot = robot;
+    let setup = real_logs::split::setup(robot, &model)?;
     Ok(Material {
         cases: cases.collect(),
         taxonomy: simulated::taxonomy(&setup),

@@ -11,7 +11,7 @@ use crate::chassis::{Ground, Motor, RockerBogie};
 use crate::fault_prior::FaultPrior;
 use crate::tolerance::Tolerance;
 
-/// Shortest and longest interval of a nominal model, s. Chosen by hand: a frame of 50 Hz; beyond a
+/// Shortest and longest interval of a model of channels, s. Chosen by hand: a frame of 50 Hz; beyond a
 /// second a detector is blind.
 pub(crate) const INTERVAL_MIN_S: f64 = 0.02;
 pub(crate) const INTERVAL_MAX_S: f64 = 1.0;
@@ -157,18 +157,18 @@ pub struct Description {
     /// Channels beside the standard ones.
     #[serde(default)]
     pub channel: Vec<FurtherChannel>,
-    /// Order of the polynomials of the command in a nominal model.
+    /// Order of the polynomials of the command in a model of channels.
     #[serde(default = "four")]
     #[schemars(range(min = 1, max = 4))]
     pub polynomial_order: usize,
-    /// Interval over which a nominal model averages frames into one observation, s.
+    /// Interval over which a model of channels averages frames into one observation, s.
     #[serde(default = "tenth")]
     #[schemars(range(min = INTERVAL_MIN_S, max = INTERVAL_MAX_S))]
     pub interval_s: f64,
     /// Wheels.
     #[schemars(length(min = 1, max = WHEELS))]
     pub wheels: Vec<Wheel>,
-    /// Sensor noise; left out, or "estimate": a nominal model learns it from the log.
+    /// Sensor noise; left out, or "estimate": a model of channels learns it from the log.
     #[serde(default, deserialize_with = "given_or_estimated")]
     pub noise: SensorNoise,
     /// Healthy variation beside that of the runs learned from; left out: none.

@@ -11,7 +11,7 @@ use crate::model_file::ModelError;
 ///
 /// Exceedances of a level by the log-odds of nominal runs grow rarer exponentially with the level:
 /// `interval(h) = interval_at_level · exp(slope (h - level))`. The slope is at most 1 for a filter
-/// that knows its nominal model exactly, and smaller when the residuals are not quite white.
+/// that knows its model exactly, and smaller when the residuals are not quite white.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {

@@ -224,7 +224,7 @@ pub fn section(report: &Report<'_>) -> String {
              it."
         }
         false => {
-            "The model is of nominal behaviour alone: labels say fault or no fault, and leaf, \
+            "The labels name no leaf of the fault tree: they say fault or no fault, and leaf, \
              side, type and calibration do not apply."
         }
     };

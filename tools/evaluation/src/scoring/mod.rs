@@ -202,8 +202,8 @@ pub fn score(cases: &[Case], taxonomy: &Taxonomy, alarm_log_odds: f64) -> Score 
         .iter()
         .map(|(class, of)| (class.clone(), Detection::new(of)));
     let mut faulty = cases.iter().filter(|case| !case.label.is_nominal());
-    let identifies = taxonomy.has_faults()
-        && (classes.is_empty() || faulty.any(|case| case.is_named(taxonomy)));
+    let identifies =
+        taxonomy.has_faults() && (classes.is_empty() || faulty.any(|case| case.is_named(taxonomy)));
     let named = || classes.iter().filter(|_| identifies);
     let identification =
         named().map(|(class, of)| (class.clone(), Identification::new(of, taxonomy)));

@@ -31,8 +31,8 @@ impl fmt::Display for Score {
         if !self.identifies {
             writeln!(
                 f,
-                "\nleaf, side, type and their calibration do not apply: the model is of nominal \
-                 behaviour alone"
+                "\nleaf, side, type and their calibration do not apply: the labels name no leaf of \
+                 the fault tree"
             )?;
             self.confusion_table(f)?;
             return self.field_table(f);

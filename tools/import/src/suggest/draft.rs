@@ -199,7 +199,7 @@ impl Draft {
         lines.push(format!("wheel_radius_m = {}", number(self.radius_m)));
         lines.push("noise = \"estimate\"".to_owned());
         lines.push("polynomial_order = 2".to_owned());
-        // A nominal model wants some frames in an interval.
+        // A model of channels wants some frames in an interval.
         let interval_s = (2.0 / frame.rate_hz).clamp(0.1, 1.0);
         lines.push(format!(
             "interval_s = {}\n\ncommand = [",

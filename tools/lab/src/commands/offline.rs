@@ -86,7 +86,7 @@ pub struct FilterArgs {
     seed: u64,
     #[command(flatten)]
     robot: RobotArgs,
-    /// Fault tree (TOML); a nominal model needs none.
+    /// Fault tree (TOML); that of a model of channels follows from the description.
     #[arg(long, value_name = "F", default_value = "config/trees/rover.toml")]
     tree: PathBuf,
     /// Decision model (`.pomdp`) that chooses the action of each row [default: config/rover.pomdp].

@@ -106,7 +106,7 @@ fn labels_count_as_fault_or_no_fault_and_the_page_has_what_applies() {
     for absent in ["<section id=\"calibration\"", "leaf right", "by side"] {
         assert!(!page.contains(absent), "{absent}");
     }
-    assert!(page.contains("labels say fault or no fault"));
+    assert!(page.contains("they say fault or no fault"));
 }
 
 #[test]

@@ -19,6 +19,10 @@ const GAIN_SD_MAX: f64 = 0.3;
 /// exactly would else see a fault in every rounding.
 const FLOOR: f64 = 1e-3;
 
+/// A command this far outside what was driven, relative to the width of that, is still known: the
+/// same command is never twice the same to the last digit.
+const BEYOND_MAX: f64 = 0.02;
+
 /// True if an observation takes part in learning a channel: all that it is predicted from is known,
 /// and the robot moves, or has just stopped.
 pub(super) fn counts(history: &History, lags: usize) -> bool {
@@ -56,7 +60,7 @@ fn residuals(
                 .unwrap_or(predicted);
             before = Some(predicted);
             let mut axes = ranges[*fold].iter().zip(&now.command);
-            let known = axes.all(|(range, value)| range.beyond(*value) <= 0.0);
+            let known = axes.all(|(range, value)| range.beyond(*value) <= BEYOND_MAX);
             if let Some(value) = now.values[place].filter(|_| known && counts(history, scales.lags))
             {
                 out.push(Residual {

@@ -10,6 +10,9 @@ use super::record::Record;
 /// Ridge, per observation, on standardised terms: keeps terms that move together from growing
 /// against each other.
 const RIDGE: f64 = 1e-4;
+/// Least root mean square by which a term is standardised; all terms are within -1 and 1. A product
+/// that a part of the log does not excite, but for rounding, keeps a weight of about zero.
+const SIZE_MIN: f64 = 0.01;
 /// Residuals beyond so many robust deviations get less weight.
 const HUBER: f64 = 3.0;
 /// Rounds of reweighting.
@@ -58,7 +61,7 @@ fn solve(matrix: &DMatrix<f64>, values: &DVector<f64>) -> Option<DVector<f64>> {
     let count = values.len() as f64;
     let scale: Vec<f64> = matrix
         .column_iter()
-        .map(|column| (column.norm_squared() / count).sqrt().max(1e-9))
+        .map(|column| (column.norm_squared() / count).sqrt().max(SIZE_MIN))
         .collect();
     let mut scaled = matrix.clone();
     for (mut column, scale) in scaled.column_iter_mut().zip(&scale) {
