@@ -11,8 +11,8 @@ use crate::chassis::{Ground, Motor, RockerBogie};
 use crate::fault_prior::FaultPrior;
 use crate::tolerance::Tolerance;
 
-/// Shortest and longest interval of a model of channels, s. Chosen by hand: a frame of 50 Hz; beyond a
-/// second a detector is blind.
+/// Shortest and longest interval of a model of channels, s. Chosen by hand: a frame of 50 Hz; beyond
+/// a second a detector is blind.
 pub(crate) const INTERVAL_MIN_S: f64 = 0.02;
 pub(crate) const INTERVAL_MAX_S: f64 = 1.0;
 

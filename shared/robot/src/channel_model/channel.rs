@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::AXES;
 use super::component::Drive;
+use super::coverage::product;
 use super::observation::{DEPTH, History};
 
 /// Part of a drive's largest commanded speed at which its sense of turning counts as half decided:
@@ -125,11 +126,8 @@ impl Term {
         match self.of {
             Regressor::Constant => 1.0,
             Regressor::Command => {
-                let axes = command.iter().zip(&scales.axes).zip(self.powers);
-                let powers = axes.filter(|(_, power)| *power > 0);
-                powers
-                    .map(|((value, size), power)| (value / size).powi(i32::from(power)))
-                    .product()
+                let scaled = std::array::from_fn(|axis| command[axis] / scales.axes[axis]);
+                product(&self.powers, &scaled)
             }
             Regressor::Lagged => {
                 command[self.index.min(AXES - 1)] / scales.axes[self.index.min(AXES - 1)]

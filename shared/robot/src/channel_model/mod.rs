@@ -7,6 +7,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`component`] | channels, drives and components of a robot |
+//! | [`coverage`] | which commands a log covers |
 //! | [`observation`] | frames averaged into observations, and the last few of them |
 //! | [`channel`] | one channel: terms, weights, noise |
 //! | [`window`] | the last seconds of residuals and predictions, in blocks |
@@ -30,6 +31,7 @@ pub const COMPONENTS_MAX: usize = CHANNELS_MAX + DRIVES_MAX;
 pub mod bank;
 pub mod channel;
 pub mod component;
+pub mod coverage;
 pub mod directions;
 pub mod fault_kind;
 pub mod law;
@@ -42,6 +44,7 @@ pub mod window;
 
 pub use channel::{Channel, Regressor, Scales, Term};
 pub use component::{Component, Quantity, Target, components, drives, targets};
-pub use model::{Model, Range};
+pub use coverage::{Combinations, Range};
+pub use model::Model;
 pub use monitor::Monitor;
 pub use observation::{History, Observation, Observer};

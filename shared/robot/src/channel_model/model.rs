@@ -4,9 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::channel::{Channel, Regressor, Term};
 use super::component::targets;
+use super::coverage::{Combinations, Range, widening};
 use super::fault_kind::FaultKind;
 use super::law::{Direction, Law};
-use super::observation::{DEPTH, History, Observation};
+use super::observation::{DEPTH, History};
 use super::scatter::Scatter;
 use super::{AXES, CHANNELS_MAX, DRIVES_MAX};
 use crate::alarm::AlarmError;
@@ -17,82 +18,19 @@ use crate::learned::{Calibration, Form};
 use crate::model_file::{self, ModelFile, check_range, refuse};
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 /// The word by which the file is told from a model of the rover's kind.
 pub const KIND: &str = "channels";
 /// Prior fault rate at which log-odds are collected and tempered, 1/h.
 pub const FAULT_RATE_1_H: f64 = 1.0;
-/// Growth of the deviation per width of the learned range by which a command lies outside it.
-/// Chosen: a quarter of the range outside doubles it.
-const EXTRAPOLATION: f64 = 4.0;
 /// Terms of a channel. Chosen: of four axes to the fourth order learning makes 115 at most. Smaller
 /// refuses such a model; larger only lets a file cost more time.
 const TERMS_MAX: usize = 128;
-/// Gaps of a range. Learning takes one for a gap if it is wider than 0.15 of the range (`GAP` in
-/// `channel_learning::excitation`): six at most, one fewer than this.
-const GAPS_MAX: usize = 7;
 /// Largest order of a polynomial.
 const ORDER_MAX: u32 = 4;
 // `Model::check` names these in its messages as numbers.
 const _: () = assert!(AXES == 4 && CHANNELS_MAX == 28 && DRIVES_MAX == 8);
 const _: () = assert!(TERMS_MAX == 128 && DEPTH == 9 && ORDER_MAX == 4);
-
-/// What was learned of one axis of the command.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Range {
-    /// Name of the axis.
-    pub name: String,
-    /// Its unit.
-    pub unit: String,
-    /// Smallest value learned from.
-    pub min: f64,
-    /// Largest value learned from.
-    pub max: f64,
-    /// Stretches within these bounds in which nothing was learned from, each from the last value
-    /// below to the first above.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub gaps: Vec<[f64; 2]>,
-}
-
-impl Range {
-    /// Size by which the axis is divided in polynomials.
-    #[must_use]
-    pub fn size(&self) -> f64 {
-        self.min.abs().max(self.max.abs()).max(1e-9)
-    }
-
-    /// How far a command lies outside the range, or from the ends of the gap that it lies in, in
-    /// units of the range's width.
-    #[must_use]
-    pub fn beyond(&self, value: f64) -> f64 {
-        let outside = (self.min - value).max(value - self.max).max(0.0);
-        let within = self
-            .gaps
-            .iter()
-            .map(|[from, to]| (value - from).min(to - value));
-        within.fold(outside, f64::max) / (self.max - self.min).max(1e-9)
-    }
-
-    /// True if its numbers make sense.
-    fn is_sane(&self) -> bool {
-        let inside = |[from, to]: &[f64; 2]| self.min <= *from && from < to && *to <= self.max;
-        let bounds = self.min.is_finite() && self.max.is_finite() && self.max >= self.min;
-        bounds && self.gaps.len() <= GAPS_MAX && self.gaps.iter().all(inside)
-    }
-}
-
-/// Factor on all deviations for a command outside the ranges learned from.
-#[must_use]
-pub fn widening(ranges: &[Range], now: &Observation) -> f64 {
-    // A robot at rest is known.
-    if !now.moving {
-        return 1.0;
-    }
-    let axes = ranges.iter().zip(&now.command);
-    let beyond = axes.map(|(range, value)| range.beyond(*value));
-    1.0 + EXTRAPOLATION * beyond.fold(0.0, f64::max)
-}
 
 /// Faults whose log-odds behave alike without a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -192,6 +130,8 @@ pub struct Model {
     pub provenance: Provenance,
     /// Axes of the command, and the ranges learned from.
     pub command: Vec<Range>,
+    /// Combinations of the axes learned from.
+    pub combinations: Combinations,
     /// Channels, in the order of [`targets`].
     pub channel: Vec<Channel>,
     /// The joint law of their residuals.
@@ -314,7 +254,7 @@ impl Model {
     pub fn widening(&self, history: &History) -> f64 {
         history
             .ago(0)
-            .map_or(1.0, |now| widening(&self.command, now))
+            .map_or(1.0, |now| widening(&self.command, &self.combinations, now))
     }
 
     /// Size of each axis of the command; 1 for axes that do not exist.
@@ -353,6 +293,11 @@ impl ModelFile for Model {
         if self.command.len() > AXES || !ranges {
             let found = format!("{} axes", self.command.len());
             return refuse("command", found, "0 to 4 axes, min up to max, gaps inside");
+        }
+        if !self.combinations.is_sane() {
+            let found = format!("{} products", self.combinations.powers.len());
+            let allowed = "at most 15, each with a finite row of the precision";
+            return refuse("combinations", found, allowed);
         }
         let count = self.channel.len();
         if count == 0 || count > CHANNELS_MAX {

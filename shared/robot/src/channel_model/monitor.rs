@@ -14,10 +14,11 @@ use vigil_inference::logspace::{log_add, log_sum_exp};
 use super::bank::{Bank, ChannelPlace, DrivePlace, IMPOSSIBLE, KINDS_MAX, Laws, Weighed};
 use super::channel::{Channel, Scales, commands, lags};
 use super::component::{Quantity, Target, components, drives, targets};
+use super::coverage::{Combinations, Range, widening};
 use super::directions::{covariances, directions};
 use super::fault_kind::{DRIVE_KINDS, FaultKind, SENSOR_KINDS};
 use super::law::{BLOCK_S, BLOCKS, Law};
-use super::model::{Class, FAULT_RATE_1_H, Model, Tail, widening};
+use super::model::{Class, FAULT_RATE_1_H, Model, Tail};
 use super::observation::History;
 use super::scatter::ScatterLaw;
 use super::window::Window;
@@ -81,7 +82,8 @@ struct Watch {
 #[derive(Debug, Clone)]
 pub struct Monitor {
     bank: Bank,
-    ranges: Vec<super::model::Range>,
+    ranges: Vec<Range>,
+    combinations: Combinations,
     /// Observations that a prediction looks back.
     lags: usize,
     /// Places of the channels in an observation.
@@ -143,6 +145,7 @@ impl Monitor {
             watched: watched.collect(),
             bank: Bank::new(window, laws(model, &places)?, sensed, driven),
             ranges: model.command.clone(),
+            combinations: model.combinations.clone(),
             lags: lags(model.interval_s),
             places,
             tails: Class::ALL.map(tail),
@@ -216,7 +219,7 @@ impl Monitor {
             return;
         }
         self.run_s += now.dt_s;
-        let widening = widening(&self.ranges, now);
+        let widening = widening(&self.ranges, &self.combinations, now);
         self.bank
             .window_mut()
             .push(history, &commands(history), (widening, self.suspects));

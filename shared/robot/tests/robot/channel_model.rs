@@ -10,7 +10,7 @@ use vigil_robot::Description;
 use vigil_robot::channel_model::directions::{covariances, directions};
 use vigil_robot::channel_model::law::{BLOCKS, Change, Direction, Law, Row};
 use vigil_robot::channel_model::tree::tree;
-use vigil_robot::channel_model::{Model, Monitor, Observer, components, drives};
+use vigil_robot::channel_model::{Combinations, Model, Monitor, Observer, components, drives};
 use vigil_robot::learned::Form;
 use vigil_robot::learned::channels::Channels;
 
@@ -337,4 +337,37 @@ fn another_prior_rate_moves_log_odds_and_threshold_by_its_logarithm() {
         let threshold = |rate_1_h| model.alarm_log_odds(of, 1000.0, rate_1_h).unwrap();
         assert!((threshold(rate_1_h) - threshold(1.0) - shift).abs() < 1e-9);
     }
+}
+
+#[test]
+fn novelty_is_one_on_average_and_grows_with_what_was_not_driven() {
+    let near =
+        |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+    let powers = vec![[0, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0]];
+    // One axis at a time, never both.
+    let driven = [
+        [1.0, 0.0, 0.0, 0.0],
+        [0.5, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0, 0.0],
+    ];
+    let row = |c: &[f64; 4]| DVector::from_vec(vec![1.0, c[0], c[1]]);
+    let mut mean = DMatrix::zeros(3, 3);
+    for command in &driven {
+        mean += row(command) * row(command).transpose() / driven.len() as f64;
+    }
+    let precision = mean.try_inverse().unwrap();
+    let combinations = Combinations {
+        powers,
+        precision: (0..3)
+            .map(|i| precision.row(i).iter().copied().collect())
+            .collect(),
+    };
+    let all = driven.iter().map(|command| combinations.novelty(command));
+    near(all.sum::<f64>() / driven.len() as f64, 1.0);
+    let both = [1.0, 1.0, 0.0, 0.0];
+    let expected = (row(&both).transpose() * &precision * row(&both))[(0, 0)] / 3.0;
+    near(combinations.novelty(&both), expected);
+    assert!(expected > combinations.novelty(&driven[0]));
+    near(Combinations::default().novelty(&both), 0.0);
 }

@@ -215,7 +215,7 @@ fn a_model_of_channels_is_shown_and_an_edited_one_refused_in_the_same_way() {
         "file layout    version 3",
         "frames         kobuki.csv.gz",
         "runs learned   1: 0",
-        "of each run    the first 40 s",
+        "of each run    the first 60 s",
         "learned range  cmd_yaw_rate -1.320 to 0.330 rad/s",
         "\nenc_L\n",
         "cmd_speed*cmd_yaw_rate",

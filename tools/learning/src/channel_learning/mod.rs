@@ -6,6 +6,7 @@
 //! the deviations.
 
 mod calibrate;
+mod coverage;
 mod excitation;
 mod joint;
 mod noise;
@@ -20,7 +21,9 @@ use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::channel_model::model::{KIND, VERSION};
 use vigil_robot::channel_model::scatter::Scatter;
-use vigil_robot::channel_model::{Channel, Model, Range, Scales, Target, Term, drives, targets};
+use vigil_robot::channel_model::{
+    Channel, Combinations, Model, Range, Scales, Target, Term, drives, targets,
+};
 use vigil_robot::learned::model::Provenance;
 
 use crate::data_hash::data_hash;
@@ -145,7 +148,14 @@ pub fn learn(
     let untold = untold(&records, &model, robot)?;
     report.untold(&untold, &model);
     let scales = Scales::new(model.sizes(), drives(robot), robot.interval_s);
+    let products = coverage::products(&terms::command(robot), &untold);
+    let ranges = model.command.clone();
+    let combinations = |part| coverage::combinations(&records, part, &products, &ranges);
+    model.combinations = combinations(None);
     let mut models = excitation::of_parts(&records, &model);
+    for (part, seen) in models.iter_mut().enumerate() {
+        seen.combinations = combinations(Some(part));
+    }
     for (place, target) in all.iter().enumerate() {
         let mut terms = terms::predictors(target, robot);
         terms.retain(|term| !untold.contains(term));
@@ -184,6 +194,7 @@ fn blank(
         widened: widening(exposure_s, robot.interval_s),
         provenance,
         command,
+        combinations: Combinations::default(),
         channel: Vec::new(),
         direction: Vec::new(),
         scatter: Scatter::default(),

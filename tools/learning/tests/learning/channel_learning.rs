@@ -236,6 +236,37 @@ fn speeds_between_those_of_the_log_are_no_fault_and_what_it_does_not_tell_is_sai
     assert!((10.0..11.0).contains(&found_s), "{found_s}");
 }
 
+/// Straight ahead, then turning on the spot, by turns.
+fn straight_or_turning(t: f64) -> [f64; 2] {
+    match (t / 6.0) as u64 % 2 {
+        0 => [0.5 + 0.3 * (0.9 * t).sin(), 0.0],
+        _ => [0.0, 0.8 * (0.7 * t).sin()],
+    }
+}
+
+#[test]
+fn a_combination_of_commands_that_the_log_lacks_is_no_fault() {
+    // Wheels that slip in curves: a product of both axes that the log does not tell.
+    let slipping = |id: u32, drive: &dyn Fn(f64) -> [f64; 2], length_s: f64| {
+        let mut run = run(id, length_s, drive, Fault::None);
+        for frame in &mut run.frames {
+            let product = frame.command[0] * frame.command[1];
+            frame.channel[2] -= 0.6 * product;
+        }
+        run
+    };
+    let log = [slipping(0, &straight_or_turning, 700.0)];
+    let (model, report) = learn(&log, &[], f64::INFINITY, &robot()).unwrap();
+    let told = report.warnings.iter().any(|w| w.contains("without v*w: "));
+    assert!(told, "{:?}", report.warnings);
+    for id in 0..6 {
+        let known = slipping(60 + id, &straight_or_turning, 60.0);
+        assert_eq!(alarm(&model, &known), None, "as in the log");
+        let curve = slipping(70 + id, &|t: f64| [0.6, 0.7 * (0.4 * t).sin()], 60.0);
+        assert_eq!(alarm(&model, &curve), None, "a curve");
+    }
+}
+
 #[test]
 fn columns_that_mean_something_else_are_refused_in_the_words_of_the_description() {
     let refused = |change: &dyn Fn(&mut SensorFrame)| {
