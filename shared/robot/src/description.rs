@@ -11,10 +11,15 @@ use crate::chassis::{Ground, Motor, RockerBogie};
 use crate::fault_prior::FaultPrior;
 use crate::tolerance::Tolerance;
 
-/// Shortest and longest interval of a model of channels, s. Chosen by hand: a frame of 50 Hz; beyond
-/// a second a detector is blind.
+/// Shortest and longest interval of a model of channels, s. Chosen by hand: a frame of 50 Hz;
+/// beyond a second a detector is blind.
 pub(crate) const INTERVAL_MIN_S: f64 = 0.02;
 pub(crate) const INTERVAL_MAX_S: f64 = 1.0;
+
+/// A limit that nothing reaches, in any unit.
+const LIMIT_MAX: f64 = 1e3;
+/// Part of an axis's limit up to which a robot without a geometry is not told to move.
+const STANDING_PART: f64 = 0.02;
 
 /// Kind of motion that the command vector describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -28,6 +33,8 @@ pub enum Kinematics {
     /// Three omnidirectional wheels; the command is (velocity forward m/s, velocity left m/s) and,
     /// if the robot is turned too, yaw rate rad/s.
     Omni3,
+    /// No geometry: any axes of a command, or none, and any channels. A car, an aircraft, a boat.
+    None,
 }
 
 /// One axis of the command vector.
@@ -132,6 +139,18 @@ pub struct Limits {
     pub wheel_rate_rad_s: f64,
 }
 
+impl Default for Limits {
+    /// Limits that nothing reaches.
+    fn default() -> Self {
+        Self {
+            curvature_1_m: LIMIT_MAX,
+            speed_m_s: LIMIT_MAX,
+            yaw_rate_rad_s: LIMIT_MAX,
+            wheel_rate_rad_s: LIMIT_MAX,
+        }
+    }
+}
+
 /// A robot. Wheel order here is the order of every per-wheel array in the blocks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -140,8 +159,9 @@ pub struct Description {
     pub name: String,
     /// Kind of motion.
     pub kinematics: Kinematics,
-    /// Radius of the wheels, m.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    /// Radius of the wheels, m, above 0; a robot without a geometry needs none.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
     pub wheel_radius_m: f64,
     /// Mass, kg; only the simulator needs it, which drives an `ackermann6`.
     #[serde(default = "unknown_mass_kg")]
@@ -165,8 +185,9 @@ pub struct Description {
     #[serde(default = "tenth")]
     #[schemars(range(min = INTERVAL_MIN_S, max = INTERVAL_MAX_S))]
     pub interval_s: f64,
-    /// Wheels.
-    #[schemars(length(min = 1, max = WHEELS))]
+    /// Wheels; a robot without a geometry needs none.
+    #[serde(default)]
+    #[schemars(length(max = WHEELS))]
     pub wheels: Vec<Wheel>,
     /// Sensor noise; left out, or "estimate": a model of channels learns it from the log.
     #[serde(default, deserialize_with = "given_or_estimated")]
@@ -189,7 +210,8 @@ pub struct Description {
     /// Prior rates of faults; left out: the defaults of [`FaultPrior`].
     #[serde(default)]
     pub fault_prior: FaultPrior,
-    /// Limits.
+    /// Limits; a robot without a geometry needs none.
+    #[serde(default)]
     pub limits: Limits,
 }
 
@@ -230,7 +252,7 @@ fn tenth() -> f64 {
 }
 
 fn any_curvature_1_m() -> f64 {
-    1e3
+    LIMIT_MAX
 }
 
 /// Sensor noise as a table, or the word "estimate".
@@ -257,7 +279,7 @@ impl Description {
         self.kinematics == Kinematics::Ackermann6
     }
 
-    /// Commanded velocity: forward m/s, left m/s, yaw rate rad/s.
+    /// Commanded velocity: forward m/s, left m/s, yaw rate rad/s; zero without a geometry.
     #[must_use]
     pub fn twist(&self, command: &[f64]) -> [f64; 3] {
         let axis = |i: usize| command.get(i).copied().unwrap_or(0.0);
@@ -265,7 +287,24 @@ impl Description {
             Kinematics::Ackermann6 => [axis(1), 0.0, axis(0) * axis(1)],
             Kinematics::Differential => [axis(0), 0.0, axis(1)],
             Kinematics::Omni3 => [axis(0), axis(1), axis(2)],
+            Kinematics::None => [0.0; 3],
         }
+    }
+
+    /// True if a command asks the robot to move. Without a geometry a rate does (an axis in m/s or
+    /// rad/s), and where no axis is a rate any axis; a robot without a command always moves.
+    #[must_use]
+    pub fn is_told_to_move(&self, command: &[f64]) -> bool {
+        if self.kinematics != Kinematics::None {
+            return self.path_speed_m_s(self.twist(command)) > self.body.standing_m_s;
+        }
+        let is_rate = |axis: &Axis| axis.unit.ends_with("/s");
+        let any_rate = self.command.iter().any(is_rate);
+        let mut axes = self.command.iter().zip(command);
+        let moves = axes.any(|(axis, value)| {
+            is_rate(axis) == any_rate && value.abs() > STANDING_PART * axis.limit
+        });
+        moves || self.command.is_empty()
     }
 
     /// Speed of the fastest point between the outermost wheels for a velocity, m/s.

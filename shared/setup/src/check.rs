@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use vigil_cycle::service;
-use vigil_robot::description::Kinematics;
+use vigil_robot::channel_model::AXES;
+use vigil_robot::description::{Kinematics, Limits};
 use vigil_robot::kinematics::GeometryError;
 use vigil_robot::slip::SlipModel;
 use vigil_robot::{AlarmError, Description, RobotModel, declared};
@@ -226,6 +227,9 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
         }
     }
     command(robot, &mut report);
+    if robot.kinematics != Kinematics::None {
+        geometry(robot, &mut report);
+    }
     match SlipModel::new(robot) {
         Err(error @ GeometryError::Table { table, .. }) if robot.has_fault_models() => {
             report(table, error.to_string());
@@ -234,6 +238,27 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
             report(quantity, error.to_string());
         }
         _ => {}
+    }
+}
+
+/// What a robot with a geometry must have.
+fn geometry(robot: &Description, report: &mut impl FnMut(&str, String)) {
+    let needs = "with these kinematics; a robot of other kinematics has kinematics = \"none\"";
+    if robot.wheel_radius_m <= 0.0 {
+        let found = robot.wheel_radius_m;
+        report(
+            "wheel_radius_m",
+            format!("{found} is out of range: allowed is above 0 {needs}"),
+        );
+    }
+    if robot.wheels.is_empty() {
+        report(
+            "wheels",
+            format!("no wheels: at least one is needed {needs}"),
+        );
+    }
+    if robot.limits == Limits::default() {
+        report("limits", format!("missing: the limits are needed {needs}"));
     }
 }
 
@@ -247,6 +272,7 @@ fn command(robot: &Description, report: &mut impl FnMut(&str, String)) {
             2..=3,
             "forward and left velocity, and yaw rate if it is commanded",
         ),
+        Kinematics::None => (0..=AXES, "up to four axes"),
     };
     if !needed.contains(&axes) {
         report("command", format!("{axes} axes: allowed are {shown}"));

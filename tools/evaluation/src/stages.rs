@@ -8,6 +8,7 @@ use vigil_decision::{Inputs, Supervisor, fused_alarm};
 use vigil_diagnosis::detect::Detector;
 use vigil_diagnosis::identify::{Diagnoser, Input};
 use vigil_robot::Description;
+use vigil_robot::description::Kinematics;
 
 use crate::scoring::field::{BLIND, RobotOrder, SAFE_STOP, Size};
 use crate::scoring::{MULTIPLE, Side, Taxonomy, UNKNOWN, Verdict};
@@ -152,7 +153,10 @@ impl Stages {
             action: decided.map_or_else(String::new, |action| vocabulary.action(action)),
             order: decided.map_or(RobotOrder::GoOn, order),
             size: size(belief),
-            drives: velocity.iter().any(|value| value.abs() >= DRIVES),
+            drives: match vocabulary.robot.kinematics {
+                Kinematics::None => vocabulary.robot.is_told_to_move(&frame.command),
+                _ => velocity.iter().any(|value| value.abs() >= DRIVES),
+            },
         }
     }
 }

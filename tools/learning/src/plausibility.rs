@@ -142,7 +142,7 @@ fn beginning(run: &Run, until_s: f64) -> Vec<&SensorFrame> {
 
 /// True if the frame's command asks for motion.
 fn moves(frame: &SensorFrame, robot: &Description) -> bool {
-    robot.path_speed_m_s(robot.twist(&frame.command)) >= robot.body.standing_m_s
+    robot.is_told_to_move(&frame.command)
 }
 
 fn seconds(frame: &SensorFrame) -> f64 {
@@ -224,7 +224,7 @@ fn constant_channel(frames: &[&SensorFrame], robot: &Description) -> Option<Stri
     // In some directions a wheel of an omnidirectional robot does not roll.
     let needed = match robot.kinematics {
         Kinematics::Omni3 => robot.wheels.len(),
-        Kinematics::Ackermann6 | Kinematics::Differential => 1,
+        Kinematics::Ackermann6 | Kinematics::Differential | Kinematics::None => 1,
     };
     (still_wheels.len() >= needed).then(|| still_wheels.swap_remove(0))
 }

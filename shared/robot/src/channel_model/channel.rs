@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::AXES;
 use super::component::Drive;
 use super::coverage::product;
-use super::observation::{DEPTH, History};
+use super::observation::{DEPTH, History, SMOOTHING_S};
 
 /// Part of a drive's largest commanded speed at which its sense of turning counts as half decided:
 /// friction changes its sign with it.
@@ -33,6 +33,9 @@ pub enum Regressor {
     Command,
     /// One axis of the command, some observations ago, divided by its learned size.
     Lagged,
+    /// One axis of the command, smoothed with one of [`SMOOTHING_S`] and divided by its learned
+    /// size, times the product of powers of the axes as they are.
+    Smoothed,
     /// Sense of a drive's commanded speed, -1 to 1.
     Sense,
 }
@@ -46,10 +49,10 @@ pub struct Term {
     /// Axis of the command, or drive.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub index: usize,
-    /// Observations ago.
+    /// Observations ago; of a smoothed axis the place of its time constant.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub lag: usize,
-    /// Powers, one per axis of the block's command vector; for `command`.
+    /// Powers, one per axis of the block's command vector; for `command` and `smoothed`.
     #[serde(default, skip_serializing_if = "are_zero")]
     pub powers: [u8; AXES],
 }
@@ -92,6 +95,14 @@ impl Scales {
     }
 }
 
+impl Scales {
+    /// Product of powers of a command's axes, each divided by its size.
+    fn product(&self, powers: &[u8; AXES], command: &[f64; AXES]) -> f64 {
+        let scaled = std::array::from_fn(|axis| command[axis] / self.axes[axis]);
+        product(powers, &scaled)
+    }
+}
+
 impl Term {
     /// A term of one axis or drive.
     #[must_use]
@@ -125,11 +136,8 @@ impl Term {
     fn of_command(&self, command: &[f64; AXES], scales: &Scales) -> f64 {
         match self.of {
             Regressor::Constant => 1.0,
-            Regressor::Command => {
-                let scaled = std::array::from_fn(|axis| command[axis] / scales.axes[axis]);
-                product(&self.powers, &scaled)
-            }
-            Regressor::Lagged => {
+            Regressor::Command => scales.product(&self.powers, command),
+            Regressor::Lagged | Regressor::Smoothed => {
                 command[self.index.min(AXES - 1)] / scales.axes[self.index.min(AXES - 1)]
             }
             Regressor::Sense => {
@@ -141,10 +149,20 @@ impl Term {
         }
     }
 
-    /// Its value for the newest observation of `history`.
+    /// Its value under the newest commands.
     #[must_use]
-    pub fn value(&self, history: &History, scales: &Scales) -> f64 {
-        self.of_command(history.command(self.lag), scales)
+    pub fn value(&self, commands: &Commands, scales: &Scales) -> f64 {
+        let place = match self.of {
+            Regressor::Smoothed => DEPTH + self.lag,
+            _ => self.lag,
+        };
+        let value = self.of_command(&commands[place.min(commands.len() - 1)], scales);
+        match self.of {
+            Regressor::Smoothed if !are_zero(&self.powers) => {
+                value * scales.product(&self.powers, &commands[0])
+            }
+            _ => value,
+        }
     }
 }
 
@@ -173,13 +191,17 @@ pub struct Channel {
     pub held_out_ratio: f64,
 }
 
-/// The commands that a prediction looks back on, newest first.
-pub type Commands = [[f64; AXES]; DEPTH];
+/// The commands that a prediction looks back on, newest first, then the smoothed ones.
+pub type Commands = [[f64; AXES]; DEPTH + SMOOTHING_S.len()];
 
-/// The newest commands of a record, newest first; before its beginning the first one.
+/// The newest commands of a record; before its beginning the first one.
 #[must_use]
 pub fn commands(history: &History) -> Commands {
-    std::array::from_fn(|lag| *history.command(lag))
+    let newest = history.ago(0).copied().unwrap_or_default();
+    std::array::from_fn(|place| match place.checked_sub(DEPTH) {
+        Some(smoothed) => newest.smoothed[smoothed],
+        None => *history.command(place),
+    })
 }
 
 impl Channel {
@@ -188,10 +210,7 @@ impl Channel {
     pub fn predict(&self, commands: &Commands, scales: &Scales) -> f64 {
         let terms = self.terms.iter().zip(&self.weights);
         terms
-            .map(|(term, weight)| {
-                let lag = term.lag.min(commands.len() - 1);
-                weight * term.of_command(&commands[lag], scales)
-            })
+            .map(|(term, weight)| weight * term.value(commands, scales))
             .sum()
     }
 

@@ -127,7 +127,7 @@ pub fn drives(robot: &Description) -> Vec<Drive> {
             let reach = x.hypot(y).max(1e-9);
             vec![-y / reach, x / reach, reach]
         }
-        Kinematics::Ackermann6 => Vec::new(),
+        Kinematics::Ackermann6 | Kinematics::None => Vec::new(),
     };
     let rows: Vec<Vec<f64>> = robot.wheels.iter().map(|w| row(w.x, w.y)).collect();
     let wheels = rows.len().min(DRIVES_MAX);

@@ -7,7 +7,7 @@ use super::component::targets;
 use super::coverage::{Combinations, Range, widening};
 use super::fault_kind::FaultKind;
 use super::law::{Direction, Law};
-use super::observation::{DEPTH, History};
+use super::observation::{DEPTH, History, SMOOTHING_S};
 use super::scatter::Scatter;
 use super::{AXES, CHANNELS_MAX, DRIVES_MAX};
 use crate::alarm::AlarmError;
@@ -18,11 +18,13 @@ use crate::learned::{Calibration, Form};
 use crate::model_file::{self, ModelFile, check_range, refuse};
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 4;
+pub const VERSION: u32 = 5;
 /// The word by which the file is told from a model of the rover's kind.
 pub const KIND: &str = "channels";
 /// Prior fault rate at which log-odds are collected and tempered, 1/h.
 pub const FAULT_RATE_1_H: f64 = 1.0;
+/// Time at rest from which on a robot at rest is known, s.
+const REST_MIN_S: f64 = 3.0;
 /// Terms of a channel. Chosen: of four axes to the fourth order learning makes 115 at most. Smaller
 /// refuses such a model; larger only lets a file cost more time.
 const TERMS_MAX: usize = 128;
@@ -124,6 +126,8 @@ pub struct Model {
     pub interval_s: f64,
     /// Time in motion that was learned from, s.
     pub exposure_s: f64,
+    /// Time at rest that was learned from, s.
+    pub rest_s: f64,
     /// Factor by which all deviations were widened because the log is short.
     pub widened: f64,
     /// Where the model comes from.
@@ -247,6 +251,12 @@ impl Model {
     ) -> Result<f64, AlarmError> {
         let calibration = self.calibration(channels, form)?;
         Ok(calibration.alarm_log_odds(interval_h, fault_rate_1_h))
+    }
+
+    /// True if the log showed the robot at rest.
+    #[must_use]
+    pub fn knows_rest(&self) -> bool {
+        self.rest_s >= REST_MIN_S
     }
 
     /// Factor on all deviations for the newest command of `history`.
@@ -393,7 +403,14 @@ fn check_term(key: &str, term: &Term, axes: usize) -> Result<(), ModelError> {
     if term.lag >= DEPTH {
         return refuse(format!("{key}.lag"), term.lag, "0 to 8");
     }
-    let is_axis = term.of == Regressor::Lagged;
+    let is_axis = matches!(term.of, Regressor::Lagged | Regressor::Smoothed);
+    if term.of == Regressor::Smoothed && term.lag >= SMOOTHING_S.len() {
+        return refuse(
+            format!("{key}.lag"),
+            term.lag,
+            "the place of a time constant, 0 or 1",
+        );
+    }
     if is_axis && term.index >= axes {
         let key = format!("{key}.index");
         return refuse(key, term.index, "the index of an axis, from 0");

@@ -86,6 +86,8 @@ pub struct Monitor {
     combinations: Combinations,
     /// Observations that a prediction looks back.
     lags: usize,
+    /// False if the log did not show the robot at rest: then a rest says nothing.
+    knows_rest: bool,
     /// Places of the channels in an observation.
     places: Vec<usize>,
     watched: Vec<Watch>,
@@ -147,6 +149,7 @@ impl Monitor {
             ranges: model.command.clone(),
             combinations: model.combinations.clone(),
             lags: lags(model.interval_s),
+            knows_rest: model.knows_rest(),
             places,
             tails: Class::ALL.map(tail),
             prior_log_odds: (fault_rate_1_h / FAULT_RATE_1_H).ln(),
@@ -214,7 +217,8 @@ impl Monitor {
     pub fn step(&mut self, history: &History) {
         let Some(now) = history.ago(0) else { return };
         // Before, nobody knows what was commanded.
-        if history.ago(self.lags).is_none() {
+        let is_known = now.moving || self.knows_rest;
+        if history.ago(self.lags).is_none() || !is_known {
             self.bank.clear();
             return;
         }

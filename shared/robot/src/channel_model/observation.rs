@@ -25,6 +25,10 @@ const POSE_MAX: f64 = 1e7;
 /// tenth is beyond the jitter of a planner's command.
 const CHANGE: f64 = 0.1;
 
+/// Time constants with which commands are smoothed, s: what is slower than the observations that a
+/// prediction looks back on.
+pub const SMOOTHING_S: [f64; 2] = [0.5, 2.0];
+
 /// What was measured over one interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
@@ -34,8 +38,9 @@ pub struct Observation {
     pub dt_s: f64,
     /// Mean command, in the units of the robot's description.
     pub command: [f64; AXES],
-    /// Commanded speed of the fastest point of the robot, m/s.
-    pub path_speed_m_s: f64,
+    /// The same, smoothed with each of [`SMOOTHING_S`]; a record begins as if its first command had
+    /// stood for long.
+    pub smoothed: [[f64; AXES]; SMOOTHING_S.len()],
     /// What each channel measured, in the order of [`targets`]; none if it did not.
     pub values: [Option<f64>; CHANNELS_MAX],
     /// True if the robot is told to move, or its wheels turn.
@@ -52,7 +57,7 @@ impl Default for Observation {
             t_ns: 0,
             dt_s: 0.0,
             command: [0.0; AXES],
-            path_speed_m_s: 0.0,
+            smoothed: [[0.0; AXES]; SMOOTHING_S.len()],
             values: [None; CHANNELS_MAX],
             moving: false,
             moving_s: 0.0,
@@ -96,6 +101,18 @@ impl History {
     pub fn clear(&mut self) {
         self.count = 0;
     }
+}
+
+/// The commands smoothed up to now.
+fn smoothed(last: Option<&Observation>, now: &Observation) -> [[f64; AXES]; SMOOTHING_S.len()] {
+    let Some(last) = last else {
+        return [now.command; SMOOTHING_S.len()];
+    };
+    std::array::from_fn(|i| {
+        let part = 1.0 - (-now.dt_s / SMOOTHING_S[i]).exp();
+        let before = &last.smoothed[i];
+        std::array::from_fn(|axis| before[axis] + part * (now.command[axis] - before[axis]))
+    })
 }
 
 /// Sum of the readings of one channel.
@@ -264,6 +281,7 @@ impl Observer {
             let before = last.map_or(0.0, |last| last.command[i]);
             now.command[i] = mean.take().unwrap_or(before);
         }
+        now.smoothed = smoothed(last.as_ref(), &now);
         let moved = self.moved();
         let mut rolls = false;
         let standing_m_s = self.robot.body.standing_m_s;
@@ -277,9 +295,7 @@ impl Observer {
             let rate = now.values[i].filter(|_| target.quantity == Quantity::WheelRate);
             rolls |= rate.is_some_and(|rate| rate.abs() * self.robot.wheel_radius_m > standing_m_s);
         }
-        let twist = self.robot.twist(&now.command);
-        now.path_speed_m_s = self.robot.path_speed_m_s(twist);
-        now.moving = now.path_speed_m_s > standing_m_s || rolls;
+        now.moving = self.robot.is_told_to_move(&now.command) || rolls;
         self.pose_before = self.pose.take();
         let changed = last.is_none_or(|last| {
             let axes = self.robot.command.iter().enumerate().take(AXES);

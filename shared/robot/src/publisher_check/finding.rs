@@ -150,6 +150,7 @@ fn turning(robot: &Description) -> &str {
         Kinematics::Ackermann6 => 0,
         Kinematics::Differential => 1,
         Kinematics::Omni3 => 2,
+        Kinematics::None => return "the command",
     };
     let axis = robot.command.get(axis);
     axis.map_or("the command", |axis| axis.name.as_str())

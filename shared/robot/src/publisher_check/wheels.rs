@@ -87,7 +87,7 @@ impl Wheels {
             pair_count: 0,
             wheel_count: match robot.kinematics {
                 // In which sense its wheels turn differs from maker to maker.
-                Kinematics::Omni3 => 0,
+                Kinematics::Omni3 | Kinematics::None => 0,
                 _ => robot.wheels.len().min(WHEELS),
             },
         };

@@ -24,10 +24,16 @@ const FLOOR: f64 = 1e-3;
 const BEYOND_MAX: f64 = 0.02;
 
 /// True if an observation takes part in learning a channel: all that it is predicted from is known,
-/// and the robot moves, or has just stopped.
+/// and the robot moves, or has just stopped. Of a longer rest one observation a second does, so
+/// that it does not outweigh the motion.
 pub(super) fn counts(history: &History, lags: usize) -> bool {
-    let known = history.ago(lags).is_some();
-    known && (0..=lags).any(|lag| history.ago(lag).is_some_and(|then| then.moving))
+    let Some((now, _)) = history.ago(0).zip(history.ago(lags)) else {
+        return false;
+    };
+    let second = |t_ns: u64| t_ns / 1_000_000_000;
+    let moved = (0..=lags).any(|lag| history.ago(lag).is_some_and(|then| then.moving));
+    let before = history.ago(1).map_or(0, |last| second(last.t_ns));
+    moved || second(now.t_ns) != before
 }
 
 /// A residual of a model that has not seen it.
@@ -77,6 +83,22 @@ fn residuals(
         }
     }
     out
+}
+
+/// Root mean square of the residuals that models of parts have on parts that they have not seen.
+pub(super) fn unseen_error(
+    (models, ranges): (&[Channel], &[&[Range]]),
+    place: usize,
+    records: &[Record],
+    scales: &Scales,
+) -> f64 {
+    let unseen = residuals((models, ranges), place, records, scales);
+    mean(
+        unseen
+            .iter()
+            .map(|residual| residual.apart * residual.apart),
+    )
+    .sqrt()
 }
 
 /// Fits the variance of `channel` to the residuals that models of parts have on the parts that they

@@ -27,6 +27,19 @@ impl Record {
     }
 }
 
+/// Time at rest, s: longer than a second after motion.
+pub(super) fn rest_s(records: &[Record], lags: usize) -> f64 {
+    let all = records.iter().flat_map(|record| &record.histories);
+    let is_rest = |history: &&History| {
+        let there = (0..=lags).map(|lag| history.ago(lag));
+        there
+            .into_iter()
+            .all(|then| then.is_some_and(|then| !then.moving))
+    };
+    let rests = all.filter(is_rest).filter_map(|history| history.ago(0));
+    rests.map(|now| now.dt_s).sum()
+}
+
 /// The runs up to a time, s.
 pub(super) fn all(runs: &[&Run], until_s: f64, robot: &Description) -> Vec<Record> {
     let record = |(i, run): (usize, &&Run)| {

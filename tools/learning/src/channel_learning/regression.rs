@@ -1,7 +1,8 @@
 //! Ridge regression with Huber weights.
 
 use nalgebra::{DMatrix, DVector};
-use vigil_robot::channel_model::{Channel, Scales};
+use vigil_robot::channel_model::channel::commands;
+use vigil_robot::channel_model::{Channel, Regressor, Scales, Term};
 
 use super::LogError;
 use super::noise::counts;
@@ -37,7 +38,13 @@ pub(super) fn fit(
             else {
                 continue;
             };
-            rows.extend(channel.terms.iter().map(|term| term.value(history, scales)));
+            let commands = commands(history);
+            rows.extend(
+                channel
+                    .terms
+                    .iter()
+                    .map(|term| term.value(&commands, scales)),
+            );
             values.push(value);
         }
     }
@@ -51,13 +58,19 @@ pub(super) fn fit(
     }
     let matrix = DMatrix::from_row_slice(values.len(), terms, &rows);
     let values = DVector::from_vec(values);
-    if let Some(weights) = solve(&matrix, &values) {
+    let penalised: Vec<bool> = channel.terms.iter().map(is_penalised).collect();
+    if let Some(weights) = solve(&matrix, &values, &penalised) {
         channel.weights = weights.iter().copied().collect();
     }
     Ok(())
 }
 
-fn solve(matrix: &DMatrix<f64>, values: &DVector<f64>) -> Option<DVector<f64>> {
+/// A channel's constant may be of any size.
+fn is_penalised(term: &Term) -> bool {
+    term.of != Regressor::Constant
+}
+
+fn solve(matrix: &DMatrix<f64>, values: &DVector<f64>, penalised: &[bool]) -> Option<DVector<f64>> {
     let count = values.len() as f64;
     let scale: Vec<f64> = matrix
         .column_iter()
@@ -75,7 +88,7 @@ fn solve(matrix: &DMatrix<f64>, values: &DVector<f64>) -> Option<DVector<f64>> {
             row *= *trust;
         }
         let mut normal = scaled.tr_mul(&weighted);
-        for i in 0..scale.len() {
+        for (i, _) in penalised.iter().enumerate().filter(|(_, is)| **is) {
             normal[(i, i)] += RIDGE * count;
         }
         solution = normal.cholesky()?.solve(&weighted.tr_mul(values));

@@ -113,6 +113,13 @@ impl Report {
     }
 
     pub(super) fn finish(&mut self, model: &Model) {
+        if !model.knows_rest() {
+            self.warnings.push(format!(
+                "the log shows {:.0} s at rest: a robot that stands is not watched; record some \
+                 seconds with no motion commanded",
+                model.rest_s
+            ));
+        }
         let short = model
             .calibration
             .iter()

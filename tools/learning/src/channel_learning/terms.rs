@@ -2,13 +2,37 @@
 
 use vigil_robot::Description;
 use vigil_robot::channel_model::channel::lags;
+use vigil_robot::channel_model::observation::SMOOTHING_S;
 use vigil_robot::channel_model::{AXES, Model, Quantity, Regressor, Target, Term, drives};
 
 /// Highest power of the command in a motor's part.
 const ORDER_MAX: usize = 4;
 
-/// The terms of a channel.
-pub(super) fn predictors(target: &Target, robot: &Description) -> Vec<Term> {
+/// Sets of terms of a channel, each with those of the one before: as a quick robot needs them; with
+/// what is slow; with what is slow in one axis and acts through another, as a car turns by its
+/// speed and its steering angle.
+pub(super) fn candidates(target: &Target, robot: &Description) -> [Vec<Term>; 3] {
+    let quick = quick(target, robot);
+    let axes = robot.command.len().min(AXES);
+    let places = 0..SMOOTHING_S.len();
+    let alone: Vec<Term> = places
+        .flat_map(|place| (0..axes).map(move |axis| Term::new(Regressor::Smoothed, axis, place)))
+        .collect();
+    let others = |of: &Term| {
+        let of = *of;
+        let others = (0..axes).filter(move |&other| other != of.index);
+        others.map(move |other| Term {
+            powers: std::array::from_fn(|i| u8::from(i == other)),
+            ..of
+        })
+    };
+    let through: Vec<Term> = alone.iter().flat_map(others).collect();
+    let slow: Vec<Term> = quick.iter().copied().chain(alone).collect();
+    let all = slow.iter().copied().chain(through).collect();
+    [quick, slow, all]
+}
+
+fn quick(target: &Target, robot: &Description) -> Vec<Term> {
     let mut terms = command(robot);
     let axes = robot.command.len().min(AXES);
     for lag in 1..=lags(robot.interval_s) {
@@ -73,6 +97,14 @@ pub(super) fn word(term: &Term, model: &Model) -> String {
             factors.collect::<Vec<_>>().join("*")
         }
         Regressor::Lagged => axis(term.index).to_owned(),
+        Regressor::Smoothed => {
+            let time_s = SMOOTHING_S[term.lag.min(SMOOTHING_S.len() - 1)];
+            let others = Term::command(term.powers);
+            return match word(&others, model) {
+                others if others.is_empty() => format!("{}[~{time_s} s]", axis(term.index)),
+                others => format!("{}[~{time_s} s]*{others}", axis(term.index)),
+            };
+        }
         Regressor::Sense => format!("sense_{}", term.index),
     };
     match term.lag {

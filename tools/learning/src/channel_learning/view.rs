@@ -106,7 +106,8 @@ impl fmt::Display for View {
         writeln!(
             f,
             "\nchannels, each a mean over {} s and predicted by weights of the command (each axis \
-             divided by the\nlargest value learned from); [-k]: k observations earlier",
+             divided by the\nlargest value learned from); [-k]: k observations earlier; \
+             [~T]: smoothed over T",
             self.interval_s
         )?;
         for Channel {

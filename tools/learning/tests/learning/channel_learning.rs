@@ -7,7 +7,7 @@ use vigil_blocks::SensorFrame;
 use vigil_learning::channel_learning::{LogError, learn};
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
-use vigil_robot::channel_model::{Model, Monitor, Observer};
+use vigil_robot::channel_model::{Model, Monitor, Observer, components};
 use vigil_robot::learned::Form;
 use vigil_robot::learned::channels::Channels;
 
@@ -81,16 +81,28 @@ fn model(length_s: f64) -> (Model, Vec<String>) {
 
 /// First time at which the log-odds reach the alarm for 24 h between false alarms, s.
 fn alarm(model: &Model, run: &Run) -> Option<f64> {
-    let form = Form::LearnedBias;
-    let calibration = model.calibration(Channels::PoseEncoders, form).unwrap();
-    let threshold = calibration.alarm_log_odds(24.0, 1.0);
-    let mut monitor = Monitor::new(model, &robot(), Channels::PoseEncoders, 1.0).unwrap();
-    let mut observer = Observer::new(&robot());
+    alarm_of(model, &robot(), run)
+}
+
+fn alarm_of(model: &Model, robot: &Description, run: &Run) -> Option<f64> {
+    first_alarm(model, robot, run).map(|(t_s, _)| t_s)
+}
+
+/// The same with the component that is most probably broken.
+fn first_alarm(model: &Model, robot: &Description, run: &Run) -> Option<(f64, String)> {
+    let calibration = model.calibration(Channels::PoseEncoders, Form::LearnedBias);
+    let threshold = calibration.unwrap().alarm_log_odds(24.0, 1.0);
+    let mut monitor = Monitor::new(model, robot, Channels::PoseEncoders, 1.0).unwrap();
+    let mut observer = Observer::new(robot);
     for frame in &run.frames {
         if observer.push(frame).complete {
             monitor.step(observer.history());
             if monitor.is_ready() && monitor.report().log_odds > threshold {
-                return Some(frame.header.t_capture_ns as f64 * 1e-9);
+                let parts = components(robot);
+                let beliefs = monitor.beliefs().iter().zip(&parts);
+                let best = beliefs.max_by(|a, b| a.0.p.total_cmp(&b.0.p)).unwrap();
+                let t_s = frame.header.t_capture_ns as f64 * 1e-9;
+                return Some((t_s, best.1.name.clone()));
             }
         }
     }
@@ -265,6 +277,99 @@ fn a_combination_of_commands_that_the_log_lacks_is_no_fault() {
         let curve = slipping(70 + id, &|t: f64| [0.6, 0.7 * (0.4 * t).sin()], 60.0);
         assert_eq!(alarm(&model, &curve), None, "a curve");
     }
+}
+
+/// A car: no kinematics of ours, a speed and a steering angle commanded, two channels.
+fn car() -> Description {
+    toml::from_str(
+        r#"
+name = "car"
+kinematics = "none"
+command = [
+  { name = "cmd_speed", unit = "m/s", limit = 5.0 },
+  { name = "cmd_steer", unit = "rad", limit = 0.5 },
+]
+measured = { pose = false, wheel_rates = false, steer = false, yaw_rate = true, currents = false }
+channel = [{ name = "speed", role = "other", unit = "m/s", limit = 6.0 }]
+polynomial_order = 3
+"#,
+    )
+    .unwrap()
+}
+
+#[test]
+fn a_robot_without_a_geometry_is_learned_and_its_faults_are_named() {
+    let robot = car();
+    assert!(robot.is_told_to_move(&[1.0, 0.0]) && !robot.is_told_to_move(&[0.0, 0.4]));
+    let drive = |id: u32, length_s: f64, bias_from_s: f64| {
+        let command = |t: f64| [2.0 + 1.5 * (0.31 * t).sin(), 0.3 * (0.47 * t).sin()];
+        let mut run = run(id, length_s, command, Fault::Bias(bias_from_s, 0.15));
+        for frame in &mut run.frames {
+            let [v, steer] = [frame.command[0], frame.command[1]];
+            // Frames of the car: its gyro, then the speed.
+            let noise = frame.channel[2] - steer;
+            frame.channel[0] = v * steer.tan() / 1.2 + noise;
+            frame.channel[1] = v + 0.1 * (frame.channel[1] - v);
+            frame.channel_valid = 0b11;
+        }
+        run
+    };
+    let (model, _) = learn(&[drive(0, 700.0, 1e9)], &[], f64::INFINITY, &robot).unwrap();
+    let names: Vec<&str> = model.channel.iter().map(|c| c.name.as_str()).collect();
+    assert_eq!(names, ["yaw_rate", "speed"]);
+    assert_eq!(first_alarm(&model, &robot, &drive(1, 120.0, 1e9)), None);
+    let (t_s, name) = first_alarm(&model, &robot, &drive(2, 60.0, 20.0)).unwrap();
+    assert!(
+        (20.0..23.0).contains(&t_s) && name == "yaw_rate",
+        "{t_s} s: {name}"
+    );
+}
+
+#[test]
+fn what_is_slow_in_one_axis_is_predicted_through_the_other() {
+    // A heavy car: its speed follows within two seconds, its steering at once.
+    let slow = |id: u32, bias_from_s: f64| {
+        let command = |t: f64| {
+            let step = (t / 4.0) as usize % 5;
+            [[0.0, 3.0, 1.0, 2.0, 0.5][step], 0.3 * (0.47 * t).sin()]
+        };
+        let mut run = run(id, 120.0, command, Fault::Bias(bias_from_s, 0.2));
+        let mut speed = 0.0;
+        for frame in &mut run.frames {
+            let [v, steer] = [frame.command[0], frame.command[1]];
+            let noise = frame.channel[2] - steer;
+            speed += (v - speed) / (2.0 * RATE_HZ);
+            frame.channel[0] = speed * steer.tan() / 1.2 + noise;
+            frame.channel[1] = speed + noise;
+            frame.channel_valid = 0b11;
+        }
+        run
+    };
+    let runs: Vec<Run> = (0..6).map(|id| slow(id, 1e9)).collect();
+    let (model, report) = learn(&runs, &[], f64::INFINITY, &car()).unwrap();
+    let told = |text: &str| report.warnings.iter().any(|w| w.contains(text));
+    assert!(
+        model.knows_rest() && !told("at rest"),
+        "{:?}",
+        report.warnings
+    );
+    assert_eq!(alarm_of(&model, &car(), &slow(6, 1e9)), None);
+    let found_s = alarm_of(&model, &car(), &slow(7, 60.0)).unwrap();
+    assert!((60.0..63.0).contains(&found_s), "{found_s} s");
+}
+
+#[test]
+fn a_rest_that_the_log_lacks_says_nothing() {
+    let (model, warnings) = model(200.0);
+    let told = warnings.iter().any(|w| w.contains("0 s at rest"));
+    assert!(!model.knows_rest() && told, "{warnings:?}");
+    let stopping = |t: f64| if t < 20.0 { weave(t) } else { [0.0, 0.0] };
+    let mut parked = run(80, 60.0, stopping, Fault::None);
+    for frame in parked.frames.iter_mut().skip(1500) {
+        // As if the wheels were turned by hand.
+        frame.channel[0] += 0.05;
+    }
+    assert_eq!(alarm(&model, &parked), None);
 }
 
 #[test]
