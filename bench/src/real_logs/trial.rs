@@ -113,12 +113,10 @@ pub fn trial(
     let broken = injection.frames(run, robot, target, onset_s);
     let mut stages = begin(split, run)?;
     let mut rule = Rule::new(robot);
-    let leaf = match target.quantity.is_pose() {
-        true => "pose",
-        false => &target.name,
-    };
     let tree = &split.setup.tree;
-    let node = tree.index(leaf).ok_or("the tree lacks a leaf")?;
+    let node = tree
+        .index(target.component())
+        .ok_or("the tree lacks a leaf")?;
     let group = tree.nodes()[node].parent;
     let truth = Truth { node, group };
     let mut trial = Trial {

@@ -128,21 +128,17 @@ pub(crate) fn assert_likelihoods(likelihood: &[f64]) {
 }
 
 /// Probability and predicted probability of a state; without an alarm, the unknown is nominal.
+/// Those of several leaves add up, to more than 1 where they may be present together.
 fn probabilities(diagnosis: &FaultBelief, meaning: StateMeaning, alarm: bool) -> (f64, f64) {
     let unknown = (diagnosis.p_unknown, diagnosis.p_unknown_predicted);
     match meaning.node {
-        None if meaning.leaves != 0 => {
+        None if meaning.unknown && alarm => unknown,
+        None if meaning.unknown => (0.0, 0.0),
+        None => {
             let leaves = || (0..64).filter(|leaf| meaning.leaves >> leaf & 1 == 1);
-            let sum = |p: &[f64]| {
-                leaves()
-                    .filter_map(|leaf| p.get(leaf))
-                    .sum::<f64>()
-                    .min(1.0)
-            };
+            let sum = |p: &[f64]| leaves().filter_map(|leaf| p.get(leaf)).sum();
             (sum(&diagnosis.p), sum(&diagnosis.p_predicted))
         }
-        None if alarm => unknown,
-        None => (0.0, 0.0),
         Some(0) if !alarm => (
             (diagnosis.p[0] + unknown.0).min(1.0),
             (diagnosis.p_predicted[0] + unknown.1).min(1.0),
@@ -200,7 +196,7 @@ fn divide(set: &FaultSet, states: &[StateMeaning], weights: &mut [f64]) {
             *weight = (*weight - own * set.p).max(0.0) + kept;
         } else if is_in(meaning) && !(stuck == 1 && meaning.stuck) {
             *weight = (*weight - set.p).max(0.0) + share;
-        } else if stuck > 1 && meaning.is_unknown() {
+        } else if stuck > 1 && meaning.unknown {
             *weight += set.p;
         }
     }
@@ -211,7 +207,10 @@ fn divide(set: &FaultSet, states: &[StateMeaning], weights: &mut [f64]) {
 pub(crate) fn is_sound(diagnosis: &FaultBelief, states: &[StateMeaning], tree_hash: u64) -> bool {
     let mut sum = 0.0;
     for meaning in states {
-        let (p, predicted) = probabilities(diagnosis, *meaning, true);
+        let (mut p, mut predicted) = probabilities(diagnosis, *meaning, true);
+        if meaning.leaves.count_ones() > 1 {
+            (p, predicted) = (p.min(1.0), predicted.min(1.0));
+        }
         if ![p, predicted]
             .iter()
             .all(|p| (0.0..=1.0 + P_TOLERANCE).contains(p))
@@ -246,6 +245,7 @@ mod tests {
                     None => 0,
                 },
             },
+            unknown: node.is_none(),
             wheel: None,
             stuck,
         }
@@ -255,6 +255,7 @@ mod tests {
     fn the_state_of_all_faults_has_the_probability_of_any_of_them() {
         let any = StateMeaning {
             leaves: 0b110,
+            unknown: false,
             ..state(None, false)
         };
         let states = [state(Some(0), false), any, state(None, false)];
@@ -279,6 +280,36 @@ mod tests {
         let mut found = [0.0; 3];
         weights(&said, &states, true, &mut found);
         for (found, expected) in found.into_iter().zip([0.2, 0.7, 0.1]) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_state_of_leaves_that_come_together_counts_each_set_once() {
+        let any = StateMeaning {
+            leaves: 0b110,
+            unknown: false,
+            ..state(None, false)
+        };
+        let none = StateMeaning { leaves: 0, ..any };
+        let states = [state(Some(0), false), any, none, state(None, false)];
+        let mut said = FaultBelief {
+            p_unknown: 0.0,
+            set_count: 2,
+            ..FaultBelief::default()
+        };
+        (said.p[0], said.p[1], said.p[2]) = (0.1, 0.9, 0.6);
+        said.sets[0] = FaultSet {
+            leaves: 0b110,
+            p: 0.6,
+        };
+        said.sets[1] = FaultSet {
+            leaves: 0b10,
+            p: 0.3,
+        };
+        let mut found = [0.0; 4];
+        weights(&said, &states, true, &mut found);
+        for (found, expected) in found.into_iter().zip([0.1, 0.9, 0.0, 0.0]) {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }
     }

@@ -132,17 +132,12 @@ pub(crate) struct StateMeaning {
     pub node: Option<usize>,
     /// The leaves that it stands for, as bits.
     pub leaves: u64,
+    /// True for what no modelled fault explains.
+    pub unknown: bool,
     /// Wheel of the fault.
     pub wheel: Option<usize>,
     /// True if the fault is a stuck wheel.
     pub stuck: bool,
-}
-
-impl StateMeaning {
-    /// True for the state of what no modelled fault explains.
-    pub const fn is_unknown(self) -> bool {
-        self.node.is_none() && self.leaves == 0
-    }
 }
 
 /// Checks that a block can carry the model's belief and values.
@@ -187,6 +182,7 @@ fn meaning(
         return Ok(StateMeaning {
             node: None,
             leaves: if name == FAULT { others } else { 0 },
+            unknown: name == UNKNOWN,
             wheel: None,
             stuck: false,
         });
@@ -205,6 +201,7 @@ fn meaning(
     Ok(StateMeaning {
         node: Some(node),
         leaves: if node == 0 { 0 } else { 1 << node },
+        unknown: false,
         wheel,
         stuck,
     })
@@ -345,6 +342,7 @@ mod tests {
         let states = [Some(3), Some(4)].map(|wheel| StateMeaning {
             leaves: 0,
             node: wheel,
+            unknown: false,
             wheel,
             stuck: wheel == Some(4),
         });

@@ -11,10 +11,10 @@ use crate::chassis::{Ground, Motor, RockerBogie};
 use crate::fault_prior::FaultPrior;
 use crate::tolerance::Tolerance;
 
-/// Shortest and longest interval of a model of channels, s. Chosen by hand: a frame of 50 Hz;
-/// beyond a second a detector is blind.
+/// Shortest and longest interval of a model of channels, s. Chosen by hand: a frame of 50 Hz; two
+/// observations in half a second.
 pub(crate) const INTERVAL_MIN_S: f64 = 0.02;
-pub(crate) const INTERVAL_MAX_S: f64 = 1.0;
+pub(crate) const INTERVAL_MAX_S: f64 = 0.3;
 
 /// A limit that nothing reaches, in any unit.
 const LIMIT_MAX: f64 = 1e3;
@@ -273,7 +273,8 @@ fn given_or_estimated<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Senso
 }
 
 impl Description {
-    /// True if the robot's faults are modelled one by one, false if only its nominal behaviour is.
+    /// True if the robot has the rover's models of motion and faults, false if it has a model of
+    /// channels.
     #[must_use]
     pub fn has_fault_models(&self) -> bool {
         self.kinematics == Kinematics::Ackermann6

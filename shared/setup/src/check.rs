@@ -4,6 +4,7 @@ use std::path::Path;
 
 use vigil_cycle::service;
 use vigil_robot::channel_model::AXES;
+use vigil_robot::channel_model::component::unfit;
 use vigil_robot::description::{Kinematics, Limits};
 use vigil_robot::kinematics::GeometryError;
 use vigil_robot::slip::SlipModel;
@@ -227,6 +228,10 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
         }
     }
     command(robot, &mut report);
+    let channels = (!robot.has_fault_models()).then(|| unfit(robot)).flatten();
+    if let Some(message) = channels {
+        report("channel", message);
+    }
     if robot.kinematics != Kinematics::None {
         geometry(robot, &mut report);
     }

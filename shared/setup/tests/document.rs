@@ -138,7 +138,7 @@ fn a_robot_out_of_its_ranges_is_refused_by_line_and_key() {
             "mass_kg = 14.2",
             "interval_s = 0.01",
             6,
-            "interval_s: 0.01 is out of range: allowed is 0.02 to 1",
+            "interval_s: 0.01 is out of range: allowed is 0.02 to 0.3",
         ),
         (
             "y = 0.30, steered = true },\n  { name = \"LM\"",

@@ -45,6 +45,11 @@ impl Maxima {
         self.found.len() as f64 * WINDOW_S
     }
 
+    /// Highest of all; -inf if there is none.
+    pub fn highest(&self) -> f64 {
+        self.found.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// The tail beyond the median; see [`Calibration::fit`].
     pub fn tail(&mut self, channels: Channels, form: Form, rate_1_h: f64) -> Option<Calibration> {
         Calibration::fit(channels, form, rate_1_h, &mut self.found, WINDOW_S)

@@ -29,6 +29,8 @@ struct Verdict {
     size_sd: [f64; FAULT_NODES],
     size_kind: [u32; FAULT_NODES],
     onset_ns: u64,
+    /// Node of the most probable leaf; 0 if there is none.
+    likeliest: usize,
     runner_up: u32,
 }
 
@@ -39,6 +41,7 @@ const NO_VERDICT: Verdict = Verdict {
     size_sd: [0.0; FAULT_NODES],
     size_kind: [0; FAULT_NODES],
     onset_ns: 0,
+    likeliest: 0,
     runner_up: 0,
 };
 
@@ -182,9 +185,15 @@ impl ChannelIdentifier {
             if p > best[0].0 {
                 best = [(p, node), best[0]];
                 verdict.onset_ns = now_ns.saturating_sub((1e9 * age_s) as u64);
+                verdict.likeliest = node;
             } else if p > best[1].0 {
                 best[1] = (p, node);
             }
+        }
+        // The window shows the last seconds alone: a fault that stands began before.
+        let before = &self.verdict;
+        if self.alarm_t_ns != 0 && before.likeliest == verdict.likeliest && before.onset_ns != 0 {
+            verdict.onset_ns = verdict.onset_ns.min(before.onset_ns);
         }
         verdict.unknown = (1.0 - named).clamp(0.0, 1.0);
         // Probabilities that sum to a little more than one, by rounding, sum to one.

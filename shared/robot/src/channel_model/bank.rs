@@ -4,9 +4,9 @@ use vigil_inference::logspace::log_sum_exp;
 
 use super::component::{Quantity, Target};
 use super::fault_kind::{DRIVE_KINDS, FaultKind, SENSOR_KINDS};
-use super::law::{BLOCK_S, BLOCKS, Change, Law, Row};
+use super::law::{BLOCKS, Change, Law, Row};
 use super::scatter::ScatterLaw;
-use super::window::{DELAY_BLOCKS, Window};
+use super::window::{DELAY_BLOCKS, OFFSET, Window};
 use super::{CHANNELS_MAX, COMPONENTS_MAX};
 
 /// Kinds of a component at most.
@@ -33,7 +33,8 @@ const DELAYS: [f64; 4] = [0.5, 1.0, 2.0, DELAY_BLOCKS as f64];
 const ERRATIC: f64 = 6.0;
 /// The value at which a sensor has frozen is one number more: its price in nats.
 const HELD: f64 = 2.0;
-/// Silence after which a channel is missing, s, and how much that says.
+/// Silence after which a channel is missing, s, if it was never silent for half as long, and how
+/// much that says.
 const MISSING_S: f64 = 1.0;
 const MISSING: f64 = 30.0;
 /// Deviations of a robot with which something is wrong that no single fault explains, relative to
@@ -88,6 +89,8 @@ pub struct ChannelPlace {
     pub component: usize,
     /// Its usual size in motion, in its unit.
     pub usual: f64,
+    /// Longest silence of a healthy one, s.
+    pub silence_s: f64,
 }
 
 /// A drive.
@@ -204,14 +207,14 @@ impl Bank {
     }
 
     /// Weighs all faults; `measured`: what of the channels the newest observation holds, which
-    /// lasted `dt_s`.
-    pub fn weigh(&mut self, measured: impl Fn(usize) -> bool, dt_s: f64) {
+    /// lasted `dt_s`. False if the window is too short yet to say anything.
+    pub fn weigh(&mut self, measured: impl Fn(usize) -> bool, dt_s: f64) -> bool {
         let n = self.channels.len();
         self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
         (self.unknown, self.unknown_noise) = (IMPOSSIBLE, IMPOSSIBLE);
         self.first = BLOCKS - self.window.whole_blocks();
         let Some(law) = self.laws.mean.get_mut(self.first) else {
-            return;
+            return false;
         };
         law.take(&self.window.z[..n]);
         if let Some(scatter) = &mut self.laws.scatter {
@@ -230,6 +233,7 @@ impl Bank {
         self.unknown = self.law().log_ratio_scaled(UNKNOWN);
         let scatter = self.laws.scatter.as_ref();
         self.unknown_noise = scatter.map_or(IMPOSSIBLE, |scatter| scatter.any(UNKNOWN_NOISE));
+        true
     }
 
     fn weigh_sensor(&mut self, channel: usize) {
@@ -249,7 +253,8 @@ impl Bank {
     }
 
     fn sensor(&self, channel: usize, kind: FaultKind) -> Weighed {
-        let ChannelPlace { target, usual, .. } = &self.channels[channel];
+        let place = &self.channels[channel];
+        let quantity = place.target.quantity;
         let window = &self.window;
         let (unit, predicted) = (&window.unit[channel], &window.predicted[channel]);
         // A sensor that repeats itself is not as rough as it was.
@@ -263,7 +268,7 @@ impl Bank {
             .iter()
             .fold(0.0, |sum, unit| sum + unit / BLOCKS as f64);
         let deviation = if units > 0.0 { 1.0 / units } else { 0.0 };
-        let bias_sd = BIAS_SD * usual.hypot(BIAS_DEVIATIONS * deviation);
+        let bias_sd = BIAS_SD * place.usual.hypot(BIAS_DEVIATIONS * deviation);
         match kind {
             FaultKind::Bias => self.added(channel, unit, bias_sd),
             FaultKind::Gain => {
@@ -274,7 +279,7 @@ impl Bank {
                 }
             }
             // The velocity of a pose that drifts is biased, and one that stands is zero.
-            FaultKind::Drift | FaultKind::Frozen if target.quantity.is_pose() => Weighed::NONE,
+            FaultKind::Drift | FaultKind::Frozen if quantity.is_pose() => Weighed::NONE,
             FaultKind::Drift => self.drifting(channel, bias_sd / DRIFT_S),
             FaultKind::Frozen => self.replaced(
                 channel,
@@ -295,11 +300,13 @@ impl Bank {
             FaultKind::Delay => self.delayed(channel),
             FaultKind::Erratic => self.erratic(channel),
             FaultKind::Noise => self.noisier(|i| i == channel),
-            FaultKind::Missing if self.silent_s[channel] > MISSING_S => Weighed {
-                log_ratio: MISSING,
-                age_s: self.silent_s[channel],
-                ..Weighed::NONE
-            },
+            FaultKind::Missing if self.silent_s[channel] > MISSING_S.max(2.0 * place.silence_s) => {
+                Weighed {
+                    log_ratio: MISSING,
+                    age_s: self.silent_s[channel],
+                    ..Weighed::NONE
+                }
+            }
             _ => Weighed::NONE,
         }
     }
@@ -314,7 +321,7 @@ impl Bank {
             log_ratio,
             size,
             size_sd,
-            age_s: BLOCK_S * BLOCKS as f64,
+            age_s: self.window.block_s() * BLOCKS as f64,
         }
     }
 
@@ -328,7 +335,7 @@ impl Bank {
             log_ratio: self.law().log_ratio(less, penalty),
             size: b / precision,
             size_sd: (self.law().variance_scale(less) / precision).sqrt(),
-            age_s: BLOCK_S * self.law().blocks(first) as f64,
+            age_s: self.window.block_s() * self.law().blocks(first) as f64,
         }
     }
 
@@ -345,7 +352,7 @@ impl Bank {
                 if block < first {
                     0.0
                 } else {
-                    unit[block] * BLOCK_S * blocks
+                    unit[block] * self.window.block_s() * blocks
                 }
             });
             self.sized(self.law().change(channel, &grown)[0], size_sd, first)
@@ -359,9 +366,9 @@ impl Bank {
             let of = |first: usize| self.law().log_ratio(changes[first].less(), 0.0);
             Weighed {
                 log_ratio: log_sum_exp(&JOINT_ONSETS.map(of)) - (JOINT_ONSETS.len() as f64).ln(),
-                size: BLOCK_S * blocks,
-                size_sd: 0.25 * BLOCK_S * blocks,
-                age_s: BLOCK_S * BLOCKS as f64,
+                size: self.window.block_s() * blocks,
+                size_sd: 0.25 * self.window.block_s() * blocks,
+                age_s: self.window.block_s() * BLOCKS as f64,
             }
         });
         let weights = tried.map(|one| one.log_ratio);
@@ -376,7 +383,7 @@ impl Bank {
             log_ratio: total - (DELAYS.len() as f64).ln(),
             size,
             size_sd: tried.iter().map(apart).sum::<f64>().sqrt(),
-            age_s: BLOCK_S * BLOCKS as f64,
+            age_s: self.window.block_s() * BLOCKS as f64,
         }
     }
 
@@ -392,7 +399,7 @@ impl Bank {
             let left = self.law().own_square(channel, &apart);
             Weighed {
                 log_ratio: self.law().log_ratio(less - left, price),
-                age_s: BLOCK_S * self.law().blocks(first) as f64,
+                age_s: self.window.block_s() * self.law().blocks(first) as f64,
                 ..Weighed::NONE
             }
         }))
@@ -405,7 +412,7 @@ impl Bank {
             let less = less * (1.0 - 1.0 / (ERRATIC * ERRATIC));
             Weighed {
                 log_ratio: self.law().log_ratio(less, penalty),
-                age_s: BLOCK_S * self.law().blocks(first) as f64,
+                age_s: self.window.block_s() * self.law().blocks(first) as f64,
                 ..Weighed::NONE
             }
         }))
@@ -431,8 +438,8 @@ impl Bank {
             FaultKind::Offset => {
                 let found = self.moved(&self.window.offset[drive], 1.0, |_| true);
                 Weighed {
-                    size: 0.1 * found.size,
-                    size_sd: 0.1 * found.size_sd,
+                    size: OFFSET * found.size,
+                    size_sd: OFFSET * found.size_sd,
                     ..found
                 }
             }
@@ -467,7 +474,7 @@ impl Bank {
             let change = self.law().joint_change(&rows[..n], silent);
             Weighed {
                 log_ratio: self.law().log_ratio(free + change.less(), price),
-                age_s: BLOCK_S * self.law().blocks(first) as f64,
+                age_s: self.window.block_s() * self.law().blocks(first) as f64,
                 ..Weighed::NONE
             }
         }))

@@ -93,9 +93,7 @@ impl Scales {
             lags: lags(interval_s),
         }
     }
-}
 
-impl Scales {
     /// Product of powers of a command's axes, each divided by its size.
     fn product(&self, powers: &[u8; AXES], command: &[f64; AXES]) -> f64 {
         let scaled = std::array::from_fn(|axis| command[axis] / self.axes[axis]);
@@ -187,7 +185,9 @@ pub struct Channel {
     pub context_sd: [f64; 2],
     /// Root mean square of the channel's value in motion.
     pub usual: f64,
-    /// Root mean square of the residual on the parts left out, over that expected: about 1.
+    /// Longest silence of a healthy one, s.
+    pub silence_s: f64,
+    /// Root mean square of the residual on the parts left out, over that on parts learned from.
     pub held_out_ratio: f64,
 }
 

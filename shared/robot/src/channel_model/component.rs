@@ -53,10 +53,30 @@ pub struct Target {
     pub largest: f64,
 }
 
+/// Name of the component of a pose.
+const POSE: &str = "pose";
+
 /// What is modelled of a robot, in order: at most [`CHANNELS_MAX`]. The axes of a pose become the
 /// velocities between two of them.
 #[must_use]
 pub fn targets(robot: &Description) -> Vec<Target> {
+    let mut all = predicted(robot);
+    all.truncate(CHANNELS_MAX);
+    all
+}
+
+impl Target {
+    /// Name of the component that it belongs to.
+    #[must_use]
+    pub fn component(&self) -> &str {
+        match self.quantity.is_pose() {
+            true => POSE,
+            false => &self.name,
+        }
+    }
+}
+
+fn predicted(robot: &Description) -> Vec<Target> {
     let mut out = Vec::new();
     if robot.measured.pose {
         let pose = [
@@ -80,7 +100,9 @@ pub fn targets(robot: &Description) -> Vec<Target> {
             Role::BodyRate if channel.name == "yaw_rate" => {
                 (Quantity::YawRate, BEYOND_LIMITS * limits.yaw_rate_rad_s)
             }
-            Role::WheelRate => (Quantity::WheelRate, BEYOND_LIMITS * limits.wheel_rate_rad_s),
+            Role::WheelRate if channel.wheel.is_some() => {
+                (Quantity::WheelRate, BEYOND_LIMITS * limits.wheel_rate_rad_s)
+            }
             Role::Current if channel.wheel.is_some() => (Quantity::Current, CURRENT_MAX_A),
             _ => (
                 Quantity::Other,
@@ -98,8 +120,29 @@ pub fn targets(robot: &Description) -> Vec<Target> {
             largest,
         });
     }
-    out.truncate(CHANNELS_MAX);
     out
+}
+
+/// Why a robot's channels cannot be modelled; none if they can.
+#[must_use]
+pub fn unfit(robot: &Description) -> Option<String> {
+    let all = predicted(robot);
+    if all.len() > CHANNELS_MAX {
+        let found = all.len();
+        return Some(format!(
+            "{found} channels: allowed are {CHANNELS_MAX}, a pose counts as three"
+        ));
+    }
+    let is_taken = |i: usize| {
+        let name = &all[i].name;
+        let own = !all[i].quantity.is_pose();
+        own && (name == POSE || all[..i].iter().any(|other| other.name == *name))
+    };
+    let twice = (0..all.len()).find(|&i| is_taken(i))?;
+    let name = &all[twice].name;
+    Some(format!(
+        "a channel cannot be called '{name}': the name is taken"
+    ))
 }
 
 /// What turns a part of the command into motion: a wheel's motor, or an axis of the command where
@@ -131,7 +174,7 @@ pub fn drives(robot: &Description) -> Vec<Drive> {
     };
     let rows: Vec<Vec<f64>> = robot.wheels.iter().map(|w| row(w.x, w.y)).collect();
     let wheels = rows.len().min(DRIVES_MAX);
-    let shares = wheels > 0 && rows.iter().all(|row| row.len() >= axes);
+    let shares = axes > 0 && wheels > 0 && rows.iter().all(|row| row.len() >= axes);
     let inverse = shares.then(|| {
         let matrix = DMatrix::from_fn(wheels, axes, |i, axis| rows[i][axis]);
         matrix.pseudo_inverse(1e-9).ok()
@@ -203,10 +246,7 @@ pub fn components(robot: &Description) -> Vec<Component> {
     };
     let mut out: Vec<Component> = Vec::new();
     for target in targets(robot) {
-        let name = match target.quantity.is_pose() {
-            true => "pose".to_owned(),
-            false => target.name,
-        };
+        let name = target.component().to_owned();
         if out.iter().any(|component| component.name == name) {
             continue;
         }

@@ -29,6 +29,8 @@ pub struct Range {
     pub min: f64,
     /// Largest value learned from.
     pub max: f64,
+    /// Size by which the axis is divided in products: its largest magnitude in the whole log.
+    pub size: f64,
     /// Stretches within these bounds in which nothing was learned from, each from the last value
     /// below to the first above.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -36,12 +38,6 @@ pub struct Range {
 }
 
 impl Range {
-    /// Size by which the axis is divided in polynomials.
-    #[must_use]
-    pub fn size(&self) -> f64 {
-        self.min.abs().max(self.max.abs()).max(1e-9)
-    }
-
     /// How far a command lies outside the range, or from the ends of the gap that it lies in, in
     /// units of the range's width.
     #[must_use]
@@ -58,7 +54,8 @@ impl Range {
     pub(super) fn is_sane(&self) -> bool {
         let inside = |[from, to]: &[f64; 2]| self.min <= *from && from < to && *to <= self.max;
         let bounds = self.min.is_finite() && self.max.is_finite() && self.max >= self.min;
-        bounds && self.gaps.len() <= GAPS_MAX && self.gaps.iter().all(inside)
+        let sized = (1e-9..=1e9).contains(&self.size);
+        bounds && sized && self.gaps.len() <= GAPS_MAX && self.gaps.iter().all(inside)
     }
 }
 
@@ -121,7 +118,7 @@ pub fn widening(ranges: &[Range], combinations: &Combinations, now: &Observation
     let outside = 1.0 + EXTRAPOLATION * beyond.fold(0.0, f64::max);
     let mut command = now.command;
     for (value, range) in command.iter_mut().zip(ranges) {
-        *value /= range.size();
+        *value /= range.size;
     }
     let novelty = combinations.novelty(&command);
     outside * (novelty / NOVEL).max(1.0).sqrt()

@@ -8,6 +8,8 @@ use super::law::{BLOCKS, Direction};
 const LEAST: f64 = 1e-4;
 /// Factor on all correlations while they are none of a process.
 const SHRINK: f64 = 0.97;
+/// Most often that is done: then all are below a hundred thousandth.
+const SHRINKS_MAX: usize = 400;
 /// Share of a block's variance that no other block explains. Chosen: with less the law takes a
 /// healthy robot's transients for faults.
 const OWN: f64 = 0.3;
@@ -38,9 +40,13 @@ pub fn directions(covariances: &[DMatrix<f64>]) -> Vec<Direction> {
                 found.clamp(-SLOWEST, SLOWEST)
             }),
         };
-        while !is_process(&direction) {
+        for _ in 0..SHRINKS_MAX {
+            if is_process(&direction) {
+                return direction;
+            }
             direction.correlation = direction.correlation.map(|value| SHRINK * value);
         }
+        direction.correlation = [0.0; BLOCKS - 1];
         direction
     };
     eigen.eigenvalues.iter().enumerate().map(along).collect()

@@ -8,7 +8,7 @@ use super::coverage::{Combinations, Range, widening};
 use super::fault_kind::FaultKind;
 use super::law::{Direction, Law};
 use super::observation::{DEPTH, History, SMOOTHING_S};
-use super::scatter::Scatter;
+use super::scatter::{Scatter, ScatterLaw};
 use super::{AXES, CHANNELS_MAX, DRIVES_MAX};
 use crate::alarm::AlarmError;
 use crate::description::{Description, INTERVAL_MAX_S, INTERVAL_MIN_S};
@@ -18,21 +18,24 @@ use crate::learned::{Calibration, Form};
 use crate::model_file::{self, ModelFile, check_range, refuse};
 
 /// Version of the file's layout.
-pub const VERSION: u32 = 5;
+pub const VERSION: u32 = 3;
 /// The word by which the file is told from a model of the rover's kind.
 pub const KIND: &str = "channels";
 /// Prior fault rate at which log-odds are collected and tempered, 1/h.
 pub const FAULT_RATE_1_H: f64 = 1.0;
+/// Largest weight of a term.
+const WEIGHT_MAX: f64 = 1e9;
 /// Time at rest from which on a robot at rest is known, s.
 const REST_MIN_S: f64 = 3.0;
-/// Terms of a channel. Chosen: of four axes to the fourth order learning makes 115 at most. Smaller
-/// refuses such a model; larger only lets a file cost more time.
-const TERMS_MAX: usize = 128;
+/// Terms of a channel. Of four axes to the fourth order learning makes 70 products, 32 lagged axes,
+/// 32 smoothed ones and 8 senses. Smaller refuses such a model; larger only lets a file cost more
+/// time.
+const TERMS_MAX: usize = 160;
 /// Largest order of a polynomial.
 const ORDER_MAX: u32 = 4;
 // `Model::check` names these in its messages as numbers.
 const _: () = assert!(AXES == 4 && CHANNELS_MAX == 28 && DRIVES_MAX == 8);
-const _: () = assert!(TERMS_MAX == 128 && DEPTH == 9 && ORDER_MAX == 4);
+const _: () = assert!(TERMS_MAX == 160 && DEPTH == 9 && ORDER_MAX == 4);
 
 /// Faults whose log-odds behave alike without a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -272,7 +275,7 @@ impl Model {
     pub fn sizes(&self) -> [f64; AXES] {
         let mut sizes = [1.0; AXES];
         for (size, range) in sizes.iter_mut().zip(&self.command) {
-            *size = range.size();
+            *size = range.size;
         }
         sizes
     }
@@ -318,13 +321,15 @@ impl ModelFile for Model {
         }
         for (i, direction) in self.direction.iter().enumerate() {
             let values = direction.vector.iter().chain(&direction.correlation);
-            let numbers = values.chain([&direction.variance]).all(|v| v.is_finite());
-            if !numbers || direction.vector.len() != count || direction.variance <= 0.0 {
+            let units = values.chain([&0.0]).all(|value| value.abs() <= 1.0 + 1e-6);
+            let varies = (1e-12..=1e12).contains(&direction.variance);
+            if !units || direction.vector.len() != count || !varies {
                 let found = format!("{direction:?}");
                 return refuse(
                     format!("direction.{i}"),
                     found,
-                    "a number for each channel, and a variance above 0",
+                    "a share of -1 to 1 for each channel, correlations of -1 to 1, and a variance \
+                     of 1e-12 to 1e12",
                 );
             }
         }
@@ -343,13 +348,14 @@ fn check_channel(key: &str, channel: &Channel, axes: usize) -> Result<(), ModelE
     let (terms, weights) = (channel.terms.len(), channel.weights.len());
     if terms != weights || terms > TERMS_MAX {
         let found = format!("{terms} terms and {weights} weights");
-        return refuse(key, found, "as many weights as terms, at most 128");
+        return refuse(key, found, "as many weights as terms, at most 160");
     }
     for (i, term) in channel.terms.iter().enumerate() {
         check_term(&format!("{key}.terms.{i}"), term, axes)?;
     }
-    if let Some(weight) = channel.weights.iter().find(|weight| !weight.is_finite()) {
-        return refuse(format!("{key}.weights"), weight, "finite numbers");
+    let is_large = |weight: &&f64| weight.is_nan() || weight.abs() > WEIGHT_MAX;
+    if let Some(weight) = channel.weights.iter().find(is_large) {
+        return refuse(format!("{key}.weights"), weight, "numbers up to 1e9");
     }
     if !channel.variance[0].is_normal() {
         let found = channel.variance[0];
@@ -359,6 +365,7 @@ fn check_channel(key: &str, channel: &Channel, axes: usize) -> Result<(), ModelE
     let others = [
         ("usual", &channel.usual),
         ("held_out_ratio", &channel.held_out_ratio),
+        ("silence_s", &channel.silence_s),
     ];
     let context = channel.context_sd.iter().map(|value| ("context_sd", value));
     for (name, value) in variance.chain(others).chain(context) {
@@ -369,6 +376,10 @@ fn check_channel(key: &str, channel: &Channel, axes: usize) -> Result<(), ModelE
     Ok(())
 }
 
+fn all(count: usize) -> Vec<usize> {
+    (0..count).collect()
+}
+
 /// Checks the law of the roughness.
 fn check_scatter(scatter: &Scatter, channels: usize) -> Result<(), ModelError> {
     let rows = scatter.covariance.iter().all(|row| row.len() == channels);
@@ -377,25 +388,27 @@ fn check_scatter(scatter: &Scatter, channels: usize) -> Result<(), ModelError> {
         .mean
         .iter()
         .chain(scatter.covariance.iter().flatten());
-    if sizes && values.all(|value| value.is_finite()) {
+    let bounded = values.all(|value| value.abs() <= 1e6);
+    let n = scatter.covariance.len();
+    let of = &scatter.covariance;
+    let sound = |i: usize| of[i][i] >= 1e-6 && (0..i).all(|j| (of[i][j] - of[j][i]).abs() < 1e-9);
+    if sizes && bounded && (0..n).all(sound) && ScatterLaw::new(scatter, &all(n)).is_some() {
         return Ok(());
     }
     let found = format!("{} means", scatter.mean.len());
     refuse(
         "scatter",
         found,
-        "a finite mean and a row of covariances for each channel",
+        "a mean for each channel and a covariance, all up to 1e6, each variance from 1e-6",
     )
 }
 
 /// Checks the numbers of a tail.
 fn check_tail(tail: &Tail) -> Result<(), ModelError> {
-    let positive = tail.slope > 0.0 && tail.interval_h > 0.0 && tail.interval_h.is_finite();
-    if positive && tail.slope.is_finite() && tail.level_log_odds.is_finite() {
-        return Ok(());
-    }
-    let found = format!("{tail:?}");
-    refuse("tail", found, "finite numbers, interval and slope above 0")
+    let key = |name: &str| format!("tail.{}.{:?}.{name}", tail.sensors, tail.class);
+    check_range(&key("level_log_odds"), tail.level_log_odds, -1e4, 1e4)?;
+    check_range(&key("interval_h"), tail.interval_h, 1e-9, 1e9)?;
+    check_range(&key("slope"), tail.slope, 1e-3, 10.0)
 }
 
 /// Checks that a term points at what exists.

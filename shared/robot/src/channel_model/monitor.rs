@@ -34,9 +34,6 @@ const BLOCKS_MIN: usize = 2;
 const READY_S: f64 = 1.0;
 /// Log-odds of a component from which on it may be broken.
 const SUSPECT_LOG_ODDS: f64 = -2.0;
-/// Confidence in the likelihoods that tell one kind of fault from another: the law is less certain
-/// of the form of a change than of its being there.
-const KIND_CONFIDENCE: f64 = 0.2;
 
 /// What is believed of one component, given that something is wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,8 +42,6 @@ pub struct ComponentBelief {
     pub p: f64,
     /// Most probable kind.
     pub kind: FaultKind,
-    /// Its probability among the kinds.
-    pub p_kind: f64,
     /// The same with the unit of its size.
     pub size_kind: SizeKind,
     /// Size.
@@ -60,7 +55,6 @@ pub struct ComponentBelief {
 const NO_BELIEF: ComponentBelief = ComponentBelief {
     p: 0.0,
     kind: FaultKind::Erratic,
-    p_kind: 0.0,
     size_kind: SizeKind::None,
     size: 0.0,
     size_sd: 0.0,
@@ -99,7 +93,6 @@ pub struct Monitor {
     suspects: u64,
     classes: [f64; Class::ALL.len()],
     beliefs: [ComponentBelief; COMPONENTS_MAX],
-    p_unknown: f64,
     report: DetectionOutput,
 }
 
@@ -157,7 +150,6 @@ impl Monitor {
             suspects: 0,
             classes: [IMPOSSIBLE; Class::ALL.len()],
             beliefs: [NO_BELIEF; COMPONENTS_MAX],
-            p_unknown: 1.0,
             report: DetectionOutput {
                 log_odds: IMPOSSIBLE,
                 channels: [IMPOSSIBLE; SLOTS],
@@ -175,6 +167,7 @@ impl Monitor {
         self.bank.reset();
         self.run_s = 0.0;
         self.sum_up();
+        self.report.evidence = 0.0;
     }
 
     /// What the last observation did.
@@ -193,12 +186,6 @@ impl Monitor {
     #[must_use]
     pub fn beliefs(&self) -> &[ComponentBelief] {
         &self.beliefs[..self.watched.len()]
-    }
-
-    /// Probability that no single fault explains the window, given that something is wrong.
-    #[must_use]
-    pub const fn p_unknown(&self) -> f64 {
-        self.p_unknown
     }
 
     /// Log-odds of each class of faults at [`FAULT_RATE_1_H`], not tempered.
@@ -228,10 +215,12 @@ impl Monitor {
             .window_mut()
             .push(history, &commands(history), (widening, self.suspects));
         let places = &self.places;
-        self.bank
-            .weigh(|channel| now.values[places[channel]].is_some(), now.dt_s);
-        self.sum_up();
-        self.report.evidence = -0.5 * self.bank.mean_square();
+        let measured = |channel: usize| now.values[places[channel]].is_some();
+        // After a break what was said before stands until there is something new to say.
+        if self.bank.weigh(measured, now.dt_s) {
+            self.sum_up();
+            self.report.evidence = -0.5 * self.bank.mean_square();
+        }
     }
 
     fn sum_up(&mut self) {
@@ -306,7 +295,6 @@ impl Monitor {
             *slot = log_add(*slot, *odds).max(IMPOSSIBLE);
         }
         let total = log_sum_exp(&channels);
-        self.p_unknown = (unknown - total).exp().clamp(0.0, 1.0);
         for (i, (watched, odds)) in self.watched.iter().zip(odds).enumerate() {
             let quantity = watched.quantity;
             self.beliefs[i] = ComponentBelief {
@@ -333,15 +321,14 @@ fn sensed(robot: &Description, used: &[(usize, Channel)]) -> Option<Vec<ChannelP
     let (all, names) = (targets(robot), components(robot));
     let one = |(place, channel): &(usize, Channel)| {
         let target = all[*place].clone();
-        let name = match target.quantity.is_pose() {
-            true => "pose",
-            false => &target.name,
-        };
-        let component = names.iter().position(|one| one.name == name)?;
+        let component = names
+            .iter()
+            .position(|one| one.name == target.component())?;
         Some(ChannelPlace {
             target,
             component,
             usual: channel.usual,
+            silence_s: channel.silence_s,
         })
     };
     used.iter().map(one).collect()
@@ -367,11 +354,9 @@ fn kind(quantity: Option<Quantity>, place: usize) -> Option<FaultKind> {
 
 /// The most probable kind of a component's fault.
 fn likeliest(weighed: &[Weighed; KINDS_MAX], quantity: Option<Quantity>) -> ComponentBelief {
-    let ratios = weighed.map(|one| KIND_CONFIDENCE * one.log_ratio);
-    let total = log_sum_exp(&ratios);
     let mut best = 0;
     for k in 1..KINDS_MAX {
-        if ratios[k] > ratios[best] {
+        if weighed[k].log_ratio > weighed[best].log_ratio {
             best = k;
         }
     }
@@ -381,7 +366,6 @@ fn likeliest(weighed: &[Weighed; KINDS_MAX], quantity: Option<Quantity>) -> Comp
     ComponentBelief {
         p: 0.0,
         kind,
-        p_kind: (ratios[best] - total).exp(),
         size_kind: kind.size_kind(quantity),
         size: weighed[best].size,
         size_sd: weighed[best].size_sd,

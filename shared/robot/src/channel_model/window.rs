@@ -14,7 +14,7 @@ const RING: usize = BLOCK_MAX * (BLOCKS + DELAY_BLOCKS);
 /// Motion after which a robot no longer speeds up, s.
 const MOVES_S: f64 = 0.5;
 /// Part of a drive's largest commanded speed that is added to show what an offset of it does.
-const OFFSET: f64 = 0.1;
+pub const OFFSET: f64 = 0.1;
 
 /// Time over which a run's own offset and gain are learned, s, and the part of a block's
 /// information that is new.
@@ -104,6 +104,8 @@ pub struct Window {
     scales: Scales,
     /// Observations of a block.
     per_block: usize,
+    /// Length of an observation, s.
+    interval_s: f64,
     ring: Vec<Moment>,
     newest: usize,
     context: [Context; CHANNELS_MAX],
@@ -133,6 +135,7 @@ impl Window {
             channels,
             scales,
             per_block,
+            interval_s,
             ring: vec![NOTHING; RING.min(per_block * (BLOCKS + DELAY_BLOCKS))],
             newest: 0,
             context: [Context::NONE; CHANNELS_MAX],
@@ -146,16 +149,16 @@ impl Window {
         }
     }
 
-    /// Number of channels.
-    #[must_use]
-    pub fn channels(&self) -> usize {
-        self.channels.len()
-    }
-
     /// Drives.
     #[must_use]
     pub fn drives(&self) -> usize {
         self.scales.drives.len().min(DRIVES_MAX)
+    }
+
+    /// Length of a block, s.
+    #[must_use]
+    pub fn block_s(&self) -> f64 {
+        self.per_block as f64 * self.interval_s
     }
 
     /// Observations of a block.
@@ -267,10 +270,11 @@ impl Window {
                     let expected = moment.unit[i] * (offset + gain * moment.predicted[i]);
                     *sum = Some(sum.unwrap_or(0.0) + value - expected);
                     sums.unit[i] += moment.unit[i];
-                    sums.predicted[i] += moment.predicted[i] * moment.unit[i];
+                    // A whole sensor reads this run's own offset and gain as well.
+                    sums.predicted[i] += moment.predicted[i] * moment.unit[i] + expected;
                     for d in 0..drives {
-                        sums.share[d][i] += moment.share[d][i];
-                        sums.offset[d][i] += moment.offset[d][i];
+                        sums.share[d][i] += (1.0 + gain) * moment.share[d][i];
+                        sums.offset[d][i] += (1.0 + gain) * moment.offset[d][i];
                     }
                     let before = older.z[i].filter(|_| older.is_there && moment.moves);
                     let Some(before) = before else { continue };

@@ -145,7 +145,7 @@ impl Calibration {
         let blank = Self::blank(channels, form, fault_rate_1_h, count.max(1), window_s);
         let beyond = (count / HIGH).max(MAXIMA_MIN);
         match count.checked_sub(beyond + 1).and_then(|i| maxima.get(i)) {
-            Some(&level) => blank.above(level, maxima).not_below(maxima.last().copied()),
+            Some(&level) => blank.above(level, maxima),
             // No maxima, no level. Chosen: odds far below an alarm's.
             None => Self {
                 level_log_odds: maxima.last().copied().unwrap_or(-10.0),
@@ -154,15 +154,14 @@ impl Calibration {
         }
     }
 
-    /// A tail that is heavier than an exponential one begins at its highest maximum, which was seen
-    /// once.
-    fn not_below(self, highest: Option<f64>) -> Self {
-        let Some(highest) = highest.filter(|&highest| {
-            let apart = self.tail_slope * (highest - self.level_log_odds);
-            self.interval_at_level_h * apart.exp() > self.exposure_h
-        }) else {
+    /// A tail under which the highest maximum, which was seen once, would be rarer than that begins
+    /// there.
+    #[must_use]
+    pub fn not_below(self, highest: f64) -> Self {
+        let apart = self.tail_slope * (highest - self.level_log_odds);
+        if self.interval_at_level_h * apart.exp() <= self.exposure_h {
             return self;
-        };
+        }
         Self {
             level_log_odds: highest,
             interval_at_level_h: self.exposure_h,

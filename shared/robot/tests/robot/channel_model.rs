@@ -7,10 +7,13 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use vigil_robot::Description;
+use vigil_robot::channel_model::component::unfit;
 use vigil_robot::channel_model::directions::{covariances, directions};
 use vigil_robot::channel_model::law::{BLOCKS, Change, Direction, Law, Row};
 use vigil_robot::channel_model::tree::tree;
 use vigil_robot::channel_model::{Combinations, Model, Monitor, Observer, components, drives};
+use vigil_robot::channel_table::FurtherChannel;
+use vigil_robot::description::Kinematics;
 use vigil_robot::learned::Form;
 use vigil_robot::learned::channels::Channels;
 
@@ -46,13 +49,13 @@ fn a_file_that_was_changed_by_accident_is_refused() {
     let model = Model::from_toml(&shipped()).unwrap();
     assert_eq!(model.to_toml().unwrap(), shipped());
     assert!(!model.is_edited());
-    let changed = shipped().replacen("exposure_s = 30", "exposure_s = 31", 1);
+    let changed = shipped().replacen("exposure_s = 46", "exposure_s = 946", 1);
     let message = Model::from_toml(&changed).unwrap_err().to_string();
     assert!(
         message.contains("changed or cut short") && message.contains(&model.hash),
         "{message}"
     );
-    let edited = Model::from_toml(&edited("exposure_s = 30", "exposure_s = 31")).unwrap();
+    let edited = Model::from_toml(&edited("exposure_s = 46", "exposure_s = 946")).unwrap();
     assert!(edited.is_edited() && edited.hash() != model.hash());
     let old = shipped().replacen("version = 3", "version = 2", 1);
     let message = Model::from_toml(&old).unwrap_err().to_string();
@@ -74,7 +77,7 @@ fn an_interval_out_of_range_is_refused_with_what_is_allowed() {
     ] {
         let changed = edited("interval_s = 0.1", &format!("interval_s = {interval}"));
         let message = Model::from_toml(&changed).unwrap_err().to_string();
-        let wanted = format!("interval_s: {found} is not allowed: 0.02 to 1");
+        let wanted = format!("interval_s: {found} is not allowed: 0.02 to 0.3");
         assert_eq!(message, wanted);
     }
 }
@@ -82,11 +85,11 @@ fn an_interval_out_of_range_is_refused_with_what_is_allowed() {
 #[test]
 fn what_points_at_nothing_is_refused_by_name() {
     for (from, to, key) in [
-        ("lag = 1", "lag = 9", "channel.0.terms.6.lag: 9"),
+        ("lag = 1", "lag = 9", "channel.0.terms.5.lag: 9"),
         (
             "of = \"lagged\"",
             "of = \"lagged\"\nindex = 2",
-            "channel.0.terms.6.index: 2",
+            "channel.0.terms.5.index: 2",
         ),
         (
             "powers = [0, 1, 0, 0]",
@@ -118,6 +121,64 @@ fn what_points_at_nothing_is_refused_by_name() {
     assert!(message.starts_with("scatter"), "{message}");
     let message = broken(&|m| m.tail[0].slope = 0.0);
     assert!(message.starts_with("tail"), "{message}");
+}
+
+#[test]
+fn numbers_that_would_blind_or_end_a_service_are_refused() {
+    let refused = |change: &dyn Fn(&mut Model)| {
+        let mut model = Model::from_toml(&shipped()).unwrap();
+        change(&mut model);
+        let text = model.sealed().to_toml().unwrap();
+        Model::from_toml(&text).unwrap_err().to_string()
+    };
+    for (key, message) in [
+        ("tail", refused(&|m| m.tail[6].slope = 1e308)),
+        ("tail", refused(&|m| m.tail[6].level_log_odds = -1e9)),
+        (
+            "direction",
+            refused(&|m| m.direction[0].vector = vec![1e150; 5]),
+        ),
+        ("direction", refused(&|m| m.direction[0].variance = 1e308)),
+        ("scatter", refused(&|m| m.scatter.covariance[0][0] = 1e-310)),
+        ("scatter", refused(&|m| m.scatter.covariance[0][1] = 1e5)),
+        (
+            "channel.0.weights",
+            refused(&|m| m.channel[0].weights[0] = 1e300),
+        ),
+        (
+            "channel.0.silence_s",
+            refused(&|m| m.channel[0].silence_s = -1.0),
+        ),
+        ("command", refused(&|m| m.command[0].size = 0.0)),
+        (
+            "combinations",
+            refused(&|m| m.combinations.precision[0].clear()),
+        ),
+    ] {
+        assert!(message.starts_with(key), "{key}: {message}");
+    }
+}
+
+#[test]
+fn wheels_without_a_command_have_no_drives() {
+    let mut robot = robot("kobuki");
+    robot.kinematics = Kinematics::None;
+    robot.command.clear();
+    assert!(drives(&robot).is_empty());
+    let names: Vec<String> = components(&robot).into_iter().map(|one| one.name).collect();
+    assert_eq!(
+        names,
+        ["enc_L", "enc_R", "yaw_rate", "current_L", "current_R"]
+    );
+    assert_eq!(unfit(&robot), None);
+    let further = |name: &str| FurtherChannel {
+        name: name.to_owned(),
+        ..toml::from_str("name = 'a'\nrole = 'other'\nunit = 'V'").unwrap()
+    };
+    robot.channel = vec![further("enc_L")];
+    assert!(unfit(&robot).unwrap().contains("'enc_L'"));
+    robot.channel = (0..24).map(|i| further(&format!("c{i}"))).collect();
+    assert!(unfit(&robot).unwrap().contains("29 channels"));
 }
 
 /// A law of three channels, and the covariance of its window: channel by channel, then by block.

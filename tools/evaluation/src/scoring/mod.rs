@@ -204,7 +204,13 @@ pub fn score(cases: &[Case], taxonomy: &Taxonomy, alarm_log_odds: f64) -> Score 
     let mut faulty = cases.iter().filter(|case| !case.label.is_nominal());
     let identifies =
         taxonomy.has_faults() && (classes.is_empty() || faulty.any(|case| case.is_named(taxonomy)));
-    let named = || classes.iter().filter(|_| identifies);
+    // Only runs whose label names a fault tell whether a name is right.
+    let mut named = classes.clone();
+    for of in named.values_mut() {
+        of.retain(|case| identifies && case.is_named(taxonomy));
+    }
+    named.retain(|_, of| !of.is_empty());
+    let named = || named.iter();
     let identification =
         named().map(|(class, of)| (class.clone(), Identification::new(of, taxonomy)));
     let calibration = named().map(|(class, of)| (class.clone(), Calibration::new(of, taxonomy)));

@@ -200,7 +200,7 @@ impl Draft {
         lines.push("noise = \"estimate\"".to_owned());
         lines.push("polynomial_order = 2".to_owned());
         // A model of channels wants some frames in an interval.
-        let interval_s = (2.0 / frame.rate_hz).clamp(0.1, 1.0);
+        let interval_s = (2.0 / frame.rate_hz).clamp(0.1, 0.3);
         lines.push(format!(
             "interval_s = {}\n\ncommand = [",
             number(interval_s)

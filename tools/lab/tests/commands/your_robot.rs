@@ -177,6 +177,6 @@ fn the_page_can_be_followed_on_the_kobukis_data() {
     assert_eq!(alarms["0"], None, "the run without a fault");
     for run in ["1", "2", "3"] {
         let first_s = alarms[run].unwrap_or(f64::INFINITY);
-        assert!(first_s < 40.0, "run {run}: {first_s} s");
+        assert!(first_s < 80.0, "run {run}: {first_s} s");
     }
 }

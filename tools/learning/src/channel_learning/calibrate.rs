@@ -27,10 +27,23 @@ pub(super) fn fit(
     }
     let form = Form::LearnedBias;
     for channels in sets {
-        let tail = |class: Class| {
+        let fitted = |class: Class| {
             let of = |monitor: &Monitor| monitor.classes()[class as usize];
             let mut found = maxima(models, records, (robot, channels), of);
-            let found = found.high_tail(channels, form, FAULT_RATE_1_H);
+            let tail = found.high_tail(channels, form, FAULT_RATE_1_H);
+            (class, tail, found.highest())
+        };
+        let fitted = Class::ALL.map(fitted);
+        // The same residuals feed all classes but that of noise, and few moments show their tail.
+        let shared = fitted.iter().filter(|(class, ..)| *class != Class::Noise);
+        let least = shared
+            .map(|(_, tail, _)| tail.tail_slope)
+            .fold(f64::INFINITY, f64::min);
+        let tails = fitted.map(|(class, mut found, highest)| {
+            if class != Class::Noise {
+                found.tail_slope = least;
+            }
+            let found = found.not_below(highest);
             Tail {
                 sensors: found.sensors,
                 class,
@@ -38,27 +51,19 @@ pub(super) fn fit(
                 interval_h: found.interval_at_level_h,
                 slope: found.tail_slope,
             }
-        };
-        let mut tails = Class::ALL.map(tail);
-        // The same residuals feed all classes but that of noise, and few moments show their tail.
-        let shared = |tail: &&mut Tail| tail.class != Class::Noise;
-        let slopes = tails.iter_mut().filter(shared).map(|tail| tail.slope);
-        let least = slopes.fold(f64::INFINITY, f64::min);
-        for tail in tails.iter_mut().filter(shared) {
-            tail.slope = least;
-        }
+        });
         for each in models.iter_mut().chain([&mut *model]) {
             each.tail.extend(tails.iter().cloned());
         }
         let of = |monitor: &Monitor| monitor.report().log_odds;
-        let mut found = maxima(models, records, (robot, channels), of);
-        let mut found = found.high_tail(channels, form, FAULT_RATE_1_H);
+        let mut all = maxima(models, records, (robot, channels), of);
+        let mut found = all.high_tail(channels, form, FAULT_RATE_1_H);
         // Where the log is too short to show it: tempered log-odds have this slope, if those of the
         // classes are right.
         if found.tail_slope == SLOPE_UNKNOWN {
             found.tail_slope = 1.0;
         }
-        model.calibration.push(found);
+        model.calibration.push(found.not_below(all.highest()));
     }
 }
 

@@ -48,7 +48,7 @@ pub(super) fn combinations(
             }
             let mut command = now.command;
             for (value, range) in command.iter_mut().zip(ranges) {
-                *value /= range.size();
+                *value /= range.size;
             }
             let values: Vec<f64> = powers.iter().map(|of| product(of, &command)).collect();
             sums += DMatrix::from_fn(n, n, |i, j| values[i] * values[j]);

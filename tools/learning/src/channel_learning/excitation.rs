@@ -62,6 +62,7 @@ pub(super) fn ranges(records: &[Record], robot: &Description) -> Result<Vec<Rang
             unit: axis.unit.clone(),
             min,
             max,
+            size: min.abs().max(max.abs()).max(1e-9),
             gaps: Vec::new(),
         });
     }

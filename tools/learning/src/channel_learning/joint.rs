@@ -58,6 +58,17 @@ pub(super) fn fit(model: &mut Model, models: &[Model], records: &[Record], scale
     model.scatter = moments.scatter(shrink);
 }
 
+/// The covariance itself, or nearest to it one without a negative variance in any direction: sums
+/// over pairs of channels may have one.
+fn whole(covariance: DMatrix<f64>) -> DMatrix<f64> {
+    let mut shrunk = covariance;
+    while shrunk.clone().cholesky().is_none() {
+        let diagonal = DMatrix::from_diagonal(&shrunk.diagonal());
+        shrunk = 0.9 * &shrunk + 0.1 * diagonal;
+    }
+    shrunk
+}
+
 impl Moments {
     fn take_fold(
         &mut self,
@@ -150,6 +161,7 @@ impl Moments {
                 false => shrink * found,
             }
         });
+        let covariance = whole(covariance);
         let rows = (0..n).map(|i| covariance.row(i).iter().copied().collect());
         Scatter {
             mean: mean.iter().copied().collect(),

@@ -99,7 +99,7 @@ pub enum LogError {
     },
     /// The description measures nothing that a model could be made of.
     #[error(
-        "no channel can be predicted: measured must have pose, wheel_rates, yaw_rate or currents"
+        "no channel can be predicted: the description has neither measured channels nor [[channel]]"
     )]
     NoChannels,
     /// A channel has too few observations.
@@ -289,6 +289,7 @@ fn weights(
         variance: [0.0; 3],
         context_sd: [0.0; 2],
         usual: 0.0,
+        silence_s: record::silence_s(records, place),
         held_out_ratio: 1.0,
     };
     let mut models = vec![channel.clone(); FOLDS];

@@ -27,7 +27,23 @@ impl Record {
     }
 }
 
-/// Time at rest, s: longer than a second after motion.
+/// Longest time in which a channel was not measured, s.
+pub(super) fn silence_s(records: &[Record], place: usize) -> f64 {
+    let mut longest_s = 0.0;
+    for record in records {
+        let mut silent_s = 0.0;
+        for now in record.histories.iter().filter_map(|history| history.ago(0)) {
+            silent_s = match now.values[place] {
+                Some(_) => 0.0,
+                None => silent_s + now.dt_s,
+            };
+            longest_s = f64::max(longest_s, silent_s);
+        }
+    }
+    longest_s
+}
+
+/// Time at rest after all lags of the motion before, s.
 pub(super) fn rest_s(records: &[Record], lags: usize) -> f64 {
     let all = records.iter().flat_map(|record| &record.histories);
     let is_rest = |history: &&History| {

@@ -38,13 +38,14 @@ fn quick(target: &Target, robot: &Description) -> Vec<Term> {
     for lag in 1..=lags(robot.interval_s) {
         terms.extend((0..axes).map(|axis| Term::new(Regressor::Lagged, axis, lag)));
     }
-    let all = drives(robot).len();
-    match (target.quantity, target.wheel) {
-        (Quantity::Current, Some(wheel)) if wheel < all => {
-            terms.push(Term::new(Regressor::Sense, wheel, 0));
-        }
+    let all = drives(robot);
+    let own = all
+        .iter()
+        .position(|drive| drive.wheel.is_some() && drive.wheel == target.wheel);
+    match (target.quantity, own) {
+        (Quantity::Current, Some(drive)) => terms.push(Term::new(Regressor::Sense, drive, 0)),
         (Quantity::Other | Quantity::Current, _) => {
-            terms.extend((0..all).map(|drive| Term::new(Regressor::Sense, drive, 0)));
+            terms.extend((0..all.len()).map(|drive| Term::new(Regressor::Sense, drive, 0)));
         }
         _ => {}
     }

@@ -4,6 +4,7 @@
 //! nevertheless bends it as its ridge likes, holds at these two speeds, and is wrong at all others.
 
 use vigil_robot::channel_model::AXES;
+use vigil_robot::channel_model::coverage::product;
 use vigil_robot::channel_model::{History, Range, Regressor, Term};
 
 /// Part of what even driving over the whole range would show of a term, from which it counts as
@@ -41,7 +42,7 @@ pub(super) fn untold(terms: &[Term], commands: &[[f64; AXES]], ranges: &[Range])
             untold.push(term);
             continue;
         }
-        let mut column: Vec<f64> = commands.iter().map(|c| product(&term, c)).collect();
+        let mut column: Vec<f64> = commands.iter().map(|c| product(&term.powers, c)).collect();
         for other in &basis {
             let along = mean_product(&column, other);
             let parts = column.iter_mut().zip(other);
@@ -84,11 +85,6 @@ fn scaled(command: &[f64; AXES], ranges: &[Range]) -> [f64; AXES] {
     out
 }
 
-fn product(term: &Term, command: &[f64; AXES]) -> f64 {
-    let powers = term.powers.iter().zip(command);
-    powers.map(|(&p, value)| value.powi(i32::from(p))).product()
-}
-
 fn mean_product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len().max(1) as f64
 }
@@ -115,6 +111,7 @@ mod tests {
             unit: "m/s".into(),
             min: 0.2,
             max: 0.5,
+            size: 0.5,
             gaps: Vec::new(),
         }
     }

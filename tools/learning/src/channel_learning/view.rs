@@ -94,6 +94,7 @@ impl fmt::Display for View {
             min,
             max,
             gaps,
+            ..
         } in &self.command
         {
             write!(f, "learned range  {name} {min:.3} to {max:.3} {unit}")?;
