@@ -85,8 +85,29 @@ impl Archive {
     /// Adds lines to the summary, and shows them.
     pub fn say(&mut self, lines: &str) {
         println!("{lines}");
+        self.add(lines);
+    }
+
+    fn add(&mut self, lines: &str) {
         let lines = lines.split('\n').map(str::to_owned);
         self.run.summary.extend(lines);
+    }
+
+    /// Keeps figures and lines that were already shown.
+    ///
+    /// # Errors
+    /// The file system's.
+    pub fn keep(
+        question: &str,
+        figures: &[(impl AsRef<str>, Value)],
+        lines: &[String],
+    ) -> io::Result<()> {
+        let mut archive = Self::new(question)?;
+        for (name, found) in figures {
+            archive.store(name.as_ref(), found)?;
+        }
+        lines.iter().for_each(|line| archive.add(line));
+        archive.close()
     }
 
     /// Writes the result, and says where it and the raw data lie.

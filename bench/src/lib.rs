@@ -16,6 +16,7 @@ pub mod missions;
 pub mod null_drive;
 pub mod real_logs;
 pub mod results;
+pub mod run_time;
 pub mod simulated;
 
 /// What the question of this name ends with: 0, or 1 and the reason.

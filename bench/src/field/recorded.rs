@@ -9,7 +9,7 @@ use vigil_evaluation::scoring::Taxonomy;
 use vigil_evaluation::scoring::field::{Scorer, Stretch};
 use vigil_learning::channel_learning;
 use vigil_recording::{frames, labels};
-use vigil_setup::{Setup, load_robot};
+use vigil_setup::Setup;
 
 use super::frames::{Fate, RunConditions, Way};
 use super::ground::stream;
@@ -17,9 +17,10 @@ use super::job::{Job, ScoredRun};
 use super::scenario::{Scenario, Source};
 use super::timeline::Timeline;
 use super::watch::Watch;
+use crate::load;
 use crate::real_logs::{self, husky, logs};
+use crate::run_time::{period_s, span_s, time_s};
 use crate::simulated::{self, stages};
-use crate::{load, root};
 
 /// A run, and what is true in it.
 #[derive(Debug, Clone)]
@@ -130,9 +131,8 @@ fn material(data: &Path, source: &Source) -> Result<Material, Box<dyn Error>> {
             learned(log.robot, halves, source.half.unwrap_or(1))
         }
         "husky" => {
-            let folder = logs::unpacked("husky_boreal")?;
-            let robot = load_robot(&root().join("config/robots/husky.toml"))?;
-            let runs = husky::runs(&folder, &robot)?;
+            let robot = husky::robot()?;
+            let runs = husky::runs(&robot)?;
             learned(robot, runs, source.half.unwrap_or(1))
         }
         other => Err(format!(
@@ -206,21 +206,6 @@ impl Case {
         let (leaf, onset_s) = fault.map_or(("", None), |(leaf, s)| (leaf.as_str(), Some(*s)));
         Stretch::of_label(leaf, onset_s, taxonomy)
     }
-
-    /// Times of the first and the last frame, s.
-    fn span_s(&self) -> [f64; 2] {
-        let ends = [self.run.frames.first(), self.run.frames.last()];
-        ends.map(|frame| frame.map_or(0.0, |frame| frame.header.t_capture_ns as f64 * 1e-9))
-    }
-
-    /// Usual time between frames, s.
-    fn period_s(&self) -> f64 {
-        let t_s = |i: usize| self.run.frames[i].header.t_capture_ns as f64 * 1e-9;
-        let mut gaps_s: Vec<f64> = (1..self.run.frames.len())
-            .map(|i| t_s(i) - t_s(i - 1))
-            .collect();
-        crate::quantile(&mut gaps_s, 0.5)
-    }
 }
 
 /// Plays a recorded run to every set of sensors.
@@ -236,12 +221,12 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<ScoredRun>, Box<dy
     let case = cases.get(job.run).ok_or("there is no such run")?;
     let mut scored = Vec::new();
     for (sensors, name) in job.scenario.sets() {
-        let period_s = case.period_s();
+        let period_s = period_s(&case.run);
         let seed = u64::from(case.run.id);
         let truth = case.truth(sensors, taxonomy);
         let mut watch = Watch {
             stages: stages(setup, sensors, 1.0 / period_s, seed)?,
-            scorer: Scorer::new(&truth, taxonomy, case.span_s(), seed),
+            scorer: Scorer::new(&truth, taxonomy, span_s(&case.run), seed),
             timeline: Timeline::asked_for(job, seed, name),
         };
         let mut rng = stream(job.scenario.first_seed + seed, 4);
@@ -256,7 +241,7 @@ pub fn play(material: &Material, job: &Job<'_>) -> Result<Vec<ScoredRun>, Box<dy
         let mut way = Way::new(&job.scenario.frames, &setup.robot, conditions, rng);
         let mut held = None;
         for frame in &case.run.frames {
-            let t_s = frame.header.t_capture_ns as f64 * 1e-9;
+            let t_s = time_s(frame);
             let fate = way.fate(t_s);
             fate.deliver(frame, held.as_ref(), &mut |frame| watch.take(frame));
             held = (fate == Fate::Overtaken).then_some(*frame);

@@ -58,12 +58,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         figures.push(("delays.json", found));
     }
     if args.only.is_empty() && args.scale == 1.0 && args.hours >= 1000.0 || args.archive {
-        let mut archive = Archive::new("promise")?;
-        for (name, found) in &figures {
-            archive.store(name, found)?;
-        }
-        lines.iter().for_each(|line| archive.say(line));
-        archive.close()?;
+        Archive::keep("promise", &figures, &lines)?;
     }
     Ok(())
 }

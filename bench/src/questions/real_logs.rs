@@ -42,12 +42,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         figures.push((format!("{log}.json"), found));
     }
     if logs.len() == LOGS.len() || args.archive {
-        let mut archive = Archive::new("real-logs")?;
-        for (name, found) in &figures {
-            archive.store(name, found)?;
-        }
-        lines.iter().for_each(|line| archive.say(line));
-        archive.close()?;
+        Archive::keep("real-logs", &figures, &lines)?;
     }
     Ok(())
 }

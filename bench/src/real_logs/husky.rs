@@ -7,17 +7,30 @@ use std::path::{Path, PathBuf};
 use vigil_blocks::SensorFrame;
 use vigil_recording::frames::Run;
 use vigil_robot::{ChannelMap, Description};
+use vigil_setup::{SetupError, load_robot};
+
+use super::logs::unpacked;
+use crate::root;
 
 /// Half the distance between the wheels' centres, m.
 fn half_track_m(robot: &Description) -> f64 {
     robot.wheels.first().map_or(f64::NAN, |wheel| wheel.y.abs())
 }
 
-/// The runs of the unpacked log below `folder`, each with the ground it is on, in order.
+/// The robot.
 ///
 /// # Errors
-/// A file that is missing or malformed.
-pub fn runs(folder: &Path, robot: &Description) -> Result<Vec<(String, Run)>, Box<dyn Error>> {
+/// A description that is refused.
+pub fn robot() -> Result<Description, SetupError> {
+    load_robot(&root().join("config/robots/husky.toml"))
+}
+
+/// The runs of its log, each with the ground it is on, in order.
+///
+/// # Errors
+/// What is missing or malformed.
+pub fn runs(robot: &Description) -> Result<Vec<(String, Run)>, Box<dyn Error>> {
+    let folder = unpacked("husky_boreal")?;
     let mut grounds: Vec<PathBuf> = fs::read_dir(folder)?
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|path| path.is_dir())

@@ -1,10 +1,13 @@
 //! What a broken sensor makes of a run.
 
 use vigil_blocks::SensorFrame;
+use vigil_inference::angle::wrap;
 use vigil_recording::frames::Run;
 use vigil_robot::channel_model::fault_kind::FaultKind;
 use vigil_robot::channel_model::{Quantity, Target};
 use vigil_robot::{ChannelMap, Description};
+
+use crate::run_time::time_s;
 
 /// Delays that are tried, s.
 const DELAYS_S: [f64; 2] = [0.4, 1.0];
@@ -161,10 +164,7 @@ impl Injection {
                 let read = match quantity {
                     Quantity::Forward => dx * cos + dy * sin,
                     Quantity::Lateral => dy * cos - dx * sin,
-                    _ => {
-                        let turned = pose[2] - before[2];
-                        turned.sin().atan2(turned.cos())
-                    }
+                    _ => wrap(pose[2] - before[2]),
                 };
                 let more = match self.change {
                     Change::Gain(gain) => (gain - 1.0) * read,
@@ -185,10 +185,4 @@ impl Injection {
         }
         out
     }
-}
-
-/// Capture time of a frame, s.
-#[must_use]
-pub fn time_s(frame: &SensorFrame) -> f64 {
-    frame.header.t_capture_ns as f64 * 1e-9
 }

@@ -44,7 +44,7 @@ pub fn log(archive: &str, log: &str) -> Result<Log, Box<dyn Error>> {
 ///
 /// # Errors
 /// What is missing or malformed.
-pub fn unpacked(archive: &str) -> Result<PathBuf, Box<dyn Error>> {
+pub(super) fn unpacked(archive: &str) -> Result<PathBuf, Box<dyn Error>> {
     let data = std::env::var("VIGIL_DATA").map_err(
         |_| "VIGIL_DATA is not set: the folder that holds real/kobuki_wheel_fault.tar.xz",
     )?;

@@ -7,10 +7,10 @@ use vigil_learning::channel_learning;
 use vigil_recording::frames::Run;
 use vigil_robot::channel_model::{Model, tree::tree};
 use vigil_robot::{Description, RobotModel};
-use vigil_setup::{Setup, load_robot};
+use vigil_setup::Setup;
 
 use super::{husky, logs};
-use crate::{load, root};
+use crate::load;
 
 /// Logs that are split.
 pub const LOGS: [&str; 3] = ["kobuki", "robotino", "husky"];
@@ -62,9 +62,8 @@ impl Split {
                 )
             }
             "husky" => {
-                let folder = logs::unpacked("husky_boreal")?;
-                let robot = load_robot(&root().join("config/robots/husky.toml"))?;
-                let runs = husky::runs(&folder, &robot)?;
+                let robot = husky::robot()?;
+                let runs = husky::runs(&robot)?;
                 let runs: Vec<Run> = runs.into_iter().map(|(_, run)| run).collect();
                 let (learned, judged) = halves(&runs);
                 (robot, learned, judged)

@@ -11,9 +11,9 @@ use vigil_robot::Description;
 use vigil_robot::channel_model::fault_kind::SENSOR_KINDS;
 use vigil_robot::channel_model::{Observer, Quantity, targets};
 
-use super::injection::{Injection, time_s};
+use super::injection::Injection;
 use super::split::Split;
-use crate::quantile;
+use crate::run_time::{period_s, span_s, time_s};
 use crate::simulated::stages;
 
 /// Part of a run before the fault.
@@ -109,7 +109,7 @@ pub fn trial(
     let robot = split.robot();
     let all = targets(robot);
     let target = &all[injection.channel];
-    let onset_s = run.frames.first().map_or(0.0, time_s) + ONSET * length_s(run);
+    let onset_s = span_s(run)[0] + ONSET * length_s(run);
     let broken = injection.frames(run, robot, target, onset_s);
     let mut stages = begin(split, run)?;
     let mut rule = Rule::new(robot);
@@ -167,21 +167,13 @@ pub fn trial(
 fn begin(split: &Split, run: &Run) -> Result<Stages, Box<dyn Error>> {
     let mut setup = split.setup.clone();
     setup.file.detector.false_alarm_interval_h = INTERVAL_H;
-    let frames = run.frames.iter().map(time_s);
-    let mut gaps_s: Vec<f64> = frames
-        .clone()
-        .zip(frames.skip(1))
-        .map(|(a, b)| b - a)
-        .collect();
-    let rate_hz = 1.0 / quantile(&mut gaps_s, 0.5);
+    let rate_hz = 1.0 / period_s(run);
     stages(&setup, Sensors::PoseEncoders, rate_hz, u64::from(run.id))
 }
 
 fn length_s(run: &Run) -> f64 {
-    match (run.frames.first(), run.frames.last()) {
-        (Some(first), Some(last)) => time_s(last) - time_s(first),
-        _ => 0.0,
-    }
+    let [first_s, last_s] = span_s(run);
+    last_s - first_s
 }
 
 /// For how long a broken channel has been beyond its tolerance of what it would have read.

@@ -259,26 +259,8 @@ mod tests {
             ..state(None, false)
         };
         let states = [state(Some(0), false), any, state(None, false)];
-        let mut said = FaultBelief {
-            p_unknown: 0.1,
-            set_count: 3,
-            ..FaultBelief::default()
-        };
-        (said.p[0], said.p[1], said.p[2]) = (0.2, 0.5, 0.4);
-        said.sets[0] = FaultSet {
-            leaves: 0b10,
-            p: 0.3,
-        };
-        said.sets[1] = FaultSet {
-            leaves: 0b110,
-            p: 0.2,
-        };
-        said.sets[2] = FaultSet {
-            leaves: 0b100,
-            p: 0.2,
-        };
-        let mut found = [0.0; 3];
-        weights(&said, &states, true, &mut found);
+        let said = diagnosis(&[0.2, 0.5, 0.4], 0.1);
+        let found = weighed_over(&states, said, &[(0b10, 0.3), (0b110, 0.2), (0b100, 0.2)]);
         for (found, expected) in found.into_iter().zip([0.2, 0.7, 0.1]) {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }
@@ -293,22 +275,8 @@ mod tests {
         };
         let none = StateMeaning { leaves: 0, ..any };
         let states = [state(Some(0), false), any, none, state(None, false)];
-        let mut said = FaultBelief {
-            p_unknown: 0.0,
-            set_count: 2,
-            ..FaultBelief::default()
-        };
-        (said.p[0], said.p[1], said.p[2]) = (0.1, 0.9, 0.6);
-        said.sets[0] = FaultSet {
-            leaves: 0b110,
-            p: 0.6,
-        };
-        said.sets[1] = FaultSet {
-            leaves: 0b10,
-            p: 0.3,
-        };
-        let mut found = [0.0; 4];
-        weights(&said, &states, true, &mut found);
+        let said = diagnosis(&[0.1, 0.9, 0.6], 0.0);
+        let found = weighed_over(&states, said, &[(0b110, 0.6), (0b10, 0.3)]);
         for (found, expected) in found.into_iter().zip([0.1, 0.9, 0.0, 0.0]) {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }
@@ -415,13 +383,20 @@ mod tests {
 
     /// Weights where the sets are these: their leaves as bits, their probability.
     fn weighed(p: &[f64], sets: &[(u64, f64)]) -> [f64; 6] {
-        let mut said = diagnosis(p, 0.0);
+        weighed_over(&STATES, diagnosis(p, 0.0), sets)
+    }
+
+    fn weighed_over<const N: usize>(
+        states: &[StateMeaning; N],
+        mut said: FaultBelief,
+        sets: &[(u64, f64)],
+    ) -> [f64; N] {
         said.set_count = sets.len() as u32;
         for (set, (leaves, p)) in said.sets.iter_mut().zip(sets) {
             (set.leaves, set.p) = (*leaves, *p);
         }
-        let mut out = [0.0; 6];
-        weights(&said, &STATES, true, &mut out);
+        let mut out = [0.0; N];
+        weights(&said, states, true, &mut out);
         out
     }
 

@@ -292,12 +292,19 @@ impl Description {
         }
     }
 
-    /// True if a command asks the robot to move. Without a geometry a rate does (an axis in m/s or
-    /// rad/s), and where no axis is a rate any axis; a robot without a command always moves.
+    /// True if a command asks the robot to move, beyond what it stands with.
     #[must_use]
     pub fn is_told_to_move(&self, command: &[f64]) -> bool {
+        self.is_told_beyond(command, self.body.standing_m_s)
+    }
+
+    /// True if a command asks for more than this speed. Without a geometry a rate does (an axis in
+    /// m/s or rad/s) above 2 % of its limit, and where no axis is a rate any axis; a robot without
+    /// a command always moves.
+    #[must_use]
+    pub fn is_told_beyond(&self, command: &[f64], speed_m_s: f64) -> bool {
         if self.kinematics != Kinematics::None {
-            return self.path_speed_m_s(self.twist(command)) > self.body.standing_m_s;
+            return self.path_speed_m_s(self.twist(command)) > speed_m_s;
         }
         let is_rate = |axis: &Axis| axis.unit.ends_with("/s");
         let any_rate = self.command.iter().any(is_rate);

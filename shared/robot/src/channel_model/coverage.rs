@@ -105,6 +105,16 @@ pub fn product(powers: &[u8; AXES], command: &[f64; AXES]) -> f64 {
         .product()
 }
 
+/// A command, each axis divided by its learned size.
+#[must_use]
+pub fn scaled(command: &[f64; AXES], ranges: &[Range]) -> [f64; AXES] {
+    let mut scaled = *command;
+    for (value, range) in scaled.iter_mut().zip(ranges) {
+        *value /= range.size;
+    }
+    scaled
+}
+
 /// Factor on all deviations for a command outside the ranges learned from, or in a combination that
 /// was not driven.
 #[must_use]
@@ -116,10 +126,6 @@ pub fn widening(ranges: &[Range], combinations: &Combinations, now: &Observation
     let axes = ranges.iter().zip(&now.command);
     let beyond = axes.map(|(range, value)| range.beyond(*value));
     let outside = 1.0 + EXTRAPOLATION * beyond.fold(0.0, f64::max);
-    let mut command = now.command;
-    for (value, range) in command.iter_mut().zip(ranges) {
-        *value /= range.size;
-    }
-    let novelty = combinations.novelty(&command);
+    let novelty = combinations.novelty(&scaled(&now.command, ranges));
     outside * (novelty / NOVEL).max(1.0).sqrt()
 }

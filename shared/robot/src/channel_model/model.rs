@@ -376,10 +376,6 @@ fn check_channel(key: &str, channel: &Channel, axes: usize) -> Result<(), ModelE
     Ok(())
 }
 
-fn all(count: usize) -> Vec<usize> {
-    (0..count).collect()
-}
-
 /// Checks the law of the roughness.
 fn check_scatter(scatter: &Scatter, channels: usize) -> Result<(), ModelError> {
     let rows = scatter.covariance.iter().all(|row| row.len() == channels);
@@ -392,7 +388,8 @@ fn check_scatter(scatter: &Scatter, channels: usize) -> Result<(), ModelError> {
     let n = scatter.covariance.len();
     let of = &scatter.covariance;
     let sound = |i: usize| of[i][i] >= 1e-6 && (0..i).all(|j| (of[i][j] - of[j][i]).abs() < 1e-9);
-    if sizes && bounded && (0..n).all(sound) && ScatterLaw::new(scatter, &all(n)).is_some() {
+    let places: Vec<usize> = (0..n).collect();
+    if sizes && bounded && (0..n).all(sound) && ScatterLaw::new(scatter, &places).is_some() {
         return Ok(());
     }
     let found = format!("{} means", scatter.mean.len());

@@ -44,6 +44,14 @@ fn edited(from: &str, to: &str) -> String {
     changed
 }
 
+/// Why the shipped model is refused after a change that is sealed.
+fn refused(change: impl Fn(&mut Model)) -> String {
+    let mut model = Model::from_toml(&shipped()).unwrap();
+    change(&mut model);
+    let text = model.sealed().to_toml().unwrap();
+    Model::from_toml(&text).unwrap_err().to_string()
+}
+
 #[test]
 fn a_file_that_was_changed_by_accident_is_refused() {
     let model = Model::from_toml(&shipped()).unwrap();
@@ -105,54 +113,42 @@ fn what_points_at_nothing_is_refused_by_name() {
         let message = Model::from_toml(&edited(from, to)).unwrap_err().to_string();
         assert!(message.starts_with(key), "{to}: {message}");
     }
-    let broken = |change: &dyn Fn(&mut Model)| {
-        let mut model = Model::from_toml(&shipped()).unwrap();
-        change(&mut model);
-        let text = model.sealed().to_toml().unwrap();
-        Model::from_toml(&text).unwrap_err().to_string()
-    };
     for message in [
-        broken(&|m| m.direction[1].variance = -1.0),
-        broken(&|m| m.direction[0].correlation = [1.0; 7]),
+        refused(|m| m.direction[1].variance = -1.0),
+        refused(|m| m.direction[0].correlation = [1.0; 7]),
     ] {
         assert!(message.starts_with("direction"), "{message}");
     }
-    let message = broken(&|m| m.scatter.mean.clear());
+    let message = refused(|m| m.scatter.mean.clear());
     assert!(message.starts_with("scatter"), "{message}");
-    let message = broken(&|m| m.tail[0].slope = 0.0);
+    let message = refused(|m| m.tail[0].slope = 0.0);
     assert!(message.starts_with("tail"), "{message}");
 }
 
 #[test]
 fn numbers_that_would_blind_or_end_a_service_are_refused() {
-    let refused = |change: &dyn Fn(&mut Model)| {
-        let mut model = Model::from_toml(&shipped()).unwrap();
-        change(&mut model);
-        let text = model.sealed().to_toml().unwrap();
-        Model::from_toml(&text).unwrap_err().to_string()
-    };
     for (key, message) in [
-        ("tail", refused(&|m| m.tail[6].slope = 1e308)),
-        ("tail", refused(&|m| m.tail[6].level_log_odds = -1e9)),
+        ("tail", refused(|m| m.tail[6].slope = 1e308)),
+        ("tail", refused(|m| m.tail[6].level_log_odds = -1e9)),
         (
             "direction",
-            refused(&|m| m.direction[0].vector = vec![1e150; 5]),
+            refused(|m| m.direction[0].vector = vec![1e150; 5]),
         ),
-        ("direction", refused(&|m| m.direction[0].variance = 1e308)),
-        ("scatter", refused(&|m| m.scatter.covariance[0][0] = 1e-310)),
-        ("scatter", refused(&|m| m.scatter.covariance[0][1] = 1e5)),
+        ("direction", refused(|m| m.direction[0].variance = 1e308)),
+        ("scatter", refused(|m| m.scatter.covariance[0][0] = 1e-310)),
+        ("scatter", refused(|m| m.scatter.covariance[0][1] = 1e5)),
         (
             "channel.0.weights",
-            refused(&|m| m.channel[0].weights[0] = 1e300),
+            refused(|m| m.channel[0].weights[0] = 1e300),
         ),
         (
             "channel.0.silence_s",
-            refused(&|m| m.channel[0].silence_s = -1.0),
+            refused(|m| m.channel[0].silence_s = -1.0),
         ),
-        ("command", refused(&|m| m.command[0].size = 0.0)),
+        ("command", refused(|m| m.command[0].size = 0.0)),
         (
             "combinations",
-            refused(&|m| m.combinations.precision[0].clear()),
+            refused(|m| m.combinations.precision[0].clear()),
         ),
     ] {
         assert!(message.starts_with(key), "{key}: {message}");

@@ -27,13 +27,12 @@ pub(super) fn fit(
     }
     let form = Form::LearnedBias;
     for channels in sets {
-        let fitted = |class: Class| {
-            let of = |monitor: &Monitor| monitor.classes()[class as usize];
-            let mut found = maxima(models, records, (robot, channels), of);
+        let mut by_class = maxima(models, records, (robot, channels), Monitor::classes);
+        let fitted = Class::ALL.map(|class| {
+            let found = &mut by_class[class as usize];
             let tail = found.high_tail(channels, form, FAULT_RATE_1_H);
             (class, tail, found.highest())
-        };
-        let fitted = Class::ALL.map(fitted);
+        });
         // The same residuals feed all classes but that of noise, and few moments show their tail.
         let shared = fitted.iter().filter(|(class, ..)| *class != Class::Noise);
         let least = shared
@@ -55,8 +54,8 @@ pub(super) fn fit(
         for each in models.iter_mut().chain([&mut *model]) {
             each.tail.extend(tails.iter().cloned());
         }
-        let of = |monitor: &Monitor| monitor.report().log_odds;
-        let mut all = maxima(models, records, (robot, channels), of);
+        let of = |monitor: &Monitor| [monitor.report().log_odds];
+        let [mut all] = maxima(models, records, (robot, channels), of);
         let mut found = all.high_tail(channels, form, FAULT_RATE_1_H);
         // Where the log is too short to show it: tempered log-odds have this slope, if those of the
         // classes are right.
@@ -83,21 +82,21 @@ pub(super) fn tell(bounds: &mut Bounds, model: &Model) {
     }
 }
 
-/// Highest log-odds, as `of` takes them, of each window of motion.
-fn maxima(
+/// Highest of each of the log-odds that `of` takes, of each window of motion.
+fn maxima<const N: usize>(
     models: &[Model],
     records: &[Record],
     (robot, channels): (&Description, Channels),
-    of: impl Fn(&Monitor) -> f64,
-) -> Maxima {
-    let mut maxima = Maxima::new();
+    of: impl Fn(&Monitor) -> [f64; N],
+) -> [Maxima; N] {
+    let mut maxima = [(); N].map(|()| Maxima::new());
     for (fold, model) in models.iter().enumerate() {
         let Some(mut monitor) = Monitor::new(model, robot, channels, FAULT_RATE_1_H) else {
             continue;
         };
         let ahead = CONTEXT_BLOCKS * monitor.bank().window().per_block();
         for record in records {
-            maxima.begin();
+            maxima.iter_mut().for_each(Maxima::begin);
             let mut is_new = true;
             for (k, history) in record.histories.iter().enumerate() {
                 let last = (k + ahead).min(record.folds.len() - 1);
@@ -113,7 +112,8 @@ fn maxima(
                     continue;
                 };
                 if record.folds[k] == fold && monitor.is_ready() {
-                    maxima.push(of(&monitor), now.dt_s);
+                    let pairs = maxima.iter_mut().zip(of(&monitor));
+                    pairs.for_each(|(maxima, log_odds)| maxima.push(log_odds, now.dt_s));
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! Which combinations of the command's axes a log covers.
 
 use nalgebra::DMatrix;
-use vigil_robot::channel_model::coverage::product;
+use vigil_robot::channel_model::coverage::{product, scaled};
 use vigil_robot::channel_model::{AXES, Combinations, Range, Term};
 
 use super::record::Record;
@@ -46,10 +46,7 @@ pub(super) fn combinations(
             if Some(*fold) == left_out || !is_settled(history, ranges) {
                 continue;
             }
-            let mut command = now.command;
-            for (value, range) in command.iter_mut().zip(ranges) {
-                *value /= range.size;
-            }
+            let command = scaled(&now.command, ranges);
             let values: Vec<f64> = powers.iter().map(|of| product(of, &command)).collect();
             sums += DMatrix::from_fn(n, n, |i, j| values[i] * values[j]);
             count += 1.0;

@@ -3,7 +3,7 @@
 
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
-use vigil_robot::channel_model::{History, Observer};
+use vigil_robot::channel_model::{History, Observation, Observer};
 
 /// Parts into which a log is divided: each is judged by what was learned from the others.
 pub(super) const FOLDS: usize = 5;
@@ -46,12 +46,8 @@ pub(super) fn silence_s(records: &[Record], place: usize) -> f64 {
 /// Time at rest after all lags of the motion before, s.
 pub(super) fn rest_s(records: &[Record], lags: usize) -> f64 {
     let all = records.iter().flat_map(|record| &record.histories);
-    let is_rest = |history: &&History| {
-        let there = (0..=lags).map(|lag| history.ago(lag));
-        there
-            .into_iter()
-            .all(|then| then.is_some_and(|then| !then.moving))
-    };
+    let rests_at = |then: Option<&Observation>| then.is_some_and(|then| !then.moving);
+    let is_rest = |history: &&History| (0..=lags).all(|lag| rests_at(history.ago(lag)));
     let rests = all.filter(is_rest).filter_map(|history| history.ago(0));
     rests.map(|now| now.dt_s).sum()
 }

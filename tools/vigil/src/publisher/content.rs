@@ -6,7 +6,6 @@ use vigil_blocks::SensorFrame;
 use vigil_recording::frames::{Field, fields};
 use vigil_robot::Description;
 use vigil_robot::channel::{Role, channels};
-use vigil_robot::description::Kinematics;
 use vigil_robot::publisher_check::PublisherCheck;
 
 use super::FrameArrival;
@@ -48,10 +47,7 @@ pub fn findings(robot: &Description, frames: &[FrameArrival]) -> Vec<Finding> {
 }
 
 fn is_moving(robot: &Description, frame: &SensorFrame) -> bool {
-    match robot.kinematics {
-        Kinematics::None => robot.is_told_to_move(&frame.command),
-        _ => robot.path_speed_m_s(robot.twist(&frame.command)) > MOVING_M_S,
-    }
+    robot.is_told_beyond(&frame.command, MOVING_M_S)
 }
 
 fn stretch(robot: &Description, field: Field, frames: &[FrameArrival]) -> Stretch {
