@@ -1,4 +1,4 @@
-// Sends frames as datagrams to a graph with `--source socket`.
+// Sends frames as datagrams to a graph with `--source socket`, and hears its verdicts.
 #pragma once
 #include "waiting.hpp"
 
@@ -49,6 +49,21 @@ class SocketPublisher {
     }
     waiting.end();
     return true;
+  }
+
+  // The newest verdict that has arrived since the last call; false if none has. It never waits. The robot obeys it for
+  // verdict.valid_for_ns from now, and stops after that.
+  bool verdict(vigil_verdict &verdict) const {
+    bool is_new = false;
+    uint8_t bytes[VIGIL_VERDICT_DATAGRAM_SIZE + 1];
+    while (sender >= 0) {
+      const ssize_t count = recv(sender, bytes, sizeof bytes, MSG_DONTWAIT);
+      // Nobody listens where the last frame went; `publish` says so.
+      if (count < 0 && errno == ECONNREFUSED) continue;
+      if (count < 0) break;
+      if (vigil_take_verdict(bytes, static_cast<size_t>(count), &verdict)) is_new = true;
+    }
+    return is_new;
   }
 
  private:
@@ -112,6 +127,12 @@ class SocketPublisher {
     }
     sender = socket(address.ss_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     if (sender < 0) fail(to + ": " + std::strerror(errno));
+    if (address.ss_family == AF_UNIX) {
+      // A name of the kernel's choice: a socket without one gets no verdicts.
+      const sockaddr_un unnamed{AF_UNIX, {}};
+      if (bind(sender, reinterpret_cast<const sockaddr *>(&unnamed), sizeof unnamed.sun_family) != 0)
+        fail(to + ": " + std::strerror(errno));
+    }
     epoch = std::chrono::steady_clock::now().time_since_epoch().count(), seq = 0;
   }
 };

@@ -1,4 +1,7 @@
-"""Sends frames as datagrams to a graph with `--source socket`: nothing but Python's own library."""
+"""Sends frames as datagrams to a graph with `--source socket`, and hears its verdicts.
+
+It needs nothing but Python's own library.
+"""
 
 import pathlib
 import socket
@@ -16,7 +19,7 @@ class SocketPublisher:
 
     `to`: the name of a graph on this machine; or host:port of its UDP socket, or the path of its Unix socket.
     `SocketPublisher(name)` waits for that graph. `channels` is the channel list; with an address, the file `channels`.
-    `publish(frame)` never waits. While nobody listens it says so, and goes on by itself when somebody does.
+    `publish(frame)` never waits, nor does `verdict()`. While nobody listens it says so, and goes on by itself when somebody does.
     """
 
     def __init__(self, to="rover", channels=ROVER):
@@ -54,6 +57,23 @@ class SocketPublisher:
         self.waiting.end()
         return True
 
+    def verdict(self):
+        """The newest verdict that has arrived since the last call; None if none has. Never waits.
+
+        The robot obeys it for `valid_for_ns` from now, and stops after that.
+        """
+        newest = None
+        while self._sender is not None:
+            try:
+                data = self._sender.recv(4096)
+            except BlockingIOError:
+                break
+            except OSError:
+                # Nobody listens where the last frame went; `publish` says so.
+                continue
+            newest = vigil.verdict_of(data) or newest
+        return newest
+
     def _is_found(self, now_ns):
         """Looks for the graph of this name; takes the address of the one that there is."""
         self._look_ns = now_ns + LOOK_NS
@@ -88,6 +108,9 @@ class SocketPublisher:
             host, port = to.rsplit(":", 1)
             family, self._to = socket.AF_INET6 if ":" in host else socket.AF_INET, (host.strip("[]"), int(port))
         self._sender = socket.socket(family, socket.SOCK_DGRAM)
+        if family == socket.AF_UNIX:
+            # A name of the kernel's choice: a socket without one gets no verdicts.
+            self._sender.bind("")
         # A queue that is full holds up no robot.
         self._sender.setblocking(False)
         self._epoch, self._seq = time.monotonic_ns(), 0

@@ -12,8 +12,15 @@ int main(int count, char **words) {
   std::puts("sending; scripts/up shows 'alarm' and 'diagnosis' when the wheel sticks");
   auto due = steady_clock::now();
   vigil_sensor_frame frame;
+  vigil_verdict verdict{};
+  std::string said;
   while (next_frame(publisher.channels(), frame)) {
     std::this_thread::sleep_until(due += period);
     publisher.publish(frame);
+    // A robot would do as the newest one says: see docs/external-sensor.md.
+    if (!publisher.verdict(verdict)) continue;
+    const std::string now = std::string(verdict.action_name) + ", " + verdict.mode_name;
+    if (now != said) std::printf("%s p=%.3f\n", now.c_str(), verdict.p_mode);
+    said = now;
   }
 }

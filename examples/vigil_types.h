@@ -75,6 +75,7 @@
 #define VIGIL_CAUSE_FRAME 1u
 #define VIGIL_CAUSE_MISSED 2u
 #define VIGIL_DATAGRAM_SIZE 592u
+#define VIGIL_VERDICT_DATAGRAM_SIZE 304u
 
 typedef struct {
   /* Schema hash of the block (Block::SCHEMA). */
@@ -634,6 +635,81 @@ VIGIL_ASSERT(offsetof(vigil_health, particles_configured) == 380);
 VIGIL_ASSERT(offsetof(vigil_health, event_count) == 384);
 VIGIL_ASSERT(offsetof(vigil_health, events) == 392);
 
+#define VIGIL_VERDICT_SCHEMA 0x643a44b44715b3d4ull
+#define VIGIL_VERDICT_TYPE_NAME "vigil.Verdict.v1.643a44b44715b3d4"
+typedef struct {
+  /* Common header. t_capture_ns is that of the frame behind this verdict, by the publisher's own clock. */
+  vigil_header header;
+  /* Run of the frame. */
+  uint64_t run_id;
+  /* Counts decisions: rises when the action or its parameters change. From 1. */
+  uint64_t decision_seq;
+  /* How long the action is valid, ns from its arrival; 0 if it is not valid. */
+  uint64_t valid_for_ns;
+  /* Probability that something is wrong. */
+  double p_fault;
+  /* Probability of mode; 0 for a mode that is no node of the fault tree. */
+  double p_mode;
+  /* Expected size of the fault mode, in the unit of size_kind; 0 without a size. */
+  double size;
+  /* Standard deviation of size, in the same unit. */
+  double size_sd;
+  /* Speed factor to apply, 0..1. */
+  double speed_scale;
+  /* Curvature to command: curvature_gain * curvature + curvature_offset. */
+  double curvature_gain;
+  /* See curvature_gain; 1/m. */
+  double curvature_offset;
+  /* What the robot is to do: a RecoveryKind. */
+  uint32_t kind;
+  /* Wheel that the action is about; u32::MAX for none. */
+  uint32_t wheel;
+  /* 1 while the alarm stands. */
+  uint32_t alarm;
+  /* Alarms raised so far. */
+  uint32_t alarm_count;
+  /* Why nothing is seen: a Blindness; 0 while something is. */
+  uint32_t blind;
+  /* Diagnosis with hysteresis, see FaultBelief::reported. */
+  uint32_t mode;
+  /* Bit 0: identifier lost; bit 1: detector lost. */
+  uint32_t lost_stages;
+  /* In which way the component is broken: a SizeKind. */
+  uint32_t size_kind;
+  /* Name of mode, UTF-8, zeros behind it: a node of the fault tree (ND for nominal), or UNKNOWN, MULTIPLE, BLIND. */
+  char mode_name[32];
+  /* Name of the next best explanation, as mode_name. */
+  char runner_up_name[32];
+  /* Name of the action in the decision model, UTF-8, zeros behind it. */
+  char action_name[32];
+  /* Word for size_kind: gain, bias, stuck; zeros behind it. */
+  char size_name[32];
+} vigil_verdict;
+VIGIL_ASSERT(sizeof(vigil_verdict) == 288);
+VIGIL_ASSERT(offsetof(vigil_verdict, header) == 0);
+VIGIL_ASSERT(offsetof(vigil_verdict, run_id) == 48);
+VIGIL_ASSERT(offsetof(vigil_verdict, decision_seq) == 56);
+VIGIL_ASSERT(offsetof(vigil_verdict, valid_for_ns) == 64);
+VIGIL_ASSERT(offsetof(vigil_verdict, p_fault) == 72);
+VIGIL_ASSERT(offsetof(vigil_verdict, p_mode) == 80);
+VIGIL_ASSERT(offsetof(vigil_verdict, size) == 88);
+VIGIL_ASSERT(offsetof(vigil_verdict, size_sd) == 96);
+VIGIL_ASSERT(offsetof(vigil_verdict, speed_scale) == 104);
+VIGIL_ASSERT(offsetof(vigil_verdict, curvature_gain) == 112);
+VIGIL_ASSERT(offsetof(vigil_verdict, curvature_offset) == 120);
+VIGIL_ASSERT(offsetof(vigil_verdict, kind) == 128);
+VIGIL_ASSERT(offsetof(vigil_verdict, wheel) == 132);
+VIGIL_ASSERT(offsetof(vigil_verdict, alarm) == 136);
+VIGIL_ASSERT(offsetof(vigil_verdict, alarm_count) == 140);
+VIGIL_ASSERT(offsetof(vigil_verdict, blind) == 144);
+VIGIL_ASSERT(offsetof(vigil_verdict, mode) == 148);
+VIGIL_ASSERT(offsetof(vigil_verdict, lost_stages) == 152);
+VIGIL_ASSERT(offsetof(vigil_verdict, size_kind) == 156);
+VIGIL_ASSERT(offsetof(vigil_verdict, mode_name) == 160);
+VIGIL_ASSERT(offsetof(vigil_verdict, runner_up_name) == 192);
+VIGIL_ASSERT(offsetof(vigil_verdict, action_name) == 224);
+VIGIL_ASSERT(offsetof(vigil_verdict, size_name) == 256);
+
 
 /* CRC-32C (Castagnoli), bit by bit: `crc` is what came before, 0 to begin. */
 static inline uint32_t vigil_crc32c(uint32_t crc, const uint8_t *bytes, size_t count) {
@@ -645,20 +721,45 @@ static inline uint32_t vigil_crc32c(uint32_t crc, const uint8_t *bytes, size_t c
   return ~crc;
 }
 
+/* What a datagram begins with: `kind` 1 is a frame, 2 a verdict. */
+static inline void vigil_datagram_head(uint8_t kind, size_t size, uint8_t head[12]) {
+  const uint8_t bytes[12] = {'V', 'G', 'I', 'L', 2, 0, kind, 0,
+                             (uint8_t)(size & 0xff), (uint8_t)(size >> 8), 0, 0};
+  memcpy(head, bytes, 12);
+}
+
+/* Checksum of a datagram, which holds a block of this size. */
+static inline uint32_t vigil_datagram_crc(const uint8_t *bytes, size_t size) {
+  return vigil_crc32c(vigil_crc32c(0, bytes, 12), bytes + 16, size);
+}
+
 /* The datagram of a frame, for the sockets of `sensor.source = "socket"`. The sender fills in
  * header.epoch (not 0, another at each start), header.seq and header.t_capture_ns; it leaves
  * header.t_schedule_ns at 0 unless it runs on Vigil's machine and has its CLOCK_MONOTONIC. */
 static inline void vigil_datagram(const vigil_sensor_frame *frame,
                                   uint8_t bytes[VIGIL_DATAGRAM_SIZE]) {
-  const uint8_t head[12] = {'V', 'G', 'I', 'L', 2, 0, 1, 0,
-                            sizeof *frame & 0xff, sizeof *frame >> 8, 0, 0};
-  memcpy(bytes, head, 12);
+  vigil_datagram_head(1, sizeof *frame, bytes);
   memcpy(bytes + 16, frame, sizeof *frame);
   const uint64_t schema = VIGIL_SENSOR_FRAME_SCHEMA;
   memcpy(bytes + 16, &schema, 8);
-  uint32_t crc = vigil_crc32c(0, bytes, 12);
-  crc = vigil_crc32c(crc, bytes + 16, sizeof *frame);
+  const uint32_t crc = vigil_datagram_crc(bytes, sizeof *frame);
   for (int i = 0; i < 4; i++) bytes[12 + i] = (uint8_t)(crc >> (8 * i));
+}
+
+/* Takes the verdict of a datagram that came back; 0 if it is none. Obey it for
+ * verdict->valid_for_ns from now, and stop after that. */
+static inline int vigil_take_verdict(const uint8_t *bytes, size_t count, vigil_verdict *verdict) {
+  uint8_t head[12];
+  vigil_datagram_head(2, sizeof *verdict, head);
+  if (count != VIGIL_VERDICT_DATAGRAM_SIZE || memcmp(bytes, head, 12) != 0) return 0;
+  const uint32_t crc = vigil_datagram_crc(bytes, sizeof *verdict);
+  for (int i = 0; i < 4; i++)
+    if (bytes[12 + i] != (uint8_t)(crc >> (8 * i))) return 0;
+  uint64_t schema = 0;
+  memcpy(&schema, bytes + 16, 8);
+  if (schema != VIGIL_VERDICT_SCHEMA) return 0;
+  memcpy(verdict, bytes + 16, sizeof *verdict);
+  return 1;
 }
 
 #endif

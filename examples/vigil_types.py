@@ -702,6 +702,90 @@ assert Health.event_count.offset == 384
 assert Health.events.offset == 392
 
 
+class Verdict(ctypes.LittleEndianStructure):
+    SCHEMA = 0x643A44B44715B3D4
+    TYPE_NAME = "vigil.Verdict.v1.643a44b44715b3d4"
+
+    @staticmethod
+    def type_name():
+        return Verdict.TYPE_NAME
+
+    _fields_ = [
+        # Common header. t_capture_ns is that of the frame behind this verdict, by the publisher's own clock.
+        ("header", Header),
+        # Run of the frame.
+        ("run_id", ctypes.c_uint64),
+        # Counts decisions: rises when the action or its parameters change. From 1.
+        ("decision_seq", ctypes.c_uint64),
+        # How long the action is valid, ns from its arrival; 0 if it is not valid.
+        ("valid_for_ns", ctypes.c_uint64),
+        # Probability that something is wrong.
+        ("p_fault", ctypes.c_double),
+        # Probability of mode; 0 for a mode that is no node of the fault tree.
+        ("p_mode", ctypes.c_double),
+        # Expected size of the fault mode, in the unit of size_kind; 0 without a size.
+        ("size", ctypes.c_double),
+        # Standard deviation of size, in the same unit.
+        ("size_sd", ctypes.c_double),
+        # Speed factor to apply, 0..1.
+        ("speed_scale", ctypes.c_double),
+        # Curvature to command: curvature_gain * curvature + curvature_offset.
+        ("curvature_gain", ctypes.c_double),
+        # See curvature_gain; 1/m.
+        ("curvature_offset", ctypes.c_double),
+        # What the robot is to do: a RecoveryKind.
+        ("kind", ctypes.c_uint32),
+        # Wheel that the action is about; u32::MAX for none.
+        ("wheel", ctypes.c_uint32),
+        # 1 while the alarm stands.
+        ("alarm", ctypes.c_uint32),
+        # Alarms raised so far.
+        ("alarm_count", ctypes.c_uint32),
+        # Why nothing is seen: a Blindness; 0 while something is.
+        ("blind", ctypes.c_uint32),
+        # Diagnosis with hysteresis, see FaultBelief::reported.
+        ("mode", ctypes.c_uint32),
+        # Bit 0: identifier lost; bit 1: detector lost.
+        ("lost_stages", ctypes.c_uint32),
+        # In which way the component is broken: a SizeKind.
+        ("size_kind", ctypes.c_uint32),
+        # Name of mode, UTF-8, zeros behind it: a node of the fault tree (ND for nominal), or UNKNOWN, MULTIPLE, BLIND.
+        ("mode_name", ctypes.c_char * 32),
+        # Name of the next best explanation, as mode_name.
+        ("runner_up_name", ctypes.c_char * 32),
+        # Name of the action in the decision model, UTF-8, zeros behind it.
+        ("action_name", ctypes.c_char * 32),
+        # Word for size_kind: gain, bias, stuck; zeros behind it.
+        ("size_name", ctypes.c_char * 32),
+    ]
+
+
+assert ctypes.sizeof(Verdict) == 288
+assert Verdict.header.offset == 0
+assert Verdict.run_id.offset == 48
+assert Verdict.decision_seq.offset == 56
+assert Verdict.valid_for_ns.offset == 64
+assert Verdict.p_fault.offset == 72
+assert Verdict.p_mode.offset == 80
+assert Verdict.size.offset == 88
+assert Verdict.size_sd.offset == 96
+assert Verdict.speed_scale.offset == 104
+assert Verdict.curvature_gain.offset == 112
+assert Verdict.curvature_offset.offset == 120
+assert Verdict.kind.offset == 128
+assert Verdict.wheel.offset == 132
+assert Verdict.alarm.offset == 136
+assert Verdict.alarm_count.offset == 140
+assert Verdict.blind.offset == 144
+assert Verdict.mode.offset == 148
+assert Verdict.lost_stages.offset == 152
+assert Verdict.size_kind.offset == 156
+assert Verdict.mode_name.offset == 160
+assert Verdict.runner_up_name.offset == 192
+assert Verdict.action_name.offset == 224
+assert Verdict.size_name.offset == 256
+
+
 def _folders():
     """Where the folders of graphs lie."""
     user = os.environ.get("XDG_RUNTIME_DIR")
@@ -879,5 +963,23 @@ def datagram(frame):
     """
     frame.header.schema = SensorFrame.SCHEMA
     body = bytes(frame)
-    head = b"VGIL" + struct.pack("<HHI", 2, 1, len(body))
+    head = _head(1, len(body))
     return head + struct.pack("<I", crc32c(head + body)) + body
+
+
+def _head(kind, size):
+    return b"VGIL" + struct.pack("<HHI", 2, kind, size)
+
+
+def verdict_of(data):
+    """The Verdict of a datagram that came back; None if it is none.
+
+    A robot obeys it for valid_for_ns from its arrival, and stops after that.
+    """
+    head, size = _head(2, ctypes.sizeof(Verdict)), ctypes.sizeof(Verdict)
+    if len(data) != 16 + size or data[:12] != head:
+        return None
+    if struct.unpack("<I", data[12:16])[0] != crc32c(head + data[16:]):
+        return None
+    verdict = Verdict.from_buffer_copy(data[16:])
+    return verdict if verdict.header.schema == Verdict.SCHEMA else None

@@ -50,8 +50,12 @@ class Publishers(unittest.TestCase):
         # At the recording's own rate: due times are found from its capture times.
         with Graph("--source", "socket", "--rate", "20") as graph:
             socket = graph.wait_for_socket()
-            self.run_to_its_end(publisher("socket_publisher.py", FRAMES, STUCK_RUN, socket, 20))
+            command = [sys.executable, EXAMPLES / "socket_publisher.py", FRAMES, str(STUCK_RUN), socket, "20"]
+            heard = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=True).stdout
             self.assert_found(graph.stop(), "sensor-sim")
+        # What the graph decided came back to the sender.
+        self.assertIn("go_on, ND", heard)
+        self.assertIn(STUCK_LEAF, heard)
 
     def rows(self):
         """Rows of the recorded run, as the C++ publishers read them."""
@@ -60,7 +64,7 @@ class Publishers(unittest.TestCase):
 
     def feed(self, *command):
         options = {"cwd": ROOT, "text": True, "check": True, "timeout": 60}
-        subprocess.run(command, input=self.rows(), stdout=subprocess.DEVNULL, **options)
+        return subprocess.run(command, input=self.rows(), stdout=subprocess.PIPE, **options).stdout
 
     def test_cpp_through_udp(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -69,8 +73,9 @@ class Publishers(unittest.TestCase):
             subprocess.run(["c++", *flags, EXAMPLES / "socket_publisher.cpp", "-o", program], check=True)
             with Graph("--source", "socket", "--rate", "20") as graph:
                 graph.wait_for_socket()
-                self.feed(program, f"127.0.0.1:{graph.udp_port}")
+                heard = self.feed(program, f"127.0.0.1:{graph.udp_port}")
                 self.assert_found(graph.stop(), "sensor-sim")
+        self.assertIn(STUCK_LEAF, heard)
 
     def has_binding(self, folder):
         """True if cmake finds iceoryx2's C++ binding."""

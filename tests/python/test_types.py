@@ -1,6 +1,7 @@
 """The types of other languages are those of the Rust structs, and compile."""
 
 import pathlib
+import struct
 import subprocess
 import tempfile
 import unittest
@@ -44,6 +45,36 @@ class Types(unittest.TestCase):
                 subprocess.run([compiler, *flags, file, "-o", program], check=True)
                 made = subprocess.run([program], check=True, capture_output=True).stdout
                 self.assertEqual(made, vigil_types.datagram(frame))
+
+    def test_the_header_and_python_take_the_same_verdicts(self):
+        source = """
+            #include "vigil_types.h"
+            #include <stdio.h>
+            int main(void) {
+              uint8_t bytes[VIGIL_VERDICT_DATAGRAM_SIZE + 1];
+              vigil_verdict verdict;
+              size_t count = fread(bytes, 1, sizeof bytes, stdin);
+              if (!vigil_take_verdict(bytes, count, &verdict)) return 1;
+              return printf("%s %.2f", verdict.mode_name, verdict.speed_scale) < 0;
+            }"""
+        verdict = vigil_types.Verdict(mode_name=b"LF_STUCK", speed_scale=0.25)
+        verdict.header.schema = vigil_types.Verdict.SCHEMA
+        body = bytes(verdict)
+        head = b"VGIL" + struct.pack("<HHI", 2, 2, len(body))
+        good = head + struct.pack("<I", vigil_types.crc32c(head + body)) + body
+        corrupt = good[:-1] + bytes([good[-1] ^ 1])
+        frame = vigil_types.datagram(vigil_types.SensorFrame())
+        with tempfile.TemporaryDirectory() as folder:
+            file, program = pathlib.Path(folder) / "main.c", pathlib.Path(folder) / "main"
+            file.write_text(source)
+            flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", f"-I{EXAMPLES}"]
+            subprocess.run(["cc", *flags, file, "-o", program], check=True)
+            for data, is_one in [(good, True), (corrupt, False), (good[:-1], False), (frame, False)]:
+                done = subprocess.run([program], input=data, capture_output=True)
+                self.assertEqual(done.returncode, 0 if is_one else 1)
+                self.assertEqual(vigil_types.verdict_of(data) is not None, is_one)
+                if is_one:
+                    self.assertEqual(done.stdout, b"LF_STUCK 0.25")
 
     def test_the_checksum_is_castagnolis(self):
         # The check value of the catalogue of parametrised CRC algorithms.

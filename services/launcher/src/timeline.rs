@@ -5,8 +5,8 @@ use std::fmt;
 
 use serde::Serialize;
 use vigil_blocks::{
-    ActionRejection, Blindness, Event, EventKind, Evidence, MODE_BLIND, MODE_MULTIPLE,
-    MODE_UNKNOWN, Rejection, SizeKind,
+    ActionRejection, Blindness, Event, EventKind, Evidence, MODE_MULTIPLE, Rejection, SizeKind,
+    mode_word,
 };
 use vigil_cycle::failure::Failure;
 use vigil_cycle::topic::ServiceName;
@@ -374,16 +374,8 @@ impl Namer {
     }
 
     fn mode(&self, node: u32) -> String {
-        match node {
-            MODE_UNKNOWN => "UNKNOWN".into(),
-            MODE_MULTIPLE => "MULTIPLE".into(),
-            MODE_BLIND => "BLIND".into(),
-            node => self
-                .nodes
-                .get(node as usize)
-                .cloned()
-                .unwrap_or_else(|| "?".into()),
-        }
+        let name = self.nodes.get(node as usize).map(String::as_str);
+        mode_word(node).or(name).unwrap_or("?").to_owned()
     }
 }
 

@@ -28,5 +28,7 @@ pub use injection_schedule::InjectionSchedule;
 pub use navigation::{Navigator, NavigatorEvent};
 pub use playback::{Playback, PlaybackError};
 pub use simulation::Simulation;
-pub use wiring::{ListenAddresses, PlaybackSource, SimulatorSource, SocketStage};
+pub use wiring::{
+    ListenAddresses, PlaybackSource, SimulatorSource, SocketInputs, SocketStage, VerdictNames,
+};
 pub use world::{CURRENT_PER_TORQUE_A_N_M, TrueState, World};

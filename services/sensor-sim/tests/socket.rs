@@ -7,17 +7,17 @@ use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use vigil_blocks::{Block, Rejection, SensorFrame, datagram};
+use vigil_blocks::{Action, Block, FaultBelief, Rejection, SensorFrame, Verdict, datagram};
 use vigil_cycle::datagrams::Datagrams;
 use vigil_cycle::placement::{PlacementRequest, read_back};
 use vigil_cycle::port::Bus;
 use vigil_cycle::topic::ServiceName;
 use vigil_cycle::{
     Clock, CycleAccount, DeadlineMonitor, Graph, HealthBoard, OnMiss, Receiver, Recorder, Schedule,
-    Stage, StageCycle, Topic, VirtualClock,
+    Sender, Stage, StageCycle, Stamp, Topic, VirtualClock,
 };
 use vigil_robot::ChannelMap;
-use vigil_sensor_sim::SocketStage;
+use vigil_sensor_sim::{SocketStage, VerdictNames};
 
 const PERIOD_NS: u64 = 10_000_000;
 const SCHEDULE: Schedule = Schedule {
@@ -32,6 +32,8 @@ struct Border {
     cycle: StageCycle,
     stage: SocketStage,
     published: Box<dyn Receiver<SensorFrame>>,
+    beliefs: Box<dyn Sender<FaultBelief>>,
+    actions: Box<dyn Sender<Action>>,
     datagrams: Rc<Datagrams>,
     file: PathBuf,
     robot_hash: u64,
@@ -56,7 +58,13 @@ impl Border {
         let datagrams = Datagrams::bind(Some(free.unwrap()), Some(&file)).unwrap();
         let datagrams = Rc::new(datagrams);
         let published = graph.receiver(Topic::Sensor).unwrap();
-        let stage = SocketStage::new(Rc::clone(&datagrams), &robot, &graph).unwrap();
+        let names = VerdictNames::new(
+            ["ND", "LF_STUCK"].into_iter(),
+            ["stop", "go_on"].into_iter(),
+        );
+        let stage = SocketStage::new(Rc::clone(&datagrams), &robot, names, &graph).unwrap();
+        let beliefs = graph.sender(Topic::Diagnosis).unwrap();
+        let actions = graph.sender(Topic::Action).unwrap();
         let recorder = Recorder::new().unwrap();
         let account = CycleAccount::new(DeadlineMonitor::new(SCHEDULE), board, recorder)
             .with_on_miss(OnMiss::Count);
@@ -65,6 +73,8 @@ impl Border {
             cycle: StageCycle::new(account).with_input_of(stage.writer()),
             stage,
             published,
+            beliefs,
+            actions,
             datagrams,
             file,
             robot_hash: ChannelMap::new(&robot).hash(),
@@ -95,6 +105,21 @@ impl Border {
         frame.header.t_schedule_ns = self.clock.now_ns();
         frame.header.t_capture_ns = self.clock.now_ns();
         datagram::encode(&frame)
+    }
+
+    /// Another stage decides, on the frame captured at `t_capture_ns`, what is valid for 5 ms.
+    fn decide(&mut self, t_capture_ns: u64, reported: u32) {
+        let now_ns = self.clock.now_ns();
+        let stamp = Stamp {
+            t_schedule_ns: now_ns,
+            t_capture_ns,
+        };
+        let belief = self.beliefs.block();
+        (belief.reported, belief.p[1]) = (reported, 0.9);
+        self.beliefs.send(stamp, &self.clock).unwrap();
+        let action = self.actions.block();
+        (action.action, action.valid_until_ns) = (1, now_ns + 5_000_000);
+        self.actions.send(stamp, &self.clock).unwrap();
     }
 
     fn rejected(&self, cause: Rejection) -> u64 {
@@ -165,4 +190,44 @@ fn frames_that_come_together_all_go_out() {
     }
     assert_eq!(border.turn().len(), 8);
     assert_eq!(border.cycle.account().health().view().lost, 0);
+}
+
+/// The verdicts that wait at a socket.
+fn verdicts(of: &UdpSocket) -> Vec<Verdict> {
+    of.set_nonblocking(true).unwrap();
+    let mut buffer = [0; 2 * datagram::VERDICT_DATAGRAM_SIZE];
+    let mut all = Vec::new();
+    while let Ok(length) = of.recv(&mut buffer) {
+        all.push(datagram::decode_verdict(&buffer[..length]).unwrap());
+    }
+    all
+}
+
+#[test]
+fn each_decision_goes_to_the_source_and_to_nobody_else() {
+    let mut border = Border::new("verdicts");
+    let to = border.datagrams.udp_address().unwrap();
+    let [first, other] = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
+    // Before there is a source, nobody is answered.
+    border.decide(1, 0);
+    border.turn();
+    first.send_to(&border.frame(1, 0), to).unwrap();
+    let _ = other.send_to(&border.frame(2, 0), to);
+    border.turn();
+    assert_eq!(verdicts(&first), []);
+    border.decide(77, 1);
+    border.turn();
+    border.decide(78, vigil_blocks::MODE_UNKNOWN);
+    // Without a new decision nothing is said again.
+    border.turn();
+    border.turn();
+    let [known, unknown] = verdicts(&first).try_into().unwrap();
+    assert_eq!((known.header.seq, known.header.t_capture_ns), (0, 77));
+    assert_eq!((known.valid_for_ns, known.p_mode), (5_000_000, 0.9));
+    assert_eq!(known.mode_name, vigil_blocks::fixed_name("LF_STUCK"));
+    assert_eq!(known.runner_up_name, vigil_blocks::fixed_name("ND"));
+    assert_eq!(known.action_name, vigil_blocks::fixed_name("go_on"));
+    assert_eq!((unknown.header.seq, unknown.header.t_capture_ns), (1, 78));
+    assert_eq!(unknown.mode_name, vigil_blocks::fixed_name("UNKNOWN"));
+    assert_eq!(verdicts(&other), []);
 }

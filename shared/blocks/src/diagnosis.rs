@@ -16,6 +16,17 @@ pub const MODE_MULTIPLE: u32 = 1001;
 /// [`FaultBelief::mode`] without valid input for a second.
 pub const MODE_BLIND: u32 = 1002;
 
+/// The word for a mode that is no node of the fault tree.
+#[must_use]
+pub const fn mode_word(mode: u32) -> Option<&'static str> {
+    match mode {
+        MODE_UNKNOWN => Some("UNKNOWN"),
+        MODE_MULTIPLE => Some("MULTIPLE"),
+        MODE_BLIND => Some("BLIND"),
+        _ => None,
+    }
+}
+
 part! {
 /// A set of leaves of the fault tree and its probability.
 pub struct FaultSet, size 16 {

@@ -14,6 +14,7 @@ mod particles;
 mod rejection;
 mod sensor;
 mod size_kind;
+mod verdict;
 
 pub use action::{
     Action, ActionRejection, ControlMode, DECISION_ACTIONS, DECISION_STATES, RecoveryKind,
@@ -26,6 +27,7 @@ pub use control::{Control, ControlCommand};
 pub use detection::{Blindness, DetectionBelief, EVIDENCE, Evidence, Readiness};
 pub use diagnosis::{
     FAULT_NODES, FAULT_SETS, FaultBelief, FaultSet, MODE_BLIND, MODE_MULTIPLE, MODE_UNKNOWN,
+    mode_word,
 };
 pub use header::{BlockId, Cause, CauseKind, Header};
 pub use health::{Degraded, EVENTS, Event, EventKind, Health, ServiceState};
@@ -34,3 +36,4 @@ pub use particles::{HealthyBelief, PARTICLE_CAPACITY, ParticleBlock, WeightedHyp
 pub use rejection::{REJECTIONS, Rejection};
 pub use sensor::{ActionOutcome, CHANNELS, COMMANDS, SensorFrame, Symptoms, WHEELS};
 pub use size_kind::SizeKind;
+pub use verdict::{NAME_SIZE, Verdict, fixed_name};

@@ -1,15 +1,15 @@
 //! Sockets on which datagrams arrive, none of which ever blocks.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::fs;
 use std::io;
 use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::{AsRawFd, RawFd};
 use std::os::unix::fs::FileTypeExt;
-use std::os::unix::net::UnixDatagram;
+use std::os::unix::net::{SocketAddr as UnixAddr, UnixDatagram};
 use std::path::{Path, PathBuf};
 
-use crate::wake::{Inputs, NOTHING};
+use crate::wake::{INPUTS, Inputs, NOTHING};
 
 /// Where a datagram came from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +30,8 @@ pub struct Datagrams {
     is_unix_first: Cell<bool>,
     /// What arrives at the Unix socket stays in the kernel.
     is_unix_shut: Cell<bool>,
+    /// Whose datagram was the last at the Unix socket: a socket without a name cannot be answered.
+    unix_peer: RefCell<Option<UnixAddr>>,
 }
 
 /// Datagrams that are thrown away at most when the Unix socket is opened again: more than its queue
@@ -70,6 +72,7 @@ impl Datagrams {
             file,
             is_unix_first: Cell::new(false),
             is_unix_shut: Cell::new(false),
+            unix_peer: RefCell::new(None),
         })
     }
 
@@ -109,8 +112,24 @@ impl Datagrams {
         if self.is_unix_shut.get() {
             return None;
         }
-        let length = self.unix.as_ref()?.recv(buffer).ok()?;
+        let (length, peer) = self.unix.as_ref()?.recv_from(buffer).ok()?;
+        *self.unix_peer.borrow_mut() = Some(peer).filter(|peer| !peer.is_unnamed());
         Some((length, From::Unix))
+    }
+
+    /// Sends a datagram back; false if nobody takes it. Of several programs that use the Unix
+    /// socket, the one that sent last is meant.
+    pub fn answer(&self, to: From, bytes: &[u8]) -> bool {
+        let sent = match to {
+            From::Udp(peer) => self.udp.as_ref().map(|udp| udp.send_to(bytes, peer)),
+            From::Unix => {
+                let peer = self.unix_peer.borrow();
+                let (unix, peer) = (self.unix.as_ref(), peer.as_ref());
+                unix.zip(peer)
+                    .map(|(unix, peer)| unix.send_to_addr(bytes, peer))
+            }
+        };
+        sent.is_some_and(|sent| sent.is_ok())
     }
 
     /// From now on what comes from elsewhere stays in the kernel: nobody is woken by it.
@@ -166,11 +185,11 @@ impl Datagrams {
 }
 
 impl Inputs for std::rc::Rc<Datagrams> {
-    fn descriptors(&self) -> [RawFd; 2] {
+    fn descriptors(&self) -> [RawFd; INPUTS] {
         let udp = self.udp.as_ref().map_or(NOTHING, AsRawFd::as_raw_fd);
         let unix = self.unix.as_ref().filter(|_| !self.is_unix_shut.get());
         let unix = unix.map_or(NOTHING, AsRawFd::as_raw_fd);
-        [udp, unix]
+        [udp, unix, NOTHING]
     }
 }
 
@@ -241,6 +260,32 @@ mod tests {
         fs::write(&path, "not a socket").unwrap();
         assert!(Datagrams::bind(None, Some(&path)).is_err());
         fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn whoever_has_an_address_is_answered() {
+        let path = std::env::temp_dir().join(format!("answers-{}", std::process::id()));
+        let local = "127.0.0.1:0".parse().unwrap();
+        let datagrams = Datagrams::bind(Some(local), Some(&path)).unwrap();
+        let (udp, mut buffer) = (UdpSocket::bind(local).unwrap(), [0; 8]);
+        let from = From::Udp(udp.local_addr().unwrap());
+        udp.send_to(b"one", datagrams.udp_address().unwrap())
+            .unwrap();
+        assert_eq!(received(&datagrams), [(b"one".to_vec(), from)]);
+        datagrams.only(from).unwrap();
+        assert!(datagrams.answer(from, b"answer"));
+        assert_eq!(udp.recv(&mut buffer).unwrap(), 6);
+        assert!(!datagrams.answer(From::Unix, b"nobody"));
+        datagrams.from_anywhere();
+        let (own, unnamed) = (path.with_extension("own"), UnixDatagram::unbound().unwrap());
+        let named = UnixDatagram::bind(&own).unwrap();
+        for (sender, is_answered) in [(&unnamed, false), (&named, true), (&unnamed, false)] {
+            sender.send_to(b"two", &path).unwrap();
+            assert_eq!(received(&datagrams), [(b"two".to_vec(), From::Unix)]);
+            assert_eq!(datagrams.answer(From::Unix, b"back"), is_answered);
+        }
+        assert_eq!(named.recv(&mut buffer).unwrap(), 4);
+        fs::remove_file(own).unwrap();
     }
 
     #[test]

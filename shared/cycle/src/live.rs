@@ -6,7 +6,7 @@ use crate::port_error::PortError;
 use crate::signal;
 use crate::source::{Source, SourceCycle};
 use crate::stage::{Stage, StageCycle};
-use crate::wake::{self, Inputs, NOTHING, Timer, Wake};
+use crate::wake::{self, INPUTS, Inputs, NOTHING, Timer, Wake};
 
 /// No wait is longer than this, ns: the interval of Health, which a source below 20 Hz sends by
 /// these wake-ups. A stop request that comes just before a wait is seen after it.
@@ -93,7 +93,7 @@ pub(crate) fn run_stage(
         if wake == Wake::Input && !cycle.had_input() {
             // A flood of wake-ups must not hold the core.
             let until_ns = cycle.listens_again_ns(Monotonic.now_ns());
-            wake::wait(&timer, [NOTHING; 2], until_ns);
+            wake::wait(&timer, [NOTHING; INPUTS], until_ns);
         }
     }
     cycle.account_mut().stop(&Monotonic)?;

@@ -85,7 +85,7 @@ pub struct Intake<'a> {
     account: &'a mut InputAccount,
     clock: &'a dyn Clock,
     period_ns: u64,
-    /// True if a block was taken in this turn.
+    /// True if a block was taken in this turn, of whichever input.
     is_input: bool,
     /// Frames stepped in this turn.
     frames: u32,
@@ -127,6 +127,11 @@ impl Intake<'_> {
     ) -> bool {
         let arrival = account.admit::<T>(header, self.now_ns(), self.period_ns, content);
         arrival.is_taken()
+    }
+
+    /// A block of a further input was taken: the wake-up was not for nothing.
+    pub const fn took_further(&mut self) {
+        self.is_input = true;
     }
 
     /// Accounts what the known writer sent and was refused before its header could be read.
@@ -239,7 +244,7 @@ impl StageCycle {
         (self.last_stamp.t_schedule_ns > 0 && self.misses_in_a_row == 0).then_some(next_ns)
     }
 
-    /// True if the last turn has taken a block of its input, with a frame behind it or without.
+    /// True if the last turn has taken a block of an input, with a frame behind it or without.
     #[must_use]
     pub const fn had_input(&self) -> bool {
         self.had_input

@@ -67,25 +67,29 @@ impl Timer {
 /// In place of a descriptor: there is none.
 pub const NOTHING: RawFd = -1;
 
-/// What wakes a stage: up to two descriptors that become readable when there is input.
+/// Descriptors that a wait looks at.
+pub const INPUTS: usize = 3;
+
+/// What wakes a stage: descriptors that become readable when there is input.
 pub trait Inputs {
     /// The descriptors; [`NOTHING`] in an unused place.
-    fn descriptors(&self) -> [RawFd; 2];
+    fn descriptors(&self) -> [RawFd; INPUTS];
 
     /// Consumes pending wake-ups that are not input themselves; else the descriptors stay readable.
     fn drain(&self) {}
 }
 
 /// Blocks until one of `inputs` is readable or `deadline_ns` has come.
-pub fn wait(timer: &Timer, inputs: [RawFd; 2], deadline_ns: u64) -> Wake {
+pub fn wait(timer: &Timer, inputs: [RawFd; INPUTS], deadline_ns: u64) -> Wake {
     timer.arm(deadline_ns);
     let poll = |fd| libc::pollfd {
         fd,
         events: libc::POLLIN,
         revents: 0,
     };
-    let mut fds = [poll(inputs[0]), poll(inputs[1]), poll(timer.fd.as_raw_fd())];
-    // SAFETY: `fds` holds three valid entries, of which the kernel ignores negative ones; null
+    let [first, second, third] = inputs.map(poll);
+    let mut fds = [first, second, third, poll(timer.fd.as_raw_fd())];
+    // SAFETY: `fds` holds valid entries, of which the kernel ignores negative ones; null
     // time-out and mask mean "no limit, no change".
     #[allow(unsafe_code)]
     let ready = unsafe {
@@ -98,7 +102,7 @@ pub fn wait(timer: &Timer, inputs: [RawFd; 2], deadline_ns: u64) -> Wake {
     };
     if ready < 0 {
         Wake::Signal
-    } else if fds[0].revents != 0 || fds[1].revents != 0 {
+    } else if fds[..INPUTS].iter().any(|fd| fd.revents != 0) {
         Wake::Input
     } else {
         Wake::Deadline
@@ -114,13 +118,13 @@ mod tests {
     fn the_timer_never_wakes_early_and_input_wakes_at_once() {
         let (timer, idle) = (Timer::new().unwrap(), Timer::new().unwrap());
         let at_ns = Monotonic.now_ns() + 3_000_000;
-        let idle_fd = [NOTHING, idle.fd.as_raw_fd()];
+        let idle_fd = [NOTHING, NOTHING, idle.fd.as_raw_fd()];
         assert_eq!(wait(&timer, idle_fd, at_ns), Wake::Deadline);
         assert!(Monotonic.now_ns() >= at_ns);
         idle.arm(1);
         let far_ns = Monotonic.now_ns() + 3_600_000_000_000;
         assert_eq!(wait(&timer, idle_fd, far_ns), Wake::Input);
         let near_ns = Monotonic.now_ns() + 1_000_000;
-        assert_eq!(wait(&timer, [NOTHING; 2], near_ns), Wake::Deadline);
+        assert_eq!(wait(&timer, [NOTHING; INPUTS], near_ns), Wake::Deadline);
     }
 }

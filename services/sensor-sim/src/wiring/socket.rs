@@ -1,6 +1,7 @@
-//! Frames that arrive as datagrams, checked and passed on.
+//! Frames that arrive as datagrams, checked and passed on; verdicts go back to who sent them.
 
 use std::net::SocketAddr;
+use std::os::fd::RawFd;
 use std::path::PathBuf;
 use std::rc::Rc;
 
@@ -8,11 +9,14 @@ use vigil_blocks::datagram::{self, DATAGRAM_SIZE};
 use vigil_blocks::{Cause, Rejection, SensorFrame};
 use vigil_cycle::datagrams::{Datagrams, From};
 use vigil_cycle::input::SILENT_NS;
+use vigil_cycle::port::EventListener;
+use vigil_cycle::wake::{INPUTS, Inputs};
 use vigil_cycle::{
     Clock, Graph, HealthBoard, Intake, PortError, Sender, Stage, Stamp, Topic, Writer,
 };
 use vigil_robot::{Description, FrameGuard};
 
+use super::answers::{Answers, VerdictNames};
 use crate::arrival_clock::{ArrivalBatch, ArrivalClock};
 
 /// Datagrams that one turn takes at most: a flood must not hold it. At the
@@ -28,6 +32,26 @@ pub struct ListenAddresses {
     pub udp: Option<SocketAddr>,
     /// File of the Unix datagram socket; `None` for none.
     pub unix: Option<PathBuf>,
+}
+
+/// What wakes the stage: datagrams, and actions to be sent back.
+pub struct SocketInputs {
+    /// The sockets.
+    pub datagrams: Rc<Datagrams>,
+    /// Announces actions.
+    pub actions: EventListener,
+}
+
+impl Inputs for SocketInputs {
+    fn descriptors(&self) -> [RawFd; INPUTS] {
+        let [udp, unix, _] = self.datagrams.descriptors();
+        let [actions, ..] = self.actions.descriptors();
+        [udp, unix, actions]
+    }
+
+    fn drain(&self) {
+        self.actions.drain();
+    }
 }
 
 /// Takes frames from sockets and publishes those that pass every check. The first source whose
@@ -47,18 +71,22 @@ pub struct SocketStage {
     unread: usize,
     waiting: Vec<SensorFrame>,
     frames: Box<dyn Sender<SensorFrame>>,
+    answers: Answers,
 }
 
 impl SocketStage {
-    /// Publishes on `graph` what arrives at `datagrams`, for frames of `robot`.
+    /// Publishes on `graph` what arrives at `datagrams`, for frames of `robot`; verdicts that go
+    /// back use these names.
     ///
     /// # Errors
     /// The transport's.
     pub fn new(
         datagrams: Rc<Datagrams>,
         robot: &Description,
+        names: VerdictNames,
         graph: &Graph,
     ) -> Result<Self, PortError> {
+        let frames = graph.sender::<SensorFrame>(Topic::Sensor)?;
         Ok(Self {
             datagrams,
             guard: FrameGuard::new(robot),
@@ -70,7 +98,8 @@ impl SocketStage {
             arrived: Vec::with_capacity(TURN_MAX),
             unread: 0,
             waiting: Vec::with_capacity(TURN_MAX),
-            frames: graph.sender(Topic::Sensor)?,
+            answers: Answers::new(names, graph, frames.epoch())?,
+            frames,
         })
     }
 
@@ -109,6 +138,9 @@ impl SocketStage {
 
 impl Stage for SocketStage {
     fn take(&mut self, intake: &mut Intake<'_>) {
+        if self.answers.take() {
+            intake.took_further();
+        }
         let are_all_here = self.receive(intake);
         let now_ns = intake.now_ns();
         for i in 0..self.arrived.len() {
@@ -173,6 +205,7 @@ impl Stage for SocketStage {
     }
 
     fn after(&mut self, _health: &mut HealthBoard, now_ns: u64) {
+        self.answers.send(&self.datagrams, self.source, now_ns);
         if self.source.is_some() && now_ns.saturating_sub(self.taken_ns) > SILENT_NS {
             self.source = None;
             self.unread += self.datagrams.from_anywhere();

@@ -17,7 +17,7 @@ use crate::clock::{Clock, Monotonic};
 use crate::domain::{BORROWED, Domain, LOANED, Queues};
 use crate::port_error::PortError;
 use crate::topic::Topic;
-use crate::wake::{Inputs, NOTHING};
+use crate::wake::{INPUTS, Inputs, NOTHING};
 
 /// A block as the transport sees it: the same bytes, named by the block's schema.
 #[repr(transparent)]
@@ -262,11 +262,11 @@ pub struct EventListener {
 }
 
 impl Inputs for EventListener {
-    fn descriptors(&self) -> [RawFd; 2] {
+    fn descriptors(&self) -> [RawFd; INPUTS] {
         // SAFETY: the descriptor is only polled, and only while the listener lives.
         #[allow(unsafe_code)]
         let descriptor = unsafe { self.listener.file_descriptor().native_handle() };
-        [descriptor, NOTHING]
+        [descriptor, NOTHING, NOTHING]
     }
 
     fn drain(&self) {

@@ -7,7 +7,7 @@ use vigil_blocks::layout::{Field, Layout};
 use vigil_blocks::{
     Action, ActionOutcome, Block, Cause, CauseKind, ControlMode, DetectionBelief, Event,
     FaultBelief, FaultSet, Header, Health, HealthyBelief, ParticleBlock, RecoveryKind, SensorFrame,
-    SizeKind, Symptoms, WeightedHypothesis,
+    SizeKind, Symptoms, Verdict, WeightedHypothesis,
 };
 
 pub use c::header;
@@ -53,6 +53,7 @@ fn structs() -> Vec<Struct> {
         block::<FaultBelief>(),
         block::<Action>(),
         block::<Health>(),
+        block::<Verdict>(),
     ]
 }
 
@@ -130,6 +131,11 @@ fn elements(field: &Field) -> (&'static str, Option<usize>) {
         }
     };
     (element, Some(field.size / size))
+}
+
+/// True for a name: its bytes are letters.
+fn is_text(field: &Field) -> bool {
+    field.type_text == "[u8; NAME_SIZE]"
 }
 
 /// Documentation of a field as one line of plain text.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Struct, constants, doc, elements, structs};
+use super::{Struct, constants, doc, elements, is_text, structs};
 
 const HEAD: &str = r#""""Wire blocks of Vigil, as ctypes. Made by `vigil types python`; do not edit.
 
@@ -19,7 +19,7 @@ import tempfile
 
 "#;
 
-/// What every publisher needs besides: where the graph lives, and the datagram.
+/// What every publisher needs besides: where the graph lives, and the datagrams.
 const TAIL: &str = r#"
 
 def _folders():
@@ -199,8 +199,26 @@ def datagram(frame):
     """
     frame.header.schema = SensorFrame.SCHEMA
     body = bytes(frame)
-    head = b"VGIL" + struct.pack("<HHI", 2, 1, len(body))
+    head = _head(1, len(body))
     return head + struct.pack("<I", crc32c(head + body)) + body
+
+
+def _head(kind, size):
+    return b"VGIL" + struct.pack("<HHI", 2, kind, size)
+
+
+def verdict_of(data):
+    """The Verdict of a datagram that came back; None if it is none.
+
+    A robot obeys it for valid_for_ns from its arrival, and stops after that.
+    """
+    head, size = _head(2, ctypes.sizeof(Verdict)), ctypes.sizeof(Verdict)
+    if len(data) != 16 + size or data[:12] != head:
+        return None
+    if struct.unpack("<I", data[12:16])[0] != crc32c(head + data[16:]):
+        return None
+    verdict = Verdict.from_buffer_copy(data[16:])
+    return verdict if verdict.header.schema == Verdict.SCHEMA else None
 "#;
 
 /// The whole module.
@@ -231,12 +249,12 @@ fn one(item: &Struct, text: &mut String) {
         let (element, count) = elements(field);
         let count = count.map_or_else(String::new, |n| format!(" * {n}"));
         let _ = writeln!(text, "        # {}", doc(field));
-        let _ = writeln!(
-            text,
-            "        (\"{}\", {}{count}),",
-            field.name,
+        let ctype = if is_text(field) {
+            "ctypes.c_char".into()
+        } else {
             ctype(element)
-        );
+        };
+        let _ = writeln!(text, "        (\"{}\", {ctype}{count}),", field.name);
     }
     let _ = writeln!(text, "    ]\n\n");
     let _ = writeln!(text, "assert ctypes.sizeof({name}) == {}", item.size);
