@@ -1,6 +1,8 @@
 """Publishers of examples/ drive real graphs, which find the fault that was recorded."""
 
+import csv
 import ctypes
+import gzip
 import json
 import os
 import pathlib
@@ -115,6 +117,46 @@ class Publishers(unittest.TestCase):
             self.assertEqual(done.returncode, 1)
             self.assertIn("the graph has vigil.SensorFrame.v1.", done.stderr)
             self.assertIn("this program has vigil.SensorFrame.v0.0123456789abcdef, 576 bytes", done.stderr)
+
+
+class Record(unittest.TestCase):
+    def test_what_a_publisher_sends_is_recorded_without_a_graph_or_a_model(self):
+        with tempfile.TemporaryDirectory() as folder:
+            config, frames = pathlib.Path(folder) / "config", pathlib.Path(folder) / "frames.csv.gz"
+            shutil.copytree(ROOT / "config", config)
+            (config / "models" / "rover.toml").unlink()
+            name = f"py{os.getpid()}-record"
+            graph = ["--config", config / "rover.toml", "--graph", name, "--source", "external", "--rate", "20"]
+            process = publisher("publisher.py", FRAMES, STUCK_RUN, name, 20)
+            try:
+                done = vigil("record", *graph, "--out", frames, "--seconds", "4", "--json")
+            finally:
+                process.terminate()
+                process.communicate(timeout=20)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            said = json.loads(done.stdout)
+            self.assertEqual((said["runs"], said["refused"]), (1, {}))
+            with gzip.open(frames, "rt") as file:
+                recorded = list(csv.DictReader(file))
+            with gzip.open(FRAMES, "rt") as file:
+                sent = [row for row in csv.DictReader(file) if row["run"] == str(STUCK_RUN)]
+        self.assertEqual(len(recorded), said["frames"])
+        self.assertGreater(len(recorded), 40)
+        # One after the other as they were sent, to the rounding of the file.
+        first = [float(row["x"]) for row in sent].index(float(recorded[0]["x"]))
+        for ours, theirs in zip(recorded, sent[first:]):
+            for column in set(ours) & set(theirs) - {"run", "t"}:
+                self.assertAlmostEqual(float(ours[column]), float(theirs[column]), delta=1e-6, msg=column)
+            t_s = float(theirs["t"]) - float(sent[first]["t"])
+            self.assertAlmostEqual(float(ours["t"]), t_s, delta=2e-6)
+
+    def test_without_a_publisher_nothing_is_written(self):
+        with tempfile.TemporaryDirectory() as folder:
+            frames = pathlib.Path(folder) / "frames.csv"
+            name = f"py{os.getpid()}-silent"
+            done = vigil("record", "--graph", name, "--source", "external", "--out", frames, "--seconds", "1")
+            self.assertEqual((done.returncode, frames.exists()), (1, False), done.stderr)
+            self.assertIn("no frame came", done.stdout)
 
 
 class CheckPublisher(unittest.TestCase):

@@ -76,7 +76,7 @@ impl Children {
         let line = |s: &ServiceProcess| format!("{} {}\n", s.name.as_str(), s.child.id());
         let text: String = self.services.iter().map(line).collect();
         // First: a publisher that finds the graph may ask for them.
-        plan.setup.tell_publishers(domain)?;
+        plan.setup.border().tell_publishers(domain)?;
         std::fs::write(domain.processes_file(), text)
     }
 

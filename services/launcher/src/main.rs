@@ -100,7 +100,7 @@ fn run(args: &LauncherArgs, plan: &Plan) -> Result<Outcome, LauncherError> {
     let mut observer = HealthObserver::new(link, plan)?;
     let _awake = args.keep_awake.then(|| plan.keep_awake()).transpose()?;
     let mut children = Children::start(plan, &domain)?;
-    for address in plan.setup.addresses(domain.folder()) {
+    for address in plan.setup.border().addresses(domain.folder()) {
         tell!(
             "vigil: graph '{}' takes datagrams at {address}",
             domain.graph()

@@ -6,7 +6,8 @@
 //! `steer_<WHEEL>` (rad) for every steered wheel, `yaw_rate` (rad/s), `current_<WHEEL>` (A), and
 //! the description's `[[channel]]` tables by their names. Of a robot with fault models gyro and
 //! currents are read where they are there, whatever it says.
-//! Columns are found by name, in any order; others are ignored. The rows of a run are contiguous
+//! An empty cell means that the channel was not measured; the rover's are always. Columns are found by
+//! name, in any order; others are ignored. The rows of a run are contiguous
 //! and in order of time. Several runs may follow each other.
 
 use std::collections::BTreeSet;
@@ -121,6 +122,8 @@ struct Columns {
     run: usize,
     t: usize,
     fields: Vec<(usize, String, Field)>,
+    /// A channel may be without a value.
+    may_lack: bool,
 }
 
 impl Columns {
@@ -148,6 +151,7 @@ impl Columns {
             run: *run,
             t: *t,
             fields,
+            may_lack: !robot.has_fault_models(),
         })
     }
 
@@ -161,6 +165,10 @@ impl Columns {
         }
         frame.header.t_capture_ns = (t_s * 1e9).round() as u64;
         for (column, name, field) in &self.fields {
+            let is_channel = matches!(field, Field::Channel { .. });
+            if is_channel && self.may_lack && table.text(*column).is_empty() {
+                continue;
+            }
             let value = table.number(*column)?;
             field.put(value, &mut frame);
             if field.is_angle() {

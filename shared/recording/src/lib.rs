@@ -3,3 +3,6 @@
 pub mod frames;
 pub mod labels;
 pub mod table;
+mod writer;
+
+pub use writer::FrameWriter;

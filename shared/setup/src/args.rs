@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use vigil_cycle::serve::Leave;
 use vigil_diagnosis::identify::IdentifierFilter;
 
+use crate::border::Border;
 use crate::document::Document;
 use crate::graph_file::Source;
 use crate::load::Setup;
@@ -129,6 +130,14 @@ impl GraphArgs {
     /// Every problem found, at once; see [`SetupError`].
     pub fn load(&self) -> Result<Setup, SetupError> {
         self.read()?.check()
+    }
+
+    /// Reads graph file and robot, applies these options, checks both. Models may be missing.
+    ///
+    /// # Errors
+    /// Every problem found, at once.
+    pub fn border(&self) -> Result<Border, SetupError> {
+        self.read()?.border()
     }
 
     /// Reads the graph file and the files that it names, and applies these options.

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 use vigil_cycle::domain::Queues;
-use vigil_cycle::{service, watchdog};
+use vigil_cycle::{Domain, PortError, service, watchdog};
 use vigil_diagnosis::{detect, identify};
 
 mod navigation;
@@ -84,10 +84,25 @@ pub struct GraphSettings {
     pub seed: u64,
 }
 
+impl GraphFile {
+    /// The graph's place on this machine.
+    ///
+    /// # Errors
+    /// [`PortError::Setup`] when no runtime folder can be made.
+    pub(crate) fn domain(&self) -> Result<Domain, PortError> {
+        Domain::new(&self.graph.name, self.transport)
+    }
+}
+
 impl GraphSettings {
     /// Default: any number would do.
     const fn seed() -> u64 {
         1
+    }
+
+    /// Period of the schedule, ns.
+    pub(crate) fn period_ns(&self) -> u64 {
+        (1e9 / self.rate_hz).round() as u64
     }
 }
 

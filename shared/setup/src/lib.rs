@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod args;
+mod border;
 mod check;
 mod document;
 pub mod graph_file;
@@ -15,6 +16,7 @@ mod schema;
 mod state_risks;
 
 pub use args::{GraphArgs, ServiceArgs};
+pub use border::Border;
 pub use document::Document;
 pub use load::{Setup, load_decision, load_graph, load_model, load_robot, load_tree};
 pub use problem::{Problem, SetupError};

@@ -11,6 +11,7 @@ use vigil_robot::learned::ModelError;
 use vigil_robot::tree::{Node, TreeError};
 use vigil_robot::{Description, RobotModel};
 
+use crate::border::Border;
 use crate::document::{Document, TextFile, resolve};
 use crate::graph_file::{GraphFile, TreeFile};
 use crate::problem::{Problem, SetupError};
@@ -61,6 +62,40 @@ pub fn load_graph(path: &Path, change: impl FnOnce(&mut GraphFile)) -> Result<Se
 }
 
 impl Document {
+    /// Checks what publishers meet: graph file and robot. Models may be missing.
+    ///
+    /// # Errors
+    /// Every problem found, at once.
+    pub fn border(&self) -> Result<Border, SetupError> {
+        let mut problems = Vec::new();
+        let robot = keep(robot(&self.robot), &mut problems);
+        self.check_graph(robot.as_ref(), &mut problems)?;
+        match (robot, problems.is_empty()) {
+            (Some(robot), true) => Ok(Border {
+                file: self.file.clone(),
+                path: self.graph.path.clone(),
+                robot,
+            }),
+            _ => Err(SetupError { problems }),
+        }
+    }
+
+    /// Adds the problems of the graph file to `problems`.
+    fn check_graph(
+        &self,
+        robot: Option<&Description>,
+        problems: &mut Vec<Problem>,
+    ) -> Result<(), SetupError> {
+        let (file, path) = (&self.file, &self.graph.path);
+        let text = self.graph.text()?;
+        let mut report = |key: &str, message| {
+            problems.push(Problem::at_key(path, text, key, message));
+        };
+        ranges::check_all(&schema(), file, &mut report);
+        check::graph(file, robot, path, report);
+        Ok(())
+    }
+
     /// Checks everything: each file, each value against its range, and what spans rooms.
     ///
     /// # Errors
@@ -80,12 +115,7 @@ impl Document {
         let decision = keep(decision(&self.decision), &mut problems);
         let text = self.graph.text()?;
         let at = |key: &str, message| Problem::at_key(path, text, key, message);
-        ranges::check_all(&schema(), file, &mut |key, message| {
-            problems.push(at(key, message));
-        });
-        check::graph(file, robot.as_ref(), path, |key, message| {
-            problems.push(at(key, message));
-        });
+        self.check_graph(robot.as_ref(), &mut problems)?;
         if let (Some(model), Some(robot), true) = (&model, &robot, problems.is_empty()) {
             check::alarm(file, (model, robot), |key, message| {
                 problems.push(at(key, message))

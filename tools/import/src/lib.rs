@@ -13,7 +13,6 @@ mod ros;
 mod series;
 mod suggest;
 mod survey;
-mod write;
 
 use std::path::{Path, PathBuf};
 
@@ -29,8 +28,8 @@ pub use suggest::{Suggestion, suggest};
 pub use survey::{Survey, SurveyTable, Values, survey};
 use vigil_blocks::SensorFrame;
 use vigil_robot::Description;
-pub use write::write;
 
+use vigil_recording::FrameWriter;
 use vigil_recording::frames::{Field, Run, fields};
 use vigil_recording::table::TableError;
 
@@ -84,6 +83,21 @@ impl ImportError {
 }
 
 impl ImportedLog {
+    /// Writes the frames as CSV, compressed if the name ends in `.gz`.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), ImportError> {
+        let mut file = FrameWriter::create(path, &self.columns)?;
+        for run in &self.runs {
+            for row in &run.rows {
+                let values = row.iter().skip(1).map(|value| Some(*value));
+                file.row(run.id, row.first().copied().unwrap_or(0.0), values)?;
+            }
+        }
+        Ok(file.finish()?)
+    }
+
     /// The runs as frames, as [`vigil_recording::frames::read`] would read them from the written
     /// file, but for its rounding and its checks.
     #[must_use]

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use vigil_terminal::exit_code;
 
-use commands::{diagnose, evaluate, import, learn, pomdp, report};
+use commands::{diagnose, evaluate, import, init, learn, pomdp, report};
 
 /// Learns models, imports logs, diagnoses and scores recorded runs, solves decision models.
 ///
@@ -21,6 +21,7 @@ struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Init(init::Args),
     Import(import::Args),
     Learn(learn::Args),
     Diagnose(diagnose::Args),
@@ -31,6 +32,7 @@ enum Command {
 
 fn main() -> ExitCode {
     exit_code(match Args::parse().command {
+        Command::Init(args) => init::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Learn(args) => learn::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),

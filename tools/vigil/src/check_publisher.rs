@@ -44,14 +44,16 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         let message = format!("--seconds {}: allowed is 0.1 to 3600", args.seconds);
         return Err(CommandError::usage(message));
     }
-    let mut setup = args.graph.load().map_err(CommandError::usage)?;
-    setup.file.sensor.source = publisher::source(&setup).map_err(CommandError::failure)?;
+    let mut border = args.graph.border().map_err(CommandError::usage)?;
+    border.file.sensor.source = publisher::source(&border).map_err(CommandError::failure)?;
     if !args.json {
         eprintln!("listening for {} s", args.seconds);
     }
-    let (heard, unheard) =
-        publisher::listen(&setup, args.seconds).map_err(CommandError::failure)?;
-    let mut found = publisher::findings(&setup, &heard);
+    let (heard, unheard) = publisher::listen(&border, args.seconds, &mut |heard, arrival, _| {
+        heard.keep(arrival);
+    })
+    .map_err(CommandError::failure)?;
+    let mut found = publisher::findings(&border, &heard);
     if let Some(error) = unheard {
         found.push(Finding::new(
             "listening",

@@ -11,7 +11,8 @@ use vigil_terminal::{CommandError, Outcome};
 /// The program's name.
 const PROGRAM: &str = "vigil-lab";
 /// Its commands, and what each does.
-const COMMANDS: [(&str, &str); 6] = [
+const COMMANDS: [(&str, &str); 7] = [
+    ("init", "Writes the files of a new robot, from its log"),
     ("import", "Turns another program's log into frames"),
     ("learn", "Learns a model from recorded frames, or shows one"),
     ("diagnose", "Diagnoses recorded runs"),

@@ -10,6 +10,7 @@ mod laboratory;
 mod print_channels;
 mod print_types;
 mod publisher;
+mod record;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -33,6 +34,7 @@ enum Command {
     CheckPublisher(check_publisher::Args),
     Config(config::Args),
     Inject(inject::Args),
+    Record(record::Args),
     #[command(name = "channels")]
     PrintChannels(print_channels::Args),
     #[command(name = "types")]
@@ -48,6 +50,7 @@ fn main() -> ExitCode {
         Command::CheckPublisher(args) => check_publisher::run(&args),
         Command::Config(args) => config::run(&args),
         Command::Inject(args) => inject::run(&args),
+        Command::Record(args) => record::run(&args),
         Command::PrintChannels(args) => print_channels::run(&args),
         Command::PrintTypes(args) => print_types::run(&args),
         Command::Laboratory(words) => laboratory::run(&words),

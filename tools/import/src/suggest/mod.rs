@@ -13,6 +13,7 @@ mod signals;
 mod sources;
 mod wheels;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clock::TimeColumn;
@@ -26,6 +27,8 @@ use super::survey::SurveyTable;
 
 /// Channels beside the standard ones that are suggested at most: a frame holds 48 in all.
 const FURTHER_MAX: usize = 32;
+/// Columns without a meaning that are named at most.
+const UNKNOWN_MAX: usize = 12;
 /// Rates of frames that are suggested, Hz.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=100.0;
 /// Period from which a further channel is held between its samples, s: half of the pause that an
@@ -33,7 +36,7 @@ const RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=100.0;
 const SLOW_S: f64 = 0.5;
 
 /// Two descriptions to be corrected by hand.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Suggestion {
     /// The log's folder.
     pub folder: PathBuf,
@@ -43,6 +46,8 @@ pub struct Suggestion {
     pub robot: String,
     /// What is uncertain, and what was left out.
     pub unsure: Vec<String>,
+    /// Rate of the frames, Hz.
+    pub rate_hz: f64,
 }
 
 /// A column whose name says what it may be.
@@ -127,6 +132,7 @@ pub fn suggest(path: &Path, name: &str, robot_file: &str) -> Result<Suggestion, 
     }
     pose::draft(&evidence, &mut draft);
     further(&evidence, &mut draft);
+    unknown(&evidence, &mut draft);
     if draft.channels.is_empty() {
         return Err(ImportError::description(
             path.display().to_string(),
@@ -143,11 +149,51 @@ pub fn suggest(path: &Path, name: &str, robot_file: &str) -> Result<Suggestion, 
         places: &places,
     };
     Ok(Suggestion {
+        rate_hz: frame.rate_hz,
         log: draft.log_text(&frame),
         robot: draft.robot_text(&frame),
         unsure: draft.unsure,
         folder: places.folder,
     })
+}
+
+/// Says which columns of the files in use nothing was made of. A topic's parts are too many.
+fn unknown(evidence: &Evidence, draft: &mut Draft) {
+    let used: BTreeSet<usize> = draft.channels.iter().map(|channel| channel.table).collect();
+    for table in used {
+        let survey = evidence.tables.get(table);
+        let Some(survey) = survey.filter(|survey| survey.layout.is_some()) else {
+            continue;
+        };
+        let time = TimeColumn::find(survey).map(|time| time.name);
+        let is_left = |name: &&str| {
+            let is_guessed =
+                |found: &NamedColumn| (found.table, found.column.as_str()) == (table, *name);
+            !evidence.found.iter().any(is_guessed) && time.as_deref() != Some(*name)
+        };
+        let varies = survey.columns.iter().filter(|column| {
+            let mut values = column.values.iter().filter(|value| value.is_finite());
+            values
+                .next()
+                .is_some_and(|first| values.any(|value| value != first))
+        });
+        let left: Vec<&str> = varies
+            .map(|column| column.name.as_str())
+            .filter(is_left)
+            .collect();
+        if left.is_empty() {
+            continue;
+        }
+        let more = left.len().saturating_sub(UNKNOWN_MAX);
+        let mut names = left[..left.len() - more].join(", ");
+        if more > 0 {
+            names += &format!(" and {more} more");
+        }
+        let table = evidence.table(table);
+        draft
+            .unsure
+            .push(format!("of {table} nothing was made of {names}"));
+    }
 }
 
 /// Columns that may be channels: of tables with a time, with values in every run, that vary.

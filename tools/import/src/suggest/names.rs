@@ -148,6 +148,12 @@ fn wanted(lower: &str, own: &[String], has_place: bool) -> Option<Guess> {
         "wz",
         "turn",
         "rotation",
+        "ang",
+        "angular",
+        "angular_z",
+        "ang_z",
+        "yaw",
+        "rot",
     ]);
     if is_turn || bare == "w" {
         return Some(Guess::Command(2));
@@ -155,8 +161,10 @@ fn wanted(lower: &str, own: &[String], has_place: bool) -> Option<Guess> {
     if ends(&["linear.y", "vy", "left"]) || bare.starts_with('y') {
         return Some(Guess::Command(1));
     }
-    let is_forward =
-        ends(&["linear.x", "vx", "speed", "forward", "velocity", "vel"]) || bare == "v";
+    let is_forward = ends(&[
+        "linear.x", "linear_x", "lin_x", "vx", "speed", "forward", "velocity", "vel", "lin",
+        "linear",
+    ]) || ["v", "x"].contains(&bare.as_str());
     (is_forward && !has_place).then_some(Guess::Command(0))
 }
 
@@ -199,6 +207,17 @@ fn wheel(own: &[String], has_place: bool) -> Option<Guess> {
     }
 }
 
+/// Words that say whose place a number is, or in which unit.
+const PLACE_WORDS: [&str; 14] = [
+    "odom", "odometry", "pose", "pos", "position", "robot", "base", "link", "map", "world", "m",
+    "mm", "rad", "deg",
+];
+/// Words that say whose rate a number is.
+const GYRO_WORDS: [&str; 13] = [
+    "imu", "gyro", "gyr", "angular", "vel", "velocity", "rate", "body", "base", "raw", "rad",
+    "deg", "s",
+];
+
 /// What moves with the body.
 fn body(table: &str, lower: &str, own: &[String]) -> Option<Guess> {
     let is = |names: &[&str]| {
@@ -208,8 +227,18 @@ fn body(table: &str, lower: &str, own: &[String]) -> Option<Guess> {
     };
     // Shorter names are also parts of quaternions and vectors.
     let plain = |names: [&str; 3]| names.contains(&lower);
+    // `odom_x`, `base_gyro_z`: what is left without the words that say of what.
+    let bare = |words: &[&str]| -> Vec<&str> {
+        let own = own.iter().map(String::as_str);
+        own.filter(|word| !words.contains(word)).collect()
+    };
+    let place = bare(&PLACE_WORDS);
+    let is_gyro =
+        any(own, &["gyro", "gyr"]) || any(own, &["angular"]) && any(own, &["vel", "velocity"]);
+    let turn = bare(&GYRO_WORDS);
     let lower_table = table.to_lowercase();
     let is_odometry = lower_table.contains("odom");
+    let is_odometry_name = any(own, &["odom", "odometry", "pose"]);
     Some(match () {
         () if any(own, &["delta", "error", "err"]) => Guess::Further("tracking-error", ""),
         () if is(&[
@@ -220,7 +249,7 @@ fn body(table: &str, lower: &str, own: &[String]) -> Option<Guess> {
             "yaw_rate",
             "yawrate",
             "gyro.z",
-        ]) =>
+        ]) || is_gyro && matches!(turn[..], ["z" | "yaw"]) =>
         {
             Guess::Gyro
         }
@@ -233,7 +262,8 @@ fn body(table: &str, lower: &str, own: &[String]) -> Option<Guess> {
             "gyro_y",
             "wx",
             "wy",
-        ]) || lower.starts_with("rate_") =>
+        ]) || lower.starts_with("rate_")
+            || is_gyro && matches!(turn[..], ["x" | "y" | "roll" | "pitch"]) =>
         {
             Guess::Further("body-rate", "rad/s")
         }
@@ -241,14 +271,20 @@ fn body(table: &str, lower: &str, own: &[String]) -> Option<Guess> {
             "linear_acceleration.x",
             "linear_acceleration.y",
             "linear_acceleration.z",
-        ]) || any(own, &["acc", "accel", "ax", "ay", "az"]) =>
+        ]) || any(own, &["acc", "accel", "acceleration", "ax", "ay", "az"]) =>
         {
             Guess::Further("acceleration", "m/s2")
         }
-        () if is(&["position.x", "translation.x"]) || plain(["x", "xpos", "pos_x"]) => {
+        () if is(&["position.x", "translation.x"])
+            || plain(["x", "xpos", "pos_x"])
+            || place[..] == ["x"] =>
+        {
             Guess::Pose(0)
         }
-        () if is(&["position.y", "translation.y"]) || plain(["y", "ypos", "pos_y"]) => {
+        () if is(&["position.y", "translation.y"])
+            || plain(["y", "ypos", "pos_y"])
+            || place[..] == ["y"] =>
+        {
             Guess::Pose(1)
         }
         () if is(&[
@@ -258,7 +294,8 @@ fn body(table: &str, lower: &str, own: &[String]) -> Option<Guess> {
             "ang",
             "theta",
             "heading",
-        ]) && !lower_table.contains("imu") =>
+        ]) && !lower_table.contains("imu")
+            || is_odometry_name && matches!(place[..], ["yaw" | "theta" | "th" | "heading"]) =>
         {
             Guess::Pose(2)
         }
@@ -283,6 +320,16 @@ mod tests {
             ("exp.csv", "", "m1setvel", None),
             ("exp.csv", "", "omega_cmd", Some(Guess::Command(2))),
             ("exp.csv", "", "cmd_v", Some(Guess::Command(0))),
+            ("log.csv", "", "cmd_lin", Some(Guess::Command(0))),
+            ("log.csv", "", "cmd_ang", Some(Guess::Command(2))),
+            ("log.csv", "", "cmd_vel_angular_z", Some(Guess::Command(2))),
+            ("log.csv", "", "cmd_yaw", Some(Guess::Command(2))),
+            ("log.csv", "", "odom_x", Some(Guess::Pose(0))),
+            ("log.csv", "", "robot_pos_y_m", Some(Guess::Pose(1))),
+            ("log.csv", "", "odom_yaw", Some(Guess::Pose(2))),
+            ("log.csv", "", "imu_gyro_z", Some(Guess::Gyro)),
+            ("log.csv", "", "imu_angular_velocity_z", Some(Guess::Gyro)),
+            ("log.csv", "", "pose.orientation.x", None),
             (
                 "/joint_states",
                 joints,

@@ -136,7 +136,7 @@ fn import(paths: &Paths<'_>, is_json: bool) -> Result<Outcome, CommandError> {
     let imported = import::import(&log, &robot, from)
         .map_err(|error| at(path, &error))
         .map_err(CommandError::usage)?;
-    import::write(&imported, out).map_err(CommandError::failure)?;
+    imported.write(out).map_err(CommandError::failure)?;
     for warning in warnings(&imported, &robot) {
         eprintln!("warning: {warning}");
     }

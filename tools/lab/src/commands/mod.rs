@@ -4,6 +4,7 @@ pub mod diagnose;
 pub mod evaluate;
 mod files;
 pub mod import;
+pub mod init;
 pub mod learn;
 mod learn_channels;
 mod offline;

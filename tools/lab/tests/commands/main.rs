@@ -4,6 +4,7 @@
 
 mod channels;
 mod import;
+mod init;
 mod model;
 mod offline;
 mod pomdp;

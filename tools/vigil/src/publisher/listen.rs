@@ -14,7 +14,7 @@ use vigil_cycle::{
 };
 use vigil_robot::FrameGuard;
 use vigil_sensor_sim::{ArrivalBatch, ArrivalClock};
-use vigil_setup::Setup;
+use vigil_setup::Border;
 use vigil_setup::graph_file::Source;
 
 use super::{BorderReport, FrameArrival, Reception};
@@ -26,12 +26,20 @@ const DATAGRAMS_MAX: usize = 64;
 /// Longest sleep, ns: a wish to stop is heard then.
 const SLEEP_NS: u64 = 50_000_000;
 
-/// Listens for `seconds`, or until a signal; what was heard, and why no more.
+/// Takes a frame that was heard; true if a graph takes it.
+pub type FrameSink<'a> = &'a mut dyn FnMut(&mut Reception, FrameArrival, bool);
+
+/// Listens for `seconds`, or until a signal, and gives each frame to `sink`; what was heard, and
+/// why no more.
 ///
 /// # Errors
 /// That there is no place for a graph.
-pub fn listen(setup: &Setup, seconds: f64) -> Result<(Reception, Option<PortError>), PortError> {
-    let domain = setup.domain()?;
+pub fn listen(
+    border: &Border,
+    seconds: f64,
+    sink: FrameSink<'_>,
+) -> Result<(Reception, Option<PortError>), PortError> {
+    let domain = border.domain()?;
     // Held as long as this listens: no graph is started meanwhile.
     let lock = domain.lock().map_err(|e| PortError::setup("lock", e))?;
     let mut heard = Reception {
@@ -40,19 +48,19 @@ pub fn listen(setup: &Setup, seconds: f64) -> Result<(Reception, Option<PortErro
     };
     signal::install();
     let sign = if lock.is_some() {
-        setup
+        border
             .tell_publishers(&domain)
             .map_err(|e| PortError::setup("runtime folder", e))?;
         Some(Sign::put(domain.processes_file())?)
     } else {
         None
     };
-    let listened = if setup.file.sensor.source == Source::Socket && lock.is_some() {
-        sockets(setup, seconds, &mut heard)
+    let listened = if border.file.sensor.source == Source::Socket && lock.is_some() {
+        sockets(border, seconds, &mut heard, sink)
     } else {
-        let listened = topic(setup, seconds, &mut heard);
+        let listened = topic(border, seconds, &mut heard, sink);
         if heard.topic.is_none() {
-            heard.topic = found_topic(setup)?;
+            heard.topic = found_topic(border)?;
         }
         listened
     };
@@ -79,9 +87,10 @@ impl Drop for Sign {
 }
 
 impl Reception {
-    fn take(&mut self, frame: SensorFrame, now_ns: u64) {
+    /// Keeps a frame, if there is room.
+    pub fn keep(&mut self, arrival: FrameArrival) {
         if self.frames.len() < FRAMES_MAX {
-            self.frames.push(FrameArrival { now_ns, frame });
+            self.frames.push(arrival);
         } else {
             self.more += 1;
         }
@@ -96,14 +105,14 @@ struct Guard {
 }
 
 impl Guard {
-    fn new(setup: &Setup) -> Self {
+    fn new(border: &Border) -> Self {
         Self {
-            account: InputAccount::new(match setup.file.sensor.source {
+            account: InputAccount::new(match border.file.sensor.source {
                 Source::Socket => Writer::Socket,
                 _ => Writer::Publisher,
             }),
-            content: FrameGuard::new(&setup.robot),
-            period_ns: setup.period_ns(),
+            content: FrameGuard::new(&border.robot),
+            period_ns: border.period_ns(),
         }
     }
 
@@ -125,7 +134,7 @@ fn while_it_lasts(
 ) -> Result<(), PortError> {
     let timer = Timer::new().map_err(|e| PortError::setup("timer", e))?;
     let from_ns = Monotonic.now_ns();
-    let until_ns = from_ns + (seconds * 1e9) as u64;
+    let until_ns = from_ns.saturating_add((seconds * 1e9) as u64);
     while Monotonic.now_ns() < until_ns && !signal::stop_requested() {
         let next_ns = (Monotonic.now_ns() + SLEEP_NS).min(until_ns);
         if wake::wait(&timer, inputs.descriptors(), next_ns) == wake::Wake::Input {
@@ -138,15 +147,20 @@ fn while_it_lasts(
 }
 
 /// The sensor's topic as it is, if it is there.
-fn found_topic(setup: &Setup) -> Result<Option<FoundTopic>, PortError> {
-    let path = Topic::Sensor.path(&setup.file.graph.name);
-    let mut all = FoundTopic::all(&setup.domain()?)?.into_iter();
+fn found_topic(border: &Border) -> Result<Option<FoundTopic>, PortError> {
+    let path = Topic::Sensor.path(&border.file.graph.name);
+    let mut all = FoundTopic::all(&border.domain()?)?.into_iter();
     Ok(all.find(|topic| topic.path == path))
 }
 
 /// Reads the sensor's topic.
-fn topic(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), PortError> {
-    let domain = setup.domain()?;
+fn topic(
+    border: &Border,
+    seconds: f64,
+    heard: &mut Reception,
+    sink: FrameSink<'_>,
+) -> Result<(), PortError> {
+    let domain = border.domain()?;
     let graph = Graph::SharedMemory(Link::join(&domain, "check-publisher")?);
     let Graph::SharedMemory(link) = &graph else {
         return Ok(());
@@ -159,11 +173,11 @@ fn topic(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), PortE
     } else {
         Some(graph.sender::<Action>(Topic::Action)?)
     };
-    let mut guard = Guard::new(setup);
-    let mut border = Border::new(setup, &graph)?;
+    let mut guard = Guard::new(border);
+    let mut health = BorderHealth::new(border, &graph)?;
     let mut arrived = Vec::with_capacity(frames.buffer());
     while_it_lasts(seconds, &listener, heard, |heard| {
-        border.look();
+        health.look();
         for _ in 0..frames.buffer() {
             let Some(frame) = frames.take_next() else {
                 break;
@@ -171,20 +185,20 @@ fn topic(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), PortE
             arrived.push((*frame, Monotonic.now_ns()));
         }
         // Who joins is given frames that were sent before: of the first batch the newest counts.
-        let old = if heard.frames.is_empty() {
-            arrived.len().saturating_sub(1)
-        } else {
-            0
+        let old = match heard.is_heard {
+            true => 0,
+            false => arrived.len().saturating_sub(1),
         };
         for (frame, now_ns) in arrived.drain(..).skip(old) {
-            guard.take(&frame, now_ns);
-            heard.take(frame, now_ns);
+            heard.is_heard = true;
+            let is_taken = guard.take(&frame, now_ns);
+            sink(heard, FrameArrival { now_ns, frame }, is_taken);
         }
     })?;
-    heard.topic = found_topic(setup)?;
+    heard.topic = found_topic(border)?;
     heard.rejected = if heard.is_graph_running {
-        heard.border = border.report();
-        border.rejected()
+        heard.border = health.report();
+        health.rejected()
     } else {
         guard.account.rejected
     };
@@ -192,9 +206,14 @@ fn topic(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), PortE
 }
 
 /// Reads the sockets that a graph would read.
-fn sockets(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), PortError> {
-    let socket = &setup.file.sensor.socket;
-    let folder = setup.domain()?.folder().to_owned();
+fn sockets(
+    border: &Border,
+    seconds: f64,
+    heard: &mut Reception,
+    sink: FrameSink<'_>,
+) -> Result<(), PortError> {
+    let socket = &border.file.sensor.socket;
+    let folder = border.domain()?.folder().to_owned();
     let unix = (!socket.unix.is_empty()).then(|| folder.join(&socket.unix));
     let udp = socket
         .udp_address()
@@ -202,7 +221,7 @@ fn sockets(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), Por
     let datagrams = Datagrams::bind(udp, unix.as_deref());
     let datagrams = datagrams.map_err(|e| PortError::setup("sensor.socket", e))?;
     let datagrams = std::rc::Rc::new(datagrams);
-    let (mut guard, mut clock) = (Guard::new(setup), ArrivalClock::default());
+    let (mut guard, mut clock) = (Guard::new(border), ArrivalClock::default());
     let mut arrived = Vec::with_capacity(DATAGRAMS_MAX);
     while_it_lasts(seconds, &datagrams, heard, |heard| {
         let mut buffer = [0; DATAGRAM_SIZE + 1];
@@ -225,10 +244,12 @@ fn sockets(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), Por
                 is_complete: arrived.len() < DATAGRAMS_MAX,
             };
             let dated = clock.date(&mut frame.header, here, now_ns);
-            if guard.take(&frame, now_ns) {
+            let is_taken = guard.take(&frame, now_ns);
+            if is_taken {
                 clock = dated;
             }
-            heard.take(frame, now_ns);
+            heard.is_heard = true;
+            sink(heard, FrameArrival { now_ns, frame }, is_taken);
         }
     })?;
     heard.rejected = guard.account.rejected;
@@ -236,16 +257,16 @@ fn sockets(setup: &Setup, seconds: f64, heard: &mut Reception) -> Result<(), Por
 }
 
 /// The service at the border of a running graph: what it refuses.
-struct Border {
+struct BorderHealth {
     health: Box<dyn Receiver<Health>>,
     is_socket: bool,
     /// The first report and the newest.
     window: Option<[Box<Health>; 2]>,
 }
 
-impl Border {
-    fn new(setup: &Setup, graph: &Graph) -> Result<Self, PortError> {
-        let service = match setup.file.sensor.source {
+impl BorderHealth {
+    fn new(border: &Border, graph: &Graph) -> Result<Self, PortError> {
+        let service = match border.file.sensor.source {
             Source::Socket => ServiceName::SensorSim,
             _ => ServiceName::Detector,
         };

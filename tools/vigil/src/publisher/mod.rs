@@ -9,7 +9,7 @@ mod transport;
 
 use vigil_blocks::{REJECTIONS, SensorFrame};
 use vigil_cycle::port::FoundTopic;
-use vigil_setup::Setup;
+use vigil_setup::Border;
 
 use crate::findings::Finding;
 
@@ -30,6 +30,8 @@ pub struct FrameArrival {
 pub struct Reception {
     /// Frames in the order of arrival, at most [`listen::FRAMES_MAX`].
     pub frames: Vec<FrameArrival>,
+    /// A frame has come, kept or not.
+    pub is_heard: bool,
     /// Frames beyond those.
     pub more: u64,
     /// How long was listened, s.
@@ -55,16 +57,16 @@ pub struct BorderReport {
 }
 
 /// Everything that can be said about it.
-pub fn findings(setup: &Setup, heard: &Reception) -> Vec<Finding> {
-    let mut all = transport::findings(setup, heard);
+pub fn findings(border: &Border, heard: &Reception) -> Vec<Finding> {
+    let mut all = transport::findings(border, heard);
     all.extend(refused::findings(heard));
     if heard.frames.is_empty() {
         return all;
     }
-    let rate_hz = heard.border.map_or(setup.file.graph.rate_hz, |border| {
+    let rate_hz = heard.border.map_or(border.file.graph.rate_hz, |border| {
         1e9 / border.period_ns as f64
     });
     all.extend(timing::findings(rate_hz, heard));
-    all.extend(content::findings(&setup.robot, &heard.frames));
+    all.extend(content::findings(&border.robot, &heard.frames));
     all
 }

@@ -4,15 +4,15 @@ use std::fs;
 
 use vigil_cycle::PortError;
 use vigil_cycle::topic::ServiceName;
-use vigil_setup::Setup;
+use vigil_setup::Border;
 use vigil_setup::graph_file::Source;
 
 /// The source of the running graph of this name; the file's if none is running.
 ///
 /// # Errors
 /// That there is no place for a graph.
-pub fn source(setup: &Setup) -> Result<Source, PortError> {
-    let (domain, sensor) = (setup.domain()?, &setup.file.sensor);
+pub fn source(border: &Border) -> Result<Source, PortError> {
+    let (domain, sensor) = (border.domain()?, &border.file.sensor);
     let Ok(processes) = fs::read_to_string(domain.processes_file()) else {
         return Ok(sensor.source);
     };

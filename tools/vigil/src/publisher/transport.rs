@@ -4,7 +4,7 @@ use vigil_blocks::{Block, SensorFrame};
 use vigil_cycle::Topic;
 use vigil_cycle::domain::Queues;
 use vigil_cycle::port::FoundTopic;
-use vigil_setup::Setup;
+use vigil_setup::Border;
 use vigil_setup::graph_file::Source;
 
 use super::Reception;
@@ -14,20 +14,20 @@ use crate::findings::{Finding, Status};
 const PUBLISHERS: usize = 1;
 
 /// The first few findings: the source, the type, its topic's settings, whether frames came.
-pub fn findings(setup: &Setup, heard: &Reception) -> Vec<Finding> {
-    let mut all = vec![source(setup, heard)];
-    if setup.file.sensor.source != Source::Socket {
-        all.push(types(setup, heard));
-        let demanded = setup.file.transport.for_topic(Topic::Sensor);
+pub fn findings(border: &Border, heard: &Reception) -> Vec<Finding> {
+    let mut all = vec![source(border, heard)];
+    if border.file.sensor.source != Source::Socket {
+        all.push(types(border, heard));
+        let demanded = border.file.transport.for_topic(Topic::Sensor);
         let found = heard.topic.as_ref();
         all.extend(found.map(|found| settings(demanded, found)));
     }
-    all.push(frames(setup, heard));
+    all.push(frames(border, heard));
     all
 }
 
-fn source(setup: &Setup, heard: &Reception) -> Finding {
-    let (path, source) = (setup.path.display(), setup.file.sensor.source);
+fn source(border: &Border, heard: &Reception) -> Finding {
+    let (path, source) = (border.path.display(), border.file.sensor.source);
     let who = if heard.is_graph_running {
         "the graph is running"
     } else {
@@ -49,8 +49,8 @@ fn source(setup: &Setup, heard: &Reception) -> Finding {
 }
 
 /// The type on the topic, which its first user has fixed.
-fn types(setup: &Setup, heard: &Reception) -> Finding {
-    let path = Topic::Sensor.path(&setup.file.graph.name);
+fn types(border: &Border, heard: &Reception) -> Finding {
+    let path = Topic::Sensor.path(&border.file.graph.name);
     let (name, size, alignment) = (
         SensorFrame::TYPE_NAME,
         size_of::<SensorFrame>(),
@@ -129,7 +129,7 @@ fn difference(found: &str) -> String {
     told.join(", ")
 }
 
-fn frames(setup: &Setup, heard: &Reception) -> Finding {
+fn frames(border: &Border, heard: &Reception) -> Finding {
     let (count, seconds) = (heard.frames.len() as u64 + heard.more, heard.seconds);
     if count > 0 {
         let detail = format!("{count} in {seconds:.1} s");
@@ -140,15 +140,15 @@ fn frames(setup: &Setup, heard: &Reception) -> Finding {
         let detail = format!("none in {seconds:.1} s was taken, {refused} were refused: see there");
         return Finding::new("frames", Status::Failure, detail);
     }
-    let sensor = &setup.file.sensor;
-    let (folder, prefix) = setup
+    let sensor = &border.file.sensor;
+    let (folder, prefix) = border
         .domain()
         .map(|domain| {
             let folder = domain.folder().display().to_string();
             (folder, domain.transport_prefix())
         })
         .unwrap_or_default();
-    let graph = &setup.file.graph.name;
+    let graph = &border.file.graph.name;
     let how = if sensor.source == Source::Socket {
         let socket = &sensor.socket;
         format!(
