@@ -19,7 +19,8 @@ class SocketPublisher:
 
     `to`: the name of a graph on this machine; or host:port of its UDP socket, or the path of its Unix socket.
     `SocketPublisher(name)` waits for that graph. `channels` is the channel list; with an address, the file `channels`.
-    `publish(frame)` never waits, nor does `verdict()`. While nobody listens it says so, and goes on by itself when somebody does.
+    `publish(frame)` never waits, nor does `verdict()`. While nobody listens it says so, and goes on by itself when
+    somebody does.
     """
 
     def __init__(self, to="rover", channels=ROVER):
@@ -66,11 +67,12 @@ class SocketPublisher:
         while self._sender is not None:
             try:
                 data = self._sender.recv(4096)
-            except BlockingIOError:
-                break
-            except OSError:
+            except ConnectionRefusedError:
                 # Nobody listens where the last frame went; `publish` says so.
                 continue
+            except OSError:
+                # Nothing waits.
+                break
             newest = vigil.verdict_of(data) or newest
         return newest
 

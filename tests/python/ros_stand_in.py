@@ -4,6 +4,7 @@ Messages have the real definitions: whatever a node publishes is written in CDR 
 refuses fields of a wrong name or type.
 """
 
+import functools
 import sys
 import types
 
@@ -178,8 +179,9 @@ class Context:
         self.is_up = False
 
 
+@functools.cache
 def install():
-    """Puts all of it where a node imports it from; the Context."""
+    """Puts all of it where a node imports it from, once a process; the Context."""
     rclpy, context = types.ModuleType("rclpy"), Context()
     rclpy.init, rclpy.spin, rclpy.try_shutdown = context.init, context.spin, context.try_shutdown
     rclpy.create_node = Node

@@ -139,7 +139,8 @@ class Diagnostics(unittest.TestCase):
         unknown = dict(alarm=1, mode=1000, mode_name=b"UNKNOWN")
         slow, stop = vigil.RECOVERY_SLOW_DOWN, vigil.RECOVERY_STOP
         for level, said, one in [
-            (report.OK, "no fault", verdict()),
+            (report.OK, "^no fault$", verdict()),
+            (report.OK, "^no fault, at 50% of the speed$", verdict(speed_scale=0.5)),
             (report.WARN, "no alarm: slow", verdict(slow, action_name=b"slow")),
             (report.WARN, r"fault without a name \(UNKNOWN\): go_on", verdict(**unknown)),
             (report.WARN, r"fault without a name \(ND\): slow", verdict(slow, alarm=1, action_name=b"slow")),

@@ -60,7 +60,9 @@ def _judged(verdict):
     if verdict.lost_stages:
         return WARN, f"lost: {_of(LOST, verdict.lost_stages)}: {action}"
     is_free = verdict.kind == vigil.RECOVERY_GO_ON
-    return (OK if is_free else WARN), ("no fault" if is_free else f"no alarm: {action}")
+    # At its start a graph lets the robot go on more slowly, until it knows more.
+    slower = f", at {verdict.speed_scale:.0%} of the speed" if verdict.speed_scale < 1.0 else ""
+    return (OK, f"no fault{slower}") if is_free else (WARN, f"no alarm: {action}")
 
 
 def _values(verdict):
