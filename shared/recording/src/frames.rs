@@ -6,9 +6,9 @@
 //! `steer_<WHEEL>` (rad) for every steered wheel, `yaw_rate` (rad/s), `current_<WHEEL>` (A), and
 //! the description's `[[channel]]` tables by their names. Of a robot with fault models gyro and
 //! currents are read where they are there, whatever it says.
-//! An empty cell means that the channel was not measured; the rover's are always. Columns are found by
-//! name, in any order; others are ignored. The rows of a run are contiguous
-//! and in order of time. Several runs may follow each other.
+//! An empty cell means that the channel was not measured; the rover's are always. Columns are found
+//! by name, in any order; others are ignored. The rows of a run are contiguous and in order of
+//! time. Several runs may follow each other.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;

@@ -220,90 +220,112 @@ const GYRO_WORDS: [&str; 13] = [
 
 /// What moves with the body.
 fn body(table: &str, lower: &str, own: &[String]) -> Option<Guess> {
-    let is = |names: &[&str]| {
-        names
-            .iter()
-            .any(|name| lower == *name || lower.ends_with(&format!(".{name}")))
-    };
-    // Shorter names are also parts of quaternions and vectors.
-    let plain = |names: [&str; 3]| names.contains(&lower);
-    // `odom_x`, `base_gyro_z`: what is left without the words that say of what.
-    let bare = |words: &[&str]| -> Vec<&str> {
-        let own = own.iter().map(String::as_str);
-        own.filter(|word| !words.contains(word)).collect()
-    };
-    let place = bare(&PLACE_WORDS);
-    let is_gyro =
-        any(own, &["gyro", "gyr"]) || any(own, &["angular"]) && any(own, &["vel", "velocity"]);
-    let turn = bare(&GYRO_WORDS);
+    if any(own, &["delta", "error", "err"]) {
+        return Some(Guess::Further("tracking-error", ""));
+    }
+    if let Some(rate) = body_rate(lower, own) {
+        return Some(rate);
+    }
     let lower_table = table.to_lowercase();
-    let is_odometry = lower_table.contains("odom");
-    let is_odometry_name = any(own, &["odom", "odometry", "pose"]);
-    Some(match () {
-        () if any(own, &["delta", "error", "err"]) => Guess::Further("tracking-error", ""),
-        () if is(&[
-            "angular_velocity.z",
-            "gyro_z",
-            "gz",
-            "wz",
-            "yaw_rate",
-            "yawrate",
-            "gyro.z",
-        ]) || is_gyro && matches!(turn[..], ["z" | "yaw"]) =>
-        {
-            Guess::Gyro
-        }
-        () if is_odometry && is(&["twist.twist.linear.x"]) => Guess::Speed,
-        () if lower.contains("twist") => return None,
-        () if is(&[
-            "angular_velocity.x",
-            "angular_velocity.y",
-            "gyro_x",
-            "gyro_y",
-            "wx",
-            "wy",
-        ]) || lower.starts_with("rate_")
-            || is_gyro && matches!(turn[..], ["x" | "y" | "roll" | "pitch"]) =>
-        {
-            Guess::Further("body-rate", "rad/s")
-        }
-        () if is(&[
-            "linear_acceleration.x",
-            "linear_acceleration.y",
-            "linear_acceleration.z",
-        ]) || any(own, &["acc", "accel", "acceleration", "ax", "ay", "az"]) =>
-        {
-            Guess::Further("acceleration", "m/s2")
-        }
-        () if is(&["position.x", "translation.x"])
-            || plain(["x", "xpos", "pos_x"])
-            || place[..] == ["x"] =>
-        {
-            Guess::Pose(0)
-        }
-        () if is(&["position.y", "translation.y"])
-            || plain(["y", "ypos", "pos_y"])
-            || place[..] == ["y"] =>
-        {
-            Guess::Pose(1)
-        }
-        () if is(&[
-            "pose.orientation.yaw",
-            "rotation.yaw",
-            "yaw",
-            "ang",
-            "theta",
-            "heading",
-        ]) && !lower_table.contains("imu")
-            || is_odometry_name && matches!(place[..], ["yaw" | "theta" | "th" | "heading"]) =>
-        {
-            Guess::Pose(2)
-        }
-        () if is(&["roll", "pitch", "yaw", "qx", "qy", "qz"]) => Guess::Further("attitude", ""),
-        () if any(own, &["voltage", "volt", "volts", "battery"]) => Guess::Further("voltage", "V"),
-        () if lower.starts_with("vel_") => Guess::Further("other", "m/s"),
-        () => return None,
-    })
+    if lower_table.contains("odom") && is(lower, &["twist.twist.linear.x"]) {
+        return Some(Guess::Speed);
+    }
+    if lower.contains("twist") {
+        return None;
+    }
+    let accelerations = [
+        "linear_acceleration.x",
+        "linear_acceleration.y",
+        "linear_acceleration.z",
+    ];
+    let words = ["acc", "accel", "acceleration", "ax", "ay", "az"];
+    if is(lower, &accelerations) || any(own, &words) {
+        return Some(Guess::Further("acceleration", "m/s2"));
+    }
+    if let Some(axis) = pose(&lower_table, lower, own) {
+        return Some(Guess::Pose(axis));
+    }
+    if is(lower, &["roll", "pitch", "yaw", "qx", "qy", "qz"]) {
+        return Some(Guess::Further("attitude", ""));
+    }
+    if any(own, &["voltage", "volt", "volts", "battery"]) {
+        return Some(Guess::Further("voltage", "V"));
+    }
+    let is_velocity = lower.starts_with("vel_");
+    is_velocity.then_some(Guess::Further("other", "m/s"))
+}
+
+/// True if a name is one of these, or ends in one as a field.
+fn is(lower: &str, names: &[&str]) -> bool {
+    let ends = |name: &&str| lower == *name || lower.ends_with(&format!(".{name}"));
+    names.iter().any(ends)
+}
+
+/// What is left of a name without the words that say of what: `odom_x`, `base_gyro_z`.
+fn bare<'a>(own: &'a [String], words: &[&str]) -> Vec<&'a str> {
+    let own = own.iter().map(String::as_str);
+    own.filter(|word| !words.contains(word)).collect()
+}
+
+/// A rate of the body, by a gyro.
+fn body_rate(lower: &str, own: &[String]) -> Option<Guess> {
+    let has_both = any(own, &["angular"]) && any(own, &["vel", "velocity"]);
+    let is_gyro = any(own, &["gyro", "gyr"]) || has_both;
+    let axis = bare(own, &GYRO_WORDS);
+    let turns = [
+        "angular_velocity.z",
+        "gyro_z",
+        "gz",
+        "wz",
+        "yaw_rate",
+        "yawrate",
+        "gyro.z",
+    ];
+    if is(lower, &turns) || is_gyro && matches!(axis[..], ["z" | "yaw"]) {
+        return Some(Guess::Gyro);
+    }
+    let tilts = [
+        "angular_velocity.x",
+        "angular_velocity.y",
+        "gyro_x",
+        "gyro_y",
+        "wx",
+        "wy",
+    ];
+    let is_tilt = is_gyro && matches!(axis[..], ["x" | "y" | "roll" | "pitch"]);
+    let is_rate = is(lower, &tilts) || lower.starts_with("rate_") || is_tilt;
+    is_rate.then_some(Guess::Further("body-rate", "rad/s"))
+}
+
+/// An axis of the pose.
+fn pose(lower_table: &str, lower: &str, own: &[String]) -> Option<usize> {
+    // Short names are also parts of quaternions and vectors.
+    let plain = |names: [&str; 3]| names.contains(&lower);
+    let place = bare(own, &PLACE_WORDS);
+    if is(lower, &["position.x", "translation.x"])
+        || plain(["x", "xpos", "pos_x"])
+        || place == ["x"]
+    {
+        return Some(0);
+    }
+    if is(lower, &["position.y", "translation.y"])
+        || plain(["y", "ypos", "pos_y"])
+        || place == ["y"]
+    {
+        return Some(1);
+    }
+    let angles = [
+        "pose.orientation.yaw",
+        "rotation.yaw",
+        "yaw",
+        "ang",
+        "theta",
+        "heading",
+    ];
+    let is_angle = is(lower, &angles) && !lower_table.contains("imu");
+    let is_odometry = any(own, &["odom", "odometry", "pose"]);
+    let is_of_odometry = is_odometry && matches!(place[..], ["yaw" | "theta" | "th" | "heading"]);
+    (is_angle || is_of_odometry).then_some(2)
 }
 
 #[cfg(test)]

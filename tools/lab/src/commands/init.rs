@@ -149,8 +149,8 @@ fn graph(name: &str, rate_hz: f64) -> String {
         _ => [0, 1, 2, 3],
     };
     format!(
-        r#"# The graph of a new robot. Every key, its unit and range: docs/configuration.md. Paths are relative
-# to this file.
+        r#"# The graph of a new robot. Every key, its unit and range: docs/configuration.md.
+# Paths are relative to this file.
 [graph]
 name = "{name}"
 rate_hz = {rate_hz:?}

@@ -16,8 +16,8 @@ fn page() -> String {
     fs::read_to_string(root().join("docs/your-robot.md")).unwrap()
 }
 
-/// Every command of the page's blocks that needs no publisher, its program first; the file of labels
-/// is none.
+/// Every command of the page's blocks that needs no publisher, its program first; the file of
+/// labels is none.
 fn commands(page: &str) -> Vec<Vec<String>> {
     let blocks = page.split("```").skip(1).step_by(2);
     let needs_no_publisher = |block: &&str| !block.starts_with("sh not run: needs a publisher");
