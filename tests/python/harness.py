@@ -5,6 +5,7 @@ import os
 import pathlib
 import shutil
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -106,3 +107,13 @@ class Graph:
 
 def events(summary, kind):
     return [event["what"] for event in summary["events"] if event["event"] == kind]
+
+
+def datagram_of(verdict):
+    """The datagram in which a graph sends a verdict."""
+    import vigil_types
+
+    verdict.header.schema = vigil_types.Verdict.SCHEMA
+    body = bytes(verdict)
+    head = b"VGIL" + struct.pack("<HHI", 2, 2, len(body))
+    return head + struct.pack("<I", vigil_types.crc32c(head + body)) + body

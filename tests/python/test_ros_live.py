@@ -7,13 +7,12 @@ pip install ros-kilted-rclpy==9.1.2 ros-rmw-fastrtps-cpp ros-geometry-msgs ros-n
 
 import os
 import socket
-import struct
 import subprocess
 import sys
 import time
 import unittest
 
-from harness import EXAMPLES, WATCHDOG_S
+from harness import EXAMPLES, WATCHDOG_S, datagram_of
 
 import vigil_types as vigil
 
@@ -39,13 +38,6 @@ class Live(unittest.TestCase):
         environment = {**os.environ, "ROS_DOMAIN_ID": "77", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
         done = subprocess.run([sys.executable, __file__, "robot"], env=environment, timeout=WATCHDOG_S)
         self.assertEqual(done.returncode, 0)
-
-
-def datagram_of(verdict):
-    verdict.header.schema = vigil.Verdict.SCHEMA
-    body = bytes(verdict)
-    head = b"VGIL" + struct.pack("<HHI", 2, 2, len(body))
-    return head + struct.pack("<I", vigil.crc32c(head + body)) + body
 
 
 class Robot:

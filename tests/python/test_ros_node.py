@@ -7,13 +7,12 @@ import json
 import os
 import pathlib
 import socket
-import struct
 import tempfile
 import time
 import unittest
 from unittest import mock
 
-from harness import EXAMPLES, WATCHDOG_S
+from harness import EXAMPLES, WATCHDOG_S, datagram_of
 from ros_messages import driven, message, rows, stamped
 from ros_stand_in import Ros, install
 from test_ros_frames import parameters
@@ -30,13 +29,6 @@ CHANNELS = EXAMPLES / "rover.channels"
 ODOM, JOINTS = ("/odom", ["nav_msgs/msg/Odometry"]), ("/joint_states", ["sensor_msgs/msg/JointState"])
 TWIST, STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 OUT = {"cmd_vel_out": "/cmd_vel"}
-
-
-def datagram_of(answer):
-    answer.header.schema = vigil.Verdict.SCHEMA
-    body = bytes(answer)
-    head = b"VGIL" + struct.pack("<HHI", 2, 2, len(body))
-    return head + struct.pack("<I", vigil.crc32c(head + body)) + body
 
 
 class PlayedGraph:

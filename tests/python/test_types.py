@@ -1,12 +1,11 @@
 """The types of other languages are those of the Rust structs, and compile."""
 
 import pathlib
-import struct
 import subprocess
 import tempfile
 import unittest
 
-from harness import EXAMPLES, vigil
+from harness import EXAMPLES, datagram_of, vigil
 
 import vigil_types
 
@@ -58,10 +57,7 @@ class Types(unittest.TestCase):
               return printf("%s %.2f", verdict.mode_name, verdict.speed_scale) < 0;
             }"""
         verdict = vigil_types.Verdict(mode_name=b"LF_STUCK", speed_scale=0.25)
-        verdict.header.schema = vigil_types.Verdict.SCHEMA
-        body = bytes(verdict)
-        head = b"VGIL" + struct.pack("<HHI", 2, 2, len(body))
-        good = head + struct.pack("<I", vigil_types.crc32c(head + body)) + body
+        good = datagram_of(verdict)
         corrupt = good[:-1] + bytes([good[-1] ^ 1])
         frame = vigil_types.datagram(vigil_types.SensorFrame())
         with tempfile.TemporaryDirectory() as folder:

@@ -7,10 +7,10 @@ use std::rc::Rc;
 
 use clap::Parser;
 use vigil_blocks::Action;
+use vigil_cycle::Topic;
 use vigil_cycle::datagrams::Datagrams;
 use vigil_cycle::serve::{self, ServeError, ServicePlan};
 use vigil_cycle::topic::ServiceName;
-use vigil_cycle::{Graph, Topic};
 use vigil_sensor_sim::{
     ListenAddresses, PlaybackSource, SensorSource, SimulatorSource, SocketInputs, SocketStage,
     VerdictNames, assemble,
@@ -74,10 +74,7 @@ fn serve_socket(
         let datagrams = Datagrams::bind(listen.udp, listen.unix.as_deref())
             .map_err(|e| ServeError::Build(format!("sensor.socket: {e}")))?;
         let datagrams = Rc::new(datagrams);
-        let Graph::SharedMemory(link) = graph else {
-            return Err(ServeError::Build("not in shared memory".into()));
-        };
-        let actions = link.listener::<Action>(Topic::Action)?;
+        let actions = serve::listener::<Action>(graph, Topic::Action)?;
         let names = VerdictNames::new(
             setup.tree.nodes().iter().map(|node| node.name.as_str()),
             setup.decision.actions().iter().map(String::as_str),

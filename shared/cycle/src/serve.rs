@@ -14,7 +14,7 @@ use crate::health::HealthBoard;
 use crate::live::{self, FinishedRun, ServiceEnd, WarmUp};
 use crate::on_miss::OnMiss;
 use crate::placement::PlacementRequest;
-use crate::port::{Graph, Link};
+use crate::port::{EventListener, Graph, Link};
 use crate::port_error::PortError;
 use crate::recorder::Recorder;
 use crate::report::{ReportError, RunReport};
@@ -154,11 +154,22 @@ pub fn stage<T: vigil_blocks::Block, S: Stage>(
 ) -> Result<(), ServeError> {
     woken_by(plan, |graph| {
         let stage = build(graph)?;
-        let Graph::SharedMemory(link) = graph else {
-            return Err(ServeError::Build("not in shared memory".into()));
-        };
-        Ok((stage, link.listener::<T>(input)?))
+        Ok((stage, listener::<T>(graph, input)?))
     })
+}
+
+/// Opens what announces the blocks of a topic.
+///
+/// # Errors
+/// The transport's; that the graph is not in shared memory.
+pub fn listener<T: vigil_blocks::Block>(
+    graph: &Graph,
+    topic: Topic,
+) -> Result<EventListener, ServeError> {
+    match graph {
+        Graph::SharedMemory(link) => Ok(link.listener::<T>(topic)?),
+        Graph::InProcess(_) => Err(ServeError::Build("not in shared memory".into())),
+    }
 }
 
 /// Runs a stage that is woken by what `build` opens with it, until SIGINT or SIGTERM.

@@ -16,7 +16,7 @@ mod navigation;
 mod supervisor;
 
 /// Largest length of a graph's name: it is part of shared-memory and socket names.
-const NAME_LENGTH_MAX: usize = 24;
+pub const NAME_LENGTH_MAX: usize = 24;
 
 /// Checks a graph file; `report` gets the key and a message for each problem.
 pub(crate) fn graph(

@@ -17,6 +17,7 @@ mod state_risks;
 
 pub use args::{GraphArgs, ServiceArgs};
 pub use border::Border;
+pub use check::NAME_LENGTH_MAX;
 pub use document::Document;
 pub use load::{Setup, load_decision, load_graph, load_model, load_robot, load_tree};
 pub use problem::{Problem, SetupError};

@@ -139,7 +139,6 @@ struct Recording<'a> {
     /// Made with the first frame, which says what of the optional channels is measured.
     file: Option<FrameWriter>,
     fields: Vec<Field>,
-    /// `run_id` of the present run, its first capture and its last, ns.
     run: Option<PresentRun>,
     runs: u32,
     frames: u64,
@@ -149,6 +148,7 @@ struct Recording<'a> {
     failed: Option<TableError>,
 }
 
+/// The run to which the last frame belonged; first capture and last, ns.
 struct PresentRun {
     id: u64,
     epoch: u64,

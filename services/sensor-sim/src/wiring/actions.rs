@@ -1,51 +1,39 @@
 //! The supervisor's newest action, and the start of the drive.
 
-use vigil_blocks::{Action, Block, CauseKind};
-use vigil_cycle::{Graph, PortError, Receiver, Topic};
+use vigil_blocks::{Action, CauseKind};
+use vigil_cycle::{Graph, PortError, Topic};
+
+use super::newest::Newest;
 
 /// Reads actions.
 pub(super) struct Actions {
-    receiver: Box<dyn Receiver<Action>>,
-    latest: Option<Box<Action>>,
+    action: Newest<Action>,
     ready_ns: Option<u64>,
 }
 
 impl Actions {
     pub(super) fn new(graph: &Graph) -> Result<Self, PortError> {
-        let receiver = graph.receiver(Topic::Action)?;
-        // Allocated once: a cycle only copies into it.
         Ok(Self {
-            receiver,
-            latest: Some(Box::default()),
+            action: Newest::new(graph.receiver(Topic::Action)?),
             ready_ns: None,
         })
     }
 
     /// Takes the actions that have arrived, in the cycle that was due at `t_schedule_ns`.
     pub(super) fn take(&mut self, t_schedule_ns: u64, own_epoch: u64) {
-        for _ in 0..self.receiver.buffer() {
-            let Some(action) = self.receiver.take_next() else {
-                break;
-            };
-            if action.header.schema != Action::SCHEMA {
-                continue;
-            }
-            if let Some(latest) = &mut self.latest {
-                **latest = *action;
-            }
+        let ready_ns = &mut self.ready_ns;
+        self.action.take(|action| {
             // An action that follows from a frame of ours has passed through every stage.
             let from_frame = action.cause.kind() == Some(CauseKind::Frame);
-            if from_frame && action.cause.frame_epoch == own_epoch && self.ready_ns.is_none() {
-                self.ready_ns = Some(t_schedule_ns);
+            if from_frame && action.cause.frame_epoch == own_epoch && ready_ns.is_none() {
+                *ready_ns = Some(t_schedule_ns);
             }
-        }
+        });
     }
 
     /// The newest action; `None` before the first.
     pub(super) fn newest(&self) -> Option<&Action> {
-        self.latest
-            .as_deref()
-            .filter(|action| action.header.epoch != 0)
+        Some(self.action.block()).filter(|action| action.header.epoch != 0)
     }
 
     /// The scheduled instant of the first cycle in which every stage had answered, ns.

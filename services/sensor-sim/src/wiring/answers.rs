@@ -4,7 +4,9 @@ use vigil_blocks::{
     Action, Block, FaultBelief, NAME_SIZE, SizeKind, Verdict, datagram, fixed_name, mode_word,
 };
 use vigil_cycle::datagrams::{Datagrams, From};
-use vigil_cycle::{Graph, PortError, Receiver, Topic};
+use vigil_cycle::{Graph, PortError, Topic};
+
+use super::newest::Newest;
 
 /// The names of a graph's faults and actions, as verdicts carry them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -41,11 +43,8 @@ impl VerdictNames {
 /// Answers each action with a verdict.
 pub(super) struct Answers {
     names: VerdictNames,
-    actions: Box<dyn Receiver<Action>>,
-    beliefs: Box<dyn Receiver<FaultBelief>>,
-    /// Allocated once: a cycle only copies into it.
-    belief: Box<FaultBelief>,
-    action: Box<Action>,
+    action: Newest<Action>,
+    belief: Newest<FaultBelief>,
     verdict: Box<Verdict>,
     /// The action has not been answered yet.
     is_new: bool,
@@ -57,10 +56,8 @@ impl Answers {
         (verdict.header.schema, verdict.header.epoch) = (Verdict::SCHEMA, epoch);
         Ok(Self {
             names,
-            actions: graph.receiver(Topic::Action)?,
-            beliefs: graph.receiver(Topic::Diagnosis)?,
-            belief: Box::default(),
-            action: Box::default(),
+            action: Newest::new(graph.receiver(Topic::Action)?),
+            belief: Newest::new(graph.receiver(Topic::Diagnosis)?),
             verdict,
             is_new: false,
         })
@@ -68,24 +65,8 @@ impl Answers {
 
     /// Takes what has been decided; true if anything has.
     pub(super) fn take(&mut self) -> bool {
-        for _ in 0..self.beliefs.buffer() {
-            match self.beliefs.take_next() {
-                Some(belief) if belief.header.schema == FaultBelief::SCHEMA => {
-                    *self.belief = *belief;
-                }
-                Some(_) => {}
-                None => break,
-            }
-        }
-        for _ in 0..self.actions.buffer() {
-            let Some(action) = self.actions.take_next() else {
-                break;
-            };
-            if action.header.schema == Action::SCHEMA {
-                *self.action = *action;
-                self.is_new = true;
-            }
-        }
+        self.belief.take(|_| {});
+        self.is_new |= self.action.take(|_| {});
         self.is_new
     }
 
@@ -95,13 +76,14 @@ impl Answers {
         let Some(to) = to.filter(|_| is_new) else {
             return;
         };
-        let (verdict, action) = (&mut self.verdict, &self.action);
-        verdict.fill(action, &self.belief, now_ns);
+        let (action, belief) = (self.action.block(), self.belief.block());
+        let verdict = &mut self.verdict;
+        verdict.fill(action, belief, now_ns);
         verdict.header.t_schedule_ns = action.header.t_schedule_ns;
         verdict.header.t_capture_ns = action.header.t_capture_ns;
         verdict.action_name = self.names.action(action.action);
-        verdict.mode_name = self.names.mode(self.belief.reported);
-        verdict.runner_up_name = self.names.mode(self.belief.runner_up);
+        verdict.mode_name = self.names.mode(belief.reported);
+        verdict.runner_up_name = self.names.mode(belief.runner_up);
         verdict.size_name = fixed_name(SizeKind::from_wire(verdict.size_kind).word());
         verdict.header.t_publish_ns = now_ns;
         // One that does not arrive is replaced by the next; a robot without any stops.

@@ -2,6 +2,7 @@
 
 mod actions;
 mod answers;
+mod newest;
 mod peers;
 mod playback;
 mod simulator;

@@ -171,13 +171,9 @@ fn unknown(evidence: &Evidence, draft: &mut Draft) {
                 |found: &NamedColumn| (found.table, found.column.as_str()) == (table, *name);
             !evidence.found.iter().any(is_guessed) && time.as_deref() != Some(*name)
         };
-        let varies = survey.columns.iter().filter(|column| {
-            let mut values = column.values.iter().filter(|value| value.is_finite());
-            values
-                .next()
-                .is_some_and(|first| values.any(|value| value != first))
-        });
-        let left: Vec<&str> = varies
+        let columns = survey.columns.iter();
+        let left: Vec<&str> = columns
+            .filter(|column| varies(&column.values))
             .map(|column| column.name.as_str())
             .filter(is_left)
             .collect();
@@ -194,6 +190,13 @@ fn unknown(evidence: &Evidence, draft: &mut Draft) {
             .unsure
             .push(format!("of {table} nothing was made of {names}"));
     }
+}
+
+/// True if the finite values are not all the same.
+fn varies<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {
+    let mut values = values.into_iter().filter(|value| value.is_finite());
+    let first = values.next();
+    first.is_some_and(|first| values.any(|value| value != first))
 }
 
 /// Columns that may be channels: of tables with a time, with values in every run, that vary.
@@ -213,8 +216,7 @@ fn found(tables: &[SurveyTable], runs: &[Vec<SurveyTable>]) -> Vec<NamedColumn> 
             });
             let of_runs: Vec<&[f64]> = of_runs.map(|c| c.values.as_slice()).collect();
             let is_there = |values: &&[f64]| values.iter().any(|v| v.is_finite());
-            let mut all = of_runs.iter().copied().flatten().filter(|v| v.is_finite());
-            let varies = all.next().is_some_and(|first| all.any(|v| v != first));
+            let varies = varies(of_runs.iter().copied().flatten());
             if varies && of_runs.len() == runs.len() && of_runs.iter().all(is_there) {
                 out.push(NamedColumn {
                     table: at,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use vigil_import as import;
-use vigil_setup::load_robot;
+use vigil_setup::{NAME_LENGTH_MAX, load_robot};
 use vigil_terminal::{CommandError, Outcome, output};
 
 use crate::commands::files::write_whole;
@@ -16,8 +16,6 @@ const DECISION: &str = include_str!("../../../../config/any-robot.pomdp");
 const TREE: &str = include_str!("../../../../config/trees/generated.toml");
 /// Rate of a graph whose log is not known, Hz.
 const RATE_HZ: f64 = 20.0;
-/// Longest name of a graph.
-const NAME_LENGTH_MAX: usize = 24;
 
 /// Writes the files of a new robot into a folder: graph, robot, fault tree, decision model.
 ///

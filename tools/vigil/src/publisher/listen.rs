@@ -175,7 +175,7 @@ fn topic(
     };
     let mut guard = Guard::new(border);
     let mut health = BorderHealth::new(border, &graph)?;
-    let mut arrived = Vec::with_capacity(frames.buffer());
+    let (mut arrived, mut is_heard) = (Vec::with_capacity(frames.buffer()), false);
     while_it_lasts(seconds, &listener, heard, |heard| {
         health.look();
         for _ in 0..frames.buffer() {
@@ -185,12 +185,12 @@ fn topic(
             arrived.push((*frame, Monotonic.now_ns()));
         }
         // Who joins is given frames that were sent before: of the first batch the newest counts.
-        let old = match heard.is_heard {
+        let old = match is_heard {
             true => 0,
             false => arrived.len().saturating_sub(1),
         };
         for (frame, now_ns) in arrived.drain(..).skip(old) {
-            heard.is_heard = true;
+            is_heard = true;
             let is_taken = guard.take(&frame, now_ns);
             sink(heard, FrameArrival { now_ns, frame }, is_taken);
         }
@@ -248,7 +248,6 @@ fn sockets(
             if is_taken {
                 clock = dated;
             }
-            heard.is_heard = true;
             sink(heard, FrameArrival { now_ns, frame }, is_taken);
         }
     })?;

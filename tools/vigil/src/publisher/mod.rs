@@ -30,8 +30,6 @@ pub struct FrameArrival {
 pub struct Reception {
     /// Frames in the order of arrival, at most [`listen::FRAMES_MAX`].
     pub frames: Vec<FrameArrival>,
-    /// A frame has come, kept or not.
-    pub is_heard: bool,
     /// Frames beyond those.
     pub more: u64,
     /// How long was listened, s.
