@@ -183,7 +183,7 @@ fn learned(
     let is_judged = |run: &frames::Run| run.id as usize % 2 == judged;
     let others = runs.iter().filter(|(_, run)| !is_judged(run));
     let others: Vec<frames::Run> = others.map(|(_, run)| run.clone()).collect();
-    let (model, _) = channel_learning::learn(&others, &[], f64::INFINITY, &robot)?;
+    let (model, _) = channel_learning::learn(&others, &[], f64::INFINITY, &robot, &[])?;
     let cases = runs.into_iter().filter(|(_, run)| is_judged(run));
     let cases = cases.map(|(ground, run)| Case {
         run,

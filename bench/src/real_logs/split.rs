@@ -70,7 +70,7 @@ impl Split {
             }
             other => return Err(format!("log '{other}': allowed are {}", LOGS.join(", ")).into()),
         };
-        let (model, _) = channel_learning::learn(&learned, &[], f64::INFINITY, &robot)?;
+        let (model, _) = channel_learning::learn(&learned, &[], f64::INFINITY, &robot, &[])?;
         let every = if log == "robotino" { FAULTY_EVERY } else { 1 };
         Ok(Self {
             setup: setup(robot, &model)?,

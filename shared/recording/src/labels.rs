@@ -2,8 +2,8 @@
 //!
 //! CSV: `run`, `mode` (`ND`, `<WHEEL>_STUCK`, `<WHEEL>_ENC`), `kind` (`stuck`, `zero`, `frozen`,
 //! `noise`, or empty), `wheel` (or empty), `onset_s` (-1 for none), `cmd_curv`, `cmd_speed`,
-//! `dur_s`; if wanted, `terrain`. Other columns are ignored. For a robot whose faults are not
-//! modelled, `run`, `mode` and `onset_s` are enough, and a mode may have any name.
+//! `dur_s`; if wanted, `terrain` and `group`. Other columns are ignored. For a robot with a model
+//! of channels, `run`, `mode` and `onset_s` are enough, and a mode may have any name.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -32,6 +32,9 @@ pub struct Label {
     pub command_speed_m_s: f64,
     /// Duration, s.
     pub duration_s: f64,
+    /// Runs of one group resemble each other beyond their faults, as those of one day do: none is
+    /// judged by what another showed. Left out: each run is one of its own.
+    pub group: String,
 }
 
 impl Label {
@@ -128,6 +131,7 @@ fn label(table: &Table, at: &[usize], robot: &Description) -> Result<Label, Labe
         command_curvature_1_m: table.number(curvature)?,
         command_speed_m_s: table.number(speed)?,
         duration_s: table.number(duration)?,
+        group: group(table, run),
     })
 }
 
@@ -143,7 +147,19 @@ fn unnamed(table: &Table, run: usize, mode: usize, onset: usize) -> Result<Label
         command_curvature_1_m: 0.0,
         command_speed_m_s: 0.0,
         duration_s: 0.0,
+        group: group(table, run),
     })
+}
+
+/// Name of a run's group: its own id where the file gives none.
+fn group(table: &Table, run: usize) -> String {
+    let given = table.position("group").map_or("", |at| table.text(at));
+    let name = if given.is_empty() {
+        table.text(run)
+    } else {
+        given
+    };
+    name.to_owned()
 }
 
 /// Mode and onset, which must agree.

@@ -9,6 +9,7 @@ use crate::body::Body;
 use crate::channel_table::FurtherChannel;
 use crate::chassis::{Ground, Motor, RockerBogie};
 use crate::fault_prior::FaultPrior;
+use crate::fault_table::{DECLARED_MAX, DeclaredFault};
 use crate::tolerance::Tolerance;
 
 /// Shortest and longest interval of a model of channels, s. Chosen by hand: a frame of 50 Hz; two
@@ -16,6 +17,8 @@ use crate::tolerance::Tolerance;
 pub(crate) const INTERVAL_MIN_S: f64 = 0.02;
 pub(crate) const INTERVAL_MAX_S: f64 = 0.3;
 
+/// Longest warm-up, s.
+const WARM_UP_MAX_S: f64 = 600.0;
 /// A limit that nothing reaches, in any unit.
 const LIMIT_MAX: f64 = 1e3;
 /// Part of an axis's limit up to which a robot without a geometry is not told to move.
@@ -177,6 +180,10 @@ pub struct Description {
     /// Channels beside the standard ones.
     #[serde(default)]
     pub channel: Vec<FurtherChannel>,
+    /// Faults beside those of single sensors and drives; only of a robot with a model of channels.
+    #[serde(default)]
+    #[schemars(length(max = DECLARED_MAX))]
+    pub fault: Vec<DeclaredFault>,
     /// Order of the polynomials of the command in a model of channels.
     #[serde(default = "four")]
     #[schemars(range(min = 1, max = 4))]
@@ -185,6 +192,11 @@ pub struct Description {
     #[serde(default = "tenth")]
     #[schemars(range(min = INTERVAL_MIN_S, max = INTERVAL_MAX_S))]
     pub interval_s: f64,
+    /// First seconds of a run that a model of channels neither learns from nor watches, as sensors
+    /// settle; left out: none.
+    #[serde(default)]
+    #[schemars(range(min = 0, max = WARM_UP_MAX_S))]
+    pub warm_up_s: f64,
     /// Wheels; a robot without a geometry needs none.
     #[serde(default)]
     #[schemars(length(max = WHEELS))]

@@ -14,6 +14,7 @@ pub mod disturbance;
 pub mod disturbance_kind;
 pub mod fault;
 mod fault_prior;
+pub mod fault_table;
 pub mod frame_guard;
 pub mod fused_alarm;
 pub mod injection;

@@ -228,7 +228,11 @@ pub(crate) fn robot(robot: &Description, mut report: impl FnMut(&str, String)) {
         }
     }
     command(robot, &mut report);
-    let channels = (!robot.has_fault_models()).then(|| unfit(robot)).flatten();
+    let channels = match robot.has_fault_models() {
+        true if robot.fault.is_empty() => None,
+        true => Some("an ackermann6 has no [[fault]]: its faults are modelled".to_owned()),
+        false => unfit(robot),
+    };
     if let Some(message) = channels {
         report("channel", message);
     }

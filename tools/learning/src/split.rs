@@ -58,6 +58,7 @@ mod tests {
                 command_curvature_1_m: 0.0,
                 command_speed_m_s: 0.2,
                 duration_s: 15.0,
+                group: String::new(),
             })
             .collect()
     }

@@ -3,7 +3,8 @@
 use vigil_inference::logspace::log_sum_exp;
 
 use super::component::{Quantity, Target};
-use super::fault_kind::{DRIVE_KINDS, FaultKind, SENSOR_KINDS};
+use super::declared_faults::DeclaredFaults;
+use super::fault_kind::{DECLARED_KINDS, DRIVE_KINDS, FaultKind, SENSOR_KINDS};
 use super::law::{BLOCKS, Change, Law, Row};
 use super::scatter::ScatterLaw;
 use super::window::{DELAY_BLOCKS, OFFSET, Window};
@@ -119,6 +120,9 @@ pub struct Bank {
     first: usize,
     channels: Vec<ChannelPlace>,
     drives: Vec<DrivePlace>,
+    /// The declared faults, whose components are the last ones.
+    declared: DeclaredFaults,
+    first_declared: usize,
     silent_s: [f64; CHANNELS_MAX],
     weighed: [[Weighed; KINDS_MAX]; COMPONENTS_MAX],
     unknown: f64,
@@ -133,6 +137,7 @@ impl Bank {
         laws: Laws,
         channels: Vec<ChannelPlace>,
         drives: Vec<DrivePlace>,
+        (declared, first_declared): (DeclaredFaults, usize),
     ) -> Self {
         Self {
             window,
@@ -140,6 +145,8 @@ impl Bank {
             first: 0,
             channels,
             drives,
+            declared,
+            first_declared,
             silent_s: [0.0; CHANNELS_MAX],
             weighed: [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX],
             unknown: IMPOSSIBLE,
@@ -161,6 +168,7 @@ impl Bank {
     /// Begins a new record.
     pub fn clear(&mut self) {
         self.window.clear();
+        self.declared.clear();
         self.silent_s = [0.0; CHANNELS_MAX];
         self.weighed = [[Weighed::NONE; KINDS_MAX]; COMPONENTS_MAX];
         (self.unknown, self.unknown_noise) = (IMPOSSIBLE, IMPOSSIBLE);
@@ -230,6 +238,10 @@ impl Bank {
         for drive in 0..self.drives.len() {
             self.weigh_drive(drive);
         }
+        self.declared.take(&self.window, dt_s);
+        for fault in 0..self.declared.len() {
+            self.weigh_declared(fault);
+        }
         self.unknown = self.law().log_ratio_scaled(UNKNOWN);
         let scatter = self.laws.scatter.as_ref();
         self.unknown_noise = scatter.map_or(IMPOSSIBLE, |scatter| scatter.any(UNKNOWN_NOISE));
@@ -263,12 +275,7 @@ impl Bank {
             let scatter = self.laws.scatter.as_ref();
             scatter.map_or(0.0, |scatter| scatter.still(channel, newest))
         };
-        // A bias may be as large as what is measured, or as many deviations.
-        let units = unit
-            .iter()
-            .fold(0.0, |sum, unit| sum + unit / BLOCKS as f64);
-        let deviation = if units > 0.0 { 1.0 / units } else { 0.0 };
-        let bias_sd = BIAS_SD * place.usual.hypot(BIAS_DEVIATIONS * deviation);
+        let bias_sd = self.bias_sd(channel);
         match kind {
             FaultKind::Bias => self.added(channel, unit, bias_sd),
             FaultKind::Gain => {
@@ -309,6 +316,57 @@ impl Bank {
             }
             _ => Weighed::NONE,
         }
+    }
+
+    /// A bias may be as large as what is measured, or as many deviations.
+    fn bias_sd(&self, channel: usize) -> f64 {
+        let unit = &self.window.unit[channel];
+        let units = unit
+            .iter()
+            .fold(0.0, |sum, unit| sum + unit / BLOCKS as f64);
+        let deviation = if units > 0.0 { 1.0 / units } else { 0.0 };
+        BIAS_SD
+            * self.channels[channel]
+                .usual
+                .hypot(BIAS_DEVIATIONS * deviation)
+    }
+
+    fn weigh_declared(&mut self, fault: usize) {
+        let component = self.first_declared + fault;
+        for (k, kind) in DECLARED_KINDS.into_iter().enumerate() {
+            self.weighed[component][k] = match kind {
+                FaultKind::Shift => self.shifted(fault),
+                FaultKind::Signature => self.recognized(fault),
+                _ => Weighed::NONE,
+            };
+        }
+    }
+
+    /// A declared fault by its labelled runs.
+    fn recognized(&self, fault: usize) -> Weighed {
+        let found = self.declared.evidence(fault);
+        found.map_or(Weighed::NONE, |log_ratio| Weighed {
+            log_ratio,
+            age_s: self.window.block_s() * BLOCKS as f64,
+            ..Weighed::NONE
+        })
+    }
+
+    /// A declared fault by the channels in which it shows.
+    fn shifted(&self, fault: usize) -> Weighed {
+        let unit = &self.window.unit;
+        Weighed::over(JOINT_ONSETS.map(|first| {
+            let sd = |channel: usize| self.bias_sd(channel);
+            let law = (self.law(), self.first);
+            let Some(found) = self.declared.shift(fault, law, (unit, sd), first) else {
+                return Weighed::NONE;
+            };
+            Weighed {
+                log_ratio: self.law().log_ratio(found.less, found.penalty),
+                age_s: self.window.block_s() * self.law().blocks(first) as f64,
+                ..Weighed::NONE
+            }
+        }))
     }
 
     /// More noise of some channels.

@@ -7,6 +7,7 @@ use vigil_blocks::CHANNELS;
 use super::{AXES, CHANNELS_MAX, DRIVES_MAX};
 use crate::channel::{Role, channels};
 use crate::description::{Description, Kinematics};
+use crate::fault_table::{DECLARED_MAX, DeclaredFault, SHOWN_MAX};
 use crate::frame_guard::{BEYOND_LIMITS, CURRENT_MAX_A};
 
 /// What a channel measures.
@@ -138,10 +139,52 @@ pub fn unfit(robot: &Description) -> Option<String> {
         let own = !all[i].quantity.is_pose();
         own && (name == POSE || all[..i].iter().any(|other| other.name == *name))
     };
-    let twice = (0..all.len()).find(|&i| is_taken(i))?;
-    let name = &all[twice].name;
+    if let Some(twice) = (0..all.len()).find(|&i| is_taken(i)) {
+        let name = &all[twice].name;
+        return Some(format!(
+            "a channel cannot be called '{name}': the name is taken"
+        ));
+    }
+    let found = robot.fault.len();
+    if found > DECLARED_MAX {
+        return Some(format!("{found} faults: allowed are {DECLARED_MAX}"));
+    }
+    let components = components(robot);
+    let unfit = |fault: &DeclaredFault| unfit_fault(fault, &all, &components);
+    robot.fault.iter().find_map(unfit)
+}
+
+/// Why a declared fault cannot be watched; none if it can.
+fn unfit_fault(fault: &DeclaredFault, all: &[Target], components: &[Component]) -> Option<String> {
+    let name = &fault.name;
+    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if name.is_empty() || !name.chars().all(is_name) || name == "ND" {
+        return Some(format!(
+            "fault '{name}': a name has letters, digits, _ and -, and is not ND"
+        ));
+    }
+    if components
+        .iter()
+        .filter(|other| other.name == *name)
+        .count()
+        > 1
+    {
+        return Some(format!(
+            "a fault cannot be called '{name}': the name is taken"
+        ));
+    }
+    if fault.shows.len() > SHOWN_MAX {
+        let found = fault.shows.len();
+        return Some(format!(
+            "fault '{name}' shows in {found} channels: allowed are {SHOWN_MAX}"
+        ));
+    }
+    let is_unknown = |shown: &&String| all.iter().all(|target| target.name != **shown);
+    let unknown = fault.shows.iter().find(is_unknown)?;
+    let known: Vec<&str> = all.iter().map(|target| target.name.as_str()).collect();
     Some(format!(
-        "a channel cannot be called '{name}': the name is taken"
+        "fault '{name}' shows in '{unknown}', which is no channel; there are {}",
+        known.join(", ")
     ))
 }
 
@@ -230,19 +273,20 @@ impl Drive {
 pub struct Component {
     /// Name of its leaf: `pose`, a channel's name, or `drive_<WHEEL>`.
     pub name: String,
-    /// Its fault in the words of a fault tree: `sensor:<CHANNEL>` or `drive:<WHEEL>`.
+    /// Its fault in the words of a fault tree: `sensor:<CHANNEL>`, `drive:<WHEEL>` or
+    /// `fault:<NAME>`.
     pub fault: String,
-    /// Abstract node above it: its wheel's, or that of all further sensors.
-    pub group: String,
+    /// Abstract node above it: its wheel's, that of all further sensors, or the one declared.
+    pub group: Option<String>,
 }
 
 /// The components of a robot: its sensors in the order of [`targets`], those of the pose as one,
-/// then its drives.
+/// then its drives, then the faults that its description declares.
 #[must_use]
 pub fn components(robot: &Description) -> Vec<Component> {
     let group = |wheel: Option<usize>| {
         let wheel = wheel.and_then(|wheel| robot.wheels.get(wheel));
-        wheel.map_or("BODY".to_owned(), |wheel| format!("WHEEL_{}", wheel.name))
+        Some(wheel.map_or("BODY".to_owned(), |wheel| format!("WHEEL_{}", wheel.name)))
     };
     let mut out: Vec<Component> = Vec::new();
     for target in targets(robot) {
@@ -261,5 +305,16 @@ pub fn components(robot: &Description) -> Vec<Component> {
         fault: format!("drive:{}", drive.name),
         group: group(drive.wheel),
     }));
+    out.extend(
+        robot
+            .fault
+            .iter()
+            .take(DECLARED_MAX)
+            .map(|declared| Component {
+                name: declared.name.clone(),
+                fault: format!("fault:{}", declared.name),
+                group: declared.group.clone(),
+            }),
+    );
     out
 }

@@ -36,6 +36,10 @@ pub enum FaultKind {
     /// What a drive moves jolts: the noise of all that is measured at it is this many times as
     /// large.
     Rough,
+    /// A declared fault shifts the channels in which it shows.
+    Shift,
+    /// A declared fault shows as in the labelled runs.
+    Signature,
 }
 
 /// Kinds of a sensor's faults.
@@ -59,6 +63,9 @@ pub const DRIVE_KINDS: [FaultKind; 5] = [
     FaultKind::Rough,
 ];
 
+/// Kinds of evidence for a declared fault.
+pub const DECLARED_KINDS: [FaultKind; 2] = [FaultKind::Shift, FaultKind::Signature];
+
 impl FaultKind {
     /// The word for it and the unit of its size on the wire; `of`: what the sensor measures.
     #[must_use]
@@ -81,6 +88,7 @@ impl FaultKind {
             (Self::Loss, _) => SizeKind::EffectShareLost,
             (Self::Slip, _) => SizeKind::GripShareLost,
             (Self::Offset, _) => SizeKind::SpeedShareAdded,
+            (Self::Shift | Self::Signature, _) => SizeKind::None,
         }
     }
 }

@@ -213,6 +213,31 @@ impl Law {
         &self.z[channel]
     }
 
+    /// Precision between the blocks of two channels.
+    #[must_use]
+    pub fn between(&self, one: usize, other: usize) -> Square {
+        let mut out = [[0.0; BLOCKS]; BLOCKS];
+        for (direction, precision) in self.directions.iter().zip(&self.precision) {
+            let share = direction.vector[one] * direction.vector[other];
+            for (row, from) in out.iter_mut().zip(precision) {
+                row.iter_mut().zip(from).for_each(|(a, b)| *a += share * b);
+            }
+        }
+        out
+    }
+
+    /// `Pz` at a channel; zero where nothing was measured.
+    #[must_use]
+    pub fn gradient(&self, channel: usize) -> &Row {
+        &self.gradient[channel]
+    }
+
+    /// A change of a channel, where it was measured.
+    #[must_use]
+    pub fn masked(&self, channel: usize, row: &Row) -> Row {
+        masked(row, &self.read[channel])
+    }
+
     /// Square of the window under the law: its expectation is the number of its values.
     #[must_use]
     pub const fn square(&self) -> f64 {

@@ -14,10 +14,15 @@
 //! | [`law`], [`directions`] | the joint law of the residuals, and its principal directions |
 //! | [`scatter`] | the law of how rough they are |
 //! | [`fault_kind`] | the ways in which a component fails |
+//! | [`shift`] | a change of several channels, each by an amount of its own |
+//! | [`signature`] | what labelled runs showed of a declared fault |
+//! | [`declared_faults`] | the faults that a description declares, weighed |
 //! | [`bank`] | all faults, weighed |
 //! | [`monitor`] | detection, and what is believed of each component |
 //! | [`model`] | the model file |
 //! | [`tree`] | the fault tree of a robot |
+
+use crate::fault_table::DECLARED_MAX;
 
 /// Axes of a command that a model may have.
 pub const AXES: usize = 4;
@@ -26,12 +31,13 @@ pub const CHANNELS_MAX: usize = 28;
 /// Drives at most: one for each wheel, or each axis.
 pub const DRIVES_MAX: usize = 8;
 /// Components at most.
-pub const COMPONENTS_MAX: usize = CHANNELS_MAX + DRIVES_MAX;
+pub const COMPONENTS_MAX: usize = CHANNELS_MAX + DRIVES_MAX + DECLARED_MAX;
 
 pub mod bank;
 pub mod channel;
 pub mod component;
 pub mod coverage;
+pub mod declared_faults;
 pub mod directions;
 pub mod fault_kind;
 pub mod law;
@@ -39,6 +45,8 @@ pub mod model;
 pub mod monitor;
 pub mod observation;
 pub mod scatter;
+pub mod shift;
+pub mod signature;
 pub mod tree;
 pub mod window;
 

@@ -9,6 +9,7 @@ use super::fault_kind::FaultKind;
 use super::law::{Direction, Law};
 use super::observation::{DEPTH, History, SMOOTHING_S};
 use super::scatter::{Scatter, ScatterLaw};
+use super::signature::Signatures;
 use super::{AXES, CHANNELS_MAX, DRIVES_MAX};
 use crate::alarm::AlarmError;
 use crate::description::{Description, INTERVAL_MAX_S, INTERVAL_MIN_S};
@@ -53,19 +54,25 @@ pub enum Class {
     Drive,
     /// More noise.
     Noise,
+    /// A declared fault, by the channels in which it shows.
+    Shift,
+    /// A declared fault, by its labelled runs.
+    Signature,
     /// What no single fault explains.
     Unknown,
 }
 
 impl Class {
     /// Every class.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Steady,
         Self::Still,
         Self::Late,
         Self::Erratic,
         Self::Drive,
         Self::Noise,
+        Self::Shift,
+        Self::Signature,
         Self::Unknown,
     ];
 
@@ -82,6 +89,8 @@ impl Class {
                 Some(Self::Drive)
             }
             FaultKind::Noise | FaultKind::Rough => Some(Self::Noise),
+            FaultKind::Shift => Some(Self::Shift),
+            FaultKind::Signature => Some(Self::Signature),
         }
     }
 }
@@ -145,6 +154,9 @@ pub struct Model {
     pub direction: Vec<Direction>,
     /// The law of their roughness.
     pub scatter: Scatter,
+    /// How declared faults show.
+    #[serde(default, skip_serializing_if = "Signatures::is_empty")]
+    pub signatures: Signatures,
     /// Tails of the classes of faults.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tail: Vec<Tail>,
@@ -338,6 +350,11 @@ impl ModelFile for Model {
             return refuse("direction", found, "one for each channel, of a covariance");
         }
         check_scatter(&self.scatter, count)?;
+        if !self.signatures.fits(count) {
+            let found = format!("{} faults", self.signatures.fault.len());
+            let allowed = "at most 8 faults of 1 to 8 phases, each with three numbers a channel";
+            return refuse("signatures", found, allowed);
+        }
         self.tail.iter().try_for_each(check_tail)?;
         self.calibration.iter().try_for_each(check_calibration)
     }

@@ -15,8 +15,9 @@ use super::bank::{Bank, ChannelPlace, DrivePlace, IMPOSSIBLE, KINDS_MAX, Laws, W
 use super::channel::{Channel, Scales, commands, lags};
 use super::component::{Quantity, Target, components, drives, targets};
 use super::coverage::{Combinations, Range, widening};
+use super::declared_faults::DeclaredFaults;
 use super::directions::{covariances, directions};
-use super::fault_kind::{DRIVE_KINDS, FaultKind, SENSOR_KINDS};
+use super::fault_kind::{DECLARED_KINDS, DRIVE_KINDS, FaultKind, SENSOR_KINDS};
 use super::law::{BLOCK_S, BLOCKS, Law};
 use super::model::{Class, FAULT_RATE_1_H, Model, Tail};
 use super::observation::History;
@@ -24,6 +25,7 @@ use super::scatter::ScatterLaw;
 use super::window::Window;
 use super::{CHANNELS_MAX, COMPONENTS_MAX};
 use crate::description::Description;
+use crate::fault_table::DECLARED_MAX;
 use crate::learned::channels::Channels;
 use crate::learned::monitor::DetectionOutput;
 use crate::slot::{SLOTS, Slot};
@@ -61,13 +63,42 @@ const NO_BELIEF: ComponentBelief = ComponentBelief {
     age_s: 0.0,
 };
 
+/// What a component is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    /// A sensor of this quantity.
+    Sensor(Quantity),
+    /// A drive.
+    Drive,
+    /// A declared fault of the robot.
+    Robot,
+}
+
+impl Part {
+    /// Kind behind a place of its faults.
+    fn kind(self, place: usize) -> Option<FaultKind> {
+        let kinds: &[FaultKind] = match self {
+            Self::Sensor(_) => &SENSOR_KINDS,
+            Self::Drive => &DRIVE_KINDS,
+            Self::Robot => &DECLARED_KINDS,
+        };
+        kinds.get(place).copied()
+    }
+
+    const fn quantity(self) -> Option<Quantity> {
+        match self {
+            Self::Sensor(quantity) => Some(quantity),
+            Self::Drive | Self::Robot => None,
+        }
+    }
+}
+
 /// A component at work.
 #[derive(Debug, Clone, Copy)]
 struct Watch {
     /// Whether the channels in use show it.
     is_seen: bool,
-    /// What its sensor measures; none for a drive.
-    quantity: Option<Quantity>,
+    part: Part,
     /// Slot of its evidence.
     slot: usize,
 }
@@ -116,7 +147,8 @@ impl Monitor {
         let used = used.collect::<Option<Vec<_>>>()?;
         let sensed = sensed(robot, &used)?;
         let count = components(robot).len();
-        let first_drive = count - scales.drives.len();
+        let first_declared = count - robot.fault.len().min(DECLARED_MAX);
+        let first_drive = first_declared - scales.drives.len();
         let driven = scales
             .drives
             .iter()
@@ -126,11 +158,26 @@ impl Monitor {
                 wheel: drive.wheel,
             });
         let driven = driven.collect();
+        let laws = laws(model, &places)?;
+        let targets: Vec<Target> = sensed.iter().map(|one| one.target.clone()).collect();
+        let has_all = places.len() == all.len();
+        let signatures = has_all.then_some(&model.signatures);
+        let declared = DeclaredFaults::new(robot, &targets, &laws.mean, signatures);
         let watched = (0..count).map(|i| {
             let sensor = sensed.iter().find(|sensed| sensed.component == i);
+            let part = match sensor {
+                Some(sensed) => Part::Sensor(sensed.target.quantity),
+                None if i >= first_declared => Part::Robot,
+                None => Part::Drive,
+            };
+            let is_seen = match part {
+                Part::Sensor(_) => true,
+                Part::Drive => i >= first_drive,
+                Part::Robot => declared.is_seen(i - first_declared),
+            };
             Watch {
-                is_seen: sensor.is_some() || i >= first_drive,
-                quantity: sensor.map(|sensed| sensed.target.quantity),
+                is_seen,
+                part,
                 slot: sensor.map_or(Slot::ANY, |sensed| slot(&sensed.target)),
             }
         });
@@ -138,7 +185,7 @@ impl Monitor {
         let window = Window::new(used, scales, model.interval_s);
         let mut monitor = Self {
             watched: watched.collect(),
-            bank: Bank::new(window, laws(model, &places)?, sensed, driven),
+            bank: Bank::new(window, laws, sensed, driven, (declared, first_declared)),
             ranges: model.command.clone(),
             combinations: model.combinations.clone(),
             lags: lags(model.interval_s),
@@ -236,7 +283,7 @@ impl Monitor {
         let mut certain = [IMPOSSIBLE; COMPONENTS_MAX];
         for (i, watched) in self.watched.iter().enumerate() {
             for (k, found) in self.bank.weighed(i).iter().enumerate() {
-                let Some(kind) = kind(watched.quantity, k) else {
+                let Some(kind) = watched.part.kind(k) else {
                     continue;
                 };
                 let log_odds = prior + found.log_ratio - (KINDS_MAX as f64).ln();
@@ -296,17 +343,16 @@ impl Monitor {
         }
         let total = log_sum_exp(&channels);
         for (i, (watched, odds)) in self.watched.iter().zip(odds).enumerate() {
-            let quantity = watched.quantity;
             self.beliefs[i] = ComponentBelief {
                 p: (odds - total).exp().clamp(0.0, 1.0),
-                ..likeliest(self.bank.weighed(i), quantity)
+                ..likeliest(self.bank.weighed(i), watched.part)
             };
         }
         let is_suspect = |i: usize| odds[i] > SUSPECT_LOG_ODDS;
-        let drives = (0..n).any(|i| self.watched[i].quantity.is_none() && is_suspect(i));
+        let shared = (0..n).any(|i| self.watched[i].part.quantity().is_none() && is_suspect(i));
         let channels_of = self.bank.components().enumerate();
         self.suspects = channels_of
-            .filter(|&(_, component)| drives || unknown > SUSPECT_LOG_ODDS || is_suspect(component))
+            .filter(|&(_, component)| shared || unknown > SUSPECT_LOG_ODDS || is_suspect(component))
             .fold(0, |bits, (channel, _)| bits | 1 << channel);
         let prior = self.prior_log_odds;
         self.report.log_odds = (total + prior).max(IMPOSSIBLE);
@@ -344,29 +390,21 @@ fn laws(model: &Model, places: &[usize]) -> Option<Laws> {
     })
 }
 
-/// Kind behind a place of a component's faults.
-fn kind(quantity: Option<Quantity>, place: usize) -> Option<FaultKind> {
-    match quantity {
-        Some(_) => SENSOR_KINDS.get(place).copied(),
-        None => DRIVE_KINDS.get(place).copied(),
-    }
-}
-
 /// The most probable kind of a component's fault.
-fn likeliest(weighed: &[Weighed; KINDS_MAX], quantity: Option<Quantity>) -> ComponentBelief {
+fn likeliest(weighed: &[Weighed; KINDS_MAX], part: Part) -> ComponentBelief {
     let mut best = 0;
     for k in 1..KINDS_MAX {
         if weighed[k].log_ratio > weighed[best].log_ratio {
             best = k;
         }
     }
-    let Some(kind) = kind(quantity, best) else {
+    let Some(kind) = part.kind(best) else {
         return NO_BELIEF;
     };
     ComponentBelief {
         p: 0.0,
         kind,
-        size_kind: kind.size_kind(quantity),
+        size_kind: kind.size_kind(part.quantity()),
         size: weighed[best].size,
         size_sd: weighed[best].size_sd,
         age_s: weighed[best].age_s,

@@ -145,6 +145,8 @@ pub struct Observer {
     started: bool,
     run_id: u64,
     t_ns: u64,
+    /// Time since the run began, s.
+    run_s: f64,
     reset_count: u32,
     elapsed_s: f64,
     command: [Mean; AXES],
@@ -167,6 +169,7 @@ impl Observer {
             started: false,
             run_id: 0,
             t_ns: 0,
+            run_s: 0.0,
             reset_count: 0,
             elapsed_s: 0.0,
             command: [Mean::default(); AXES],
@@ -205,7 +208,11 @@ impl Observer {
         } else {
             t_ns.saturating_sub(self.t_ns) as f64 * 1e-9
         };
-        let broken = new_run || is_stale || dt_s > GAP_S.max(2.0 * self.robot.interval_s);
+        self.run_s = if new_run { 0.0 } else { self.run_s + dt_s };
+        // What is measured before sensors have settled is as good as lost.
+        let is_cold = self.run_s < self.robot.warm_up_s;
+        let lost = is_stale || dt_s > GAP_S.max(2.0 * self.robot.interval_s);
+        let broken = new_run || is_cold || lost;
         self.stale = 0;
         if broken {
             self.history.clear();

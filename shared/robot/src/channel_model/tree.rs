@@ -19,16 +19,22 @@ pub fn tree(robot: &Description) -> Result<FaultTree, TreeError> {
         fault: None,
     }];
     for component in &components {
-        if !nodes.iter().any(|node| node.name == component.group) {
+        let Some(group) = &component.group else {
+            continue;
+        };
+        if !nodes.iter().any(|node| node.name == *group) {
             nodes.push(Node {
-                name: component.group.clone(),
+                name: group.clone(),
                 parent: None,
                 fault: None,
             });
         }
     }
     let groups = nodes.clone();
-    let parent = |of: &Component| groups.iter().position(|node| node.name == of.group);
+    let parent = |of: &Component| {
+        let group = of.group.as_ref()?;
+        groups.iter().position(|node| node.name == *group)
+    };
     nodes.extend(components.iter().map(|component| Node {
         name: component.name.clone(),
         parent: parent(component),

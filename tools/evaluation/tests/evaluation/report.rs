@@ -41,6 +41,7 @@ fn case(run: u32, truth: &str, mode: &str, since_s: f64, p: f64) -> Case {
             command_curvature_1_m: 0.0,
             command_speed_m_s: 0.2,
             duration_s: 15.0,
+            group: String::new(),
         },
         verdicts: verdicts.collect(),
     }

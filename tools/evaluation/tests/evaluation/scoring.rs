@@ -21,6 +21,7 @@ fn label(run: u32, mode: &str, kind: &str, onset_s: Option<f64>) -> Label {
         command_curvature_1_m: 0.0,
         command_speed_m_s: 0.2,
         duration_s: 15.0,
+        group: String::new(),
     }
 }
 

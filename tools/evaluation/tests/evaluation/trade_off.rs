@@ -26,6 +26,7 @@ fn case(run: u32, mode: &str, onset_s: Option<f64>, end_s: f64, log_odds: &[(f64
             command_curvature_1_m: 0.0,
             command_speed_m_s: 0.2,
             duration_s: end_s,
+            group: String::new(),
         },
         verdicts: verdicts.collect(),
     }

@@ -34,8 +34,8 @@ pub struct Args {
     /// Recorded frames (CSV, plain or gzip).
     #[arg(long, value_name = "F", required_unless_present = "show")]
     frames: Option<PathBuf>,
-    /// Labels of the runs (CSV). Without them every run counts as healthy, and the model knows no
-    /// faults.
+    /// Labels of the runs (CSV). Without them every run counts as healthy. A model of channels
+    /// learns from them how the faults show that the description declares.
     #[arg(long, value_name = "R")]
     runs: Option<PathBuf>,
     /// Frames of healthy runs (CSV) from which a model with faults also learns yaw rate and motor
@@ -68,6 +68,18 @@ pub struct Args {
     /// Seed of the split.
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed())]
     seed: u64,
+    /// Diagnose each group of runs by a model learned from the others, and score that. Only a model
+    /// of channels.
+    #[arg(long, requires = "runs")]
+    cross_validate: bool,
+    /// Mean time between false alarms, h, to cross-validate with.
+    #[arg(
+        long,
+        value_name = "H",
+        requires = "cross_validate",
+        default_value_t = detect::Settings::default().false_alarm_interval_h
+    )]
+    false_alarm_interval: f64,
     #[command(flatten)]
     robot: RobotArgs,
     /// Print the report, or the model shown, as one JSON document.
@@ -150,19 +162,14 @@ fn print_view<V: Serialize + Display>(
 fn learn(args: &Args, frames_file: &Path, out: &Path) -> Result<Outcome, CommandError> {
     check_place("--out", out)?;
     let robot = args.robot.load()?;
-    let Some(labels_file) = &args.runs else {
+    let Some(labels_file) = args.runs.as_ref().filter(|_| robot.has_fault_models()) else {
         if robot.has_fault_models() {
             let refused = "--runs is needed: the faults of this kind of robot are learned too, and \
                            without labels faulty runs would count as healthy";
             return Err(CommandError::usage(refused));
         }
-        return unlabelled(args, frames_file, out, &robot);
+        return channels(args, frames_file, out, &robot);
     };
-    if !robot.has_fault_models() {
-        let refused = "--runs: faults are learned for an ackermann6 only; leave the labels out, \
-                       and the faulty runs too (--only)";
-        return Err(CommandError::usage(refused));
-    }
     let labels = labels::read(labels_file, &robot).map_err(CommandError::usage)?;
     let runs = frames::read(frames_file, &robot).map_err(CommandError::usage)?;
     warn_slow(&runs, &labels, frames_file, &robot);
@@ -249,8 +256,8 @@ fn learn_further(
         .map_err(|error| CommandError::usage(format!("{}: {error}", file.display())))
 }
 
-/// Learns from runs without labels.
-fn unlabelled(
+/// Learns a model of channels.
+fn channels(
     args: &Args,
     frames_file: &Path,
     out: &Path,
@@ -265,6 +272,10 @@ fn unlabelled(
     if !args.only.is_empty() {
         runs.retain(|run| args.only.contains(&run.id));
     }
+    let labels = match &args.runs {
+        Some(file) => Some(labels::read(file, robot).map_err(CommandError::usage)?),
+        None => None,
+    };
     learn_channels::run(&learn_channels::Task {
         robot,
         runs: &runs,
@@ -273,7 +284,9 @@ fn unlabelled(
         test_fraction: args.test_fraction,
         seed: args.seed,
         until_s: args.until.unwrap_or(f64::INFINITY),
+        cross_validate: args.cross_validate.then_some(args.false_alarm_interval),
         json: args.json,
+        labels: labels.as_deref(),
     })
 }
 

@@ -1,14 +1,19 @@
-//! `vigil learn` without labels: a model of the channels of any described robot.
+//! `vigil learn` for any described robot: a model of its channels.
 
 use std::path::Path;
 
 use serde::Serialize;
-use vigil_learning::channel_learning::{self, Report};
+use vigil_blocks::SensorFrame;
+use vigil_evaluation::scoring::Score;
+use vigil_learning::channel_learning::{self, LabelledRun, Report};
 use vigil_learning::split::split_runs;
 use vigil_recording::frames::Run;
+use vigil_recording::labels::Label;
 use vigil_robot::Description;
+use vigil_robot::channel_model::Model;
 use vigil_robot::learned::model::Provenance;
 
+use super::cross_validation;
 use super::files::{file_name, write_whole};
 use vigil_terminal::output;
 use vigil_terminal::{CommandError, Outcome};
@@ -20,8 +25,10 @@ const RUNS_TO_SPLIT: usize = 6;
 pub(super) struct Task<'a> {
     /// The robot.
     pub robot: &'a Description,
-    /// Runs, all without a fault.
+    /// Runs; without labels all count as healthy.
     pub runs: &'a [Run],
+    /// Labels of the runs.
+    pub labels: Option<&'a [Label]>,
     /// Frames file, for messages.
     pub frames: &'a Path,
     /// Where to write the model.
@@ -32,6 +39,9 @@ pub(super) struct Task<'a> {
     pub seed: u64,
     /// End of what is learned from in each run, s.
     pub until_s: f64,
+    /// Mean time between false alarms, h, with which to cross-validate; none if that was not asked
+    /// for.
+    pub cross_validate: Option<f64>,
     /// Print JSON.
     pub json: bool,
 }
@@ -44,6 +54,8 @@ struct Document<'a> {
     #[serde(flatten)]
     report: &'a Report,
     held_out_run_ids: &'a [u32],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cross_validation: Option<&'a Score>,
 }
 
 /// Writes the model and says how well it holds.
@@ -56,9 +68,7 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
         true => Vec::new(),
         false => split_runs(&ids, task.test_fraction, task.seed),
     };
-    let (mut model, report) =
-        channel_learning::learn(task.runs, &held_out, task.until_s, task.robot)
-            .map_err(|error| CommandError::usage(format!("{}: {error}", task.frames.display())))?;
+    let (mut model, report) = learn(task, &held_out)?;
     model.provenance = Provenance {
         frames_file: file_name(task.frames),
         seed: task.seed,
@@ -72,6 +82,12 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
     for warning in &report.warnings {
         eprintln!("warning: {warning}");
     }
+    let score = match (task.cross_validate, task.labels) {
+        (Some(interval_h), Some(labels)) => {
+            Some(cross_validation::score(task, labels, interval_h)?)
+        }
+        _ => None,
+    };
     let printed = if task.json {
         output::json(&Document {
             schema_version: 1,
@@ -79,10 +95,83 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
             model_hash: format!("{:016x}", model.hash()),
             report: &report,
             held_out_run_ids: &model.provenance.runs_held_out,
+            cross_validation: score.as_ref(),
         })
     } else {
-        output::line(&format!("model {}\n{report}", task.out.display()))
+        let validated = score.map_or_else(String::new, |score| {
+            format!("\neach group diagnosed by what the others show\n{score}")
+        });
+        output::line(&format!(
+            "model {}\n{report}{validated}",
+            task.out.display()
+        ))
     };
     printed.map_err(CommandError::failure)?;
     Ok(Outcome::Done)
+}
+
+/// Learns from the runs that are not held out.
+pub(super) fn learn(task: &Task<'_>, held_out: &[u32]) -> Result<(Model, Report), CommandError> {
+    let labels = labels(task)?;
+    let healthy: Vec<Run> = task.runs.iter().map(|run| healthy(run, &labels)).collect();
+    let is_learned = |label: &LabelledRun<'_>| !held_out.contains(&label.run.id);
+    let labelled: Vec<LabelledRun<'_>> = labels.into_iter().filter(is_learned).collect();
+    channel_learning::learn(&healthy, held_out, task.until_s, task.robot, &labelled)
+        .map_err(|error| CommandError::usage(format!("{}: {error}", task.frames.display())))
+}
+
+/// The runs with a fault.
+fn labels<'a>(task: &Task<'a>) -> Result<Vec<LabelledRun<'a>>, CommandError> {
+    let Some(labels) = task.labels else {
+        return Ok(Vec::new());
+    };
+    let mut found = Vec::new();
+    for run in task.runs {
+        let id = run.id;
+        let Some(label) = labels.iter().find(|label| label.run == id) else {
+            let message = format!("there is no label of run {id}");
+            return Err(CommandError::usage(message));
+        };
+        let Some(onset_s) = label.onset_s else {
+            continue;
+        };
+        if !task
+            .robot
+            .fault
+            .iter()
+            .any(|fault| fault.name == label.mode)
+        {
+            let declared = task.robot.fault.iter().map(|fault| fault.name.as_str());
+            let declared: Vec<&str> = declared.collect();
+            let message = format!(
+                "run {id} has the mode '{}', which is no [[fault]] of {}: it declares {}",
+                label.mode,
+                task.robot.name,
+                if declared.is_empty() {
+                    "none".to_owned()
+                } else {
+                    declared.join(", ")
+                }
+            );
+            return Err(CommandError::usage(message));
+        }
+        found.push(LabelledRun {
+            run,
+            fault: &label.mode,
+            onset_s,
+            group: &label.group,
+        });
+    }
+    Ok(found)
+}
+
+/// A run up to its fault.
+fn healthy(run: &Run, labels: &[LabelledRun<'_>]) -> Run {
+    let label = labels.iter().find(|label| label.run.id == run.id);
+    let until_s = label.map_or(f64::INFINITY, |label| label.onset_s);
+    let is_before = |frame: &&SensorFrame| (frame.header.t_capture_ns as f64) * 1e-9 < until_s;
+    Run {
+        id: run.id,
+        frames: run.frames.iter().take_while(is_before).copied().collect(),
+    }
 }

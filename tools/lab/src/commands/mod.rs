@@ -1,5 +1,6 @@
 //! The commands, one a module: each has its `Args` and a `run`.
 
+mod cross_validation;
 pub mod diagnose;
 pub mod evaluate;
 mod files;

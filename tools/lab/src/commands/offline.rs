@@ -70,6 +70,9 @@ pub struct FilterArgs {
     /// likelihood, or by a constant likelihood over windows.
     #[arg(long, value_name = "FORM", value_enum, default_value_t)]
     detector: Form,
+    /// Mean time between false alarms, h.
+    #[arg(long, value_name = "H", default_value_t = detect::Settings::default().false_alarm_interval_h)]
+    false_alarm_interval: f64,
     /// Identification filter.
     #[arg(long, value_name = "NAME", value_enum, default_value_t)]
     pub identifier: IdentifierFilter,
@@ -207,6 +210,7 @@ impl FilterArgs {
         let settings = detect::Settings {
             sensors: channels(sensors),
             form: self.detector,
+            false_alarm_interval_h: self.false_alarm_interval,
             ..detect::Settings::default()
         };
         let refuse = |error: &dyn std::fmt::Display| {

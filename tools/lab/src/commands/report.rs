@@ -57,5 +57,6 @@ fn unlabelled(run: u32) -> Label {
         command_curvature_1_m: f64::NAN,
         command_speed_m_s: f64::NAN,
         duration_s: f64::NAN,
+        group: String::new(),
     }
 }

@@ -3,9 +3,9 @@
 use vigil_robot::Description;
 use vigil_robot::channel_model::model::{Class, FAULT_RATE_1_H, Tail};
 use vigil_robot::channel_model::{Model, Monitor};
-use vigil_robot::learned::Form;
 use vigil_robot::learned::calibration::SLOPE_UNKNOWN;
 use vigil_robot::learned::channels::Channels;
+use vigil_robot::learned::{Calibration, Form};
 
 use super::joint::CONTEXT_BLOCKS;
 use super::record::Record;
@@ -28,31 +28,19 @@ pub(super) fn fit(
     let form = Form::LearnedBias;
     for channels in sets {
         let mut by_class = maxima(models, records, (robot, channels), Monitor::classes);
-        let fitted = Class::ALL.map(|class| {
-            let found = &mut by_class[class as usize];
-            let tail = found.high_tail(channels, form, FAULT_RATE_1_H);
-            (class, tail, found.highest())
-        });
-        // The same residuals feed all classes but that of noise, and few moments show their tail.
-        let shared = fitted.iter().filter(|(class, ..)| *class != Class::Noise);
-        let least = shared
-            .map(|(_, tail, _)| tail.tail_slope)
-            .fold(f64::INFINITY, f64::min);
-        let tails = fitted.map(|(class, mut found, highest)| {
-            if class != Class::Noise {
-                found.tail_slope = least;
-            }
-            let found = found.not_below(highest);
-            Tail {
-                sensors: found.sensors,
-                class,
-                level_log_odds: found.level_log_odds,
-                interval_h: found.interval_at_level_h,
-                slope: found.tail_slope,
-            }
-        });
-        for each in models.iter_mut().chain([&mut *model]) {
-            each.tail.extend(tails.iter().cloned());
+        let shows = robot.fault.iter().any(|fault| !fault.shows.is_empty());
+        let is_there = |class: &Class| *class != Class::Shift || shows;
+        let all = Class::ALL
+            .into_iter()
+            .filter(|class| *class != Class::Signature);
+        let tails = tails(all.filter(is_there), &mut by_class, (channels, form));
+        extend(model, models, &tails);
+        if !model.signatures.is_empty() {
+            // They are seen as live: what is suspected of the other classes is known.
+            let mut by_class = maxima(models, records, (robot, channels), Monitor::classes);
+            let signature = [Class::Signature].into_iter();
+            let tails = self::tails(signature, &mut by_class, (channels, form));
+            extend(model, models, &tails);
         }
         let of = |monitor: &Monitor| [monitor.report().log_odds];
         let [mut all] = maxima(models, records, (robot, channels), of);
@@ -64,6 +52,45 @@ pub(super) fn fit(
         }
         model.calibration.push(found.not_below(all.highest()));
     }
+}
+
+fn extend(model: &mut Model, models: &mut [Model], tails: &[Tail]) {
+    for each in models.iter_mut().chain([model]) {
+        each.tail.extend(tails.iter().cloned());
+    }
+}
+
+/// The tails of classes of faults. The same residuals feed all classes but that of noise, and few
+/// moments show their tail: they share the least slope.
+fn tails(
+    classes: impl Iterator<Item = Class>,
+    maxima: &mut [Maxima; Class::ALL.len()],
+    (channels, form): (Channels, Form),
+) -> Vec<Tail> {
+    let fitted = classes.map(|class| {
+        let found = &mut maxima[class as usize];
+        let tail = found.high_tail(channels, form, FAULT_RATE_1_H);
+        (class, tail, found.highest())
+    });
+    let fitted: Vec<_> = fitted.collect();
+    let shared = fitted.iter().filter(|(class, ..)| *class != Class::Noise);
+    let least = shared
+        .map(|(_, tail, _)| tail.tail_slope)
+        .fold(f64::INFINITY, f64::min);
+    let tail = |(class, mut found, highest): (Class, Calibration, f64)| {
+        if class != Class::Noise {
+            found.tail_slope = least;
+        }
+        let found = found.not_below(highest);
+        Tail {
+            sensors: found.sensors,
+            class,
+            level_log_odds: found.level_log_odds,
+            interval_h: found.interval_at_level_h,
+            slope: found.tail_slope,
+        }
+    };
+    fitted.into_iter().map(tail).collect()
 }
 
 /// Tells which slopes stand on a bound, or were not learned.

@@ -9,6 +9,7 @@ mod calibrate;
 mod coverage;
 mod excitation;
 mod joint;
+mod labelled;
 mod noise;
 mod record;
 mod regression;
@@ -22,6 +23,7 @@ use vigil_robot::Description;
 use vigil_robot::channel_model::channel::lags;
 use vigil_robot::channel_model::model::{KIND, VERSION};
 use vigil_robot::channel_model::scatter::Scatter;
+use vigil_robot::channel_model::signature::Signatures;
 use vigil_robot::channel_model::{
     Channel, Combinations, Model, Range, Scales, Target, Term, drives, targets,
 };
@@ -29,6 +31,7 @@ use vigil_robot::learned::model::Provenance;
 
 use crate::data_hash::data_hash;
 use crate::plausibility::{self, RunCheck, RunDoubt};
+pub use labelled::LabelledRun;
 use record::{FOLDS, Record};
 pub use report::{ChannelFit, Report};
 pub use view::View;
@@ -114,7 +117,8 @@ pub enum LogError {
     },
 }
 
-/// Learns a model from the runs that are not in `held_out`, up to `until_s` of each.
+/// Learns a model from the runs that are not in `held_out`, up to `until_s` of each; from runs of
+/// declared faults how these show.
 ///
 /// # Errors
 /// [`LogError`] naming what is missing.
@@ -123,6 +127,7 @@ pub fn learn(
     held_out: &[u32],
     until_s: f64,
     robot: &Description,
+    labelled: &[LabelledRun<'_>],
 ) -> Result<(Model, Report), LogError> {
     let (left_out, learned): (Vec<&Run>, Vec<&Run>) =
         runs.iter().partition(|run| held_out.contains(&run.id));
@@ -179,6 +184,11 @@ pub fn learn(
         part.direction.clone_from(&model.direction);
         part.scatter.clone_from(&model.scatter);
     }
+    let told = labelled::fit(&mut model, (&models, &records), labelled, (robot, &scales));
+    for part in &mut models {
+        part.signatures.clone_from(&model.signatures);
+    }
+    report.faults = told;
     calibrate::fit(&mut model, &mut models, &records, robot);
     calibrate::tell(&mut report.bounds, &model);
     report.finish(&model);
@@ -207,6 +217,7 @@ fn blank(
         channel: Vec::new(),
         direction: Vec::new(),
         scatter: Scatter::default(),
+        signatures: Signatures::default(),
         tail: Vec::new(),
         calibration: Vec::new(),
     }

@@ -36,6 +36,8 @@ pub struct Report {
     pub exposure_s: f64,
     /// Channels.
     pub channels: Vec<ChannelFit>,
+    /// What labelled runs show of each declared fault.
+    pub faults: Vec<String>,
     /// What the user must know.
     pub warnings: Vec<String>,
     /// Numbers of the model that stand on a bound set by hand.
@@ -78,6 +80,7 @@ impl Report {
             runs_held_out,
             exposure_s: model.exposure_s,
             channels: Vec::new(),
+            faults: Vec::new(),
             warnings,
             bounds: Bounds::default(),
         }
@@ -156,6 +159,9 @@ impl fmt::Display for Report {
                 channel.usual,
                 channel.held_out_ratio
             )?;
+        }
+        for fault in &self.faults {
+            writeln!(f, "{fault}")?;
         }
         let lines = self.bounds.lines();
         if !lines.is_empty() {

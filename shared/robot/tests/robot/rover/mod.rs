@@ -21,6 +21,8 @@ pub fn rover() -> Description {
         mass_kg: 14.2,
         command: Vec::new(),
         channel: Vec::new(),
+        fault: Vec::new(),
+        warm_up_s: 0.0,
         measured: vigil_robot::description::MeasuredChannels::default(),
         polynomial_order: 4,
         interval_s: 0.1,

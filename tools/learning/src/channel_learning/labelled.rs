@@ -1,0 +1,340 @@
+//! Signatures of declared faults from labelled runs.
+//!
+//! A fault's mean is that of its runs' means in each phase of its age: a long run counts no more
+//! than a short one. Its covariance lies between that of health and that of its own runs; the fewer
+//! these are, the nearer to health. A signature is kept if it finds at least half of the fault's
+//! runs without having seen the group that they are of, so one of a single group never is.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+use vigil_recording::frames::Run;
+use vigil_robot::Description;
+use vigil_robot::channel_model::channel::commands;
+use vigil_robot::channel_model::law::BLOCKS;
+use vigil_robot::channel_model::signature::{
+    Evidence, MEANS_MAX, Means, Phase, Signature, Signatures, means,
+};
+use vigil_robot::channel_model::window::Window;
+use vigil_robot::channel_model::{Model, Scales};
+
+use super::joint::CONTEXT_BLOCKS;
+use super::record::{self, Record};
+
+/// Ages of a fault, s, over which it looks alike: it has hardly begun, it grows, it stands, and
+/// controllers answer it. Chosen: the last ends where the robot is no longer the one that was
+/// commanded before the fault.
+const PHASES_S: [[f64; 2]; 4] = [[0.25, 1.0], [1.0, 2.0], [2.0, 4.0], [4.0, 9.0]];
+/// Share of the runs' own covariance for many runs, and the number of runs for half of that.
+const OWN_SHARE: f64 = 0.5;
+const OWN_RUNS: f64 = 3.0;
+/// Part of a covariance that is taken for independent.
+const INDEPENDENT: f64 = 0.3;
+/// A run is found if its evidence exceeds this, nats, and the highest in health by a factor, within
+/// a time after the onset.
+const FOUND: f64 = 5.0;
+const FOUND_RATIO: f64 = 1.2;
+const FOUND_S: f64 = 10.0;
+/// Smallest deviation of a mean.
+const SD_MIN: f64 = 1e-3;
+
+/// A run with a declared fault.
+#[derive(Debug, Clone)]
+pub struct LabelledRun<'a> {
+    /// Its frames, from before the onset on.
+    pub run: &'a Run,
+    /// Name of the fault.
+    pub fault: &'a str,
+    /// Onset, s.
+    pub onset_s: f64,
+    /// Runs of one group resemble each other beyond the fault: one day, one recording.
+    pub group: &'a str,
+}
+
+/// Means since the onset of a run.
+struct Sample<'a> {
+    label: &'a LabelledRun<'a>,
+    /// Age, s, and length of the observation, s.
+    ages: Vec<[f64; 2]>,
+    means: Vec<Means>,
+}
+
+/// Fits the signatures of `model`, whose joint law is fitted. Says of each declared fault what came
+/// of it.
+pub(super) fn fit(
+    model: &mut Model,
+    (models, records): (&[Model], &[Record]),
+    labelled: &[LabelledRun<'_>],
+    (robot, scales): (&Description, &Scales),
+) -> Vec<String> {
+    if labelled.is_empty() {
+        return Vec::new();
+    }
+    let healthy = healthy_means(models, records, scales);
+    let n = MEANS_MAX / vigil_robot::channel_model::CHANNELS_MAX * model.channel.len();
+    let Some((mean, covariance)) = moments(&healthy, n) else {
+        return Vec::new();
+    };
+    let sd: Vec<f64> = (0..n)
+        .map(|i| covariance[(i, i)].sqrt().max(SD_MIN))
+        .collect();
+    model.signatures = Signatures {
+        mean: mean.iter().copied().collect(),
+        sd: sd.clone(),
+        fault: Vec::new(),
+    };
+    let health = Health {
+        correlation: DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (sd[i] * sd[j])),
+        records: healthy_records(&healthy, &model.signatures),
+    };
+    let samples = samples(model, labelled, (robot, scales));
+    let mut told = Vec::new();
+    for fault in &robot.fault {
+        let of_fault = samples.iter().filter(|one| one.label.fault == fault.name);
+        let runs: Vec<&Sample<'_>> = of_fault.collect();
+        if runs.is_empty() {
+            continue;
+        }
+        let found = found(&health, &fault.name, &runs);
+        let groups: Vec<&str> = runs.iter().map(|run| run.label.group).collect();
+        let all = runs.len();
+        told.push(format!(
+            "{}: {found} of {all} runs found by what the others of their kind showed",
+            fault.name
+        ));
+        let single = groups.iter().all(|group| *group == groups[0]);
+        if !single && 2 * found >= all {
+            model
+                .signatures
+                .fault
+                .extend(health.signature(&fault.name, &runs));
+        }
+    }
+    if model.signatures.is_empty() {
+        model.signatures = Signatures::default();
+    }
+    told
+}
+
+/// The means of a healthy robot, in each run.
+struct HealthyRun {
+    dt_s: Vec<f64>,
+    means: Vec<Means>,
+}
+
+struct Health {
+    /// Correlation of the standardized means.
+    correlation: DMatrix<f64>,
+    /// Standardized means.
+    records: Vec<HealthyRun>,
+}
+
+/// Each part of the log seen through the model that has not seen it.
+fn healthy_means(models: &[Model], records: &[Record], scales: &Scales) -> Vec<HealthyRun> {
+    let mut out = Vec::new();
+    for (fold, model) in models.iter().enumerate() {
+        let n = model.channel.len();
+        let used = model.channel.iter().cloned().enumerate().collect();
+        let mut window = Window::new(used, scales.clone(), model.interval_s);
+        let ahead = CONTEXT_BLOCKS * window.per_block();
+        for record in records {
+            window.reset();
+            let mut run = HealthyRun {
+                dt_s: Vec::new(),
+                means: Vec::new(),
+            };
+            for (k, history) in record.histories.iter().enumerate() {
+                let last = (k + ahead).min(record.folds.len() - 1);
+                let is_near = record.folds[k..=last].contains(&fold);
+                let Some(now) = history.ago(0).filter(|_| is_near) else {
+                    window.reset();
+                    continue;
+                };
+                if history.ago(scales.lags).is_none() {
+                    window.clear();
+                    continue;
+                }
+                window.push(history, &commands(history), (model.widening(history), 0));
+                if record.folds[k] == fold && now.moving && window.whole_blocks() == BLOCKS {
+                    run.dt_s.push(now.dt_s);
+                    run.means.push(means(&window, n));
+                }
+            }
+            if !run.means.is_empty() {
+                out.push(run);
+            }
+        }
+    }
+    out
+}
+
+fn healthy_records(healthy: &[HealthyRun], signatures: &Signatures) -> Vec<HealthyRun> {
+    let standardized = |run: &HealthyRun| HealthyRun {
+        dt_s: run.dt_s.clone(),
+        means: run
+            .means
+            .iter()
+            .map(|m| signatures.standardized(m))
+            .collect(),
+    };
+    healthy.iter().map(standardized).collect()
+}
+
+/// Mean and covariance of the first `n` means.
+fn moments(runs: &[HealthyRun], n: usize) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let all = || runs.iter().flat_map(|run| &run.means);
+    let count = all().count();
+    (count > n).then(|| {
+        let part = 1.0 / count as f64;
+        let mut mean = DVector::zeros(n);
+        all().for_each(|m| mean += part * vector(m, n));
+        let mut covariance = DMatrix::zeros(n, n);
+        for m in all() {
+            let apart = vector(m, n) - &mean;
+            covariance.ger(part, &apart, &apart, 1.0);
+        }
+        (mean, covariance)
+    })
+}
+
+fn vector(means: &Means, n: usize) -> DVector<f64> {
+    DVector::from_column_slice(&means[..n])
+}
+
+/// The labelled runs through the model of health.
+fn samples<'a>(
+    model: &Model,
+    labelled: &'a [LabelledRun<'a>],
+    (robot, scales): (&Description, &Scales),
+) -> Vec<Sample<'a>> {
+    let n = model.channel.len();
+    let used = model.channel.iter().cloned().enumerate().collect();
+    let mut window = Window::new(used, scales.clone(), model.interval_s);
+    let mut sample = |label: &'a LabelledRun<'a>| {
+        let mut out = Sample {
+            label,
+            ages: Vec::new(),
+            means: Vec::new(),
+        };
+        window.reset();
+        let until_s = label.onset_s + FOUND_S;
+        for record in record::all(&[label.run], until_s, robot) {
+            for history in &record.histories {
+                let Some(now) = history.ago(0) else { continue };
+                if history.ago(scales.lags).is_none() {
+                    window.clear();
+                    continue;
+                }
+                window.push(history, &commands(history), (model.widening(history), 0));
+                let age_s = now.t_ns as f64 * 1e-9 - label.onset_s;
+                if age_s >= 0.0 && window.whole_blocks() == BLOCKS {
+                    out.ages.push([age_s, now.dt_s]);
+                    let found = means(&window, n);
+                    out.means.push(model.signatures.standardized(&found));
+                }
+            }
+        }
+        out
+    };
+    labelled.iter().map(&mut sample).collect()
+}
+
+impl Health {
+    /// The signature that these runs show; none if they show no phase.
+    fn signature(&self, fault: &str, runs: &[&Sample<'_>]) -> Option<Signature> {
+        let n = self.correlation.nrows();
+        let mut spread = DMatrix::zeros(n, n);
+        let (mut phases, mut count) = (Vec::new(), 0.0);
+        for [from, to] in PHASES_S {
+            let in_phase = |run: &&Sample<'_>| {
+                let ages = run.ages.iter().zip(&run.means);
+                let within = ages.filter(|([age, _], _)| (from..to).contains(age));
+                within.map(|(_, m)| vector(m, n)).collect::<Vec<_>>()
+            };
+            let found: Vec<Vec<DVector<f64>>> = runs
+                .iter()
+                .map(in_phase)
+                .filter(|found| !found.is_empty())
+                .collect();
+            if found.is_empty() {
+                continue;
+            }
+            let mean_of = |all: &Vec<DVector<f64>>| {
+                let sum = all.iter().fold(DVector::zeros(n), |sum, one| sum + one);
+                sum / all.len() as f64
+            };
+            let means = found.iter().map(mean_of);
+            let mean = means.fold(DVector::zeros(n), |sum, one| sum + one) / found.len() as f64;
+            for one in found.iter().flatten() {
+                let apart = one - &mean;
+                spread.ger(1.0, &apart, &apart, 1.0);
+                count += 1.0;
+            }
+            phases.push(mean);
+        }
+        let runs_count = runs.len() as f64;
+        let own = OWN_SHARE * runs_count / (runs_count + OWN_RUNS);
+        let mixed = (1.0 - own) * &self.correlation + own / f64::max(count, 1.0) * spread;
+        let diagonal = DMatrix::from_diagonal(&mixed.diagonal());
+        let inverse = ((1.0 - INDEPENDENT) * mixed + INDEPENDENT * diagonal).cholesky()?;
+        let phase = |mean: DVector<f64>| {
+            let weights = inverse.solve(&mean);
+            Phase {
+                offset: 0.5 * weights.dot(&mean),
+                weights: weights.iter().copied().collect(),
+            }
+        };
+        let phase: Vec<Phase> = phases.into_iter().map(phase).collect();
+        (!phase.is_empty()).then(|| Signature {
+            fault: fault.to_owned(),
+            runs: runs.len(),
+            phase,
+        })
+    }
+
+    /// The highest evidence that a signature has without a fault.
+    fn highest(&self, signature: &Signature) -> f64 {
+        let of_run = |run: &HealthyRun| {
+            let observations = run.dt_s.iter().zip(&run.means);
+            highest(signature, observations.map(|(dt_s, m)| (*dt_s, m)))
+        };
+        self.records.iter().map(of_run).fold(0.0, f64::max)
+    }
+}
+
+/// The highest evidence over successive means, each of an observation of so many seconds.
+fn highest<'a>(signature: &Signature, means: impl Iterator<Item = (f64, &'a Means)>) -> f64 {
+    let mut evidence = Evidence::default();
+    let step = |(dt_s, means): (f64, &Means)| {
+        evidence.take(signature.log_ratio(means), dt_s);
+        evidence.log_ratio()
+    };
+    means.map(step).fold(0.0, f64::max)
+}
+
+/// How many of a fault's runs are found by the signature that the other groups show.
+fn found(health: &Health, fault: &str, runs: &[&Sample<'_>]) -> usize {
+    let mut by_group: BTreeMap<&str, Vec<&Sample<'_>>> = BTreeMap::new();
+    for run in runs {
+        by_group.entry(run.label.group).or_default().push(run);
+    }
+    let mut found = 0;
+    for (group, left_out) in &by_group {
+        let others: Vec<&Sample<'_>> = runs
+            .iter()
+            .filter(|run| run.label.group != *group)
+            .copied()
+            .collect();
+        let signature = health.signature(fault, &others);
+        let Some(signature) = signature.filter(|_| !others.is_empty()) else {
+            continue;
+        };
+        let threshold = FOUND.max(FOUND_RATIO * health.highest(&signature));
+        let is_found = |run: &&&Sample<'_>| {
+            let observations = run.ages.iter().zip(&run.means);
+            highest(&signature, observations.map(|([_, dt_s], m)| (*dt_s, m))) > threshold
+        };
+        found += left_out.iter().filter(is_found).count();
+    }
+    found
+}
