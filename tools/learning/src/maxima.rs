@@ -45,6 +45,12 @@ impl Maxima {
         self.found.len() as f64 * WINDOW_S
     }
 
+    /// True if they are not all the same.
+    pub fn vary(&self) -> bool {
+        let lowest = self.found.iter().copied().fold(f64::INFINITY, f64::min);
+        self.highest() > lowest
+    }
+
     /// Highest of all; -inf if there is none.
     pub fn highest(&self) -> f64 {
         self.found.iter().copied().fold(f64::NEG_INFINITY, f64::max)

@@ -191,6 +191,12 @@ impl Bank {
         &self.weighed[component]
     }
 
+    /// The declared faults.
+    #[must_use]
+    pub const fn declared(&self) -> &DeclaredFaults {
+        &self.declared
+    }
+
     /// What is said of faults that are none of these.
     #[must_use]
     pub const fn unknown(&self) -> f64 {

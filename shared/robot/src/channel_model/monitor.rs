@@ -34,6 +34,8 @@ use crate::slot::{SLOTS, Slot};
 const BLOCKS_MIN: usize = 2;
 /// Observed motion after which evidence counts, s.
 const READY_S: f64 = 1.0;
+/// How much more frequent a fault with labelled runs is than any other. Chosen.
+const RECORDED: f64 = 10.0;
 /// Log-odds of a component from which on it may be broken.
 const SUSPECT_LOG_ODDS: f64 = -2.0;
 
@@ -321,6 +323,11 @@ impl Monitor {
             let (tempered, slope) = tail
                 .as_ref()
                 .map_or((total, 1.0), |tail| (tail.tempered(total), tail.slope));
+            // A fault of which there are recordings does occur.
+            let tempered = match class == Class::Signature as usize {
+                true => tempered + RECORDED.ln(),
+                false => tempered,
+            };
             // The likelihoods tell the components apart no better than health from faults.
             let sharpened = all.map(|value| slope * (value - total));
             let none = slope * (of_none - total);
@@ -330,7 +337,31 @@ impl Monitor {
                 *slot = log_add(*slot, tempered + value - sharpened_total);
             }
         }
+        self.divide_declared(&raw, &mut odds);
         self.report_odds(&odds, odds_unknown);
+    }
+
+    /// Divides what speaks for the declared faults among them by all that is known of each: how
+    /// rarely a class says so much without a fault is no measure of which one it is.
+    fn divide_declared(
+        &self,
+        raw: &[[f64; Class::ALL.len()]; COMPONENTS_MAX],
+        odds: &mut [f64; COMPONENTS_MAX],
+    ) {
+        let n = self.watched.len();
+        let first = n - self.bank.declared().len();
+        let classes = [Class::Shift as usize, Class::Signature as usize];
+        let slopes = classes.map(|class| self.tails[class].as_ref().map_or(1.0, |tail| tail.slope));
+        let slope = 0.5 * (slopes[0] + slopes[1]);
+        let total = log_sum_exp(&odds[first..n]);
+        let mut shares = [IMPOSSIBLE; DECLARED_MAX];
+        for (share, raw) in shares.iter_mut().zip(&raw[first..n]) {
+            *share = slope * log_sum_exp(&classes.map(|class| raw[class]));
+        }
+        let sum = log_sum_exp(&shares[..n - first]);
+        for (odds, share) in odds[first..n].iter_mut().zip(shares) {
+            *odds = total + share - sum;
+        }
     }
 
     fn report_odds(&mut self, odds: &[f64; COMPONENTS_MAX], unknown: f64) {

@@ -1,6 +1,6 @@
 //! What labelled runs showed of a declared fault, and how much the last seconds look like it.
 //!
-//! The whitened residuals of each channel are averaged over the last 0.5, 1 and 4 s. A fault that
+//! The whitened residuals of each channel are averaged over the last 0.5, 2 and 4 s. A fault that
 //! has begun moves these means in a way that changes with its age, so a signature has a few phases.
 //! The evidence of a phase is linear in the means `v`, `w·v - c`, with `w = C⁻¹μ` and `c = ½ μᵀC⁻¹μ`
 //! for its mean `μ` and a covariance `C` (Fisher's discriminant): the log-likelihood ratio of two
@@ -15,7 +15,7 @@ use super::window::Window;
 use crate::fault_table::DECLARED_MAX;
 
 /// Newest blocks that each mean spans.
-const SPANS: [usize; 3] = [1, 2, BLOCKS];
+const SPANS: [usize; 3] = [1, BLOCKS / 2, BLOCKS];
 /// Means of all channels at most.
 pub const MEANS_MAX: usize = SPANS.len() * CHANNELS_MAX;
 /// Phases of a signature at most.

@@ -61,13 +61,16 @@ fn extend(model: &mut Model, models: &mut [Model], tails: &[Tail]) {
 }
 
 /// The tails of classes of faults. The same residuals feed all classes but that of noise, and few
-/// moments show their tail: they share the least slope.
+/// moments show their tail: they share the least slope. A class that nothing tells of this robot,
+/// as a delay without a command, has none.
 fn tails(
     classes: impl Iterator<Item = Class>,
     maxima: &mut [Maxima; Class::ALL.len()],
     (channels, form): (Channels, Form),
 ) -> Vec<Tail> {
-    let fitted = classes.map(|class| {
+    let told = classes.filter(|class| maxima[*class as usize].vary());
+    let told: Vec<Class> = told.collect();
+    let fitted = told.into_iter().map(|class| {
         let found = &mut maxima[class as usize];
         let tail = found.high_tail(channels, form, FAULT_RATE_1_H);
         (class, tail, found.highest())

@@ -29,7 +29,7 @@ const PHASES_S: [[f64; 2]; 4] = [[0.25, 1.0], [1.0, 2.0], [2.0, 4.0], [4.0, 9.0]
 const OWN_SHARE: f64 = 0.5;
 const OWN_RUNS: f64 = 3.0;
 /// Part of a covariance that is taken for independent.
-const INDEPENDENT: f64 = 0.3;
+const INDEPENDENT: f64 = 0.1;
 /// A run is found if its evidence exceeds this, nats, and the highest in health by a factor, within
 /// a time after the onset.
 const FOUND: f64 = 5.0;
