@@ -188,7 +188,7 @@ pub fn score(cases: &[Case], taxonomy: &Taxonomy, alarm_log_odds: f64) -> Score 
     for case in cases {
         let kind = match case.label.kind.as_str() {
             _ if case.label.is_nominal() => "nominal",
-            "" => "unnamed",
+            "" => taxonomy.class(&case.label.mode).unwrap_or("unnamed"),
             kind => kind,
         };
         *runs.entry(kind.to_owned()).or_default() += 1;

@@ -30,7 +30,8 @@ struct Node {
     parent: Option<usize>,
     /// Common side of all leaves below.
     side: Option<Side>,
-    /// Common type of all leaves below: the first word of the fault, `stuck` or `encoder`.
+    /// Common type of all leaves below: the first word of the fault, `stuck` or `encoder`; a
+    /// declared fault is a type of its own.
     class: Option<String>,
     is_leaf: bool,
 }
@@ -45,7 +46,9 @@ impl Taxonomy {
             .map(|node| {
                 let mut words = node.fault.as_deref().unwrap_or("").split(':');
                 let class = words.next().filter(|word| !word.is_empty());
-                let wheel = words.next().and_then(|name| robot.wheel_index(name));
+                let of = words.next();
+                let class = if class == Some("fault") { of } else { class };
+                let wheel = of.and_then(|name| robot.wheel_index(name));
                 Node {
                     name: node.name.clone(),
                     parent: node.parent,
