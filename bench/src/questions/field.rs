@@ -14,7 +14,8 @@ use vigil_bench::field::{
     self, File, Graph, Job, Library, Outcome, Scenario, ScoredRun, barred_lines, document, jobs,
     library, lines, select,
 };
-use vigil_bench::{in_parallel, machine, root};
+use vigil_bench::{machine, root};
+use vigil_evaluation::parallel::in_parallel;
 
 /// Does the diagnosis hold in the field?
 #[derive(Debug, clap::Args)]

@@ -8,9 +8,9 @@ use std::time::Instant;
 
 use serde_json::json;
 use vigil_bench::archive::Archive;
-use vigil_bench::in_parallel;
 use vigil_bench::machine;
 use vigil_bench::missions::{self, Mission, Plan, ShippedGraph};
+use vigil_evaluation::parallel::in_parallel;
 
 /// Missions between two lines of progress.
 const PROGRESS: usize = 25;

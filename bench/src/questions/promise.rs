@@ -10,8 +10,9 @@ use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
 use vigil_bench::field::{self, Detected, File, Graph, Library, MISSED_S, Scenario, select};
 use vigil_bench::null_drive::{Declared, Law};
-use vigil_bench::{in_parallel, load, quantile, root};
+use vigil_bench::{load, quantile, root};
 use vigil_diagnosis::detect::{Form, Settings};
+use vigil_evaluation::parallel::in_parallel;
 use vigil_robot::declared::Promise;
 
 /// Forms that are compared.

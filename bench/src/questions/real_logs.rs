@@ -8,8 +8,8 @@ use std::error::Error;
 
 use serde_json::{Value, json};
 use vigil_bench::archive::Archive;
-use vigil_bench::in_parallel;
 use vigil_bench::real_logs::{Injection, LOGS, Split, healthy, table, tolerances, trial};
+use vigil_evaluation::parallel::in_parallel;
 use vigil_recording::frames::Run;
 use vigil_robot::channel_model::targets;
 

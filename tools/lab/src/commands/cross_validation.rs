@@ -2,18 +2,36 @@
 //! others.
 
 use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use vigil_diagnosis::detect::{self, Detector};
 use vigil_diagnosis::identify::{self, ChannelIdentifier, Diagnoser};
+use vigil_evaluation::parallel::in_parallel;
 use vigil_evaluation::scoring::{self, Case, Score, Taxonomy};
 use vigil_evaluation::stages::{Stages, Vocabulary};
 use vigil_recording::frames::Run;
 use vigil_recording::labels::Label;
+use vigil_robot::FaultTree;
 use vigil_robot::channel_model::tree::tree;
 use vigil_terminal::CommandError;
 use vigil_terminal::output::Progress;
 
 use super::learn_channels::{self, Task};
+
+/// What stays the same over the groups.
+struct CrossValidation<'a> {
+    task: &'a Task<'a>,
+    labels: &'a [Label],
+    tree: FaultTree,
+    vocabulary: Vocabulary,
+    settings: detect::Settings,
+}
+
+/// The diagnosis of one group.
+struct Fold {
+    cases: Vec<Case>,
+    alarm_log_odds: f64,
+}
 
 /// The score of the diagnosis of each run by a model that has not seen its group.
 ///
@@ -24,57 +42,89 @@ pub(super) fn score(
     labels: &[Label],
     false_alarm_interval_h: f64,
 ) -> Result<Score, CommandError> {
-    let group_of = |run: &Run| {
-        let label = labels.iter().find(|label| label.run == run.id);
-        label.map_or("", |label| label.group.as_str())
-    };
-    let groups: BTreeSet<&str> = task.runs.iter().map(group_of).collect();
+    let ids: Vec<u32> = task.runs.iter().map(|run| run.id).collect();
+    let used = labels.iter().filter(|label| ids.contains(&label.run));
+    let groups: BTreeSet<&str> = used.map(|label| label.group.as_str()).collect();
     if groups.len() < 2 {
         let refused = "--cross-validate: needs runs of two groups or more (column 'group')";
         return Err(CommandError::usage(refused));
     }
-    let progress = Progress::new("groups", groups.len());
     let tree = tree(task.robot).map_err(CommandError::usage)?;
     let identify::Settings { p_unknown, .. } = identify::Settings::default();
-    let vocabulary = Vocabulary {
-        taxonomy: Taxonomy::new(&tree, task.robot).with_prior_unknown(p_unknown),
-        robot: task.robot.clone(),
-        actions: Vec::new(),
+    let validation = CrossValidation {
+        task,
+        labels,
+        vocabulary: Vocabulary {
+            taxonomy: Taxonomy::new(&tree, task.robot).with_prior_unknown(p_unknown),
+            robot: task.robot.clone(),
+            actions: Vec::new(),
+        },
+        tree,
+        settings: detect::Settings {
+            false_alarm_interval_h,
+            ..detect::Settings::default()
+        },
     };
-    let settings = detect::Settings {
-        false_alarm_interval_h,
-        ..detect::Settings::default()
-    };
-    let (mut cases, mut alarm_log_odds) = (Vec::new(), f64::NEG_INFINITY);
-    for (done, group) in groups.iter().enumerate() {
-        progress.show(done);
-        let is_left_out = |run: &&Run| group_of(run) == *group;
-        let left_out: Vec<u32> = task.runs.iter().filter(is_left_out).map(|r| r.id).collect();
+    let groups: Vec<&str> = groups.into_iter().collect();
+    let folds = validation.folds(&groups)?;
+    let threshold = folds.iter().map(|fold| fold.alarm_log_odds);
+    let alarm_log_odds = threshold.fold(f64::NEG_INFINITY, f64::max);
+    let cases: Vec<Case> = folds.into_iter().flat_map(|fold| fold.cases).collect();
+    let taxonomy = &validation.vocabulary.taxonomy;
+    Ok(scoring::score(&cases, taxonomy, alarm_log_odds))
+}
+
+impl CrossValidation<'_> {
+    /// All groups, in order.
+    fn folds(&self, groups: &[&str]) -> Result<Vec<Fold>, CommandError> {
+        let done = AtomicUsize::new(0);
+        let progress = Progress::new("groups", groups.len());
+        let fold = |group: &&str| {
+            progress.show(done.fetch_add(1, Ordering::Relaxed));
+            self.fold(group)
+        };
+        in_parallel(groups, fold).into_iter().collect()
+    }
+
+    fn fold(&self, group: &str) -> Result<Fold, CommandError> {
+        let task = self.task;
+        let label = |run: &&Run| self.labels.iter().find(|label| label.run == run.id);
+        let of_group = |run: &&Run| label(run).is_some_and(|label| label.group == group);
+        let left_out: Vec<u32> = task
+            .runs
+            .iter()
+            .filter(of_group)
+            .map(|run| run.id)
+            .collect();
         let (model, _) = learn_channels::learn(task, &left_out)?;
         let refuse = |error: &dyn std::fmt::Display| {
             CommandError::usage(format!("without the group '{group}': {error}"))
         };
-        let detector = Detector::of_channels(&model, task.robot, &settings);
+        let settings = &self.settings;
+        let detector = Detector::of_channels(&model, task.robot, settings);
         let detector = detector.map_err(|error| refuse(&error))?;
-        alarm_log_odds = f64::max(alarm_log_odds, detector.alarm_log_odds());
         let used = (settings.sensors, settings.fault_rate_1_h);
-        let identifier = ChannelIdentifier::new(&model, task.robot, &tree, used);
+        let identifier = ChannelIdentifier::new(&model, task.robot, &self.tree, used);
         let identifier = identifier.map_err(|error| refuse(&error))?;
-        for run in task.runs.iter().filter(is_left_out) {
-            let Some(label) = labels.iter().find(|label| label.run == run.id) else {
-                continue;
-            };
-            let diagnoser = Diagnoser::from(identifier.clone());
-            let mut stages = Stages::new(detector.clone(), diagnoser, None, vocabulary.clone());
+        let case = |run: &Run| {
+            let mut stages = Stages::new(
+                detector.clone(),
+                Diagnoser::from(identifier.clone()),
+                None,
+                self.vocabulary.clone(),
+            );
             let verdicts = run.frames.iter().map(|frame| {
                 stages.take(frame);
                 stages.verdict(frame)
             });
-            cases.push(Case {
-                label: label.clone(),
+            Some(Case {
+                label: label(&run)?.clone(),
                 verdicts: verdicts.collect(),
-            });
-        }
+            })
+        };
+        Ok(Fold {
+            cases: task.runs.iter().filter(of_group).filter_map(case).collect(),
+            alarm_log_odds: detector.alarm_log_odds(),
+        })
     }
-    Ok(scoring::score(&cases, &vocabulary.taxonomy, alarm_log_odds))
 }

@@ -8,6 +8,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 use vigil_recording::frames::Run;
 use vigil_robot::Description;
 use vigil_robot::channel_model::channel::commands;
@@ -59,14 +60,26 @@ struct Sample<'a> {
     means: Vec<Means>,
 }
 
-/// Fits the signatures of `model`, whose joint law is fitted. Says of each declared fault what came
-/// of it.
+/// What came of a declared fault's runs.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct FaultFit {
+    /// Name of the fault.
+    pub fault: String,
+    /// Its runs.
+    pub runs: usize,
+    /// Runs that are found by what those of the other groups showed.
+    pub runs_found: usize,
+    /// True if the model recognizes the fault by its runs.
+    pub is_used: bool,
+}
+
+/// Fits the signatures of `model`, whose joint law is fitted.
 pub(super) fn fit(
     model: &mut Model,
     (models, records): (&[Model], &[Record]),
     labelled: &[LabelledRun<'_>],
     (robot, scales): (&Description, &Scales),
-) -> Vec<String> {
+) -> Vec<FaultFit> {
     if labelled.is_empty() {
         return Vec::new();
     }
@@ -95,20 +108,16 @@ pub(super) fn fit(
         if runs.is_empty() {
             continue;
         }
-        let found = found(&health, &fault.name, &runs);
-        let groups: Vec<&str> = runs.iter().map(|run| run.label.group).collect();
-        let all = runs.len();
-        told.push(format!(
-            "{}: {found} of {all} runs found by what the others of their kind showed",
-            fault.name
-        ));
-        let single = groups.iter().all(|group| *group == groups[0]);
-        if !single && 2 * found >= all {
-            model
-                .signatures
-                .fault
-                .extend(health.signature(&fault.name, &runs));
-        }
+        let runs_found = found(&health, &fault.name, &runs);
+        let signature = health.signature(&fault.name, &runs);
+        let signature = signature.filter(|_| 2 * runs_found >= runs.len());
+        told.push(FaultFit {
+            fault: fault.name.clone(),
+            runs: runs.len(),
+            runs_found,
+            is_used: signature.is_some(),
+        });
+        model.signatures.fault.extend(signature);
     }
     if model.signatures.is_empty() {
         model.signatures = Signatures::default();

@@ -31,7 +31,7 @@ use vigil_robot::learned::model::Provenance;
 
 use crate::data_hash::data_hash;
 use crate::plausibility::{self, RunCheck, RunDoubt};
-pub use labelled::LabelledRun;
+pub use labelled::{FaultFit, LabelledRun};
 use record::{FOLDS, Record};
 pub use report::{ChannelFit, Report};
 pub use view::View;

@@ -6,6 +6,7 @@ use serde::Serialize;
 use vigil_robot::channel_model::{Channel, Model, Term};
 
 use super::LONG_ENOUGH_S;
+use super::labelled::FaultFit;
 use super::terms::word;
 use crate::bounds::Bounds;
 use crate::learning::RESIDUAL_BAR;
@@ -37,7 +38,7 @@ pub struct Report {
     /// Channels.
     pub channels: Vec<ChannelFit>,
     /// What labelled runs show of each declared fault.
-    pub faults: Vec<String>,
+    pub faults: Vec<FaultFit>,
     /// What the user must know.
     pub warnings: Vec<String>,
     /// Numbers of the model that stand on a bound set by hand.
@@ -160,8 +161,24 @@ impl fmt::Display for Report {
                 channel.held_out_ratio
             )?;
         }
-        for fault in &self.faults {
-            writeln!(f, "{fault}")?;
+        if !self.faults.is_empty() {
+            writeln!(f)?;
+        }
+        for FaultFit {
+            fault,
+            runs,
+            runs_found,
+            is_used,
+        } in &self.faults
+        {
+            let used = match is_used {
+                true => "recognized by them",
+                false => "not recognized by them: too few",
+            };
+            writeln!(
+                f,
+                "{fault}: {runs_found} of {runs} runs found by what the other groups show, {used}"
+            )?;
         }
         let lines = self.bounds.lines();
         if !lines.is_empty() {

@@ -97,7 +97,7 @@ fn sensed(robot: &Description, mut run: Run) -> Run {
 
 fn learned(robot: &Description) -> Model {
     let runs = [sensed(robot, run(0, 700.0, stop_and_go, stop_and_go))];
-    learn(&runs, &[], f64::INFINITY, robot).unwrap().0
+    learn(&runs, &[], f64::INFINITY, robot, &[]).unwrap().0
 }
 
 /// First alarm for 24 h between false alarms, s, and the channel with the highest log-odds then.

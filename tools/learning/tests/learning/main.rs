@@ -4,6 +4,7 @@
 
 mod channel_learning;
 mod channel_sensing;
+mod declared_faults;
 mod learning;
 mod refusals;
 mod rover;

@@ -1,0 +1,192 @@
+//! Faults that a description declares: named by the channels that they shift, or by labelled runs.
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+use vigil_blocks::SensorFrame;
+use vigil_learning::channel_learning::{LabelledRun, Report, learn};
+use vigil_recording::frames::Run;
+use vigil_robot::Description;
+use vigil_robot::channel_model::{Model, Monitor, Observer, components};
+use vigil_robot::learned::Form;
+use vigil_robot::learned::channels::Channels;
+
+const NOISE: f64 = 0.05;
+const RATE_HZ: f64 = 50.0;
+const ONSET_S: f64 = 40.0;
+const CHANNELS: usize = 4;
+
+/// An aircraft without a command: four channels.
+fn robot(warm_up_s: f64) -> Description {
+    toml::from_str(&format!(
+        r#"
+name = "kite"
+kinematics = "none"
+command = []
+warm_up_s = {warm_up_s:.1}
+measured = {{ pose = false, wheel_rates = false, steer = false, yaw_rate = false, currents = false }}
+channel = [{{ name = "a" }}, {{ name = "b" }}, {{ name = "c" }}, {{ name = "d" }}]
+fault = [
+  {{ name = "engine" }},
+  {{ name = "rudder", group = "SURFACE", shows = ["a", "b"] }},
+  {{ name = "flap", group = "SURFACE", shows = ["c", "d"] }},
+]
+"#
+    ))
+    .unwrap()
+}
+
+/// What each channel reads more from the onset on, as a function of the fault's age, s.
+type Effect = fn(f64) -> [f64; CHANNELS];
+
+const NOTHING: Effect = |_| [0.0; CHANNELS];
+/// It grows over a second, and the robot answers in another channel.
+const ENGINE: Effect = |age_s| {
+    let grown = age_s.min(1.0);
+    let answered = (0.5 * (age_s - 1.0)).clamp(0.0, 1.0);
+    [-0.08 * grown, 0.0, 0.06 * grown, 0.08 * answered]
+};
+
+fn run(id: u32, length_s: f64, scale: f64, effect: Effect) -> Run {
+    let mut rng = Pcg64Mcg::seed_from_u64(u64::from(id));
+    let frame = |i: u64| {
+        let t_s = i as f64 / RATE_HZ;
+        let mut frame = SensorFrame::default();
+        frame.header.t_capture_ns = (t_s * 1e9) as u64;
+        (frame.header.seq, frame.run_id) = (i, u64::from(id) + 1);
+        let more = match t_s >= ONSET_S {
+            true => effect(t_s - ONSET_S),
+            false => [0.0; CHANNELS],
+        };
+        for (channel, more) in more.into_iter().enumerate() {
+            let noise = NOISE * rng.sample::<f64, _>(StandardNormal);
+            frame.set_channel(channel, 1.0 + noise + scale * more);
+        }
+        frame
+    };
+    let frames = (0..(length_s * RATE_HZ) as u64).map(frame).collect();
+    Run { id, frames }
+}
+
+fn labelled<'a>(run: &'a Run, group: &'a str) -> LabelledRun<'a> {
+    LabelledRun {
+        run,
+        fault: "engine",
+        onset_s: ONSET_S,
+        group,
+    }
+}
+
+fn learned(robot: &Description, labelled: &[LabelledRun<'_>]) -> (Model, Report) {
+    let healthy = [run(0, 700.0, 0.0, NOTHING)];
+    learn(&healthy, &[], f64::INFINITY, robot, labelled).unwrap()
+}
+
+/// First alarm of 24 h between false ones, s, and the most probable component two seconds later.
+fn found(model: &Model, robot: &Description, run: &Run) -> Option<(f64, String)> {
+    let calibration = model.calibration(Channels::PoseEncoders, Form::LearnedBias);
+    let threshold = calibration.unwrap().alarm_log_odds(24.0, 1.0);
+    let mut monitor = Monitor::new(model, robot, Channels::PoseEncoders, 1.0).unwrap();
+    let mut observer = Observer::new(robot);
+    let mut alarm_s = None;
+    for frame in &run.frames {
+        if !observer.push(frame).complete {
+            continue;
+        }
+        monitor.step(observer.history());
+        let t_s = frame.header.t_capture_ns as f64 * 1e-9;
+        if monitor.is_ready() && monitor.report().log_odds > threshold {
+            alarm_s = alarm_s.or(Some(t_s));
+        }
+        if alarm_s.is_some_and(|alarm_s| t_s >= alarm_s + 2.0) {
+            let parts = components(robot);
+            let beliefs = monitor.beliefs().iter().zip(&parts);
+            let best = beliefs.max_by(|a, b| a.0.p.total_cmp(&b.0.p)).unwrap();
+            return Some((alarm_s?, best.1.name.clone()));
+        }
+    }
+    None
+}
+
+#[test]
+fn a_fault_of_labelled_runs_is_named_in_a_run_that_was_not_learned_from() {
+    let robot = robot(0.0);
+    let runs: Vec<Run> = (1..7)
+        .map(|id| run(id, 60.0, 0.7 + 0.1 * f64::from(id), ENGINE))
+        .collect();
+    let groups = ["monday", "monday", "tuesday", "tuesday", "friday", "friday"];
+    let labels = runs
+        .iter()
+        .zip(groups)
+        .map(|(run, group)| labelled(run, group));
+    let (model, report) = learned(&robot, &labels.collect::<Vec<_>>());
+    assert_eq!(report.faults.len(), 1);
+    let fit = &report.faults[0];
+    assert_eq!(
+        (fit.fault.as_str(), fit.runs, fit.runs_found),
+        ("engine", 6, 6)
+    );
+    assert!(fit.is_used);
+    let text = model.to_toml().unwrap();
+    assert_eq!(Model::from_toml(&text).unwrap(), model);
+    let (alarm_s, name) = found(&model, &robot, &run(9, 60.0, 0.9, ENGINE)).unwrap();
+    assert!((ONSET_S..ONSET_S + 4.0).contains(&alarm_s), "{alarm_s}");
+    assert_eq!(name, "engine");
+    for id in 20..24 {
+        assert_eq!(found(&model, &robot, &run(id, 120.0, 0.0, NOTHING)), None);
+    }
+}
+
+#[test]
+fn runs_of_one_group_alone_vouch_for_nothing() {
+    let runs: Vec<Run> = (1..4).map(|id| run(id, 60.0, 1.0, ENGINE)).collect();
+    let labels: Vec<LabelledRun<'_>> = runs.iter().map(|run| labelled(run, "monday")).collect();
+    let (model, report) = learned(&robot(0.0), &labels);
+    let fit = &report.faults[0];
+    assert_eq!((fit.runs, fit.runs_found, fit.is_used), (3, 0, false));
+    assert!(model.signatures.is_empty());
+}
+
+#[test]
+fn a_declared_fault_is_named_by_its_channels_and_a_sensor_by_its_own() {
+    let robot = robot(0.0);
+    let (model, report) = learned(&robot, &[]);
+    assert!(report.faults.is_empty());
+    let cases: [(Effect, &str); 4] = [
+        (|_| [0.08, 0.06, 0.0, 0.0], "rudder"),
+        (|_| [0.08, -0.06, 0.0, 0.0], "rudder"),
+        (|_| [0.0, 0.0, -0.05, 0.09], "flap"),
+        (|_| [0.0, 0.0, 0.1, 0.0], "c"),
+    ];
+    for (i, (effect, expected)) in cases.into_iter().enumerate() {
+        let (alarm_s, name) =
+            found(&model, &robot, &run(30 + i as u32, 60.0, 1.0, effect)).unwrap();
+        assert!(
+            (ONSET_S..ONSET_S + 4.0).contains(&alarm_s),
+            "{expected}: {alarm_s}"
+        );
+        assert_eq!(name, expected);
+    }
+}
+
+#[test]
+fn a_warm_up_is_neither_learned_from_nor_watched() {
+    let robot = robot(15.0);
+    let cold = |id: u32, length_s: f64| {
+        let mut run = run(id, length_s, 0.0, NOTHING);
+        for frame in &mut run.frames {
+            if frame.header.t_capture_ns < 14_000_000_000 {
+                frame.set_channel(1, 0.0);
+            }
+        }
+        run
+    };
+    let (model, _) = learn(&[cold(0, 700.0)], &[], f64::INFINITY, &robot, &[]).unwrap();
+    assert!((model.channel[1].variance[0].sqrt() - NOISE / 5_f64.sqrt()).abs() < 0.003);
+    assert_eq!(found(&model, &robot, &cold(2, 60.0)), None);
+    let without = Description {
+        warm_up_s: 0.0,
+        ..robot
+    };
+    assert!(found(&model, &without, &cold(2, 60.0)).is_some());
+}
