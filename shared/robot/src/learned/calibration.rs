@@ -37,9 +37,10 @@ const MAXIMA_MIN: usize = 30;
 /// A high level is the one that one in so many maxima exceeds, at least [`MAXIMA_MIN`] of them. The
 /// top twentieth: 30 maxima beyond it know a slope within 30 %.
 const HIGH: usize = 20;
-/// So few maxima exceed the level at which a tail begins that falls faster than the largest slope.
-/// Chosen: their number is known within a factor of two.
+/// So few maxima exceed the level at which a tail begins that falls faster than the largest slope,
+/// and so many may be expected to: the upper 95 % bound of a Poisson mean after five events.
 const RARE: usize = 5;
+const RARE_EXPECTED: f64 = 10.5;
 /// Slope taken for a tail that a log is too short to show: half of that of a model without error.
 pub const SLOPE_UNKNOWN: f64 = 0.5;
 /// Bounds of a slope. At 1 the log-odds of a model without error grow as the logarithm of time; at
@@ -167,7 +168,7 @@ impl Calibration {
         match level {
             Some(&level) if self.tail_slope >= SLOPE_LIMITS.1 => Self {
                 level_log_odds: level.max(self.level_log_odds),
-                interval_at_level_h: self.exposure_h / RARE as f64,
+                interval_at_level_h: self.exposure_h / RARE_EXPECTED,
                 ..self
             },
             _ => self,

@@ -62,7 +62,8 @@ pub struct Args {
     /// Learned model to show (TOML).
     #[arg(long, value_name = "MODEL", requires = "show")]
     model: Option<PathBuf>,
-    /// Fraction of the runs of every mode and kind to hold out, 0 to 0.9.
+    /// Fraction of the runs of every mode and kind to hold out, 0 to 0.9; of a model of channels,
+    /// of all runs or, with labels, of their groups.
     #[arg(long, value_name = "X", default_value_t = 0.333, value_parser = test_fraction)]
     test_fraction: f64,
     /// Seed of the split.

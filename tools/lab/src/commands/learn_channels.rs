@@ -1,5 +1,6 @@
 //! `vigil learn` for any described robot: a model of its channels.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde::Serialize;
@@ -63,11 +64,7 @@ struct Document<'a> {
 /// # Errors
 /// A log that cannot support a model; an output that cannot be written.
 pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
-    let ids: Vec<u32> = task.runs.iter().map(|run| run.id).collect();
-    let held_out = match ids.len() < RUNS_TO_SPLIT {
-        true => Vec::new(),
-        false => split_runs(&ids, task.test_fraction, task.seed),
-    };
+    let held_out = held_out(task);
     let (mut model, report) = learn(task, &held_out)?;
     model.provenance = Provenance {
         frames_file: file_name(task.frames),
@@ -108,6 +105,33 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
     };
     printed.map_err(CommandError::failure)?;
     Ok(Outcome::Done)
+}
+
+/// Runs to leave out of learning: whole groups of labelled ones, each of which hardly differs from
+/// its likes.
+fn held_out(task: &Task<'_>) -> Vec<u32> {
+    let ids = task.runs.iter().map(|run| run.id);
+    let Some(labels) = task.labels else {
+        let ids: Vec<u32> = ids.collect();
+        return match ids.len() < RUNS_TO_SPLIT {
+            true => Vec::new(),
+            false => split_runs(&ids, task.test_fraction, task.seed),
+        };
+    };
+    let group = |id: u32| {
+        labels
+            .iter()
+            .find(|label| label.run == id)
+            .map(|label| &label.group)
+    };
+    let groups: BTreeSet<&String> = ids.clone().filter_map(group).collect();
+    let numbered: Vec<u32> = (0..).take(groups.len()).collect();
+    let left_out = split_runs(&numbered, task.test_fraction, task.seed);
+    let is_left_out = |id: &u32| {
+        let place = group(*id).and_then(|group| groups.iter().position(|other| *other == group));
+        place.is_some_and(|place| left_out.contains(&(place as u32)))
+    };
+    ids.filter(is_left_out).collect()
 }
 
 /// Learns from the runs that are not held out.
