@@ -36,10 +36,6 @@ const BLOCKS_MIN: usize = 2;
 const READY_S: f64 = 1.0;
 /// How much more frequent a fault with labelled runs is than any other. Chosen.
 const RECORDED: f64 = 10.0;
-/// A window speaks against a kind by no more than this, nats: it may be one that shows nothing.
-const LEAST_LOG_RATIO: f64 = -20.0;
-/// Time over which the kind of a fault is told, s: two windows. Chosen.
-const KIND_S: f64 = 8.0;
 /// Log-odds of a component from which on it may be broken.
 const SUSPECT_LOG_ODDS: f64 = -2.0;
 
@@ -126,8 +122,6 @@ pub struct Monitor {
     /// What the prior fault rate adds to the log-odds.
     prior_log_odds: f64,
     run_s: f64,
-    /// Log-ratio of each kind of each component's faults, averaged while it may be broken.
-    kinds: [[f64; KINDS_MAX]; COMPONENTS_MAX],
     /// Channels, as bits, of which no context is learned: something may be wrong with them.
     suspects: u64,
     classes: [f64; Class::ALL.len()],
@@ -202,7 +196,6 @@ impl Monitor {
             tails: Class::ALL.map(tail),
             prior_log_odds: (fault_rate_1_h / FAULT_RATE_1_H).ln(),
             run_s: 0.0,
-            kinds: [[IMPOSSIBLE; KINDS_MAX]; COMPONENTS_MAX],
             suspects: 0,
             classes: [IMPOSSIBLE; Class::ALL.len()],
             beliefs: [NO_BELIEF; COMPONENTS_MAX],
@@ -222,7 +215,7 @@ impl Monitor {
     pub fn reset(&mut self) {
         self.bank.reset();
         self.run_s = 0.0;
-        self.sum_up(0.0);
+        self.sum_up();
         self.report.evidence = 0.0;
     }
 
@@ -274,12 +267,12 @@ impl Monitor {
         let measured = |channel: usize| now.values[places[channel]].is_some();
         // After a break what was said before stands until there is something new to say.
         if self.bank.weigh(measured, now.dt_s) {
-            self.sum_up(now.dt_s);
+            self.sum_up();
             self.report.evidence = -0.5 * self.bank.mean_square();
         }
     }
 
-    fn sum_up(&mut self, dt_s: f64) {
+    fn sum_up(&mut self) {
         let shares = 1.0
             + self
                 .watched
@@ -345,7 +338,7 @@ impl Monitor {
             }
         }
         self.divide_declared(&raw, &mut odds);
-        self.report_odds(&odds, odds_unknown, dt_s);
+        self.report_odds(&odds, odds_unknown);
     }
 
     /// Divides what speaks for the declared faults among them by all that is known of each: how
@@ -371,23 +364,7 @@ impl Monitor {
         }
     }
 
-    /// One window says little of how a component fails: a gain shows only while the robot turns.
-    fn average_kinds(&mut self, odds: &[f64; COMPONENTS_MAX], dt_s: f64) {
-        let part = 1.0 - (-dt_s / KIND_S).exp();
-        for (i, kinds) in self.kinds.iter_mut().enumerate().take(self.watched.len()) {
-            let is_suspect = odds[i] > SUSPECT_LOG_ODDS;
-            for (k, mean) in kinds.iter_mut().enumerate() {
-                let found = self.bank.weighed(i)[k].log_ratio.max(LEAST_LOG_RATIO);
-                // What no healthy robot shows needs no second look.
-                let kind = self.watched[i].part.kind(k);
-                let is_certain = kind.is_some_and(|kind| Class::from_kind(kind).is_none());
-                let part = if is_suspect && !is_certain { part } else { 1.0 };
-                *mean += part * (found - *mean);
-            }
-        }
-    }
-
-    fn report_odds(&mut self, odds: &[f64; COMPONENTS_MAX], unknown: f64, dt_s: f64) {
+    fn report_odds(&mut self, odds: &[f64; COMPONENTS_MAX], unknown: f64) {
         let n = self.watched.len();
         let mut channels = [IMPOSSIBLE; SLOTS];
         channels[Slot::ANY] = unknown.max(IMPOSSIBLE);
@@ -396,11 +373,10 @@ impl Monitor {
             *slot = log_add(*slot, *odds).max(IMPOSSIBLE);
         }
         let total = log_sum_exp(&channels);
-        self.average_kinds(odds, dt_s);
         for (i, (watched, odds)) in self.watched.iter().zip(odds).enumerate() {
             self.beliefs[i] = ComponentBelief {
                 p: (odds - total).exp().clamp(0.0, 1.0),
-                ..likeliest(self.bank.weighed(i), &self.kinds[i], watched.part)
+                ..likeliest(self.bank.weighed(i), watched.part)
             };
         }
         let is_suspect = |i: usize| odds[i] > SUSPECT_LOG_ODDS;
@@ -445,15 +421,11 @@ fn laws(model: &Model, places: &[usize]) -> Option<Laws> {
     })
 }
 
-/// The most probable kind of a component's fault, by the mean log-ratio of each.
-fn likeliest(
-    weighed: &[Weighed; KINDS_MAX],
-    kinds: &[f64; KINDS_MAX],
-    part: Part,
-) -> ComponentBelief {
+/// The most probable kind of a component's fault.
+fn likeliest(weighed: &[Weighed; KINDS_MAX], part: Part) -> ComponentBelief {
     let mut best = 0;
     for k in 1..KINDS_MAX {
-        if kinds[k] > kinds[best] {
+        if weighed[k].log_ratio > weighed[best].log_ratio {
             best = k;
         }
     }

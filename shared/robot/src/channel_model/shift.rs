@@ -116,7 +116,7 @@ mod tests {
         let shift = ShiftLaw::new(&law, &[0, 1]);
         let found = shift.weigh(&law, 4, |channel| ([1.0; BLOCKS], [3.0, 0.5][channel]));
         // Of a mean of n values with an amount of variance v: n² z² / (n + 1/v), ½ ln(1 + n v).
-        let (n, v) = (4.0, [9.0, 0.25]);
+        let (n, v) = (4.0_f64, [9.0_f64, 0.25]);
         let less = n * n * (4.0 / (n + 1.0 / v[0]) + 1.0 / (n + 1.0 / v[1]));
         let penalty = 0.5 * ((1.0 + n * v[0]).ln() + (1.0 + n * v[1]).ln());
         assert!((found.less - less).abs() < 1e-9, "{found:?}");

@@ -152,3 +152,74 @@ impl Evidence {
         self.log_ratio
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn standardized(values: &[f64]) -> Means {
+        let mut out = [0.0; MEANS_MAX];
+        out[..values.len()].copy_from_slice(values);
+        out
+    }
+
+    #[test]
+    fn evidence_is_the_ratio_of_two_gaussian_laws_averaged_over_phases() {
+        // One channel; the means are independent and of unit variance.
+        let phase = |mean: [f64; 3]| Phase {
+            weights: mean.to_vec(),
+            offset: 0.5 * mean.iter().map(|m| m * m).sum::<f64>(),
+        };
+        let means = [[1.0, 2.0, 0.5], [-1.0, 0.0, 3.0]];
+        let signature = Signature {
+            fault: "engine".to_owned(),
+            runs: 2,
+            phase: means.map(phase).to_vec(),
+        };
+        let seen = [0.3, 1.8, 0.1];
+        let log_density = |mean: [f64; 3]| {
+            let parts = seen.iter().zip(mean);
+            -0.5 * parts.map(|(x, m)| (x - m) * (x - m)).sum::<f64>()
+        };
+        let ratio = |mean| (log_density(mean) - log_density([0.0; 3])).exp();
+        let expected = (0.5 * (ratio(means[0]) + ratio(means[1]))).ln();
+        let found = signature.log_ratio(&standardized(&seen));
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    }
+
+    #[test]
+    fn evidence_is_averaged_and_never_negative() {
+        let mut evidence = Evidence::default();
+        evidence.take(-1e9, 0.1);
+        assert!(evidence.log_ratio().abs() < 1e-12);
+        for _ in 0..1000 {
+            evidence.take(7.0, 0.1);
+        }
+        assert!((evidence.log_ratio() - 7.0).abs() < 1e-9);
+        evidence.take(f64::INFINITY, 1e9);
+        assert!((evidence.log_ratio() - LOG_RATIO_MAX).abs() < 1e-9);
+    }
+
+    #[test]
+    fn signatures_of_other_channels_do_not_fit() {
+        let of = |weights: usize, sd: f64, phases: usize| Signatures {
+            mean: vec![0.0; 6],
+            sd: vec![sd; 6],
+            fault: vec![Signature {
+                fault: "engine".to_owned(),
+                runs: 1,
+                phase: vec![
+                    Phase {
+                        weights: vec![0.0; weights],
+                        offset: 0.0,
+                    };
+                    phases
+                ],
+            }],
+        };
+        assert!(of(6, 1.0, 4).fits(2) && Signatures::default().fits(2));
+        assert!(!of(6, 1.0, 4).fits(3) && !of(5, 1.0, 4).fits(2));
+        assert!(!of(6, 0.0, 4).fits(2) && !of(6, f64::NAN, 4).fits(2));
+        assert!(!of(6, 1.0, 0).fits(2) && !of(6, 1.0, 9).fits(2));
+    }
+}

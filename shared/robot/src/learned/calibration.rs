@@ -37,10 +37,6 @@ const MAXIMA_MIN: usize = 30;
 /// A high level is the one that one in so many maxima exceeds, at least [`MAXIMA_MIN`] of them. The
 /// top twentieth: 30 maxima beyond it know a slope within 30 %.
 const HIGH: usize = 20;
-/// So few maxima exceed the level at which a tail begins that falls faster than the largest slope,
-/// and so many may be expected to: the upper 95 % bound of a Poisson mean after five events.
-const RARE: usize = 5;
-const RARE_EXPECTED: f64 = 10.5;
 /// Slope taken for a tail that a log is too short to show: half of that of a model without error.
 pub const SLOPE_UNKNOWN: f64 = 0.5;
 /// Bounds of a slope. At 1 the log-odds of a model without error grow as the logarithm of time; at
@@ -149,29 +145,12 @@ impl Calibration {
         let blank = Self::blank(channels, form, fault_rate_1_h, count.max(1), window_s);
         let beyond = (count / HIGH).max(MAXIMA_MIN);
         match count.checked_sub(beyond + 1).and_then(|i| maxima.get(i)) {
-            Some(&level) => blank.above(level, maxima).from_rare(maxima),
+            Some(&level) => blank.above(level, maxima),
             // No maxima, no level. Chosen: odds far below an alarm's.
             None => Self {
                 level_log_odds: maxima.last().copied().unwrap_or(-10.0),
                 ..blank
             },
-        }
-    }
-
-    /// A tail that falls faster than the largest slope begins at a higher level, which few of the
-    /// sorted maxima exceed: from there on less is extrapolated.
-    fn from_rare(self, maxima: &[f64]) -> Self {
-        let level = maxima
-            .len()
-            .checked_sub(RARE + 1)
-            .and_then(|i| maxima.get(i));
-        match level {
-            Some(&level) if self.tail_slope >= SLOPE_LIMITS.1 => Self {
-                level_log_odds: level.max(self.level_log_odds),
-                interval_at_level_h: self.exposure_h / RARE_EXPECTED,
-                ..self
-            },
-            _ => self,
         }
     }
 
