@@ -8,6 +8,7 @@
 mod calibrate;
 mod coverage;
 mod excitation;
+mod isolability;
 mod joint;
 mod noise;
 mod record;
@@ -15,6 +16,7 @@ mod regression;
 mod report;
 mod terms;
 mod told;
+mod unseen;
 mod view;
 
 use vigil_recording::frames::Run;
@@ -29,6 +31,7 @@ use vigil_robot::learned::model::Provenance;
 
 use crate::data_hash::data_hash;
 use crate::plausibility::{self, RunCheck, RunDoubt};
+pub use isolability::Isolability;
 use record::{FOLDS, Record};
 pub use report::{ChannelFit, Report};
 pub use view::View;
@@ -181,6 +184,13 @@ pub fn learn(
     }
     calibrate::fit(&mut model, &mut models, &records, robot);
     calibrate::tell(&mut report.bounds, &model);
+    report.isolability = isolability::report(&isolability::Task {
+        model: &model,
+        models: &models,
+        records: &records,
+        scales: &scales,
+        robot,
+    });
     report.finish(&model);
     Ok((model.sealed(), report))
 }

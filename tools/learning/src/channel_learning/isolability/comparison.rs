@@ -1,0 +1,275 @@
+//! In which windows each fault is detected, and told from each other one.
+
+use vigil_robot::channel_model::Target;
+use vigil_robot::channel_model::law::{BLOCKS, Law};
+use vigil_robot::channel_model::model::Tail;
+
+use super::fault::{Extent, Fault, Signature, signature};
+use super::snapshot::Snapshot;
+
+/// Blocks since the onset that are looked at.
+const AGES: [usize; 4] = [1, 2, 4, BLOCKS];
+/// Odds at which two faults count as told apart.
+const ODDS: f64 = 9.0;
+
+/// What alarms and names.
+pub(super) struct Rule {
+    /// The law of whole windows.
+    pub law: Law,
+    /// What is measured.
+    pub targets: Vec<Target>,
+    /// Log-odds of a component before anything is seen.
+    pub prior: f64,
+    /// Log-odds at which to alarm.
+    pub alarm: f64,
+    /// Tail of each fault's class.
+    pub tails: Vec<Option<Tail>>,
+}
+
+impl Rule {
+    /// True if a window with a fault is expected to alarm.
+    fn detects(&self, fault: &Fault, tail: Option<&Tail>, sight: &Sight) -> bool {
+        let prior = fault.extent.prior;
+        let penalty = match prior > 0.0 {
+            true => 0.5 * (1.0 + sight.own / prior).ln(),
+            false => 0.0,
+        };
+        let ratio = self.law.log_ratio_at(sight.square, sight.less);
+        let log_odds = self.prior + ratio - penalty - fault.price;
+        tail.map_or(log_odds, |tail| tail.tempered(log_odds)) >= self.alarm
+    }
+
+    /// True if a window with a fault, seen as this fault and as a rival, excludes the rival. Odds
+    /// between faults are tempered as those against none.
+    pub fn excludes(&self, pair: [usize; 2], [as_fault, as_rival]: [&Sight; 2]) -> bool {
+        let slope = |fault: usize| self.tails[fault].as_ref().map_or(1.0, |tail| tail.slope);
+        let slope = f64::min(slope(pair[0]), slope(pair[1]));
+        let ratio = |sight: &Sight| self.law.log_ratio_at(sight.square, sight.less);
+        slope * (ratio(as_fault) - ratio(as_rival)) >= ODDS.ln()
+    }
+}
+
+/// What a fault explains of a window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sight {
+    /// Square of the window.
+    pub square: f64,
+    /// By how much the fault of the best size lessens it, held back by its prior.
+    pub less: f64,
+    /// Factor of the stated size that does so.
+    pub factor: f64,
+    /// `s'Ps` of the stated size.
+    pub own: f64,
+}
+
+impl Sight {
+    /// Of a fault in a window `square`, with whose residuals `r` its signature has the product
+    /// `s'Pr`.
+    pub fn new(extent: &Extent, square: f64, own: f64, product: f64) -> Self {
+        let [least, most] = extent.bounds;
+        let precision = (own + extent.prior).max(1e-300);
+        let factor = (product / precision).max(least).min(most);
+        Self {
+            square,
+            less: factor * (2.0 * product - factor * precision),
+            factor,
+            own,
+        }
+    }
+}
+
+/// The signatures of all faults in a window, then its residuals, and their products.
+pub(super) struct Products {
+    /// The signatures.
+    pub signatures: Vec<Signature>,
+    first: usize,
+    square: f64,
+    /// `s_f' P s_g`, by rows.
+    table: Vec<Vec<f64>>,
+}
+
+impl Products {
+    /// Of a window, from block `first` on.
+    pub fn new(faults: &[Fault], first: usize, snapshot: &Snapshot, rule: &Rule) -> Self {
+        let one = |fault: &Fault| signature(fault, first, snapshot, &rule.targets, &rule.law);
+        let mut signatures: Vec<Signature> = faults.iter().map(one).collect();
+        signatures.push(Signature {
+            rows: snapshot.z.iter().copied().enumerate().collect(),
+            weighed: rule.law.weighed(&snapshot.z),
+            silent: None,
+        });
+        let n = signatures.len();
+        let mut table = vec![vec![0.0; n]; n];
+        for f in 0..n {
+            for g in f..n {
+                table[f][g] = product(&signatures[f], &signatures[g]);
+                table[g][f] = table[f][g];
+            }
+        }
+        Self {
+            signatures,
+            first,
+            square: snapshot.square,
+            table,
+        }
+    }
+
+    /// A window with the first fault, seen as this one and as the second. A channel of which one
+    /// of both says nothing takes no part. `more` adds to the product of two signatures.
+    pub fn sights(
+        &self,
+        faults: &[Fault],
+        [fault, seen_as]: [usize; 2],
+        rule: &Rule,
+        more: impl Fn([usize; 2]) -> f64,
+    ) -> [Sight; 2] {
+        let silent = [fault, seen_as]
+            .into_iter()
+            .find_map(|of| self.signatures[of].silent);
+        let inner = |f: usize, g: usize| {
+            let hidden = silent.map_or(0.0, |i| {
+                let weighed = |of: usize| &self.signatures[of].weighed[i];
+                rule.law.hidden(i, self.first, [weighed(f), weighed(g)])
+            });
+            self.table[f][g] - hidden + more([f, g])
+        };
+        let residuals = self.signatures.len() - 1;
+        let square = self.square + 2.0 * inner(fault, residuals) + inner(fault, fault);
+        [fault, seen_as].map(|of| {
+            let product = inner(of, residuals) + inner(of, fault);
+            Sight::new(&faults[of].extent, square, inner(of, of), product)
+        })
+    }
+
+    /// True if the window excludes the second of two faults, where the first is there.
+    pub fn exclude(&self, faults: &[Fault], pair: [usize; 2], rule: &Rule) -> bool {
+        let [as_fault, as_rival] = self.sights(faults, pair, rule, |_| 0.0);
+        rule.excludes(pair, [&as_fault, &as_rival])
+    }
+
+    /// Adds to `sums` what each channel carries of the difference between a fault and so many times
+    /// a rival.
+    fn carry(&self, sums: &mut [f64], [fault, rival]: [usize; 2], x: f64) {
+        let [f, g] = [fault, rival].map(|of| &self.signatures[of]);
+        let weighed = |i: usize, block: usize| f.weighed[i][block] - x * g.weighed[i][block];
+        for (signature, factor) in [(f, 1.0), (g, -x)] {
+            for (i, row) in &signature.rows {
+                let part = row
+                    .iter()
+                    .enumerate()
+                    .map(|(block, s)| s * weighed(*i, block));
+                sums[*i] += factor * part.sum::<f64>();
+            }
+        }
+    }
+}
+
+fn product(f: &Signature, g: &Signature) -> f64 {
+    let rows = f.rows.iter();
+    rows.map(|(i, row)| {
+        let blocks = row.iter().zip(&g.weighed[*i]);
+        blocks.map(|(a, b)| a * b).sum::<f64>()
+    })
+    .sum()
+}
+
+/// For each window how many blocks after its onset a fault shows; zero if not within the window.
+pub(super) struct Comparison {
+    /// Is detected, by fault.
+    pub detected: Vec<Vec<u8>>,
+    /// Is told from a rival, by fault and rival.
+    pub told: Vec<Vec<Vec<u8>>>,
+    /// What each channel carries of a fault.
+    pub carried: Vec<Vec<f64>>,
+}
+
+impl Comparison {
+    /// Of all windows.
+    pub fn new(faults: &[Fault], log: &[Snapshot], rule: &Rule) -> Self {
+        let n = faults.len();
+        let mut found = Self {
+            detected: vec![vec![0; log.len()]; n],
+            told: vec![vec![vec![0; log.len()]; n]; n],
+            carried: vec![vec![0.0; rule.targets.len()]; n],
+        };
+        for (window, snapshot) in log.iter().enumerate() {
+            for age in AGES {
+                found.take(faults, [window, age], snapshot, rule);
+            }
+        }
+        found
+    }
+
+    fn take(
+        &mut self,
+        faults: &[Fault],
+        [window, age]: [usize; 2],
+        snapshot: &Snapshot,
+        rule: &Rule,
+    ) {
+        let first = BLOCKS - age;
+        let products = Products::new(faults, first, snapshot, rule);
+        let set = |slot: &mut u8| {
+            if *slot == 0 {
+                *slot = age as u8;
+            }
+        };
+        let tried = |(_, fault): &(usize, &Fault)| fault.is_tried(first);
+        for (f, fault) in faults.iter().enumerate().filter(tried) {
+            let [sight, _] = products.sights(faults, [f, f], rule, |_| 0.0);
+            if rule.detects(fault, rule.tails[f].as_ref(), &sight) {
+                set(&mut self.detected[f][window]);
+            }
+            for g in (0..faults.len()).filter(|&g| g != f) {
+                if products.exclude(faults, [f, g], rule) {
+                    set(&mut self.told[f][g][window]);
+                }
+            }
+            if age == BLOCKS {
+                products.carry(&mut self.carried[f], [f, f], 0.0);
+            }
+        }
+    }
+
+    /// Windows that show a fault.
+    pub fn windows(&self, fault: usize) -> usize {
+        self.detected[fault]
+            .iter()
+            .filter(|blocks| **blocks > 0)
+            .count()
+    }
+
+    /// Share of all windows that show a fault.
+    pub fn seen(&self, fault: usize) -> f64 {
+        self.windows(fault) as f64 / self.detected[fault].len().max(1) as f64
+    }
+
+    /// Share of the windows that show either fault in which it is told from the other; the smaller
+    /// of both.
+    pub fn apart(&self, [one, other]: [usize; 2]) -> f64 {
+        let share = |f: usize, g: usize| {
+            let both = self.detected[f].iter().zip(&self.told[f][g]);
+            let told = both.filter(|(seen, told)| **seen > 0 && **told > 0).count();
+            told as f64 / self.windows(f).max(1) as f64
+        };
+        share(one, other).min(share(other, one))
+    }
+}
+
+/// For each pair what each channel carries of the difference between its faults, over all windows.
+pub(super) fn carried(
+    pairs: &[[usize; 2]],
+    faults: &[Fault],
+    log: &[Snapshot],
+    rule: &Rule,
+) -> Vec<Vec<f64>> {
+    let mut found = vec![vec![0.0; rule.targets.len()]; pairs.len()];
+    for snapshot in log.iter().filter(|_| !pairs.is_empty()) {
+        let products = Products::new(faults, 0, snapshot, rule);
+        for (pair, sums) in pairs.iter().zip(&mut found) {
+            let [_, rival] = products.sights(faults, *pair, rule, |_| 0.0);
+            products.carry(sums, *pair, rival.factor);
+        }
+    }
+    found
+}
