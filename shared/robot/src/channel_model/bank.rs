@@ -23,7 +23,7 @@ const DRIFT_S: f64 = 4.0;
 /// Delays that are looked for, in blocks; one with a size of its own between them.
 pub const DELAYS: [f64; 4] = [0.5, 1.0, 2.0, DELAY_BLOCKS as f64];
 /// Deviation of an erratic sensor's readings, relative to that of a whole one given all others.
-const ERRATIC: f64 = 6.0;
+pub const ERRATIC: f64 = 6.0;
 /// The value at which a sensor has frozen is one number more: its price in nats.
 pub const HELD: f64 = 2.0;
 /// Silence after which a channel is missing, s, if it was never silent for half as long, and how
@@ -32,7 +32,7 @@ const MISSING_S: f64 = 1.0;
 const MISSING: f64 = 30.0;
 /// Deviations of a robot with which something is wrong that no single fault explains, relative to
 /// those of a healthy one.
-const UNKNOWN: f64 = 2.0;
+pub const UNKNOWN: f64 = 2.0;
 /// The same of the roughness.
 const UNKNOWN_NOISE: f64 = 3.0;
 

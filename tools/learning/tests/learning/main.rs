@@ -4,6 +4,7 @@
 
 mod channel_learning;
 mod channel_sensing;
+mod isolability;
 mod learning;
 mod refusals;
 mod rover;

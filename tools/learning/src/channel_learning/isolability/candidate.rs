@@ -7,8 +7,9 @@ use vigil_robot::channel_model::window::OFFSET;
 use vigil_robot::channel_model::{AXES, Scales, Target};
 use vigil_robot::description::Kinematics;
 
-use super::comparison::{Comparison, Products, Rule};
+use super::comparison::{Comparison, Products};
 use super::fault::{Fault, Origin, Signature};
+use super::rule::Rule;
 use super::snapshot::Snapshot;
 
 /// Deviation of a block's mean over the usual size of what a further sensor measures; that of each
@@ -174,7 +175,13 @@ pub(super) fn tells(candidates: &[Candidate], question: &Question<'_>) -> Vec<Ve
                     };
                     let [as_fault, as_rival] = products.sights(faults, [f, g], rule, more);
                     let is_seen = comparison.detected[f][window] > 0;
-                    *slot += usize::from(is_seen && rule.excludes([f, g], [&as_fault, &as_rival]));
+                    *slot += usize::from(
+                        is_seen
+                            && rule.excludes(
+                                [faults[f].class, faults[g].class],
+                                [&as_fault, &as_rival],
+                            ),
+                    );
                 }
             }
         }

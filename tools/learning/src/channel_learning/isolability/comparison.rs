@@ -1,83 +1,15 @@
 //! In which windows each fault is detected, and told from each other one.
 
-use vigil_robot::channel_model::Target;
-use vigil_robot::channel_model::law::{BLOCKS, Law};
-use vigil_robot::channel_model::model::Tail;
+use vigil_inference::logspace::log_add;
+use vigil_robot::channel_model::law::{BLOCKS, Row};
+use vigil_robot::channel_model::model::Class;
 
-use super::fault::{Extent, Fault, Signature, signature};
+use super::fault::{Fault, Signature, signature};
+use super::rule::{Rule, Sight};
 use super::snapshot::Snapshot;
 
 /// Blocks since the onset that are looked at.
 const AGES: [usize; 4] = [1, 2, 4, BLOCKS];
-/// Odds at which two faults count as told apart.
-const ODDS: f64 = 9.0;
-
-/// What alarms and names.
-pub(super) struct Rule {
-    /// The law of whole windows.
-    pub law: Law,
-    /// What is measured.
-    pub targets: Vec<Target>,
-    /// Log-odds of a component before anything is seen.
-    pub prior: f64,
-    /// Log-odds at which to alarm.
-    pub alarm: f64,
-    /// Tail of each fault's class.
-    pub tails: Vec<Option<Tail>>,
-}
-
-impl Rule {
-    /// True if a window with a fault is expected to alarm.
-    fn detects(&self, fault: &Fault, tail: Option<&Tail>, sight: &Sight) -> bool {
-        let prior = fault.extent.prior;
-        let penalty = match prior > 0.0 {
-            true => 0.5 * (1.0 + sight.own / prior).ln(),
-            false => 0.0,
-        };
-        let ratio = self.law.log_ratio_at(sight.square, sight.less);
-        let log_odds = self.prior + ratio - penalty - fault.price;
-        tail.map_or(log_odds, |tail| tail.tempered(log_odds)) >= self.alarm
-    }
-
-    /// True if a window with a fault, seen as this fault and as a rival, excludes the rival. Odds
-    /// between faults are tempered as those against none.
-    pub fn excludes(&self, pair: [usize; 2], [as_fault, as_rival]: [&Sight; 2]) -> bool {
-        let slope = |fault: usize| self.tails[fault].as_ref().map_or(1.0, |tail| tail.slope);
-        let slope = f64::min(slope(pair[0]), slope(pair[1]));
-        let ratio = |sight: &Sight| self.law.log_ratio_at(sight.square, sight.less);
-        slope * (ratio(as_fault) - ratio(as_rival)) >= ODDS.ln()
-    }
-}
-
-/// What a fault explains of a window.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sight {
-    /// Square of the window.
-    pub square: f64,
-    /// By how much the fault of the best size lessens it, held back by its prior.
-    pub less: f64,
-    /// Factor of the stated size that does so.
-    pub factor: f64,
-    /// `s'Ps` of the stated size.
-    pub own: f64,
-}
-
-impl Sight {
-    /// Of a fault in a window `square`, with whose residuals `r` its signature has the product
-    /// `s'Pr`.
-    pub fn new(extent: &Extent, square: f64, own: f64, product: f64) -> Self {
-        let [least, most] = extent.bounds;
-        let precision = (own + extent.prior).max(1e-300);
-        let factor = (product / precision).max(least).min(most);
-        Self {
-            square,
-            less: factor * (2.0 * product - factor * precision),
-            factor,
-            own,
-        }
-    }
-}
-
 /// The signatures of all faults in a window, then its residuals, and their products.
 pub(super) struct Products {
     /// The signatures.
@@ -144,7 +76,37 @@ impl Products {
     /// True if the window excludes the second of two faults, where the first is there.
     pub fn exclude(&self, faults: &[Fault], pair: [usize; 2], rule: &Rule) -> bool {
         let [as_fault, as_rival] = self.sights(faults, pair, rule, |_| 0.0);
-        rule.excludes(pair, [&as_fault, &as_rival])
+        rule.excludes(pair.map(|of| faults[of].class), [&as_fault, &as_rival])
+    }
+
+    /// True if a window with a fault is expected to alarm, for whatever reason.
+    fn alarms(&self, faults: &[Fault], fault: usize, rule: &Rule) -> bool {
+        let square = self.sights(faults, [fault, fault], rule, |_| 0.0)[0].square;
+        let mut classes = rule.classes(square);
+        let mut add = |class: Class, log_odds: f64| {
+            let slot = &mut classes[class as usize];
+            *slot = log_add(*slot, log_odds);
+        };
+        let tried = faults
+            .iter()
+            .enumerate()
+            .filter(|(_, of)| of.is_tried(self.first));
+        for (rival, of) in tried {
+            let [_, sight] = self.sights(faults, [fault, rival], rule, |_| 0.0);
+            add(of.class, rule.log_odds(of, &sight));
+        }
+        let residuals = self.signatures.len() - 1;
+        let weighed = [fault, residuals].map(|of| &self.signatures[of].weighed);
+        for channel in 0..rule.targets.len() {
+            let [one, other] = weighed.map(|rows| rows[channel]);
+            let row: Row = std::array::from_fn(|block| one[block] + other[block]);
+            let says = rule.law.hidden(channel, self.first, [&row, &row]);
+            add(
+                Class::Erratic,
+                rule.erratic(channel, self.first, [square, says]),
+            );
+        }
+        rule.alarms(&classes)
     }
 
     /// Adds to `sums` what each channel carries of the difference between a fault and so many times
@@ -209,20 +171,15 @@ impl Comparison {
     ) {
         let first = BLOCKS - age;
         let products = Products::new(faults, first, snapshot, rule);
-        let set = |slot: &mut u8| {
-            if *slot == 0 {
-                *slot = age as u8;
-            }
-        };
         let tried = |(_, fault): &(usize, &Fault)| fault.is_tried(first);
-        for (f, fault) in faults.iter().enumerate().filter(tried) {
-            let [sight, _] = products.sights(faults, [f, f], rule, |_| 0.0);
-            if rule.detects(fault, rule.tails[f].as_ref(), &sight) {
-                set(&mut self.detected[f][window]);
+        for (f, _) in faults.iter().enumerate().filter(tried) {
+            if self.detected[f][window] == 0 && products.alarms(faults, f, rule) {
+                self.detected[f][window] = age as u8;
             }
             for g in (0..faults.len()).filter(|&g| g != f) {
-                if products.exclude(faults, [f, g], rule) {
-                    set(&mut self.told[f][g][window]);
+                let told = &mut self.told[f][g][window];
+                if *told == 0 && products.exclude(faults, [f, g], rule) {
+                    *told = age as u8;
                 }
             }
             if age == BLOCKS {

@@ -6,8 +6,9 @@ use vigil_robot::channel_model::observation::SMOOTHING_S;
 use vigil_robot::channel_model::window::{DELAY_BLOCKS, Window};
 use vigil_robot::channel_model::{AXES, History, Model, Observation, Range, Scales};
 
-use super::comparison::{Products, Rule};
+use super::comparison::Products;
 use super::fault::Fault;
+use super::rule::Rule;
 use super::snapshot::Snapshot;
 
 /// Durations that are tried, in blocks.

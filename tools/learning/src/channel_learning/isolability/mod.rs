@@ -14,12 +14,15 @@ mod cover;
 mod fault;
 mod manoeuvre;
 mod report;
+mod rule;
 mod snapshot;
+#[cfg(test)]
+mod tests;
 mod wait;
 
 use vigil_robot::Description;
 use vigil_robot::channel_model::law::Law;
-use vigil_robot::channel_model::model::FAULT_RATE_1_H;
+use vigil_robot::channel_model::model::{Class, FAULT_RATE_1_H};
 use vigil_robot::channel_model::monitor::component_prior;
 use vigil_robot::channel_model::{Model, Scales, components, targets};
 use vigil_robot::learned::Form;
@@ -27,12 +30,13 @@ use vigil_robot::learned::channels::Channels;
 
 use super::record::Record;
 use candidate::{Question, candidates};
-use comparison::{Comparison, Rule, carried};
+use comparison::{Comparison, carried};
 use cover::cover;
 use fault::{Fault, faults};
 use manoeuvre::manoeuvres;
 pub use report::Isolability;
 use report::{AxisCommand, FaultReport, Pair, PairReport, Sensor, TestDrive};
+use rule::Rule;
 use snapshot::Snapshot;
 use wait::Waits;
 
@@ -108,13 +112,11 @@ impl<'a> Study<'a> {
         let channels = Channels::PoseEncoders;
         let form = (channels, Form::LearnedBias);
         let alarm = model.alarm_log_odds(form, FALSE_ALARM_INTERVAL_H, FAULT_RATE_1_H);
-        let tails = faults
-            .iter()
-            .map(|fault| model.tail(channels, fault.class).cloned());
+        let tails = Class::ALL.map(|class| model.tail(channels, class).cloned());
         let rule = Rule {
             prior: component_prior(components(robot).len()),
             alarm: alarm.ok()?,
-            tails: tails.collect(),
+            tails,
             law,
             targets,
         };
@@ -125,14 +127,6 @@ impl<'a> Study<'a> {
             let others = (one + 1..faults.len()).filter(|&other| shown(other));
             for other in others.filter(|&other| !faults[one].is_whole_of(&faults[other])) {
                 let apart = comparison.apart([one, other]);
-                if std::env::var("DBG").is_ok() {
-                    eprintln!(
-                        "{:.2} {} | {}",
-                        apart,
-                        faults[one].name(),
-                        faults[other].name()
-                    );
-                }
                 if apart < HARDLY {
                     never.push([one, other]);
                 } else if apart < AT_ONCE {

@@ -12,11 +12,12 @@ pub type Pair = [String; 2];
 
 /// Lines of slow pairs in the text.
 const SLOW_MAX: usize = 4;
-/// Columns of a list of pairs.
-const LIST: usize = 60;
-/// Columns of a name and of a wait.
-const NAME: usize = 14;
-const CELL: usize = 19;
+/// Columns of a list.
+const LIST: usize = 70;
+/// Columns of a name, of a size and of a wait.
+const NAME: usize = 12;
+const SIZE: usize = 11;
+const CELL: usize = 18;
 
 /// A fault of a stated size.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -161,6 +162,7 @@ impl Isolability {
     /// A line for each channel, or each drive.
     fn write_table(&self, f: &mut fmt::Formatter<'_>, of_drives: bool) -> fmt::Result {
         let is_drive = |row: &[FaultReport]| row.iter().any(|fault| fault.kind == "loss");
+        let of = if of_drives { "drive" } else { "sensor" };
         let mut head = Vec::new();
         for row in self
             .rows()
@@ -169,42 +171,81 @@ impl Isolability {
         {
             let kinds: Vec<&str> = row.iter().map(|fault| fault.kind).collect();
             if kinds != head {
-                let of = if of_drives { "drive" } else { "sensor" };
-                write!(f, "{of:<NAME$}")?;
-                kinds
-                    .iter()
-                    .try_for_each(|kind| write!(f, " {kind:<CELL$}"))?;
-                writeln!(f)?;
+                let size = if of_drives { "" } else { "bias of" };
+                writeln!(f, "{}", line(of, size, &kinds))?;
                 head = kinds;
             }
-            write!(f, "{:<NAME$}", row[0].broken)?;
-            for fault in row {
-                write!(f, " {:<CELL$}", shown(fault.detected_after))?;
-            }
+            let bias = row.iter().find(|fault| fault.kind == "bias");
+            let bias = bias.map_or(String::new(), |fault| {
+                format!("{:.3} {}", fault.size.unwrap_or(0.0), fault.size_unit)
+            });
+            let waits = row.iter().map(|fault| shown(fault.detected_after));
+            let mut cells: Vec<String> = waits.collect();
             let mut by: Vec<&str> = Vec::new();
             for channel in row.iter().flat_map(|fault| &fault.channels) {
                 let is_new = !by.contains(&channel.as_str()) && of_drives;
                 by.extend(is_new.then_some(channel.as_str()));
             }
-            writeln!(f, " {}", by.join(" "))?;
+            cells.push(by.join(" "));
+            let cells: Vec<&str> = cells.iter().map(String::as_str).collect();
+            writeln!(f, "{}", line(&row[0].broken, &bias, &cells))?;
         }
         Ok(())
     }
+
+    /// Several groups a line.
+    fn write_groups(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut text = String::new();
+        for group in self.groups.iter().map(|group| in_short(group)) {
+            if !text.is_empty() && text.len() + group.len() > LIST {
+                writeln!(f, "not told apart: {text}")?;
+                text.clear();
+            }
+            text += if text.is_empty() { "" } else { "; " };
+            text += &group;
+        }
+        match text.is_empty() {
+            true => Ok(()),
+            false => writeln!(f, "not told apart: {text}"),
+        }
+    }
+}
+
+fn line(name: &str, size: &str, cells: &[&str]) -> String {
+    let mut text = format!("{name:<NAME$} {size:<SIZE$}");
+    for cell in cells {
+        text += &format!(" {cell:<CELL$}");
+    }
+    text.trim_end().to_owned()
+}
+
+/// A group, with the kinds of what is broken together.
+fn in_short(group: &[String]) -> String {
+    let mut text = String::new();
+    let mut last = "";
+    for name in group {
+        let (broken, kind) = name.rsplit_once(' ').unwrap_or((name, ""));
+        text += &match (broken == last, text.is_empty()) {
+            (true, _) => format!("/{kind}"),
+            (false, true) => name.clone(),
+            (false, false) => format!(", {name}"),
+        };
+        last = broken;
+    }
+    text
 }
 
 impl fmt::Display for Isolability {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "faults put into {} windows: alarm after so long, half of all onsets to nine of ten, and \
-             so far (nine of ten), at {} h between false alarms",
+            "faults put into {} windows of the log, at {} h between false alarms: time from the\n\
+             onset to the alarm, half and nine of ten of all onsets, and way of the latter; -: never",
             self.windows, self.false_alarm_interval_h
         )?;
         self.write_table(f, false)?;
         self.write_table(f, true)?;
-        for group in &self.groups {
-            writeln!(f, "not told apart: {}", group.join(", "))?;
-        }
+        self.write_groups(f)?;
         for pair in self.slow_pairs.iter().take(SLOW_MAX) {
             let [one, other] = &pair.pair;
             let (after, by) = (shown(pair.told_after), pair.channels.join(" "));
