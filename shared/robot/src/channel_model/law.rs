@@ -281,7 +281,7 @@ impl Law {
         Change { b, a }
     }
 
-    /// `P s` of a signature, by channel. Its product with another signature says how alike both are.
+    /// `P s` of a signature, by channel. Its product with another one says how alike both are.
     #[must_use]
     pub fn weighed(&self, signature: &[Row]) -> Vec<Row> {
         let mut out = vec![[0.0; BLOCKS]; self.channels];

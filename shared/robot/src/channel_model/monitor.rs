@@ -311,8 +311,8 @@ impl Monitor {
     }
 }
 
-/// Log-odds at [`FAULT_RATE_1_H`] that a fault of one of so many components, or of none of them, has
-/// begun within a window.
+/// Log-odds at [`FAULT_RATE_1_H`] that a fault of one of so many components has begun within a
+/// window; as much is kept for a fault of none of them.
 #[must_use]
 pub fn component_prior(components: usize) -> f64 {
     let shares = 1.0 + components as f64;

@@ -86,3 +86,15 @@ pub(super) fn run(task: &Task<'_>) -> Result<Outcome, CommandError> {
     printed.map_err(CommandError::failure)?;
     Ok(Outcome::Done)
 }
+
+#[cfg(test)]
+mod tests {
+    use vigil_diagnosis::detect::Settings;
+    use vigil_learning::channel_learning::FALSE_ALARM_INTERVAL_H;
+
+    #[test]
+    fn the_report_is_of_the_detectors_own_interval_between_false_alarms() {
+        let settings = Settings::default();
+        assert_eq!(FALSE_ALARM_INTERVAL_H, settings.false_alarm_interval_h);
+    }
+}

@@ -31,8 +31,9 @@ struct Moments {
     windows: f64,
 }
 
-/// Fits both laws to the residuals that `models` of the parts have on what they have not seen.
-pub(super) fn fit(model: &mut Model, models: &[Model], records: &[Record], scales: &Scales) {
+/// Fits both laws to the residuals that `models` of the parts have on what they have not seen. All
+/// take them.
+pub(super) fn fit(model: &mut Model, models: &mut [Model], records: &[Record], scales: &Scales) {
     let n = model.channel.len();
     let mut moments = Moments {
         n,
@@ -69,6 +70,10 @@ pub(super) fn fit(model: &mut Model, models: &[Model], records: &[Record], scale
         .collect();
     model.direction = directions(&covariances);
     model.scatter = moments.scatter(shrink);
+    for part in models {
+        part.direction.clone_from(&model.direction);
+        part.scatter.clone_from(&model.scatter);
+    }
 }
 
 /// The covariance itself, or nearest to it one without a negative variance in any direction: sums

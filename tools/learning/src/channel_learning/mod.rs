@@ -31,7 +31,7 @@ use vigil_robot::learned::model::Provenance;
 
 use crate::data_hash::data_hash;
 use crate::plausibility::{self, RunCheck, RunDoubt};
-pub use isolability::Isolability;
+pub use isolability::{FALSE_ALARM_INTERVAL_H, Isolability};
 use record::{FOLDS, Record};
 pub use report::{ChannelFit, Report};
 pub use view::View;
@@ -177,11 +177,7 @@ pub fn learn(
             part.channel.push(channel);
         }
     }
-    joint::fit(&mut model, &models, &records, &scales);
-    for part in &mut models {
-        part.direction.clone_from(&model.direction);
-        part.scatter.clone_from(&model.scatter);
-    }
+    joint::fit(&mut model, &mut models, &records, &scales);
     calibrate::fit(&mut model, &mut models, &records, robot);
     calibrate::tell(&mut report.bounds, &model);
     report.isolability = isolability::report(&isolability::Task {

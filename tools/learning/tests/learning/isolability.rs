@@ -16,7 +16,10 @@ fn robot(wheel_rates: bool) -> Description {
 name = "small"
 kinematics = "differential"
 wheel_radius_m = 0.1
-command = [{{ name = "v", unit = "m/s", limit = 1.0 }}, {{ name = "w", unit = "rad/s", limit = 2.0 }}]
+command = [
+  {{ name = "v", unit = "m/s", limit = 1.0 }},
+  {{ name = "w", unit = "rad/s", limit = 2.0 }},
+]
 wheels = [
   {{ name = "L", x = 0.0, y = 0.1, steered = false }},
   {{ name = "R", x = 0.0, y = -0.1, steered = false }},

@@ -7,9 +7,9 @@ use vigil_robot::channel_model::window::OFFSET;
 use vigil_robot::channel_model::{AXES, Scales, Target};
 use vigil_robot::description::Kinematics;
 
-use super::comparison::{Comparison, Products};
+use super::Study;
+use super::comparison::Products;
 use super::fault::{Fault, Origin, Signature};
-use super::rule::Rule;
 use super::snapshot::Snapshot;
 
 /// Deviation of a block's mean over the usual size of what a further sensor measures; that of each
@@ -121,89 +121,46 @@ fn in_unit(row: &Row, unit: &Row) -> Row {
     })
 }
 
-/// What is compared.
-pub(super) struct Question<'a> {
-    /// All faults.
-    pub faults: &'a [Fault],
-    /// Pairs of them that the robot's own sensors do not tell apart.
-    pub pairs: &'a [[usize; 2]],
-    /// Where in the log each fault is detected.
-    pub comparison: &'a Comparison,
-    /// Windows of the log.
-    pub log: &'a [Snapshot],
-    /// What the robot's drives are.
-    pub scales: &'a Scales,
-    /// What alarms.
-    pub rule: &'a Rule,
-}
-
-/// For each candidate whether it tells each pair in half of the windows that show the fault.
-pub(super) fn tells(candidates: &[Candidate], question: &Question<'_>) -> Vec<Vec<bool>> {
-    let Question {
-        faults,
-        pairs,
-        log,
-        scales,
-        rule,
-        comparison,
-    } = *question;
-    let sizes: Vec<Vec<f64>> = candidates
-        .iter()
-        .map(|one| usual(*one, log, scales))
-        .collect();
+/// For each candidate whether it tells each pair that nothing else tells, in half of the windows
+/// that show the fault.
+pub(super) fn tells(candidates: &[Candidate], study: &Study<'_>) -> Vec<Vec<bool>> {
+    let (faults, pairs, scales) = (&study.faults, &study.never, study.task.scales);
+    let sizes = candidates.iter().map(|one| usual(*one, &study.log, scales));
+    let sizes: Vec<Vec<f64>> = sizes.collect();
     let mut told = vec![vec![[0_usize; 2]; pairs.len()]; candidates.len()];
-    for (window, snapshot) in log.iter().enumerate() {
-        let products = Products::new(faults, 0, snapshot, rule);
+    for (window, snapshot) in study.log.iter().enumerate().filter(|_| !pairs.is_empty()) {
+        let products = Products::new(faults, 0, snapshot, &study.rule);
         for ((candidate, sizes), told) in candidates.iter().zip(&sizes).zip(&mut told) {
-            let change = |(fault, signature): (&Fault, &Signature)| -> Vec<Row> {
+            let change = |(fault, signature): (&Fault, &Signature)| -> Vec<f64> {
                 let rows = candidate.change(fault, signature, snapshot, scales);
-                let rows = rows.into_iter().zip(sizes);
-                rows.map(|(row, size)| row.map(|value| value / (NOISE * size)))
-                    .collect()
+                let scaled = |(row, size): (Row, &f64)| row.map(|value| value / (NOISE * size));
+                rows.into_iter().zip(sizes).flat_map(scaled).collect()
             };
             let changes = faults.iter().zip(&products.signatures).map(change);
-            let changes: Vec<Vec<Row>> = changes.collect();
-            for (pair, told) in pairs.iter().zip(told) {
-                for (slot, [f, g]) in told.iter_mut().zip([*pair, [pair[1], pair[0]]]) {
-                    // What a further sensor leaves over is none of the log's residuals.
-                    let more = |[f, g]: [usize; 2]| match (changes.get(f), changes.get(g)) {
-                        (Some(f), Some(g)) => {
-                            let rows = f.iter().flatten().zip(g.iter().flatten());
-                            rows.map(|(a, b)| a * b).sum::<f64>()
-                        }
-                        _ => 0.0,
-                    };
-                    let [as_fault, as_rival] = products.sights(faults, [f, g], rule, more);
-                    let is_seen = comparison.detected[f][window] > 0;
-                    *slot += usize::from(
-                        is_seen
-                            && rule.excludes(
-                                [faults[f].class, faults[g].class],
-                                [&as_fault, &as_rival],
-                            ),
-                    );
+            let changes: Vec<Vec<f64>> = changes.collect();
+            // What a further sensor leaves over is none of the log's residuals.
+            let more = |[f, g]: [usize; 2]| match [changes.get(f), changes.get(g)] {
+                [Some(f), Some(g)] => f.iter().zip(g).map(|(a, b)| a * b).sum(),
+                _ => 0.0,
+            };
+            for (&[one, other], told) in pairs.iter().zip(told) {
+                for (count, pair) in told.iter_mut().zip([[one, other], [other, one]]) {
+                    let is_seen = study.comparison.detected[pair[0]][window] > 0;
+                    let told = is_seen && products.exclude(faults, pair, &study.rule, more);
+                    *count += usize::from(told);
                 }
             }
         }
     }
-    let half = |f: usize, told: usize| 2 * told >= comparison.windows(f).max(1);
-    let of_pair =
-        |(pair, told): (&[usize; 2], &[usize; 2])| half(pair[0], told[0]) && half(pair[1], told[1]);
-    told.iter()
-        .map(|told| pairs.iter().zip(told).map(of_pair).collect())
-        .collect()
+    let half = |(fault, told): (&usize, &usize)| 2 * told >= study.comparison.windows(*fault);
+    let is_told = |(pair, told): (&[usize; 2], &[usize; 2])| pair.iter().zip(told).all(half);
+    let of_candidate = |told: &Vec<[usize; 2]>| pairs.iter().zip(told).map(is_told).collect();
+    told.iter().map(of_candidate).collect()
 }
 
 /// Root mean square of each of a candidate's readings over the log.
 fn usual(candidate: Candidate, log: &[Snapshot], scales: &Scales) -> Vec<f64> {
-    let mut sums = vec![
-        0.0;
-        if candidate == Candidate::Pose {
-            AXES
-        } else {
-            1
-        }
-    ];
+    let mut sums = [0.0; AXES];
     for snapshot in log {
         for (sum, row) in sums.iter_mut().zip(candidate.reading(snapshot, scales)) {
             *sum += row.iter().map(|value| value * value).sum::<f64>();

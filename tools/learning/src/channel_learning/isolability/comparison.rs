@@ -51,13 +51,12 @@ impl Products {
     pub fn sights(
         &self,
         faults: &[Fault],
-        [fault, seen_as]: [usize; 2],
+        pair: [usize; 2],
         rule: &Rule,
         more: impl Fn([usize; 2]) -> f64,
     ) -> [Sight; 2] {
-        let silent = [fault, seen_as]
-            .into_iter()
-            .find_map(|of| self.signatures[of].silent);
+        let [fault, _] = pair;
+        let silent = pair.into_iter().find_map(|of| self.signatures[of].silent);
         let inner = |f: usize, g: usize| {
             let hidden = silent.map_or(0.0, |i| {
                 let weighed = |of: usize| &self.signatures[of].weighed[i];
@@ -67,16 +66,22 @@ impl Products {
         };
         let residuals = self.signatures.len() - 1;
         let square = self.square + 2.0 * inner(fault, residuals) + inner(fault, fault);
-        [fault, seen_as].map(|of| {
+        pair.map(|of| {
             let product = inner(of, residuals) + inner(of, fault);
             Sight::new(&faults[of].extent, square, inner(of, of), product)
         })
     }
 
     /// True if the window excludes the second of two faults, where the first is there.
-    pub fn exclude(&self, faults: &[Fault], pair: [usize; 2], rule: &Rule) -> bool {
-        let [as_fault, as_rival] = self.sights(faults, pair, rule, |_| 0.0);
-        rule.excludes(pair.map(|of| faults[of].class), [&as_fault, &as_rival])
+    pub fn exclude(
+        &self,
+        faults: &[Fault],
+        pair: [usize; 2],
+        rule: &Rule,
+        more: impl Fn([usize; 2]) -> f64,
+    ) -> bool {
+        let sights = self.sights(faults, pair, rule, more);
+        rule.excludes(pair.map(|fault| faults[fault].class), &sights)
     }
 
     /// True if a window with a fault is expected to alarm, for whatever reason.
@@ -103,7 +108,7 @@ impl Products {
             let says = rule.law.hidden(channel, self.first, [&row, &row]);
             add(
                 Class::Erratic,
-                rule.erratic(channel, self.first, [square, says]),
+                rule.erratic(channel, self.first, square, says),
             );
         }
         rule.alarms(&classes)
@@ -111,8 +116,8 @@ impl Products {
 
     /// Adds to `sums` what each channel carries of the difference between a fault and so many times
     /// a rival.
-    fn carry(&self, sums: &mut [f64], [fault, rival]: [usize; 2], x: f64) {
-        let [f, g] = [fault, rival].map(|of| &self.signatures[of]);
+    fn carry(&self, sums: &mut [f64], pair: [usize; 2], x: f64) {
+        let [f, g] = pair.map(|of| &self.signatures[of]);
         let weighed = |i: usize, block: usize| f.weighed[i][block] - x * g.weighed[i][block];
         for (signature, factor) in [(f, 1.0), (g, -x)] {
             for (i, row) in &signature.rows {
@@ -156,7 +161,7 @@ impl Comparison {
         };
         for (window, snapshot) in log.iter().enumerate() {
             for age in AGES {
-                found.take(faults, [window, age], snapshot, rule);
+                found.take(faults, window, age, snapshot, rule);
             }
         }
         found
@@ -165,7 +170,8 @@ impl Comparison {
     fn take(
         &mut self,
         faults: &[Fault],
-        [window, age]: [usize; 2],
+        window: usize,
+        age: usize,
         snapshot: &Snapshot,
         rule: &Rule,
     ) {
@@ -178,7 +184,7 @@ impl Comparison {
             }
             for g in (0..faults.len()).filter(|&g| g != f) {
                 let told = &mut self.told[f][g][window];
-                if *told == 0 && products.exclude(faults, [f, g], rule) {
+                if *told == 0 && products.exclude(faults, [f, g], rule, |_| 0.0) {
                     *told = age as u8;
                 }
             }
@@ -203,7 +209,8 @@ impl Comparison {
 
     /// Share of the windows that show either fault in which it is told from the other; the smaller
     /// of both.
-    pub fn apart(&self, [one, other]: [usize; 2]) -> f64 {
+    pub fn apart(&self, pair: [usize; 2]) -> f64 {
+        let [one, other] = pair;
         let share = |f: usize, g: usize| {
             let both = self.detected[f].iter().zip(&self.told[f][g]);
             let told = both.filter(|(seen, told)| **seen > 0 && **told > 0).count();

@@ -133,9 +133,9 @@ pub(super) fn faults(robot: &Description, model: &Model, log: &[Snapshot]) -> Ve
     let (all, parts) = (targets(robot), components(robot));
     let mut found = Vec::new();
     for (channel, target) in all.iter().enumerate() {
-        if let Some(sizes) = tolerance(channel, log) {
+        if let Some(tolerance) = Tolerance::new(channel, log) {
             let usual = model.channel[channel].usual;
-            found.extend(sensor_faults(target, channel, usual, sizes));
+            found.extend(sensor_faults(target, channel, usual, &tolerance));
         }
     }
     let drives = drives(robot);
@@ -146,27 +146,30 @@ pub(super) fn faults(robot: &Description, model: &Model, log: &[Snapshot]) -> Ve
     found
 }
 
-/// Of a channel's faults: the tolerance that the mean residuals of a second give, and their mean
-/// deviation.
-fn tolerance(channel: usize, log: &[Snapshot]) -> Option<[f64; 2]> {
-    let mut residuals: Vec<f64> = log.iter().filter_map(|one| one.residual[channel]).collect();
-    residuals.sort_by(f64::total_cmp);
-    let last = residuals.len().checked_sub(1)?;
-    let tolerance = residuals[(WITHIN * last as f64).round() as usize];
-    let units = log.iter().flat_map(|one| one.unit[channel]);
-    let units: Vec<f64> = units.filter(|unit| *unit > 0.0).collect();
-    let deviation = units.len() as f64 / units.iter().sum::<f64>();
-    (tolerance > 0.0 && deviation.is_finite()).then_some([tolerance, deviation])
+/// How much a healthy channel is off.
+struct Tolerance {
+    /// Bound of nearly all mean residuals of a second, in the channel's unit.
+    size: f64,
+    /// Mean deviation of a residual, in that unit.
+    deviation: f64,
 }
 
-fn sensor_faults(
-    target: &Target,
-    channel: usize,
-    usual: f64,
-    [tolerance, deviation]: [f64; 2],
-) -> Vec<Fault> {
+impl Tolerance {
+    fn new(channel: usize, log: &[Snapshot]) -> Option<Self> {
+        let mut residuals: Vec<f64> = log.iter().filter_map(|one| one.residual[channel]).collect();
+        residuals.sort_by(f64::total_cmp);
+        let last = residuals.len().checked_sub(1)?;
+        let size = residuals[(WITHIN * last as f64).round() as usize];
+        let units = log.iter().flat_map(|one| one.unit[channel]);
+        let units: Vec<f64> = units.filter(|unit| *unit > 0.0).collect();
+        let deviation = units.len() as f64 / units.iter().sum::<f64>();
+        (size > 0.0 && deviation.is_finite()).then_some(Self { size, deviation })
+    }
+}
+
+fn sensor_faults(target: &Target, channel: usize, usual: f64, tolerance: &Tolerance) -> Vec<Fault> {
     let is_pose = target.quantity.is_pose();
-    let bias = TOLERANCES * tolerance;
+    let bias = TOLERANCES * tolerance.size;
     let gain = bias / usual.max(1e-9);
     // A pose that stands has velocities of zero.
     let still = if is_pose {
@@ -186,7 +189,7 @@ fn sensor_faults(
         kind,
         origin: Origin::Channel(channel),
         extent: match kind {
-            FaultKind::Bias => Extent::any(bias, bias_sd(usual, deviation) / bias),
+            FaultKind::Bias => Extent::any(bias, bias_sd(usual, tolerance.deviation) / bias),
             FaultKind::Gain => Extent {
                 size: 1.0 + gain,
                 ..Extent::any(gain, GAIN_SD / gain)

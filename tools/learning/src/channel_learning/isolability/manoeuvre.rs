@@ -123,7 +123,7 @@ pub(super) fn tells(
 ) -> Vec<Vec<bool>> {
     let of_one = |snapshot: &Snapshot| -> Vec<bool> {
         let products = Products::new(faults, 0, snapshot, rule);
-        let told = |f: usize, g: usize| products.exclude(faults, [f, g], rule);
+        let told = |f: usize, g: usize| products.exclude(faults, [f, g], rule, |_| 0.0);
         pairs
             .iter()
             .map(|&[one, other]| told(one, other) && told(other, one))

@@ -29,7 +29,7 @@ use vigil_robot::learned::Form;
 use vigil_robot::learned::channels::Channels;
 
 use super::record::Record;
-use candidate::{Question, candidates};
+use candidate::candidates;
 use comparison::{Comparison, carried};
 use cover::cover;
 use fault::{Fault, faults};
@@ -232,17 +232,7 @@ impl<'a> Study<'a> {
     fn sensors(&self) -> Vec<Sensor> {
         let Task { robot, scales, .. } = *self.task;
         let candidates = candidates(robot, scales, &self.rule.targets);
-        let tells = candidate::tells(
-            &candidates,
-            &Question {
-                faults: &self.faults,
-                pairs: &self.never,
-                comparison: &self.comparison,
-                log: &self.log,
-                scales,
-                rule: &self.rule,
-            },
-        );
+        let tells = candidate::tells(&candidates, self);
         let one = |cover: cover::Cover| Sensor {
             sensor: candidates[cover.means].name(scales, &self.rule.targets),
             pairs: cover

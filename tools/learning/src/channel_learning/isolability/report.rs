@@ -240,7 +240,7 @@ impl fmt::Display for Isolability {
         writeln!(
             f,
             "faults put into {} windows of the log, at {} h between false alarms: time from the\n\
-             onset to the alarm, half and nine of ten of all onsets, and way of the latter; -: never",
+             onset to the alarm, half and nine of ten of all onsets; way of the latter; -: never",
             self.windows, self.false_alarm_interval_h
         )?;
         self.write_table(f, false)?;

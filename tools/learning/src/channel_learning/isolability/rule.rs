@@ -50,7 +50,7 @@ impl Rule {
 
     /// Log-odds of an erratic channel in a window with this square, of which the channel's readings
     /// from block `first` on say so much.
-    pub fn erratic(&self, channel: usize, first: usize, [square, says]: [f64; 2]) -> f64 {
+    pub fn erratic(&self, channel: usize, first: usize, square: f64, says: f64) -> f64 {
         let ratio = self
             .law
             .log_ratio_at(square, says * (1.0 - 1.0 / (ERRATIC * ERRATIC)));
@@ -76,7 +76,7 @@ impl Rule {
 
     /// True if a window with a fault, seen as this fault and as a rival, excludes the rival. Odds
     /// between faults are tempered as those against none.
-    pub fn excludes(&self, classes: [Class; 2], [as_fault, as_rival]: [&Sight; 2]) -> bool {
+    pub fn excludes(&self, classes: [Class; 2], [as_fault, as_rival]: &[Sight; 2]) -> bool {
         let slope = |class: Class| self.tails[class as usize].as_ref().map_or(1.0, |t| t.slope);
         let [fault, rival] = classes.map(slope);
         let ratio = |sight: &Sight| self.law.log_ratio_at(sight.square, sight.less);

@@ -90,12 +90,12 @@ fn a_bias_and_a_gain_of_one_channel_differ_by_how_much_the_prediction_varies() {
     assert!((own.own - 4.0 * 9.0 / 4.0).abs() < 1e-12);
     assert!((own.less - own.own).abs() < 1e-12 && (own.square - 17.0).abs() < 1e-12);
     assert!(left(&faults, &steady, &rule, 0).abs() < 1e-12);
-    assert!(!products.exclude(&faults, [0, 1], &rule));
+    assert!(!products.exclude(&faults, [0, 1], &rule, |_| 0.0));
     // Of values u: n b² (1 - (Σu)² / (n Σu²)) over the variance.
     let varied = snapshot(1, [0.0, 4.0, 0.0, 4.0, 0.0, 4.0, 0.0, 4.0]);
     let exact = 8.0 * 9.0 / 4.0 * (1.0 - 16.0 * 16.0 / (8.0 * 64.0));
     assert!((left(&faults, &varied, &rule, 0) - exact).abs() < 1e-12);
-    assert!(Products::new(&faults, 0, &varied, &rule).exclude(&faults, [0, 1], &rule));
+    assert!(Products::new(&faults, 0, &varied, &rule).exclude(&faults, [0, 1], &rule, |_| 0.0));
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn opposite_faults_of_two_like_sensors_need_a_third_to_be_told_apart() {
     ];
     let window = snapshot(2, [0.0; BLOCKS]);
     assert!(left(&faults, &window, &two, 0) < 1e-3);
-    assert!(!Products::new(&faults, 0, &window, &two).exclude(&faults, [0, 1], &two));
+    assert!(!Products::new(&faults, 0, &window, &two).exclude(&faults, [0, 1], &two, |_| 0.0));
 
     let third = 3.0_f64.sqrt().recip();
     let sixth = 6.0_f64.sqrt().recip();
@@ -123,7 +123,7 @@ fn opposite_faults_of_two_like_sensors_need_a_third_to_be_told_apart() {
     // cosine of two of them is -1/2.
     let exact = 8.0 * 25.0 * 2.0 / 3.0 * (1.0 - 0.25);
     assert!((left(&faults, &window, &three, 0) - exact).abs() < 0.1);
-    assert!(Products::new(&faults, 0, &window, &three).exclude(&faults, [0, 1], &three));
+    assert!(Products::new(&faults, 0, &window, &three).exclude(&faults, [0, 1], &three, |_| 0.0));
 }
 
 #[test]
