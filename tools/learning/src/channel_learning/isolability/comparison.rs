@@ -10,6 +10,7 @@ use super::snapshot::Snapshot;
 
 /// Blocks since the onset that are looked at.
 const AGES: [usize; 4] = [1, 2, 4, BLOCKS];
+
 /// The signatures of all faults in a window, then its residuals, and their products.
 pub(super) struct Products {
     /// The signatures.

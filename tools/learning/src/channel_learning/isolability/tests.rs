@@ -2,6 +2,7 @@
 
 use vigil_robot::channel_model::fault_kind::FaultKind;
 use vigil_robot::channel_model::law::{BLOCKS, Direction, Law, Row};
+use vigil_robot::channel_model::model::Class;
 use vigil_robot::channel_model::{AXES, Quantity, Target};
 
 use super::comparison::Products;
@@ -9,7 +10,6 @@ use super::fault::{Extent, Fault, Origin};
 use super::rule::Rule;
 use super::snapshot::{Place, Snapshot};
 use super::wait::{Wait, Waits};
-use vigil_robot::channel_model::model::Class;
 
 /// Rules over channels with these directions, white in time.
 fn rule(directions: &[(Vec<f64>, f64)]) -> Rule {
